@@ -1,0 +1,11 @@
+//! Camera models: pixel → ray and point → pixel, with analytic Jacobians, and the calibration files they
+//! come from.
+//!
+//! Pixel convention: the centre of the first pixel is (0, 0). Files that count from the corner
+//! (`pixel_centre = "half"`) are converted when read.
+
+mod calibration;
+mod pinhole;
+
+pub use calibration::{CalibrationError, format_calibration, read_calibration};
+pub use pinhole::Pinhole;

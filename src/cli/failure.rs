@@ -1,0 +1,86 @@
+//! What went wrong, and the exit code that says so.
+
+use crate::atomic::WriteError;
+use crate::camera::CalibrationError;
+use crate::frames::FrameError;
+use crate::surface::SurfaceError;
+use crate::survey::SurveyError;
+use crate::trajectory::tum::TumError;
+use std::io::ErrorKind;
+
+/// An error as the user meets it: one text with the remedy, and an exit code.
+///
+/// 0 success, 1 a bug of ours, 2 wrong usage, 3 bad input, 4 a quality gate was not met, 75 a passing
+/// obstacle (a full disk): try again.
+#[derive(Debug)]
+pub struct Failure {
+    /// What to print.
+    pub message: String,
+    /// What to exit with.
+    pub code: u8,
+}
+
+impl Failure {
+    /// A state we believed impossible.
+    pub fn bug(message: impl Into<String>) -> Self {
+        Self {
+            message: message.into(),
+            code: 1,
+        }
+    }
+
+    /// Arguments that do not go together.
+    pub fn usage(message: impl Into<String>) -> Self {
+        Self {
+            message: message.into(),
+            code: 2,
+        }
+    }
+
+    /// Input that cannot be used.
+    pub fn input(message: impl Into<String>) -> Self {
+        Self {
+            message: message.into(),
+            code: 3,
+        }
+    }
+
+    /// A result worse than was asked for.
+    pub fn quality(message: impl Into<String>) -> Self {
+        Self {
+            message: message.into(),
+            code: 4,
+        }
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(error: WriteError) -> Self {
+        let passing = matches!(
+            error.source.kind(),
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::Interrupted
+        );
+        Self {
+            code: if passing { 75 } else { 3 },
+            message: error.to_string(),
+        }
+    }
+}
+
+macro_rules! bad_input {
+    ($($error:ty),* $(,)?) => {
+        $(impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Self::input(error.to_string())
+            }
+        })*
+    };
+}
+
+bad_input!(
+    CalibrationError,
+    FrameError,
+    SurfaceError,
+    SurveyError,
+    TumError
+);

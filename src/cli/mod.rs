@@ -1,0 +1,55 @@
+//! The command line: arguments, printing and exit codes; the work is done by the library.
+
+mod failure;
+mod terminal;
+
+pub use failure::Failure;
+pub use terminal::Terminal;
+
+use clap::{Parser, Subcommand};
+
+/// Repairs the trajectory of a revolving tunnel camera by photometric consistency and unrolls the wall into
+/// one metric panorama.
+#[derive(Debug, Parser)]
+#[command(
+    name = "tunnelstitch",
+    version,
+    max_term_width = 100,
+    arg_required_else_help = true
+)]
+pub struct Cli {
+    #[command(flatten)]
+    global: Global,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Flags that every command understands.
+#[derive(Debug, clap::Args)]
+pub struct Global {
+    /// No progress bars and no summaries; only errors and what --json asks for.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// Threads to work with [default: all cores]. The result does not depend on it.
+    #[arg(long, global = true, value_name = "N", env = "TUNNELSTITCH_THREADS", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {}
+
+/// Parses the arguments and runs the command.
+///
+/// # Errors
+/// [`Failure`], with the text to show and the exit code to leave with.
+pub fn run() -> Result<(), Failure> {
+    let cli = Cli::parse();
+    if let Some(threads) = cli.global.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(threads))
+            .build_global()
+            .map_err(|error| Failure::bug(format!("cannot start {threads} threads: {error}")))?;
+    }
+    let terminal = Terminal::new(cli.global.quiet);
+    match cli.command {}
+}

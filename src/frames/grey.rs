@@ -1,0 +1,101 @@
+//! A single-channel picture in floating point.
+
+/// A grey image, row-major, in grey levels of an 8-bit picture (0–255; 16-bit input is scaled to that
+/// range and keeps its finer steps).
+#[derive(Clone, Debug, PartialEq)]
+pub struct GreyImage {
+    width: usize,
+    height: usize,
+    data: Vec<f32>,
+}
+
+impl GreyImage {
+    /// An image from its rows.
+    ///
+    /// # Panics
+    /// If `data` does not hold `width · height` values.
+    pub fn new(width: usize, height: usize, data: Vec<f32>) -> Self {
+        assert_eq!(data.len(), width * height, "pixels of a grey image");
+        Self {
+            width,
+            height,
+            data,
+        }
+    }
+
+    /// Width in pixels.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height in pixels.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The pixels, row-major.
+    pub fn data(&self) -> &[f32] {
+        &self.data
+    }
+
+    /// The value of a pixel.
+    pub fn at(&self, x: usize, y: usize) -> f32 {
+        self.data[y * self.width + x]
+    }
+
+    /// Half the size: each pixel is the `[1 3 3 1]/8 ⊗ [1 3 3 1]/8` mean around the corner shared by four.
+    ///
+    /// The filter is even, so the new centre lies exactly between the old ones
+    /// (see [`crate::camera::Pinhole::at_level`]); borders repeat the outermost pixel.
+    pub fn halved(&self) -> Self {
+        let (w, h) = (self.width / 2, self.height / 2);
+        // Across first: four taps a pixel, into rows of half width.
+        let mut across = vec![0.0f32; w * self.height];
+        for (row, out) in self
+            .data
+            .chunks_exact(self.width)
+            .zip(across.chunks_exact_mut(w))
+        {
+            let last = self.width - 1;
+            for (x, value) in out.iter_mut().enumerate() {
+                let c = 2 * x;
+                let (a, d) = (row[c.saturating_sub(1)], row[(c + 2).min(last)]);
+                *value = 0.125 * (a + d) + 0.375 * (row[c] + row[c + 1]);
+            }
+        }
+        let mut data = vec![0.0f32; w * h];
+        for (y, out) in data.chunks_exact_mut(w).enumerate() {
+            let c = 2 * y;
+            let row = |k: usize| &across[k * w..(k + 1) * w];
+            let (a, b) = (row(c.saturating_sub(1)), row(c));
+            let (e, d) = (row(c + 1), row((c + 2).min(self.height - 1)));
+            for x in 0..w {
+                out[x] = 0.125 * (a[x] + d[x]) + 0.375 * (b[x] + e[x]);
+            }
+        }
+        Self::new(w, h, data)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halving_keeps_a_ramp_with_the_half_pixel_shift() {
+        let ramp = GreyImage::new(16, 8, (0..128).map(|k| (k % 16) as f32).collect());
+        let half = ramp.halved();
+        assert_eq!((half.width(), half.height()), (8, 4));
+        // u = 2 u_1 + ½ away from the border.
+        for x in 1..7 {
+            assert!((half.at(x, 2) - (2.0 * x as f32 + 0.5)).abs() < 1e-5);
+        }
+    }
+
+    #[test]
+    fn halving_an_odd_size_drops_the_last_row_and_column() {
+        let half = GreyImage::new(5, 7, vec![3.0; 35]).halved();
+        assert_eq!((half.width(), half.height()), (2, 3));
+        assert!(half.data().iter().all(|v| (v - 3.0).abs() < 1e-6));
+    }
+}

@@ -1,0 +1,13 @@
+//! Photometric trajectory repair and metric panoramas for tunnels, sewers and pipes.
+
+#![forbid(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod atomic;
+pub mod camera;
+pub mod cli;
+pub mod frames;
+pub mod progress;
+pub mod surface;
+pub mod survey;
+pub mod trajectory;

@@ -1,0 +1,91 @@
+//! How the wall point of a fixed pixel moves when the pose moves.
+
+use super::WallFrame;
+use crate::trajectory::{Pose, so3};
+use nalgebra::{Matrix2x6, Vector3};
+
+/// `∂(s, h)/∂ξ` of the wall point seen through a fixed pixel, for `ξ = (ω, ρ)` of [`Pose::retract`].
+///
+/// The pixel's ray meets the wall at `x_w = t + λ R d_c`. Moving the pose moves that point by
+/// `e_s δs + e_h δh = m + δλ d`, where `m = ρ + R (ω × x_c) = ρ − R [x_c]ₓ ω` and `d = x_w − t`. The dual
+/// vectors `a = e_h × d` and `b = d × e_s` are orthogonal to the unknown `δλ d`, so
+///
+/// `δs = a·m / a·e_s`,  `δh = b·m / b·e_h`.
+///
+/// No assumption on the shape enters: any surface with tangents will do. Rows: s, h (metres); columns: ω
+/// (radians), ρ (metres). The result is not finite where the ray grazes the wall.
+pub fn wall_jacobian(pose: &Pose, wall: &WallFrame) -> Matrix2x6<f64> {
+    let d = wall.x_w - pose.t_wc;
+    let x_c: Vector3<f64> = pose.r_wc.inverse_transform_vector(&d);
+    let a = wall.e_h.cross(&d);
+    let b = d.cross(&wall.e_s);
+    let row_s = a / a.dot(&wall.e_s);
+    let row_h = b / b.dot(&wall.e_h);
+    // m = [−R [x_c]ₓ | I] ξ, so a row nᵀ of duals gives (−nᵀ R [x_c]ₓ, nᵀ) = ((x_c × Rᵀn)ᵀ, nᵀ).
+    let mut jacobian = Matrix2x6::zeros();
+    for (row, n) in [row_s, row_h].iter().enumerate() {
+        let omega = so3::skew(&x_c) * pose.r_wc.inverse_transform_vector(n);
+        for k in 0..3 {
+            jacobian[(row, k)] = omega[k];
+            jacobian[(row, 3 + k)] = n[k];
+        }
+    }
+    jacobian
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Pinhole;
+    use crate::surface::{Circle, Surface};
+    use nalgebra::Vector6;
+
+    #[test]
+    fn jacobian_matches_central_differences() {
+        let circle = Circle::new(3.0).unwrap();
+        let camera = Pinhole::from_vertical_fov(640, 480, 60f64.to_radians());
+        for (turn, t) in [
+            (Vector3::new(0.1, 0.7, -0.2), Vector3::new(0.5, 2.0, -0.4)),
+            (Vector3::new(-0.3, 2.9, 0.4), Vector3::new(-1.5, 0.0, 1.0)),
+        ] {
+            let pose = Pose::new(so3::exp(&turn), t);
+            for (u, v) in [(0.0, 0.0), (320.0, 240.0), (600.0, 50.0), (10.0, 470.0)] {
+                let ray = camera.ray(u, v);
+                let wall_of =
+                    |pose: &Pose| circle.hit(&pose.t_wc, &(pose.r_wc * ray)).unwrap().wall;
+                let analytic = wall_jacobian(&pose, &circle.frame(wall_of(&pose)));
+                let step = 1e-6;
+                for k in 0..6 {
+                    let mut xi = Vector6::zeros();
+                    xi[k] = step;
+                    let (plus, minus) = (wall_of(&pose.retract(&xi)), wall_of(&pose.retract(&-xi)));
+                    let numeric_s = (plus.s_m - minus.s_m) / (2.0 * step);
+                    let numeric_h = (plus.h_m - minus.h_m) / (2.0 * step);
+                    assert!((numeric_s - analytic[(0, k)]).abs() < 1e-7, "s, column {k}");
+                    assert!((numeric_h - analytic[(1, k)]).abs() < 1e-7, "h, column {k}");
+                }
+            }
+        }
+    }
+
+    /// Turning about the axis and moving along it shift the whole wall rigidly: the two gauge freedoms.
+    #[test]
+    fn the_gauge_moves_every_wall_point_alike() {
+        let circle = Circle::new(3.0).unwrap();
+        let pose = Pose::new(
+            so3::exp(&Vector3::new(0.1, 0.7, -0.2)),
+            Vector3::new(0.5, 2.0, -0.4),
+        );
+        // A turn α about y: R ← Ry(α) R, so ω = Rᵀ ŷ α, and ρ = ŷ × t α.
+        let omega = pose.r_wc.inverse_transform_vector(&Vector3::y());
+        let rho = Vector3::y().cross(&pose.t_wc);
+        let turn = Vector6::new(omega.x, omega.y, omega.z, rho.x, rho.y, rho.z);
+        for d in [Vector3::z(), Vector3::new(0.4, -0.5, 1.0)] {
+            let hit = circle.hit(&pose.t_wc, &(pose.r_wc * d)).unwrap();
+            let jacobian = wall_jacobian(&pose, &circle.frame(hit.wall));
+            let moved = jacobian * turn;
+            assert!((moved.x - 3.0).abs() < 1e-9 && moved.y.abs() < 1e-9);
+            assert!((jacobian[(0, 4)]).abs() < 1e-12 && (jacobian[(1, 4)] - 1.0).abs() < 1e-12);
+        }
+    }
+}

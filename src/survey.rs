@@ -1,0 +1,371 @@
+//! `survey.toml`: what a data set is.
+//!
+//! ```toml
+//! [tunnel]
+//! shape = "circle"
+//! radius_m = 3.0
+//!
+//! [camera]
+//! file = "camera.json"
+//!
+//! [frames]
+//! images = "frames/*.jpg"     # sorted by name
+//!
+//! [poses]
+//! initial = "baseline.tum"
+//! truth = "groundtruth.tum"   # optional: only for comparison
+//!
+//! [prior]                     # optional: how far off the initial poses may be
+//! model = "random-walk"       # or "independent"
+//! rotation_sigma_deg = 2.0
+//! translation_sigma_m = [0.02, 0.02, 0.03]
+//! ```
+//!
+//! Relative paths are relative to `survey.toml`. Unknown keys are errors with line and column.
+
+use crate::camera::{CalibrationError, Pinhole, read_calibration};
+use crate::frames::{self, FrameError, FrameFile};
+use crate::surface::{Circle, Surface, SurfaceError};
+use crate::trajectory::tum::{self, TumError};
+use crate::trajectory::{Jitter, JitterModel, Pose, Trajectory};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// Name of the file that describes a survey.
+pub const SURVEY_FILE: &str = "survey.toml";
+
+/// Why a survey cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SurveyError {
+    /// `survey.toml` cannot be read.
+    #[error("{}: cannot read the survey: {source}; a survey is a folder with a survey.toml", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// `survey.toml` is malformed or has an unknown key.
+    #[error("{}:{line}:{column}: {what}", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// 1-based line.
+        line: usize,
+        /// 1-based column.
+        column: usize,
+        /// What the parser said.
+        what: String,
+    },
+    /// A value is impossible.
+    #[error("{}: {what}", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// Which, and what it should be.
+        what: String,
+    },
+    /// Frames and poses do not pair up.
+    #[error(
+        "{}: {poses} poses for {frames} frames; every frame needs exactly one pose, in the order of the frames' names",
+        path.display()
+    )]
+    Count {
+        /// The pose file.
+        path: PathBuf,
+        /// Poses found.
+        poses: usize,
+        /// Frames found.
+        frames: usize,
+    },
+    /// A pose does not go with the tunnel.
+    #[error("{}: frame {frame}: {source}; check radius_m and the poses' origin and units", path.display())]
+    Placement {
+        /// The pose file.
+        path: PathBuf,
+        /// Index of the frame.
+        frame: usize,
+        /// What is wrong.
+        source: SurfaceError,
+    },
+    /// Calibration.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// Frames.
+    #[error(transparent)]
+    Frames(#[from] FrameError),
+    /// Trajectory.
+    #[error(transparent)]
+    Trajectory(#[from] TumError),
+}
+
+/// `survey.toml` as written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurveyFile {
+    /// The tunnel.
+    pub tunnel: TunnelSection,
+    /// The camera.
+    pub camera: CameraSection,
+    /// The frames.
+    pub frames: FramesSection,
+    /// The poses.
+    pub poses: PosesSection,
+    /// Noise of the initial poses.
+    #[serde(default)]
+    pub prior: PriorSection,
+}
+
+/// Shape of the tunnel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Shape {
+    /// Straight, circular section.
+    Circle,
+}
+
+/// `[tunnel]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TunnelSection {
+    /// Shape of the tunnel.
+    pub shape: Shape,
+    /// Radius, metres.
+    pub radius_m: f64,
+}
+
+/// `[camera]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSection {
+    /// Calibration file.
+    pub file: PathBuf,
+}
+
+/// `[frames]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FramesSection {
+    /// Glob pattern of the frames.
+    pub images: String,
+}
+
+/// `[poses]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PosesSection {
+    /// The poses to be refined, TUM.
+    pub initial: PathBuf,
+    /// The true poses, TUM, where they are known: only ever used for comparison.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<PathBuf>,
+}
+
+/// `[prior]`: the noise model of the initial poses.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorSection {
+    /// How errors of consecutive poses hang together.
+    pub model: JitterModel,
+    /// 1-σ about each axis, degrees.
+    pub rotation_sigma_deg: f64,
+    /// 1-σ along x, y, z, metres.
+    pub translation_sigma_m: [f64; 3],
+}
+
+impl Default for PriorSection {
+    /// The paper's experiment: 2° and (2, 2, 3) cm a step, accumulating.
+    fn default() -> Self {
+        Self {
+            model: JitterModel::RandomWalk,
+            rotation_sigma_deg: 2.0,
+            translation_sigma_m: [0.02, 0.02, 0.03],
+        }
+    }
+}
+
+impl From<PriorSection> for Jitter {
+    fn from(prior: PriorSection) -> Self {
+        Self {
+            model: prior.model,
+            rotation_sigma_rad: prior.rotation_sigma_deg.to_radians(),
+            translation_sigma_m: prior.translation_sigma_m,
+        }
+    }
+}
+
+/// A survey, read and checked: everything but the pixels.
+#[derive(Debug)]
+pub struct Survey {
+    /// The folder of `survey.toml`.
+    pub folder: PathBuf,
+    /// `survey.toml` as written.
+    pub file: SurveyFile,
+    /// The camera.
+    pub camera: Pinhole,
+    /// The tunnel.
+    pub surface: Box<dyn Surface>,
+    /// The frames, sorted by name.
+    pub frames: Vec<FrameFile>,
+    /// The initial poses, one per frame.
+    pub initial: Trajectory,
+    /// The true poses, one per frame, where known.
+    pub truth: Option<Trajectory>,
+    /// Noise model of the initial poses.
+    pub prior: Jitter,
+}
+
+impl Survey {
+    /// Reads a survey: `path` is its folder or its `survey.toml`.
+    ///
+    /// # Errors
+    /// Everything that can be wrong before a pixel is read; see [`SurveyError`].
+    pub fn open(path: &Path) -> Result<Self, SurveyError> {
+        let toml_path = if path.is_dir() {
+            path.join(SURVEY_FILE)
+        } else {
+            path.to_owned()
+        };
+        let file = read_survey_file(&toml_path)?;
+        let folder = match toml_path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        let value = |what: String| SurveyError::Value {
+            path: toml_path.clone(),
+            what,
+        };
+        let Shape::Circle = file.tunnel.shape;
+        let circle = Circle::new(file.tunnel.radius_m)
+            .map_err(|error| value(format!("tunnel.radius_m: {error}")))?;
+        let prior = &file.prior;
+        if !(prior.rotation_sigma_deg.is_finite() && prior.rotation_sigma_deg > 0.0) {
+            return Err(value(format!(
+                "prior.rotation_sigma_deg is {}; it must be positive",
+                prior.rotation_sigma_deg
+            )));
+        }
+        if !prior
+            .translation_sigma_m
+            .iter()
+            .all(|s| s.is_finite() && *s > 0.0)
+        {
+            return Err(value(format!(
+                "prior.translation_sigma_m is {:?}; all three must be positive",
+                prior.translation_sigma_m
+            )));
+        }
+        let camera = read_calibration(&folder.join(&file.camera.file))?;
+        let frames = frames::list(&folder, &file.frames.images)?;
+        let surface: Box<dyn Surface> = Box::new(circle);
+        let mut survey = Self {
+            camera,
+            surface,
+            frames,
+            initial: Vec::new(),
+            truth: None,
+            prior: file.prior.into(),
+            folder,
+            file,
+        };
+        survey.initial = survey.read_poses(&survey.folder.join(&survey.file.poses.initial))?;
+        survey.truth = match &survey.file.poses.truth {
+            Some(truth) => Some(survey.read_poses(&survey.folder.join(truth))?),
+            None => None,
+        };
+        Ok(survey)
+    }
+
+    /// Reads a pose file and checks it against the frames and the tunnel.
+    ///
+    /// # Errors
+    /// A malformed file, a number of poses other than that of the frames, a camera outside the tunnel.
+    pub fn read_poses(&self, path: &Path) -> Result<Trajectory, SurveyError> {
+        let trajectory = tum::read(path)?;
+        if trajectory.len() != self.frames.len() {
+            return Err(SurveyError::Count {
+                path: path.to_owned(),
+                poses: trajectory.len(),
+                frames: self.frames.len(),
+            });
+        }
+        for (frame, stamped) in trajectory.iter().enumerate() {
+            self.surface
+                .check_inside(&stamped.pose.t_wc)
+                .map_err(|source| SurveyError::Placement {
+                    path: path.to_owned(),
+                    frame,
+                    source,
+                })?;
+        }
+        Ok(trajectory)
+    }
+
+    /// The initial poses without their times.
+    pub fn initial_poses(&self) -> Vec<Pose> {
+        self.initial.iter().map(|stamped| stamped.pose).collect()
+    }
+}
+
+fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
+    let text = std::fs::read_to_string(path).map_err(|source| SurveyError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    toml::from_str(&text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start.min(text.len()));
+        let before = &text.as_bytes()[..at];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        let column = 1 + before
+            .iter()
+            .rev()
+            .take_while(|byte| **byte != b'\n')
+            .count();
+        SurveyError::Parse {
+            path: path.to_owned(),
+            line,
+            column,
+            what: error.message().replace('\n', " "),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_file_round_trips() {
+        let file = SurveyFile {
+            tunnel: TunnelSection {
+                shape: Shape::Circle,
+                radius_m: 3.0,
+            },
+            camera: CameraSection {
+                file: "camera.json".into(),
+            },
+            frames: FramesSection {
+                images: "frames/*.png".into(),
+            },
+            poses: PosesSection {
+                initial: "baseline.tum".into(),
+                truth: None,
+            },
+            prior: PriorSection::default(),
+        };
+        let text = toml::to_string(&file).unwrap();
+        assert_eq!(toml::from_str::<SurveyFile>(&text).unwrap(), file);
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_line_and_column() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(SURVEY_FILE);
+        std::fs::write(&path, "[tunnel]\nshape = \"circle\"\n  raduis_m = 3.0\n").unwrap();
+        let message = Survey::open(dir.path()).unwrap_err().to_string();
+        assert!(
+            message.contains("survey.toml:3:3: unknown field `raduis_m`"),
+            "{message}"
+        );
+    }
+}

@@ -1,0 +1,36 @@
+//! Where the camera was: poses, the plan they should have followed, the jitter that moved them off it,
+//! and the files they are kept in.
+
+mod jitter;
+mod plan;
+mod pose;
+pub mod so3;
+pub mod tum;
+
+pub use jitter::{Jitter, JitterModel};
+pub use plan::spiral;
+pub use pose::Pose;
+
+/// One pose of a trajectory with its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StampedPose {
+    /// Seconds (or the frame's index, where no clock exists).
+    pub time_s: f64,
+    /// Camera-to-world pose.
+    pub pose: Pose,
+}
+
+/// Poses in the order of their frames, times strictly increasing.
+pub type Trajectory = Vec<StampedPose>;
+
+/// A trajectory whose times are the frames' indices.
+pub fn indexed(poses: impl IntoIterator<Item = Pose>) -> Trajectory {
+    poses
+        .into_iter()
+        .enumerate()
+        .map(|(k, pose)| StampedPose {
+            time_s: k as f64,
+            pose,
+        })
+        .collect()
+}
