@@ -8,6 +8,7 @@ pub mod camera;
 pub mod cli;
 pub mod frames;
 pub mod progress;
+pub mod refine;
 pub mod surface;
 pub mod survey;
 pub mod trajectory;

@@ -3,6 +3,7 @@
 use crate::atomic::WriteError;
 use crate::camera::CalibrationError;
 use crate::frames::FrameError;
+use crate::refine::RefineError;
 use crate::surface::SurfaceError;
 use crate::survey::SurveyError;
 use crate::trajectory::tum::TumError;
@@ -80,6 +81,7 @@ macro_rules! bad_input {
 bad_input!(
     CalibrationError,
     FrameError,
+    RefineError,
     SurfaceError,
     SurveyError,
     TumError

@@ -1,12 +1,14 @@
 //! The command line: arguments, printing and exit codes; the work is done by the library.
 
 mod failure;
+mod refine;
 mod terminal;
 
 pub use failure::Failure;
 pub use terminal::Terminal;
 
 use clap::{Parser, Subcommand};
+use std::sync::Arc;
 
 /// Repairs the trajectory of a revolving tunnel camera by photometric consistency and unrolls the wall into
 /// one metric panorama.
@@ -36,7 +38,9 @@ pub struct Global {
 }
 
 #[derive(Debug, Subcommand)]
-enum Command {}
+enum Command {
+    Refine(refine::RefineArguments),
+}
 
 /// Parses the arguments and runs the command.
 ///
@@ -50,6 +54,8 @@ pub fn run() -> Result<(), Failure> {
             .build_global()
             .map_err(|error| Failure::bug(format!("cannot start {threads} threads: {error}")))?;
     }
-    let terminal = Terminal::new(cli.global.quiet);
-    match cli.command {}
+    let terminal = Arc::new(Terminal::new(cli.global.quiet));
+    match cli.command {
+        Command::Refine(arguments) => refine::run(&arguments, &terminal),
+    }
 }

@@ -1,0 +1,121 @@
+//! `tunnelstitch refine`.
+
+use super::{Failure, Terminal};
+use crate::atomic;
+use crate::progress::Progress;
+use crate::refine::{FrameFlag, RefineOptions, Refined, refine};
+use crate::survey::Survey;
+use crate::trajectory::tum;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Corrects the poses of a survey by photometric consistency.
+///
+/// Reads SURVEY/survey.toml and writes poses.tum (camera-to-world, for evo and everything else that reads
+/// TUM) and refine.json (costs, residuals, gains, 1-σ of every frame, timings) into DIR.
+#[derive(Debug, clap::Args)]
+pub struct RefineArguments {
+    /// Folder of the survey (with survey.toml), or the file itself.
+    survey: PathBuf,
+    /// Folder for the results; made if missing.
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// Steps of each global solve, at the most.
+    #[arg(long, value_name = "N", default_value_t = RefineOptions::default().max_iterations, value_parser = clap::value_parser!(u64).range(1..))]
+    max_iterations: u64,
+    /// Print the report (refine.json) on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, or an output that cannot be written.
+pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), Failure> {
+    let survey = Survey::open(&arguments.survey)?;
+    atomic::create_folder(&arguments.out)?;
+    let options = RefineOptions {
+        max_iterations: arguments.max_iterations,
+        ..RefineOptions::default()
+    };
+    let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
+    let refined = refine(&survey, &options, &progress)?;
+    let json = write(&refined, &arguments.out)?;
+    if arguments.json {
+        println!("{json}");
+    } else {
+        summarise(&refined, terminal);
+        terminal.say(format!(
+            "wrote {} and {}",
+            arguments.out.join("poses.tum").display(),
+            arguments.out.join("refine.json").display()
+        ));
+    }
+    Ok(())
+}
+
+/// Writes poses.tum and refine.json; returns the text of the latter.
+///
+/// # Errors
+/// An output that cannot be written.
+pub fn write(refined: &Refined, out: &Path) -> Result<String, Failure> {
+    let json = serde_json::to_string_pretty(&refined.report)
+        .map_err(|error| Failure::bug(error.to_string()))?;
+    atomic::write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
+    atomic::write_text(&out.join("refine.json"), &json)?;
+    Ok(json)
+}
+
+/// Prints what the refinement did.
+pub fn summarise(refined: &Refined, terminal: &Terminal) {
+    let report = &refined.report;
+    terminal.say("  level  steps        cost: start → end      observations  noise (grey)");
+    for level in &report.levels {
+        let solve = &level.solve;
+        terminal.say(format!(
+            "  {:>5}  {:>5}  {:>12.4e} → {:>11.4e}  {:>12}  {:>12.2}",
+            level.level,
+            solve.iterations,
+            solve.cost_start,
+            solve.cost_end,
+            solve.observations,
+            solve.sigma
+        ));
+    }
+    let mean = |value: &dyn Fn(&crate::refine::FrameReport) -> f64| {
+        report.frames.iter().map(value).sum::<f64>() / report.frames.len() as f64
+    };
+    terminal.say(format!(
+        "  stopped: {}\n  mean 1-σ: rotation {:.4}°, translation {:.2} mm, on the wall {:.2} mm ({:.3} px)",
+        report.stopped_because,
+        mean(&|f| f.sigma.rotation_deg),
+        1e3 * mean(&|f| f.sigma.translation_m),
+        1e3 * mean(&|f| f.sigma.wall_m),
+        mean(&|f| f.sigma.wall_px),
+    ));
+    let seconds: f64 = report.timings.iter().map(|t| t.seconds).sum();
+    let stages: Vec<String> = report
+        .timings
+        .iter()
+        .map(|t| format!("{} {:.2} s", t.stage, t.seconds))
+        .collect();
+    terminal.say(format!("  {seconds:.2} s: {}", stages.join(", ")));
+    if report.frames_on_prior == 0 {
+        terminal.say(format!("  all {} frames improved", report.frames.len()));
+    } else {
+        terminal.warn(format!(
+            "{} of {} frames could not be improved and rest on their prior:",
+            report.frames_on_prior,
+            report.frames.len()
+        ));
+        for frame in &report.frames {
+            if let (FrameFlag::Prior, Some(reason)) = (frame.flag, &frame.reason) {
+                terminal.warn(format!(
+                    "  frame {} ({}): {reason}",
+                    frame.index, frame.file
+                ));
+            }
+        }
+    }
+}

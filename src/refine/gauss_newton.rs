@@ -1,0 +1,266 @@
+//! Damped Gauss–Newton on the manifold of poses, as a solver for argmin's executor.
+
+use super::estimate::FrameEstimate;
+use super::problem::{Linearisation, Problem, ProblemError};
+use crate::progress::Progress;
+use argmin::core::observers::{Observe, ObserverMode};
+use argmin::core::{
+    Error, Executor, IterState, KV, Problem as Counted, Solver, State, TerminationReason,
+};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub struct Stopping {
+    /// Steps at the most.
+    pub max_iterations: u64,
+    /// A step that moves no wall point by more than this ends the solve, pixels of full size.
+    pub step_px: f64,
+}
+
+/// Why a solve stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StopReason {
+    /// The last step moved the wall by less than the tolerance.
+    StepBelowTolerance,
+    /// No step, however damped, lowers the robust cost any more.
+    NoFurtherDescent,
+    /// The number of steps allowed was used up.
+    MaxIterations,
+}
+
+/// The course of one solve.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SolveRecord {
+    /// Steps taken.
+    pub iterations: u64,
+    /// Robust cost at the start.
+    pub cost_start: f64,
+    /// Robust cost at the end, on the same wall samples.
+    pub cost_end: f64,
+    /// Observations (wall sample × frame) compared.
+    pub observations: usize,
+    /// Largest movement of the wall in the last step, pixels of full size.
+    pub last_step_px: f64,
+    /// Noise of a pixel assumed, grey levels.
+    pub sigma: f64,
+    /// Why it stopped.
+    pub stop: StopReason,
+}
+
+/// Where a solve ended.
+pub struct Solution<'a> {
+    /// The problem that was solved.
+    pub problem: Problem<'a>,
+    /// Estimates of the active frames.
+    pub estimates: Vec<FrameEstimate>,
+    /// Cost and normal equations there.
+    pub linearisation: Linearisation,
+    /// Its course.
+    pub record: SolveRecord,
+}
+
+type Iterate = IterState<Vec<FrameEstimate>, (), (), (), (), f64>;
+
+/// First damping tried after a rejected step, and the factor between tries.
+const DAMPING: (f64, f64) = (1e-4, 10.0);
+/// Tries before a step is given up.
+const TRIES: usize = 8;
+
+/// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
+///
+/// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples; such a
+/// step is never taken.
+#[derive(Default)]
+struct DampedGaussNewton {
+    stopping: Option<Stopping>,
+    lambda: f64,
+    current: Option<Linearisation>,
+    cost_start: f64,
+    iterations: u64,
+    last_step_px: f64,
+    stop: Option<StopReason>,
+}
+
+impl DampedGaussNewton {
+    fn step_tolerance(&self) -> f64 {
+        self.stopping.map_or(0.0, |stopping| stopping.step_px)
+    }
+
+    /// One accepted step, or the reason there is none.
+    fn advance(
+        &mut self,
+        problem: &Problem,
+        estimates: &[FrameEstimate],
+        current: Linearisation,
+    ) -> Result<(Vec<FrameEstimate>, Linearisation), ProblemError> {
+        for _ in 0..TRIES {
+            let factor =
+                problem
+                    .symbolic()
+                    .factorise(problem.pattern(), &current.normal, self.lambda);
+            let factor = match factor {
+                Ok(factor) => factor,
+                Err(_) if self.lambda < 1.0 => {
+                    self.raise_damping();
+                    continue;
+                }
+                Err(source) => return Err(problem.factor_error(source)),
+            };
+            let step = factor.step(&current.normal.gradient);
+            let moved = problem.wall_step_px(estimates, &step);
+            let step_px = moved.into_iter().fold(0.0, f64::max);
+            let candidate: Vec<_> = estimates
+                .iter()
+                .zip(&step)
+                .map(|(estimate, step)| estimate.retract(step))
+                .collect();
+            let next = problem.linearise(&candidate);
+            if next.cost < current.cost {
+                self.iterations += 1;
+                self.last_step_px = step_px;
+                self.lambda = if self.lambda > DAMPING.0 {
+                    self.lambda / DAMPING.1
+                } else {
+                    0.0
+                };
+                if step_px < self.step_tolerance() {
+                    self.stop = Some(StopReason::StepBelowTolerance);
+                }
+                return Ok((candidate, next));
+            }
+            if step_px < self.step_tolerance() {
+                self.last_step_px = step_px;
+                self.stop = Some(StopReason::StepBelowTolerance);
+                return Ok((estimates.to_vec(), current));
+            }
+            self.raise_damping();
+        }
+        self.stop = Some(StopReason::NoFurtherDescent);
+        Ok((estimates.to_vec(), current))
+    }
+
+    fn raise_damping(&mut self) {
+        self.lambda = (self.lambda * DAMPING.1).max(DAMPING.0);
+    }
+}
+
+impl<'a> Solver<Problem<'a>, Iterate> for DampedGaussNewton {
+    fn name(&self) -> &str {
+        "damped Gauss–Newton"
+    }
+
+    fn init(
+        &mut self,
+        problem: &mut Counted<Problem<'a>>,
+        mut state: Iterate,
+    ) -> Result<(Iterate, Option<KV>), Error> {
+        let estimates = state.take_param().unwrap_or_default();
+        let first = problem.problem("linearise", |p| Ok(p.linearise(&estimates)))?;
+        self.cost_start = first.cost;
+        state = state.param(estimates).cost(first.cost);
+        self.current = Some(first);
+        Ok((state, None))
+    }
+
+    fn next_iter(
+        &mut self,
+        problem: &mut Counted<Problem<'a>>,
+        mut state: Iterate,
+    ) -> Result<(Iterate, Option<KV>), Error> {
+        let (Some(estimates), Some(current)) = (state.take_param(), self.current.take()) else {
+            return Err(Error::msg("the solver was not initialised"));
+        };
+        let (estimates, next) =
+            problem.problem("step", |p| Ok(self.advance(p, &estimates, current)?))?;
+        state = state.param(estimates).cost(next.cost);
+        self.current = Some(next);
+        if self.stop.is_some() {
+            state = state.terminate_with(TerminationReason::SolverConverged);
+        }
+        Ok((state, None))
+    }
+}
+
+/// Tells a [`Progress`] about every iteration.
+struct Reporter {
+    stage: String,
+    progress: Arc<dyn Progress>,
+}
+
+impl Observe<Iterate> for Reporter {
+    fn observe_iter(&mut self, state: &Iterate, _news: &KV) -> Result<(), Error> {
+        self.progress.advance(1);
+        self.progress.detail(&format!(
+            "{}: step {}, cost {:.6e}",
+            self.stage,
+            state.get_iter() + 1,
+            state.get_cost()
+        ));
+        Ok(())
+    }
+}
+
+/// Solves `problem` from the estimates it was made with; `announce` names the stage to a progress display.
+///
+/// # Errors
+/// [`ProblemError::Factor`] if the normal equations stay singular whatever the damping.
+pub fn solve<'a>(
+    problem: Problem<'a>,
+    stopping: Stopping,
+    announce: Option<(&str, &Arc<dyn Progress>)>,
+) -> Result<Solution<'a>, ProblemError> {
+    let sigma = problem.sigma();
+    let start = problem.start();
+    let solver = DampedGaussNewton {
+        stopping: Some(stopping),
+        ..Default::default()
+    };
+    let mut executor = Executor::new(problem, solver).configure(|state| {
+        state
+            .param(start.clone())
+            .max_iters(stopping.max_iterations)
+    });
+    if let Some((stage, progress)) = announce {
+        executor = executor.add_observer(
+            Reporter {
+                stage: stage.to_owned(),
+                progress: Arc::clone(progress),
+            },
+            ObserverMode::Always,
+        );
+    }
+    let outcome = match executor.run() {
+        Ok(outcome) => outcome,
+        Err(error) => {
+            return Err(error
+                .downcast::<ProblemError>()
+                .unwrap_or_else(|other| ProblemError::Solver(other.to_string())));
+        }
+    };
+    let solver = outcome.solver;
+    let (Some(problem), Some(linearisation), Some(estimates)) = (
+        outcome.problem.get_problem(),
+        solver.current,
+        outcome.state.get_param().cloned(),
+    ) else {
+        return Err(ProblemError::Solver("no iterate was kept".to_owned()));
+    };
+    let record = SolveRecord {
+        iterations: solver.iterations,
+        cost_start: solver.cost_start,
+        cost_end: linearisation.cost,
+        observations: linearisation.frames.iter().map(|f| f.samples).sum(),
+        last_step_px: solver.last_step_px,
+        sigma,
+        stop: solver.stop.unwrap_or(StopReason::MaxIterations),
+    };
+    Ok(Solution {
+        problem,
+        estimates,
+        linearisation,
+        record,
+    })
+}

@@ -1,0 +1,38 @@
+//! The estimator: every frame's pose and exposure from the photometric consistency of overlapping strips of
+//! the wall.
+//!
+//! It minimises over all poses `T_i`, log-gains `α_i` and biases `b_i`
+//!
+//! `E = Σ_x Σ_i q_i ρ((I_i(π(T_i⁻¹ X(x))) − b_i)/a_i − S(x)) / σ² + prior`
+//!
+//! over wall samples x ([`grid`]), with the wall's texture S eliminated exactly ([`tile`]); q is the number
+//! of pixels a sample stands for in a frame.
+//!
+//! `samples → linearise → reduce → solve → accept`: [`grid`] and [`visibility`] choose the samples, [`tile`]
+//! linearises, [`problem`] reduces to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
+//! Tracking ([`track`]), window and global solve are drivers over the same parts.
+
+mod covariance;
+mod estimate;
+mod factor;
+mod footprint;
+mod gauss_newton;
+mod grid;
+mod normal;
+mod options;
+mod prior;
+mod problem;
+mod report;
+mod robust;
+mod run;
+mod tile;
+mod track;
+mod view;
+mod visibility;
+
+pub use footprint::Footprint;
+pub use gauss_newton::{SolveRecord, StopReason};
+pub use options::RefineOptions;
+pub use problem::ProblemError;
+pub use report::{FrameFlag, FrameReport, LevelReport, RefineReport, StageTime};
+pub use run::{RefineError, Refined, refine};

@@ -1,0 +1,67 @@
+//! Settings of the estimator.
+
+/// How to refine. The defaults suit most surveys; the noise model of the poses comes from the survey.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct RefineOptions {
+    /// 1-σ of the logarithm of a frame's gain around 0 (0.3 is about ±30 %).
+    pub log_gain_sigma: f64,
+    /// 1-σ of a frame's bias around 0, grey levels.
+    pub bias_sigma: f64,
+    /// Rows of the coarsest pyramid level, at least.
+    pub coarsest_rows: u32,
+    /// Pyramid levels that tracking and windows use, from the coarsest; the global solve starts where they end.
+    pub tracking_levels: usize,
+    /// Frames placed between two solves of the sliding window.
+    pub window_stride: usize,
+    /// Steps of a global solve per level, at the most.
+    pub max_iterations: u64,
+    /// A global solve ends when no wall point moves by more than this in a step, pixels (doubled at each
+    /// coarser level).
+    pub step_tolerance_px: f64,
+}
+
+impl Default for RefineOptions {
+    fn default() -> Self {
+        Self {
+            log_gain_sigma: 0.3,
+            bias_sigma: 10.0,
+            coarsest_rows: 30,
+            tracking_levels: 3,
+            window_stride: 6,
+            max_iterations: 20,
+            step_tolerance_px: 0.002,
+        }
+    }
+}
+
+impl RefineOptions {
+    /// The coarsest pyramid level for frames of this height (0 is full size).
+    pub fn coarsest_level(&self, height: u32) -> usize {
+        let mut level = 0;
+        while height >> (level + 1) >= self.coarsest_rows.max(2) {
+            level += 1;
+        }
+        level
+    }
+
+    /// The finest level of tracking, where the global solve starts.
+    pub fn handover_level(&self, height: u32) -> usize {
+        self.coarsest_level(height)
+            .saturating_sub(self.tracking_levels.saturating_sub(1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_follow_the_height() {
+        let options = RefineOptions::default();
+        assert_eq!(options.coarsest_level(480), 4);
+        assert_eq!(options.coarsest_level(360), 3);
+        assert_eq!(options.handover_level(480), 2);
+        assert_eq!(options.coarsest_level(20), 0);
+        assert_eq!(options.handover_level(20), 0);
+    }
+}

@@ -1,0 +1,517 @@
+//! The photometric problem over a run of frames at one pyramid level: cost and normal equations.
+
+use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
+use super::factor::{FactorError, Symbolic};
+use super::grid::{TilePoints, WallGrid};
+use super::normal::{Block, NormalEquations, Pattern};
+use super::prior::Prior;
+use super::robust::Loss;
+use super::tile::{ObserverMoments, SAMPLES, TileWork};
+use super::view::View;
+use super::visibility::{Tile, Visibility};
+use crate::camera::Pinhole;
+use crate::frames::Pyramid;
+use crate::surface::{Surface, SurfaceError, wall_jacobian};
+use nalgebra::{Matrix2x6, SMatrix, Vector2};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Everything the estimator is given.
+pub struct Scene<'a> {
+    /// The tunnel.
+    pub surface: &'a dyn Surface,
+    /// The camera at full size.
+    pub camera: &'a Pinhole,
+    /// The frames.
+    pub frames: &'a [Pyramid],
+    /// Noise of the initial poses and exposures.
+    pub prior: &'a Prior,
+}
+
+/// Why a problem cannot be set up or solved.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum ProblemError {
+    /// A frame's pose does not go with the tunnel.
+    #[error("frame {frame}: {source}; check the initial poses, radius_m and the calibration")]
+    Placement {
+        /// The frame.
+        frame: usize,
+        /// What is wrong.
+        source: SurfaceError,
+    },
+    /// The normal equations have no solution.
+    #[error("frames {first} to {last}: {source}")]
+    Factor {
+        /// First estimated frame.
+        first: usize,
+        /// Last estimated frame.
+        last: usize,
+        /// What is wrong.
+        source: FactorError,
+    },
+    /// The iteration broke off for a reason of its own.
+    #[error("the solver stopped: {0}")]
+    Solver(String),
+}
+
+/// Blocks of tiles worked on before their sums are added up: bounds the memory, whatever the length.
+const BATCH: usize = 64;
+/// Tiles looked at to estimate the noise.
+const SCALE_TILES: usize = 2000;
+/// Width of a bin of the residual histogram, grey levels, and the number of bins.
+const HISTOGRAM: (f32, usize) = (1.0 / 64.0, 64 * 128);
+/// Residual σ never goes below this (8-bit rounding alone gives 0.29).
+const LEAST_SIGMA: f64 = 0.2;
+/// Noise of a pixel over that of a bilinear sample between pixels: each axis averages `f² + (1−f)²` of the
+/// variance, 2/3 over all phases f, so 4/9 for both.
+const PIXEL_OVER_SAMPLE: f64 = 1.5;
+
+/// Cost and normal equations at one estimate.
+#[derive(Clone, Debug)]
+pub struct Linearisation {
+    /// Robust cost of pixels plus cost of the prior.
+    pub cost: f64,
+    /// Normal equations over the active frames.
+    pub normal: NormalEquations,
+    /// How each active frame took part.
+    pub frames: Vec<FrameShare>,
+}
+
+/// How a frame took part in a linearisation.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FrameShare {
+    /// Wall samples it was compared at.
+    pub samples: usize,
+    /// `Σ q` over those samples: its pixels that were used.
+    pub pixels: f64,
+    /// `Σ q ω` over them: what the robust loss left.
+    pub inliers: f64,
+    /// `Σ q ω e²`, grey levels².
+    pub square: f64,
+}
+
+/// The cost of a run of frames on a fixed set of wall samples.
+///
+/// `participants` are sampled; of them the `active` frames are estimated and the others held.
+pub struct Problem<'a> {
+    surface: &'a dyn Surface,
+    prior: &'a Prior,
+    frames: &'a [Pyramid],
+    level: usize,
+    camera: Pinhole,
+    grid: WallGrid,
+    participants: Range<usize>,
+    active: Range<usize>,
+    held: Vec<FrameEstimate>,
+    visibility: Visibility,
+    pattern: Pattern,
+    symbolic: Symbolic,
+    sigma: f64,
+    loss: Loss,
+}
+
+impl<'a> Problem<'a> {
+    /// Chooses the wall samples for the present `estimates` (of all frames, indexed absolutely), and
+    /// estimates the noise from the residuals there.
+    ///
+    /// # Errors
+    /// [`ProblemError`].
+    pub fn new(
+        scene: &Scene<'a>,
+        level: usize,
+        participants: Range<usize>,
+        active: Range<usize>,
+        estimates: &[FrameEstimate],
+    ) -> Result<Self, ProblemError> {
+        let camera = scene.camera.at_level(level);
+        let held = estimates[participants.clone()].to_vec();
+        let poses: Vec<_> = held.iter().map(|estimate| estimate.pose).collect();
+        let placed = |(k, source)| ProblemError::Placement {
+            frame: participants.start + k,
+            source,
+        };
+        let spacing = sample_spacing(scene.surface, &camera, &poses).map_err(placed)?;
+        let grid = WallGrid::new(scene.surface, spacing);
+        let local = active.start - participants.start..active.end - participants.start;
+        let visibility =
+            Visibility::find(scene.surface, &grid, &camera, &poses, &local).map_err(placed)?;
+        let pattern = Pattern::new(
+            active.len(),
+            covisible_pairs(&visibility, &local)
+                .into_iter()
+                .chain(scene.prior.pairs(&active)),
+        );
+        let symbolic = Symbolic::new(&pattern).map_err(|source| ProblemError::Factor {
+            first: active.start,
+            last: active.end - 1,
+            source,
+        })?;
+        let mut problem = Self {
+            surface: scene.surface,
+            prior: scene.prior,
+            frames: scene.frames,
+            level,
+            camera,
+            grid,
+            participants,
+            active,
+            held,
+            visibility,
+            pattern,
+            symbolic,
+            sigma: 1.0,
+            loss: Loss::for_sigma(1.0),
+        };
+        problem.estimate_noise();
+        Ok(problem)
+    }
+
+    /// The estimates of the active frames that the problem was made with.
+    pub fn start(&self) -> Vec<FrameEstimate> {
+        let first = self.active.start - self.participants.start;
+        self.held[first..first + self.active.len()].to_vec()
+    }
+
+    /// The block pattern of the normal matrix.
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    /// The symbolic factorisation of the normal matrix.
+    pub fn symbolic(&self) -> &Symbolic {
+        &self.symbolic
+    }
+
+    /// Number of tiles that are compared.
+    pub fn tiles(&self) -> usize {
+        self.visibility.tiles.len()
+    }
+
+    /// Estimated noise of a pixel, 1-σ in grey levels.
+    pub fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    /// Turns a factorisation failure into an error that names the frames.
+    pub fn factor_error(&self, source: FactorError) -> ProblemError {
+        ProblemError::Factor {
+            first: self.active.start,
+            last: self.active.end - 1,
+            source,
+        }
+    }
+
+    fn views<'s>(&'s self, estimates: &[FrameEstimate]) -> Vec<View<'s>> {
+        self.participants
+            .clone()
+            .zip(estimates)
+            .map(|(k, estimate)| View::new(self.frames[k].level(self.level), self.camera, estimate))
+            .collect()
+    }
+
+    fn with_active(&self, active: &[FrameEstimate]) -> Vec<FrameEstimate> {
+        let mut estimates = self.held.clone();
+        let first = self.active.start - self.participants.start;
+        estimates[first..first + active.len()].copy_from_slice(active);
+        estimates
+    }
+
+    /// Median absolute residual around the plain mean of every few tiles, as a standard deviation.
+    fn estimate_noise(&mut self) {
+        let views = self.views(&self.held);
+        let stride = (self.visibility.tiles.len() / SCALE_TILES).max(1);
+        let sample: Vec<&Tile> = self.visibility.tiles.iter().step_by(stride).collect();
+        let (bin, bins) = HISTOGRAM;
+        let histogram = sample
+            .par_chunks(32)
+            .map(|tiles| {
+                let mut work = TileWork::default();
+                let mut histogram = vec![0u64; bins];
+                for tile in tiles {
+                    let points = TilePoints::new(&self.grid, self.surface, tile.id);
+                    let observers = self.visibility.observers(tile);
+                    let seen = observers.iter().map(|k| &views[*k]);
+                    work.residual_histogram(&points, seen, bin, &mut histogram);
+                }
+                histogram
+            })
+            .reduce(
+                || vec![0; bins],
+                |mut a, b| {
+                    a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+                    a
+                },
+            );
+        let half = histogram.iter().sum::<u64>() / 2;
+        let mut below = 0;
+        let median = histogram
+            .iter()
+            .take_while(|count| {
+                below += **count;
+                below <= half
+            })
+            .count();
+        let sigma = (1.4826 * (median as f64 + 0.5) * f64::from(bin)).max(LEAST_SIGMA);
+        self.sigma = PIXEL_OVER_SAMPLE * sigma;
+        self.loss = Loss::for_sigma(sigma);
+    }
+
+    /// Cost and normal equations at the given estimates of the active frames.
+    ///
+    /// The same sums in the same order whatever the number of threads.
+    pub fn linearise(&self, active: &[FrameEstimate]) -> Linearisation {
+        let estimates = self.with_active(active);
+        let views = self.views(&estimates);
+        let mut normal = NormalEquations::zeros(&self.pattern);
+        let mut frames = vec![FrameShare::default(); self.active.len()];
+        let mut cost = 0.0;
+        for batch in self.visibility.blocks.chunks(BATCH) {
+            let sums: Vec<BlockSums> = batch
+                .par_iter()
+                .map(|block| self.sum_block(&self.visibility.tiles[block.clone()], &views))
+                .collect();
+            for sum in sums {
+                cost += sum.cost;
+                sum.add_to(&self.pattern, &mut normal, &mut frames);
+            }
+        }
+        let information = self.sigma.powi(-2);
+        cost *= information;
+        normal.blocks.iter_mut().for_each(|b| *b *= information);
+        normal.gradient.iter_mut().for_each(|g| *g *= information);
+        cost += self.prior.add(
+            &self.participants,
+            &estimates,
+            &self.active,
+            &self.pattern,
+            &mut normal,
+        );
+        Linearisation {
+            cost,
+            normal,
+            frames,
+        }
+    }
+
+    fn slot(&self, participant: usize) -> Option<usize> {
+        let frame = self.participants.start + participant;
+        self.active
+            .contains(&frame)
+            .then(|| frame - self.active.start)
+    }
+
+    fn sum_block(&self, tiles: &[Tile], views: &[View]) -> BlockSums {
+        let mut slots: Vec<usize> = tiles
+            .iter()
+            .flat_map(|tile| self.visibility.observers(tile))
+            .filter_map(|k| self.slot(*k))
+            .collect();
+        slots.sort_unstable();
+        slots.dedup();
+        let mut sums = BlockSums::new(slots);
+        let mut work = TileWork::default();
+        let mut columns = Vec::new();
+        let spacing = (self.grid.spacing_s_m, self.grid.spacing_h_m);
+        for tile in tiles {
+            let points = TilePoints::new(&self.grid, self.surface, tile.id);
+            let observers = self.visibility.observers(tile);
+            let seen = observers.iter().map(|k| &views[*k]);
+            work.moments(&points, seen, spacing, &self.loss);
+            columns.clear();
+            for (k, moments) in observers.iter().zip(&work.observers) {
+                sums.cost += moments.cost;
+                if let Some(slot) = self.slot(*k) {
+                    columns.push(Column {
+                        place: sums.place(slot),
+                        moments: *moments,
+                        a: views[*k].wall_jacobian(&points),
+                        inverse_gain: 1.0 / f64::from(views[*k].gain()),
+                    });
+                }
+            }
+            sums.add_tile(&work, &columns);
+        }
+        sums
+    }
+
+    /// How far a step moves the wall under each active frame, in pixels of full size: the largest over the
+    /// frame's middle and corners.
+    pub fn wall_step_px(&self, active: &[FrameEstimate], step: &[FrameStep]) -> Vec<f64> {
+        let full = 0.5f64.powi(self.level as i32);
+        active
+            .iter()
+            .zip(step)
+            .map(|(estimate, step)| self.frame_step_px(estimate, step) / full)
+            .collect()
+    }
+
+    fn frame_step_px(&self, estimate: &FrameEstimate, step: &FrameStep) -> f64 {
+        let xi: nalgebra::Vector6<f64> = step.fixed_rows::<6>(0).into();
+        let pose = &estimate.pose;
+        let corners = self.camera.border(1, 0.0);
+        let middle = Vector2::new(self.camera.cx, self.camera.cy);
+        corners
+            .iter()
+            .chain([&middle])
+            .filter_map(|pixel| {
+                let ray = pose.r_wc * self.camera.ray(pixel.x, pixel.y);
+                let hit = self.surface.hit(&pose.t_wc, &ray).ok()?;
+                let wall = self.surface.frame(hit.wall);
+                Some((wall_jacobian(pose, &wall) * xi).norm() * self.camera.fy / hit.range)
+            })
+            .fold(0.0, f64::max)
+    }
+}
+
+/// Distance between wall samples: a pixel's width on the wall, in the median frame's middle.
+fn sample_spacing(
+    surface: &dyn Surface,
+    camera: &Pinhole,
+    poses: &[crate::trajectory::Pose],
+) -> Result<f64, (usize, SurfaceError)> {
+    let ray = camera.ray(camera.cx, camera.cy);
+    let mut ranges = Vec::with_capacity(poses.len());
+    for (k, pose) in poses.iter().enumerate() {
+        let hit = surface
+            .hit(&pose.t_wc, &(pose.r_wc * ray))
+            .map_err(|error| (k, error))?;
+        ranges.push(hit.range);
+    }
+    ranges.sort_unstable_by(f64::total_cmp);
+    Ok(ranges[ranges.len() / 2] / camera.fy)
+}
+
+fn covisible_pairs(visibility: &Visibility, active: &Range<usize>) -> Vec<(usize, usize)> {
+    let mut pairs = Vec::new();
+    for block in &visibility.blocks {
+        let mut slots: Vec<usize> = visibility.tiles[block.clone()]
+            .iter()
+            .flat_map(|tile| visibility.observers(tile))
+            .filter(|k| active.contains(k))
+            .map(|k| k - active.start)
+            .collect();
+        slots.sort_unstable();
+        slots.dedup();
+        for (n, a) in slots.iter().enumerate() {
+            pairs.extend(slots[n..].iter().map(|b| (*a, *b)));
+        }
+    }
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+/// An active observer of a tile.
+struct Column {
+    place: usize,
+    moments: ObserverMoments,
+    a: Matrix2x6<f64>,
+    inverse_gain: f64,
+}
+
+impl Column {
+    /// `M B` (4 × 8) for this observer's `B = diag(A, 1, 1/a)`.
+    fn features_times_b(&self, m: &nalgebra::Matrix4<f64>) -> SMatrix<f64, 4, UNKNOWNS> {
+        let mut product = SMatrix::<f64, 4, UNKNOWNS>::zeros();
+        for c in 0..6 {
+            for r in 0..4 {
+                product[(r, c)] = m[(r, 0)] * self.a[(0, c)] + m[(r, 1)] * self.a[(1, c)];
+            }
+        }
+        for r in 0..4 {
+            product[(r, 6)] = m[(r, 2)];
+            product[(r, 7)] = m[(r, 3)] * self.inverse_gain;
+        }
+        product
+    }
+
+    /// Adds `scale · Bᵀ F` to a block.
+    fn add_b_transposed_times(&self, f: &SMatrix<f64, 4, UNKNOWNS>, scale: f64, block: &mut Block) {
+        for c in 0..UNKNOWNS {
+            let (f0, f1) = (scale * f[(0, c)], scale * f[(1, c)]);
+            for r in 0..6 {
+                block[(r, c)] += self.a[(0, r)] * f0 + self.a[(1, r)] * f1;
+            }
+            block[(6, c)] += scale * f[(2, c)];
+            block[(7, c)] += scale * f[(3, c)] * self.inverse_gain;
+        }
+    }
+}
+
+/// Sums over the tiles of one block, for the few active frames that see it.
+struct BlockSums {
+    slots: Vec<usize>,
+    cost: f64,
+    gradient: Vec<FrameStep>,
+    shares: Vec<FrameShare>,
+    /// Upper triangle, row by row.
+    blocks: Vec<Block>,
+}
+
+impl BlockSums {
+    fn new(slots: Vec<usize>) -> Self {
+        let n = slots.len();
+        Self {
+            slots,
+            cost: 0.0,
+            gradient: vec![FrameStep::zeros(); n],
+            shares: vec![FrameShare::default(); n],
+            blocks: vec![Block::zeros(); n * (n + 1) / 2],
+        }
+    }
+
+    /// Place of a slot among this block's; it must be one of them.
+    fn place(&self, slot: usize) -> usize {
+        self.slots.partition_point(|s| *s < slot)
+    }
+
+    fn block_index(&self, row: usize, column: usize) -> usize {
+        let n = self.slots.len();
+        row * n - row * (row + 1) / 2 + column
+    }
+
+    fn add_tile(&mut self, work: &TileWork, columns: &[Column]) {
+        let total: f64 = work.observers.iter().map(|o| o.weight).sum();
+        for (n, b) in columns.iter().enumerate() {
+            let moments = &b.moments;
+            let share = &mut self.shares[b.place];
+            share.samples += SAMPLES;
+            share.pixels += moments.pixels;
+            share.inliers += moments.inliers;
+            share.square += moments.square;
+            let gradient = &mut self.gradient[b.place];
+            for k in 0..6 {
+                gradient[k] -=
+                    b.a[(0, k)] * moments.gradient[0] + b.a[(1, k)] * moments.gradient[1];
+            }
+            gradient[6] -= moments.gradient[2];
+            gradient[7] -= moments.gradient[3] * b.inverse_gain;
+            let f = b.features_times_b(&work.features);
+            for a in &columns[..=n] {
+                let own = if a.place == b.place {
+                    a.moments.weight
+                } else {
+                    0.0
+                };
+                let scale = own - a.moments.weight * moments.weight / total.max(1e-12);
+                let index = self.block_index(a.place, b.place);
+                a.add_b_transposed_times(&f, scale, &mut self.blocks[index]);
+            }
+        }
+    }
+
+    fn add_to(&self, pattern: &Pattern, normal: &mut NormalEquations, frames: &mut [FrameShare]) {
+        for (column, slot) in self.slots.iter().enumerate() {
+            normal.gradient[*slot] += self.gradient[column];
+            let (share, sum) = (&mut frames[*slot], &self.shares[column]);
+            share.samples += sum.samples;
+            share.pixels += sum.pixels;
+            share.inliers += sum.inliers;
+            share.square += sum.square;
+            for row in 0..=column {
+                let block = &self.blocks[self.block_index(row, column)];
+                normal.add_block(pattern, self.slots[row], *slot, block);
+            }
+        }
+    }
+}

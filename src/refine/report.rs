@@ -1,0 +1,75 @@
+//! `refine.json`: what the estimator did and how sure it is.
+
+use super::covariance::FrameSigma;
+use super::gauss_newton::SolveRecord;
+use serde::{Deserialize, Serialize};
+
+/// What a frame's refined pose rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FrameFlag {
+    /// Its pixels.
+    Photometric,
+    /// The prior alone: the pixels do not determine it.
+    Prior,
+}
+
+/// One frame of the report.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FrameReport {
+    /// Index of the frame.
+    pub index: usize,
+    /// Name of its file.
+    pub file: String,
+    /// What its pose rests on.
+    pub flag: FrameFlag,
+    /// Why, if it rests on the prior.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// Wall samples at which it was compared with other frames.
+    pub points: usize,
+    /// Root mean square of its residuals against the fused wall, grey levels, as weighted by the robust loss.
+    pub residual: f64,
+    /// Share of its pixels' weight that the robust loss left, 0 to 1.
+    pub inlier_share: f64,
+    /// Gain `a` of `I = a S + b`.
+    pub gain: f64,
+    /// Bias `b`, grey levels.
+    pub bias: f64,
+    /// 1-σ relative to the first frame.
+    pub sigma: FrameSigma,
+}
+
+/// One global solve of the report.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct LevelReport {
+    /// Pyramid level; 0 is full size.
+    pub level: usize,
+    /// Its course.
+    #[serde(flatten)]
+    pub solve: SolveRecord,
+}
+
+/// Wall-clock time of one stage.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct StageTime {
+    /// Name of the stage.
+    pub stage: String,
+    /// Seconds.
+    pub seconds: f64,
+}
+
+/// The whole report.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RefineReport {
+    /// Global solves, coarse to fine.
+    pub levels: Vec<LevelReport>,
+    /// Frames in order.
+    pub frames: Vec<FrameReport>,
+    /// Frames whose pose rests on the prior.
+    pub frames_on_prior: usize,
+    /// Why the last solve stopped, in words.
+    pub stopped_because: String,
+    /// Time by stage.
+    pub timings: Vec<StageTime>,
+}

@@ -1,0 +1,119 @@
+//! Tracking: placing one frame after another, with a sliding window that keeps the errors from growing.
+//!
+//! Registering each frame only against those already placed gains error exponentially. Solving the last
+//! frames that can overlap again together, every few frames, with the oldest third held, keeps it bounded.
+
+use super::estimate::FrameEstimate;
+use super::footprint::Footprint;
+use super::gauss_newton::{Stopping, solve};
+use super::options::RefineOptions;
+use super::problem::{Problem, ProblemError, Scene};
+use crate::progress::Progress;
+use crate::trajectory::{JitterModel, Pose, so3};
+use nalgebra::Vector3;
+
+/// How far back overlap is looked for, frames.
+const FARTHEST: usize = 256;
+/// Stopping rules of a single frame and of a window; the global solve does the rest.
+const FRAME_STOPPING: Stopping = Stopping {
+    max_iterations: 12,
+    step_px: 0.1,
+};
+const WINDOW_STOPPING: Stopping = Stopping {
+    max_iterations: 6,
+    step_px: 0.2,
+};
+
+/// Places all frames; returns their estimates.
+///
+/// # Errors
+/// [`ProblemError`] if a pose leaves the tunnel or an equation has no solution.
+pub fn track(
+    scene: &Scene,
+    options: &RefineOptions,
+    progress: &dyn Progress,
+) -> Result<Vec<FrameEstimate>, ProblemError> {
+    let count = scene.frames.len();
+    let coarsest = options.coarsest_level(scene.camera.height);
+    let finest = options.handover_level(scene.camera.height);
+    let mut estimates = vec![FrameEstimate::at(scene.prior.initial[0])];
+    let mut footprints = vec![footprint(scene, 0, &estimates)?];
+    progress.start("tracking", count);
+    progress.advance(1);
+    for k in 1..count {
+        estimates.push(FrameEstimate::at(predict(scene, &estimates)));
+        footprints.push(footprint(scene, k, &estimates)?);
+        let first = earliest_overlap(scene, &footprints);
+        for level in (finest..=coarsest).rev() {
+            let problem = Problem::new(scene, level, first..k + 1, k..k + 1, &estimates)?;
+            if problem.tiles() > 0 {
+                estimates[k] = solve(problem, FRAME_STOPPING, None)?.estimates[0];
+            }
+        }
+        if k % options.window_stride == 0 || k + 1 == count {
+            let held = if first == 0 { 0 } else { (k + 1 - first) / 3 };
+            let active = first + held..k + 1;
+            let problem = Problem::new(scene, finest, first..k + 1, active.clone(), &estimates)?;
+            if problem.tiles() > 0 {
+                let solution = solve(problem, WINDOW_STOPPING, None)?;
+                estimates[active].copy_from_slice(&solution.estimates);
+            }
+        }
+        footprints[k] = footprint(scene, k, &estimates)?;
+        progress.advance(1);
+    }
+    progress.finish();
+    Ok(estimates)
+}
+
+fn footprint(
+    scene: &Scene,
+    k: usize,
+    estimates: &[FrameEstimate],
+) -> Result<Footprint, ProblemError> {
+    Footprint::trace(scene.surface, scene.camera, &estimates[k].pose)
+        .map_err(|source| ProblemError::Placement { frame: k, source })
+}
+
+/// The first frame that may share wall with the last one.
+fn earliest_overlap(scene: &Scene, footprints: &[Footprint]) -> usize {
+    let last = footprints.len() - 1;
+    let perimeter = scene.surface.perimeter_m();
+    (last.saturating_sub(FARTHEST)..last)
+        .find(|k| footprints[*k].overlaps(&footprints[last], perimeter))
+        .unwrap_or(last)
+}
+
+/// Where the prior expects the next frame, given the frames already placed.
+///
+/// Random walk: the last pose and the initial step. Independent: the initial pose, moved by the gauge (turn
+/// about the axis, shift along it) that the placed frames have taken on.
+fn predict(scene: &Scene, placed: &[FrameEstimate]) -> Pose {
+    let initial = &scene.prior.initial;
+    let k = placed.len();
+    match scene.prior.jitter.model {
+        JitterModel::RandomWalk => {
+            let last = &placed[k - 1].pose;
+            let (before, next) = (&initial[k - 1], &initial[k]);
+            Pose::new(
+                last.r_wc * (before.r_wc.inverse() * next.r_wc),
+                last.t_wc + (next.t_wc - before.t_wc),
+            )
+        }
+        JitterModel::Independent => {
+            let first = k.saturating_sub(FARTHEST);
+            let share = 1.0 / (k - first) as f64;
+            let (mut turn, mut shift) = (0.0, 0.0);
+            for (placed, initial) in placed[first..].iter().zip(&initial[first..]) {
+                let moved = placed.pose.r_wc * initial.r_wc.inverse();
+                turn += share * so3::log(&moved).y;
+                shift += share * (placed.pose.t_wc.y - initial.t_wc.y);
+            }
+            let about_axis = so3::exp(&(Vector3::y() * turn));
+            Pose::new(
+                about_axis * initial[k].r_wc,
+                about_axis * initial[k].t_wc + Vector3::y() * shift,
+            )
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! Sampling a frame at the wall samples of a tile.
+
+use super::estimate::FrameEstimate;
+use super::grid::{AREA, SIDE, TilePoints};
+use crate::camera::Pinhole;
+use crate::frames::GreyImage;
+use crate::surface::wall_jacobian;
+use crate::trajectory::Pose;
+use nalgebra::{Matrix2x6, Matrix3, Vector3};
+
+/// A frame at one pyramid level with its current estimate, ready to be sampled.
+pub struct View<'a> {
+    image: &'a GreyImage,
+    camera: Pinhole,
+    pose: Pose,
+    r_cw: Matrix3<f32>,
+    gain: f32,
+    bias: f32,
+}
+
+impl<'a> View<'a> {
+    /// A frame's `image` seen by `camera` (of the same level).
+    pub fn new(image: &'a GreyImage, camera: Pinhole, estimate: &FrameEstimate) -> Self {
+        let r_wc = estimate.pose.r_wc.to_rotation_matrix();
+        Self {
+            image,
+            camera,
+            pose: estimate.pose,
+            r_cw: r_wc.matrix().transpose().cast(),
+            gain: estimate.log_gain.exp() as f32,
+            bias: estimate.bias as f32,
+        }
+    }
+
+    /// The gain `a`.
+    pub fn gain(&self) -> f32 {
+        self.gain
+    }
+
+    /// `∂(s, h)/∂ξ` at the middle of a tile.
+    pub fn wall_jacobian(&self, points: &TilePoints) -> Matrix2x6<f64> {
+        wall_jacobian(&self.pose, &points.centre)
+    }
+
+    /// The wall's values `(I − b)/a` as this frame shows them, bilinearly interpolated, into `values`.
+    /// Samples that a step has moved out of the picture repeat its border.
+    ///
+    /// Returns the number of pixels per wall sample: the weight that makes every pixel count once, however
+    /// obliquely it sees the wall.
+    pub fn sample(&self, points: &TilePoints, values: &mut [f32; AREA]) -> f32 {
+        let centre: Vector3<f64> = self.pose.to_camera(&points.centre.x_w);
+        let c: Vector3<f32> = centre.cast();
+        let r = &self.r_cw;
+        let (mut u, mut v) = ([0.0f32; AREA], [0.0f32; AREA]);
+        let mut z = [0.0f32; AREA];
+        for k in 0..AREA {
+            let (dx, dy, dz) = (points.dx[k], points.dy[k], points.dz[k]);
+            u[k] = c.x + r[(0, 0)] * dx + r[(0, 1)] * dy + r[(0, 2)] * dz;
+            v[k] = c.y + r[(1, 0)] * dx + r[(1, 1)] * dy + r[(1, 2)] * dz;
+            z[k] = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
+        }
+        self.camera.project_slices(&mut u, &mut v, &z);
+        self.bilinear(&u, &v, values);
+        quadrilateral_area(&u, &v) / ((SIDE - 1) * (SIDE - 1)) as f32
+    }
+
+    fn bilinear(&self, u: &[f32; AREA], v: &[f32; AREA], values: &mut [f32; AREA]) {
+        let (width, height) = (self.image.width(), self.image.height());
+        let data = self.image.data();
+        let (last_u, last_v) = ((width - 2) as f32, (height - 2) as f32);
+        let inverse_gain = 1.0 / self.gain;
+        let mut index = [0u32; AREA];
+        let (mut fu, mut fv) = ([0.0f32; AREA], [0.0f32; AREA]);
+        for k in 0..AREA {
+            // `max` first: a NaN (a sample behind the camera) becomes the first pixel.
+            let x0 = (u[k].max(0.0).min(last_u)) as i32;
+            let y0 = (v[k].max(0.0).min(last_v)) as i32;
+            fu[k] = (u[k] - x0 as f32).clamp(0.0, 1.0);
+            fv[k] = (v[k] - y0 as f32).clamp(0.0, 1.0);
+            index[k] = (y0 * width as i32 + x0) as u32;
+        }
+        for k in 0..AREA {
+            let top = index[k] as usize;
+            let upper = &data[top..top + 2];
+            let lower = &data[top + width..top + width + 2];
+            let a = upper[0] + fu[k] * (upper[1] - upper[0]);
+            let b = lower[0] + fu[k] * (lower[1] - lower[0]);
+            values[k] = (a + fv[k] * (b - a) - self.bias) * inverse_gain;
+        }
+    }
+}
+
+/// Area in the picture of the quadrilateral between a tile's outermost samples, px².
+fn quadrilateral_area(u: &[f32; AREA], v: &[f32; AREA]) -> f32 {
+    let (a, b, c, d) = (0, SIDE - 1, AREA - 1, AREA - SIDE);
+    let diagonal_1 = (u[c] - u[a], v[c] - v[a]);
+    let diagonal_2 = (u[d] - u[b], v[d] - v[b]);
+    0.5 * (diagonal_1.0 * diagonal_2.1 - diagonal_1.1 * diagonal_2.0).abs()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::refine::grid::{TileId, WallGrid};
+    use crate::surface::{Circle, Surface, WallPoint};
+    use crate::trajectory::so3;
+
+    /// A frame whose grey value is a linear function of the pixel: bilinear sampling must return it exactly.
+    #[test]
+    fn samples_are_where_the_camera_projects_them() {
+        let circle = Circle::new(3.0).unwrap();
+        let camera = Pinhole::from_vertical_fov(160, 120, 60f64.to_radians());
+        let data = (0..160 * 120)
+            .map(|k| 0.5 * (k % 160) as f32 + 1.5 * (k / 160) as f32)
+            .collect();
+        let image = GreyImage::new(160, 120, data);
+        let mut estimate = FrameEstimate::at(Pose::new(
+            so3::exp(&Vector3::new(0.05, 0.3, -0.1)),
+            Vector3::new(0.4, 10.0, -0.2),
+        ));
+        estimate.log_gain = 0.2;
+        estimate.bias = 3.0;
+        let view = View::new(&image, camera, &estimate);
+        let grid = WallGrid::new(&circle, 3.0 / camera.fy);
+        let hit = circle
+            .hit(&estimate.pose.t_wc, &(estimate.pose.r_wc * Vector3::z()))
+            .unwrap();
+        let (width, height) = grid.tile_size_m();
+        let tile = TileId {
+            column: (hit.wall.s_m / width) as i64,
+            row: (hit.wall.h_m / height) as i64,
+        };
+        let points = TilePoints::new(&grid, &circle, tile);
+        let mut values = [0.0; AREA];
+        let pixels = view.sample(&points, &mut values);
+        let centre = grid.centre(tile);
+        for (k, value) in values.iter().enumerate() {
+            let (i, j) = ((k % SIDE) as f64 - 4.5, (k / SIDE) as f64 - 4.5);
+            let wall = WallPoint {
+                s_m: centre.s_m + i * grid.spacing_s_m,
+                h_m: centre.h_m + j * grid.spacing_h_m,
+            };
+            let x_w = circle.frame(wall).x_w;
+            let pixel = camera.project(&estimate.pose.to_camera(&x_w)).unwrap();
+            let grey = 0.5 * pixel.x + 1.5 * pixel.y;
+            let expected = (grey - estimate.bias) / estimate.log_gain.exp();
+            assert!((f64::from(*value) - expected).abs() < 2e-3);
+        }
+        // At about the distance the grid was made for, a sample is about a pixel.
+        assert!((0.5..2.0).contains(&pixels), "{pixels}");
+    }
+}
