@@ -75,26 +75,20 @@ impl WallGrid {
         }
     }
 
-    /// The four outermost samples of a tile with its ring, and its middle.
-    pub fn probes(&self, surface: &dyn Surface, tile: TileId) -> [Vector3<f64>; 5] {
+    /// Coordinates along s and h of a tile's samples, ring included.
+    fn samples(&self, tile: TileId) -> ([f64; SIDE], [f64; SIDE]) {
         let centre = self.centre(tile);
         let reach = 0.5 * (SIDE - 1) as f64;
-        let (ds, dh) = (reach * self.spacing_s_m, reach * self.spacing_h_m);
-        [
-            (-1.0, -1.0),
-            (1.0, -1.0),
-            (1.0, 1.0),
-            (-1.0, 1.0),
-            (0.0, 0.0),
-        ]
-        .map(|(i, j)| {
-            surface
-                .frame(WallPoint {
-                    s_m: centre.s_m + i * ds,
-                    h_m: centre.h_m + j * dh,
-                })
-                .x_w
-        })
+        (
+            std::array::from_fn(|i| centre.s_m + (i as f64 - reach) * self.spacing_s_m),
+            std::array::from_fn(|j| centre.h_m + (j as f64 - reach) * self.spacing_h_m),
+        )
+    }
+
+    /// The four corners of a tile with its ring, in `points`.
+    pub fn corners(&self, surface: &dyn Surface, tile: TileId, points: &mut Vec<Vector3<f64>>) {
+        let (s, h) = self.samples(tile);
+        surface.lattice(&[s[0], s[SIDE - 1]], &[h[0], h[SIDE - 1]], points);
     }
 }
 
@@ -113,30 +107,27 @@ pub struct TilePoints {
 }
 
 impl TilePoints {
-    /// The samples of `tile`.
-    pub fn new(grid: &WallGrid, surface: &dyn Surface, tile: TileId) -> Self {
-        let middle = grid.centre(tile);
-        let centre = surface.frame(middle);
+    /// The samples of `tile`; `scratch` is room for the work.
+    pub fn new(
+        grid: &WallGrid,
+        surface: &dyn Surface,
+        tile: TileId,
+        scratch: &mut Vec<Vector3<f64>>,
+    ) -> Self {
+        let centre = surface.frame(grid.centre(tile));
         let mut points = Self {
             centre,
             dx: [0.0; AREA],
             dy: [0.0; AREA],
             dz: [0.0; AREA],
         };
-        let reach = 0.5 * (SIDE - 1) as f64;
-        for j in 0..SIDE {
-            for i in 0..SIDE {
-                let x_w = surface
-                    .frame(WallPoint {
-                        s_m: middle.s_m + (i as f64 - reach) * grid.spacing_s_m,
-                        h_m: middle.h_m + (j as f64 - reach) * grid.spacing_h_m,
-                    })
-                    .x_w;
-                let offset = x_w - centre.x_w;
-                points.dx[j * SIDE + i] = offset.x as f32;
-                points.dy[j * SIDE + i] = offset.y as f32;
-                points.dz[j * SIDE + i] = offset.z as f32;
-            }
+        let (s, h) = grid.samples(tile);
+        surface.lattice(&s, &h, scratch);
+        for (k, x_w) in scratch.iter().enumerate() {
+            let offset = x_w - centre.x_w;
+            points.dx[k] = offset.x as f32;
+            points.dy[k] = offset.y as f32;
+            points.dz[k] = offset.z as f32;
         }
         points
     }
@@ -162,15 +153,9 @@ mod tests {
         let grid = WallGrid::new(&circle, 0.01);
         let last = grid.columns - 1;
         // The ring left of the first column is the last sample of the last column.
-        let a = TilePoints::new(&grid, &circle, TileId { column: 0, row: 4 });
-        let b = TilePoints::new(
-            &grid,
-            &circle,
-            TileId {
-                column: last,
-                row: 4,
-            },
-        );
+        let at =
+            |column| TilePoints::new(&grid, &circle, TileId { column, row: 4 }, &mut Vec::new());
+        let (a, b) = (at(0), at(last));
         let world = |p: &TilePoints, k: usize| {
             p.centre.x_w + Vector3::new(f64::from(p.dx[k]), f64::from(p.dy[k]), f64::from(p.dz[k]))
         };

@@ -5,7 +5,7 @@ use super::factor::{FactorError, Symbolic};
 use super::grid::{TilePoints, WallGrid};
 use super::normal::{Block, NormalEquations, Pattern};
 use super::prior::Prior;
-use super::robust::Loss;
+use super::robust::{NoiseHistogram, NoiseModel};
 use super::tile::{ObserverMoments, SAMPLES, TileWork};
 use super::view::View;
 use super::visibility::{Tile, Visibility};
@@ -58,10 +58,6 @@ pub enum ProblemError {
 const BATCH: usize = 64;
 /// Tiles looked at to estimate the noise.
 const SCALE_TILES: usize = 2000;
-/// Width of a bin of the residual histogram, grey levels, and the number of bins.
-const HISTOGRAM: (f32, usize) = (1.0 / 64.0, 64 * 128);
-/// Residual σ never goes below this (8-bit rounding alone gives 0.29).
-const LEAST_SIGMA: f64 = 0.2;
 /// Noise of a pixel over that of a bilinear sample between pixels: each axis averages `f² + (1−f)²` of the
 /// variance, 2/3 over all phases f, so 4/9 for both.
 const PIXEL_OVER_SAMPLE: f64 = 1.5;
@@ -107,7 +103,7 @@ pub struct Problem<'a> {
     pattern: Pattern,
     symbolic: Symbolic,
     sigma: f64,
-    loss: Loss,
+    noise: NoiseModel,
 }
 
 impl<'a> Problem<'a> {
@@ -160,7 +156,10 @@ impl<'a> Problem<'a> {
             pattern,
             symbolic,
             sigma: 1.0,
-            loss: Loss::for_sigma(1.0),
+            noise: NoiseModel {
+                floor: 1.0,
+                steepness: 0.0,
+            },
         };
         problem.estimate_noise();
         Ok(problem)
@@ -216,44 +215,31 @@ impl<'a> Problem<'a> {
         estimates
     }
 
-    /// Median absolute residual around the plain mean of every few tiles, as a standard deviation.
+    /// Reads the noise from the residuals around the plain mean in every few tiles.
     fn estimate_noise(&mut self) {
         let views = self.views(&self.held);
         let stride = (self.visibility.tiles.len() / SCALE_TILES).max(1);
         let sample: Vec<&Tile> = self.visibility.tiles.iter().step_by(stride).collect();
-        let (bin, bins) = HISTOGRAM;
         let histogram = sample
             .par_chunks(32)
             .map(|tiles| {
                 let mut work = TileWork::default();
-                let mut histogram = vec![0u64; bins];
+                let mut histogram = NoiseHistogram::default();
+                let mut scratch = Vec::new();
                 for tile in tiles {
-                    let points = TilePoints::new(&self.grid, self.surface, tile.id);
+                    let points = TilePoints::new(&self.grid, self.surface, tile.id, &mut scratch);
                     let observers = self.visibility.observers(tile);
                     let seen = observers.iter().map(|k| &views[*k]);
-                    work.residual_histogram(&points, seen, bin, &mut histogram);
+                    work.count_residuals(&points, seen, &mut histogram);
                 }
                 histogram
             })
-            .reduce(
-                || vec![0; bins],
-                |mut a, b| {
-                    a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
-                    a
-                },
-            );
-        let half = histogram.iter().sum::<u64>() / 2;
-        let mut below = 0;
-        let median = histogram
-            .iter()
-            .take_while(|count| {
-                below += **count;
-                below <= half
-            })
-            .count();
-        let sigma = (1.4826 * (median as f64 + 0.5) * f64::from(bin)).max(LEAST_SIGMA);
-        self.sigma = PIXEL_OVER_SAMPLE * sigma;
-        self.loss = Loss::for_sigma(sigma);
+            .reduce(NoiseHistogram::default, |a, b| a.merge(&b));
+        self.noise = histogram.fit();
+        if std::env::var_os("TS_NOISE").is_some() && self.active.start == 0 {
+            eprintln!("level {} {:?}", self.level, self.noise);
+        }
+        self.sigma = PIXEL_OVER_SAMPLE * f64::from(self.noise.floor).sqrt();
     }
 
     /// Cost and normal equations at the given estimates of the active frames.
@@ -311,12 +297,13 @@ impl<'a> Problem<'a> {
         let mut sums = BlockSums::new(slots);
         let mut work = TileWork::default();
         let mut columns = Vec::new();
+        let mut scratch = Vec::new();
         let spacing = (self.grid.spacing_s_m, self.grid.spacing_h_m);
         for tile in tiles {
-            let points = TilePoints::new(&self.grid, self.surface, tile.id);
+            let points = TilePoints::new(&self.grid, self.surface, tile.id, &mut scratch);
             let observers = self.visibility.observers(tile);
             let seen = observers.iter().map(|k| &views[*k]);
-            work.moments(&points, seen, spacing, &self.loss);
+            work.moments(&points, seen, spacing, &self.noise);
             columns.clear();
             for (k, moments) in observers.iter().zip(&work.observers) {
                 sums.cost += moments.cost;

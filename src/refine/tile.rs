@@ -27,7 +27,7 @@
 //! directions are exact null vectors of the data term.
 
 use super::grid::{AREA, SIDE, TILE, TilePoints};
-use super::robust::Loss;
+use super::robust::{Loss, NoiseHistogram, NoiseModel};
 use super::view::View;
 use nalgebra::{Matrix4, Vector4};
 
@@ -86,8 +86,8 @@ impl TileWork {
         }
     }
 
-    /// The texture: the weighted mean, then once more with the robust weights around it.
-    fn texture(&self, loss: &Loss) -> [f32; AREA] {
+    /// The weighted mean of all observers.
+    fn mean(&self) -> [f32; AREA] {
         let mut sum = [0.0f32; AREA];
         let mut total = 0.0f32;
         for frame in &self.samples {
@@ -97,23 +97,25 @@ impl TileWork {
                 sum[k] += q * frame.values[k];
             }
         }
-        let mean = sum.map(|s| s / total);
+        sum.map(|s| s / total)
+    }
+
+    /// The mean once more, with the robust weights around the plain one.
+    fn texture(&self, mean: &[f32; AREA], precision: &[f32; AREA]) -> [f32; AREA] {
         let mut sum = [0.0f32; AREA];
-        let mut weights = [0.0f32; AREA];
+        let mut weights = [1e-12f32; AREA];
         for frame in &self.samples {
             let q = frame.pixels * frame.gain * frame.gain;
             for k in 0..AREA {
-                let w = q * loss.weight(frame.gain * (frame.values[k] - mean[k]));
+                let e = frame.gain * (frame.values[k] - mean[k]);
+                let w = q * Loss::weight(e * e, precision[k]);
                 weights[k] += w;
-                sum[k] += w * frame.values[k];
+                sum[k] += w * (frame.values[k] - mean[k]);
             }
         }
-        // Where every value is an outlier to all others the mean is as good as any.
-        let mut texture = mean;
+        let mut texture = *mean;
         for k in 0..AREA {
-            if weights[k] > 1e-6 * total {
-                texture[k] = sum[k] / weights[k];
-            }
+            texture[k] += sum[k] / weights[k];
         }
         texture
     }
@@ -126,54 +128,71 @@ impl TileWork {
         points: &TilePoints,
         views: impl Iterator<Item = &'a View<'a>>,
         spacing_m: (f64, f64),
-        loss: &Loss,
+        noise: &NoiseModel,
     ) {
         self.sample(points, views);
-        let texture = self.texture(loss);
+        let mean = self.mean();
+        let precision = gradient_squares(&mean).map(|g2| noise.precision(g2));
+        let texture = self.texture(&mean, &precision);
         let slope_s = (0.5 / spacing_m.0) as f32;
         let slope_h = (0.5 / spacing_m.1) as f32;
         let mut phi = [[0.0f32; SAMPLES]; 3];
+        let mut inner_precision = [0.0f32; SAMPLES];
         for j in 0..TILE {
             for i in 0..TILE {
                 let (k, c) = (j * TILE + i, (j + 1) * SIDE + i + 1);
                 phi[0][k] = (texture[c + 1] - texture[c - 1]) * slope_s;
                 phi[1][k] = (texture[c + SIDE] - texture[c - SIDE]) * slope_h;
                 phi[2][k] = texture[c];
+                inner_precision[k] = precision[c];
             }
         }
         self.features = feature_moments(&phi);
         self.observers.clear();
         for frame in &self.samples {
-            self.observers.push(observer_moments(frame, &phi, loss));
+            self.observers
+                .push(observer_moments(frame, &phi, &inner_precision));
         }
     }
 
-    /// Adds the magnitudes of the residuals around the plain mean to `histogram` (bins of `bin` grey
-    /// levels), each scaled by `√(n/(n−1))` for the share of the mean it has itself made.
-    pub fn residual_histogram<'a>(
+    /// Counts the residuals around the plain mean, each scaled by `√(n/(n−1))` for the share of the mean
+    /// that it has itself made.
+    pub fn count_residuals<'a>(
         &mut self,
         points: &TilePoints,
         views: impl Iterator<Item = &'a View<'a>>,
-        bin: f32,
-        histogram: &mut [u64],
+        histogram: &mut NoiseHistogram,
     ) {
         self.sample(points, views);
         let n = self.samples.len() as f32;
-        let scale = (n / (n - 1.0)).sqrt() / bin;
-        let last = histogram.len() - 1;
-        for k in 0..AREA {
-            let mean = self
-                .samples
-                .iter()
-                .map(|frame| frame.values[k])
-                .sum::<f32>()
-                / n;
-            for frame in &self.samples {
-                let e = frame.gain * (frame.values[k] - mean);
-                histogram[((e.abs() * scale) as usize).min(last)] += 1;
+        let scale = (n / (n - 1.0)).sqrt();
+        let mean = self.mean();
+        let squares = gradient_squares(&mean);
+        for frame in &self.samples {
+            for k in 0..AREA {
+                let e = frame.gain * (frame.values[k] - mean[k]);
+                histogram.add(scale * e, squares[k]);
             }
         }
     }
+}
+
+/// Squared length of a texture's gradient in grey levels a sample; the ring takes its neighbours' value.
+fn gradient_squares(texture: &[f32; AREA]) -> [f32; AREA] {
+    let mut squares = [0.0f32; AREA];
+    for j in 1..=TILE {
+        for i in 1..=TILE {
+            let c = j * SIDE + i;
+            let square = |n: usize| (texture[n] - texture[c]).powi(2);
+            squares[c] =
+                0.5 * (square(c - 1) + square(c + 1) + square(c - SIDE) + square(c + SIDE));
+        }
+        squares[j * SIDE] = squares[j * SIDE + 1];
+        squares[j * SIDE + TILE + 1] = squares[j * SIDE + TILE];
+    }
+    squares.copy_within(SIDE..2 * SIDE, 0);
+    squares.copy_within(TILE * SIDE..(TILE + 1) * SIDE, (TILE + 1) * SIDE);
+    squares
 }
 
 fn feature_moments(phi: &[[f32; SAMPLES]; 3]) -> Matrix4<f64> {
@@ -182,14 +201,18 @@ fn feature_moments(phi: &[[f32; SAMPLES]; 3]) -> Matrix4<f64> {
         for b in a..3 {
             moments[(a, b)] = f64::from(dot(&phi[a], &phi[b]));
         }
-        moments[(a, 3)] = f64::from(lanes(&phi[a], |v| v));
+        moments[(a, 3)] = f64::from(sum(&phi[a]));
     }
     moments[(3, 3)] = SAMPLES as f64;
     moments.fill_lower_triangle_with_upper_triangle();
     moments
 }
 
-fn observer_moments(frame: &Samples, phi: &[[f32; SAMPLES]; 3], loss: &Loss) -> ObserverMoments {
+fn observer_moments(
+    frame: &Samples,
+    phi: &[[f32; SAMPLES]; 3],
+    precision: &[f32; SAMPLES],
+) -> ObserverMoments {
     let mut e = [0.0f32; SAMPLES];
     for j in 0..TILE {
         for i in 0..TILE {
@@ -197,23 +220,25 @@ fn observer_moments(frame: &Samples, phi: &[[f32; SAMPLES]; 3], loss: &Loss) -> 
             e[k] = frame.gain * (frame.values[(j + 1) * SIDE + i + 1] - phi[2][k]);
         }
     }
-    let w = e.map(|e| loss.weight(e));
-    let mut we = [0.0f32; SAMPLES];
+    let (mut w, mut we, mut loss) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES], [0.0f32; SAMPLES]);
     for k in 0..SAMPLES {
+        let square = e[k] * e[k];
+        w[k] = Loss::weight(square, precision[k]);
         we[k] = w[k] * e[k];
+        loss[k] = Loss::value(square, precision[k]);
     }
     let (q, a) = (f64::from(frame.pixels), f64::from(frame.gain));
-    let inliers = f64::from(lanes(&w, |v| v));
+    let inliers = f64::from(sum(&w));
     // w r = q a² ω r = q a (ω e).
     ObserverMoments {
         gradient: Vector4::new(
             f64::from(dot(&we, &phi[0])),
             f64::from(dot(&we, &phi[1])),
             f64::from(dot(&we, &phi[2])),
-            f64::from(lanes(&we, |v| v)),
+            f64::from(sum(&we)),
         ) * (q * a),
         weight: q * a * a * inliers / SAMPLES as f64,
-        cost: q * f64::from(lanes(&e, |e| loss.value(e))),
+        cost: q * f64::from(sum(&loss)),
         square: q * f64::from(dot(&we, &e)),
         pixels: q * SAMPLES as f64,
         inliers: q * inliers,
@@ -231,12 +256,12 @@ fn dot(a: &[f32; SAMPLES], b: &[f32; SAMPLES]) -> f32 {
     sums.iter().sum()
 }
 
-/// Sum of `f` of every value, in eight running sums.
-fn lanes(a: &[f32; SAMPLES], f: impl Fn(f32) -> f32) -> f32 {
+/// Sum, in eight running sums.
+fn sum(a: &[f32; SAMPLES]) -> f32 {
     let mut sums = [0.0f32; 8];
     for k in (0..SAMPLES).step_by(8) {
         for lane in 0..8 {
-            sums[lane] += f(a[k + lane]);
+            sums[lane] += a[k + lane];
         }
     }
     sums.iter().sum()

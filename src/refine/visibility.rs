@@ -115,13 +115,15 @@ fn tiles_of_frame(
             .is_some_and(|pixel| camera.sees(&pixel, MARGIN_PX))
     };
     let mut tiles = Vec::new();
+    let mut corners = Vec::new();
     for row in first_row..=last_row {
         for column in first_column..=last_column {
             let tile = TileId {
                 column: column.rem_euclid(grid.columns),
                 row,
             };
-            if grid.probes(surface, tile).iter().all(&inside) {
+            grid.corners(surface, tile, &mut corners);
+            if corners.iter().all(&inside) {
                 tiles.push(tile);
             }
         }

@@ -77,6 +77,22 @@ impl Surface for Circle {
         }
     }
 
+    /// One sine and cosine a column.
+    fn lattice(&self, s_m: &[f64], h_m: &[f64], points: &mut Vec<Vector3<f64>>) {
+        points.clear();
+        for &h_m in h_m.iter().take(1) {
+            points.extend(
+                s_m.iter()
+                    .map(|&s_m| self.frame(WallPoint { s_m, h_m }).x_w),
+            );
+        }
+        for &h_m in h_m.iter().skip(1) {
+            for column in 0..s_m.len() {
+                points.push(Vector3::new(points[column].x, h_m, points[column].z));
+            }
+        }
+    }
+
     fn perimeter_m(&self) -> f64 {
         TAU * self.radius_m
     }
@@ -148,6 +164,22 @@ mod tests {
             let e_h = (point(s, h + step) - point(s, h - step)) / (2.0 * step);
             prop_assert!((e_s - frame.e_s).norm() < 1e-7);
             prop_assert!((e_h - frame.e_h).norm() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn the_lattice_is_the_frame_point_by_point() {
+        let circle = Circle::new(3.0).unwrap();
+        let (s, h) = ([0.1, 0.2, 18.9], [-1.0, 4.0]);
+        let mut points = vec![Vector3::zeros()];
+        circle.lattice(&s, &h, &mut points);
+        assert_eq!(points.len(), 6);
+        for (k, x_w) in points.iter().enumerate() {
+            let wall = WallPoint {
+                s_m: s[k % 3],
+                h_m: h[k / 3],
+            };
+            assert!((x_w - circle.frame(wall).x_w).norm() < 1e-12);
         }
     }
 

@@ -83,6 +83,18 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
     /// The wall around `wall`; any `s` and `h` are allowed, `s` is periodic.
     fn frame(&self, wall: WallPoint) -> WallFrame;
 
+    /// World coordinates of the lattice `s_m × h_m` of wall points, in `points` row by row (s runs fastest).
+    ///
+    /// Same as [`Surface::frame`] point by point; shapes override it where the lattice shares work.
+    fn lattice(&self, s_m: &[f64], h_m: &[f64], points: &mut Vec<Vector3<f64>>) {
+        points.clear();
+        for &h_m in h_m {
+            for &s_m in s_m {
+                points.push(self.frame(WallPoint { s_m, h_m }).x_w);
+            }
+        }
+    }
+
     /// Length of the section's outline, metres: the period of `s`.
     fn perimeter_m(&self) -> f64;
 
