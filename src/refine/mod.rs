@@ -25,6 +25,7 @@ mod problem;
 mod report;
 mod robust;
 mod run;
+mod search;
 mod tile;
 mod track;
 mod view;

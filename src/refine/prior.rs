@@ -65,6 +65,12 @@ impl Prior {
         cost
     }
 
+    /// Half the squared Mahalanobis distance of a pose from where the prior expects it.
+    pub fn deviation_cost(&self, expected: &Pose, pose: &Pose) -> f64 {
+        let e = expected.local(pose);
+        0.5 * e.component_mul(&e).dot(&self.information())
+    }
+
     fn add_exposure(
         &self,
         estimate: &FrameEstimate,

@@ -56,6 +56,8 @@ pub enum ProblemError {
 
 /// Blocks of tiles worked on before their sums are added up: bounds the memory, whatever the length.
 const BATCH: usize = 64;
+/// Samples over a frame's height, at least.
+const LEAST_ROWS: u32 = 90;
 /// Tiles looked at to estimate the noise.
 const SCALE_TILES: usize = 2000;
 /// Noise of a pixel over that of a bilinear sample between pixels: each axis averages `f² + (1−f)²` of the
@@ -126,7 +128,8 @@ impl<'a> Problem<'a> {
             frame: participants.start + k,
             source,
         };
-        let spacing = sample_spacing(scene.surface, &camera, &poses).map_err(placed)?;
+        let spacing = sample_spacing(scene.surface, &camera, &poses).map_err(placed)?
+            / oversampling(camera.height);
         let grid = WallGrid::new(scene.surface, spacing);
         let local = active.start - participants.start..active.end - participants.start;
         let visibility =
@@ -350,8 +353,14 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// Wall samples per pixel along each axis: one, but more at coarse levels, where whole tiles of pixels would
+/// leave much of the frame's border unused.
+fn oversampling(rows: u32) -> f64 {
+    (f64::from(LEAST_ROWS) / f64::from(rows)).ceil().max(1.0)
+}
+
 /// Distance between wall samples: a pixel's width on the wall, in the median frame's middle.
-fn sample_spacing(
+pub fn sample_spacing(
     surface: &dyn Surface,
     camera: &Pinhole,
     poses: &[crate::trajectory::Pose],

@@ -8,10 +8,13 @@ use super::footprint::Footprint;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
 use super::problem::{Problem, ProblemError, Scene};
+use super::search::FusedWall;
 use crate::progress::Progress;
-use crate::trajectory::{JitterModel, Pose, so3};
+use crate::trajectory::{Jitter, JitterModel, Pose, so3};
 use nalgebra::Vector3;
 
+/// Hypotheses refined per frame.
+const HYPOTHESES: usize = 5;
 /// How far back overlap is looked for, frames.
 const FARTHEST: usize = 256;
 /// Stopping rules of a single frame and of a window; the global solve does the rest.
@@ -34,7 +37,6 @@ pub fn track(
     progress: &dyn Progress,
 ) -> Result<Vec<FrameEstimate>, ProblemError> {
     let count = scene.frames.len();
-    let coarsest = options.coarsest_level(scene.camera.height);
     let finest = options.handover_level(scene.camera.height);
     let mut estimates = vec![FrameEstimate::at(scene.prior.initial[0])];
     let mut footprints = vec![footprint(scene, 0, &estimates)?];
@@ -44,11 +46,8 @@ pub fn track(
         estimates.push(FrameEstimate::at(predict(scene, &estimates)));
         footprints.push(footprint(scene, k, &estimates)?);
         let first = earliest_overlap(scene, &footprints);
-        for level in (finest..=coarsest).rev() {
-            let problem = Problem::new(scene, level, first..k + 1, k..k + 1, &estimates)?;
-            if problem.tiles() > 0 {
-                estimates[k] = solve(problem, FRAME_STOPPING, None)?.estimates[0];
-            }
+        if first < k {
+            estimates[k] = place(scene, options, first, &estimates)?;
         }
         if k % options.window_stride == 0 || k + 1 == count {
             let held = if first == 0 { 0 } else { (k + 1 - first) / 3 };
@@ -64,6 +63,77 @@ pub fn track(
     }
     progress.finish();
     Ok(estimates)
+}
+
+/// Places the last of `estimates` (its predicted pose) on the wall that the frames from `first` on show:
+/// search, brief refinement of every hypothesis, full refinement of the best.
+fn place(
+    scene: &Scene,
+    options: &RefineOptions,
+    first: usize,
+    estimates: &[FrameEstimate],
+) -> Result<FrameEstimate, ProblemError> {
+    let k = estimates.len() - 1;
+    let predicted = estimates[k];
+    let coarsest = options.coarsest_level(scene.camera.height);
+    let finest = options.handover_level(scene.camera.height);
+    let distance = wall_distance(scene, k, &predicted.pose)?;
+    let sigma = picture_sigma(&scene.prior.jitter, distance);
+    let margin = 3.0 * sigma[1].max(sigma[0]) * distance;
+    let placed: Vec<_> = (first..k).map(|i| (i, estimates[i])).collect();
+    let wall = |level| FusedWall::new(scene, level, &placed, k, &predicted.pose, margin);
+    let hypotheses = wall(coarsest)?.search(k, &predicted.pose, sigma, HYPOTHESES);
+
+    let refine_at = |level: usize, estimate: FrameEstimate| {
+        let mut trial = estimates.to_vec();
+        trial[k] = estimate;
+        let problem = Problem::new(scene, level, first..k + 1, k..k + 1, &trial)?;
+        if problem.tiles() == 0 {
+            return Ok(estimate);
+        }
+        Ok(solve(problem, FRAME_STOPPING, None)?.estimates[0])
+    };
+    let judged = finest.max(coarsest.saturating_sub(1));
+    let judge = wall(judged)?;
+    let mut best = (f64::NEG_INFINITY, predicted);
+    for hypothesis in hypotheses {
+        let mut estimate = hypothesis.estimate;
+        for level in (judged..=coarsest).rev() {
+            // A hypothesis that runs out of the tunnel is no hypothesis.
+            match refine_at(level, estimate) {
+                Ok(refined) => estimate = refined,
+                Err(ProblemError::Placement { .. }) => break,
+                Err(error) => return Err(error),
+            }
+        }
+        let cost = scene.prior.deviation_cost(&predicted.pose, &estimate.pose);
+        if let Some(scored) = judge.score(k, &estimate.pose, cost)
+            && scored.score > best.0
+        {
+            best = (scored.score, estimate);
+        }
+    }
+    let mut estimate = best.1;
+    for level in (finest..judged).rev() {
+        estimate = refine_at(level, estimate)?;
+    }
+    Ok(estimate)
+}
+
+fn wall_distance(scene: &Scene, k: usize, pose: &Pose) -> Result<f64, ProblemError> {
+    scene
+        .surface
+        .hit(&pose.t_wc, &(pose.r_wc * Vector3::z()))
+        .map(|hit| hit.range)
+        .map_err(|source| ProblemError::Placement { frame: k, source })
+}
+
+/// σ of pitch, yaw and roll as they appear in the picture: a shift across the view looks like a turn.
+fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
+    let turn = jitter.rotation_sigma_rad;
+    let [x, y, z] = jitter.translation_sigma_m;
+    let (along, across) = (y / distance_m, x.max(z) / distance_m);
+    [turn.hypot(along), turn.hypot(across), turn]
 }
 
 fn footprint(
