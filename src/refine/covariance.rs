@@ -1,11 +1,11 @@
 //! How sure the estimate is: marginal covariance of every frame from the sparse factor.
 
-use super::estimate::{FrameEstimate, FrameStep};
+use super::estimate::FrameEstimate;
 use super::factor::{FactorError, Symbolic};
-use super::normal::{Block, NormalEquations, Pattern};
+use super::normal::{NormalEquations, Pattern};
 use crate::camera::Pinhole;
 use crate::surface::{Surface, wall_jacobian};
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::Matrix6;
 use rayon::prelude::*;
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
@@ -21,12 +21,8 @@ pub struct FrameSigma {
     pub wall_px: f64,
 }
 
-/// Information that ties the gauge at the first frame: 1 µrad and 1 µm.
-const GAUGE_INFORMATION: f64 = 1e12;
-
 /// The covariance of every frame's pose: diagonal blocks of `H⁻¹` with H the normal matrix at the estimate
-/// (pixels weighted by their noise, plus prior), after tying turn about the axis and shift along it at the
-/// first frame. What remains is what pixels and prior leave uncertain.
+/// (pixels weighted by their noise, plus prior, the gauge tied at the first frame).
 ///
 /// # Errors
 /// [`FactorError`] if the normal matrix is singular.
@@ -34,18 +30,8 @@ pub fn frame_covariances(
     pattern: &Pattern,
     symbolic: &Symbolic,
     normal: &NormalEquations,
-    estimates: &[FrameEstimate],
 ) -> Result<Vec<Matrix6<f64>>, FactorError> {
-    let mut tied = normal.clone();
-    let pose = &estimates[0].pose;
-    let omega = pose.r_wc.inverse_transform_vector(&Vector3::y());
-    let rho = Vector3::y().cross(&pose.t_wc);
-    let turn =
-        FrameStep::from_column_slice(&[omega.x, omega.y, omega.z, rho.x, rho.y, rho.z, 0.0, 0.0]);
-    let shift = FrameStep::from_column_slice(&[0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
-    let block: Block = (turn * turn.transpose() + shift * shift.transpose()) * GAUGE_INFORMATION;
-    tied.add_block(pattern, 0, 0, &block);
-    let factor = symbolic.factorise(pattern, &tied, 0.0)?;
+    let factor = symbolic.factorise(pattern, normal, 0.0)?;
     Ok((0..pattern.frames())
         .into_par_iter()
         .map(|k| factor.marginal(k).fixed_view::<6, 6>(0, 0).into_owned())

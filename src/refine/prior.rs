@@ -2,6 +2,7 @@
 
 use super::estimate::{FrameEstimate, FrameStep};
 use super::normal::{Block, NormalEquations, Pattern};
+use crate::surface::{Gauge, GaugeMotion};
 use crate::trajectory::{Jitter, JitterModel, Pose, so3};
 use nalgebra::{Matrix6, Vector6};
 use std::ops::Range;
@@ -63,6 +64,17 @@ impl Prior {
             }
         }
         cost
+    }
+
+    /// The gauge motion after which the poses agree best with the prior: at the first frame for a random walk,
+    /// over all frames for independent errors.
+    pub fn settle_gauge(&self, gauge: &Gauge, estimates: &[FrameEstimate]) -> GaugeMotion {
+        let count = match self.jitter.model {
+            JitterModel::RandomWalk => 1,
+            JitterModel::Independent => estimates.len(),
+        };
+        let poses: Vec<Pose> = estimates[..count].iter().map(|e| e.pose).collect();
+        gauge.align(&poses, &self.initial[..count])
     }
 
     /// Half the squared Mahalanobis distance of a pose from where the prior expects it.

@@ -60,6 +60,8 @@ const BATCH: usize = 64;
 const LEAST_ROWS: u32 = 90;
 /// Tiles looked at to estimate the noise.
 const SCALE_TILES: usize = 2000;
+/// Stiffness of the gauge at the first frame over that of its pixels.
+const GAUGE_TIE: f64 = 1e6;
 /// Noise of a pixel over that of a bilinear sample between pixels: each axis averages `f² + (1−f)²` of the
 /// variance, 2/3 over all phases f, so 4/9 for both.
 const PIXEL_OVER_SAMPLE: f64 = 1.5;
@@ -275,10 +277,34 @@ impl<'a> Problem<'a> {
             &self.pattern,
             &mut normal,
         );
+        if self.held_frames() == 0 {
+            self.tie_gauge(&active[0], &mut normal);
+        }
         Linearisation {
             cost,
             normal,
             frames,
+        }
+    }
+
+    fn held_frames(&self) -> usize {
+        self.participants.len() - self.active.len()
+    }
+
+    /// Stiffens the first frame against moving along the gauge, where the pixels say nothing and rounding
+    /// would otherwise decide. Neither cost nor gradient change: where the trajectory stands along the gauge
+    /// is settled in closed form, by [`Prior::settle_gauge`].
+    fn tie_gauge(&self, first: &FrameEstimate, normal: &mut NormalEquations) {
+        let Some(place) = self.pattern.place(0, 0) else {
+            return;
+        };
+        let pose_block = normal.blocks[place].fixed_view::<6, 6>(0, 0).into_owned();
+        for direction in self.surface.gauge().directions(&first.pose) {
+            let stiffness = (direction.transpose() * pose_block * direction)[0]
+                / direction.norm_squared().powi(2);
+            let tie = direction * direction.transpose() * (GAUGE_TIE * stiffness);
+            let mut block = normal.blocks[place].fixed_view_mut::<6, 6>(0, 0);
+            block += tie;
         }
     }
 

@@ -122,7 +122,6 @@ pub fn refine(
         solution.problem.pattern(),
         solution.problem.symbolic(),
         &solution.linearisation.normal,
-        &estimates,
     )
     .map_err(|source| solution.problem.factor_error(source))?;
     let reports: Vec<FrameReport> = (0..count)
@@ -133,6 +132,7 @@ pub fn refine(
         .collect();
     clock.lap("covariance");
 
+    let motion = prior.settle_gauge(&scene.surface.gauge(), &estimates);
     let on_prior = reports
         .iter()
         .filter(|f| f.flag == FrameFlag::Prior)
@@ -143,7 +143,7 @@ pub fn refine(
         .zip(&estimates)
         .map(|(initial, estimate)| StampedPose {
             time_s: initial.time_s,
-            pose: estimate.pose,
+            pose: motion.apply(&estimate.pose),
         })
         .collect();
     Ok(Refined {

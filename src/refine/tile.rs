@@ -34,6 +34,9 @@ use nalgebra::{Matrix4, Vector4};
 /// Samples of a tile without its ring.
 pub const SAMPLES: usize = TILE * TILE;
 
+/// Steps of reweighting from the plain mean to the robust texture.
+const REWEIGHTINGS: usize = 2;
+
 /// Moments of one observer of a tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ObserverMoments {
@@ -59,6 +62,8 @@ struct Samples {
     pixels: f32,
     /// Gain a.
     gain: f32,
+    /// Robust weight ω at every wall sample.
+    weights: [f32; AREA],
 }
 
 /// Room for the work on one tile, reused from tile to tile.
@@ -82,6 +87,7 @@ impl TileWork {
                 values,
                 pixels,
                 gain: view.gain(),
+                weights: [1.0; AREA],
             });
         }
     }
@@ -100,22 +106,28 @@ impl TileWork {
         sum.map(|s| s / total)
     }
 
-    /// The mean once more, with the robust weights around the plain one.
-    fn texture(&self, mean: &[f32; AREA], precision: &[f32; AREA]) -> [f32; AREA] {
+    /// One step of iteratively reweighted least squares: sets every weight by the residual from `reference`
+    /// and returns the mean with these weights.
+    ///
+    /// The weighted residuals from that mean sum to zero at every sample, exactly; otherwise the gradient
+    /// would have a part along the gauge, where nothing but the weak prior resists.
+    fn reweight(&mut self, reference: &[f32; AREA], precision: &[f32; AREA]) -> [f32; AREA] {
         let mut sum = [0.0f32; AREA];
-        let mut weights = [1e-12f32; AREA];
-        for frame in &self.samples {
+        let mut total = [1e-12f32; AREA];
+        for frame in &mut self.samples {
             let q = frame.pixels * frame.gain * frame.gain;
             for k in 0..AREA {
-                let e = frame.gain * (frame.values[k] - mean[k]);
-                let w = q * Loss::weight(e * e, precision[k]);
-                weights[k] += w;
-                sum[k] += w * (frame.values[k] - mean[k]);
+                let difference = frame.values[k] - reference[k];
+                let e = frame.gain * difference;
+                let w = Loss::weight(e * e, precision[k]);
+                frame.weights[k] = w;
+                total[k] += q * w;
+                sum[k] += q * w * difference;
             }
         }
-        let mut texture = *mean;
+        let mut texture = *reference;
         for k in 0..AREA {
-            texture[k] += sum[k] / weights[k];
+            texture[k] += sum[k] / total[k];
         }
         texture
     }
@@ -133,7 +145,10 @@ impl TileWork {
         self.sample(points, views);
         let mean = self.mean();
         let precision = gradient_squares(&mean).map(|g2| noise.precision(g2));
-        let texture = self.texture(&mean, &precision);
+        let mut texture = mean;
+        for _ in 0..REWEIGHTINGS {
+            texture = self.reweight(&texture, &precision);
+        }
         let slope_s = (0.5 / spacing_m.0) as f32;
         let slope_h = (0.5 / spacing_m.1) as f32;
         let mut phi = [[0.0f32; SAMPLES]; 3];
@@ -213,19 +228,18 @@ fn observer_moments(
     phi: &[[f32; SAMPLES]; 3],
     precision: &[f32; SAMPLES],
 ) -> ObserverMoments {
-    let mut e = [0.0f32; SAMPLES];
+    let (mut e, mut w) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES]);
     for j in 0..TILE {
         for i in 0..TILE {
-            let k = j * TILE + i;
-            e[k] = frame.gain * (frame.values[(j + 1) * SIDE + i + 1] - phi[2][k]);
+            let (k, c) = (j * TILE + i, (j + 1) * SIDE + i + 1);
+            e[k] = frame.gain * (frame.values[c] - phi[2][k]);
+            w[k] = frame.weights[c];
         }
     }
-    let (mut w, mut we, mut loss) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES], [0.0f32; SAMPLES]);
+    let (mut we, mut loss) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES]);
     for k in 0..SAMPLES {
-        let square = e[k] * e[k];
-        w[k] = Loss::weight(square, precision[k]);
         we[k] = w[k] * e[k];
-        loss[k] = Loss::value(square, precision[k]);
+        loss[k] = Loss::value(e[k] * e[k], precision[k]);
     }
     let (q, a) = (f64::from(frame.pixels), f64::from(frame.gain));
     let inliers = f64::from(sum(&w));

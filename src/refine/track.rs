@@ -10,7 +10,7 @@ use super::options::RefineOptions;
 use super::problem::{Problem, ProblemError, Scene};
 use super::search::FusedWall;
 use crate::progress::Progress;
-use crate::trajectory::{Jitter, JitterModel, Pose, so3};
+use crate::trajectory::{Jitter, JitterModel, Pose};
 use nalgebra::Vector3;
 
 /// Hypotheses refined per frame.
@@ -172,18 +172,9 @@ fn predict(scene: &Scene, placed: &[FrameEstimate]) -> Pose {
         }
         JitterModel::Independent => {
             let first = k.saturating_sub(FARTHEST);
-            let share = 1.0 / (k - first) as f64;
-            let (mut turn, mut shift) = (0.0, 0.0);
-            for (placed, initial) in placed[first..].iter().zip(&initial[first..]) {
-                let moved = placed.pose.r_wc * initial.r_wc.inverse();
-                turn += share * so3::log(&moved).y;
-                shift += share * (placed.pose.t_wc.y - initial.t_wc.y);
-            }
-            let about_axis = so3::exp(&(Vector3::y() * turn));
-            Pose::new(
-                about_axis * initial[k].r_wc,
-                about_axis * initial[k].t_wc + Vector3::y() * shift,
-            )
+            let poses: Vec<Pose> = placed[first..].iter().map(|e| e.pose).collect();
+            let motion = scene.surface.gauge().align(&initial[first..k], &poses);
+            motion.apply(&initial[k])
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The circular tunnel `x² + z² = r²`.
 
-use super::{Hit, Surface, SurfaceError, WallFrame, WallPoint};
+use super::{Gauge, Hit, Surface, SurfaceError, WallFrame, WallPoint};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -95,6 +95,13 @@ impl Surface for Circle {
 
     fn perimeter_m(&self) -> f64 {
         TAU * self.radius_m
+    }
+
+    fn gauge(&self) -> Gauge {
+        Gauge {
+            turn: true,
+            shift: true,
+        }
     }
 
     fn check_inside(&self, t: &Vector3<f64>) -> Result<(), SurfaceError> {

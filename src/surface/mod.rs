@@ -6,9 +6,11 @@
 
 mod circle;
 mod displacement;
+mod gauge;
 
 pub use circle::Circle;
 pub use displacement::wall_jacobian;
+pub use gauge::{Gauge, GaugeMotion};
 
 use nalgebra::Vector3;
 
@@ -97,6 +99,9 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
 
     /// Length of the section's outline, metres: the period of `s`.
     fn perimeter_m(&self) -> f64;
+
+    /// The motions that map the tunnel onto itself.
+    fn gauge(&self) -> Gauge;
 
     /// Checks that a camera stands inside.
     ///
