@@ -43,45 +43,6 @@ impl GreyImage {
         self.data[y * self.width + x]
     }
 
-    /// B-spline
-    pub fn prefilter(&mut self) {
-        fn line(c: &mut [f32]) {
-            let z = 3f32.sqrt() - 2.0;
-            let n = c.len();
-            let lambda = (1.0 - z) * (1.0 - 1.0 / z);
-            for v in c.iter_mut() {
-                *v *= lambda;
-            }
-            let mut s = c[0];
-            let mut zn = z;
-            for v in c.iter().take(20).skip(1) {
-                s += zn * v;
-                zn *= z;
-            }
-            c[0] = s;
-            for k in 1..n {
-                c[k] += z * c[k - 1];
-            }
-            c[n - 1] = (z / (z * z - 1.0)) * (c[n - 1] + z * c[n - 2]);
-            for k in (0..n - 1).rev() {
-                c[k] = z * (c[k + 1] - c[k]);
-            }
-        }
-        for row in self.data.chunks_exact_mut(self.width) {
-            line(row);
-        }
-        let mut col = vec![0.0; self.height];
-        for x in 0..self.width {
-            for y in 0..self.height {
-                col[y] = self.data[y * self.width + x];
-            }
-            line(&mut col);
-            for y in 0..self.height {
-                self.data[y * self.width + x] = col[y];
-            }
-        }
-    }
-
     /// Half the size: each pixel is the `[1 3 3 1]/8 ⊗ [1 3 3 1]/8` mean around the corner shared by four.
     ///
     /// The filter is even, so the new centre lies exactly between the old ones

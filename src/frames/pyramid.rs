@@ -16,11 +16,6 @@ impl Pyramid {
             let next = pyramid[pyramid.len() - 1].halved();
             pyramid.push(next);
         }
-        if std::env::var_os("CUBIC").is_some_and(|v| v == "bs") {
-            for image in &mut pyramid {
-                image.prefilter();
-            }
-        }
         Self { levels: pyramid }
     }
 

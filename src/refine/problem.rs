@@ -241,9 +241,6 @@ impl<'a> Problem<'a> {
             })
             .reduce(NoiseHistogram::default, |a, b| a.merge(&b));
         self.noise = histogram.fit();
-        if std::env::var_os("TS_NOISE").is_some() && self.active.start == 0 {
-            eprintln!("level {} {:?}", self.level, self.noise);
-        }
         self.sigma = PIXEL_OVER_SAMPLE * f64::from(self.noise.floor).sqrt();
     }
 

@@ -60,50 +60,8 @@ impl<'a> View<'a> {
             z[k] = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
         }
         self.camera.project_slices(&mut u, &mut v, &z);
-        if std::env::var_os("CUBIC").is_some() {
-            self.cubic(&u, &v, values)
-        } else {
-            self.bilinear(&u, &v, values)
-        };
+        self.bilinear(&u, &v, values);
         quadrilateral_area(&u, &v) / ((SIDE - 1) * (SIDE - 1)) as f32
-    }
-
-    fn cubic(&self, u: &[f32; AREA], v: &[f32; AREA], values: &mut [f32; AREA]) {
-        let (width, height) = (self.image.width(), self.image.height());
-        let data = self.image.data();
-        let inverse_gain = 1.0 / self.gain;
-        let w = |t: f32| -> [f32; 4] {
-            if std::env::var_os("CUBIC").unwrap() == "bs" {
-                let s = 1.0 - t;
-                [
-                    s * s * s / 6.0,
-                    (4.0 - 6.0 * t * t + 3.0 * t * t * t) / 6.0,
-                    (4.0 - 6.0 * s * s + 3.0 * s * s * s) / 6.0,
-                    t * t * t / 6.0,
-                ]
-            } else {
-                let t2 = t * t;
-                let t3 = t2 * t;
-                [
-                    -0.5 * t + t2 - 0.5 * t3,
-                    1.0 - 2.5 * t2 + 1.5 * t3,
-                    0.5 * t + 2.0 * t2 - 1.5 * t3,
-                    -0.5 * t2 + 0.5 * t3,
-                ]
-            }
-        };
-        for k in 0..AREA {
-            let x0 = u[k].max(1.0).min((width - 3) as f32) as usize;
-            let y0 = v[k].max(1.0).min((height - 3) as f32) as usize;
-            let wx = w((u[k] - x0 as f32).clamp(0.0, 1.0));
-            let wy = w((v[k] - y0 as f32).clamp(0.0, 1.0));
-            let mut sum = 0.0;
-            for j in 0..4 {
-                let row = &data[(y0 + j - 1) * width + x0 - 1..][..4];
-                sum += wy[j] * (wx[0] * row[0] + wx[1] * row[1] + wx[2] * row[2] + wx[3] * row[3]);
-            }
-            values[k] = (sum - self.bias) * inverse_gain;
-        }
     }
 
     fn bilinear(&self, u: &[f32; AREA], v: &[f32; AREA], values: &mut [f32; AREA]) {

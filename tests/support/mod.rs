@@ -1,0 +1,72 @@
+//! What the integration tests share: the fixture, copies of its first frames, and running the program.
+
+// Every test binary uses its own part of this.
+#![allow(dead_code)]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The survey rendered by Blender.
+pub fn blender_survey() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/blender_free48")
+}
+
+/// A writable survey of the fixture's first `count` frames.
+pub fn first_frames(count: usize) -> tempfile::TempDir {
+    let from = blender_survey();
+    let dir = tempfile::tempdir().expect("a temporary folder");
+    std::fs::create_dir(dir.path().join("frames")).expect("a folder for frames");
+    for name in ["survey.toml", "camera.json"] {
+        std::fs::copy(from.join(name), dir.path().join(name)).expect("a copy");
+    }
+    for k in 0..count {
+        let name = format!("frames/{k:06}.jpg");
+        std::fs::copy(from.join(&name), dir.path().join(&name)).expect("a copy of a frame");
+    }
+    for name in ["baseline.tum", "groundtruth.tum"] {
+        let text = std::fs::read_to_string(from.join(name)).expect("poses");
+        let first: Vec<&str> = text.lines().take(count).collect();
+        std::fs::write(dir.path().join(name), first.join("\n") + "\n").expect("poses");
+    }
+    dir
+}
+
+/// Replaces the first occurrence of `from` in a text file by `to`; it must occur.
+pub fn edit(path: &Path, from: &str, to: &str) {
+    let text = std::fs::read_to_string(path).expect("a text file");
+    assert!(text.contains(from), "{} holds no {from:?}", path.display());
+    std::fs::write(path, text.replacen(from, to, 1)).expect("the edited file");
+}
+
+/// Runs the program.
+pub fn tunnelstitch(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+        .args(arguments)
+        .output()
+        .expect("the program starts")
+}
+
+/// Runs the program and expects success; returns standard output.
+pub fn succeed(arguments: &[&str]) -> String {
+    let output = tunnelstitch(arguments);
+    assert!(
+        output.status.success(),
+        "{arguments:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// Runs the program and expects it to fail with `code`; returns standard error.
+pub fn fail(arguments: &[&str], code: i32) -> String {
+    let output = tunnelstitch(arguments);
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
+    assert!(!message.contains("panicked"), "{message}");
+    message
+}
+
+/// A path as an argument.
+pub fn text(path: &Path) -> &str {
+    path.to_str().expect("a path in UTF-8")
+}
