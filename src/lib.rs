@@ -6,9 +6,11 @@
 pub mod atomic;
 pub mod camera;
 pub mod cli;
+pub mod evaluate;
 pub mod frames;
 pub mod progress;
 pub mod refine;
+pub mod render;
 pub mod surface;
 pub mod survey;
 pub mod trajectory;

@@ -2,8 +2,10 @@
 
 use crate::atomic::WriteError;
 use crate::camera::CalibrationError;
+use crate::evaluate::EvaluateError;
 use crate::frames::FrameError;
 use crate::refine::RefineError;
+use crate::render::RenderError;
 use crate::surface::SurfaceError;
 use crate::survey::SurveyError;
 use crate::trajectory::tum::TumError;
@@ -80,8 +82,10 @@ macro_rules! bad_input {
 
 bad_input!(
     CalibrationError,
+    EvaluateError,
     FrameError,
     RefineError,
+    RenderError,
     SurfaceError,
     SurveyError,
     TumError

@@ -1,7 +1,11 @@
 //! The command line: arguments, printing and exit codes; the work is done by the library.
 
+mod compare;
 mod failure;
+mod json;
+mod project;
 mod refine;
+mod stitch;
 mod terminal;
 
 pub use failure::Failure;
@@ -40,6 +44,9 @@ pub struct Global {
 #[derive(Debug, Subcommand)]
 enum Command {
     Refine(refine::RefineArguments),
+    Stitch(stitch::StitchArguments),
+    Compare(compare::CompareArguments),
+    Project(project::ProjectArguments),
 }
 
 /// Parses the arguments and runs the command.
@@ -57,5 +64,8 @@ pub fn run() -> Result<(), Failure> {
     let terminal = Arc::new(Terminal::new(cli.global.quiet));
     match cli.command {
         Command::Refine(arguments) => refine::run(&arguments, &terminal),
+        Command::Stitch(arguments) => stitch::run(&arguments, &terminal),
+        Command::Compare(arguments) => compare::run(&arguments, &terminal),
+        Command::Project(arguments) => project::run(&arguments, &terminal),
     }
 }

@@ -15,7 +15,6 @@
 mod covariance;
 mod estimate;
 mod factor;
-mod footprint;
 mod gauss_newton;
 mod grid;
 mod normal;
@@ -31,7 +30,6 @@ mod track;
 mod view;
 mod visibility;
 
-pub use footprint::Footprint;
 pub use gauss_newton::{SolveRecord, StopReason};
 pub use options::RefineOptions;
 pub use problem::ProblemError;

@@ -11,9 +11,8 @@
 //! that both show, and ν the number of samples that share one independent piece of texture.
 
 use super::estimate::FrameEstimate;
-use super::footprint::Footprint;
 use super::problem::{ProblemError, Scene, sample_spacing};
-use crate::surface::WallPoint;
+use crate::surface::{Footprint, WallPoint};
 use crate::trajectory::{Pose, so3};
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -62,21 +61,25 @@ impl<'a> FusedWall<'a> {
     ) -> Result<Self, ProblemError> {
         let camera = scene.camera.at_level(level);
         let fail = |source| ProblemError::Placement { frame, source };
-        let footprint = Footprint::trace(scene.surface, &camera, pose).map_err(fail)?;
+        let footprint = Footprint::trace(scene.surface, &camera, pose)
+            .map_err(fail)?
+            .widened(margin_m);
         let spacing = sample_spacing(scene.surface, &camera, std::slice::from_ref(pose))
             .map_err(|(_, source)| fail(source))?;
-        let count = |(from, to): (f64, f64)| ((to - from + 2.0 * margin_m) / spacing) as usize;
-        let axis = |range: (f64, f64)| -> Vec<f64> {
-            (0..=count(range))
-                .map(|k| range.0 - margin_m + k as f64 * spacing)
+        let axis = |from: f64, to: f64| -> Vec<f64> {
+            (0..=((to - from) / spacing) as usize)
+                .map(|k| from + k as f64 * spacing)
                 .collect()
         };
-        let (s, h) = (axis(footprint.s_m), axis(footprint.h_m));
+        let (s, h) = (
+            axis(footprint.s_min_m, footprint.s_max_m),
+            axis(footprint.h_min_m, footprint.h_max_m),
+        );
         let origin = scene
             .surface
             .frame(WallPoint {
-                s_m: 0.5 * (footprint.s_m.0 + footprint.s_m.1),
-                h_m: 0.5 * (footprint.h_m.0 + footprint.h_m.1),
+                s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
+                h_m: 0.5 * (footprint.h_min_m + footprint.h_max_m),
             })
             .x_w;
         let mut lattice = Vec::new();

@@ -99,8 +99,8 @@ impl TileWork {
         for frame in &self.samples {
             let q = frame.pixels * frame.gain * frame.gain;
             total += q;
-            for k in 0..AREA {
-                sum[k] += q * frame.values[k];
+            for (sum, value) in sum.iter_mut().zip(&frame.values) {
+                *sum += q * value;
             }
         }
         sum.map(|s| s / total)

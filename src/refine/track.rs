@@ -4,12 +4,12 @@
 //! frames that can overlap again together, every few frames, with the oldest third held, keeps it bounded.
 
 use super::estimate::FrameEstimate;
-use super::footprint::Footprint;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
 use super::problem::{Problem, ProblemError, Scene};
 use super::search::FusedWall;
 use crate::progress::Progress;
+use crate::surface::Footprint;
 use crate::trajectory::{Jitter, JitterModel, Pose};
 use nalgebra::Vector3;
 

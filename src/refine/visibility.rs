@@ -1,9 +1,8 @@
 //! Which frames see which tiles of the wall.
 
-use super::footprint::Footprint;
 use super::grid::{TileId, WallGrid};
 use crate::camera::Pinhole;
-use crate::surface::{Surface, SurfaceError};
+use crate::surface::{Footprint, Surface, SurfaceError};
 use crate::trajectory::Pose;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -104,11 +103,11 @@ fn tiles_of_frame(
 ) -> Result<Vec<TileId>, SurfaceError> {
     let footprint = Footprint::trace(surface, camera, pose)?;
     let (width, height) = grid.tile_size_m();
-    let first_column = (footprint.s_m.0 / width).floor() as i64;
+    let first_column = (footprint.s_min_m / width).floor() as i64;
     let last_column =
-        ((footprint.s_m.1 / width).floor() as i64).min(first_column + grid.columns - 1);
-    let first_row = (footprint.h_m.0 / height).floor() as i64;
-    let last_row = (footprint.h_m.1 / height).floor() as i64;
+        ((footprint.s_max_m / width).floor() as i64).min(first_column + grid.columns - 1);
+    let first_row = (footprint.h_min_m / height).floor() as i64;
+    let last_row = (footprint.h_max_m / height).floor() as i64;
     let inside = |x_w: &nalgebra::Vector3<f64>| {
         camera
             .project(&pose.to_camera(x_w))

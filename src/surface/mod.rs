@@ -6,10 +6,12 @@
 
 mod circle;
 mod displacement;
+mod footprint;
 mod gauge;
 
 pub use circle::Circle;
 pub use displacement::wall_jacobian;
+pub use footprint::{Footprint, shortest_arc};
 pub use gauge::{Gauge, GaugeMotion};
 
 use nalgebra::Vector3;
@@ -61,6 +63,9 @@ pub enum SurfaceError {
     /// The ray runs along the axis and never meets the wall.
     #[error("the ray runs along the tunnel's axis and meets no wall")]
     Parallel,
+    /// The end of the tunnel lies within the picture.
+    #[error("the picture holds the vanishing point of the tunnel's axis, and so wall without end")]
+    LooksAlongTheAxis,
     /// The ray or the camera's position is not a number.
     #[error("the camera's position or viewing direction is not finite")]
     NotFinite,

@@ -1,0 +1,33 @@
+//! Results for programs, on standard output.
+
+use super::Failure;
+use serde::Serialize;
+use std::io::Write;
+
+/// Prints a value as indented JSON with a line break at its end.
+///
+/// # Errors
+/// A standard output that is closed or full.
+pub fn print(value: &impl Serialize) -> Result<(), Failure> {
+    print_text(&text(value)?)
+}
+
+/// Prints JSON that is text already.
+///
+/// # Errors
+/// As [`print`].
+pub fn print_text(text: &str) -> Result<(), Failure> {
+    std::io::stdout()
+        .write_all(text.as_bytes())
+        .map_err(|error| Failure::input(format!("cannot write the JSON: {error}")))
+}
+
+/// A value as indented JSON with a line break at its end.
+///
+/// # Errors
+/// A value that has no JSON, which is a bug.
+pub fn text(value: &impl Serialize) -> Result<String, Failure> {
+    serde_json::to_string_pretty(value)
+        .map(|text| text + "\n")
+        .map_err(|error| Failure::bug(format!("cannot make JSON of the result: {error}")))
+}

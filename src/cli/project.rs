@@ -1,0 +1,95 @@
+//! `tunnelstitch project`: the cylindrical projection of one photo.
+
+use super::stitch::{InterpolationArgument, positive};
+use super::{Failure, Terminal};
+use crate::camera::{Pinhole, read_calibration};
+use crate::frames::{FrameFile, load_colour};
+use crate::render::{Picture, PictureFormat, cylinder, write_picture};
+use std::path::{Path, PathBuf};
+
+/// Projects one photo onto a cylinder around the camera.
+///
+/// Without a calibration the photo's principal point is its middle. What the photo does not show is
+/// transparent; the result is cropped to the rest.
+#[derive(Debug, clap::Args)]
+pub struct ProjectArguments {
+    /// The photo.
+    image: PathBuf,
+    /// The result, .png or .tif.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// Vertical field of view of the photo, degrees.
+    #[arg(long, value_name = "DEG", default_value_t = 60.0, value_parser = field_of_view, conflicts_with_all = ["focal_px", "camera"])]
+    fov_deg: f64,
+    /// Focal length of the photo, pixels, instead of a field of view.
+    #[arg(long, value_name = "F", value_parser = positive, conflicts_with = "camera")]
+    focal_px: Option<f64>,
+    /// Calibration of the camera, instead of a field of view.
+    #[arg(long, value_name = "FILE")]
+    camera: Option<PathBuf>,
+    /// How the photo is sampled between its pixels.
+    #[arg(long, value_enum, default_value_t)]
+    interpolation: InterpolationArgument,
+}
+
+fn field_of_view(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value < 180.0 => Ok(value),
+        _ => Err("must lie between 0 and 180 degrees".to_owned()),
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for an unreadable photo or calibration, a photo of another size than the calibration's, and
+/// an output that cannot be written.
+pub fn run(arguments: &ProjectArguments, terminal: &Terminal) -> Result<(), Failure> {
+    let format =
+        PictureFormat::of(&arguments.out).map_err(|error| Failure::usage(error.to_string()))?;
+    let camera = match &arguments.camera {
+        Some(path) => read_calibration(path)?,
+        None => camera_of(arguments)?,
+    };
+    let file = FrameFile {
+        index: 0,
+        path: arguments.image.clone(),
+    };
+    let photo = Picture::from_decoded(load_colour(&file, camera.width, camera.height)?);
+    let result = cylinder::project(&photo, &camera, arguments.interpolation.into());
+    write_picture(&arguments.out, &result.image, format)?;
+    terminal.say(format!(
+        "{}: {} × {} px, first pixel at û = {}, v̂ = {}",
+        arguments.out.display(),
+        result.image.width(),
+        result.image.height(),
+        result.origin_px[0],
+        result.origin_px[1]
+    ));
+    Ok(())
+}
+
+/// The camera that the arguments describe, for a photo of this size.
+fn camera_of(arguments: &ProjectArguments) -> Result<Pinhole, Failure> {
+    let (width, height) = dimensions(&arguments.image)?;
+    if width < 2 || height < 2 {
+        return Err(Failure::input(format!(
+            "{}: {width} × {height} px is too small for a photo",
+            arguments.image.display()
+        )));
+    }
+    let mut camera = Pinhole::from_vertical_fov(width, height, arguments.fov_deg.to_radians());
+    if let Some(focal_px) = arguments.focal_px {
+        (camera.fx, camera.fy) = (focal_px, focal_px);
+    }
+    Ok(camera)
+}
+
+fn dimensions(path: &Path) -> Result<(u32, u32), Failure> {
+    let fail = |what: String| Failure::input(format!("{}: {what}", path.display()));
+    image::ImageReader::open(path)
+        .and_then(image::ImageReader::with_guessed_format)
+        .map_err(|error| fail(error.to_string()))?
+        .into_dimensions()
+        .map_err(|error| fail(error.to_string()))
+}

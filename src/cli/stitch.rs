@@ -1,0 +1,179 @@
+//! `tunnelstitch stitch`: one panorama from given poses.
+
+use super::{Failure, Terminal, json};
+use crate::progress::Progress;
+use crate::render::{Interpolation, Layout, PictureFormat, StitchOptions, stitch, write_picture};
+use crate::survey::Survey;
+use crate::trajectory::Pose;
+use clap::ValueEnum;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Draws one panorama of the unrolled wall from given poses.
+///
+/// The poses are used as they are; `refine` makes them right.
+#[derive(Debug, clap::Args)]
+pub struct StitchArguments {
+    /// Folder of the survey, or its survey.toml.
+    survey: PathBuf,
+    /// Which poses: `initial` and `truth` are those of survey.toml, anything else is a TUM file.
+    #[arg(long, default_value = "initial", value_name = "initial|truth|FILE")]
+    poses: String,
+    /// The panorama, .png or .tif.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    #[command(flatten)]
+    picture: PictureArguments,
+    /// Treat every camera as standing on the tunnel's axis (to see what its position does).
+    #[arg(long)]
+    ignore_offset: bool,
+    /// Print what was drawn as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// How panoramas are drawn.
+#[derive(Debug, clap::Args)]
+pub struct PictureArguments {
+    /// Pixels per metre of wall [default: the frames' own resolution at the wall].
+    #[arg(long, value_name = "N", value_parser = positive)]
+    pub px_per_metre: Option<f64>,
+    /// How the panorama lies in its file.
+    #[arg(long, value_enum, default_value_t)]
+    pub layout: LayoutArgument,
+    /// How frames are sampled between their pixels.
+    #[arg(long, value_enum, default_value_t)]
+    pub interpolation: InterpolationArgument,
+}
+
+/// Layouts by name.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum LayoutArgument {
+    /// Angle to the right, chainage down: the wall as seen from inside.
+    #[default]
+    ThetaRight,
+    /// The same turned counter-clockwise: chainage to the right, angle up.
+    ChainageRight,
+}
+
+impl From<LayoutArgument> for Layout {
+    fn from(layout: LayoutArgument) -> Self {
+        match layout {
+            LayoutArgument::ThetaRight => Self::ThetaRight,
+            LayoutArgument::ChainageRight => Self::ChainageRight,
+        }
+    }
+}
+
+/// Interpolations by name.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum InterpolationArgument {
+    /// Catmull-Rom: sharp.
+    #[default]
+    Bicubic,
+    /// Softer and faster.
+    Bilinear,
+}
+
+impl From<InterpolationArgument> for Interpolation {
+    fn from(interpolation: InterpolationArgument) -> Self {
+        match interpolation {
+            InterpolationArgument::Bicubic => Self::Bicubic,
+            InterpolationArgument::Bilinear => Self::Bilinear,
+        }
+    }
+}
+
+/// A number above zero, for clap.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("must be a positive number".to_owned()),
+    }
+}
+
+#[derive(Serialize)]
+struct Report {
+    out: PathBuf,
+    width: u32,
+    height: u32,
+    px_per_metre: f64,
+    layout: Layout,
+    chainage_m: [f64; 2],
+    coverage: f64,
+    frames: usize,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for everything wrong with the survey, the poses or the output.
+pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failure> {
+    let format =
+        PictureFormat::of(&arguments.out).map_err(|error| Failure::usage(error.to_string()))?;
+    let survey = Survey::open(&arguments.survey)?;
+    let poses = poses_by_name(&survey, &arguments.poses)?;
+    let options = StitchOptions {
+        px_per_metre: arguments.picture.px_per_metre,
+        interpolation: arguments.picture.interpolation.into(),
+        ignore_offset: arguments.ignore_offset,
+    };
+    let panorama = stitch(
+        survey.surface.as_ref(),
+        &survey.camera,
+        &survey.frames,
+        &poses,
+        &options,
+        terminal,
+    )?;
+    let canvas = *panorama.canvas();
+    let coverage = panorama.coverage();
+    let layout = arguments.picture.layout.into();
+    let image = panorama.into_image(layout);
+    let report = Report {
+        out: arguments.out.clone(),
+        width: image.width(),
+        height: image.height(),
+        px_per_metre: canvas.px_per_metre,
+        layout,
+        chainage_m: canvas.chainage_m(),
+        coverage,
+        frames: survey.frames.len(),
+    };
+    terminal.start("writing", 1);
+    let written = write_picture(&arguments.out, &image, format);
+    terminal.finish();
+    written?;
+    if arguments.json {
+        return json::print(&report);
+    }
+    terminal.say(format!(
+        "{}: {} × {} px, {:.2} px per metre, chainage {:.3} to {:.3} m, {:.1} % covered by {} frames",
+        arguments.out.display(),
+        report.width,
+        report.height,
+        report.px_per_metre,
+        report.chainage_m[0],
+        report.chainage_m[1],
+        100.0 * report.coverage,
+        report.frames
+    ));
+    Ok(())
+}
+
+/// The poses that `initial`, `truth` or the name of a TUM file stand for.
+fn poses_by_name(survey: &Survey, name: &str) -> Result<Vec<Pose>, Failure> {
+    match name {
+        "initial" => Ok(survey.initial_poses()),
+        "truth" => match &survey.truth {
+            Some(truth) => Ok(truth.iter().map(|stamped| stamped.pose).collect()),
+            None => Err(Failure::usage(
+                "--poses truth: the survey has no poses.truth; use --poses initial or a TUM file",
+            )),
+        },
+        file => {
+            let trajectory = survey.read_poses(Path::new(file))?;
+            Ok(trajectory.iter().map(|stamped| stamped.pose).collect())
+        }
+    }
+}

@@ -1,0 +1,60 @@
+//! Why an evaluation is impossible.
+
+use crate::render::RenderError;
+use crate::surface::SurfaceError;
+
+/// Why an evaluation is impossible.
+#[derive(Debug, thiserror::Error)]
+pub enum EvaluateError {
+    /// Two trajectories cannot be compared frame by frame.
+    #[error("{estimated} poses are to be compared with {others}; each needs one pose per frame")]
+    Count {
+        /// Poses judged.
+        estimated: usize,
+        /// Poses, or frames, to judge them by.
+        others: usize,
+    },
+    /// There is no pose at all.
+    #[error("no poses to evaluate")]
+    Empty,
+    /// A ray of a frame meets no wall.
+    #[error("frame {frame}, {which} pose: {source}; check the pose, or remove the frame")]
+    Frame {
+        /// Index of the frame.
+        frame: usize,
+        /// "estimated" or "true".
+        which: &'static str,
+        /// What is wrong.
+        source: SurfaceError,
+    },
+    /// Two panoramas lie on different canvases.
+    #[error("the panoramas are {}×{} and {}×{} px; only equal canvases can be compared", first[0], first[1], second[0], second[1])]
+    Canvas {
+        /// Columns and rows of the first.
+        first: [usize; 2],
+        /// Columns and rows of the second.
+        second: [usize; 2],
+    },
+    /// A panorama cannot be drawn.
+    #[error("{which} poses: {source}")]
+    Render {
+        /// "initial", "refined" or "true".
+        which: &'static str,
+        /// What is wrong.
+        source: RenderError,
+    },
+}
+
+/// Checks that `estimated` poses can be paired with `others`.
+///
+/// # Errors
+/// [`EvaluateError::Count`], [`EvaluateError::Empty`].
+pub(super) fn check_pairs(estimated: usize, others: usize) -> Result<(), EvaluateError> {
+    if estimated != others {
+        return Err(EvaluateError::Count { estimated, others });
+    }
+    if estimated == 0 {
+        return Err(EvaluateError::Empty);
+    }
+    Ok(())
+}

@@ -1,0 +1,29 @@
+//! How far poses and pictures are from the truth, and from agreeing with each other.
+//!
+//! | question | answer |
+//! | --- | --- |
+//! | how far off are the poses? | [`trajectory_error`], after removing the gauge |
+//! | how far off is each pixel on the wall? | [`wall_error`] |
+//! | how like the true panorama is this one? | [`image_metrics`] |
+//! | how well do the frames agree, without any truth? | [`seam_residual`] |
+//!
+//! [`compare`] asks all of it for initial and refined poses at once.
+
+mod compare;
+mod error;
+mod image_metrics;
+mod seam;
+mod spread;
+mod ssim;
+mod table;
+mod trajectory_error;
+mod wall_error;
+
+pub use compare::{CompareInput, Comparison, Panoramas, Scores, compare};
+pub use error::EvaluateError;
+pub use image_metrics::{ImageMetrics, image_metrics};
+pub use seam::{SeamResidual, seam_residual};
+pub use spread::Spread;
+pub use table::Row;
+pub use trajectory_error::{TrajectoryError, trajectory_error};
+pub use wall_error::{WallError, wall_error};

@@ -1,0 +1,199 @@
+//! How far poses put the pixels from where they belong, on the wall.
+
+use super::error::check_pairs;
+use super::{EvaluateError, Spread, spread::root_mean_square};
+use crate::camera::Pinhole;
+use crate::surface::{Surface, WallPoint, shortest_arc};
+use crate::trajectory::Pose;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+
+/// Distances on the unrolled wall between where the estimated and the true pose put a pixel.
+///
+/// Over a grid of 9 × 7 pixels a frame, its border included. The mean `Δs` and the mean `Δh` over all pixels
+/// of all frames are removed as far as the tunnel's [gauge](crate::surface::Gauge) leaves them free: no
+/// picture fixes them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WallError {
+    /// Mean `Δs` that was removed, metres.
+    pub shift_s_m: f64,
+    /// Mean `Δh` that was removed, metres.
+    pub shift_h_m: f64,
+    /// All pixels, millimetres.
+    pub mm: Spread,
+    /// All pixels, in pixels of the frame at its centre: metres over `distance / f`, both of the true pose.
+    pub px: Spread,
+    /// Root mean square of each frame, millimetres.
+    pub frame_rms_mm: Vec<f64>,
+    /// Root mean square of each frame, pixels.
+    pub frame_rms_px: Vec<f64>,
+    /// The frame with the greatest root mean square.
+    pub worst_frame: usize,
+    /// Its root mean square, millimetres.
+    pub worst_frame_rms_mm: f64,
+    /// Its root mean square, pixels.
+    pub worst_frame_rms_px: f64,
+}
+
+/// Grid of pixels along u and v.
+const GRID: [u32; 2] = [9, 7];
+
+/// Compares where estimated and true poses put the pixels on the wall.
+///
+/// # Errors
+/// [`EvaluateError::Count`], [`EvaluateError::Empty`]; [`EvaluateError::Frame`] if a ray meets no wall.
+pub fn wall_error(
+    surface: &dyn Surface,
+    camera: &Pinhole,
+    estimated: &[Pose],
+    truth: &[Pose],
+) -> Result<WallError, EvaluateError> {
+    check_pairs(estimated.len(), truth.len())?;
+    let perimeter_m = surface.perimeter_m();
+    let focal_px = (camera.fx * camera.fy).sqrt();
+    let (mut delta_s, mut delta_h, mut pixel_m) = (Vec::new(), Vec::new(), Vec::new());
+    for (frame, (estimate, truth)) in estimated.iter().zip(truth).enumerate() {
+        let hit = |pose: &Pose, which, u, v| {
+            surface
+                .hit(&pose.t_wc, &(pose.r_wc * camera.ray(u, v)))
+                .map_err(|source| EvaluateError::Frame {
+                    frame,
+                    which,
+                    source,
+                })
+        };
+        for j in 0..GRID[1] {
+            for i in 0..GRID[0] {
+                let u = f64::from((camera.width - 1) * i) / f64::from(GRID[0] - 1);
+                let v = f64::from((camera.height - 1) * j) / f64::from(GRID[1] - 1);
+                let here: WallPoint = hit(estimate, "estimated", u, v)?.wall;
+                let there: WallPoint = hit(truth, "true", u, v)?.wall;
+                delta_s.push(here.s_m - there.s_m);
+                delta_h.push(here.h_m - there.h_m);
+            }
+        }
+        pixel_m.push(hit(truth, "true", camera.cx, camera.cy)?.range / focal_px);
+    }
+    let gauge = surface.gauge();
+    let shift_s_m = match gauge.turn {
+        true => mean_arc(&delta_s, perimeter_m),
+        false => 0.0,
+    };
+    let shift_h_m = match gauge.shift {
+        true => delta_h.iter().sum::<f64>() / delta_h.len() as f64,
+        false => 0.0,
+    };
+    let distances_mm: Vec<f64> = delta_s
+        .iter()
+        .zip(&delta_h)
+        .map(|(s, h)| 1e3 * shortest_arc(s - shift_s_m, perimeter_m).hypot(h - shift_h_m))
+        .collect();
+    let per_frame = (GRID[0] * GRID[1]) as usize;
+    let distances_px: Vec<f64> = distances_mm
+        .iter()
+        .enumerate()
+        .map(|(k, mm)| 1e-3 * mm / pixel_m[k / per_frame])
+        .collect();
+    let of_frames = |distances: &[f64]| -> Vec<f64> {
+        distances
+            .chunks_exact(per_frame)
+            .map(root_mean_square)
+            .collect()
+    };
+    let (frame_rms_mm, frame_rms_px) = (of_frames(&distances_mm), of_frames(&distances_px));
+    let worst_frame = (0..frame_rms_px.len())
+        .max_by(|a, b| frame_rms_px[*a].total_cmp(&frame_rms_px[*b]))
+        .unwrap_or_default();
+    Ok(WallError {
+        shift_s_m,
+        shift_h_m,
+        mm: Spread::of(&distances_mm),
+        px: Spread::of(&distances_px),
+        worst_frame,
+        worst_frame_rms_mm: frame_rms_mm[worst_frame],
+        worst_frame_rms_px: frame_rms_px[worst_frame],
+        frame_rms_mm,
+        frame_rms_px,
+    })
+}
+
+/// The mean of arcs on a circle of perimeter P: the direction of `Σ exp(2πi Δs / P)` first, then the mean of
+/// the shortest arcs around it until it stays.
+fn mean_arc(arcs_m: &[f64], perimeter_m: f64) -> f64 {
+    let (mut sin, mut cos) = (0.0, 0.0);
+    for arc in arcs_m {
+        let (s, c) = (TAU * arc / perimeter_m).sin_cos();
+        sin += s;
+        cos += c;
+    }
+    let mut mean = perimeter_m / TAU * sin.atan2(cos);
+    // The arcs across the way change only while the mean moves; a few rounds settle it.
+    for _ in 0..20 {
+        let step = arcs_m
+            .iter()
+            .map(|arc| shortest_arc(arc - mean, perimeter_m))
+            .sum::<f64>()
+            / arcs_m.len() as f64;
+        mean += step;
+        if step.abs() < 1e-15 * perimeter_m {
+            break;
+        }
+    }
+    shortest_arc(mean, perimeter_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::{Circle, GaugeMotion};
+    use crate::trajectory::spiral;
+
+    fn scene() -> (Circle, Pinhole, Vec<Pose>) {
+        let circle = Circle::new(3.0).unwrap();
+        let camera = Pinhole::from_vertical_fov(640, 480, 60f64.to_radians());
+        (circle, camera, spiral(24, 0.1, 30f64.to_radians()))
+    }
+
+    #[test]
+    fn the_gauge_costs_nothing_even_across_the_wrap() {
+        let (circle, camera, truth) = scene();
+        for alpha_rad in [0.3, 3.1, -3.1] {
+            let gauge = GaugeMotion {
+                turn_rad: alpha_rad,
+                shift_m: -7.0,
+            };
+            let error = wall_error(&circle, &camera, &gauge.apply_all(&truth), &truth).unwrap();
+            assert!(error.mm.max < 1e-6, "{}", error.mm.max);
+            assert!((error.shift_s_m - 3.0 * alpha_rad).abs() < 1e-9);
+            assert!((error.shift_h_m + 7.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_frame_pushed_along_the_axis_is_off_by_that_much() {
+        let (circle, camera, truth) = scene();
+        let mut estimated = truth.clone();
+        estimated[5].t_wc.y += 0.024;
+        let error = wall_error(&circle, &camera, &estimated, &truth).unwrap();
+        // The mean shift of 1 mm is removed everywhere.
+        assert!((error.frame_rms_mm[5] - 23.0).abs() < 1e-6);
+        assert!((error.mm.median - 1.0).abs() < 1e-6);
+        assert_eq!(error.worst_frame, 5);
+        let px = 0.023 * camera.fx / 3.0;
+        assert!((error.worst_frame_rms_px - px).abs() < 1e-6);
+        assert!((error.px.max - px).abs() < 1e-6);
+        let rms = ((23.0f64.powi(2) + 23.0) / 24.0).sqrt();
+        assert!((error.mm.rms - rms).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_camera_outside_names_its_frame() {
+        let (circle, camera, truth) = scene();
+        let mut estimated = truth.clone();
+        estimated[2].t_wc.x = 5.0;
+        let message = wall_error(&circle, &camera, &estimated, &truth)
+            .unwrap_err()
+            .to_string();
+        assert!(message.contains("frame 2, estimated pose"), "{message}");
+    }
+}

@@ -1,0 +1,167 @@
+//! The cylindrical projection of one photo.
+
+use super::{Interpolation, Picture};
+use crate::camera::Pinhole;
+use image::{DynamicImage, GrayAlphaImage, RgbaImage};
+use rayon::prelude::*;
+
+/// A photo on the unit cylinder around its camera, unrolled.
+#[derive(Clone, Debug)]
+pub struct CylinderPicture {
+    /// The picture, with alpha 0 outside the photo.
+    pub image: DynamicImage,
+    /// `û` of the first column and `v̂` of the first row, pixels: where the crop begins.
+    pub origin_px: [i64; 2],
+}
+
+/// Projects a photo onto the cylinder of radius 1 around the camera's y axis, with square pixels of the
+/// photo's own focal length:
+///
+/// `û = fx θ + cx`, `v̂ = fy h + cy`, `θ = atan x`, `h = y / √(x² + 1)`, `x = (u − cx)/fx`,
+/// `y = (v − cy)/fy` (pixels, radians, and lengths in units of the radius).
+///
+/// Each pixel of the result is taken back by `x = tan θ`, `y = h √(x² + 1)`. The result is cropped to what
+/// the photo covers. `photo` must be as large as the camera's pictures.
+///
+/// Source: arXiv 1806.10278, Section III.
+pub fn project(photo: &Picture, camera: &Pinhole, interpolation: Interpolation) -> CylinderPicture {
+    let [left, right, top, bottom] = extent(camera);
+    let (first_u, first_v) = (left.ceil() as i64, top.ceil() as i64);
+    let width = (right.floor() as i64 - first_u + 1).max(1) as usize;
+    let height = (bottom.floor() as i64 - first_v + 1).max(1) as usize;
+    let origin = [first_u, first_v];
+    let pixels = match photo.channels() {
+        1 => unroll::<1>(photo, camera, interpolation, origin, [width, height]),
+        _ => unroll::<3>(photo, camera, interpolation, origin, [width, height]),
+    };
+    let (w, h) = (width as u32, height as u32);
+    // `unroll` made exactly these many pixels.
+    let image = match photo.channels() {
+        1 => GrayAlphaImage::from_raw(w, h, pixels).map(DynamicImage::from),
+        _ => RgbaImage::from_raw(w, h, pixels).map(DynamicImage::from),
+    }
+    .unwrap_or_default();
+    CylinderPicture {
+        image,
+        origin_px: origin,
+    }
+}
+
+/// Pixel of the photo → pixel of the unrolled cylinder.
+pub fn to_cylinder(camera: &Pinhole, u: f64, v: f64) -> [f64; 2] {
+    let ray = camera.ray(u, v);
+    let theta = ray.x.atan();
+    let h = ray.y / ray.x.hypot(1.0);
+    [camera.fx * theta + camera.cx, camera.fy * h + camera.cy]
+}
+
+/// Pixel of the unrolled cylinder → pixel of the photo, `None` behind the camera.
+pub fn from_cylinder(camera: &Pinhole, u_hat: f64, v_hat: f64) -> Option<[f64; 2]> {
+    let theta = (u_hat - camera.cx) / camera.fx;
+    if theta.abs() >= std::f64::consts::FRAC_PI_2 {
+        return None;
+    }
+    let x = theta.tan();
+    let y = (v_hat - camera.cy) / camera.fy * x.hypot(1.0);
+    Some([camera.fx * x + camera.cx, camera.fy * y + camera.cy])
+}
+
+/// Least and greatest û, least and greatest v̂ of the photo's pixel centres.
+fn extent(camera: &Pinhole) -> [f64; 4] {
+    let last_u = f64::from(camera.width - 1);
+    let last_v = f64::from(camera.height - 1);
+    let [left, _] = to_cylinder(camera, 0.0, 0.0);
+    let [right, _] = to_cylinder(camera, last_u, 0.0);
+    // h = y / √(x² + 1) has its extremes at the sides and where x is nearest to zero.
+    let columns = [0.0, last_u, camera.cx.clamp(0.0, last_u)];
+    let top = columns.map(|u| to_cylinder(camera, u, 0.0)[1]);
+    let bottom = columns.map(|u| to_cylinder(camera, u, last_v)[1]);
+    [
+        left,
+        right,
+        top.into_iter().fold(f64::INFINITY, f64::min),
+        bottom.into_iter().fold(f64::NEG_INFINITY, f64::max),
+    ]
+}
+
+fn unroll<const C: usize>(
+    photo: &Picture,
+    camera: &Pinhole,
+    interpolation: Interpolation,
+    origin: [i64; 2],
+    [width, height]: [usize; 2],
+) -> Vec<u8> {
+    let mut pixels = vec![0u8; width * height * (C + 1)];
+    pixels
+        .par_chunks_exact_mut(width * (C + 1))
+        .enumerate()
+        .for_each(|(row, out)| {
+            let v_hat = (origin[1] + row as i64) as f64;
+            for (column, pixel) in out.chunks_exact_mut(C + 1).enumerate() {
+                let u_hat = (origin[0] + column as i64) as f64;
+                let seen = from_cylinder(camera, u_hat, v_hat)
+                    .filter(|[u, v]| camera.sees(&nalgebra::Vector2::new(*u, *v), 0.0));
+                if let Some([u, v]) = seen {
+                    let value: [f32; C] = photo.sample(u, v, interpolation);
+                    for (sample, value) in pixel.iter_mut().zip(value) {
+                        // The cast saturates: a cubic overshoots at edges.
+                        *sample = value.round() as u8;
+                    }
+                    pixel[C] = u8::MAX;
+                }
+            }
+        });
+    pixels
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Pinhole {
+        Pinhole::from_vertical_fov(161, 121, 60f64.to_radians())
+    }
+
+    #[test]
+    fn the_two_maps_are_inverse() {
+        let camera = camera();
+        for (u, v) in [(0.0, 0.0), (160.0, 30.0), (80.0, 60.0), (17.5, 119.25)] {
+            let [u_hat, v_hat] = to_cylinder(&camera, u, v);
+            let [again_u, again_v] = from_cylinder(&camera, u_hat, v_hat).unwrap();
+            assert!((again_u - u).abs() < 1e-9 && (again_v - v).abs() < 1e-9);
+        }
+        assert!(from_cylinder(&camera, camera.cx + 2.0 * camera.fx, 0.0).is_none());
+    }
+
+    /// Section III by hand: the corner of a 60° photo.
+    #[test]
+    fn a_corner_lands_where_the_equations_say() {
+        let camera = camera();
+        let f = 60.5 / 30f64.to_radians().tan();
+        let x: f64 = -80.0 / f;
+        let [u_hat, v_hat] = to_cylinder(&camera, 0.0, 0.0);
+        assert!((u_hat - (f * x.atan() + 80.0)).abs() < 1e-9);
+        assert!((v_hat - (-60.0 / (x * x + 1.0).sqrt() + 60.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_crop_is_tight_and_the_middle_column_stays() {
+        let camera = camera();
+        let data = (0..161 * 121).map(|k| (k / 161) as u8).collect();
+        let photo = Picture::new(161, 121, 1, data);
+        let cylinder = project(&photo, &camera, Interpolation::Bicubic);
+        let image = cylinder.image.to_luma_alpha8();
+        // At θ = 0 rows are kept: v̂ = v, from the first to the last.
+        assert_eq!(image.height(), 121);
+        assert_eq!(cylinder.origin_px[1], 0);
+        let middle = (80 - cylinder.origin_px[0]) as u32;
+        for row in 0..121 {
+            assert_eq!(image.get_pixel(middle, row).0, [row as u8, 255]);
+        }
+        // Each side column is covered somewhere, its corner is not.
+        for column in [0, image.width() - 1] {
+            assert_eq!(image.get_pixel(column, 0).0, [0, 0]);
+            assert_eq!(image.get_pixel(column, 60).0[1], 255);
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Why a panorama cannot be drawn.
+
+use crate::frames::FrameError;
+use crate::surface::SurfaceError;
+
+/// Why a panorama cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// Some ray of a frame has no place on the wall.
+    #[error(
+        "frame {frame}: {source}; its picture cannot be laid on the wall: check its pose, or remove the frame"
+    )]
+    Frame {
+        /// Index of the frame.
+        frame: usize,
+        /// What is wrong.
+        source: SurfaceError,
+    },
+    /// Frames and poses do not pair up.
+    #[error("{poses} poses for {frames} frames; every frame needs exactly one pose")]
+    Count {
+        /// Poses given.
+        poses: usize,
+        /// Frames given.
+        frames: usize,
+    },
+    /// The resolution is no number of pixels.
+    #[error("{px_per_metre} px per metre is no resolution; it must be a positive number")]
+    Resolution {
+        /// Pixels per metre asked for.
+        px_per_metre: f64,
+    },
+    /// A picture nobody can mean.
+    #[error(
+        "the panorama would be {columns:.0} × {rows:.0} px ({:.1} Gpx, at most {:.0} are drawn): {perimeter_m:.3} m around and {chainage_m:.3} m along at {px_per_metre:.1} px per metre; lower --px-per-metre, and check radius_m and the units of the poses. Frame {frame} reaches farthest: it spans {span_m:.3} m of chainage",
+        columns * rows / 1e9,
+        limit_px / 1e9
+    )]
+    TooManyPixels {
+        /// Columns around the section.
+        columns: f64,
+        /// Rows along the axis.
+        rows: f64,
+        /// Most pixels drawn.
+        limit_px: f64,
+        /// Length around, metres.
+        perimeter_m: f64,
+        /// Length along, metres.
+        chainage_m: f64,
+        /// Resolution.
+        px_per_metre: f64,
+        /// The frame with the longest footprint.
+        frame: usize,
+        /// Length of its footprint along the axis, metres.
+        span_m: f64,
+    },
+    /// A picture for which this machine is too small.
+    #[error(
+        "a panorama of {columns} × {rows} px and its {frames} frames need {needed_mib} MiB of memory, and {available_mib} MiB are free; lower --px-per-metre, or render fewer frames"
+    )]
+    Memory {
+        /// Columns around the section.
+        columns: u32,
+        /// Rows along the axis.
+        rows: u32,
+        /// Frames to be held.
+        frames: usize,
+        /// Memory needed, MiB.
+        needed_mib: u64,
+        /// Memory free, MiB.
+        available_mib: u64,
+    },
+    /// The output's name does not say a format that can hold the panorama.
+    #[error("{0}")]
+    Format(String),
+    /// A frame's file.
+    #[error(transparent)]
+    Frames(#[from] FrameError),
+}

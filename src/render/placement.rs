@@ -1,0 +1,104 @@
+//! Where the frames lie on the unrolled wall.
+
+use super::RenderError;
+use crate::camera::Pinhole;
+use crate::surface::{Footprint, Surface};
+use crate::trajectory::Pose;
+
+/// A frame with its pose and its place on the wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Camera-to-world pose.
+    pub pose: Pose,
+    /// The part of the wall it sees.
+    pub footprint: Footprint,
+}
+
+/// Places every frame on the wall.
+///
+/// # Errors
+/// [`RenderError::Frame`], for the first frame that has no place.
+pub fn place(
+    surface: &dyn Surface,
+    camera: &Pinhole,
+    poses: &[Pose],
+) -> Result<Vec<Placement>, RenderError> {
+    poses
+        .iter()
+        .enumerate()
+        .map(|(frame, pose)| {
+            Ok(Placement {
+                pose: *pose,
+                footprint: Footprint::trace(surface, camera, pose)
+                    .map_err(|source| RenderError::Frame { frame, source })?,
+            })
+        })
+        .collect()
+}
+
+/// The frames' own resolution at the wall: the median over the frames of `f / distance`, pixels per metre,
+/// with the distance of the wall along the optical axis, metres, and `f = √(fx fy)`, pixels.
+///
+/// # Errors
+/// [`RenderError::Frame`] for a camera that stands outside or looks along the axis.
+pub fn native_px_per_metre(
+    surface: &dyn Surface,
+    camera: &Pinhole,
+    poses: &[Pose],
+) -> Result<f64, RenderError> {
+    let focal_px = (camera.fx * camera.fy).sqrt();
+    let mut resolutions = Vec::with_capacity(poses.len());
+    for (frame, pose) in poses.iter().enumerate() {
+        let ray = pose.r_wc * camera.ray(camera.cx, camera.cy);
+        let hit = surface
+            .hit(&pose.t_wc, &ray)
+            .map_err(|source| RenderError::Frame { frame, source })?;
+        resolutions.push(focal_px / hit.range);
+    }
+    resolutions.sort_by(f64::total_cmp);
+    match resolutions.get(resolutions.len() / 2) {
+        Some(median) => Ok(*median),
+        None => Err(RenderError::Count {
+            poses: 0,
+            frames: 0,
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::Circle;
+    use crate::trajectory::so3;
+    use nalgebra::Vector3;
+    use std::f64::consts::TAU;
+
+    fn camera() -> Pinhole {
+        Pinhole::from_vertical_fov(640, 480, 60f64.to_radians())
+    }
+
+    fn facing(turn: Vector3<f64>) -> Pose {
+        Pose::new(so3::exp(&turn), Vector3::zeros())
+    }
+
+    #[test]
+    fn native_resolution_is_focal_length_over_distance() {
+        let circle = Circle::new(3.0).unwrap();
+        let poses = [facing(Vector3::zeros()), facing(Vector3::y())];
+        let ppm = native_px_per_metre(&circle, &camera(), &poses).unwrap();
+        assert!((ppm - camera().fx / 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_frame_without_a_place_is_named_with_the_remedy() {
+        let circle = Circle::new(3.0).unwrap();
+        let poses = [
+            facing(Vector3::zeros()),
+            facing(Vector3::x() * (-TAU / 4.0)),
+        ];
+        let message = place(&circle, &camera(), &poses).unwrap_err().to_string();
+        for part in ["frame 1", "vanishing point", "check its pose"] {
+            assert!(message.contains(part), "{message}");
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! The canvas in small squares, each with the frames that may see it.
+
+use super::{Canvas, Placement};
+use crate::surface::{Footprint, Surface};
+use nalgebra::Vector3;
+
+/// Edge of a tile, pixels: its wall points and sums stay in the second-level cache.
+const EDGE: u32 = 128;
+
+/// A rectangle of the canvas.
+pub(crate) struct Tile {
+    /// First column.
+    pub column: u32,
+    /// First row.
+    pub row: u32,
+    /// Number of columns.
+    pub columns: u32,
+    /// Number of rows.
+    pub rows: u32,
+    /// Frames whose footprints meet it, in their order.
+    pub frames: Vec<usize>,
+}
+
+impl Tile {
+    /// The wall points of the pixels' centres, row-major, metres.
+    pub fn points(&self, surface: &dyn Surface, canvas: &Canvas) -> Vec<Vector3<f64>> {
+        let mut points = Vec::with_capacity(self.columns as usize * self.rows as usize);
+        for row in self.row..self.row + self.rows {
+            for column in self.column..self.column + self.columns {
+                points.push(surface.frame(canvas.wall(column, row)).x_w);
+            }
+        }
+        points
+    }
+}
+
+/// The tiles of a canvas, in bands from the first row to the last, each band from the first column to the
+/// last.
+pub(crate) fn tiles(
+    surface: &dyn Surface,
+    canvas: &Canvas,
+    placements: &[Placement],
+) -> Vec<Vec<Tile>> {
+    let perimeter_m = surface.perimeter_m();
+    let pixel_m = 1.0 / canvas.px_per_metre;
+    (0..canvas.rows.div_ceil(EDGE))
+        .map(|band| {
+            let row = band * EDGE;
+            let rows = EDGE.min(canvas.rows - row);
+            let h_m = canvas.h_start_m + f64::from(row) * pixel_m;
+            let frames_in = |s_m: f64, width_m: f64, among: &mut dyn Iterator<Item = usize>| {
+                let tile = Footprint {
+                    s_min_m: s_m,
+                    s_max_m: s_m + width_m,
+                    h_min_m: h_m,
+                    h_max_m: h_m + f64::from(rows) * pixel_m,
+                };
+                among
+                    .filter(|frame| {
+                        let footprint = &placements[*frame].footprint;
+                        // The box comes from single rays: 2 % cover what bulges between them.
+                        let span_m = (footprint.s_max_m - footprint.s_min_m)
+                            .max(footprint.h_max_m - footprint.h_min_m);
+                        let margin_m = pixel_m + 0.02 * span_m;
+                        footprint.widened(margin_m).overlaps(&tile, perimeter_m)
+                    })
+                    .collect::<Vec<usize>>()
+            };
+            let in_band = frames_in(0.0, perimeter_m, &mut (0..placements.len()));
+            (0..canvas.columns.div_ceil(EDGE))
+                .map(|across| {
+                    let column = across * EDGE;
+                    let columns = EDGE.min(canvas.columns - column);
+                    let s_m = f64::from(column) * pixel_m;
+                    let width_m = f64::from(columns) * pixel_m;
+                    Tile {
+                        column,
+                        row,
+                        columns,
+                        rows,
+                        frames: frames_in(s_m, width_m, &mut in_band.iter().copied()),
+                    }
+                })
+                .collect()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Pinhole;
+    use crate::render::place;
+    use crate::surface::Circle;
+    use crate::trajectory::spiral;
+
+    #[test]
+    fn tiles_cover_the_canvas_once_and_know_their_frames() {
+        let circle = Circle::new(3.0).unwrap();
+        let camera = Pinhole::from_vertical_fov(64, 48, 1.0);
+        let poses = spiral(12, 0.5, 30f64.to_radians());
+        let placements = place(&circle, &camera, &poses).unwrap();
+        let canvas = Canvas::of_placements(&circle, &placements, 40.0).unwrap();
+        let bands = tiles(&circle, &canvas, &placements);
+        let pixels: u32 = bands
+            .iter()
+            .flatten()
+            .map(|tile| tile.columns * tile.rows)
+            .sum();
+        assert_eq!(pixels as usize, canvas.pixels());
+        for tile in bands.iter().flatten() {
+            let points = tile.points(&circle, &canvas);
+            for (frame, pose) in poses.iter().enumerate() {
+                let seen = points.iter().any(|x_w| {
+                    camera
+                        .project(&pose.to_camera(x_w))
+                        .is_some_and(|pixel| camera.sees(&pixel, 0.0))
+                });
+                assert!(!seen || tile.frames.contains(&frame));
+            }
+        }
+        // Most tiles are seen by a few frames only.
+        let listed: usize = bands.iter().flatten().map(|tile| tile.frames.len()).sum();
+        let all: usize = bands.iter().flatten().count() * poses.len();
+        assert!(listed * 2 < all, "{listed} of {all}");
+    }
+}

@@ -1,0 +1,117 @@
+//! Picture files with transparency.
+
+use super::RenderError;
+use crate::atomic::{self, WriteError};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::codecs::tiff::TiffEncoder;
+use image::{DynamicImage, ImageError};
+use std::io;
+use std::path::Path;
+
+/// A picture format that can hold holes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PictureFormat {
+    /// `.png`: grey or colour with alpha.
+    Png,
+    /// `.tif`, `.tiff`: uncompressed, colour with alpha (grey too, since few programs read grey with
+    /// alpha from TIFF).
+    Tiff,
+}
+
+/// Most pixels of four bytes that fit into a TIFF's 32-bit offsets, with room for its header.
+const TIFF_LIMIT_PX: u64 = (1 << 30) - (1 << 16);
+
+impl PictureFormat {
+    /// The format that a file's name asks for.
+    ///
+    /// # Errors
+    /// [`RenderError::Format`] with the remedy for every other name.
+    pub fn of(path: &Path) -> Result<Self, RenderError> {
+        let extension = path
+            .extension()
+            .map(|extension| extension.to_string_lossy().to_ascii_lowercase())
+            .unwrap_or_default();
+        match extension.as_str() {
+            "png" => Ok(Self::Png),
+            "tif" | "tiff" => Ok(Self::Tiff),
+            "jpg" | "jpeg" => Err(RenderError::Format(format!(
+                "{}: JPEG knows no transparency, and what no frame sees must be transparent; write .png or .tif instead",
+                path.display()
+            ))),
+            _ => Err(RenderError::Format(format!(
+                "{}: the name must end in .png or .tif",
+                path.display()
+            ))),
+        }
+    }
+}
+
+/// Writes a picture; nothing appears under that name unless all of it was written.
+///
+/// # Errors
+/// Whatever the system or the encoder says.
+pub fn write_picture(
+    path: &Path,
+    image: &DynamicImage,
+    format: PictureFormat,
+) -> Result<(), WriteError> {
+    let pixels = u64::from(image.width()) * u64::from(image.height());
+    if format == PictureFormat::Tiff && pixels > TIFF_LIMIT_PX {
+        let what = format!(
+            "{} × {} px are more than a TIFF file holds; write .png, or lower --px-per-metre",
+            image.width(),
+            image.height()
+        );
+        return Err(WriteError::new(path, io::Error::other(what)));
+    }
+    atomic::write(path, |writer| {
+        match format {
+            PictureFormat::Png => {
+                let encoder = PngEncoder::new_with_quality(
+                    writer,
+                    CompressionType::Fast,
+                    FilterType::Adaptive,
+                );
+                image.write_with_encoder(encoder)
+            }
+            PictureFormat::Tiff => {
+                DynamicImage::from(image.to_rgba8()).write_with_encoder(TiffEncoder::new(writer))
+            }
+        }
+        .map_err(|error| match error {
+            ImageError::IoError(source) => source,
+            other => io::Error::other(other),
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::GrayAlphaImage;
+
+    #[test]
+    fn png_and_tiff_keep_the_holes() {
+        let dir = tempfile::tempdir().unwrap();
+        let image = GrayAlphaImage::from_raw(2, 1, vec![77, 255, 0, 0]).unwrap();
+        let image = DynamicImage::from(image);
+        for name in ["a.png", "a.TIF"] {
+            let path = dir.path().join(name);
+            write_picture(&path, &image, PictureFormat::of(&path).unwrap()).unwrap();
+            let again = image::open(&path).unwrap();
+            assert_eq!(again.to_rgba8(), image.to_rgba8(), "{name}");
+        }
+    }
+
+    #[test]
+    fn other_formats_are_refused_with_the_remedy() {
+        for (name, expected) in [
+            ("a.jpg", "transparen"),
+            ("a", ".png or .tif"),
+            ("a.bmp", ".tif"),
+        ] {
+            let message = PictureFormat::of(Path::new(name)).unwrap_err().to_string();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! The part of the wall that a frame sees.
+
+use super::{Surface, SurfaceError};
+use crate::camera::Pinhole;
+use crate::trajectory::Pose;
+use nalgebra::Vector2;
+
+/// Rays along each edge of a frame. The box of the curved outline is short by the sagitta of one step:
+/// about 0.01 px for a 640 px wide frame.
+const STEPS_PER_EDGE: usize = 64;
+
+/// Steps from the middle of a frame to its first corner, to follow `s` without losing a turn.
+const STEPS_TO_CORNER: usize = 16;
+
+/// The shortest way around: `Δs − P round(Δs / P)`, in `[−P/2, P/2]` metres.
+pub fn shortest_arc(delta_s_m: f64, perimeter_m: f64) -> f64 {
+    delta_s_m - perimeter_m * (delta_s_m / perimeter_m).round()
+}
+
+/// Bounding box of a frame on the unrolled wall, metres.
+///
+/// `s` is unwrapped: a frame across θ = 0 has a negative `s_min_m` or an `s_max_m` beyond the perimeter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footprint {
+    /// Least arc length.
+    pub s_min_m: f64,
+    /// Greatest arc length.
+    pub s_max_m: f64,
+    /// Least chainage.
+    pub h_min_m: f64,
+    /// Greatest chainage.
+    pub h_max_m: f64,
+}
+
+impl Footprint {
+    /// Traces the frame's border on the wall, through the outermost pixel centres.
+    ///
+    /// Pixel → wall is one-to-one and smooth, so `s` and `h` take their extremes on the frame's border.
+    ///
+    /// # Errors
+    /// A camera outside the tunnel; [`SurfaceError::Parallel`] for a border pixel that looks along the axis;
+    /// [`SurfaceError::LooksAlongTheAxis`] if the axis's vanishing point lies within the picture.
+    pub fn trace(
+        surface: &dyn Surface,
+        camera: &Pinhole,
+        pose: &Pose,
+    ) -> Result<Self, SurfaceError> {
+        let perimeter_m = surface.perimeter_m();
+        let wall = |pixel: &Vector2<f64>| {
+            surface
+                .hit(&pose.t_wc, &(pose.r_wc * camera.ray(pixel.x, pixel.y)))
+                .map(|hit| hit.wall)
+        };
+        let border = camera.border(STEPS_PER_EDGE, 0.0);
+        let middle = 0.5 * Vector2::new(f64::from(camera.width - 1), f64::from(camera.height - 1));
+        // `s` near the point before, so that no turn is lost on the way to the corner and around.
+        let follow = |s_m: f64, before_m: f64| before_m + shortest_arc(s_m - before_m, perimeter_m);
+        let inward = |error| match error {
+            SurfaceError::Parallel => SurfaceError::LooksAlongTheAxis,
+            other => other,
+        };
+        let mut s_m = wall(&middle).map_err(inward)?.s_m;
+        for step in 1..STEPS_TO_CORNER {
+            let pixel = middle + (border[0] - middle) * (step as f64 / STEPS_TO_CORNER as f64);
+            s_m = follow(wall(&pixel).map_err(inward)?.s_m, s_m);
+        }
+        s_m = follow(wall(&border[0])?.s_m, s_m);
+        let s_first_m = s_m;
+        let mut footprint = Self {
+            s_min_m: f64::INFINITY,
+            s_max_m: f64::NEG_INFINITY,
+            h_min_m: f64::INFINITY,
+            h_max_m: f64::NEG_INFINITY,
+        };
+        // Once around and back to the first point.
+        for pixel in border.iter().chain(&border[..1]) {
+            let point = wall(pixel)?;
+            s_m = follow(point.s_m, s_m);
+            footprint.s_min_m = footprint.s_min_m.min(s_m);
+            footprint.s_max_m = footprint.s_max_m.max(s_m);
+            footprint.h_min_m = footprint.h_min_m.min(point.h_m);
+            footprint.h_max_m = footprint.h_max_m.max(point.h_m);
+        }
+        if (s_m - s_first_m).abs() > 0.5 * perimeter_m {
+            return Err(SurfaceError::LooksAlongTheAxis);
+        }
+        Ok(footprint)
+    }
+
+    /// True if the two share some wall; turns around the tunnel do not count.
+    pub fn overlaps(&self, other: &Self, perimeter_m: f64) -> bool {
+        if self.h_min_m > other.h_max_m || other.h_min_m > self.h_max_m {
+            return false;
+        }
+        let behind = (other.s_min_m - self.s_min_m).rem_euclid(perimeter_m);
+        behind <= self.s_max_m - self.s_min_m
+            || behind + other.s_max_m - other.s_min_m >= perimeter_m
+    }
+
+    /// The box with `margin_m` more on every side, metres.
+    pub fn widened(&self, margin_m: f64) -> Self {
+        Self {
+            s_min_m: self.s_min_m - margin_m,
+            s_max_m: self.s_max_m + margin_m,
+            h_min_m: self.h_min_m - margin_m,
+            h_max_m: self.h_max_m + margin_m,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::Circle;
+    use crate::trajectory::{so3, spiral};
+    use nalgebra::Vector3;
+    use std::f64::consts::TAU;
+
+    fn camera() -> Pinhole {
+        Pinhole::from_vertical_fov(640, 480, 60f64.to_radians())
+    }
+
+    fn facing(turn: Vector3<f64>) -> Pose {
+        Pose::new(so3::exp(&turn), Vector3::zeros())
+    }
+
+    #[test]
+    fn a_centred_frame_spans_its_field_of_view() {
+        let circle = Circle::new(3.0).unwrap();
+        let camera = camera();
+        let footprint = Footprint::trace(&circle, &camera, &facing(Vector3::zeros())).unwrap();
+        let half_angle = (camera.cx / camera.fx).atan();
+        assert!((footprint.s_max_m - 3.0 * half_angle).abs() < 1e-9);
+        assert!((footprint.s_min_m + 3.0 * half_angle).abs() < 1e-9);
+        // The middle of the upper edge is the farthest up: h = −r cy/f, met within the sagitta.
+        let h_m = 3.0 * camera.cy / camera.fy;
+        assert!((footprint.h_max_m - h_m).abs() < 1e-9 && (footprint.h_min_m + h_m).abs() < 1e-9);
+    }
+
+    #[test]
+    fn neighbours_overlap_across_the_seam_and_opposites_do_not() {
+        let circle = Circle::new(3.0).unwrap();
+        let poses = spiral(13, 0.1, 30f64.to_radians());
+        let at = |k: usize| Footprint::trace(&circle, &camera(), &poses[k]).unwrap();
+        let perimeter = circle.perimeter_m();
+        for (a, b, expected) in [(0, 11, true), (11, 0, true), (0, 12, true), (0, 6, false)] {
+            assert_eq!(at(a).overlaps(&at(b), perimeter), expected, "{a} and {b}");
+        }
+    }
+
+    #[test]
+    fn meeting_a_box_minds_the_wrap() {
+        let at = |s_m: f64, h_m: f64, size_m: f64| Footprint {
+            s_min_m: s_m,
+            s_max_m: s_m + size_m,
+            h_min_m: h_m,
+            h_max_m: h_m + size_m,
+        };
+        let footprint = Footprint {
+            s_min_m: -1.0,
+            s_max_m: 2.0,
+            h_min_m: 0.0,
+            h_max_m: 1.0,
+        };
+        let meets = |s_m, h_m| footprint.overlaps(&at(s_m, h_m, 0.5), TAU);
+        assert!(meets(0.0, 0.5) && meets(TAU - 0.9, 0.5) && meets(TAU - 1.4, 0.5));
+        assert!(!meets(2.1, 0.5) && !meets(TAU - 1.6, 0.5) && !meets(0.0, 1.1));
+        assert!(!meets(0.0, -0.6) && meets(0.0, -0.4));
+        assert!(footprint.widened(0.2).overlaps(&at(2.1, 0.5, 0.5), TAU));
+    }
+
+    #[test]
+    fn frames_without_an_end_and_cameras_outside_are_refused() {
+        let circle = Circle::new(3.0).unwrap();
+        let camera = camera();
+        let trace = |camera: &Pinhole, pose: &Pose| Footprint::trace(&circle, camera, pose);
+        let along = facing(Vector3::x() * (-TAU / 4.0));
+        assert_eq!(trace(&camera, &along), Err(SurfaceError::LooksAlongTheAxis));
+        // The vanishing point within the picture, on no ray that is traced.
+        let nearly = facing(Vector3::x() * (0.13 - TAU / 4.0));
+        assert_eq!(
+            trace(&camera, &nearly),
+            Err(SurfaceError::LooksAlongTheAxis)
+        );
+        // The middle of the upper edge exactly along the axis.
+        let mut odd = camera;
+        (odd.width, odd.cx) = (641, 320.0);
+        let tilt = facing(Vector3::x() * (TAU / 4.0 - (camera.cy / camera.fy).atan()));
+        assert_eq!(trace(&odd, &tilt), Err(SurfaceError::Parallel));
+        let outside = Pose::new(so3::exp(&Vector3::zeros()), Vector3::x() * 4.0);
+        assert!(matches!(
+            trace(&camera, &outside),
+            Err(SurfaceError::CameraOutside { .. })
+        ));
+    }
+}
