@@ -1,7 +1,45 @@
-//! Files that are complete or absent: written under a temporary name beside the target, then renamed.
+//! Files and folders that are complete or absent: written under a temporary name beside the target, then
+//! renamed.
+//!
+//! What is unfinished is removed when writing fails, and by [`remove_unfinished`] when the program is
+//! interrupted.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use tempfile::{TempDir, TempPath};
+
+/// Temporary names in use.
+static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// A temporary name on the list of unfinished ones for as long as this lives.
+struct Listed(PathBuf);
+
+impl Listed {
+    fn new(path: &Path) -> Self {
+        let mut list = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+        list.push(path.to_owned());
+        Self(path.to_owned())
+    }
+}
+
+impl Drop for Listed {
+    fn drop(&mut self) {
+        let mut list = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+        list.retain(|path| *path != self.0);
+    }
+}
+
+/// Removes every file and folder that is being written. For a program about to be ended from outside: the
+/// writers are not told and must not go on, so the list stays locked until the process ends.
+pub fn remove_unfinished() {
+    let list = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    for path in list.iter() {
+        // Nobody is left to tell if the system refuses.
+        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
+    }
+    std::mem::forget(list);
+}
 
 /// An output that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -32,20 +70,17 @@ pub fn write(
     fill: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
 ) -> Result<(), WriteError> {
     let fail = |source| WriteError::new(path, source);
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
     let mut builder = tempfile::Builder::new();
-    builder.prefix(".tunnelstitch-").suffix(".part");
+    builder.prefix(PREFIX).suffix(".part");
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
         // Those of a plain new file; the system applies the process's umask.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
-    let temporary = builder.tempfile_in(folder).map_err(fail)?;
-    let (file, temporary_path) = temporary.into_parts();
+    let temporary = builder.tempfile_in(beside(path)).map_err(fail)?;
+    let (file, temporary_path): (_, TempPath) = temporary.into_parts();
+    let _listed = Listed::new(&temporary_path);
     let mut writer = std::io::BufWriter::new(file);
     fill(&mut writer).map_err(fail)?;
     writer.flush().map_err(fail)?;
@@ -61,6 +96,79 @@ pub fn write(
 /// As [`write`].
 pub fn write_text(path: &Path, text: &str) -> Result<(), WriteError> {
     write(path, |writer| writer.write_all(text.as_bytes()))
+}
+
+/// Beginning of temporary names.
+const PREFIX: &str = ".tunnelstitch-";
+
+/// The folder that holds `path`.
+fn beside(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    }
+}
+
+/// A folder that is being filled under a temporary name beside its final one.
+pub struct StagedFolder {
+    temporary: TempDir,
+    listed: Listed,
+    target: PathBuf,
+}
+
+impl StagedFolder {
+    /// Begins the folder that will be `target`; the folders above it are made if missing.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn begin(target: &Path) -> Result<Self, WriteError> {
+        let parent = beside(target);
+        create_folder(parent)?;
+        let temporary = tempfile::Builder::new()
+            .prefix(PREFIX)
+            .tempdir_in(parent)
+            .map_err(|source| WriteError::new(target, source))?;
+        Ok(Self {
+            listed: Listed::new(temporary.path()),
+            temporary,
+            target: target.to_owned(),
+        })
+    }
+
+    /// Where to write for now.
+    pub fn path(&self) -> &Path {
+        self.temporary.path()
+    }
+
+    /// Gives the folder its final name; a folder of that name is replaced.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn finish(self) -> Result<(), WriteError> {
+        let fail = |source| WriteError::new(&self.target, source);
+        if self.target.exists() {
+            std::fs::remove_dir_all(&self.target).map_err(fail)?;
+        }
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            // A temporary folder is private; the finished one is as its parent.
+            let mode = std::fs::metadata(beside(&self.target))
+                .map_err(fail)?
+                .permissions()
+                .mode();
+            std::fs::set_permissions(
+                self.temporary.path(),
+                std::fs::Permissions::from_mode(mode & 0o777),
+            )
+            .map_err(fail)?;
+        }
+        std::fs::rename(self.temporary.path(), &self.target).map_err(fail)?;
+        drop(self.listed);
+        // It is no longer temporary.
+        let _ = self.temporary.keep();
+        Ok(())
+    }
 }
 
 /// Makes a folder and those above it.
@@ -87,5 +195,23 @@ mod tests {
         assert!(failed.unwrap_err().to_string().contains("disk full"));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_staged_folder_appears_whole_or_not_at_all() {
+        let dir = tempfile::tempdir().unwrap();
+        let target = dir.path().join("deep/folder");
+        let abandoned = StagedFolder::begin(&target).unwrap();
+        write_text(&abandoned.path().join("a.txt"), "half").unwrap();
+        drop(abandoned);
+        assert!(!target.exists());
+        for text in ["first", "second"] {
+            let staged = StagedFolder::begin(&target).unwrap();
+            write_text(&staged.path().join("a.txt"), text).unwrap();
+            staged.finish().unwrap();
+            assert_eq!(std::fs::read_to_string(target.join("a.txt")).unwrap(), text);
+        }
+        let litter = std::fs::read_dir(dir.path().join("deep")).unwrap().count();
+        assert_eq!(litter, 1);
     }
 }

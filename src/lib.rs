@@ -13,4 +13,6 @@ pub mod refine;
 pub mod render;
 pub mod surface;
 pub mod survey;
+#[cfg(test)]
+mod test_wall;
 pub mod trajectory;

@@ -27,7 +27,7 @@ use crate::camera::{CalibrationError, Pinhole, read_calibration};
 use crate::frames::{self, FrameError, FrameFile};
 use crate::surface::{Circle, Surface, SurfaceError};
 use crate::trajectory::tum::{self, TumError};
-use crate::trajectory::{Jitter, JitterModel, Pose, Trajectory};
+use crate::trajectory::{Jitter, JitterModel, Pose, Trajectory, poses_of};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -303,7 +303,7 @@ impl Survey {
 
     /// The initial poses without their times.
     pub fn initial_poses(&self) -> Vec<Pose> {
-        self.initial.iter().map(|stamped| stamped.pose).collect()
+        poses_of(&self.initial)
     }
 }
 

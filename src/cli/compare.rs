@@ -1,19 +1,21 @@
 //! `tunnelstitch compare`: initial against refined poses.
 
 use super::stitch::{PictureArguments, positive};
-use super::{Failure, Terminal, json};
+use super::{Failure, PROGRAM, Terminal, json};
 use crate::atomic;
-use crate::evaluate::{CompareInput, Comparison, compare};
+use crate::evaluate::{CompareInput, Comparison, before_after, compare};
 use crate::progress::Progress;
-use crate::render::{Layout, Panorama, PictureFormat, write_picture};
+use crate::render::{Layout, PictureFormat, write_picture};
 use crate::survey::Survey;
-use crate::trajectory::Pose;
+use crate::trajectory::poses_of;
+use image::DynamicImage;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Compares the survey's initial poses with refined ones, and both with the true ones where known.
 ///
-/// Writes baseline.png, refined.png, truth.png (all of the same stretch of wall) and compare.json.
+/// Writes baseline.png, refined.png, truth.png (all of the same stretch of wall), before-after.png (a small
+/// extract of the first above the second) and compare.json.
 #[derive(Debug, clap::Args)]
 pub struct CompareArguments {
     /// Folder of the survey, or its survey.toml.
@@ -38,6 +40,7 @@ pub struct CompareArguments {
 /// `compare.json`.
 #[derive(Serialize)]
 struct Report<'a> {
+    program: &'static str,
     survey: &'a Path,
     refined_poses: &'a Path,
     layout: Layout,
@@ -57,13 +60,39 @@ pub fn run(arguments: &CompareArguments, terminal: &Terminal) -> Result<(), Fail
             "--max-wall-px needs true poses, and the survey has no poses.truth",
         ));
     }
-    let refined = survey.read_poses(&arguments.refined)?;
-    let only_poses = |trajectory: &crate::trajectory::Trajectory| -> Vec<Pose> {
-        trajectory.iter().map(|stamped| stamped.pose).collect()
-    };
-    let (initial, refined) = (survey.initial_poses(), only_poses(&refined));
-    let truth = survey.truth.as_ref().map(only_poses);
-    atomic::create_folder(&arguments.out)?;
+    let (comparison, json) = compare_into(
+        &survey,
+        &arguments.refined,
+        &arguments.picture,
+        &arguments.out,
+        terminal,
+    )?;
+    if arguments.json {
+        json::print_text(&json)?;
+    } else {
+        terminal.say(comparison.to_string());
+        terminal.say(format!("wrote {}", arguments.out.display()));
+    }
+    gate(&comparison, arguments.max_wall_px)
+}
+
+/// Compares and writes the panoramas and compare.json into `out`; returns the text of the latter too.
+///
+/// # Errors
+/// Bad input, or an output that cannot be written.
+pub fn compare_into(
+    survey: &Survey,
+    refined_file: &Path,
+    picture: &PictureArguments,
+    out: &Path,
+    terminal: &Terminal,
+) -> Result<(Comparison, String), Failure> {
+    let (initial, refined) = (
+        survey.initial_poses(),
+        poses_of(&survey.read_poses(refined_file)?),
+    );
+    let truth = survey.truth.as_deref().map(poses_of);
+    atomic::create_folder(out)?;
     let input = CompareInput {
         surface: survey.surface.as_ref(),
         camera: &survey.camera,
@@ -71,42 +100,38 @@ pub fn run(arguments: &CompareArguments, terminal: &Terminal) -> Result<(), Fail
         initial: &initial,
         refined: &refined,
         truth: truth.as_deref(),
-        px_per_metre: arguments.picture.px_per_metre,
-        interpolation: arguments.picture.interpolation.into(),
+        px_per_metre: picture.px_per_metre,
+        interpolation: picture.interpolation.into(),
     };
     let (comparison, panoramas) = compare(&input, terminal)?;
-    let layout = arguments.picture.layout.into();
-    let report = json::text(&Report {
-        survey: &arguments.survey,
-        refined_poses: &arguments.refined,
+    let layout = picture.layout.into();
+    let json = json::text(&Report {
+        program: PROGRAM,
+        survey: &survey.folder,
+        refined_poses: refined_file,
         layout,
         comparison: &comparison,
     })?;
-    let pictures = [
-        ("baseline.png", Some(panoramas.baseline)),
-        ("refined.png", Some(panoramas.refined)),
-        ("truth.png", panoramas.truth),
-    ];
-    terminal.start("writing", pictures.len());
-    for (name, panorama) in pictures {
-        if let Some(panorama) = panorama {
-            write(&arguments.out.join(name), panorama, layout)?;
-        }
+    terminal.start("writing", 4);
+    let write = |name: &str, image: &DynamicImage| -> Result<(), Failure> {
+        write_picture(&out.join(name), image, PictureFormat::Png)?;
         terminal.advance(1);
+        Ok(())
+    };
+    let baseline = panoramas.baseline.into_image(Layout::ThetaRight);
+    let refined = panoramas.refined.into_image(Layout::ThetaRight);
+    write(
+        "before-after.png",
+        &before_after(&baseline, &refined).into(),
+    )?;
+    write("baseline.png", &layout.turn(baseline))?;
+    write("refined.png", &layout.turn(refined))?;
+    if let Some(truth) = panoramas.truth {
+        write("truth.png", &truth.into_image(layout))?;
     }
     terminal.finish();
-    atomic::write_text(&arguments.out.join("compare.json"), &report)?;
-    if arguments.json {
-        json::print_text(&report)?;
-    } else {
-        terminal.say(comparison.to_string());
-    }
-    gate(&comparison, arguments.max_wall_px)
-}
-
-fn write(path: &Path, panorama: Panorama, layout: Layout) -> Result<(), Failure> {
-    let image = panorama.into_image(layout);
-    Ok(write_picture(path, &image, PictureFormat::Png)?)
+    atomic::write_text(&out.join("compare.json"), &json)?;
+    Ok((comparison, json))
 }
 
 /// Fails if the refined wall error is above the limit.

@@ -7,7 +7,7 @@ use std::io::Write;
 /// Prints a value as indented JSON with a line break at its end.
 ///
 /// # Errors
-/// A standard output that is closed or full.
+/// A standard output that is full.
 pub fn print(value: &impl Serialize) -> Result<(), Failure> {
     print_text(&text(value)?)
 }
@@ -17,9 +17,13 @@ pub fn print(value: &impl Serialize) -> Result<(), Failure> {
 /// # Errors
 /// As [`print`].
 pub fn print_text(text: &str) -> Result<(), Failure> {
-    std::io::stdout()
-        .write_all(text.as_bytes())
-        .map_err(|error| Failure::input(format!("cannot write the JSON: {error}")))
+    match std::io::stdout().write_all(text.as_bytes()) {
+        // A reader that has left (`| head`) is no error.
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::input(format!("cannot write the JSON: {error}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// A value as indented JSON with a line break at its end.

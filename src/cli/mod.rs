@@ -11,8 +11,12 @@ mod terminal;
 pub use failure::Failure;
 pub use terminal::Terminal;
 
+use crate::atomic;
 use clap::{Parser, Subcommand};
 use std::sync::Arc;
+
+/// Name and version, as results carry them.
+const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
 
 /// Repairs the trajectory of a revolving tunnel camera by photometric consistency and unrolls the wall into
 /// one metric panorama.
@@ -61,6 +65,12 @@ pub fn run() -> Result<(), Failure> {
             .build_global()
             .map_err(|error| Failure::bug(format!("cannot start {threads} threads: {error}")))?;
     }
+    // Nothing half-written stays behind; 130 is what a shell expects after Ctrl-C.
+    ctrlc::set_handler(|| {
+        atomic::remove_unfinished();
+        std::process::exit(130);
+    })
+    .map_err(|error| Failure::bug(format!("cannot watch for Ctrl-C: {error}")))?;
     let terminal = Arc::new(Terminal::new(cli.global.quiet));
     match cli.command {
         Command::Refine(arguments) => refine::run(&arguments, &terminal),

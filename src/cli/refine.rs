@@ -1,11 +1,12 @@
 //! `tunnelstitch refine`.
 
-use super::{Failure, Terminal};
+use super::{Failure, PROGRAM, Terminal, json};
 use crate::atomic;
 use crate::progress::Progress;
-use crate::refine::{FrameFlag, RefineOptions, Refined, refine};
-use crate::survey::Survey;
+use crate::refine::{FrameFlag, RefineOptions, RefineReport, Refined, refine};
+use crate::survey::{Survey, SurveyFile};
 use crate::trajectory::tum;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -28,22 +29,32 @@ pub struct RefineArguments {
     json: bool,
 }
 
+/// `refine.json`.
+#[derive(Serialize)]
+struct ReportFile<'a> {
+    /// Name and version of the program.
+    program: &'static str,
+    /// The survey as given, and what its survey.toml says.
+    survey: &'a Path,
+    survey_file: &'a SurveyFile,
+    /// The effective options.
+    options: &'a RefineOptions,
+    #[serde(flatten)]
+    report: &'a RefineReport,
+}
+
 /// Runs the command.
 ///
 /// # Errors
 /// Bad input, or an output that cannot be written.
 pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), Failure> {
-    let survey = Survey::open(&arguments.survey)?;
-    atomic::create_folder(&arguments.out)?;
     let options = RefineOptions {
         max_iterations: arguments.max_iterations,
         ..RefineOptions::default()
     };
-    let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
-    let refined = refine(&survey, &options, &progress)?;
-    let json = write(&refined, &arguments.out)?;
+    let (refined, json) = refine_into(&arguments.survey, &options, &arguments.out, terminal)?;
     if arguments.json {
-        println!("{json}");
+        json::print_text(&json)?;
     } else {
         summarise(&refined, terminal);
         terminal.say(format!(
@@ -55,16 +66,30 @@ pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), 
     Ok(())
 }
 
-/// Writes poses.tum and refine.json; returns the text of the latter.
+/// Refines a survey and writes poses.tum and refine.json into `out`; returns the text of the latter too.
 ///
 /// # Errors
-/// An output that cannot be written.
-pub fn write(refined: &Refined, out: &Path) -> Result<String, Failure> {
-    let json = serde_json::to_string_pretty(&refined.report)
-        .map_err(|error| Failure::bug(error.to_string()))?;
+/// Bad input, or an output that cannot be written.
+pub fn refine_into(
+    survey_path: &Path,
+    options: &RefineOptions,
+    out: &Path,
+    terminal: &Arc<Terminal>,
+) -> Result<(Refined, String), Failure> {
+    let survey = Survey::open(survey_path)?;
+    atomic::create_folder(out)?;
+    let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
+    let refined = refine(&survey, options, &progress)?;
+    let json = json::text(&ReportFile {
+        program: PROGRAM,
+        survey: survey_path,
+        survey_file: &survey.file,
+        options,
+        report: &refined.report,
+    })?;
     atomic::write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
     atomic::write_text(&out.join("refine.json"), &json)?;
-    Ok(json)
+    Ok((refined, json))
 }
 
 /// Prints what the refinement did.

@@ -4,7 +4,7 @@ use super::{Failure, Terminal, json};
 use crate::progress::Progress;
 use crate::render::{Interpolation, Layout, PictureFormat, StitchOptions, stitch, write_picture};
 use crate::survey::Survey;
-use crate::trajectory::Pose;
+use crate::trajectory::{Pose, poses_of};
 use clap::ValueEnum;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -166,14 +166,11 @@ fn poses_by_name(survey: &Survey, name: &str) -> Result<Vec<Pose>, Failure> {
     match name {
         "initial" => Ok(survey.initial_poses()),
         "truth" => match &survey.truth {
-            Some(truth) => Ok(truth.iter().map(|stamped| stamped.pose).collect()),
+            Some(truth) => Ok(poses_of(truth)),
             None => Err(Failure::usage(
                 "--poses truth: the survey has no poses.truth; use --poses initial or a TUM file",
             )),
         },
-        file => {
-            let trajectory = survey.read_poses(Path::new(file))?;
-            Ok(trajectory.iter().map(|stamped| stamped.pose).collect())
-        }
+        file => Ok(poses_of(&survey.read_poses(Path::new(file))?)),
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::progress::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write;
 use std::sync::Mutex;
 use std::time::Duration;
 
@@ -24,13 +25,14 @@ impl Terminal {
     /// Prints a line of the summary.
     pub fn say(&self, text: impl AsRef<str>) {
         if !self.quiet {
-            println!("{}", text.as_ref());
+            // A reader that has left (`| head`) is no error.
+            let _ = writeln!(std::io::stdout(), "{}", text.as_ref());
         }
     }
 
     /// Prints a warning on standard error, even when quiet.
     pub fn warn(&self, text: impl AsRef<str>) {
-        eprintln!("warning: {}", text.as_ref());
+        let _ = writeln!(std::io::stderr(), "warning: {}", text.as_ref());
     }
 
     fn with_bar(&self, act: impl FnOnce(&ProgressBar)) {

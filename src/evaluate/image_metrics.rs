@@ -57,8 +57,8 @@ pub fn image_metrics(first: &Panorama, second: &Panorama) -> Result<ImageMetrics
 mod tests {
     use super::*;
     use crate::progress::Silent;
-    use crate::render::test_wall::{TestWall, waves};
     use crate::render::{Canvas, FrameStack, Interpolation, Picture, place, render};
+    use crate::test_wall::{TestWall, waves};
 
     fn panorama(wall: &TestWall, stack: &FrameStack, ppm: f64) -> Panorama {
         let placements = place(&wall.circle, &wall.camera, &wall.poses).unwrap();

@@ -9,6 +9,7 @@
 //!
 //! [`compare`] asks all of it for initial and refined poses at once.
 
+mod before_after;
 mod compare;
 mod error;
 mod image_metrics;
@@ -19,6 +20,7 @@ mod table;
 mod trajectory_error;
 mod wall_error;
 
+pub use before_after::before_after;
 pub use compare::{CompareInput, Comparison, Panoramas, Scores, compare};
 pub use error::EvaluateError;
 pub use image_metrics::{ImageMetrics, image_metrics};

@@ -108,8 +108,8 @@ struct Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::test_wall::{TestWall, waves};
     use crate::render::{Picture, place};
+    use crate::test_wall::{TestWall, waves};
 
     #[test]
     fn true_poses_leave_rounding_noise_and_wrong_ones_much_more() {

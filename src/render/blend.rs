@@ -166,8 +166,8 @@ fn draw<const C: usize>(
 mod tests {
     use super::*;
     use crate::progress::Silent;
-    use crate::render::test_wall::{self, TestWall};
     use crate::render::{Layout, StitchOptions, on_the_axis, place};
+    use crate::test_wall::{self, TestWall};
 
     fn draw_wall(wall: &TestWall, ppm: f64) -> Panorama {
         let placements = place(&wall.circle, &wall.camera, &wall.poses).unwrap();

@@ -2,6 +2,7 @@
 
 use super::{Placement, RenderError};
 use crate::surface::{Footprint, Surface, WallPoint};
+use image::DynamicImage;
 use serde::{Deserialize, Serialize};
 
 /// How the panorama lies in its picture file.
@@ -14,6 +15,17 @@ pub enum Layout {
     /// [`Layout::ThetaRight`] turned by 90° counter-clockwise: chainage to the right, θ up. (A transpose
     /// would mirror all writing on the wall.)
     ChainageRight,
+}
+
+impl Layout {
+    /// Turns a picture that lies as [`Layout::ThetaRight`].
+    pub fn turn(self, image: DynamicImage) -> DynamicImage {
+        match self {
+            Self::ThetaRight => image,
+            // 270° clockwise.
+            Self::ChainageRight => image.rotate270(),
+        }
+    }
 }
 
 /// The pixels of a panorama: once around the tunnel, and along it as far as the frames see.

@@ -21,8 +21,6 @@ mod picture;
 mod placement;
 mod stack;
 mod stitch;
-#[cfg(test)]
-pub(crate) mod test_wall;
 mod tiles;
 mod write;
 

@@ -71,10 +71,6 @@ impl Panorama {
             RgbaImage::from_raw(width, height, self.pixels).map(DynamicImage::from)
         }
         .unwrap_or_default();
-        match layout {
-            Layout::ThetaRight => image,
-            // 270° clockwise.
-            Layout::ChainageRight => image.rotate270(),
-        }
+        layout.turn(image)
     }
 }

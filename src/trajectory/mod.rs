@@ -23,6 +23,11 @@ pub struct StampedPose {
 /// Poses in the order of their frames, times strictly increasing.
 pub type Trajectory = Vec<StampedPose>;
 
+/// The poses of a trajectory, without their times.
+pub fn poses_of(trajectory: &[StampedPose]) -> Vec<Pose> {
+    trajectory.iter().map(|stamped| stamped.pose).collect()
+}
+
 /// A trajectory whose times are the frames' indices.
 pub fn indexed(poses: impl IntoIterator<Item = Pose>) -> Trajectory {
     poses

@@ -1,7 +1,8 @@
 //! A wall with a known texture and frames of it, for tests.
 
-use super::{FrameStack, Picture};
 use crate::camera::Pinhole;
+use crate::frames::GreyImage;
+use crate::render::{FrameStack, Picture};
 use crate::surface::{Circle, Surface, WallPoint};
 use crate::trajectory::{Pose, so3, spiral};
 use nalgebra::Vector3;
@@ -60,22 +61,30 @@ impl TestWall {
         self.circle.perimeter_m()
     }
 
-    /// The frames: the texture at each pixel centre's wall point, rounded to whole grey levels.
-    pub fn stack(&self) -> FrameStack {
-        let pictures = self.poses.iter().map(|pose| self.picture(pose)).collect();
-        FrameStack::from_pictures(self.camera, pictures)
+    /// The frames: the texture at each pixel centre's wall point.
+    pub fn frames(&self) -> Vec<GreyImage> {
+        self.poses.iter().map(|pose| self.frame(pose)).collect()
     }
 
-    fn picture(&self, pose: &Pose) -> Picture {
+    /// The frames as pictures of whole grey levels.
+    pub fn stack(&self) -> FrameStack {
+        let pictures = self.frames().into_iter().map(|frame| {
+            let data = frame.data().iter().map(|v| v.round() as u8).collect();
+            Picture::new(frame.width(), frame.height(), 1, data)
+        });
+        FrameStack::from_pictures(self.camera, pictures.collect())
+    }
+
+    fn frame(&self, pose: &Pose) -> GreyImage {
         let (width, height) = (self.camera.width, self.camera.height);
         let mut data = Vec::new();
         for v in 0..height {
             for u in 0..width {
                 let ray = pose.r_wc * self.camera.ray(f64::from(u), f64::from(v));
                 let hit = self.circle.hit(&pose.t_wc, &ray).unwrap();
-                data.push((self.texture)(hit.wall, self.perimeter_m()).round() as u8);
+                data.push((self.texture)(hit.wall, self.perimeter_m()) as f32);
             }
         }
-        Picture::new(width as usize, height as usize, 1, data)
+        GreyImage::new(width as usize, height as usize, data)
     }
 }
