@@ -33,7 +33,7 @@ pub struct StitchArguments {
 }
 
 /// How panoramas are drawn.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 pub struct PictureArguments {
     /// Pixels per metre of wall [default: the frames' own resolution at the wall].
     #[arg(long, value_name = "N", value_parser = positive)]

@@ -26,9 +26,14 @@ pub struct CylinderPicture {
 /// Source: arXiv 1806.10278, Section III.
 pub fn project(photo: &Picture, camera: &Pinhole, interpolation: Interpolation) -> CylinderPicture {
     let [left, right, top, bottom] = extent(camera);
-    let (first_u, first_v) = (left.ceil() as i64, top.ceil() as i64);
-    let width = (right.floor() as i64 - first_u + 1).max(1) as usize;
-    let height = (bottom.floor() as i64 - first_v + 1).max(1) as usize;
+    // Rounding errors do not cost a row or a column.
+    let (ceil, floor) = (
+        |value: f64| (value - 1e-9).ceil() as i64,
+        |value: f64| (value + 1e-9).floor() as i64,
+    );
+    let (first_u, first_v) = (ceil(left), ceil(top));
+    let width = (floor(right) - first_u + 1).max(1) as usize;
+    let height = (floor(bottom) - first_v + 1).max(1) as usize;
     let origin = [first_u, first_v];
     let pixels = match photo.channels() {
         1 => unroll::<1>(photo, camera, interpolation, origin, [width, height]),
@@ -66,14 +71,15 @@ pub fn from_cylinder(camera: &Pinhole, u_hat: f64, v_hat: f64) -> Option<[f64; 2
     Some([camera.fx * x + camera.cx, camera.fy * y + camera.cy])
 }
 
-/// Least and greatest û, least and greatest v̂ of the photo's pixel centres.
+/// Least and greatest û, least and greatest v̂ of the photo's pixel centres in whole columns of the result.
 fn extent(camera: &Pinhole) -> [f64; 4] {
     let last_u = f64::from(camera.width - 1);
     let last_v = f64::from(camera.height - 1);
     let [left, _] = to_cylinder(camera, 0.0, 0.0);
     let [right, _] = to_cylinder(camera, last_u, 0.0);
-    // h = y / √(x² + 1) has its extremes at the sides and where x is nearest to zero.
-    let columns = [0.0, last_u, camera.cx.clamp(0.0, last_u)];
+    // h = y / √(x² + 1) has its extremes at the sides and in the column where x is nearest to zero.
+    let middle = from_cylinder(camera, camera.cx.round(), camera.cy).map_or(0.0, |[u, _]| u);
+    let columns = [0.0, last_u, middle.clamp(0.0, last_u)];
     let top = columns.map(|u| to_cylinder(camera, u, 0.0)[1]);
     let bottom = columns.map(|u| to_cylinder(camera, u, last_v)[1]);
     [
@@ -100,7 +106,7 @@ fn unroll<const C: usize>(
             for (column, pixel) in out.chunks_exact_mut(C + 1).enumerate() {
                 let u_hat = (origin[0] + column as i64) as f64;
                 let seen = from_cylinder(camera, u_hat, v_hat)
-                    .filter(|[u, v]| camera.sees(&nalgebra::Vector2::new(*u, *v), 0.0));
+                    .filter(|[u, v]| camera.sees(&nalgebra::Vector2::new(*u, *v), -1e-9));
                 if let Some([u, v]) = seen {
                     let value: [f32; C] = photo.sample(u, v, interpolation);
                     for (sample, value) in pixel.iter_mut().zip(value) {

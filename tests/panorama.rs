@@ -1,0 +1,196 @@
+//! Panoramas through the program: what they look like, and that they depend on nothing but the input.
+
+mod support;
+
+use image::{DynamicImage, GenericImageView};
+use std::path::{Path, PathBuf};
+use support::{fail, first_frames, succeed, text};
+
+/// Resolution of the small panoramas here, pixels per metre.
+const PX_PER_METRE: &str = "30";
+
+fn stitch(survey: &Path, out: &Path, more: &[&str]) -> DynamicImage {
+    let mut arguments = vec!["stitch", text(survey), "--out", text(out)];
+    arguments.extend(["--px-per-metre", PX_PER_METRE, "--quiet"]);
+    arguments.extend(more);
+    succeed(&arguments);
+    image::open(out).unwrap()
+}
+
+/// The first turn of the fixture at its true poses against the committed picture, which was looked at:
+/// upright signs, straight mortar lines, no seam. A decoder or a rounding may move a grey level here and
+/// there; a pixel on the wall may not.
+#[test]
+fn the_panorama_is_the_golden_picture() {
+    let survey = first_frames(12);
+    let out = survey.path().join("panorama.png");
+    let drawn = stitch(survey.path(), &out, &["--poses", "truth"]).to_rgba8();
+    let golden =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/golden/free12_truth_30px.png");
+    let golden = image::open(golden).unwrap().to_rgba8();
+    assert_eq!(drawn.dimensions(), golden.dimensions());
+    let (mut sum, mut worst) = (0u64, 0u8);
+    for (a, b) in drawn.pixels().zip(golden.pixels()) {
+        assert_eq!(a[3], b[3], "holes are where they were");
+        for channel in 0..3 {
+            let difference = a[channel].abs_diff(b[channel]);
+            sum += u64::from(difference);
+            worst = worst.max(difference);
+        }
+    }
+    let mean = sum as f64 / (3 * golden.pixels().count()) as f64;
+    assert!(mean < 0.05, "mean difference {mean} grey levels");
+    assert!(worst <= 2, "largest difference {worst} grey levels");
+}
+
+#[test]
+fn holes_are_transparent_and_covered_wall_is_opaque() {
+    let survey = first_frames(3);
+    let out = survey.path().join("panorama.png");
+    let picture = stitch(survey.path(), &out, &[]).to_rgba8();
+    let alphas = |value| picture.pixels().filter(|p| p[3] == value).count();
+    assert_eq!(alphas(0) + alphas(255), picture.pixels().count());
+    // Three frames of twelve to the turn see about a quarter of the wall each way.
+    assert!(alphas(0) > alphas(255) && alphas(255) > 1000);
+}
+
+#[test]
+fn any_number_of_threads_gives_the_same_bytes() {
+    let survey = first_frames(12);
+    let bytes = |threads: &str| {
+        let out = survey.path().join(format!("{threads}.png"));
+        stitch(survey.path(), &out, &["--threads", threads]);
+        std::fs::read(out).unwrap()
+    };
+    assert!(bytes("1") == bytes("2"));
+}
+
+#[test]
+fn chainage_right_is_the_picture_turned() {
+    let survey = first_frames(4);
+    let path = |name: &str| -> PathBuf { survey.path().join(name) };
+    let upright = stitch(survey.path(), &path("a.png"), &[]);
+    let turned = stitch(
+        survey.path(),
+        &path("b.tif"),
+        &["--layout", "chainage-right"],
+    );
+    assert_eq!(upright.rotate270().to_rgba8(), turned.to_rgba8());
+}
+
+/// Leaving out the camera's distance from the axis keeps the canvas of a centred flight and moves the wall.
+#[test]
+fn ignoring_the_offset_changes_the_picture() {
+    let survey = first_frames(12);
+    let path = |name: &str| survey.path().join(name);
+    let with = stitch(survey.path(), &path("a.png"), &["--poses", "truth"]);
+    let without = stitch(
+        survey.path(),
+        &path("b.png"),
+        &["--poses", "truth", "--ignore-offset"],
+    );
+    assert_eq!(with.width(), without.width());
+    assert!(with != without);
+}
+
+#[test]
+fn the_report_says_where_the_picture_lies() {
+    let survey = first_frames(4);
+    let out = survey.path().join("panorama.png");
+    let json = succeed(&["stitch", text(survey.path()), "--out", text(&out), "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let picture = image::open(&out).unwrap();
+    assert_eq!(report["width"], picture.width());
+    assert_eq!(report["height"], picture.height());
+    // The perimeter of a tunnel of 3 m radius.
+    let around = f64::from(picture.width()) / report["px_per_metre"].as_f64().unwrap();
+    assert!((around - 6.0 * std::f64::consts::PI).abs() < 1e-9);
+    let [start, end] = [0, 1].map(|k| report["chainage_m"][k].as_f64().unwrap());
+    let along = f64::from(picture.height()) / report["px_per_metre"].as_f64().unwrap();
+    assert!((end - start - along).abs() < 1e-9);
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_with_the_remedy() {
+    let survey = first_frames(2);
+    let folder = text(survey.path());
+    let at = |name: &str| survey.path().join(name);
+    let message = fail(&["stitch", folder, "--out", text(&at("a.jpg"))], 2);
+    assert!(message.contains("transparen") && message.contains(".png"));
+    let message = fail(
+        &["stitch", folder, "--out", "a.png", "--px-per-metre", "1e9"],
+        3,
+    );
+    assert!(message.contains("--px-per-metre"), "{message}");
+    let message = fail(
+        &["stitch", folder, "--out", "a.png", "--px-per-metre=-3"],
+        2,
+    );
+    assert!(message.contains("positive"), "{message}");
+    let message = fail(
+        &["stitch", folder, "--out", "a.png", "--poses", "none.tum"],
+        3,
+    );
+    assert!(message.contains("none.tum"), "{message}");
+    let message = fail(
+        &["stitch", folder, "--out", text(&at("no/such/folder/a.png"))],
+        3,
+    );
+    assert!(message.contains("no/such/folder"), "{message}");
+    assert!(!at("a.jpg").exists() && !Path::new("a.png").exists());
+}
+
+#[test]
+fn a_photo_is_projected_onto_the_cylinder() {
+    let survey = first_frames(1);
+    let photo = survey.path().join("frames/000000.jpg");
+    let out = survey.path().join("cylinder.png");
+    let camera = survey.path().join("camera.json");
+    succeed(&[
+        "project",
+        text(&photo),
+        "--camera",
+        text(&camera),
+        "--out",
+        text(&out),
+    ]);
+    let (flat, cylinder) = (
+        image::open(&photo).unwrap(),
+        image::open(&out).unwrap().to_rgba8(),
+    );
+    // û = f θ + cx: the sides at ±atan(239.5 / f) instead of ±239.5, f = 180 / tan 30°.
+    let f = 180.0 / 30f64.to_radians().tan();
+    let half_width = (239.5 / f).atan() * f;
+    assert_eq!(
+        f64::from(cylinder.width()),
+        2.0 * half_width.floor().round()
+    );
+    // No column lies at θ = 0 exactly, so the outermost rows of the photo reach no whole row.
+    assert_eq!(cylinder.height(), flat.height() - 2);
+    assert_eq!(cylinder.get_pixel(0, 0)[3], 0);
+    // At θ = 0 the photo is unchanged, and the middle column lies between two of either picture.
+    let (column, photo_column) = (cylinder.width() / 2, flat.width() / 2);
+    let difference: f64 = (0..cylinder.height())
+        .map(|row| {
+            let (a, b) = (
+                cylinder.get_pixel(column, row),
+                flat.get_pixel(photo_column, row + 1),
+            );
+            f64::from(a[0].abs_diff(b[0]))
+        })
+        .sum::<f64>()
+        / f64::from(cylinder.height());
+    assert!(difference < 3.0, "{difference} grey levels");
+    let message = fail(
+        &[
+            "project",
+            text(&photo),
+            "--out",
+            "x.png",
+            "--fov-deg",
+            "180",
+        ],
+        2,
+    );
+    assert!(message.contains("between 0 and 180"), "{message}");
+}
