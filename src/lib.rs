@@ -1,4 +1,79 @@
 //! Photometric trajectory repair and metric panoramas for tunnels, sewers and pipes.
+//!
+//! A camera revolves while its carrier moves through a tunnel of known shape. The wall has no features to
+//! match, and the poses are wrong by degrees and centimetres a frame. This crate makes them right by the
+//! photometric consistency of overlapping strips of the wall, says how sure it is, and unrolls the wall into
+//! one panorama in metres.
+//!
+//! # The flow of data
+//!
+//! ```text
+//! survey.toml ─ survey ──┬─> refine ──> poses.tum, refine.json ──┐
+//!   camera, trajectory,  │                                       v
+//!   surface, frames      └─> render <── initial, refined, true poses ──> panoramas
+//!                                            │
+//! simulate ──> a survey with true poses      └─> evaluate ──> compare.json
+//! ```
+//!
+//! [`camera`], [`trajectory`] and [`surface`] are the geometry; [`frames`] loads the pictures; [`refine`],
+//! [`render`] and [`simulate`] know nothing of each other and share the geometry only (the simulator not even
+//! the ray–wall intersection, so that it can judge the others); [`evaluate`] measures; [`cli`] prints.
+//!
+//! # An example
+//!
+//! Simulate half a turn of the paper's third experiment, repair its poses, and measure what is left:
+//!
+//! ```
+//! use std::sync::Arc;
+//! use tunnelstitch::evaluate::wall_error;
+//! use tunnelstitch::progress::{Progress, Silent};
+//! use tunnelstitch::refine::{RefineOptions, refine};
+//! use tunnelstitch::simulate::{self, SimulateOptions};
+//! use tunnelstitch::survey::Survey;
+//! use tunnelstitch::trajectory::poses_of;
+//!
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("survey");
+//! let options = SimulateOptions {
+//!     frames: 6,
+//!     width: 320,
+//!     height: 240,
+//!     ..SimulateOptions::free()
+//! };
+//! simulate::run(&options, &path, false, &Silent)?;
+//!
+//! let survey = Survey::open(&path)?;
+//! let silent: Arc<dyn Progress> = Arc::new(Silent);
+//! let refined = refine(&survey, &RefineOptions::default(), &silent)?;
+//!
+//! let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
+//! let off = |poses: &[_]| {
+//!     wall_error(survey.surface.as_ref(), &survey.camera, poses, &truth).map(|error| error.px.rms)
+//! };
+//! assert!(off(&survey.initial_poses())? > 5.0);
+//! assert!(off(&poses_of(&refined.trajectory))? < 0.2);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # Symbols
+//!
+//! | symbol | in code | meaning |
+//! | --- | --- | --- |
+//! | x_c, x_w | `x_c`, `x_w` | a point in camera and in world coordinates, metres |
+//! | R, t | `r_wc`, `t_wc` | camera-to-world pose: x_w = R x_c + t |
+//! | ξ = (ω, ρ) | `xi` | step of a pose: R ← R Exp(ω), t ← t + ρ; radians, metres |
+//! | (u, v) | `pixel`, `u`, `v` | pixel; the centre of the first is (0, 0) |
+//! | θ, r | `theta`, `radius_m` | angle atan2(x, z) around the axis (the world's y), radius |
+//! | (s, h) | `WallPoint` | arc length rθ and chainage y on the wall, metres |
+//! | S | `texture` | grey value of the wall |
+//! | a, b | `gain`, `bias` | exposure of a frame: I = a S + b, grey levels |
+//! | q | `pixels` | pixels that a wall sample stands for in a frame |
+//! | σ | `sigma` | noise of a pixel, grey levels; or 1-σ of whatever is named |
+//!
+//! Names end in their unit: `_m`, `_rad`, `_deg`, `_px`, `_s`.
+//!
+//! Source: R. S. Pahwa, W. K. Leong, S. Foong, K. Leman, M. N. Do, "Feature-less Stitching of Cylindrical
+//! Tunnel", arXiv 1806.10278.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
@@ -11,6 +86,7 @@ pub mod frames;
 pub mod progress;
 pub mod refine;
 pub mod render;
+pub mod simulate;
 pub mod surface;
 pub mod survey;
 #[cfg(test)]

@@ -6,6 +6,7 @@ use crate::evaluate::EvaluateError;
 use crate::frames::FrameError;
 use crate::refine::RefineError;
 use crate::render::RenderError;
+use crate::simulate::SimulateError;
 use crate::surface::SurfaceError;
 use crate::survey::SurveyError;
 use crate::trajectory::tum::TumError;
@@ -66,6 +67,16 @@ impl From<WriteError> for Failure {
         Self {
             code: if passing { 75 } else { 3 },
             message: error.to_string(),
+        }
+    }
+}
+
+impl From<SimulateError> for Failure {
+    fn from(error: SimulateError) -> Self {
+        match error {
+            SimulateError::Write(error) => error.into(),
+            SimulateError::Option { .. } => Self::usage(error.to_string()),
+            _ => Self::input(error.to_string()),
         }
     }
 }

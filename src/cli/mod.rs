@@ -1,10 +1,12 @@
 //! The command line: arguments, printing and exit codes; the work is done by the library.
 
 mod compare;
+mod demo;
 mod failure;
 mod json;
 mod project;
 mod refine;
+mod simulate;
 mod stitch;
 mod terminal;
 
@@ -47,6 +49,8 @@ pub struct Global {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Demo(demo::DemoArguments),
+    Simulate(simulate::SimulateArguments),
     Refine(refine::RefineArguments),
     Stitch(stitch::StitchArguments),
     Compare(compare::CompareArguments),
@@ -73,6 +77,8 @@ pub fn run() -> Result<(), Failure> {
     .map_err(|error| Failure::bug(format!("cannot watch for Ctrl-C: {error}")))?;
     let terminal = Arc::new(Terminal::new(cli.global.quiet));
     match cli.command {
+        Command::Demo(arguments) => demo::run(&arguments, &terminal),
+        Command::Simulate(arguments) => simulate::run(&arguments, &terminal),
         Command::Refine(arguments) => refine::run(&arguments, &terminal),
         Command::Stitch(arguments) => stitch::run(&arguments, &terminal),
         Command::Compare(arguments) => compare::run(&arguments, &terminal),

@@ -3,8 +3,8 @@
 use super::stitch::{InterpolationArgument, positive};
 use super::{Failure, Terminal};
 use crate::camera::{Pinhole, read_calibration};
-use crate::frames::{FrameFile, load_colour};
-use crate::render::{Picture, PictureFormat, cylinder, write_picture};
+use crate::frames::{FrameFile, PictureFormat, load_colour, write_picture};
+use crate::render::{Picture, cylinder};
 use std::path::{Path, PathBuf};
 
 /// Projects one photo onto a cylinder around the camera.

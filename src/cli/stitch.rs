@@ -1,8 +1,9 @@
 //! `tunnelstitch stitch`: one panorama from given poses.
 
 use super::{Failure, Terminal, json};
+use crate::frames::{PictureFormat, write_picture};
 use crate::progress::Progress;
-use crate::render::{Interpolation, Layout, PictureFormat, StitchOptions, stitch, write_picture};
+use crate::render::{Interpolation, Layout, StitchOptions, stitch};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
 use clap::ValueEnum;

@@ -70,9 +70,6 @@ pub enum RenderError {
         /// Memory free, MiB.
         available_mib: u64,
     },
-    /// The output's name does not say a format that can hold the panorama.
-    #[error("{0}")]
-    Format(String),
     /// A frame's file.
     #[error(transparent)]
     Frames(#[from] FrameError),

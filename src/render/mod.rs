@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! poses ─ place ──> footprints ─ Canvas::covering ──> canvas
-//! files ─ FrameStack::load ──────────────────────────> render ──> Panorama ──> write_picture
+//! files ─ FrameStack::load ──────────────────────────> render ──> Panorama
 //! ```
 //!
 //! [`stitch`] does all of it. Every canvas pixel is taken back to its wall point, from there into each frame
@@ -22,7 +22,6 @@ mod placement;
 mod stack;
 mod stitch;
 mod tiles;
-mod write;
 
 pub use blend::render;
 pub use canvas::{Canvas, Layout};
@@ -34,4 +33,3 @@ pub use stack::{FrameStack, level_for};
 pub(crate) use stitch::check_memory;
 pub use stitch::{StitchOptions, on_the_axis, stitch};
 pub(crate) use tiles::{Tile, tiles};
-pub use write::{PictureFormat, write_picture};

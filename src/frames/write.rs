@@ -1,12 +1,16 @@
 //! Picture files with transparency.
 
-use super::RenderError;
 use crate::atomic::{self, WriteError};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::tiff::TiffEncoder;
 use image::{DynamicImage, ImageError};
 use std::io;
 use std::path::Path;
+
+/// An output's name does not say a format that can hold a panorama.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct FormatError(String);
 
 /// A picture format that can hold holes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,8 +29,8 @@ impl PictureFormat {
     /// The format that a file's name asks for.
     ///
     /// # Errors
-    /// [`RenderError::Format`] with the remedy for every other name.
-    pub fn of(path: &Path) -> Result<Self, RenderError> {
+    /// [`FormatError`] with the remedy for every other name.
+    pub fn of(path: &Path) -> Result<Self, FormatError> {
         let extension = path
             .extension()
             .map(|extension| extension.to_string_lossy().to_ascii_lowercase())
@@ -34,11 +38,11 @@ impl PictureFormat {
         match extension.as_str() {
             "png" => Ok(Self::Png),
             "tif" | "tiff" => Ok(Self::Tiff),
-            "jpg" | "jpeg" => Err(RenderError::Format(format!(
+            "jpg" | "jpeg" => Err(FormatError(format!(
                 "{}: JPEG knows no transparency, and what no frame sees must be transparent; write .png or .tif instead",
                 path.display()
             ))),
-            _ => Err(RenderError::Format(format!(
+            _ => Err(FormatError(format!(
                 "{}: the name must end in .png or .tif",
                 path.display()
             ))),

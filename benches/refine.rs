@@ -1,0 +1,72 @@
+//! `cargo bench --bench refine`: the estimator stage by stage, on a simulated survey.
+//!
+//! The survey is that of `tunnelstitch demo`: 120 frames of 640 × 480 px. Each round decodes and refines it
+//! anew; the table gives the median and the range over the rounds, and frames per second end to end.
+
+use std::sync::Arc;
+use tunnelstitch::progress::{Progress, Silent};
+use tunnelstitch::refine::{RefineOptions, refine};
+use tunnelstitch::simulate::{self, SimulateOptions};
+use tunnelstitch::survey::Survey;
+
+const ROUNDS: usize = 5;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path().join("survey");
+    simulate::run(&SimulateOptions::free(), &path, false, &Silent)?;
+    let survey = Survey::open(&path)?;
+    let silent: Arc<dyn Progress> = Arc::new(Silent);
+    let mut stages: Vec<String> = Vec::new();
+    let mut seconds: Vec<Vec<f64>> = Vec::new();
+    let mut totals = Vec::new();
+    for _ in 0..ROUNDS {
+        let report = refine(&survey, &RefineOptions::default(), &silent)?.report;
+        totals.push(report.timings.iter().map(|lap| lap.seconds).sum::<f64>());
+        for lap in report.timings {
+            match stages.iter().position(|stage| *stage == lap.stage) {
+                Some(stage) => seconds[stage].push(lap.seconds),
+                None => {
+                    stages.push(lap.stage);
+                    seconds.push(vec![lap.seconds]);
+                }
+            }
+        }
+    }
+    let frames = survey.frames.len() as f64;
+    println!(
+        "refine: {frames} frames of {} × {} px, {} threads, {ROUNDS} rounds",
+        survey.camera.width,
+        survey.camera.height,
+        rayon::current_num_threads()
+    );
+    println!("{:<16} {:>9} {:>19}", "stage", "median s", "range s");
+    for (stage, seconds) in stages.iter().zip(&seconds) {
+        print_row(stage, seconds);
+    }
+    print_row("all", &totals);
+    let [low, median, high] = spread(&totals);
+    println!(
+        "{:.1} frames/s ({:.1} to {:.1})",
+        frames / median,
+        frames / high,
+        frames / low
+    );
+    Ok(())
+}
+
+fn print_row(stage: &str, seconds: &[f64]) {
+    let [low, median, high] = spread(seconds);
+    println!("{stage:<16} {median:>9.3} {low:>9.3} {high:>9.3}");
+}
+
+/// Least, middle and greatest.
+fn spread(values: &[f64]) -> [f64; 3] {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    [
+        sorted[0],
+        sorted[sorted.len() / 2],
+        sorted[sorted.len() - 1],
+    ]
+}

@@ -1,0 +1,97 @@
+//! `tunnelstitch demo`: the whole job on a simulated survey.
+
+use super::compare::compare_into;
+use super::refine::{refine_into, summarise};
+use super::stitch::PictureArguments;
+use super::{Failure, Terminal, json};
+use crate::refine::RefineOptions;
+use crate::simulate::{self, SimulateOptions};
+use crate::survey::Survey;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Shows the whole job: simulates a survey with wrong poses, refines them, stitches and compares.
+///
+/// The survey is a revolving camera's flight through a brick tunnel: ten turns of twelve frames, each step
+/// 2° and a few centimetres off the plan. An earlier demo in the same folder is replaced.
+#[derive(Debug, clap::Args)]
+pub struct DemoArguments {
+    /// Folder for everything; made if missing.
+    #[arg(long, short, value_name = "DIR", default_value = "tunnelstitch-demo")]
+    out: PathBuf,
+    /// Turns of the camera, twelve frames each.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    turns: u16,
+    /// Seed of wall, jitter and noise.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Print compare.json on standard output instead of the tables.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// An output that cannot be written.
+pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Failure> {
+    let since = Instant::now();
+    let say = |text: String| {
+        if !arguments.json {
+            terminal.say(text);
+        }
+    };
+    let [survey_folder, refined_folder, compare_folder] =
+        ["survey", "refined", "compare"].map(|name| arguments.out.join(name));
+    let (survey_path, refined_path, compare_path) = (
+        survey_folder.display(),
+        refined_folder.display(),
+        compare_folder.display(),
+    );
+
+    let options = SimulateOptions {
+        frames: 12 * usize::from(arguments.turns),
+        seed: arguments.seed,
+        ..SimulateOptions::free()
+    };
+    say(format!(
+        "tunnelstitch simulate free --turns {} --seed {} --out {survey_path}",
+        arguments.turns, arguments.seed
+    ));
+    simulate::run(&options, &survey_folder, true, terminal.as_ref())?;
+
+    say(format!(
+        "\ntunnelstitch refine {survey_path} --out {refined_path}"
+    ));
+    let refine_options = RefineOptions::default();
+    let (refined, _) = refine_into(&survey_folder, &refine_options, &refined_folder, terminal)?;
+    if !arguments.json {
+        summarise(&refined, terminal);
+    }
+
+    let poses = refined_folder.join("poses.tum");
+    say(format!(
+        "\ntunnelstitch compare {survey_path} --refined {} --out {compare_path}",
+        poses.display()
+    ));
+    let (comparison, json) = compare_into(
+        &Survey::open(&survey_folder)?,
+        &poses,
+        &PictureArguments::default(),
+        &compare_folder,
+        terminal,
+    )?;
+    if arguments.json {
+        return json::print_text(&json);
+    }
+    say(format!(
+        "{comparison}\n\n\
+         {:.0} s in all. Look at\n  \
+         {compare_path}/before-after.png  what the poses did to the panorama, above before, below after\n  \
+         {compare_path}/refined.png       the whole panorama; baseline.png and truth.png lie beside it\n  \
+         {refined_path}/poses.tum         the refined trajectory; refine.json says how sure it is",
+        since.elapsed().as_secs_f64()
+    ));
+    Ok(())
+}

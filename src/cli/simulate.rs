@@ -1,0 +1,221 @@
+//! `tunnelstitch simulate`: a survey of a tunnel that never was.
+
+use super::stitch::positive;
+use super::{Failure, Terminal, json};
+use crate::simulate::{self, Light, SimulateOptions, Wall};
+use crate::survey::PriorSection;
+use crate::trajectory::JitterModel;
+use clap::ValueEnum;
+use std::path::PathBuf;
+
+/// Simulates a survey: frames of a tunnel wall, wrong initial poses, and the true ones.
+///
+/// Writes a folder that all other commands take: survey.toml, camera.json, frames, baseline.tum (the plan),
+/// groundtruth.tum, and simulation.json, which records the options.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    tunnelstitch simulate free --out survey\n  \
+    tunnelstitch simulate free --wall concrete --jitter independent --seed 7 --out survey\n  \
+    tunnelstitch simulate off-centre --texture bricks.jpg --texture-width-m 2 --out survey")]
+pub struct SimulateArguments {
+    /// Which of the paper's experiments; the options below change it.
+    #[arg(value_enum)]
+    experiment: Experiment,
+    /// Folder for the survey.
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// Replace an earlier survey of that name.
+    #[arg(long)]
+    force: bool,
+    /// Number of frames [default: 12; free: 120].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    frames: Option<u32>,
+    /// Turns of the camera, instead of a number of frames.
+    #[arg(long, value_name = "N", conflicts_with = "frames", value_parser = positive)]
+    turns: Option<f64>,
+    /// Advance from frame to frame, metres [default: 0; free: 0.1].
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    advance_m: Option<f64>,
+    /// Turn from frame to frame, degrees.
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 30.0,
+        allow_hyphen_values = true
+    )]
+    turn_deg: f64,
+    /// Radius of the tunnel, metres.
+    #[arg(long, value_name = "M", default_value_t = 3.0)]
+    radius_m: f64,
+    /// Width and height of the frames, pixels.
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
+    size: [u32; 2],
+    /// Vertical field of view, degrees.
+    #[arg(long, value_name = "DEG", default_value_t = 60.0)]
+    fov_deg: f64,
+    /// Noise on the plan: errors that add up from frame to frame, or each frame on its own [default: none; free:
+    /// random-walk].
+    #[arg(long, value_enum)]
+    jitter: Option<JitterArgument>,
+    /// 1-σ of the jitter about each axis, degrees [default: 2 with jitter].
+    #[arg(long, value_name = "DEG")]
+    rotation_sigma_deg: Option<f64>,
+    /// 1-σ of the jitter along x, y and z, metres [default: 0.02,0.02,0.03 with jitter].
+    #[arg(long, value_name = "X,Y,Z", value_parser = three_numbers)]
+    translation_sigma_m: Option<[f64; 3]>,
+    /// What the wall looks like.
+    #[arg(long, value_enum, default_value_t)]
+    wall: WallArgument,
+    /// A picture to paper the wall with, instead.
+    #[arg(long, value_name = "FILE", conflicts_with = "wall")]
+    texture: Option<PathBuf>,
+    /// Width of that picture on the wall, metres; it repeats, a whole number of times around.
+    #[arg(long, value_name = "M", default_value_t = 1.0, requires = "texture")]
+    texture_width_m: f64,
+    /// How the wall is lit.
+    #[arg(long, value_enum, default_value_t)]
+    light: LightArgument,
+    /// 1-σ of the sensor's noise, grey levels.
+    #[arg(long, value_name = "GREY", default_value_t = 2.0)]
+    noise: f64,
+    /// Rays along each side of a pixel.
+    #[arg(long, value_name = "N", default_value_t = 4)]
+    supersample: u32,
+    /// Seed of wall, jitter and noise: the same seed gives the same bytes.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Print the record (simulation.json) on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Experiment {
+    /// From the axis; the initial poses are true.
+    Centred,
+    /// From (0.5, 0, 0.5) m, while the initial poses claim the axis.
+    OffCentre,
+    /// Flying forward, every step off the plan.
+    Free,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum JitterArgument {
+    RandomWalk,
+    Independent,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum WallArgument {
+    /// Bricks, each with a tone of its own.
+    #[default]
+    Brick,
+    /// Smooth stains of low contrast.
+    Concrete,
+    /// A tile of 8 × 6 bricks that repeats.
+    TiledBrick,
+}
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+enum LightArgument {
+    /// Bright at θ = 0, dark at 180°.
+    #[default]
+    Downward,
+    /// The same everywhere.
+    Even,
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let parsed = text.split_once(['x', '×']).and_then(|(width, height)| {
+        Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
+    });
+    parsed.ok_or_else(|| "must be width x height in pixels, as 640x480".to_owned())
+}
+
+fn three_numbers(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    numbers
+        .ok()
+        .and_then(|numbers| <[f64; 3]>::try_from(numbers).ok())
+        .ok_or_else(|| "must be three numbers with commas between, as 0.02,0.02,0.03".to_owned())
+}
+
+impl SimulateArguments {
+    fn options(&self) -> SimulateOptions {
+        let preset = match self.experiment {
+            Experiment::Centred => SimulateOptions::centred(),
+            Experiment::OffCentre => SimulateOptions::off_centre(),
+            Experiment::Free => SimulateOptions::free(),
+        };
+        let frames = match (self.frames, self.turns) {
+            (Some(frames), _) => frames as usize,
+            (None, Some(turns)) => (turns * 360.0 / self.turn_deg.abs()).round() as usize,
+            (None, None) => preset.frames,
+        };
+        let wall = match (&self.texture, self.wall) {
+            (Some(path), _) => Wall::Texture {
+                path: path.clone(),
+                width_m: self.texture_width_m,
+            },
+            (None, WallArgument::Brick) => Wall::Brick,
+            (None, WallArgument::Concrete) => Wall::Concrete,
+            (None, WallArgument::TiledBrick) => Wall::TiledBrick,
+        };
+        SimulateOptions {
+            frames,
+            advance_m: self.advance_m.unwrap_or(preset.advance_m),
+            turn_deg: self.turn_deg,
+            radius_m: self.radius_m,
+            width: self.size[0],
+            height: self.size[1],
+            vertical_fov_deg: self.fov_deg,
+            jitter: self.jitter_of(preset.jitter),
+            wall,
+            light: match self.light {
+                LightArgument::Downward => Light::Downward,
+                LightArgument::Even => Light::Even,
+            },
+            noise_grey: self.noise,
+            supersample: self.supersample,
+            seed: self.seed,
+            ..preset
+        }
+    }
+
+    /// The preset's jitter with the arguments' changes; any of them asks for jitter.
+    fn jitter_of(&self, preset: Option<PriorSection>) -> Option<PriorSection> {
+        let asked = self.jitter.is_some()
+            || self.rotation_sigma_deg.is_some()
+            || self.translation_sigma_m.is_some();
+        let jitter = preset.or(asked.then(PriorSection::default))?;
+        Some(PriorSection {
+            model: match self.jitter {
+                Some(JitterArgument::RandomWalk) => JitterModel::RandomWalk,
+                Some(JitterArgument::Independent) => JitterModel::Independent,
+                None => jitter.model,
+            },
+            rotation_sigma_deg: self.rotation_sigma_deg.unwrap_or(jitter.rotation_sigma_deg),
+            translation_sigma_m: self
+                .translation_sigma_m
+                .unwrap_or(jitter.translation_sigma_m),
+        })
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Impossible options, or an output that cannot be written.
+pub fn run(arguments: &SimulateArguments, terminal: &Terminal) -> Result<(), Failure> {
+    let options = arguments.options();
+    let simulated = simulate::run(&options, &arguments.out, arguments.force, terminal)?;
+    if arguments.json {
+        return json::print(&simulated);
+    }
+    let out = arguments.out.display();
+    terminal.say(format!(
+        "{out}: {} frames of {} × {} px, with true poses\nnext: tunnelstitch refine {out} --out {out}-refined",
+        options.frames, options.width, options.height
+    ));
+    Ok(())
+}

@@ -1,0 +1,142 @@
+//! The ray caster.
+
+use super::band::Band;
+use crate::camera::Pinhole;
+use crate::frames::GreyImage;
+use crate::trajectory::Pose;
+use nalgebra::Vector3;
+use std::f64::consts::TAU;
+
+/// Renders a frame: each pixel is the mean of `n × n` rays spread evenly over its square.
+///
+/// A ray `t + λ d` meets the wall where `|(t + λ d)_xz| = r`. With `d̂ = d_xz/|d_xz|`, the way along it is
+/// `−t·d̂ + √(r² − (t × d̂)²)`: from the foot of the perpendicular on the axis's side to the circle. The camera must
+/// stand inside.
+pub(super) fn cast(band: &Band, radius_m: f64, camera: &Pinhole, pose: &Pose, n: u32) -> GreyImage {
+    let (width, height) = (camera.width as usize, camera.height as usize);
+    let offsets: Vec<f64> = (0..n)
+        .map(|k| (f64::from(k) + 0.5) / f64::from(n) - 0.5)
+        .collect();
+    let caster = Caster {
+        radius_m,
+        t: pose.t_wc,
+    };
+    let share = 1.0 / (n * n) as f32;
+    let right = pose.r_wc * Vector3::x();
+    let mut data = vec![0.0f32; width * height];
+    for (v, row) in data.chunks_exact_mut(width).enumerate() {
+        for offset_v in &offsets {
+            let first = pose.r_wc * camera.ray(0.0, v as f64 + offset_v);
+            for (u, pixel) in row.iter_mut().enumerate() {
+                for offset_u in &offsets {
+                    let d = first + right * ((u as f64 + offset_u) / camera.fx);
+                    let (theta, h_m) = caster.hit(&d);
+                    *pixel += band.at(theta, h_m);
+                }
+            }
+        }
+        row.iter_mut().for_each(|pixel| *pixel *= share);
+    }
+    GreyImage::new(width, height, data)
+}
+
+/// Rays from one place.
+pub(super) struct Caster {
+    /// Radius of the tunnel, metres.
+    pub radius_m: f64,
+    /// Where the rays start, metres.
+    pub t: Vector3<f64>,
+}
+
+impl Caster {
+    /// Angle θ in `[0, 2π)` and chainage (metres) of the wall that a ray of direction `d` meets.
+    #[inline]
+    pub fn hit(&self, d: &Vector3<f64>) -> (f64, f64) {
+        let across = (d.x * d.x + d.z * d.z).sqrt();
+        let (dx, dz) = (d.x / across, d.z / across);
+        let foot = self.t.x * dx + self.t.z * dz;
+        let aside = self.t.x * dz - self.t.z * dx;
+        let way = (self.radius_m * self.radius_m - aside * aside).sqrt() - foot;
+        // Single precision is 10⁻⁷ rad, far below a texel.
+        let theta = f64::from(((self.t.x + way * dx) as f32).atan2((self.t.z + way * dz) as f32));
+        let theta = if theta < 0.0 { theta + TAU } else { theta };
+        (theta, self.t.y + way / across * d.y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::Light;
+    use crate::simulate::wall::Texture;
+    use crate::trajectory::so3;
+
+    /// A smooth wall.
+    struct Waves;
+
+    fn waves(theta: f64, h_m: f64) -> f64 {
+        128.0 + 60.0 * (9.0 * theta + 2.0 * h_m).sin() + 30.0 * (8.0 * h_m).cos()
+    }
+
+    impl Texture for Waves {
+        fn row(&self, h_m: f64, _texel_m: f64, row: &mut [f32]) {
+            let count = row.len() as f64;
+            for (k, value) in row.iter_mut().enumerate() {
+                *value = waves(TAU * (k as f64 + 0.5) / count, h_m) as f32;
+            }
+        }
+    }
+
+    /// The hit satisfies the wall's equation and lies ahead on the ray.
+    #[test]
+    fn a_hit_lies_on_the_wall_and_on_the_ray() {
+        let caster = Caster {
+            radius_m: 2.0,
+            t: Vector3::new(0.9, 7.0, -1.1),
+        };
+        for k in 0..50 {
+            let k = f64::from(k);
+            let d = Vector3::new((1.7 * k).sin(), 0.8 * (0.9 * k).cos(), (2.3 * k).cos());
+            let (theta, h_m) = caster.hit(&d);
+            let x_w = Vector3::new(2.0 * theta.sin(), h_m, 2.0 * theta.cos());
+            let along = x_w - caster.t;
+            assert!(along.cross(&d).norm() < 1e-5 * along.norm() * d.norm() + 1e-6);
+            assert!(along.dot(&d) > 0.0);
+        }
+    }
+
+    /// Known wall points, projected forward by the camera's equation, show the wall's grey value there.
+    #[test]
+    fn pixels_show_the_wall_that_projects_onto_them() {
+        let (radius_m, columns) = (2.0, 4000);
+        let texel_m = TAU * radius_m / columns as f64;
+        let camera = Pinhole::from_vertical_fov(160, 120, 1.0);
+        let turn = so3::exp(&Vector3::new(0.1, 0.7, -0.05));
+        let pose = Pose::new(turn, Vector3::new(0.4, 0.3, -0.2));
+        let band = Band::paint(&Waves, Light::Even, columns, texel_m, [-2.0, 3.0]);
+        let frame = cast(&band, radius_m, &camera, &pose, 4);
+        let mut compared = 0;
+        for k in 0..160_000 {
+            let (theta, h_m) = (
+                TAU * f64::from(k % 400) / 400.0,
+                f64::from(k / 400) * 0.01 - 1.7,
+            );
+            let x_w = Vector3::new(radius_m * theta.sin(), h_m, radius_m * theta.cos());
+            let x_c = pose.to_camera(&x_w);
+            if x_c.z <= 0.0 {
+                continue;
+            }
+            let u = camera.fx * x_c.x / x_c.z + camera.cx;
+            let v = camera.fy * x_c.y / x_c.z + camera.cy;
+            // Near a pixel's centre, so that nothing needs to be interpolated.
+            let (i, j) = (u.round(), v.round());
+            let near = (u - i).hypot(v - j) < 0.05;
+            if near && i >= 0.0 && j >= 0.0 && i < 160.0 && j < 120.0 {
+                let seen = f64::from(frame.at(i as usize, j as usize));
+                assert!((seen - waves(theta, h_m)).abs() < 1.0, "at {u} {v}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 20, "{compared}");
+    }
+}

@@ -1,0 +1,57 @@
+//! Concrete walls.
+
+use super::noise::{ValueNoise, derived_seed};
+use super::wall::Texture;
+
+/// Mean grey level.
+const MEAN: f32 = 128.0;
+/// Stains: amplitude in grey levels, and cell in metres.
+const STAINS: [(f32, f64); 4] = [(5.0, 1.2), (5.0, 0.3), (4.0, 0.060), (4.0, 0.015)];
+
+/// Smooth stains of all sizes, a few grey levels strong, unique over the whole tunnel.
+pub(super) struct ConcreteWall {
+    stains: Vec<ValueNoise>,
+}
+
+impl ConcreteWall {
+    /// A wall of the given perimeter (metres).
+    pub fn new(seed: u64, perimeter_m: f64) -> Self {
+        let stains = (1..).zip(STAINS).map(|(purpose, (amplitude, cell_m))| {
+            ValueNoise::unique(derived_seed(seed, purpose), amplitude, cell_m, perimeter_m)
+        });
+        Self {
+            stains: stains.collect(),
+        }
+    }
+}
+
+impl Texture for ConcreteWall {
+    fn row(&self, h_m: f64, texel_m: f64, row: &mut [f32]) {
+        row.fill(MEAN);
+        for stain in &self.stains {
+            stain.add_to_row(h_m, texel_m, row);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn contrast_is_low_but_there_is_some() {
+        let perimeter_m = TAU * 3.0;
+        let wall = ConcreteWall::new(1, perimeter_m);
+        let mut values = Vec::new();
+        for k in 0..400 {
+            let mut row = vec![0.0; 2000];
+            wall.row(f64::from(k) * 0.02, perimeter_m / 2000.0, &mut row);
+            values.extend(row.into_iter().map(f64::from));
+        }
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / values.len() as f64;
+        assert!((mean - 128.0).abs() < 1.0, "{mean}");
+        assert!((2.5..6.0).contains(&variance.sqrt()), "{}", variance.sqrt());
+    }
+}

@@ -1,0 +1,236 @@
+//! What to simulate.
+
+use super::SimulateError;
+use crate::survey::PriorSection;
+use crate::trajectory::JitterModel;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What the wall looks like. Grey levels of an evenly lit wall.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Wall {
+    /// Bricks of 215 × 65 mm, each with a tone of its own.
+    Brick,
+    /// Cast concrete: smooth stains, low contrast.
+    Concrete,
+    /// A tile of 8 × 6 bricks that repeats all over the tunnel: pictures of different places look alike.
+    TiledBrick,
+    /// A picture that repeats all over the tunnel.
+    Texture {
+        /// The picture.
+        path: PathBuf,
+        /// Its width on the wall, metres; changed a little so that a whole number fits around.
+        width_m: f64,
+    },
+}
+
+/// How the wall is lit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Light {
+    /// From one side, as the paper's: `0.35 + 0.65 (1 + cos θ)/2`, bright at θ = 0, dark at 180°.
+    Downward,
+    /// The same everywhere.
+    Even,
+}
+
+/// A survey to simulate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SimulateOptions {
+    /// Number of frames.
+    pub frames: usize,
+    /// Radius of the tunnel, metres.
+    pub radius_m: f64,
+    /// Width of a frame, pixels.
+    pub width: u32,
+    /// Height of a frame, pixels.
+    pub height: u32,
+    /// Vertical field of view, degrees.
+    pub vertical_fov_deg: f64,
+    /// Advance along the axis from frame to frame, metres.
+    pub advance_m: f64,
+    /// Turn about the axis from frame to frame, degrees.
+    pub turn_deg: f64,
+    /// Where the camera really stands, relative to the plan, metres; the initial poses do not know.
+    pub offset_m: [f64; 3],
+    /// Noise on the plan, if any; the initial poses do not know.
+    pub jitter: Option<PriorSection>,
+    /// What the wall looks like.
+    pub wall: Wall,
+    /// How it is lit.
+    pub light: Light,
+    /// 1-σ of the sensor's noise, grey levels.
+    pub noise_grey: f64,
+    /// Rays along each side of a pixel; a pixel is the mean of its square.
+    pub supersample: u32,
+    /// Seed of wall, jitter and noise.
+    pub seed: u64,
+}
+
+impl SimulateOptions {
+    /// The paper's first experiment: 12 frames, 30° apart, from the axis of a tunnel of 3 m radius.
+    pub fn centred() -> Self {
+        Self {
+            frames: 12,
+            radius_m: 3.0,
+            width: 640,
+            height: 480,
+            vertical_fov_deg: 60.0,
+            advance_m: 0.0,
+            turn_deg: 30.0,
+            offset_m: [0.0; 3],
+            jitter: None,
+            wall: Wall::Brick,
+            light: Light::Downward,
+            noise_grey: 2.0,
+            supersample: 4,
+            seed: 1,
+        }
+    }
+
+    /// The second: the same from (0.5, 0, 0.5) m, while the initial poses claim the axis.
+    pub fn off_centre() -> Self {
+        Self {
+            offset_m: [0.5, 0.0, 0.5],
+            ..Self::centred()
+        }
+    }
+
+    /// The third: ten turns of twelve frames, 0.10 m and 30° a frame, each step 2° and (2, 2, 3) cm off.
+    pub fn free() -> Self {
+        Self {
+            frames: 120,
+            advance_m: 0.10,
+            jitter: Some(PriorSection::default()),
+            ..Self::centred()
+        }
+    }
+
+    /// The noise model that goes into the survey: the jitter, or for a plan without any, wide enough for the
+    /// camera's offset from it.
+    pub(super) fn prior(&self) -> PriorSection {
+        // A prior of zero width is none.
+        const LEAST: (f64, f64) = (0.01, 1e-4);
+        match self.jitter {
+            Some(jitter) => PriorSection {
+                rotation_sigma_deg: jitter.rotation_sigma_deg.max(LEAST.0),
+                translation_sigma_m: jitter.translation_sigma_m.map(|sigma| sigma.max(LEAST.1)),
+                ..jitter
+            },
+            None => PriorSection {
+                model: JitterModel::Independent,
+                rotation_sigma_deg: 1.0,
+                translation_sigma_m: self.offset_m.map(|offset| offset.abs() + 0.02),
+            },
+        }
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// [`SimulateError::Option`] with the name of the first that is impossible.
+    pub(super) fn check(&self) -> Result<(), SimulateError> {
+        let positive = |v: f64| v.is_finite() && v > 0.0;
+        let not_negative = |v: f64| v.is_finite() && v >= 0.0;
+        let check = |good: bool, what: &str| match good {
+            true => Ok(()),
+            false => Err(SimulateError::Option {
+                what: what.to_owned(),
+            }),
+        };
+        check(
+            (1..=1_000_000).contains(&self.frames),
+            "the number of frames must lie between 1 and 1000000",
+        )?;
+        check(
+            positive(self.radius_m),
+            "the radius must be a positive number of metres",
+        )?;
+        let side = |pixels| (16..=16_384).contains(&pixels);
+        check(
+            side(self.width) && side(self.height),
+            "a frame must be 16 to 16384 pixels wide and high",
+        )?;
+        check(
+            positive(self.vertical_fov_deg) && self.vertical_fov_deg < 170.0,
+            "the vertical field of view must lie between 0 and 170 degrees",
+        )?;
+        check(
+            self.advance_m.is_finite() && self.turn_deg.is_finite(),
+            "advance and turn must be finite",
+        )?;
+        check(
+            self.offset_m.iter().all(|v| v.is_finite()),
+            "the offset must be finite",
+        )?;
+        if let Some(jitter) = &self.jitter {
+            check(
+                not_negative(jitter.rotation_sigma_deg)
+                    && jitter.translation_sigma_m.iter().all(|v| not_negative(*v)),
+                "the sigmas of the jitter must not be negative",
+            )?;
+        }
+        if let Wall::Texture { width_m, .. } = self.wall {
+            check(
+                positive(width_m),
+                "the width of the texture must be a positive number of metres",
+            )?;
+        }
+        check(
+            not_negative(self.noise_grey),
+            "the noise must not be negative",
+        )?;
+        check(
+            (1..=16).contains(&self.supersample),
+            "1 to 16 rays may be cast along each side of a pixel",
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn presets_are_possible_and_nonsense_is_not() {
+        let presets = [
+            SimulateOptions::centred(),
+            SimulateOptions::off_centre(),
+            SimulateOptions::free(),
+        ];
+        for preset in &presets {
+            preset.check().unwrap();
+            let prior = preset.prior();
+            assert!(prior.rotation_sigma_deg > 0.0);
+            assert!(prior.translation_sigma_m.iter().all(|sigma| *sigma > 0.0));
+        }
+        let free = SimulateOptions::free;
+        let wrong = [
+            SimulateOptions {
+                frames: 0,
+                ..free()
+            },
+            SimulateOptions {
+                radius_m: f64::NAN,
+                ..free()
+            },
+            SimulateOptions { width: 8, ..free() },
+            SimulateOptions {
+                vertical_fov_deg: 180.0,
+                ..free()
+            },
+            SimulateOptions {
+                noise_grey: -1.0,
+                ..free()
+            },
+            SimulateOptions {
+                supersample: 0,
+                ..free()
+            },
+        ];
+        for options in wrong {
+            assert!(options.check().is_err(), "{options:?}");
+        }
+    }
+}

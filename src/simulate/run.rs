@@ -1,0 +1,134 @@
+//! Writing a simulated survey.
+
+use super::{Scene, SimulateError, SimulateOptions};
+use crate::atomic::{self, StagedFolder, WriteError};
+use crate::camera::format_calibration;
+use crate::frames::{PictureFormat, write_picture};
+use crate::progress::Progress;
+use crate::survey::{
+    CameraSection, FramesSection, PosesSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
+};
+use crate::trajectory::{Pose, indexed, tum};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::Path;
+
+/// What was written; also `simulation.json`, from which the survey can be made again.
+#[derive(Clone, Debug, Serialize)]
+pub struct Simulated {
+    /// Name and version of the program.
+    pub program: &'static str,
+    /// What was simulated.
+    pub options: SimulateOptions,
+}
+
+/// Writes a survey folder: `survey.toml`, `camera.json`, `frames/000000.png` …, `baseline.tum` (the plan),
+/// `groundtruth.tum` and `simulation.json`.
+///
+/// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier survey of that
+/// name is replaced. The same options give the same bytes, whatever the number of threads.
+///
+/// # Errors
+/// [`SimulateError`].
+pub fn run(
+    options: &SimulateOptions,
+    out: &Path,
+    overwrite: bool,
+    progress: &dyn Progress,
+) -> Result<Simulated, SimulateError> {
+    let scene = Scene::new(options)?;
+    check_target(out, overwrite)?;
+    let simulated = Simulated {
+        program: concat!("tunnelstitch ", env!("CARGO_PKG_VERSION")),
+        options: options.clone(),
+    };
+    let folder = StagedFolder::begin(out)?;
+    // Whoever reads an error knows the folder by its final name.
+    let final_name = |error: WriteError| {
+        let path = match error.path.strip_prefix(folder.path()) {
+            Ok(inside) => out.join(inside),
+            Err(_) => error.path,
+        };
+        WriteError::new(&path, error.source)
+    };
+    write_texts(&scene, &simulated, folder.path()).map_err(final_name)?;
+    write_frames(&scene, &folder.path().join("frames"), progress).map_err(final_name)?;
+    folder.finish()?;
+    Ok(simulated)
+}
+
+/// Refuses to replace what is no survey.
+fn check_target(out: &Path, overwrite: bool) -> Result<(), SimulateError> {
+    let exists = |what| {
+        Err(SimulateError::Exists {
+            path: out.to_owned(),
+            what,
+        })
+    };
+    if !out.exists() {
+        return Ok(());
+    }
+    let is_empty = std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none());
+    if is_empty {
+        return Ok(());
+    }
+    if !out.join(SURVEY_FILE).is_file() {
+        return exists("exists and is no survey, so it is not replaced; choose another folder");
+    }
+    if !overwrite {
+        return exists("the survey exists; choose another folder, or replace it with --force");
+    }
+    Ok(())
+}
+
+fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<(), WriteError> {
+    let options = &simulated.options;
+    let survey = SurveyFile {
+        tunnel: TunnelSection {
+            shape: Shape::Circle,
+            radius_m: options.radius_m,
+        },
+        camera: CameraSection {
+            file: "camera.json".into(),
+        },
+        frames: FramesSection {
+            images: "frames/*.png".to_owned(),
+        },
+        poses: PosesSection {
+            initial: "baseline.tum".into(),
+            truth: Some("groundtruth.tum".into()),
+        },
+        prior: options.prior(),
+    };
+    let other = std::io::Error::other;
+    let path = |name: &str| folder.join(name);
+    let (survey_path, record_path) = (path(SURVEY_FILE), path("simulation.json"));
+    let survey = toml::to_string(&survey)
+        .map_err(|error| WriteError::new(&survey_path, other(error.to_string())))?;
+    let record = serde_json::to_string_pretty(simulated)
+        .map_err(|error| WriteError::new(&record_path, other(error.to_string())))?;
+    let trajectory = |poses: &[Pose]| tum::format(&indexed(poses.iter().copied()));
+    atomic::write_text(&survey_path, &survey)?;
+    atomic::write_text(&record_path, &(record + "\n"))?;
+    atomic::write_text(&path("camera.json"), &format_calibration(scene.camera()))?;
+    atomic::write_text(&path("baseline.tum"), &trajectory(scene.plan()))?;
+    atomic::write_text(&path("groundtruth.tum"), &trajectory(scene.truth()))
+}
+
+/// Renders and writes all frames, batch by batch, the frames of a batch in parallel.
+fn write_frames(scene: &Scene, folder: &Path, progress: &dyn Progress) -> Result<(), WriteError> {
+    atomic::create_folder(folder)?;
+    progress.start("simulating", scene.truth().len());
+    for (batch, h_m) in scene.batches() {
+        let band = scene.band(h_m);
+        batch.into_par_iter().try_for_each(|frame| {
+            let picture = scene.noisy(&scene.exact(&band, frame), frame);
+            let path = folder.join(format!("{frame:06}.png"));
+            write_picture(&path, &picture.into(), PictureFormat::Png)?;
+            progress.advance(1);
+            Ok(())
+        })?;
+    }
+    progress.finish();
+    Ok(())
+}

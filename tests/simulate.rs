@@ -1,0 +1,198 @@
+//! Simulated surveys and the demo, through the program.
+
+mod support;
+
+use std::path::Path;
+use support::{fail, succeed, text};
+use tunnelstitch::survey::Survey;
+
+/// Options of a survey small enough for a test.
+const SMALL: [&str; 6] = ["--frames", "4", "--size", "64x48", "--supersample", "2"];
+
+fn simulate(experiment: &str, out: &Path, more: &[&str]) -> String {
+    let mut arguments = vec!["simulate", experiment, "--out", text(out)];
+    arguments.extend(SMALL);
+    arguments.extend(more);
+    succeed(&arguments)
+}
+
+/// All files of a folder and of its folders with their contents, by name.
+fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(next) = folders.pop() {
+        for entry in std::fs::read_dir(next).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).unwrap().display().to_string();
+                found.push((name, std::fs::read(path).unwrap()));
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn every_experiment_is_a_complete_survey() {
+    let dir = tempfile::tempdir().unwrap();
+    for experiment in ["centred", "off-centre", "free"] {
+        let out = dir.path().join(experiment);
+        let said = simulate(experiment, &out, &[]);
+        assert!(said.contains("next: tunnelstitch refine"), "{said}");
+        let survey = Survey::open(&out).unwrap();
+        assert_eq!(survey.frames.len(), 4);
+        assert_eq!((survey.camera.width, survey.camera.height), (64, 48));
+        let truth = survey.truth.unwrap();
+        let same = survey.initial == truth;
+        assert_eq!(same, experiment == "centred", "{experiment}");
+        for frame in &survey.frames {
+            let picture = image::open(&frame.path).unwrap().to_luma8();
+            assert_eq!(picture.dimensions(), (64, 48));
+            let (low, high) = picture.iter().fold((255, 0), |(low, high), value| {
+                (low.min(*value), high.max(*value))
+            });
+            assert!(high - low > 40, "{experiment}: {low} to {high}");
+        }
+    }
+}
+
+#[test]
+fn the_seed_decides_every_byte_and_the_threads_none() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = |name: &str, more: &[&str]| {
+        let out = dir.path().join(name);
+        simulate("free", &out, more);
+        contents(&out)
+    };
+    let first = survey("first", &["--seed", "5", "--threads", "1"]);
+    assert_eq!(first.len(), 9);
+    assert!(first == survey("second", &["--seed", "5", "--threads", "2"]));
+    let other = survey("third", &["--seed", "6"]);
+    for name in ["frames/000000.png", "groundtruth.tum"] {
+        let of = |files: &[(String, Vec<u8>)]| {
+            let file = files.iter().find(|(found, _)| found == name);
+            file.map(|(_, bytes)| bytes.clone())
+        };
+        assert!(of(&first).is_some() && of(&first) != of(&other), "{name}");
+    }
+}
+
+#[test]
+fn a_texture_papers_the_wall() {
+    let dir = tempfile::tempdir().unwrap();
+    let texture = dir.path().join("texture.png");
+    image::GrayImage::from_pixel(8, 8, image::Luma([180]))
+        .save(&texture)
+        .unwrap();
+    let out = dir.path().join("survey");
+    simulate(
+        "centred",
+        &out,
+        &[
+            "--texture",
+            text(&texture),
+            "--light",
+            "even",
+            "--noise",
+            "0",
+        ],
+    );
+    let frame = image::open(out.join("frames/000002.png"))
+        .unwrap()
+        .to_luma8();
+    assert!(frame.iter().all(|value| *value == 180));
+}
+
+#[test]
+fn only_a_survey_is_replaced_and_only_when_asked() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("survey");
+    simulate("free", &out, &["--seed", "1"]);
+    let before = contents(&out);
+    let mut again = vec!["simulate", "free", "--out", text(&out), "--seed", "2"];
+    again.extend(SMALL);
+    let message = fail(&again, 3);
+    assert!(message.contains("--force"), "{message}");
+    assert!(contents(&out) == before);
+    again.push("--force");
+    succeed(&again);
+    assert!(contents(&out) != before);
+
+    let precious = dir.path().join("precious");
+    std::fs::create_dir(&precious).unwrap();
+    std::fs::write(precious.join("thesis.txt"), "years of work").unwrap();
+    again[3] = text(&precious);
+    let message = fail(&again, 3);
+    assert!(message.contains("no survey"), "{message}");
+    assert!(precious.join("thesis.txt").exists());
+    // Nothing temporary is left beside them.
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
+}
+
+#[test]
+fn impossible_surveys_are_refused_with_the_reason() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("survey");
+    let refuse = |more: &[&str], code: i32, part: &str| {
+        let mut arguments = vec!["simulate", "free", "--out", text(&out)];
+        arguments.extend(more);
+        let message = fail(&arguments, code);
+        assert!(message.contains(part), "{more:?}: {message}");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    };
+    refuse(&["--radius-m", "0"], 2, "radius");
+    refuse(&["--size", "640"], 2, "640x480");
+    refuse(&["--size", "8x8"], 2, "16 to 16384");
+    refuse(&["--noise=-1"], 2, "noise");
+    refuse(&["--fov-deg", "200"], 2, "field of view");
+    refuse(&["--frames", "0"], 2, "--frames");
+    refuse(&["--translation-sigma-m", "1,2"], 2, "three numbers");
+    refuse(&["--translation-sigma-m", "9,9,9"], 3, "off the axis");
+    refuse(&["--texture", "no-such.png"], 3, "no-such.png");
+    refuse(&["--texture", "a.png", "--wall", "brick"], 2, "--wall");
+}
+
+#[test]
+fn an_output_that_cannot_be_written_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("file");
+    std::fs::write(&file, "in the way").unwrap();
+    let out = file.join("survey");
+    let mut arguments = vec!["simulate", "free", "--out", text(&out)];
+    arguments.extend(SMALL);
+    let message = fail(&arguments, 3);
+    assert!(message.contains("file"), "{message}");
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "in the way");
+}
+
+#[test]
+fn the_demo_does_the_whole_job_and_can_be_repeated() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("demo");
+    let demo = || succeed(&["demo", "--turns", "1", "--out", text(&out)]);
+    let said = demo();
+    for part in ["wall error RMS", "PSNR", "before-after.png", "poses.tum"] {
+        assert!(said.contains(part), "{said}");
+    }
+    for name in [
+        "survey/survey.toml",
+        "refined/poses.tum",
+        "refined/refine.json",
+        "compare/baseline.png",
+        "compare/refined.png",
+        "compare/truth.png",
+        "compare/before-after.png",
+        "compare/compare.json",
+    ] {
+        assert!(out.join(name).is_file(), "{name}");
+    }
+    let report = std::fs::read_to_string(out.join("compare/compare.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let wall_px = |which: &str| report[which]["wall"]["px"]["rms"].as_f64().unwrap();
+    assert!(wall_px("baseline") > 10.0, "{}", wall_px("baseline"));
+    assert!(wall_px("refined") < 0.05, "{}", wall_px("refined"));
+    demo();
+}
