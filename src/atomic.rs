@@ -90,10 +90,10 @@ pub fn write(
         .map_err(|error| fail(error.error))
 }
 
-/// Writes a text file; see [`write`].
+/// Writes a text file; see [`write()`].
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_text(path: &Path, text: &str) -> Result<(), WriteError> {
     write(path, |writer| writer.write_all(text.as_bytes()))
 }

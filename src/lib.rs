@@ -77,6 +77,9 @@
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
+// The equations stand beside the code that does them, much of it private: `cargo doc
+// --document-private-items` shows all of it.
+#![allow(rustdoc::private_intra_doc_links)]
 
 pub mod atomic;
 pub mod camera;

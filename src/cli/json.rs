@@ -15,7 +15,7 @@ pub fn print(value: &impl Serialize) -> Result<(), Failure> {
 /// Prints JSON that is text already.
 ///
 /// # Errors
-/// As [`print`].
+/// As [`print()`].
 pub fn print_text(text: &str) -> Result<(), Failure> {
     match std::io::stdout().write_all(text.as_bytes()) {
         // A reader that has left (`| head`) is no error.

@@ -2,12 +2,12 @@
 //!
 //! | question | answer |
 //! | --- | --- |
-//! | how far off are the poses? | [`trajectory_error`], after removing the gauge |
-//! | how far off is each pixel on the wall? | [`wall_error`] |
-//! | how like the true panorama is this one? | [`image_metrics`] |
+//! | how far off are the poses? | [`trajectory_error()`], after removing the gauge |
+//! | how far off is each pixel on the wall? | [`wall_error()`] |
+//! | how like the true panorama is this one? | [`image_metrics()`] |
 //! | how well do the frames agree, without any truth? | [`seam_residual`] |
 //!
-//! [`compare`] asks all of it for initial and refined poses at once.
+//! [`compare()`] asks all of it for initial and refined poses at once.
 
 mod before_after;
 mod compare;

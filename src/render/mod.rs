@@ -5,7 +5,7 @@
 //! files ─ FrameStack::load ──────────────────────────> render ──> Panorama
 //! ```
 //!
-//! [`stitch`] does all of it. Every canvas pixel is taken back to its wall point, from there into each frame
+//! [`stitch()`] does all of it. Every canvas pixel is taken back to its wall point, from there into each frame
 //! that sees it, and the samples are averaged with weights that fall to zero at the frame's border. The
 //! same function draws the initial, the refined and the true poses, so pictures differ by their poses only.
 //!

@@ -8,7 +8,7 @@
 //! shares no warp code with the renderer or the estimator, so that it can judge them.
 //!
 //! [`SimulateOptions::centred`], [`SimulateOptions::off_centre`] and [`SimulateOptions::free`] are the three
-//! experiments of the paper (arXiv 1806.10278); [`run`] writes a whole survey folder, [`Scene`] renders single
+//! experiments of the paper (arXiv 1806.10278); [`run()`] writes a whole survey folder, [`Scene`] renders single
 //! frames in memory.
 
 mod band;
