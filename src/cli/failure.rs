@@ -101,3 +101,29 @@ bad_input!(
     SurveyError,
     TumError
 );
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Error;
+    use std::path::Path;
+
+    #[test]
+    fn a_full_disk_is_worth_another_try_and_a_forbidden_folder_is_not() {
+        let failure = |kind: ErrorKind| {
+            Failure::from(WriteError::new(
+                Path::new("out/poses.tum"),
+                Error::from(kind),
+            ))
+        };
+        assert_eq!(failure(ErrorKind::StorageFull).code, 75);
+        assert_eq!(failure(ErrorKind::PermissionDenied).code, 3);
+        let wrapped = SimulateError::from(WriteError::new(
+            Path::new("frames/000000.png"),
+            Error::from(ErrorKind::StorageFull),
+        ));
+        let failure = Failure::from(wrapped);
+        assert_eq!(failure.code, 75);
+        assert!(failure.message.contains("frames/000000.png"));
+    }
+}
