@@ -1,6 +1,6 @@
 //! Damped Gauss–Newton on the manifold of poses, as a solver for argmin's executor.
 
-use super::estimate::FrameEstimate;
+use super::estimate::{FrameEstimate, UNKNOWNS};
 use super::problem::{Linearisation, Problem, ProblemError};
 use crate::progress::Progress;
 use argmin::core::observers::{Observe, ObserverMode};
@@ -17,6 +17,9 @@ pub struct Stopping {
     pub max_iterations: u64,
     /// A step that moves no wall point by more than this ends the solve, pixels of full size.
     pub step_px: f64,
+    /// A step shorter than this share of the estimate's own uncertainty ends the solve: `√(δᵀHδ / unknowns)`, with
+    /// H the inverse covariance.
+    pub step_sigma: f64,
 }
 
 /// Why a solve stopped.
@@ -25,6 +28,8 @@ pub struct Stopping {
 pub enum StopReason {
     /// The last step moved the wall by less than the tolerance.
     StepBelowTolerance,
+    /// The last step was a small share of the estimate's uncertainty.
+    StepBelowUncertainty,
     /// No step, however damped, lowers the robust cost any more.
     NoFurtherDescent,
     /// The number of steps allowed was used up.
@@ -85,8 +90,17 @@ struct DampedGaussNewton {
 }
 
 impl DampedGaussNewton {
-    fn step_tolerance(&self) -> f64 {
-        self.stopping.map_or(0.0, |stopping| stopping.step_px)
+    /// Why a step that moves the wall by `step_px` and lowers the quadratic model by `½ decrement` is the last one,
+    /// if it is.
+    fn reason_to_stop(&self, step_px: f64, decrement: f64, unknowns: usize) -> Option<StopReason> {
+        let stopping = self.stopping?;
+        if step_px < stopping.step_px {
+            Some(StopReason::StepBelowTolerance)
+        } else if decrement < stopping.step_sigma.powi(2) * unknowns as f64 {
+            Some(StopReason::StepBelowUncertainty)
+        } else {
+            None
+        }
     }
 
     /// One accepted step, or the reason there is none.
@@ -112,6 +126,12 @@ impl DampedGaussNewton {
             let step = factor.step(&current.normal.gradient);
             let moved = problem.wall_step_px(estimates, &step);
             let step_px = moved.into_iter().fold(0.0, f64::max);
+            let decrement: f64 = step
+                .iter()
+                .zip(&current.normal.gradient)
+                .map(|(step, gradient)| -step.dot(gradient))
+                .sum();
+            let stop = self.reason_to_stop(step_px, decrement, UNKNOWNS * step.len());
             let candidate: Vec<_> = estimates
                 .iter()
                 .zip(&step)
@@ -126,14 +146,12 @@ impl DampedGaussNewton {
                 } else {
                     0.0
                 };
-                if step_px < self.step_tolerance() {
-                    self.stop = Some(StopReason::StepBelowTolerance);
-                }
+                self.stop = stop;
                 return Ok((candidate, next));
             }
-            if step_px < self.step_tolerance() {
+            if stop.is_some() {
                 self.last_step_px = step_px;
-                self.stop = Some(StopReason::StepBelowTolerance);
+                self.stop = stop;
                 return Ok((estimates.to_vec(), current));
             }
             self.raise_damping();

@@ -66,12 +66,22 @@ impl WallGrid {
         )
     }
 
-    /// The middle of a tile.
+    /// The middle of a tile, a fraction of a sample off the regular place.
+    ///
+    /// Walls repeat in step with a regular lattice: courses of bricks run along its rows, so that every joint would
+    /// be sampled at the same fraction everywhere, and what falls between the samples would not average out.
+    /// The fractions follow a sequence that fills the square evenly, `frac(row φ⁻¹ + column φ⁻²)` and its mirror with
+    /// φ³ = φ + 1.
+    ///
+    /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018 (the sequence).
     pub fn centre(&self, tile: TileId) -> WallPoint {
+        const PHI: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
         let (width, height) = self.tile_size_m();
+        let (column, row) = (tile.column as f64, tile.row as f64);
+        let fraction = |a: f64, b: f64| (row * a + column * b).rem_euclid(1.0) - 0.5;
         WallPoint {
-            s_m: (tile.column as f64 + 0.5) * width,
-            h_m: (tile.row as f64 + 0.5) * height,
+            s_m: (column + 0.5) * width + fraction(PHI[0], PHI[1]) * self.spacing_s_m,
+            h_m: (row + 0.5) * height + fraction(PHI[1], PHI[0]) * self.spacing_h_m,
         }
     }
 
@@ -136,7 +146,7 @@ impl TilePoints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Circle;
+    use crate::surface::{Circle, shortest_arc};
 
     #[test]
     fn a_whole_number_of_tiles_goes_around() {
@@ -147,20 +157,50 @@ mod tests {
         assert!((grid.spacing_s_m / 0.0072 - 1.0).abs() < 0.01);
     }
 
+    /// No gap and no overlap of more than a sample between neighbours, across the wrap too.
     #[test]
-    fn neighbouring_tiles_share_their_rings() {
+    fn tiles_lie_side_by_side_within_a_sample() {
         let circle = Circle::new(3.0).unwrap();
         let grid = WallGrid::new(&circle, 0.01);
-        let last = grid.columns - 1;
-        // The ring left of the first column is the last sample of the last column.
-        let at =
-            |column| TilePoints::new(&grid, &circle, TileId { column, row: 4 }, &mut Vec::new());
-        let (a, b) = (at(0), at(last));
-        let world = |p: &TilePoints, k: usize| {
-            p.centre.x_w + Vector3::new(f64::from(p.dx[k]), f64::from(p.dy[k]), f64::from(p.dz[k]))
+        let (width, height) = grid.tile_size_m();
+        let centre = |column: i64, row: i64| {
+            grid.centre(TileId {
+                column: column.rem_euclid(grid.columns),
+                row,
+            })
         };
-        let row = 3 * SIDE;
-        assert!((world(&a, row) - world(&b, row + TILE)).norm() < 1e-6);
-        assert!((world(&a, row + 1) - world(&b, row + TILE + 1)).norm() < 1e-6);
+        for (column, row) in [(0, 4), (7, -3), (grid.columns - 1, 11)] {
+            let (a, right) = (centre(column, row), centre(column + 1, row));
+            let along = shortest_arc(right.s_m - a.s_m, circle.perimeter_m());
+            assert!((along - width).abs() < grid.spacing_s_m);
+            let below = centre(column, row + 1);
+            assert!((below.h_m - a.h_m - height).abs() < grid.spacing_h_m);
+        }
+    }
+
+    /// Any few tiles in a row or column see the wall at well-spread fractions of a sample.
+    #[test]
+    fn fractions_of_a_sample_are_spread_evenly() {
+        let circle = Circle::new(3.0).unwrap();
+        let grid = WallGrid::new(&circle, 0.01);
+        let fraction = |column: i64, row: i64| {
+            let h_m = grid.centre(TileId { column, row }).h_m;
+            (h_m / grid.spacing_h_m).rem_euclid(1.0)
+        };
+        for along in [true, false] {
+            let mut quarters = [0; 4];
+            for k in 0..40 {
+                let f = if along {
+                    fraction(k, 3)
+                } else {
+                    fraction(3, k)
+                };
+                quarters[(4.0 * f) as usize % 4] += 1;
+            }
+            assert!(
+                quarters.iter().all(|n| (7..=13).contains(n)),
+                "{quarters:?}"
+            );
+        }
     }
 }

@@ -13,11 +13,15 @@ pub struct RefineOptions {
     pub tracking_levels: usize,
     /// Frames placed between two solves of the sliding window.
     pub window_stride: usize,
+    /// Wall samples per pixel along each axis in the last solve.
+    pub final_density: f64,
     /// Steps of a global solve per level, at the most.
     pub max_iterations: u64,
     /// A global solve ends when no wall point moves by more than this in a step, pixels (doubled at each
-    /// coarser level).
+    /// coarser level), ...
     pub step_tolerance_px: f64,
+    /// ... or when a step is shorter than this share of the estimate's own uncertainty.
+    pub step_tolerance_sigma: f64,
 }
 
 impl Default for RefineOptions {
@@ -28,8 +32,10 @@ impl Default for RefineOptions {
             coarsest_rows: 30,
             tracking_levels: 3,
             window_stride: 6,
+            final_density: 2.0,
             max_iterations: 20,
-            step_tolerance_px: 0.002,
+            step_tolerance_px: 0.0005,
+            step_tolerance_sigma: 0.03,
         }
     }
 }

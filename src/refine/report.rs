@@ -45,6 +45,8 @@ pub struct FrameReport {
 pub struct LevelReport {
     /// Pyramid level; 0 is full size.
     pub level: usize,
+    /// Wall samples per pixel along each axis.
+    pub samples_per_pixel: f64,
     /// Its course.
     #[serde(flatten)]
     pub solve: SolveRecord,

@@ -5,7 +5,7 @@ use super::estimate::FrameEstimate;
 use super::gauss_newton::{Solution, StopReason, Stopping, solve};
 use super::options::RefineOptions;
 use super::prior::Prior;
-use super::problem::{FrameShare, Problem, ProblemError, Scene};
+use super::problem::{FrameShare, Problem, ProblemError, Sampling, Scene};
 use super::report::{FrameFlag, FrameReport, LevelReport, RefineReport, StageTime};
 use super::track::track;
 use crate::frames::{FrameError, Pyramid, load_grey};
@@ -93,18 +93,23 @@ pub fn refine(
 
     let mut levels = Vec::new();
     let mut last = None;
-    for level in (0..=options.handover_level(height)).rev() {
-        let problem = Problem::new(&scene, level, 0..count, 0..count, &estimates)?;
+    for sampling in stages(options, height) {
+        let Sampling { level, density } = sampling;
+        let problem = Problem::new(&scene, sampling, 0..count, 0..count, &estimates)?;
         if problem.tiles() == 0 {
             continue;
         }
-        let stage = format!("level {level}");
+        let stage = match sampling == Sampling::of(level) {
+            true => format!("level {level}"),
+            false => format!("level {level}, {density} samples per pixel"),
+        };
         progress.start("global", options.max_iterations as usize);
         let solution = solve(
             problem,
             Stopping {
                 max_iterations: options.max_iterations,
                 step_px: options.step_tolerance_px * 2f64.powi(level as i32),
+                step_sigma: options.step_tolerance_sigma,
             },
             Some((&stage, progress)),
         )?;
@@ -112,10 +117,11 @@ pub fn refine(
         estimates.clone_from(&solution.estimates);
         levels.push(LevelReport {
             level,
+            samples_per_pixel: density,
             solve: solution.record.clone(),
         });
         last = Some(solution);
-        clock.lap(&format!("global level {level}"));
+        clock.lap(&format!("global {stage}"));
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
     let covariances = frame_covariances(
@@ -156,6 +162,19 @@ pub fn refine(
             timings: clock.laps,
         },
     })
+}
+
+/// The global solves: coarse to fine, and the finest once more with a denser look at the wall.
+///
+/// One sample per pixel is too sparse to end with: the products of residual and gradient vary faster than either,
+/// and where the wall repeats in step with the samples (courses of bricks run along them) what falls between
+/// them does not average out. On brick this alone is 0.05 px of wall error over two turns.
+fn stages(options: &RefineOptions, height: u32) -> impl Iterator<Item = Sampling> {
+    let levels = (0..=options.handover_level(height)).rev();
+    levels.map(Sampling::of).chain([Sampling {
+        level: 0,
+        density: options.final_density,
+    }])
 }
 
 fn load(
@@ -235,6 +254,10 @@ fn explain(solution: &Solution, options: &RefineOptions) -> String {
         StopReason::StepBelowTolerance => format!(
             "the last step moved no wall point by more than {} px",
             options.step_tolerance_px
+        ),
+        StopReason::StepBelowUncertainty => format!(
+            "the last step was shorter than {} of the estimate's uncertainty",
+            options.step_tolerance_sigma
         ),
         StopReason::NoFurtherDescent => {
             "no step, however damped, lowers the robust cost any more".to_owned()

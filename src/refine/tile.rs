@@ -54,6 +54,14 @@ pub struct ObserverMoments {
     pub inliers: f64,
 }
 
+/// A frame that sees a tile.
+pub struct Seen<'a> {
+    /// The frame.
+    pub view: &'a View<'a>,
+    /// Pixels per wall sample, q.
+    pub pixels: f32,
+}
+
 /// What one frame shows of a tile.
 struct Samples {
     /// `z` at every wall sample.
@@ -78,11 +86,11 @@ pub struct TileWork {
 
 impl TileWork {
     /// Samples all observers.
-    fn sample<'a>(&mut self, points: &TilePoints, views: impl Iterator<Item = &'a View<'a>>) {
+    fn sample<'a>(&mut self, points: &TilePoints, observers: impl Iterator<Item = Seen<'a>>) {
         self.samples.clear();
-        for view in views {
+        for Seen { view, pixels } in observers {
             let mut values = [0.0; AREA];
-            let pixels = view.sample(points, &mut values);
+            view.sample(points, &mut values);
             self.samples.push(Samples {
                 values,
                 pixels,
@@ -132,17 +140,17 @@ impl TileWork {
         texture
     }
 
-    /// Fills [`TileWork::observers`] and [`TileWork::features`] for the frames `views`.
+    /// Fills [`TileWork::observers`] and [`TileWork::features`] for a tile's observers.
     ///
     /// `spacing_m`: distance between samples along s and h.
     pub fn moments<'a>(
         &mut self,
         points: &TilePoints,
-        views: impl Iterator<Item = &'a View<'a>>,
+        observers: impl Iterator<Item = Seen<'a>>,
         spacing_m: (f64, f64),
         noise: &NoiseModel,
     ) {
-        self.sample(points, views);
+        self.sample(points, observers);
         let mean = self.mean();
         let precision = gradient_squares(&mean).map(|g2| noise.precision(g2));
         let mut texture = mean;
@@ -175,10 +183,10 @@ impl TileWork {
     pub fn count_residuals<'a>(
         &mut self,
         points: &TilePoints,
-        views: impl Iterator<Item = &'a View<'a>>,
+        observers: impl Iterator<Item = Seen<'a>>,
         histogram: &mut NoiseHistogram,
     ) {
-        self.sample(points, views);
+        self.sample(points, observers);
         let n = self.samples.len() as f32;
         let scale = (n / (n - 1.0)).sqrt();
         let mean = self.mean();

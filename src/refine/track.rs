@@ -6,7 +6,7 @@
 use super::estimate::FrameEstimate;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
-use super::problem::{Problem, ProblemError, Scene};
+use super::problem::{Problem, ProblemError, Sampling, Scene};
 use super::search::FusedWall;
 use crate::progress::Progress;
 use crate::surface::Footprint;
@@ -21,10 +21,12 @@ const FARTHEST: usize = 256;
 const FRAME_STOPPING: Stopping = Stopping {
     max_iterations: 12,
     step_px: 0.1,
+    step_sigma: 0.0,
 };
 const WINDOW_STOPPING: Stopping = Stopping {
     max_iterations: 6,
     step_px: 0.2,
+    step_sigma: 0.0,
 };
 
 /// Places all frames; returns their estimates.
@@ -52,7 +54,13 @@ pub fn track(
         if k % options.window_stride == 0 || k + 1 == count {
             let held = if first == 0 { 0 } else { (k + 1 - first) / 3 };
             let active = first + held..k + 1;
-            let problem = Problem::new(scene, finest, first..k + 1, active.clone(), &estimates)?;
+            let problem = Problem::new(
+                scene,
+                Sampling::of(finest),
+                first..k + 1,
+                active.clone(),
+                &estimates,
+            )?;
             if problem.tiles() > 0 {
                 let solution = solve(problem, WINDOW_STOPPING, None)?;
                 estimates[active].copy_from_slice(&solution.estimates);
@@ -87,7 +95,7 @@ fn place(
     let refine_at = |level: usize, estimate: FrameEstimate| {
         let mut trial = estimates.to_vec();
         trial[k] = estimate;
-        let problem = Problem::new(scene, level, first..k + 1, k..k + 1, &trial)?;
+        let problem = Problem::new(scene, Sampling::of(level), first..k + 1, k..k + 1, &trial)?;
         if problem.tiles() == 0 {
             return Ok(estimate);
         }

@@ -1,7 +1,7 @@
 //! Sampling a frame at the wall samples of a tile.
 
 use super::estimate::FrameEstimate;
-use super::grid::{AREA, SIDE, TilePoints};
+use super::grid::{AREA, TilePoints};
 use crate::camera::Pinhole;
 use crate::frames::GreyImage;
 use crate::surface::wall_jacobian;
@@ -44,10 +44,7 @@ impl<'a> View<'a> {
 
     /// The wall's values `(I − b)/a` as this frame shows them, bilinearly interpolated, into `values`.
     /// Samples that a step has moved out of the picture repeat its border.
-    ///
-    /// Returns the number of pixels per wall sample: the weight that makes every pixel count once, however
-    /// obliquely it sees the wall.
-    pub fn sample(&self, points: &TilePoints, values: &mut [f32; AREA]) -> f32 {
+    pub fn sample(&self, points: &TilePoints, values: &mut [f32; AREA]) {
         let centre: Vector3<f64> = self.pose.to_camera(&points.centre.x_w);
         let c: Vector3<f32> = centre.cast();
         let r = &self.r_cw;
@@ -61,7 +58,6 @@ impl<'a> View<'a> {
         }
         self.camera.project_slices(&mut u, &mut v, &z);
         self.bilinear(&u, &v, values);
-        quadrilateral_area(&u, &v) / ((SIDE - 1) * (SIDE - 1)) as f32
     }
 
     fn bilinear(&self, u: &[f32; AREA], v: &[f32; AREA], values: &mut [f32; AREA]) {
@@ -90,18 +86,10 @@ impl<'a> View<'a> {
     }
 }
 
-/// Area in the picture of the quadrilateral between a tile's outermost samples, px².
-fn quadrilateral_area(u: &[f32; AREA], v: &[f32; AREA]) -> f32 {
-    let (a, b, c, d) = (0, SIDE - 1, AREA - 1, AREA - SIDE);
-    let diagonal_1 = (u[c] - u[a], v[c] - v[a]);
-    let diagonal_2 = (u[d] - u[b], v[d] - v[b]);
-    0.5 * (diagonal_1.0 * diagonal_2.1 - diagonal_1.1 * diagonal_2.0).abs()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::refine::grid::{TileId, WallGrid};
+    use crate::refine::grid::{SIDE, TileId, WallGrid};
     use crate::surface::{Circle, Surface, WallPoint};
     use crate::trajectory::so3;
 
@@ -132,7 +120,7 @@ mod tests {
         };
         let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
         let mut values = [0.0; AREA];
-        let pixels = view.sample(&points, &mut values);
+        view.sample(&points, &mut values);
         let centre = grid.centre(tile);
         for (k, value) in values.iter().enumerate() {
             let (i, j) = ((k % SIDE) as f64 - 4.5, (k / SIDE) as f64 - 4.5);
@@ -146,7 +134,5 @@ mod tests {
             let expected = (grey - estimate.bias) / estimate.log_gain.exp();
             assert!((f64::from(*value) - expected).abs() < 2e-3);
         }
-        // At about the distance the grid was made for, a sample is about a pixel.
-        assert!((0.5..2.0).contains(&pixels), "{pixels}");
     }
 }
