@@ -134,6 +134,13 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
             report.frames_on_prior,
             report.frames.len()
         ));
+        if 2 * report.frames_on_prior > report.frames.len() {
+            terminal.warn(
+                "  most frames do not match their neighbours; check that the poses are camera-to-world with the \
+                 tunnel's axis along y, that radius_m and the calibration are right, and that [prior] is as wide \
+                 as the poses are wrong",
+            );
+        }
         for frame in &report.frames {
             if let (FrameFlag::Prior, Some(reason)) = (frame.flag, &frame.reason) {
                 terminal.warn(format!(

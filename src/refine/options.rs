@@ -17,8 +17,7 @@ pub struct RefineOptions {
     pub final_density: f64,
     /// Steps of a global solve per level, at the most.
     pub max_iterations: u64,
-    /// A global solve ends when no wall point moves by more than this in a step, pixels (doubled at each
-    /// coarser level), ...
+    /// The last global solve ends when no wall point moves by more than this in a step, pixels, ...
     pub step_tolerance_px: f64,
     /// ... or when a step is shorter than this share of the estimate's own uncertainty.
     pub step_tolerance_sigma: f64,

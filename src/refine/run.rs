@@ -46,6 +46,8 @@ pub struct Refined {
     pub report: RefineReport,
 }
 
+/// How much coarser the tolerances of all solves but the last are.
+const CLOSE: f64 = 20.0;
 /// Share of a frame's pixels that must overlap other frames for its pose to count as photometric.
 const LEAST_PIXEL_SHARE: f64 = 0.02;
 /// Largest 1-σ on the wall of a pose that counts as photometric, pixels.
@@ -93,7 +95,7 @@ pub fn refine(
 
     let mut levels = Vec::new();
     let mut last = None;
-    for sampling in stages(options, height) {
+    for (sampling, stopping) in stages(options, height) {
         let Sampling { level, density } = sampling;
         let problem = Problem::new(&scene, sampling, 0..count, 0..count, &estimates)?;
         if problem.tiles() == 0 {
@@ -104,15 +106,7 @@ pub fn refine(
             false => format!("level {level}, {density} samples per pixel"),
         };
         progress.start("global", options.max_iterations as usize);
-        let solution = solve(
-            problem,
-            Stopping {
-                max_iterations: options.max_iterations,
-                step_px: options.step_tolerance_px * 2f64.powi(level as i32),
-                step_sigma: options.step_tolerance_sigma,
-            },
-            Some((&stage, progress)),
-        )?;
+        let solution = solve(problem, stopping, Some((&stage, progress)))?;
         progress.finish();
         estimates.clone_from(&solution.estimates);
         levels.push(LevelReport {
@@ -169,12 +163,30 @@ pub fn refine(
 /// One sample per pixel is too sparse to end with: the products of residual and gradient vary faster than either,
 /// and where the wall repeats in step with the samples (courses of bricks run along them) what falls between
 /// them does not average out. On brick this alone is 0.05 px of wall error over two turns.
-fn stages(options: &RefineOptions, height: u32) -> impl Iterator<Item = Sampling> {
-    let levels = (0..=options.handover_level(height)).rev();
-    levels.map(Sampling::of).chain([Sampling {
+///
+/// All but the last only have to bring the estimate close for the next.
+fn stages(
+    options: &RefineOptions,
+    height: u32,
+) -> impl Iterator<Item = (Sampling, Stopping)> + use<> {
+    let last = Stopping {
+        max_iterations: options.max_iterations,
+        step_px: options.step_tolerance_px,
+        step_sigma: options.step_tolerance_sigma,
+    };
+    let close = move |level: usize| Stopping {
+        step_px: CLOSE * last.step_px * 2f64.powi(level as i32),
+        step_sigma: CLOSE * last.step_sigma,
+        ..last
+    };
+    let finest = Sampling {
         level: 0,
         density: options.final_density,
-    }])
+    };
+    (0..=options.handover_level(height))
+        .rev()
+        .map(move |level| (Sampling::of(level), close(level)))
+        .chain([(finest, last)])
 }
 
 fn load(
@@ -221,7 +233,7 @@ fn frame_report(
         ))
     } else if sigma.wall_px.is_nan() || sigma.wall_px > LARGEST_SIGMA_PX {
         Some(format!(
-            "the wall it shows has too little texture: its position is uncertain by {:.1} px",
+            "its place on the wall is uncertain by {:.1} px: too little texture, or frames that do not match",
             sigma.wall_px
         ))
     } else {
