@@ -12,7 +12,7 @@ use super::visibility::{Observer, Tile, Visibility};
 use crate::camera::Pinhole;
 use crate::frames::Pyramid;
 use crate::surface::{Surface, SurfaceError, wall_jacobian};
-use nalgebra::{Matrix2x6, SMatrix, Vector2};
+use nalgebra::{Matrix2x6, Matrix4, SMatrix, Vector2};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -304,6 +304,21 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// M of a tile: `Σ φφᵀ` without what noise has added to the slopes.
+    ///
+    /// The slopes of S are noisy, and their squares add up where the slopes themselves would cancel: on a wall of low
+    /// contrast H would be several times too stiff, steps too short, and the covariance too small. The noise is known
+    /// once the frames are aligned at full size; before that, residuals are mostly misalignment.
+    fn features(&self, work: &TileWork) -> Matrix4<f64> {
+        let mut features = work.features;
+        if self.level == 0 && self.held_frames() == 0 {
+            for (k, noise) in work.slope_noise.iter().enumerate() {
+                features[(k, k)] -= noise;
+            }
+        }
+        features
+    }
+
     fn held_frames(&self) -> usize {
         self.participants.len() - self.active.len()
     }
@@ -363,7 +378,7 @@ impl<'a> Problem<'a> {
                     });
                 }
             }
-            sums.add_tile(&work, &columns);
+            sums.add_tile(&columns, &self.features(&work), total_weight(&work));
         }
         sums
     }
@@ -451,6 +466,11 @@ fn covisible_pairs(visibility: &Visibility, active: &Range<usize>) -> Vec<(usize
     pairs
 }
 
+/// Weight of all observers of a tile, per sample.
+fn total_weight(work: &TileWork) -> f64 {
+    work.observers.iter().map(|observer| observer.weight).sum()
+}
+
 /// An active observer of a tile.
 struct Column {
     place: usize,
@@ -461,7 +481,7 @@ struct Column {
 
 impl Column {
     /// `M B` (4 × 8) for this observer's `B = diag(A, 1, 1/a)`.
-    fn features_times_b(&self, m: &nalgebra::Matrix4<f64>) -> SMatrix<f64, 4, UNKNOWNS> {
+    fn features_times_b(&self, m: &Matrix4<f64>) -> SMatrix<f64, 4, UNKNOWNS> {
         let mut product = SMatrix::<f64, 4, UNKNOWNS>::zeros();
         for c in 0..6 {
             for r in 0..4 {
@@ -520,8 +540,8 @@ impl BlockSums {
         row * n - row * (row + 1) / 2 + column
     }
 
-    fn add_tile(&mut self, work: &TileWork, columns: &[Column]) {
-        let total: f64 = work.observers.iter().map(|o| o.weight).sum();
+    /// `features`: M of the tile; `total`: weight of all its observers, held ones too.
+    fn add_tile(&mut self, columns: &[Column], features: &Matrix4<f64>, total: f64) {
         for (n, b) in columns.iter().enumerate() {
             let moments = &b.moments;
             let share = &mut self.shares[b.place];
@@ -536,7 +556,7 @@ impl BlockSums {
             }
             gradient[6] -= moments.gradient[2];
             gradient[7] -= moments.gradient[3] * b.inverse_gain;
-            let f = b.features_times_b(&work.features);
+            let f = b.features_times_b(features);
             for a in &columns[..=n] {
                 let own = if a.place == b.place {
                     a.moments.weight

@@ -23,6 +23,8 @@
 //! - `M = Σ_x φ φᵀ` (4 × 4), and the mean weights `w̄_i`: eliminating S leaves
 //!   `H_ij = (w̄_i δ_ij − w̄_i w̄_j / Σ_k w̄_k) B_iᵀ M B_j`.
 //!
+//! M counts the noise of the slopes as if it were texture; [`TileWork::slope_noise`] says how much that is.
+//!
 //! Rows of the bracket sum to zero, so what moves all frames of a tile alike costs nothing: the gauge
 //! directions are exact null vectors of the data term.
 
@@ -82,6 +84,8 @@ pub struct TileWork {
     pub observers: Vec<ObserverMoments>,
     /// `Σ_x φ φᵀ`.
     pub features: Matrix4<f64>,
+    /// What the noise of S has added to the first two diagonal elements of `features`, on average.
+    pub slope_noise: [f64; 2],
 }
 
 impl TileWork {
@@ -112,6 +116,22 @@ impl TileWork {
             }
         }
         sum.map(|s| s / total)
+    }
+
+    /// Variance of `S(x + 1) − S(x − 1)` by the sensor's noise, grey levels².
+    ///
+    /// With v the variance of a sample, S has `v Σ q²a² / (Σ q a²)²`. Bilinear samples L pixels apart correlate by
+    /// `β(L)/β(0)` with β the cubic B-spline (the autocorrelation of the triangular kernel); the two are 2√q apart.
+    fn slope_variance(&self, noise: &NoiseModel) -> f32 {
+        let (mut square, mut sum, mut pixels) = (0.0f32, 0.0f32, 0.0f32);
+        for frame in &self.samples {
+            square += (frame.pixels * frame.gain).powi(2);
+            sum += frame.pixels * frame.gain * frame.gain;
+            pixels += frame.pixels;
+        }
+        let apart = 2.0 * (pixels / self.samples.len().max(1) as f32).sqrt();
+        let correlation = cubic_b_spline(apart) / cubic_b_spline(0.0);
+        noise.floor * square / (sum * sum) * 2.0 * (1.0 - correlation)
     }
 
     /// One step of iteratively reweighted least squares: sets every weight by the residual from `reference`
@@ -171,6 +191,9 @@ impl TileWork {
             }
         }
         self.features = feature_moments(&phi);
+        let noise_variance = self.slope_variance(noise);
+        self.slope_noise = [slope_s, slope_h]
+            .map(|slope| SAMPLES as f64 * f64::from(noise_variance * slope * slope));
         self.observers.clear();
         for frame in &self.samples {
             self.observers
@@ -197,6 +220,15 @@ impl TileWork {
                 histogram.add(scale * e, squares[k]);
             }
         }
+    }
+}
+
+/// The cubic B-spline β(x), `x ≥ 0`.
+fn cubic_b_spline(x: f32) -> f32 {
+    if x < 1.0 {
+        2.0 / 3.0 - x * x * (1.0 - 0.5 * x)
+    } else {
+        (2.0 - x).max(0.0).powi(3) / 6.0
     }
 }
 
@@ -287,4 +319,78 @@ fn sum(a: &[f32; SAMPLES]) -> f32 {
         }
     }
     sums.iter().sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Pinhole;
+    use crate::frames::GreyImage;
+    use crate::refine::estimate::FrameEstimate;
+    use crate::refine::grid::{TileId, WallGrid};
+    use crate::surface::Circle;
+    use crate::trajectory::{Pose, so3};
+    use nalgebra::Vector3;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, Normal};
+
+    /// Frames of pure noise: all slope there is, is noise.
+    #[test]
+    fn the_noise_of_slopes_is_known() {
+        let circle = Circle::new(3.0).unwrap();
+        let camera = Pinhole::from_vertical_fov(160, 120, 60f64.to_radians());
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let noise = Normal::new(100.0f32, 5.0).unwrap();
+        let images: Vec<GreyImage> = (0..3)
+            .map(|_| {
+                let data = (0..160 * 120).map(|_| noise.sample(&mut rng)).collect();
+                GreyImage::new(160, 120, data)
+            })
+            .collect();
+        let views: Vec<View> = images
+            .iter()
+            .enumerate()
+            .map(|(k, image)| {
+                let turn = Vector3::new(0.01, 0.02, 0.05) * k as f64;
+                let pose = Pose::new(so3::exp(&turn), Vector3::zeros());
+                View::new(image, camera, &FrameEstimate::at(pose))
+            })
+            .collect();
+        // A bilinear sample has 4/9 of a pixel's variance on average.
+        let model = NoiseModel {
+            floor: 25.0 * 4.0 / 9.0,
+            steepness: 0.0,
+        };
+        for density in [1.0, 2.0] {
+            let spacing = 3.0 / camera.fy / density;
+            let grid = WallGrid::new(&circle, spacing);
+            let (mut found, mut expected) = ([0.0; 2], [0.0; 2]);
+            let mut work = TileWork::default();
+            let reach = (4.0 * density) as i64;
+            for row in -reach..reach {
+                for column in -reach..reach {
+                    let column = column.rem_euclid(grid.columns);
+                    let tile = TileId { column, row };
+                    let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
+                    let seen = views.iter().map(|view| Seen {
+                        view,
+                        pixels: (1.0 / (density * density)) as f32,
+                    });
+                    let spacing = (grid.spacing_s_m, grid.spacing_h_m);
+                    work.moments(&points, seen, spacing, &model);
+                    for k in 0..2 {
+                        found[k] += work.features[(k, k)];
+                        expected[k] += work.slope_noise[k];
+                    }
+                }
+            }
+            for k in 0..2 {
+                let ratio = found[k] / expected[k];
+                assert!(
+                    (ratio - 1.0).abs() < 0.1,
+                    "density {density}, axis {k}: {ratio}"
+                );
+            }
+        }
+    }
 }
