@@ -34,7 +34,7 @@ impl Default for RefineOptions {
             final_density: 2.0,
             max_iterations: 20,
             step_tolerance_px: 0.0005,
-            step_tolerance_sigma: 0.03,
+            step_tolerance_sigma: 0.1,
         }
     }
 }

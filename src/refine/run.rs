@@ -53,7 +53,7 @@ const LEAST_PIXEL_SHARE: f64 = 0.02;
 /// Largest 1-σ on the wall of a pose that counts as photometric, pixels.
 const LARGEST_SIGMA_PX: f64 = 1.0;
 /// Least share of a frame's weight that the robust loss must leave.
-const LEAST_INLIER_SHARE: f64 = 0.5;
+const LEAST_INLIER_SHARE: f64 = 0.8;
 
 /// Refines the poses of `survey`.
 ///

@@ -118,6 +118,14 @@ impl TileWork {
         sum.map(|s| s / total)
     }
 
+    /// Squared gradient of the texture as the frames show it: in their own grey levels a sample, by their mean square
+    /// gain. (In the wall's units a common factor of all gains would change the noise model, and with it the cost.)
+    fn activity(&self, texture: &[f32; AREA]) -> [f32; AREA] {
+        let gains: f32 = self.samples.iter().map(|frame| frame.gain.powi(2)).sum();
+        let square_gain = gains / self.samples.len().max(1) as f32;
+        gradient_squares(texture).map(|square| square_gain * square)
+    }
+
     /// Variance of `S(x + 1) − S(x − 1)` by the sensor's noise, grey levels².
     ///
     /// With v the variance of a sample, S has `v Σ q²a² / (Σ q a²)²`. Bilinear samples L pixels apart correlate by
@@ -172,7 +180,7 @@ impl TileWork {
     ) {
         self.sample(points, observers);
         let mean = self.mean();
-        let precision = gradient_squares(&mean).map(|g2| noise.precision(g2));
+        let precision = self.activity(&mean).map(|g2| noise.precision(g2));
         let mut texture = mean;
         for _ in 0..REWEIGHTINGS {
             texture = self.reweight(&texture, &precision);
@@ -213,7 +221,7 @@ impl TileWork {
         let n = self.samples.len() as f32;
         let scale = (n / (n - 1.0)).sqrt();
         let mean = self.mean();
-        let squares = gradient_squares(&mean);
+        let squares = self.activity(&mean);
         for frame in &self.samples {
             for k in 0..AREA {
                 let e = frame.gain * (frame.values[k] - mean[k]);

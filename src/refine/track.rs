@@ -1,7 +1,8 @@
 //! Tracking: placing one frame after another, with a sliding window that keeps the errors from growing.
 //!
 //! Registering each frame only against those already placed gains error exponentially. Solving the last
-//! frames that can overlap again together, every few frames, with the oldest third held, keeps it bounded.
+//! frames that can overlap again together, every few frames, with the oldest third held, keeps it bounded. When a
+//! turn closes, the window is solved from the coarsest level.
 
 use super::estimate::FrameEstimate;
 use super::gauss_newton::{Stopping, solve};
@@ -12,6 +13,7 @@ use crate::progress::Progress;
 use crate::surface::Footprint;
 use crate::trajectory::{Jitter, JitterModel, Pose};
 use nalgebra::Vector3;
+use std::ops::Range;
 
 /// Hypotheses refined per frame.
 const HYPOTHESES: usize = 5;
@@ -42,6 +44,7 @@ pub fn track(
     let finest = options.handover_level(scene.camera.height);
     let mut estimates = vec![FrameEstimate::at(scene.prior.initial[0])];
     let mut footprints = vec![footprint(scene, 0, &estimates)?];
+    let mut before = 0;
     progress.start("tracking", count);
     progress.advance(1);
     for k in 1..count {
@@ -51,19 +54,18 @@ pub fn track(
         if first < k {
             estimates[k] = place(scene, options, first, &estimates)?;
         }
-        if k % options.window_stride == 0 || k + 1 == count {
+        // The frame looks farther back than the one before it did: a turn has closed on wall that was placed
+        // without it, and what has drifted apart meanwhile may be many pixels.
+        let closes = first < before;
+        before = first;
+        if closes || k % options.window_stride == 0 || k + 1 == count {
+            let coarsest = match closes {
+                true => options.coarsest_level(scene.camera.height),
+                false => finest,
+            };
             let held = if first == 0 { 0 } else { (k + 1 - first) / 3 };
-            let active = first + held..k + 1;
-            let problem = Problem::new(
-                scene,
-                Sampling::of(finest),
-                first..k + 1,
-                active.clone(),
-                &estimates,
-            )?;
-            if problem.tiles() > 0 {
-                let solution = solve(problem, WINDOW_STOPPING, None)?;
-                estimates[active].copy_from_slice(&solution.estimates);
+            for level in (finest..=coarsest).rev() {
+                solve_window(scene, level, first..k + 1, held, &mut estimates)?;
             }
         }
         footprints[k] = footprint(scene, k, &estimates)?;
@@ -71,6 +73,24 @@ pub fn track(
     }
     progress.finish();
     Ok(estimates)
+}
+
+/// Solves the frames of a window together, the oldest `held` of them held.
+fn solve_window(
+    scene: &Scene,
+    level: usize,
+    window: Range<usize>,
+    held: usize,
+    estimates: &mut [FrameEstimate],
+) -> Result<(), ProblemError> {
+    let active = window.start + held..window.end;
+    let sampling = Sampling::of(level);
+    let problem = Problem::new(scene, sampling, window, active.clone(), estimates)?;
+    if problem.tiles() > 0 {
+        let solution = solve(problem, WINDOW_STOPPING, None)?;
+        estimates[active].copy_from_slice(&solution.estimates);
+    }
+    Ok(())
 }
 
 /// Places the last of `estimates` (its predicted pose) on the wall that the frames from `first` on show:
