@@ -120,8 +120,28 @@ impl StagedFolder {
     /// Begins the folder that will be `target`; the folders above it are made if missing.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// Whatever the system says; a target without a name of its own (`.`, `..`, `/`), or one that holds the folder the
+    /// program works in.
     pub fn begin(target: &Path) -> Result<Self, WriteError> {
+        let refuse = |what: &str| Err(WriteError::new(target, std::io::Error::other(what)));
+        let named = target
+            .components()
+            .next_back()
+            .is_some_and(|last| matches!(last, std::path::Component::Normal(_)));
+        if !named {
+            return refuse(
+                "it has no name of its own; name a folder that may be replaced as a whole",
+            );
+        }
+        if target.symlink_metadata().is_ok_and(|meta| !meta.is_dir()) {
+            return refuse("it exists and is no folder");
+        }
+        let here = std::env::current_dir().and_then(|here| here.canonicalize());
+        if let (Ok(here), Ok(target)) = (here, target.canonicalize())
+            && here.starts_with(target)
+        {
+            return refuse("the program works in it, so it cannot be replaced");
+        }
         let parent = beside(target);
         create_folder(parent)?;
         let temporary = tempfile::Builder::new()
@@ -146,9 +166,6 @@ impl StagedFolder {
     /// Whatever the system says.
     pub fn finish(self) -> Result<(), WriteError> {
         let fail = |source| WriteError::new(&self.target, source);
-        if self.target.exists() {
-            std::fs::remove_dir_all(&self.target).map_err(fail)?;
-        }
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
@@ -163,7 +180,23 @@ impl StagedFolder {
             )
             .map_err(fail)?;
         }
-        std::fs::rename(self.temporary.path(), &self.target).map_err(fail)?;
+        // The old folder steps aside first and goes only when the new one is in place.
+        let mut old = None;
+        if self.target.exists() {
+            let aside = tempfile::Builder::new()
+                .prefix(PREFIX)
+                .tempdir_in(beside(&self.target))
+                .map_err(fail)?;
+            std::fs::rename(&self.target, aside.path().join("old")).map_err(fail)?;
+            old = Some(aside);
+        }
+        if let Err(error) = std::fs::rename(self.temporary.path(), &self.target) {
+            if let Some(aside) = &old {
+                // If even this fails, the old folder stays where it stepped aside.
+                std::fs::rename(aside.path().join("old"), &self.target).map_err(fail)?;
+            }
+            return Err(fail(error));
+        }
         drop(self.listed);
         // It is no longer temporary.
         let _ = self.temporary.keep();
@@ -174,8 +207,12 @@ impl StagedFolder {
 /// Makes a folder and those above it.
 ///
 /// # Errors
-/// Whatever the system says.
+/// Whatever the system says; a file in its place.
 pub fn create_folder(path: &Path) -> Result<(), WriteError> {
+    if path.is_file() {
+        let what = std::io::Error::other("it is a file, and a folder is needed");
+        return Err(WriteError::new(path, what));
+    }
     std::fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))
 }
 
@@ -211,6 +248,14 @@ mod tests {
             staged.finish().unwrap();
             assert_eq!(std::fs::read_to_string(target.join("a.txt")).unwrap(), text);
         }
+        for nameless in [".", "..", "/", "deep/.."] {
+            assert!(
+                StagedFolder::begin(Path::new(nameless)).is_err(),
+                "{nameless}"
+            );
+        }
+        let above = std::env::current_dir().unwrap();
+        assert!(StagedFolder::begin(&above).is_err());
         let litter = std::fs::read_dir(dir.path().join("deep")).unwrap().count();
         assert_eq!(litter, 1);
     }

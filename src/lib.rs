@@ -81,6 +81,9 @@
 // --document-private-items` shows all of it.
 #![allow(rustdoc::private_intra_doc_links)]
 
+/// Name and version, as results carry them.
+const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
+
 pub mod atomic;
 pub mod camera;
 pub mod cli;

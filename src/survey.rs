@@ -239,19 +239,19 @@ impl Survey {
         let circle = Circle::new(file.tunnel.radius_m)
             .map_err(|error| value(format!("tunnel.radius_m: {error}")))?;
         let prior = &file.prior;
-        if !(prior.rotation_sigma_deg.is_finite() && prior.rotation_sigma_deg > 0.0) {
+        if !(1e-6..=180.0).contains(&prior.rotation_sigma_deg) {
             return Err(value(format!(
-                "prior.rotation_sigma_deg is {}; it must be positive",
+                "prior.rotation_sigma_deg is {}; it must lie between 1e-6 and 180",
                 prior.rotation_sigma_deg
             )));
         }
         if !prior
             .translation_sigma_m
             .iter()
-            .all(|s| s.is_finite() && *s > 0.0)
+            .all(|s| (1e-9..=10.0 * file.tunnel.radius_m).contains(s))
         {
             return Err(value(format!(
-                "prior.translation_sigma_m is {:?}; all three must be positive",
+                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times the radius",
                 prior.translation_sigma_m
             )));
         }

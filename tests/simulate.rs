@@ -41,7 +41,15 @@ fn every_experiment_is_a_complete_survey() {
     for experiment in ["centred", "off-centre", "free"] {
         let out = dir.path().join(experiment);
         let said = simulate(experiment, &out, &[]);
-        assert!(said.contains("next: tunnelstitch refine"), "{said}");
+        let next = if experiment == "free" {
+            "refine"
+        } else {
+            "stitch"
+        };
+        assert!(
+            said.contains(&format!("next: tunnelstitch {next}")),
+            "{said}"
+        );
         let survey = Survey::open(&out).unwrap();
         assert_eq!(survey.frames.len(), 4);
         assert_eq!((survey.camera.width, survey.camera.height), (64, 48));
@@ -126,10 +134,47 @@ fn only_a_survey_is_replaced_and_only_when_asked() {
     std::fs::write(precious.join("thesis.txt"), "years of work").unwrap();
     again[3] = text(&precious);
     let message = fail(&again, 3);
-    assert!(message.contains("no survey"), "{message}");
+    assert!(message.contains("not just a simulated survey"), "{message}");
     assert!(precious.join("thesis.txt").exists());
+    // A survey with something of the user's in it is as precious.
+    std::fs::write(out.join("notes.txt"), "mine").unwrap();
+    again[3] = text(&out);
+    fail(&again, 3);
+    std::fs::remove_file(out.join("notes.txt")).unwrap();
+    // As is one that was taken in the field: it has no record of a simulation.
+    std::fs::remove_file(out.join("simulation.json")).unwrap();
+    fail(&again, 3);
+    assert!(out.join("survey.toml").exists());
     // Nothing temporary is left beside them.
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
+}
+
+/// The folder the program works in is nobody's to replace.
+#[test]
+fn the_present_folder_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("thesis.txt"), "years of work").unwrap();
+    for out in [".", "..", "./"] {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+            .current_dir(dir.path())
+            .args(["simulate", "free", "--force", "--out", out])
+            .args(SMALL)
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(3), "{out}");
+    }
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+}
+
+/// A demo never replaces a survey that is not its own.
+#[test]
+fn a_demo_over_a_real_survey_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let real = support::first_frames(2);
+    std::fs::rename(real.path(), dir.path().join("survey")).unwrap();
+    let message = fail(&["demo", "--turns", "1", "--out", text(dir.path())], 3);
+    assert!(message.contains("not just a simulated survey"), "{message}");
+    assert!(dir.path().join("survey/groundtruth.tum").exists());
 }
 
 #[test]
@@ -146,7 +191,9 @@ fn impossible_surveys_are_refused_with_the_reason() {
     refuse(&["--radius-m", "0"], 2, "radius");
     refuse(&["--size", "640"], 2, "640x480");
     refuse(&["--size", "8x8"], 2, "16 to 16384");
-    refuse(&["--noise=-1"], 2, "noise");
+    refuse(&["--noise", "-1"], 2, "noise");
+    refuse(&["--turns", "1", "--turn-deg", "0"], 2, "--turn-deg");
+    refuse(&["--radius-m", "300", "--size", "64x48"], 2, "memory");
     refuse(&["--fov-deg", "200"], 2, "field of view");
     refuse(&["--frames", "0"], 2, "--frames");
     refuse(&["--translation-sigma-m", "1,2"], 2, "three numbers");

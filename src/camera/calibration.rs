@@ -74,17 +74,19 @@ pub fn read_calibration(path: &Path) -> Result<Pinhole, CalibrationError> {
         source,
     })?;
     let file: CalibrationFile =
-        serde_json::from_str(&text).map_err(|source| CalibrationError::Parse {
-            path: path.to_owned(),
-            source,
+        serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|source| {
+            CalibrationError::Parse {
+                path: path.to_owned(),
+                source,
+            }
         })?;
     let fail = |what: String| CalibrationError::Value {
         path: path.to_owned(),
         what,
     };
-    if file.width < 2 || file.height < 2 {
+    if file.width < 16 || file.height < 16 {
         return Err(fail(format!(
-            "width and height are {} × {}; they must be the frames' size in pixels",
+            "width and height are {} × {}; they must be the frames' size in pixels, 16 at the least",
             file.width, file.height
         )));
     }
@@ -149,7 +151,7 @@ mod tests {
 
     #[test]
     fn half_pixel_centres_are_converted() {
-        let text = r#"{"model":"pinhole","width":4,"height":2,"fx":3,"fy":3,"cx":2,"cy":1,"pixel_centre":"half"}"#;
+        let text = r#"{"model":"pinhole","width": 40, "height": 20,"fx":3,"fy":3,"cx":2,"cy":1,"pixel_centre":"half"}"#;
         let camera = read_text(text).unwrap();
         assert_eq!((camera.cx, camera.cy), (1.5, 0.5));
     }
@@ -158,15 +160,15 @@ mod tests {
     fn bad_files_say_where_and_what() {
         for (text, expected) in [
             (
-                r#"{"model":"pinhole","width":4,"height":2,"fx":3,"fy":3,"cx":2,"cy":1,"k1":0}"#,
+                r#"{"model":"pinhole","width": 40, "height": 20,"fx":3,"fy":3,"cx":2,"cy":1,"k1":0}"#,
                 "unknown field `k1`",
             ),
             (
-                r#"{"model":"pinhole","width":4,"height":2,"fx":-3,"fy":3,"cx":2,"cy":1}"#,
+                r#"{"model":"pinhole","width": 40, "height": 20,"fx":-3,"fy":3,"cx":2,"cy":1}"#,
                 "fx is -3",
             ),
             (
-                r#"{"model":"fisheye","width":4,"height":2,"fx":3,"fy":3,"cx":2,"cy":1}"#,
+                r#"{"model":"fisheye","width": 40, "height": 20,"fx":3,"fy":3,"cx":2,"cy":1}"#,
                 "unknown variant `fisheye`",
             ),
             (r#"{"model":"pinhole","width":4}"#, "missing field"),

@@ -75,6 +75,11 @@ impl Pinhole {
         )
     }
 
+    /// Pixels of the image's shorter side.
+    pub fn shorter_side(&self) -> u32 {
+        self.width.min(self.height)
+    }
+
     /// True if the pixel lies at least `margin` pixels inside the outermost pixel centres.
     pub fn sees(&self, pixel: &Vector2<f64>, margin: f64) -> bool {
         pixel.x >= margin

@@ -1,8 +1,9 @@
 //! `tunnelstitch compare`: initial against refined poses.
 
 use super::stitch::{PictureArguments, positive};
-use super::{Failure, PROGRAM, Terminal, json};
-use crate::atomic;
+use super::{Failure, Terminal, json};
+use crate::PROGRAM;
+use crate::atomic::{self, WriteError};
 use crate::evaluate::{CompareInput, Comparison, before_after, compare};
 use crate::frames::{PictureFormat, write_picture};
 use crate::progress::Progress;
@@ -25,11 +26,11 @@ pub struct CompareArguments {
     #[arg(long, value_name = "FILE")]
     refined: PathBuf,
     /// Folder for the results; made if need be.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
     picture: PictureArguments,
-    /// Print compare.json too.
+    /// Print compare.json on standard output instead of the table.
     #[arg(long)]
     json: bool,
     /// Exit with code 4 if the refined poses put pixels farther than this from their true place on the wall
@@ -127,8 +128,15 @@ pub fn compare_into(
     )?;
     write("baseline.png", &layout.turn(baseline))?;
     write("refined.png", &layout.turn(refined))?;
-    if let Some(truth) = panoramas.truth {
-        write("truth.png", &truth.into_image(layout))?;
+    match panoramas.truth {
+        Some(truth) => write("truth.png", &truth.into_image(layout))?,
+        // One from an earlier comparison would belong to other pictures.
+        None => match std::fs::remove_file(out.join("truth.png")) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                return Err(WriteError::new(&out.join("truth.png"), error).into());
+            }
+            _ => {}
+        },
     }
     terminal.finish();
     atomic::write_text(&out.join("compare.json"), &json)?;

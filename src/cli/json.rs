@@ -1,8 +1,10 @@
 //! Results for programs, on standard output.
 
 use super::Failure;
+use crate::atomic::WriteError;
 use serde::Serialize;
 use std::io::Write;
+use std::path::Path;
 
 /// Prints a value as indented JSON with a line break at its end.
 ///
@@ -20,7 +22,7 @@ pub fn print_text(text: &str) -> Result<(), Failure> {
     match std::io::stdout().write_all(text.as_bytes()) {
         // A reader that has left (`| head`) is no error.
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Failure::input(format!("cannot write the JSON: {error}")))
+            Err(WriteError::new(Path::new("standard output"), error).into())
         }
         _ => Ok(()),
     }

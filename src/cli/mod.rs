@@ -17,9 +17,6 @@ use crate::atomic;
 use clap::{Parser, Subcommand};
 use std::sync::Arc;
 
-/// Name and version, as results carry them.
-const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
-
 /// Repairs the trajectory of a revolving tunnel camera by photometric consistency and unrolls the wall into
 /// one metric panorama.
 #[derive(Debug, Parser)]

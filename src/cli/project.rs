@@ -1,9 +1,9 @@
 //! `tunnelstitch project`: the cylindrical projection of one photo.
 
-use super::stitch::{InterpolationArgument, positive};
+use super::stitch::{InterpolationArgument, picture_output, positive};
 use super::{Failure, Terminal};
 use crate::camera::{Pinhole, read_calibration};
-use crate::frames::{FrameFile, PictureFormat, load_colour, write_picture};
+use crate::frames::{FrameFile, load_colour, write_picture};
 use crate::render::{Picture, cylinder};
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ pub struct ProjectArguments {
     /// The photo.
     image: PathBuf,
     /// The result, .png or .tif.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     /// Vertical field of view of the photo, degrees.
     #[arg(long, value_name = "DEG", default_value_t = 60.0, value_parser = field_of_view, conflicts_with_all = ["focal_px", "camera"])]
@@ -45,8 +45,7 @@ fn field_of_view(text: &str) -> Result<f64, String> {
 /// [`Failure`] for an unreadable photo or calibration, a photo of another size than the calibration's, and
 /// an output that cannot be written.
 pub fn run(arguments: &ProjectArguments, terminal: &Terminal) -> Result<(), Failure> {
-    let format =
-        PictureFormat::of(&arguments.out).map_err(|error| Failure::usage(error.to_string()))?;
+    let format = picture_output(&arguments.out)?;
     let camera = match &arguments.camera {
         Some(path) => read_calibration(path)?,
         None => camera_of(arguments)?,

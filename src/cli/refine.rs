@@ -1,6 +1,7 @@
 //! `tunnelstitch refine`.
 
-use super::{Failure, PROGRAM, Terminal, json};
+use super::{Failure, Terminal, json};
+use crate::PROGRAM;
 use crate::atomic;
 use crate::progress::Progress;
 use crate::refine::{FrameFlag, RefineOptions, RefineReport, Refined, refine};
@@ -24,7 +25,7 @@ pub struct RefineArguments {
     /// Steps of each global solve, at the most.
     #[arg(long, value_name = "N", default_value_t = RefineOptions::default().max_iterations, value_parser = clap::value_parser!(u64).range(1..))]
     max_iterations: u64,
-    /// Print the report (refine.json) on standard output.
+    /// Print refine.json on standard output instead of the summary.
     #[arg(long)]
     json: bool,
 }
@@ -130,15 +131,15 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
         terminal.say(format!("  all {} frames improved", report.frames.len()));
     } else {
         terminal.warn(format!(
-            "{} of {} frames could not be improved and rest on their prior:",
+            "{} of {} frames could not be made sure by their pixels; do not rely on them without their prior:",
             report.frames_on_prior,
             report.frames.len()
         ));
-        if 2 * report.frames_on_prior > report.frames.len() {
+        if report.frames_on_prior == report.frames.len() {
             terminal.warn(
-                "  most frames do not match their neighbours; check that the poses are camera-to-world with the \
-                 tunnel's axis along y, that radius_m and the calibration are right, and that [prior] is as wide \
-                 as the poses are wrong",
+                "  no frame is sure: too few overlapping frames, a wall without texture, poses in another convention \
+                 (they must be camera-to-world, with the tunnel's axis along y), or a wrong radius_m, calibration or \
+                 [prior]",
             );
         }
         for frame in &report.frames {

@@ -13,10 +13,13 @@ use std::path::PathBuf;
 /// Writes a folder that all other commands take: survey.toml, camera.json, frames, baseline.tum (the plan),
 /// groundtruth.tum, and simulation.json, which records the options.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  \
+#[command(
+    allow_negative_numbers = true,
+    after_help = "Examples:\n  \
     tunnelstitch simulate free --out survey\n  \
     tunnelstitch simulate free --wall concrete --jitter independent --seed 7 --out survey\n  \
-    tunnelstitch simulate off-centre --texture bricks.jpg --texture-width-m 2 --out survey")]
+    tunnelstitch simulate off-centre --texture bricks.jpg --texture-width-m 2 --out survey"
+)]
 pub struct SimulateArguments {
     /// Which of the paper's experiments; the options below change it.
     #[arg(value_enum)]
@@ -24,7 +27,7 @@ pub struct SimulateArguments {
     /// Folder for the survey.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-    /// Replace an earlier survey of that name.
+    /// Replace an earlier simulated survey of that name.
     #[arg(long)]
     force: bool,
     /// Number of frames [default: 12; free: 120].
@@ -207,14 +210,27 @@ impl SimulateArguments {
 /// # Errors
 /// Impossible options, or an output that cannot be written.
 pub fn run(arguments: &SimulateArguments, terminal: &Terminal) -> Result<(), Failure> {
+    if arguments.turns.is_some() && arguments.turn_deg == 0.0 {
+        return Err(Failure::usage(
+            "--turns needs a --turn-deg other than 0; or give a number of --frames",
+        ));
+    }
     let options = arguments.options();
     let simulated = simulate::run(&options, &arguments.out, arguments.force, terminal)?;
     if arguments.json {
         return json::print(&simulated);
     }
-    let out = arguments.out.display();
+    // Without a slash at its end.
+    let out: PathBuf = arguments.out.components().collect();
+    let out = out.display();
+    let next = match arguments.experiment {
+        Experiment::Free => format!("refine {out} --out {out}-refined"),
+        Experiment::Centred | Experiment::OffCentre => {
+            format!("stitch {out} --poses truth --out {out}.png")
+        }
+    };
     terminal.say(format!(
-        "{out}: {} frames of {} × {} px, with true poses\nnext: tunnelstitch refine {out} --out {out}-refined",
+        "{out}: {} frames of {} × {} px, with true poses\nnext: tunnelstitch {next}",
         options.frames, options.width, options.height
     ));
     Ok(())

@@ -1,6 +1,7 @@
 //! `tunnelstitch stitch`: one panorama from given poses.
 
 use super::{Failure, Terminal, json};
+use crate::atomic;
 use crate::frames::{PictureFormat, write_picture};
 use crate::progress::Progress;
 use crate::render::{Interpolation, Layout, StitchOptions, stitch};
@@ -21,7 +22,7 @@ pub struct StitchArguments {
     #[arg(long, default_value = "initial", value_name = "initial|truth|FILE")]
     poses: String,
     /// The panorama, .png or .tif.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
     picture: PictureArguments,
@@ -110,8 +111,7 @@ struct Report {
 /// # Errors
 /// [`Failure`] for everything wrong with the survey, the poses or the output.
 pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failure> {
-    let format =
-        PictureFormat::of(&arguments.out).map_err(|error| Failure::usage(error.to_string()))?;
+    let format = picture_output(&arguments.out)?;
     let survey = Survey::open(&arguments.survey)?;
     let poses = poses_by_name(&survey, &arguments.poses)?;
     let options = StitchOptions {
@@ -129,6 +129,11 @@ pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failu
     )?;
     let canvas = *panorama.canvas();
     let coverage = panorama.coverage();
+    if coverage == 0.0 {
+        return Err(Failure::input(
+            "no frame covers a single pixel of the panorama; check the calibration (cx, cy) and --px-per-metre",
+        ));
+    }
     let layout = arguments.picture.layout.into();
     let image = panorama.into_image(layout);
     let report = Report {
@@ -160,6 +165,27 @@ pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failu
         report.frames
     ));
     Ok(())
+}
+
+/// The format of a picture to be written; its folder is made if missing. Checked before any work is done.
+///
+/// # Errors
+/// A name that says no format or belongs to a folder; a folder that cannot be made.
+pub fn picture_output(path: &Path) -> Result<PictureFormat, Failure> {
+    let format = PictureFormat::of(path).map_err(|error| Failure::usage(error.to_string()))?;
+    if path.is_dir() {
+        return Err(Failure::usage(format!(
+            "{}: is a folder; name a file",
+            path.display()
+        )));
+    }
+    if let Some(folder) = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+    {
+        atomic::create_folder(folder)?;
+    }
+    Ok(format)
 }
 
 /// The poses that `initial`, `truth` or the name of a TUM file stand for.

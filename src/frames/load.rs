@@ -77,7 +77,10 @@ pub fn list(folder: &Path, pattern: &str) -> Result<Vec<FrameFile>, FrameError> 
     let found = glob::glob(&full.to_string_lossy()).map_err(|error| fail(error.to_string()))?;
     let mut paths = Vec::new();
     for path in found {
-        paths.push(path.map_err(|error| fail(error.to_string()))?);
+        let path = path.map_err(|error| fail(error.to_string()))?;
+        if !path.is_dir() {
+            paths.push(path);
+        }
     }
     paths.sort();
     if paths.is_empty() {

@@ -7,8 +7,8 @@ pub struct RefineOptions {
     pub log_gain_sigma: f64,
     /// 1-σ of a frame's bias around 0, grey levels.
     pub bias_sigma: f64,
-    /// Rows of the coarsest pyramid level, at least.
-    pub coarsest_rows: u32,
+    /// Pixels of the shorter side at the coarsest pyramid level, at least.
+    pub coarsest_side: u32,
     /// Pyramid levels that tracking and windows use, from the coarsest; the global solve starts where they end.
     pub tracking_levels: usize,
     /// Frames placed between two solves of the sliding window.
@@ -28,7 +28,7 @@ impl Default for RefineOptions {
         Self {
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
-            coarsest_rows: 30,
+            coarsest_side: 30,
             tracking_levels: 3,
             window_stride: 6,
             final_density: 2.0,
@@ -40,18 +40,18 @@ impl Default for RefineOptions {
 }
 
 impl RefineOptions {
-    /// The coarsest pyramid level for frames of this height (0 is full size).
-    pub fn coarsest_level(&self, height: u32) -> usize {
+    /// The coarsest pyramid level for frames whose shorter side has this many pixels (0 is full size).
+    pub fn coarsest_level(&self, side: u32) -> usize {
         let mut level = 0;
-        while height >> (level + 1) >= self.coarsest_rows.max(2) {
+        while side >> (level + 1) >= self.coarsest_side.max(2) {
             level += 1;
         }
         level
     }
 
     /// The finest level of tracking, where the global solve starts.
-    pub fn handover_level(&self, height: u32) -> usize {
-        self.coarsest_level(height)
+    pub fn handover_level(&self, side: u32) -> usize {
+        self.coarsest_level(side)
             .saturating_sub(self.tracking_levels.saturating_sub(1))
     }
 }
@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_follow_the_height() {
+    fn levels_follow_the_shorter_side() {
         let options = RefineOptions::default();
         assert_eq!(options.coarsest_level(480), 4);
         assert_eq!(options.coarsest_level(360), 3);

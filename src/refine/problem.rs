@@ -59,7 +59,9 @@ pub enum ProblemError {
         source: SurfaceError,
     },
     /// The normal equations have no solution.
-    #[error("frames {first} to {last}: {source}")]
+    #[error(
+        "frames {first} to {last}: {source}; check that the poses are camera-to-world, radius_m, the calibration, and that [prior] is neither absurdly wide nor narrow"
+    )]
     Factor {
         /// First estimated frame.
         first: usize,
@@ -79,6 +81,8 @@ const BATCH: usize = 64;
 const LEAST_ROWS: u32 = 90;
 /// Tiles looked at to estimate the noise.
 const SCALE_TILES: usize = 2000;
+/// Share of a tile's squared slopes that counts as texture, at least, however noisy they are.
+const LEAST_TEXTURE: f64 = 0.05;
 /// Stiffness of the gauge at the first frame over that of its pixels.
 const GAUGE_TIE: f64 = 1e6;
 /// Noise of a pixel over that of a bilinear sample between pixels: each axis averages `f² + (1−f)²` of the
@@ -309,14 +313,19 @@ impl<'a> Problem<'a> {
     /// The slopes of S are noisy, and their squares add up where the slopes themselves would cancel: on a wall of low
     /// contrast H would be several times too stiff, steps too short, and the covariance too small. The noise is known
     /// once the frames are aligned at full size; before that, residuals are mostly misalignment.
+    ///
+    /// The slopes are shrunk, `M ← D M D` with `D_kk² = 1 − noise/M_kk` but no less than [`LEAST_TEXTURE`], so that M
+    /// stays positive semidefinite.
     fn features(&self, work: &TileWork) -> Matrix4<f64> {
-        let mut features = work.features;
+        let mut shrink = nalgebra::Vector4::repeat(1.0);
         if self.level == 0 && self.held_frames() == 0 {
             for (k, noise) in work.slope_noise.iter().enumerate() {
-                features[(k, k)] -= noise;
+                let share = 1.0 - noise / work.features[(k, k)].max(f64::MIN_POSITIVE);
+                shrink[k] = share.max(LEAST_TEXTURE).sqrt();
             }
         }
-        features
+        let d = Matrix4::from_diagonal(&shrink);
+        d * work.features * d
     }
 
     fn held_frames(&self) -> usize {

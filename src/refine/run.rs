@@ -12,6 +12,7 @@ use crate::frames::{FrameError, Pyramid, load_grey};
 use crate::progress::Progress;
 use crate::survey::Survey;
 use crate::trajectory::{StampedPose, Trajectory};
+use nalgebra::Matrix6;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
@@ -71,12 +72,8 @@ pub fn refine(
         return Err(RefineError::SingleFrame);
     }
     let mut clock = Clock::default();
-    let height = survey.camera.height;
-    let frames = load(
-        survey,
-        options.coarsest_level(height) + 1,
-        progress.as_ref(),
-    )?;
+    let side = survey.camera.shorter_side();
+    let frames = load(survey, options.coarsest_level(side) + 1, progress.as_ref())?;
     clock.lap("decode");
     let prior = Prior {
         jitter: survey.prior,
@@ -95,7 +92,7 @@ pub fn refine(
 
     let mut levels = Vec::new();
     let mut last = None;
-    for (sampling, stopping) in stages(options, height) {
+    for (sampling, stopping) in stages(options, side) {
         let Sampling { level, density } = sampling;
         let problem = Problem::new(&scene, sampling, 0..count, 0..count, &estimates)?;
         if problem.tiles() == 0 {
@@ -123,7 +120,8 @@ pub fn refine(
         solution.problem.symbolic(),
         &solution.linearisation.normal,
     )
-    .map_err(|source| solution.problem.factor_error(source))?;
+    // Poses without a covariance are still poses; they are reported as uncertain.
+    .unwrap_or_else(|_| vec![Matrix6::from_element(f64::NAN); count]);
     let reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = frame_sigma(scene.surface, scene.camera, &estimates[k], &covariances[k]);
@@ -167,7 +165,7 @@ pub fn refine(
 /// All but the last only have to bring the estimate close for the next.
 fn stages(
     options: &RefineOptions,
-    height: u32,
+    side: u32,
 ) -> impl Iterator<Item = (Sampling, Stopping)> + use<> {
     let last = Stopping {
         max_iterations: options.max_iterations,
@@ -183,7 +181,7 @@ fn stages(
         level: 0,
         density: options.final_density,
     };
-    (0..=options.handover_level(height))
+    (0..=options.handover_level(side))
         .rev()
         .map(move |level| (Sampling::of(level), close(level)))
         .chain([(finest, last)])

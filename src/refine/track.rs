@@ -41,7 +41,7 @@ pub fn track(
     progress: &dyn Progress,
 ) -> Result<Vec<FrameEstimate>, ProblemError> {
     let count = scene.frames.len();
-    let finest = options.handover_level(scene.camera.height);
+    let finest = options.handover_level(scene.camera.shorter_side());
     let mut estimates = vec![FrameEstimate::at(scene.prior.initial[0])];
     let mut footprints = vec![footprint(scene, 0, &estimates)?];
     let mut before = 0;
@@ -60,7 +60,7 @@ pub fn track(
         before = first;
         if closes || k % options.window_stride == 0 || k + 1 == count {
             let coarsest = match closes {
-                true => options.coarsest_level(scene.camera.height),
+                true => options.coarsest_level(scene.camera.shorter_side()),
                 false => finest,
             };
             let held = if first == 0 { 0 } else { (k + 1 - first) / 3 };
@@ -103,11 +103,13 @@ fn place(
 ) -> Result<FrameEstimate, ProblemError> {
     let k = estimates.len() - 1;
     let predicted = estimates[k];
-    let coarsest = options.coarsest_level(scene.camera.height);
-    let finest = options.handover_level(scene.camera.height);
+    let coarsest = options.coarsest_level(scene.camera.shorter_side());
+    let finest = options.handover_level(scene.camera.shorter_side());
     let distance = wall_distance(scene, k, &predicted.pose)?;
     let sigma = picture_sigma(&scene.prior.jitter, distance);
-    let margin = 3.0 * sigma[1].max(sigma[0]) * distance;
+    // Beyond half a turn there is no more wall to look at.
+    let widest = 0.5 * scene.surface.perimeter_m();
+    let margin = (3.0 * sigma[1].max(sigma[0]) * distance).min(widest);
     let placed: Vec<_> = (first..k).map(|i| (i, estimates[i])).collect();
     let wall = |level| FusedWall::new(scene, level, &placed, k, &predicted.pose, margin);
     let hypotheses = wall(coarsest)?.search(k, &predicted.pose, sigma, HYPOTHESES);

@@ -115,7 +115,9 @@ impl SimulateOptions {
         match self.jitter {
             Some(jitter) => PriorSection {
                 rotation_sigma_deg: jitter.rotation_sigma_deg.max(LEAST.0),
-                translation_sigma_m: jitter.translation_sigma_m.map(|sigma| sigma.max(LEAST.1)),
+                translation_sigma_m: std::array::from_fn(|k| {
+                    jitter.translation_sigma_m[k].max(LEAST.1) + self.offset_m[k].abs()
+                }),
                 ..jitter
             },
             None => PriorSection {
@@ -144,8 +146,8 @@ impl SimulateOptions {
             "the number of frames must lie between 1 and 1000000",
         )?;
         check(
-            positive(self.radius_m),
-            "the radius must be a positive number of metres",
+            (0.01..=1000.0).contains(&self.radius_m),
+            "the radius must lie between 0.01 and 1000 metres",
         )?;
         let side = |pixels| (16..=16_384).contains(&pixels);
         check(
@@ -157,8 +159,8 @@ impl SimulateOptions {
             "the vertical field of view must lie between 0 and 170 degrees",
         )?;
         check(
-            self.advance_m.is_finite() && self.turn_deg.is_finite(),
-            "advance and turn must be finite",
+            self.advance_m.abs() <= 1000.0 && self.turn_deg.is_finite(),
+            "the advance must be no more than 1000 metres a frame, and the turn finite",
         )?;
         check(
             self.offset_m.iter().all(|v| v.is_finite()),

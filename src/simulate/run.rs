@@ -25,8 +25,8 @@ pub struct Simulated {
 /// Writes a survey folder: `survey.toml`, `camera.json`, `frames/000000.png` …, `baseline.tum` (the plan),
 /// `groundtruth.tum` and `simulation.json`.
 ///
-/// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier survey of that
-/// name is replaced. The same options give the same bytes, whatever the number of threads.
+/// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier simulated
+/// survey of that name is replaced. The same options give the same bytes, whatever the number of threads.
 ///
 /// # Errors
 /// [`SimulateError`].
@@ -39,7 +39,7 @@ pub fn run(
     let scene = Scene::new(options)?;
     check_target(out, overwrite)?;
     let simulated = Simulated {
-        program: concat!("tunnelstitch ", env!("CARGO_PKG_VERSION")),
+        program: crate::PROGRAM,
         options: options.clone(),
     };
     let folder = StagedFolder::begin(out)?;
@@ -57,7 +57,20 @@ pub fn run(
     Ok(simulated)
 }
 
-/// Refuses to replace what is no survey.
+/// The record of a simulation; no other survey has one.
+const RECORD_FILE: &str = "simulation.json";
+
+/// What a simulated survey consists of.
+const FILES: [&str; 6] = [
+    SURVEY_FILE,
+    RECORD_FILE,
+    "camera.json",
+    "baseline.tum",
+    "groundtruth.tum",
+    "frames",
+];
+
+/// Refuses to replace what was not simulated.
 fn check_target(out: &Path, overwrite: bool) -> Result<(), SimulateError> {
     let exists = |what| {
         Err(SimulateError::Exists {
@@ -72,13 +85,25 @@ fn check_target(out: &Path, overwrite: bool) -> Result<(), SimulateError> {
     if is_empty {
         return Ok(());
     }
-    if !out.join(SURVEY_FILE).is_file() {
-        return exists("exists and is no survey, so it is not replaced; choose another folder");
+    if !is_simulated(out) {
+        return exists(
+            "exists and is not just a simulated survey, so it is not replaced; choose another folder",
+        );
     }
     if !overwrite {
         return exists("the survey exists; choose another folder, or replace it with --force");
     }
     Ok(())
+}
+
+/// True if a folder holds what [`run`] writes and nothing else.
+fn is_simulated(folder: &Path) -> bool {
+    let Ok(mut entries) = std::fs::read_dir(folder) else {
+        return false;
+    };
+    let ours = entries
+        .all(|entry| entry.is_ok_and(|entry| FILES.iter().any(|name| entry.file_name() == *name)));
+    ours && folder.join(RECORD_FILE).is_file()
 }
 
 fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<(), WriteError> {
@@ -102,7 +127,7 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
     };
     let other = std::io::Error::other;
     let path = |name: &str| folder.join(name);
-    let (survey_path, record_path) = (path(SURVEY_FILE), path("simulation.json"));
+    let (survey_path, record_path) = (path(SURVEY_FILE), path(RECORD_FILE));
     let survey = toml::to_string(&survey)
         .map_err(|error| WriteError::new(&survey_path, other(error.to_string())))?;
     let record = serde_json::to_string_pretty(simulated)

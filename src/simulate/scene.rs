@@ -70,6 +70,19 @@ impl Scene {
             .collect::<Result<Vec<_>, _>>()?;
         let perimeter_m = TAU * options.radius_m;
         let texel_m = texel_m(options, &camera, &truth);
+        let widest = reaches
+            .iter()
+            .map(|h_m| h_m[1] - h_m[0])
+            .fold(0.0, f64::max);
+        if perimeter_m / texel_m * widest / texel_m > 4.0 * MOST_TEXELS as f64 {
+            return Err(SimulateError::Option {
+                what: format!(
+                    "a frame would see {perimeter_m:.0} × {widest:.0} m of wall painted in steps of {:.1} mm, which is \
+                     more than memory is for; lower the radius, the field of view or the frames' size",
+                    1e3 * texel_m
+                ),
+            });
+        }
         Ok(Self {
             texture: texture(&options.wall, derived_seed(options.seed, 0), perimeter_m)?,
             columns: (perimeter_m / texel_m).ceil() as usize,

@@ -47,6 +47,8 @@ pub fn read(path: &Path) -> Result<Trajectory, TumError> {
         source,
     })?;
     let mut trajectory: Trajectory = Vec::new();
+    // Some editors begin a file with a byte order mark.
+    let text = text.trim_start_matches('\u{feff}');
     for (index, raw) in text.lines().enumerate() {
         let line = raw.trim();
         if line.is_empty() || line.starts_with('#') {
