@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         survey.camera.height,
         rayon::current_num_threads()
     );
-    println!("{:<16} {:>9} {:>19}", "stage", "median s", "range s");
+    println!("{:<36} {:>9} {:>19}", "stage", "median s", "range s");
     for (stage, seconds) in stages.iter().zip(&seconds) {
         print_row(stage, seconds);
     }
@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 fn print_row(stage: &str, seconds: &[f64]) {
     let [low, median, high] = spread(seconds);
-    println!("{stage:<16} {median:>9.3} {low:>9.3} {high:>9.3}");
+    println!("{stage:<36} {median:>9.3} {low:>9.3} {high:>9.3}");
 }
 
 /// Least, middle and greatest.
