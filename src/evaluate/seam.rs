@@ -3,10 +3,10 @@
 use crate::render::{Canvas, FrameStack, Placement, tiles};
 use crate::surface::Surface;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// Grey differences between frames at the same wall points.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SeamResidual {
     /// Root mean square difference of two frames at a wall point, grey levels.
     pub rms_grey: f64,

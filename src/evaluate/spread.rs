@@ -1,9 +1,9 @@
 //! A list of errors in three numbers.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// Root mean square, median and greatest of a list of errors, in the errors' own unit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {
     /// `√(Σ e² / n)`.
     pub rms: f64,

@@ -9,7 +9,7 @@ use nalgebra::Matrix6;
 use rayon::prelude::*;
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
-#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct FrameSigma {
     /// Rotation, root mean square over the three axes, degrees.
     pub rotation_deg: f64,

@@ -7,7 +7,7 @@ use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{
     Error, Executor, IterState, KV, Problem as Counted, Solver, State, TerminationReason,
 };
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::sync::Arc;
 
 /// When to stop.
@@ -23,7 +23,7 @@ pub struct Stopping {
 }
 
 /// Why a solve stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopReason {
     /// The last step moved the wall by less than the tolerance.
@@ -37,7 +37,7 @@ pub enum StopReason {
 }
 
 /// The course of one solve.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct SolveRecord {
     /// Steps taken.
     pub iterations: u64,
@@ -78,9 +78,8 @@ const TRIES: usize = 8;
 ///
 /// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples; such a
 /// step is never taken.
-#[derive(Default)]
 struct DampedGaussNewton {
-    stopping: Option<Stopping>,
+    stopping: Stopping,
     lambda: f64,
     current: Option<Linearisation>,
     cost_start: f64,
@@ -90,13 +89,24 @@ struct DampedGaussNewton {
 }
 
 impl DampedGaussNewton {
+    fn new(stopping: Stopping) -> Self {
+        Self {
+            stopping,
+            lambda: 0.0,
+            current: None,
+            cost_start: 0.0,
+            iterations: 0,
+            last_step_px: 0.0,
+            stop: None,
+        }
+    }
+
     /// Why a step that moves the wall by `step_px` and lowers the quadratic model by `½ decrement` is the last one,
     /// if it is.
     fn reason_to_stop(&self, step_px: f64, decrement: f64, unknowns: usize) -> Option<StopReason> {
-        let stopping = self.stopping?;
-        if step_px < stopping.step_px {
+        if step_px < self.stopping.step_px {
             Some(StopReason::StepBelowTolerance)
-        } else if decrement < stopping.step_sigma.powi(2) * unknowns as f64 {
+        } else if decrement < self.stopping.step_sigma.powi(2) * unknowns as f64 {
             Some(StopReason::StepBelowUncertainty)
         } else {
             None
@@ -232,10 +242,7 @@ pub fn solve<'a>(
 ) -> Result<Solution<'a>, ProblemError> {
     let sigma = problem.sigma();
     let start = problem.start();
-    let solver = DampedGaussNewton {
-        stopping: Some(stopping),
-        ..Default::default()
-    };
+    let solver = DampedGaussNewton::new(stopping);
     let mut executor = Executor::new(problem, solver).configure(|state| {
         state
             .param(start.clone())

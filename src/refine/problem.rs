@@ -11,7 +11,7 @@ use super::view::View;
 use super::visibility::{Observer, Tile, Visibility};
 use crate::camera::Pinhole;
 use crate::frames::Pyramid;
-use crate::surface::{Surface, SurfaceError, wall_jacobian};
+use crate::surface::{Surface, SurfaceError, viewing_distance, wall_jacobian};
 use nalgebra::{Matrix2x6, Matrix4, SMatrix, Vector2};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -433,13 +433,9 @@ pub fn sample_spacing(
     camera: &Pinhole,
     poses: &[crate::trajectory::Pose],
 ) -> Result<f64, (usize, SurfaceError)> {
-    let ray = camera.ray(camera.cx, camera.cy);
     let mut ranges = Vec::with_capacity(poses.len());
     for (k, pose) in poses.iter().enumerate() {
-        let hit = surface
-            .hit(&pose.t_wc, &(pose.r_wc * ray))
-            .map_err(|error| (k, error))?;
-        ranges.push(hit.range);
+        ranges.push(viewing_distance(surface, pose).map_err(|error| (k, error))?);
     }
     ranges.sort_unstable_by(f64::total_cmp);
     Ok(ranges[ranges.len() / 2] / camera.fy)

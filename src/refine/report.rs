@@ -2,10 +2,10 @@
 
 use super::covariance::FrameSigma;
 use super::gauss_newton::SolveRecord;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// What a frame's refined pose rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FrameFlag {
     /// Its pixels.
@@ -15,7 +15,7 @@ pub enum FrameFlag {
 }
 
 /// One frame of the report.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct FrameReport {
     /// Index of the frame.
     pub index: usize,
@@ -24,7 +24,7 @@ pub struct FrameReport {
     /// What its pose rests on.
     pub flag: FrameFlag,
     /// Why, if it rests on the prior.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// Wall samples at which it was compared with other frames.
     pub points: usize,
@@ -41,7 +41,7 @@ pub struct FrameReport {
 }
 
 /// One global solve of the report.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct LevelReport {
     /// Pyramid level; 0 is full size.
     pub level: usize,
@@ -53,7 +53,7 @@ pub struct LevelReport {
 }
 
 /// Wall-clock time of one stage.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct StageTime {
     /// Name of the stage.
     pub stage: String,
@@ -62,7 +62,7 @@ pub struct StageTime {
 }
 
 /// The whole report.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize)]
 pub struct RefineReport {
     /// Global solves, coarse to fine.
     pub levels: Vec<LevelReport>,

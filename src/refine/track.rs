@@ -10,9 +10,8 @@ use super::options::RefineOptions;
 use super::problem::{Problem, ProblemError, Sampling, Scene};
 use super::search::FusedWall;
 use crate::progress::Progress;
-use crate::surface::Footprint;
+use crate::surface::{Footprint, viewing_distance};
 use crate::trajectory::{Jitter, JitterModel, Pose};
-use nalgebra::Vector3;
 use std::ops::Range;
 
 /// Hypotheses refined per frame.
@@ -105,7 +104,8 @@ fn place(
     let predicted = estimates[k];
     let coarsest = options.coarsest_level(scene.camera.shorter_side());
     let finest = options.handover_level(scene.camera.shorter_side());
-    let distance = wall_distance(scene, k, &predicted.pose)?;
+    let distance = viewing_distance(scene.surface, &predicted.pose)
+        .map_err(|source| ProblemError::Placement { frame: k, source })?;
     let sigma = picture_sigma(&scene.prior.jitter, distance);
     // Beyond half a turn there is no more wall to look at.
     let widest = 0.5 * scene.surface.perimeter_m();
@@ -148,14 +148,6 @@ fn place(
         estimate = refine_at(level, estimate)?;
     }
     Ok(estimate)
-}
-
-fn wall_distance(scene: &Scene, k: usize, pose: &Pose) -> Result<f64, ProblemError> {
-    scene
-        .surface
-        .hit(&pose.t_wc, &(pose.r_wc * Vector3::z()))
-        .map(|hit| hit.range)
-        .map_err(|source| ProblemError::Placement { frame: k, source })
 }
 
 /// σ of pitch, yaw and roll as they appear in the picture: a shift across the view looks like a turn.

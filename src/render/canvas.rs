@@ -3,10 +3,10 @@
 use super::{Placement, RenderError};
 use crate::surface::{Footprint, Surface, WallPoint};
 use image::DynamicImage;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// How the panorama lies in its picture file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Layout {
     /// θ to the right from 0 to 2π, chainage down: the wall as seen from inside, not mirrored.

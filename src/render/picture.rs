@@ -1,10 +1,10 @@
 //! A decoded picture and its values between the pixels.
 
 use image::DynamicImage;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// How values between pixel centres are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Interpolation {
     /// Weighted mean of the 2 × 2 pixels around; soft.

@@ -2,7 +2,7 @@
 
 use super::RenderError;
 use crate::camera::Pinhole;
-use crate::surface::{Footprint, Surface};
+use crate::surface::{Footprint, Surface, viewing_distance};
 use crate::trajectory::Pose;
 
 /// A frame with its pose and its place on the wall.
@@ -49,11 +49,9 @@ pub fn native_px_per_metre(
     let focal_px = (camera.fx * camera.fy).sqrt();
     let mut resolutions = Vec::with_capacity(poses.len());
     for (frame, pose) in poses.iter().enumerate() {
-        let ray = pose.r_wc * camera.ray(camera.cx, camera.cy);
-        let hit = surface
-            .hit(&pose.t_wc, &ray)
+        let distance_m = viewing_distance(surface, pose)
             .map_err(|source| RenderError::Frame { frame, source })?;
-        resolutions.push(focal_px / hit.range);
+        resolutions.push(focal_px / distance_m);
     }
     resolutions.sort_by(f64::total_cmp);
     match resolutions.get(resolutions.len() / 2) {

@@ -14,6 +14,7 @@ pub use displacement::wall_jacobian;
 pub use footprint::{Footprint, shortest_arc};
 pub use gauge::{Gauge, GaugeMotion};
 
+use crate::trajectory::Pose;
 use nalgebra::Vector3;
 
 /// A point of the unrolled wall, metres.
@@ -75,6 +76,15 @@ pub enum SurfaceError {
         /// The radius given, metres.
         radius_m: f64,
     },
+}
+
+/// Distance of the wall along a camera's optical axis, metres.
+///
+/// # Errors
+/// As [`Surface::hit`].
+pub fn viewing_distance(surface: &dyn Surface, pose: &Pose) -> Result<f64, SurfaceError> {
+    let hit = surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()))?;
+    Ok(hit.range)
 }
 
 /// A tunnel: a closed section swept along the axis.

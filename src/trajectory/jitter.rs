@@ -18,7 +18,7 @@ pub enum JitterModel {
 }
 
 /// Standard deviations of the pose noise, per step (random walk) or per pose (independent).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jitter {
     /// How errors of consecutive poses hang together.
     pub model: JitterModel,
