@@ -1,7 +1,7 @@
 //! Noise on a plan: what really happened while the carrier followed it.
 
 use super::{Pose, so3};
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
@@ -28,10 +28,21 @@ pub struct Jitter {
     pub translation_sigma_m: [f64; 3],
 }
 
-/// Share of the lateral offset that a random walk loses at each step: the carrier steers back to the
-/// axis, as any carrier that survives its tunnel does. 2 % keeps the offset's spread below
+/// Share of the lateral offset, and of the tilt against the axis, that a random walk loses at each step: the carrier
+/// steers back to the axis, as any carrier that survives its tunnel does. 2 % keeps their spread below
 /// `σ / √(1 − 0.98²) ≈ 5 σ`, for any length.
 const STEERING: f64 = 0.02;
+
+/// Turns an executed attitude back towards the planned one by a share of the tilt between their axes of the tunnel.
+/// What it has turned about the axis stays.
+fn steered(executed: &UnitQuaternion<f64>, planned: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    let carried = executed * planned.inverse() * Vector3::y();
+    match UnitQuaternion::rotation_between(&carried, &Vector3::y()) {
+        Some(tilt) => so3::exp(&(so3::log(&tilt) * STEERING)) * executed,
+        // Upside down: every way back is as good as another.
+        None => *executed,
+    }
+}
 
 impl Jitter {
     /// The trajectory that results when `plan` is executed with this noise.
@@ -50,7 +61,8 @@ impl Jitter {
                     let mut t_wc = last.t_wc + (planned.t_wc - before.t_wc) + rho;
                     t_wc.x *= 1.0 - STEERING;
                     t_wc.z *= 1.0 - STEERING;
-                    Pose::new(last.r_wc * increment * so3::exp(&omega), t_wc)
+                    let r_wc = last.r_wc * increment * so3::exp(&omega);
+                    Pose::new(steered(&r_wc, &planned.r_wc), t_wc)
                 }
                 (JitterModel::Independent, _) => {
                     let (omega, rho) = self.draw(rng);
@@ -112,5 +124,23 @@ mod tests {
                 "{model:?}: {measured}"
             );
         }
+    }
+
+    /// However long the survey, the camera looks at the wall and not along the tunnel.
+    #[test]
+    fn a_long_random_walk_keeps_its_tilt_and_offset_bounded() {
+        let plan = spiral(12_000, 0.1, 30f64.to_radians());
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let executed = jitter(JitterModel::RandomWalk).apply(&plan, &mut rng);
+        let (mut tilt, mut offset) = (0.0, 0.0);
+        for (planned, pose) in plan.iter().zip(&executed) {
+            let axis = pose.r_wc * planned.r_wc.inverse() * Vector3::y();
+            tilt += axis.angle(&Vector3::y()).powi(2) / 2.0;
+            offset += pose.t_wc.x.powi(2);
+        }
+        let rms = |sum: f64| (sum / plan.len() as f64).sqrt();
+        let expected = 1.0 / (1.0 - 0.98f64.powi(2)).sqrt();
+        assert!((rms(tilt) / (expected * 2f64.to_radians()) - 1.0).abs() < 0.2);
+        assert!((rms(offset) / (expected * 0.02) - 1.0).abs() < 0.2);
     }
 }
