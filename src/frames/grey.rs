@@ -1,7 +1,7 @@
 //! A single-channel picture in floating point.
 
 /// A grey image, row-major, in grey levels of an 8-bit picture (0–255; 16-bit input is scaled to that
-/// range and keeps its finer steps).
+/// range and keeps its finer steps). NaN where the picture has no value: clipped white or black.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GreyImage {
     width: usize,
@@ -38,6 +38,16 @@ impl GreyImage {
         &self.data
     }
 
+    /// The pixels, row-major, to be changed.
+    pub fn data_mut(&mut self) -> &mut [f32] {
+        &mut self.data
+    }
+
+    /// True if some pixel has no value.
+    pub fn has_gaps(&self) -> bool {
+        self.data.iter().any(|value| value.is_nan())
+    }
+
     /// The value of a pixel.
     pub fn at(&self, x: usize, y: usize) -> f32 {
         self.data[y * self.width + x]
@@ -47,7 +57,30 @@ impl GreyImage {
     ///
     /// The filter is even, so the new centre lies exactly between the old ones
     /// (see [`crate::camera::Pinhole::at_level`]); borders repeat the outermost pixel.
+    ///
+    /// Pixels without a value count for nothing; where they make up more than half of the weight, the result
+    /// has no value either.
     pub fn halved(&self) -> Self {
+        if !self.has_gaps() {
+            return self.filtered_half();
+        }
+        let with = |value: fn(f32) -> f32| {
+            let data = self.data.iter().map(|v| value(*v)).collect();
+            Self::new(self.width, self.height, data).filtered_half()
+        };
+        let mut half = with(|v| if v.is_nan() { 0.0 } else { v });
+        let weight = with(|v| if v.is_nan() { 0.0 } else { 1.0 });
+        for (value, weight) in half.data.iter_mut().zip(&weight.data) {
+            *value = if *weight < 0.5 {
+                f32::NAN
+            } else {
+                *value / weight
+            };
+        }
+        half
+    }
+
+    fn filtered_half(&self) -> Self {
         let (w, h) = (self.width / 2, self.height / 2);
         // Across first: four taps a pixel, into rows of half width.
         let mut across = vec![0.0f32; w * self.height];
@@ -97,5 +130,18 @@ mod tests {
         let half = GreyImage::new(5, 7, vec![3.0; 35]).halved();
         assert_eq!((half.width(), half.height()), (2, 3));
         assert!(half.data().iter().all(|v| (v - 3.0).abs() < 1e-6));
+    }
+
+    #[test]
+    fn gaps_shrink_into_the_coarse_picture_or_vanish() {
+        let mut image = GreyImage::new(16, 16, vec![7.0; 256]);
+        image.data_mut()[5 * 16 + 5] = f32::NAN;
+        let half = image.halved();
+        assert!(half.data().iter().all(|v| (v - 7.0).abs() < 1e-5));
+        for y in 4..10 {
+            image.data_mut()[y * 16 + 4..y * 16 + 10].fill(f32::NAN);
+        }
+        let half = image.halved();
+        assert!(half.at(3, 3).is_nan() && (half.at(1, 1) - 7.0).abs() < 1e-5);
     }
 }

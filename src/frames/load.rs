@@ -133,12 +133,15 @@ fn jpeg_is_complete(bytes: &[u8]) -> bool {
     bytes[end..].windows(2).any(|pair| pair == [0xff, 0xd9])
 }
 
-/// Decodes a frame to grey levels (0–255, Rec. 709 luma of colour pictures).
+/// Decodes a frame to grey levels (0–255, Rec. 709 luma of colour pictures; 16-bit pictures keep their finer steps).
+///
+/// Full white and full black are NaN: the sensor or the encoder has clipped them, so they only say that the wall is at
+/// least as bright or as dark.
 ///
 /// # Errors
 /// As [`load_colour`].
 pub fn load_grey(file: &FrameFile, width: u32, height: u32) -> Result<GreyImage, FrameError> {
-    let data = match load_colour(file, width, height)? {
+    let mut data: Vec<f32> = match load_colour(file, width, height)? {
         DynamicImage::ImageLuma8(grey) => grey.into_raw().into_iter().map(f32::from).collect(),
         other => other
             .to_luma32f()
@@ -147,5 +150,11 @@ pub fn load_grey(file: &FrameFile, width: u32, height: u32) -> Result<GreyImage,
             .map(|v| v * 255.0)
             .collect(),
     };
+    // Luma of white may be a rounding error short of 255.
+    for value in &mut data {
+        if *value <= 1e-3 || *value >= 255.0 - 1e-3 {
+            *value = f32::NAN;
+        }
+    }
     Ok(GreyImage::new(width as usize, height as usize, data))
 }

@@ -1,11 +1,15 @@
 //! The pictures: loading, grey values, pyramids, writing.
 
+mod cache;
 mod grey;
 mod load;
 mod pyramid;
+mod shading;
 mod write;
 
+pub use cache::FrameCache;
 pub use grey::GreyImage;
 pub use load::{FrameError, FrameFile, list, load_colour, load_grey};
 pub use pyramid::Pyramid;
+pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
 pub use write::{FormatError, PictureFormat, write_picture};

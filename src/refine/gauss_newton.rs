@@ -147,7 +147,7 @@ impl DampedGaussNewton {
                 .zip(&step)
                 .map(|(estimate, step)| estimate.retract(step))
                 .collect();
-            let next = problem.linearise(&candidate);
+            let next = problem.linearise(&candidate)?;
             if next.cost < current.cost {
                 self.iterations += 1;
                 self.last_step_px = step_px;
@@ -186,7 +186,7 @@ impl<'a> Solver<Problem<'a>, Iterate> for DampedGaussNewton {
         mut state: Iterate,
     ) -> Result<(Iterate, Option<KV>), Error> {
         let estimates = state.take_param().unwrap_or_default();
-        let first = problem.problem("linearise", |p| Ok(p.linearise(&estimates)))?;
+        let first = problem.problem("linearise", |p| Ok(p.linearise(&estimates)?))?;
         self.cost_start = first.cost;
         state = state.param(estimates).cost(first.cost);
         self.current = Some(first);

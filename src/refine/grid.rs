@@ -11,7 +11,7 @@ pub const SIDE: usize = TILE + 2;
 pub const AREA: usize = SIDE * SIDE;
 
 /// Tiles along the side of a block: the unit of parallel work, about a hundredth of a frame.
-const BLOCK: i64 = 8;
+pub const BLOCK: i64 = 8;
 
 /// A regular lattice on the unrolled wall; a whole number of tiles goes around the section.
 #[derive(Clone, Copy, Debug)]
@@ -22,6 +22,8 @@ pub struct WallGrid {
     pub spacing_h_m: f64,
     /// Tiles around the section.
     pub columns: i64,
+    /// Samples per pixel along each axis, where the lattice was made for.
+    pub density: f64,
 }
 
 /// Name of a tile: column around the section, row along the axis (row 0 begins at h = 0).
@@ -47,14 +49,16 @@ impl TileId {
 }
 
 impl WallGrid {
-    /// A lattice with samples about `spacing_m` apart.
-    pub fn new(surface: &dyn Surface, spacing_m: f64) -> Self {
+    /// A lattice with about `density` samples to a pixel's width of `pixel_m` on the wall.
+    pub fn new(surface: &dyn Surface, pixel_m: f64, density: f64) -> Self {
+        let spacing_m = pixel_m / density;
         let tiles = surface.perimeter_m() / (spacing_m * TILE as f64);
         let columns = (tiles.round() as i64).max(1);
         Self {
             spacing_s_m: surface.perimeter_m() / (columns as f64 * TILE as f64),
             spacing_h_m: spacing_m,
             columns,
+            density,
         }
     }
 
@@ -151,7 +155,7 @@ mod tests {
     #[test]
     fn a_whole_number_of_tiles_goes_around() {
         let circle = Circle::new(3.0).unwrap();
-        let grid = WallGrid::new(&circle, 0.0072);
+        let grid = WallGrid::new(&circle, 0.0072, 1.0);
         let (width, _) = grid.tile_size_m();
         assert!((width * grid.columns as f64 - circle.perimeter_m()).abs() < 1e-9);
         assert!((grid.spacing_s_m / 0.0072 - 1.0).abs() < 0.01);
@@ -161,7 +165,7 @@ mod tests {
     #[test]
     fn tiles_lie_side_by_side_within_a_sample() {
         let circle = Circle::new(3.0).unwrap();
-        let grid = WallGrid::new(&circle, 0.01);
+        let grid = WallGrid::new(&circle, 0.02, 2.0);
         let (width, height) = grid.tile_size_m();
         let centre = |column: i64, row: i64| {
             grid.centre(TileId {
@@ -182,7 +186,7 @@ mod tests {
     #[test]
     fn fractions_of_a_sample_are_spread_evenly() {
         let circle = Circle::new(3.0).unwrap();
-        let grid = WallGrid::new(&circle, 0.01);
+        let grid = WallGrid::new(&circle, 0.02, 2.0);
         let fraction = |column: i64, row: i64| {
             let h_m = grid.centre(TileId { column, row }).h_m;
             (h_m / grid.spacing_h_m).rem_euclid(1.0)

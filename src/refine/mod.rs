@@ -12,26 +12,34 @@
 //! linearises, [`problem`] reduces to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
 //! Tracking ([`track`]), window and global solve are drivers over the same parts.
 
+mod consistency;
+mod contrast;
 mod covariance;
+mod coverage;
+mod doubt;
 mod estimate;
+mod examine;
 mod factor;
 mod gauss_newton;
 mod grid;
 mod normal;
 mod options;
+mod place;
 mod prior;
 mod problem;
 mod report;
 mod robust;
 mod run;
 mod search;
+mod spectrum;
 mod tile;
 mod track;
 mod view;
 mod visibility;
+mod wall;
 
 pub use gauss_newton::{SolveRecord, StopReason};
 pub use options::RefineOptions;
 pub use problem::ProblemError;
-pub use report::{FrameFlag, FrameReport, LevelReport, RefineReport, StageTime};
+pub use report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 pub use run::{RefineError, Refined, refine};

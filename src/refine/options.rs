@@ -15,6 +15,8 @@ pub struct RefineOptions {
     pub window_stride: usize,
     /// Wall samples per pixel along each axis in the last solve.
     pub final_density: f64,
+    /// Memory for decoded frames, bytes. Frames that do not fit are decoded anew when needed.
+    pub cache_bytes: usize,
     /// Steps of a global solve per level, at the most.
     pub max_iterations: u64,
     /// The last global solve ends when no wall point moves by more than this in a step, pixels, ...
@@ -32,6 +34,7 @@ impl Default for RefineOptions {
             tracking_levels: 3,
             window_stride: 6,
             final_density: 2.0,
+            cache_bytes: 2 << 30,
             max_iterations: 20,
             step_tolerance_px: 0.0005,
             step_tolerance_sigma: 0.1,

@@ -21,13 +21,36 @@ pub struct Prior {
     pub jitter: Jitter,
     /// The initial poses of all frames.
     pub initial: Vec<Pose>,
+    /// Their times, seconds; where frames are missing, a step is longer and as much less certain.
+    pub times_s: Vec<f64>,
+    /// The median of the steps between those times, seconds.
+    pub usual_step_s: f64,
     /// 1-σ of the log-gain.
     pub log_gain_sigma: f64,
     /// 1-σ of the bias, grey levels.
     pub bias_sigma: f64,
 }
 
+/// The median step between times, seconds.
+pub fn usual_step_s(times_s: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times_s.windows(2).map(|t| t[1] - t[0]).collect();
+    steps.sort_unstable_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+}
+
 impl Prior {
+    /// How many usual steps lie between two frames, by their times: variances of a random walk grow by so much.
+    ///
+    /// The usual step is the median one; a step counts for no less than one.
+    pub fn steps_between(&self, a: usize, b: usize) -> f64 {
+        (a..b).map(|k| self.step_ratio(k)).sum()
+    }
+
+    /// The step from frame `k` to the next over the usual one.
+    fn step_ratio(&self, k: usize) -> f64 {
+        ((self.times_s[k + 1] - self.times_s[k]) / self.usual_step_s).max(1.0)
+    }
+
     /// Pairs of frames that the prior ties together within `active`, counted from its start.
     pub fn pairs(&self, active: &Range<usize>) -> Vec<(usize, usize)> {
         match self.jitter.model {
@@ -132,7 +155,7 @@ impl Prior {
         normal: &mut NormalEquations,
     ) -> f64 {
         let (e, j_before, j) = relative(&self.initial[k - 1], &self.initial[k], before, pose);
-        let weighted = Matrix6::from_diagonal(&self.information());
+        let weighted = Matrix6::from_diagonal(&(self.information() / self.step_ratio(k - 1)));
         let slot = |k: usize| active.contains(&k).then(|| k - active.start);
         for (frame, j) in [(k - 1, &j_before), (k, &j)] {
             if let Some(slot) = slot(frame) {
@@ -237,6 +260,8 @@ mod tests {
                     translation_sigma_m: [0.02, 0.02, 0.03],
                 },
                 initial: (0..5).map(|k| pose(0.1 * f64::from(k))).collect(),
+                times_s: vec![0.0, 1.0, 2.0, 5.0, 6.0],
+                usual_step_s: 1.0,
                 log_gain_sigma: 0.3,
                 bias_sigma: 10.0,
             };

@@ -2,19 +2,22 @@
 
 use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
 use super::factor::{FactorError, Symbolic};
+use super::coverage::Coverage;
 use super::grid::{TilePoints, WallGrid};
 use super::normal::{Block, NormalEquations, Pattern};
 use super::prior::Prior;
 use super::robust::{NoiseHistogram, NoiseModel};
 use super::tile::{ObserverMoments, SAMPLES, Seen, TileWork};
 use super::view::View;
-use super::visibility::{Observer, Tile, Visibility};
+use super::visibility::{Observer, Placed, Tile, Visibility, reach_m};
 use crate::camera::Pinhole;
-use crate::frames::Pyramid;
-use crate::surface::{Surface, SurfaceError, viewing_distance, wall_jacobian};
+use crate::frames::{FrameCache, FrameError, Pyramid};
+use crate::surface::{Footprint, Surface, SurfaceError, viewing_distance, wall_jacobian};
 use nalgebra::{Matrix2x6, Matrix4, SMatrix, Vector2};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// How finely a problem looks at the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,20 +39,36 @@ impl Sampling {
 }
 
 /// Everything the estimator is given.
+#[derive(Clone, Copy)]
 pub struct Scene<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
     /// The camera at full size.
     pub camera: &'a Pinhole,
     /// The frames.
-    pub frames: &'a [Pyramid],
+    pub frames: &'a FrameCache,
     /// Noise of the initial poses and exposures.
     pub prior: &'a Prior,
 }
 
+/// The frames that take part in a problem.
+pub struct Members<'m> {
+    /// A run of frames.
+    pub participants: Range<usize>,
+    /// Those of them that are estimated; the others are held.
+    pub active: Range<usize>,
+    /// Estimates of the participants.
+    pub estimates: &'m [FrameEstimate],
+    /// Which participants' pixels are compared; for the others only the prior speaks.
+    pub compared: Cow<'m, [bool]>,
+}
+
 /// Why a problem cannot be set up or solved.
-#[derive(Clone, Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum ProblemError {
+    /// A frame cannot be read any more.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
     /// A frame's pose does not go with the tunnel.
     #[error("frame {frame}: {source}; check the initial poses, radius_m and the calibration")]
     Placement {
@@ -83,6 +102,8 @@ const LEAST_ROWS: u32 = 90;
 const SCALE_TILES: usize = 2000;
 /// Share of a tile's squared slopes that counts as texture, at least, however noisy they are.
 const LEAST_TEXTURE: f64 = 0.05;
+/// A camera looks no farther than this many radii, when the lattice is laid out.
+const LONGEST_VIEW_RADII: f64 = 3.0;
 /// Stiffness of the gauge at the first frame over that of its pixels.
 const GAUGE_TIE: f64 = 1e6;
 /// Noise of a pixel over that of a bilinear sample between pixels: each axis averages `f² + (1−f)²` of the
@@ -115,18 +136,19 @@ pub struct FrameShare {
 
 /// The cost of a run of frames on a fixed set of wall samples.
 ///
-/// `participants` are sampled; of them the `active` frames are estimated and the others held.
+/// `participants` are sampled; of them the `active` frames are estimated and the others held. The wall is worked
+/// through in stretches along the tunnel, so that memory for frames and samples does not grow with its length.
 pub struct Problem<'a> {
-    surface: &'a dyn Surface,
-    prior: &'a Prior,
-    frames: &'a [Pyramid],
+    scene: Scene<'a>,
     level: usize,
     camera: Pinhole,
     grid: WallGrid,
     participants: Range<usize>,
     active: Range<usize>,
     held: Vec<FrameEstimate>,
-    visibility: Visibility,
+    coverage: Coverage<'a>,
+    /// The first active frame that is compared, counted from the first active one: the gauge is tied there.
+    tied: Option<usize>,
     pattern: Pattern,
     symbolic: Symbolic,
     sigma: f64,
@@ -134,63 +156,86 @@ pub struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    /// Chooses the wall samples for the present `estimates` (of all frames, indexed absolutely), and
-    /// estimates the noise from the residuals there.
+    /// Chooses the wall samples for the present estimates and estimates the noise from the residuals there.
     ///
     /// # Errors
     /// [`ProblemError`].
     pub fn new(
         scene: &Scene<'a>,
         sampling: Sampling,
-        participants: Range<usize>,
-        active: Range<usize>,
-        estimates: &[FrameEstimate],
+        members: Members,
     ) -> Result<Self, ProblemError> {
         let Sampling { level, density } = sampling;
+        let Members {
+            participants,
+            active,
+            estimates,
+            compared,
+        } = members;
         let camera = scene.camera.at_level(level);
-        let held = estimates[participants.clone()].to_vec();
-        let poses: Vec<_> = held.iter().map(|estimate| estimate.pose).collect();
-        let placed = |(k, source)| ProblemError::Placement {
-            frame: participants.start + k,
-            source,
-        };
-        let spacing = sample_spacing(scene.surface, &camera, &poses).map_err(placed)?
-            / density.max(least_density(camera.height));
-        let grid = WallGrid::new(scene.surface, spacing);
-        let local = active.start - participants.start..active.end - participants.start;
-        let visibility =
-            Visibility::find(scene.surface, &grid, &camera, &poses, &local).map_err(placed)?;
-        let pattern = Pattern::new(
-            active.len(),
-            covisible_pairs(&visibility, &local)
-                .into_iter()
-                .chain(scene.prior.pairs(&active)),
+        let reach_m = reach_m(scene.surface);
+        let tied = active
+            .clone()
+            .position(|frame| compared[frame - participants.start]);
+        let placed = participants
+            .clone()
+            .into_par_iter()
+            .zip(estimates.par_iter().zip(compared.par_iter()))
+            .map(|(frame, (estimate, compared))| {
+                if !compared {
+                    return Ok(None);
+                }
+                let pose = estimate.pose;
+                Footprint::within(scene.surface, &camera, &pose, reach_m)
+                    .map(|footprint| {
+                        Some(Placed {
+                            pose,
+                            footprint,
+                            active: active.contains(&frame),
+                        })
+                    })
+                    .map_err(|source| ProblemError::Placement { frame, source })
+            })
+            .collect::<Result<Vec<Option<Placed>>, _>>()?;
+        let pixel_m = pixel_on_wall(scene.surface, &camera, placed.iter().flatten());
+        let grid = WallGrid::new(
+            scene.surface,
+            pixel_m,
+            density.max(least_density(camera.height)),
         );
+        let shading = scene.frames.shading();
+        let coverage = Coverage::new(scene.surface, grid, camera, shading, placed);
+        let slot = |k: &usize| {
+            let frame = participants.start + k;
+            active.contains(&frame).then(|| frame - active.start)
+        };
+        let covisible = coverage.pairs.iter();
+        let covisible = covisible.filter_map(|(a, b)| slot(a).zip(slot(b)));
+        let pattern = Pattern::new(active.len(), covisible.chain(scene.prior.pairs(&active)));
         let symbolic = Symbolic::new(&pattern).map_err(|source| ProblemError::Factor {
             first: active.start,
             last: active.end - 1,
             source,
         })?;
         let mut problem = Self {
-            surface: scene.surface,
-            prior: scene.prior,
-            frames: scene.frames,
+            scene: *scene,
             level,
             camera,
             grid,
-            participants,
-            active,
-            held,
-            visibility,
+            held: estimates.to_vec(),
+            coverage,
+            tied,
             pattern,
             symbolic,
+            participants,
+            active,
             sigma: 1.0,
             noise: NoiseModel {
                 floor: 1.0,
                 steepness: 0.0,
             },
         };
-        problem.estimate_noise();
+        problem.estimate_noise()?;
         Ok(problem)
     }
 
@@ -212,7 +257,7 @@ impl<'a> Problem<'a> {
 
     /// Number of tiles that are compared.
     pub fn tiles(&self) -> usize {
-        self.visibility.tiles.len()
+        self.coverage.tiles
     }
 
     /// Estimated noise of a pixel, 1-σ in grey levels.
@@ -229,11 +274,26 @@ impl<'a> Problem<'a> {
         }
     }
 
-    fn views<'s>(&'s self, estimates: &[FrameEstimate]) -> Vec<View<'s>> {
-        self.participants
-            .clone()
-            .zip(estimates)
-            .map(|(k, estimate)| View::new(self.frames[k].level(self.level), self.camera, estimate))
+    /// The pictures of a stretch's frames.
+    fn pictures(&self, stretch: usize) -> Result<Vec<Arc<Pyramid>>, ProblemError> {
+        let first = self.participants.start;
+        let frames = self.coverage.frames(stretch).par_iter();
+        Ok(frames
+            .map(|k| self.scene.frames.get(first + k))
+            .collect::<Result<_, _>>()?)
+    }
+
+    /// The frames of a stretch at the given estimates of all participants.
+    fn views<'s>(
+        &self,
+        stretch: usize,
+        pictures: &'s [Arc<Pyramid>],
+        estimates: &[FrameEstimate],
+    ) -> Vec<View<'s>> {
+        let frames = self.coverage.frames(stretch).iter();
+        frames
+            .zip(pictures)
+            .map(|(k, picture)| View::new(picture.level(self.level), self.camera, &estimates[*k]))
             .collect()
     }
 
@@ -245,53 +305,68 @@ impl<'a> Problem<'a> {
     }
 
     /// Reads the noise from the residuals around the plain mean in every few tiles.
-    fn estimate_noise(&mut self) {
-        let views = self.views(&self.held);
-        let stride = (self.visibility.tiles.len() / SCALE_TILES).max(1);
-        let sample: Vec<&Tile> = self.visibility.tiles.iter().step_by(stride).collect();
-        let histogram = sample
-            .par_chunks(32)
-            .map(|tiles| {
-                let mut work = TileWork::default();
-                let mut histogram = NoiseHistogram::default();
-                let mut scratch = Vec::new();
-                for tile in tiles {
-                    let points = TilePoints::new(&self.grid, self.surface, tile.id, &mut scratch);
-                    let observers = self.visibility.observers(tile);
-                    let seen = observers.iter().map(|o| o.seen(&views));
-                    work.count_residuals(&points, seen, &mut histogram);
-                }
-                histogram
-            })
-            .reduce(NoiseHistogram::default, |a, b| a.merge(&b));
+    fn estimate_noise(&mut self) -> Result<(), ProblemError> {
+        let stride = (self.coverage.tiles / SCALE_TILES).max(1);
+        let mut histogram = NoiseHistogram::default();
+        for stretch in 0..self.coverage.len() {
+            let visibility = self.coverage.visibility(stretch);
+            let pictures = self.pictures(stretch)?;
+            let views = self.views(stretch, &pictures, &self.held);
+            let sample: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
+            let counted = sample
+                .par_chunks(32)
+                .map(|tiles| {
+                    let mut work = TileWork::default();
+                    let mut histogram = NoiseHistogram::default();
+                    let mut scratch = Vec::new();
+                    for tile in tiles {
+                        let points =
+                            TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
+                        let observers = visibility.observers(tile);
+                        let seen = observers.iter().map(|o| o.seen(&views));
+                        work.count_residuals(&points, seen, &mut histogram);
+                    }
+                    histogram
+                })
+                .reduce(NoiseHistogram::default, |a, b| a.merge(&b));
+            histogram = histogram.merge(&counted);
+        }
         self.noise = histogram.fit();
         self.sigma = PIXEL_OVER_SAMPLE * f64::from(self.noise.floor).sqrt();
+        Ok(())
     }
 
     /// Cost and normal equations at the given estimates of the active frames.
     ///
     /// The same sums in the same order whatever the number of threads.
-    pub fn linearise(&self, active: &[FrameEstimate]) -> Linearisation {
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
+    pub fn linearise(&self, active: &[FrameEstimate]) -> Result<Linearisation, ProblemError> {
         let estimates = self.with_active(active);
-        let views = self.views(&estimates);
         let mut normal = NormalEquations::zeros(&self.pattern);
         let mut frames = vec![FrameShare::default(); self.active.len()];
         let mut cost = 0.0;
-        for batch in self.visibility.blocks.chunks(BATCH) {
-            let sums: Vec<BlockSums> = batch
-                .par_iter()
-                .map(|block| self.sum_block(&self.visibility.tiles[block.clone()], &views))
-                .collect();
-            for sum in sums {
-                cost += sum.cost;
-                sum.add_to(&self.pattern, &mut normal, &mut frames);
+        for stretch in 0..self.coverage.len() {
+            let visibility = self.coverage.visibility(stretch);
+            let pictures = self.pictures(stretch)?;
+            let views = self.views(stretch, &pictures, &estimates);
+            for batch in visibility.blocks.chunks(BATCH) {
+                let sums: Vec<BlockSums> = batch
+                    .par_iter()
+                    .map(|block| self.sum_block(stretch, &visibility, block, &views))
+                    .collect();
+                for sum in sums {
+                    cost += sum.cost;
+                    sum.add_to(&self.pattern, &mut normal, &mut frames);
+                }
             }
         }
         let information = self.sigma.powi(-2);
         cost *= information;
         normal.blocks.iter_mut().for_each(|b| *b *= information);
         normal.gradient.iter_mut().for_each(|g| *g *= information);
-        cost += self.prior.add(
+        cost += self.scene.prior.add(
             &self.participants,
             &estimates,
             &self.active,
@@ -299,13 +374,14 @@ impl<'a> Problem<'a> {
             &mut normal,
         );
         if self.held_frames() == 0 {
-            self.tie_gauge(&active[0], &mut normal);
+            let tied = self.tied.unwrap_or(0);
+            self.tie_gauge(tied, &active[tied], &mut normal);
         }
-        Linearisation {
+        Ok(Linearisation {
             cost,
             normal,
             frames,
-        }
+        })
     }
 
     /// M of a tile: `Σ φφᵀ` without what noise has added to the slopes.
@@ -332,15 +408,15 @@ impl<'a> Problem<'a> {
         self.participants.len() - self.active.len()
     }
 
-    /// Stiffens the first frame against moving along the gauge, where the pixels say nothing and rounding
+    /// Stiffens the first compared frame against moving along the gauge, where the pixels say nothing and rounding
     /// would otherwise decide. Neither cost nor gradient change: where the trajectory stands along the gauge
     /// is settled in closed form, by [`Prior::settle_gauge`].
-    fn tie_gauge(&self, first: &FrameEstimate, normal: &mut NormalEquations) {
-        let Some(place) = self.pattern.place(0, 0) else {
+    fn tie_gauge(&self, slot: usize, first: &FrameEstimate, normal: &mut NormalEquations) {
+        let Some(place) = self.pattern.place(slot, slot) else {
             return;
         };
         let pose_block = normal.blocks[place].fixed_view::<6, 6>(0, 0).into_owned();
-        for direction in self.surface.gauge().directions(&first.pose) {
+        for direction in self.scene.surface.gauge().directions(&first.pose) {
             let stiffness = (direction.transpose() * pose_block * direction)[0]
                 / direction.norm_squared().powi(2);
             let tie = direction * direction.transpose() * (GAUGE_TIE * stiffness);
@@ -356,11 +432,23 @@ impl<'a> Problem<'a> {
             .then(|| frame - self.active.start)
     }
 
-    fn sum_block(&self, tiles: &[Tile], views: &[View]) -> BlockSums {
+    fn sum_block(
+        &self,
+        stretch: usize,
+        visibility: &Visibility,
+        block: &Range<usize>,
+        views: &[View],
+    ) -> BlockSums {
+        let tiles = &visibility.tiles[block.clone()];
+        let stretch_slots: Vec<Option<usize>> = self.coverage
+            .frames(stretch)
+            .iter()
+            .map(|k| self.slot(*k))
+            .collect();
         let mut slots: Vec<usize> = tiles
             .iter()
-            .flat_map(|tile| self.visibility.observers(tile))
-            .filter_map(|o| self.slot(o.frame))
+            .flat_map(|tile| visibility.observers(tile))
+            .filter_map(|o| stretch_slots[o.frame as usize])
             .collect();
         slots.sort_unstable();
         slots.dedup();
@@ -370,20 +458,20 @@ impl<'a> Problem<'a> {
         let mut scratch = Vec::new();
         let spacing = (self.grid.spacing_s_m, self.grid.spacing_h_m);
         for tile in tiles {
-            let points = TilePoints::new(&self.grid, self.surface, tile.id, &mut scratch);
-            let observers = self.visibility.observers(tile);
+            let points = TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
+            let observers = visibility.observers(tile);
             let seen = observers.iter().map(|o| o.seen(views));
             work.moments(&points, seen, spacing, &self.noise);
             columns.clear();
             for (observer, moments) in observers.iter().zip(&work.observers) {
                 sums.cost += moments.cost;
-                let view = &views[observer.frame];
-                if let Some(slot) = self.slot(observer.frame) {
+                let view = &views[observer.frame as usize];
+                if let Some(slot) = stretch_slots[observer.frame as usize] {
                     columns.push(Column {
                         place: sums.place(slot),
                         moments: *moments,
                         a: view.wall_jacobian(&points),
-                        inverse_gain: 1.0 / f64::from(view.gain()),
+                        inverse_gain: 1.0 / f64::from(view.gain() * observer.shade),
                     });
                 }
             }
@@ -413,8 +501,8 @@ impl<'a> Problem<'a> {
             .chain([&middle])
             .filter_map(|pixel| {
                 let ray = pose.r_wc * self.camera.ray(pixel.x, pixel.y);
-                let hit = self.surface.hit(&pose.t_wc, &ray).ok()?;
-                let wall = self.surface.frame(hit.wall);
+                let hit = self.scene.surface.hit(&pose.t_wc, &ray).ok()?;
+                let wall = self.scene.surface.frame(hit.wall);
                 Some((wall_jacobian(pose, &wall) * xi).norm() * self.camera.fy / hit.range)
             })
             .fold(0.0, f64::max)
@@ -427,48 +515,29 @@ fn least_density(rows: u32) -> f64 {
     (f64::from(LEAST_ROWS) / f64::from(rows)).ceil().max(1.0)
 }
 
-/// Distance between wall samples: a pixel's width on the wall, in the median frame's middle.
-pub fn sample_spacing(
+/// A pixel's width on the wall in the median frame's middle, metres. Frames that look along the tunnel do not count.
+fn pixel_on_wall<'p>(
     surface: &dyn Surface,
     camera: &Pinhole,
-    poses: &[crate::trajectory::Pose],
-) -> Result<f64, (usize, SurfaceError)> {
-    let mut ranges = Vec::with_capacity(poses.len());
-    for (k, pose) in poses.iter().enumerate() {
-        ranges.push(viewing_distance(surface, pose).map_err(|error| (k, error))?);
-    }
+    placed: impl Iterator<Item = &'p Placed>,
+) -> f64 {
+    let mut ranges: Vec<f64> = placed
+        .filter_map(|frame| viewing_distance(surface, &frame.pose).ok())
+        .collect();
     ranges.sort_unstable_by(f64::total_cmp);
-    Ok(ranges[ranges.len() / 2] / camera.fy)
+    let middle = ranges.get(ranges.len() / 2);
+    let radius_m = surface.perimeter_m() / std::f64::consts::TAU;
+    middle.copied().unwrap_or(radius_m).min(LONGEST_VIEW_RADII * radius_m) / camera.fy
 }
 
 impl Observer {
     fn seen<'v>(&self, views: &'v [View<'v>]) -> Seen<'v> {
         Seen {
-            view: &views[self.frame],
+            view: &views[self.frame as usize],
             pixels: self.pixels,
+            shade: self.shade,
         }
     }
-}
-
-fn covisible_pairs(visibility: &Visibility, active: &Range<usize>) -> Vec<(usize, usize)> {
-    let mut pairs = Vec::new();
-    for block in &visibility.blocks {
-        let mut slots: Vec<usize> = visibility.tiles[block.clone()]
-            .iter()
-            .flat_map(|tile| visibility.observers(tile))
-            .map(|o| o.frame)
-            .filter(|k| active.contains(k))
-            .map(|k| k - active.start)
-            .collect();
-        slots.sort_unstable();
-        slots.dedup();
-        for (n, a) in slots.iter().enumerate() {
-            pairs.extend(slots[n..].iter().map(|b| (*a, *b)));
-        }
-    }
-    pairs.sort_unstable();
-    pairs.dedup();
-    pairs
 }
 
 /// Weight of all observers of a tile, per sample.
@@ -601,7 +670,7 @@ mod tests {
     /// A ring of frames of a smooth wall, each with an exposure of its own, and estimates near the truth.
     struct Ring {
         wall: TestWall,
-        frames: Vec<Pyramid>,
+        frames: FrameCache,
         prior: Prior,
         estimates: Vec<FrameEstimate>,
     }
@@ -638,13 +707,15 @@ mod tests {
                     rotation_sigma_rad: 0.05,
                     translation_sigma_m: [0.05; 3],
                 },
+                times_s: (0..wall.poses.len()).map(|k| k as f64).collect(),
+                usual_step_s: 1.0,
                 initial: wall.poses.clone(),
                 log_gain_sigma: 0.3,
                 bias_sigma: 10.0,
             };
             Self {
                 wall,
-                frames,
+                frames: FrameCache::of_pyramids(frames),
                 prior,
                 estimates,
             }
@@ -657,12 +728,18 @@ mod tests {
                 frames: &self.frames,
                 prior: &self.prior,
             };
-            let all = 0..self.frames.len();
+            let all = 0..self.estimates.len();
             let sampling = Sampling {
                 level: 0,
                 density: 2.0,
             };
-            Problem::new(&scene, sampling, all.clone(), all, &self.estimates).unwrap()
+            let members = Members {
+                participants: all.clone(),
+                active: all,
+                estimates: &self.estimates,
+                compared: Cow::Owned(vec![true; self.estimates.len()]),
+            };
+            Problem::new(&scene, sampling, members).unwrap()
         }
     }
 
@@ -673,17 +750,17 @@ mod tests {
     fn the_gradient_is_the_derivative_of_the_cost() {
         let ring = Ring::new(5e-4);
         let problem = ring.problem();
-        let gradient = problem.linearise(&ring.estimates).normal.gradient;
+        let gradient = problem.linearise(&ring.estimates).unwrap().normal.gradient;
         let steps = [2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 1e-3, 0.1];
         for unknown in 0..UNKNOWNS {
             let (mut error, mut size) = (0.0f64, 0.0f64);
-            for frame in 0..ring.frames.len() {
+            for frame in 0..ring.estimates.len() {
                 let cost = |amount: f64| {
                     let mut step = FrameStep::zeros();
                     step[unknown] = amount;
                     let mut moved = ring.estimates.clone();
                     moved[frame] = moved[frame].retract(&step);
-                    problem.linearise(&moved).cost
+                    problem.linearise(&moved).unwrap().cost
                 };
                 let h = steps[unknown];
                 let numeric = (cost(h) - cost(-h)) / (2.0 * h);
@@ -701,9 +778,9 @@ mod tests {
         let ring = Ring::new(2e-3);
         let problem = ring.problem();
         let mut estimates = ring.estimates.clone();
-        let start = problem.linearise(&estimates).cost;
+        let start = problem.linearise(&estimates).unwrap().cost;
         for _ in 0..6 {
-            let at = problem.linearise(&estimates);
+            let at = problem.linearise(&estimates).unwrap();
             let factor = problem
                 .symbolic()
                 .factorise(problem.pattern(), &at.normal, 0.0)
@@ -715,7 +792,7 @@ mod tests {
                 .map(|(estimate, step)| estimate.retract(step))
                 .collect();
         }
-        let end = problem.linearise(&estimates).cost;
+        let end = problem.linearise(&estimates).unwrap().cost;
         assert!(end < 0.1 * start, "{start} → {end}");
         let poses: Vec<_> = estimates.iter().map(|e| e.pose).collect();
         let motion = ring.wall.circle.gauge().align(&poses, &ring.wall.poses);

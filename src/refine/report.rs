@@ -2,6 +2,7 @@
 
 use super::covariance::FrameSigma;
 use super::gauss_newton::SolveRecord;
+use crate::trajectory::Pose;
 use serde::Serialize;
 
 /// What a frame's refined pose rests on.
@@ -12,6 +13,26 @@ pub enum FrameFlag {
     Photometric,
     /// The prior alone: the pixels do not determine it.
     Prior,
+    /// The prior alone: the pixels allow two poses.
+    Ambiguous,
+}
+
+/// A pose in the report, as in a TUM file.
+#[derive(Clone, Debug, Serialize)]
+pub struct PoseReport {
+    /// Position, metres.
+    pub translation_m: [f64; 3],
+    /// Rotation, camera to world: x, y, z, w.
+    pub quaternion_xyzw: [f64; 4],
+}
+
+impl From<&Pose> for PoseReport {
+    fn from(pose: &Pose) -> Self {
+        Self {
+            translation_m: pose.t_wc.into(),
+            quaternion_xyzw: pose.r_wc.coords.into(),
+        }
+    }
 }
 
 /// One frame of the report.
@@ -26,6 +47,9 @@ pub struct FrameReport {
     /// Why, if it rests on the prior.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+    /// The other pose, if two are possible.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub other_pose: Option<PoseReport>,
     /// Wall samples at which it was compared with other frames.
     pub points: usize,
     /// Root mean square of its residuals against the fused wall, grey levels, as weighted by the robust loss.

@@ -1,28 +1,27 @@
 //! From a survey to refined poses: load, track, solve globally coarse to fine, report.
 
+use super::consistency::{Comparison, blurred, compare_pairs, contradictions};
 use super::covariance::{frame_covariances, frame_sigma};
+use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
+use super::examine::examine;
 use super::gauss_newton::{Solution, StopReason, Stopping, solve};
 use super::options::RefineOptions;
-use super::prior::Prior;
+use super::prior::{Prior, usual_step_s};
 use super::problem::{FrameShare, Problem, ProblemError, Sampling, Scene};
-use super::report::{FrameFlag, FrameReport, LevelReport, RefineReport, StageTime};
-use super::track::track;
-use crate::frames::{FrameError, Pyramid, load_grey};
+use super::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
+use super::track::{Tracked, retry, track};
+use crate::frames::FrameCache;
 use crate::progress::Progress;
 use crate::survey::Survey;
 use crate::trajectory::{StampedPose, Trajectory};
 use nalgebra::Matrix6;
-use rayon::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
 
 /// Why a survey cannot be refined.
 #[derive(Debug, thiserror::Error)]
 pub enum RefineError {
-    /// A frame cannot be used.
-    #[error(transparent)]
-    Frames(#[from] FrameError),
     /// Nothing to compare with.
     #[error(
         "the survey has a single frame; refinement compares frames that overlap on the wall, so it needs two or more"
@@ -73,28 +72,41 @@ pub fn refine(
     }
     let mut clock = Clock::default();
     let side = survey.camera.shorter_side();
-    let frames = load(survey, options.coarsest_level(side) + 1, progress.as_ref())?;
-    clock.lap("decode");
+    let coarsest = options.coarsest_level(side);
+    let mut frames = FrameCache::new(
+        &survey.frames,
+        &survey.camera,
+        coarsest + 1,
+        options.cache_bytes,
+    );
+    let times_s: Vec<f64> = survey.initial.iter().map(|stamped| stamped.time_s).collect();
     let prior = Prior {
         jitter: survey.prior,
         initial: survey.initial_poses(),
+        usual_step_s: usual_step_s(&times_s),
+        times_s,
         log_gain_sigma: options.log_gain_sigma,
         bias_sigma: options.bias_sigma,
     };
-    let scene = Scene {
-        surface: survey.surface.as_ref(),
-        camera: &survey.camera,
-        frames: &frames,
-        prior: &prior,
-    };
-    let mut estimates = track(&scene, options, progress.as_ref())?;
+    let examined = examine(&scene(survey, &prior, &frames), coarsest, progress.as_ref())?;
+    if examined.shading.is_some() {
+        frames.set_shading(examined.shading);
+    }
+    clock.lap("decode");
+    let mut tracked = track(
+        &scene(survey, &prior, &frames),
+        options,
+        examined.doubts,
+        progress.as_ref(),
+    )?;
     clock.lap("track");
 
+    let scene = scene(survey, &prior, &frames);
     let mut levels = Vec::new();
     let mut last = None;
-    for (sampling, stopping) in stages(options, side) {
+    for (k, (sampling, stopping)) in stages(options, side).enumerate() {
         let Sampling { level, density } = sampling;
-        let problem = Problem::new(&scene, sampling, 0..count, 0..count, &estimates)?;
+        let problem = Problem::new(&scene, sampling, tracked.members())?;
         if problem.tiles() == 0 {
             continue;
         }
@@ -105,7 +117,7 @@ pub fn refine(
         progress.start("global", options.max_iterations as usize);
         let solution = solve(problem, stopping, Some((&stage, progress)))?;
         progress.finish();
-        estimates.clone_from(&solution.estimates);
+        tracked.estimates.clone_from(&solution.estimates);
         levels.push(LevelReport {
             level,
             samples_per_pixel: density,
@@ -113,6 +125,10 @@ pub fn refine(
         });
         last = Some(solution);
         clock.lap(&format!("global {stage}"));
+        if k == 0 {
+            recheck(&scene, options, &mut tracked)?;
+            clock.lap("check");
+        }
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
     let covariances = frame_covariances(
@@ -122,23 +138,24 @@ pub fn refine(
     )
     // Poses without a covariance are still poses; they are reported as uncertain.
     .unwrap_or_else(|_| vec![Matrix6::from_element(f64::NAN); count]);
+    let estimates = &tracked.estimates;
     let reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = frame_sigma(scene.surface, scene.camera, &estimates[k], &covariances[k]);
-            frame_report(survey, k, &solution, sigma)
+            frame_report(survey, k, &solution, tracked.doubts[k].as_ref(), sigma)
         })
         .collect();
     clock.lap("covariance");
 
-    let motion = prior.settle_gauge(&scene.surface.gauge(), &estimates);
+    let motion = prior.settle_gauge(&scene.surface.gauge(), estimates);
     let on_prior = reports
         .iter()
-        .filter(|f| f.flag == FrameFlag::Prior)
+        .filter(|f| f.flag != FrameFlag::Photometric)
         .count();
     let trajectory = survey
         .initial
         .iter()
-        .zip(&estimates)
+        .zip(estimates)
         .map(|(initial, estimate)| StampedPose {
             time_s: initial.time_s,
             pose: motion.apply(&estimate.pose),
@@ -154,6 +171,15 @@ pub fn refine(
             timings: clock.laps,
         },
     })
+}
+
+fn scene<'a>(survey: &'a Survey, prior: &'a Prior, frames: &'a FrameCache) -> Scene<'a> {
+    Scene {
+        surface: survey.surface.as_ref(),
+        camera: &survey.camera,
+        frames,
+        prior,
+    }
 }
 
 /// The global solves: coarse to fine, and the finest once more with a denser look at the wall.
@@ -187,56 +213,85 @@ fn stages(
         .chain([(finest, last)])
 }
 
-fn load(
-    survey: &Survey,
-    levels: usize,
-    progress: &dyn Progress,
-) -> Result<Vec<Pyramid>, FrameError> {
-    progress.start("decoding", survey.frames.len());
-    let (width, height) = (survey.camera.width, survey.camera.height);
-    let frames = survey
-        .frames
-        .par_iter()
-        .map(|file| {
-            let grey = load_grey(file, width, height)?;
-            progress.advance(1);
-            Ok(Pyramid::new(grey, levels))
-        })
-        .collect();
-    progress.finish();
-    frames
+/// Compares all frames pair by pair, takes out those that contradict the rest, tries once more to place what is not
+/// placed, and solves again.
+fn recheck(
+    scene: &Scene,
+    options: &RefineOptions,
+    tracked: &mut Tracked,
+) -> Result<(), ProblemError> {
+    let side = scene.camera.shorter_side();
+    let coarse = Comparison {
+        level: options.coarsest_level(side).saturating_sub(1),
+        stride: 2,
+        window: None,
+    };
+    let fine = Comparison {
+        level: 1.min(options.coarsest_level(side)),
+        stride: 5,
+        window: Some(FINE_WINDOW),
+    };
+    let count = tracked.estimates.len();
+    for round in 0..ROUNDS {
+        let pairs = compare_pairs(scene, coarse, tracked)?;
+        for (frame, doubt) in contradictions(&pairs, count) {
+            tracked.doubts[frame] = Some(doubt);
+        }
+        if round + 1 == ROUNDS || retry(scene, options, tracked)? == 0 {
+            break;
+        }
+        let level = options.handover_level(side);
+        for level in (level..=options.coarsest_level(side)).rev() {
+            let problem = Problem::new(scene, Sampling::of(level), tracked.members())?;
+            let stopping = Stopping {
+                max_iterations: options.max_iterations,
+                step_px: CLOSE * options.step_tolerance_px * 2f64.powi(level as i32),
+                step_sigma: CLOSE * options.step_tolerance_sigma,
+            };
+            tracked.estimates = solve(problem, stopping, None)?.estimates;
+        }
+    }
+    let pairs = compare_pairs(scene, fine, tracked)?;
+    let mut doubts = contradictions(&pairs, count);
+    doubts.extend(blurred(&pairs, count));
+    for (frame, doubt) in doubts {
+        tracked.doubts[frame] = Some(doubt);
+    }
+    Ok(())
 }
+
+/// Times that contradictions are looked for, and frames in doubt tried again between.
+const ROUNDS: usize = 3;
+/// Half width of the window for fine detail, pixels.
+const FINE_WINDOW: usize = 3;
 
 fn frame_report(
     survey: &Survey,
     k: usize,
     solution: &Solution,
+    doubt: Option<&Doubt>,
     sigma: super::covariance::FrameSigma,
 ) -> FrameReport {
     let share: &FrameShare = &solution.linearisation.frames[k];
     let estimate: &FrameEstimate = &solution.estimates[k];
     let all = f64::from(survey.camera.width) * f64::from(survey.camera.height);
     let inlier_share = share.inliers / share.pixels.max(1e-9);
-    let reason = if share.samples == 0 {
-        Some("it overlaps no other frame on the wall".to_owned())
-    } else if share.pixels < LEAST_PIXEL_SHARE * all {
-        Some(format!(
-            "only {:.1} % of its pixels overlap other frames",
-            100.0 * share.pixels / all
-        ))
+    let late = if share.pixels < LEAST_PIXEL_SHARE * all {
+        Some(Doubt::NoOverlap {
+            share: share.pixels / all,
+        })
     } else if inlier_share < LEAST_INLIER_SHARE {
-        Some(format!(
-            "{:.0} % of its pixels disagree with the other frames",
-            100.0 * (1.0 - inlier_share)
-        ))
+        Some(Doubt::Disagrees {
+            share: 1.0 - inlier_share,
+        })
     } else if sigma.wall_px.is_nan() || sigma.wall_px > LARGEST_SIGMA_PX {
-        Some(format!(
-            "its place on the wall is uncertain by {:.1} px: too little texture, or frames that do not match",
-            sigma.wall_px
-        ))
+        Some(Doubt::Uncertain {
+            wall_px: sigma.wall_px,
+        })
     } else {
         None
     };
+    let doubt = doubt.cloned().or(late);
     FrameReport {
         index: k,
         file: survey.frames[k]
@@ -244,12 +299,16 @@ fn frame_report(
             .file_name()
             .map(|name| name.to_string_lossy().into_owned())
             .unwrap_or_default(),
-        flag: if reason.is_some() {
-            FrameFlag::Prior
-        } else {
-            FrameFlag::Photometric
+        flag: match &doubt {
+            None => FrameFlag::Photometric,
+            Some(Doubt::Ambiguous { .. }) => FrameFlag::Ambiguous,
+            Some(_) => FrameFlag::Prior,
         },
-        reason,
+        other_pose: match &doubt {
+            Some(Doubt::Ambiguous { other, .. }) => Some(PoseReport::from(other)),
+            _ => None,
+        },
+        reason: doubt.map(|doubt| doubt.to_string()),
         points: share.samples,
         residual: (share.square / share.inliers.max(1e-9)).sqrt(),
         inlier_share,

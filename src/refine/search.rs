@@ -1,299 +1,299 @@
 //! Looking for a frame beyond the basin of Gauss–Newton.
 //!
 //! A wall of bricks correlates with itself over a fraction of a brick only; the prior is wider than that. So
-//! before a frame is refined, poses over the whole width of the prior are compared with the wall fused from
-//! the frames already placed, at a coarse level: turns about the three camera axes on a regular grid (a
-//! shift of the camera looks nearly like a turn, and refinement tells them apart). The best local maxima are
-//! handed on as hypotheses.
+//! before a frame is refined, it is compared with the wall fused from the frames already placed, over the whole width
+//! of the prior: the frame, unrolled under a few hypotheses of pitch and roll, is correlated with the wall over all
+//! shifts at once, by Fourier transform (a shift of the camera looks nearly like a turn, and refinement tells them
+//! apart). The best maxima are handed on as hypotheses.
 //!
-//! The score of a pose is its log-posterior with gain, bias and noise profiled out:
-//! `ℓ = −(n/2ν) ln(1 − c²) − ½ ωᵀΣ⁻¹ω`, with c the correlation of the frame with the wall on the n samples
-//! that both show, and ν the number of samples that share one independent piece of texture.
+//! Both are compared by their local contrast ([`super::contrast`]), normalised over what both show: with masks m,
+//!
+//! `c(d) = Σ A(x) W(x+d) / √(Σ A²(x) m_W(x+d) · Σ m_A(x) W²(x+d))`.
+//!
+//! The score of a hypothesis is its log-posterior with exposure and noise profiled out:
+//! `ℓ = −(n/2ν) ln(1 − c²) − ½ ωᵀΣ⁻¹ω`, n the samples both show, ν those that share one independent piece of texture.
+//!
+//! Source: J. P. Lewis, "Fast normalized cross-correlation", 1995 (correlation by transform); D. Padfield, "Masked
+//! object registration in the Fourier domain", IEEE Trans. Image Processing 21(5), 2012 (masks).
 
-use super::estimate::FrameEstimate;
-use super::problem::{ProblemError, Scene, sample_spacing};
-use crate::surface::{Footprint, WallPoint};
+use super::problem::Scene;
+use super::spectrum::{Spectrum, Transform};
+use super::wall::{Agreement, FusedWall, Portrait};
+use crate::surface::{WallPoint, shortest_arc, wall_jacobian};
 use crate::trajectory::{Pose, so3};
-use nalgebra::Vector3;
+use nalgebra::{Matrix2, Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Half width of the search, in standard deviations of the prior.
-const REACH: f64 = 3.5;
-/// Step of the grid: movement of the picture, pixels of the search level.
-const STEP_PX: f64 = 0.6;
+pub const REACH: f64 = 3.5;
 /// ν: samples per independent piece of texture.
 const SAMPLES_PER_PIECE: f64 = 4.0;
 /// Least share of the frame that must lie on known wall.
-const LEAST_OVERLAP: f64 = 0.1;
-/// Candidates at the most; a wider prior is searched with a coarser grid.
-const MOST_CANDIDATES: f64 = 50_000.0;
+const LEAST_OVERLAP: f64 = 0.08;
+/// Step between roll hypotheses: movement of the frame's corners, samples.
+const ROLL_STEP: f64 = 2.0;
+/// Step between pitch hypotheses, radians: by as much less, the shift does instead.
+const PITCH_STEP: f64 = 0.12;
+/// Local maxima kept per pitch and roll.
+const MAXIMA: usize = 4;
+/// Maxima closer than this are one, samples.
+const APART: f64 = 2.5;
 
 /// A pose worth refining.
 #[derive(Clone, Copy, Debug)]
 pub struct Hypothesis {
-    /// Pose, with the gain and bias that fit the wall best.
-    pub estimate: FrameEstimate,
+    /// The pose.
+    pub pose: Pose,
     /// Log-posterior ℓ.
     pub score: f64,
 }
 
-/// The wall around a frame as the frames already placed show it, on a lattice of one sample a pixel.
-pub struct FusedWall<'a> {
-    scene: &'a Scene<'a>,
-    level: usize,
-    origin: Vector3<f64>,
-    points: Vec<[f32; 3]>,
-    values: Vec<f32>,
+/// ℓ without the prior.
+pub fn log_likelihood(agreement: &Agreement) -> f64 {
+    let c = agreement.correlation.clamp(0.0, 1.0 - 1e-6);
+    -0.5 * agreement.samples / SAMPLES_PER_PIECE * (1.0 - c * c).ln()
 }
 
-impl<'a> FusedWall<'a> {
-    /// Fuses the `placed` frames around where `pose` looks, `margin_m` metres more on every side.
-    ///
-    /// # Errors
-    /// A pose that does not go with the tunnel, named as frame `frame`.
-    pub fn new(
-        scene: &'a Scene<'a>,
-        level: usize,
-        placed: &[(usize, FrameEstimate)],
-        frame: usize,
-        pose: &Pose,
-        margin_m: f64,
-    ) -> Result<Self, ProblemError> {
-        let camera = scene.camera.at_level(level);
-        let fail = |source| ProblemError::Placement { frame, source };
-        let footprint = Footprint::trace(scene.surface, &camera, pose)
-            .map_err(fail)?
-            .widened(margin_m);
-        let spacing = sample_spacing(scene.surface, &camera, std::slice::from_ref(pose))
-            .map_err(|(_, source)| fail(source))?;
-        let axis = |from: f64, to: f64| -> Vec<f64> {
-            (0..=((to - from) / spacing) as usize)
-                .map(|k| from + k as f64 * spacing)
-                .collect()
-        };
-        let (s, h) = (
-            axis(footprint.s_min_m, footprint.s_max_m),
-            axis(footprint.h_min_m, footprint.h_max_m),
-        );
-        let origin = scene
-            .surface
-            .frame(WallPoint {
-                s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
-                h_m: 0.5 * (footprint.h_min_m + footprint.h_max_m),
-            })
-            .x_w;
-        let mut lattice = Vec::new();
-        scene.surface.lattice(&s, &h, &mut lattice);
-        let lattice: Vec<[f32; 3]> = lattice
-            .iter()
-            .map(|x_w| {
-                let offset = x_w - origin;
-                [offset.x as f32, offset.y as f32, offset.z as f32]
-            })
-            .collect();
-        let samplers: Vec<Sampler> = placed
-            .iter()
-            .map(|(k, estimate)| Sampler::new(scene, level, *k, estimate, &origin))
-            .collect();
-        let fused: Vec<([f32; 3], f32)> = lattice
-            .par_chunks(256)
-            .flat_map_iter(|points| {
-                let samplers = &samplers;
-                points.iter().filter_map(move |point| {
-                    let (mut sum, mut seen) = (0.0, 0.0);
-                    for value in samplers.iter().filter_map(|sampler| sampler.at(point)) {
-                        sum += value;
-                        seen += 1.0;
+/// Least number of samples a frame must share with the wall to be compared.
+pub fn least_samples(portrait: &Portrait) -> f64 {
+    let camera = portrait.camera();
+    LEAST_OVERLAP * f64::from(camera.width) * f64::from(camera.height)
+}
+
+/// A maximum of the correlation over shifts.
+struct Peak {
+    pitch: f64,
+    roll: f64,
+    /// Shift along s and h, metres.
+    shift_m: Vector2<f64>,
+    score: f64,
+}
+
+/// Searches around `predicted` over `sigma_rad`, the prior's σ of pitch, yaw and roll as seen in the picture; returns at
+/// most `count` local maxima, best first.
+pub fn search(
+    scene: &Scene,
+    wall: &FusedWall,
+    portrait: &Portrait,
+    predicted: &Pose,
+    sigma_rad: [f64; 3],
+    count: usize,
+) -> Vec<Hypothesis> {
+    let Ok(hit) = scene
+        .surface
+        .hit(&predicted.t_wc, &(predicted.r_wc * Vector3::z()))
+    else {
+        return Vec::new();
+    };
+    let spacing = wall.lattice.spacing_m;
+    let cells = |angle: f64| (angle * hit.range / spacing).ceil() as usize;
+    let camera = portrait.camera();
+    let half_diagonal = 0.5 * f64::from(camera.width).hypot(f64::from(camera.height));
+    let pitches = steps(REACH * sigma_rad[0], PITCH_STEP);
+    let rolls = steps(REACH * sigma_rad[2], ROLL_STEP / half_diagonal);
+    // Shifts along h make up for half a step of pitch; those along s for all of the yaw.
+    let half_pitch = if pitches.len() > 1 {
+        0.6 * (pitches[1] - pitches[0])
+    } else {
+        REACH * sigma_rad[0]
+    };
+    let reach = (cells(REACH * sigma_rad[1]), cells(half_pitch));
+    let correlator = Correlator::new(wall, reach);
+    let least = least_samples(portrait);
+    let hypotheses: Vec<(f64, f64)> = pitches
+        .iter()
+        .flat_map(|pitch| rolls.iter().map(|roll| (*pitch, *roll)))
+        .collect();
+    let mut peaks: Vec<Peak> = hypotheses
+        .par_iter()
+        .flat_map_iter(|&(pitch, roll)| {
+            let turn = so3::exp(&(Vector3::x() * pitch)) * so3::exp(&(Vector3::z() * roll));
+            let pose = Pose::new(predicted.r_wc * turn, predicted.t_wc);
+            let mut own: Vec<Peak> = correlator
+                .correlate(wall, portrait, &pose)
+                .into_iter()
+                .filter(|(_, agreement)| agreement.samples >= least)
+                .map(|(shift, agreement)| {
+                    let shift_m = shift * spacing;
+                    // A camera that pitches up (about x) looks towards −h.
+                    let omega = Vector3::new(
+                        pitch - shift_m.y / hit.range,
+                        shift_m.x / hit.range,
+                        roll,
+                    );
+                    let prior: f64 = (0..3).map(|k| 0.5 * (omega[k] / sigma_rad[k]).powi(2)).sum();
+                    Peak {
+                        pitch,
+                        roll,
+                        shift_m,
+                        score: log_likelihood(&agreement) - prior,
                     }
-                    (seen > 0.0).then_some((*point, sum / seen))
                 })
-            })
-            .collect();
-        let (points, values) = fused.into_iter().unzip();
-        Ok(Self {
-            scene,
-            level,
-            origin,
-            points,
-            values,
+                .collect();
+            own.sort_by(|a, b| b.score.total_cmp(&a.score));
+            own.truncate(MAXIMA);
+            own
         })
+        .collect();
+    peaks.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut best: Vec<&Peak> = Vec::new();
+    for peak in &peaks {
+        let same = |other: &&Peak| {
+            let along = peak.shift_m.y - other.shift_m.y - (peak.pitch - other.pitch) * hit.range;
+            let across = peak.shift_m.x - other.shift_m.x;
+            along.hypot(across) < APART * spacing
+                && (peak.roll - other.roll).abs() * half_diagonal < 1.5 * ROLL_STEP
+        };
+        if !best.iter().any(same) {
+            best.push(peak);
+        }
+        if best.len() == count {
+            break;
+        }
+    }
+    best.into_iter()
+        .filter_map(|peak| {
+            let turn =
+                so3::exp(&(Vector3::x() * peak.pitch)) * so3::exp(&(Vector3::z() * peak.roll));
+            let pose = Pose::new(predicted.r_wc * turn, predicted.t_wc);
+            Some(Hypothesis {
+                pose: shifted(scene, &pose, &peak.shift_m)?,
+                score: peak.score,
+            })
+        })
+        .collect()
+}
+
+/// Angles from `−half` to `half`, no more than `step` apart.
+fn steps(half: f64, step: f64) -> Vec<f64> {
+    let n = (half / step).floor() as i32;
+    (-n..=n).map(|k| f64::from(k) * step).collect()
+}
+
+/// The pose turned (about its own x and y) so that its middle looks at a wall point `shift_m` away from where it does.
+fn shifted(scene: &Scene, pose: &Pose, shift_m: &Vector2<f64>) -> Option<Pose> {
+    let look = |pose: &Pose| scene.surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()));
+    let from = look(pose).ok()?.wall;
+    let target = WallPoint {
+        s_m: from.s_m + shift_m.x,
+        h_m: from.h_m + shift_m.y,
+    };
+    let mut pose = *pose;
+    for _ in 0..8 {
+        let hit = look(&pose).ok()?.wall;
+        let left = Vector2::new(
+            shortest_arc(target.s_m - hit.s_m, scene.surface.perimeter_m()),
+            target.h_m - hit.h_m,
+        );
+        let a = wall_jacobian(&pose, &scene.surface.frame(hit));
+        let turn: Matrix2<f64> = a.fixed_columns::<2>(0).into_owned();
+        let step = turn.try_inverse()? * left;
+        let step = step * (0.3 / step.norm()).min(1.0);
+        pose.r_wc *= so3::exp(&Vector3::new(step.x, step.y, 0.0));
+    }
+    Some(pose)
+}
+
+/// The wall's spectra, ready to be correlated with frames over shifts up to a reach.
+struct Correlator {
+    transform: Transform,
+    reach: (usize, usize),
+    contrast: Spectrum,
+    square: Spectrum,
+    mask: Spectrum,
+}
+
+impl Correlator {
+    fn new(wall: &FusedWall, reach: (usize, usize)) -> Self {
+        let lattice = &wall.lattice;
+        // Room for shifts beyond the wall's end, so that nothing comes around from the other.
+        let transform = Transform::at_least(lattice.columns + reach.0, lattice.rows + reach.1);
+        let spread = |value: fn(f32) -> f32| {
+            let raster = place(&transform, lattice.columns, &wall.contrast, value);
+            transform.forward(raster)
+        };
+        Self {
+            contrast: spread(|v| v),
+            square: spread(|v| v * v),
+            mask: spread(|_| 1.0),
+            transform,
+            reach,
+        }
     }
 
-    /// Scores `pose` for frame `frame`; `prior` is its `½ ωᵀΣ⁻¹ω`. None without enough common wall or
-    /// where the two do not correlate at all.
-    pub fn score(&self, frame: usize, pose: &Pose, prior: f64) -> Option<Hypothesis> {
-        let estimate = FrameEstimate::at(*pose);
-        let sampler = Sampler::new(self.scene, self.level, frame, &estimate, &self.origin);
-        let (mut n, mut x, mut y) = (0.0f64, 0.0f64, 0.0f64);
-        let (mut xx, mut yy, mut xy) = (0.0f64, 0.0f64, 0.0f64);
-        for (point, wall) in self.points.iter().zip(&self.values) {
-            if let Some(value) = sampler.at(point) {
-                let (wall, value) = (f64::from(*wall), f64::from(value));
-                n += 1.0;
-                x += wall;
-                y += value;
-                xx += wall * wall;
-                yy += value * value;
-                xy += wall * value;
+    /// Local maxima of the correlation of the frame at `pose` over shifts, in samples.
+    fn correlate(
+        &self,
+        wall: &FusedWall,
+        portrait: &Portrait,
+        pose: &Pose,
+    ) -> Vec<(Vector2<f64>, Agreement)> {
+        let sampler = portrait.contrast(pose, &wall.origin);
+        let unrolled: Vec<f32> = wall
+            .points
+            .iter()
+            .map(|point| sampler.at(point).unwrap_or(f32::NAN))
+            .collect();
+        let transform = &self.transform;
+        let columns = wall.lattice.columns;
+        let spread = |value: fn(f32) -> f32| {
+            transform.forward(place(transform, columns, &unrolled, value))
+        };
+        let (contrast, square, mask) = (spread(|v| v), spread(|v| v * v), spread(|_| 1.0));
+        let product = transform.correlate(&contrast, &self.contrast);
+        let own = transform.correlate(&square, &self.mask);
+        let walls = transform.correlate(&mask, &self.square);
+        let samples = transform.correlate(&mask, &self.mask);
+        let (reach_s, reach_h) = (self.reach.0 as i64, self.reach.1 as i64);
+        let (width, height) = (transform.columns as i64, transform.rows as i64);
+        let index = |ds: i64, dh: i64| {
+            (dh.rem_euclid(height) * width + ds.rem_euclid(width)) as usize
+        };
+        let at = |ds: i64, dh: i64| -> f32 {
+            let k = index(ds, dh);
+            let energy = (own[k] * walls[k]).max(0.0).sqrt();
+            if samples[k] < 1.0 || energy <= 0.0 {
+                -1.0
+            } else {
+                product[k] / energy
+            }
+        };
+        let mut maxima = Vec::new();
+        for dh in -reach_h..=reach_h {
+            for ds in -reach_s..=reach_s {
+                let c = at(ds, dh);
+                let peak = c > 0.0
+                    && (-1..=1).all(|y| (-1..=1).all(|x| (x, y) == (0, 0) || at(ds + x, dh + y) <= c));
+                if peak {
+                    maxima.push((
+                        Vector2::new(ds as f64, dh as f64),
+                        Agreement {
+                            correlation: f64::from(c),
+                            samples: f64::from(samples[index(ds, dh)]),
+                        },
+                    ));
+                }
             }
         }
-        let camera = self.scene.camera.at_level(self.level);
-        let pixels = f64::from(camera.width) * f64::from(camera.height);
-        if n < LEAST_OVERLAP * pixels {
-            return None;
-        }
-        let (variance_x, variance_y) = (xx / n - (x / n).powi(2), yy / n - (y / n).powi(2));
-        let covariance = xy / n - x * y / (n * n);
-        if !(covariance > 0.0 && variance_x > 0.0 && variance_y > 0.0) {
-            return None;
-        }
-        let c2 = (covariance * covariance / (variance_x * variance_y)).min(1.0 - 1e-9);
-        let gain = (covariance / variance_x).clamp(0.4, 2.5);
-        Some(Hypothesis {
-            estimate: FrameEstimate {
-                pose: *pose,
-                log_gain: gain.ln(),
-                bias: y / n - gain * x / n,
-            },
-            score: -0.5 * n / SAMPLES_PER_PIECE * (1.0 - c2).ln() - prior,
-        })
-    }
-
-    /// Searches around `predicted` for frame `frame`; returns at most `count` local maxima, best first.
-    /// `sigma_rad`: prior σ of pitch, yaw and roll as seen in the picture.
-    pub fn search(
-        &self,
-        frame: usize,
-        predicted: &Pose,
-        sigma_rad: [f64; 3],
-        count: usize,
-    ) -> Vec<Hypothesis> {
-        let camera = self.scene.camera.at_level(self.level);
-        let half_diagonal = 0.5 * f64::from(camera.width).hypot(f64::from(camera.height));
-        let finest = [
-            STEP_PX / camera.fy,
-            STEP_PX / camera.fx,
-            1.5 * STEP_PX / half_diagonal,
-        ];
-        let total: f64 = (0..3)
-            .map(|k| 1.0 + 2.0 * REACH * sigma_rad[k] / finest[k])
-            .product();
-        let widen = (total / MOST_CANDIDATES).max(1.0).cbrt();
-        let step = finest.map(|s| s * widen);
-        let half: [i32; 3] =
-            std::array::from_fn(|k| (REACH * sigma_rad[k] / step[k]).ceil() as i32);
-        let side = half.map(|n| 2 * n + 1);
-        let cells: Vec<[i32; 3]> = (0..side[0] * side[1] * side[2])
-            .map(|k| {
-                [
-                    k / (side[1] * side[2]) - half[0],
-                    k / side[2] % side[1] - half[1],
-                    k % side[2] - half[2],
-                ]
-            })
-            .collect();
-        let scored: Vec<Option<Hypothesis>> = cells
-            .par_iter()
-            .map(|cell| {
-                let omega = Vector3::from_fn(|k, _| f64::from(cell[k]) * step[k]);
-                let prior: f64 = (0..3)
-                    .map(|k| 0.5 * (omega[k] / sigma_rad[k]).powi(2))
-                    .sum();
-                let pose = Pose::new(predicted.r_wc * so3::exp(&omega), predicted.t_wc);
-                self.scene.surface.check_inside(&pose.t_wc).ok()?;
-                self.score(frame, &pose, prior)
-            })
-            .collect();
-        let index = |cell: [i32; 3]| -> Option<usize> {
-            (0..3).all(|k| cell[k].abs() <= half[k]).then(|| {
-                (((cell[0] + half[0]) * side[1] + cell[1] + half[1]) * side[2] + cell[2] + half[2])
-                    as usize
-            })
-        };
-        let score = |cell: [i32; 3]| {
-            index(cell)
-                .and_then(|k| scored[k])
-                .map_or(f64::NEG_INFINITY, |hypothesis| hypothesis.score)
-        };
-        let mut maxima: Vec<Hypothesis> = cells
-            .iter()
-            .filter(|cell| {
-                let own = score(**cell);
-                own.is_finite()
-                    && (0..27).all(|k| {
-                        let neighbour = [
-                            cell[0] + k / 9 - 1,
-                            cell[1] + k / 3 % 3 - 1,
-                            cell[2] + k % 3 - 1,
-                        ];
-                        score(neighbour) <= own
-                    })
-            })
-            .filter_map(|cell| index(*cell).and_then(|k| scored[k]))
-            .collect();
-        maxima.sort_by(|a, b| b.score.total_cmp(&a.score));
-        maxima.truncate(count);
         maxima
     }
 }
 
-/// One frame ready to be sampled point by point.
-struct Sampler<'a> {
-    image: &'a crate::frames::GreyImage,
-    r_cw: nalgebra::Matrix3<f32>,
-    centre: Vector3<f32>,
-    focal: (f32, f32),
-    principal: (f32, f32),
-    limit: (f32, f32),
-    inverse_gain: f32,
-    bias: f32,
-}
-
-impl<'a> Sampler<'a> {
-    fn new(
-        scene: &Scene<'a>,
-        level: usize,
-        frame: usize,
-        estimate: &FrameEstimate,
-        origin: &Vector3<f64>,
-    ) -> Self {
-        let camera = scene.camera.at_level(level);
-        let image = scene.frames[frame].level(level);
-        let r_wc = estimate.pose.r_wc.to_rotation_matrix();
-        Self {
-            image,
-            r_cw: r_wc.matrix().transpose().cast(),
-            centre: estimate.pose.to_camera(origin).cast(),
-            focal: (camera.fx as f32, camera.fy as f32),
-            principal: (camera.cx as f32, camera.cy as f32),
-            limit: ((image.width() - 1) as f32, (image.height() - 1) as f32),
-            inverse_gain: (-estimate.log_gain).exp() as f32,
-            bias: estimate.bias as f32,
+/// A lattice's values in a raster of the transform's size; 0 where there is none.
+fn place(
+    transform: &Transform,
+    columns: usize,
+    values: &[f32],
+    value: fn(f32) -> f32,
+) -> Vec<f32> {
+    let mut raster = vec![0.0; transform.columns * transform.rows];
+    let rows = raster.chunks_exact_mut(transform.columns);
+    for (row, values) in rows.zip(values.chunks_exact(columns)) {
+        for (cell, v) in row.iter_mut().zip(values) {
+            if !v.is_nan() {
+                *cell = value(*v);
+            }
         }
     }
-
-    /// The wall's value at a point (relative to the origin) as this frame shows it, if it does.
-    #[inline]
-    fn at(&self, point: &[f32; 3]) -> Option<f32> {
-        let r = &self.r_cw;
-        let dot =
-            |row: usize| r[(row, 0)] * point[0] + r[(row, 1)] * point[1] + r[(row, 2)] * point[2];
-        let z = self.centre.z + dot(2);
-        if z <= 0.0 {
-            return None;
-        }
-        let inverse = 1.0 / z;
-        let u = self.focal.0 * (self.centre.x + dot(0)) * inverse + self.principal.0;
-        let v = self.focal.1 * (self.centre.y + dot(1)) * inverse + self.principal.1;
-        if !(u >= 0.0 && v >= 0.0 && u < self.limit.0 && v < self.limit.1) {
-            return None;
-        }
-        let (x, y) = (u as usize, v as usize);
-        let (fu, fv) = (u - x as f32, v - y as f32);
-        let width = self.image.width();
-        let data = &self.image.data()[y * width + x..][..width + 2];
-        let a = data[0] + fu * (data[1] - data[0]);
-        let b = data[width] + fu * (data[width + 1] - data[width]);
-        Some((a + fv * (b - a) - self.bias) * self.inverse_gain)
-    }
+    raster
 }

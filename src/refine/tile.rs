@@ -1,6 +1,7 @@
 //! One tile of the wall: texture, residuals and their first and second moments.
 //!
-//! For wall samples x of the tile and the frames i that see it, with values `z_i(x) = (I_i(x) − b_i)/a_i`:
+//! For wall samples x of the tile and the frames i that see it, with gain `a_i = exp(α_i) V` (the frame's own times the
+//! camera's shading V there) and values `z_i(x) = (I_i(x) − b_i)/a_i`:
 //!
 //! - residual in the frame's own grey levels `e_i = I_i − b_i − a_i S = a_i r_i` with `r_i = z_i − S`: noise is
 //!   equal there, whatever the gain (in the wall's units a large gain would hide any residual);
@@ -24,6 +25,8 @@
 //!   `H_ij = (w̄_i δ_ij − w̄_i w̄_j / Σ_k w̄_k) B_iᵀ M B_j`.
 //!
 //! M counts the noise of the slopes as if it were texture; [`TileWork::slope_noise`] says how much that is.
+//!
+//! Where a frame has no value (clipped pixels) its weight is zero, and its cost that of plain noise.
 //!
 //! Rows of the bracket sum to zero, so what moves all frames of a tile alike costs nothing: the gauge
 //! directions are exact null vectors of the data term.
@@ -50,7 +53,7 @@ pub struct ObserverMoments {
     pub cost: f64,
     /// `Σ_x q ω(e) e²`, grey levels².
     pub square: f64,
-    /// `Σ_x q`: pixels that the samples stand for.
+    /// `Σ_x q`: pixels that the samples with a value stand for.
     pub pixels: f64,
     /// `Σ_x q ω(e)`: what the robust loss leaves of them.
     pub inliers: f64,
@@ -62,6 +65,8 @@ pub struct Seen<'a> {
     pub view: &'a View<'a>,
     /// Pixels per wall sample, q.
     pub pixels: f32,
+    /// The camera's shading V around the tile.
+    pub shade: f32,
 }
 
 /// What one frame shows of a tile.
@@ -70,16 +75,20 @@ struct Samples {
     values: [f32; AREA],
     /// Pixels per wall sample, q.
     pixels: f32,
-    /// Gain a.
+    /// Gain a, shading included.
     gain: f32,
     /// Robust weight ω at every wall sample.
     weights: [f32; AREA],
+    /// 1 where there is a value, else 0.
+    known: [f32; AREA],
 }
 
 /// Room for the work on one tile, reused from tile to tile.
 #[derive(Default)]
 pub struct TileWork {
     samples: Vec<Samples>,
+    /// True if some frame lacks some value.
+    gaps: bool,
     /// Moments of each observer, in the order given.
     pub observers: Vec<ObserverMoments>,
     /// `Σ_x φ φᵀ`.
@@ -92,30 +101,61 @@ impl TileWork {
     /// Samples all observers.
     fn sample<'a>(&mut self, points: &TilePoints, observers: impl Iterator<Item = Seen<'a>>) {
         self.samples.clear();
-        for Seen { view, pixels } in observers {
-            let mut values = [0.0; AREA];
-            view.sample(points, &mut values);
-            self.samples.push(Samples {
-                values,
-                pixels,
-                gain: view.gain(),
+        self.gaps = false;
+        for seen in observers {
+            let mut frame = Samples {
+                values: [0.0; AREA],
+                pixels: seen.pixels,
+                gain: seen.view.gain() * seen.shade,
                 weights: [1.0; AREA],
-            });
+                known: [1.0; AREA],
+            };
+            seen.view.sample(points, seen.shade, &mut frame.values);
+            // One NaN makes the sum NaN.
+            if frame.values.iter().sum::<f32>().is_nan() {
+                self.gaps = true;
+                for (value, known) in frame.values.iter_mut().zip(&mut frame.known) {
+                    if value.is_nan() {
+                        (*value, *known) = (0.0, 0.0);
+                    }
+                }
+            }
+            self.samples.push(frame);
         }
     }
 
-    /// The weighted mean of all observers.
+    /// The weighted mean of all observers; 0 where none has a value.
     fn mean(&self) -> [f32; AREA] {
         let mut sum = [0.0f32; AREA];
-        let mut total = 0.0f32;
+        let mut total = [1e-12f32; AREA];
         for frame in &self.samples {
             let q = frame.pixels * frame.gain * frame.gain;
-            total += q;
-            for (sum, value) in sum.iter_mut().zip(&frame.values) {
-                *sum += q * value;
+            for k in 0..AREA {
+                total[k] += q * frame.known[k];
+                sum[k] += q * frame.values[k];
             }
         }
-        sum.map(|s| s / total)
+        for (sum, total) in sum.iter_mut().zip(&total) {
+            *sum /= total;
+        }
+        sum
+    }
+
+    /// 1 at the samples around which the texture is known, so that it has a slope; else 0.
+    fn covered(&self) -> [f32; SAMPLES] {
+        if !self.gaps {
+            return [1.0; SAMPLES];
+        }
+        let mut known = [0.0f32; AREA];
+        for frame in &self.samples {
+            for (known, own) in known.iter_mut().zip(&frame.known) {
+                *known = known.max(*own);
+            }
+        }
+        std::array::from_fn(|k| {
+            let c = (k / TILE + 1) * SIDE + k % TILE + 1;
+            known[c] * known[c - 1] * known[c + 1] * known[c - SIDE] * known[c + SIDE]
+        })
     }
 
     /// Squared gradient of the texture as the frames show it: in their own grey levels a sample, by their mean square
@@ -155,7 +195,7 @@ impl TileWork {
             for k in 0..AREA {
                 let difference = frame.values[k] - reference[k];
                 let e = frame.gain * difference;
-                let w = Loss::weight(e * e, precision[k]);
+                let w = frame.known[k] * Loss::weight(e * e, precision[k]);
                 frame.weights[k] = w;
                 total[k] += q * w;
                 sum[k] += q * w * difference;
@@ -189,11 +229,12 @@ impl TileWork {
         let slope_h = (0.5 / spacing_m.1) as f32;
         let mut phi = [[0.0f32; SAMPLES]; 3];
         let mut inner_precision = [0.0f32; SAMPLES];
+        let covered = self.covered();
         for j in 0..TILE {
             for i in 0..TILE {
                 let (k, c) = (j * TILE + i, (j + 1) * SIDE + i + 1);
-                phi[0][k] = (texture[c + 1] - texture[c - 1]) * slope_s;
-                phi[1][k] = (texture[c + SIDE] - texture[c - SIDE]) * slope_h;
+                phi[0][k] = (texture[c + 1] - texture[c - 1]) * slope_s * covered[k];
+                phi[1][k] = (texture[c + SIDE] - texture[c - SIDE]) * slope_h * covered[k];
                 phi[2][k] = texture[c];
                 inner_precision[k] = precision[c];
             }
@@ -225,7 +266,9 @@ impl TileWork {
         for frame in &self.samples {
             for k in 0..AREA {
                 let e = frame.gain * (frame.values[k] - mean[k]);
-                histogram.add(scale * e, squares[k]);
+                if frame.known[k] > 0.0 {
+                    histogram.add(scale * e, squares[k]);
+                }
             }
         }
     }
@@ -277,17 +320,21 @@ fn observer_moments(
     precision: &[f32; SAMPLES],
 ) -> ObserverMoments {
     let (mut e, mut w) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES]);
+    let mut known = [0.0f32; SAMPLES];
     for j in 0..TILE {
         for i in 0..TILE {
             let (k, c) = (j * TILE + i, (j + 1) * SIDE + i + 1);
             e[k] = frame.gain * (frame.values[c] - phi[2][k]);
             w[k] = frame.weights[c];
+            known[k] = frame.known[c];
         }
     }
     let (mut we, mut loss) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES]);
     for k in 0..SAMPLES {
         we[k] = w[k] * e[k];
-        loss[k] = Loss::value(e[k] * e[k], precision[k]);
+        // A sample without a value costs what plain noise would: losing one is no gain.
+        let noise = 0.5 / precision[k];
+        loss[k] = known[k] * (Loss::value(e[k] * e[k], precision[k]) - noise) + noise;
     }
     let (q, a) = (f64::from(frame.pixels), f64::from(frame.gain));
     let inliers = f64::from(sum(&w));
@@ -302,7 +349,7 @@ fn observer_moments(
         weight: q * a * a * inliers / SAMPLES as f64,
         cost: q * f64::from(sum(&loss)),
         square: q * f64::from(dot(&we, &e)),
-        pixels: q * SAMPLES as f64,
+        pixels: q * f64::from(sum(&known)),
         inliers: q * inliers,
     }
 }
@@ -370,8 +417,7 @@ mod tests {
             steepness: 0.0,
         };
         for density in [1.0, 2.0] {
-            let spacing = 3.0 / camera.fy / density;
-            let grid = WallGrid::new(&circle, spacing);
+            let grid = WallGrid::new(&circle, 3.0 / camera.fy, density);
             let (mut found, mut expected) = ([0.0; 2], [0.0; 2]);
             let mut work = TileWork::default();
             let reach = (4.0 * density) as i64;
@@ -383,6 +429,7 @@ mod tests {
                     let seen = views.iter().map(|view| Seen {
                         view,
                         pixels: (1.0 / (density * density)) as f32,
+                        shade: 1.0,
                     });
                     let spacing = (grid.spacing_s_m, grid.spacing_h_m);
                     work.moments(&points, seen, spacing, &model);

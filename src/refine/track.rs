@@ -3,75 +3,118 @@
 //! Registering each frame only against those already placed gains error exponentially. Solving the last
 //! frames that can overlap again together, every few frames, with the oldest third held, keeps it bounded. When a
 //! turn closes, the window is solved from the coarsest level.
+//!
+//! A frame that cannot be placed stays where the prior expects it, and no other is compared with it.
 
+use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
-use super::problem::{Problem, ProblemError, Sampling, Scene};
-use super::search::FusedWall;
+use super::place::{Expectation, Surroundings, place};
+use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
+use super::visibility::reach_m;
 use crate::progress::Progress;
-use crate::surface::{Footprint, viewing_distance};
-use crate::trajectory::{Jitter, JitterModel, Pose};
+use crate::surface::Footprint;
+use crate::trajectory::{JitterModel, Pose};
+use std::borrow::Cow;
 use std::ops::Range;
 
-/// Hypotheses refined per frame.
-const HYPOTHESES: usize = 5;
 /// How far back overlap is looked for, frames.
 const FARTHEST: usize = 256;
-/// Stopping rules of a single frame and of a window; the global solve does the rest.
-const FRAME_STOPPING: Stopping = Stopping {
-    max_iterations: 12,
-    step_px: 0.1,
-    step_sigma: 0.0,
-};
+/// Stopping rule of a window; the global solve does the rest.
 const WINDOW_STOPPING: Stopping = Stopping {
     max_iterations: 6,
     step_px: 0.2,
     step_sigma: 0.0,
 };
 
-/// Places all frames; returns their estimates.
+/// All frames after tracking.
+#[derive(Clone, Debug)]
+pub struct Tracked {
+    /// Their estimates.
+    pub estimates: Vec<FrameEstimate>,
+    /// Why a frame is at its prior, for those that are.
+    pub doubts: Vec<Option<Doubt>>,
+}
+
+impl Tracked {
+    /// All frames, all to be estimated; those in doubt by the prior alone.
+    pub fn members(&self) -> Members<'_> {
+        let all = 0..self.estimates.len();
+        Members {
+            compared: Cow::Owned(self.believed(&all)),
+            participants: all.clone(),
+            active: all,
+            estimates: &self.estimates,
+        }
+    }
+
+    /// Which frames of a run are believed.
+    pub fn believed(&self, run: &Range<usize>) -> Vec<bool> {
+        self.doubts[run.clone()].iter().map(Option::is_none).collect()
+    }
+}
+
+/// Places all frames. `doubts` are those that are known to be useless beforehand.
 ///
 /// # Errors
-/// [`ProblemError`] if a pose leaves the tunnel or an equation has no solution.
+/// [`ProblemError`] if a frame cannot be read, an initial pose stands outside the tunnel, or an equation has no solution.
 pub fn track(
     scene: &Scene,
     options: &RefineOptions,
+    doubts: Vec<Option<Doubt>>,
     progress: &dyn Progress,
-) -> Result<Vec<FrameEstimate>, ProblemError> {
+) -> Result<Tracked, ProblemError> {
     let count = scene.frames.len();
-    let finest = options.handover_level(scene.camera.shorter_side());
-    let mut estimates = vec![FrameEstimate::at(scene.prior.initial[0])];
-    let mut footprints = vec![footprint(scene, 0, &estimates)?];
+    let mut tracked = Tracked {
+        estimates: Vec::with_capacity(count),
+        doubts,
+    };
+    let mut footprints = Vec::with_capacity(count);
     let mut before = 0;
     progress.start("tracking", count);
-    progress.advance(1);
-    for k in 1..count {
-        estimates.push(FrameEstimate::at(predict(scene, &estimates)));
-        footprints.push(footprint(scene, k, &estimates)?);
+    for k in 0..count {
+        let expected = expect(scene, k, &tracked);
+        tracked.estimates.push(FrameEstimate::at(expected.pose));
+        footprints.push(footprint(scene, k, &tracked)?);
         let first = earliest_overlap(scene, &footprints);
-        if first < k {
-            estimates[k] = place(scene, options, first, &estimates)?;
+        if tracked.doubts[k].is_none() && first < k {
+            let run = first..k + 1;
+            let mut placed = tracked.believed(&run);
+            placed[k - first] = false;
+            if placed.iter().any(|placed| *placed) {
+                let surroundings = Surroundings {
+                    estimates: &tracked.estimates[run.clone()],
+                    placed: &placed,
+                    run,
+                };
+                match place(scene, options, k, &expected, &surroundings)? {
+                    Ok(estimate) => tracked.estimates[k] = estimate,
+                    Err(doubt) => tracked.doubts[k] = Some(doubt),
+                }
+            }
         }
         // The frame looks farther back than the one before it did: a turn has closed on wall that was placed
         // without it, and what has drifted apart meanwhile may be many pixels.
         let closes = first < before;
         before = first;
-        if closes || k % options.window_stride == 0 || k + 1 == count {
+        if k > 0 && (closes || k % options.window_stride == 0 || k + 1 == count) {
+            let side = scene.camera.shorter_side();
+            let finest = options.handover_level(side);
             let coarsest = match closes {
-                true => options.coarsest_level(scene.camera.shorter_side()),
+                true => options.coarsest_level(side),
                 false => finest,
             };
             let held = if first == 0 { 0 } else { (k + 1 - first) / 3 };
             for level in (finest..=coarsest).rev() {
-                solve_window(scene, level, first..k + 1, held, &mut estimates)?;
+                solve_window(scene, level, first..k + 1, held, &mut tracked)?;
             }
         }
-        footprints[k] = footprint(scene, k, &estimates)?;
+        footprints[k] = footprint(scene, k, &tracked)?;
         progress.advance(1);
     }
     progress.finish();
-    Ok(estimates)
+    Ok(tracked)
 }
 
 /// Solves the frames of a window together, the oldest `held` of them held.
@@ -80,90 +123,27 @@ fn solve_window(
     level: usize,
     window: Range<usize>,
     held: usize,
-    estimates: &mut [FrameEstimate],
+    tracked: &mut Tracked,
 ) -> Result<(), ProblemError> {
     let active = window.start + held..window.end;
-    let sampling = Sampling::of(level);
-    let problem = Problem::new(scene, sampling, window, active.clone(), estimates)?;
+    let members = Members {
+        active: active.clone(),
+        estimates: &tracked.estimates[window.clone()],
+        compared: Cow::Owned(tracked.believed(&window)),
+        participants: window,
+    };
+    let problem = Problem::new(scene, Sampling::of(level), members)?;
     if problem.tiles() > 0 {
         let solution = solve(problem, WINDOW_STOPPING, None)?;
-        estimates[active].copy_from_slice(&solution.estimates);
+        tracked.estimates[active].copy_from_slice(&solution.estimates);
     }
     Ok(())
 }
 
-/// Places the last of `estimates` (its predicted pose) on the wall that the frames from `first` on show:
-/// search, brief refinement of every hypothesis, full refinement of the best.
-fn place(
-    scene: &Scene,
-    options: &RefineOptions,
-    first: usize,
-    estimates: &[FrameEstimate],
-) -> Result<FrameEstimate, ProblemError> {
-    let k = estimates.len() - 1;
-    let predicted = estimates[k];
-    let coarsest = options.coarsest_level(scene.camera.shorter_side());
-    let finest = options.handover_level(scene.camera.shorter_side());
-    let distance = viewing_distance(scene.surface, &predicted.pose)
-        .map_err(|source| ProblemError::Placement { frame: k, source })?;
-    let sigma = picture_sigma(&scene.prior.jitter, distance);
-    // Beyond half a turn there is no more wall to look at.
-    let widest = 0.5 * scene.surface.perimeter_m();
-    let margin = (3.0 * sigma[1].max(sigma[0]) * distance).min(widest);
-    let placed: Vec<_> = (first..k).map(|i| (i, estimates[i])).collect();
-    let wall = |level| FusedWall::new(scene, level, &placed, k, &predicted.pose, margin);
-    let hypotheses = wall(coarsest)?.search(k, &predicted.pose, sigma, HYPOTHESES);
-
-    let refine_at = |level: usize, estimate: FrameEstimate| {
-        let mut trial = estimates.to_vec();
-        trial[k] = estimate;
-        let problem = Problem::new(scene, Sampling::of(level), first..k + 1, k..k + 1, &trial)?;
-        if problem.tiles() == 0 {
-            return Ok(estimate);
-        }
-        Ok(solve(problem, FRAME_STOPPING, None)?.estimates[0])
-    };
-    let judged = finest.max(coarsest.saturating_sub(1));
-    let judge = wall(judged)?;
-    let mut best = (f64::NEG_INFINITY, predicted);
-    for hypothesis in hypotheses {
-        let mut estimate = hypothesis.estimate;
-        for level in (judged..=coarsest).rev() {
-            // A hypothesis that runs out of the tunnel is no hypothesis.
-            match refine_at(level, estimate) {
-                Ok(refined) => estimate = refined,
-                Err(ProblemError::Placement { .. }) => break,
-                Err(error) => return Err(error),
-            }
-        }
-        let cost = scene.prior.deviation_cost(&predicted.pose, &estimate.pose);
-        if let Some(scored) = judge.score(k, &estimate.pose, cost)
-            && scored.score > best.0
-        {
-            best = (scored.score, estimate);
-        }
-    }
-    let mut estimate = best.1;
-    for level in (finest..judged).rev() {
-        estimate = refine_at(level, estimate)?;
-    }
-    Ok(estimate)
-}
-
-/// σ of pitch, yaw and roll as they appear in the picture: a shift across the view looks like a turn.
-fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
-    let turn = jitter.rotation_sigma_rad;
-    let [x, y, z] = jitter.translation_sigma_m;
-    let (along, across) = (y / distance_m, x.max(z) / distance_m);
-    [turn.hypot(along), turn.hypot(across), turn]
-}
-
-fn footprint(
-    scene: &Scene,
-    k: usize,
-    estimates: &[FrameEstimate],
-) -> Result<Footprint, ProblemError> {
-    Footprint::trace(scene.surface, scene.camera, &estimates[k].pose)
+/// What the last frame sees of the wall.
+fn footprint(scene: &Scene, k: usize, tracked: &Tracked) -> Result<Footprint, ProblemError> {
+    let pose = &tracked.estimates[k].pose;
+    Footprint::within(scene.surface, scene.camera, pose, reach_m(scene.surface))
         .map_err(|source| ProblemError::Placement { frame: k, source })
 }
 
@@ -176,27 +156,91 @@ fn earliest_overlap(scene: &Scene, footprints: &[Footprint]) -> usize {
         .unwrap_or(last)
 }
 
-/// Where the prior expects the next frame, given the frames already placed.
+/// Where the prior expects frame `k`, given the believed frames.
 ///
-/// Random walk: the last pose and the initial step. Independent: the initial pose, moved by the gauge (turn
-/// about the axis, shift along it) that the placed frames have taken on.
-fn predict(scene: &Scene, placed: &[FrameEstimate]) -> Pose {
+/// Random walk: the nearest believed pose and the initial steps from there. Independent: the initial pose, moved by the
+/// gauge (turn about the axis, shift along it) that the believed frames have taken on.
+///
+/// Where that lies outside the tunnel: the initial pose.
+pub fn expect(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
+    let expected = expect_anywhere(scene, k, tracked);
+    match scene.surface.check_inside(&expected.pose.t_wc) {
+        Ok(()) => expected,
+        Err(_) => Expectation {
+            pose: scene.prior.initial[k],
+            ..expected
+        },
+    }
+}
+
+fn expect_anywhere(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
     let initial = &scene.prior.initial;
-    let k = placed.len();
+    let around = k.saturating_sub(FARTHEST)..(k + FARTHEST).min(tracked.estimates.len());
+    let believed = around.filter(|i| *i != k && tracked.doubts[*i].is_none());
     match scene.prior.jitter.model {
-        JitterModel::RandomWalk => {
-            let last = &placed[k - 1].pose;
-            let (before, next) = (&initial[k - 1], &initial[k]);
-            Pose::new(
-                last.r_wc * (before.r_wc.inverse() * next.r_wc),
-                last.t_wc + (next.t_wc - before.t_wc),
-            )
-        }
+        JitterModel::RandomWalk => match believed.min_by_key(|i| i.abs_diff(k)) {
+            Some(near) => {
+                let pose = &tracked.estimates[near].pose;
+                let (from, to) = (&initial[near], &initial[k]);
+                let steps = scene.prior.steps_between(near.min(k), near.max(k));
+                Expectation {
+                    pose: Pose::new(
+                        pose.r_wc * (from.r_wc.inverse() * to.r_wc),
+                        pose.t_wc + (to.t_wc - from.t_wc),
+                    ),
+                    widened: steps.sqrt(),
+                }
+            }
+            None => Expectation {
+                pose: initial[k],
+                widened: 1.0,
+            },
+        },
         JitterModel::Independent => {
-            let first = k.saturating_sub(FARTHEST);
-            let poses: Vec<Pose> = placed[first..].iter().map(|e| e.pose).collect();
-            let motion = scene.surface.gauge().align(&initial[first..k], &poses);
-            motion.apply(&initial[k])
+            let (from, to): (Vec<Pose>, Vec<Pose>) = believed
+                .map(|i| (initial[i], tracked.estimates[i].pose))
+                .unzip();
+            let motion = scene.surface.gauge().align(&from, &to);
+            Expectation {
+                pose: motion.apply(&initial[k]),
+                widened: 1.0,
+            }
         }
     }
+}
+
+/// Tries once more to place the frames in doubt, now that there are frames on both sides of them; returns how many it
+/// has placed. Those that show nothing are not tried.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn retry(
+    scene: &Scene,
+    options: &RefineOptions,
+    tracked: &mut Tracked,
+) -> Result<usize, ProblemError> {
+    let count = tracked.estimates.len();
+    let mut won = 0;
+    for k in 0..count {
+        if !tracked.doubts[k].as_ref().is_some_and(Doubt::may_pass) {
+            continue;
+        }
+        let run = k.saturating_sub(FARTHEST)..(k + FARTHEST).min(count);
+        let expected = expect(scene, k, tracked);
+        let placed = tracked.believed(&run);
+        let surroundings = Surroundings {
+            estimates: &tracked.estimates[run.clone()],
+            placed: &placed,
+            run,
+        };
+        tracked.estimates[k] = match place(scene, options, k, &expected, &surroundings)? {
+            Ok(estimate) => {
+                tracked.doubts[k] = None;
+                won += 1;
+                estimate
+            }
+            Err(_) => FrameEstimate::at(expected.pose),
+        };
+    }
+    Ok(won)
 }

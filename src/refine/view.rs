@@ -42,9 +42,10 @@ impl<'a> View<'a> {
         wall_jacobian(&self.pose, &points.centre)
     }
 
-    /// The wall's values `(I − b)/a` as this frame shows them, bilinearly interpolated, into `values`.
+    /// The wall's values `(I/V − b/V)/a` as this frame shows them, bilinearly interpolated, into `values`; the frame
+    /// holds `I/V`, and `shade` is V around the tile. NaN where a pixel next to the sample has no value.
     /// Samples that a step has moved out of the picture repeat its border.
-    pub fn sample(&self, points: &TilePoints, values: &mut [f32; AREA]) {
+    pub fn sample(&self, points: &TilePoints, shade: f32, values: &mut [f32; AREA]) {
         let centre: Vector3<f64> = self.pose.to_camera(&points.centre.x_w);
         let c: Vector3<f32> = centre.cast();
         let r = &self.r_cw;
@@ -57,10 +58,10 @@ impl<'a> View<'a> {
             z[k] = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
         }
         self.camera.project_slices(&mut u, &mut v, &z);
-        self.bilinear(&u, &v, values);
+        self.bilinear(&u, &v, self.bias / shade, values);
     }
 
-    fn bilinear(&self, u: &[f32; AREA], v: &[f32; AREA], values: &mut [f32; AREA]) {
+    fn bilinear(&self, u: &[f32; AREA], v: &[f32; AREA], bias: f32, values: &mut [f32; AREA]) {
         let (width, height) = (self.image.width(), self.image.height());
         let data = self.image.data();
         let (last_u, last_v) = ((width - 2) as f32, (height - 2) as f32);
@@ -81,7 +82,7 @@ impl<'a> View<'a> {
             let lower = &data[top + width..top + width + 2];
             let a = upper[0] + fu[k] * (upper[1] - upper[0]);
             let b = lower[0] + fu[k] * (lower[1] - lower[0]);
-            values[k] = (a + fv[k] * (b - a) - self.bias) * inverse_gain;
+            values[k] = (a + fv[k] * (b - a) - bias) * inverse_gain;
         }
     }
 }
@@ -109,7 +110,7 @@ mod tests {
         estimate.log_gain = 0.2;
         estimate.bias = 3.0;
         let view = View::new(&image, camera, &estimate);
-        let grid = WallGrid::new(&circle, 3.0 / camera.fy);
+        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
         let hit = circle
             .hit(&estimate.pose.t_wc, &(estimate.pose.r_wc * Vector3::z()))
             .unwrap();
@@ -120,7 +121,8 @@ mod tests {
         };
         let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
         let mut values = [0.0; AREA];
-        view.sample(&points, &mut values);
+        let shade = 0.5;
+        view.sample(&points, shade, &mut values);
         let centre = grid.centre(tile);
         for (k, value) in values.iter().enumerate() {
             let (i, j) = ((k % SIDE) as f64 - 4.5, (k / SIDE) as f64 - 4.5);
@@ -131,7 +133,8 @@ mod tests {
             let x_w = circle.frame(wall).x_w;
             let pixel = camera.project(&estimate.pose.to_camera(&x_w)).unwrap();
             let grey = 0.5 * pixel.x + 1.5 * pixel.y;
-            let expected = (grey - estimate.bias) / estimate.log_gain.exp();
+            let bias = estimate.bias / f64::from(shade);
+            let expected = (grey - bias) / estimate.log_gain.exp();
             assert!((f64::from(*value) - expected).abs() < 2e-3);
         }
     }

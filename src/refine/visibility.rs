@@ -2,7 +2,8 @@
 
 use super::grid::{SIDE, TileId, WallGrid};
 use crate::camera::Pinhole;
-use crate::surface::{Footprint, Surface, SurfaceError};
+use crate::frames::Shading;
+use crate::surface::{Footprint, Surface};
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -14,15 +15,29 @@ const MARGIN_PX: f64 = 1.0;
 /// Area of a tile between its outermost samples, in samples.
 const SAMPLES_BETWEEN_CORNERS: f64 = ((SIDE - 1) * (SIDE - 1)) as f64;
 
+/// Least area of a sample in a frame over that where the lattice was made for: a tile seen more obliquely, or from
+/// farther away, is left out.
+const LEAST_PIXELS: f64 = 0.05;
+
+/// How far along the tunnel a frame is compared, in radii of a circle with the section's perimeter.
+const REACH_RADII: f64 = 6.0;
+
+/// How far along the tunnel a frame is compared, metres.
+pub fn reach_m(surface: &dyn Surface) -> f64 {
+    REACH_RADII * surface.perimeter_m() / std::f64::consts::TAU
+}
+
 /// A frame that sees all of a tile.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observer {
-    /// Index of the frame.
-    pub frame: usize,
+    /// The frame, counted among those of the [`Visibility`].
+    pub frame: u32,
     /// Pixels that a sample of the tile stands for in this frame, q: the weight that makes every pixel count
     /// once, however obliquely it sees the wall. It stays as it is while the poses move; otherwise a step could
     /// lower the cost by looking at the wall more obliquely.
     pub pixels: f32,
+    /// The camera's shading V at the tile's middle; it stays as it is, too.
+    pub shade: f32,
 }
 
 /// A tile and the frames that see all of it.
@@ -34,11 +49,22 @@ pub struct Tile {
     pub observers: Range<usize>,
 }
 
+/// A frame as it is placed when the samples are chosen.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed {
+    /// Its pose.
+    pub pose: Pose,
+    /// What it sees of the wall.
+    pub footprint: Footprint,
+    /// True if it is to be estimated.
+    pub active: bool,
+}
+
 /// The observations of a set of frames: every tile that at least two frames see, one of them active.
 ///
-/// A frame either sees a whole tile (with the ring its gradients need) or does not count there at all: no
-/// mask is needed, every sample of a tile averages the same frames, and the set stays the same while the
-/// poses move, so that costs before and after a step are of the same points.
+/// A frame either sees a whole tile (with the ring its gradients need) or does not count there at all: every sample of
+/// a tile averages the same frames, and the set stays the same while the poses move, so that costs before and after
+/// a step are of the same points.
 #[derive(Clone, Debug)]
 pub struct Visibility {
     /// Tiles, block by block.
@@ -50,35 +76,28 @@ pub struct Visibility {
 }
 
 impl Visibility {
-    /// Finds the tiles that `poses` see; `active` are the frames to be estimated. Frames are counted from
-    /// the first of `poses`.
-    ///
-    /// # Errors
-    /// The first frame that does not go with the tunnel.
+    /// Finds the tiles in `rows` of the lattice that the frames `placed` see.
     pub fn find(
         surface: &dyn Surface,
         grid: &WallGrid,
         camera: &Pinhole,
-        poses: &[Pose],
-        active: &Range<usize>,
-    ) -> Result<Self, (usize, SurfaceError)> {
-        let seen: Vec<Vec<(TileId, f32)>> = poses
+        shading: Option<&Shading>,
+        placed: &[Placed],
+        rows: &Range<i64>,
+    ) -> Self {
+        let seen: Vec<Vec<(TileId, Observer)>> = placed
             .par_iter()
             .enumerate()
-            .map(|(k, pose)| {
-                tiles_of_frame(surface, grid, camera, pose).map_err(|error| (k, error))
+            .map(|(k, frame)| {
+                let mut tiles = tiles_of_frame(surface, grid, camera, shading, frame, rows);
+                tiles.iter_mut().for_each(|(_, o)| o.frame = k as u32);
+                tiles
             })
-            .collect::<Result<_, _>>()?;
+            .collect();
         let mut pairs: Vec<((i64, i64, i64, i64), Observer)> = seen
             .iter()
-            .enumerate()
-            .flat_map(|(frame, tiles)| {
-                let observe = move |(tile, pixels): &(TileId, f32)| {
-                    let pixels = *pixels;
-                    (tile.key(), Observer { frame, pixels })
-                };
-                tiles.iter().map(observe)
-            })
+            .flatten()
+            .map(|(tile, observer)| (tile.key(), *observer))
             .collect();
         pairs.par_sort_unstable_by_key(|(key, observer)| (*key, observer.frame));
 
@@ -88,7 +107,7 @@ impl Visibility {
             blocks: Vec::new(),
         };
         for group in pairs.chunk_by(|a, b| a.0 == b.0) {
-            if group.len() < 2 || !group.iter().any(|(_, o)| active.contains(&o.frame)) {
+            if group.len() < 2 || !group.iter().any(|(_, o)| placed[o.frame as usize].active) {
                 continue;
             }
             let (_, _, row, column) = group[0].0;
@@ -107,7 +126,7 @@ impl Visibility {
             visibility.blocks.push(start..start + run.len());
             start += run.len();
         }
-        Ok(visibility)
+        visibility
     }
 
     /// The frames that see `tile`.
@@ -116,28 +135,38 @@ impl Visibility {
     }
 }
 
-/// The tiles that a frame sees, with the pixels a sample stands for.
+/// Rows of tiles that a footprint reaches.
+pub fn rows_of(grid: &WallGrid, footprint: &Footprint) -> Range<i64> {
+    let (_, height) = grid.tile_size_m();
+    (footprint.h_min_m / height).floor() as i64..(footprint.h_max_m / height).floor() as i64 + 1
+}
+
+/// The tiles that a frame sees within `rows`, with what it makes of a sample.
 fn tiles_of_frame(
     surface: &dyn Surface,
     grid: &WallGrid,
     camera: &Pinhole,
-    pose: &Pose,
-) -> Result<Vec<(TileId, f32)>, SurfaceError> {
-    let footprint = Footprint::trace(surface, camera, pose)?;
-    let (width, height) = grid.tile_size_m();
+    shading: Option<&Shading>,
+    frame: &Placed,
+    rows: &Range<i64>,
+) -> Vec<(TileId, Observer)> {
+    let Placed {
+        pose, footprint, ..
+    } = frame;
+    let (width, _) = grid.tile_size_m();
     let first_column = (footprint.s_min_m / width).floor() as i64;
     let last_column =
         ((footprint.s_max_m / width).floor() as i64).min(first_column + grid.columns - 1);
-    let first_row = (footprint.h_min_m / height).floor() as i64;
-    let last_row = (footprint.h_max_m / height).floor() as i64;
+    let own_rows = rows_of(grid, footprint);
     let pixel = |x_w: &Vector3<f64>| {
         camera
             .project(&pose.to_camera(x_w))
             .filter(|pixel| camera.sees(pixel, MARGIN_PX))
     };
+    let sample_pixels = grid.density.powi(-2);
     let mut tiles = Vec::new();
     let mut corners = Vec::new();
-    for row in first_row..=last_row {
+    for row in own_rows.start.max(rows.start)..own_rows.end.min(rows.end) {
         for column in first_column..=last_column {
             let tile = TileId {
                 column: column.rem_euclid(grid.columns),
@@ -147,11 +176,24 @@ fn tiles_of_frame(
             if let [Some(a), Some(b), Some(c), Some(d)] = [0, 1, 2, 3].map(|k| pixel(&corners[k])) {
                 // Half the cross product of the diagonals; the corners come row by row.
                 let area = 0.5 * (d - a).perp(&(c - b)).abs();
-                tiles.push((tile, (area / SAMPLES_BETWEEN_CORNERS) as f32));
+                let pixels = area / SAMPLES_BETWEEN_CORNERS;
+                if pixels < LEAST_PIXELS * sample_pixels {
+                    continue;
+                }
+                let middle = 0.25 * (a + b + c + d);
+                let shade = shading.map_or(1.0, |shading| shading.at_level(&middle, camera));
+                tiles.push((
+                    tile,
+                    Observer {
+                        frame: 0,
+                        pixels: pixels as f32,
+                        shade: shade as f32,
+                    },
+                ));
             }
         }
     }
-    Ok(tiles)
+    tiles
 }
 
 #[cfg(test)]
@@ -164,10 +206,20 @@ mod tests {
     fn every_tile_is_seen_by_an_active_frame_and_another() {
         let circle = Circle::new(3.0).unwrap();
         let camera = Pinhole::from_vertical_fov(160, 120, 60f64.to_radians());
-        let grid = WallGrid::new(&circle, 3.0 / camera.fy);
+        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
         let poses = spiral(24, 0.1, 30f64.to_radians());
         let active = 20..24;
-        let found = Visibility::find(&circle, &grid, &camera, &poses, &active).unwrap();
+        let placed: Vec<Placed> = poses
+            .iter()
+            .enumerate()
+            .map(|(k, pose)| Placed {
+                pose: *pose,
+                footprint: Footprint::trace(&circle, &camera, pose).unwrap(),
+                active: active.contains(&k),
+            })
+            .collect();
+        let everywhere = -1000..1000;
+        let found = Visibility::find(&circle, &grid, &camera, None, &placed, &everywhere);
         assert!(!found.tiles.is_empty());
         for tile in &found.tiles {
             let observers = found.observers(tile);
@@ -179,9 +231,28 @@ mod tests {
             );
             // At about the distance the grid was made for, a sample is about a pixel.
             assert!(observers.iter().all(|o| (0.4..2.0).contains(&o.pixels)));
-            assert!(observers.iter().any(|o| active.contains(&o.frame)));
+            assert!(observers.iter().any(|o| active.contains(&(o.frame as usize))));
         }
         let tiles: usize = found.blocks.iter().map(|block| block.len()).sum();
         assert_eq!(tiles, found.tiles.len());
+    }
+
+    /// Looked at in pieces, the wall has the same tiles.
+    #[test]
+    fn pieces_make_up_the_whole() {
+        let circle = Circle::new(3.0).unwrap();
+        let camera = Pinhole::from_vertical_fov(160, 120, 60f64.to_radians());
+        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
+        let placed: Vec<Placed> = spiral(12, 0.1, 30f64.to_radians())
+            .into_iter()
+            .map(|pose| Placed {
+                pose,
+                footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),
+                active: true,
+            })
+            .collect();
+        let find = |rows| Visibility::find(&circle, &grid, &camera, None, &placed, &rows);
+        let (all, below, above) = (find(-100..100), find(-100..0), find(0..100));
+        assert_eq!(all.observers, [below.observers, above.observers].concat());
     }
 }

@@ -87,6 +87,40 @@ impl Footprint {
         Ok(footprint)
     }
 
+    /// The same for any view, but no farther than `reach_m` along the tunnel from the camera.
+    ///
+    /// A frame that holds the tunnel's vanishing point sees all the way around, and wall without end: its box is the
+    /// whole section on both sides of the camera, as far as the reach.
+    ///
+    /// # Errors
+    /// [`SurfaceError::CameraOutside`], [`SurfaceError::NotFinite`].
+    pub fn within(
+        surface: &dyn Surface,
+        camera: &Pinhole,
+        pose: &Pose,
+        reach_m: f64,
+    ) -> Result<Self, SurfaceError> {
+        let near_m = pose.t_wc.y - reach_m..=pose.t_wc.y + reach_m;
+        let clamp = |h_m: f64| h_m.clamp(*near_m.start(), *near_m.end());
+        match Self::trace(surface, camera, pose) {
+            Ok(footprint) => Ok(Self {
+                h_min_m: clamp(footprint.h_min_m),
+                h_max_m: clamp(footprint.h_max_m),
+                ..footprint
+            }),
+            Err(SurfaceError::Parallel | SurfaceError::LooksAlongTheAxis) => {
+                surface.check_inside(&pose.t_wc)?;
+                Ok(Self {
+                    s_min_m: 0.0,
+                    s_max_m: surface.perimeter_m(),
+                    h_min_m: *near_m.start(),
+                    h_max_m: *near_m.end(),
+                })
+            }
+            Err(error) => Err(error),
+        }
+    }
+
     /// True if the two share some wall; turns around the tunnel do not count.
     pub fn overlaps(&self, other: &Self, perimeter_m: f64) -> bool {
         if self.h_min_m > other.h_max_m || other.h_min_m > self.h_max_m {
@@ -167,6 +201,19 @@ mod tests {
         assert!(!meets(2.1, 0.5) && !meets(TAU - 1.6, 0.5) && !meets(0.0, 1.1));
         assert!(!meets(0.0, -0.6) && meets(0.0, -0.4));
         assert!(footprint.widened(0.2).overlaps(&at(2.1, 0.5, 0.5), TAU));
+    }
+
+    #[test]
+    fn a_view_along_the_tunnel_is_cut_off() {
+        let circle = Circle::new(3.0).unwrap();
+        let camera = camera();
+        let along = facing(Vector3::x() * (-TAU / 4.0));
+        let cut = Footprint::within(&circle, &camera, &along, 5.0).unwrap();
+        assert_eq!((cut.h_min_m, cut.h_max_m), (-5.0, 5.0));
+        assert_eq!(cut.s_max_m - cut.s_min_m, circle.perimeter_m());
+        let across = facing(Vector3::zeros());
+        let traced = Footprint::trace(&circle, &camera, &across).unwrap();
+        assert_eq!(Footprint::within(&circle, &camera, &across, 5.0), Ok(traced));
     }
 
     #[test]

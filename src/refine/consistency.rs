@@ -1,0 +1,302 @@
+//! Do frames that show the same wall show the same thing?
+//!
+//! Gauss–Newton ends in a minimum, not always the right one; neighbours may agree with each other and not with the turn
+//! before. So once all frames are placed, every pair that overlaps is compared on the wall: local contrast of the one
+//! against that of the other. Right pairs correlate as well as the texture lets them, wrong ones do not, and a low
+//! residual fused from several frames cannot hide it.
+
+use super::doubt::Doubt;
+use super::problem::{ProblemError, Scene};
+use super::track::Tracked;
+use super::visibility::reach_m;
+use super::wall::{Lattice, Portrait, pixel_m};
+use crate::surface::Footprint;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// Frames compared at once: bounds the memory.
+const RUN: usize = 32;
+/// How far apart in the survey frames are compared.
+const FARTHEST: usize = 256;
+/// Least samples that two frames share, as a share of the lattice over one.
+const LEAST_OVERLAP: f64 = 0.03;
+/// Share of the usual correlation that a right pair reaches.
+const LEAST_SHARE: f64 = 0.6;
+/// Share of its weight that may contradict before a frame is doubted.
+const MOST_CONTRADICTION: f64 = 0.25;
+/// A blurred frame has less than this share of the others' fine contrast (variance).
+const LEAST_SHARPNESS: f64 = 0.5;
+
+/// Two frames compared where they overlap.
+#[derive(Clone, Copy, Debug)]
+pub struct Pair {
+    /// The earlier frame.
+    pub a: usize,
+    /// The later one.
+    pub b: usize,
+    /// Wall samples both show.
+    pub samples: f64,
+    /// Correlation of local contrast there.
+    pub correlation: f64,
+    /// Variance of the earlier frame's local detail over the later one's there, gains removed.
+    pub sharpness: f64,
+}
+
+/// How frames are compared.
+#[derive(Clone, Copy, Debug)]
+pub struct Comparison {
+    /// Pyramid level.
+    pub level: usize,
+    /// Every how many pixels a wall sample is taken, along each axis.
+    pub stride: usize,
+    /// Half width of the window of local contrast, pixels; None: as wide as light is smooth.
+    pub window: Option<usize>,
+}
+
+/// Compares all believed frames that overlap.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn compare_pairs(
+    scene: &Scene,
+    comparison: Comparison,
+    tracked: &Tracked,
+) -> Result<Vec<Pair>, ProblemError> {
+    let Comparison {
+        level,
+        stride,
+        window,
+    } = comparison;
+    let count = tracked.estimates.len();
+    let camera = scene.camera.at_level(level);
+    let reach = reach_m(scene.surface);
+    let perimeter = scene.surface.perimeter_m();
+    let footprints = (0..count)
+        .into_par_iter()
+        .map(|k| {
+            if tracked.doubts[k].is_some() {
+                return Ok(None);
+            }
+            let pose = &tracked.estimates[k].pose;
+            Footprint::within(scene.surface, &camera, pose, reach)
+                .map(Some)
+                .map_err(|source| ProblemError::Placement { frame: k, source })
+        })
+        .collect::<Result<Vec<Option<Footprint>>, _>>()?;
+    let others = |a: usize| -> Vec<usize> {
+        let Some(own) = &footprints[a] else {
+            return Vec::new();
+        };
+        let last = (a + FARTHEST + 1).min(count);
+        (a + 1..last)
+            .filter(|b| footprints[*b].is_some_and(|other| other.overlaps(own, perimeter)))
+            .collect()
+    };
+    let mut pairs = Vec::new();
+    for start in (0..count).step_by(RUN) {
+        let run = start..(start + RUN).min(count);
+        let partners: Vec<(usize, Vec<usize>)> = run.map(|a| (a, others(a))).collect();
+        let mut needed: Vec<usize> = partners
+            .iter()
+            .flat_map(|(a, others)| std::iter::once(a).chain(others))
+            .copied()
+            .collect();
+        needed.sort_unstable();
+        needed.dedup();
+        let portraits: BTreeMap<usize, Portrait> = needed
+            .into_par_iter()
+            .filter(|k| tracked.doubts[*k].is_none())
+            .map(|k| {
+                let portrait = match window {
+                    Some(window) => Portrait::fine(scene, level, k, window)?,
+                    None => Portrait::new(scene, level, k)?,
+                };
+                Ok((k, portrait))
+            })
+            .collect::<Result<_, ProblemError>>()?;
+        let compared: Vec<Vec<Pair>> = partners
+            .par_iter()
+            .map(|(a, others)| compare(scene, *a, others, stride, &footprints, &portraits, tracked))
+            .collect();
+        pairs.extend(compared.into_iter().flatten());
+    }
+    Ok(pairs)
+}
+
+fn compare(
+    scene: &Scene,
+    a: usize,
+    others: &[usize],
+    stride: usize,
+    footprints: &[Option<Footprint>],
+    portraits: &BTreeMap<usize, Portrait>,
+    tracked: &Tracked,
+) -> Vec<Pair> {
+    let (Some(own), Some(footprint)) = (portraits.get(&a), &footprints[a]) else {
+        return Vec::new();
+    };
+    let pose = &tracked.estimates[a].pose;
+    let lattice = Lattice::over(
+        footprint,
+        stride as f64 * pixel_m(scene, own.camera(), pose),
+    );
+    let points = lattice.points(scene);
+    let origin = points[points.len() / 2];
+    let gain = |k: usize| tracked.estimates[k].log_gain.exp();
+    let (contrast, detail) = (own.contrast(pose, &origin), own.detail(pose, &origin));
+    let seen: Vec<([f32; 3], [f64; 2])> = points
+        .iter()
+        .filter_map(|x_w| {
+            let offset = x_w - origin;
+            let point = [offset.x as f32, offset.y as f32, offset.z as f32];
+            let values = [contrast.at(&point)?, detail.at(&point)?];
+            Some((point, values.map(f64::from)))
+        })
+        .collect();
+    let least = LEAST_OVERLAP * seen.len() as f64;
+    others
+        .iter()
+        .filter_map(|b| {
+            let portrait = portraits.get(b)?;
+            let pose = &tracked.estimates[*b].pose;
+            let contrast = portrait.contrast(pose, &origin);
+            let detail = portrait.detail(pose, &origin);
+            let (mut n, mut xx, mut yy, mut xy) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+            let (mut own_detail, mut other_detail) = (0.0f64, 0.0f64);
+            for (point, [x, own]) in &seen {
+                if let (Some(y), Some(other)) = (contrast.at(point), detail.at(point)) {
+                    let (y, other) = (f64::from(y), f64::from(other));
+                    n += 1.0;
+                    xx += x * x;
+                    yy += y * y;
+                    xy += x * y;
+                    own_detail += own * own;
+                    other_detail += other * other;
+                }
+            }
+            let exposure = gain(*b) / gain(a);
+            (n >= least && xx > 0.0 && yy > 0.0).then(|| Pair {
+                a,
+                b: *b,
+                samples: n,
+                correlation: xy / (xx * yy).sqrt(),
+                sharpness: exposure * exposure * own_detail / other_detail.max(f64::MIN_POSITIVE),
+            })
+        })
+        .collect()
+}
+
+/// The frames that contradict the rest, worst first.
+///
+/// Frames are taken out one by one, always the one with the largest share of its overlap in pairs that correlate much
+/// less than usual, until no frame contradicts the others by more than a little. Pairs count by their samples.
+pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
+    let usual = upper_quartile(pairs.iter().map(|pair| pair.correlation));
+    let wrong = |pair: &Pair| pair.correlation < LEAST_SHARE * usual;
+    let (mut all, mut bad) = (vec![0.0; frames], vec![0.0; frames]);
+    let mut of_frame: Vec<Vec<usize>> = vec![Vec::new(); frames];
+    for (k, pair) in pairs.iter().enumerate() {
+        for frame in [pair.a, pair.b] {
+            all[frame] += pair.samples;
+            if wrong(pair) {
+                bad[frame] += pair.samples;
+            }
+            of_frame[frame].push(k);
+        }
+    }
+    let mut out = vec![false; frames];
+    let mut doubts = Vec::new();
+    loop {
+        let worst = (0..frames)
+            .filter(|k| !out[*k] && bad[*k] > MOST_CONTRADICTION * all[*k])
+            .max_by(|a, b| (bad[*a] / all[*a]).total_cmp(&(bad[*b] / all[*b])));
+        let Some(worst) = worst else {
+            return doubts;
+        };
+        out[worst] = true;
+        let mut against = (worst, 1.0);
+        for pair in of_frame[worst].iter().map(|k| &pairs[*k]) {
+            let other = if pair.a == worst { pair.b } else { pair.a };
+            if out[other] {
+                continue;
+            }
+            all[other] -= pair.samples;
+            if wrong(pair) {
+                bad[other] -= pair.samples;
+                if pair.correlation < against.1 {
+                    against = (other, pair.correlation);
+                }
+            }
+        }
+        doubts.push((
+            worst,
+            Doubt::Contradicts {
+                frame: against.0,
+                correlation: against.1,
+            },
+        ));
+    }
+}
+
+/// The frames that show less fine detail than those they overlap.
+pub fn blurred(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
+    let mut ratios: Vec<Vec<f64>> = vec![Vec::new(); frames];
+    for pair in pairs {
+        ratios[pair.a].push(pair.sharpness);
+        ratios[pair.b].push(1.0 / pair.sharpness);
+    }
+    ratios
+        .into_iter()
+        .enumerate()
+        .filter_map(|(frame, mut ratios)| {
+            ratios.sort_unstable_by(f64::total_cmp);
+            let share = *ratios.get(ratios.len() / 2)?;
+            (share < LEAST_SHARPNESS).then_some((frame, Doubt::Blurred { share }))
+        })
+        .collect()
+}
+
+fn upper_quartile(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    sorted.get(sorted.len() * 3 / 4).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pair(a: usize, b: usize, correlation: f64) -> Pair {
+        Pair {
+            a,
+            b,
+            samples: 100.0,
+            correlation,
+            sharpness: 1.0,
+        }
+    }
+
+    #[test]
+    fn one_wrong_frame_is_taken_out_and_its_neighbours_stay() {
+        let mut pairs = Vec::new();
+        for a in 0..8usize {
+            for b in a + 1..(a + 4).min(8) {
+                let wrong = a == 5 || b == 5;
+                pairs.push(pair(a, b, if wrong { 0.2 } else { 0.9 }));
+            }
+        }
+        let doubts = contradictions(&pairs, 8);
+        assert_eq!(doubts.len(), 1);
+        assert_eq!(doubts[0].0, 5);
+        assert!(contradictions(&pairs[..1], 8).is_empty());
+    }
+
+    #[test]
+    fn the_frame_without_fine_detail_is_the_blurred_one() {
+        let mut pairs = vec![pair(0, 1, 0.9), pair(1, 2, 0.9), pair(0, 2, 0.9)];
+        (pairs[0].sharpness, pairs[1].sharpness) = (5.0, 0.2);
+        let blurred = blurred(&pairs, 3);
+        assert_eq!(blurred.len(), 1);
+        assert_eq!(blurred[0].0, 1);
+    }
+}

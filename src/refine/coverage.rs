@@ -1,0 +1,169 @@
+//! The wall in stretches along the tunnel, each with the frames that see it.
+//!
+//! The wall is worked through stretch by stretch, so that memory for samples and frames does not grow with the
+//! tunnel's length.
+
+use super::grid::{BLOCK, WallGrid};
+use super::visibility::{Placed, Visibility, rows_of};
+use crate::camera::Pinhole;
+use crate::frames::Shading;
+use crate::surface::Surface;
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Observations of a stretch at the least: enough work for all threads, little enough to hold in memory.
+const STRETCH_OBSERVATIONS: f64 = 1e6;
+/// Observations whose visibility is kept from one linearisation to the next; beyond, it is found anew each time.
+const KEPT_OBSERVATIONS: usize = 16_000_000;
+
+/// A stretch of the wall that is worked on at once.
+#[derive(Clone, Debug)]
+struct Stretch {
+    /// Rows of tiles.
+    rows: Range<i64>,
+    /// Compared participants that see some of them.
+    frames: Vec<usize>,
+}
+
+/// Which frames see which tiles, stretch by stretch.
+#[derive(Debug)]
+pub struct Coverage<'a> {
+    surface: &'a dyn Surface,
+    grid: WallGrid,
+    camera: Pinhole,
+    shading: Option<&'a Shading>,
+    /// Where the participants stood when the samples were chosen; None for those that are not compared.
+    placed: Vec<Option<Placed>>,
+    stretches: Vec<Stretch>,
+    kept: Vec<Option<Visibility>>,
+    /// Number of tiles that are compared.
+    pub tiles: usize,
+    /// Participants that see wall in common: pairs in ascending order, each once, a frame with itself included.
+    pub pairs: Vec<(usize, usize)>,
+}
+
+impl<'a> Coverage<'a> {
+    /// Finds the tiles of all participants' frames.
+    pub fn new(
+        surface: &'a dyn Surface,
+        grid: WallGrid,
+        camera: Pinhole,
+        shading: Option<&'a Shading>,
+        placed: Vec<Option<Placed>>,
+    ) -> Self {
+        let mut coverage = Self {
+            stretches: stretches(&grid, &placed),
+            surface,
+            grid,
+            camera,
+            shading,
+            placed,
+            kept: Vec::new(),
+            tiles: 0,
+            pairs: Vec::new(),
+        };
+        let mut observations = 0;
+        for stretch in 0..coverage.stretches.len() {
+            let visibility = coverage.find(stretch);
+            coverage.tiles += visibility.tiles.len();
+            let pairs = coverage.pairs_of(stretch, &visibility);
+            coverage.pairs.extend(pairs);
+            observations += visibility.observers.len();
+            let keep = observations <= KEPT_OBSERVATIONS;
+            coverage.kept.push(keep.then_some(visibility));
+        }
+        coverage.pairs.sort_unstable();
+        coverage.pairs.dedup();
+        coverage
+    }
+
+    /// Number of stretches.
+    pub fn len(&self) -> usize {
+        self.stretches.len()
+    }
+
+    /// The participants whose frames see some of a stretch; a [`Visibility`]'s frames are places in this list.
+    pub fn frames(&self, stretch: usize) -> &[usize] {
+        &self.stretches[stretch].frames
+    }
+
+    /// The observations of a stretch: those kept, or found anew (the same, from the same poses).
+    pub fn visibility(&self, stretch: usize) -> Cow<'_, Visibility> {
+        match &self.kept[stretch] {
+            Some(visibility) => Cow::Borrowed(visibility),
+            None => Cow::Owned(self.find(stretch)),
+        }
+    }
+
+    fn find(&self, stretch: usize) -> Visibility {
+        let Stretch { rows, frames } = &self.stretches[stretch];
+        let placed: Vec<Placed> = frames.iter().filter_map(|k| self.placed[*k]).collect();
+        Visibility::find(
+            self.surface,
+            &self.grid,
+            &self.camera,
+            self.shading,
+            &placed,
+            rows,
+        )
+    }
+
+    fn pairs_of(&self, stretch: usize, visibility: &Visibility) -> Vec<(usize, usize)> {
+        let frames = self.frames(stretch);
+        let mut pairs = Vec::new();
+        for block in &visibility.blocks {
+            let mut seen: Vec<usize> = visibility.tiles[block.clone()]
+                .iter()
+                .flat_map(|tile| visibility.observers(tile))
+                .map(|o| frames[o.frame as usize])
+                .collect();
+            seen.sort_unstable();
+            seen.dedup();
+            for (n, a) in seen.iter().enumerate() {
+                pairs.extend(seen[n..].iter().map(|b| (*a, *b)));
+            }
+        }
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs
+    }
+}
+
+/// Cuts the lattice's rows into stretches of about [`STRETCH_OBSERVATIONS`].
+fn stretches(grid: &WallGrid, placed: &[Option<Placed>]) -> Vec<Stretch> {
+    let rows: Vec<Option<Range<i64>>> = placed
+        .iter()
+        .map(|frame| frame.as_ref().map(|frame| rows_of(grid, &frame.footprint)))
+        .collect();
+    let Some(first) = rows.iter().flatten().map(|r| r.start).min() else {
+        return Vec::new();
+    };
+    let last = rows.iter().flatten().map(|r| r.end).max().unwrap_or(first);
+    // Whole blocks of rows, so that no block is cut.
+    let (first, last) = (first.div_euclid(BLOCK), (last - 1).div_euclid(BLOCK));
+    let mut load = vec![0.0; (last - first + 1) as usize];
+    let (width, _) = grid.tile_size_m();
+    for (frame, rows) in placed.iter().flatten().zip(rows.iter().flatten()) {
+        let columns = (frame.footprint.s_max_m - frame.footprint.s_min_m) / width;
+        for row in rows.start.div_euclid(BLOCK)..=(rows.end - 1).div_euclid(BLOCK) {
+            load[(row - first) as usize] += columns * BLOCK as f64;
+        }
+    }
+    let mut stretches: Vec<Stretch> = Vec::new();
+    let (mut start, mut sum) = (first, 0.0);
+    for (k, load) in load.iter().enumerate() {
+        let end = first + k as i64 + 1;
+        sum += load;
+        if sum >= STRETCH_OBSERVATIONS || end == last + 1 {
+            let span = start * BLOCK..end * BLOCK;
+            let meets = |rows: &Range<i64>| rows.start < span.end && span.start < rows.end;
+            let frames: Vec<usize> = (0..rows.len())
+                .filter(|k| rows[*k].as_ref().is_some_and(meets))
+                .collect();
+            stretches.push(Stretch { rows: span, frames });
+            (start, sum) = (end, 0.0);
+        }
+    }
+    stretches
+}
+

@@ -1,0 +1,243 @@
+//! Placing one frame on the wall that others show: search, brief refinement of the hypotheses, verdict.
+
+use super::doubt::Doubt;
+use super::estimate::FrameEstimate;
+use super::gauss_newton::{Stopping, solve};
+use super::options::RefineOptions;
+use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
+use super::search::{REACH, least_samples, log_likelihood, search};
+use super::visibility::reach_m;
+use super::wall::{FusedWall, Portrait, pixel_m};
+use crate::surface::{Footprint, shortest_arc, viewing_distance};
+use crate::trajectory::{Jitter, Pose};
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Hypotheses refined per frame, at the most.
+const HYPOTHESES: usize = 10;
+/// A hypothesis is refined if its log-posterior is at least this share of the best one's.
+const WORTH_REFINING: f64 = 0.5;
+/// Stopping rule of a single frame; the global solve does the rest.
+const STOPPING: Stopping = Stopping {
+    max_iterations: 12,
+    step_px: 0.1,
+    step_sigma: 0.0,
+};
+/// Correlation of local contrast with the wall that a placed frame must reach.
+const LEAST_CORRELATION: f64 = 0.5;
+/// Two places are told apart by the pixels if what they leave unexplained, `1 − c²`, differs by this factor, ...
+const UNEXPLAINED: f64 = 2.0;
+/// ... or else by the prior if its log-densities differ by this (3 σ).
+const PRIOR_MARGIN: f64 = 4.5;
+/// Places closer than this are one, samples of the search level.
+const APART: f64 = 2.0;
+
+/// What is known of a frame before it is placed.
+#[derive(Clone, Copy, Debug)]
+pub struct Expectation {
+    /// Pose that the prior predicts.
+    pub pose: Pose,
+    /// σ of that prediction over that of the prior's single step.
+    pub widened: f64,
+}
+
+/// A candidate after its refinement.
+struct Candidate {
+    estimate: FrameEstimate,
+    /// `1 − c²`.
+    unexplained: f64,
+    correlation: f64,
+    likelihood: f64,
+    /// `½ eᵀΣ⁻¹e` of the prior.
+    deviation: f64,
+}
+
+impl Candidate {
+    fn score(&self) -> f64 {
+        self.likelihood - self.deviation
+    }
+}
+
+/// The frames around the one that is placed.
+pub struct Surroundings<'s> {
+    /// A run of frames that includes the one to be placed.
+    pub run: Range<usize>,
+    /// Their estimates.
+    pub estimates: &'s [FrameEstimate],
+    /// Which of them show the wall: those placed already.
+    pub placed: &'s [bool],
+}
+
+/// Places frame `frame` on the wall that the placed frames around it show.
+///
+/// # Errors
+/// [`ProblemError`]: a frame that cannot be read, equations without a solution.
+pub fn place(
+    scene: &Scene,
+    options: &RefineOptions,
+    frame: usize,
+    expected: &Expectation,
+    surroundings: &Surroundings,
+) -> Result<Result<FrameEstimate, Doubt>, ProblemError> {
+    let side = scene.camera.shorter_side();
+    let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
+    let level = finest.max(coarsest.saturating_sub(1));
+    let camera = scene.camera.at_level(level);
+    let no_match = |correlation| Ok(Err(Doubt::NoMatch { correlation }));
+    let Ok(distance) = viewing_distance(scene.surface, &expected.pose) else {
+        return no_match(0.0);
+    };
+    let sigma = picture_sigma(&scene.prior.jitter, distance).map(|s| s * expected.widened);
+    // Beyond half a turn there is no more wall to look at.
+    let widest = 0.5 * scene.surface.perimeter_m();
+    let margin = (REACH * sigma[1].max(sigma[0]) * distance).min(widest);
+    let near = near(scene, frame, &expected.pose, margin, surroundings)?;
+    let mut portraits = Vec::new();
+    for (k, _) in near.iter().enumerate().filter(|(_, near)| **near) {
+        let portrait = Portrait::new(scene, level, surroundings.run.start + k)?;
+        portraits.push((portrait, surroundings.estimates[k]));
+    }
+    let portrait = Portrait::new(scene, level, frame)?;
+    let wall = FusedWall::new(scene, &portraits, &camera, (frame, &expected.pose), margin)?;
+    let found = search(scene, &wall, &portrait, &expected.pose, sigma, HYPOTHESES);
+    let best = found.first().map_or(0.0, |hypothesis| hypothesis.score);
+
+    let refine_at = |level: usize, estimate: FrameEstimate| {
+        let own = frame - surroundings.run.start;
+        let mut estimates = surroundings.estimates.to_vec();
+        estimates[own] = estimate;
+        let mut compared = near.clone();
+        compared[own] = true;
+        let members = Members {
+            participants: surroundings.run.clone(),
+            active: frame..frame + 1,
+            estimates: &estimates,
+            compared: Cow::Owned(compared),
+        };
+        let problem = Problem::new(scene, Sampling::of(level), members)?;
+        if problem.tiles() == 0 {
+            return Ok(estimate);
+        }
+        Ok(solve(problem, STOPPING, None)?.estimates[0])
+    };
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for hypothesis in found {
+        if hypothesis.score < WORTH_REFINING * best {
+            break;
+        }
+        let mut estimate = wall.exposed(&portrait, &hypothesis.pose);
+        let mut refined = Ok(estimate);
+        for level in (level..=coarsest).rev() {
+            refined = refine_at(level, estimate);
+            match &refined {
+                Ok(refined) => estimate = *refined,
+                Err(_) => break,
+            }
+        }
+        match refined {
+            Ok(_) => {}
+            // A hypothesis that runs out of the tunnel is no hypothesis.
+            Err(ProblemError::Placement { .. } | ProblemError::Factor { .. }) => continue,
+            Err(error) => return Err(error),
+        }
+        let agreement = wall.agreement(&portrait, &estimate.pose);
+        if agreement.samples < least_samples(&portrait) || agreement.correlation <= 0.0 {
+            continue;
+        }
+        let deviation = scene.prior.deviation_cost(&expected.pose, &estimate.pose);
+        candidates.push(Candidate {
+            estimate,
+            unexplained: 1.0 - agreement.correlation.powi(2),
+            correlation: agreement.correlation,
+            likelihood: log_likelihood(&agreement),
+            deviation: deviation / expected.widened.powi(2),
+        });
+    }
+    candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    let Some(first) = candidates.first() else {
+        return no_match(0.0);
+    };
+    if first.correlation < LEAST_CORRELATION {
+        return no_match(first.correlation);
+    }
+    // Those that the pixels alone cannot tell from the best.
+    let pixel = pixel_m(scene, &camera, &first.estimate.pose);
+    let rivals: Vec<&Candidate> = candidates
+        .iter()
+        .filter(|c| c.unexplained < UNEXPLAINED * first.unexplained)
+        .collect();
+    let best = rivals
+        .iter()
+        .min_by(|a, b| a.deviation.total_cmp(&b.deviation))
+        .unwrap_or(&first);
+    for rival in &rivals {
+        let apart_m = apart_m(scene, &best.estimate.pose, &rival.estimate.pose);
+        if apart_m > APART * pixel && rival.deviation - best.deviation < PRIOR_MARGIN {
+            return Ok(Err(Doubt::Ambiguous {
+                other: rival.estimate.pose,
+                apart_m,
+            }));
+        }
+    }
+    let mut estimate = best.estimate;
+    for level in (finest..level).rev() {
+        estimate = refine_at(level, estimate)?;
+    }
+    Ok(Ok(estimate))
+}
+
+/// Which placed frames may show wall that `pose` sees, or would see `margin_m` farther.
+fn near(
+    scene: &Scene,
+    frame: usize,
+    pose: &Pose,
+    margin_m: f64,
+    surroundings: &Surroundings,
+) -> Result<Vec<bool>, ProblemError> {
+    let reach = reach_m(scene.surface);
+    let perimeter = scene.surface.perimeter_m();
+    let trace = |frame: usize, pose: &Pose| {
+        Footprint::within(scene.surface, scene.camera, pose, reach)
+            .map_err(|source| ProblemError::Placement { frame, source })
+    };
+    let own = trace(frame, pose)?.widened(margin_m);
+    let frames = surroundings.estimates.iter().zip(surroundings.placed);
+    frames
+        .enumerate()
+        .map(|(k, (estimate, placed))| {
+            let other = surroundings.run.start + k;
+            Ok(*placed
+                && other != frame
+                && trace(other, &estimate.pose)?.overlaps(&own, perimeter))
+        })
+        .collect()
+}
+
+/// σ of pitch, yaw and roll as they appear in the picture: a shift across the view looks like a turn.
+fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
+    let turn = jitter.rotation_sigma_rad;
+    let [x, y, z] = jitter.translation_sigma_m;
+    let (along, across) = (y / distance_m, x.max(z) / distance_m);
+    [turn.hypot(along), turn.hypot(across), turn]
+}
+
+/// How far apart two poses put the frame on the wall: the mean over its middle and corners, metres.
+fn apart_m(scene: &Scene, a: &Pose, b: &Pose) -> f64 {
+    let camera = scene.camera;
+    let middle = nalgebra::Vector2::new(camera.cx, camera.cy);
+    let corners = camera.border(1, 0.0);
+    let perimeter = scene.surface.perimeter_m();
+    corners
+        .iter()
+        .chain([&middle])
+        .filter_map(|pixel| {
+            let look = |pose: &Pose| {
+                let ray = pose.r_wc * camera.ray(pixel.x, pixel.y);
+                scene.surface.hit(&pose.t_wc, &ray).ok()
+            };
+            let (a, b) = (look(a)?.wall, look(b)?.wall);
+            Some(shortest_arc(a.s_m - b.s_m, perimeter).hypot(a.h_m - b.h_m))
+        })
+        .sum::<f64>()
+        / 5.0
+}
