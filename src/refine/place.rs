@@ -25,6 +25,13 @@ const STOPPING: Stopping = Stopping {
 };
 /// Correlation of local contrast with the wall that a placed frame must reach.
 const LEAST_CORRELATION: f64 = 0.5;
+/// Correlation from which on a pose is settled and is not looked for any closer.
+const SETTLED: f64 = 0.9;
+/// Closer looks at the most, and half their σ, radians.
+const CLOSER_LOOKS: usize = 4;
+const CLOSE_RAD: f64 = 0.05;
+/// Gain in log-posterior, as a factor, for which another closer look is worth its time.
+const WORTH_ANOTHER: f64 = 1.02;
 /// Two places are told apart by the pixels if what they leave unexplained, `1 − c²`, differs by this factor, ...
 const UNEXPLAINED: f64 = 2.0;
 /// ... or else by the prior if its log-densities differ by this (3 σ).
@@ -39,6 +46,15 @@ pub struct Expectation {
     pub pose: Pose,
     /// σ of that prediction over that of the prior's single step.
     pub widened: f64,
+}
+
+/// A frame that has found its place.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed {
+    /// Its estimate.
+    pub estimate: FrameEstimate,
+    /// False if it matches the wall less well than it should: the wall itself may be bent.
+    pub settled: bool,
 }
 
 /// A candidate after its refinement.
@@ -78,7 +94,7 @@ pub fn place(
     frame: usize,
     expected: &Expectation,
     surroundings: &Surroundings,
-) -> Result<Result<FrameEstimate, Doubt>, ProblemError> {
+) -> Result<Result<Placed, Doubt>, ProblemError> {
     let side = scene.camera.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
     let level = finest.max(coarsest.saturating_sub(1));
@@ -120,38 +136,53 @@ pub fn place(
         }
         Ok(solve(problem, STOPPING, None)?.estimates[0])
     };
-    let mut candidates: Vec<Candidate> = Vec::new();
-    for hypothesis in found {
-        if hypothesis.score < WORTH_REFINING * best {
-            break;
-        }
-        let mut estimate = wall.exposed(&portrait, &hypothesis.pose);
-        let mut refined = Ok(estimate);
+    // Gauss–Newton from a pose; None if it leads out of the tunnel or off the wall.
+    let refined = |pose: &Pose| -> Result<Option<Candidate>, ProblemError> {
+        let mut estimate = wall.exposed(&portrait, pose);
         for level in (level..=coarsest).rev() {
-            refined = refine_at(level, estimate);
-            match &refined {
-                Ok(refined) => estimate = *refined,
-                Err(_) => break,
-            }
-        }
-        match refined {
-            Ok(_) => {}
-            // A hypothesis that runs out of the tunnel is no hypothesis.
-            Err(ProblemError::Placement { .. } | ProblemError::Factor { .. }) => continue,
-            Err(error) => return Err(error),
+            estimate = match refine_at(level, estimate) {
+                Ok(refined) => refined,
+                Err(ProblemError::Placement { .. } | ProblemError::Factor { .. }) => {
+                    return Ok(None);
+                }
+                Err(error) => return Err(error),
+            };
         }
         let agreement = wall.agreement(&portrait, &estimate.pose);
         if agreement.samples < least_samples(&portrait) || agreement.correlation <= 0.0 {
-            continue;
+            return Ok(None);
         }
         let deviation = scene.prior.deviation_cost(&expected.pose, &estimate.pose);
-        candidates.push(Candidate {
+        Ok(Some(Candidate {
             estimate,
             unexplained: 1.0 - agreement.correlation.powi(2),
             correlation: agreement.correlation,
             likelihood: log_likelihood(&agreement),
             deviation: deviation / expected.widened.powi(2),
-        });
+        }))
+    };
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for hypothesis in found {
+        if hypothesis.score < WORTH_REFINING * best {
+            break;
+        }
+        candidates.extend(refined(&hypothesis.pose)?);
+    }
+    // A half-right pose has stretched and sheared what it unrolled; from there the search sees better.
+    let close = sigma.map(|s| s.min(CLOSE_RAD));
+    for _ in 0..CLOSER_LOOKS {
+        candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
+        let Some(first) = candidates.first().filter(|c| c.correlation < SETTLED) else {
+            break;
+        };
+        let from = first.estimate.pose;
+        let before = first.score();
+        for hypothesis in search(scene, &wall, &portrait, &from, close, 2) {
+            candidates.extend(refined(&hypothesis.pose)?);
+        }
+        if candidates.iter().all(|c| c.score() < WORTH_ANOTHER * before) {
+            break;
+        }
     }
     candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
     let Some(first) = candidates.first() else {
@@ -183,7 +214,10 @@ pub fn place(
     for level in (finest..level).rev() {
         estimate = refine_at(level, estimate)?;
     }
-    Ok(Ok(estimate))
+    Ok(Ok(Placed {
+        estimate,
+        settled: best.correlation >= SETTLED,
+    }))
 }
 
 /// Which placed frames may show wall that `pose` sees, or would see `margin_m` farther.

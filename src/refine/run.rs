@@ -107,7 +107,8 @@ pub fn refine(
     for (k, (sampling, stopping)) in stages(options, side).enumerate() {
         let Sampling { level, density } = sampling;
         let problem = Problem::new(&scene, sampling, tracked.members())?;
-        if problem.tiles() == 0 {
+        // Where no frame can be believed, the prior is all there is to report.
+        if problem.tiles() == 0 && tracked.doubts.iter().all(Option::is_none) {
             continue;
         }
         let stage = match sampling == Sampling::of(level) {

@@ -78,6 +78,7 @@ pub fn track(
         tracked.estimates.push(FrameEstimate::at(expected.pose));
         footprints.push(footprint(scene, k, &tracked)?);
         let first = earliest_overlap(scene, &footprints);
+        let mut settled = true;
         if tracked.doubts[k].is_none() && first < k {
             let run = first..k + 1;
             let mut placed = tracked.believed(&run);
@@ -89,7 +90,10 @@ pub fn track(
                     run,
                 };
                 match place(scene, options, k, &expected, &surroundings)? {
-                    Ok(estimate) => tracked.estimates[k] = estimate,
+                    Ok(placed) => {
+                        tracked.estimates[k] = placed.estimate;
+                        settled = placed.settled;
+                    }
                     Err(doubt) => tracked.doubts[k] = Some(doubt),
                 }
             }
@@ -98,10 +102,10 @@ pub fn track(
         // without it, and what has drifted apart meanwhile may be many pixels.
         let closes = first < before;
         before = first;
-        if k > 0 && (closes || k % options.window_stride == 0 || k + 1 == count) {
+        if k > 0 && (closes || !settled || k % options.window_stride == 0 || k + 1 == count) {
             let side = scene.camera.shorter_side();
             let finest = options.handover_level(side);
-            let coarsest = match closes {
+            let coarsest = match closes || !settled {
                 true => options.coarsest_level(side),
                 false => finest,
             };
@@ -234,10 +238,10 @@ pub fn retry(
             run,
         };
         tracked.estimates[k] = match place(scene, options, k, &expected, &surroundings)? {
-            Ok(estimate) => {
+            Ok(placed) => {
                 tracked.doubts[k] = None;
                 won += 1;
-                estimate
+                placed.estimate
             }
             Err(_) => FrameEstimate::at(expected.pose),
         };
