@@ -133,13 +133,18 @@ fn jpeg_is_complete(bytes: &[u8]) -> bool {
     bytes[end..].windows(2).any(|pair| pair == [0xff, 0xd9])
 }
 
-/// Decodes a frame to grey levels (0–255, Rec. 709 luma of colour pictures).
+/// Decodes a frame to grey levels (0–255, Rec. 709 luma of colour pictures); those of 16 bits keep their fractions.
 ///
 /// # Errors
 /// As [`load_colour`].
 pub fn load_grey(file: &FrameFile, width: u32, height: u32) -> Result<GreyImage, FrameError> {
     let data = match load_colour(file, width, height)? {
         DynamicImage::ImageLuma8(grey) => grey.into_raw().into_iter().map(f32::from).collect(),
+        // 65535 = 255 · 257.
+        DynamicImage::ImageLuma16(grey) => {
+            let values = grey.into_raw().into_iter();
+            values.map(|v| f32::from(v) / 257.0).collect()
+        }
         other => other
             .to_luma32f()
             .into_raw()
@@ -148,4 +153,27 @@ pub fn load_grey(file: &FrameFile, width: u32, height: u32) -> Result<GreyImage,
             .collect(),
     };
     Ok(GreyImage::new(width as usize, height as usize, data))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::{PictureFormat, write_picture};
+    use image::ImageBuffer;
+
+    #[test]
+    fn sixteen_bits_keep_their_fractions_of_grey_levels() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frame.png");
+        // Every value there is.
+        let all = ImageBuffer::from_fn(256, 256, |u, v| image::Luma([(256 * v + u) as u16]));
+        write_picture(&path, &all.into(), PictureFormat::Png).unwrap();
+        let grey = load_grey(&FrameFile { index: 0, path }, 256, 256).unwrap();
+        for (value, level) in grey.data().iter().enumerate() {
+            assert_eq!((f64::from(*level) * 257.0).round() as usize, value);
+        }
+        for level in 0..=255u16 {
+            assert_eq!(grey.data()[usize::from(257 * level)], f32::from(level));
+        }
+    }
 }
