@@ -4,6 +4,7 @@ mod support;
 
 use std::path::Path;
 use support::{fail, succeed, text};
+use tunnelstitch::frames::load_grey;
 use tunnelstitch::survey::Survey;
 
 /// Options of a survey small enough for a test.
@@ -12,6 +13,14 @@ const SMALL: [&str; 6] = ["--frames", "4", "--size", "64x48", "--supersample", "
 fn simulate(experiment: &str, out: &Path, more: &[&str]) -> String {
     let mut arguments = vec!["simulate", experiment, "--out", text(out)];
     arguments.extend(SMALL);
+    arguments.extend(more);
+    succeed(&arguments)
+}
+
+/// A free survey of any number of small frames.
+fn simulate_with(out: &Path, more: &[&str]) -> String {
+    let mut arguments = vec!["simulate", "free", "--out", text(out)];
+    arguments.extend(&SMALL[2..]);
     arguments.extend(more);
     succeed(&arguments)
 }
@@ -114,6 +123,109 @@ fn a_texture_papers_the_wall() {
     assert!(frame.iter().all(|value| *value == 180));
 }
 
+/// A record of a survey with nothing special holds nothing special: what was simulated before stays as it was.
+#[test]
+fn hardships_are_recorded_and_reproducible() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = |name: &str, more: &[&str]| {
+        let out = dir.path().join(name);
+        simulate("free", &out, more);
+        contents(&out)
+    };
+    let record = |files: &[(String, Vec<u8>)]| {
+        let file = files.iter().find(|(name, _)| name == "simulation.json");
+        let record: serde_json::Value = serde_json::from_slice(&file.unwrap().1).unwrap();
+        record["options"].clone()
+    };
+    let hardships: [(&[&str], &str, serde_json::Value); 6] = [
+        (&["--gain-percent", "20"], "gain_percent", 20.0.into()),
+        (&["--bias-grey", "6"], "bias_grey", 6.0.into()),
+        (&["--lamp-corner", "0.4"], "lamp_corner", 0.4.into()),
+        (
+            &["--specular-percent", "10"],
+            "specular_percent",
+            10.0.into(),
+        ),
+        (&["--moving", "7"], "moving", 7.into()),
+        (&["--bits", "16"], "bits", 16.into()),
+    ];
+    let plain = survey("plain", &[]);
+    let frame = |files: &[(String, Vec<u8>)]| {
+        let file = files.iter().find(|(name, _)| name == "frames/000002.png");
+        file.unwrap().1.clone()
+    };
+    for (arguments, key, value) in &hardships {
+        assert!(record(&plain).get(key).is_none(), "{key}");
+        let hard = survey(&format!("one-{key}"), arguments);
+        assert_eq!(record(&hard)[key], *value, "{key}");
+        assert!(frame(&hard) != frame(&plain), "{key}");
+    }
+    let mut all: Vec<&str> = hardships
+        .iter()
+        .flat_map(|(more, ..)| *more)
+        .copied()
+        .collect();
+    all.extend(["--bad-frames", "1:blurred,3:occluded", "--threads", "1"]);
+    let first = survey("first", &all);
+    assert_eq!(record(&first)["bad_frames"], "1:blurred,3:occluded");
+    *all.last_mut().unwrap() = "2";
+    assert!(first == survey("second", &all));
+}
+
+#[test]
+fn sixteen_bit_frames_hold_what_eight_bits_round_away() {
+    let dir = tempfile::tempdir().unwrap();
+    let grey = |bits: &str| {
+        let out = dir.path().join(bits);
+        simulate("centred", &out, &["--bits", bits]);
+        let survey = Survey::open(&out).unwrap();
+        load_grey(&survey.frames[1], 64, 48).unwrap()
+    };
+    let (coarse, fine) = (grey("8"), grey("16"));
+    assert!(coarse.data().iter().all(|v| v.fract() == 0.0));
+    let between = fine.data().iter().filter(|v| v.fract() != 0.0).count();
+    assert!(between > fine.data().len() * 9 / 10, "{between}");
+    for (coarse, fine) in coarse.data().iter().zip(fine.data()) {
+        assert!((coarse - fine).abs() < 0.503, "{coarse} {fine}");
+    }
+}
+
+#[test]
+fn bad_frames_go_into_the_survey_and_missing_ones_out_of_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("bad");
+    let spec = "1:black,2:repeated,4-6:missing";
+    let said = simulate_with(&out, &["--frames", "8", "--bad-frames", spec]);
+    assert!(said.contains("5 frames of"), "{said}");
+    let survey = Survey::open(&out).unwrap();
+    let names: Vec<_> = survey
+        .frames
+        .iter()
+        .map(|frame| {
+            frame
+                .path
+                .file_stem()
+                .unwrap()
+                .to_string_lossy()
+                .into_owned()
+        })
+        .collect();
+    assert_eq!(names, ["000000", "000001", "000002", "000003", "000007"]);
+    let picture = |k: usize| std::fs::read(&survey.frames[k].path).unwrap();
+    assert!(picture(1) == picture(2) && picture(0) != picture(1));
+    for poses in [&survey.initial, survey.truth.as_ref().unwrap()] {
+        let times: Vec<f64> = poses.iter().map(|stamped| stamped.time_s).collect();
+        assert_eq!(times, [0.0, 1.0, 2.0, 3.0, 7.0]);
+    }
+    // The poses go on where the picture stays.
+    assert!(survey.initial[1].pose != survey.initial[2].pose);
+    // And are those of the survey without bad frames.
+    let good = dir.path().join("good");
+    simulate_with(&good, &["--frames", "8"]);
+    let good = Survey::open(&good).unwrap().truth.unwrap();
+    assert_eq!(good[7], survey.truth.as_ref().unwrap()[4]);
+}
+
 #[test]
 fn only_a_survey_is_replaced_and_only_when_asked() {
     let dir = tempfile::tempdir().unwrap();
@@ -200,6 +312,15 @@ fn impossible_surveys_are_refused_with_the_reason() {
     refuse(&["--translation-sigma-m", "9,9,9"], 3, "off the axis");
     refuse(&["--texture", "no-such.png"], 3, "no-such.png");
     refuse(&["--texture", "a.png", "--wall", "brick"], 2, "--wall");
+    refuse(&["--gain-percent", "100"], 2, "gain");
+    refuse(&["--bias-grey", "-1"], 2, "bias");
+    refuse(&["--lamp-corner", "0"], 2, "corner");
+    refuse(&["--specular-percent", "95"], 2, "damp patches");
+    refuse(&["--moving", "-1"], 2, "--moving");
+    refuse(&["--bits", "12"], 2, "8, 16");
+    refuse(&["--bad-frames", "5:black,9:blury"], 2, "`9:blury`");
+    refuse(&["--bad-frames", "5:black,120:black"], 2, "`120:black`");
+    refuse(&["--bad-frames", "0:repeated"], 2, "`0:repeated`");
 }
 
 #[test]

@@ -75,7 +75,9 @@ impl From<SimulateError> for Failure {
     fn from(error: SimulateError) -> Self {
         match error {
             SimulateError::Write(error) => error.into(),
-            SimulateError::Option { .. } => Self::usage(error.to_string()),
+            SimulateError::Option { .. } | SimulateError::BadFrames(_) => {
+                Self::usage(error.to_string())
+            }
             _ => Self::input(error.to_string()),
         }
     }

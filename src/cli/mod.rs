@@ -3,6 +3,7 @@
 mod compare;
 mod demo;
 mod failure;
+mod hardships;
 mod json;
 mod project;
 mod refine;

@@ -1,5 +1,6 @@
 //! `tunnelstitch simulate`: a survey of a tunnel that never was.
 
+use super::hardships::HardshipArguments;
 use super::stitch::positive;
 use super::{Failure, Terminal, json};
 use crate::simulate::{self, Light, SimulateOptions, Wall};
@@ -18,7 +19,9 @@ use std::path::PathBuf;
     after_help = "Examples:\n  \
     tunnelstitch simulate free --out survey\n  \
     tunnelstitch simulate free --wall concrete --jitter independent --seed 7 --out survey\n  \
-    tunnelstitch simulate off-centre --texture bricks.jpg --texture-width-m 2 --out survey"
+    tunnelstitch simulate off-centre --texture bricks.jpg --texture-width-m 2 --out survey\n  \
+    tunnelstitch simulate free --lamp-corner 0.4 --gain-percent 20 --bias-grey 5 --specular-percent 3 --out damp\n  \
+    tunnelstitch simulate free --turns 2 --moving 8 --bad-frames 5:black,18-20:missing --out bad"
 )]
 pub struct SimulateArguments {
     /// Which of the paper's experiments; the options below change it.
@@ -84,7 +87,9 @@ pub struct SimulateArguments {
     /// Rays along each side of a pixel.
     #[arg(long, value_name = "N", default_value_t = 4)]
     supersample: u32,
-    /// Seed of wall, jitter and noise: the same seed gives the same bytes.
+    #[command(flatten)]
+    hardships: HardshipArguments,
+    /// Seed of all that is random (wall, jitter, noise, hardships): the same seed gives the same bytes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Print the record (simulation.json) on standard output.
@@ -164,7 +169,7 @@ impl SimulateArguments {
             (None, WallArgument::Concrete) => Wall::Concrete,
             (None, WallArgument::TiledBrick) => Wall::TiledBrick,
         };
-        SimulateOptions {
+        self.hardships.add_to(SimulateOptions {
             frames,
             advance_m: self.advance_m.unwrap_or(preset.advance_m),
             turn_deg: self.turn_deg,
@@ -182,7 +187,7 @@ impl SimulateArguments {
             supersample: self.supersample,
             seed: self.seed,
             ..preset
-        }
+        })
     }
 
     /// The preset's jitter with the arguments' changes; any of them asks for jitter.
@@ -231,7 +236,9 @@ pub fn run(arguments: &SimulateArguments, terminal: &Terminal) -> Result<(), Fai
     };
     terminal.say(format!(
         "{out}: {} frames of {} × {} px, with true poses\nnext: tunnelstitch {next}",
-        options.frames, options.width, options.height
+        options.frames - options.bad_frames.missing(),
+        options.width,
+        options.height
     ));
     Ok(())
 }

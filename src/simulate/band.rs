@@ -1,7 +1,9 @@
 //! A stretch of the lit wall as a raster.
 
 use super::Light;
+use super::damp::{Damp, Water};
 use super::wall::Texture;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -16,6 +18,8 @@ pub(super) struct Band {
     rows: usize,
     /// Row-major; each row ends with a copy of its first texel.
     texels: Vec<f32>,
+    /// Damp, where the wall has any: rows of `columns` texels.
+    water: Vec<Water>,
 }
 
 impl Band {
@@ -23,6 +27,7 @@ impl Band {
     pub fn paint(
         texture: &dyn Texture,
         light: Light,
+        damp: Option<&Damp>,
         columns: usize,
         texel_m: f64,
         h_m: [f64; 2],
@@ -46,13 +51,49 @@ impl Band {
                 }
                 again[0] = once[0];
             });
-        Self {
+        let mut band = Self {
             texel_m,
             columns,
             first_row,
             rows,
             texels,
+            water: Vec::new(),
+        };
+        if let Some(damp) = damp {
+            band.moisten(damp);
         }
+        band
+    }
+
+    /// Puts damp on the wall: it is darker there, and glints.
+    fn moisten(&mut self, damp: &Damp) {
+        let (columns, texel_m, first_row) = (self.columns, self.texel_m, self.first_row);
+        self.water = vec![Water::default(); self.rows * columns];
+        self.texels
+            .par_chunks_exact_mut(columns + 1)
+            .zip(self.water.par_chunks_exact_mut(columns))
+            .enumerate()
+            .for_each(|(k, (row, water))| {
+                let h_m = ((first_row + k as i64) as f64 + 0.5) * texel_m;
+                damp.row(h_m, texel_m, water);
+                for (texel, water) in row.iter_mut().zip(water.iter()) {
+                    *texel *= water.albedo();
+                }
+                row[columns] = row[0];
+            });
+    }
+
+    /// Brightness that the camera's lamp adds where a ray of direction `d` meets the wall at angle θ (in `[0, 2π)`) and
+    /// chainage h (metres, within the band), grey levels. Of the nearest texel: texels are finer than pixels.
+    #[inline]
+    pub fn glint(&self, theta: f64, h_m: f64, d: &Vector3<f64>) -> f32 {
+        if self.water.is_empty() {
+            return 0.0;
+        }
+        let column = (theta * (self.columns as f64 / TAU)) as usize;
+        let row = ((h_m / self.texel_m).floor() as i64 - self.first_row) as usize;
+        let k = row.min(self.rows - 1) * self.columns + column.min(self.columns - 1);
+        self.water[k].glint(theta, d)
     }
 
     /// Rows that a band between two chainages has.
@@ -112,7 +153,7 @@ mod tests {
     fn a_band_shows_the_wall_across_the_wrap_and_up_to_its_ends() {
         let (columns, radius_m) = (720, 3.0);
         let texel_m = TAU * radius_m / columns as f64;
-        let band = Band::paint(&Ramp, Light::Even, columns, texel_m, [-1.0, 2.0]);
+        let band = Band::paint(&Ramp, Light::Even, None, columns, texel_m, [-1.0, 2.0]);
         for theta in [0.0, 0.001, 1.0, 3.1, TAU - 0.001] {
             for h_m in [-1.0, 0.0, 0.777, 2.0] {
                 let expected = 100.0 + 40.0 * theta.cos() + 7.0 * h_m;

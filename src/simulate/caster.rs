@@ -31,7 +31,7 @@ pub(super) fn cast(band: &Band, radius_m: f64, camera: &Pinhole, pose: &Pose, n:
                 for offset_u in &offsets {
                     let d = first + right * ((u as f64 + offset_u) / camera.fx);
                     let (theta, h_m) = caster.hit(&d);
-                    *pixel += band.at(theta, h_m);
+                    *pixel += band.at(theta, h_m) + band.glint(theta, h_m, &d);
                 }
             }
         }
@@ -113,7 +113,7 @@ mod tests {
         let camera = Pinhole::from_vertical_fov(160, 120, 1.0);
         let turn = so3::exp(&Vector3::new(0.1, 0.7, -0.05));
         let pose = Pose::new(turn, Vector3::new(0.4, 0.3, -0.2));
-        let band = Band::paint(&Waves, Light::Even, columns, texel_m, [-2.0, 3.0]);
+        let band = Band::paint(&Waves, Light::Even, None, columns, texel_m, [-2.0, 3.0]);
         let frame = cast(&band, radius_m, &camera, &pose, 4);
         let mut compared = 0;
         for k in 0..160_000 {

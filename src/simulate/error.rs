@@ -1,5 +1,6 @@
 //! Why a survey cannot be simulated.
 
+use super::BadFramesError;
 use crate::atomic::WriteError;
 use std::path::PathBuf;
 
@@ -12,6 +13,9 @@ pub enum SimulateError {
         /// Which, and what it should be.
         what: String,
     },
+    /// A bad frame is impossible.
+    #[error(transparent)]
+    BadFrames(#[from] BadFramesError),
     /// The wall's picture cannot be used.
     #[error("{}: cannot use the texture: {what}", path.display())]
     Texture {

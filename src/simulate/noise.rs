@@ -1,4 +1,7 @@
-//! Random numbers that depend on a place and nothing else.
+//! Random numbers that depend on a place, or on a purpose and a frame, and nothing else.
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
 /// 64 well-mixed bits of three integers.
 ///
@@ -21,6 +24,35 @@ pub(super) fn uniform(seed: u64, i: i64, j: i64) -> f32 {
 /// A seed for one purpose among many.
 pub(super) fn derived_seed(seed: u64, purpose: i64) -> u64 {
     hash(seed, purpose, -1)
+}
+
+/// What a simulation's random numbers are for (those of jitter and sensor noise are the seed's own streams).
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Purpose {
+    /// The wall.
+    Texture,
+    /// Gain and bias of the frames.
+    Exposure,
+    /// Damp patches and their ripple.
+    Damp,
+    /// Things that are not on the wall.
+    Moving,
+    /// Blur and occlusion of bad frames.
+    BadFrames,
+}
+
+impl Purpose {
+    /// The seed for this purpose.
+    pub fn seed(self, seed: u64) -> u64 {
+        derived_seed(seed, self as i64)
+    }
+
+    /// The random numbers for this purpose of one frame.
+    pub fn rng(self, seed: u64, frame: usize) -> ChaCha8Rng {
+        let mut rng = ChaCha8Rng::seed_from_u64(self.seed(seed));
+        rng.set_stream(frame as u64);
+        rng
+    }
 }
 
 /// Smooth noise: uniform numbers on a lattice of the wall, interpolated by `3t² − 2t³` along s and h.

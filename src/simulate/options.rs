@@ -1,6 +1,6 @@
 //! What to simulate.
 
-use super::SimulateError;
+use super::{BadFrames, Bits, SimulateError};
 use crate::survey::PriorSection;
 use crate::trajectory::JitterModel;
 use serde::Serialize;
@@ -62,10 +62,37 @@ pub struct SimulateOptions {
     pub light: Light,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise_grey: f64,
+    /// Most that a frame's gain differs from 1, percent: uniform in `1 ± P/100`, each frame on its own.
+    #[serde(skip_serializing_if = "is_default")]
+    pub gain_percent: f64,
+    /// Most that a frame's bias differs from 0, grey levels: uniform in ±B, each frame on its own.
+    #[serde(skip_serializing_if = "is_default")]
+    pub bias_grey: f64,
+    /// Shading that moves with the camera, if any: the light in the frame's darkest corner, as a share (0–1) of that
+    /// at the brightest spot, which lies a tenth of the frame right of and above its middle.
+    #[serde(skip_serializing_if = "is_default")]
+    pub lamp_corner: Option<f64>,
+    /// How much of the wall is covered by damp patches in which the camera's lamp glints, percent.
+    #[serde(skip_serializing_if = "is_default")]
+    pub specular_percent: f64,
+    /// Things in each frame that are not on the wall, at other places in every frame.
+    #[serde(skip_serializing_if = "is_default")]
+    pub moving: u32,
+    /// Bits of a frame's grey values.
+    #[serde(skip_serializing_if = "is_default")]
+    pub bits: Bits,
+    /// Frames that are no good.
+    #[serde(skip_serializing_if = "is_default")]
+    pub bad_frames: BadFrames,
     /// Rays along each side of a pixel; a pixel is the mean of its square.
     pub supersample: u32,
-    /// Seed of wall, jitter and noise.
+    /// Seed of everything that is random.
     pub seed: u64,
+}
+
+/// True of what was not asked for: the record leaves it out.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 impl SimulateOptions {
@@ -84,6 +111,13 @@ impl SimulateOptions {
             wall: Wall::Brick,
             light: Light::Downward,
             noise_grey: 2.0,
+            gain_percent: 0.0,
+            bias_grey: 0.0,
+            lamp_corner: None,
+            specular_percent: 0.0,
+            moving: 0,
+            bits: Bits::default(),
+            bad_frames: BadFrames::default(),
             supersample: 4,
             seed: 1,
         }
@@ -186,7 +220,28 @@ impl SimulateOptions {
         check(
             (1..=16).contains(&self.supersample),
             "1 to 16 rays may be cast along each side of a pixel",
-        )
+        )?;
+        check(
+            (0.0..100.0).contains(&self.gain_percent),
+            "the gain may vary by 0 to less than 100 percent",
+        )?;
+        check(
+            (0.0..=255.0).contains(&self.bias_grey),
+            "the bias may vary by 0 to 255 grey levels",
+        )?;
+        check(
+            self.lamp_corner.is_none_or(|c| c > 0.0 && c <= 1.0),
+            "the lamp's light in the corner must be a share above 0 and up to 1",
+        )?;
+        check(
+            (0.0..=90.0).contains(&self.specular_percent),
+            "damp patches may cover 0 to 90 percent of the wall",
+        )?;
+        check(
+            self.moving <= 10_000,
+            "there may be no more than 10000 moving things in a frame",
+        )?;
+        Ok(self.bad_frames.check(self.frames)?)
     }
 }
 
@@ -228,6 +283,34 @@ mod tests {
             },
             SimulateOptions {
                 supersample: 0,
+                ..free()
+            },
+            SimulateOptions {
+                gain_percent: 100.0,
+                ..free()
+            },
+            SimulateOptions {
+                bias_grey: -1.0,
+                ..free()
+            },
+            SimulateOptions {
+                lamp_corner: Some(0.0),
+                ..free()
+            },
+            SimulateOptions {
+                lamp_corner: Some(f64::NAN),
+                ..free()
+            },
+            SimulateOptions {
+                specular_percent: 91.0,
+                ..free()
+            },
+            SimulateOptions {
+                moving: 10_001,
+                ..free()
+            },
+            SimulateOptions {
+                bad_frames: "120:black".parse().unwrap(),
                 ..free()
             },
         ];

@@ -8,7 +8,7 @@ use crate::progress::Progress;
 use crate::survey::{
     CameraSection, FramesSection, PosesSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
 };
-use crate::trajectory::{Pose, indexed, tum};
+use crate::trajectory::{Pose, StampedPose, indexed, tum};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
@@ -132,7 +132,11 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
         .map_err(|error| WriteError::new(&survey_path, other(error.to_string())))?;
     let record = serde_json::to_string_pretty(simulated)
         .map_err(|error| WriteError::new(&record_path, other(error.to_string())))?;
-    let trajectory = |poses: &[Pose]| tum::format(&indexed(poses.iter().copied()));
+    let trajectory = |poses: &[Pose]| {
+        let all = indexed(poses.iter().copied());
+        let there: Vec<StampedPose> = scene.frames().map(|frame| all[frame]).collect();
+        tum::format(&there)
+    };
     atomic::write_text(&survey_path, &survey)?;
     atomic::write_text(&record_path, &(record + "\n"))?;
     atomic::write_text(&path("camera.json"), &format_calibration(scene.camera()))?;
@@ -140,19 +144,22 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
     atomic::write_text(&path("groundtruth.tum"), &trajectory(scene.truth()))
 }
 
-/// Renders and writes all frames, batch by batch, the frames of a batch in parallel.
+/// Renders and writes all frames that are there, each named by its number in the plan, batch by batch, the frames of a batch in parallel.
 fn write_frames(scene: &Scene, folder: &Path, progress: &dyn Progress) -> Result<(), WriteError> {
     atomic::create_folder(folder)?;
-    progress.start("simulating", scene.truth().len());
-    for (batch, h_m) in scene.batches() {
-        let band = scene.band(h_m);
-        batch.into_par_iter().try_for_each(|frame| {
-            let picture = scene.noisy(&scene.exact(&band, frame), frame);
-            let path = folder.join(format!("{frame:06}.png"));
-            write_picture(&path, &picture.into(), PictureFormat::Png)?;
-            progress.advance(1);
-            Ok(())
-        })?;
+    progress.start("simulating", scene.frames().count());
+    for batch in scene.batches() {
+        let band = scene.band(batch.h_m);
+        batch
+            .frames
+            .into_par_iter()
+            .try_for_each(|(frame, shown)| {
+                let picture = scene.delivered(&band, shown);
+                let path = folder.join(format!("{frame:06}.png"));
+                write_picture(&path, &picture, PictureFormat::Png)?;
+                progress.advance(1);
+                Ok(())
+            })?;
     }
     progress.finish();
     Ok(())

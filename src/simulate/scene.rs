@@ -2,23 +2,26 @@
 
 use super::band::Band;
 use super::caster::{Caster, cast};
-use super::noise::derived_seed;
+use super::damp::Damp;
+use super::lamp::Lamp;
+use super::moving::hide_behind_things;
+use super::noise::Purpose;
+use super::sensor::deliver;
+use super::spoil::spoil;
 use super::wall::{Texture, texture};
-use super::{SimulateError, SimulateOptions};
+use super::{Exposure, SimulateError, SimulateOptions};
 use crate::camera::Pinhole;
 use crate::frames::GreyImage;
 use crate::trajectory::{Jitter, Pose, spiral};
-use image::GrayImage;
+use image::DynamicImage;
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, Normal};
 use std::f64::consts::TAU;
-use std::ops::Range;
 
 /// How far the wall reaches from a camera along the tunnel, radii.
 const REACH_RADII: f64 = 20.0;
-/// Texels of a band at the most, four bytes each.
+/// Texels of a band at the most, four bytes each, and three more where the wall is damp.
 const MOST_TEXELS: usize = 1 << 26;
 /// Texels over the width of a pixel where the wall is nearest.
 const TEXELS_PER_PIXEL: f64 = 3.0;
@@ -34,6 +37,7 @@ pub struct Scene {
     /// Least and greatest chainage that each frame sees, metres.
     reaches: Vec<[f64; 2]>,
     texture: Box<dyn Texture>,
+    damp: Option<Damp>,
     /// Texels once around.
     columns: usize,
 }
@@ -84,7 +88,13 @@ impl Scene {
             });
         }
         Ok(Self {
-            texture: texture(&options.wall, derived_seed(options.seed, 0), perimeter_m)?,
+            texture: texture(
+                &options.wall,
+                Purpose::Texture.seed(options.seed),
+                perimeter_m,
+            )?,
+            damp: (options.specular_percent > 0.0)
+                .then(|| Damp::new(options.seed, options.specular_percent, perimeter_m)),
             columns: (perimeter_m / texel_m).ceil() as usize,
             options: options.clone(),
             camera,
@@ -109,7 +119,19 @@ impl Scene {
         &self.truth
     }
 
-    /// A frame without noise, in grey levels that are not rounded.
+    /// Gain and bias of a frame.
+    pub fn exposure(&self, frame: usize) -> Exposure {
+        Exposure::of(&self.options, frame)
+    }
+
+    /// The frames that are there, in their order.
+    pub fn frames(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.truth.len()).filter(|frame| self.options.bad_frames.shown(*frame).is_some())
+    }
+
+    /// A frame without noise, as if it were a good one, in grey levels that are neither rounded nor saturated: the wall
+    /// with all that the light does to it (damp patches and their glints, moving things, the camera's lamp, gain and
+    /// bias).
     ///
     /// # Panics
     /// If there is no such frame.
@@ -117,27 +139,36 @@ impl Scene {
         self.exact(&self.band(self.reaches[frame]), frame)
     }
 
-    /// A frame as the sensor delivers it.
+    /// A frame as the sensor delivers it, good or bad; `None` if it is missing.
     ///
     /// # Panics
     /// If there is no such frame.
-    pub fn render(&self, frame: usize) -> GrayImage {
-        self.noisy(&self.render_exact(frame), frame)
+    pub fn render(&self, frame: usize) -> Option<DynamicImage> {
+        let shown = self.options.bad_frames.shown(frame)?;
+        Some(self.delivered(&self.band(self.reaches[shown]), shown))
     }
 
-    /// Runs of consecutive frames, each with the chainages it sees, so short that a band of the wall for each fits
-    /// into bounded memory.
-    pub(super) fn batches(&self) -> Vec<(Range<usize>, [f64; 2])> {
-        let mut batches: Vec<(Range<usize>, [f64; 2])> = Vec::new();
-        for (frame, reach) in self.reaches.iter().enumerate() {
-            if let Some((frames, h_m)) = batches.last_mut() {
+    /// Runs of the frames that are there, each with the chainages that their pictures show, so short that a band of
+    /// the wall for each fits into bounded memory.
+    pub(super) fn batches(&self) -> Vec<Batch> {
+        let mut batches: Vec<Batch> = Vec::new();
+        for frame in 0..self.truth.len() {
+            let Some(shown) = self.options.bad_frames.shown(frame) else {
+                continue;
+            };
+            let reach = self.reaches[shown];
+            if let Some(Batch { frames, h_m }) = batches.last_mut() {
                 let joined = [h_m[0].min(reach[0]), h_m[1].max(reach[1])];
                 if Band::rows(joined, self.texel_m()) * self.columns <= MOST_TEXELS {
-                    (frames.end, *h_m) = (frame + 1, joined);
+                    frames.push((frame, shown));
+                    *h_m = joined;
                     continue;
                 }
             }
-            batches.push((frame..frame + 1, *reach));
+            batches.push(Batch {
+                frames: vec![(frame, shown)],
+                h_m: reach,
+            });
         }
         batches
     }
@@ -148,40 +179,57 @@ impl Scene {
         Band::paint(
             texture,
             self.options.light,
+            self.damp.as_ref(),
             self.columns,
             self.texel_m(),
             h_m,
         )
     }
 
-    /// A frame without noise, of a band that holds all it sees.
-    pub(super) fn exact(&self, band: &Band, frame: usize) -> GreyImage {
+    /// [`Self::render_exact`], of a band that holds all the frame sees.
+    fn exact(&self, band: &Band, frame: usize) -> GreyImage {
+        let options = &self.options;
         let pose = &self.truth[frame];
-        cast(
+        let wall = cast(
             band,
-            self.options.radius_m,
+            options.radius_m,
             &self.camera,
             pose,
-            self.options.supersample,
-        )
+            options.supersample,
+        );
+        let seen = hide_behind_things(options.seed, frame, options.moving, wall);
+        let lit = match options.lamp_corner {
+            Some(corner) => Lamp::new(corner, seen.width(), seen.height()).shine(seen),
+            None => seen,
+        };
+        self.exposure(frame).expose(lit)
     }
 
-    /// Adds the sensor's noise, a stream of its own for every frame, and rounds to whole grey levels.
-    pub(super) fn noisy(&self, exact: &GreyImage, frame: usize) -> GrayImage {
-        let mut rng = ChaCha8Rng::seed_from_u64(self.options.seed);
+    /// The picture that a frame takes as the sensor delivers it, of a band that holds all it sees; its noise is a stream
+    /// of its own.
+    pub(super) fn delivered(&self, band: &Band, frame: usize) -> DynamicImage {
+        let options = &self.options;
+        let exact = self.exact(band, frame);
+        let picture = match options.bad_frames.fault(frame) {
+            Some(fault) => spoil(fault, options.seed, frame, exact),
+            None => exact,
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
         rng.set_stream(1 + frame as u64);
-        // A checked option: the noise is finite and not negative.
-        let noise = Normal::new(0.0, self.options.noise_grey as f32).ok();
-        GrayImage::from_fn(self.camera.width, self.camera.height, |u, v| {
-            let noise = noise.map_or(0.0, |noise| noise.sample(&mut rng));
-            // The cast saturates.
-            image::Luma([(exact.at(u as usize, v as usize) + noise).round() as u8])
-        })
+        deliver(&picture, options.noise_grey, options.bits, &mut rng)
     }
 
     fn texel_m(&self) -> f64 {
         TAU * self.options.radius_m / self.columns as f64
     }
+}
+
+/// Frames that are rendered of one band of the wall.
+pub(super) struct Batch {
+    /// Each frame with the one whose picture it shows.
+    pub frames: Vec<(usize, usize)>,
+    /// Least and greatest chainage that they see, metres.
+    pub h_m: [f64; 2],
 }
 
 /// Least and greatest chainage that a frame sees, metres.
@@ -248,7 +296,7 @@ fn texel_m(options: &SimulateOptions, camera: &Pinhole, truth: &[Pose]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::Wall;
+    use crate::simulate::{Light, Wall};
     use crate::survey::PriorSection;
 
     fn small() -> SimulateOptions {
@@ -270,20 +318,21 @@ mod tests {
             ..small()
         };
         let scene = Scene::new(&options).unwrap();
-        let (exact, noisy) = (scene.render_exact(2), scene.render(2));
-        let squares: f64 = noisy
+        let noisy = |frame| scene.render(frame).unwrap().into_luma8();
+        let (exact, third) = (scene.render_exact(3), noisy(3));
+        let squares: f64 = third
             .enumerate_pixels()
             .map(|(u, v, pixel)| {
                 f64::from(f32::from(pixel.0[0]) - exact.at(u as usize, v as usize)).powi(2)
             })
             .sum();
-        let sigma = (squares / f64::from(noisy.width() * noisy.height())).sqrt();
+        let sigma = (squares / f64::from(third.width() * third.height())).sqrt();
         // Rounding adds 1/12.
         assert!(
             (sigma / (9.0f64 + 1.0 / 12.0).sqrt() - 1.0).abs() < 0.03,
             "{sigma}"
         );
-        assert!(scene.render(3) != noisy);
+        assert!(noisy(2) != third);
     }
 
     #[test]
@@ -291,7 +340,7 @@ mod tests {
         let scene = Scene::new(&small()).unwrap();
         let batches = scene.batches();
         assert_eq!(batches.len(), 1);
-        let band = scene.band(batches[0].1);
+        let band = scene.band(batches[0].h_m);
         for frame in [0, 7] {
             assert_eq!(scene.exact(&band, frame), scene.render_exact(frame));
         }
@@ -360,5 +409,128 @@ mod tests {
             data.data().iter().sum::<f32>() / data.data().len() as f32
         };
         assert!(mean(0) > 2.0 * mean(6));
+    }
+
+    fn mean(picture: &GreyImage) -> f32 {
+        picture.data().iter().sum::<f32>() / picture.data().len() as f32
+    }
+
+    #[test]
+    fn exposure_is_applied_to_the_noise_free_light() {
+        let plain = Scene::new(&small()).unwrap();
+        assert_eq!(
+            plain.exposure(5),
+            Exposure {
+                gain: 1.0,
+                bias_grey: 0.0
+            }
+        );
+        let scene = Scene::new(&SimulateOptions {
+            gain_percent: 30.0,
+            bias_grey: 10.0,
+            ..small()
+        })
+        .unwrap();
+        let Exposure { gain, bias_grey } = scene.exposure(5);
+        let light = plain.render_exact(5);
+        for (value, light) in scene.render_exact(5).data().iter().zip(light.data()) {
+            let expected = gain * f64::from(*light) + bias_grey;
+            assert!((f64::from(*value) - expected).abs() < 1e-3);
+        }
+        assert!((gain - 1.0).abs() > 1e-3 && scene.exposure(6).gain != gain);
+    }
+
+    /// Every hardship changes the picture, and none the geometry.
+    #[test]
+    fn hardships_leave_the_poses_alone() {
+        let plain = Scene::new(&small()).unwrap();
+        let hard = [
+            SimulateOptions {
+                lamp_corner: Some(0.5),
+                ..small()
+            },
+            SimulateOptions {
+                specular_percent: 10.0,
+                ..small()
+            },
+            SimulateOptions {
+                moving: 5,
+                ..small()
+            },
+        ];
+        for options in hard {
+            let scene = Scene::new(&options).unwrap();
+            assert_eq!(scene.truth(), plain.truth());
+            assert_ne!(scene.render_exact(3), plain.render_exact(3), "{options:?}");
+            assert_eq!(
+                scene.render_exact(3),
+                Scene::new(&options).unwrap().render_exact(3)
+            );
+        }
+    }
+
+    /// On the axis and level, the water faces the camera where the wall is nearest: in the middle row of the frame.
+    /// An advance of the camera takes the glint along.
+    #[test]
+    fn glints_stay_before_the_camera_and_move_over_the_wall() {
+        let options = SimulateOptions {
+            frames: 2,
+            turn_deg: 0.0,
+            advance_m: 0.5,
+            jitter: None,
+            light: Light::Even,
+            ..small()
+        };
+        let damp = SimulateOptions {
+            specular_percent: 40.0,
+            ..options.clone()
+        };
+        let (dry, damp) = (Scene::new(&options).unwrap(), Scene::new(&damp).unwrap());
+        for frame in 0..2 {
+            let (dry, damp) = (dry.render_exact(frame), damp.render_exact(frame));
+            let brighter = |v: usize| {
+                let row = (0..80).map(|u| damp.at(u, v) - dry.at(u, v));
+                row.fold(f32::MIN, f32::max)
+            };
+            let middle = (28..32).map(brighter).fold(f32::MIN, f32::max);
+            assert!(middle > 60.0, "frame {frame}: {middle}");
+            for v in (0..5).chain(55..60) {
+                assert!(brighter(v) < 5.0, "frame {frame}, row {v}: {}", brighter(v));
+            }
+            assert!(mean(&damp) != mean(&dry));
+        }
+    }
+
+    #[test]
+    fn bad_frames_are_bad_and_the_others_as_they_were() {
+        let bad = SimulateOptions {
+            bad_frames: "1:black,2:blurred,3:occluded,4:repeated,6-7:missing,8:repeated"
+                .parse()
+                .unwrap(),
+            ..small()
+        };
+        let (good, bad) = (Scene::new(&small()).unwrap(), Scene::new(&bad).unwrap());
+        let there: Vec<usize> = bad.frames().collect();
+        assert_eq!(there, [0, 1, 2, 3, 4, 5, 8, 9, 10, 11]);
+        for frame in [0, 5, 9] {
+            assert_eq!(bad.render(frame), good.render(frame));
+        }
+        for frame in [1, 2, 3] {
+            assert_ne!(bad.render(frame), good.render(frame));
+            assert_eq!(bad.render_exact(frame), good.render_exact(frame));
+        }
+        let black = bad.render(1).unwrap().into_luma8();
+        let brightest = black.iter().max().copied().unwrap();
+        assert!((3..20).contains(&brightest), "{brightest}");
+        assert_eq!(bad.render(4), bad.render(3));
+        assert_eq!(bad.render(6), None);
+        assert_eq!(bad.render(8), bad.render(5));
+        let batched: Vec<(usize, usize)> = bad
+            .batches()
+            .into_iter()
+            .flat_map(|batch| batch.frames)
+            .collect();
+        assert_eq!(batched.len(), 10);
+        assert!(batched.contains(&(4, 3)) && batched.contains(&(8, 5)));
     }
 }
