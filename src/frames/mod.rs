@@ -3,6 +3,7 @@
 mod cache;
 mod grey;
 mod load;
+mod noise;
 mod pyramid;
 mod shading;
 mod write;
@@ -10,6 +11,7 @@ mod write;
 pub use cache::FrameCache;
 pub use grey::GreyImage;
 pub use load::{FrameError, FrameFile, list, load_colour, load_grey};
+pub use noise::{noise_at_level, noise_sigma};
 pub use pyramid::Pyramid;
 pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
 pub use write::{FormatError, PictureFormat, write_picture};

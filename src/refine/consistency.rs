@@ -9,7 +9,7 @@ use super::doubt::Doubt;
 use super::problem::{ProblemError, Scene};
 use super::track::Tracked;
 use super::visibility::reach_m;
-use super::wall::{Lattice, Portrait, pixel_m};
+use super::wall::{Lattice, Likeness, Portrait, pixel_m};
 use crate::surface::Footprint;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -20,8 +20,8 @@ const RUN: usize = 32;
 const FARTHEST: usize = 256;
 /// Least samples that two frames share, as a share of the lattice over one.
 const LEAST_OVERLAP: f64 = 0.03;
-/// Share of the usual correlation that a right pair reaches.
-const LEAST_SHARE: f64 = 0.6;
+/// Correlation, noise aside, that a right pair reaches.
+const LEAST_QUALITY: f64 = 0.6;
 /// Share of its weight that may contradict before a frame is doubted.
 const MOST_CONTRADICTION: f64 = 0.25;
 /// A blurred frame has less than this share of the others' fine contrast (variance).
@@ -36,8 +36,8 @@ pub struct Pair {
     pub b: usize,
     /// Wall samples both show.
     pub samples: f64,
-    /// Correlation of local contrast there.
-    pub correlation: f64,
+    /// Correlation of local contrast there, noise aside.
+    pub quality: f64,
     /// Variance of the earlier frame's local detail over the later one's there, gains removed.
     pub sharpness: f64,
 }
@@ -144,13 +144,14 @@ fn compare(
     let origin = points[points.len() / 2];
     let gain = |k: usize| tracked.estimates[k].log_gain.exp();
     let (contrast, detail) = (own.contrast(pose, &origin), own.detail(pose, &origin));
-    let seen: Vec<([f32; 3], [f64; 2])> = points
+    let noise = own.noise(scene, pose, &origin);
+    let seen: Vec<([f32; 3], [f32; 3])> = points
         .iter()
         .filter_map(|x_w| {
             let offset = x_w - origin;
             let point = [offset.x as f32, offset.y as f32, offset.z as f32];
-            let values = [contrast.at(&point)?, detail.at(&point)?];
-            Some((point, values.map(f64::from)))
+            let values = [contrast.at(&point)?, noise.at(&point)?, detail.at(&point)?];
+            Some((point, values))
         })
         .collect();
     let least = LEAST_OVERLAP * seen.len() as f64;
@@ -161,25 +162,25 @@ fn compare(
             let pose = &tracked.estimates[*b].pose;
             let contrast = portrait.contrast(pose, &origin);
             let detail = portrait.detail(pose, &origin);
-            let (mut n, mut xx, mut yy, mut xy) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+            let noise = portrait.noise(scene, pose, &origin);
+            let mut likeness = Likeness::default();
             let (mut own_detail, mut other_detail) = (0.0f64, 0.0f64);
-            for (point, [x, own]) in &seen {
-                if let (Some(y), Some(other)) = (contrast.at(point), detail.at(point)) {
-                    let (y, other) = (f64::from(y), f64::from(other));
-                    n += 1.0;
-                    xx += x * x;
-                    yy += y * y;
-                    xy += x * y;
-                    own_detail += own * own;
-                    other_detail += other * other;
+            for (point, [x, noise_x, own]) in &seen {
+                if let (Some(y), Some(noise_y), Some(other)) =
+                    (contrast.at(point), noise.at(point), detail.at(point))
+                {
+                    likeness.add((*x, *noise_x), (y, noise_y));
+                    own_detail += f64::from(*own).powi(2);
+                    other_detail += f64::from(other).powi(2);
                 }
             }
             let exposure = gain(*b) / gain(a);
-            (n >= least && xx > 0.0 && yy > 0.0).then(|| Pair {
+            let quality = likeness.match_quality()?;
+            (likeness.samples >= least).then(|| Pair {
                 a,
                 b: *b,
-                samples: n,
-                correlation: xy / (xx * yy).sqrt(),
+                samples: likeness.samples,
+                quality,
                 sharpness: exposure * exposure * own_detail / other_detail.max(f64::MIN_POSITIVE),
             })
         })
@@ -188,11 +189,10 @@ fn compare(
 
 /// The frames that contradict the rest, worst first.
 ///
-/// Frames are taken out one by one, always the one with the largest share of its overlap in pairs that correlate much
-/// less than usual, until no frame contradicts the others by more than a little. Pairs count by their samples.
+/// Frames are taken out one by one, always the one with the largest share of its overlap in pairs that do not
+/// match, until no frame contradicts the others by more than a little. Pairs count by their samples.
 pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
-    let usual = upper_quartile(pairs.iter().map(|pair| pair.correlation));
-    let wrong = |pair: &Pair| pair.correlation < LEAST_SHARE * usual;
+    let wrong = |pair: &Pair| pair.quality < LEAST_QUALITY;
     let (mut all, mut bad) = (vec![0.0; frames], vec![0.0; frames]);
     let mut of_frame: Vec<Vec<usize>> = vec![Vec::new(); frames];
     for (k, pair) in pairs.iter().enumerate() {
@@ -223,8 +223,8 @@ pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
             all[other] -= pair.samples;
             if wrong(pair) {
                 bad[other] -= pair.samples;
-                if pair.correlation < against.1 {
-                    against = (other, pair.correlation);
+                if pair.quality < against.1 {
+                    against = (other, pair.quality);
                 }
             }
         }
@@ -256,22 +256,16 @@ pub fn blurred(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
         .collect()
 }
 
-fn upper_quartile(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    sorted.get(sorted.len() * 3 / 4).copied().unwrap_or(0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn pair(a: usize, b: usize, correlation: f64) -> Pair {
+    fn pair(a: usize, b: usize, quality: f64) -> Pair {
         Pair {
             a,
             b,
             samples: 100.0,
-            correlation,
+            quality,
             sharpness: 1.0,
         }
     }

@@ -18,6 +18,8 @@ pub struct LocalContrast {
     pub detail: GreyImage,
     /// `(I − mean)/√(variance + floor)`.
     pub contrast: GreyImage,
+    /// `1/(variance + floor)`: the variance that a unit of noise has in the contrast.
+    pub sensitivity: GreyImage,
 }
 
 /// Detail and contrast with mean and variance over a square window of `2 reach + 1` pixels around each pixel.
@@ -65,6 +67,7 @@ pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
     };
     let floor = LEAST_SPREAD * LEAST_SPREAD * overall + 1e-6;
     let (mut detail, mut contrast) = (Vec::with_capacity(w * h), Vec::with_capacity(w * h));
+    let mut sensitivity = Vec::with_capacity(w * h);
     for y in 0..h {
         let (y0, y1) = (y.saturating_sub(reach), (y + reach + 1).min(h));
         for x in 0..w {
@@ -73,11 +76,13 @@ pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
             let own = image.at(x, y) - level - mean;
             detail.push(own);
             contrast.push(own / (variance + floor).sqrt());
+            sensitivity.push(1.0 / (variance + floor));
         }
     }
     LocalContrast {
         detail: GreyImage::new(w, h, detail),
         contrast: GreyImage::new(w, h, contrast),
+        sensitivity: GreyImage::new(w, h, sensitivity),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::doubt::Doubt;
 use super::problem::{ProblemError, Scene};
-use crate::frames::{GreyImage, Shading};
+use crate::frames::{GreyImage, Shading, noise_sigma};
 use crate::progress::Progress;
 use crate::surface::viewing_distance;
 use rayon::prelude::*;
@@ -22,6 +22,8 @@ pub struct Examined {
     pub doubts: Vec<Option<Doubt>>,
     /// Shading that all frames have in common, if there is one.
     pub shading: Option<Shading>,
+    /// 1-σ of the sensor's noise, grey levels: the median over the frames.
+    pub noise: f64,
 }
 
 /// Looks at every frame at the coarsest pyramid level.
@@ -39,16 +41,17 @@ pub fn examine(
     let mut sums: Vec<[f64; 2]> = Vec::new();
     let mut last: Option<(usize, GreyImage)> = None;
     let mut size = (0, 0);
+    let mut noises = Vec::new();
     for start in (0..count).step_by(RUN) {
         let small = (start..(start + RUN).min(count))
             .into_par_iter()
             .map(|k| {
-                let picture = scene.frames.get(k)?.level(coarsest).clone();
+                let frame = scene.frames.get(k)?;
                 progress.advance(1);
-                Ok(picture)
+                Ok((frame.level(coarsest).clone(), noise_sigma(frame.level(0))))
             })
-            .collect::<Result<Vec<GreyImage>, ProblemError>>()?;
-        for (k, picture) in (start..).zip(small) {
+            .collect::<Result<Vec<(GreyImage, Option<f64>)>, ProblemError>>()?;
+        for (k, (picture, noise)) in (start..).zip(small) {
             size = (picture.width(), picture.height());
             sums.resize(size.0 * size.1, [0.0; 2]);
             let (mean, spread, known) = moments(&picture);
@@ -61,6 +64,7 @@ pub fn examine(
                 repeated.map(|(earlier, _)| Doubt::Repeated(*earlier))
             });
             if doubts[k].is_none() {
+                noises.extend(noise);
                 for (sum, value) in sums.iter_mut().zip(picture.data()) {
                     if !value.is_nan() {
                         sum[0] += f64::from(*value) / mean;
@@ -77,7 +81,9 @@ pub fn examine(
     let mean = GreyImage::new(size.0, size.1, mean.collect());
     let full = (scene.camera.width as usize, scene.camera.height as usize);
     let enough = doubts.iter().filter(|d| d.is_none()).count() >= LEAST_FRAMES;
+    noises.sort_unstable_by(f64::total_cmp);
     Ok(Examined {
+        noise: noises.get(noises.len() / 2).copied().unwrap_or(0.0),
         doubts,
         shading: enough.then(|| Shading::of_mean(&mean, full)).flatten(),
     })

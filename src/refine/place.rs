@@ -23,8 +23,10 @@ const STOPPING: Stopping = Stopping {
     step_px: 0.1,
     step_sigma: 0.0,
 };
-/// Correlation of local contrast with the wall that a placed frame must reach.
-const LEAST_CORRELATION: f64 = 0.5;
+/// Correlation of local contrast with the wall, noise aside, that a placed frame must reach.
+const LEAST_QUALITY: f64 = 0.5;
+/// Share of the texture that even the right pose leaves unexplained: blur, interpolation.
+const LEAST_UNEXPLAINED: f64 = 0.05;
 /// Correlation from which on a pose is settled and is not looked for any closer.
 const SETTLED: f64 = 0.9;
 /// Closer looks at the most, and half their σ, radians.
@@ -62,7 +64,8 @@ struct Candidate {
     estimate: FrameEstimate,
     /// `1 − c²`.
     unexplained: f64,
-    correlation: f64,
+    /// Correlation c with the wall, noise aside.
+    quality: f64,
     likelihood: f64,
     /// `½ eᵀΣ⁻¹e` of the prior.
     deviation: f64,
@@ -148,16 +151,19 @@ pub fn place(
                 Err(error) => return Err(error),
             };
         }
-        let agreement = wall.agreement(&portrait, &estimate.pose);
-        if agreement.samples < least_samples(&portrait) || agreement.correlation <= 0.0 {
+        let likeness = wall.likeness(scene, &portrait, &estimate.pose);
+        let correlation = likeness.correlation();
+        if likeness.samples < least_samples(&portrait) || correlation <= 0.0 {
             return Ok(None);
         }
+        // Where noise drowns the texture, nothing speaks against the pose; its σ will tell.
+        let quality = likeness.match_quality().unwrap_or(1.0);
         let deviation = scene.prior.deviation_cost(&expected.pose, &estimate.pose);
         Ok(Some(Candidate {
             estimate,
-            unexplained: 1.0 - agreement.correlation.powi(2),
-            correlation: agreement.correlation,
-            likelihood: log_likelihood(&agreement),
+            unexplained: (1.0 - quality * quality).max(LEAST_UNEXPLAINED),
+            quality,
+            likelihood: log_likelihood(correlation, likeness.samples),
             deviation: deviation / expected.widened.powi(2),
         }))
     };
@@ -172,7 +178,7 @@ pub fn place(
     let close = sigma.map(|s| s.min(CLOSE_RAD));
     for _ in 0..CLOSER_LOOKS {
         candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
-        let Some(first) = candidates.first().filter(|c| c.correlation < SETTLED) else {
+        let Some(first) = candidates.first().filter(|c| c.quality < SETTLED) else {
             break;
         };
         let from = first.estimate.pose;
@@ -185,11 +191,14 @@ pub fn place(
         }
     }
     candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    if std::env::var_os("TS_DEBUG").is_some() {
+        eprintln!("frame {frame}: near {} best {best:.0} cands {:?}", portraits.len(), candidates.iter().map(|c| format!("c {:.2} ll {:.0} dev {:.1}", c.quality, c.likelihood, c.deviation)).collect::<Vec<_>>());
+    }
     let Some(first) = candidates.first() else {
         return no_match(0.0);
     };
-    if first.correlation < LEAST_CORRELATION {
-        return no_match(first.correlation);
+    if first.quality < LEAST_QUALITY {
+        return no_match(first.quality);
     }
     // Those that the pixels alone cannot tell from the best.
     let pixel = pixel_m(scene, &camera, &first.estimate.pose);
@@ -216,7 +225,7 @@ pub fn place(
     }
     Ok(Ok(Placed {
         estimate,
-        settled: best.correlation >= SETTLED,
+        settled: best.quality >= SETTLED,
     }))
 }
 

@@ -49,6 +49,8 @@ pub struct Scene<'a> {
     pub frames: &'a FrameCache,
     /// Noise of the initial poses and exposures.
     pub prior: &'a Prior,
+    /// The sensor's noise, 1-σ in grey levels, as single pictures show it.
+    pub noise: f64,
 }
 
 /// The frames that take part in a problem.
@@ -727,6 +729,7 @@ mod tests {
                 camera: &self.wall.camera,
                 frames: &self.frames,
                 prior: &self.prior,
+                noise: 0.0,
             };
             let all = 0..self.estimates.len();
             let sampling = Sampling {

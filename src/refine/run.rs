@@ -88,20 +88,20 @@ pub fn refine(
         log_gain_sigma: options.log_gain_sigma,
         bias_sigma: options.bias_sigma,
     };
-    let examined = examine(&scene(survey, &prior, &frames), coarsest, progress.as_ref())?;
+    let examined = examine(&scene(survey, &prior, &frames, 0.0), coarsest, progress.as_ref())?;
     if examined.shading.is_some() {
         frames.set_shading(examined.shading);
     }
     clock.lap("decode");
     let mut tracked = track(
-        &scene(survey, &prior, &frames),
+        &scene(survey, &prior, &frames, examined.noise),
         options,
         examined.doubts,
         progress.as_ref(),
     )?;
     clock.lap("track");
 
-    let scene = scene(survey, &prior, &frames);
+    let scene = scene(survey, &prior, &frames, examined.noise);
     let mut levels = Vec::new();
     let mut last = None;
     for (k, (sampling, stopping)) in stages(options, side).enumerate() {
@@ -174,12 +174,18 @@ pub fn refine(
     })
 }
 
-fn scene<'a>(survey: &'a Survey, prior: &'a Prior, frames: &'a FrameCache) -> Scene<'a> {
+fn scene<'a>(
+    survey: &'a Survey,
+    prior: &'a Prior,
+    frames: &'a FrameCache,
+    noise: f64,
+) -> Scene<'a> {
     Scene {
         surface: survey.surface.as_ref(),
         camera: &survey.camera,
         frames,
         prior,
+        noise,
     }
 }
 
@@ -235,6 +241,7 @@ fn recheck(
     let count = tracked.estimates.len();
     for round in 0..ROUNDS {
         let pairs = compare_pairs(scene, coarse, tracked)?;
+        debug(&pairs, count);
         for (frame, doubt) in contradictions(&pairs, count) {
             tracked.doubts[frame] = Some(doubt);
         }
@@ -253,6 +260,7 @@ fn recheck(
         }
     }
     let pairs = compare_pairs(scene, fine, tracked)?;
+    debug(&pairs, count);
     let mut doubts = contradictions(&pairs, count);
     doubts.extend(blurred(&pairs, count));
     for (frame, doubt) in doubts {
@@ -363,4 +371,17 @@ impl Clock {
         });
         self.since = now;
     }
+}
+
+fn debug(pairs: &[super::consistency::Pair], count: usize) {
+    if std::env::var_os("TS_DEBUG").is_none() { return; }
+    let mut cs: Vec<f64> = pairs.iter().map(|p| p.quality).collect();
+    cs.sort_by(f64::total_cmp);
+    let q = |f: f64| cs[((cs.len() - 1) as f64 * f) as usize];
+    eprintln!("pairs {} c: min {:.2} 5% {:.2} 25% {:.2} 50% {:.2} 75% {:.2}", cs.len(), q(0.0), q(0.05), q(0.25), q(0.5), q(0.75));
+    let mut sh: Vec<f64> = pairs.iter().map(|p| p.sharpness).collect();
+    sh.sort_by(f64::total_cmp);
+    eprintln!("  sharp min {:.2} max {:.2}", sh[0], sh[sh.len()-1]);
+    eprintln!("  contradictions {:?}", contradictions(pairs, count).iter().map(|(k, d)| format!("{k}: {d}")).collect::<Vec<_>>());
+    eprintln!("  blurred {:?}", blurred(pairs, count).iter().map(|(k, d)| format!("{k}: {d}")).collect::<Vec<_>>());
 }

@@ -18,7 +18,7 @@
 
 use super::problem::Scene;
 use super::spectrum::{Spectrum, Transform};
-use super::wall::{Agreement, FusedWall, Portrait};
+use super::wall::{FusedWall, Portrait};
 use crate::surface::{WallPoint, shortest_arc, wall_jacobian};
 use crate::trajectory::{Pose, so3};
 use nalgebra::{Matrix2, Vector2, Vector3};
@@ -49,9 +49,9 @@ pub struct Hypothesis {
 }
 
 /// ℓ without the prior.
-pub fn log_likelihood(agreement: &Agreement) -> f64 {
-    let c = agreement.correlation.clamp(0.0, 1.0 - 1e-6);
-    -0.5 * agreement.samples / SAMPLES_PER_PIECE * (1.0 - c * c).ln()
+pub fn log_likelihood(correlation: f64, samples: f64) -> f64 {
+    let c = correlation.clamp(0.0, 1.0 - 1e-6);
+    -0.5 * samples / SAMPLES_PER_PIECE * (1.0 - c * c).ln()
 }
 
 /// Least number of samples a frame must share with the wall to be compared.
@@ -112,9 +112,9 @@ pub fn search(
             let mut own: Vec<Peak> = correlator
                 .correlate(wall, portrait, &pose)
                 .into_iter()
-                .filter(|(_, agreement)| agreement.samples >= least)
-                .map(|(shift, agreement)| {
-                    let shift_m = shift * spacing;
+                .filter(|found| found.samples >= least)
+                .map(|found| {
+                    let shift_m = found.shift * spacing;
                     // A camera that pitches up (about x) looks towards −h.
                     let omega = Vector3::new(
                         pitch - shift_m.y / hit.range,
@@ -126,7 +126,7 @@ pub fn search(
                         pitch,
                         roll,
                         shift_m,
-                        score: log_likelihood(&agreement) - prior,
+                        score: log_likelihood(found.correlation, found.samples) - prior,
                     }
                 })
                 .collect();
@@ -194,6 +194,15 @@ fn shifted(scene: &Scene, pose: &Pose, shift_m: &Vector2<f64>) -> Option<Pose> {
     Some(pose)
 }
 
+/// A local maximum over shifts.
+struct Maximum {
+    /// Shift, samples.
+    shift: Vector2<f64>,
+    correlation: f64,
+    /// Samples that both show.
+    samples: f64,
+}
+
 /// The wall's spectra, ready to be correlated with frames over shifts up to a reach.
 struct Correlator {
     transform: Transform,
@@ -227,7 +236,7 @@ impl Correlator {
         wall: &FusedWall,
         portrait: &Portrait,
         pose: &Pose,
-    ) -> Vec<(Vector2<f64>, Agreement)> {
+    ) -> Vec<Maximum> {
         let sampler = portrait.contrast(pose, &wall.origin);
         let unrolled: Vec<f32> = wall
             .points
@@ -265,13 +274,11 @@ impl Correlator {
                 let peak = c > 0.0
                     && (-1..=1).all(|y| (-1..=1).all(|x| (x, y) == (0, 0) || at(ds + x, dh + y) <= c));
                 if peak {
-                    maxima.push((
-                        Vector2::new(ds as f64, dh as f64),
-                        Agreement {
-                            correlation: f64::from(c),
-                            samples: f64::from(samples[index(ds, dh)]),
-                        },
-                    ));
+                    maxima.push(Maximum {
+                        shift: Vector2::new(ds as f64, dh as f64),
+                        correlation: f64::from(c),
+                        samples: f64::from(samples[index(ds, dh)]),
+                    });
                 }
             }
         }

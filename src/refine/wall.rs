@@ -5,7 +5,7 @@ use super::estimate::FrameEstimate;
 use super::problem::{ProblemError, Scene};
 use super::visibility::reach_m;
 use crate::camera::Pinhole;
-use crate::frames::{GreyImage, Pyramid};
+use crate::frames::{GreyImage, Pyramid, noise_at_level};
 use crate::surface::{Footprint, WallPoint, viewing_distance};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Vector3};
@@ -119,6 +119,14 @@ impl Portrait {
         Sampler::new(&self.local.contrast, &self.camera, pose, origin)
     }
 
+    /// Variance of the contrast's noise at a wall point, as `pose` would put it there.
+    pub fn noise(&self, scene: &Scene, pose: &Pose, origin: &Vector3<f64>) -> NoiseSampler<'_> {
+        NoiseSampler {
+            sensitivity: Sampler::new(&self.local.sensitivity, &self.camera, pose, origin),
+            variance: (scene.noise * scene.noise * noise_at_level(self.level)) as f32,
+        }
+    }
+
     /// Detail, grey levels, as `pose` would put it on the wall.
     pub fn detail(&self, pose: &Pose, origin: &Vector3<f64>) -> Sampler<'_> {
         Sampler::new(&self.local.detail, &self.camera, pose, origin)
@@ -180,6 +188,71 @@ impl<'a> Sampler<'a> {
     }
 }
 
+/// The noise of a [`Portrait`]'s contrast.
+pub struct NoiseSampler<'a> {
+    sensitivity: Sampler<'a>,
+    variance: f32,
+}
+
+impl NoiseSampler<'_> {
+    /// Variance at a wall point (relative to the origin), where the picture has a value.
+    #[inline]
+    pub fn at(&self, point: &[f32; 3]) -> Option<f32> {
+        Some(self.variance * self.sensitivity.at(point)?)
+    }
+}
+
+/// Sums over the samples that two pictures of the wall share.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Likeness {
+    /// Samples.
+    pub samples: f64,
+    xx: f64,
+    yy: f64,
+    xy: f64,
+    noise_x: f64,
+    noise_y: f64,
+}
+
+impl Likeness {
+    /// Adds a sample: both contrasts and the variances of their noise.
+    #[inline]
+    pub fn add(&mut self, (x, noise_x): (f32, f32), (y, noise_y): (f32, f32)) {
+        let (x, y) = (f64::from(x), f64::from(y));
+        self.samples += 1.0;
+        self.xx += x * x;
+        self.yy += y * y;
+        self.xy += x * y;
+        self.noise_x += f64::from(noise_x);
+        self.noise_y += f64::from(noise_y);
+    }
+
+    /// Correlation as it is, −1 to 1.
+    pub fn correlation(&self) -> f64 {
+        self.xy / (self.xx * self.yy).sqrt().max(f64::MIN_POSITIVE)
+    }
+
+    /// Share of the contrast that is texture and not noise, 0 to 1.
+    pub fn texture(&self) -> f64 {
+        let share = |all: f64, noise: f64| (1.0 - noise / all.max(f64::MIN_POSITIVE)).max(0.0);
+        (share(self.xx, self.noise_x) * share(self.yy, self.noise_y)).sqrt()
+    }
+
+    /// Correlation of the textures behind the noise: the one as it is over the share that is texture.
+    ///
+    /// About 1 where both show the same wall, however noisy. None where noise drowns the texture.
+    ///
+    /// Source: C. Spearman, "The proof and measurement of association between two things", 1904 (correction for
+    /// attenuation).
+    pub fn match_quality(&self) -> Option<f64> {
+        let texture = self.texture();
+        (texture > LEAST_TEXTURE).then(|| (self.correlation() / texture).min(1.0))
+    }
+}
+
+/// Least share of texture with which pictures can be compared.
+const LEAST_TEXTURE: f64 = 0.2;
+
 /// The wall around a frame, fused from the frames already placed.
 pub struct FusedWall {
     /// Where it is sampled.
@@ -190,17 +263,10 @@ pub struct FusedWall {
     pub points: Vec<[f32; 3]>,
     /// Local contrast there, the mean over the frames; NaN where none looks.
     pub contrast: Vec<f32>,
+    /// Variance of its noise.
+    noise: Vec<f32>,
     /// The wall's grey value there, likewise.
     grey: Vec<f32>,
-}
-
-/// How well a frame at some pose agrees with the wall.
-#[derive(Clone, Copy, Debug)]
-pub struct Agreement {
-    /// Correlation of local contrast, −1 to 1.
-    pub correlation: f64,
-    /// Wall samples both show.
-    pub samples: f64,
 }
 
 impl FusedWall {
@@ -232,29 +298,34 @@ impl FusedWall {
                 [offset.x as f32, offset.y as f32, offset.z as f32]
             })
             .collect();
-        let samplers: Vec<(Sampler, Sampler, f32, f32)> = placed
+        let samplers: Vec<(Sampler, NoiseSampler, Sampler, f32, f32)> = placed
             .iter()
             .map(|(portrait, estimate)| {
                 (
                     portrait.contrast(&estimate.pose, &origin),
+                    portrait.noise(scene, &estimate.pose, &origin),
                     portrait.grey(&estimate.pose, &origin),
                     (-estimate.log_gain).exp() as f32,
                     estimate.bias as f32,
                 )
             })
             .collect();
-        let fused: Vec<[f32; 2]> = points
+        let fused: Vec<[f32; 3]> = points
             .par_iter()
             .map(|point| {
-                let (mut sum, mut seen) = ([0.0f32; 2], 0.0f32);
-                for (contrast, grey, inverse_gain, bias) in &samplers {
-                    if let (Some(contrast), Some(grey)) = (contrast.at(point), grey.at(point)) {
+                let (mut sum, mut seen) = ([0.0f32; 3], 0.0f32);
+                for (contrast, noise, grey, inverse_gain, bias) in &samplers {
+                    if let (Some(contrast), Some(noise), Some(grey)) =
+                        (contrast.at(point), noise.at(point), grey.at(point))
+                    {
                         sum[0] += contrast;
-                        sum[1] += (grey - bias) * inverse_gain;
+                        sum[1] += noise;
+                        sum[2] += (grey - bias) * inverse_gain;
                         seen += 1.0;
                     }
                 }
-                sum.map(|sum| if seen > 0.0 { sum / seen } else { f32::NAN })
+                let seen = if seen > 0.0 { seen } else { f32::NAN };
+                [sum[0] / seen, sum[1] / (seen * seen), sum[2] / seen]
             })
             .collect();
         Ok(Self {
@@ -262,30 +333,26 @@ impl FusedWall {
             origin,
             points,
             contrast: fused.iter().map(|f| f[0]).collect(),
-            grey: fused.iter().map(|f| f[1]).collect(),
+            noise: fused.iter().map(|f| f[1]).collect(),
+            grey: fused.iter().map(|f| f[2]).collect(),
         })
     }
 
-    /// Correlates a frame at `pose` with the wall.
-    pub fn agreement(&self, portrait: &Portrait, pose: &Pose) -> Agreement {
-        let sampler = portrait.contrast(pose, &self.origin);
-        let (mut n, mut xx, mut yy, mut xy) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
-        for (point, wall) in self.points.iter().zip(&self.contrast) {
+    /// Compares a frame at `pose` with the wall.
+    pub fn likeness(&self, scene: &Scene, portrait: &Portrait, pose: &Pose) -> Likeness {
+        let contrast = portrait.contrast(pose, &self.origin);
+        let noise = portrait.noise(scene, pose, &self.origin);
+        let mut likeness = Likeness::default();
+        let wall = self.contrast.iter().zip(&self.noise);
+        for (point, (wall, wall_noise)) in self.points.iter().zip(wall) {
             if wall.is_nan() {
                 continue;
             }
-            if let Some(value) = sampler.at(point) {
-                let (wall, value) = (f64::from(*wall), f64::from(value));
-                n += 1.0;
-                xx += wall * wall;
-                yy += value * value;
-                xy += wall * value;
+            if let (Some(value), Some(noise)) = (contrast.at(point), noise.at(point)) {
+                likeness.add((*wall, *wall_noise), (value, noise));
             }
         }
-        Agreement {
-            correlation: xy / (xx * yy).sqrt().max(f64::MIN_POSITIVE),
-            samples: n,
-        }
+        likeness
     }
 
     /// The estimate with `pose` and the gain and bias that fit the wall best: a line through its grey values.
