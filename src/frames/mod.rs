@@ -1,6 +1,7 @@
 //! The pictures: loading, grey values, pyramids, writing.
 
 mod cache;
+mod contrast;
 mod grey;
 mod load;
 mod noise;
@@ -9,6 +10,7 @@ mod shading;
 mod write;
 
 pub use cache::FrameCache;
+pub use contrast::{LocalContrast, local_contrast, wide_window};
 pub use grey::GreyImage;
 pub use load::{FrameError, FrameFile, list, load_colour, load_grey};
 pub use noise::{noise_at_level, noise_sigma};

@@ -1,8 +1,10 @@
 //! The image pyramid of a frame.
 
 use super::GreyImage;
+use super::contrast::subdued;
 
-/// A frame at full size (level 0) and halved again and again.
+/// A frame at full size (level 0) and halved again and again, from level 1 on without its extremes
+/// ([`super::contrast::subdued`]).
 #[derive(Clone, Debug)]
 pub struct Pyramid {
     levels: Vec<GreyImage>,
@@ -14,7 +16,7 @@ impl Pyramid {
         let mut pyramid = vec![image];
         while pyramid.len() < levels {
             let next = pyramid[pyramid.len() - 1].halved();
-            pyramid.push(next);
+            pyramid.push(subdued(&next));
         }
         Self { levels: pyramid }
     }

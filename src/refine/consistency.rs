@@ -20,8 +20,10 @@ const RUN: usize = 32;
 const FARTHEST: usize = 256;
 /// Least samples that two frames share, as a share of the lattice over one.
 const LEAST_OVERLAP: f64 = 0.03;
-/// Correlation, noise aside, that a right pair reaches.
+/// Correlation, noise aside, that a right pair reaches, ...
 const LEAST_QUALITY: f64 = 0.6;
+/// ... or this in its finest detail.
+const LEAST_FINE_QUALITY: f64 = 0.85;
 /// Share of its weight that may contradict before a frame is doubted.
 const MOST_CONTRADICTION: f64 = 0.25;
 /// A blurred frame has less than this share of the others' fine contrast (variance).
@@ -36,32 +38,95 @@ pub struct Pair {
     pub b: usize,
     /// Wall samples both show.
     pub samples: f64,
+    /// True if they cannot show the same wall.
+    pub wrong: bool,
     /// Correlation of local contrast there, noise aside.
     pub quality: f64,
-    /// Variance of the earlier frame's local detail over the later one's there, gains removed.
-    pub sharpness: f64,
+    /// Variance of the earlier frame's finest detail over the later one's there, gains removed; None where noise
+    /// drowns it.
+    pub sharpness: Option<f64>,
 }
 
-/// How frames are compared.
-#[derive(Clone, Copy, Debug)]
-pub struct Comparison {
-    /// Pyramid level.
-    pub level: usize,
-    /// Every how many pixels a wall sample is taken, along each axis.
-    pub stride: usize,
-    /// Half width of the window of local contrast, pixels; None: as wide as light is smooth.
-    pub window: Option<usize>,
-}
-
-/// Compares all believed frames that overlap.
+/// Compares all believed frames that overlap: at pyramid level `level`, in windows that hold a brick or two, and in
+/// finest detail.
+///
+/// Either alone can be misled: the first by glints and things before the wall, the second by the edges of a pattern
+/// that repeats. Two frames contradict if neither sees the same wall in them.
 ///
 /// # Errors
 /// [`ProblemError`].
 pub fn compare_pairs(
     scene: &Scene,
-    comparison: Comparison,
+    level: usize,
     tracked: &Tracked,
 ) -> Result<Vec<Pair>, ProblemError> {
+    let coarse = compare_at(scene, Comparison { level, ..COARSE }, tracked)?;
+    let fine = Comparison {
+        level: FINE.level.min(level),
+        ..FINE
+    };
+    let fine: BTreeMap<(usize, usize), Compared> = compare_at(scene, fine, tracked)?
+        .into_iter()
+        .map(|compared| ((compared.a, compared.b), compared))
+        .collect();
+    Ok(coarse
+        .into_iter()
+        .filter_map(|coarse| {
+            let fine = fine.get(&(coarse.a, coarse.b));
+            let fine_quality = fine.and_then(|fine| fine.quality);
+            let wrong = match (coarse.quality, fine_quality) {
+                (None, None) => return None,
+                (Some(c), None) | (None, Some(c)) => c < LEAST_QUALITY,
+                (Some(c), Some(f)) => c < LEAST_QUALITY && f < LEAST_FINE_QUALITY,
+            };
+            Some(Pair {
+                a: coarse.a,
+                b: coarse.b,
+                samples: coarse.samples,
+                wrong,
+                quality: coarse.quality.or(fine_quality).unwrap_or(0.0),
+                sharpness: fine_quality.and(fine.map(|fine| fine.sharpness)),
+            })
+        })
+        .collect())
+}
+
+/// How frames are compared.
+#[derive(Clone, Copy, Debug)]
+struct Comparison {
+    /// Pyramid level.
+    level: usize,
+    /// Every how many pixels a wall sample is taken, along each axis.
+    stride: usize,
+    /// Half width of the window of local contrast, pixels.
+    window: usize,
+}
+
+const COARSE: Comparison = Comparison {
+    level: 2,
+    stride: 4,
+    window: 6,
+};
+const FINE: Comparison = Comparison {
+    level: 1,
+    stride: 5,
+    window: 3,
+};
+
+/// Two frames compared in one way.
+struct Compared {
+    a: usize,
+    b: usize,
+    samples: f64,
+    quality: Option<f64>,
+    sharpness: f64,
+}
+
+fn compare_at(
+    scene: &Scene,
+    comparison: Comparison,
+    tracked: &Tracked,
+) -> Result<Vec<Compared>, ProblemError> {
     let Comparison {
         level,
         stride,
@@ -106,15 +171,9 @@ pub fn compare_pairs(
         let portraits: BTreeMap<usize, Portrait> = needed
             .into_par_iter()
             .filter(|k| tracked.doubts[*k].is_none())
-            .map(|k| {
-                let portrait = match window {
-                    Some(window) => Portrait::fine(scene, level, k, window)?,
-                    None => Portrait::new(scene, level, k)?,
-                };
-                Ok((k, portrait))
-            })
+            .map(|k| Ok((k, Portrait::fine(scene, level, k, window)?)))
             .collect::<Result<_, ProblemError>>()?;
-        let compared: Vec<Vec<Pair>> = partners
+        let compared: Vec<Vec<Compared>> = partners
             .par_iter()
             .map(|(a, others)| compare(scene, *a, others, stride, &footprints, &portraits, tracked))
             .collect();
@@ -131,7 +190,7 @@ fn compare(
     footprints: &[Option<Footprint>],
     portraits: &BTreeMap<usize, Portrait>,
     tracked: &Tracked,
-) -> Vec<Pair> {
+) -> Vec<Compared> {
     let (Some(own), Some(footprint)) = (portraits.get(&a), &footprints[a]) else {
         return Vec::new();
     };
@@ -175,12 +234,11 @@ fn compare(
                 }
             }
             let exposure = gain(*b) / gain(a);
-            let quality = likeness.match_quality()?;
-            (likeness.samples >= least).then(|| Pair {
+            (likeness.samples >= least).then(|| Compared {
                 a,
                 b: *b,
                 samples: likeness.samples,
-                quality,
+                quality: likeness.match_quality(),
                 sharpness: exposure * exposure * own_detail / other_detail.max(f64::MIN_POSITIVE),
             })
         })
@@ -192,13 +250,12 @@ fn compare(
 /// Frames are taken out one by one, always the one with the largest share of its overlap in pairs that do not
 /// match, until no frame contradicts the others by more than a little. Pairs count by their samples.
 pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
-    let wrong = |pair: &Pair| pair.quality < LEAST_QUALITY;
     let (mut all, mut bad) = (vec![0.0; frames], vec![0.0; frames]);
     let mut of_frame: Vec<Vec<usize>> = vec![Vec::new(); frames];
     for (k, pair) in pairs.iter().enumerate() {
         for frame in [pair.a, pair.b] {
             all[frame] += pair.samples;
-            if wrong(pair) {
+            if pair.wrong {
                 bad[frame] += pair.samples;
             }
             of_frame[frame].push(k);
@@ -221,7 +278,7 @@ pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
                 continue;
             }
             all[other] -= pair.samples;
-            if wrong(pair) {
+            if pair.wrong {
                 bad[other] -= pair.samples;
                 if pair.quality < against.1 {
                     against = (other, pair.quality);
@@ -241,9 +298,9 @@ pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
 /// The frames that show less fine detail than those they overlap.
 pub fn blurred(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
     let mut ratios: Vec<Vec<f64>> = vec![Vec::new(); frames];
-    for pair in pairs {
-        ratios[pair.a].push(pair.sharpness);
-        ratios[pair.b].push(1.0 / pair.sharpness);
+    for (pair, sharpness) in pairs.iter().filter_map(|p| Some((p, p.sharpness?))) {
+        ratios[pair.a].push(sharpness);
+        ratios[pair.b].push(1.0 / sharpness);
     }
     ratios
         .into_iter()
@@ -266,7 +323,8 @@ mod tests {
             b,
             samples: 100.0,
             quality,
-            sharpness: 1.0,
+            wrong: quality < LEAST_QUALITY,
+            sharpness: Some(1.0),
         }
     }
 
@@ -288,7 +346,7 @@ mod tests {
     #[test]
     fn the_frame_without_fine_detail_is_the_blurred_one() {
         let mut pairs = vec![pair(0, 1, 0.9), pair(1, 2, 0.9), pair(0, 2, 0.9)];
-        (pairs[0].sharpness, pairs[1].sharpness) = (5.0, 0.2);
+        (pairs[0].sharpness, pairs[1].sharpness) = (Some(5.0), Some(0.2));
         let blurred = blurred(&pairs, 3);
         assert_eq!(blurred.len(), 1);
         assert_eq!(blurred[0].0, 1);

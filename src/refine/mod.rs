@@ -13,7 +13,6 @@
 //! Tracking ([`track`]), window and global solve are drivers over the same parts.
 
 mod consistency;
-mod contrast;
 mod covariance;
 mod coverage;
 mod doubt;

@@ -38,6 +38,8 @@ const WORTH_ANOTHER: f64 = 1.02;
 const UNEXPLAINED: f64 = 2.0;
 /// ... or else by the prior if its log-densities differ by this (3 σ).
 const PRIOR_MARGIN: f64 = 4.5;
+/// `½ eᵀΣ⁻¹e` beyond which a pose is not what the prior allows: all six unknowns 3.5 σ off.
+const MOST_DEVIATION: f64 = 0.5 * 6.0 * REACH * REACH;
 /// Places closer than this are one, samples of the search level.
 const APART: f64 = 2.0;
 
@@ -158,13 +160,17 @@ pub fn place(
         }
         // Where noise drowns the texture, nothing speaks against the pose; its σ will tell.
         let quality = likeness.match_quality().unwrap_or(1.0);
-        let deviation = scene.prior.deviation_cost(&expected.pose, &estimate.pose);
+        let deviation = scene.prior.deviation_cost(&expected.pose, &estimate.pose)
+            / expected.widened.powi(2);
+        if deviation > MOST_DEVIATION {
+            return Ok(None);
+        }
         Ok(Some(Candidate {
             estimate,
             unexplained: (1.0 - quality * quality).max(LEAST_UNEXPLAINED),
             quality,
             likelihood: log_likelihood(correlation, likeness.samples),
-            deviation: deviation / expected.widened.powi(2),
+            deviation,
         }))
     };
     let mut candidates: Vec<Candidate> = Vec::new();
@@ -191,9 +197,6 @@ pub fn place(
         }
     }
     candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
-    if std::env::var_os("TS_DEBUG").is_some() {
-        eprintln!("frame {frame}: near {} best {best:.0} cands {:?}", portraits.len(), candidates.iter().map(|c| format!("c {:.2} ll {:.0} dev {:.1}", c.quality, c.likelihood, c.deviation)).collect::<Vec<_>>());
-    }
     let Some(first) = candidates.first() else {
         return no_match(0.0);
     };

@@ -31,7 +31,7 @@ impl NoiseModel {
 pub struct Loss;
 
 /// `1/(c²/v)`.
-const SHARPNESS: f32 = 1.0 / 36.0;
+const SHARPNESS: f32 = 1.0 / 9.0;
 
 impl Loss {
     /// `ω(e)`.

@@ -1,6 +1,6 @@
 //! From a survey to refined poses: load, track, solve globally coarse to fine, report.
 
-use super::consistency::{Comparison, blurred, compare_pairs, contradictions};
+use super::consistency::{blurred, compare_pairs, contradictions};
 use super::covariance::{frame_covariances, frame_sigma};
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
@@ -199,16 +199,11 @@ fn scene<'a>(
 fn stages(
     options: &RefineOptions,
     side: u32,
-) -> impl Iterator<Item = (Sampling, Stopping)> + use<> {
+) -> impl Iterator<Item = (Sampling, Stopping)> + '_ {
     let last = Stopping {
         max_iterations: options.max_iterations,
         step_px: options.step_tolerance_px,
         step_sigma: options.step_tolerance_sigma,
-    };
-    let close = move |level: usize| Stopping {
-        step_px: CLOSE * last.step_px * 2f64.powi(level as i32),
-        step_sigma: CLOSE * last.step_sigma,
-        ..last
     };
     let finest = Sampling {
         level: 0,
@@ -216,8 +211,17 @@ fn stages(
     };
     (0..=options.handover_level(side))
         .rev()
-        .map(move |level| (Sampling::of(level), close(level)))
+        .map(move |level| (Sampling::of(level), close(options, level)))
         .chain([(finest, last)])
+}
+
+/// When a solve has come close enough for the next.
+fn close(options: &RefineOptions, level: usize) -> Stopping {
+    Stopping {
+        max_iterations: options.max_iterations,
+        step_px: CLOSE * options.step_tolerance_px * 2f64.powi(level as i32),
+        step_sigma: CLOSE * options.step_tolerance_sigma,
+    }
 }
 
 /// Compares all frames pair by pair, takes out those that contradict the rest, tries once more to place what is not
@@ -228,52 +232,29 @@ fn recheck(
     tracked: &mut Tracked,
 ) -> Result<(), ProblemError> {
     let side = scene.camera.shorter_side();
-    let coarse = Comparison {
-        level: options.coarsest_level(side).saturating_sub(1),
-        stride: 2,
-        window: None,
-    };
-    let fine = Comparison {
-        level: 1.min(options.coarsest_level(side)),
-        stride: 5,
-        window: Some(FINE_WINDOW),
-    };
     let count = tracked.estimates.len();
+    let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
     for round in 0..ROUNDS {
-        let pairs = compare_pairs(scene, coarse, tracked)?;
-        debug(&pairs, count);
-        for (frame, doubt) in contradictions(&pairs, count) {
+        let pairs = compare_pairs(scene, finest, tracked)?;
+        let mut doubts = contradictions(&pairs, count);
+        doubts.extend(blurred(&pairs, count));
+        for (frame, doubt) in doubts {
             tracked.doubts[frame] = Some(doubt);
         }
         if round + 1 == ROUNDS || retry(scene, options, tracked)? == 0 {
             break;
         }
-        let level = options.handover_level(side);
-        for level in (level..=options.coarsest_level(side)).rev() {
+        for level in (finest..=coarsest).rev() {
             let problem = Problem::new(scene, Sampling::of(level), tracked.members())?;
-            let stopping = Stopping {
-                max_iterations: options.max_iterations,
-                step_px: CLOSE * options.step_tolerance_px * 2f64.powi(level as i32),
-                step_sigma: CLOSE * options.step_tolerance_sigma,
-            };
+            let stopping = close(options, level);
             tracked.estimates = solve(problem, stopping, None)?.estimates;
         }
-    }
-    let pairs = compare_pairs(scene, fine, tracked)?;
-    debug(&pairs, count);
-    let mut doubts = contradictions(&pairs, count);
-    doubts.extend(blurred(&pairs, count));
-    for (frame, doubt) in doubts {
-        tracked.doubts[frame] = Some(doubt);
     }
     Ok(())
 }
 
 /// Times that contradictions are looked for, and frames in doubt tried again between.
 const ROUNDS: usize = 3;
-/// Half width of the window for fine detail, pixels.
-const FINE_WINDOW: usize = 3;
-
 fn frame_report(
     survey: &Survey,
     k: usize,
@@ -371,17 +352,4 @@ impl Clock {
         });
         self.since = now;
     }
-}
-
-fn debug(pairs: &[super::consistency::Pair], count: usize) {
-    if std::env::var_os("TS_DEBUG").is_none() { return; }
-    let mut cs: Vec<f64> = pairs.iter().map(|p| p.quality).collect();
-    cs.sort_by(f64::total_cmp);
-    let q = |f: f64| cs[((cs.len() - 1) as f64 * f) as usize];
-    eprintln!("pairs {} c: min {:.2} 5% {:.2} 25% {:.2} 50% {:.2} 75% {:.2}", cs.len(), q(0.0), q(0.05), q(0.25), q(0.5), q(0.75));
-    let mut sh: Vec<f64> = pairs.iter().map(|p| p.sharpness).collect();
-    sh.sort_by(f64::total_cmp);
-    eprintln!("  sharp min {:.2} max {:.2}", sh[0], sh[sh.len()-1]);
-    eprintln!("  contradictions {:?}", contradictions(pairs, count).iter().map(|(k, d)| format!("{k}: {d}")).collect::<Vec<_>>());
-    eprintln!("  blurred {:?}", blurred(pairs, count).iter().map(|(k, d)| format!("{k}: {d}")).collect::<Vec<_>>());
 }

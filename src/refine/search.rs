@@ -6,7 +6,7 @@
 //! shifts at once, by Fourier transform (a shift of the camera looks nearly like a turn, and refinement tells them
 //! apart). The best maxima are handed on as hypotheses.
 //!
-//! Both are compared by their local contrast ([`super::contrast`]), normalised over what both show: with masks m,
+//! Both are compared by their local contrast ([`crate::frames::local_contrast`]), normalised over what both show: with masks m,
 //!
 //! `c(d) = Σ A(x) W(x+d) / √(Σ A²(x) m_W(x+d) · Σ m_A(x) W²(x+d))`.
 //!

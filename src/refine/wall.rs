@@ -1,11 +1,12 @@
 //! The wall around a frame as the frames already placed show it.
 
-use super::contrast::{LocalContrast, local_contrast, wide_window};
 use super::estimate::FrameEstimate;
 use super::problem::{ProblemError, Scene};
 use super::visibility::reach_m;
 use crate::camera::Pinhole;
-use crate::frames::{GreyImage, Pyramid, noise_at_level};
+use crate::frames::{
+    GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level, wide_window,
+};
 use crate::surface::{Footprint, WallPoint, viewing_distance};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Vector3};
