@@ -21,7 +21,7 @@
 //! Within a tile A_i is nearly constant, so the normal equations need only moments:
 //!
 //! - `g_i = Σ_x w_i r_i φ` (4), the gradient of frame i being `−B_iᵀ g_i`;
-//! - `M = Σ_x φ φᵀ` (4 × 4), and the mean weights `w̄_i`: eliminating S leaves
+//! - `M = Σ_x p φ φᵀ` (4 × 4), p the sample's share of the information, and the mean weights `w̄_i`: eliminating S leaves
 //!   `H_ij = (w̄_i δ_ij − w̄_i w̄_j / Σ_k w̄_k) B_iᵀ M B_j`.
 //!
 //! M counts the noise of the slopes as if it were texture; [`TileWork::slope_noise`] says how much that is.
@@ -91,7 +91,7 @@ pub struct TileWork {
     gaps: bool,
     /// Moments of each observer, in the order given.
     pub observers: Vec<ObserverMoments>,
-    /// `Σ_x φ φᵀ`.
+    /// `Σ_x p φ φᵀ`.
     pub features: Matrix4<f64>,
     /// What the noise of S has added to the first two diagonal elements of `features`, on average.
     pub slope_noise: [f64; 2],
@@ -158,12 +158,24 @@ impl TileWork {
         })
     }
 
-    /// Squared gradient of the texture as the frames show it: in their own grey levels a sample, by their mean square
-    /// gain. (In the wall's units a common factor of all gains would change the noise model, and with it the cost.)
-    fn activity(&self, texture: &[f32; AREA]) -> [f32; AREA] {
-        let gains: f32 = self.samples.iter().map(|frame| frame.gain.powi(2)).sum();
-        let square_gain = gains / self.samples.len().max(1) as f32;
-        gradient_squares(texture).map(|square| square_gain * square)
+    /// Squared gradient of the texture as the frames show it, in their own grey levels a sample: of the frame that shows
+    /// least (with four frames or more, the second least).
+    ///
+    /// Where only one frame is steep it shows a glint or an edge of something before the wall, which must not pass for
+    /// the noise of a steep texture. (In the wall's units a common factor of all gains would change the noise
+    /// model, and with it the cost.)
+    fn activity(&self) -> [f32; AREA] {
+        let (mut least, mut second) = ([f32::INFINITY; AREA], [f32::INFINITY; AREA]);
+        for frame in &self.samples {
+            let square_gain = frame.gain * frame.gain;
+            let squares = gradient_squares(&frame.values);
+            for k in 0..AREA {
+                let square = square_gain * squares[k];
+                second[k] = second[k].min(square.max(least[k]));
+                least[k] = least[k].min(square);
+            }
+        }
+        if self.samples.len() < 4 { least } else { second }
     }
 
     /// Variance of `S(x + 1) − S(x − 1)` by the sensor's noise, grey levels².
@@ -220,7 +232,7 @@ impl TileWork {
     ) {
         self.sample(points, observers);
         let mean = self.mean();
-        let precision = self.activity(&mean).map(|g2| noise.precision(g2));
+        let precision = self.activity().map(|g2| noise.precision(g2));
         let mut texture = mean;
         for _ in 0..REWEIGHTINGS {
             texture = self.reweight(&texture, &precision);
@@ -239,7 +251,7 @@ impl TileWork {
                 inner_precision[k] = precision[c];
             }
         }
-        self.features = feature_moments(&phi);
+        self.features = feature_moments(&phi, &self.shares());
         let noise_variance = self.slope_variance(noise);
         self.slope_noise = [slope_s, slope_h]
             .map(|slope| SAMPLES as f64 * f64::from(noise_variance * slope * slope));
@@ -248,6 +260,34 @@ impl TileWork {
             self.observers
                 .push(observer_moments(frame, &phi, &inner_precision));
         }
+    }
+
+    /// How much each sample tells about poses, relative to one at which every frame has its mean weight: the trace of the
+    /// bracket, `Σ w − Σ w²/Σ w`, there and with the mean weights.
+    ///
+    /// Where all frames but one are rejected (a glint in it), the texture is that frame's own and says nothing, however
+    /// steep it is.
+    fn shares(&self) -> [f32; SAMPLES] {
+        let (mut sum, mut square) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES]);
+        let (mut mean_sum, mut mean_square) = (0.0f32, 0.0f32);
+        for frame in &self.samples {
+            let q = frame.pixels * frame.gain * frame.gain;
+            let mut own = 0.0;
+            for j in 0..TILE {
+                let row = &frame.weights[(j + 1) * SIDE + 1..][..TILE];
+                for (i, weight) in row.iter().enumerate() {
+                    let w = q * weight;
+                    own += w;
+                    sum[j * TILE + i] += w;
+                    square[j * TILE + i] += w * w;
+                }
+            }
+            own /= SAMPLES as f32;
+            mean_sum += own;
+            mean_square += own * own;
+        }
+        let usual = (mean_sum - mean_square / mean_sum.max(1e-12)).max(1e-12);
+        std::array::from_fn(|k| (sum[k] - square[k] / sum[k].max(1e-12)) / usual)
     }
 
     /// Counts the residuals around the plain mean, each scaled by `√(n/(n−1))` for the share of the mean
@@ -262,7 +302,7 @@ impl TileWork {
         let n = self.samples.len() as f32;
         let scale = (n / (n - 1.0)).sqrt();
         let mean = self.mean();
-        let squares = self.activity(&mean);
+        let squares = self.activity();
         for frame in &self.samples {
             for k in 0..AREA {
                 let e = frame.gain * (frame.values[k] - mean[k]);
@@ -301,15 +341,16 @@ fn gradient_squares(texture: &[f32; AREA]) -> [f32; AREA] {
     squares
 }
 
-fn feature_moments(phi: &[[f32; SAMPLES]; 3]) -> Matrix4<f64> {
+fn feature_moments(phi: &[[f32; SAMPLES]; 3], shares: &[f32; SAMPLES]) -> Matrix4<f64> {
     let mut moments = Matrix4::zeros();
     for a in 0..3 {
+        let shared: [f32; SAMPLES] = std::array::from_fn(|k| shares[k] * phi[a][k]);
         for b in a..3 {
-            moments[(a, b)] = f64::from(dot(&phi[a], &phi[b]));
+            moments[(a, b)] = f64::from(dot(&shared, &phi[b]));
         }
-        moments[(a, 3)] = f64::from(sum(&phi[a]));
+        moments[(a, 3)] = f64::from(sum(&shared));
     }
-    moments[(3, 3)] = SAMPLES as f64;
+    moments[(3, 3)] = f64::from(sum(shares));
     moments.fill_lower_triangle_with_upper_triangle();
     moments
 }
