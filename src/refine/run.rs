@@ -119,6 +119,9 @@ pub fn refine(
         let solution = solve(problem, stopping, Some((&stage, progress)))?;
         progress.finish();
         tracked.estimates.clone_from(&solution.estimates);
+        if sampling == Sampling::of(0) {
+            disagreements(&solution.linearisation.frames, &mut tracked.doubts);
+        }
         levels.push(LevelReport {
             level,
             samples_per_pixel: density,
@@ -255,6 +258,20 @@ fn recheck(
 
 /// Times that contradictions are looked for, and frames in doubt tried again between.
 const ROUNDS: usize = 3;
+/// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve does without them.
+fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) {
+    for (share, doubt) in shares.iter().zip(doubts) {
+        if doubt.is_none() && share.pixels > 0.0 {
+            *doubt = disagreement(share);
+        }
+    }
+}
+
+fn disagreement(share: &FrameShare) -> Option<Doubt> {
+    let rejected = 1.0 - share.inliers / share.pixels.max(1e-9);
+    (rejected > 1.0 - LEAST_INLIER_SHARE).then_some(Doubt::Disagrees { share: rejected })
+}
+
 fn frame_report(
     survey: &Survey,
     k: usize,
@@ -270,10 +287,8 @@ fn frame_report(
         Some(Doubt::NoOverlap {
             share: share.pixels / all,
         })
-    } else if inlier_share < LEAST_INLIER_SHARE {
-        Some(Doubt::Disagrees {
-            share: 1.0 - inlier_share,
-        })
+    } else if let Some(doubt) = disagreement(share) {
+        Some(doubt)
     } else if sigma.wall_px.is_nan() || sigma.wall_px > LARGEST_SIGMA_PX {
         Some(Doubt::Uncertain {
             wall_px: sigma.wall_px,
