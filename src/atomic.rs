@@ -204,6 +204,35 @@ impl StagedFolder {
     }
 }
 
+/// A folder for what is needed for a while; it goes with all that is in it when this is dropped or the program is
+/// interrupted.
+pub struct ScratchFolder {
+    folder: TempDir,
+    _listed: Listed,
+}
+
+impl ScratchFolder {
+    /// Makes one inside `parent`.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn inside(parent: &Path) -> Result<Self, WriteError> {
+        let folder = tempfile::Builder::new()
+            .prefix(PREFIX)
+            .tempdir_in(parent)
+            .map_err(|source| WriteError::new(parent, source))?;
+        Ok(Self {
+            _listed: Listed::new(folder.path()),
+            folder,
+        })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        self.folder.path()
+    }
+}
+
 /// Makes a folder and those above it.
 ///
 /// # Errors

@@ -3,6 +3,7 @@
 use crate::atomic::WriteError;
 use crate::camera::CalibrationError;
 use crate::evaluate::EvaluateError;
+use crate::evaluate::converge::ConvergeError;
 use crate::frames::FrameError;
 use crate::refine::RefineError;
 use crate::render::RenderError;
@@ -78,6 +79,17 @@ impl From<SimulateError> for Failure {
             SimulateError::Option { .. } | SimulateError::BadFrames(_) => {
                 Self::usage(error.to_string())
             }
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<ConvergeError> for Failure {
+    fn from(error: ConvergeError) -> Self {
+        match error {
+            ConvergeError::Option { what } => Self::usage(what),
+            ConvergeError::Simulate(error) => error.into(),
+            ConvergeError::Write(error) => error.into(),
             _ => Self::input(error.to_string()),
         }
     }

@@ -1,6 +1,7 @@
 //! The command line: arguments, printing and exit codes; the work is done by the library.
 
 mod compare;
+mod converge;
 mod demo;
 mod failure;
 mod hardships;
@@ -52,6 +53,7 @@ enum Command {
     Refine(refine::RefineArguments),
     Stitch(stitch::StitchArguments),
     Compare(compare::CompareArguments),
+    Converge(converge::ConvergeArguments),
     Project(project::ProjectArguments),
 }
 
@@ -80,6 +82,7 @@ pub fn run() -> Result<(), Failure> {
         Command::Refine(arguments) => refine::run(&arguments, &terminal),
         Command::Stitch(arguments) => stitch::run(&arguments, &terminal),
         Command::Compare(arguments) => compare::run(&arguments, &terminal),
+        Command::Converge(arguments) => converge::run(&arguments, &terminal),
         Command::Project(arguments) => project::run(&arguments, &terminal),
     }
 }

@@ -107,14 +107,27 @@ enum Experiment {
     Free,
 }
 
+/// Noise models by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum JitterArgument {
+pub enum JitterArgument {
+    /// Errors add up from frame to frame.
     RandomWalk,
+    /// Each frame errs on its own.
     Independent,
 }
 
+impl From<JitterArgument> for JitterModel {
+    fn from(jitter: JitterArgument) -> Self {
+        match jitter {
+            JitterArgument::RandomWalk => Self::RandomWalk,
+            JitterArgument::Independent => Self::Independent,
+        }
+    }
+}
+
+/// Walls by name.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
-enum WallArgument {
+pub enum WallArgument {
     /// Bricks, each with a tone of its own.
     #[default]
     Brick,
@@ -133,7 +146,8 @@ enum LightArgument {
     Even,
 }
 
-fn size(text: &str) -> Result<[u32; 2], String> {
+/// Width and height of a picture, for clap: "640x480".
+pub fn size(text: &str) -> Result<[u32; 2], String> {
     let parsed = text.split_once(['x', '×']).and_then(|(width, height)| {
         Some([width.trim().parse().ok()?, height.trim().parse().ok()?])
     });
@@ -197,11 +211,7 @@ impl SimulateArguments {
             || self.translation_sigma_m.is_some();
         let jitter = preset.or(asked.then(PriorSection::default))?;
         Some(PriorSection {
-            model: match self.jitter {
-                Some(JitterArgument::RandomWalk) => JitterModel::RandomWalk,
-                Some(JitterArgument::Independent) => JitterModel::Independent,
-                None => jitter.model,
-            },
+            model: self.jitter.map_or(jitter.model, JitterModel::from),
             rotation_sigma_deg: self.rotation_sigma_deg.unwrap_or(jitter.rotation_sigma_deg),
             translation_sigma_m: self
                 .translation_sigma_m

@@ -6,11 +6,13 @@
 //! | how far off is each pixel on the wall? | [`wall_error()`] |
 //! | how like the true panorama is this one? | [`image_metrics()`] |
 //! | how well do the frames agree, without any truth? | [`seam_residual`] |
+//! | how much noise can the refinement take? | [`converge`] |
 //!
 //! [`compare()`] asks all of it for initial and refined poses at once.
 
 mod before_after;
 mod compare;
+pub mod converge;
 mod error;
 mod image_metrics;
 mod seam;

@@ -50,29 +50,12 @@ pub fn wall_error(
 ) -> Result<WallError, EvaluateError> {
     check_pairs(estimated.len(), truth.len())?;
     let perimeter_m = surface.perimeter_m();
-    let focal_px = (camera.fx * camera.fy).sqrt();
     let (mut delta_s, mut delta_h, mut pixel_m) = (Vec::new(), Vec::new(), Vec::new());
     for (frame, (estimate, truth)) in estimated.iter().zip(truth).enumerate() {
-        let hit = |pose: &Pose, which, u, v| {
-            surface
-                .hit(&pose.t_wc, &(pose.r_wc * camera.ray(u, v)))
-                .map_err(|source| EvaluateError::Frame {
-                    frame,
-                    which,
-                    source,
-                })
-        };
-        for j in 0..GRID[1] {
-            for i in 0..GRID[0] {
-                let u = f64::from((camera.width - 1) * i) / f64::from(GRID[0] - 1);
-                let v = f64::from((camera.height - 1) * j) / f64::from(GRID[1] - 1);
-                let here: WallPoint = hit(estimate, "estimated", u, v)?.wall;
-                let there: WallPoint = hit(truth, "true", u, v)?.wall;
-                delta_s.push(here.s_m - there.s_m);
-                delta_h.push(here.h_m - there.h_m);
-            }
-        }
-        pixel_m.push(hit(truth, "true", camera.cx, camera.cy)?.range / focal_px);
+        let offsets = frame_offsets(surface, camera, frame, estimate, truth)?;
+        delta_s.extend(offsets.delta_s_m);
+        delta_h.extend(offsets.delta_h_m);
+        pixel_m.push(offsets.pixel_m);
     }
     let gauge = surface.gauge();
     let shift_s_m = match gauge.turn {
@@ -117,9 +100,58 @@ pub fn wall_error(
     })
 }
 
+/// How far one frame's pixels lie from where they belong on the wall, the gauge still in it.
+pub(super) struct FrameOffsets {
+    /// `Δs` of each pixel of the grid, metres; only its rest by the perimeter means anything.
+    pub delta_s_m: Vec<f64>,
+    /// `Δh` of each pixel, metres.
+    pub delta_h_m: Vec<f64>,
+    /// Size of a pixel on the wall at the frame's centre, metres.
+    pub pixel_m: f64,
+}
+
+/// Lays a frame's grid of pixels on the wall by its estimated and by its true pose.
+///
+/// # Errors
+/// [`EvaluateError::Frame`] if a ray meets no wall.
+pub(super) fn frame_offsets(
+    surface: &dyn Surface,
+    camera: &Pinhole,
+    frame: usize,
+    estimate: &Pose,
+    truth: &Pose,
+) -> Result<FrameOffsets, EvaluateError> {
+    let hit = |pose: &Pose, which, u, v| {
+        surface
+            .hit(&pose.t_wc, &(pose.r_wc * camera.ray(u, v)))
+            .map_err(|source| EvaluateError::Frame {
+                frame,
+                which,
+                source,
+            })
+    };
+    let (mut delta_s_m, mut delta_h_m) = (Vec::new(), Vec::new());
+    for j in 0..GRID[1] {
+        for i in 0..GRID[0] {
+            let u = f64::from((camera.width - 1) * i) / f64::from(GRID[0] - 1);
+            let v = f64::from((camera.height - 1) * j) / f64::from(GRID[1] - 1);
+            let here: WallPoint = hit(estimate, "estimated", u, v)?.wall;
+            let there: WallPoint = hit(truth, "true", u, v)?.wall;
+            delta_s_m.push(here.s_m - there.s_m);
+            delta_h_m.push(here.h_m - there.h_m);
+        }
+    }
+    let focal_px = (camera.fx * camera.fy).sqrt();
+    Ok(FrameOffsets {
+        delta_s_m,
+        delta_h_m,
+        pixel_m: hit(truth, "true", camera.cx, camera.cy)?.range / focal_px,
+    })
+}
+
 /// The mean of arcs on a circle of perimeter P: the direction of `Σ exp(2πi Δs / P)` first, then the mean of
 /// the shortest arcs around it until it stays.
-fn mean_arc(arcs_m: &[f64], perimeter_m: f64) -> f64 {
+pub(super) fn mean_arc(arcs_m: &[f64], perimeter_m: f64) -> f64 {
     let (mut sin, mut cos) = (0.0, 0.0);
     for arc in arcs_m {
         let (s, c) = (TAU * arc / perimeter_m).sin_cos();

@@ -1,0 +1,126 @@
+//! One point of the grid.
+
+use crate::simulate::{SimulateOptions, Wall};
+use crate::survey::PriorSection;
+use crate::trajectory::JitterModel;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Walls that need no file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SweepWall {
+    /// [`Wall::Brick`].
+    Brick,
+    /// [`Wall::Concrete`].
+    Concrete,
+    /// [`Wall::TiledBrick`].
+    TiledBrick,
+}
+
+impl SweepWall {
+    /// Its name, as on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Brick => "brick",
+            Self::Concrete => "concrete",
+            Self::TiledBrick => "tiled-brick",
+        }
+    }
+}
+
+impl From<SweepWall> for Wall {
+    fn from(wall: SweepWall) -> Self {
+        match wall {
+            SweepWall::Brick => Self::Brick,
+            SweepWall::Concrete => Self::Concrete,
+            SweepWall::TiledBrick => Self::TiledBrick,
+        }
+    }
+}
+
+/// Name of a noise model, as on the command line.
+pub(super) fn jitter_name(model: JitterModel) -> &'static str {
+    match model {
+        JitterModel::RandomWalk => "random-walk",
+        JitterModel::Independent => "independent",
+    }
+}
+
+/// Sigmas of the `free` experiment: what the scale 1 means.
+pub(super) fn unit() -> PriorSection {
+    SimulateOptions::free().jitter.unwrap_or_default()
+}
+
+/// One point of the grid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cell {
+    /// How errors of consecutive poses hang together.
+    pub jitter: JitterModel,
+    /// What the wall looks like.
+    pub wall: SweepWall,
+    /// Turn from frame to frame, degrees: the overlap.
+    pub turn_deg: f64,
+    /// 1-σ about each axis, degrees.
+    pub rotation_sigma_deg: f64,
+    /// Multiple of the `free` experiment's translation sigmas.
+    pub translation_scale: f64,
+    /// 1-σ along x, y, z, metres: that multiple of them.
+    pub translation_sigma_m: [f64; 3],
+}
+
+impl Cell {
+    /// A cell; angles in degrees, `translation_scale` a multiple of the `free` experiment's sigmas.
+    pub fn new(
+        jitter: JitterModel,
+        wall: SweepWall,
+        turn_deg: f64,
+        rotation_sigma_deg: f64,
+        translation_scale: f64,
+    ) -> Self {
+        Self {
+            jitter,
+            wall,
+            turn_deg,
+            rotation_sigma_deg,
+            translation_scale,
+            translation_sigma_m: unit().translation_sigma_m.map(|m| m * translation_scale),
+        }
+    }
+
+    /// The noise of the poses.
+    pub(super) fn prior(&self) -> PriorSection {
+        PriorSection {
+            model: self.jitter,
+            rotation_sigma_deg: self.rotation_sigma_deg,
+            translation_sigma_m: self.translation_sigma_m,
+        }
+    }
+
+    /// What tells cells apart, with a number that went through JSON equal to itself.
+    pub(super) fn key(&self) -> String {
+        format!(
+            "{} {} {:.9} {:.9} {:.9}",
+            jitter_name(self.jitter),
+            self.wall.name(),
+            self.turn_deg,
+            self.rotation_sigma_deg,
+            self.translation_scale
+        )
+    }
+}
+
+impl fmt::Display for Cell {
+    /// As `random-walk, brick, turn 30°, rotation 4°, translation ×2`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{}, {}, turn {}°, rotation {}°, translation ×{}",
+            jitter_name(self.jitter),
+            self.wall.name(),
+            self.turn_deg,
+            self.rotation_sigma_deg,
+            self.translation_scale
+        )
+    }
+}

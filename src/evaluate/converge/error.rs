@@ -1,0 +1,38 @@
+//! Why a sweep is impossible.
+
+use crate::atomic::WriteError;
+use crate::evaluate::EvaluateError;
+use crate::simulate::SimulateError;
+use crate::survey::SurveyError;
+use std::path::PathBuf;
+
+/// Why a sweep is impossible. A survey that the refinement refuses is no such error but a result.
+#[derive(Debug, thiserror::Error)]
+pub enum ConvergeError {
+    /// An option is impossible.
+    #[error("{what}")]
+    Option {
+        /// Which, and what it should be.
+        what: String,
+    },
+    /// The log of an earlier sweep cannot be continued.
+    #[error("{}: {what}", path.display())]
+    Log {
+        /// The log.
+        path: PathBuf,
+        /// What is wrong, and the remedy.
+        what: String,
+    },
+    /// A survey cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// A simulated survey cannot be read.
+    #[error(transparent)]
+    Survey(#[from] SurveyError),
+    /// Poses cannot be judged.
+    #[error(transparent)]
+    Evaluate(#[from] EvaluateError),
+    /// An output cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}

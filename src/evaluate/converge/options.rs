@@ -1,0 +1,222 @@
+//! What to sweep.
+
+use super::cell::unit;
+use super::{Cell, ConvergeError, Settings, SweepWall};
+use crate::simulate::SimulateOptions;
+use crate::trajectory::JitterModel;
+use serde::Serialize;
+use std::collections::HashSet;
+
+/// How the translation's noise goes with the rotation's.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TranslationScale {
+    /// In proportion: the `free` experiment's sigmas at its rotation sigma (2°), twice them at twice that. One axis
+    /// of the grid.
+    Auto,
+    /// Each of these multiples of the `free` experiment's sigmas, with every rotation: two axes.
+    Factors(Vec<f64>),
+}
+
+/// A sweep.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ConvergeOptions {
+    /// 1-σ of the rotation about each axis, degrees.
+    pub rotations_deg: Vec<f64>,
+    /// 1-σ of the translation.
+    pub translation: TranslationScale,
+    /// Noise models.
+    pub jitters: Vec<JitterModel>,
+    /// Turns from frame to frame, degrees.
+    pub turns_deg: Vec<f64>,
+    /// Walls.
+    pub walls: Vec<SweepWall>,
+    /// Runs of each cell: seeds 1 to this.
+    pub seeds: u64,
+    /// Frames of a survey.
+    pub frames: usize,
+    /// Width of a frame, pixels.
+    pub width: u32,
+    /// Height of a frame, pixels.
+    pub height: u32,
+    /// 1-σ of the sensor's noise, grey levels.
+    pub noise_grey: f64,
+}
+
+impl Default for ConvergeOptions {
+    /// The command's defaults: 2° to 12°, both noise models, 20 seeds, two turns of twelve frames.
+    fn default() -> Self {
+        Self {
+            rotations_deg: vec![2.0, 4.0, 6.0, 8.0, 12.0],
+            translation: TranslationScale::Auto,
+            jitters: vec![JitterModel::RandomWalk, JitterModel::Independent],
+            turns_deg: vec![30.0],
+            walls: vec![SweepWall::Brick],
+            seeds: 20,
+            frames: 24,
+            width: 640,
+            height: 480,
+            noise_grey: 2.0,
+        }
+    }
+}
+
+/// Seeds of a cell at the most: from this on, a seed would be the second draw of another.
+pub(super) const MOST_SEEDS: u64 = 1000;
+
+impl ConvergeOptions {
+    /// The cells: noise models, in them walls, turns, translation scales, and rotations innermost.
+    pub fn cells(&self) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        for &jitter in &self.jitters {
+            for &wall in &self.walls {
+                for &turn_deg in &self.turns_deg {
+                    for row in 0..self.translation_rows() {
+                        for &rotation_deg in &self.rotations_deg {
+                            let scale = self.translation_scale(row, rotation_deg);
+                            cells.push(Cell::new(jitter, wall, turn_deg, rotation_deg, scale));
+                        }
+                    }
+                }
+            }
+        }
+        cells
+    }
+
+    /// Rows of the grid for one noise model, wall and turn.
+    pub(super) fn translation_rows(&self) -> usize {
+        match &self.translation {
+            TranslationScale::Auto => 1,
+            TranslationScale::Factors(factors) => factors.len(),
+        }
+    }
+
+    fn translation_scale(&self, row: usize, rotation_deg: f64) -> f64 {
+        match &self.translation {
+            TranslationScale::Auto => rotation_deg / unit().rotation_sigma_deg,
+            TranslationScale::Factors(factors) => factors[row],
+        }
+    }
+
+    /// What all runs of the sweep share.
+    pub fn settings(&self) -> Settings {
+        Settings {
+            schema_version: super::SCHEMA_VERSION,
+            program: crate::PROGRAM.to_owned(),
+            frames: self.frames,
+            width: self.width,
+            height: self.height,
+            noise_grey: self.noise_grey,
+        }
+    }
+
+    /// The survey of a cell by a seed: the `free` experiment with the cell's noise.
+    pub(super) fn survey(&self, cell: &Cell, seed: u64) -> SimulateOptions {
+        SimulateOptions {
+            frames: self.frames,
+            width: self.width,
+            height: self.height,
+            turn_deg: cell.turn_deg,
+            jitter: Some(cell.prior()),
+            wall: cell.wall.into(),
+            noise_grey: self.noise_grey,
+            seed,
+            ..SimulateOptions::free()
+        }
+    }
+
+    /// Checks what the simulator does not.
+    ///
+    /// # Errors
+    /// [`ConvergeError::Option`] with what is impossible.
+    pub(super) fn check(&self) -> Result<(), ConvergeError> {
+        let check = |good: bool, what: &str| match good {
+            true => Ok(()),
+            false => Err(ConvergeError::Option {
+                what: what.to_owned(),
+            }),
+        };
+        let sigma = |v: &f64| v.is_finite() && *v >= 0.0;
+        check(
+            self.rotations_deg.iter().all(sigma),
+            "the rotation sigmas must be finite and not negative",
+        )?;
+        if let TranslationScale::Factors(factors) = &self.translation {
+            check(
+                factors.iter().all(sigma),
+                "the translation scales must be finite and not negative",
+            )?;
+        }
+        check(
+            self.frames >= 2,
+            "a survey to refine needs two frames or more",
+        )?;
+        check(
+            (1..=MOST_SEEDS).contains(&self.seeds),
+            "1 to 1000 seeds can be swept",
+        )?;
+        let cells = self.cells();
+        check(
+            !cells.is_empty(),
+            "the sweep is empty; each list needs at least one value",
+        )?;
+        let keys: HashSet<String> = cells.iter().map(Cell::key).collect();
+        check(
+            keys.len() == cells.len(),
+            "a value is in its list twice; name each only once",
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_has_every_combination_and_auto_follows_the_rotation() {
+        let mut options = ConvergeOptions {
+            rotations_deg: vec![2.0, 6.0],
+            ..ConvergeOptions::default()
+        };
+        let cells = options.cells();
+        assert_eq!(cells.len(), 4);
+        assert_eq!(cells[1].translation_scale, 3.0);
+        assert!((cells[1].translation_sigma_m[2] - 0.09).abs() < 1e-12);
+        assert_eq!(cells[2].jitter, JitterModel::Independent);
+        options.translation = TranslationScale::Factors(vec![0.5, 1.0, 2.0]);
+        let cells = options.cells();
+        assert_eq!(cells.len(), 12);
+        assert_eq!(cells[5].rotation_sigma_deg, 6.0);
+        assert_eq!(cells[5].translation_sigma_m, [0.04, 0.04, 0.06]);
+        options.check().unwrap();
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        let wrong = [
+            ConvergeOptions {
+                rotations_deg: vec![2.0, 2.0],
+                ..ConvergeOptions::default()
+            },
+            ConvergeOptions {
+                rotations_deg: vec![-1.0],
+                ..ConvergeOptions::default()
+            },
+            ConvergeOptions {
+                walls: Vec::new(),
+                ..ConvergeOptions::default()
+            },
+            ConvergeOptions {
+                seeds: 1001,
+                ..ConvergeOptions::default()
+            },
+            ConvergeOptions {
+                frames: 1,
+                ..ConvergeOptions::default()
+            },
+        ];
+        for options in wrong {
+            assert!(options.check().is_err(), "{options:?}");
+        }
+    }
+}
