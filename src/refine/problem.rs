@@ -102,7 +102,7 @@ const BATCH: usize = 64;
 const LEAST_ROWS: u32 = 90;
 /// Tiles looked at to estimate the noise.
 const SCALE_TILES: usize = 2000;
-/// Share of a tile's squared slopes that counts as texture, at least, however noisy they are.
+/// Share of a block's squared slopes that counts as texture, at least, however noisy they are.
 const LEAST_TEXTURE: f64 = 0.05;
 /// A camera looks no farther than this many radii, when the lattice is laid out.
 const LONGEST_VIEW_RADII: f64 = 3.0;
@@ -119,6 +119,9 @@ pub struct Linearisation {
     pub cost: f64,
     /// Normal equations over the active frames.
     pub normal: NormalEquations,
+    /// Scatter of the scores, in the pattern's order: `Σ_b g_b g_bᵀ` over the blocks b of the wall, with g the gradient
+    /// of the block's cost. It is the variance of the pixels' gradient, whatever the errors are like.
+    pub scatter: Vec<Block>,
     /// How each active frame took part.
     pub frames: Vec<FrameShare>,
 }
@@ -348,6 +351,7 @@ impl<'a> Problem<'a> {
         let estimates = self.with_active(active);
         let mut normal = NormalEquations::zeros(&self.pattern);
         let mut frames = vec![FrameShare::default(); self.active.len()];
+        let mut scatter = vec![Block::zeros(); self.pattern.blocks()];
         let mut cost = 0.0;
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch);
@@ -360,7 +364,7 @@ impl<'a> Problem<'a> {
                     .collect();
                 for sum in sums {
                     cost += sum.cost;
-                    sum.add_to(&self.pattern, &mut normal, &mut frames);
+                    sum.add_to(&self.pattern, &mut normal, &mut scatter, &mut frames);
                 }
             }
         }
@@ -368,6 +372,7 @@ impl<'a> Problem<'a> {
         cost *= information;
         normal.blocks.iter_mut().for_each(|b| *b *= information);
         normal.gradient.iter_mut().for_each(|g| *g *= information);
+        scatter.iter_mut().for_each(|b| *b *= information * information);
         cost += self.scene.prior.add(
             &self.participants,
             &estimates,
@@ -382,28 +387,30 @@ impl<'a> Problem<'a> {
         Ok(Linearisation {
             cost,
             normal,
+            scatter,
             frames,
         })
     }
 
-    /// M of a tile: `Σ φφᵀ` without what noise has added to the slopes.
+    /// How much of the slopes of a block of the wall is texture and not noise: D, by which M becomes `D M D`.
     ///
     /// The slopes of S are noisy, and their squares add up where the slopes themselves would cancel: on a wall of low
     /// contrast H would be several times too stiff, steps too short, and the covariance too small. The noise is known
     /// once the frames are aligned at full size; before that, residuals are mostly misalignment.
     ///
-    /// The slopes are shrunk, `M ← D M D` with `D_kk² = 1 − noise/M_kk` but no less than [`LEAST_TEXTURE`], so that M
-    /// stays positive semidefinite.
-    fn features(&self, work: &TileWork) -> Matrix4<f64> {
-        let mut shrink = nalgebra::Vector4::repeat(1.0);
+    /// `D_kk² = 1 − noise/M_kk` with both summed over a block of tiles (over a single one, M's own scatter would bias it),
+    /// but no less than [`LEAST_TEXTURE`], so that M stays positive semidefinite.
+    fn texture_share(&self, tiles: &[TileSums]) -> Matrix4<f64> {
+        let mut share = nalgebra::Vector4::repeat(1.0);
         if self.level == 0 && self.held_frames() == 0 {
-            for (k, noise) in work.slope_noise.iter().enumerate() {
-                let share = 1.0 - noise / work.features[(k, k)].max(f64::MIN_POSITIVE);
-                shrink[k] = share.max(LEAST_TEXTURE).sqrt();
+            for k in 0..2 {
+                let noise: f64 = tiles.iter().map(|tile| tile.slope_noise[k]).sum();
+                let all: f64 = tiles.iter().map(|tile| tile.features[(k, k)]).sum();
+                let texture = 1.0 - noise / all.max(f64::MIN_POSITIVE);
+                share[k] = texture.max(LEAST_TEXTURE).sqrt();
             }
         }
-        let d = Matrix4::from_diagonal(&shrink);
-        d * work.features * d
+        Matrix4::from_diagonal(&share)
     }
 
     fn held_frames(&self) -> usize {
@@ -456,15 +463,15 @@ impl<'a> Problem<'a> {
         slots.dedup();
         let mut sums = BlockSums::new(slots);
         let mut work = TileWork::default();
-        let mut columns = Vec::new();
         let mut scratch = Vec::new();
         let spacing = (self.grid.spacing_s_m, self.grid.spacing_h_m);
+        let mut summed: Vec<TileSums> = Vec::with_capacity(tiles.len());
         for tile in tiles {
             let points = TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
             let observers = visibility.observers(tile);
             let seen = observers.iter().map(|o| o.seen(views));
             work.moments(&points, seen, spacing, &self.noise);
-            columns.clear();
+            let mut columns = Vec::with_capacity(observers.len());
             for (observer, moments) in observers.iter().zip(&work.observers) {
                 sums.cost += moments.cost;
                 let view = &views[observer.frame as usize];
@@ -477,7 +484,16 @@ impl<'a> Problem<'a> {
                     });
                 }
             }
-            sums.add_tile(&columns, &self.features(&work), total_weight(&work));
+            summed.push(TileSums {
+                columns,
+                features: work.features,
+                slope_noise: work.slope_noise,
+                total: total_weight(&work),
+            });
+        }
+        let share = self.texture_share(&summed);
+        for tile in &summed {
+            sums.add_tile(&tile.columns, &(share * tile.features * share), tile.total);
         }
         sums
     }
@@ -545,6 +561,17 @@ impl Observer {
 /// Weight of all observers of a tile, per sample.
 fn total_weight(work: &TileWork) -> f64 {
     work.observers.iter().map(|observer| observer.weight).sum()
+}
+
+/// What a tile adds to the normal equations.
+struct TileSums {
+    columns: Vec<Column>,
+    /// M.
+    features: Matrix4<f64>,
+    /// What noise has added to its first two diagonal elements.
+    slope_noise: [f64; 2],
+    /// Weight of all observers, held ones too.
+    total: f64,
 }
 
 /// An active observer of a tile.
@@ -646,7 +673,13 @@ impl BlockSums {
         }
     }
 
-    fn add_to(&self, pattern: &Pattern, normal: &mut NormalEquations, frames: &mut [FrameShare]) {
+    fn add_to(
+        &self,
+        pattern: &Pattern,
+        normal: &mut NormalEquations,
+        scatter: &mut [Block],
+        frames: &mut [FrameShare],
+    ) {
         for (column, slot) in self.slots.iter().enumerate() {
             normal.gradient[*slot] += self.gradient[column];
             let (share, sum) = (&mut frames[*slot], &self.shares[column]);
@@ -657,6 +690,9 @@ impl BlockSums {
             for row in 0..=column {
                 let block = &self.blocks[self.block_index(row, column)];
                 normal.add_block(pattern, self.slots[row], *slot, block);
+                if let Some(place) = pattern.place(self.slots[row], *slot) {
+                    scatter[place] += self.gradient[row] * self.gradient[column].transpose();
+                }
             }
         }
     }
