@@ -11,7 +11,7 @@ use super::tile::{ObserverMoments, SAMPLES, Seen, TileWork};
 use super::view::View;
 use super::visibility::{Observer, Placed, Tile, Visibility, reach_m};
 use crate::camera::Pinhole;
-use crate::frames::{FrameCache, FrameError, Pyramid};
+use crate::frames::{FrameCache, FrameError, Pyramid, noise_at_level};
 use crate::surface::{Footprint, Surface, SurfaceError, viewing_distance, wall_jacobian};
 use nalgebra::{Matrix2x6, Matrix4, SMatrix, Vector2};
 use rayon::prelude::*;
@@ -106,6 +106,8 @@ const SCALE_TILES: usize = 2000;
 const LEAST_TEXTURE: f64 = 0.05;
 /// A camera looks no farther than this many radii, when the lattice is laid out.
 const LONGEST_VIEW_RADII: f64 = 3.0;
+/// Factor by which the variance of residuals may be short of the sensor's.
+const MOST_UNDERESTIMATE: f64 = 1.25;
 /// Stiffness of the gauge at the first frame over that of its pixels.
 const GAUGE_TIE: f64 = 1e6;
 /// Noise of a pixel over that of a bilinear sample between pixels: each axis averages `f² + (1−f)²` of the
@@ -337,6 +339,13 @@ impl<'a> Problem<'a> {
             histogram = histogram.merge(&counted);
         }
         self.noise = histogram.fit();
+        // Residuals are a little too small, for S has fitted itself to them; single pictures know the noise better, but
+        // take fine texture for noise.
+        let single = self.scene.noise.powi(2) * noise_at_level(self.level);
+        let fitted = f64::from(self.noise.floor);
+        if single > fitted && single < MOST_UNDERESTIMATE * fitted {
+            self.noise.floor = single as f32;
+        }
         self.sigma = PIXEL_OVER_SAMPLE * f64::from(self.noise.floor).sqrt();
         Ok(())
     }

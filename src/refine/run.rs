@@ -135,21 +135,6 @@ pub fn refine(
         }
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
-    if let Some(path) = std::env::var_os("TS_DUMP") {
-        let mut out = String::new();
-        let pattern = solution.problem.pattern();
-        for column in 0..pattern.frames() {
-            for &row in pattern.rows(column) {
-                let place = pattern.place(row, column).unwrap_or(0);
-                for (name, b) in [("H", &solution.linearisation.normal.blocks[place]), ("V", &solution.linearisation.scatter[place])] {
-                    out += &format!("{name} {row} {column}");
-                    for v in b.iter() { out += &format!(" {v:e}"); }
-                    out += "\n";
-                }
-            }
-        }
-        let _ = std::fs::write(path, out);
-    }
     let covariances = frame_covariances(
         solution.problem.pattern(),
         solution.problem.symbolic(),

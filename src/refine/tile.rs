@@ -302,7 +302,10 @@ impl TileWork {
         let n = self.samples.len() as f32;
         let scale = (n / (n - 1.0)).sqrt();
         let mean = self.mean();
-        let squares = self.activity();
+        let gains: f32 = self.samples.iter().map(|frame| frame.gain.powi(2)).sum();
+        let square_gain = gains / self.samples.len().max(1) as f32;
+        // Of the mean: a single frame's gradient would go with its own noise.
+        let squares = gradient_squares(&mean).map(|square| square_gain * square);
         for frame in &self.samples {
             for k in 0..AREA {
                 let e = frame.gain * (frame.values[k] - mean[k]);
