@@ -26,8 +26,14 @@ use std::path::PathBuf;
     tunnelstitch converge --rotation-deg 2,4,8 --translation-scale 0.5,1,2,4 --jitter random-walk --out grid\n      \
     rotation against translation; ×1 is 2, 2 and 3 cm\n  \
     tunnelstitch converge --turn-deg 20,30,45 --wall brick,concrete,tiled-brick --rotation-deg 4 --out walls\n      \
-    overlap against texture")]
+    overlap against texture\n  \
+    tunnelstitch converge --efficiency --wall brick,concrete --frames 60 --seeds 10 --out limit\n      \
+    how close the poses come to the Cramér–Rao bound, and whether their stated uncertainty is true")]
 pub struct ConvergeArguments {
+    /// Compare the errors with the Cramér–Rao bound and with the stated covariances instead, at 2° of random walk if
+    /// nothing else is asked for; writes efficiency.json and efficiency.txt.
+    #[arg(long)]
+    efficiency: bool,
     /// Folder for the results; made if missing. An unfinished sweep in it is continued.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
@@ -36,6 +42,7 @@ pub struct ConvergeArguments {
         long,
         value_name = "DEG,…",
         value_delimiter = ',',
+        default_value_if("efficiency", "true", "2"),
         default_value = "2,4,6,8,12"
     )]
     rotation_deg: Vec<f64>,
@@ -48,6 +55,7 @@ pub struct ConvergeArguments {
         long,
         value_enum,
         value_delimiter = ',',
+        default_value_if("efficiency", "true", "random-walk"),
         default_value = "random-walk,independent"
     )]
     jitter: Vec<JitterArgument>,
@@ -124,6 +132,17 @@ impl ConvergeArguments {
 /// # Errors
 /// Impossible options, a log of another sweep, or an output that cannot be written.
 pub fn run(arguments: &ConvergeArguments, terminal: &Terminal) -> Result<(), Failure> {
+    if arguments.efficiency {
+        let table = converge::efficiency(&arguments.options(), &arguments.out, terminal)?;
+        if arguments.json {
+            return json::print(&table);
+        }
+        for row in &table {
+            terminal.say(format!("{row}\n"));
+        }
+        terminal.say(format!("wrote {}", arguments.out.join("efficiency.json").display()));
+        return Ok(());
+    }
     let swept = converge::run(
         &arguments.options(),
         &arguments.out,

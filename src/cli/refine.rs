@@ -14,7 +14,8 @@ use std::sync::Arc;
 /// Corrects the poses of a survey by photometric consistency.
 ///
 /// Reads SURVEY/survey.toml and writes poses.tum (camera-to-world, for evo and everything else that reads
-/// TUM) and refine.json (costs, residuals, gains, 1-σ of every frame, timings) into DIR.
+/// TUM), refine.json (costs, residuals, gains, 1-σ of every frame, timings) and covariance.csv (6 × 6
+/// covariance of every frame and of neighbours) into DIR.
 #[derive(Debug, clap::Args)]
 pub struct RefineArguments {
     /// Folder of the survey (with survey.toml), or the file itself.
@@ -67,7 +68,7 @@ pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), 
     Ok(())
 }
 
-/// Refines a survey and writes poses.tum and refine.json into `out`; returns the text of the latter too.
+/// Refines a survey and writes poses.tum, refine.json and covariance.csv into `out`; returns the text of the latter too.
 ///
 /// # Errors
 /// Bad input, or an output that cannot be written.
@@ -90,6 +91,8 @@ pub fn refine_into(
     })?;
     atomic::write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
     atomic::write_text(&out.join("refine.json"), &json)?;
+    let sigmas: Vec<_> = refined.report.frames.iter().map(|frame| frame.sigma).collect();
+    atomic::write_text(&out.join("covariance.csv"), &refined.covariances.csv(&sigmas))?;
     Ok((refined, json))
 }
 

@@ -6,6 +6,7 @@
 //! | how far off is each pixel on the wall? | [`wall_error()`] |
 //! | how like the true panorama is this one? | [`image_metrics()`] |
 //! | how well do the frames agree, without any truth? | [`seam_residual`] |
+//! | is the stated uncertainty true? | [`normalised_errors`] |
 //! | how much noise can the refinement take? | [`converge`] |
 //!
 //! [`compare()`] asks all of it for initial and refined poses at once.
@@ -20,6 +21,7 @@ mod spread;
 mod ssim;
 mod table;
 mod trajectory_error;
+mod uncertainty;
 mod wall_error;
 
 pub use before_after::before_after;
@@ -30,4 +32,5 @@ pub use seam::{SeamResidual, seam_residual};
 pub use spread::Spread;
 pub use table::Row;
 pub use trajectory_error::{TrajectoryError, trajectory_error};
+pub use uncertainty::{normalised_errors, tied_errors};
 pub use wall_error::{WallError, wall_error};

@@ -20,7 +20,6 @@ pub struct FrameCache {
 #[derive(Debug)]
 enum Source {
     Files(Vec<FrameFile>, Pinhole),
-    #[cfg(test)]
     Memory(Vec<Arc<Pyramid>>),
 }
 
@@ -45,8 +44,7 @@ impl FrameCache {
         }
     }
 
-    /// Frames that are in memory anyway.
-    #[cfg(test)]
+    /// Frames that are in memory anyway, with whatever levels they have.
     pub fn of_pyramids(pyramids: Vec<Pyramid>) -> Self {
         Self {
             source: Source::Memory(pyramids.into_iter().map(Arc::new).collect()),
@@ -61,7 +59,6 @@ impl FrameCache {
     pub fn len(&self) -> usize {
         match &self.source {
             Source::Files(files, _) => files.len(),
-            #[cfg(test)]
             Source::Memory(pyramids) => pyramids.len(),
         }
     }
@@ -84,7 +81,6 @@ impl FrameCache {
     pub fn get(&self, frame: usize) -> Result<Arc<Pyramid>, FrameError> {
         let (files, camera) = match &self.source {
             Source::Files(files, camera) => (files, camera),
-            #[cfg(test)]
             Source::Memory(pyramids) => return Ok(Arc::clone(&pyramids[frame])),
         };
         {

@@ -1,12 +1,27 @@
-//! How sure the estimate is: marginal covariance of every frame from the sparse factor.
+//! How sure the estimate is.
+//!
+//! Were all residuals independent noise of the assumed size, the covariance would be `Z = H⁻¹`. They are not quite: where
+//! the wall is steep, aliasing and interpolation add errors that depend on how pixels happen to fall. How much the
+//! estimate moves for it is told by the scatter of the gradients of the parts of the cost, `V = Σ_b g_b g_bᵀ` over blocks
+//! b of the wall (32 × 32 pixels: errors of neighbouring samples hang together, those of blocks hardly), plus the
+//! prior's own information P. If the model were true, `V + P = H`. So
+//!
+//! `Σ = c H⁻¹`,   `c = tr(H⁻¹ (V + P)) / unknowns`,
+//!
+//! with c about 1 on noisy walls of low contrast, and about 3 on sharp bricks. Only blocks of `H⁻¹` where H itself has
+//! blocks are needed ([`super::selected_inverse`]).
+//!
+//! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`H⁻¹ V H⁻¹`);
+//! R. W. M. Wedderburn, "Quasi-likelihood functions", Biometrika 61(3), 1974 (one factor for all).
 
-use super::estimate::FrameEstimate;
-use super::factor::{FactorError, Symbolic};
-use super::normal::{NormalEquations, Pattern};
+use super::estimate::{FrameEstimate, UNKNOWNS};
+use super::factor::FactorError;
+use super::normal::{Block, NormalEquations, Pattern};
+use super::selected_inverse::SelectedInverse;
 use crate::camera::Pinhole;
-use crate::surface::{Surface, wall_jacobian};
-use nalgebra::Matrix6;
-use rayon::prelude::*;
+use crate::surface::{GaugeMotion, Surface, wall_jacobian};
+use crate::trajectory::so3;
+use nalgebra::{Matrix6, Vector3};
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
@@ -21,21 +36,107 @@ pub struct FrameSigma {
     pub wall_px: f64,
 }
 
-/// The covariance of every frame's pose: diagonal blocks of `H⁻¹` with H the normal matrix at the estimate
-/// (pixels weighted by their noise, plus prior, the gauge tied at the first frame).
+/// Covariances of the poses' steps `ξ = (ω, ρ)` ([`crate::trajectory::Pose::retract`]): rad², rad·m, m².
+#[derive(Clone, Debug)]
+pub struct Covariances {
+    /// Of every frame, all others marginalised.
+    pub frames: Vec<Matrix6<f64>>,
+    /// Of every frame (rows) with the next (columns); not a number where the two have nothing in common.
+    pub next: Vec<Matrix6<f64>>,
+    /// The factor c.
+    pub variance_factor: f64,
+}
+
+impl Covariances {
+    /// Of `frames` frames of which nothing is known.
+    pub(super) fn unknown(frames: usize) -> Self {
+        let unknown = Matrix6::from_element(f64::NAN);
+        Self {
+            frames: vec![unknown; frames],
+            next: vec![unknown; frames.saturating_sub(1)],
+            variance_factor: f64::NAN,
+        }
+    }
+
+    /// The covariances after all poses have moved along the gauge: positions turn with it, `ρ → R_y ρ`; rotations are in
+    /// the cameras' own axes.
+    pub(super) fn moved(mut self, motion: &GaugeMotion) -> Self {
+        let turn = so3::exp(&(Vector3::y() * motion.turn_rad));
+        let mut t = Matrix6::identity();
+        t.fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(turn.to_rotation_matrix().matrix());
+        for covariance in self.frames.iter_mut().chain(&mut self.next) {
+            *covariance = t * *covariance * t.transpose();
+        }
+        self
+    }
+
+    /// As `covariance.csv`: one line per frame and one per pair of neighbours.
+    ///
+    /// Columns: `frame_a`, `frame_b` (the same for a frame by itself, the next for a pair), 1-σ of the frame on the wall
+    /// in mm (empty for pairs), then the 36 elements row by row, rows `ξ_a` and columns `ξ_b` with
+    /// `ξ = (ω_x, ω_y, ω_z, ρ_x, ρ_y, ρ_z)`, rad and m, in the convention `R ← R exp(ω)`, `t ← t + ρ`.
+    pub fn csv(&self, sigmas: &[FrameSigma]) -> String {
+        let names = ["wx", "wy", "wz", "x", "y", "z"];
+        let mut text = "frame_a,frame_b,wall_sigma_mm".to_owned();
+        for a in names {
+            for b in names {
+                text += &format!(",{a}_{b}");
+            }
+        }
+        text.push('\n');
+        let mut line = |a: usize, b: usize, wall: String, covariance: &Matrix6<f64>| {
+            text += &format!("{a},{b},{wall}");
+            for value in covariance.transpose().iter() {
+                text += &format!(",{value:.9e}");
+            }
+            text.push('\n');
+        };
+        for (k, covariance) in self.frames.iter().enumerate() {
+            let wall = sigmas.get(k).map_or(String::new(), |s| format!("{:.6}", 1e3 * s.wall_m));
+            line(k, k, wall, covariance);
+            if let Some(next) = self.next.get(k) {
+                line(k, k + 1, String::new(), next);
+            }
+        }
+        text
+    }
+}
+
+/// The covariances at a solution: `normal` with the gauge tied, `scatter` V of the pixels, `prior` P, all on `pattern`.
 ///
 /// # Errors
 /// [`FactorError`] if the normal matrix is singular.
-pub fn frame_covariances(
+pub fn covariances(
     pattern: &Pattern,
-    symbolic: &Symbolic,
     normal: &NormalEquations,
-) -> Result<Vec<Matrix6<f64>>, FactorError> {
-    let factor = symbolic.factorise(pattern, normal, 0.0)?;
-    Ok((0..pattern.frames())
-        .into_par_iter()
-        .map(|k| factor.marginal(k).fixed_view::<6, 6>(0, 0).into_owned())
-        .collect())
+    scatter: &[Block],
+    prior: &[Block],
+) -> Result<Covariances, FactorError> {
+    let inverse = SelectedInverse::new(pattern, normal)?;
+    let count = pattern.frames();
+    let mut trace = 0.0;
+    for column in 0..count {
+        for &row in pattern.rows(column) {
+            if let (Some(place), Some(z)) = (pattern.place(row, column), inverse.block(row, column)) {
+                // Off the diagonal each block stands for its transpose, too.
+                let twice = if row == column { 1.0 } else { 2.0 };
+                trace += twice * z.component_mul(&(scatter[place] + prior[place])).sum();
+            }
+        }
+    }
+    let variance_factor = trace / (UNKNOWNS * count) as f64;
+    let pose = |block: Block| variance_factor * block.fixed_view::<6, 6>(0, 0).into_owned();
+    let unknown = Matrix6::from_element(f64::NAN);
+    Ok(Covariances {
+        frames: (0..count)
+            .map(|k| inverse.block(k, k).map_or(unknown, pose))
+            .collect(),
+        next: (1..count)
+            .map(|k| inverse.block(k - 1, k).map_or(unknown, pose))
+            .collect(),
+        variance_factor,
+    })
 }
 
 /// Reads a pose covariance as σ of rotation, translation and wall position.
@@ -70,5 +171,45 @@ pub fn frame_sigma(
         translation_m: (trace(3) / 3.0).sqrt(),
         wall_m: (wall / points).sqrt(),
         wall_px: (wall_px / points).sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_has_a_line_per_frame_and_pair_and_38_numbers_each() {
+        let mut covariances = Covariances::unknown(3);
+        covariances.next[1] = Matrix6::from_fn(|r, c| (10 * r + c) as f64);
+        let text = covariances.csv(&[]);
+        let lines: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+        assert_eq!(lines.len(), 6);
+        assert!(lines.iter().all(|line| line.len() == 39));
+        assert_eq!(lines[4][..2], ["1", "2"]);
+        // Row by row: the second number is row 0, column 1.
+        assert_eq!(lines[4][4].parse(), Ok(1.0));
+        assert_eq!(lines[4][9].parse(), Ok(10.0));
+        assert_eq!(lines[0][4], "wx_wy");
+    }
+
+    /// If the scatter is what the model says, so is the covariance; twice the scatter, twice the covariance.
+    #[test]
+    fn the_factor_follows_the_scatter() {
+        let pattern = Pattern::new(3, [(0, 1), (1, 2)]);
+        let mut normal = NormalEquations::zeros(&pattern);
+        for k in 0..3 {
+            normal.add_block(&pattern, k, k, &(Block::identity() * 4.0));
+        }
+        for k in 0..2 {
+            normal.add_block(&pattern, k, k + 1, &(Block::identity() * -1.0));
+        }
+        let none = vec![Block::zeros(); pattern.blocks()];
+        let one = covariances(&pattern, &normal, &normal.blocks, &none).unwrap();
+        assert!((one.variance_factor - 1.0).abs() < 1e-12);
+        let two = covariances(&pattern, &normal, &normal.blocks, &normal.blocks).unwrap();
+        assert!((two.frames[1] - one.frames[1] * 2.0).norm() < 1e-12);
+        assert!((one.frames[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
+        assert!((one.next[0][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
     }
 }

@@ -12,6 +12,7 @@
 //! linearises, [`problem`] reduces to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
 //! Tracking ([`track`]), window and global solve are drivers over the same parts.
 
+mod bound;
 mod consistency;
 mod covariance;
 mod coverage;
@@ -30,6 +31,7 @@ mod report;
 mod robust;
 mod run;
 mod search;
+mod selected_inverse;
 mod spectrum;
 mod tile;
 mod track;
@@ -37,6 +39,8 @@ mod view;
 mod visibility;
 mod wall;
 
+pub use bound::pose_bound;
+pub use covariance::{Covariances, FrameSigma};
 pub use gauss_newton::{SolveRecord, StopReason};
 pub use options::RefineOptions;
 pub use problem::ProblemError;

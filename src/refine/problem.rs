@@ -160,6 +160,8 @@ pub struct Problem<'a> {
     symbolic: Symbolic,
     sigma: f64,
     noise: NoiseModel,
+    /// True if the frames are known to be free of noise.
+    exact: bool,
 }
 
 impl<'a> Problem<'a> {
@@ -241,9 +243,24 @@ impl<'a> Problem<'a> {
                 floor: 1.0,
                 steepness: 0.0,
             },
+            exact: false,
         };
         problem.estimate_noise()?;
         Ok(problem)
+    }
+
+    /// The same for frames without noise, weighted as if each pixel had noise of `sigma` grey levels: no residual is
+    /// rejected, and all slopes are texture.
+    pub fn exact(self, sigma: f64) -> Self {
+        Self {
+            sigma,
+            noise: NoiseModel {
+                floor: f32::MAX,
+                steepness: 0.0,
+            },
+            exact: true,
+            ..self
+        }
     }
 
     /// The estimates of the active frames that the problem was made with.
@@ -411,7 +428,7 @@ impl<'a> Problem<'a> {
     /// but no less than [`LEAST_TEXTURE`], so that M stays positive semidefinite.
     fn texture_share(&self, tiles: &[TileSums]) -> Matrix4<f64> {
         let mut share = nalgebra::Vector4::repeat(1.0);
-        if self.level == 0 && self.held_frames() == 0 {
+        if self.level == 0 && self.held_frames() == 0 && !self.exact {
             for k in 0..2 {
                 let noise: f64 = tiles.iter().map(|tile| tile.slope_noise[k]).sum();
                 let all: f64 = tiles.iter().map(|tile| tile.features[(k, k)]).sum();
@@ -424,6 +441,20 @@ impl<'a> Problem<'a> {
 
     fn held_frames(&self) -> usize {
         self.participants.len() - self.active.len()
+    }
+
+    /// The prior's part of the normal matrix at the given estimates of the active frames.
+    pub fn prior_information(&self, active: &[FrameEstimate]) -> Vec<Block> {
+        let mut normal = NormalEquations::zeros(&self.pattern);
+        let estimates = self.with_active(active);
+        self.scene.prior.add(
+            &self.participants,
+            &estimates,
+            &self.active,
+            &self.pattern,
+            &mut normal,
+        );
+        normal.blocks
     }
 
     /// Stiffens the first compared frame against moving along the gauge, where the pixels say nothing and rounding

@@ -94,6 +94,8 @@ pub struct RefineReport {
     pub frames: Vec<FrameReport>,
     /// Frames whose pose rests on the prior.
     pub frames_on_prior: usize,
+    /// Factor by which the covariance exceeds that of independent noise: what aliasing adds.
+    pub variance_factor: f64,
     /// Why the last solve stopped, in words.
     pub stopped_because: String,
     /// Time by stage.

@@ -1,7 +1,7 @@
 //! From a survey to refined poses: load, track, solve globally coarse to fine, report.
 
 use super::consistency::{blurred, compare_pairs, contradictions};
-use super::covariance::{frame_covariances, frame_sigma};
+use super::covariance::{Covariances, covariances, frame_sigma};
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::examine::examine;
@@ -15,7 +15,6 @@ use crate::frames::FrameCache;
 use crate::progress::Progress;
 use crate::survey::Survey;
 use crate::trajectory::{StampedPose, Trajectory};
-use nalgebra::Matrix6;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -44,6 +43,8 @@ pub struct Refined {
     pub trajectory: Trajectory,
     /// What was done and how sure it is.
     pub report: RefineReport,
+    /// How sure it is, in full.
+    pub covariances: Covariances,
 }
 
 /// How much coarser the tolerances of all solves but the last are.
@@ -135,17 +136,23 @@ pub fn refine(
         }
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
-    let covariances = frame_covariances(
+    let covariances = covariances(
         solution.problem.pattern(),
-        solution.problem.symbolic(),
         &solution.linearisation.normal,
+        &solution.linearisation.scatter,
+        &solution.problem.prior_information(&solution.estimates),
     )
     // Poses without a covariance are still poses; they are reported as uncertain.
-    .unwrap_or_else(|_| vec![Matrix6::from_element(f64::NAN); count]);
+    .unwrap_or_else(|_| Covariances::unknown(count));
     let estimates = &tracked.estimates;
     let reports: Vec<FrameReport> = (0..count)
         .map(|k| {
-            let sigma = frame_sigma(scene.surface, scene.camera, &estimates[k], &covariances[k]);
+            let sigma = frame_sigma(
+                scene.surface,
+                scene.camera,
+                &estimates[k],
+                &covariances.frames[k],
+            );
             frame_report(survey, k, &solution, tracked.doubts[k].as_ref(), sigma)
         })
         .collect();
@@ -172,8 +179,10 @@ pub fn refine(
             levels,
             frames: reports,
             frames_on_prior: on_prior,
+            variance_factor: covariances.variance_factor,
             timings: clock.laps,
         },
+        covariances: covariances.moved(&motion),
     })
 }
 

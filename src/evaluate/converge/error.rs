@@ -2,6 +2,7 @@
 
 use crate::atomic::WriteError;
 use crate::evaluate::EvaluateError;
+use crate::refine::RefineError;
 use crate::simulate::SimulateError;
 use crate::survey::SurveyError;
 use std::path::PathBuf;
@@ -29,6 +30,9 @@ pub enum ConvergeError {
     /// A simulated survey cannot be read.
     #[error(transparent)]
     Survey(#[from] SurveyError),
+    /// A survey whose efficiency is asked for cannot be refined, or bounded.
+    #[error(transparent)]
+    Refine(#[from] RefineError),
     /// Poses cannot be judged.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),

@@ -21,6 +21,7 @@
 
 mod cell;
 mod draw;
+mod efficiency;
 mod error;
 mod lettering;
 mod log;
@@ -33,6 +34,7 @@ mod summary;
 mod table;
 
 pub use cell::{Cell, SweepWall};
+pub use efficiency::{Efficiency, PoseRms, efficiency};
 pub use error::ConvergeError;
 pub use majority::{MajorityError, majority_error};
 pub use options::{ConvergeOptions, TranslationScale};

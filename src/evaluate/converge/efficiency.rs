@@ -1,0 +1,273 @@
+//! How close the refinement comes to the Cramér–Rao bound, and whether the uncertainty it states is true.
+
+use super::draw::draw;
+use super::{Cell, ConvergeError, ConvergeOptions};
+use crate::atomic::{self, ScratchFolder};
+use crate::camera::Pinhole;
+use crate::evaluate::{normalised_errors, tied_errors};
+use crate::frames::{GreyImage, load_colour};
+use crate::progress::{Progress, Silent};
+use crate::refine::{Covariances, RefineOptions, pose_bound, refine};
+use crate::simulate::{self, SimulateOptions};
+use crate::surface::{Surface, wall_jacobian};
+use crate::survey::Survey;
+use crate::trajectory::{Pose, poses_of};
+use nalgebra::{Matrix6, Vector2, Vector6};
+use serde::Serialize;
+use std::fmt;
+use std::path::Path;
+use std::sync::Arc;
+
+/// 95 % of χ² with 6 degrees of freedom lie below.
+const CHI_SQUARE_95: f64 = 12.592;
+/// Variance that rounding to whole grey levels adds, grey levels².
+const ROUNDING: f64 = 1.0 / 12.0;
+
+/// Root mean squares over all frames but the first, where the gauge is fixed.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct PoseRms {
+    /// Rotation, degrees per axis.
+    pub rotation_deg: f64,
+    /// Translation, millimetres per axis.
+    pub translation_mm: f64,
+    /// Position on the wall of the frame's middle and corners, pixels of the frame.
+    pub wall_px: f64,
+}
+
+/// One cell of the test.
+#[derive(Clone, Debug, Serialize)]
+pub struct Efficiency {
+    /// The noise of the poses, and the wall.
+    pub cell: Cell,
+    /// 1-σ of the sensor's noise, grey levels.
+    pub noise_grey: f64,
+    /// Surveys, each with a wall and a trajectory of its own.
+    pub surveys: usize,
+    /// Errors made.
+    pub error: PoseRms,
+    /// Cramér–Rao bound without the prior.
+    pub bound: PoseRms,
+    /// Bayesian bound, with it.
+    pub bayesian_bound: PoseRms,
+    /// Error over bound, on the wall.
+    pub ratio: f64,
+    /// Error over Bayesian bound, on the wall.
+    pub bayesian_ratio: f64,
+    /// Mean normalised error squared of a frame; 6 if the stated covariances are true.
+    pub normalised_error: f64,
+    /// Share of frames whose 95 % ellipsoid holds the truth.
+    pub inside_95: f64,
+    /// Mean factor by which the covariance was enlarged for aliasing.
+    pub variance_factor: f64,
+}
+
+/// Mean squares being summed up.
+#[derive(Clone, Copy, Default)]
+struct Squares {
+    rotation: f64,
+    translation: f64,
+    wall: f64,
+    count: f64,
+}
+
+impl Squares {
+    /// Adds a frame's `E[ξξᵀ]`, expected or made.
+    fn add(&mut self, surface: &dyn Surface, camera: &Pinhole, pose: &Pose, square: &Matrix6<f64>) {
+        let trace = |first: usize| (0..3).map(|k| square[(first + k, first + k)]).sum::<f64>() / 3.0;
+        self.rotation += trace(0);
+        self.translation += trace(3);
+        let middle = Vector2::new(camera.cx, camera.cy);
+        let corners = camera.border(1, 0.0);
+        let (mut wall, mut points) = (0.0, 0.0);
+        for pixel in corners.iter().chain([&middle]) {
+            let ray = pose.r_wc * camera.ray(pixel.x, pixel.y);
+            if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
+                let a = wall_jacobian(pose, &surface.frame(hit.wall));
+                wall += (a * square * a.transpose()).trace() * (camera.fy / hit.range).powi(2);
+                points += 1.0;
+            }
+        }
+        self.wall += wall / points;
+        self.count += 1.0;
+    }
+
+    fn rms(&self) -> PoseRms {
+        let root = |sum: f64| (sum / self.count).sqrt();
+        PoseRms {
+            rotation_deg: root(self.rotation).to_degrees(),
+            translation_mm: 1e3 * root(self.translation),
+            wall_px: root(self.wall),
+        }
+    }
+}
+
+/// Runs `options.seeds` surveys of each cell and writes efficiency.json and efficiency.txt into `out`.
+///
+/// A sensor rounds to whole grey levels; the bounds are for its noise and the rounding's variance, 1/12, together.
+///
+/// # Errors
+/// [`ConvergeError`].
+pub fn efficiency(
+    options: &ConvergeOptions,
+    out: &Path,
+    progress: &dyn Progress,
+) -> Result<Vec<Efficiency>, ConvergeError> {
+    options.check()?;
+    atomic::create_folder(out)?;
+    let cells = options.cells();
+    progress.start("experiments", cells.len() * options.seeds as usize);
+    let mut table = Vec::new();
+    for cell in &cells {
+        let (mut error, mut bound) = (Squares::default(), Squares::default());
+        let mut bayesian = Squares::default();
+        let (mut normalised, mut factors) = (Vec::new(), 0.0);
+        let mut surveys = 0;
+        for seed in 1..=options.seeds {
+            progress.detail(&format!("{cell}, seed {seed}"));
+            let Some(survey) = draw(options, cell, seed)?.survey else {
+                progress.advance(1);
+                continue;
+            };
+            let run = one(&survey, out)?;
+            surveys += 1;
+            factors += run.variance_factor;
+            normalised.extend(run.normalised);
+            for k in 1..run.truth.len() {
+                let add = |squares: &mut Squares, square: &Matrix6<f64>| {
+                    squares.add(run.survey.surface.as_ref(), &run.survey.camera, &run.truth[k], square);
+                };
+                add(&mut error, &(run.errors[k] * run.errors[k].transpose()));
+                add(&mut bound, &run.bound.frames[k]);
+                add(&mut bayesian, &run.bayesian.frames[k]);
+            }
+            progress.advance(1);
+        }
+        let inside = normalised.iter().filter(|e| **e < CHI_SQUARE_95).count();
+        let frames = normalised.len().max(1) as f64;
+        table.push(Efficiency {
+            cell: cell.clone(),
+            noise_grey: options.noise_grey,
+            surveys,
+            error: error.rms(),
+            bound: bound.rms(),
+            bayesian_bound: bayesian.rms(),
+            ratio: error.rms().wall_px / bound.rms().wall_px,
+            bayesian_ratio: error.rms().wall_px / bayesian.rms().wall_px,
+            normalised_error: normalised.iter().sum::<f64>() / frames,
+            inside_95: inside as f64 / frames,
+            variance_factor: factors / surveys.max(1) as f64,
+        });
+    }
+    progress.finish();
+    let path = out.join("efficiency.json");
+    let json = serde_json::to_string_pretty(&table)
+        .map_err(|error| atomic::WriteError::new(&path, std::io::Error::other(error)))?
+        + "\n";
+    atomic::write_text(&path, &json)?;
+    let text: String = table.iter().map(|row| format!("{row}\n\n")).collect();
+    atomic::write_text(&out.join("efficiency.txt"), &text)?;
+    Ok(table)
+}
+
+/// One survey refined.
+struct Run {
+    survey: Survey,
+    truth: Vec<Pose>,
+    errors: Vec<Vector6<f64>>,
+    bound: Covariances,
+    bayesian: Covariances,
+    normalised: Vec<f64>,
+    variance_factor: f64,
+}
+
+/// Refines one survey and computes its bounds.
+fn one(options: &SimulateOptions, out: &Path) -> Result<Run, ConvergeError> {
+    let scratch = ScratchFolder::inside(out)?;
+    let folder = scratch.path().join("survey");
+    simulate::run(options, &folder, false, &Silent)?;
+    let survey = Survey::open(&folder)?;
+    let silent: Arc<dyn Progress> = Arc::new(Silent);
+    let refined = refine(&survey, &RefineOptions::default(), &silent)?;
+    let doubled = doubled_frames(options, &scratch.path().join("doubled"))?;
+    let noise = (options.noise_grey.powi(2) + ROUNDING).sqrt();
+    let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
+    let errors = tied_errors(
+        survey.surface.as_ref(),
+        &poses_of(&refined.trajectory),
+        &truth,
+    )?;
+    let normalised = normalised_errors(&errors, &refined.covariances.frames);
+    Ok(Run {
+        bound: pose_bound(&survey, &doubled, noise, false)?,
+        bayesian: pose_bound(&survey, &doubled, noise, true)?,
+        normalised: normalised.into_iter().flatten().collect(),
+        variance_factor: refined.covariances.variance_factor,
+        truth,
+        errors,
+        survey,
+    })
+}
+
+/// The frames of a survey without noise and with twice as many pixels along each axis.
+fn doubled_frames(options: &SimulateOptions, folder: &Path) -> Result<Vec<GreyImage>, ConvergeError> {
+    let doubled = SimulateOptions {
+        width: 2 * options.width,
+        height: 2 * options.height,
+        noise_grey: 0.0,
+        bits: simulate::Bits::Sixteen,
+        ..options.clone()
+    };
+    simulate::run(&doubled, folder, false, &Silent)?;
+    let survey = Survey::open(folder)?;
+    survey
+        .frames
+        .iter()
+        .map(|file| {
+            let picture = load_colour(file, doubled.width, doubled.height)
+                .map_err(crate::survey::SurveyError::from)?;
+            let data = picture.to_luma32f().into_raw();
+            Ok(GreyImage::new(
+                doubled.width as usize,
+                doubled.height as usize,
+                data.into_iter().map(|v| 255.0 * v).collect(),
+            ))
+        })
+        .collect()
+}
+
+impl fmt::Display for Efficiency {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} with noise of {} grey levels, {} surveys",
+            self.cell,
+            self.noise_grey,
+            self.surveys
+        )?;
+        writeln!(f, "{:22} {:>12} {:>14} {:>10}", "", "rotation °", "translation mm", "wall px")?;
+        let rows = [
+            ("error", &self.error),
+            ("Cramér–Rao bound", &self.bound),
+            ("Bayesian bound", &self.bayesian_bound),
+        ];
+        for (name, rms) in rows {
+            writeln!(
+                f,
+                "{name:22} {:>12.5} {:>14.4} {:>10.5}",
+                rms.rotation_deg, rms.translation_mm, rms.wall_px
+            )?;
+        }
+        writeln!(
+            f,
+            "error / bound {:.3}, error / Bayesian bound {:.3}",
+            self.ratio, self.bayesian_ratio
+        )?;
+        write!(
+            f,
+            "normalised error squared {:.2} (6 if the covariances are true), {:.1} % inside the 95 % ellipsoid, variance factor {:.2}",
+            self.normalised_error,
+            100.0 * self.inside_95,
+            self.variance_factor
+        )
+    }
+}
