@@ -21,6 +21,10 @@ use std::ops::Range;
 
 /// How far back overlap is looked for, frames.
 const FARTHEST: usize = 256;
+/// Frames of a long window, and frames placed between two of them: what short windows have bent a little, each a bit
+/// farther than the one before, is straightened by a look at several turns.
+const LONG_WINDOW: usize = 160;
+const LONG_STRIDE: usize = 30;
 /// Stopping rule of a window; the global solve does the rest.
 const WINDOW_STOPPING: Stopping = Stopping {
     max_iterations: 6,
@@ -113,6 +117,13 @@ pub fn track(
             for level in (finest..=coarsest).rev() {
                 solve_window(scene, level, first..k + 1, held, &mut tracked)?;
             }
+        }
+        if k > 0 && k % LONG_STRIDE == 0 {
+            let side = scene.camera.shorter_side();
+            let start = (k + 1).saturating_sub(LONG_WINDOW);
+            let held = if start == 0 { 0 } else { LONG_WINDOW / 8 };
+            let level = options.handover_level(side);
+            solve_window(scene, level, start..k + 1, held, &mut tracked)?;
         }
         footprints[k] = footprint(scene, k, &tracked)?;
         progress.advance(1);
