@@ -824,10 +824,12 @@ mod tests {
 
     /// Central differences of the cost against the gradient, unknown by unknown. The texture is eliminated
     /// and the loss robust; where frames agree but for their small displacements, the fused texture's
-    /// gradient is each frame's own, so the two must agree up to what sampling leaves (1 to 3 %).
+    /// gradient is each frame's own, so the two must agree up to what sampling leaves (1 to 3 %). (The frames have no noise,
+    /// so the loss is as narrow as it ever gets, and residuals must be well inside: at its shoulders S needs more
+    /// reweightings to be the minimiser than are worth their time on real data.)
     #[test]
     fn the_gradient_is_the_derivative_of_the_cost() {
-        let ring = Ring::new(5e-4);
+        let ring = Ring::new(1e-4);
         let problem = ring.problem();
         let gradient = problem.linearise(&ring.estimates).unwrap().normal.gradient;
         let steps = [2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 1e-3, 0.1];
@@ -843,6 +845,7 @@ mod tests {
                 };
                 let h = steps[unknown];
                 let numeric = (cost(h) - cost(-h)) / (2.0 * h);
+                
                 error += (numeric - gradient[frame][unknown]).powi(2);
                 size += numeric.powi(2);
             }

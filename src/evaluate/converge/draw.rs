@@ -86,7 +86,7 @@ mod tests {
     fn a_tame_survey_is_drawn_once_and_a_wild_one_again() {
         let tame = drawn(2.0, 1.0, 12);
         assert_eq!((tame.redraws, tame.survey.unwrap().seed), (0, 7));
-        let wild = drawn(14.0, 1.0, 12);
+        let wild = drawn(40.0, 1.0, 12);
         let survey = wild.survey.unwrap();
         assert!(wild.redraws > 0);
         assert_eq!(survey.seed, 7 + 1000 * wild.redraws);
