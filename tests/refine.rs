@@ -125,3 +125,109 @@ fn poses_in_the_wrong_direction_are_warned_of() {
     let warned = String::from_utf8_lossy(&output.stderr);
     assert!(warned.contains("camera-to-world"), "{warned}");
 }
+
+/// Root mean square wall error of a refined survey's believed frames, pixels, with the gauge fixed by them.
+fn believed_wall_px(survey: &Path, out: &Path) -> f64 {
+    let survey = tunnelstitch::survey::Survey::open(survey).unwrap();
+    let report: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    let believed = |k: usize| report["frames"][k]["flag"] == "photometric";
+    let poses = |trajectory: &tunnelstitch::trajectory::Trajectory| -> Vec<_> {
+        let all = tunnelstitch::trajectory::poses_of(trajectory);
+        let kept = all.into_iter().enumerate().filter(|(k, _)| believed(*k));
+        kept.map(|(_, pose)| pose).collect()
+    };
+    let refined = tunnelstitch::trajectory::tum::read(&out.join("poses.tum")).unwrap();
+    let error = tunnelstitch::evaluate::wall_error(
+        survey.surface.as_ref(),
+        &survey.camera,
+        &poses(&refined),
+        &poses(survey.truth.as_ref().unwrap()),
+    );
+    error.unwrap().px.rms
+}
+
+/// Simulates and refines; returns the folder with `survey` and `out`.
+fn repaired(options: &[&str]) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
+    let mut arguments = vec!["simulate", "free", "--out", text(&survey), "--quiet"];
+    arguments.extend(options);
+    succeed(&arguments);
+    succeed(&["refine", text(&survey), "--out", text(&out), "--quiet"]);
+    dir
+}
+
+/// Gain ±30 %, a lamp that falls to 40 % at the corners, glints on 3 % of the wall, things before it, 16 bits.
+#[test]
+fn uneven_light_glints_and_moving_things_do_no_harm() {
+    let light = "--frames 30 --size 480x360 --gain-percent 30 --bias-grey 5 --lamp-corner 0.4 \
+                 --specular-percent 3 --moving 2 --bits 16 --seed 4";
+    let dir = repaired(&light.split_whitespace().collect::<Vec<_>>());
+    let px = believed_wall_px(&dir.path().join("survey"), &dir.path().join("out"));
+    assert!(px < 0.15, "{px}");
+}
+
+/// Bad frames are named with the reason, and the others are as exact as without them.
+#[test]
+fn bad_frames_are_flagged_and_the_rest_stays_exact() {
+    let bad = "5:black,9:blurred,12:occluded,15:repeated,20-22:missing";
+    let options = ["--frames", "30", "--size", "480x360", "--seed", "6"];
+    let dir = repaired(&[&options[..], &["--bad-frames", bad]].concat());
+    let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
+    let report: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    let flagged: Vec<u64> = report["frames"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter(|frame| frame["flag"] != "photometric")
+        .map(|frame| frame["index"].as_u64().unwrap())
+        .collect();
+    assert_eq!(flagged, [5, 9, 12, 15]);
+    assert!(
+        report["frames"][15]["reason"]
+            .as_str()
+            .unwrap()
+            .contains("frame 14")
+    );
+    let px = believed_wall_px(&survey, &out);
+    assert!(px < 0.03, "{px}");
+
+    // A covariance for every frame and every pair of neighbours.
+    let table = std::fs::read_to_string(out.join("covariance.csv")).unwrap();
+    assert_eq!(table.lines().count(), 1 + 27 + 26);
+}
+
+/// One initial pose is 20° off: that frame stays there, is named, and the others do not suffer.
+#[test]
+fn a_wrong_prior_costs_one_frame() {
+    let dir = tempfile::tempdir().unwrap();
+    let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
+    let options = ["--frames", "24", "--size", "480x360", "--seed", "8"];
+    succeed(
+        &[
+            &["simulate", "free", "--out", text(&survey), "--quiet"],
+            &options[..],
+        ]
+        .concat(),
+    );
+    let path = survey.join("baseline.tum");
+    let mut baseline = tunnelstitch::trajectory::tum::read(&path).unwrap();
+    let turn = nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::y() * 0.35);
+    baseline[10].pose.r_wc *= turn;
+    std::fs::write(&path, tunnelstitch::trajectory::tum::format(&baseline)).unwrap();
+    succeed(&["refine", text(&survey), "--out", text(&out), "--quiet"]);
+    let report: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    for frame in report["frames"].as_array().unwrap() {
+        let expected = if frame["index"] == 10 {
+            "prior"
+        } else {
+            "photometric"
+        };
+        assert_eq!(frame["flag"], expected, "{frame}");
+    }
+    let px = believed_wall_px(&survey, &out);
+    assert!(px < 0.05, "{px}");
+}

@@ -140,7 +140,10 @@ pub fn run(arguments: &ConvergeArguments, terminal: &Terminal) -> Result<(), Fai
         for row in &table {
             terminal.say(format!("{row}\n"));
         }
-        terminal.say(format!("wrote {}", arguments.out.join("efficiency.json").display()));
+        terminal.say(format!(
+            "wrote {}",
+            arguments.out.join("efficiency.json").display()
+        ));
         return Ok(());
     }
     let swept = converge::run(

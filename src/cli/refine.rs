@@ -91,8 +91,16 @@ pub fn refine_into(
     })?;
     atomic::write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
     atomic::write_text(&out.join("refine.json"), &json)?;
-    let sigmas: Vec<_> = refined.report.frames.iter().map(|frame| frame.sigma).collect();
-    atomic::write_text(&out.join("covariance.csv"), &refined.covariances.csv(&sigmas))?;
+    let sigmas: Vec<_> = refined
+        .report
+        .frames
+        .iter()
+        .map(|frame| frame.sigma)
+        .collect();
+    atomic::write_text(
+        &out.join("covariance.csv"),
+        &refined.covariances.csv(&sigmas),
+    )?;
     Ok((refined, json))
 }
 

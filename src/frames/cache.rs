@@ -56,7 +56,7 @@ impl FrameCache {
     }
 
     /// Number of frames.
-    pub fn len(&self) -> usize {
+    pub fn frames(&self) -> usize {
         match &self.source {
             Source::Files(files, _) => files.len(),
             Source::Memory(pyramids) => pyramids.len(),

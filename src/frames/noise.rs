@@ -49,7 +49,11 @@ pub fn noise_at_level(level: usize) -> f64 {
         kernel = next;
     }
     let product = |shift: usize| -> f64 {
-        kernel.iter().zip(kernel.iter().skip(shift)).map(|(a, b)| a * b).sum()
+        kernel
+            .iter()
+            .zip(kernel.iter().skip(shift))
+            .map(|(a, b)| a * b)
+            .sum()
     };
     let axis = 2.0 / 3.0 * product(0) + product(1 << level) / 3.0;
     axis * axis
@@ -71,7 +75,12 @@ mod tests {
     #[test]
     fn noise_is_found_under_edges_and_light() {
         let image = noisy(3.0, |x, y| {
-            100.0 + 0.2 * x as f32 - 0.1 * y as f32 + if (x / 17 + y / 11) % 2 == 0 { 40.0 } else { 0.0 }
+            100.0 + 0.2 * x as f32 - 0.1 * y as f32
+                + if (x / 17 + y / 11) % 2 == 0 {
+                    40.0
+                } else {
+                    0.0
+                }
         });
         let sigma = noise_sigma(&image).unwrap();
         assert!((sigma / 3.0 - 1.0).abs() < 0.1, "{sigma}");

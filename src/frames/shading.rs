@@ -84,7 +84,10 @@ impl Shading {
     ///
     /// Full size: `u = 2^l u_l + (2^l − 1)/2`, the same point of the picture.
     pub fn at_level(&self, pixel: &Vector2<f64>, camera: &crate::camera::Pinhole) -> f64 {
-        let scale = (self.size.0 as f64 / f64::from(camera.width)).log2().round().exp2();
+        let scale = (self.size.0 as f64 / f64::from(camera.width))
+            .log2()
+            .round()
+            .exp2();
         self.at(&(pixel * scale + Vector2::repeat(0.5 * (scale - 1.0))))
     }
 
@@ -196,7 +199,8 @@ mod tests {
         };
         let mut image = GreyImage::new(64, 48, (0..64 * 48).map(picture).collect());
         let shading = Shading::of_mean(&image, size).unwrap();
-        let before = (shading.at(&Vector2::new(10.0, 40.0)) / shading.at(&Vector2::new(38.0, 20.0)))
+        let before = (shading.at(&Vector2::new(10.0, 40.0))
+            / shading.at(&Vector2::new(38.0, 20.0)))
             / (lamp(10.0, 40.0) / lamp(38.0, 20.0));
         assert!((before - 1.0).abs() < 0.01, "{before}");
         shading.divide(&mut image);
@@ -220,7 +224,10 @@ mod tests {
     #[test]
     fn division_agrees_with_the_value_at_a_pixel() {
         let mut delta = [0.0; TERMS];
-        delta.iter_mut().enumerate().for_each(|(k, d)| *d = 0.03 * ((k * 7) as f64).sin());
+        delta
+            .iter_mut()
+            .enumerate()
+            .for_each(|(k, d)| *d = 0.03 * ((k * 7) as f64).sin());
         let shading = Shading::none((40, 30)).changed(&delta);
         let mut image = GreyImage::new(40, 30, vec![1.0; 1200]);
         shading.divide(&mut image);

@@ -48,7 +48,11 @@ pub fn pose_bound(
         return Err(RefineError::NoOverlap);
     };
     let count = truth.len();
-    let times_s: Vec<f64> = survey.initial.iter().map(|stamped| stamped.time_s).collect();
+    let times_s: Vec<f64> = survey
+        .initial
+        .iter()
+        .map(|stamped| stamped.time_s)
+        .collect();
     let options = super::RefineOptions::default();
     let prior = Prior {
         jitter: survey.prior,
@@ -59,7 +63,9 @@ pub fn pose_bound(
         bias_sigma: options.bias_sigma,
     };
     let camera = doubled_camera(&survey.camera);
-    let frames = doubled.iter().map(|frame| Pyramid::new(as_pixels_see(frame), 1));
+    let frames = doubled
+        .iter()
+        .map(|frame| Pyramid::new(as_pixels_see(frame), 1));
     let frames = FrameCache::of_pyramids(frames.collect());
     let scene = Scene {
         surface: survey.surface.as_ref(),
@@ -90,8 +96,8 @@ pub fn pose_bound(
             *block -= of_pose(prior);
         }
     }
-    let inverse = SelectedInverse::new(pattern, &normal)
-        .map_err(|source| problem.factor_error(source))?;
+    let inverse =
+        SelectedInverse::new(pattern, &normal).map_err(|source| problem.factor_error(source))?;
     let pose = |row: usize, column: usize| {
         let block = inverse.block(row, column);
         block.map_or(Matrix6::from_element(f64::NAN), |block| {

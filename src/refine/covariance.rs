@@ -93,7 +93,9 @@ impl Covariances {
             text.push('\n');
         };
         for (k, covariance) in self.frames.iter().enumerate() {
-            let wall = sigmas.get(k).map_or(String::new(), |s| format!("{:.6}", 1e3 * s.wall_m));
+            let wall = sigmas
+                .get(k)
+                .map_or(String::new(), |s| format!("{:.6}", 1e3 * s.wall_m));
             line(k, k, wall, covariance);
             if let Some(next) = self.next.get(k) {
                 line(k, k + 1, String::new(), next);
@@ -118,7 +120,8 @@ pub fn covariances(
     let mut trace = 0.0;
     for column in 0..count {
         for &row in pattern.rows(column) {
-            if let (Some(place), Some(z)) = (pattern.place(row, column), inverse.block(row, column)) {
+            if let (Some(place), Some(z)) = (pattern.place(row, column), inverse.block(row, column))
+            {
                 // Off the diagonal each block stands for its transpose, too.
                 let twice = if row == column { 1.0 } else { 2.0 };
                 trace += twice * z.component_mul(&(scatter[place] + prior[place])).sum();

@@ -166,4 +166,3 @@ fn stretches(grid: &WallGrid, placed: &[Option<Placed>]) -> Vec<Stretch> {
     }
     stretches
 }
-

@@ -35,7 +35,7 @@ pub fn examine(
     coarsest: usize,
     progress: &dyn Progress,
 ) -> Result<Examined, ProblemError> {
-    let count = scene.frames.len();
+    let count = scene.frames.frames();
     progress.start("decoding", count);
     let mut doubts = Vec::with_capacity(count);
     let mut sums: Vec<[f64; 2]> = Vec::new();

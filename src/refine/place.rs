@@ -160,8 +160,8 @@ pub fn place(
         }
         // Where noise drowns the texture, nothing speaks against the pose; its σ will tell.
         let quality = likeness.match_quality().unwrap_or(1.0);
-        let deviation = scene.prior.deviation_cost(&expected.pose, &estimate.pose)
-            / expected.widened.powi(2);
+        let deviation =
+            scene.prior.deviation_cost(&expected.pose, &estimate.pose) / expected.widened.powi(2);
         if deviation > MOST_DEVIATION {
             return Ok(None);
         }
@@ -192,7 +192,10 @@ pub fn place(
         for hypothesis in search(scene, &wall, &portrait, &from, close, 2) {
             candidates.extend(refined(&hypothesis.pose)?);
         }
-        if candidates.iter().all(|c| c.score() < WORTH_ANOTHER * before) {
+        if candidates
+            .iter()
+            .all(|c| c.score() < WORTH_ANOTHER * before)
+        {
             break;
         }
     }
@@ -252,9 +255,11 @@ fn near(
         .enumerate()
         .map(|(k, (estimate, placed))| {
             let other = surroundings.run.start + k;
-            Ok(*placed
-                && other != frame
-                && trace(other, &estimate.pose)?.overlaps(&own, perimeter))
+            Ok(
+                *placed
+                    && other != frame
+                    && trace(other, &estimate.pose)?.overlaps(&own, perimeter),
+            )
         })
         .collect()
 }

@@ -1,8 +1,8 @@
 //! The photometric problem over a run of frames at one pyramid level: cost and normal equations.
 
+use super::coverage::Coverage;
 use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
 use super::factor::{FactorError, Symbolic};
-use super::coverage::Coverage;
 use super::grid::{TilePoints, WallGrid};
 use super::normal::{Block, NormalEquations, Pattern};
 use super::prior::Prior;
@@ -398,7 +398,9 @@ impl<'a> Problem<'a> {
         cost *= information;
         normal.blocks.iter_mut().for_each(|b| *b *= information);
         normal.gradient.iter_mut().for_each(|g| *g *= information);
-        scatter.iter_mut().for_each(|b| *b *= information * information);
+        scatter
+            .iter_mut()
+            .for_each(|b| *b *= information * information);
         cost += self.scene.prior.add(
             &self.participants,
             &estimates,
@@ -489,7 +491,8 @@ impl<'a> Problem<'a> {
         views: &[View],
     ) -> BlockSums {
         let tiles = &visibility.tiles[block.clone()];
-        let stretch_slots: Vec<Option<usize>> = self.coverage
+        let stretch_slots: Vec<Option<usize>> = self
+            .coverage
             .frames(stretch)
             .iter()
             .map(|k| self.slot(*k))
@@ -585,7 +588,11 @@ fn pixel_on_wall<'p>(
     ranges.sort_unstable_by(f64::total_cmp);
     let middle = ranges.get(ranges.len() / 2);
     let radius_m = surface.perimeter_m() / std::f64::consts::TAU;
-    middle.copied().unwrap_or(radius_m).min(LONGEST_VIEW_RADII * radius_m) / camera.fy
+    middle
+        .copied()
+        .unwrap_or(radius_m)
+        .min(LONGEST_VIEW_RADII * radius_m)
+        / camera.fy
 }
 
 impl Observer {
@@ -845,7 +852,7 @@ mod tests {
                 };
                 let h = steps[unknown];
                 let numeric = (cost(h) - cost(-h)) / (2.0 * h);
-                
+
                 error += (numeric - gradient[frame][unknown]).powi(2);
                 size += numeric.powi(2);
             }

@@ -80,7 +80,11 @@ pub fn refine(
         coarsest + 1,
         options.cache_bytes,
     );
-    let times_s: Vec<f64> = survey.initial.iter().map(|stamped| stamped.time_s).collect();
+    let times_s: Vec<f64> = survey
+        .initial
+        .iter()
+        .map(|stamped| stamped.time_s)
+        .collect();
     let prior = Prior {
         jitter: survey.prior,
         initial: survey.initial_poses(),
@@ -89,7 +93,11 @@ pub fn refine(
         log_gain_sigma: options.log_gain_sigma,
         bias_sigma: options.bias_sigma,
     };
-    let examined = examine(&scene(survey, &prior, &frames, 0.0), coarsest, progress.as_ref())?;
+    let examined = examine(
+        &scene(survey, &prior, &frames, 0.0),
+        coarsest,
+        progress.as_ref(),
+    )?;
     if examined.shading.is_some() {
         frames.set_shading(examined.shading);
     }
@@ -208,10 +216,7 @@ fn scene<'a>(
 /// them does not average out. On brick this alone is 0.05 px of wall error over two turns.
 ///
 /// All but the last only have to bring the estimate close for the next.
-fn stages(
-    options: &RefineOptions,
-    side: u32,
-) -> impl Iterator<Item = (Sampling, Stopping)> + '_ {
+fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling, Stopping)> + '_ {
     let last = Stopping {
         max_iterations: options.max_iterations,
         step_px: options.step_tolerance_px,

@@ -116,12 +116,11 @@ pub fn search(
                 .map(|found| {
                     let shift_m = found.shift * spacing;
                     // A camera that pitches up (about x) looks towards −h.
-                    let omega = Vector3::new(
-                        pitch - shift_m.y / hit.range,
-                        shift_m.x / hit.range,
-                        roll,
-                    );
-                    let prior: f64 = (0..3).map(|k| 0.5 * (omega[k] / sigma_rad[k]).powi(2)).sum();
+                    let omega =
+                        Vector3::new(pitch - shift_m.y / hit.range, shift_m.x / hit.range, roll);
+                    let prior: f64 = (0..3)
+                        .map(|k| 0.5 * (omega[k] / sigma_rad[k]).powi(2))
+                        .sum();
                     Peak {
                         pitch,
                         roll,
@@ -231,12 +230,7 @@ impl Correlator {
     }
 
     /// Local maxima of the correlation of the frame at `pose` over shifts, in samples.
-    fn correlate(
-        &self,
-        wall: &FusedWall,
-        portrait: &Portrait,
-        pose: &Pose,
-    ) -> Vec<Maximum> {
+    fn correlate(&self, wall: &FusedWall, portrait: &Portrait, pose: &Pose) -> Vec<Maximum> {
         let sampler = portrait.contrast(pose, &wall.origin);
         let unrolled: Vec<f32> = wall
             .points
@@ -245,9 +239,8 @@ impl Correlator {
             .collect();
         let transform = &self.transform;
         let columns = wall.lattice.columns;
-        let spread = |value: fn(f32) -> f32| {
-            transform.forward(place(transform, columns, &unrolled, value))
-        };
+        let spread =
+            |value: fn(f32) -> f32| transform.forward(place(transform, columns, &unrolled, value));
         let (contrast, square, mask) = (spread(|v| v), spread(|v| v * v), spread(|_| 1.0));
         let product = transform.correlate(&contrast, &self.contrast);
         let own = transform.correlate(&square, &self.mask);
@@ -255,9 +248,8 @@ impl Correlator {
         let samples = transform.correlate(&mask, &self.mask);
         let (reach_s, reach_h) = (self.reach.0 as i64, self.reach.1 as i64);
         let (width, height) = (transform.columns as i64, transform.rows as i64);
-        let index = |ds: i64, dh: i64| {
-            (dh.rem_euclid(height) * width + ds.rem_euclid(width)) as usize
-        };
+        let index =
+            |ds: i64, dh: i64| (dh.rem_euclid(height) * width + ds.rem_euclid(width)) as usize;
         let at = |ds: i64, dh: i64| -> f32 {
             let k = index(ds, dh);
             let energy = (own[k] * walls[k]).max(0.0).sqrt();
@@ -272,7 +264,8 @@ impl Correlator {
             for ds in -reach_s..=reach_s {
                 let c = at(ds, dh);
                 let peak = c > 0.0
-                    && (-1..=1).all(|y| (-1..=1).all(|x| (x, y) == (0, 0) || at(ds + x, dh + y) <= c));
+                    && (-1..=1)
+                        .all(|y| (-1..=1).all(|x| (x, y) == (0, 0) || at(ds + x, dh + y) <= c));
                 if peak {
                     maxima.push(Maximum {
                         shift: Vector2::new(ds as f64, dh as f64),
@@ -287,12 +280,7 @@ impl Correlator {
 }
 
 /// A lattice's values in a raster of the transform's size; 0 where there is none.
-fn place(
-    transform: &Transform,
-    columns: usize,
-    values: &[f32],
-    value: fn(f32) -> f32,
-) -> Vec<f32> {
+fn place(transform: &Transform, columns: usize, values: &[f32], value: fn(f32) -> f32) -> Vec<f32> {
     let mut raster = vec![0.0; transform.columns * transform.rows];
     let rows = raster.chunks_exact_mut(transform.columns);
     for (row, values) in rows.zip(values.chunks_exact(columns)) {

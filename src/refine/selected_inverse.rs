@@ -32,18 +32,20 @@ impl SelectedInverse {
     pub fn new(pattern: &Pattern, normal: &NormalEquations) -> Result<Self, FactorError> {
         let count = pattern.frames();
         let rows = fill(pattern);
-        let place = |rows: &[Vec<usize>], column: usize, row: usize| rows[column].binary_search(&row).ok();
+        let place =
+            |rows: &[Vec<usize>], column: usize, row: usize| rows[column].binary_search(&row).ok();
         // The lower triangle: the transposes of the pattern's upper blocks.
-        let mut factor: Vec<Vec<Block>> = rows.iter().map(|r| vec![Block::zeros(); r.len()]).collect();
+        let mut factor: Vec<Vec<Block>> =
+            rows.iter().map(|r| vec![Block::zeros(); r.len()]).collect();
         let mut diagonal = vec![Block::zeros(); count];
-        for column in 0..count {
+        for (column, pivot) in diagonal.iter_mut().enumerate() {
             for &row in pattern.rows(column) {
                 let Some(at) = pattern.place(row, column) else {
                     continue;
                 };
                 let block = &normal.blocks[at];
                 if row == column {
-                    diagonal[column] = block.symmetric_upper();
+                    *pivot = block.symmetric_upper();
                 } else if let Some(at) = place(&rows, row, column) {
                     factor[row][at] = block.transpose();
                 }
@@ -99,7 +101,11 @@ impl SelectedInverse {
         }
         let (late, early) = (row.max(column), row.min(column));
         let block = self.below[early].get(self.rows[early].binary_search(&late).ok()?)?;
-        Some(if row > column { *block } else { block.transpose() })
+        Some(if row > column {
+            *block
+        } else {
+            block.transpose()
+        })
     }
 }
 

@@ -116,10 +116,7 @@ mod tests {
         assert_eq!((w, h), (12, 8));
         let a: Vec<f32> = (0..w * h).map(|k| (1.7 * k as f32).sin()).collect();
         let b: Vec<f32> = (0..w * h).map(|k| (0.3 * (k * k) as f32).cos()).collect();
-        let c = transform.correlate(
-            &transform.forward(a.clone()),
-            &transform.forward(b.clone()),
-        );
+        let c = transform.correlate(&transform.forward(a.clone()), &transform.forward(b.clone()));
         for (dx, dy) in [(0, 0), (3, 1), (11, 7)] {
             let mut sum = 0.0;
             for y in 0..h {

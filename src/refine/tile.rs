@@ -175,7 +175,11 @@ impl TileWork {
                 least[k] = least[k].min(square);
             }
         }
-        if self.samples.len() < 4 { least } else { second }
+        if self.samples.len() < 4 {
+            least
+        } else {
+            second
+        }
     }
 
     /// Variance of `S(x + 1) − S(x − 1)` by the sensor's noise, grey levels².

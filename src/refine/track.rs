@@ -55,7 +55,10 @@ impl Tracked {
 
     /// Which frames of a run are believed.
     pub fn believed(&self, run: &Range<usize>) -> Vec<bool> {
-        self.doubts[run.clone()].iter().map(Option::is_none).collect()
+        self.doubts[run.clone()]
+            .iter()
+            .map(Option::is_none)
+            .collect()
     }
 }
 
@@ -69,7 +72,7 @@ pub fn track(
     doubts: Vec<Option<Doubt>>,
     progress: &dyn Progress,
 ) -> Result<Tracked, ProblemError> {
-    let count = scene.frames.len();
+    let count = scene.frames.frames();
     let mut tracked = Tracked {
         estimates: Vec::with_capacity(count),
         doubts,

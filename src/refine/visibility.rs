@@ -231,7 +231,11 @@ mod tests {
             );
             // At about the distance the grid was made for, a sample is about a pixel.
             assert!(observers.iter().all(|o| (0.4..2.0).contains(&o.pixels)));
-            assert!(observers.iter().any(|o| active.contains(&(o.frame as usize))));
+            assert!(
+                observers
+                    .iter()
+                    .any(|o| active.contains(&(o.frame as usize)))
+            );
         }
         let tiles: usize = found.blocks.iter().map(|block| block.len()).sum();
         assert_eq!(tiles, found.tiles.len());

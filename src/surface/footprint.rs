@@ -213,7 +213,10 @@ mod tests {
         assert_eq!(cut.s_max_m - cut.s_min_m, circle.perimeter_m());
         let across = facing(Vector3::zeros());
         let traced = Footprint::trace(&circle, &camera, &across).unwrap();
-        assert_eq!(Footprint::within(&circle, &camera, &across, 5.0), Ok(traced));
+        assert_eq!(
+            Footprint::within(&circle, &camera, &across, 5.0),
+            Ok(traced)
+        );
     }
 
     #[test]

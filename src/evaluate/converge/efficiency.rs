@@ -73,7 +73,8 @@ struct Squares {
 impl Squares {
     /// Adds a frame's `E[ξξᵀ]`, expected or made.
     fn add(&mut self, surface: &dyn Surface, camera: &Pinhole, pose: &Pose, square: &Matrix6<f64>) {
-        let trace = |first: usize| (0..3).map(|k| square[(first + k, first + k)]).sum::<f64>() / 3.0;
+        let trace =
+            |first: usize| (0..3).map(|k| square[(first + k, first + k)]).sum::<f64>() / 3.0;
         self.rotation += trace(0);
         self.translation += trace(3);
         let middle = Vector2::new(camera.cx, camera.cy);
@@ -134,7 +135,12 @@ pub fn efficiency(
             normalised.extend(run.normalised);
             for k in 1..run.truth.len() {
                 let add = |squares: &mut Squares, square: &Matrix6<f64>| {
-                    squares.add(run.survey.surface.as_ref(), &run.survey.camera, &run.truth[k], square);
+                    squares.add(
+                        run.survey.surface.as_ref(),
+                        &run.survey.camera,
+                        &run.truth[k],
+                        square,
+                    );
                 };
                 add(&mut error, &(run.errors[k] * run.errors[k].transpose()));
                 add(&mut bound, &run.bound.frames[k]);
@@ -209,7 +215,10 @@ fn one(options: &SimulateOptions, out: &Path) -> Result<Run, ConvergeError> {
 }
 
 /// The frames of a survey without noise and with twice as many pixels along each axis.
-fn doubled_frames(options: &SimulateOptions, folder: &Path) -> Result<Vec<GreyImage>, ConvergeError> {
+fn doubled_frames(
+    options: &SimulateOptions,
+    folder: &Path,
+) -> Result<Vec<GreyImage>, ConvergeError> {
     let doubled = SimulateOptions {
         width: 2 * options.width,
         height: 2 * options.height,
@@ -240,11 +249,13 @@ impl fmt::Display for Efficiency {
         writeln!(
             f,
             "{} with noise of {} grey levels, {} surveys",
-            self.cell,
-            self.noise_grey,
-            self.surveys
+            self.cell, self.noise_grey, self.surveys
         )?;
-        writeln!(f, "{:22} {:>12} {:>14} {:>10}", "", "rotation °", "translation mm", "wall px")?;
+        writeln!(
+            f,
+            "{:22} {:>12} {:>14} {:>10}",
+            "", "rotation °", "translation mm", "wall px"
+        )?;
         let rows = [
             ("error", &self.error),
             ("Cramér–Rao bound", &self.bound),

@@ -64,12 +64,10 @@ pub fn majority_error(
         frames: &offsets,
     };
     let mut best: Option<MajorityError> = None;
-    for proposer in 0..offsets.len() {
-        if offsets[proposer].is_some() {
-            let error = frames.errors(frames.shift(|frame| frame == proposer));
-            if best.as_ref().is_none_or(|best| better(&error, best)) {
-                best = Some(error);
-            }
+    for (proposer, _) in offsets.iter().enumerate().filter(|(_, o)| o.is_some()) {
+        let error = frames.errors(frames.shift(|frame| frame == proposer));
+        if best.as_ref().is_none_or(|best| better(&error, best)) {
+            best = Some(error);
         }
     }
     let Some(mut best) = best else {

@@ -170,8 +170,8 @@ fn judge(survey: &Survey, refined: &Refined, record: &mut RunRecord) -> Result<(
     record.false_successes = frames
         .iter()
         .zip(&error.frame_rms_px)
-        // Not "at least": what is no number is not good.
-        .filter(|(frame, px)| sure(frame.flag) && !(**px < GOOD_PX))
+        // What is no number is not good.
+        .filter(|(frame, px)| sure(frame.flag) && (px.is_nan() || **px >= GOOD_PX))
         .count();
     Ok(())
 }

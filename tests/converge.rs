@@ -1,0 +1,48 @@
+//! Convergence tests through the program, as small as they get.
+
+mod support;
+
+use support::{succeed, text};
+
+#[test]
+fn a_sweep_is_written_resumed_and_drawn() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("sweep");
+    let sweep = |seeds: &'static str| {
+        let options = "--rotation-deg 2 --jitter random-walk --frames 6 --size 160x120 --quiet";
+        let mut arguments = vec!["converge", "--out", text(&out), "--seeds", seeds];
+        arguments.extend(options.split(' '));
+        succeed(&arguments);
+        std::fs::read_to_string(out.join("runs.jsonl")).unwrap()
+    };
+    let first = sweep("2");
+    assert_eq!(first.lines().count(), 2);
+    // Nothing is done twice, not even timed again; one seed more is one line more.
+    assert_eq!(sweep("2"), first);
+    let more = sweep("3");
+    assert!(more.starts_with(&first) && more.lines().count() == 3);
+
+    let result: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("converge.json")).unwrap()).unwrap();
+    assert_eq!(result["cells"][0]["runs"], 3);
+    assert_eq!(result["cells"][0]["false_successes"], 0);
+    let map = image::open(out.join("converge.png")).unwrap();
+    assert!(map.width() > 100 && map.height() > 50);
+}
+
+#[test]
+fn the_efficiency_is_measured_against_the_bound() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("limit");
+    let options = "--efficiency --frames 14 --size 240x180 --seeds 1 --wall concrete --quiet";
+    let mut arguments = vec!["converge", "--out", text(&out)];
+    arguments.extend(options.split(' '));
+    succeed(&arguments);
+    let table: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("efficiency.json")).unwrap())
+            .unwrap();
+    let number = |name: &str| table[0][name].as_f64().unwrap();
+    // One survey scatters; far below the bound or far above would be a mistake in one of the two.
+    assert!((0.4..3.0).contains(&number("ratio")), "{table}");
+    assert!((1.0..20.0).contains(&number("normalised_error")), "{table}");
+}
