@@ -23,6 +23,9 @@ pub struct RefineArguments {
     /// Folder for the results; made if missing.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
+    /// Look at the wall once per pixel in the last solve instead of twice along each axis: about half the time.
+    #[arg(long)]
+    fast: bool,
     /// Steps of each global solve, at the most.
     #[arg(long, value_name = "N", default_value_t = RefineOptions::default().max_iterations, value_parser = clap::value_parser!(u64).range(1..))]
     max_iterations: u64,
@@ -52,7 +55,10 @@ struct ReportFile<'a> {
 pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), Failure> {
     let options = RefineOptions {
         max_iterations: arguments.max_iterations,
-        ..RefineOptions::default()
+        ..match arguments.fast {
+            true => RefineOptions::fast(),
+            false => RefineOptions::default(),
+        }
     };
     let (refined, json) = refine_into(&arguments.survey, &options, &arguments.out, terminal)?;
     if arguments.json {

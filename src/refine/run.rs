@@ -229,6 +229,7 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
     (0..=options.handover_level(side))
         .rev()
         .map(move |level| (Sampling::of(level), close(options, level)))
+        .filter(move |(sampling, _)| *sampling != finest)
         .chain([(finest, last)])
 }
 
