@@ -25,7 +25,7 @@ const LEAST_QUALITY: f64 = 0.6;
 /// ... or this in its finest detail.
 const LEAST_FINE_QUALITY: f64 = 0.85;
 /// Share of its weight that may contradict before a frame is doubted.
-const MOST_CONTRADICTION: f64 = 0.25;
+const MOST_CONTRADICTION: f64 = 0.15;
 /// A blurred frame has less than this share of the others' fine contrast (variance).
 const LEAST_SHARPNESS: f64 = 0.5;
 

@@ -53,8 +53,8 @@ const CLOSE: f64 = 20.0;
 const LEAST_PIXEL_SHARE: f64 = 0.02;
 /// Largest 1-σ on the wall of a pose that counts as photometric, pixels.
 const LARGEST_SIGMA_PX: f64 = 1.0;
-/// Least share of a frame's weight that the robust loss must leave.
-const LEAST_INLIER_SHARE: f64 = 0.8;
+/// Share of a frame's weight that the robust loss may reject: always, at the most, and as a multiple of the usual.
+const MOST_REJECTED: (f64, f64, f64) = (0.1, 0.3, 2.0);
 
 /// Refines the poses of `survey`.
 ///
@@ -153,6 +153,7 @@ pub fn refine(
     // Poses without a covariance are still poses; they are reported as uncertain.
     .unwrap_or_else(|_| Covariances::unknown(count));
     let estimates = &tracked.estimates;
+    let most = most_rejected(&solution.linearisation.frames);
     let reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = frame_sigma(
@@ -161,7 +162,14 @@ pub fn refine(
                 &estimates[k],
                 &covariances.frames[k],
             );
-            frame_report(survey, k, &solution, tracked.doubts[k].as_ref(), sigma)
+            frame_report(
+                survey,
+                k,
+                &solution,
+                tracked.doubts[k].as_ref(),
+                most,
+                sigma,
+            )
         })
         .collect();
     clock.lap("covariance");
@@ -275,16 +283,30 @@ fn recheck(
 const ROUNDS: usize = 3;
 /// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve does without them.
 fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) {
+    let most = most_rejected(shares);
     for (share, doubt) in shares.iter().zip(doubts) {
         if doubt.is_none() && share.pixels > 0.0 {
-            *doubt = disagreement(share);
+            *doubt = disagreement(share, most);
         }
     }
 }
 
-fn disagreement(share: &FrameShare) -> Option<Doubt> {
-    let rejected = 1.0 - share.inliers / share.pixels.max(1e-9);
-    (rejected > 1.0 - LEAST_INLIER_SHARE).then_some(Doubt::Disagrees { share: rejected })
+/// Share of its pixels that a believable frame may have rejected: a few times the usual, within limits.
+fn most_rejected(shares: &[FrameShare]) -> f64 {
+    let compared = shares.iter().filter(|share| share.pixels > 0.0);
+    let mut rejected: Vec<f64> = compared.map(rejected).collect();
+    rejected.sort_unstable_by(f64::total_cmp);
+    let usual = rejected.get(rejected.len() / 2).copied().unwrap_or(0.0);
+    (MOST_REJECTED.2 * usual).clamp(MOST_REJECTED.0, MOST_REJECTED.1)
+}
+
+fn rejected(share: &FrameShare) -> f64 {
+    1.0 - share.inliers / share.pixels.max(1e-9)
+}
+
+fn disagreement(share: &FrameShare, most: f64) -> Option<Doubt> {
+    let share = rejected(share);
+    (share > most).then_some(Doubt::Disagrees { share })
 }
 
 fn frame_report(
@@ -292,6 +314,7 @@ fn frame_report(
     k: usize,
     solution: &Solution,
     doubt: Option<&Doubt>,
+    most_rejected: f64,
     sigma: super::covariance::FrameSigma,
 ) -> FrameReport {
     let share: &FrameShare = &solution.linearisation.frames[k];
@@ -302,7 +325,7 @@ fn frame_report(
         Some(Doubt::NoOverlap {
             share: share.pixels / all,
         })
-    } else if let Some(doubt) = disagreement(share) {
+    } else if let Some(doubt) = disagreement(share, most_rejected) {
         Some(doubt)
     } else if sigma.wall_px.is_nan() || sigma.wall_px > LARGEST_SIGMA_PX {
         Some(Doubt::Uncertain {
