@@ -8,9 +8,17 @@
 //! over wall samples x ([`grid`]), with the wall's texture S eliminated exactly ([`tile`]); q is the number
 //! of pixels a sample stands for in a frame.
 //!
-//! `samples → linearise → reduce → solve → accept`: [`grid`] and [`visibility`] choose the samples, [`tile`]
-//! linearises, [`problem`] reduces to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
-//! Tracking ([`track`]), window and global solve are drivers over the same parts.
+//! | step | where |
+//! | --- | --- |
+//! | a first look: useless frames, common light, noise | [`examine`] |
+//! | one frame after another, sliding windows | [`track`]; a single frame: [`place`], [`search`] on the fused [`wall`] |
+//! | do overlapping frames show the same? take out, try again | [`consistency`], [`doubt`] |
+//! | all frames together, coarse to fine | [`run`](mod@run) |
+//! | how sure | [`covariance`]; how sure it could be at best: [`bound`] |
+//!
+//! Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`] and [`coverage`]
+//! choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, [`problem`] reduces
+//! to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
 
 mod bound;
 mod consistency;
