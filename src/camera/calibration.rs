@@ -1,6 +1,6 @@
 //! The calibration file `camera.json`.
 
-use super::Pinhole;
+use super::{Pinhole, Radial};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -59,12 +59,20 @@ struct CalibrationFile {
     fy: f64,
     cx: f64,
     cy: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    k1: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    k2: f64,
     #[serde(default)]
     pixel_centre: PixelCentre,
 }
 
-/// Reads `camera.json`: `model` ("pinhole"), `width`, `height`, `fx`, `fy`, `cx`, `cy` in pixels, and
-/// `pixel_centre` ("integer", the default, or "half").
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// Reads `camera.json`: `model` ("pinhole"), `width`, `height`, `fx`, `fy`, `cx`, `cy` in pixels, `k1`, `k2` (radial
+/// distortion, 0 if missing), and `pixel_centre` ("integer", the default, or "half").
 ///
 /// # Errors
 /// An unreadable file, an unknown or missing key (with line and column), or numbers that make no camera.
@@ -97,7 +105,12 @@ pub fn read_calibration(path: &Path) -> Result<Pinhole, CalibrationError> {
             )));
         }
     }
-    for (name, value) in [("cx", file.cx), ("cy", file.cy)] {
+    for (name, value) in [
+        ("cx", file.cx),
+        ("cy", file.cy),
+        ("k1", file.k1),
+        ("k2", file.k2),
+    ] {
         if !value.is_finite() {
             return Err(fail(format!("{name} is {value}; it must be a number")));
         }
@@ -106,14 +119,25 @@ pub fn read_calibration(path: &Path) -> Result<Pinhole, CalibrationError> {
         PixelCentre::Integer => 0.0,
         PixelCentre::Half => 0.5,
     };
-    Ok(Pinhole {
+    let camera = Pinhole {
         width: file.width,
         height: file.height,
         fx: file.fx,
         fy: file.fy,
         cx: file.cx - shift,
         cy: file.cy - shift,
-    })
+        radial: Radial {
+            k1: file.k1,
+            k2: file.k2,
+        },
+    };
+    if camera.field().is_none() {
+        return Err(fail(format!(
+            "k1 = {} and k2 = {} fold the picture back on itself before its corners; check them, and that fx and fy are in pixels",
+            file.k1, file.k2
+        )));
+    }
+    Ok(camera)
 }
 
 /// The text of a `camera.json` that [`read_calibration`] restores exactly.
@@ -126,6 +150,8 @@ pub fn format_calibration(camera: &Pinhole) -> String {
         fy: camera.fy,
         cx: camera.cx,
         cy: camera.cy,
+        k1: camera.radial.k1,
+        k2: camera.radial.k2,
         pixel_centre: PixelCentre::Integer,
     };
     // Numbers and plain names always serialise.
@@ -147,6 +173,12 @@ mod tests {
     fn round_trip_is_exact() {
         let camera = Pinhole::from_vertical_fov(640, 480, 1.0471975511965976);
         assert_eq!(read_text(&format_calibration(&camera)).unwrap(), camera);
+        let radial = Radial {
+            k1: -0.0512345678901,
+            k2: 0.003,
+        };
+        let camera = Pinhole { radial, ..camera };
+        assert_eq!(read_text(&format_calibration(&camera)).unwrap(), camera);
     }
 
     #[test]
@@ -160,8 +192,12 @@ mod tests {
     fn bad_files_say_where_and_what() {
         for (text, expected) in [
             (
-                r#"{"model":"pinhole","width": 40, "height": 20,"fx":3,"fy":3,"cx":2,"cy":1,"k1":0}"#,
-                "unknown field `k1`",
+                r#"{"model":"pinhole","width": 40, "height": 20,"fx":3,"fy":3,"cx":2,"cy":1,"k3":0}"#,
+                "unknown field `k3`",
+            ),
+            (
+                r#"{"model":"pinhole","width": 40, "height": 20,"fx":30,"fy":30,"cx":20,"cy":10,"k1":-2}"#,
+                "fold the picture",
             ),
             (
                 r#"{"model":"pinhole","width": 40, "height": 20,"fx":-3,"fy":3,"cx":2,"cy":1}"#,

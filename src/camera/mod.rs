@@ -6,6 +6,8 @@
 
 mod calibration;
 mod pinhole;
+mod radial;
 
 pub use calibration::{CalibrationError, format_calibration, read_calibration};
 pub use pinhole::Pinhole;
+pub use radial::Radial;

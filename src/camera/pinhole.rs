@@ -1,9 +1,11 @@
 //! The pinhole camera.
 
-use nalgebra::{Matrix2x3, Vector2, Vector3};
+use super::Radial;
+use nalgebra::{Matrix2x3, Matrix2x5, Vector2, Vector3};
 
-/// A pinhole camera: `u = fx x/z + cx`, `v = fy y/z + cy`, pixels counted from the centre of the first.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A pinhole camera: `u = fx x/z + cx`, `v = fy y/z + cy`, pixels counted from the centre of the first, with `(x/z, y/z)`
+/// distorted by the lens before ([`Radial`]).
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Pinhole {
     /// Width of the image, pixels.
     pub width: u32,
@@ -17,6 +19,9 @@ pub struct Pinhole {
     pub cx: f64,
     /// Principal point, v.
     pub cy: f64,
+    /// Distortion of the lens.
+    #[serde(flatten)]
+    pub radial: Radial,
 }
 
 impl Pinhole {
@@ -31,27 +36,73 @@ impl Pinhole {
             fy: f,
             cx: 0.5 * (f64::from(width) - 1.0),
             cy: 0.5 * (f64::from(height) - 1.0),
+            radial: Radial::default(),
         }
     }
 
-    /// The ray of a pixel in camera coordinates, `K⁻¹ (u, v, 1)ᵀ`; its z is 1.
+    /// The ray of a pixel in camera coordinates, `K⁻¹ (u, v, 1)ᵀ` with the distortion undone; its z is 1.
     pub fn ray(&self, u: f64, v: f64) -> Vector3<f64> {
-        Vector3::new((u - self.cx) / self.fx, (v - self.cy) / self.fy, 1.0)
+        let p = Vector2::new((u - self.cx) / self.fx, (v - self.cy) / self.fy);
+        if self.radial.is_none() {
+            return p.push(1.0);
+        }
+        self.radial.undistort(&p).push(1.0)
     }
 
-    /// The pixel of a point in camera coordinates, or `None` behind the camera.
+    /// `∂(x, y)/∂(ln f, cx, cy, k1, k2)` of the ray `(x, y, 1)` of a fixed pixel, with fx and fy growing alike.
+    ///
+    /// The pixel fixes `K p_d`, so that `∂p_d = −(p_d ∂ln f, ∂cx/fx, ∂cy/fy)`, and
+    /// `∂p = (∂p_d/∂p)⁻¹ (∂p_d − p (q ∂k1 + q² ∂k2))` with p, q, p_d as in [`Radial`].
+    pub fn ray_jacobian(&self, ray: &Vector3<f64>) -> Matrix2x5<f64> {
+        let p = ray.xy();
+        let q = p.norm_squared();
+        let p_d = p * self.radial.factor(q);
+        let columns = [
+            -p_d,
+            Vector2::new(-1.0 / self.fx, 0.0),
+            Vector2::new(0.0, -1.0 / self.fy),
+            -p * q,
+            -p * (q * q),
+        ];
+        self.radial.inverse_jacobian(&p) * Matrix2x5::from_columns(&columns)
+    }
+
+    /// The pixel of a point in camera coordinates, or `None` behind the camera or where the lens would fold the picture.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
-        (x_c.z > 0.0).then(|| {
-            Vector2::new(
-                self.fx * x_c.x / x_c.z + self.cx,
-                self.fy * x_c.y / x_c.z + self.cy,
-            )
+        if self.radial.is_none() {
+            return (x_c.z > 0.0).then(|| {
+                Vector2::new(
+                    self.fx * x_c.x / x_c.z + self.cx,
+                    self.fy * x_c.y / x_c.z + self.cy,
+                )
+            });
+        }
+        let p = x_c.xy() / x_c.z;
+        let q = p.norm_squared();
+        (x_c.z > 0.0 && q < self.radial.limit()).then(|| {
+            let p_d = p * self.radial.factor(q);
+            Vector2::new(self.fx * p_d.x + self.cx, self.fy * p_d.y + self.cy)
         })
+    }
+
+    /// The largest `|(x/z, y/z)|²` within the picture, out to the pixels' outer corners, if the lens is one-to-one that far;
+    /// else `None`.
+    pub fn field(&self) -> Option<f64> {
+        let limit = self.radial.limit();
+        let farthest = self
+            .border(1, 0.5)
+            .iter()
+            .map(|corner| self.ray(corner.x, corner.y).xy().norm_squared())
+            .fold(0.0, f64::max);
+        (farthest < limit).then_some(farthest)
     }
 
     /// Projects many points at once, in single precision: on entry `x`, `y`, `z` are camera coordinates, on
     /// return `x` and `y` hold u and v. Points behind the camera give meaningless pixels.
     pub fn project_slices(&self, x: &mut [f32], y: &mut [f32], z: &[f32]) {
+        if !self.radial.is_none() {
+            self.distort_slices(x, y, z);
+        }
         let (fx, fy) = (self.fx as f32, self.fy as f32);
         let (cx, cy) = (self.cx as f32, self.cy as f32);
         for ((x, y), z) in x.iter_mut().zip(y.iter_mut()).zip(z) {
@@ -61,18 +112,25 @@ impl Pinhole {
         }
     }
 
+    /// Moves points across their rays to where a lens without distortion would show them as this one does.
+    fn distort_slices(&self, x: &mut [f32], y: &mut [f32], z: &[f32]) {
+        let (k1, k2) = (self.radial.k1 as f32, self.radial.k2 as f32);
+        let limit = self.radial.limit() as f32;
+        for ((x, y), z) in x.iter_mut().zip(y.iter_mut()).zip(z) {
+            let q = ((*x * *x + *y * *y) / (z * z)).min(limit);
+            let factor = 1.0 + q * (k1 + q * k2);
+            *x *= factor;
+            *y *= factor;
+        }
+    }
+
     /// `∂(u, v)/∂x_c`, pixels per metre, for a point in front of the camera.
     pub fn project_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
         let inverse = 1.0 / x_c.z;
         let (x, y) = (x_c.x * inverse, x_c.y * inverse);
-        Matrix2x3::new(
-            self.fx * inverse,
-            0.0,
-            -self.fx * x * inverse,
-            0.0,
-            self.fy * inverse,
-            -self.fy * y * inverse,
-        )
+        let central = Matrix2x3::new(inverse, 0.0, -x * inverse, 0.0, inverse, -y * inverse);
+        let focal = nalgebra::Matrix2::new(self.fx, 0.0, 0.0, self.fy);
+        focal * self.radial.jacobian(&Vector2::new(x, y)) * central
     }
 
     /// Pixels of the image's shorter side.
@@ -101,6 +159,7 @@ impl Pinhole {
             fy: self.fy * scale,
             cx: (self.cx + 0.5) * scale - 0.5,
             cy: (self.cy + 0.5) * scale - 0.5,
+            radial: self.radial,
         }
     }
 
@@ -138,15 +197,72 @@ mod tests {
             fy: 417.0,
             cx: 318.0,
             cy: 241.0,
+            radial: Radial {
+                k1: -0.06,
+                k2: 0.01,
+            },
         }
     }
 
     #[test]
     fn projection_inverts_the_ray() {
+        for radial in [Radial::default(), camera().radial] {
+            let camera = Pinhole { radial, ..camera() };
+            let pixel = camera.project(&(camera.ray(100.25, 33.5) * 2.7)).unwrap();
+            assert!((pixel - Vector2::new(100.25, 33.5)).norm() < 1e-10);
+            assert!(camera.project(&Vector3::new(0.0, 0.0, -1.0)).is_none());
+        }
+    }
+
+    #[test]
+    fn slices_are_projected_like_points() {
+        for radial in [Radial::default(), camera().radial] {
+            let camera = Pinhole { radial, ..camera() };
+            let x_c = Vector3::new(0.7, -0.4, 1.5);
+            let (mut x, mut y) = ([x_c.x as f32], [x_c.y as f32]);
+            camera.project_slices(&mut x, &mut y, &[x_c.z as f32]);
+            let pixel = camera.project(&x_c).unwrap();
+            assert!((f64::from(x[0]) - pixel.x).abs() < 1e-3);
+            assert!((f64::from(y[0]) - pixel.y).abs() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_lens_that_folds_the_picture_has_no_field() {
+        let lens = |k1| Pinhole {
+            radial: Radial { k1, k2: 0.0 },
+            ..camera()
+        };
+        assert!(lens(-0.1).field().is_some());
+        assert!(lens(-0.4).field().is_none());
+        // 1 / (3 · 0.4) is less than 1.
+        assert!(lens(-0.4).project(&Vector3::new(1.0, 0.0, 1.0)).is_none());
+    }
+
+    #[test]
+    fn the_ray_follows_the_intrinsics_as_central_differences_do() {
         let camera = camera();
-        let pixel = camera.project(&(camera.ray(100.25, 33.5) * 2.7)).unwrap();
-        assert!((pixel - Vector2::new(100.25, 33.5)).norm() < 1e-10);
-        assert!(camera.project(&Vector3::new(0.0, 0.0, -1.0)).is_none());
+        let (u, v) = (560.0, 70.0);
+        let analytic = camera.ray_jacobian(&camera.ray(u, v));
+        let step = 1e-6;
+        for k in 0..5 {
+            let moved = |amount: f64| {
+                let mut camera = camera;
+                match k {
+                    0 => {
+                        camera.fx *= amount.exp();
+                        camera.fy *= amount.exp();
+                    }
+                    1 => camera.cx += amount,
+                    2 => camera.cy += amount,
+                    3 => camera.radial.k1 += amount,
+                    _ => camera.radial.k2 += amount,
+                }
+                camera.ray(u, v).xy()
+            };
+            let numeric = (moved(step) - moved(-step)) / (2.0 * step);
+            assert!((numeric - analytic.column(k)).norm() < 1e-8, "column {k}");
+        }
     }
 
     #[test]

@@ -3,9 +3,10 @@
 use super::{Failure, Terminal, json};
 use crate::PROGRAM;
 use crate::atomic;
+use crate::camera::format_calibration;
 use crate::progress::Progress;
-use crate::refine::{FrameFlag, RefineOptions, RefineReport, Refined, refine};
-use crate::survey::{Survey, SurveyFile};
+use crate::refine::{CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, refine};
+use crate::survey::{CalibrationGroup, SURVEY_FILE, Survey, SurveyFile};
 use crate::trajectory::tum;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -26,12 +27,47 @@ pub struct RefineArguments {
     /// Look at the wall once per pixel in the last solve instead of twice along each axis: about half the time.
     #[arg(long)]
     fast: bool,
+    /// Estimate what all frames share, too: focal, centre, distortion, radius, axis, or all, with commas between. How far
+    /// off the given values may be is said by [calibrate] in survey.toml. Writes camera.json and survey.toml into DIR, for
+    /// the other commands.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    calibrate: Option<Vec<CalibrateArgument>>,
     /// Steps of each global solve, at the most.
     #[arg(long, value_name = "N", default_value_t = RefineOptions::default().max_iterations, value_parser = clap::value_parser!(u64).range(1..))]
     max_iterations: u64,
     /// Print refine.json on standard output instead of the summary.
     #[arg(long)]
     json: bool,
+}
+
+/// What `--calibrate` takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum CalibrateArgument {
+    /// Focal length; fx and fy grow alike.
+    Focal,
+    /// Principal point.
+    Centre,
+    /// Radial distortion, k1 and k2.
+    Distortion,
+    /// The tunnel's radius.
+    Radius,
+    /// Where the frame of the initial poses has the tunnel's axis.
+    Axis,
+    /// All of these.
+    All,
+}
+
+impl CalibrateArgument {
+    fn groups(self) -> Vec<CalibrationGroup> {
+        match self {
+            Self::Focal => vec![CalibrationGroup::Focal],
+            Self::Centre => vec![CalibrationGroup::Centre],
+            Self::Distortion => vec![CalibrationGroup::Distortion],
+            Self::Radius => vec![CalibrationGroup::Radius],
+            Self::Axis => vec![CalibrationGroup::Axis],
+            Self::All => CalibrationGroup::ALL.to_vec(),
+        }
+    }
 }
 
 /// `refine.json`.
@@ -55,6 +91,10 @@ struct ReportFile<'a> {
 pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), Failure> {
     let options = RefineOptions {
         max_iterations: arguments.max_iterations,
+        calibrate: arguments
+            .calibrate
+            .as_ref()
+            .map(|list| list.iter().flat_map(|group| group.groups()).collect()),
         ..match arguments.fast {
             true => RefineOptions::fast(),
             false => RefineOptions::default(),
@@ -70,6 +110,14 @@ pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), 
             arguments.out.join("poses.tum").display(),
             arguments.out.join("refine.json").display()
         ));
+        if refined.report.calibration.is_some() {
+            let (out, poses) = (&arguments.out, arguments.out.join("poses.tum"));
+            terminal.say(format!(
+                "with the refined calibration, {0} is a survey: tunnelstitch stitch {0} --poses {1} --out panorama.png",
+                out.display(),
+                poses.display()
+            ));
+        }
     }
     Ok(())
 }
@@ -86,6 +134,14 @@ pub fn refine_into(
 ) -> Result<(Refined, String), Failure> {
     let survey = Survey::open(survey_path)?;
     atomic::create_folder(out)?;
+    let survey_section = survey.file.calibrate.as_ref();
+    let asked = options
+        .calibrate
+        .as_ref()
+        .or(survey_section.map(|section| &section.unknowns));
+    if asked.is_some_and(|groups| !groups.is_empty()) {
+        check_apart(&survey.folder, out)?;
+    }
     let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
     let refined = refine(&survey, options, &progress)?;
     let json = json::text(&ReportFile {
@@ -107,7 +163,78 @@ pub fn refine_into(
         &out.join("covariance.csv"),
         &refined.covariances.csv(&sigmas),
     )?;
+    if let Some(calibration) = &refined.report.calibration {
+        let file =
+            calibrated(&survey, calibration).map_err(|error| Failure::bug(error.to_string()))?;
+        let camera = format_calibration(&calibration.camera);
+        atomic::write_text(&out.join(CAMERA_FILE), &camera)?;
+        atomic::write_text(&out.join(SURVEY_FILE), &file)?;
+    }
     Ok((refined, json))
+}
+
+/// Name of the refined calibration.
+const CAMERA_FILE: &str = "camera.json";
+
+/// Refuses to write the refined calibration over the survey's own.
+fn check_apart(survey: &Path, out: &Path) -> Result<(), Failure> {
+    match (survey.canonicalize(), out.canonicalize()) {
+        (Ok(survey), Ok(folder)) if survey == folder => Err(Failure::input(format!(
+            "{}: with --calibrate, --out must not be the survey's own folder, whose {SURVEY_FILE} would be replaced",
+            out.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The text of a `survey.toml` with the refined calibration and the survey's own frames and poses.
+fn calibrated(
+    survey: &Survey,
+    calibration: &CalibrationReport,
+) -> Result<String, toml::ser::Error> {
+    let folder = std::path::absolute(&survey.folder).unwrap_or_else(|_| survey.folder.clone());
+    let mut file = survey.file.clone();
+    file.tunnel.radius_m = calibration.radius_m;
+    file.camera.file = CAMERA_FILE.into();
+    let escaped = glob::Pattern::escape(&folder.to_string_lossy());
+    let images = Path::new(&escaped).join(&file.frames.images);
+    file.frames.images = images.to_string_lossy().into_owned();
+    file.poses.initial = folder.join(&file.poses.initial);
+    file.poses.truth = file.poses.truth.map(|truth| folder.join(truth));
+    file.calibrate = None;
+    Ok(format!(
+        "# The survey with the calibration that refine has found.\n{}",
+        toml::to_string(&file)?
+    ))
+}
+
+fn summarise_calibration(calibration: &CalibrationReport, terminal: &Terminal) {
+    terminal.say("  calibration              given     estimate          1-σ   (prior 1-σ)");
+    for unknown in &calibration.unknowns {
+        let unit = match unknown.unit {
+            "1" => "",
+            unit => unit,
+        };
+        terminal.say(format!(
+            "  {:<13} {:>3} {:>12.5} {:>12.5} {:>12.5}   ({:.5}){}",
+            unknown.name,
+            unit,
+            unknown.initial,
+            unknown.estimate,
+            unknown.sigma,
+            unknown.prior_sigma,
+            if unknown.observed {
+                ""
+            } else {
+                "   not observable"
+            },
+        ));
+    }
+    for unknown in &calibration.unknowns {
+        if let Some(reason) = &unknown.reason {
+            terminal.warn(format!("  {} stays as given: {reason}", unknown.name));
+        }
+    }
 }
 
 /// Prints what the refinement did.
@@ -137,6 +264,9 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
         1e3 * mean(&|f| f.sigma.wall_m),
         mean(&|f| f.sigma.wall_px),
     ));
+    if let Some(calibration) = &report.calibration {
+        summarise_calibration(calibration, terminal);
+    }
     let seconds: f64 = report.timings.iter().map(|t| t.seconds).sum();
     let stages: Vec<String> = report
         .timings

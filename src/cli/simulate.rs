@@ -59,6 +59,22 @@ pub struct SimulateArguments {
     /// Vertical field of view, degrees.
     #[arg(long, value_name = "DEG", default_value_t = 60.0)]
     fov_deg: f64,
+    /// Radial distortion of the lens: k1 in OpenCV's convention. The field of view is that without distortion.
+    #[arg(
+        long,
+        value_name = "K1",
+        default_value_t = 0.0,
+        allow_hyphen_values = true
+    )]
+    k1: f64,
+    /// The same: k2.
+    #[arg(
+        long,
+        value_name = "K2",
+        default_value_t = 0.0,
+        allow_hyphen_values = true
+    )]
+    k2: f64,
     /// Noise on the plan: errors that add up from frame to frame, or each frame on its own [default: none; free:
     /// random-walk].
     #[arg(long, value_enum)]
@@ -191,6 +207,7 @@ impl SimulateArguments {
             width: self.size[0],
             height: self.size[1],
             vertical_fov_deg: self.fov_deg,
+            distortion: [self.k1, self.k2],
             jitter: self.jitter_of(preset.jitter),
             wall,
             light: match self.light {

@@ -13,6 +13,7 @@
 //!
 //! Source: C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection, Estimation, and Modulation Theory", 1968.
 
+use super::calibration::{Calibration, Kappa};
 use super::covariance::Covariances;
 use super::estimate::FrameEstimate;
 use super::normal::Block;
@@ -69,7 +70,9 @@ pub fn pose_bound(
     let frames = FrameCache::of_pyramids(frames.collect());
     let scene = Scene {
         surface: survey.surface.as_ref(),
-        camera: &camera,
+        camera,
+        calibration: Calibration::none(&camera),
+        kappa: Kappa::zeros(),
         frames: &frames,
         prior: &prior,
         noise: 0.0,
@@ -91,7 +94,7 @@ pub fn pose_bound(
     let mut normal = problem.linearise(&estimates)?.normal;
     let pattern = problem.pattern();
     if !bayesian {
-        let prior = problem.prior_information(&estimates);
+        let (prior, _) = problem.prior_information(&estimates, &Kappa::zeros());
         for (block, prior) in normal.blocks.iter_mut().zip(&prior) {
             *block -= of_pose(prior);
         }
@@ -129,6 +132,7 @@ fn doubled_camera(camera: &Pinhole) -> Pinhole {
         fy: 2.0 * camera.fy,
         cx: 2.0 * camera.cx,
         cy: 2.0 * camera.cy,
+        radial: camera.radial,
     }
 }
 

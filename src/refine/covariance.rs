@@ -18,10 +18,11 @@ use super::estimate::{FrameEstimate, UNKNOWNS};
 use super::factor::FactorError;
 use super::normal::{Block, NormalEquations, Pattern};
 use super::selected_inverse::SelectedInverse;
+use super::shared::{BorderBlock, SharedBlock};
 use crate::camera::Pinhole;
 use crate::surface::{GaugeMotion, Surface, wall_jacobian};
 use crate::trajectory::so3;
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
@@ -56,6 +57,27 @@ impl Covariances {
             next: vec![unknown; frames.saturating_sub(1)],
             variance_factor: f64::NAN,
         }
+    }
+
+    /// The covariances with the shared unknowns uncertain, too: `Z + W Σ_κ Wᵀ`.
+    pub(super) fn with_shared(mut self, w: &[BorderBlock], covariance: &SharedBlock) -> Self {
+        let pose = |k: usize| w[k].fixed_rows::<6>(0).into_owned();
+        for (k, frame) in self.frames.iter_mut().enumerate() {
+            *frame += pose(k) * covariance * pose(k).transpose();
+        }
+        for (k, next) in self.next.iter_mut().enumerate() {
+            *next += pose(k) * covariance * pose(k + 1).transpose();
+        }
+        self
+    }
+
+    /// The covariances after all positions have been multiplied by `scale`.
+    pub(super) fn scaled(mut self, scale: f64) -> Self {
+        let d = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, scale, scale, scale));
+        for covariance in self.frames.iter_mut().chain(&mut self.next) {
+            *covariance = d * *covariance * d;
+        }
+        self
     }
 
     /// The covariances after all poses have moved along the gauge: positions turn with it, `ρ → R_y ρ`; rotations are in

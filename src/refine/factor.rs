@@ -8,6 +8,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
+use nalgebra::SMatrix;
 
 /// Why the normal equations could not be solved.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -132,6 +133,28 @@ impl Factor<'_> {
             Par::Seq,
             MemStack::new(&mut MemBuffer::new(scratch)),
         );
+    }
+
+    /// `H⁻¹ B` of a matrix B with C columns, given and returned frame by frame.
+    pub fn solve<const C: usize>(
+        &self,
+        blocks: &[SMatrix<f64, UNKNOWNS, C>],
+    ) -> Vec<SMatrix<f64, UNKNOWNS, C>> {
+        let n = blocks.len() * UNKNOWNS;
+        let mut rhs = Vec::with_capacity(n * C);
+        for column in 0..C {
+            rhs.extend(
+                blocks
+                    .iter()
+                    .flat_map(|b| b.column(column).into_owned().data.0[0]),
+            );
+        }
+        self.solve_in_place(&mut rhs, C);
+        let value =
+            |frame: usize, row: usize, column: usize| rhs[column * n + frame * UNKNOWNS + row];
+        (0..blocks.len())
+            .map(|frame| SMatrix::from_fn(|row, column| value(frame, row, column)))
+            .collect()
     }
 
     /// The step `δ` of `H δ = −g`.

@@ -1,6 +1,8 @@
 //! Damped Gauss–Newton on the manifold of poses, as a solver for argmin's executor.
 
+use super::calibration::Kappa;
 use super::estimate::{FrameEstimate, UNKNOWNS};
+use super::factor::FactorError;
 use super::problem::{Linearisation, Problem, ProblemError};
 use crate::progress::Progress;
 use argmin::core::observers::{Observe, ObserverMode};
@@ -61,13 +63,18 @@ pub struct Solution<'a> {
     pub problem: Problem<'a>,
     /// Estimates of the active frames.
     pub estimates: Vec<FrameEstimate>,
+    /// The shared unknowns.
+    pub kappa: Kappa,
     /// Cost and normal equations there.
     pub linearisation: Linearisation,
     /// Its course.
     pub record: SolveRecord,
 }
 
-type Iterate = IterState<Vec<FrameEstimate>, (), (), (), (), f64>;
+/// What is estimated: the active frames and the shared unknowns.
+type Unknowns = (Vec<FrameEstimate>, Kappa);
+
+type Iterate = IterState<Unknowns, (), (), (), (), f64>;
 
 /// First damping tried after a rejected step, and the factor between tries.
 const DAMPING: (f64, f64) = (1e-4, 10.0);
@@ -117,9 +124,9 @@ impl DampedGaussNewton {
     fn advance(
         &mut self,
         problem: &Problem,
-        estimates: &[FrameEstimate],
+        (estimates, kappa): &Unknowns,
         current: Linearisation,
-    ) -> Result<(Vec<FrameEstimate>, Linearisation), ProblemError> {
+    ) -> Result<(Unknowns, Linearisation), ProblemError> {
         for _ in 0..TRIES {
             let factor =
                 problem
@@ -133,21 +140,36 @@ impl DampedGaussNewton {
                 }
                 Err(source) => return Err(problem.factor_error(source)),
             };
-            let step = factor.step(&current.normal.gradient);
-            let moved = problem.wall_step_px(estimates, &step);
+            let gradient = &current.normal.gradient;
+            let (step, shared) = match &current.border {
+                None => (factor.step(gradient), Kappa::zeros()),
+                Some(border) => match border.step(&factor, gradient, self.lambda) {
+                    Some(step) => step,
+                    None if self.lambda < 1.0 => {
+                        self.raise_damping();
+                        continue;
+                    }
+                    None => return Err(problem.factor_error(FactorError::NotPositiveDefinite)),
+                },
+            };
+            let moved = problem.wall_step_px(estimates, &step, &shared);
             let step_px = moved.into_iter().fold(0.0, f64::max);
-            let decrement: f64 = step
+            let mut decrement: f64 = step
                 .iter()
-                .zip(&current.normal.gradient)
+                .zip(gradient)
                 .map(|(step, gradient)| -step.dot(gradient))
                 .sum();
+            if let Some(border) = &current.border {
+                decrement -= shared.dot(&border.gradient);
+            }
             let stop = self.reason_to_stop(step_px, decrement, UNKNOWNS * step.len());
             let candidate: Vec<_> = estimates
                 .iter()
                 .zip(&step)
                 .map(|(estimate, step)| estimate.retract(step))
                 .collect();
-            let next = problem.linearise(&candidate)?;
+            let candidate = (candidate, kappa + shared);
+            let next = problem.linearise_at(&candidate.0, &candidate.1)?;
             if next.cost < current.cost {
                 self.iterations += 1;
                 self.last_step_px = step_px;
@@ -162,12 +184,12 @@ impl DampedGaussNewton {
             if stop.is_some() {
                 self.last_step_px = step_px;
                 self.stop = stop;
-                return Ok((estimates.to_vec(), current));
+                return Ok(((estimates.clone(), *kappa), current));
             }
             self.raise_damping();
         }
         self.stop = Some(StopReason::NoFurtherDescent);
-        Ok((estimates.to_vec(), current))
+        Ok(((estimates.clone(), *kappa), current))
     }
 
     fn raise_damping(&mut self) {
@@ -185,10 +207,10 @@ impl<'a> Solver<Problem<'a>, Iterate> for DampedGaussNewton {
         problem: &mut Counted<Problem<'a>>,
         mut state: Iterate,
     ) -> Result<(Iterate, Option<KV>), Error> {
-        let estimates = state.take_param().unwrap_or_default();
-        let first = problem.problem("linearise", |p| Ok(p.linearise(&estimates)?))?;
+        let (estimates, kappa) = state.take_param().unwrap_or_default();
+        let first = problem.problem("linearise", |p| Ok(p.linearise_at(&estimates, &kappa)?))?;
         self.cost_start = first.cost;
-        state = state.param(estimates).cost(first.cost);
+        state = state.param((estimates, kappa)).cost(first.cost);
         self.current = Some(first);
         Ok((state, None))
     }
@@ -198,12 +220,12 @@ impl<'a> Solver<Problem<'a>, Iterate> for DampedGaussNewton {
         problem: &mut Counted<Problem<'a>>,
         mut state: Iterate,
     ) -> Result<(Iterate, Option<KV>), Error> {
-        let (Some(estimates), Some(current)) = (state.take_param(), self.current.take()) else {
+        let (Some(unknowns), Some(current)) = (state.take_param(), self.current.take()) else {
             return Err(Error::msg("the solver was not initialised"));
         };
-        let (estimates, next) =
-            problem.problem("step", |p| Ok(self.advance(p, &estimates, current)?))?;
-        state = state.param(estimates).cost(next.cost);
+        let (unknowns, next) =
+            problem.problem("step", |p| Ok(self.advance(p, &unknowns, current)?))?;
+        state = state.param(unknowns).cost(next.cost);
         self.current = Some(next);
         if self.stop.is_some() {
             state = state.terminate_with(TerminationReason::SolverConverged);
@@ -241,7 +263,7 @@ pub fn solve<'a>(
     announce: Option<(&str, &Arc<dyn Progress>)>,
 ) -> Result<Solution<'a>, ProblemError> {
     let sigma = problem.sigma();
-    let start = problem.start();
+    let start = (problem.start(), problem.kappa());
     let solver = DampedGaussNewton::new(stopping);
     let mut executor = Executor::new(problem, solver).configure(|state| {
         state
@@ -266,7 +288,7 @@ pub fn solve<'a>(
         }
     };
     let solver = outcome.solver;
-    let (Some(problem), Some(linearisation), Some(estimates)) = (
+    let (Some(problem), Some(linearisation), Some((estimates, kappa))) = (
         outcome.problem.get_problem(),
         solver.current,
         outcome.state.get_param().cloned(),
@@ -285,6 +307,7 @@ pub fn solve<'a>(
     Ok(Solution {
         problem,
         estimates,
+        kappa,
         linearisation,
         record,
     })

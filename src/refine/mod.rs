@@ -14,6 +14,7 @@
 //! | one frame after another, sliding windows | [`track`]; a single frame: [`place`], [`search`] on the fused [`wall`] |
 //! | do overlapping frames show the same? take out, try again | [`consistency`], [`doubt`] |
 //! | all frames together, coarse to fine | [`run`](mod@run) |
+//! | what all frames share, if asked for | [`calibration`], [`shared`], [`observed`] |
 //! | how sure | [`covariance`]; how sure it could be at best: [`bound`] |
 //!
 //! Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`] and [`coverage`]
@@ -21,6 +22,7 @@
 //! to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
 
 mod bound;
+mod calibration;
 mod consistency;
 mod covariance;
 mod coverage;
@@ -31,6 +33,7 @@ mod factor;
 mod gauss_newton;
 mod grid;
 mod normal;
+mod observed;
 mod options;
 mod place;
 mod prior;
@@ -40,6 +43,7 @@ mod robust;
 mod run;
 mod search;
 mod selected_inverse;
+mod shared;
 mod spectrum;
 mod tile;
 mod track;
@@ -50,6 +54,7 @@ mod wall;
 pub use bound::pose_bound;
 pub use covariance::{Covariances, FrameSigma};
 pub use gauss_newton::{SolveRecord, StopReason};
+pub use observed::{CalibrationReport, UnknownReport};
 pub use options::RefineOptions;
 pub use problem::ProblemError;
 pub use report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};

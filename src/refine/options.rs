@@ -1,8 +1,13 @@
 //! Settings of the estimator.
 
+use crate::survey::CalibrationGroup;
+
 /// How to refine. The defaults suit most surveys; the noise model of the poses comes from the survey.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
+#[derive(Clone, Debug, serde::Serialize)]
 pub struct RefineOptions {
+    /// What to estimate besides the poses; if None, what the survey asks for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibrate: Option<Vec<CalibrationGroup>>,
     /// 1-σ of the logarithm of a frame's gain around 0 (0.3 is about ±30 %).
     pub log_gain_sigma: f64,
     /// 1-σ of a frame's bias around 0, grey levels.
@@ -28,6 +33,7 @@ pub struct RefineOptions {
 impl Default for RefineOptions {
     fn default() -> Self {
         Self {
+            calibrate: None,
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
             coarsest_side: 30,

@@ -246,7 +246,7 @@ fn near(
     let reach = reach_m(scene.surface);
     let perimeter = scene.surface.perimeter_m();
     let trace = |frame: usize, pose: &Pose| {
-        Footprint::within(scene.surface, scene.camera, pose, reach)
+        Footprint::within(scene.surface, &scene.camera, pose, reach)
             .map_err(|source| ProblemError::Placement { frame, source })
     };
     let own = trace(frame, pose)?.widened(margin_m);

@@ -1,5 +1,6 @@
 //! The photometric problem over a run of frames at one pyramid level: cost and normal equations.
 
+use super::calibration::{Calibration, Kappa, LENS, RADIUS};
 use super::coverage::Coverage;
 use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
 use super::factor::{FactorError, Symbolic};
@@ -7,13 +8,14 @@ use super::grid::{TilePoints, WallGrid};
 use super::normal::{Block, NormalEquations, Pattern};
 use super::prior::Prior;
 use super::robust::{NoiseHistogram, NoiseModel};
+use super::shared::Border;
 use super::tile::{ObserverMoments, SAMPLES, Seen, TileWork};
 use super::view::View;
 use super::visibility::{Observer, Placed, Tile, Visibility, reach_m};
 use crate::camera::Pinhole;
 use crate::frames::{FrameCache, FrameError, Pyramid, noise_at_level};
 use crate::surface::{Footprint, Surface, SurfaceError, viewing_distance, wall_jacobian};
-use nalgebra::{Matrix2x6, Matrix4, SMatrix, Vector2};
+use nalgebra::{Matrix2x5, Matrix2x6, Matrix4, Matrix4x2, Matrix5, SMatrix, Vector2, Vector5};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -43,8 +45,12 @@ impl Sampling {
 pub struct Scene<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
-    /// The camera at full size.
-    pub camera: &'a Pinhole,
+    /// The camera at full size, as far as it is known by now.
+    pub camera: Pinhole,
+    /// What all frames share and may be estimated.
+    pub calibration: Calibration,
+    /// Its unknowns by now; the camera is that of these.
+    pub kappa: Kappa,
     /// The frames.
     pub frames: &'a FrameCache,
     /// Noise of the initial poses and exposures.
@@ -126,6 +132,10 @@ pub struct Linearisation {
     pub scatter: Vec<Block>,
     /// How each active frame took part.
     pub frames: Vec<FrameShare>,
+    /// The shared unknowns' part of the equations, if they are estimated.
+    pub border: Option<Border>,
+    /// Their part of the scatter.
+    pub border_scatter: Option<Border>,
 }
 
 /// How a frame took part in a linearisation.
@@ -156,12 +166,16 @@ pub struct Problem<'a> {
     coverage: Coverage<'a>,
     /// The first active frame that is compared, counted from the first active one: the gauge is tied there.
     tied: Option<usize>,
+    /// Number of frames that are compared.
+    compared: usize,
     pattern: Pattern,
     symbolic: Symbolic,
     sigma: f64,
     noise: NoiseModel,
     /// True if the frames are known to be free of noise.
     exact: bool,
+    /// True if the shared unknowns are estimated.
+    calibrates: bool,
 }
 
 impl<'a> Problem<'a> {
@@ -183,6 +197,7 @@ impl<'a> Problem<'a> {
         } = members;
         let camera = scene.camera.at_level(level);
         let reach_m = reach_m(scene.surface);
+        let compared_frames = compared.iter().filter(|compared| **compared).count();
         let tied = active
             .clone()
             .position(|frame| compared[frame - participants.start]);
@@ -234,6 +249,7 @@ impl<'a> Problem<'a> {
             held: estimates.to_vec(),
             coverage,
             tied,
+            compared: compared_frames,
             pattern,
             symbolic,
             participants,
@@ -244,6 +260,7 @@ impl<'a> Problem<'a> {
                 steepness: 0.0,
             },
             exact: false,
+            calibrates: false,
         };
         problem.estimate_noise()?;
         Ok(problem)
@@ -261,6 +278,19 @@ impl<'a> Problem<'a> {
             exact: true,
             ..self
         }
+    }
+
+    /// The same with the scene's shared unknowns estimated, too; all participants must be active.
+    pub fn calibrating(self) -> Self {
+        Self {
+            calibrates: self.scene.calibration.any() && self.held_frames() == 0,
+            ..self
+        }
+    }
+
+    /// The shared unknowns that the problem was made with.
+    pub fn kappa(&self) -> Kappa {
+        self.scene.kappa
     }
 
     /// The estimates of the active frames that the problem was made with.
@@ -307,17 +337,18 @@ impl<'a> Problem<'a> {
             .collect::<Result<_, _>>()?)
     }
 
-    /// The frames of a stretch at the given estimates of all participants.
+    /// The frames of a stretch at the given estimates of all participants, seen by `camera` (of the level).
     fn views<'s>(
         &self,
         stretch: usize,
         pictures: &'s [Arc<Pyramid>],
         estimates: &[FrameEstimate],
+        camera: Pinhole,
     ) -> Vec<View<'s>> {
         let frames = self.coverage.frames(stretch).iter();
         frames
             .zip(pictures)
-            .map(|(k, picture)| View::new(picture.level(self.level), self.camera, &estimates[*k]))
+            .map(|(k, picture)| View::new(picture.level(self.level), camera, &estimates[*k]))
             .collect()
     }
 
@@ -335,7 +366,7 @@ impl<'a> Problem<'a> {
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch);
             let pictures = self.pictures(stretch)?;
-            let views = self.views(stretch, &pictures, &self.held);
+            let views = self.views(stretch, &pictures, &self.held, self.camera);
             let sample: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
             let counted = sample
                 .par_chunks(32)
@@ -367,30 +398,61 @@ impl<'a> Problem<'a> {
         Ok(())
     }
 
-    /// Cost and normal equations at the given estimates of the active frames.
+    /// Cost and normal equations at the given estimates of the active frames and the problem's own shared unknowns.
+    ///
+    /// # Errors
+    /// As [`Problem::linearise_at`].
+    pub fn linearise(&self, active: &[FrameEstimate]) -> Result<Linearisation, ProblemError> {
+        self.linearise_at(active, &self.scene.kappa)
+    }
+
+    /// Cost and normal equations at the given estimates of the active frames and shared unknowns.
+    ///
+    /// A lens that folds the picture costs infinitely much.
     ///
     /// The same sums in the same order whatever the number of threads.
     ///
     /// # Errors
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
-    pub fn linearise(&self, active: &[FrameEstimate]) -> Result<Linearisation, ProblemError> {
+    pub fn linearise_at(
+        &self,
+        active: &[FrameEstimate],
+        kappa: &Kappa,
+    ) -> Result<Linearisation, ProblemError> {
         let estimates = self.with_active(active);
         let mut normal = NormalEquations::zeros(&self.pattern);
         let mut frames = vec![FrameShare::default(); self.active.len()];
         let mut scatter = vec![Block::zeros(); self.pattern.blocks()];
+        let mut border = self.calibrates.then(|| Border::zeros(self.active.len()));
+        let calibration = self.scene.calibration;
+        let Some(lens) = calibration.camera(kappa) else {
+            return Ok(Linearisation {
+                cost: f64::INFINITY,
+                normal,
+                scatter,
+                frames,
+                border_scatter: border.clone(),
+                border,
+            });
+        };
+        let mut border_scatter = border.clone();
         let mut cost = 0.0;
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch);
             let pictures = self.pictures(stretch)?;
-            let views = self.views(stretch, &pictures, &estimates);
+            let camera = lens.at_level(self.level);
+            let views = self.views(stretch, &pictures, &estimates, camera);
             for batch in visibility.blocks.chunks(BATCH) {
                 let sums: Vec<BlockSums> = batch
                     .par_iter()
-                    .map(|block| self.sum_block(stretch, &visibility, block, &views))
+                    .map(|block| self.sum_block(stretch, &visibility, block, &views, &lens))
                     .collect();
                 for sum in sums {
                     cost += sum.cost;
                     sum.add_to(&self.pattern, &mut normal, &mut scatter, &mut frames);
+                    if let (Some(border), Some(scatter)) = (&mut border, &mut border_scatter) {
+                        sum.add_to_border(border, scatter);
+                    }
                 }
             }
         }
@@ -401,13 +463,24 @@ impl<'a> Problem<'a> {
         scatter
             .iter_mut()
             .for_each(|b| *b *= information * information);
+        if let (Some(border), Some(scatter)) = (&mut border, &mut border_scatter) {
+            border.scale(information);
+            scatter.scale(information * information);
+        }
         cost += self.scene.prior.add(
             &self.participants,
             &estimates,
             &self.active,
+            &calibration.metric(kappa),
             &self.pattern,
             &mut normal,
+            border.as_mut(),
         );
+        if let Some(border) = &mut border {
+            cost += calibration.prior_cost(kappa) - self.volume() * kappa[RADIUS];
+            border.gradient[RADIUS] -= self.volume();
+            border.close(&calibration, kappa);
+        }
         if self.held_frames() == 0 {
             let tied = self.tied.unwrap_or(0);
             self.tie_gauge(tied, &active[tied], &mut normal);
@@ -417,7 +490,21 @@ impl<'a> Problem<'a> {
             normal,
             scatter,
             frames,
+            border,
+            border_scatter,
         })
+    }
+
+    /// By how much the logarithm of the volume that the pixels leave to the positions grows with that of the radius.
+    ///
+    /// Pixels fix the 3N − 1 coordinates of N positions (not the one along the axis) in units of the radius. In metres, where
+    /// the prior is a density, they leave a volume that grows as `r^(3N − 1)`. Without this term the radius would
+    /// shrink until the steps had no noise at all.
+    fn volume(&self) -> f64 {
+        match self.scene.calibration.free[RADIUS] {
+            true => (3 * self.compared) as f64 - 1.0,
+            false => 0.0,
+        }
     }
 
     /// How much of the slopes of a block of the wall is texture and not noise: D, by which M becomes `D M D`.
@@ -445,18 +532,27 @@ impl<'a> Problem<'a> {
         self.participants.len() - self.active.len()
     }
 
-    /// The prior's part of the normal matrix at the given estimates of the active frames.
-    pub fn prior_information(&self, active: &[FrameEstimate]) -> Vec<Block> {
+    /// The prior's part of the normal matrix at the given estimates of the active frames, and of its border.
+    pub fn prior_information(
+        &self,
+        active: &[FrameEstimate],
+        kappa: &Kappa,
+    ) -> (Vec<Block>, Border) {
         let mut normal = NormalEquations::zeros(&self.pattern);
+        let mut border = Border::zeros(self.active.len());
         let estimates = self.with_active(active);
+        let calibration = self.scene.calibration;
         self.scene.prior.add(
             &self.participants,
             &estimates,
             &self.active,
+            &calibration.metric(kappa),
             &self.pattern,
             &mut normal,
+            Some(&mut border),
         );
-        normal.blocks
+        border.close(&calibration, kappa);
+        (normal.blocks, border)
     }
 
     /// Stiffens the first compared frame against moving along the gauge, where the pixels say nothing and rounding
@@ -489,6 +585,7 @@ impl<'a> Problem<'a> {
         visibility: &Visibility,
         block: &Range<usize>,
         views: &[View],
+        lens: &Pinhole,
     ) -> BlockSums {
         let tiles = &visibility.tiles[block.clone()];
         let stretch_slots: Vec<Option<usize>> = self
@@ -519,10 +616,16 @@ impl<'a> Problem<'a> {
                 sums.cost += moments.cost;
                 let view = &views[observer.frame as usize];
                 if let Some(slot) = stretch_slots[observer.frame as usize] {
+                    let a = view.wall_jacobian(&points);
+                    let c = match self.calibrates {
+                        true => view.lens_jacobian(&points, &a, lens),
+                        false => Matrix2x5::zeros(),
+                    };
                     columns.push(Column {
                         place: sums.place(slot),
                         moments: *moments,
-                        a: view.wall_jacobian(&points),
+                        a,
+                        c,
                         inverse_gain: 1.0 / f64::from(view.gain() * observer.shade),
                     });
                 }
@@ -536,23 +639,38 @@ impl<'a> Problem<'a> {
         }
         let share = self.texture_share(&summed);
         for tile in &summed {
-            sums.add_tile(&tile.columns, &(share * tile.features * share), tile.total);
+            let features = share * tile.features * share;
+            sums.add_tile(&tile.columns, &features, tile.total);
+            if self.calibrates {
+                sums.add_lens(&tile.columns, &features, tile.total);
+            }
         }
         sums
     }
 
-    /// How far a step moves the wall under each active frame, in pixels of full size: the largest over the
-    /// frame's middle and corners.
-    pub fn wall_step_px(&self, active: &[FrameEstimate], step: &[FrameStep]) -> Vec<f64> {
+    /// How far a step, with `shared` that of the shared unknowns, moves the wall under each active frame, in pixels of full
+    /// size: the largest over the frame's middle and corners.
+    pub fn wall_step_px(
+        &self,
+        active: &[FrameEstimate],
+        step: &[FrameStep],
+        shared: &Kappa,
+    ) -> Vec<f64> {
         let full = 0.5f64.powi(self.level as i32);
+        let lens = shared.fixed_rows::<LENS>(0).into_owned();
         active
             .iter()
             .zip(step)
-            .map(|(estimate, step)| self.frame_step_px(estimate, step) / full)
+            .map(|(estimate, step)| self.frame_step_px(estimate, step, &lens) / full)
             .collect()
     }
 
-    fn frame_step_px(&self, estimate: &FrameEstimate, step: &FrameStep) -> f64 {
+    fn frame_step_px(
+        &self,
+        estimate: &FrameEstimate,
+        step: &FrameStep,
+        lens: &Vector5<f64>,
+    ) -> f64 {
         let xi: nalgebra::Vector6<f64> = step.fixed_rows::<6>(0).into();
         let pose = &estimate.pose;
         let corners = self.camera.border(1, 0.0);
@@ -561,10 +679,18 @@ impl<'a> Problem<'a> {
             .iter()
             .chain([&middle])
             .filter_map(|pixel| {
-                let ray = pose.r_wc * self.camera.ray(pixel.x, pixel.y);
+                let ray_c = self.camera.ray(pixel.x, pixel.y);
+                let ray = pose.r_wc * ray_c;
                 let hit = self.scene.surface.hit(&pose.t_wc, &ray).ok()?;
                 let wall = self.scene.surface.frame(hit.wall);
-                Some((wall_jacobian(pose, &wall) * xi).norm() * self.camera.fy / hit.range)
+                let a = wall_jacobian(pose, &wall);
+                let mut moved = a * xi;
+                if self.calibrates {
+                    let turned = self.scene.camera.ray_jacobian(&ray_c) * lens;
+                    let across = pose.r_wc * turned.push(0.0) * hit.range;
+                    moved += a.fixed_columns::<3>(3) * across;
+                }
+                Some(moved.norm() * self.camera.fy / hit.range)
             })
             .fold(0.0, f64::max)
     }
@@ -626,6 +752,8 @@ struct Column {
     place: usize,
     moments: ObserverMoments,
     a: Matrix2x6<f64>,
+    /// C; zero unless the lens is estimated.
+    c: Matrix2x5<f64>,
     inverse_gain: f64,
 }
 
@@ -666,6 +794,12 @@ struct BlockSums {
     shares: Vec<FrameShare>,
     /// Upper triangle, row by row.
     blocks: Vec<Block>,
+    /// What the lens's unknowns share with the frames' ...
+    lens_frames: Vec<SMatrix<f64, UNKNOWNS, LENS>>,
+    /// ... and among themselves, ...
+    lens_own: Matrix5<f64>,
+    /// ... and their gradient; see [`super::shared`].
+    lens_gradient: Vector5<f64>,
 }
 
 impl BlockSums {
@@ -677,6 +811,9 @@ impl BlockSums {
             gradient: vec![FrameStep::zeros(); n],
             shares: vec![FrameShare::default(); n],
             blocks: vec![Block::zeros(); n * (n + 1) / 2],
+            lens_frames: vec![SMatrix::zeros(); n],
+            lens_own: Matrix5::zeros(),
+            lens_gradient: Vector5::zeros(),
         }
     }
 
@@ -720,6 +857,49 @@ impl BlockSums {
         }
     }
 
+    /// The same for the lens's unknowns, all observers of the tile being active.
+    fn add_lens(&mut self, columns: &[Column], features: &Matrix4<f64>, total: f64) {
+        let weighted = columns.iter().map(|a| a.c * a.moments.weight);
+        let mean = weighted.sum::<Matrix2x5<f64>>() / total.max(1e-12);
+        let slopes: Matrix4x2<f64> = features.fixed_columns::<2>(0).into_owned();
+        for a in columns {
+            let apart = a.c - mean;
+            let f = slopes * apart * a.moments.weight;
+            let block = &mut self.lens_frames[a.place];
+            for column in 0..LENS {
+                for row in 0..6 {
+                    block[(row, column)] +=
+                        a.a[(0, row)] * f[(0, column)] + a.a[(1, row)] * f[(1, column)];
+                }
+                block[(6, column)] += f[(2, column)];
+                block[(7, column)] += f[(3, column)] * a.inverse_gain;
+            }
+            self.lens_own += apart.transpose() * f.fixed_rows::<2>(0);
+            self.lens_gradient -= a.c.transpose() * a.moments.gradient.fixed_rows::<2>(0);
+        }
+    }
+
+    fn add_to_border(&self, border: &mut Border, scatter: &mut Border) {
+        for (slot, block) in self.slots.iter().zip(&self.lens_frames) {
+            let mut target = border.frames[*slot].fixed_view_mut::<UNKNOWNS, LENS>(0, 0);
+            target += block;
+        }
+        let mut own = border.own.fixed_view_mut::<LENS, LENS>(0, 0);
+        own += self.lens_own;
+        let mut gradient = border.gradient.fixed_rows_mut::<LENS>(0);
+        gradient += self.lens_gradient;
+        let mut shared = Kappa::zeros();
+        shared
+            .fixed_rows_mut::<LENS>(0)
+            .copy_from(&self.lens_gradient);
+        let frames = self
+            .slots
+            .iter()
+            .copied()
+            .zip(self.gradient.iter().copied());
+        scatter.count(frames, &shared);
+    }
+
     fn add_to(
         &self,
         pattern: &Pattern,
@@ -748,6 +928,7 @@ impl BlockSums {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::refine::calibration::SHARED;
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::{Jitter, JitterModel};
     use nalgebra::Vector6;
@@ -757,6 +938,7 @@ mod tests {
         wall: TestWall,
         frames: FrameCache,
         prior: Prior,
+        calibration: Calibration,
         estimates: Vec<FrameEstimate>,
     }
 
@@ -799,6 +981,11 @@ mod tests {
                 bias_sigma: 10.0,
             };
             Self {
+                calibration: Calibration {
+                    free: [true; SHARED],
+                    sigma: Kappa::repeat(1.0),
+                    ..Calibration::none(&wall.camera)
+                },
                 wall,
                 frames: FrameCache::of_pyramids(frames),
                 prior,
@@ -809,7 +996,9 @@ mod tests {
         fn problem(&self) -> Problem<'_> {
             let scene = Scene {
                 surface: &self.wall.circle,
-                camera: &self.wall.camera,
+                camera: self.wall.camera,
+                calibration: self.calibration,
+                kappa: Kappa::zeros(),
                 frames: &self.frames,
                 prior: &self.prior,
                 noise: 0.0,
@@ -858,6 +1047,34 @@ mod tests {
             }
             let relative = (error / size).sqrt();
             assert!(relative < 0.05, "unknown {unknown}: {relative}");
+        }
+    }
+
+    /// The same for what all frames share.
+    #[test]
+    fn the_shared_gradient_is_the_derivative_of_the_cost() {
+        let ring = Ring::new(1e-4);
+        let problem = ring.problem().calibrating();
+        let mut kappa = Kappa::zeros();
+        kappa
+            .fixed_rows_mut::<5>(0)
+            .copy_from_slice(&[2e-4, 0.02, -0.02, 3e-4, -3e-4]);
+        let at = |kappa: &Kappa| problem.linearise_at(&ring.estimates, kappa).unwrap();
+        let gradient = at(&kappa).border.unwrap().gradient;
+        let steps = [2e-4, 0.02, 0.02, 5e-4, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3];
+        for (k, h) in steps.into_iter().enumerate() {
+            let moved = |amount: f64| {
+                let mut kappa = kappa;
+                kappa[k] += amount;
+                at(&kappa).cost
+            };
+            let numeric = (moved(h) - moved(-h)) / (2.0 * h);
+            let relative = (numeric - gradient[k]).abs() / numeric.abs();
+            assert!(
+                relative < 0.05,
+                "unknown {k}: {numeric} and {}",
+                gradient[k]
+            );
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::covariance::FrameSigma;
 use super::gauss_newton::SolveRecord;
+use super::observed::CalibrationReport;
 use crate::trajectory::Pose;
 use serde::Serialize;
 
@@ -96,6 +97,9 @@ pub struct RefineReport {
     pub frames_on_prior: usize,
     /// Factor by which the covariance exceeds that of independent noise: what aliasing adds.
     pub variance_factor: f64,
+    /// Self-calibration, if it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationReport>,
     /// Why the last solve stopped, in words.
     pub stopped_because: String,
     /// Time by stage.

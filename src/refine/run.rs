@@ -1,11 +1,13 @@
 //! From a survey to refined poses: load, track, solve globally coarse to fine, report.
 
+use super::calibration::{Calibration, Kappa};
 use super::consistency::{blurred, compare_pairs, contradictions};
 use super::covariance::{Covariances, covariances, frame_sigma};
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::examine::examine;
 use super::gauss_newton::{Solution, StopReason, Stopping, solve};
+use super::observed::{CalibrationReport, Posterior, Refusal};
 use super::options::RefineOptions;
 use super::prior::{Prior, usual_step_s};
 use super::problem::{FrameShare, Problem, ProblemError, Sampling, Scene};
@@ -14,7 +16,8 @@ use super::track::{Tracked, retry, track};
 use crate::frames::FrameCache;
 use crate::progress::Progress;
 use crate::survey::Survey;
-use crate::trajectory::{StampedPose, Trajectory};
+use crate::trajectory::{Pose, StampedPose, Trajectory};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -93,8 +96,9 @@ pub fn refine(
         log_gain_sigma: options.log_gain_sigma,
         bias_sigma: options.bias_sigma,
     };
+    let mut calibration = calibration_of(survey, options, &prior.initial);
     let examined = examine(
-        &scene(survey, &prior, &frames, 0.0),
+        &scene(survey, &calibration, &prior, &frames, 0.0),
         coarsest,
         progress.as_ref(),
     )?;
@@ -103,19 +107,23 @@ pub fn refine(
     }
     clock.lap("decode");
     let mut tracked = track(
-        &scene(survey, &prior, &frames, examined.noise),
+        &scene(survey, &calibration, &prior, &frames, examined.noise),
         options,
         examined.doubts,
         progress.as_ref(),
     )?;
     clock.lap("track");
 
-    let scene = scene(survey, &prior, &frames, examined.noise);
+    let mut scene = scene(survey, &calibration, &prior, &frames, examined.noise);
     let mut levels = Vec::new();
     let mut last = None;
-    for (k, (sampling, stopping)) in stages(options, side).enumerate() {
+    let mut refusals = Vec::new();
+    let mut stages: VecDeque<_> = stages(options, side).collect();
+    let mut first = true;
+    while let Some((sampling, stopping)) = stages.pop_front() {
+        let check = std::mem::take(&mut first);
         let Sampling { level, density } = sampling;
-        let problem = Problem::new(&scene, sampling, tracked.members())?;
+        let problem = Problem::new(&scene, sampling, tracked.members())?.calibrating();
         // Where no frame can be believed, the prior is all there is to report.
         if problem.tiles() == 0 && tracked.doubts.iter().all(Option::is_none) {
             continue;
@@ -128,6 +136,15 @@ pub fn refine(
         let solution = solve(problem, stopping, Some((&stage, progress)))?;
         progress.finish();
         tracked.estimates.clone_from(&solution.estimates);
+        let refused = match level {
+            0 => refused(&solution, &calibration)?,
+            _ => Vec::new(),
+        };
+        adopt(&mut scene, &mut calibration, solution.kappa, &refused);
+        if !refused.is_empty() && stages.is_empty() {
+            stages.push_back((sampling, stopping));
+        }
+        refusals.extend(refused);
         if sampling == Sampling::of(0) {
             disagreements(&solution.linearisation.frames, &mut tracked.doubts);
         }
@@ -138,27 +155,37 @@ pub fn refine(
         });
         last = Some(solution);
         clock.lap(&format!("global {stage}"));
-        if k == 0 {
+        if check {
             recheck(&scene, options, &mut tracked)?;
             clock.lap("check");
         }
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
-    let covariances = covariances(
+    let posterior = posterior(&solution)?;
+    let shared = posterior
+        .as_ref()
+        .and_then(|p| p.covariance(&calibration.free));
+    let (prior_information, _) = solution
+        .problem
+        .prior_information(&solution.estimates, &solution.kappa);
+    let mut covariances = covariances(
         solution.problem.pattern(),
         &solution.linearisation.normal,
         &solution.linearisation.scatter,
-        &solution.problem.prior_information(&solution.estimates),
+        &prior_information,
     )
     // Poses without a covariance are still poses; they are reported as uncertain.
     .unwrap_or_else(|_| Covariances::unknown(count));
+    if let (Some(posterior), Some(shared)) = (&posterior, &shared) {
+        covariances = covariances.with_shared(&posterior.w, shared);
+    }
     let estimates = &tracked.estimates;
     let most = most_rejected(&solution.linearisation.frames);
     let reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = frame_sigma(
                 scene.surface,
-                scene.camera,
+                &scene.camera,
                 &estimates[k],
                 &covariances.frames[k],
             );
@@ -174,7 +201,8 @@ pub fn refine(
         .collect();
     clock.lap("covariance");
 
-    let motion = prior.settle_gauge(&scene.surface.gauge(), estimates);
+    let metric = calibration.metric(&scene.kappa);
+    let motion = prior.settle_gauge(&scene.surface.gauge(), estimates, &metric);
     let on_prior = reports
         .iter()
         .filter(|f| f.flag != FrameFlag::Photometric)
@@ -185,7 +213,7 @@ pub fn refine(
         .zip(estimates)
         .map(|(initial, estimate)| StampedPose {
             time_s: initial.time_s,
-            pose: motion.apply(&estimate.pose),
+            pose: metric.in_metres(&motion.apply(&estimate.pose)),
         })
         .collect();
     Ok(Refined {
@@ -196,21 +224,67 @@ pub fn refine(
             frames: reports,
             frames_on_prior: on_prior,
             variance_factor: covariances.variance_factor,
+            calibration: (calibration.any() || !refusals.is_empty()).then(|| {
+                CalibrationReport::new(
+                    &calibration,
+                    &scene.kappa,
+                    &shared.unwrap_or_default(),
+                    &refusals,
+                    survey.file.tunnel.radius_m,
+                )
+            }),
             timings: clock.laps,
         },
-        covariances: covariances.moved(&motion),
+        covariances: covariances.moved(&motion).scaled(metric.scale),
     })
+}
+
+/// What is to be estimated of the survey's calibration.
+fn calibration_of(survey: &Survey, options: &RefineOptions, initial: &[Pose]) -> Calibration {
+    let section = survey.file.calibrate.clone().unwrap_or_default();
+    let groups = options.calibrate.as_ref().unwrap_or(&section.unknowns);
+    match groups.is_empty() {
+        true => Calibration::none(&survey.camera),
+        false => Calibration::new(groups, &section, &survey.camera, initial),
+    }
+}
+
+/// Goes on with the shared unknowns `kappa`, those refused at the values given.
+fn adopt(scene: &mut Scene, calibration: &mut Calibration, mut kappa: Kappa, refused: &[Refusal]) {
+    for refusal in refused {
+        kappa[refusal.unknown] = 0.0;
+        calibration.free[refusal.unknown] = false;
+    }
+    // A lens that folds the picture has never been accepted; with one unknown back at its start it might.
+    if let Some(camera) = calibration.camera(&kappa) {
+        (scene.camera, scene.kappa) = (camera, kappa);
+    }
+    scene.calibration = *calibration;
+}
+
+/// The equations of the shared unknowns at a solution, if they are estimated.
+fn posterior(solution: &Solution) -> Result<Option<Posterior>, ProblemError> {
+    Posterior::at(solution).map_err(|source| solution.problem.factor_error(source))
+}
+
+/// The shared unknowns that the data do not observe.
+fn refused(solution: &Solution, calibration: &Calibration) -> Result<Vec<Refusal>, ProblemError> {
+    let posterior = posterior(solution)?;
+    Ok(posterior.map_or(Vec::new(), |posterior| posterior.refuse(calibration)))
 }
 
 fn scene<'a>(
     survey: &'a Survey,
+    calibration: &Calibration,
     prior: &'a Prior,
     frames: &'a FrameCache,
     noise: f64,
 ) -> Scene<'a> {
     Scene {
         surface: survey.surface.as_ref(),
-        camera: &survey.camera,
+        camera: survey.camera,
+        calibration: *calibration,
+        kappa: Kappa::zeros(),
         frames,
         prior,
         noise,

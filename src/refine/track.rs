@@ -161,7 +161,7 @@ fn solve_window(
 /// What the last frame sees of the wall.
 fn footprint(scene: &Scene, k: usize, tracked: &Tracked) -> Result<Footprint, ProblemError> {
     let pose = &tracked.estimates[k].pose;
-    Footprint::within(scene.surface, scene.camera, pose, reach_m(scene.surface))
+    Footprint::within(scene.surface, &scene.camera, pose, reach_m(scene.surface))
         .map_err(|source| ProblemError::Placement { frame: k, source })
 }
 

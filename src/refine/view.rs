@@ -6,7 +6,7 @@ use crate::camera::Pinhole;
 use crate::frames::GreyImage;
 use crate::surface::wall_jacobian;
 use crate::trajectory::Pose;
-use nalgebra::{Matrix2x6, Matrix3, Vector3};
+use nalgebra::{Matrix2x5, Matrix2x6, Matrix3, Vector3};
 
 /// A frame at one pyramid level with its current estimate, ready to be sampled.
 pub struct View<'a> {
@@ -40,6 +40,23 @@ impl<'a> View<'a> {
     /// `∂(s, h)/∂ξ` at the middle of a tile.
     pub fn wall_jacobian(&self, points: &TilePoints) -> Matrix2x6<f64> {
         wall_jacobian(&self.pose, &points.centre)
+    }
+
+    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2)` at the middle of a tile, for the `camera` at full size.
+    ///
+    /// If the ray `(x, y, 1)` of a pixel turns, the point at depth z moves across by `R z (∂x, ∂y, 0)`, and where the
+    /// ray meets the wall as if the camera had moved so: `C = A_ρ R z ∂(x, y)/∂κ`, with `A_ρ` the last three
+    /// columns of the pose's Jacobian `a`.
+    pub fn lens_jacobian(
+        &self,
+        points: &TilePoints,
+        a: &Matrix2x6<f64>,
+        camera: &Pinhole,
+    ) -> Matrix2x5<f64> {
+        let x_c = self.pose.to_camera(&points.centre.x_w);
+        let r_wc = self.pose.r_wc.to_rotation_matrix();
+        let across = a.fixed_view::<2, 3>(0, 3) * r_wc.matrix().fixed_view::<3, 2>(0, 0);
+        across * camera.ray_jacobian(&(x_c / x_c.z)) * x_c.z
     }
 
     /// The wall's values `(I/V − b/V)/a` as this frame shows them, bilinearly interpolated, into `values`; the frame
@@ -90,9 +107,56 @@ impl<'a> View<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Radial;
+    use crate::refine::calibration::{Calibration, Kappa, LENS};
     use crate::refine::grid::{SIDE, TileId, WallGrid};
     use crate::surface::{Circle, Surface, WallPoint};
     use crate::trajectory::so3;
+
+    /// The wall point that a pixel shows, against central differences over the camera's unknowns.
+    #[test]
+    fn the_wall_follows_the_lens() {
+        let circle = Circle::new(3.0).unwrap();
+        let calibration = Calibration::none(&Pinhole {
+            radial: Radial { k1: -0.1, k2: 0.02 },
+            ..Pinhole::from_vertical_fov(160, 120, 60f64.to_radians())
+        });
+        let image = GreyImage::new(160, 120, vec![0.0; 160 * 120]);
+        let estimate = FrameEstimate::at(Pose::new(
+            so3::exp(&Vector3::new(0.05, 0.3, -0.1)),
+            Vector3::new(0.4, 10.0, -0.2),
+        ));
+        let pose = estimate.pose;
+        let camera = calibration.given;
+        let view = View::new(&image, camera.at_level(1), &estimate);
+        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
+        let wall_of = |camera: &Pinhole, pixel: &nalgebra::Vector2<f64>| {
+            let ray = pose.r_wc * camera.ray(pixel.x, pixel.y);
+            circle.hit(&pose.t_wc, &ray).unwrap().wall
+        };
+        let seen = wall_of(&camera, &nalgebra::Vector2::new(130.0, 25.0));
+        let (width, height) = grid.tile_size_m();
+        let tile = TileId {
+            column: (seen.s_m / width) as i64,
+            row: (seen.h_m / height) as i64,
+        };
+        let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
+        let pixel = camera.project(&pose.to_camera(&points.centre.x_w)).unwrap();
+        let analytic = view.lens_jacobian(&points, &view.wall_jacobian(&points), &camera);
+        let step = 1e-6;
+        for k in 0..LENS {
+            let moved = |amount: f64| {
+                let mut kappa = Kappa::zeros();
+                kappa[k] = amount;
+                wall_of(&calibration.camera(&kappa).unwrap(), &pixel)
+            };
+            let (plus, minus) = (moved(step), moved(-step));
+            let s = (plus.s_m - minus.s_m) / (2.0 * step);
+            let h = (plus.h_m - minus.h_m) / (2.0 * step);
+            let expected = nalgebra::Vector2::new(s, h);
+            assert!((expected - analytic.column(k)).norm() < 1e-7, "column {k}");
+        }
+    }
 
     /// A frame whose grey value is a linear function of the pixel: bilinear sampling must return it exactly.
     #[test]

@@ -139,6 +139,31 @@ impl Portrait {
     }
 }
 
+/// The lens's distortion in single precision ([`crate::camera::Radial`]).
+struct Lens {
+    k1: f32,
+    k2: f32,
+    limit: f32,
+}
+
+impl Lens {
+    /// None for a lens without distortion.
+    fn of(camera: &Pinhole) -> Option<Self> {
+        let radial = &camera.radial;
+        (!radial.is_none()).then(|| Self {
+            k1: radial.k1 as f32,
+            k2: radial.k2 as f32,
+            limit: radial.limit() as f32,
+        })
+    }
+
+    /// `1 + k1 q + k2 q²`, within the limit.
+    #[inline]
+    fn factor(&self, q: f32) -> Option<f32> {
+        (q < self.limit).then(|| 1.0 + q * (self.k1 + q * self.k2))
+    }
+}
+
 /// A picture and a pose, ready to be sampled at wall points relative to an origin near them.
 pub struct Sampler<'a> {
     image: &'a GreyImage,
@@ -146,6 +171,7 @@ pub struct Sampler<'a> {
     centre: Vector3<f32>,
     focal: (f32, f32),
     principal: (f32, f32),
+    radial: Option<Lens>,
     limit: (f32, f32),
 }
 
@@ -158,6 +184,7 @@ impl<'a> Sampler<'a> {
             centre: pose.to_camera(origin).cast(),
             focal: (camera.fx as f32, camera.fy as f32),
             principal: (camera.cx as f32, camera.cy as f32),
+            radial: Lens::of(camera),
             limit: ((image.width() - 1) as f32, (image.height() - 1) as f32),
         }
     }
@@ -172,9 +199,13 @@ impl<'a> Sampler<'a> {
         if z <= 0.0 {
             return None;
         }
-        let inverse = 1.0 / z;
-        let u = self.focal.0 * (self.centre.x + dot(0)) * inverse + self.principal.0;
-        let v = self.focal.1 * (self.centre.y + dot(1)) * inverse + self.principal.1;
+        let mut inverse = 1.0 / z;
+        let (x, y) = (self.centre.x + dot(0), self.centre.y + dot(1));
+        if let Some(lens) = &self.radial {
+            inverse *= lens.factor((x * x + y * y) * inverse * inverse)?;
+        }
+        let u = self.focal.0 * x * inverse + self.principal.0;
+        let v = self.focal.1 * y * inverse + self.principal.1;
         if !(u >= 0.0 && v >= 0.0 && u < self.limit.0 && v < self.limit.1) {
             return None;
         }

@@ -68,7 +68,8 @@ pub fn from_cylinder(camera: &Pinhole, u_hat: f64, v_hat: f64) -> Option<[f64; 2
     }
     let x = theta.tan();
     let y = (v_hat - camera.cy) / camera.fy * x.hypot(1.0);
-    Some([camera.fx * x + camera.cx, camera.fy * y + camera.cy])
+    let pixel = camera.project(&nalgebra::Vector3::new(x, y, 1.0))?;
+    Some([pixel.x, pixel.y])
 }
 
 /// Least and greatest û, least and greatest v̂ of the photo's pixel centres in whole columns of the result.

@@ -22,14 +22,19 @@ pub(super) fn cast(band: &Band, radius_m: f64, camera: &Pinhole, pose: &Pose, n:
         t: pose.t_wc,
     };
     let share = 1.0 / (n * n) as f32;
-    let right = pose.r_wc * Vector3::x();
     let mut data = vec![0.0f32; width * height];
     for (v, row) in data.chunks_exact_mut(width).enumerate() {
         for offset_v in &offsets {
-            let first = pose.r_wc * camera.ray(0.0, v as f64 + offset_v);
+            let ray = |u: f64| pose.r_wc * camera.ray(u, v as f64 + offset_v);
+            // Without distortion rays move evenly along a row.
+            let (first, right) = (ray(0.0), pose.r_wc * Vector3::x());
             for (u, pixel) in row.iter_mut().enumerate() {
                 for offset_u in &offsets {
-                    let d = first + right * ((u as f64 + offset_u) / camera.fx);
+                    let u = u as f64 + offset_u;
+                    let d = match camera.radial.is_none() {
+                        true => first + right * (u / camera.fx),
+                        false => ray(u),
+                    };
                     let (theta, h_m) = caster.hit(&d);
                     *pixel += band.at(theta, h_m) + band.glint(theta, h_m, &d);
                 }

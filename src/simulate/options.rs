@@ -1,6 +1,7 @@
 //! What to simulate.
 
 use super::{BadFrames, Bits, SimulateError};
+use crate::camera::{Pinhole, Radial};
 use crate::survey::PriorSection;
 use crate::trajectory::JitterModel;
 use serde::Serialize;
@@ -48,6 +49,9 @@ pub struct SimulateOptions {
     pub height: u32,
     /// Vertical field of view, degrees.
     pub vertical_fov_deg: f64,
+    /// k1 and k2 of the lens ([`crate::camera::Radial`]).
+    #[serde(skip_serializing_if = "is_default")]
+    pub distortion: [f64; 2],
     /// Advance along the axis from frame to frame, metres.
     pub advance_m: f64,
     /// Turn about the axis from frame to frame, degrees.
@@ -96,6 +100,16 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 }
 
 impl SimulateOptions {
+    /// The camera.
+    pub fn camera(&self) -> Pinhole {
+        let fov_rad = self.vertical_fov_deg.to_radians();
+        let [k1, k2] = self.distortion;
+        Pinhole {
+            radial: Radial { k1, k2 },
+            ..Pinhole::from_vertical_fov(self.width, self.height, fov_rad)
+        }
+    }
+
     /// The paper's first experiment: 12 frames, 30° apart, from the axis of a tunnel of 3 m radius.
     pub fn centred() -> Self {
         Self {
@@ -104,6 +118,7 @@ impl SimulateOptions {
             width: 640,
             height: 480,
             vertical_fov_deg: 60.0,
+            distortion: [0.0; 2],
             advance_m: 0.0,
             turn_deg: 30.0,
             offset_m: [0.0; 3],
@@ -191,6 +206,10 @@ impl SimulateOptions {
         check(
             positive(self.vertical_fov_deg) && self.vertical_fov_deg < 170.0,
             "the vertical field of view must lie between 0 and 170 degrees",
+        )?;
+        check(
+            self.distortion.iter().all(|k| k.is_finite()) && self.camera().field().is_some(),
+            "k1 and k2 must not fold the picture back on itself before its corners",
         )?;
         check(
             self.advance_m.abs() <= 1000.0 && self.turn_deg.is_finite(),

@@ -124,6 +124,7 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
             truth: Some("groundtruth.tum".into()),
         },
         prior: options.prior(),
+        calibrate: None,
     };
     let other = std::io::Error::other;
     let path = |name: &str| folder.join(name);

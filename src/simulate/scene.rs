@@ -50,11 +50,7 @@ impl Scene {
     /// view along it.
     pub fn new(options: &SimulateOptions) -> Result<Self, SimulateError> {
         options.check()?;
-        let camera = Pinhole::from_vertical_fov(
-            options.width,
-            options.height,
-            options.vertical_fov_deg.to_radians(),
-        );
+        let camera = options.camera();
         let plan = spiral(
             options.frames,
             options.advance_m,
