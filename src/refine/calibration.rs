@@ -84,6 +84,12 @@ impl Calibration {
         }
     }
 
+    /// The same, but of the camera alone: a stretch of the survey says too little about the rest.
+    pub fn of_camera(mut self) -> Self {
+        self.free[LENS..].fill(false);
+        self
+    }
+
     /// True if anything is estimated.
     pub fn any(&self) -> bool {
         self.free.contains(&true)

@@ -14,13 +14,14 @@
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`H⁻¹ V H⁻¹`);
 //! R. W. M. Wedderburn, "Quasi-likelihood functions", Biometrika 61(3), 1974 (one factor for all).
 
+use super::calibration::LENS;
 use super::estimate::{FrameEstimate, UNKNOWNS};
 use super::factor::FactorError;
 use super::normal::{Block, NormalEquations, Pattern};
 use super::selected_inverse::SelectedInverse;
 use super::shared::{BorderBlock, SharedBlock};
 use crate::camera::Pinhole;
-use crate::surface::{GaugeMotion, Surface, wall_jacobian};
+use crate::surface::{GaugeMotion, Surface, lens_jacobian, wall_jacobian};
 use crate::trajectory::so3;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
@@ -165,11 +166,15 @@ pub fn covariances(
 }
 
 /// Reads a pose covariance as σ of rotation, translation and wall position.
+///
+/// `shared`: W of the frame and `Σ_κ`, where they were estimated. As `ξ` moves by `−W κ` with κ, their covariance is `−W Σ_κ`,
+/// and what a pixel shows, `A ξ + C κ`, is more certain than the pose alone.
 pub fn frame_sigma(
     surface: &dyn Surface,
     camera: &Pinhole,
     estimate: &FrameEstimate,
     covariance: &Matrix6<f64>,
+    shared: Option<(&BorderBlock, &SharedBlock)>,
 ) -> FrameSigma {
     let pose = &estimate.pose;
     let trace = |first: usize| {
@@ -182,10 +187,18 @@ pub fn frame_sigma(
     let mut points = 0.0;
     let middle = nalgebra::Vector2::new(camera.cx, camera.cy);
     for pixel in camera.border(1, 0.0).iter().chain([&middle]) {
-        let ray = pose.r_wc * camera.ray(pixel.x, pixel.y);
+        let ray_c = camera.ray(pixel.x, pixel.y);
+        let ray = pose.r_wc * ray_c;
         if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
             let a = wall_jacobian(pose, &surface.frame(hit.wall));
-            let variance = (a * covariance * a.transpose()).trace();
+            let mut variance = (a * covariance * a.transpose()).trace();
+            if let Some((w, covariance)) = shared {
+                let c = lens_jacobian(pose, &a, camera, &(ray_c * hit.range));
+                let lens = covariance.fixed_rows::<LENS>(0);
+                let own = c * lens.fixed_columns::<LENS>(0) * c.transpose();
+                let crossed = c * lens * w.fixed_rows::<6>(0).transpose() * a.transpose();
+                variance += own.trace() - 2.0 * crossed.trace();
+            }
             wall += variance;
             wall_px += variance * (camera.fy / hit.range).powi(2);
             points += 1.0;

@@ -52,6 +52,17 @@ pub enum Doubt {
 }
 
 impl Doubt {
+    /// True if the frame shows something, but nothing that fits the others.
+    pub fn is_misfit(&self) -> bool {
+        matches!(
+            self,
+            Self::NoMatch { .. }
+                | Self::Ambiguous { .. }
+                | Self::Contradicts { .. }
+                | Self::Disagrees { .. }
+        )
+    }
+
     /// True if another try, with other frames around, may place the frame.
     pub fn may_pass(&self) -> bool {
         matches!(

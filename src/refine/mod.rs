@@ -11,10 +11,10 @@
 //! | step | where |
 //! | --- | --- |
 //! | a first look: useless frames, common light, noise | [`examine`] |
-//! | one frame after another, sliding windows | [`track`]; a single frame: [`place`], [`search`] on the fused [`wall`] |
+//! | one frame after another, sliding windows | [`track`]; a single frame: [`place`], [`search`] on the fused [`wall`]; again with a better camera: [`retrack`] |
 //! | do overlapping frames show the same? take out, try again | [`consistency`], [`doubt`] |
 //! | all frames together, coarse to fine | [`run`](mod@run) |
-//! | what all frames share, if asked for | [`calibration`], [`shared`], [`observed`] |
+//! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
 //! | how sure | [`covariance`]; how sure it could be at best: [`bound`] |
 //!
 //! Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`] and [`coverage`]
@@ -32,6 +32,7 @@ mod examine;
 mod factor;
 mod gauss_newton;
 mod grid;
+mod lens;
 mod normal;
 mod observed;
 mod options;
@@ -39,6 +40,7 @@ mod place;
 mod prior;
 mod problem;
 mod report;
+mod retrack;
 mod robust;
 mod run;
 mod search;

@@ -5,6 +5,7 @@ use super::coverage::Coverage;
 use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
 use super::factor::{FactorError, Symbolic};
 use super::grid::{TilePoints, WallGrid};
+use super::lens::LensSums;
 use super::normal::{Block, NormalEquations, Pattern};
 use super::prior::Prior;
 use super::robust::{NoiseHistogram, NoiseModel};
@@ -14,8 +15,10 @@ use super::view::View;
 use super::visibility::{Observer, Placed, Tile, Visibility, reach_m};
 use crate::camera::Pinhole;
 use crate::frames::{FrameCache, FrameError, Pyramid, noise_at_level};
-use crate::surface::{Footprint, Surface, SurfaceError, viewing_distance, wall_jacobian};
-use nalgebra::{Matrix2x5, Matrix2x6, Matrix4, Matrix4x2, Matrix5, SMatrix, Vector2, Vector5};
+use crate::surface::{
+    Footprint, Surface, SurfaceError, lens_jacobian, viewing_distance, wall_jacobian,
+};
+use nalgebra::{Matrix2x5, Matrix2x6, Matrix4, SMatrix, Vector2, Vector5};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -57,6 +60,20 @@ pub struct Scene<'a> {
     pub prior: &'a Prior,
     /// The sensor's noise, 1-σ in grey levels, as single pictures show it.
     pub noise: f64,
+}
+
+impl Scene<'_> {
+    /// The same with the shared unknowns at `kappa`; as it is where they make no camera.
+    pub fn at(self, kappa: Kappa) -> Self {
+        match self.calibration.camera(&kappa) {
+            Some(camera) => Self {
+                camera,
+                kappa,
+                ..self
+            },
+            None => self,
+        }
+    }
 }
 
 /// The frames that take part in a problem.
@@ -450,8 +467,13 @@ impl<'a> Problem<'a> {
                 for sum in sums {
                     cost += sum.cost;
                     sum.add_to(&self.pattern, &mut normal, &mut scatter, &mut frames);
-                    if let (Some(border), Some(scatter)) = (&mut border, &mut border_scatter) {
-                        sum.add_to_border(border, scatter);
+                    if let Some(((lens, border), scatter)) = sum
+                        .lens
+                        .as_ref()
+                        .zip(border.as_mut())
+                        .zip(border_scatter.as_mut())
+                    {
+                        lens.add_to(&sum.slots, &sum.gradient, border, scatter);
                     }
                 }
             }
@@ -601,7 +623,7 @@ impl<'a> Problem<'a> {
             .collect();
         slots.sort_unstable();
         slots.dedup();
-        let mut sums = BlockSums::new(slots);
+        let mut sums = BlockSums::new(slots, self.calibrates);
         let mut work = TileWork::default();
         let mut scratch = Vec::new();
         let spacing = (self.grid.spacing_s_m, self.grid.spacing_h_m);
@@ -641,8 +663,8 @@ impl<'a> Problem<'a> {
         for tile in &summed {
             let features = share * tile.features * share;
             sums.add_tile(&tile.columns, &features, tile.total);
-            if self.calibrates {
-                sums.add_lens(&tile.columns, &features, tile.total);
+            if let Some(lens) = &mut sums.lens {
+                lens.add_tile(&tile.columns, &features, tile.total);
             }
         }
         sums
@@ -686,9 +708,8 @@ impl<'a> Problem<'a> {
                 let a = wall_jacobian(pose, &wall);
                 let mut moved = a * xi;
                 if self.calibrates {
-                    let turned = self.scene.camera.ray_jacobian(&ray_c) * lens;
-                    let across = pose.r_wc * turned.push(0.0) * hit.range;
-                    moved += a.fixed_columns::<3>(3) * across;
+                    let x_c = ray_c * hit.range;
+                    moved += lens_jacobian(pose, &a, &self.scene.camera, &x_c) * lens;
                 }
                 Some(moved.norm() * self.camera.fy / hit.range)
             })
@@ -748,13 +769,16 @@ struct TileSums {
 }
 
 /// An active observer of a tile.
-struct Column {
-    place: usize,
-    moments: ObserverMoments,
-    a: Matrix2x6<f64>,
+pub(super) struct Column {
+    /// Which of the block's frames.
+    pub place: usize,
+    pub moments: ObserverMoments,
+    /// A.
+    pub a: Matrix2x6<f64>,
     /// C; zero unless the lens is estimated.
-    c: Matrix2x5<f64>,
-    inverse_gain: f64,
+    pub c: Matrix2x5<f64>,
+    /// `1/a`, shading included.
+    pub inverse_gain: f64,
 }
 
 impl Column {
@@ -794,16 +818,12 @@ struct BlockSums {
     shares: Vec<FrameShare>,
     /// Upper triangle, row by row.
     blocks: Vec<Block>,
-    /// What the lens's unknowns share with the frames' ...
-    lens_frames: Vec<SMatrix<f64, UNKNOWNS, LENS>>,
-    /// ... and among themselves, ...
-    lens_own: Matrix5<f64>,
-    /// ... and their gradient; see [`super::shared`].
-    lens_gradient: Vector5<f64>,
+    /// The lens's part, if it is estimated.
+    lens: Option<LensSums>,
 }
 
 impl BlockSums {
-    fn new(slots: Vec<usize>) -> Self {
+    fn new(slots: Vec<usize>, calibrates: bool) -> Self {
         let n = slots.len();
         Self {
             slots,
@@ -811,9 +831,7 @@ impl BlockSums {
             gradient: vec![FrameStep::zeros(); n],
             shares: vec![FrameShare::default(); n],
             blocks: vec![Block::zeros(); n * (n + 1) / 2],
-            lens_frames: vec![SMatrix::zeros(); n],
-            lens_own: Matrix5::zeros(),
-            lens_gradient: Vector5::zeros(),
+            lens: calibrates.then(|| LensSums::new(n)),
         }
     }
 
@@ -855,49 +873,6 @@ impl BlockSums {
                 a.add_b_transposed_times(&f, scale, &mut self.blocks[index]);
             }
         }
-    }
-
-    /// The same for the lens's unknowns, all observers of the tile being active.
-    fn add_lens(&mut self, columns: &[Column], features: &Matrix4<f64>, total: f64) {
-        let weighted = columns.iter().map(|a| a.c * a.moments.weight);
-        let mean = weighted.sum::<Matrix2x5<f64>>() / total.max(1e-12);
-        let slopes: Matrix4x2<f64> = features.fixed_columns::<2>(0).into_owned();
-        for a in columns {
-            let apart = a.c - mean;
-            let f = slopes * apart * a.moments.weight;
-            let block = &mut self.lens_frames[a.place];
-            for column in 0..LENS {
-                for row in 0..6 {
-                    block[(row, column)] +=
-                        a.a[(0, row)] * f[(0, column)] + a.a[(1, row)] * f[(1, column)];
-                }
-                block[(6, column)] += f[(2, column)];
-                block[(7, column)] += f[(3, column)] * a.inverse_gain;
-            }
-            self.lens_own += apart.transpose() * f.fixed_rows::<2>(0);
-            self.lens_gradient -= a.c.transpose() * a.moments.gradient.fixed_rows::<2>(0);
-        }
-    }
-
-    fn add_to_border(&self, border: &mut Border, scatter: &mut Border) {
-        for (slot, block) in self.slots.iter().zip(&self.lens_frames) {
-            let mut target = border.frames[*slot].fixed_view_mut::<UNKNOWNS, LENS>(0, 0);
-            target += block;
-        }
-        let mut own = border.own.fixed_view_mut::<LENS, LENS>(0, 0);
-        own += self.lens_own;
-        let mut gradient = border.gradient.fixed_rows_mut::<LENS>(0);
-        gradient += self.lens_gradient;
-        let mut shared = Kappa::zeros();
-        shared
-            .fixed_rows_mut::<LENS>(0)
-            .copy_from(&self.lens_gradient);
-        let frames = self
-            .slots
-            .iter()
-            .copied()
-            .zip(self.gradient.iter().copied());
-        scatter.count(frames, &shared);
     }
 
     fn add_to(

@@ -12,7 +12,8 @@ use super::options::RefineOptions;
 use super::prior::{Prior, usual_step_s};
 use super::problem::{FrameShare, Problem, ProblemError, Sampling, Scene};
 use super::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
-use super::track::{Tracked, retry, track};
+use super::retrack::track_calibrating;
+use super::track::{Tracked, retry};
 use crate::frames::FrameCache;
 use crate::progress::Progress;
 use crate::survey::Survey;
@@ -56,6 +57,9 @@ const CLOSE: f64 = 20.0;
 const LEAST_PIXEL_SHARE: f64 = 0.02;
 /// Largest 1-σ on the wall of a pose that counts as photometric, pixels.
 const LARGEST_SIGMA_PX: f64 = 1.0;
+/// Share of frames that may fit nowhere before nothing is believed about what all frames share: the others may fit each
+/// other in wrong places.
+const MOST_MISFITS: f64 = 0.1;
 /// Share of a frame's weight that the robust loss may reject: always, at the most, and as a multiple of the usual.
 const MOST_REJECTED: (f64, f64, f64) = (0.1, 0.3, 2.0);
 
@@ -106,15 +110,17 @@ pub fn refine(
         frames.set_shading(examined.shading);
     }
     clock.lap("decode");
-    let mut tracked = track(
+    let mut tracked = track_calibrating(
         &scene(survey, &calibration, &prior, &frames, examined.noise),
         options,
-        examined.doubts,
+        &examined.doubts,
+        close(options, options.handover_level(side)),
         progress.as_ref(),
     )?;
     clock.lap("track");
 
-    let mut scene = scene(survey, &calibration, &prior, &frames, examined.noise);
+    let scene = scene(survey, &calibration, &prior, &frames, examined.noise);
+    let mut scene = scene.at(tracked.kappa);
     let mut levels = Vec::new();
     let mut last = None;
     let mut refusals = Vec::new();
@@ -137,7 +143,7 @@ pub fn refine(
         progress.finish();
         tracked.estimates.clone_from(&solution.estimates);
         let refused = match level {
-            0 => refused(&solution, &calibration)?,
+            0 => refused(&solution, &calibration, &tracked.doubts)?,
             _ => Vec::new(),
         };
         adopt(&mut scene, &mut calibration, solution.kappa, &refused);
@@ -188,6 +194,7 @@ pub fn refine(
                 &scene.camera,
                 &estimates[k],
                 &covariances.frames[k],
+                posterior.as_ref().map(|p| &p.w[k]).zip(shared.as_ref()),
             );
             frame_report(
                 survey,
@@ -255,11 +262,8 @@ fn adopt(scene: &mut Scene, calibration: &mut Calibration, mut kappa: Kappa, ref
         kappa[refusal.unknown] = 0.0;
         calibration.free[refusal.unknown] = false;
     }
-    // A lens that folds the picture has never been accepted; with one unknown back at its start it might.
-    if let Some(camera) = calibration.camera(&kappa) {
-        (scene.camera, scene.kappa) = (camera, kappa);
-    }
     scene.calibration = *calibration;
+    *scene = scene.at(kappa);
 }
 
 /// The equations of the shared unknowns at a solution, if they are estimated.
@@ -267,10 +271,21 @@ fn posterior(solution: &Solution) -> Result<Option<Posterior>, ProblemError> {
     Posterior::at(solution).map_err(|source| solution.problem.factor_error(source))
 }
 
-/// The shared unknowns that the data do not observe.
-fn refused(solution: &Solution, calibration: &Calibration) -> Result<Vec<Refusal>, ProblemError> {
-    let posterior = posterior(solution)?;
-    Ok(posterior.map_or(Vec::new(), |posterior| posterior.refuse(calibration)))
+/// The shared unknowns that the data do not observe: all, where too many frames do not fit the others.
+fn refused(
+    solution: &Solution,
+    calibration: &Calibration,
+    doubts: &[Option<Doubt>],
+) -> Result<Vec<Refusal>, ProblemError> {
+    let wrong = doubts.iter().flatten().filter(|doubt| doubt.is_misfit());
+    let wrong = wrong.count();
+    let Some(posterior) = posterior(solution)? else {
+        return Ok(Vec::new());
+    };
+    Ok(match wrong as f64 > MOST_MISFITS * doubts.len() as f64 {
+        true => posterior.refuse_all(calibration, wrong, doubts.len()),
+        false => posterior.refuse(calibration),
+    })
 }
 
 fn scene<'a>(

@@ -11,7 +11,7 @@
 //! With Q the scatter of the whole gradient (`V + P` of [`super::covariance`]), `Σ_κ = S⁻¹ (E Q Eᵀ) S⁻¹` with `E = (−Wᵀ, I)` is
 //! the covariance of κ with the poses unknown, and `Z + W Σ_κ Wᵀ` that of the poses with κ unknown.
 //!
-//! What a tile adds: if κ changes, the pixel of frame i that looks at x shows the wall at `x − C_i δκ` instead, with
+//! What a tile adds ([`super::lens`]): if κ changes, the pixel of frame i that looks at x shows the wall at `x − C_i δκ` instead, with
 //! `C_i = ∂(s, h)/∂κ`, so C_i stands beside A_i (see [`super::tile`]). The sums over all other frames of the bracket
 //! `w_i δ_ij − w_i w_j / Σw` are those from the mean `C̄ = Σ w C / Σ w`:
 //!

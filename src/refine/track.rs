@@ -6,6 +6,7 @@
 //!
 //! A frame that cannot be placed stays where the prior expects it, and no other is compared with it.
 
+use super::calibration::Kappa;
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::gauss_newton::{Stopping, solve};
@@ -39,6 +40,8 @@ pub struct Tracked {
     pub estimates: Vec<FrameEstimate>,
     /// Why a frame is at its prior, for those that are.
     pub doubts: Vec<Option<Doubt>>,
+    /// The shared unknowns, as far as windows have found them.
+    pub kappa: Kappa,
 }
 
 impl Tracked {
@@ -73,14 +76,21 @@ pub fn track(
     progress: &dyn Progress,
 ) -> Result<Tracked, ProblemError> {
     let count = scene.frames.frames();
+    let mut scene = Scene {
+        calibration: scene.calibration.of_camera(),
+        ..*scene
+    };
     let mut tracked = Tracked {
         estimates: Vec::with_capacity(count),
         doubts,
+        kappa: scene.kappa,
     };
     let mut footprints = Vec::with_capacity(count);
     let mut before = 0;
     progress.start("tracking", count);
     for k in 0..count {
+        scene = scene.at(tracked.kappa);
+        let scene = &scene;
         let expected = expect(scene, k, &tracked);
         tracked.estimates.push(FrameEstimate::at(expected.pose));
         footprints.push(footprint(scene, k, &tracked)?);
@@ -118,7 +128,8 @@ pub fn track(
             };
             let held = if first == 0 { 0 } else { (k + 1 - first) / 3 };
             for level in (finest..=coarsest).rev() {
-                solve_window(scene, level, first..k + 1, held, &mut tracked)?;
+                let scene = scene.at(tracked.kappa);
+                solve_window(&scene, level, first..k + 1, held, &mut tracked)?;
             }
         }
         if k > 0 && k % LONG_STRIDE == 0 {
@@ -126,7 +137,8 @@ pub fn track(
             let start = (k + 1).saturating_sub(LONG_WINDOW);
             let held = if start == 0 { 0 } else { LONG_WINDOW / 8 };
             let level = options.handover_level(side);
-            solve_window(scene, level, start..k + 1, held, &mut tracked)?;
+            let scene = scene.at(tracked.kappa);
+            solve_window(&scene, level, start..k + 1, held, &mut tracked)?;
         }
         footprints[k] = footprint(scene, k, &tracked)?;
         progress.advance(1);
@@ -135,7 +147,7 @@ pub fn track(
     Ok(tracked)
 }
 
-/// Solves the frames of a window together, the oldest `held` of them held.
+/// Solves the frames of a window together, the oldest `held` of them held; where none is, with the camera's unknowns.
 fn solve_window(
     scene: &Scene,
     level: usize,
@@ -150,9 +162,10 @@ fn solve_window(
         compared: Cow::Owned(tracked.believed(&window)),
         participants: window,
     };
-    let problem = Problem::new(scene, Sampling::of(level), members)?;
+    let problem = Problem::new(scene, Sampling::of(level), members)?.calibrating();
     if problem.tiles() > 0 {
         let solution = solve(problem, WINDOW_STOPPING, None)?;
+        tracked.kappa = solution.kappa;
         tracked.estimates[active].copy_from_slice(&solution.estimates);
     }
     Ok(())

@@ -4,7 +4,7 @@ use super::estimate::FrameEstimate;
 use super::grid::{AREA, TilePoints};
 use crate::camera::Pinhole;
 use crate::frames::GreyImage;
-use crate::surface::wall_jacobian;
+use crate::surface::{lens_jacobian, wall_jacobian};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix2x5, Matrix2x6, Matrix3, Vector3};
 
@@ -42,11 +42,8 @@ impl<'a> View<'a> {
         wall_jacobian(&self.pose, &points.centre)
     }
 
-    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2)` at the middle of a tile, for the `camera` at full size.
-    ///
-    /// If the ray `(x, y, 1)` of a pixel turns, the point at depth z moves across by `R z (∂x, ∂y, 0)`, and where the
-    /// ray meets the wall as if the camera had moved so: `C = A_ρ R z ∂(x, y)/∂κ`, with `A_ρ` the last three
-    /// columns of the pose's Jacobian `a`.
+    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2)` at the middle of a tile, for the `camera` at full size; `a`: the pose's
+    /// Jacobian there.
     pub fn lens_jacobian(
         &self,
         points: &TilePoints,
@@ -54,9 +51,7 @@ impl<'a> View<'a> {
         camera: &Pinhole,
     ) -> Matrix2x5<f64> {
         let x_c = self.pose.to_camera(&points.centre.x_w);
-        let r_wc = self.pose.r_wc.to_rotation_matrix();
-        let across = a.fixed_view::<2, 3>(0, 3) * r_wc.matrix().fixed_view::<3, 2>(0, 0);
-        across * camera.ray_jacobian(&(x_c / x_c.z)) * x_c.z
+        lens_jacobian(&self.pose, a, camera, &x_c)
     }
 
     /// The wall's values `(I/V − b/V)/a` as this frame shows them, bilinearly interpolated, into `values`; the frame

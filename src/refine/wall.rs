@@ -160,7 +160,7 @@ impl Lens {
     /// `1 + k1 q + k2 q²`, within the limit.
     #[inline]
     fn factor(&self, q: f32) -> Option<f32> {
-        (q < self.limit).then(|| 1.0 + q * (self.k1 + q * self.k2))
+        (q < self.limit).then_some(1.0 + q * (self.k1 + q * self.k2))
     }
 }
 

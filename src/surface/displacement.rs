@@ -1,8 +1,9 @@
 //! How the wall point of a fixed pixel moves when the pose moves.
 
 use super::WallFrame;
+use crate::camera::Pinhole;
 use crate::trajectory::{Pose, so3};
-use nalgebra::{Matrix2x6, Vector3};
+use nalgebra::{Matrix2x5, Matrix2x6, Vector3};
 
 /// `∂(s, h)/∂ξ` of the wall point seen through a fixed pixel, for `ξ = (ω, ρ)` of [`Pose::retract`].
 ///
@@ -33,10 +34,25 @@ pub fn wall_jacobian(pose: &Pose, wall: &WallFrame) -> Matrix2x6<f64> {
     jacobian
 }
 
+/// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2)` of the wall point `x_c` (camera coordinates) seen through a fixed pixel.
+///
+/// If the ray `(x, y, 1)` of the pixel turns, the point at depth z moves across by `m = R z (∂x, ∂y, 0)`, as if the camera
+/// had moved so: `C = A_ρ R z ∂(x, y)/∂κ`, with `A_ρ` the last three columns of `a` ([`wall_jacobian`]) and the rays'
+/// [`Pinhole::ray_jacobian`]. Rows: s, h (metres).
+pub fn lens_jacobian(
+    pose: &Pose,
+    a: &Matrix2x6<f64>,
+    camera: &Pinhole,
+    x_c: &Vector3<f64>,
+) -> Matrix2x5<f64> {
+    let r_wc = pose.r_wc.to_rotation_matrix();
+    let across = a.fixed_columns::<3>(3) * r_wc.matrix().fixed_columns::<2>(0);
+    across * camera.ray_jacobian(&(x_c / x_c.z)) * x_c.z
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Pinhole;
     use crate::surface::{Circle, Surface};
     use nalgebra::Vector6;
 

@@ -10,7 +10,7 @@ mod footprint;
 mod gauge;
 
 pub use circle::Circle;
-pub use displacement::wall_jacobian;
+pub use displacement::{lens_jacobian, wall_jacobian};
 pub use footprint::{Footprint, shortest_arc};
 pub use gauge::{Gauge, GaugeMotion};
 
