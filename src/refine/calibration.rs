@@ -15,7 +15,7 @@
 
 use crate::camera::Pinhole;
 use crate::survey::{CalibrateSection, CalibrationGroup};
-use crate::trajectory::{Pose, so3};
+use crate::trajectory::{Jitter, JitterModel, Pose, so3};
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 
 /// Number of shared unknowns.
@@ -88,6 +88,24 @@ impl Calibration {
     pub fn of_camera(mut self) -> Self {
         self.free[LENS..].fill(false);
         self
+    }
+
+    /// The noise of the initial poses as long as radius and axis are not known better than given: `σ² + δ²`, with δ how far
+    /// they may carry a pose (or a step, where errors add up) off. `arm_m`: length of the longest step, or distance of
+    /// the farthest pose from the middle.
+    pub fn widened(&self, jitter: &Jitter, arm_m: f64) -> Jitter {
+        let sigma = |k: usize| if self.free[k] { self.sigma[k] } else { 0.0 };
+        let tilt = sigma(6).hypot(sigma(7));
+        let (turned, carried) = match jitter.model {
+            JitterModel::RandomWalk => (0.0, 0.0),
+            JitterModel::Independent => (tilt, sigma(8).hypot(sigma(9))),
+        };
+        let moved = (arm_m * sigma(RADIUS).hypot(tilt)).hypot(carried);
+        Jitter {
+            rotation_sigma_rad: jitter.rotation_sigma_rad.hypot(turned),
+            translation_sigma_m: jitter.translation_sigma_m.map(|sigma| sigma.hypot(moved)),
+            ..*jitter
+        }
     }
 
     /// True if anything is estimated.
@@ -218,6 +236,22 @@ mod tests {
             assert!(placed.x.hypot(placed.z) < 1e-12);
             assert!((placed.y - 4.0 - along).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn noise_is_widened_only_by_what_is_estimated() {
+        let jitter = Jitter {
+            model: JitterModel::Independent,
+            rotation_sigma_rad: 0.03,
+            translation_sigma_m: [0.003; 3],
+        };
+        let mut calibration = calibration();
+        let same = calibration.widened(&jitter, 5.0);
+        assert_eq!(same, jitter);
+        (calibration.free[RADIUS], calibration.sigma[RADIUS]) = (true, 0.01);
+        let wide = calibration.widened(&jitter, 0.4);
+        assert!((wide.translation_sigma_m[1] - 0.005).abs() < 1e-12);
+        assert_eq!(wide.rotation_sigma_rad, 0.03);
     }
 
     #[test]

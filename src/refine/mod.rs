@@ -15,7 +15,7 @@
 //! | do overlapping frames show the same? take out, try again | [`consistency`], [`doubt`] |
 //! | all frames together, coarse to fine | [`run`](mod@run) |
 //! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
-//! | how sure | [`covariance`]; how sure it could be at best: [`bound`] |
+//! | how sure | [`certainty`], [`covariance`]; how sure it could be at best: [`bound`] |
 //!
 //! Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`] and [`coverage`]
 //! choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, [`problem`] reduces
@@ -23,6 +23,7 @@
 
 mod bound;
 mod calibration;
+mod certainty;
 mod consistency;
 mod covariance;
 mod coverage;

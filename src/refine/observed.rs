@@ -73,25 +73,6 @@ impl Posterior {
         Some(covariance)
     }
 
-    /// Refuses everything, because `wrong` of the `frames` fit nowhere.
-    pub fn refuse_all(
-        &self,
-        calibration: &Calibration,
-        wrong: usize,
-        frames: usize,
-    ) -> Vec<Refusal> {
-        let free = (0..SHARED).filter(|k| calibration.free[*k]);
-        free.map(|unknown| Refusal {
-            unknown,
-            sigma: calibration.sigma[unknown],
-            reason: format!(
-                "{wrong} of {frames} frames do not fit the others, so the rest may fit in wrong places; give better poses or \
-                 a better calibration, or estimate less at once"
-            ),
-        })
-        .collect()
-    }
-
     /// Refuses what the data cannot observe, one by one, the worst first. A singular S refuses all.
     pub fn refuse(&self, calibration: &Calibration) -> Vec<Refusal> {
         let mut free = calibration.free;

@@ -55,6 +55,24 @@ impl Prior {
         ((self.times_s[k + 1] - self.times_s[k]) / self.usual_step_s).max(1.0)
     }
 
+    /// How far a wrong scale or tilt reaches: the longest step of a random walk, or the distance of the farthest of
+    /// independent poses from their middle, metres.
+    pub fn arm_m(&self) -> f64 {
+        let poses = &self.initial;
+        let lengths: Vec<f64> = match self.jitter.model {
+            JitterModel::RandomWalk => {
+                let steps = poses.windows(2);
+                steps.map(|p| (p[1].t_wc - p[0].t_wc).norm()).collect()
+            }
+            JitterModel::Independent => {
+                let sum: Vector3<f64> = poses.iter().map(|pose| pose.t_wc).sum();
+                let middle = sum / poses.len().max(1) as f64;
+                poses.iter().map(|p| (p.t_wc - middle).norm()).collect()
+            }
+        };
+        lengths.into_iter().fold(0.0, f64::max)
+    }
+
     /// Pairs of frames that the prior ties together within `active`, counted from its start.
     pub fn pairs(&self, active: &Range<usize>) -> Vec<(usize, usize)> {
         match self.jitter.model {

@@ -1,13 +1,14 @@
 //! From a survey to refined poses: load, track, solve globally coarse to fine, report.
 
 use super::calibration::{Calibration, Kappa};
+use super::certainty::Certainty;
 use super::consistency::{blurred, compare_pairs, contradictions};
-use super::covariance::{Covariances, covariances, frame_sigma};
+use super::covariance::Covariances;
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::examine::examine;
 use super::gauss_newton::{Solution, StopReason, Stopping, solve};
-use super::observed::{CalibrationReport, Posterior, Refusal};
+use super::observed::{CalibrationReport, Refusal};
 use super::options::RefineOptions;
 use super::prior::{Prior, usual_step_s};
 use super::problem::{FrameShare, Problem, ProblemError, Sampling, Scene};
@@ -57,9 +58,6 @@ const CLOSE: f64 = 20.0;
 const LEAST_PIXEL_SHARE: f64 = 0.02;
 /// Largest 1-σ on the wall of a pose that counts as photometric, pixels.
 const LARGEST_SIGMA_PX: f64 = 1.0;
-/// Share of frames that may fit nowhere before nothing is believed about what all frames share: the others may fit each
-/// other in wrong places.
-const MOST_MISFITS: f64 = 0.1;
 /// Share of a frame's weight that the robust loss may reject: always, at the most, and as a multiple of the usual.
 const MOST_REJECTED: (f64, f64, f64) = (0.1, 0.3, 2.0);
 
@@ -110,8 +108,12 @@ pub fn refine(
         frames.set_shading(examined.shading);
     }
     clock.lap("decode");
+    let rough = Prior {
+        jitter: calibration.widened(&prior.jitter, prior.arm_m()),
+        ..prior.clone()
+    };
     let mut tracked = track_calibrating(
-        &scene(survey, &calibration, &prior, &frames, examined.noise),
+        &scene(survey, &calibration, &rough, &frames, examined.noise),
         options,
         &examined.doubts,
         close(options, options.handover_level(side)),
@@ -143,7 +145,12 @@ pub fn refine(
         progress.finish();
         tracked.estimates.clone_from(&solution.estimates);
         let refused = match level {
-            0 => refused(&solution, &calibration, &tracked.doubts)?,
+            0 => Certainty::at(&solution, &calibration)?.refused(
+                &scene.at(solution.kappa),
+                &calibration,
+                &solution.estimates,
+                &tracked.doubts,
+            ),
             _ => Vec::new(),
         };
         adopt(&mut scene, &mut calibration, solution.kappa, &refused);
@@ -167,35 +174,12 @@ pub fn refine(
         }
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
-    let posterior = posterior(&solution)?;
-    let shared = posterior
-        .as_ref()
-        .and_then(|p| p.covariance(&calibration.free));
-    let (prior_information, _) = solution
-        .problem
-        .prior_information(&solution.estimates, &solution.kappa);
-    let mut covariances = covariances(
-        solution.problem.pattern(),
-        &solution.linearisation.normal,
-        &solution.linearisation.scatter,
-        &prior_information,
-    )
-    // Poses without a covariance are still poses; they are reported as uncertain.
-    .unwrap_or_else(|_| Covariances::unknown(count));
-    if let (Some(posterior), Some(shared)) = (&posterior, &shared) {
-        covariances = covariances.with_shared(&posterior.w, shared);
-    }
+    let certainty = Certainty::at(&solution, &calibration)?;
     let estimates = &tracked.estimates;
     let most = most_rejected(&solution.linearisation.frames);
     let reports: Vec<FrameReport> = (0..count)
         .map(|k| {
-            let sigma = frame_sigma(
-                scene.surface,
-                &scene.camera,
-                &estimates[k],
-                &covariances.frames[k],
-                posterior.as_ref().map(|p| &p.w[k]).zip(shared.as_ref()),
-            );
+            let sigma = certainty.of_frame(&scene, k, &estimates[k]);
             frame_report(
                 survey,
                 k,
@@ -230,19 +214,19 @@ pub fn refine(
             levels,
             frames: reports,
             frames_on_prior: on_prior,
-            variance_factor: covariances.variance_factor,
+            variance_factor: certainty.covariances.variance_factor,
             calibration: (calibration.any() || !refusals.is_empty()).then(|| {
                 CalibrationReport::new(
                     &calibration,
                     &scene.kappa,
-                    &shared.unwrap_or_default(),
+                    &certainty.shared.unwrap_or_default(),
                     &refusals,
                     survey.file.tunnel.radius_m,
                 )
             }),
             timings: clock.laps,
         },
-        covariances: covariances.moved(&motion).scaled(metric.scale),
+        covariances: certainty.covariances.moved(&motion).scaled(metric.scale),
     })
 }
 
@@ -264,28 +248,6 @@ fn adopt(scene: &mut Scene, calibration: &mut Calibration, mut kappa: Kappa, ref
     }
     scene.calibration = *calibration;
     *scene = scene.at(kappa);
-}
-
-/// The equations of the shared unknowns at a solution, if they are estimated.
-fn posterior(solution: &Solution) -> Result<Option<Posterior>, ProblemError> {
-    Posterior::at(solution).map_err(|source| solution.problem.factor_error(source))
-}
-
-/// The shared unknowns that the data do not observe: all, where too many frames do not fit the others.
-fn refused(
-    solution: &Solution,
-    calibration: &Calibration,
-    doubts: &[Option<Doubt>],
-) -> Result<Vec<Refusal>, ProblemError> {
-    let wrong = doubts.iter().flatten().filter(|doubt| doubt.is_misfit());
-    let wrong = wrong.count();
-    let Some(posterior) = posterior(solution)? else {
-        return Ok(Vec::new());
-    };
-    Ok(match wrong as f64 > MOST_MISFITS * doubts.len() as f64 {
-        true => posterior.refuse_all(calibration, wrong, doubts.len()),
-        false => posterior.refuse(calibration),
-    })
 }
 
 fn scene<'a>(

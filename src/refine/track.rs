@@ -205,14 +205,15 @@ pub fn expect(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
 }
 
 fn expect_anywhere(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
-    let initial = &scene.prior.initial;
+    let metric = scene.calibration.metric(&scene.kappa);
+    let initial = |k: usize| metric.place_nominal(&scene.prior.initial[k]);
     let around = k.saturating_sub(FARTHEST)..(k + FARTHEST).min(tracked.estimates.len());
     let believed = around.filter(|i| *i != k && tracked.doubts[*i].is_none());
     match scene.prior.jitter.model {
         JitterModel::RandomWalk => match believed.min_by_key(|i| i.abs_diff(k)) {
             Some(near) => {
                 let pose = &tracked.estimates[near].pose;
-                let (from, to) = (&initial[near], &initial[k]);
+                let (from, to) = (initial(near), initial(k));
                 let steps = scene.prior.steps_between(near.min(k), near.max(k));
                 Expectation {
                     pose: Pose::new(
@@ -223,17 +224,17 @@ fn expect_anywhere(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
                 }
             }
             None => Expectation {
-                pose: initial[k],
+                pose: initial(k),
                 widened: 1.0,
             },
         },
         JitterModel::Independent => {
             let (from, to): (Vec<Pose>, Vec<Pose>) = believed
-                .map(|i| (initial[i], tracked.estimates[i].pose))
+                .map(|i| (initial(i), tracked.estimates[i].pose))
                 .unzip();
             let motion = scene.surface.gauge().align(&from, &to);
             Expectation {
-                pose: motion.apply(&initial[k]),
+                pose: motion.apply(&initial(k)),
                 widened: 1.0,
             }
         }
