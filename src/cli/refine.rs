@@ -28,7 +28,7 @@ pub struct RefineArguments {
     #[arg(long)]
     fast: bool,
     /// Estimate what all frames share, too: focal, centre, distortion, radius, axis, or all, with commas between. How far
-    /// off the given values may be is said by [calibrate] in survey.toml. Writes camera.json and survey.toml into DIR, for
+    /// off the given values may be is said by the section calibrate of survey.toml. Writes camera.json and survey.toml into DIR, for
     /// the other commands.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     calibrate: Option<Vec<CalibrateArgument>>,
