@@ -20,6 +20,7 @@
 //! choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, [`problem`] reduces
 //! to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
 
+mod alignment;
 mod bound;
 mod consistency;
 mod covariance;
@@ -35,6 +36,7 @@ mod options;
 mod place;
 mod prior;
 mod problem;
+mod repair;
 mod report;
 mod robust;
 mod run;
@@ -43,6 +45,7 @@ mod selected_inverse;
 mod spectrum;
 mod tile;
 mod track;
+mod verdict;
 mod view;
 mod visibility;
 mod wall;

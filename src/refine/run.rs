@@ -1,5 +1,6 @@
 //! From a survey to refined poses: load, track, solve globally coarse to fine, report.
 
+use super::alignment::alignments;
 use super::consistency::{blurred, compare_pairs, contradictions};
 use super::covariance::{Covariances, covariances, frame_sigma};
 use super::doubt::Doubt;
@@ -9,8 +10,10 @@ use super::gauss_newton::{Solution, StopReason, Stopping, solve};
 use super::options::RefineOptions;
 use super::prior::{Prior, usual_step_s};
 use super::problem::{FrameShare, Problem, ProblemError, Sampling, Scene};
+use super::repair::repair;
 use super::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 use super::track::{Tracked, retry, track};
+use super::verdict::unsupported;
 use crate::frames::FrameCache;
 use crate::progress::Progress;
 use crate::survey::Survey;
@@ -51,6 +54,8 @@ pub struct Refined {
 const CLOSE: f64 = 20.0;
 /// Share of a frame's pixels that must overlap other frames for its pose to count as photometric.
 const LEAST_PIXEL_SHARE: f64 = 0.02;
+/// Largest step left of a pose that counts as photometric, pixels on the wall.
+const LARGEST_STEP_PX: f64 = 0.25;
 /// Largest 1-σ on the wall of a pose that counts as photometric, pixels.
 const LARGEST_SIGMA_PX: f64 = 1.0;
 /// Share of a frame's weight that the robust loss may reject: always, at the most, and as a multiple of the usual.
@@ -113,8 +118,14 @@ pub fn refine(
     let scene = scene(survey, &prior, &frames, examined.noise);
     let mut levels = Vec::new();
     let mut last = None;
-    for (k, (sampling, stopping)) in stages(options, side).enumerate() {
+    let (mut solved, mut changed) = (false, false);
+    let stages: Vec<(Sampling, Stopping)> = stages(options, side).collect();
+    for (k, (sampling, stopping)) in stages.iter().copied().enumerate() {
         let Sampling { level, density } = sampling;
+        if solved && k + 1 == stages.len() {
+            repair(&scene, options, &mut tracked, changed)?;
+            clock.lap("repair");
+        }
         let problem = Problem::new(&scene, sampling, tracked.members())?;
         // Where no frame can be believed, the prior is all there is to report.
         if problem.tiles() == 0 && tracked.doubts.iter().all(Option::is_none) {
@@ -129,8 +140,9 @@ pub fn refine(
         progress.finish();
         tracked.estimates.clone_from(&solution.estimates);
         if sampling == Sampling::of(0) {
-            disagreements(&solution.linearisation.frames, &mut tracked.doubts);
+            changed = disagreements(&solution.linearisation.frames, &mut tracked.doubts);
         }
+        solved = true;
         levels.push(LevelReport {
             level,
             samples_per_pixel: density,
@@ -144,6 +156,13 @@ pub fn refine(
         }
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
+    let unsettled = unsettled(&solution)?;
+    let finest = options.handover_level(side);
+    let late = unsupported(&alignments(&scene, finest, &tracked)?, count);
+    let late = unsettled.into_iter().chain(late);
+    for (frame, doubt) in late {
+        tracked.doubts[frame].get_or_insert(doubt);
+    }
     let covariances = covariances(
         solution.problem.pattern(),
         &solution.linearisation.normal,
@@ -271,24 +290,66 @@ fn recheck(
             break;
         }
         for level in (finest..=coarsest).rev() {
-            let problem = Problem::new(scene, Sampling::of(level), tracked.members())?;
-            let stopping = close(options, level);
-            tracked.estimates = solve(problem, stopping, None)?.estimates;
+            solve_level(scene, options, level, tracked)?;
         }
     }
     Ok(())
 }
 
+/// Solves all believed frames at a pyramid level, close enough for the next; returns how each took part.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn solve_level(
+    scene: &Scene,
+    options: &RefineOptions,
+    level: usize,
+    tracked: &mut Tracked,
+) -> Result<Vec<FrameShare>, ProblemError> {
+    let problem = Problem::new(scene, Sampling::of(level), tracked.members())?;
+    let solution = solve(problem, close(options, level), None)?;
+    tracked.estimates = solution.estimates;
+    Ok(solution.linearisation.frames)
+}
+
 /// Times that contradictions are looked for, and frames in doubt tried again between.
 const ROUNDS: usize = 3;
-/// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve does without them.
-fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) {
+
+/// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve does without them;
+/// true if there are any.
+pub fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) -> bool {
     let most = most_rejected(shares);
+    let mut any = false;
     for (share, doubt) in shares.iter().zip(doubts) {
         if doubt.is_none() && share.pixels > 0.0 {
             *doubt = disagreement(share, most);
+            any |= doubt.is_some();
         }
     }
+    any
+}
+
+/// The frames that an undamped step would still move by more than [`LARGEST_STEP_PX`], for want of steps or of descent.
+///
+/// # Errors
+/// [`ProblemError::Factor`].
+fn unsettled(solution: &Solution) -> Result<Vec<(usize, Doubt)>, ProblemError> {
+    let problem = &solution.problem;
+    let linearisation = &solution.linearisation;
+    let factor = problem
+        .symbolic()
+        .factorise(problem.pattern(), &linearisation.normal, 0.0)
+        .map_err(|source| problem.factor_error(source))?;
+    let step = factor.step(&linearisation.normal.gradient);
+    let moved = problem.wall_step_px(&solution.estimates, &step);
+    Ok(moved
+        .into_iter()
+        .enumerate()
+        .filter(|(k, step_px)| {
+            linearisation.frames[*k].pixels > 0.0 && step_px.is_nan() || *step_px > LARGEST_STEP_PX
+        })
+        .map(|(k, step_px)| (k, Doubt::Unsettled { step_px }))
+        .collect())
 }
 
 /// Share of its pixels that a believable frame may have rejected: a few times the usual, within limits.

@@ -150,7 +150,8 @@ pub struct Sampler<'a> {
 }
 
 impl<'a> Sampler<'a> {
-    fn new(image: &'a GreyImage, camera: &Pinhole, pose: &Pose, origin: &Vector3<f64>) -> Self {
+    /// `image` of `camera` at `pose`; points will be relative to `origin`.
+    pub fn new(image: &'a GreyImage, camera: &Pinhole, pose: &Pose, origin: &Vector3<f64>) -> Self {
         let r_wc = pose.r_wc.to_rotation_matrix();
         Self {
             image,
