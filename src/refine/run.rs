@@ -346,7 +346,8 @@ fn unsettled(solution: &Solution) -> Result<Vec<(usize, Doubt)>, ProblemError> {
         .into_iter()
         .enumerate()
         .filter(|(k, step_px)| {
-            linearisation.frames[*k].pixels > 0.0 && step_px.is_nan() || *step_px > LARGEST_STEP_PX
+            let compared = linearisation.frames[*k].pixels > 0.0;
+            compared && (step_px.is_nan() || *step_px > LARGEST_STEP_PX)
         })
         .map(|(k, step_px)| (k, Doubt::Unsettled { step_px }))
         .collect())
