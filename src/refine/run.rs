@@ -58,8 +58,9 @@ const LEAST_PIXEL_SHARE: f64 = 0.02;
 const LARGEST_STEP_PX: f64 = 0.25;
 /// Largest 1-σ on the wall of a pose that counts as photometric, pixels.
 const LARGEST_SIGMA_PX: f64 = 1.0;
-/// Share of a frame's weight that the robust loss may reject: always, at the most, and as a multiple of the usual.
-const MOST_REJECTED: (f64, f64, f64) = (0.1, 0.3, 2.0);
+/// Share of a frame's weight that the robust loss may reject. Things before the wall, glints and oblique views cost a
+/// right frame some; whether its pose is right is asked of its alignment with others.
+const MOST_REJECTED: f64 = 0.3;
 
 /// Refines the poses of `survey`.
 ///
@@ -172,7 +173,6 @@ pub fn refine(
     // Poses without a covariance are still poses; they are reported as uncertain.
     .unwrap_or_else(|_| Covariances::unknown(count));
     let estimates = &tracked.estimates;
-    let most = most_rejected(&solution.linearisation.frames);
     let reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = frame_sigma(
@@ -181,14 +181,7 @@ pub fn refine(
                 &estimates[k],
                 &covariances.frames[k],
             );
-            frame_report(
-                survey,
-                k,
-                &solution,
-                tracked.doubts[k].as_ref(),
-                most,
-                sigma,
-            )
+            frame_report(survey, k, &solution, tracked.doubts[k].as_ref(), sigma)
         })
         .collect();
     clock.lap("covariance");
@@ -318,11 +311,10 @@ const ROUNDS: usize = 3;
 /// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve does without them;
 /// true if there are any.
 pub fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) -> bool {
-    let most = most_rejected(shares);
     let mut any = false;
     for (share, doubt) in shares.iter().zip(doubts) {
         if doubt.is_none() && share.pixels > 0.0 {
-            *doubt = disagreement(share, most);
+            *doubt = disagreement(share);
             any |= doubt.is_some();
         }
     }
@@ -353,22 +345,13 @@ fn unsettled(solution: &Solution) -> Result<Vec<(usize, Doubt)>, ProblemError> {
         .collect())
 }
 
-/// Share of its pixels that a believable frame may have rejected: a few times the usual, within limits.
-fn most_rejected(shares: &[FrameShare]) -> f64 {
-    let compared = shares.iter().filter(|share| share.pixels > 0.0);
-    let mut rejected: Vec<f64> = compared.map(rejected).collect();
-    rejected.sort_unstable_by(f64::total_cmp);
-    let usual = rejected.get(rejected.len() / 2).copied().unwrap_or(0.0);
-    (MOST_REJECTED.2 * usual).clamp(MOST_REJECTED.0, MOST_REJECTED.1)
-}
-
 fn rejected(share: &FrameShare) -> f64 {
     1.0 - share.inliers / share.pixels.max(1e-9)
 }
 
-fn disagreement(share: &FrameShare, most: f64) -> Option<Doubt> {
+fn disagreement(share: &FrameShare) -> Option<Doubt> {
     let share = rejected(share);
-    (share > most).then_some(Doubt::Disagrees { share })
+    (share > MOST_REJECTED).then_some(Doubt::Disagrees { share })
 }
 
 fn frame_report(
@@ -376,7 +359,6 @@ fn frame_report(
     k: usize,
     solution: &Solution,
     doubt: Option<&Doubt>,
-    most_rejected: f64,
     sigma: super::covariance::FrameSigma,
 ) -> FrameReport {
     let share: &FrameShare = &solution.linearisation.frames[k];
@@ -387,7 +369,7 @@ fn frame_report(
         Some(Doubt::NoOverlap {
             share: share.pixels / all,
         })
-    } else if let Some(doubt) = disagreement(share, most_rejected) {
+    } else if let Some(doubt) = disagreement(share) {
         Some(doubt)
     } else if sigma.wall_px.is_nan() || sigma.wall_px > LARGEST_SIGMA_PX {
         Some(Doubt::Uncertain {
