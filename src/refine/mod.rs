@@ -37,6 +37,7 @@ mod place;
 mod prior;
 mod problem;
 mod repair;
+mod repeats;
 mod report;
 mod robust;
 mod run;

@@ -51,6 +51,15 @@ impl Prior {
         ((self.times_s[k + 1] - self.times_s[k]) / self.usual_step_s).max(1.0)
     }
 
+    /// The pose of frame `to` if frame `from` is at `pose` and the initial steps between them are right.
+    pub fn predict(&self, from: usize, pose: &Pose, to: usize) -> Pose {
+        let (from, to) = (&self.initial[from], &self.initial[to]);
+        Pose::new(
+            pose.r_wc * (from.r_wc.inverse() * to.r_wc),
+            pose.t_wc + (to.t_wc - from.t_wc),
+        )
+    }
+
     /// Pairs of frames that the prior ties together within `active`, counted from its start.
     pub fn pairs(&self, active: &Range<usize>) -> Vec<(usize, usize)> {
         match self.jitter.model {

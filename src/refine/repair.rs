@@ -9,6 +9,7 @@ use super::alignment::alignments;
 use super::doubt::Doubt;
 use super::options::RefineOptions;
 use super::problem::{ProblemError, Scene};
+use super::repeats::{Rival, settle_repeats};
 use super::run::{disagreements, solve_level};
 use super::track::{Tracked, retry};
 use super::verdict::unsupported;
@@ -21,6 +22,8 @@ const ROUNDS: usize = 8;
 /// Takes out the frames that the others do not bear out, places them again, and solves, until nothing changes.
 /// `changed`: frames have been taken out already since the last solve.
 ///
+/// Returns the frames that the wall's repeats leave undecided.
+///
 /// A round after which fewer frames are believed than before any is undone.
 ///
 /// # Errors
@@ -30,10 +33,11 @@ pub fn repair(
     options: &RefineOptions,
     tracked: &mut Tracked,
     mut changed: bool,
-) -> Result<(), ProblemError> {
+) -> Result<Vec<Rival>, ProblemError> {
     let side = scene.camera.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
     let mut best: Option<Tracked> = None;
+    let mut rivals = Vec::new();
     for round in 0..ROUNDS {
         changed |= judge(scene, finest, tracked)?;
         if !changed
@@ -48,7 +52,11 @@ pub fn repair(
             false => 0,
         };
         if !changed && placed == 0 {
-            break;
+            let (moved, undecided) = settle_repeats(scene, options, tracked)?;
+            rivals = undecided;
+            if !moved || round + 1 == ROUNDS {
+                break;
+            }
         }
         for level in (0..=coarsest).rev() {
             let shares = solve_level(scene, options, level, tracked)?;
@@ -57,8 +65,9 @@ pub fn repair(
     }
     if let Some(best) = best.filter(|best| believed(best) > believed(tracked)) {
         *tracked = best;
+        (_, rivals) = settle_repeats(scene, options, tracked)?;
     }
-    Ok(())
+    Ok(rivals)
 }
 
 fn believed(tracked: &Tracked) -> usize {

@@ -8,9 +8,11 @@ use super::estimate::FrameEstimate;
 use super::examine::examine;
 use super::gauss_newton::{Solution, StopReason, Stopping, solve};
 use super::options::RefineOptions;
+use super::place::apart_m;
 use super::prior::{Prior, usual_step_s};
 use super::problem::{FrameShare, Problem, ProblemError, Sampling, Scene};
 use super::repair::repair;
+use super::repeats::Rival;
 use super::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 use super::track::{Tracked, retry, track};
 use super::verdict::unsupported;
@@ -119,12 +121,12 @@ pub fn refine(
     let scene = scene(survey, &prior, &frames, examined.noise);
     let mut levels = Vec::new();
     let mut last = None;
-    let (mut solved, mut changed) = (false, false);
+    let (mut solved, mut changed, mut rivals) = (false, false, Vec::new());
     let stages: Vec<(Sampling, Stopping)> = stages(options, side).collect();
     for (k, (sampling, stopping)) in stages.iter().copied().enumerate() {
         let Sampling { level, density } = sampling;
         if solved && k + 1 == stages.len() {
-            repair(&scene, options, &mut tracked, changed)?;
+            rivals = repair(&scene, options, &mut tracked, changed)?;
             clock.lap("repair");
         }
         let problem = Problem::new(&scene, sampling, tracked.members())?;
@@ -160,7 +162,13 @@ pub fn refine(
     let unsettled = unsettled(&solution)?;
     let finest = options.handover_level(side);
     let late = unsupported(&alignments(&scene, finest, &tracked)?, count);
-    let late = unsettled.into_iter().chain(late);
+    let ambiguous = rivals.into_iter().map(|(frame, motion): Rival| {
+        let pose = &tracked.estimates[frame].pose;
+        let other = motion.apply(pose);
+        let apart_m = apart_m(&scene, pose, &other);
+        (frame, Doubt::Ambiguous { other, apart_m })
+    });
+    let late: Vec<(usize, Doubt)> = ambiguous.chain(unsettled).chain(late).collect();
     for (frame, doubt) in late {
         tracked.doubts[frame].get_or_insert(doubt);
     }

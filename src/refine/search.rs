@@ -188,6 +188,27 @@ fn tilt_axis(pose: &Pose) -> Option<Vector3<f64>> {
     axis.cross(&Vector3::z()).try_normalize(1e-6)
 }
 
+/// Where else on the wall a frame at `pose` fits: shifts along s and h, metres, up to `reach_m`, at which the squared
+/// correlation has a maximum of at least `least`; the shift of none is one of them, where the pose is right.
+pub fn matches(
+    wall: &FusedWall,
+    portrait: &Portrait,
+    pose: &Pose,
+    reach_m: [f64; 2],
+    least: f64,
+) -> Vec<[f64; 2]> {
+    let spacing = wall.lattice.spacing_m;
+    let cells = |length: f64| (length / spacing).ceil() as usize;
+    let correlator = Correlator::new(wall, (cells(reach_m[0]), cells(reach_m[1])));
+    let samples = least_samples(portrait);
+    correlator
+        .correlate(wall, portrait, pose)
+        .into_iter()
+        .filter(|found| found.samples >= samples && found.correlation.powi(2) >= least)
+        .map(|found| (found.shift * spacing).into())
+        .collect()
+}
+
 /// Angles from `−half` to `half`, no more than `step` apart.
 fn steps(half: f64, step: f64) -> Vec<f64> {
     let n = (half / step).floor() as i32;
