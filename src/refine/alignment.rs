@@ -43,6 +43,12 @@ const LEAST_SAMPLES: usize = 40;
 const LEAST_OVERLAP: f64 = 0.02;
 /// Gauss–Newton finds no displacement larger than this, pixels of the level: it is no measurement then.
 const MOST_PX: f64 = 8.0;
+/// Share of the squared slopes that must be texture and not noise: with less, N is chance.
+const LEAST_TEXTURE: f64 = 0.3;
+/// σ, pixels of the level, below which a texture that leads nowhere says that the frames show different things.
+const SHARP_PX: f64 = 0.1;
+/// A step shorter than this, pixels of the level, is the last; one longer than ten times this is no end.
+const LAST_STEP_PX: f64 = 0.01;
 /// Noise of the residuals that is assumed at least, grey levels: rounding.
 const LEAST_SIGMA: f32 = 0.3;
 
@@ -55,12 +61,10 @@ pub struct Alignment {
     pub b: usize,
     /// Samples they share.
     pub samples: f64,
-    /// e, pixels of full size.
+    /// e, pixels of full size; infinite where a sharp texture leads nowhere.
     pub error_px: f64,
-    /// σ, likewise.
+    /// σ, likewise; infinite where the texture is too faint to tell.
     pub sigma_px: f64,
-    /// Correlation of what both show, once aligned.
-    pub correlation: f64,
 }
 
 /// Measures how all believed frames that overlap are aligned; `finest` is the finest level that tracking uses.
@@ -256,8 +260,9 @@ impl Template {
         let sampler = other.sampler(&self.origin);
         let mut p = Vector6::<f64>::zeros();
         let mut exposure: Option<(f64, f64)> = None;
+        let mut sharp = false;
         let mut result = None;
-        for _ in 0..STEPS {
+        for k in 0..STEPS {
             let mut seen: Vec<(&Sample, f32)> = Vec::with_capacity(self.samples.len());
             let field: [f32; 6] = (p * self.pixel_m).cast::<f32>().into();
             for sample in &self.samples {
@@ -285,12 +290,27 @@ impl Template {
                 .max(2.0 * self.noise)
                 .max(LEAST_SIGMA * LEAST_SIGMA);
             let fit = Fit::new(&seen, gain, bias, variance, self.slope_noise);
-            let step = fit.step()?;
+            let Some(step) = fit.step() else {
+                return Some(fit.silent(self.scale));
+            };
             p += step.fixed_rows::<6>(0);
             exposure = Some((gain + step[6], bias + step[7]));
             let moved = fit.rms(&Vector6::from(step.fixed_rows::<6>(0)));
-            result = Some(fit.alignment(&p, self.scale, f64::from(variance)));
-            if fit.rms(&p) > MOST_PX || moved < 0.01 {
+            let alignment = fit.alignment(&p, self.scale, f64::from(variance));
+            if k == 0 {
+                sharp = alignment.sigma_px < SHARP_PX * self.scale;
+            }
+            let lost = fit.rms(&p) > MOST_PX;
+            let ended = !lost && moved < 10.0 * LAST_STEP_PX;
+            result = Some(match (ended, sharp) {
+                (true, _) => alignment,
+                (false, true) => Alignment {
+                    error_px: f64::INFINITY,
+                    ..alignment
+                },
+                (false, false) => fit.silent(self.scale),
+            });
+            if lost || moved < LAST_STEP_PX {
                 break;
             }
         }
@@ -326,7 +346,8 @@ struct Fit {
     /// `Σ x xᵀ / Σ 1` of the regressors.
     w: Matrix3<f64>,
     samples: f64,
-    correlation: f64,
+    /// False if the slopes are mostly noise.
+    textured: bool,
 }
 
 impl Fit {
@@ -335,7 +356,6 @@ impl Fit {
         let mut right = SVector::<f64, 8>::zeros();
         let mut w = Matrix3::<f64>::zeros();
         let mut weighted = Matrix3::<f64>::zeros();
-        let mut m = [0.0f64; 6];
         let (gain32, bias32) = (gain as f32, bias as f32);
         for (sample, value) in seen {
             let e = value - (gain32 * sample.grey + bias32);
@@ -360,11 +380,12 @@ impl Fit {
             n += omega * row * row.transpose();
             right += omega * f64::from(e) * row;
             weighted += omega * outer;
-            let (a, b) = (f64::from(sample.grey), f64::from(*value));
-            for (sum, term) in m.iter_mut().zip([1.0, a, b, a * a, b * b, a * b]) {
-                *sum += omega * term;
-            }
         }
+        let noise = gain * gain * slope_noise * weighted[(0, 0)];
+        let textured = [0, 3].iter().all(|k| {
+            let all: f64 = n[(*k, *k)];
+            all - noise > LEAST_TEXTURE * all
+        });
         for k in 0..3 {
             for l in 0..3 {
                 let noise = gain * gain * slope_noise * weighted[(k, l)];
@@ -372,20 +393,30 @@ impl Fit {
                 n[(3 + k, 3 + l)] -= noise;
             }
         }
-        let [o, a, b, aa, bb, ab] = m;
-        let spread = ((aa - a * a / o) * (bb - b * b / o)).max(f64::MIN_POSITIVE);
         Self {
             n,
             right,
             w: w / seen.len() as f64,
             samples: seen.len() as f64,
-            correlation: (ab - a * b / o) / spread.sqrt(),
+            textured,
         }
     }
 
     /// None where the texture tells nothing.
     fn step(&self) -> Option<SVector<f64, 8>> {
-        Some(self.n.cholesky()?.solve(&self.right))
+        match self.textured {
+            true => Some(self.n.cholesky()?.solve(&self.right)),
+            false => None,
+        }
+    }
+
+    /// What a texture too faint to tell says: nothing.
+    fn silent(&self, scale: f64) -> Alignment {
+        Alignment {
+            error_px: 0.0,
+            sigma_px: f64::INFINITY,
+            ..self.alignment(&Vector6::zeros(), scale, 1.0)
+        }
     }
 
     /// `√(pᵀWp)`, pixels of the level.
@@ -408,7 +439,79 @@ impl Fit {
             samples: self.samples,
             error_px: scale * self.rms(p),
             sigma_px: scale * (variance * noise).sqrt(),
-            correlation: self.correlation,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::FrameCache;
+    use crate::refine::estimate::FrameEstimate;
+    use crate::refine::prior::Prior;
+    use crate::test_wall::{TestWall, waves};
+    use crate::trajectory::{Jitter, JitterModel, Pose};
+
+    /// Alignments of a ring of frames at the given poses.
+    fn measured(wall: &TestWall, poses: &[Pose]) -> Vec<Alignment> {
+        let pictures = wall
+            .frames()
+            .into_iter()
+            .map(|frame| Pyramid::new(frame, 1));
+        let frames = FrameCache::of_pyramids(pictures.collect());
+        let prior = Prior {
+            jitter: Jitter {
+                model: JitterModel::Independent,
+                rotation_sigma_rad: 0.05,
+                translation_sigma_m: [0.05; 3],
+            },
+            times_s: (0..poses.len()).map(|k| k as f64).collect(),
+            usual_step_s: 1.0,
+            initial: poses.to_vec(),
+            log_gain_sigma: 0.3,
+            bias_sigma: 10.0,
+        };
+        let scene = Scene {
+            surface: &wall.circle,
+            camera: &wall.camera,
+            frames: &frames,
+            prior: &prior,
+            noise: 0.0,
+        };
+        let tracked = Tracked {
+            estimates: poses.iter().map(|pose| FrameEstimate::at(*pose)).collect(),
+            doubts: vec![None; poses.len()],
+        };
+        alignments(&scene, 0, &tracked).unwrap()
+    }
+
+    #[test]
+    fn true_poses_are_aligned() {
+        let wall = TestWall::ring(waves);
+        let found = measured(&wall, &wall.poses);
+        assert!(found.len() >= 14);
+        for pair in found {
+            assert!(pair.error_px < 0.05, "{pair:?}");
+        }
+    }
+
+    /// A frame shifted along the tunnel by 10 mm is 1 cm · f / 1 m ≈ 1 px off all it overlaps.
+    #[test]
+    fn a_displaced_frame_is_off_by_its_displacement() {
+        let wall = TestWall::ring(waves);
+        let mut poses = wall.poses.clone();
+        poses[5].t_wc.y += 0.01;
+        let expected = 0.01 * wall.camera.fy;
+        let mut seen = 0;
+        for pair in measured(&wall, &poses) {
+            if pair.a == 5 || pair.b == 5 {
+                seen += 1;
+                let ratio = pair.error_px / expected;
+                assert!((0.7..1.4).contains(&ratio), "{pair:?} {expected}");
+            } else {
+                assert!(pair.error_px < 0.05, "{pair:?}");
+            }
+        }
+        assert!(seen >= 2);
     }
 }

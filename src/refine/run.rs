@@ -56,8 +56,8 @@ pub struct Refined {
 const CLOSE: f64 = 20.0;
 /// Share of a frame's pixels that must overlap other frames for its pose to count as photometric.
 const LEAST_PIXEL_SHARE: f64 = 0.02;
-/// Largest step left of a pose that counts as photometric, pixels on the wall.
-const LARGEST_STEP_PX: f64 = 0.25;
+/// Largest step left of a pose that counts as photometric: pixels on the wall, or multiples of σ if that is more.
+const LARGEST_STEP: (f64, f64) = (0.25, 2.0);
 /// Largest 1-σ on the wall of a pose that counts as photometric, pixels.
 const LARGEST_SIGMA_PX: f64 = 1.0;
 /// Share of a frame's weight that the robust loss may reject. Things before the wall, glints and oblique views cost a
@@ -159,7 +159,6 @@ pub fn refine(
         }
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
-    let unsettled = unsettled(&solution)?;
     let finest = options.handover_level(side);
     let late = unsupported(&alignments(&scene, finest, &tracked)?, count);
     let ambiguous = rivals.into_iter().map(|(frame, motion): Rival| {
@@ -168,7 +167,7 @@ pub fn refine(
         let apart_m = apart_m(&scene, pose, &other);
         (frame, Doubt::Ambiguous { other, apart_m })
     });
-    let late: Vec<(usize, Doubt)> = ambiguous.chain(unsettled).chain(late).collect();
+    let late: Vec<(usize, Doubt)> = ambiguous.chain(late).collect();
     for (frame, doubt) in late {
         tracked.doubts[frame].get_or_insert(doubt);
     }
@@ -181,6 +180,14 @@ pub fn refine(
     // Poses without a covariance are still poses; they are reported as uncertain.
     .unwrap_or_else(|_| Covariances::unknown(count));
     let estimates = &tracked.estimates;
+    let motion = prior.settle_gauge(&scene.surface.gauge(), estimates);
+    for doubt in tracked.doubts.iter_mut().flatten() {
+        if let Doubt::Ambiguous { other, .. } = doubt {
+            *other = motion.apply(other);
+        }
+    }
+    // No step without a covariance, whose lack is told already.
+    let steps_px = steps_left(&solution).unwrap_or_else(|_| vec![0.0; count]);
     let reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = frame_sigma(
@@ -189,12 +196,18 @@ pub fn refine(
                 &estimates[k],
                 &covariances.frames[k],
             );
-            frame_report(survey, k, &solution, tracked.doubts[k].as_ref(), sigma)
+            frame_report(
+                survey,
+                k,
+                &solution,
+                tracked.doubts[k].as_ref(),
+                steps_px[k],
+                sigma,
+            )
         })
         .collect();
     clock.lap("covariance");
 
-    let motion = prior.settle_gauge(&scene.surface.gauge(), estimates);
     let on_prior = reports
         .iter()
         .filter(|f| f.flag != FrameFlag::Photometric)
@@ -329,11 +342,11 @@ pub fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) -> boo
     any
 }
 
-/// The frames that an undamped step would still move by more than [`LARGEST_STEP_PX`], for want of steps or of descent.
+/// How far an undamped step would still move each frame, for want of steps or of descent, pixels on the wall.
 ///
 /// # Errors
 /// [`ProblemError::Factor`].
-fn unsettled(solution: &Solution) -> Result<Vec<(usize, Doubt)>, ProblemError> {
+fn steps_left(solution: &Solution) -> Result<Vec<f64>, ProblemError> {
     let problem = &solution.problem;
     let linearisation = &solution.linearisation;
     let factor = problem
@@ -341,16 +354,7 @@ fn unsettled(solution: &Solution) -> Result<Vec<(usize, Doubt)>, ProblemError> {
         .factorise(problem.pattern(), &linearisation.normal, 0.0)
         .map_err(|source| problem.factor_error(source))?;
     let step = factor.step(&linearisation.normal.gradient);
-    let moved = problem.wall_step_px(&solution.estimates, &step);
-    Ok(moved
-        .into_iter()
-        .enumerate()
-        .filter(|(k, step_px)| {
-            let compared = linearisation.frames[*k].pixels > 0.0;
-            compared && (step_px.is_nan() || *step_px > LARGEST_STEP_PX)
-        })
-        .map(|(k, step_px)| (k, Doubt::Unsettled { step_px }))
-        .collect())
+    Ok(problem.wall_step_px(&solution.estimates, &step))
 }
 
 fn rejected(share: &FrameShare) -> f64 {
@@ -367,6 +371,7 @@ fn frame_report(
     k: usize,
     solution: &Solution,
     doubt: Option<&Doubt>,
+    step_px: f64,
     sigma: super::covariance::FrameSigma,
 ) -> FrameReport {
     let share: &FrameShare = &solution.linearisation.frames[k];
@@ -383,6 +388,8 @@ fn frame_report(
         Some(Doubt::Uncertain {
             wall_px: sigma.wall_px,
         })
+    } else if step_px > LARGEST_STEP.0.max(LARGEST_STEP.1 * sigma.wall_px) {
+        Some(Doubt::Unsettled { step_px })
     } else {
         None
     };

@@ -13,8 +13,6 @@ const TOLERANCE_PX: f64 = 0.5;
 const TIMES_USUAL: f64 = 4.0;
 /// z: a pair that is aligned to the tolerance is called misaligned about once in a million.
 const SURE: f64 = 5.0;
-/// Correlation below which two frames that should show the same do not.
-const LEAST_CORRELATION: f64 = 0.3;
 /// σ of a displacement, pixels, up to which a pair ties its frames to each other.
 const TIED_PX: f64 = 1.0;
 
@@ -53,7 +51,9 @@ pub fn unsupported(alignments: &[Alignment], frames: usize) -> Vec<(usize, Doubt
     }
     let good = alignments
         .iter()
-        .filter(|p| !out[p.a] && !out[p.b] && p.sigma_px <= TIED_PX);
+        // What is too faint to measure is left to the covariance.
+        .filter(|p| !out[p.a] && !out[p.b])
+        .filter(|p| p.sigma_px <= TIED_PX || p.sigma_px == f64::INFINITY);
     let group = groups(good.map(|pair| (pair.a, pair.b)), frames);
     let mut sizes = vec![0usize; frames];
     // Frames that no pair was measured for are not judged here.
@@ -72,12 +72,13 @@ pub fn unsupported(alignments: &[Alignment], frames: usize) -> Vec<(usize, Doubt
 }
 
 fn misaligned(pair: &Alignment, most_px: f64) -> bool {
-    pair.error_px > most_px + SURE * pair.sigma_px || pair.correlation < LEAST_CORRELATION
+    pair.error_px > most_px + SURE * pair.sigma_px
 }
 
 /// The alignment error that is borne, pixels.
 fn most_px(alignments: &[Alignment]) -> f64 {
-    let mut errors: Vec<f64> = alignments.iter().map(|p| p.error_px).collect();
+    let measured = alignments.iter().filter(|p| p.sigma_px.is_finite());
+    let mut errors: Vec<f64> = measured.map(|p| p.error_px).collect();
     errors.sort_unstable_by(f64::total_cmp);
     let usual = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
     TOLERANCE_PX.max(TIMES_USUAL * usual)
@@ -110,7 +111,6 @@ mod tests {
             samples: 100.0,
             error_px,
             sigma_px: 0.03,
-            correlation: 0.95,
         }
     }
 
