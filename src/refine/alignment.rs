@@ -45,8 +45,6 @@ const LEAST_OVERLAP: f64 = 0.02;
 const MOST_PX: f64 = 8.0;
 /// Share of the squared slopes that must be texture and not noise: with less, N is chance.
 const LEAST_TEXTURE: f64 = 0.3;
-/// σ, pixels of the level, below which a texture that leads nowhere says that the frames show different things.
-const SHARP_PX: f64 = 0.1;
 /// A step shorter than this, pixels of the level, is the last; one longer than ten times this is no end.
 const LAST_STEP_PX: f64 = 0.01;
 /// Noise of the residuals that is assumed at least, grey levels: rounding.
@@ -61,7 +59,7 @@ pub struct Alignment {
     pub b: usize,
     /// Samples they share.
     pub samples: f64,
-    /// e, pixels of full size; infinite where a sharp texture leads nowhere.
+    /// e, pixels of full size.
     pub error_px: f64,
     /// σ, likewise; infinite where the texture is too faint to tell.
     pub sigma_px: f64,
@@ -260,9 +258,9 @@ impl Template {
         let sampler = other.sampler(&self.origin);
         let mut p = Vector6::<f64>::zeros();
         let mut exposure: Option<(f64, f64)> = None;
-        let mut sharp = false;
+        let mut first = None;
         let mut result = None;
-        for k in 0..STEPS {
+        for _ in 0..STEPS {
             let mut seen: Vec<(&Sample, f32)> = Vec::with_capacity(self.samples.len());
             let field: [f32; 6] = (p * self.pixel_m).cast::<f32>().into();
             for sample in &self.samples {
@@ -297,19 +295,11 @@ impl Template {
             exposure = Some((gain + step[6], bias + step[7]));
             let moved = fit.rms(&Vector6::from(step.fixed_rows::<6>(0)));
             let alignment = fit.alignment(&p, self.scale, f64::from(variance));
-            if k == 0 {
-                sharp = alignment.sigma_px < SHARP_PX * self.scale;
-            }
+            // Where the steps lead nowhere, the first is what is known: small where the poses are right.
+            let first = *first.get_or_insert(alignment);
             let lost = fit.rms(&p) > MOST_PX;
             let ended = !lost && moved < 10.0 * LAST_STEP_PX;
-            result = Some(match (ended, sharp) {
-                (true, _) => alignment,
-                (false, true) => Alignment {
-                    error_px: f64::INFINITY,
-                    ..alignment
-                },
-                (false, false) => fit.silent(self.scale),
-            });
+            result = Some(if ended { alignment } else { first });
             if lost || moved < LAST_STEP_PX {
                 break;
             }

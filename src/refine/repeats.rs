@@ -6,7 +6,8 @@
 //! likelier of the two is taken, and if the odds are not clear, the frame is ambiguous and both are reported.
 //!
 //! With errors that add up, what can be wrong by a tile is a step, and with it all frames after it; with independent
-//! errors a frame by itself.
+//! errors a frame by itself. Where less than half of the frames would be clear, none is: what they are clear against has
+//! been settled by the others.
 
 use super::options::RefineOptions;
 use super::place::{MOST_DEVIATION, Surroundings, UNEXPLAINED, near, unexplained};
@@ -58,16 +59,18 @@ pub fn settle_repeats(
         return Ok((false, Vec::new()));
     }
     let poses: Vec<Pose> = frames.iter().map(|k| tracked.estimates[*k].pose).collect();
-    let choice = match scene.prior.jitter.model {
-        JitterModel::RandomWalk => choose_steps(scene.prior, &frames, &poses, &repeats),
-        JitterModel::Independent => choose_frames(
-            scene.prior,
-            &scene.surface.gauge(),
-            &frames,
-            &poses,
-            &repeats,
-        ),
+    let choose = |clear: f64| match scene.prior.jitter.model {
+        JitterModel::RandomWalk => choose_steps(scene.prior, &frames, &poses, &repeats, clear),
+        JitterModel::Independent => {
+            let gauge = scene.surface.gauge();
+            choose_frames(scene.prior, &gauge, &frames, &poses, &repeats, clear)
+        }
     };
+    let mut choice = choose(CLEAR);
+    let undecided = choice.rival.iter().flatten().count();
+    if 2 * undecided > frames.len() {
+        choice = choose(f64::INFINITY);
+    }
     let mut moved = false;
     for (k, motion) in frames.iter().zip(&choice.motion) {
         if *motion != GaugeMotion::default() {
@@ -183,9 +186,10 @@ fn minus(a: &GaugeMotion, b: &GaugeMotion) -> GaugeMotion {
     }
 }
 
-/// The likeliest of some motions, and the second if it is not clearly less likely.
+/// The likeliest of some motions, and the second if it is less likely by no more than `clear`.
 fn likeliest(
     motions: &[GaugeMotion],
+    clear: f64,
     cost: impl Fn(&GaugeMotion) -> f64,
 ) -> (GaugeMotion, Option<GaugeMotion>) {
     let none = GaugeMotion::default();
@@ -196,7 +200,7 @@ fn likeliest(
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
     let second = ranked
         .get(1)
-        .filter(|second| second.0 - ranked[0].0 < CLEAR);
+        .filter(|second| second.0 - ranked[0].0 < clear);
     (ranked[0].1, second.map(|(_, motion)| *motion))
 }
 
@@ -206,6 +210,7 @@ fn choose_steps(
     frames: &[usize],
     poses: &[Pose],
     repeats: &[Vec<GaugeMotion>],
+    clear: f64,
 ) -> Choice {
     let mut motion = vec![GaugeMotion::default(); frames.len()];
     // How all frames from here on might be moved as well.
@@ -218,7 +223,7 @@ fn choose_steps(
         let cost = |own: &GaugeMotion| {
             prior.deviation_cost(&expected, &plus(&before, own).apply(&poses[i])) / steps
         };
-        let (best, second) = likeliest(&repeats[i], cost);
+        let (best, second) = likeliest(&repeats[i], clear, cost);
         motion[i] = plus(&before, &best);
         step[i] = second.map(|second| minus(&second, &best));
     }
@@ -251,6 +256,7 @@ fn choose_frames(
     frames: &[usize],
     poses: &[Pose],
     repeats: &[Vec<GaugeMotion>],
+    clear: f64,
 ) -> Choice {
     let initial: Vec<Pose> = frames.iter().map(|k| prior.initial[*k]).collect();
     let mut choice = Choice {
@@ -272,7 +278,7 @@ fn choose_frames(
         for i in 0..frames.len() {
             let expected = settled.apply(&initial[i]);
             let cost = |own: &GaugeMotion| prior.deviation_cost(&expected, &own.apply(&poses[i]));
-            let (best, second) = likeliest(&repeats[i], cost);
+            let (best, second) = likeliest(&repeats[i], clear, cost);
             next.motion.push(best);
             next.rival.push(second.map(|second| minus(&second, &best)));
         }
@@ -323,8 +329,10 @@ mod tests {
             shift: true,
         };
         match prior.jitter.model {
-            JitterModel::RandomWalk => choose_steps(prior, &frames, poses, &repeats),
-            JitterModel::Independent => choose_frames(prior, &gauge, &frames, poses, &repeats),
+            JitterModel::RandomWalk => choose_steps(prior, &frames, poses, &repeats, CLEAR),
+            JitterModel::Independent => {
+                choose_frames(prior, &gauge, &frames, poses, &repeats, CLEAR)
+            }
         }
     }
 
