@@ -39,6 +39,21 @@ pub enum Doubt {
         /// Share of its pixels, 0 to 1.
         share: f64,
     },
+    /// It is displaced against frames that show the same wall.
+    Misaligned {
+        /// By how much, pixels.
+        error_px: f64,
+    },
+    /// Nothing sure ties it, or the group of frames that it agrees with, to the others.
+    Apart {
+        /// Frames of that group.
+        frames: usize,
+    },
+    /// The last solve had not come to rest.
+    Unsettled {
+        /// The step that was left, pixels on the wall.
+        step_px: f64,
+    },
     /// Nothing or too little in common with others.
     NoOverlap {
         /// Share of its pixels that others show, 0 to 1.
@@ -67,7 +82,12 @@ impl Doubt {
     pub fn may_pass(&self) -> bool {
         matches!(
             self,
-            Self::NoMatch { .. } | Self::Ambiguous { .. } | Self::Contradicts { .. }
+            Self::NoMatch { .. }
+                | Self::Ambiguous { .. }
+                | Self::Contradicts { .. }
+                | Self::Disagrees { .. }
+                | Self::Misaligned { .. }
+                | Self::Apart { .. }
         )
     }
 }
@@ -98,6 +118,19 @@ impl fmt::Display for Doubt {
                 f,
                 "{:.0} % of its pixels disagree with the other frames",
                 100.0 * share
+            ),
+            Self::Misaligned { error_px } => write!(
+                f,
+                "it is displaced by {error_px:.1} px against frames that show the same wall"
+            ),
+            Self::Apart { frames: 1 } => write!(f, "nothing sure ties it to the other frames"),
+            Self::Apart { frames } => write!(
+                f,
+                "it is one of {frames} frames that agree with each other but that nothing sure ties to the others"
+            ),
+            Self::Unsettled { step_px } => write!(
+                f,
+                "its pose had not come to rest: the next step would move it by {step_px:.1} px"
             ),
             Self::NoOverlap { share } if *share == 0.0 => {
                 write!(f, "it overlaps no other frame on the wall")

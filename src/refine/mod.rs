@@ -21,6 +21,7 @@
 //! choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, [`problem`] reduces
 //! to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
 
+mod alignment;
 mod bound;
 mod calibration;
 mod certainty;
@@ -40,6 +41,8 @@ mod options;
 mod place;
 mod prior;
 mod problem;
+mod repair;
+mod repeats;
 mod report;
 mod retrack;
 mod robust;
@@ -50,6 +53,7 @@ mod shared;
 mod spectrum;
 mod tile;
 mod track;
+mod verdict;
 mod view;
 mod visibility;
 mod wall;

@@ -7,7 +7,7 @@ use super::options::RefineOptions;
 use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
 use super::search::{REACH, least_samples, log_likelihood, search};
 use super::visibility::reach_m;
-use super::wall::{FusedWall, Portrait, pixel_m};
+use super::wall::{FusedWall, Likeness, Portrait, pixel_m};
 use crate::surface::{Footprint, shortest_arc, viewing_distance};
 use crate::trajectory::{Jitter, Pose};
 use std::borrow::Cow;
@@ -35,11 +35,11 @@ const CLOSE_RAD: f64 = 0.05;
 /// Gain in log-posterior, as a factor, for which another closer look is worth its time.
 const WORTH_ANOTHER: f64 = 1.02;
 /// Two places are told apart by the pixels if what they leave unexplained, `1 − c²`, differs by this factor, ...
-const UNEXPLAINED: f64 = 2.0;
+pub const UNEXPLAINED: f64 = 2.0;
 /// ... or else by the prior if its log-densities differ by this (3 σ).
 const PRIOR_MARGIN: f64 = 4.5;
 /// `½ eᵀΣ⁻¹e` beyond which a pose is not what the prior allows: all six unknowns 3.5 σ off.
-const MOST_DEVIATION: f64 = 0.5 * 6.0 * REACH * REACH;
+pub const MOST_DEVIATION: f64 = 0.5 * 6.0 * REACH * REACH;
 /// Places closer than this are one, samples of the search level.
 const APART: f64 = 2.0;
 
@@ -155,11 +155,9 @@ pub fn place(
         }
         let likeness = wall.likeness(scene, &portrait, &estimate.pose);
         let correlation = likeness.correlation();
-        if likeness.samples < least_samples(&portrait) || correlation <= 0.0 {
+        let Some(unexplained) = unexplained(&likeness, &portrait) else {
             return Ok(None);
-        }
-        // Where noise drowns the texture, nothing speaks against the pose; its σ will tell.
-        let quality = likeness.match_quality().unwrap_or(1.0);
+        };
         let deviation =
             scene.prior.deviation_cost(&expected.pose, &estimate.pose) / expected.widened.powi(2);
         if deviation > MOST_DEVIATION {
@@ -167,8 +165,8 @@ pub fn place(
         }
         Ok(Some(Candidate {
             estimate,
-            unexplained: (1.0 - quality * quality).max(LEAST_UNEXPLAINED),
-            quality,
+            unexplained: unexplained.max(LEAST_UNEXPLAINED),
+            quality: (1.0 - unexplained).sqrt(),
             likelihood: log_likelihood(correlation, likeness.samples),
             deviation,
         }))
@@ -235,8 +233,17 @@ pub fn place(
     }))
 }
 
+/// `1 − c²`, c the correlation with the wall, noise aside; none if too little is shared, or the two do not correlate.
+///
+/// Where noise drowns the texture, nothing speaks against the pose; its σ will tell.
+pub fn unexplained(likeness: &Likeness, portrait: &Portrait) -> Option<f64> {
+    let compared = likeness.samples >= least_samples(portrait) && likeness.correlation() > 0.0;
+    let quality = likeness.match_quality().unwrap_or(1.0);
+    compared.then(|| 1.0 - quality * quality)
+}
+
 /// Which placed frames may show wall that `pose` sees, or would see `margin_m` farther.
-fn near(
+pub fn near(
     scene: &Scene,
     frame: usize,
     pose: &Pose,
@@ -273,7 +280,7 @@ fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
 }
 
 /// How far apart two poses put the frame on the wall: the mean over its middle and corners, metres.
-fn apart_m(scene: &Scene, a: &Pose, b: &Pose) -> f64 {
+pub fn apart_m(scene: &Scene, a: &Pose, b: &Pose) -> f64 {
     let camera = scene.camera;
     let middle = nalgebra::Vector2::new(camera.cx, camera.cy);
     let corners = camera.border(1, 0.0);

@@ -42,6 +42,14 @@ pub fn usual_step_s(times_s: &[f64]) -> f64 {
     steps.get(steps.len() / 2).copied().unwrap_or(1.0)
 }
 
+/// The pose after `pose` if the step from `from` to `to` is right.
+pub fn predict(pose: &Pose, from: &Pose, to: &Pose) -> Pose {
+    Pose::new(
+        pose.r_wc * (from.r_wc.inverse() * to.r_wc),
+        pose.t_wc + (to.t_wc - from.t_wc),
+    )
+}
+
 impl Prior {
     /// How many usual steps lie between two frames, by their times: variances of a random walk grow by so much.
     ///
@@ -71,6 +79,11 @@ impl Prior {
             }
         };
         lengths.into_iter().fold(0.0, f64::max)
+    }
+
+    /// The pose of frame `to` if frame `from` is at `pose` and the initial steps between them are right.
+    pub fn predict(&self, from: usize, pose: &Pose, to: usize) -> Pose {
+        predict(pose, &self.initial[from], &self.initial[to])
     }
 
     /// Pairs of frames that the prior ties together within `active`, counted from its start.

@@ -1,5 +1,6 @@
 //! From a survey to refined poses: load, track, solve globally coarse to fine, report.
 
+use super::alignment::alignments;
 use super::calibration::{Calibration, Kappa};
 use super::certainty::Certainty;
 use super::consistency::{blurred, compare_pairs, contradictions};
@@ -10,11 +11,15 @@ use super::examine::examine;
 use super::gauss_newton::{Solution, StopReason, Stopping, solve};
 use super::observed::{CalibrationReport, Refusal};
 use super::options::RefineOptions;
+use super::place::apart_m;
 use super::prior::{Prior, usual_step_s};
 use super::problem::{FrameShare, Problem, ProblemError, Sampling, Scene};
+use super::repair::repair;
+use super::repeats::Rival;
 use super::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 use super::retrack::track_calibrating;
 use super::track::{Tracked, retry};
+use super::verdict::unsupported;
 use crate::frames::FrameCache;
 use crate::progress::Progress;
 use crate::survey::Survey;
@@ -56,10 +61,13 @@ pub struct Refined {
 const CLOSE: f64 = 20.0;
 /// Share of a frame's pixels that must overlap other frames for its pose to count as photometric.
 const LEAST_PIXEL_SHARE: f64 = 0.02;
+/// Largest step left of a pose that counts as photometric: pixels on the wall, or multiples of σ if that is more.
+const LARGEST_STEP: (f64, f64) = (0.25, 2.0);
 /// Largest 1-σ on the wall of a pose that counts as photometric, pixels.
 const LARGEST_SIGMA_PX: f64 = 1.0;
-/// Share of a frame's weight that the robust loss may reject: always, at the most, and as a multiple of the usual.
-const MOST_REJECTED: (f64, f64, f64) = (0.1, 0.3, 2.0);
+/// Share of a frame's weight that the robust loss may reject. Things before the wall, glints and oblique views cost a
+/// right frame some; whether its pose is right is asked of its alignment with others.
+const MOST_REJECTED: f64 = 0.3;
 
 /// Refines the poses of `survey`.
 ///
@@ -127,9 +135,13 @@ pub fn refine(
     let mut last = None;
     let mut refusals = Vec::new();
     let mut stages: VecDeque<_> = stages(options, side).collect();
-    let mut first = true;
+    let (mut first, mut changed, mut rivals) = (true, false, None);
     while let Some((sampling, stopping)) = stages.pop_front() {
         let check = std::mem::take(&mut first);
+        if last.is_some() && stages.is_empty() && rivals.is_none() {
+            rivals = Some(repair(&scene, options, &mut tracked, changed)?);
+            clock.lap("repair");
+        }
         let Sampling { level, density } = sampling;
         let problem = Problem::new(&scene, sampling, tracked.members())?.calibrating();
         // Where no frame can be believed, the prior is all there is to report.
@@ -159,7 +171,7 @@ pub fn refine(
         }
         refusals.extend(refused);
         if sampling == Sampling::of(0) {
-            disagreements(&solution.linearisation.frames, &mut tracked.doubts);
+            changed = disagreements(&solution.linearisation.frames, &mut tracked.doubts);
         }
         levels.push(LevelReport {
             level,
@@ -174,9 +186,30 @@ pub fn refine(
         }
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
+    let finest = options.handover_level(side);
+    let late = unsupported(&alignments(&scene, finest, &tracked)?, count);
+    let rivals = rivals.unwrap_or_default();
+    let ambiguous = rivals.into_iter().map(|(frame, motion): Rival| {
+        let pose = &tracked.estimates[frame].pose;
+        let other = motion.apply(pose);
+        let apart_m = apart_m(&scene, pose, &other);
+        (frame, Doubt::Ambiguous { other, apart_m })
+    });
+    let late: Vec<(usize, Doubt)> = ambiguous.chain(late).collect();
+    for (frame, doubt) in late {
+        tracked.doubts[frame].get_or_insert(doubt);
+    }
     let certainty = Certainty::at(&solution, &calibration)?;
     let estimates = &tracked.estimates;
-    let most = most_rejected(&solution.linearisation.frames);
+    let metric = calibration.metric(&scene.kappa);
+    let motion = prior.settle_gauge(&scene.surface.gauge(), estimates, &metric);
+    for doubt in tracked.doubts.iter_mut().flatten() {
+        if let Doubt::Ambiguous { other, .. } = doubt {
+            *other = metric.in_metres(&motion.apply(other));
+        }
+    }
+    // No step without a covariance, whose lack is told already.
+    let steps_px = steps_left(&solution).unwrap_or_else(|_| vec![0.0; count]);
     let reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = certainty.of_frame(&scene, k, &estimates[k]);
@@ -185,15 +218,13 @@ pub fn refine(
                 k,
                 &solution,
                 tracked.doubts[k].as_ref(),
-                most,
+                steps_px[k],
                 sigma,
             )
         })
         .collect();
     clock.lap("covariance");
 
-    let metric = calibration.metric(&scene.kappa);
-    let motion = prior.settle_gauge(&scene.surface.gauge(), estimates, &metric);
     let on_prior = reports
         .iter()
         .filter(|f| f.flag != FrameFlag::Photometric)
@@ -322,42 +353,66 @@ fn recheck(
             break;
         }
         for level in (finest..=coarsest).rev() {
-            let problem = Problem::new(scene, Sampling::of(level), tracked.members())?;
-            let stopping = close(options, level);
-            tracked.estimates = solve(problem, stopping, None)?.estimates;
+            solve_level(scene, options, level, tracked)?;
         }
     }
     Ok(())
 }
 
-/// Times that contradictions are looked for, and frames in doubt tried again between.
-const ROUNDS: usize = 3;
-/// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve does without them.
-fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) {
-    let most = most_rejected(shares);
-    for (share, doubt) in shares.iter().zip(doubts) {
-        if doubt.is_none() && share.pixels > 0.0 {
-            *doubt = disagreement(share, most);
-        }
-    }
+/// Solves all believed frames at a pyramid level, close enough for the next; returns how each took part.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn solve_level(
+    scene: &Scene,
+    options: &RefineOptions,
+    level: usize,
+    tracked: &mut Tracked,
+) -> Result<Vec<FrameShare>, ProblemError> {
+    let problem = Problem::new(scene, Sampling::of(level), tracked.members())?;
+    let solution = solve(problem, close(options, level), None)?;
+    tracked.estimates = solution.estimates;
+    Ok(solution.linearisation.frames)
 }
 
-/// Share of its pixels that a believable frame may have rejected: a few times the usual, within limits.
-fn most_rejected(shares: &[FrameShare]) -> f64 {
-    let compared = shares.iter().filter(|share| share.pixels > 0.0);
-    let mut rejected: Vec<f64> = compared.map(rejected).collect();
-    rejected.sort_unstable_by(f64::total_cmp);
-    let usual = rejected.get(rejected.len() / 2).copied().unwrap_or(0.0);
-    (MOST_REJECTED.2 * usual).clamp(MOST_REJECTED.0, MOST_REJECTED.1)
+/// Times that contradictions are looked for, and frames in doubt tried again between.
+const ROUNDS: usize = 3;
+
+/// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve does without them;
+/// true if there are any.
+pub fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) -> bool {
+    let mut any = false;
+    for (share, doubt) in shares.iter().zip(doubts) {
+        if doubt.is_none() && share.pixels > 0.0 {
+            *doubt = disagreement(share);
+            any |= doubt.is_some();
+        }
+    }
+    any
+}
+
+/// How far an undamped step of the poses would still move each frame, for want of steps or of descent, pixels on the wall.
+///
+/// # Errors
+/// [`ProblemError::Factor`].
+fn steps_left(solution: &Solution) -> Result<Vec<f64>, ProblemError> {
+    let problem = &solution.problem;
+    let linearisation = &solution.linearisation;
+    let factor = problem
+        .symbolic()
+        .factorise(problem.pattern(), &linearisation.normal, 0.0)
+        .map_err(|source| problem.factor_error(source))?;
+    let step = factor.step(&linearisation.normal.gradient);
+    Ok(problem.wall_step_px(&solution.estimates, &step, &Kappa::zeros()))
 }
 
 fn rejected(share: &FrameShare) -> f64 {
     1.0 - share.inliers / share.pixels.max(1e-9)
 }
 
-fn disagreement(share: &FrameShare, most: f64) -> Option<Doubt> {
+fn disagreement(share: &FrameShare) -> Option<Doubt> {
     let share = rejected(share);
-    (share > most).then_some(Doubt::Disagrees { share })
+    (share > MOST_REJECTED).then_some(Doubt::Disagrees { share })
 }
 
 fn frame_report(
@@ -365,7 +420,7 @@ fn frame_report(
     k: usize,
     solution: &Solution,
     doubt: Option<&Doubt>,
-    most_rejected: f64,
+    step_px: f64,
     sigma: super::covariance::FrameSigma,
 ) -> FrameReport {
     let share: &FrameShare = &solution.linearisation.frames[k];
@@ -376,12 +431,14 @@ fn frame_report(
         Some(Doubt::NoOverlap {
             share: share.pixels / all,
         })
-    } else if let Some(doubt) = disagreement(share, most_rejected) {
+    } else if let Some(doubt) = disagreement(share) {
         Some(doubt)
     } else if sigma.wall_px.is_nan() || sigma.wall_px > LARGEST_SIGMA_PX {
         Some(Doubt::Uncertain {
             wall_px: sigma.wall_px,
         })
+    } else if step_px > LARGEST_STEP.0.max(LARGEST_STEP.1 * sigma.wall_px) {
+        Some(Doubt::Unsettled { step_px })
     } else {
         None
     };

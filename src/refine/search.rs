@@ -21,7 +21,7 @@ use super::spectrum::{Spectrum, Transform};
 use super::wall::{FusedWall, Portrait};
 use crate::surface::{WallPoint, shortest_arc, wall_jacobian};
 use crate::trajectory::{Pose, so3};
-use nalgebra::{Matrix2, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Half width of the search, in standard deviations of the prior.
@@ -34,6 +34,8 @@ const LEAST_OVERLAP: f64 = 0.08;
 const ROLL_STEP: f64 = 2.0;
 /// Step between pitch hypotheses, radians: by as much less, the shift does instead.
 const PITCH_STEP: f64 = 0.12;
+/// ... and no finer than this share of it, however steep the view.
+const LEAST_PITCH_STEP: f64 = 0.4;
 /// Local maxima kept per pitch and roll.
 const MAXIMA: usize = 4;
 /// Maxima closer than this are one, samples.
@@ -86,10 +88,20 @@ pub fn search(
         return Vec::new();
     };
     let spacing = wall.lattice.spacing_m;
-    let cells = |angle: f64| (angle * hit.range / spacing).ceil() as usize;
+    // How far a radian moves the middle of the view: of pitch along the tunnel, about the tunnel's axis around it.
+    let a = wall_jacobian(predicted, &scene.surface.frame(hit.wall));
+    let axis = predicted.r_wc.inverse() * Vector3::y();
+    let Some(tilt) = tilt_axis(predicted) else {
+        return Vec::new();
+    };
+    let along = (a.fixed_columns::<3>(0) * tilt).norm();
+    let across = (a.fixed_columns::<3>(0) * axis).norm();
+    let cells = |length: f64| (length / spacing).ceil() as usize;
     let camera = portrait.camera();
     let half_diagonal = 0.5 * f64::from(camera.width).hypot(f64::from(camera.height));
-    let pitches = steps(REACH * sigma_rad[0], PITCH_STEP);
+    // The more steeply a frame looks along the tunnel, the faster its picture on the wall stretches with the pitch.
+    let steep = (hit.range / along).clamp(LEAST_PITCH_STEP, 1.0);
+    let pitches = steps(REACH * sigma_rad[0], PITCH_STEP * steep);
     let rolls = steps(REACH * sigma_rad[2], ROLL_STEP / half_diagonal);
     // Shifts along h make up for half a step of pitch; those along s for all of the yaw.
     let half_pitch = if pitches.len() > 1 {
@@ -97,7 +109,11 @@ pub fn search(
     } else {
         REACH * sigma_rad[0]
     };
-    let reach = (cells(REACH * sigma_rad[1]), cells(half_pitch));
+    let widest = 0.5 * scene.surface.perimeter_m();
+    let reach = (
+        cells((REACH * sigma_rad[1] * across).min(widest)),
+        cells((half_pitch * along).min(widest)),
+    );
     let correlator = Correlator::new(wall, reach);
     let least = least_samples(portrait);
     let hypotheses: Vec<(f64, f64)> = pitches
@@ -107,7 +123,7 @@ pub fn search(
     let mut peaks: Vec<Peak> = hypotheses
         .par_iter()
         .flat_map_iter(|&(pitch, roll)| {
-            let turn = so3::exp(&(Vector3::x() * pitch)) * so3::exp(&(Vector3::z() * roll));
+            let turn = so3::exp(&(tilt * pitch)) * so3::exp(&(Vector3::z() * roll));
             let pose = Pose::new(predicted.r_wc * turn, predicted.t_wc);
             let mut own: Vec<Peak> = correlator
                 .correlate(wall, portrait, &pose)
@@ -115,11 +131,14 @@ pub fn search(
                 .filter(|found| found.samples >= least)
                 .map(|found| {
                     let shift_m = found.shift * spacing;
-                    // A camera that pitches up (about x) looks towards −h.
-                    let omega =
-                        Vector3::new(pitch - shift_m.y / hit.range, shift_m.x / hit.range, roll);
-                    let prior: f64 = (0..3)
-                        .map(|k| 0.5 * (omega[k] / sigma_rad[k]).powi(2))
+                    // A camera that pitches up looks towards −h.
+                    let omega = tilt * (pitch - shift_m.y / along)
+                        + axis * (shift_m.x / across)
+                        + Vector3::z() * roll;
+                    let prior: f64 = [tilt, Vector3::z().cross(&tilt), Vector3::z()]
+                        .iter()
+                        .zip(sigma_rad)
+                        .map(|(axis, sigma)| 0.5 * (omega.dot(axis) / sigma).powi(2))
                         .sum();
                     Peak {
                         pitch,
@@ -138,7 +157,7 @@ pub fn search(
     let mut best: Vec<&Peak> = Vec::new();
     for peak in &peaks {
         let same = |other: &&Peak| {
-            let along = peak.shift_m.y - other.shift_m.y - (peak.pitch - other.pitch) * hit.range;
+            let along = peak.shift_m.y - other.shift_m.y - (peak.pitch - other.pitch) * along;
             let across = peak.shift_m.x - other.shift_m.x;
             along.hypot(across) < APART * spacing
                 && (peak.roll - other.roll).abs() * half_diagonal < 1.5 * ROLL_STEP
@@ -152,8 +171,7 @@ pub fn search(
     }
     best.into_iter()
         .filter_map(|peak| {
-            let turn =
-                so3::exp(&(Vector3::x() * peak.pitch)) * so3::exp(&(Vector3::z() * peak.roll));
+            let turn = so3::exp(&(tilt * peak.pitch)) * so3::exp(&(Vector3::z() * peak.roll));
             let pose = Pose::new(predicted.r_wc * turn, predicted.t_wc);
             Some(Hypothesis {
                 pose: shifted(scene, &pose, &peak.shift_m)?,
@@ -163,13 +181,42 @@ pub fn search(
         .collect()
 }
 
+/// The axis, in the camera's frame, about which a turn moves the middle of the view along the tunnel and nowhere else: its
+/// own x for a camera that is not rolled. None for one that looks along the tunnel's axis.
+fn tilt_axis(pose: &Pose) -> Option<Vector3<f64>> {
+    let axis = pose.r_wc.inverse() * Vector3::y();
+    axis.cross(&Vector3::z()).try_normalize(1e-6)
+}
+
+/// Where else on the wall a frame at `pose` fits: shifts along s and h, metres, up to `reach_m`, at which the squared
+/// correlation has a maximum of at least `least`; the shift of none is one of them, where the pose is right.
+pub fn matches(
+    wall: &FusedWall,
+    portrait: &Portrait,
+    pose: &Pose,
+    reach_m: [f64; 2],
+    least: f64,
+) -> Vec<[f64; 2]> {
+    let spacing = wall.lattice.spacing_m;
+    let cells = |length: f64| (length / spacing).ceil() as usize;
+    let correlator = Correlator::new(wall, (cells(reach_m[0]), cells(reach_m[1])));
+    let samples = least_samples(portrait);
+    correlator
+        .correlate(wall, portrait, pose)
+        .into_iter()
+        .filter(|found| found.samples >= samples && found.correlation.powi(2) >= least)
+        .map(|found| (found.shift * spacing).into())
+        .collect()
+}
+
 /// Angles from `−half` to `half`, no more than `step` apart.
 fn steps(half: f64, step: f64) -> Vec<f64> {
     let n = (half / step).floor() as i32;
     (-n..=n).map(|k| f64::from(k) * step).collect()
 }
 
-/// The pose turned (about its own x and y) so that its middle looks at a wall point `shift_m` away from where it does.
+/// The pose turned so that its middle looks at a wall point `shift_m` away from where it does: about the tunnel's axis,
+/// which moves the picture along s and leaves it as it is, however steeply it looks along the tunnel, and in pitch.
 fn shifted(scene: &Scene, pose: &Pose, shift_m: &Vector2<f64>) -> Option<Pose> {
     let look = |pose: &Pose| scene.surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()));
     let from = look(pose).ok()?.wall;
@@ -185,10 +232,13 @@ fn shifted(scene: &Scene, pose: &Pose, shift_m: &Vector2<f64>) -> Option<Pose> {
             target.h_m - hit.h_m,
         );
         let a = wall_jacobian(&pose, &scene.surface.frame(hit));
-        let turn: Matrix2<f64> = a.fixed_columns::<2>(0).into_owned();
+        let a: Matrix2x3<f64> = a.fixed_columns::<3>(0).into_owned();
+        let axis = pose.r_wc.inverse() * Vector3::y();
+        let tilt = tilt_axis(&pose)?;
+        let turn = Matrix2::from_columns(&[a * tilt, a * axis]);
         let step = turn.try_inverse()? * left;
         let step = step * (0.3 / step.norm()).min(1.0);
-        pose.r_wc *= so3::exp(&Vector3::new(step.x, step.y, 0.0));
+        pose.r_wc *= so3::exp(&(tilt * step.x + axis * step.y));
     }
     Some(pose)
 }
@@ -235,7 +285,11 @@ impl Correlator {
         let unrolled: Vec<f32> = wall
             .points
             .iter()
-            .map(|point| sampler.at(point).unwrap_or(f32::NAN))
+            .zip(&wall.visible)
+            .map(|(point, visible)| match visible {
+                true => sampler.at(point).unwrap_or(f32::NAN),
+                false => f32::NAN,
+            })
             .collect();
         let transform = &self.transform;
         let columns = wall.lattice.columns;

@@ -12,6 +12,7 @@ use super::estimate::FrameEstimate;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
 use super::place::{Expectation, Surroundings, place};
+use super::prior::predict;
 use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
 use super::visibility::reach_m;
 use crate::progress::Progress;
@@ -21,7 +22,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 /// How far back overlap is looked for, frames.
-const FARTHEST: usize = 256;
+pub const FARTHEST: usize = 256;
 /// Frames of a long window, and frames placed between two of them: what short windows have bent a little, each a bit
 /// farther than the one before, is straightened by a look at several turns.
 const LONG_WINDOW: usize = 160;
@@ -213,13 +214,9 @@ fn expect_anywhere(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
         JitterModel::RandomWalk => match believed.min_by_key(|i| i.abs_diff(k)) {
             Some(near) => {
                 let pose = &tracked.estimates[near].pose;
-                let (from, to) = (initial(near), initial(k));
                 let steps = scene.prior.steps_between(near.min(k), near.max(k));
                 Expectation {
-                    pose: Pose::new(
-                        pose.r_wc * (from.r_wc.inverse() * to.r_wc),
-                        pose.t_wc + (to.t_wc - from.t_wc),
-                    ),
+                    pose: predict(pose, &initial(near), &initial(k)),
                     widened: steps.sqrt(),
                 }
             }

@@ -16,6 +16,13 @@ use std::sync::Arc;
 /// Lattice cells at the most: a frame that looks far along the tunnel sees more, but not well.
 const MOST_CELLS: usize = 1 << 20;
 
+/// Least pixels of a piece of wall, over those it has when seen squarely from the axis, with which it is searched.
+const LEAST_DETAIL: f32 = 0.1;
+/// How far along the tunnel that is, radii, with some room: `cos³ φ` of the pixels are left at an angle φ to the section.
+const LONGEST_LOOK_RADII: f64 = 2.5;
+/// The wall is sampled as if it were no farther than this, radii.
+const COARSEST_RADII: f64 = 1.25;
+
 /// A lattice on the unrolled wall: one sample a pixel of a pyramid level, where the frame looks.
 #[derive(Clone, Copy, Debug)]
 pub struct Lattice {
@@ -176,7 +183,8 @@ pub struct Sampler<'a> {
 }
 
 impl<'a> Sampler<'a> {
-    fn new(image: &'a GreyImage, camera: &Pinhole, pose: &Pose, origin: &Vector3<f64>) -> Self {
+    /// `image` of `camera` at `pose`; points will be relative to `origin`.
+    pub fn new(image: &'a GreyImage, camera: &Pinhole, pose: &Pose, origin: &Vector3<f64>) -> Self {
         let r_wc = pose.r_wc.to_rotation_matrix();
         Self {
             image,
@@ -299,6 +307,27 @@ pub struct FusedWall {
     noise: Vec<f32>,
     /// The wall's grey value there, likewise.
     grey: Vec<f32>,
+    /// Whether the frame that is looked for shows the point in any detail, from where it is expected.
+    pub visible: Vec<bool>,
+}
+
+/// How much of a frame's detail is left on a wall seen from afar or obliquely.
+struct Sight {
+    /// The camera, relative to the origin, metres.
+    centre: Vector3<f32>,
+    radius_m: f32,
+}
+
+impl Sight {
+    /// True if a piece of the wall with this normal has at least [`LEAST_DETAIL`] of the pixels it has when seen squarely
+    /// from the axis: `cos β (r/d)²` of them, at distance d and angle β to the normal.
+    #[inline]
+    fn sees(&self, point: &[f32; 3], normal: &Vector3<f32>) -> bool {
+        let ray = Vector3::from(*point) - self.centre;
+        let square = ray.norm_squared();
+        ray.dot(normal).abs() * self.radius_m * self.radius_m
+            > LEAST_DETAIL * square * square.sqrt()
+    }
 }
 
 impl FusedWall {
@@ -313,27 +342,47 @@ impl FusedWall {
         (frame, pose): (usize, &Pose),
         margin_m: f64,
     ) -> Result<Self, ProblemError> {
-        let footprint = Footprint::within(scene.surface, camera, pose, reach_m(scene.surface))
+        let radius_m = scene.surface.perimeter_m() / std::f64::consts::TAU;
+        let reach_m = reach_m(scene.surface).min(LONGEST_LOOK_RADII * radius_m);
+        let footprint = Footprint::within(scene.surface, camera, pose, reach_m)
             .map_err(|source| ProblemError::Placement { frame, source })?
             .widened(margin_m);
-        let lattice = Lattice::over(&footprint, pixel_m(scene, camera, pose));
+        // A frame that looks along the tunnel has its detail where the wall is near.
+        let spacing_m = pixel_m(scene, camera, pose).min(COARSEST_RADII * radius_m / camera.fy);
+        let lattice = Lattice::over(&footprint, spacing_m);
         let middle = WallPoint {
             s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
             h_m: 0.5 * (footprint.h_min_m + footprint.h_max_m),
         };
         let origin = scene.surface.frame(middle).x_w;
+        let normals: Vec<Vector3<f32>> = (0..lattice.columns)
+            .map(|column| {
+                let wall = WallPoint {
+                    s_m: lattice.s_m + column as f64 * lattice.spacing_m,
+                    h_m: middle.h_m,
+                };
+                let frame = scene.surface.frame(wall);
+                frame.e_s.cross(&frame.e_h).normalize().cast()
+            })
+            .collect();
         let points: Vec<[f32; 3]> = lattice
             .points(scene)
             .iter()
-            .map(|x_w| {
-                let offset = x_w - origin;
-                [offset.x as f32, offset.y as f32, offset.z as f32]
-            })
+            .map(|x_w| (x_w - origin).cast().into())
             .collect();
-        let samplers: Vec<(Sampler, NoiseSampler, Sampler, f32, f32)> = placed
+        let sight = |pose: &Pose| Sight {
+            centre: (pose.t_wc - origin).cast(),
+            radius_m: radius_m as f32,
+        };
+        let in_sight =
+            |sight: &Sight, k: usize| sight.sees(&points[k], &normals[k % lattice.columns]);
+        let own = sight(pose);
+        let visible: Vec<bool> = (0..points.len()).map(|k| in_sight(&own, k)).collect();
+        let samplers: Vec<(Sight, Sampler, NoiseSampler, Sampler, f32, f32)> = placed
             .iter()
             .map(|(portrait, estimate)| {
                 (
+                    sight(&estimate.pose),
                     portrait.contrast(&estimate.pose, &origin),
                     portrait.noise(scene, &estimate.pose, &origin),
                     portrait.grey(&estimate.pose, &origin),
@@ -344,9 +393,13 @@ impl FusedWall {
             .collect();
         let fused: Vec<[f32; 3]> = points
             .par_iter()
-            .map(|point| {
+            .enumerate()
+            .map(|(k, point)| {
                 let (mut sum, mut seen) = ([0.0f32; 3], 0.0f32);
-                for (contrast, noise, grey, inverse_gain, bias) in &samplers {
+                for (sight, contrast, noise, grey, inverse_gain, bias) in &samplers {
+                    if !in_sight(sight, k) {
+                        continue;
+                    }
                     if let (Some(contrast), Some(noise), Some(grey)) =
                         (contrast.at(point), noise.at(point), grey.at(point))
                     {
@@ -367,6 +420,7 @@ impl FusedWall {
             contrast: fused.iter().map(|f| f[0]).collect(),
             noise: fused.iter().map(|f| f[1]).collect(),
             grey: fused.iter().map(|f| f[2]).collect(),
+            visible,
         })
     }
 

@@ -1,0 +1,90 @@
+//! Taking apart what does not hold, and putting it together again.
+//!
+//! A wrong frame bends those it is compared with, and a bent wall makes the next frame's place wrong. Gauss–Newton at
+//! full size cannot undo it: many pixels off, it has nothing to follow. So when frames are found wrong, they are taken out,
+//! the others are solved again from the coarsest level, and the frames in doubt are placed once more on the wall as it is
+//! then.
+
+use super::alignment::alignments;
+use super::doubt::Doubt;
+use super::options::RefineOptions;
+use super::problem::{ProblemError, Scene};
+use super::repeats::{Rival, settle_repeats};
+use super::run::{disagreements, solve_level};
+use super::track::{Tracked, retry};
+use super::verdict::unsupported;
+
+/// Times that frames in doubt are placed once more.
+const TRIES: usize = 3;
+/// Times that frames are taken out, at the most.
+const ROUNDS: usize = 8;
+
+/// Takes out the frames that the others do not bear out, places them again, and solves, until nothing changes.
+/// `changed`: frames have been taken out already since the last solve.
+///
+/// Returns the frames that the wall's repeats leave undecided.
+///
+/// A round after which fewer frames are believed than before any is undone.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn repair(
+    scene: &Scene,
+    options: &RefineOptions,
+    tracked: &mut Tracked,
+    mut changed: bool,
+) -> Result<Vec<Rival>, ProblemError> {
+    let side = scene.camera.shorter_side();
+    let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
+    let mut best: Option<Tracked> = None;
+    let mut rivals = Vec::new();
+    for round in 0..ROUNDS {
+        changed |= judge(scene, finest, tracked)?;
+        if !changed
+            && best
+                .as_ref()
+                .is_none_or(|best| believed(best) < believed(tracked))
+        {
+            best = Some(tracked.clone());
+        }
+        let placed = match round < TRIES {
+            true => retry(scene, options, tracked)?,
+            false => 0,
+        };
+        if !changed && placed == 0 {
+            let (moved, undecided) = settle_repeats(scene, options, tracked)?;
+            rivals = undecided;
+            if !moved || round + 1 == ROUNDS {
+                break;
+            }
+        }
+        for level in (0..=coarsest).rev() {
+            let shares = solve_level(scene, options, level, tracked)?;
+            changed = level == 0 && disagreements(&shares, &mut tracked.doubts);
+        }
+    }
+    if let Some(best) = best.filter(|best| believed(best) > believed(tracked)) {
+        *tracked = best;
+        (_, rivals) = settle_repeats(scene, options, tracked)?;
+    }
+    Ok(rivals)
+}
+
+fn believed(tracked: &Tracked) -> usize {
+    tracked
+        .doubts
+        .iter()
+        .filter(|doubt| doubt.is_none())
+        .count()
+}
+
+/// Doubts the frames that are not borne out; true if there are any.
+fn judge(scene: &Scene, finest: usize, tracked: &mut Tracked) -> Result<bool, ProblemError> {
+    let found: Vec<(usize, Doubt)> =
+        unsupported(&alignments(scene, finest, tracked)?, tracked.doubts.len());
+    let any = !found.is_empty();
+    for (frame, doubt) in found {
+        tracked.doubts[frame] = Some(doubt);
+    }
+    Ok(any)
+}

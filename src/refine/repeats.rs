@@ -1,0 +1,391 @@
+//! Walls that repeat.
+//!
+//! Where bricks come as a printed tile, a frame moved by a whole tile shows the same, exactly: no residual, and no
+//! comparison of frames can tell. Only the prior can. So at the end each frame is compared with the wall at all gauge
+//! motions (turns about the axis, shifts along it) within the prior's reach; where it fits as well as where it is, the
+//! likelier of the two is taken, and if the odds are not clear, the frame is ambiguous and both are reported.
+//!
+//! With errors that add up, what can be wrong by a tile is a step, and with it all frames after it; with independent
+//! errors a frame by itself. Where less than half of the frames would be clear, none is: what they are clear against has
+//! been settled by the others.
+
+use super::options::RefineOptions;
+use super::place::{MOST_DEVIATION, Surroundings, UNEXPLAINED, near, unexplained};
+use super::prior::Prior;
+use super::problem::{ProblemError, Scene};
+use super::search::matches;
+use super::track::{FARTHEST, Tracked};
+use super::wall::{FusedWall, Portrait};
+use crate::surface::{Gauge, GaugeMotion};
+use crate::trajectory::{JitterModel, Pose};
+
+/// Difference of log-posteriors from which on one place is believed: odds of 1000 to 1.
+const CLEAR: f64 = 6.9;
+/// Motions closer to none than this are none, samples of the search level.
+const APART: f64 = 3.0;
+/// Sweeps over all frames until no choice changes, at the most.
+const SWEEPS: usize = 20;
+
+/// A frame, and where it might be as well.
+pub type Rival = (usize, GaugeMotion);
+
+/// What the prior makes of the repeats.
+#[derive(Debug, PartialEq)]
+struct Choice {
+    /// By how much each frame is to be moved.
+    motion: Vec<GaugeMotion>,
+    /// For each frame how it might be moved from there as well, if that is about as likely.
+    rival: Vec<Option<GaugeMotion>>,
+}
+
+/// Moves the frames that fit elsewhere as well to where the prior has them; returns whether any has moved, and those for
+/// which it does not decide.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn settle_repeats(
+    scene: &Scene,
+    options: &RefineOptions,
+    tracked: &mut Tracked,
+) -> Result<(bool, Vec<Rival>), ProblemError> {
+    let all = 0..tracked.estimates.len();
+    let believed = tracked.believed(&all);
+    let frames: Vec<usize> = all.filter(|k| believed[*k]).collect();
+    let mut repeats = Vec::with_capacity(frames.len());
+    for k in &frames {
+        repeats.push(repeats_of(scene, options, *k, tracked)?);
+    }
+    if repeats.iter().all(Vec::is_empty) {
+        return Ok((false, Vec::new()));
+    }
+    let poses: Vec<Pose> = frames.iter().map(|k| tracked.estimates[*k].pose).collect();
+    let choose = |clear: f64| match scene.prior.jitter.model {
+        JitterModel::RandomWalk => choose_steps(scene.prior, &frames, &poses, &repeats, clear),
+        JitterModel::Independent => {
+            let gauge = scene.surface.gauge();
+            choose_frames(scene.prior, &gauge, &frames, &poses, &repeats, clear)
+        }
+    };
+    let mut choice = choose(CLEAR);
+    let undecided = choice.rival.iter().flatten().count();
+    if 2 * undecided > frames.len() {
+        choice = choose(f64::INFINITY);
+    }
+    let mut moved = false;
+    for (k, motion) in frames.iter().zip(&choice.motion) {
+        if *motion != GaugeMotion::default() {
+            let pose = &mut tracked.estimates[*k].pose;
+            *pose = motion.apply(pose);
+            moved = true;
+        }
+    }
+    let rivals = frames.iter().zip(choice.rival);
+    Ok((
+        moved,
+        rivals.filter_map(|(k, rival)| Some((*k, rival?))).collect(),
+    ))
+}
+
+/// The gauge motions after which frame `frame` matches what the others show as well as it does now.
+fn repeats_of(
+    scene: &Scene,
+    options: &RefineOptions,
+    frame: usize,
+    tracked: &Tracked,
+) -> Result<Vec<GaugeMotion>, ProblemError> {
+    let side = scene.camera.shorter_side();
+    let level = options
+        .handover_level(side)
+        .max(options.coarsest_level(side).saturating_sub(1));
+    let camera = scene.camera.at_level(level);
+    let run = frame.saturating_sub(FARTHEST)..(frame + FARTHEST).min(tracked.estimates.len());
+    let mut placed = tracked.believed(&run);
+    placed[frame - run.start] = false;
+    let surroundings = Surroundings {
+        estimates: &tracked.estimates[run.clone()],
+        placed: &placed,
+        run: run.clone(),
+    };
+    let pose = tracked.estimates[frame].pose;
+    let radius_m = scene.surface.perimeter_m() / std::f64::consts::TAU;
+    let jitter = &scene.prior.jitter;
+    let farthest = (2.0 * MOST_DEVIATION).sqrt();
+    let reach_m = [
+        (farthest * jitter.rotation_sigma_rad).min(std::f64::consts::PI) * radius_m,
+        (farthest * jitter.translation_sigma_m[1]).min(std::f64::consts::PI * radius_m),
+    ];
+    let margin = reach_m[0].max(reach_m[1]);
+    let near = near(scene, frame, &pose, margin, &surroundings)?;
+    let mut portraits = Vec::new();
+    for (k, _) in near.iter().enumerate().filter(|(_, near)| **near) {
+        let portrait = Portrait::new(scene, level, run.start + k)?;
+        portraits.push((portrait, surroundings.estimates[k]));
+    }
+    if portraits.is_empty() {
+        return Ok(Vec::new());
+    }
+    let portrait = Portrait::new(scene, level, frame)?;
+    let wall = FusedWall::new(scene, &portraits, &camera, (frame, &pose), margin)?;
+    let left = |pose: &Pose| {
+        let likeness = wall.likeness(scene, &portrait, pose);
+        unexplained(&likeness, &portrait)
+    };
+    let Some(here) = left(&pose) else {
+        return Ok(Vec::new());
+    };
+    let gauge = scene.surface.gauge();
+    let motion = |[s_m, h_m]: [f64; 2]| GaugeMotion {
+        turn_rad: if gauge.turn { s_m / radius_m } else { 0.0 },
+        shift_m: if gauge.shift { h_m } else { 0.0 },
+    };
+    let spacing = wall.lattice.spacing_m;
+    let mut found = Vec::new();
+    for shift_m in matches(
+        &wall,
+        &portrait,
+        &pose,
+        reach_m,
+        (1.0 - UNEXPLAINED * here).max(0.0),
+    ) {
+        if shift_m[0].hypot(shift_m[1]) < APART * spacing {
+            continue;
+        }
+        // To a fraction of a sample: the best of ever closer neighbours.
+        let mut best = (left(&motion(shift_m).apply(&pose)), shift_m);
+        let mut step = 0.5 * spacing;
+        for _ in 0..4 {
+            let [s_m, h_m] = best.1;
+            for (ds, dh) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
+                let shift_m = [s_m + ds * step, h_m + dh * step];
+                let there = left(&motion(shift_m).apply(&pose));
+                if there.is_some_and(|there| best.0.is_none_or(|best| there < best)) {
+                    best = (there, shift_m);
+                }
+            }
+            step *= 0.5;
+        }
+        if best.0.is_some_and(|there| there < UNEXPLAINED * here) {
+            found.push(motion(best.1));
+        }
+    }
+    Ok(found)
+}
+
+/// One motion after another; they commute.
+fn plus(a: &GaugeMotion, b: &GaugeMotion) -> GaugeMotion {
+    GaugeMotion {
+        turn_rad: a.turn_rad + b.turn_rad,
+        shift_m: a.shift_m + b.shift_m,
+    }
+}
+
+fn minus(a: &GaugeMotion, b: &GaugeMotion) -> GaugeMotion {
+    GaugeMotion {
+        turn_rad: a.turn_rad - b.turn_rad,
+        shift_m: a.shift_m - b.shift_m,
+    }
+}
+
+/// The likeliest of some motions, and the second if it is less likely by no more than `clear`.
+fn likeliest(
+    motions: &[GaugeMotion],
+    clear: f64,
+    cost: impl Fn(&GaugeMotion) -> f64,
+) -> (GaugeMotion, Option<GaugeMotion>) {
+    let none = GaugeMotion::default();
+    let mut ranked: Vec<(f64, GaugeMotion)> = std::iter::once(&none)
+        .chain(motions)
+        .map(|motion| (cost(motion), *motion))
+        .collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let second = ranked
+        .get(1)
+        .filter(|second| second.0 - ranked[0].0 < clear);
+    (ranked[0].1, second.map(|(_, motion)| *motion))
+}
+
+/// Errors that add up: step by step. Of the runs of frames between undecided steps, the longest is believed.
+fn choose_steps(
+    prior: &Prior,
+    frames: &[usize],
+    poses: &[Pose],
+    repeats: &[Vec<GaugeMotion>],
+    clear: f64,
+) -> Choice {
+    let mut motion = vec![GaugeMotion::default(); frames.len()];
+    // How all frames from here on might be moved as well.
+    let mut step = vec![None; frames.len()];
+    for i in 1..frames.len() {
+        let before = motion[i - 1];
+        let (from, to) = (frames[i - 1], frames[i]);
+        let expected = prior.predict(from, &before.apply(&poses[i - 1]), to);
+        let steps = prior.steps_between(from, to);
+        let cost = |own: &GaugeMotion| {
+            prior.deviation_cost(&expected, &plus(&before, own).apply(&poses[i])) / steps
+        };
+        let (best, second) = likeliest(&repeats[i], clear, cost);
+        motion[i] = plus(&before, &best);
+        step[i] = second.map(|second| minus(&second, &best));
+    }
+    let cuts: Vec<usize> = (1..frames.len()).filter(|i| step[*i].is_some()).collect();
+    let starts = std::iter::once(0).chain(cuts.iter().copied());
+    let ends = cuts.iter().copied().chain([frames.len()]);
+    let longest = starts
+        .zip(ends)
+        .max_by_key(|(start, end)| (end - start, std::cmp::Reverse(*start)));
+    let (start, end) = longest.unwrap_or((0, frames.len()));
+    let none = GaugeMotion::default();
+    let rival = (0..frames.len())
+        .map(|i| {
+            if i >= end {
+                step[end]
+            } else if i < start {
+                step[start].map(|step| minus(&none, &step))
+            } else {
+                None
+            }
+        })
+        .collect();
+    Choice { motion, rival }
+}
+
+/// Independent errors: frame by frame, against the gauge that all have taken on, until nothing changes.
+fn choose_frames(
+    prior: &Prior,
+    gauge: &Gauge,
+    frames: &[usize],
+    poses: &[Pose],
+    repeats: &[Vec<GaugeMotion>],
+    clear: f64,
+) -> Choice {
+    let initial: Vec<Pose> = frames.iter().map(|k| prior.initial[*k]).collect();
+    let mut choice = Choice {
+        motion: vec![GaugeMotion::default(); frames.len()],
+        rival: vec![None; frames.len()],
+    };
+    for _ in 0..SWEEPS {
+        let moved: Vec<Pose> = choice
+            .motion
+            .iter()
+            .zip(poses)
+            .map(|(m, p)| m.apply(p))
+            .collect();
+        let settled = gauge.align(&initial, &moved);
+        let mut next = Choice {
+            motion: Vec::new(),
+            rival: Vec::new(),
+        };
+        for i in 0..frames.len() {
+            let expected = settled.apply(&initial[i]);
+            let cost = |own: &GaugeMotion| prior.deviation_cost(&expected, &own.apply(&poses[i]));
+            let (best, second) = likeliest(&repeats[i], clear, cost);
+            next.motion.push(best);
+            next.rival.push(second.map(|second| minus(&second, &best)));
+        }
+        let same = next.motion == choice.motion;
+        choice = next;
+        if same {
+            break;
+        }
+    }
+    choice
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trajectory::{Jitter, spiral};
+
+    const TILE: GaugeMotion = GaugeMotion {
+        turn_rad: 0.0,
+        shift_m: 0.45,
+    };
+
+    fn back(motion: &GaugeMotion) -> GaugeMotion {
+        minus(&GaugeMotion::default(), motion)
+    }
+
+    fn prior(model: JitterModel, shift_sigma_m: f64) -> Prior {
+        Prior {
+            jitter: Jitter {
+                model,
+                rotation_sigma_rad: 0.05,
+                translation_sigma_m: [0.02, shift_sigma_m, 0.02],
+            },
+            initial: spiral(12, 0.1, 30f64.to_radians()),
+            times_s: (0..12).map(f64::from).collect(),
+            usual_step_s: 1.0,
+            log_gain_sigma: 0.3,
+            bias_sigma: 10.0,
+        }
+    }
+
+    /// Every frame fits a tile on and a tile back.
+    fn choose(prior: &Prior, poses: &[Pose]) -> Choice {
+        let frames: Vec<usize> = (0..poses.len()).collect();
+        let repeats = vec![vec![TILE, back(&TILE)]; poses.len()];
+        let gauge = Gauge {
+            turn: true,
+            shift: true,
+        };
+        match prior.jitter.model {
+            JitterModel::RandomWalk => choose_steps(prior, &frames, poses, &repeats, CLEAR),
+            JitterModel::Independent => {
+                choose_frames(prior, &gauge, &frames, poses, &repeats, CLEAR)
+            }
+        }
+    }
+
+    #[test]
+    fn frames_beyond_a_wrong_step_are_moved_back_by_a_tile() {
+        let prior = prior(JitterModel::RandomWalk, 0.03);
+        let mut poses = prior.initial.clone();
+        poses[7..]
+            .iter_mut()
+            .for_each(|pose| *pose = TILE.apply(pose));
+        let choice = choose(&prior, &poses);
+        assert!(choice.rival.iter().all(Option::is_none));
+        for (k, motion) in choice.motion.iter().enumerate() {
+            let expected = if k < 7 { 0.0 } else { -0.45 };
+            assert!((motion.shift_m - expected).abs() < 1e-12, "{k}: {motion:?}");
+        }
+    }
+
+    #[test]
+    fn a_single_wrong_frame_is_moved_back_by_a_tile() {
+        let prior = prior(JitterModel::Independent, 0.03);
+        let mut poses = prior.initial.clone();
+        poses[7] = TILE.apply(&poses[7]);
+        let choice = choose(&prior, &poses);
+        assert!(choice.rival.iter().all(Option::is_none));
+        assert_eq!(choice.motion[7], back(&TILE));
+        assert_eq!(choice.motion[6], GaugeMotion::default());
+    }
+
+    /// Half a tile off with σ of a quarter: the prior cannot tell.
+    #[test]
+    fn what_the_prior_cannot_tell_is_ambiguous() {
+        let model = JitterModel::Independent;
+        let half = GaugeMotion {
+            turn_rad: 0.0,
+            shift_m: 0.2,
+        };
+        let walk = prior(JitterModel::RandomWalk, 0.1);
+        let mut poses = walk.initial.clone();
+        poses[8..]
+            .iter_mut()
+            .for_each(|pose| *pose = half.apply(pose));
+        let choice = choose(&walk, &poses);
+        for (k, rival) in choice.rival.iter().enumerate() {
+            assert_eq!(rival.is_some(), k >= 8, "{k}");
+        }
+        assert_eq!(choice.rival[9], Some(back(&TILE)));
+        let independent = prior(model, 0.1);
+        let mut poses = independent.initial.clone();
+        poses[8] = half.apply(&poses[8]);
+        let choice = choose(&independent, &poses);
+        for (k, rival) in choice.rival.iter().enumerate() {
+            assert_eq!(rival.is_some(), k == 8, "{k}");
+        }
+    }
+}
