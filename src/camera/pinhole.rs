@@ -49,18 +49,6 @@ impl Pinhole {
         })
     }
 
-    /// Projects many points at once, in single precision: on entry `x`, `y`, `z` are camera coordinates, on
-    /// return `x` and `y` hold u and v. Points behind the camera give meaningless pixels.
-    pub fn project_slices(&self, x: &mut [f32], y: &mut [f32], z: &[f32]) {
-        let (fx, fy) = (self.fx as f32, self.fy as f32);
-        let (cx, cy) = (self.cx as f32, self.cy as f32);
-        for ((x, y), z) in x.iter_mut().zip(y.iter_mut()).zip(z) {
-            let inverse = 1.0 / z;
-            *x = fx * *x * inverse + cx;
-            *y = fy * *y * inverse + cy;
-        }
-    }
-
     /// `∂(u, v)/∂x_c`, pixels per metre, for a point in front of the camera.
     pub fn project_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
         let inverse = 1.0 / x_c.z;

@@ -9,6 +9,13 @@ pub const TILE: usize = 8;
 pub const SIDE: usize = TILE + 2;
 /// Samples of a tile with its ring.
 pub const AREA: usize = SIDE * SIDE;
+/// Values that vector instructions work on at once; sums run in as many lanes, whatever the processor has.
+pub const LANES: usize = 8;
+/// A value at every sample of a tile with its ring, row by row (s runs fastest), in whole vectors: the last few repeat
+/// the tile's middle and count for nothing.
+pub type Plane = [f32; AREA.next_multiple_of(LANES)];
+/// Zero everywhere.
+pub const ZERO: Plane = [0.0; AREA.next_multiple_of(LANES)];
 
 /// Tiles along the side of a block: the unit of parallel work, about a hundredth of a frame.
 pub const BLOCK: i64 = 8;
@@ -107,17 +114,17 @@ impl WallGrid {
 }
 
 /// World coordinates of the samples of one tile with its ring, relative to its middle (so that single
-/// precision is enough), row-major: s runs fastest.
+/// precision is enough).
 #[derive(Clone, Debug)]
 pub struct TilePoints {
     /// The wall at the tile's middle.
     pub centre: WallFrame,
     /// x of every sample minus the centre's, metres.
-    pub dx: [f32; AREA],
+    pub dx: Plane,
     /// y of every sample minus the centre's, metres.
-    pub dy: [f32; AREA],
+    pub dy: Plane,
     /// z of every sample minus the centre's, metres.
-    pub dz: [f32; AREA],
+    pub dz: Plane,
 }
 
 impl TilePoints {
@@ -131,9 +138,9 @@ impl TilePoints {
         let centre = surface.frame(grid.centre(tile));
         let mut points = Self {
             centre,
-            dx: [0.0; AREA],
-            dy: [0.0; AREA],
-            dz: [0.0; AREA],
+            dx: ZERO,
+            dy: ZERO,
+            dz: ZERO,
         };
         let (s, h) = grid.samples(tile);
         surface.lattice(&s, &h, scratch);

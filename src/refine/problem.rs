@@ -13,6 +13,7 @@ use super::visibility::{Observer, Placed, Tile, Visibility, reach_m};
 use crate::camera::Pinhole;
 use crate::frames::{FrameCache, FrameError, Pyramid, noise_at_level};
 use crate::surface::{Footprint, Surface, SurfaceError, viewing_distance, wall_jacobian};
+use crate::vectors::wide;
 use nalgebra::{Matrix2x6, Matrix4, SMatrix, Vector2};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -347,8 +348,13 @@ impl<'a> Problem<'a> {
                         let points =
                             TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
                         let observers = visibility.observers(tile);
-                        let seen = observers.iter().map(|o| o.seen(&views));
-                        work.count_residuals(&points, seen, &mut histogram);
+                        wide(
+                            #[inline(always)]
+                            || {
+                                let seen = observers.iter().map(|o| o.seen(&views));
+                                work.count_residuals(&points, seen, &mut histogram);
+                            },
+                        );
                     }
                     histogram
                 })
@@ -512,8 +518,13 @@ impl<'a> Problem<'a> {
         for tile in tiles {
             let points = TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
             let observers = visibility.observers(tile);
-            let seen = observers.iter().map(|o| o.seen(views));
-            work.moments(&points, seen, spacing, &self.noise);
+            wide(
+                #[inline(always)]
+                || {
+                    let seen = observers.iter().map(|o| o.seen(views));
+                    work.moments(&points, seen, spacing, &self.noise);
+                },
+            );
             let mut columns = Vec::with_capacity(observers.len());
             for (observer, moments) in observers.iter().zip(&work.observers) {
                 sums.cost += moments.cost;
@@ -535,9 +546,14 @@ impl<'a> Problem<'a> {
             });
         }
         let share = self.texture_share(&summed);
-        for tile in &summed {
-            sums.add_tile(&tile.columns, &(share * tile.features * share), tile.total);
-        }
+        wide(
+            #[inline(always)]
+            || {
+                for tile in &summed {
+                    sums.add_tile(&tile.columns, &(share * tile.features * share), tile.total);
+                }
+            },
+        );
         sums
     }
 
@@ -596,6 +612,7 @@ fn pixel_on_wall<'p>(
 }
 
 impl Observer {
+    #[inline(always)]
     fn seen<'v>(&self, views: &'v [View<'v>]) -> Seen<'v> {
         Seen {
             view: &views[self.frame as usize],
@@ -631,6 +648,7 @@ struct Column {
 
 impl Column {
     /// `M B` (4 × 8) for this observer's `B = diag(A, 1, 1/a)`.
+    #[inline(always)]
     fn features_times_b(&self, m: &Matrix4<f64>) -> SMatrix<f64, 4, UNKNOWNS> {
         let mut product = SMatrix::<f64, 4, UNKNOWNS>::zeros();
         for c in 0..6 {
@@ -646,6 +664,7 @@ impl Column {
     }
 
     /// Adds `scale · Bᵀ F` to a block.
+    #[inline(always)]
     fn add_b_transposed_times(&self, f: &SMatrix<f64, 4, UNKNOWNS>, scale: f64, block: &mut Block) {
         for c in 0..UNKNOWNS {
             let (f0, f1) = (scale * f[(0, c)], scale * f[(1, c)]);
@@ -685,12 +704,14 @@ impl BlockSums {
         self.slots.partition_point(|s| *s < slot)
     }
 
+    #[inline(always)]
     fn block_index(&self, row: usize, column: usize) -> usize {
         let n = self.slots.len();
         row * n - row * (row + 1) / 2 + column
     }
 
     /// `features`: M of the tile; `total`: weight of all its observers, held ones too.
+    #[inline(always)]
     fn add_tile(&mut self, columns: &[Column], features: &Matrix4<f64>, total: f64) {
         for (n, b) in columns.iter().enumerate() {
             let moments = &b.moments;
