@@ -85,6 +85,7 @@ pub fn pose_bound(
     let sampling = Sampling {
         level: 0,
         density: DENSITY,
+        share: 1.0,
     };
     // A quarter of the doubled pixels are pixels.
     let problem = Problem::new(&scene, sampling, members)?.exact(2.0 * noise_grey);

@@ -43,7 +43,7 @@ pub struct SolveRecord {
     pub iterations: u64,
     /// Robust cost at the start.
     pub cost_start: f64,
-    /// Robust cost at the end, on the same wall samples.
+    /// Robust cost at the end, on the same wall samples, before the last step.
     pub cost_end: f64,
     /// Observations (wall sample × frame) compared.
     pub observations: usize,
@@ -61,7 +61,7 @@ pub struct Solution<'a> {
     pub problem: Problem<'a>,
     /// Estimates of the active frames.
     pub estimates: Vec<FrameEstimate>,
-    /// Cost and normal equations there.
+    /// Cost and normal equations there, or within the tolerance of there.
     pub linearisation: Linearisation,
     /// Its course.
     pub record: SolveRecord,
@@ -77,7 +77,8 @@ const TRIES: usize = 8;
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
 ///
 /// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples; such a
-/// step is never taken.
+/// step is never taken. Only the last step, shorter than the tolerance, is taken on trust: cost and equations are those
+/// before it.
 struct DampedGaussNewton {
     stopping: Stopping,
     lambda: f64,
@@ -147,6 +148,12 @@ impl DampedGaussNewton {
                 .zip(&step)
                 .map(|(estimate, step)| estimate.retract(step))
                 .collect();
+            if stop.is_some() {
+                self.iterations += 1;
+                self.last_step_px = step_px;
+                self.stop = stop;
+                return Ok((candidate, current));
+            }
             let next = problem.linearise(&candidate)?;
             if next.cost < current.cost {
                 self.iterations += 1;
@@ -156,13 +163,7 @@ impl DampedGaussNewton {
                 } else {
                     0.0
                 };
-                self.stop = stop;
                 return Ok((candidate, next));
-            }
-            if stop.is_some() {
-                self.last_step_px = step_px;
-                self.stop = stop;
-                return Ok((estimates.to_vec(), current));
             }
             self.raise_damping();
         }

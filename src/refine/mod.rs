@@ -16,11 +16,12 @@
 //! | all frames together, coarse to fine | [`run`](mod@run) |
 //! | how sure | [`covariance`]; how sure it could be at best: [`bound`] |
 //!
-//! Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`] and [`coverage`]
-//! choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, [`problem`] reduces
+//! Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`], [`coverage`]
+//! and [`choice`] choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, [`problem`] reduces
 //! to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
 
 mod bound;
+mod choice;
 mod consistency;
 mod covariance;
 mod coverage;

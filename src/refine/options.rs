@@ -15,6 +15,10 @@ pub struct RefineOptions {
     pub window_stride: usize,
     /// Wall samples per pixel along each axis in the last solve.
     pub final_density: f64,
+    /// Share of the wall that the last solve looks at, the most informative.
+    pub final_share: f64,
+    /// Share of the wall that the solves before it look at, below the level where tracking ends.
+    pub close_share: f64,
     /// Memory for decoded frames, bytes. Frames that do not fit are decoded anew when needed.
     pub cache_bytes: usize,
     /// Steps of a global solve per level, at the most.
@@ -23,6 +27,13 @@ pub struct RefineOptions {
     pub step_tolerance_px: f64,
     /// ... or when a step is shorter than this share of the estimate's own uncertainty.
     pub step_tolerance_sigma: f64,
+}
+
+fn env(name: &str, value: f64) -> f64 {
+    std::env::var(name)
+        .ok()
+        .and_then(|v| v.parse().ok())
+        .unwrap_or(value)
 }
 
 impl Default for RefineOptions {
@@ -34,6 +45,8 @@ impl Default for RefineOptions {
             tracking_levels: 3,
             window_stride: 6,
             final_density: 2.0,
+            final_share: 1.0,
+            close_share: env("TS_C", 0.25),
             cache_bytes: 2 << 30,
             max_iterations: 20,
             step_tolerance_px: 0.0005,
@@ -46,7 +59,8 @@ impl RefineOptions {
     /// For speed: the last solve looks at the wall once per pixel instead of twice along each axis.
     pub fn fast() -> Self {
         Self {
-            final_density: 1.0,
+            final_density: env("TS_D", 2.0),
+            final_share: env("TS_S", 0.25),
             ..Self::default()
         }
     }

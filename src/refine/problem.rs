@@ -1,6 +1,6 @@
 //! The photometric problem over a run of frames at one pyramid level: cost and normal equations.
 
-use super::coverage::Coverage;
+use super::coverage::{Coverage, Pictures};
 use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
 use super::factor::{FactorError, Symbolic};
 use super::grid::{TilePoints, WallGrid};
@@ -27,14 +27,17 @@ pub struct Sampling {
     pub level: usize,
     /// Wall samples per pixel along each axis.
     pub density: f64,
+    /// Share of the wall that is looked at, the most informative ([`super::choice`]).
+    pub share: f64,
 }
 
 impl Sampling {
-    /// A pyramid level with one sample per pixel.
+    /// A pyramid level with one sample per pixel, everywhere.
     pub fn of(level: usize) -> Self {
         Self {
             level,
             density: 1.0,
+            share: 1.0,
         }
     }
 }
@@ -148,7 +151,8 @@ pub struct FrameShare {
 /// through in stretches along the tunnel, so that memory for frames and samples does not grow with its length.
 pub struct Problem<'a> {
     scene: Scene<'a>,
-    level: usize,
+    sampling: Sampling,
+    pictures: Pictures<'a>,
     camera: Pinhole,
     grid: WallGrid,
     participants: Range<usize>,
@@ -175,7 +179,11 @@ impl<'a> Problem<'a> {
         sampling: Sampling,
         members: Members,
     ) -> Result<Self, ProblemError> {
-        let Sampling { level, density } = sampling;
+        let Sampling {
+            level,
+            density,
+            share,
+        } = sampling;
         let Members {
             participants,
             active,
@@ -213,8 +221,12 @@ impl<'a> Problem<'a> {
             pixel_m,
             density.max(least_density(camera.height)),
         );
-        let shading = scene.frames.shading();
-        let coverage = Coverage::new(scene.surface, grid, camera, shading, placed);
+        let pictures = Pictures {
+            frames: scene.frames,
+            first: participants.start,
+            level,
+        };
+        let coverage = Coverage::new(scene.surface, grid, camera, pictures, share, placed)?;
         let slot = |k: &usize| {
             let frame = participants.start + k;
             active.contains(&frame).then(|| frame - active.start)
@@ -229,7 +241,8 @@ impl<'a> Problem<'a> {
         })?;
         let mut problem = Self {
             scene: *scene,
-            level,
+            sampling,
+            pictures,
             camera,
             grid,
             held: estimates.to_vec(),
@@ -285,6 +298,11 @@ impl<'a> Problem<'a> {
         self.coverage.tiles
     }
 
+    /// How it looks at the wall.
+    pub fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
     /// Estimated noise of a pixel, 1-σ in grey levels.
     pub fn sigma(&self) -> f64 {
         self.sigma
@@ -299,15 +317,6 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The pictures of a stretch's frames.
-    fn pictures(&self, stretch: usize) -> Result<Vec<Arc<Pyramid>>, ProblemError> {
-        let first = self.participants.start;
-        let frames = self.coverage.frames(stretch).par_iter();
-        Ok(frames
-            .map(|k| self.scene.frames.get(first + k))
-            .collect::<Result<_, _>>()?)
-    }
-
     /// The frames of a stretch at the given estimates of all participants.
     fn views<'s>(
         &self,
@@ -318,7 +327,13 @@ impl<'a> Problem<'a> {
         let frames = self.coverage.frames(stretch).iter();
         frames
             .zip(pictures)
-            .map(|(k, picture)| View::new(picture.level(self.level), self.camera, &estimates[*k]))
+            .map(|(k, picture)| {
+                View::new(
+                    picture.level(self.sampling.level),
+                    self.camera,
+                    &estimates[*k],
+                )
+            })
             .collect()
     }
 
@@ -334,8 +349,8 @@ impl<'a> Problem<'a> {
         let stride = (self.coverage.tiles / SCALE_TILES).max(1);
         let mut histogram = NoiseHistogram::default();
         for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch);
-            let pictures = self.pictures(stretch)?;
+            let visibility = self.coverage.visibility(stretch)?;
+            let pictures = self.pictures.of(self.coverage.frames(stretch))?;
             let views = self.views(stretch, &pictures, &self.held);
             let sample: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
             let counted = sample
@@ -364,7 +379,7 @@ impl<'a> Problem<'a> {
         self.noise = histogram.fit();
         // Residuals are a little too small, for S has fitted itself to them; single pictures know the noise better, but
         // take fine texture for noise.
-        let single = self.scene.noise.powi(2) * noise_at_level(self.level);
+        let single = self.scene.noise.powi(2) * noise_at_level(self.sampling.level);
         let fitted = f64::from(self.noise.floor);
         if single > fitted && single < MOST_UNDERESTIMATE * fitted {
             self.noise.floor = single as f32;
@@ -386,8 +401,8 @@ impl<'a> Problem<'a> {
         let mut scatter = vec![Block::zeros(); self.pattern.blocks()];
         let mut cost = 0.0;
         for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch);
-            let pictures = self.pictures(stretch)?;
+            let visibility = self.coverage.visibility(stretch)?;
+            let pictures = self.pictures.of(self.coverage.frames(stretch))?;
             let views = self.views(stretch, &pictures, &estimates);
             for batch in visibility.blocks.chunks(BATCH) {
                 let sums: Vec<BlockSums> = batch
@@ -436,7 +451,7 @@ impl<'a> Problem<'a> {
     /// but no less than [`LEAST_TEXTURE`], so that M stays positive semidefinite.
     fn texture_share(&self, tiles: &[TileSums]) -> Matrix4<f64> {
         let mut share = nalgebra::Vector4::repeat(1.0);
-        if self.level == 0 && self.held_frames() == 0 && !self.exact {
+        if self.sampling.level == 0 && self.held_frames() == 0 && !self.exact {
             for k in 0..2 {
                 let noise: f64 = tiles.iter().map(|tile| tile.slope_noise[k]).sum();
                 let all: f64 = tiles.iter().map(|tile| tile.features[(k, k)]).sum();
@@ -560,7 +575,7 @@ impl<'a> Problem<'a> {
     /// How far a step moves the wall under each active frame, in pixels of full size: the largest over the
     /// frame's middle and corners.
     pub fn wall_step_px(&self, active: &[FrameEstimate], step: &[FrameStep]) -> Vec<f64> {
-        let full = 0.5f64.powi(self.level as i32);
+        let full = 0.5f64.powi(self.sampling.level as i32);
         active
             .iter()
             .zip(step)
@@ -839,6 +854,7 @@ mod tests {
             let sampling = Sampling {
                 level: 0,
                 density: 2.0,
+                share: 1.0,
             };
             let members = Members {
                 participants: all.clone(),

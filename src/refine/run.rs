@@ -114,26 +114,34 @@ pub fn refine(
     let mut levels = Vec::new();
     let mut last = None;
     for (k, (sampling, stopping)) in stages(options, side).enumerate() {
-        let Sampling { level, density } = sampling;
+        let Sampling {
+            level,
+            density,
+            share,
+        } = sampling;
         let problem = Problem::new(&scene, sampling, tracked.members())?;
         // Where no frame can be believed, the prior is all there is to report.
         if problem.tiles() == 0 && tracked.doubts.iter().all(Option::is_none) {
             continue;
         }
-        let stage = match sampling == Sampling::of(level) {
-            true => format!("level {level}"),
-            false => format!("level {level}, {density} samples per pixel"),
-        };
+        let mut stage = format!("level {level}");
+        if density != 1.0 {
+            stage += &format!(", {density} samples per pixel");
+        }
+        if share != 1.0 {
+            stage += &format!(", {:.0} % of the wall", 100.0 * share);
+        }
         progress.start("global", options.max_iterations as usize);
         let solution = solve(problem, stopping, Some((&stage, progress)))?;
         progress.finish();
         tracked.estimates.clone_from(&solution.estimates);
-        if sampling == Sampling::of(0) {
+        if level == 0 {
             disagreements(&solution.linearisation.frames, &mut tracked.doubts);
         }
         levels.push(LevelReport {
             level,
             samples_per_pixel: density,
+            share_of_wall: share,
             solve: solution.record.clone(),
         });
         last = Some(solution);
@@ -233,11 +241,20 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
     let finest = Sampling {
         level: 0,
         density: options.final_density,
+        share: options.final_share,
     };
-    (0..=options.handover_level(side))
+    let first = options.handover_level(side);
+    let sampling = move |level| Sampling {
+        share: if level == first {
+            1.0
+        } else {
+            options.close_share
+        },
+        ..Sampling::of(level)
+    };
+    (0..=first)
         .rev()
-        .map(move |level| (Sampling::of(level), close(options, level)))
-        .filter(move |(sampling, _)| *sampling != finest)
+        .map(move |level| (sampling(level), close(options, level)))
         .chain([(finest, last)])
 }
 
@@ -319,7 +336,9 @@ fn frame_report(
 ) -> FrameReport {
     let share: &FrameShare = &solution.linearisation.frames[k];
     let estimate: &FrameEstimate = &solution.estimates[k];
-    let all = f64::from(survey.camera.width) * f64::from(survey.camera.height);
+    let all = f64::from(survey.camera.width)
+        * f64::from(survey.camera.height)
+        * solution.problem.sampling().share;
     let inlier_share = share.inliers / share.pixels.max(1e-9);
     let late = if share.pixels < LEAST_PIXEL_SHARE * all {
         Some(Doubt::NoOverlap {

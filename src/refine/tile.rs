@@ -383,6 +383,24 @@ fn gradient_squares(texture: &Plane) -> Rows {
     squares
 }
 
+/// Sums over a tile of the squared differences between neighbours along s and h, in the values that one frame shows. NaN
+/// where it lacks one.
+#[inline(always)]
+pub fn slope_squares(points: &TilePoints, view: &View, shade: f32) -> [f64; 2] {
+    let mut values = ZERO;
+    view.sample(points, shade, &mut values);
+    let (mut along_s, mut along_h) = (NO_ROWS, NO_ROWS);
+    for k in 0..NO_ROWS.len() {
+        let c = k + SIDE;
+        along_s[k] = OWN[k] * (values[c + 1] - values[c - 1]);
+        along_h[k] = OWN[k] * (values[c + SIDE] - values[c - SIDE]);
+    }
+    [
+        f64::from(dot(&along_s, &along_s)),
+        f64::from(dot(&along_h, &along_h)),
+    ]
+}
+
 /// The tile's own samples in a plane, whose ring takes its neighbours' value.
 #[inline(always)]
 fn with_ring(rows: &Rows) -> Plane {

@@ -118,14 +118,34 @@ impl Visibility {
                 observers: start..visibility.observers.len(),
             });
         }
+        visibility.find_blocks();
+        visibility
+    }
+
+    fn find_blocks(&mut self) {
         let mut start = 0;
-        for run in visibility
-            .tiles
-            .chunk_by(|a, b| a.id.block() == b.id.block())
-        {
-            visibility.blocks.push(start..start + run.len());
+        for run in self.tiles.chunk_by(|a, b| a.id.block() == b.id.block()) {
+            self.blocks.push(start..start + run.len());
             start += run.len();
         }
+    }
+
+    /// Nothing but the tiles `kept`, which are given block by block, ascending.
+    pub fn only(&self, kept: &[Vec<usize>]) -> Self {
+        let mut visibility = Self {
+            tiles: Vec::new(),
+            observers: Vec::new(),
+            blocks: Vec::new(),
+        };
+        for tile in kept.iter().flatten().map(|k| &self.tiles[*k]) {
+            let start = visibility.observers.len();
+            visibility.observers.extend(self.observers(tile));
+            visibility.tiles.push(Tile {
+                id: tile.id,
+                observers: start..visibility.observers.len(),
+            });
+        }
+        visibility.find_blocks();
         visibility
     }
 
