@@ -43,12 +43,6 @@ pub struct TileId {
 }
 
 impl TileId {
-    /// Orders tiles block by block along the axis, so that neighbours in order are neighbours on the wall.
-    pub fn key(&self) -> (i64, i64, i64, i64) {
-        let (block_row, block_column) = self.block();
-        (block_row, block_column, self.row, self.column)
-    }
-
     /// The block of the tile.
     pub fn block(&self) -> (i64, i64) {
         (self.row.div_euclid(BLOCK), self.column.div_euclid(BLOCK))
@@ -89,7 +83,10 @@ impl WallGrid {
         const PHI: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
         let (width, height) = self.tile_size_m();
         let (column, row) = (tile.column as f64, tile.row as f64);
-        let fraction = |a: f64, b: f64| (row * a + column * b).rem_euclid(1.0) - 0.5;
+        let fraction = |a: f64, b: f64| {
+            let sum = row * a + column * b;
+            sum - sum.floor() - 0.5
+        };
         WallPoint {
             s_m: (column + 0.5) * width + fraction(PHI[0], PHI[1]) * self.spacing_s_m,
             h_m: (row + 0.5) * height + fraction(PHI[1], PHI[0]) * self.spacing_h_m,

@@ -105,7 +105,7 @@ const BATCH: usize = 64;
 /// Samples over a frame's height, at least.
 const LEAST_ROWS: u32 = 90;
 /// Tiles looked at to estimate the noise.
-const SCALE_TILES: usize = 2000;
+const SCALE_TILES: usize = 600;
 /// Share of a block's squared slopes that counts as texture, at least, however noisy they are.
 const LEAST_TEXTURE: f64 = 0.05;
 /// A camera looks no farther than this many radii, when the lattice is laid out.

@@ -418,6 +418,8 @@ impl Default for Clock {
 impl Clock {
     fn lap(&mut self, stage: &str) {
         let now = Instant::now();
+        let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+        if std::env::var("TS_CPU").is_ok() { eprintln!("CPU {stage}: {}", stat.split(' ').nth(13).unwrap_or("")); }
         self.laps.push(StageTime {
             stage: stage.to_owned(),
             seconds: (now - self.since).as_secs_f64(),
