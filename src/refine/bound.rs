@@ -73,6 +73,7 @@ pub fn pose_bound(
         frames: &frames,
         prior: &prior,
         noise: 0.0,
+        fused_gradient: true,
     };
     let estimates: Vec<FrameEstimate> =
         poses_of(truth).into_iter().map(FrameEstimate::at).collect();
@@ -85,7 +86,7 @@ pub fn pose_bound(
     let sampling = Sampling {
         level: 0,
         density: DENSITY,
-        share: 1.0,
+        information: 1.0,
     };
     // A quarter of the doubled pixels are pixels.
     let problem = Problem::new(&scene, sampling, members)?.exact(2.0 * noise_grey);

@@ -59,20 +59,23 @@ pub struct Coverage<'a> {
     /// Of the level.
     camera: Pinhole,
     pictures: Pictures<'a>,
-    /// Share of the tiles that are compared.
-    share: f64,
+    /// Share of the information that the tiles compared hold.
+    information: f64,
     /// Where the participants stood when the samples were chosen; None for those that are not compared.
     placed: Vec<Option<Placed>>,
     stretches: Vec<Stretch>,
     kept: Vec<Option<Visibility>>,
     /// Number of tiles that are compared.
     pub tiles: usize,
+    /// Number of tiles there are.
+    pub all_tiles: usize,
     /// Participants that see wall in common: pairs in ascending order, each once, a frame with itself included.
     pub pairs: Vec<(usize, usize)>,
 }
 
 impl<'a> Coverage<'a> {
-    /// Finds the tiles of all participants' frames, and chooses a `share` of them if it is less than 1.
+    /// Finds the tiles of all participants' frames, and chooses those that hold a share `information` of what they tell if
+    /// it is less than 1.
     ///
     /// # Errors
     /// [`FrameError`] of a picture that is needed to choose.
@@ -81,7 +84,7 @@ impl<'a> Coverage<'a> {
         grid: WallGrid,
         camera: Pinhole,
         pictures: Pictures<'a>,
-        share: f64,
+        information: f64,
         placed: Vec<Option<Placed>>,
     ) -> Result<Self, FrameError> {
         let mut coverage = Self {
@@ -90,15 +93,17 @@ impl<'a> Coverage<'a> {
             grid,
             camera,
             pictures,
-            share,
+            information,
             placed,
             kept: Vec::new(),
             tiles: 0,
+            all_tiles: 0,
             pairs: Vec::new(),
         };
         let mut observations = 0;
         for stretch in 0..coverage.stretches.len() {
-            let visibility = coverage.find(stretch)?;
+            let (visibility, all_tiles) = coverage.find(stretch)?;
+            coverage.all_tiles += all_tiles;
             coverage.tiles += visibility.tiles.len();
             let pairs = coverage.pairs_of(stretch, &visibility);
             coverage.pairs.extend(pairs);
@@ -128,11 +133,12 @@ impl<'a> Coverage<'a> {
     pub fn visibility(&self, stretch: usize) -> Result<Cow<'_, Visibility>, FrameError> {
         Ok(match &self.kept[stretch] {
             Some(visibility) => Cow::Borrowed(visibility),
-            None => Cow::Owned(self.find(stretch)?),
+            None => Cow::Owned(self.find(stretch)?.0),
         })
     }
 
-    fn find(&self, stretch: usize) -> Result<Visibility, FrameError> {
+    /// The observations of a stretch, and the number of tiles they are chosen from.
+    fn find(&self, stretch: usize) -> Result<(Visibility, usize), FrameError> {
         let Stretch { rows, frames } = &self.stretches[stretch];
         let placed: Vec<Placed> = frames.iter().filter_map(|k| self.placed[*k]).collect();
         let all = Visibility::find(
@@ -143,8 +149,9 @@ impl<'a> Coverage<'a> {
             &placed,
             rows,
         );
-        if self.share >= 1.0 {
-            return Ok(all);
+        if self.information >= 1.0 {
+            let count = all.tiles.len();
+            return Ok((all, count));
         }
         let pictures = self.pictures.of(frames)?;
         let views: Vec<View> = pictures
@@ -155,13 +162,8 @@ impl<'a> Coverage<'a> {
                 View::new(picture, self.camera, &FrameEstimate::at(placed.pose))
             })
             .collect();
-        Ok(most_informative(
-            &all,
-            self.share,
-            &self.grid,
-            self.surface,
-            &views,
-        ))
+        let chosen = most_informative(&all, self.information, &self.grid, self.surface, &views);
+        Ok((chosen, all.tiles.len()))
     }
 
     fn pairs_of(&self, stretch: usize, visibility: &Visibility) -> Vec<(usize, usize)> {

@@ -15,10 +15,16 @@ pub struct RefineOptions {
     pub window_stride: usize,
     /// Wall samples per pixel along each axis in the last solve.
     pub final_density: f64,
-    /// Share of the wall that the last solve looks at, the most informative.
-    pub final_share: f64,
-    /// Share of the wall that the solves before it look at, below the level where tracking ends.
-    pub close_share: f64,
+    /// Share of the information that the last solve uses: it looks at the parts of the wall that tell most.
+    pub final_information: f64,
+    /// The same of the solves before it, below the level where tracking ends.
+    pub close_information: f64,
+    /// Look for each frame over the whole prior before it is refined; otherwise it starts where the prior expects it.
+    pub search: bool,
+    /// Solve sliding windows while tracking.
+    pub windows: bool,
+    /// Linearise with the gradient of the texture fused from all frames; otherwise each frame with its own picture's.
+    pub fused_gradient: bool,
     /// Memory for decoded frames, bytes. Frames that do not fit are decoded anew when needed.
     pub cache_bytes: usize,
     /// Steps of a global solve per level, at the most.
@@ -27,13 +33,6 @@ pub struct RefineOptions {
     pub step_tolerance_px: f64,
     /// ... or when a step is shorter than this share of the estimate's own uncertainty.
     pub step_tolerance_sigma: f64,
-}
-
-fn env(name: &str, value: f64) -> f64 {
-    std::env::var(name)
-        .ok()
-        .and_then(|v| v.parse().ok())
-        .unwrap_or(value)
 }
 
 impl Default for RefineOptions {
@@ -45,8 +44,11 @@ impl Default for RefineOptions {
             tracking_levels: 3,
             window_stride: 6,
             final_density: 2.0,
-            final_share: 1.0,
-            close_share: env("TS_C", 0.25),
+            final_information: 1.0,
+            close_information: 0.5,
+            search: true,
+            windows: true,
+            fused_gradient: true,
             cache_bytes: 2 << 30,
             max_iterations: 20,
             step_tolerance_px: 0.0005,
@@ -56,11 +58,10 @@ impl Default for RefineOptions {
 }
 
 impl RefineOptions {
-    /// For speed: the last solve looks at the wall once per pixel instead of twice along each axis.
+    /// For speed: the last solve uses the parts of the wall that hold two thirds of the information.
     pub fn fast() -> Self {
         Self {
-            final_density: env("TS_D", 2.0),
-            final_share: env("TS_S", 0.25),
+            final_information: 0.65,
             ..Self::default()
         }
     }

@@ -27,8 +27,9 @@ pub struct Sampling {
     pub level: usize,
     /// Wall samples per pixel along each axis.
     pub density: f64,
-    /// Share of the wall that is looked at, the most informative ([`super::choice`]).
-    pub share: f64,
+    /// Share of the information that is used: the tiles that tell most are chosen until they hold it
+    /// ([`super::choice`]).
+    pub information: f64,
 }
 
 impl Sampling {
@@ -37,7 +38,7 @@ impl Sampling {
         Self {
             level,
             density: 1.0,
-            share: 1.0,
+            information: 1.0,
         }
     }
 }
@@ -55,6 +56,8 @@ pub struct Scene<'a> {
     pub prior: &'a Prior,
     /// The sensor's noise, 1-σ in grey levels, as single pictures show it.
     pub noise: f64,
+    /// Whether the derivative takes the gradient of the fused texture, or each frame's own.
+    pub fused_gradient: bool,
 }
 
 /// The frames that take part in a problem.
@@ -182,7 +185,7 @@ impl<'a> Problem<'a> {
         let Sampling {
             level,
             density,
-            share,
+            information,
         } = sampling;
         let Members {
             participants,
@@ -226,7 +229,7 @@ impl<'a> Problem<'a> {
             first: participants.start,
             level,
         };
-        let coverage = Coverage::new(scene.surface, grid, camera, pictures, share, placed)?;
+        let coverage = Coverage::new(scene.surface, grid, camera, pictures, information, placed)?;
         let slot = |k: &usize| {
             let frame = participants.start + k;
             active.contains(&frame).then(|| frame - active.start)
@@ -298,9 +301,9 @@ impl<'a> Problem<'a> {
         self.coverage.tiles
     }
 
-    /// How it looks at the wall.
-    pub fn sampling(&self) -> Sampling {
-        self.sampling
+    /// Share of the wall that is compared.
+    pub fn share_of_wall(&self) -> f64 {
+        self.coverage.tiles as f64 / self.coverage.all_tiles.max(1) as f64
     }
 
     /// Estimated noise of a pixel, 1-σ in grey levels.
@@ -451,7 +454,8 @@ impl<'a> Problem<'a> {
     /// but no less than [`LEAST_TEXTURE`], so that M stays positive semidefinite.
     fn texture_share(&self, tiles: &[TileSums]) -> Matrix4<f64> {
         let mut share = nalgebra::Vector4::repeat(1.0);
-        if self.sampling.level == 0 && self.held_frames() == 0 && !self.exact {
+        let fused = self.scene.fused_gradient;
+        if self.sampling.level == 0 && self.held_frames() == 0 && !self.exact && fused {
             for k in 0..2 {
                 let noise: f64 = tiles.iter().map(|tile| tile.slope_noise[k]).sum();
                 let all: f64 = tiles.iter().map(|tile| tile.features[(k, k)]).sum();
@@ -537,17 +541,24 @@ impl<'a> Problem<'a> {
                 #[inline(always)]
                 || {
                     let seen = observers.iter().map(|o| o.seen(views));
-                    work.moments(&points, seen, spacing, &self.noise);
+                    work.moments(
+                        &points,
+                        seen,
+                        spacing,
+                        &self.noise,
+                        self.scene.fused_gradient,
+                    );
                 },
             );
             let mut columns = Vec::with_capacity(observers.len());
-            for (observer, moments) in observers.iter().zip(&work.observers) {
+            for (k, (observer, moments)) in observers.iter().zip(&work.observers).enumerate() {
                 sums.cost += moments.cost;
                 let view = &views[observer.frame as usize];
                 if let Some(slot) = stretch_slots[observer.frame as usize] {
                     columns.push(Column {
                         place: sums.place(slot),
                         moments: *moments,
+                        own_features: work.own_features.get(k).copied(),
                         a: view.wall_jacobian(&points),
                         inverse_gain: 1.0 / f64::from(view.gain() * observer.shade),
                     });
@@ -657,6 +668,8 @@ struct TileSums {
 struct Column {
     place: usize,
     moments: ObserverMoments,
+    /// M of the frame's own gradient, where that is what the derivative takes.
+    own_features: Option<Matrix4<f64>>,
     a: Matrix2x6<f64>,
     inverse_gain: f64,
 }
@@ -743,6 +756,12 @@ impl BlockSums {
             gradient[6] -= moments.gradient[2];
             gradient[7] -= moments.gradient[3] * b.inverse_gain;
             let f = b.features_times_b(features);
+            if let Some(own) = &b.own_features {
+                // Its noise is in the diagonal blocks only: `w̄ Bᵀ (M_i − M) B` more.
+                let index = self.block_index(b.place, b.place);
+                let more = b.features_times_b(&(own - features));
+                b.add_b_transposed_times(&more, moments.weight, &mut self.blocks[index]);
+            }
             for a in &columns[..=n] {
                 let own = if a.place == b.place {
                     a.moments.weight
@@ -843,18 +862,23 @@ mod tests {
         }
 
         fn problem(&self) -> Problem<'_> {
+            self.problem_with(1.0)
+        }
+
+        fn problem_with(&self, information: f64) -> Problem<'_> {
             let scene = Scene {
                 surface: &self.wall.circle,
                 camera: &self.wall.camera,
                 frames: &self.frames,
                 prior: &self.prior,
                 noise: 0.0,
+                fused_gradient: true,
             };
             let all = 0..self.estimates.len();
             let sampling = Sampling {
                 level: 0,
                 density: 2.0,
-                share: 1.0,
+                information,
             };
             let members = Members {
                 participants: all.clone(),
@@ -896,6 +920,24 @@ mod tests {
             let relative = (error / size).sqrt();
             assert!(relative < 0.05, "unknown {unknown}: {relative}");
         }
+    }
+
+    /// Half of the information is in less than half of the wall, and the same unknowns are found from it.
+    #[test]
+    fn half_the_information_is_in_less_than_half_of_the_wall() {
+        let ring = Ring::new(1e-4);
+        let (all, half) = (ring.problem(), ring.problem_with(0.5));
+        assert!((0.2..0.5).contains(&half.share_of_wall()));
+        let trace = |problem: &Problem| -> f64 {
+            let at = problem.linearise(&ring.estimates).unwrap();
+            let poses = at.normal.blocks.iter();
+            problem.sigma().powi(2)
+                * poses
+                    .map(|b| b.fixed_view::<6, 6>(0, 0).trace())
+                    .sum::<f64>()
+        };
+        let share = trace(&half) / trace(&all);
+        assert!((0.4..0.65).contains(&share), "{share}");
     }
 
     /// From 2 mrad and 2 mm off to the truth, along the gauge's freedoms, in undamped steps.

@@ -94,7 +94,7 @@ pub fn refine(
         bias_sigma: options.bias_sigma,
     };
     let examined = examine(
-        &scene(survey, &prior, &frames, 0.0),
+        &scene(survey, options, &prior, &frames, 0.0),
         coarsest,
         progress.as_ref(),
     )?;
@@ -103,21 +103,21 @@ pub fn refine(
     }
     clock.lap("decode");
     let mut tracked = track(
-        &scene(survey, &prior, &frames, examined.noise),
+        &scene(survey, options, &prior, &frames, examined.noise),
         options,
         examined.doubts,
         progress.as_ref(),
     )?;
     clock.lap("track");
 
-    let scene = scene(survey, &prior, &frames, examined.noise);
+    let scene = scene(survey, options, &prior, &frames, examined.noise);
     let mut levels = Vec::new();
     let mut last = None;
     for (k, (sampling, stopping)) in stages(options, side).enumerate() {
         let Sampling {
             level,
             density,
-            share,
+            information,
         } = sampling;
         let problem = Problem::new(&scene, sampling, tracked.members())?;
         // Where no frame can be believed, the prior is all there is to report.
@@ -128,8 +128,8 @@ pub fn refine(
         if density != 1.0 {
             stage += &format!(", {density} samples per pixel");
         }
-        if share != 1.0 {
-            stage += &format!(", {:.0} % of the wall", 100.0 * share);
+        if information != 1.0 {
+            stage += &format!(", {:.0} % of the information", 100.0 * information);
         }
         progress.start("global", options.max_iterations as usize);
         let solution = solve(problem, stopping, Some((&stage, progress)))?;
@@ -141,7 +141,7 @@ pub fn refine(
         levels.push(LevelReport {
             level,
             samples_per_pixel: density,
-            share_of_wall: share,
+            share_of_wall: solution.problem.share_of_wall(),
             solve: solution.record.clone(),
         });
         last = Some(solution);
@@ -212,6 +212,7 @@ pub fn refine(
 
 fn scene<'a>(
     survey: &'a Survey,
+    options: &RefineOptions,
     prior: &'a Prior,
     frames: &'a FrameCache,
     noise: f64,
@@ -222,16 +223,16 @@ fn scene<'a>(
         frames,
         prior,
         noise,
+        fused_gradient: options.fused_gradient,
     }
 }
 
 /// The global solves: coarse to fine, and the finest once more with a denser look at the wall.
+/// Those between only bring the estimate close for the next, and a share of the information is enough for that.
 ///
 /// One sample per pixel is too sparse to end with: the products of residual and gradient vary faster than either,
 /// and where the wall repeats in step with the samples (courses of bricks run along them) what falls between
 /// them does not average out. On brick this alone is 0.05 px of wall error over two turns.
-///
-/// All but the last only have to bring the estimate close for the next.
 fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling, Stopping)> + '_ {
     let last = Stopping {
         max_iterations: options.max_iterations,
@@ -241,14 +242,14 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
     let finest = Sampling {
         level: 0,
         density: options.final_density,
-        share: options.final_share,
+        information: options.final_information,
     };
     let first = options.handover_level(side);
     let sampling = move |level| Sampling {
-        share: if level == first {
+        information: if level == first {
             1.0
         } else {
-            options.close_share
+            options.close_information
         },
         ..Sampling::of(level)
     };
@@ -338,7 +339,7 @@ fn frame_report(
     let estimate: &FrameEstimate = &solution.estimates[k];
     let all = f64::from(survey.camera.width)
         * f64::from(survey.camera.height)
-        * solution.problem.sampling().share;
+        * solution.problem.share_of_wall();
     let inlier_share = share.inliers / share.pixels.max(1e-9);
     let late = if share.pixels < LEAST_PIXEL_SHARE * all {
         Some(Doubt::NoOverlap {
@@ -418,8 +419,6 @@ impl Default for Clock {
 impl Clock {
     fn lap(&mut self, stage: &str) {
         let now = Instant::now();
-        let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-        if std::env::var("TS_CPU").is_ok() { eprintln!("CPU {stage}: {}", stat.split(' ').nth(13).unwrap_or("")); }
         self.laps.push(StageTime {
             stage: stage.to_owned(),
             seconds: (now - self.since).as_secs_f64(),

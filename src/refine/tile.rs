@@ -114,6 +114,8 @@ pub struct TileWork {
     pub observers: Vec<ObserverMoments>,
     /// `Σ_x p φ φᵀ`.
     pub features: Matrix4<f64>,
+    /// M of each observer's own gradient, if that is asked for.
+    pub own_features: Vec<Matrix4<f64>>,
     /// What the noise of S has added to the first two diagonal elements of `features`, on average.
     pub slope_noise: [f64; 2],
 }
@@ -258,7 +260,8 @@ impl TileWork {
 
     /// Fills [`TileWork::observers`] and [`TileWork::features`] for a tile's observers.
     ///
-    /// `spacing_m`: distance between samples along s and h.
+    /// `spacing_m`: distance between samples along s and h; `fused`: the derivative takes the gradient of S, and not each
+    /// frame's own.
     #[inline(always)]
     pub fn moments<'a>(
         &mut self,
@@ -266,6 +269,7 @@ impl TileWork {
         observers: impl Iterator<Item = Seen<'a>>,
         spacing_m: (f64, f64),
         noise: &NoiseModel,
+        fused: bool,
     ) {
         self.sample(points, observers);
         let precision = self.activity().map(
@@ -276,26 +280,30 @@ impl TileWork {
         for _ in 0..REWEIGHTINGS {
             texture = self.reweight(&texture, &precision);
         }
-        let slope_s = (0.5 / spacing_m.0) as f32;
-        let slope_h = (0.5 / spacing_m.1) as f32;
-        let mut phi = [NO_ROWS; 3];
-        let mut variance = NO_ROWS;
+        let slopes = [spacing_m.0, spacing_m.1].map(|spacing_m| (0.5 / spacing_m) as f32);
         let covered = self.covered();
+        let phi = features(&texture, slopes, &covered);
+        let mut variance = NO_ROWS;
         for k in 0..NO_ROWS.len() {
-            let c = k + SIDE;
-            phi[0][k] = (texture[c + 1] - texture[c - 1]) * slope_s * covered[k];
-            phi[1][k] = (texture[c + SIDE] - texture[c - SIDE]) * slope_h * covered[k];
-            phi[2][k] = texture[c];
-            variance[k] = 1.0 / precision[c];
+            variance[k] = 1.0 / precision[k + SIDE];
         }
-        self.features = feature_moments(&phi, &self.shares());
+        let shares = self.shares();
+        self.features = feature_moments(&phi, &shares);
         let noise_variance = self.slope_variance(noise);
-        self.slope_noise = [slope_s, slope_h]
-            .map(|slope| SAMPLES as f64 * f64::from(noise_variance * slope * slope));
+        self.slope_noise =
+            slopes.map(|slope| SAMPLES as f64 * f64::from(noise_variance * slope * slope));
         self.observers.clear();
+        self.own_features.clear();
         for frame in &self.samples {
-            self.observers
-                .push(observer_moments(frame, &phi, &precision, &variance));
+            let moments = if fused {
+                observer_moments(frame, &phi, &precision, &variance)
+            } else {
+                let [own_s, own_h, _] = features(&frame.values, slopes, &covered);
+                let own = [own_s, own_h, phi[2]];
+                self.own_features.push(feature_moments(&own, &shares));
+                observer_moments(frame, &own, &precision, &variance)
+            };
+            self.observers.push(moments);
         }
     }
 
@@ -412,6 +420,19 @@ fn with_ring(rows: &Rows) -> Plane {
     plane.copy_within(SIDE..2 * SIDE, 0);
     plane.copy_within(TILE * SIDE..(TILE + 1) * SIDE, (TILE + 1) * SIDE);
     plane
+}
+
+/// The first three features of a texture, `∂S/∂s, ∂S/∂h, S`, with no slope where it is not `covered`.
+#[inline(always)]
+fn features(texture: &Plane, slopes: [f32; 2], covered: &Rows) -> [Rows; 3] {
+    let mut phi = [NO_ROWS; 3];
+    for k in 0..NO_ROWS.len() {
+        let c = k + SIDE;
+        phi[0][k] = (texture[c + 1] - texture[c - 1]) * slopes[0] * covered[k];
+        phi[1][k] = (texture[c + SIDE] - texture[c - SIDE]) * slopes[1] * covered[k];
+        phi[2][k] = texture[c];
+    }
+    phi
 }
 
 /// `Σ_x p φ φᵀ` with p zero on the ring.
@@ -556,7 +577,7 @@ mod tests {
                         shade: 1.0,
                     });
                     let spacing = (grid.spacing_s_m, grid.spacing_h_m);
-                    work.moments(&points, seen, spacing, &model);
+                    work.moments(&points, seen, spacing, &model, true);
                     for k in 0..2 {
                         found[k] += work.features[(k, k)];
                         expected[k] += work.slope_noise[k];

@@ -246,15 +246,18 @@ impl<'g> Cells<'g> {
         for tile in fields.iter().flat_map(|field| self.of(field)) {
             wanted[tile] = true;
         }
-        let corners = wanted.par_iter().enumerate().map_init(Vec::new, |scratch, (k, wanted)| {
-            if *wanted {
-                self.grid.corners(surface, self.id(k), scratch);
-            }
-            match scratch[..] {
-                [a, b, c, d] if *wanted => [a, b, c, d],
-                _ => [Vector3::zeros(); 4],
-            }
-        });
+        let corners = wanted
+            .par_iter()
+            .enumerate()
+            .map_init(Vec::new, |scratch, (k, wanted)| {
+                if *wanted {
+                    self.grid.corners(surface, self.id(k), scratch);
+                }
+                match scratch[..] {
+                    [a, b, c, d] if *wanted => [a, b, c, d],
+                    _ => [Vector3::zeros(); 4],
+                }
+            });
         corners.collect()
     }
 }
