@@ -1,7 +1,8 @@
 //! `cargo bench --bench refine`: the estimator stage by stage, on a simulated survey.
 //!
 //! The survey is that of `tunnelstitch demo`: 120 frames of 640 × 480 px. Each round decodes and refines it
-//! anew; the table gives the median and the range over the rounds, and frames per second end to end.
+//! anew, in the default mode and with `--fast`; the tables give the median and the range over the rounds, and frames per
+//! second end to end.
 
 use std::sync::Arc;
 use tunnelstitch::progress::{Progress, Silent};
@@ -16,12 +17,28 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let path = folder.path().join("survey");
     simulate::run(&SimulateOptions::free(), &path, false, &Silent)?;
     let survey = Survey::open(&path)?;
+    println!(
+        "{} frames of {} × {} px, {} threads, {ROUNDS} rounds",
+        survey.frames.len(),
+        survey.camera.width,
+        survey.camera.height,
+        rayon::current_num_threads()
+    );
+    measure(&survey, "refine", &RefineOptions::default())?;
+    measure(&survey, "refine --fast", &RefineOptions::fast())
+}
+
+fn measure(
+    survey: &Survey,
+    name: &str,
+    options: &RefineOptions,
+) -> Result<(), Box<dyn std::error::Error>> {
     let silent: Arc<dyn Progress> = Arc::new(Silent);
     let mut stages: Vec<String> = Vec::new();
     let mut seconds: Vec<Vec<f64>> = Vec::new();
     let mut totals = Vec::new();
     for _ in 0..ROUNDS {
-        let report = refine(&survey, &RefineOptions::default(), &silent)?.report;
+        let report = refine(survey, options, &silent)?.report;
         totals.push(report.timings.iter().map(|lap| lap.seconds).sum::<f64>());
         for lap in report.timings {
             match stages.iter().position(|stage| *stage == lap.stage) {
@@ -33,18 +50,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         }
     }
-    let frames = survey.frames.len() as f64;
-    println!(
-        "refine: {frames} frames of {} × {} px, {} threads, {ROUNDS} rounds",
-        survey.camera.width,
-        survey.camera.height,
-        rayon::current_num_threads()
-    );
-    println!("{:<36} {:>9} {:>19}", "stage", "median s", "range s");
+    println!("\n{:<60} {:>9} {:>19}", name, "median s", "range s");
     for (stage, seconds) in stages.iter().zip(&seconds) {
         print_row(stage, seconds);
     }
     print_row("all", &totals);
+    let frames = survey.frames.len() as f64;
     let [low, median, high] = spread(&totals);
     println!(
         "{:.1} frames/s ({:.1} to {:.1})",
@@ -57,7 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 fn print_row(stage: &str, seconds: &[f64]) {
     let [low, median, high] = spread(seconds);
-    println!("{stage:<36} {median:>9.3} {low:>9.3} {high:>9.3}");
+    println!("{stage:<60} {median:>9.3} {low:>9.3} {high:>9.3}");
 }
 
 /// Least, middle and greatest.

@@ -98,3 +98,4 @@ pub mod survey;
 #[cfg(test)]
 mod test_wall;
 pub mod trajectory;
+mod vectors;

@@ -97,33 +97,6 @@ impl Pinhole {
         (farthest < limit).then_some(farthest)
     }
 
-    /// Projects many points at once, in single precision: on entry `x`, `y`, `z` are camera coordinates, on
-    /// return `x` and `y` hold u and v. Points behind the camera give meaningless pixels.
-    pub fn project_slices(&self, x: &mut [f32], y: &mut [f32], z: &[f32]) {
-        if !self.radial.is_none() {
-            self.distort_slices(x, y, z);
-        }
-        let (fx, fy) = (self.fx as f32, self.fy as f32);
-        let (cx, cy) = (self.cx as f32, self.cy as f32);
-        for ((x, y), z) in x.iter_mut().zip(y.iter_mut()).zip(z) {
-            let inverse = 1.0 / z;
-            *x = fx * *x * inverse + cx;
-            *y = fy * *y * inverse + cy;
-        }
-    }
-
-    /// Moves points across their rays to where a lens without distortion would show them as this one does.
-    fn distort_slices(&self, x: &mut [f32], y: &mut [f32], z: &[f32]) {
-        let (k1, k2) = (self.radial.k1 as f32, self.radial.k2 as f32);
-        let limit = self.radial.limit() as f32;
-        for ((x, y), z) in x.iter_mut().zip(y.iter_mut()).zip(z) {
-            let q = ((*x * *x + *y * *y) / (z * z)).min(limit);
-            let factor = 1.0 + q * (k1 + q * k2);
-            *x *= factor;
-            *y *= factor;
-        }
-    }
-
     /// `∂(u, v)/∂x_c`, pixels per metre, for a point in front of the camera.
     pub fn project_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
         let inverse = 1.0 / x_c.z;

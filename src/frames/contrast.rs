@@ -13,6 +13,7 @@ pub fn wide_window(image: &GreyImage) -> usize {
 }
 
 /// What of a picture is local.
+#[derive(Debug)]
 pub struct LocalContrast {
     /// `I − mean`, grey levels.
     pub detail: GreyImage,

@@ -10,7 +10,7 @@ mod shading;
 mod write;
 
 pub use cache::FrameCache;
-pub use contrast::{LocalContrast, local_contrast, wide_window};
+pub use contrast::{LocalContrast, local_contrast};
 pub use grey::GreyImage;
 pub use load::{FrameError, FrameFile, list, load_colour, load_grey};
 pub use noise::{noise_at_level, noise_sigma};

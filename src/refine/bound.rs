@@ -76,6 +76,7 @@ pub fn pose_bound(
         frames: &frames,
         prior: &prior,
         noise: 0.0,
+        fused_gradient: true,
     };
     let estimates: Vec<FrameEstimate> =
         poses_of(truth).into_iter().map(FrameEstimate::at).collect();
@@ -88,6 +89,7 @@ pub fn pose_bound(
     let sampling = Sampling {
         level: 0,
         density: DENSITY,
+        information: 1.0,
     };
     // A quarter of the doubled pixels are pixels.
     let problem = Problem::new(&scene, sampling, members)?.exact(2.0 * noise_grey);

@@ -158,6 +158,7 @@ fn compare_at(
             .collect()
     };
     let mut pairs = Vec::new();
+    let mut portraits: BTreeMap<usize, Portrait> = BTreeMap::new();
     for start in (0..count).step_by(RUN) {
         let run = start..(start + RUN).min(count);
         let partners: Vec<(usize, Vec<usize>)> = run.map(|a| (a, others(a))).collect();
@@ -168,11 +169,14 @@ fn compare_at(
             .collect();
         needed.sort_unstable();
         needed.dedup();
-        let portraits: BTreeMap<usize, Portrait> = needed
+        // What the run before has left is not made again.
+        portraits.retain(|k, _| needed.binary_search(k).is_ok());
+        let made: Vec<(usize, Portrait)> = needed
             .into_par_iter()
-            .filter(|k| tracked.doubts[*k].is_none())
+            .filter(|k| tracked.doubts[*k].is_none() && !portraits.contains_key(k))
             .map(|k| Ok((k, Portrait::fine(scene, level, k, window)?)))
             .collect::<Result<_, ProblemError>>()?;
+        portraits.extend(made);
         let compared: Vec<Vec<Compared>> = partners
             .par_iter()
             .map(|(a, others)| compare(scene, *a, others, stride, &footprints, &portraits, tracked))

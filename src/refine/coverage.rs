@@ -3,13 +3,18 @@
 //! The wall is worked through stretch by stretch, so that memory for samples and frames does not grow with the
 //! tunnel's length.
 
+use super::choice::most_informative;
+use super::estimate::FrameEstimate;
 use super::grid::{BLOCK, WallGrid};
+use super::view::View;
 use super::visibility::{Placed, Visibility, rows_of};
 use crate::camera::Pinhole;
-use crate::frames::Shading;
+use crate::frames::{FrameCache, FrameError, Pyramid};
 use crate::surface::Surface;
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Observations of a stretch at the least: enough work for all threads, little enough to hold in memory.
 const STRETCH_OBSERVATIONS: f64 = 1e6;
@@ -25,46 +30,80 @@ struct Stretch {
     frames: Vec<usize>,
 }
 
+/// The participants' pictures.
+#[derive(Clone, Copy, Debug)]
+pub struct Pictures<'a> {
+    /// All frames.
+    pub frames: &'a FrameCache,
+    /// The frame that is the first participant.
+    pub first: usize,
+    /// Pyramid level.
+    pub level: usize,
+}
+
+impl Pictures<'_> {
+    /// The pictures of some participants.
+    pub fn of(&self, participants: &[usize]) -> Result<Vec<Arc<Pyramid>>, FrameError> {
+        let participants = participants.par_iter();
+        participants
+            .map(|k| self.frames.get(self.first + k))
+            .collect()
+    }
+}
+
 /// Which frames see which tiles, stretch by stretch.
 #[derive(Debug)]
 pub struct Coverage<'a> {
     surface: &'a dyn Surface,
     grid: WallGrid,
+    /// Of the level.
     camera: Pinhole,
-    shading: Option<&'a Shading>,
+    pictures: Pictures<'a>,
+    /// Share of the information that the tiles compared hold.
+    information: f64,
     /// Where the participants stood when the samples were chosen; None for those that are not compared.
     placed: Vec<Option<Placed>>,
     stretches: Vec<Stretch>,
     kept: Vec<Option<Visibility>>,
     /// Number of tiles that are compared.
     pub tiles: usize,
+    /// Number of tiles there are.
+    pub all_tiles: usize,
     /// Participants that see wall in common: pairs in ascending order, each once, a frame with itself included.
     pub pairs: Vec<(usize, usize)>,
 }
 
 impl<'a> Coverage<'a> {
-    /// Finds the tiles of all participants' frames.
+    /// Finds the tiles of all participants' frames, and chooses those that hold a share `information` of what they tell if
+    /// it is less than 1.
+    ///
+    /// # Errors
+    /// [`FrameError`] of a picture that is needed to choose.
     pub fn new(
         surface: &'a dyn Surface,
         grid: WallGrid,
         camera: Pinhole,
-        shading: Option<&'a Shading>,
+        pictures: Pictures<'a>,
+        information: f64,
         placed: Vec<Option<Placed>>,
-    ) -> Self {
+    ) -> Result<Self, FrameError> {
         let mut coverage = Self {
             stretches: stretches(&grid, &placed),
             surface,
             grid,
             camera,
-            shading,
+            pictures,
+            information,
             placed,
             kept: Vec::new(),
             tiles: 0,
+            all_tiles: 0,
             pairs: Vec::new(),
         };
         let mut observations = 0;
         for stretch in 0..coverage.stretches.len() {
-            let visibility = coverage.find(stretch);
+            let (visibility, all_tiles) = coverage.find(stretch)?;
+            coverage.all_tiles += all_tiles;
             coverage.tiles += visibility.tiles.len();
             let pairs = coverage.pairs_of(stretch, &visibility);
             coverage.pairs.extend(pairs);
@@ -74,7 +113,7 @@ impl<'a> Coverage<'a> {
         }
         coverage.pairs.sort_unstable();
         coverage.pairs.dedup();
-        coverage
+        Ok(coverage)
     }
 
     /// Number of stretches.
@@ -88,24 +127,43 @@ impl<'a> Coverage<'a> {
     }
 
     /// The observations of a stretch: those kept, or found anew (the same, from the same poses).
-    pub fn visibility(&self, stretch: usize) -> Cow<'_, Visibility> {
-        match &self.kept[stretch] {
+    ///
+    /// # Errors
+    /// [`FrameError`].
+    pub fn visibility(&self, stretch: usize) -> Result<Cow<'_, Visibility>, FrameError> {
+        Ok(match &self.kept[stretch] {
             Some(visibility) => Cow::Borrowed(visibility),
-            None => Cow::Owned(self.find(stretch)),
-        }
+            None => Cow::Owned(self.find(stretch)?.0),
+        })
     }
 
-    fn find(&self, stretch: usize) -> Visibility {
+    /// The observations of a stretch, and the number of tiles they are chosen from.
+    fn find(&self, stretch: usize) -> Result<(Visibility, usize), FrameError> {
         let Stretch { rows, frames } = &self.stretches[stretch];
         let placed: Vec<Placed> = frames.iter().filter_map(|k| self.placed[*k]).collect();
-        Visibility::find(
+        let all = Visibility::find(
             self.surface,
             &self.grid,
             &self.camera,
-            self.shading,
+            self.pictures.frames.shading(),
             &placed,
             rows,
-        )
+        );
+        if self.information >= 1.0 {
+            let count = all.tiles.len();
+            return Ok((all, count));
+        }
+        let pictures = self.pictures.of(frames)?;
+        let views: Vec<View> = pictures
+            .iter()
+            .zip(&placed)
+            .map(|(picture, placed)| {
+                let picture = picture.level(self.pictures.level);
+                View::new(picture, self.camera, &FrameEstimate::at(placed.pose))
+            })
+            .collect();
+        let chosen = most_informative(&all, self.information, &self.grid, self.surface, &views);
+        Ok((chosen, all.tiles.len()))
     }
 
     fn pairs_of(&self, stretch: usize, visibility: &Visibility) -> Vec<(usize, usize)> {

@@ -45,7 +45,7 @@ pub struct SolveRecord {
     pub iterations: u64,
     /// Robust cost at the start.
     pub cost_start: f64,
-    /// Robust cost at the end, on the same wall samples.
+    /// Robust cost at the end, on the same wall samples, before the last step.
     pub cost_end: f64,
     /// Observations (wall sample × frame) compared.
     pub observations: usize,
@@ -65,7 +65,7 @@ pub struct Solution<'a> {
     pub estimates: Vec<FrameEstimate>,
     /// The shared unknowns.
     pub kappa: Kappa,
-    /// Cost and normal equations there.
+    /// Cost and normal equations there, or within the tolerance of there.
     pub linearisation: Linearisation,
     /// Its course.
     pub record: SolveRecord,
@@ -84,7 +84,8 @@ const TRIES: usize = 8;
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
 ///
 /// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples; such a
-/// step is never taken.
+/// step is never taken. Only the last step, shorter than the tolerance, is taken on trust: cost and equations are those
+/// before it.
 struct DampedGaussNewton {
     stopping: Stopping,
     lambda: f64,
@@ -169,6 +170,12 @@ impl DampedGaussNewton {
                 .map(|(estimate, step)| estimate.retract(step))
                 .collect();
             let candidate = (candidate, kappa + shared);
+            if stop.is_some() {
+                self.iterations += 1;
+                self.last_step_px = step_px;
+                self.stop = stop;
+                return Ok((candidate, current));
+            }
             let next = problem.linearise_at(&candidate.0, &candidate.1)?;
             if next.cost < current.cost {
                 self.iterations += 1;
@@ -178,13 +185,7 @@ impl DampedGaussNewton {
                 } else {
                     0.0
                 };
-                self.stop = stop;
                 return Ok((candidate, next));
-            }
-            if stop.is_some() {
-                self.last_step_px = step_px;
-                self.stop = stop;
-                return Ok(((estimates.clone(), *kappa), current));
             }
             self.raise_damping();
         }

@@ -9,6 +9,13 @@ pub const TILE: usize = 8;
 pub const SIDE: usize = TILE + 2;
 /// Samples of a tile with its ring.
 pub const AREA: usize = SIDE * SIDE;
+/// Values that vector instructions work on at once; sums run in as many lanes, whatever the processor has.
+pub const LANES: usize = 8;
+/// A value at every sample of a tile with its ring, row by row (s runs fastest), in whole vectors: the last few repeat
+/// the tile's middle and count for nothing.
+pub type Plane = [f32; AREA.next_multiple_of(LANES)];
+/// Zero everywhere.
+pub const ZERO: Plane = [0.0; AREA.next_multiple_of(LANES)];
 
 /// Tiles along the side of a block: the unit of parallel work, about a hundredth of a frame.
 pub const BLOCK: i64 = 8;
@@ -36,12 +43,6 @@ pub struct TileId {
 }
 
 impl TileId {
-    /// Orders tiles block by block along the axis, so that neighbours in order are neighbours on the wall.
-    pub fn key(&self) -> (i64, i64, i64, i64) {
-        let (block_row, block_column) = self.block();
-        (block_row, block_column, self.row, self.column)
-    }
-
     /// The block of the tile.
     pub fn block(&self) -> (i64, i64) {
         (self.row.div_euclid(BLOCK), self.column.div_euclid(BLOCK))
@@ -82,7 +83,10 @@ impl WallGrid {
         const PHI: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
         let (width, height) = self.tile_size_m();
         let (column, row) = (tile.column as f64, tile.row as f64);
-        let fraction = |a: f64, b: f64| (row * a + column * b).rem_euclid(1.0) - 0.5;
+        let fraction = |a: f64, b: f64| {
+            let sum = row * a + column * b;
+            sum - sum.floor() - 0.5
+        };
         WallPoint {
             s_m: (column + 0.5) * width + fraction(PHI[0], PHI[1]) * self.spacing_s_m,
             h_m: (row + 0.5) * height + fraction(PHI[1], PHI[0]) * self.spacing_h_m,
@@ -107,17 +111,17 @@ impl WallGrid {
 }
 
 /// World coordinates of the samples of one tile with its ring, relative to its middle (so that single
-/// precision is enough), row-major: s runs fastest.
+/// precision is enough).
 #[derive(Clone, Debug)]
 pub struct TilePoints {
     /// The wall at the tile's middle.
     pub centre: WallFrame,
     /// x of every sample minus the centre's, metres.
-    pub dx: [f32; AREA],
+    pub dx: Plane,
     /// y of every sample minus the centre's, metres.
-    pub dy: [f32; AREA],
+    pub dy: Plane,
     /// z of every sample minus the centre's, metres.
-    pub dz: [f32; AREA],
+    pub dz: Plane,
 }
 
 impl TilePoints {
@@ -131,9 +135,9 @@ impl TilePoints {
         let centre = surface.frame(grid.centre(tile));
         let mut points = Self {
             centre,
-            dx: [0.0; AREA],
-            dy: [0.0; AREA],
-            dz: [0.0; AREA],
+            dx: ZERO,
+            dy: ZERO,
+            dz: ZERO,
         };
         let (s, h) = grid.samples(tile);
         surface.lattice(&s, &h, scratch);

@@ -17,14 +17,28 @@
 //! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
 //! | how sure | [`certainty`], [`covariance`]; how sure it could be at best: [`bound`] |
 //!
-//! Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`] and [`coverage`]
-//! choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, [`problem`] reduces
+//! Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`], [`coverage`]
+//! and [`choice`] choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, [`problem`] reduces
 //! to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
+
+//!
+//! # Speed
+//!
+//! - The work on a tile is loops over whole vectors ([`tile`], [`view`]), compiled for several processors, the one at
+//!   hand chosen when it runs; sums keep their order, so results stay the same.
+//! - The last solve looks at the wall twice a pixel; those before it, and with `--fast` the last as well, at the
+//!   parts that tell most ([`choice`]).
+//! - Each linearisation serves twice: its cost judges the step that led there, its equations make the next. The last step
+//!   of a solve is within its tolerance and is not judged ([`gauss_newton`]).
+//! - Where a tile's corners are is computed once for all frames ([`visibility`]), local contrast once for a picture.
+//!
+#![doc = include_str!("ablation.md")]
 
 mod alignment;
 mod bound;
 mod calibration;
 mod certainty;
+mod choice;
 mod consistency;
 mod covariance;
 mod coverage;

@@ -5,7 +5,7 @@ use super::estimate::FrameEstimate;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
 use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
-use super::search::{REACH, least_samples, log_likelihood, search};
+use super::search::{Hypothesis, REACH, least_samples, log_likelihood, search};
 use super::visibility::reach_m;
 use super::wall::{FusedWall, Likeness, Portrait, pixel_m};
 use crate::surface::{Footprint, shortest_arc, viewing_distance};
@@ -120,7 +120,13 @@ pub fn place(
     }
     let portrait = Portrait::new(scene, level, frame)?;
     let wall = FusedWall::new(scene, &portraits, &camera, (frame, &expected.pose), margin)?;
-    let found = search(scene, &wall, &portrait, &expected.pose, sigma, HYPOTHESES);
+    let found = match options.search {
+        true => search(scene, &wall, &portrait, &expected.pose, sigma, HYPOTHESES),
+        false => vec![Hypothesis {
+            pose: expected.pose,
+            score: 0.0,
+        }],
+    };
     let best = found.first().map_or(0.0, |hypothesis| hypothesis.score);
 
     let refine_at = |level: usize, estimate: FrameEstimate| {
@@ -180,7 +186,8 @@ pub fn place(
     }
     // A half-right pose has stretched and sheared what it unrolled; from there the search sees better.
     let close = sigma.map(|s| s.min(CLOSE_RAD));
-    for _ in 0..CLOSER_LOOKS {
+    let looks = if options.search { CLOSER_LOOKS } else { 0 };
+    for _ in 0..looks {
         candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
         let Some(first) = candidates.first().filter(|c| c.quality < SETTLED) else {
             break;

@@ -1,7 +1,7 @@
 //! The photometric problem over a run of frames at one pyramid level: cost and normal equations.
 
 use super::calibration::{Calibration, Kappa, LENS, RADIUS};
-use super::coverage::Coverage;
+use super::coverage::{Coverage, Pictures};
 use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
 use super::factor::{FactorError, Symbolic};
 use super::grid::{TilePoints, WallGrid};
@@ -18,6 +18,7 @@ use crate::frames::{FrameCache, FrameError, Pyramid, noise_at_level};
 use crate::surface::{
     Footprint, Surface, SurfaceError, lens_jacobian, viewing_distance, wall_jacobian,
 };
+use crate::vectors::wide;
 use nalgebra::{Matrix2x5, Matrix2x6, Matrix4, SMatrix, Vector2, Vector5};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -31,14 +32,18 @@ pub struct Sampling {
     pub level: usize,
     /// Wall samples per pixel along each axis.
     pub density: f64,
+    /// Share of the information that is used: the tiles that tell most are chosen until they hold it
+    /// ([`super::choice`]).
+    pub information: f64,
 }
 
 impl Sampling {
-    /// A pyramid level with one sample per pixel.
+    /// A pyramid level with one sample per pixel, everywhere.
     pub fn of(level: usize) -> Self {
         Self {
             level,
             density: 1.0,
+            information: 1.0,
         }
     }
 }
@@ -60,6 +65,8 @@ pub struct Scene<'a> {
     pub prior: &'a Prior,
     /// The sensor's noise, 1-σ in grey levels, as single pictures show it.
     pub noise: f64,
+    /// Whether the derivative takes the gradient of the fused texture, or each frame's own.
+    pub fused_gradient: bool,
 }
 
 impl Scene<'_> {
@@ -124,7 +131,7 @@ const BATCH: usize = 64;
 /// Samples over a frame's height, at least.
 const LEAST_ROWS: u32 = 90;
 /// Tiles looked at to estimate the noise.
-const SCALE_TILES: usize = 2000;
+const SCALE_TILES: usize = 600;
 /// Share of a block's squared slopes that counts as texture, at least, however noisy they are.
 const LEAST_TEXTURE: f64 = 0.05;
 /// A camera looks no farther than this many radii, when the lattice is laid out.
@@ -174,7 +181,8 @@ pub struct FrameShare {
 /// through in stretches along the tunnel, so that memory for frames and samples does not grow with its length.
 pub struct Problem<'a> {
     scene: Scene<'a>,
-    level: usize,
+    sampling: Sampling,
+    pictures: Pictures<'a>,
     camera: Pinhole,
     grid: WallGrid,
     participants: Range<usize>,
@@ -205,7 +213,11 @@ impl<'a> Problem<'a> {
         sampling: Sampling,
         members: Members,
     ) -> Result<Self, ProblemError> {
-        let Sampling { level, density } = sampling;
+        let Sampling {
+            level,
+            density,
+            information,
+        } = sampling;
         let Members {
             participants,
             active,
@@ -244,8 +256,12 @@ impl<'a> Problem<'a> {
             pixel_m,
             density.max(least_density(camera.height)),
         );
-        let shading = scene.frames.shading();
-        let coverage = Coverage::new(scene.surface, grid, camera, shading, placed);
+        let pictures = Pictures {
+            frames: scene.frames,
+            first: participants.start,
+            level,
+        };
+        let coverage = Coverage::new(scene.surface, grid, camera, pictures, information, placed)?;
         let slot = |k: &usize| {
             let frame = participants.start + k;
             active.contains(&frame).then(|| frame - active.start)
@@ -260,7 +276,8 @@ impl<'a> Problem<'a> {
         })?;
         let mut problem = Self {
             scene: *scene,
-            level,
+            sampling,
+            pictures,
             camera,
             grid,
             held: estimates.to_vec(),
@@ -331,6 +348,11 @@ impl<'a> Problem<'a> {
         self.coverage.tiles
     }
 
+    /// Share of the wall that is compared.
+    pub fn share_of_wall(&self) -> f64 {
+        self.coverage.tiles as f64 / self.coverage.all_tiles.max(1) as f64
+    }
+
     /// Estimated noise of a pixel, 1-σ in grey levels.
     pub fn sigma(&self) -> f64 {
         self.sigma
@@ -345,15 +367,6 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The pictures of a stretch's frames.
-    fn pictures(&self, stretch: usize) -> Result<Vec<Arc<Pyramid>>, ProblemError> {
-        let first = self.participants.start;
-        let frames = self.coverage.frames(stretch).par_iter();
-        Ok(frames
-            .map(|k| self.scene.frames.get(first + k))
-            .collect::<Result<_, _>>()?)
-    }
-
     /// The frames of a stretch at the given estimates of all participants, seen by `camera` (of the level).
     fn views<'s>(
         &self,
@@ -365,7 +378,9 @@ impl<'a> Problem<'a> {
         let frames = self.coverage.frames(stretch).iter();
         frames
             .zip(pictures)
-            .map(|(k, picture)| View::new(picture.level(self.level), camera, &estimates[*k]))
+            .map(|(k, picture)| {
+                View::new(picture.level(self.sampling.level), camera, &estimates[*k])
+            })
             .collect()
     }
 
@@ -381,8 +396,8 @@ impl<'a> Problem<'a> {
         let stride = (self.coverage.tiles / SCALE_TILES).max(1);
         let mut histogram = NoiseHistogram::default();
         for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch);
-            let pictures = self.pictures(stretch)?;
+            let visibility = self.coverage.visibility(stretch)?;
+            let pictures = self.pictures.of(self.coverage.frames(stretch))?;
             let views = self.views(stretch, &pictures, &self.held, self.camera);
             let sample: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
             let counted = sample
@@ -395,8 +410,13 @@ impl<'a> Problem<'a> {
                         let points =
                             TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
                         let observers = visibility.observers(tile);
-                        let seen = observers.iter().map(|o| o.seen(&views));
-                        work.count_residuals(&points, seen, &mut histogram);
+                        wide(
+                            #[inline(always)]
+                            || {
+                                let seen = observers.iter().map(|o| o.seen(&views));
+                                work.count_residuals(&points, seen, &mut histogram);
+                            },
+                        );
                     }
                     histogram
                 })
@@ -406,7 +426,7 @@ impl<'a> Problem<'a> {
         self.noise = histogram.fit();
         // Residuals are a little too small, for S has fitted itself to them; single pictures know the noise better, but
         // take fine texture for noise.
-        let single = self.scene.noise.powi(2) * noise_at_level(self.level);
+        let single = self.scene.noise.powi(2) * noise_at_level(self.sampling.level);
         let fitted = f64::from(self.noise.floor);
         if single > fitted && single < MOST_UNDERESTIMATE * fitted {
             self.noise.floor = single as f32;
@@ -455,9 +475,9 @@ impl<'a> Problem<'a> {
         let mut border_scatter = border.clone();
         let mut cost = 0.0;
         for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch);
-            let pictures = self.pictures(stretch)?;
-            let camera = lens.at_level(self.level);
+            let visibility = self.coverage.visibility(stretch)?;
+            let pictures = self.pictures.of(self.coverage.frames(stretch))?;
+            let camera = lens.at_level(self.sampling.level);
             let views = self.views(stretch, &pictures, &estimates, camera);
             for batch in visibility.blocks.chunks(BATCH) {
                 let sums: Vec<BlockSums> = batch
@@ -539,7 +559,8 @@ impl<'a> Problem<'a> {
     /// but no less than [`LEAST_TEXTURE`], so that M stays positive semidefinite.
     fn texture_share(&self, tiles: &[TileSums]) -> Matrix4<f64> {
         let mut share = nalgebra::Vector4::repeat(1.0);
-        if self.level == 0 && self.held_frames() == 0 && !self.exact {
+        let fused = self.scene.fused_gradient;
+        if self.sampling.level == 0 && self.held_frames() == 0 && !self.exact && fused {
             for k in 0..2 {
                 let noise: f64 = tiles.iter().map(|tile| tile.slope_noise[k]).sum();
                 let all: f64 = tiles.iter().map(|tile| tile.features[(k, k)]).sum();
@@ -631,10 +652,21 @@ impl<'a> Problem<'a> {
         for tile in tiles {
             let points = TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
             let observers = visibility.observers(tile);
-            let seen = observers.iter().map(|o| o.seen(views));
-            work.moments(&points, seen, spacing, &self.noise);
+            wide(
+                #[inline(always)]
+                || {
+                    let seen = observers.iter().map(|o| o.seen(views));
+                    work.moments(
+                        &points,
+                        seen,
+                        spacing,
+                        &self.noise,
+                        self.scene.fused_gradient,
+                    );
+                },
+            );
             let mut columns = Vec::with_capacity(observers.len());
-            for (observer, moments) in observers.iter().zip(&work.observers) {
+            for (k, (observer, moments)) in observers.iter().zip(&work.observers).enumerate() {
                 sums.cost += moments.cost;
                 let view = &views[observer.frame as usize];
                 if let Some(slot) = stretch_slots[observer.frame as usize] {
@@ -646,6 +678,7 @@ impl<'a> Problem<'a> {
                     columns.push(Column {
                         place: sums.place(slot),
                         moments: *moments,
+                        own_features: work.own_features.get(k).copied(),
                         a,
                         c,
                         inverse_gain: 1.0 / f64::from(view.gain() * observer.shade),
@@ -660,13 +693,18 @@ impl<'a> Problem<'a> {
             });
         }
         let share = self.texture_share(&summed);
-        for tile in &summed {
-            let features = share * tile.features * share;
-            sums.add_tile(&tile.columns, &features, tile.total);
-            if let Some(lens) = &mut sums.lens {
-                lens.add_tile(&tile.columns, &features, tile.total);
-            }
-        }
+        wide(
+            #[inline(always)]
+            || {
+                for tile in &summed {
+                    let features = share * tile.features * share;
+                    sums.add_tile(&tile.columns, &features, tile.total);
+                    if let Some(lens) = &mut sums.lens {
+                        lens.add_tile(&tile.columns, &features, tile.total);
+                    }
+                }
+            },
+        );
         sums
     }
 
@@ -678,7 +716,7 @@ impl<'a> Problem<'a> {
         step: &[FrameStep],
         shared: &Kappa,
     ) -> Vec<f64> {
-        let full = 0.5f64.powi(self.level as i32);
+        let full = 0.5f64.powi(self.sampling.level as i32);
         let lens = shared.fixed_rows::<LENS>(0).into_owned();
         active
             .iter()
@@ -743,6 +781,7 @@ fn pixel_on_wall<'p>(
 }
 
 impl Observer {
+    #[inline(always)]
     fn seen<'v>(&self, views: &'v [View<'v>]) -> Seen<'v> {
         Seen {
             view: &views[self.frame as usize],
@@ -773,6 +812,8 @@ pub(super) struct Column {
     /// Which of the block's frames.
     pub place: usize,
     pub moments: ObserverMoments,
+    /// M of the frame's own gradient, where that is what the derivative takes.
+    own_features: Option<Matrix4<f64>>,
     /// A.
     pub a: Matrix2x6<f64>,
     /// C; zero unless the lens is estimated.
@@ -783,6 +824,7 @@ pub(super) struct Column {
 
 impl Column {
     /// `M B` (4 × 8) for this observer's `B = diag(A, 1, 1/a)`.
+    #[inline(always)]
     fn features_times_b(&self, m: &Matrix4<f64>) -> SMatrix<f64, 4, UNKNOWNS> {
         let mut product = SMatrix::<f64, 4, UNKNOWNS>::zeros();
         for c in 0..6 {
@@ -798,6 +840,7 @@ impl Column {
     }
 
     /// Adds `scale · Bᵀ F` to a block.
+    #[inline(always)]
     fn add_b_transposed_times(&self, f: &SMatrix<f64, 4, UNKNOWNS>, scale: f64, block: &mut Block) {
         for c in 0..UNKNOWNS {
             let (f0, f1) = (scale * f[(0, c)], scale * f[(1, c)]);
@@ -840,12 +883,14 @@ impl BlockSums {
         self.slots.partition_point(|s| *s < slot)
     }
 
+    #[inline(always)]
     fn block_index(&self, row: usize, column: usize) -> usize {
         let n = self.slots.len();
         row * n - row * (row + 1) / 2 + column
     }
 
     /// `features`: M of the tile; `total`: weight of all its observers, held ones too.
+    #[inline(always)]
     fn add_tile(&mut self, columns: &[Column], features: &Matrix4<f64>, total: f64) {
         for (n, b) in columns.iter().enumerate() {
             let moments = &b.moments;
@@ -862,6 +907,12 @@ impl BlockSums {
             gradient[6] -= moments.gradient[2];
             gradient[7] -= moments.gradient[3] * b.inverse_gain;
             let f = b.features_times_b(features);
+            if let Some(own) = &b.own_features {
+                // Its noise is in the diagonal blocks only: `w̄ Bᵀ (M_i − M) B` more.
+                let index = self.block_index(b.place, b.place);
+                let more = b.features_times_b(&(own - features));
+                b.add_b_transposed_times(&more, moments.weight, &mut self.blocks[index]);
+            }
             for a in &columns[..=n] {
                 let own = if a.place == b.place {
                     a.moments.weight
@@ -969,6 +1020,10 @@ mod tests {
         }
 
         fn problem(&self) -> Problem<'_> {
+            self.problem_with(1.0)
+        }
+
+        fn problem_with(&self, information: f64) -> Problem<'_> {
             let scene = Scene {
                 surface: &self.wall.circle,
                 camera: self.wall.camera,
@@ -977,11 +1032,13 @@ mod tests {
                 frames: &self.frames,
                 prior: &self.prior,
                 noise: 0.0,
+                fused_gradient: true,
             };
             let all = 0..self.estimates.len();
             let sampling = Sampling {
                 level: 0,
                 density: 2.0,
+                information,
             };
             let members = Members {
                 participants: all.clone(),
@@ -1051,6 +1108,24 @@ mod tests {
                 gradient[k]
             );
         }
+    }
+
+    /// Half of the information is in less than half of the wall, and the same unknowns are found from it.
+    #[test]
+    fn half_the_information_is_in_less_than_half_of_the_wall() {
+        let ring = Ring::new(1e-4);
+        let (all, half) = (ring.problem(), ring.problem_with(0.5));
+        assert!((0.2..0.5).contains(&half.share_of_wall()));
+        let trace = |problem: &Problem| -> f64 {
+            let at = problem.linearise(&ring.estimates).unwrap();
+            let poses = at.normal.blocks.iter();
+            problem.sigma().powi(2)
+                * poses
+                    .map(|b| b.fixed_view::<6, 6>(0, 0).trace())
+                    .sum::<f64>()
+        };
+        let share = trace(&half) / trace(&all);
+        assert!((0.4..0.65).contains(&share), "{share}");
     }
 
     /// From 2 mrad and 2 mm off to the truth, along the gauge's freedoms, in undamped steps.

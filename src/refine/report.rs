@@ -72,6 +72,8 @@ pub struct LevelReport {
     pub level: usize,
     /// Wall samples per pixel along each axis.
     pub samples_per_pixel: f64,
+    /// Share of the wall that was looked at, the most informative.
+    pub share_of_wall: f64,
     /// Its course.
     #[serde(flatten)]
     pub solve: SolveRecord,

@@ -15,7 +15,7 @@ pub struct NoiseModel {
 
 impl NoiseModel {
     /// `1/v(g)` for `g²`.
-    #[inline]
+    #[inline(always)]
     pub fn precision(&self, gradient_square: f32) -> f32 {
         1.0 / (self.floor + self.steepness * gradient_square)
     }
@@ -39,23 +39,23 @@ const SHARPNESS: f32 = 1.0 / 36.0;
 
 impl Loss {
     /// `ω(e)`.
-    #[inline]
+    #[inline(always)]
     pub fn weight(square: f32, precision: f32) -> f32 {
         let left = (1.0 - SHARPNESS * square * precision).max(0.0);
         left * left
     }
 
-    /// `ρ(e)`.
-    #[inline]
-    pub fn value(square: f32, precision: f32) -> f32 {
+    /// `ρ(e)/v`.
+    #[inline(always)]
+    pub fn share(square: f32, precision: f32) -> f32 {
         let left = (1.0 - SHARPNESS * square * precision).max(0.0);
-        (1.0 - left * left * left) / (6.0 * SHARPNESS * precision)
+        (1.0 - left * left * left) * (1.0 / (6.0 * SHARPNESS))
     }
 }
 
 /// Gradients are told apart by half octaves from 1 grey level a sample up.
 const GRADIENT_BINS: usize = 14;
-/// Residuals by sixteenths of an octave from 0.01 grey levels up.
+/// Residuals by sixteen steps an octave from 0.01 grey levels up.
 const RESIDUAL_BINS: usize = 256;
 const LEAST_RESIDUAL: f32 = 0.01;
 /// σ never goes below this: rounding to 8 bits alone gives 0.29, less what averaging takes off it.
@@ -78,10 +78,12 @@ impl Default for NoiseHistogram {
 impl NoiseHistogram {
     /// Counts a residual (grey levels) where the texture's gradient squared is `gradient_square`.
     pub fn add(&mut self, residual: f32, gradient_square: f32) {
-        let steep = gradient_square.max(1e-6).log2().floor() as i32 + 1;
-        let row = steep.clamp(0, GRADIENT_BINS as i32 - 1) as usize;
-        let size = (16.0 * (residual.abs().max(1e-6) / LEAST_RESIDUAL).log2()) as i32;
-        let column = size.clamp(0, RESIDUAL_BINS as i32 - 1) as usize;
+        // A float's exponent is the octave, and the first bits of its fraction the step.
+        let octave = |value: f32| (value.to_bits() >> 23) as i32 - 127;
+        let row = (octave(gradient_square) + 1).clamp(0, GRADIENT_BINS as i32 - 1) as usize;
+        let size = (residual.abs() / LEAST_RESIDUAL).max(1.0);
+        let steps = (size.to_bits() >> 19) as usize - (127 << 4);
+        let column = steps.min(RESIDUAL_BINS - 1);
         self.counts[row * RESIDUAL_BINS + column] += 1;
     }
 
@@ -137,7 +139,10 @@ fn median(counts: &[u64], total: u64) -> f64 {
     for (column, count) in counts.iter().enumerate() {
         if below + count > total / 2 {
             let part = (total / 2 - below) as f64 / *count as f64;
-            return f64::from(LEAST_RESIDUAL) * 2f64.powf((column as f64 + part) / 16.0);
+            let octave = 2f64.powi(column as i32 / 16);
+            return f64::from(LEAST_RESIDUAL)
+                * octave
+                * (1.0 + ((column % 16) as f64 + part) / 16.0);
         }
         below += count;
     }
@@ -155,7 +160,7 @@ mod tests {
         for e in [0.1f32, 1.0, 5.0, 20.0, 80.0] {
             let precision = 0.25;
             let step = 1e-2 * e.max(1.0);
-            let value = |e: f32| Loss::value(e * e, precision);
+            let value = |e: f32| Loss::share(e * e, precision) / precision;
             let slope = (value(e + step) - value(e - step)) / (2.0 * step);
             assert!(
                 (slope / e - Loss::weight(e * e, precision)).abs() < 2e-3,

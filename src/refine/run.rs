@@ -108,7 +108,7 @@ pub fn refine(
     };
     let mut calibration = calibration_of(survey, options, &prior.initial);
     let examined = examine(
-        &scene(survey, &calibration, &prior, &frames, 0.0),
+        &scene(survey, options, &calibration, &prior, &frames, 0.0),
         coarsest,
         progress.as_ref(),
     )?;
@@ -121,7 +121,14 @@ pub fn refine(
         ..prior.clone()
     };
     let mut tracked = track_calibrating(
-        &scene(survey, &calibration, &rough, &frames, examined.noise),
+        &scene(
+            survey,
+            options,
+            &calibration,
+            &rough,
+            &frames,
+            examined.noise,
+        ),
         options,
         &examined.doubts,
         close(options, options.handover_level(side)),
@@ -129,7 +136,14 @@ pub fn refine(
     )?;
     clock.lap("track");
 
-    let scene = scene(survey, &calibration, &prior, &frames, examined.noise);
+    let scene = scene(
+        survey,
+        options,
+        &calibration,
+        &prior,
+        &frames,
+        examined.noise,
+    );
     let mut scene = scene.at(tracked.kappa);
     let mut levels = Vec::new();
     let mut last = None;
@@ -142,16 +156,23 @@ pub fn refine(
             rivals = Some(repair(&scene, options, &mut tracked, changed)?);
             clock.lap("repair");
         }
-        let Sampling { level, density } = sampling;
+        let Sampling {
+            level,
+            density,
+            information,
+        } = sampling;
         let problem = Problem::new(&scene, sampling, tracked.members())?.calibrating();
         // Where no frame can be believed, the prior is all there is to report.
         if problem.tiles() == 0 && tracked.doubts.iter().all(Option::is_none) {
             continue;
         }
-        let stage = match sampling == Sampling::of(level) {
-            true => format!("level {level}"),
-            false => format!("level {level}, {density} samples per pixel"),
-        };
+        let mut stage = format!("level {level}");
+        if density != 1.0 {
+            stage += &format!(", {density} samples per pixel");
+        }
+        if information != 1.0 {
+            stage += &format!(", {:.0} % of the information", 100.0 * information);
+        }
         progress.start("global", options.max_iterations as usize);
         let solution = solve(problem, stopping, Some((&stage, progress)))?;
         progress.finish();
@@ -170,12 +191,13 @@ pub fn refine(
             stages.push_back((sampling, stopping));
         }
         refusals.extend(refused);
-        if sampling == Sampling::of(0) {
+        if level == 0 {
             changed = disagreements(&solution.linearisation.frames, &mut tracked.doubts);
         }
         levels.push(LevelReport {
             level,
             samples_per_pixel: density,
+            share_of_wall: solution.problem.share_of_wall(),
             solve: solution.record.clone(),
         });
         last = Some(solution);
@@ -283,6 +305,7 @@ fn adopt(scene: &mut Scene, calibration: &mut Calibration, mut kappa: Kappa, ref
 
 fn scene<'a>(
     survey: &'a Survey,
+    options: &RefineOptions,
     calibration: &Calibration,
     prior: &'a Prior,
     frames: &'a FrameCache,
@@ -296,16 +319,16 @@ fn scene<'a>(
         frames,
         prior,
         noise,
+        fused_gradient: options.fused_gradient,
     }
 }
 
 /// The global solves: coarse to fine, and the finest once more with a denser look at the wall.
+/// Those between only bring the estimate close for the next, and a share of the information is enough for that.
 ///
 /// One sample per pixel is too sparse to end with: the products of residual and gradient vary faster than either,
 /// and where the wall repeats in step with the samples (courses of bricks run along them) what falls between
 /// them does not average out. On brick this alone is 0.05 px of wall error over two turns.
-///
-/// All but the last only have to bring the estimate close for the next.
 fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling, Stopping)> + '_ {
     let last = Stopping {
         max_iterations: options.max_iterations,
@@ -315,11 +338,20 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
     let finest = Sampling {
         level: 0,
         density: options.final_density,
+        information: options.final_information,
     };
-    (0..=options.handover_level(side))
+    let first = options.handover_level(side);
+    let sampling = move |level| Sampling {
+        information: if level == first {
+            1.0
+        } else {
+            options.close_information
+        },
+        ..Sampling::of(level)
+    };
+    (0..=first)
         .rev()
-        .map(move |level| (Sampling::of(level), close(options, level)))
-        .filter(move |(sampling, _)| *sampling != finest)
+        .map(move |level| (sampling(level), close(options, level)))
         .chain([(finest, last)])
 }
 
@@ -425,7 +457,9 @@ fn frame_report(
 ) -> FrameReport {
     let share: &FrameShare = &solution.linearisation.frames[k];
     let estimate: &FrameEstimate = &solution.estimates[k];
-    let all = f64::from(survey.camera.width) * f64::from(survey.camera.height);
+    let all = f64::from(survey.camera.width)
+        * f64::from(survey.camera.height)
+        * solution.problem.share_of_wall();
     let inlier_share = share.inliers / share.pixels.max(1e-9);
     let late = if share.pixels < LEAST_PIXEL_SHARE * all {
         Some(Doubt::NoOverlap {

@@ -31,13 +31,34 @@
 //! Rows of the bracket sum to zero, so what moves all frames of a tile alike costs nothing: the gauge
 //! directions are exact null vectors of the data term.
 
-use super::grid::{AREA, SIDE, TILE, TilePoints};
+use super::grid::{LANES, Plane, SIDE, TILE, TilePoints, ZERO};
 use super::robust::{Loss, NoiseHistogram, NoiseModel};
 use super::view::View;
 use nalgebra::{Matrix4, Vector4};
 
 /// Samples of a tile without its ring.
 pub const SAMPLES: usize = TILE * TILE;
+
+/// A value at every sample of a tile's own rows, the ring's columns included, which count for nothing: its place is
+/// [`SIDE`] before that in a [`Plane`].
+type Rows = [f32; TILE * SIDE];
+const NO_ROWS: Rows = [0.0; TILE * SIDE];
+
+/// 1 at the tile's own samples, 0 at the ring's.
+const OWN: Rows = {
+    let mut own = NO_ROWS;
+    let mut k = 0;
+    while k < own.len() {
+        let column = k % SIDE;
+        own[k] = if column > 0 && column <= TILE {
+            1.0
+        } else {
+            0.0
+        };
+        k += 1;
+    }
+    own
+};
 
 /// Steps of reweighting from the plain mean to the robust texture.
 const REWEIGHTINGS: usize = 2;
@@ -72,15 +93,15 @@ pub struct Seen<'a> {
 /// What one frame shows of a tile.
 struct Samples {
     /// `z` at every wall sample.
-    values: [f32; AREA],
+    values: Plane,
     /// Pixels per wall sample, q.
     pixels: f32,
     /// Gain a, shading included.
     gain: f32,
     /// Robust weight ω at every wall sample.
-    weights: [f32; AREA],
+    weights: Plane,
     /// 1 where there is a value, else 0.
-    known: [f32; AREA],
+    known: Plane,
 }
 
 /// Room for the work on one tile, reused from tile to tile.
@@ -93,26 +114,33 @@ pub struct TileWork {
     pub observers: Vec<ObserverMoments>,
     /// `Σ_x p φ φᵀ`.
     pub features: Matrix4<f64>,
+    /// M of each observer's own gradient, if that is asked for.
+    pub own_features: Vec<Matrix4<f64>>,
     /// What the noise of S has added to the first two diagonal elements of `features`, on average.
     pub slope_noise: [f64; 2],
 }
 
+// Everything here is inlined into its caller, which is compiled for the processor's widest vectors.
 impl TileWork {
     /// Samples all observers.
+    #[inline(always)]
     fn sample<'a>(&mut self, points: &TilePoints, observers: impl Iterator<Item = Seen<'a>>) {
         self.samples.clear();
         self.gaps = false;
         for seen in observers {
-            let mut frame = Samples {
-                values: [0.0; AREA],
+            self.samples.push(Samples {
+                values: ZERO,
                 pixels: seen.pixels,
                 gain: seen.view.gain() * seen.shade,
-                weights: [1.0; AREA],
-                known: [1.0; AREA],
+                weights: ZERO,
+                known: [1.0; ZERO.len()],
+            });
+            let Some(frame) = self.samples.last_mut() else {
+                continue;
             };
             seen.view.sample(points, seen.shade, &mut frame.values);
             // One NaN makes the sum NaN.
-            if frame.values.iter().sum::<f32>().is_nan() {
+            if sum(&frame.values).is_nan() {
                 self.gaps = true;
                 for (value, known) in frame.values.iter_mut().zip(&mut frame.known) {
                     if value.is_nan() {
@@ -120,17 +148,17 @@ impl TileWork {
                     }
                 }
             }
-            self.samples.push(frame);
         }
     }
 
     /// The weighted mean of all observers; 0 where none has a value.
-    fn mean(&self) -> [f32; AREA] {
-        let mut sum = [0.0f32; AREA];
-        let mut total = [1e-12f32; AREA];
+    #[inline(always)]
+    fn mean(&self) -> Plane {
+        let mut sum = ZERO;
+        let mut total = [1e-12f32; ZERO.len()];
         for frame in &self.samples {
             let q = frame.pixels * frame.gain * frame.gain;
-            for k in 0..AREA {
+            for k in 0..ZERO.len() {
                 total[k] += q * frame.known[k];
                 sum[k] += q * frame.values[k];
             }
@@ -142,19 +170,20 @@ impl TileWork {
     }
 
     /// 1 at the samples around which the texture is known, so that it has a slope; else 0.
-    fn covered(&self) -> [f32; SAMPLES] {
+    #[inline(always)]
+    fn covered(&self) -> Rows {
         if !self.gaps {
-            return [1.0; SAMPLES];
+            return OWN;
         }
-        let mut known = [0.0f32; AREA];
+        let mut known = ZERO;
         for frame in &self.samples {
             for (known, own) in known.iter_mut().zip(&frame.known) {
                 *known = known.max(*own);
             }
         }
         std::array::from_fn(|k| {
-            let c = (k / TILE + 1) * SIDE + k % TILE + 1;
-            known[c] * known[c - 1] * known[c + 1] * known[c - SIDE] * known[c + SIDE]
+            let c = k + SIDE;
+            OWN[k] * known[c] * known[c - 1] * known[c + 1] * known[c - SIDE] * known[c + SIDE]
         })
     }
 
@@ -164,22 +193,23 @@ impl TileWork {
     /// Where only one frame is steep it shows a glint or an edge of something before the wall, which must not pass for
     /// the noise of a steep texture. (In the wall's units a common factor of all gains would change the noise
     /// model, and with it the cost.)
-    fn activity(&self) -> [f32; AREA] {
-        let (mut least, mut second) = ([f32::INFINITY; AREA], [f32::INFINITY; AREA]);
+    #[inline(always)]
+    fn activity(&self) -> Plane {
+        let (mut least, mut second) = ([f32::INFINITY; TILE * SIDE], [f32::INFINITY; TILE * SIDE]);
         for frame in &self.samples {
             let square_gain = frame.gain * frame.gain;
             let squares = gradient_squares(&frame.values);
-            for k in 0..AREA {
+            for k in 0..NO_ROWS.len() {
                 let square = square_gain * squares[k];
                 second[k] = second[k].min(square.max(least[k]));
                 least[k] = least[k].min(square);
             }
         }
-        if self.samples.len() < 4 {
-            least
+        with_ring(if self.samples.len() < 4 {
+            &least
         } else {
-            second
-        }
+            &second
+        })
     }
 
     /// Variance of `S(x + 1) − S(x − 1)` by the sensor's noise, grey levels².
@@ -203,22 +233,26 @@ impl TileWork {
     ///
     /// The weighted residuals from that mean sum to zero at every sample, exactly; otherwise the gradient
     /// would have a part along the gauge, where nothing but the weak prior resists.
-    fn reweight(&mut self, reference: &[f32; AREA], precision: &[f32; AREA]) -> [f32; AREA] {
-        let mut sum = [0.0f32; AREA];
-        let mut total = [1e-12f32; AREA];
+    #[inline(always)]
+    fn reweight(&mut self, reference: &Plane, precision: &Plane) -> Plane {
+        let mut sum = ZERO;
+        let mut total = [1e-12f32; ZERO.len()];
         for frame in &mut self.samples {
             let q = frame.pixels * frame.gain * frame.gain;
-            for k in 0..AREA {
-                let difference = frame.values[k] - reference[k];
-                let e = frame.gain * difference;
-                let w = frame.known[k] * Loss::weight(e * e, precision[k]);
-                frame.weights[k] = w;
-                total[k] += q * w;
-                sum[k] += q * w * difference;
+            let (mut difference, mut w) = (ZERO, ZERO);
+            for k in 0..ZERO.len() {
+                difference[k] = frame.values[k] - reference[k];
+                let e = frame.gain * difference[k];
+                w[k] = frame.known[k] * Loss::weight(e * e, precision[k]);
             }
+            for k in 0..ZERO.len() {
+                total[k] += q * w[k];
+                sum[k] += q * w[k] * difference[k];
+            }
+            frame.weights = w;
         }
         let mut texture = *reference;
-        for k in 0..AREA {
+        for k in 0..ZERO.len() {
             texture[k] += sum[k] / total[k];
         }
         texture
@@ -226,43 +260,50 @@ impl TileWork {
 
     /// Fills [`TileWork::observers`] and [`TileWork::features`] for a tile's observers.
     ///
-    /// `spacing_m`: distance between samples along s and h.
+    /// `spacing_m`: distance between samples along s and h; `fused`: the derivative takes the gradient of S, and not each
+    /// frame's own.
+    #[inline(always)]
     pub fn moments<'a>(
         &mut self,
         points: &TilePoints,
         observers: impl Iterator<Item = Seen<'a>>,
         spacing_m: (f64, f64),
         noise: &NoiseModel,
+        fused: bool,
     ) {
         self.sample(points, observers);
-        let mean = self.mean();
-        let precision = self.activity().map(|g2| noise.precision(g2));
-        let mut texture = mean;
+        let precision = self.activity().map(
+            #[inline(always)]
+            |g2| noise.precision(g2),
+        );
+        let mut texture = self.mean();
         for _ in 0..REWEIGHTINGS {
             texture = self.reweight(&texture, &precision);
         }
-        let slope_s = (0.5 / spacing_m.0) as f32;
-        let slope_h = (0.5 / spacing_m.1) as f32;
-        let mut phi = [[0.0f32; SAMPLES]; 3];
-        let mut inner_precision = [0.0f32; SAMPLES];
+        let slopes = [spacing_m.0, spacing_m.1].map(|spacing_m| (0.5 / spacing_m) as f32);
         let covered = self.covered();
-        for j in 0..TILE {
-            for i in 0..TILE {
-                let (k, c) = (j * TILE + i, (j + 1) * SIDE + i + 1);
-                phi[0][k] = (texture[c + 1] - texture[c - 1]) * slope_s * covered[k];
-                phi[1][k] = (texture[c + SIDE] - texture[c - SIDE]) * slope_h * covered[k];
-                phi[2][k] = texture[c];
-                inner_precision[k] = precision[c];
-            }
+        let phi = features(&texture, slopes, &covered);
+        let mut variance = NO_ROWS;
+        for k in 0..NO_ROWS.len() {
+            variance[k] = 1.0 / precision[k + SIDE];
         }
-        self.features = feature_moments(&phi, &self.shares());
+        let shares = self.shares();
+        self.features = feature_moments(&phi, &shares);
         let noise_variance = self.slope_variance(noise);
-        self.slope_noise = [slope_s, slope_h]
-            .map(|slope| SAMPLES as f64 * f64::from(noise_variance * slope * slope));
+        self.slope_noise =
+            slopes.map(|slope| SAMPLES as f64 * f64::from(noise_variance * slope * slope));
         self.observers.clear();
+        self.own_features.clear();
         for frame in &self.samples {
-            self.observers
-                .push(observer_moments(frame, &phi, &inner_precision));
+            let moments = if fused {
+                observer_moments(frame, &phi, &precision, &variance)
+            } else {
+                let [own_s, own_h, _] = features(&frame.values, slopes, &covered);
+                let own = [own_s, own_h, phi[2]];
+                self.own_features.push(feature_moments(&own, &shares));
+                observer_moments(frame, &own, &precision, &variance)
+            };
+            self.observers.push(moments);
         }
     }
 
@@ -271,31 +312,34 @@ impl TileWork {
     ///
     /// Where all frames but one are rejected (a glint in it), the texture is that frame's own and says nothing, however
     /// steep it is.
-    fn shares(&self) -> [f32; SAMPLES] {
-        let (mut sum, mut square) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES]);
+    #[inline(always)]
+    fn shares(&self) -> Rows {
+        let (mut total, mut square) = (NO_ROWS, NO_ROWS);
         let (mut mean_sum, mut mean_square) = (0.0f32, 0.0f32);
         for frame in &self.samples {
             let q = frame.pixels * frame.gain * frame.gain;
-            let mut own = 0.0;
-            for j in 0..TILE {
-                let row = &frame.weights[(j + 1) * SIDE + 1..][..TILE];
-                for (i, weight) in row.iter().enumerate() {
-                    let w = q * weight;
-                    own += w;
-                    sum[j * TILE + i] += w;
-                    square[j * TILE + i] += w * w;
-                }
+            let mut own = NO_ROWS;
+            for k in 0..NO_ROWS.len() {
+                let w = q * OWN[k] * frame.weights[k + SIDE];
+                own[k] = w;
+                total[k] += w;
+                square[k] += w * w;
             }
-            own /= SAMPLES as f32;
+            let own = sum(&own) / SAMPLES as f32;
             mean_sum += own;
             mean_square += own * own;
         }
         let usual = (mean_sum - mean_square / mean_sum.max(1e-12)).max(1e-12);
-        std::array::from_fn(|k| (sum[k] - square[k] / sum[k].max(1e-12)) / usual)
+        let mut shares = NO_ROWS;
+        for k in 0..NO_ROWS.len() {
+            shares[k] = (total[k] - square[k] / total[k].max(1e-12)) / usual;
+        }
+        shares
     }
 
     /// Counts the residuals around the plain mean, each scaled by `√(n/(n−1))` for the share of the mean
     /// that it has itself made.
+    #[inline(always)]
     pub fn count_residuals<'a>(
         &mut self,
         points: &TilePoints,
@@ -309,12 +353,13 @@ impl TileWork {
         let gains: f32 = self.samples.iter().map(|frame| frame.gain.powi(2)).sum();
         let square_gain = gains / self.samples.len().max(1) as f32;
         // Of the mean: a single frame's gradient would go with its own noise.
-        let squares = gradient_squares(&mean).map(|square| square_gain * square);
+        let squares = gradient_squares(&mean);
         for frame in &self.samples {
-            for k in 0..AREA {
-                let e = frame.gain * (frame.values[k] - mean[k]);
-                if frame.known[k] > 0.0 {
-                    histogram.add(scale * e, squares[k]);
+            for k in 0..NO_ROWS.len() {
+                let c = k + SIDE;
+                if OWN[k] * frame.known[c] > 0.0 {
+                    let e = frame.gain * (frame.values[c] - mean[c]);
+                    histogram.add(scale * e, square_gain * squares[k]);
                 }
             }
         }
@@ -330,28 +375,75 @@ fn cubic_b_spline(x: f32) -> f32 {
     }
 }
 
-/// Squared length of a texture's gradient in grey levels a sample; the ring takes its neighbours' value.
-fn gradient_squares(texture: &[f32; AREA]) -> [f32; AREA] {
-    let mut squares = [0.0f32; AREA];
-    for j in 1..=TILE {
-        for i in 1..=TILE {
-            let c = j * SIDE + i;
-            let square = |n: usize| (texture[n] - texture[c]).powi(2);
-            squares[c] =
-                0.5 * (square(c - 1) + square(c + 1) + square(c - SIDE) + square(c + SIDE));
-        }
-        squares[j * SIDE] = squares[j * SIDE + 1];
-        squares[j * SIDE + TILE + 1] = squares[j * SIDE + TILE];
+/// Squared length of a texture's gradient in grey levels a sample.
+#[inline(always)]
+fn gradient_squares(texture: &Plane) -> Rows {
+    let mut squares = NO_ROWS;
+    for (k, value) in squares.iter_mut().enumerate() {
+        let c = k + SIDE;
+        let (left, right) = (texture[c - 1] - texture[c], texture[c + 1] - texture[c]);
+        let (above, below) = (
+            texture[c - SIDE] - texture[c],
+            texture[c + SIDE] - texture[c],
+        );
+        *value = 0.5 * (left * left + right * right + above * above + below * below);
     }
-    squares.copy_within(SIDE..2 * SIDE, 0);
-    squares.copy_within(TILE * SIDE..(TILE + 1) * SIDE, (TILE + 1) * SIDE);
     squares
 }
 
-fn feature_moments(phi: &[[f32; SAMPLES]; 3], shares: &[f32; SAMPLES]) -> Matrix4<f64> {
+/// Sums over a tile of the squared differences between neighbours along s and h, in the values that one frame shows. NaN
+/// where it lacks one.
+#[inline(always)]
+pub fn slope_squares(points: &TilePoints, view: &View, shade: f32) -> [f64; 2] {
+    let mut values = ZERO;
+    view.sample(points, shade, &mut values);
+    let (mut along_s, mut along_h) = (NO_ROWS, NO_ROWS);
+    for k in 0..NO_ROWS.len() {
+        let c = k + SIDE;
+        along_s[k] = OWN[k] * (values[c + 1] - values[c - 1]);
+        along_h[k] = OWN[k] * (values[c + SIDE] - values[c - SIDE]);
+    }
+    [
+        f64::from(dot(&along_s, &along_s)),
+        f64::from(dot(&along_h, &along_h)),
+    ]
+}
+
+/// The tile's own samples in a plane, whose ring takes its neighbours' value.
+#[inline(always)]
+fn with_ring(rows: &Rows) -> Plane {
+    let mut plane = ZERO;
+    plane[SIDE..SIDE + rows.len()].copy_from_slice(rows);
+    for row in plane[SIDE..SIDE + rows.len()].chunks_exact_mut(SIDE) {
+        (row[0], row[TILE + 1]) = (row[1], row[TILE]);
+    }
+    plane.copy_within(SIDE..2 * SIDE, 0);
+    plane.copy_within(TILE * SIDE..(TILE + 1) * SIDE, (TILE + 1) * SIDE);
+    plane
+}
+
+/// The first three features of a texture, `∂S/∂s, ∂S/∂h, S`, with no slope where it is not `covered`.
+#[inline(always)]
+fn features(texture: &Plane, slopes: [f32; 2], covered: &Rows) -> [Rows; 3] {
+    let mut phi = [NO_ROWS; 3];
+    for k in 0..NO_ROWS.len() {
+        let c = k + SIDE;
+        phi[0][k] = (texture[c + 1] - texture[c - 1]) * slopes[0] * covered[k];
+        phi[1][k] = (texture[c + SIDE] - texture[c - SIDE]) * slopes[1] * covered[k];
+        phi[2][k] = texture[c];
+    }
+    phi
+}
+
+/// `Σ_x p φ φᵀ` with p zero on the ring.
+#[inline(always)]
+fn feature_moments(phi: &[Rows; 3], shares: &Rows) -> Matrix4<f64> {
     let mut moments = Matrix4::zeros();
     for a in 0..3 {
-        let shared: [f32; SAMPLES] = std::array::from_fn(|k| shares[k] * phi[a][k]);
+        let mut shared = *shares;
+        for k in 0..NO_ROWS.len() {
+            shared[k] *= phi[a][k];
+        }
         for b in a..3 {
             moments[(a, b)] = f64::from(dot(&shared, &phi[b]));
         }
@@ -362,27 +454,25 @@ fn feature_moments(phi: &[[f32; SAMPLES]; 3], shares: &[f32; SAMPLES]) -> Matrix
     moments
 }
 
+#[inline(always)]
 fn observer_moments(
     frame: &Samples,
-    phi: &[[f32; SAMPLES]; 3],
-    precision: &[f32; SAMPLES],
+    phi: &[Rows; 3],
+    precision: &Plane,
+    variance: &Rows,
 ) -> ObserverMoments {
-    let (mut e, mut w) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES]);
-    let mut known = [0.0f32; SAMPLES];
-    for j in 0..TILE {
-        for i in 0..TILE {
-            let (k, c) = (j * TILE + i, (j + 1) * SIDE + i + 1);
-            e[k] = frame.gain * (frame.values[c] - phi[2][k]);
-            w[k] = frame.weights[c];
-            known[k] = frame.known[c];
-        }
-    }
-    let (mut we, mut loss) = ([0.0f32; SAMPLES], [0.0f32; SAMPLES]);
-    for k in 0..SAMPLES {
+    let (mut e, mut w, mut we) = (NO_ROWS, NO_ROWS, NO_ROWS);
+    let (mut loss, mut known) = (NO_ROWS, NO_ROWS);
+    for k in 0..NO_ROWS.len() {
+        let c = k + SIDE;
+        e[k] = frame.gain * (frame.values[c] - phi[2][k]);
+        w[k] = OWN[k] * frame.weights[c];
         we[k] = w[k] * e[k];
+        known[k] = OWN[k] * frame.known[c];
         // A sample without a value costs what plain noise would: losing one is no gain.
-        let noise = 0.5 / precision[k];
-        loss[k] = known[k] * (Loss::value(e[k] * e[k], precision[k]) - noise) + noise;
+        let noise = 0.5 * variance[k];
+        let cost = variance[k] * Loss::share(e[k] * e[k], precision[c]);
+        loss[k] = OWN[k] * noise + known[k] * (cost - noise);
     }
     let (q, a) = (f64::from(frame.pixels), f64::from(frame.gain));
     let inliers = f64::from(sum(&w));
@@ -402,26 +492,33 @@ fn observer_moments(
     }
 }
 
-/// Sum of products, in eight running sums so that it vectorises and never depends on anything else.
-fn dot(a: &[f32; SAMPLES], b: &[f32; SAMPLES]) -> f32 {
-    let mut sums = [0.0f32; 8];
-    for k in (0..SAMPLES).step_by(8) {
-        for lane in 0..8 {
+/// Sum of products, lane by lane so that it vectorises and never depends on anything else.
+#[inline(always)]
+fn dot<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
+    let mut sums = [0.0f32; LANES];
+    for k in (0..N).step_by(LANES) {
+        for lane in 0..LANES {
             sums[lane] += a[k + lane] * b[k + lane];
         }
     }
-    sums.iter().sum()
+    across(sums)
 }
 
-/// Sum, in eight running sums.
-fn sum(a: &[f32; SAMPLES]) -> f32 {
-    let mut sums = [0.0f32; 8];
-    for k in (0..SAMPLES).step_by(8) {
-        for lane in 0..8 {
+/// Sum, likewise.
+#[inline(always)]
+fn sum<const N: usize>(a: &[f32; N]) -> f32 {
+    let mut sums = [0.0f32; LANES];
+    for k in (0..N).step_by(LANES) {
+        for lane in 0..LANES {
             sums[lane] += a[k + lane];
         }
     }
-    sums.iter().sum()
+    across(sums)
+}
+
+#[inline(always)]
+fn across(s: [f32; LANES]) -> f32 {
+    ((s[0] + s[4]) + (s[2] + s[6])) + ((s[1] + s[5]) + (s[3] + s[7]))
 }
 
 #[cfg(test)]
@@ -480,7 +577,7 @@ mod tests {
                         shade: 1.0,
                     });
                     let spacing = (grid.spacing_s_m, grid.spacing_h_m);
-                    work.moments(&points, seen, spacing, &model);
+                    work.moments(&points, seen, spacing, &model, true);
                     for k in 0..2 {
                         found[k] += work.features[(k, k)];
                         expected[k] += work.slope_noise[k];

@@ -120,7 +120,10 @@ pub fn track(
         // without it, and what has drifted apart meanwhile may be many pixels.
         let closes = first < before;
         before = first;
-        if k > 0 && (closes || !settled || k % options.window_stride == 0 || k + 1 == count) {
+        if k > 0
+            && options.windows
+            && (closes || !settled || k % options.window_stride == 0 || k + 1 == count)
+        {
             let side = scene.camera.shorter_side();
             let finest = options.handover_level(side);
             let coarsest = match closes || !settled {
@@ -133,7 +136,7 @@ pub fn track(
                 solve_window(&scene, level, first..k + 1, held, &mut tracked)?;
             }
         }
-        if k > 0 && k % LONG_STRIDE == 0 {
+        if k > 0 && options.windows && k % LONG_STRIDE == 0 {
             let side = scene.camera.shorter_side();
             let start = (k + 1).saturating_sub(LONG_WINDOW);
             let held = if start == 0 { 0 } else { LONG_WINDOW / 8 };

@@ -1,17 +1,23 @@
 //! Sampling a frame at the wall samples of a tile.
 
 use super::estimate::FrameEstimate;
-use super::grid::{AREA, TilePoints};
-use crate::camera::Pinhole;
+use super::grid::{Plane, TilePoints, ZERO};
+use crate::camera::{Pinhole, Radial};
 use crate::frames::GreyImage;
 use crate::surface::{lens_jacobian, wall_jacobian};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix2x5, Matrix2x6, Matrix3, Vector3};
 
+/// Added to a float from 0 on, 2²³ rounds it to an integer that stands in the last bits of the sum. Unlike a cast, which
+/// saturates, this is done on whole vectors.
+const INTEGER: f32 = 8_388_608.0;
+
 /// A frame at one pyramid level with its current estimate, ready to be sampled.
 pub struct View<'a> {
     image: &'a GreyImage,
-    camera: Pinhole,
+    /// `fx, fy, cx, cy`.
+    intrinsics: [f32; 4],
+    radial: Radial,
     pose: Pose,
     r_cw: Matrix3<f32>,
     gain: f32,
@@ -24,7 +30,8 @@ impl<'a> View<'a> {
         let r_wc = estimate.pose.r_wc.to_rotation_matrix();
         Self {
             image,
-            camera,
+            intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy].map(|v| v as f32),
+            radial: camera.radial,
             pose: estimate.pose,
             r_cw: r_wc.matrix().transpose().cast(),
             gain: estimate.log_gain.exp() as f32,
@@ -57,43 +64,63 @@ impl<'a> View<'a> {
     /// The wall's values `(I/V − b/V)/a` as this frame shows them, bilinearly interpolated, into `values`; the frame
     /// holds `I/V`, and `shade` is V around the tile. NaN where a pixel next to the sample has no value.
     /// Samples that a step has moved out of the picture repeat its border.
-    pub fn sample(&self, points: &TilePoints, shade: f32, values: &mut [f32; AREA]) {
-        let centre: Vector3<f64> = self.pose.to_camera(&points.centre.x_w);
-        let c: Vector3<f32> = centre.cast();
-        let r = &self.r_cw;
-        let (mut u, mut v) = ([0.0f32; AREA], [0.0f32; AREA]);
-        let mut z = [0.0f32; AREA];
-        for k in 0..AREA {
-            let (dx, dy, dz) = (points.dx[k], points.dy[k], points.dz[k]);
-            u[k] = c.x + r[(0, 0)] * dx + r[(0, 1)] * dy + r[(0, 2)] * dz;
-            v[k] = c.y + r[(1, 0)] * dx + r[(1, 1)] * dy + r[(1, 2)] * dz;
-            z[k] = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
+    #[inline(always)]
+    pub fn sample(&self, points: &TilePoints, shade: f32, values: &mut Plane) {
+        if self.radial.is_none() {
+            self.sample_through::<false>(points, shade, values);
+        } else {
+            self.sample_through::<true>(points, shade, values);
         }
-        self.camera.project_slices(&mut u, &mut v, &z);
-        self.bilinear(&u, &v, self.bias / shade, values);
     }
 
-    fn bilinear(&self, u: &[f32; AREA], v: &[f32; AREA], bias: f32, values: &mut [f32; AREA]) {
+    /// `DISTORTS`: the lens does.
+    #[inline(always)]
+    fn sample_through<const DISTORTS: bool>(
+        &self,
+        points: &TilePoints,
+        shade: f32,
+        values: &mut Plane,
+    ) {
+        let (k1, k2) = (self.radial.k1 as f32, self.radial.k2 as f32);
+        let limit = self.radial.limit() as f32;
+        let c: Vector3<f32> = self.pose.to_camera(&points.centre.x_w).cast();
+        let r = &self.r_cw;
+        let [fx, fy, cx, cy] = self.intrinsics;
         let (width, height) = (self.image.width(), self.image.height());
-        let data = self.image.data();
         let (last_u, last_v) = ((width - 2) as f32, (height - 2) as f32);
-        let inverse_gain = 1.0 / self.gain;
-        let mut index = [0u32; AREA];
-        let (mut fu, mut fv) = ([0.0f32; AREA], [0.0f32; AREA]);
-        for k in 0..AREA {
+        let mut index = [0u32; ZERO.len()];
+        let (mut fu, mut fv) = (ZERO, ZERO);
+        for k in 0..ZERO.len() {
+            let (dx, dy, dz) = (points.dx[k], points.dy[k], points.dz[k]);
+            let x = c.x + r[(0, 0)] * dx + r[(0, 1)] * dy + r[(0, 2)] * dz;
+            let y = c.y + r[(1, 0)] * dx + r[(1, 1)] * dy + r[(1, 2)] * dz;
+            let z = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
+            let inverse = 1.0 / z;
+            let mut scale = inverse;
+            if DISTORTS {
+                let q = ((x * x + y * y) * (inverse * inverse)).min(limit);
+                scale *= 1.0 + q * (k1 + q * k2);
+            }
+            let (u, v) = (fx * x * scale + cx, fy * y * scale + cy);
             // `max` first: a NaN (a sample behind the camera) becomes the first pixel.
-            let x0 = (u[k].max(0.0).min(last_u)) as i32;
-            let y0 = (v[k].max(0.0).min(last_v)) as i32;
-            fu[k] = (u[k] - x0 as f32).clamp(0.0, 1.0);
-            fv[k] = (v[k] - y0 as f32).clamp(0.0, 1.0);
-            index[k] = (y0 * width as i32 + x0) as u32;
+            let x0 = (u - 0.5).max(0.0).min(last_u) + INTEGER;
+            let y0 = (v - 0.5).max(0.0).min(last_v) + INTEGER;
+            fu[k] = (u - (x0 - INTEGER)).clamp(0.0, 1.0);
+            fv[k] = (v - (y0 - INTEGER)).clamp(0.0, 1.0);
+            index[k] = (y0.to_bits() - INTEGER.to_bits()) * width as u32
+                + (x0.to_bits() - INTEGER.to_bits());
         }
-        for k in 0..AREA {
+        let data = self.image.data();
+        let (mut upper, mut lower) = ([[0.0f32; 2]; ZERO.len()], [[0.0f32; 2]; ZERO.len()]);
+        for k in 0..ZERO.len() {
             let top = index[k] as usize;
-            let upper = &data[top..top + 2];
-            let lower = &data[top + width..top + width + 2];
-            let a = upper[0] + fu[k] * (upper[1] - upper[0]);
-            let b = lower[0] + fu[k] * (lower[1] - lower[0]);
+            upper[k].copy_from_slice(&data[top..top + 2]);
+            lower[k].copy_from_slice(&data[top + width..top + width + 2]);
+        }
+        let (inverse_gain, bias) = (1.0 / self.gain, self.bias / shade);
+        for k in 0..ZERO.len() {
+            let a = upper[k][0] + fu[k] * (upper[k][1] - upper[k][0]);
+            let b = lower[k][0] + fu[k] * (lower[k][1] - lower[k][0]);
             values[k] = (a + fv[k] * (b - a) - bias) * inverse_gain;
         }
     }
@@ -102,9 +129,8 @@ impl<'a> View<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Radial;
     use crate::refine::calibration::{Calibration, Kappa, LENS};
-    use crate::refine::grid::{SIDE, TileId, WallGrid};
+    use crate::refine::grid::{AREA, SIDE, TileId, WallGrid};
     use crate::surface::{Circle, Surface, WallPoint};
     use crate::trajectory::so3;
 
@@ -179,11 +205,11 @@ mod tests {
             row: (hit.wall.h_m / height) as i64,
         };
         let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
-        let mut values = [0.0; AREA];
+        let mut values = ZERO;
         let shade = 0.5;
         view.sample(&points, shade, &mut values);
         let centre = grid.centre(tile);
-        for (k, value) in values.iter().enumerate() {
+        for (k, value) in values[..AREA].iter().enumerate() {
             let (i, j) = ((k % SIDE) as f64 - 4.5, (k / SIDE) as f64 - 4.5);
             let wall = WallPoint {
                 s_m: centre.s_m + i * grid.spacing_s_m,

@@ -1,6 +1,6 @@
 //! Which frames see which tiles of the wall.
 
-use super::grid::{SIDE, TileId, WallGrid};
+use super::grid::{BLOCK, SIDE, TileId, WallGrid};
 use crate::camera::Pinhole;
 use crate::frames::Shading;
 use crate::surface::{Footprint, Surface};
@@ -85,47 +85,92 @@ impl Visibility {
         placed: &[Placed],
         rows: &Range<i64>,
     ) -> Self {
-        let seen: Vec<Vec<(TileId, Observer)>> = placed
+        let cells = Cells::over(grid, rows);
+        let fields: Vec<Field> = placed
+            .iter()
+            .map(|frame| Field::of(grid, &frame.footprint, rows))
+            .collect();
+        let corners = cells.corners(surface, &fields);
+        let seen: Vec<Vec<(usize, Observer)>> = placed
             .par_iter()
+            .zip(&fields)
             .enumerate()
-            .map(|(k, frame)| {
-                let mut tiles = tiles_of_frame(surface, grid, camera, shading, frame, rows);
-                tiles.iter_mut().for_each(|(_, o)| o.frame = k as u32);
+            .map(|(k, (frame, field))| {
+                let mut tiles = Vec::new();
+                for tile in cells.of(field) {
+                    if let Some(observer) =
+                        observe(grid, camera, shading, &frame.pose, k, &corners[tile])
+                    {
+                        tiles.push((tile, observer));
+                    }
+                }
                 tiles
             })
             .collect();
-        let mut pairs: Vec<((i64, i64, i64, i64), Observer)> = seen
-            .iter()
-            .flatten()
-            .map(|(tile, observer)| (tile.key(), *observer))
-            .collect();
-        pairs.par_sort_unstable_by_key(|(key, observer)| (*key, observer.frame));
+        // Sorted by counting; the frames come in order.
+        let mut starts = vec![0; cells.count() + 1];
+        for (tile, _) in seen.iter().flatten() {
+            starts[tile + 1] += 1;
+        }
+        for tile in 0..cells.count() {
+            starts[tile + 1] += starts[tile];
+        }
+        let nobody = Observer {
+            frame: 0,
+            pixels: 0.0,
+            shade: 1.0,
+        };
+        let (mut sorted, mut next) = (vec![nobody; starts[cells.count()]], starts.clone());
+        for (tile, observer) in seen.iter().flatten() {
+            sorted[next[*tile]] = *observer;
+            next[*tile] += 1;
+        }
 
         let mut visibility = Self {
             tiles: Vec::new(),
             observers: Vec::new(),
             blocks: Vec::new(),
         };
-        for group in pairs.chunk_by(|a, b| a.0 == b.0) {
-            if group.len() < 2 || !group.iter().any(|(_, o)| placed[o.frame as usize].active) {
+        for tile in 0..cells.count() {
+            let group = &sorted[starts[tile]..starts[tile + 1]];
+            if group.len() < 2 || !group.iter().any(|o| placed[o.frame as usize].active) {
                 continue;
             }
-            let (_, _, row, column) = group[0].0;
             let start = visibility.observers.len();
-            visibility.observers.extend(group.iter().map(|(_, o)| *o));
+            visibility.observers.extend(group);
             visibility.tiles.push(Tile {
-                id: TileId { column, row },
+                id: cells.id(tile),
                 observers: start..visibility.observers.len(),
             });
         }
+        visibility.find_blocks();
+        visibility
+    }
+
+    fn find_blocks(&mut self) {
         let mut start = 0;
-        for run in visibility
-            .tiles
-            .chunk_by(|a, b| a.id.block() == b.id.block())
-        {
-            visibility.blocks.push(start..start + run.len());
+        for run in self.tiles.chunk_by(|a, b| a.id.block() == b.id.block()) {
+            self.blocks.push(start..start + run.len());
             start += run.len();
         }
+    }
+
+    /// Nothing but the tiles `kept`, which are given block by block, ascending.
+    pub fn only(&self, kept: &[Vec<usize>]) -> Self {
+        let mut visibility = Self {
+            tiles: Vec::new(),
+            observers: Vec::new(),
+            blocks: Vec::new(),
+        };
+        for tile in kept.iter().flatten().map(|k| &self.tiles[*k]) {
+            let start = visibility.observers.len();
+            visibility.observers.extend(self.observers(tile));
+            visibility.tiles.push(Tile {
+                id: tile.id,
+                observers: start..visibility.observers.len(),
+            });
+        }
+        visibility.find_blocks();
         visibility
     }
 
@@ -141,59 +186,130 @@ pub fn rows_of(grid: &WallGrid, footprint: &Footprint) -> Range<i64> {
     (footprint.h_min_m / height).floor() as i64..(footprint.h_max_m / height).floor() as i64 + 1
 }
 
-/// The tiles that a frame sees within `rows`, with what it makes of a sample.
-fn tiles_of_frame(
-    surface: &dyn Surface,
+/// All tiles in some rows of the lattice, numbered block by block: neighbours in order are neighbours on the wall.
+struct Cells<'g> {
+    grid: &'g WallGrid,
+    /// First row of blocks.
+    first: i64,
+    /// Rows and columns of blocks.
+    rows: i64,
+    columns: i64,
+}
+
+/// Tiles in a block.
+const CELLS: i64 = BLOCK * BLOCK;
+
+impl<'g> Cells<'g> {
+    fn over(grid: &'g WallGrid, rows: &Range<i64>) -> Self {
+        let first = rows.start.div_euclid(BLOCK);
+        Self {
+            grid,
+            first,
+            rows: (rows.end - 1).div_euclid(BLOCK) + 1 - first,
+            columns: (grid.columns - 1) / BLOCK + 1,
+        }
+    }
+
+    fn count(&self) -> usize {
+        (self.rows * self.columns * CELLS) as usize
+    }
+
+    fn place(&self, tile: TileId) -> usize {
+        let (row, column) = tile.block();
+        let block = (row - self.first) * self.columns + column;
+        let (row, column) = (tile.row.rem_euclid(BLOCK), tile.column.rem_euclid(BLOCK));
+        (block * CELLS + row * BLOCK + column) as usize
+    }
+
+    fn id(&self, place: usize) -> TileId {
+        let (block, within) = (place as i64 / CELLS, place as i64 % CELLS);
+        TileId {
+            column: block % self.columns * BLOCK + within % BLOCK,
+            row: (self.first + block / self.columns) * BLOCK + within / BLOCK,
+        }
+    }
+
+    /// The places of a field's tiles.
+    fn of(&self, field: &Field) -> impl Iterator<Item = usize> {
+        let columns = field.columns.clone();
+        field.rows.clone().flat_map(move |row| {
+            columns.clone().map(move |column| {
+                let column = column.rem_euclid(self.grid.columns);
+                self.place(TileId { column, row })
+            })
+        })
+    }
+
+    /// The corners of all tiles that some frame may see, ring included, row by row; each is computed once for all frames.
+    fn corners(&self, surface: &dyn Surface, fields: &[Field]) -> Vec<[Vector3<f64>; 4]> {
+        let mut wanted = vec![false; self.count()];
+        for tile in fields.iter().flat_map(|field| self.of(field)) {
+            wanted[tile] = true;
+        }
+        let corners = wanted
+            .par_iter()
+            .enumerate()
+            .map_init(Vec::new, |scratch, (k, wanted)| {
+                if *wanted {
+                    self.grid.corners(surface, self.id(k), scratch);
+                }
+                match scratch[..] {
+                    [a, b, c, d] if *wanted => [a, b, c, d],
+                    _ => [Vector3::zeros(); 4],
+                }
+            });
+        corners.collect()
+    }
+}
+
+/// The rows and columns of tiles that a frame may see; columns may go on around the section.
+struct Field {
+    rows: Range<i64>,
+    columns: Range<i64>,
+}
+
+impl Field {
+    fn of(grid: &WallGrid, footprint: &Footprint, rows: &Range<i64>) -> Self {
+        let (width, _) = grid.tile_size_m();
+        let first = (footprint.s_min_m / width).floor() as i64;
+        let last = (footprint.s_max_m / width).floor() as i64;
+        let own = rows_of(grid, footprint);
+        Self {
+            rows: own.start.max(rows.start)..own.end.min(rows.end),
+            columns: first..(last + 1).min(first + grid.columns),
+        }
+    }
+}
+
+/// Frame `frame` at `pose` as an observer of the tile with these corners, if it sees all of it.
+fn observe(
     grid: &WallGrid,
     camera: &Pinhole,
     shading: Option<&Shading>,
-    frame: &Placed,
-    rows: &Range<i64>,
-) -> Vec<(TileId, Observer)> {
-    let Placed {
-        pose, footprint, ..
-    } = frame;
-    let (width, _) = grid.tile_size_m();
-    let first_column = (footprint.s_min_m / width).floor() as i64;
-    let last_column =
-        ((footprint.s_max_m / width).floor() as i64).min(first_column + grid.columns - 1);
-    let own_rows = rows_of(grid, footprint);
+    pose: &Pose,
+    frame: usize,
+    corners: &[Vector3<f64>; 4],
+) -> Option<Observer> {
     let pixel = |x_w: &Vector3<f64>| {
         camera
             .project(&pose.to_camera(x_w))
             .filter(|pixel| camera.sees(pixel, MARGIN_PX))
     };
-    let sample_pixels = grid.density.powi(-2);
-    let mut tiles = Vec::new();
-    let mut corners = Vec::new();
-    for row in own_rows.start.max(rows.start)..own_rows.end.min(rows.end) {
-        for column in first_column..=last_column {
-            let tile = TileId {
-                column: column.rem_euclid(grid.columns),
-                row,
-            };
-            grid.corners(surface, tile, &mut corners);
-            if let [Some(a), Some(b), Some(c), Some(d)] = [0, 1, 2, 3].map(|k| pixel(&corners[k])) {
-                // Half the cross product of the diagonals; the corners come row by row.
-                let area = 0.5 * (d - a).perp(&(c - b)).abs();
-                let pixels = area / SAMPLES_BETWEEN_CORNERS;
-                if pixels < LEAST_PIXELS * sample_pixels {
-                    continue;
-                }
-                let middle = 0.25 * (a + b + c + d);
-                let shade = shading.map_or(1.0, |shading| shading.at_level(&middle, camera));
-                tiles.push((
-                    tile,
-                    Observer {
-                        frame: 0,
-                        pixels: pixels as f32,
-                        shade: shade as f32,
-                    },
-                ));
-            }
-        }
+    let (a, b) = (pixel(&corners[0])?, pixel(&corners[1])?);
+    let (c, d) = (pixel(&corners[2])?, pixel(&corners[3])?);
+    // Half the cross product of the diagonals; the corners come row by row.
+    let area = 0.5 * (d - a).perp(&(c - b)).abs();
+    let pixels = area / SAMPLES_BETWEEN_CORNERS;
+    if pixels < LEAST_PIXELS * grid.density.powi(-2) {
+        return None;
     }
-    tiles
+    let middle = 0.25 * (a + b + c + d);
+    let shade = shading.map_or(1.0, |shading| shading.at_level(&middle, camera));
+    Some(Observer {
+        frame: frame as u32,
+        pixels: pixels as f32,
+        shade: shade as f32,
+    })
 }
 
 #[cfg(test)]

@@ -4,9 +4,7 @@ use super::estimate::FrameEstimate;
 use super::problem::{ProblemError, Scene};
 use super::visibility::reach_m;
 use crate::camera::Pinhole;
-use crate::frames::{
-    GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level, wide_window,
-};
+use crate::frames::{GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level};
 use crate::surface::{Footprint, WallPoint, viewing_distance};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Vector3};
@@ -80,7 +78,7 @@ pub struct Portrait {
     camera: Pinhole,
     level: usize,
     picture: Arc<Pyramid>,
-    local: LocalContrast,
+    local: Arc<LocalContrast>,
 }
 
 impl Portrait {
@@ -90,8 +88,12 @@ impl Portrait {
     /// [`ProblemError::Frame`].
     pub fn new(scene: &Scene, level: usize, frame: usize) -> Result<Self, ProblemError> {
         let picture = scene.frames.get(frame)?;
-        let window = wide_window(picture.level(level));
-        Ok(Self::with_window(scene, level, picture, window))
+        Ok(Self {
+            camera: scene.camera.at_level(level),
+            local: picture.contrast(level),
+            level,
+            picture,
+        })
     }
 
     /// Frame `frame` with its contrast over no more than `window` pixels to each side: fine detail only.
@@ -105,16 +107,12 @@ impl Portrait {
         window: usize,
     ) -> Result<Self, ProblemError> {
         let picture = scene.frames.get(frame)?;
-        Ok(Self::with_window(scene, level, picture, window))
-    }
-
-    fn with_window(scene: &Scene, level: usize, picture: Arc<Pyramid>, window: usize) -> Self {
-        Self {
+        Ok(Self {
             camera: scene.camera.at_level(level),
-            local: local_contrast(picture.level(level), window),
+            local: Arc::new(local_contrast(picture.level(level), window)),
             level,
             picture,
-        }
+        })
     }
 
     /// The camera of the level.
