@@ -44,40 +44,40 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn variants() -> Vec<(&'static str, RefineOptions)> {
     let all = RefineOptions::default();
     vec![
-        ("default", all),
+        ("default", all.clone()),
         (
             "each frame's own gradient instead of the fused one",
             RefineOptions {
                 fused_gradient: false,
-                ..all
+                ..all.clone()
             },
         ),
         (
             "no sliding windows",
             RefineOptions {
                 windows: false,
-                ..all
+                ..all.clone()
             },
         ),
         (
             "no search",
             RefineOptions {
                 search: false,
-                ..all
+                ..all.clone()
             },
         ),
         (
             "last solve with one sample per pixel",
             RefineOptions {
                 final_density: 1.0,
-                ..all
+                ..all.clone()
             },
         ),
         (
             "solves before the last on all of the wall",
             RefineOptions {
                 close_information: 1.0,
-                ..all
+                ..all.clone()
             },
         ),
         (

@@ -188,19 +188,6 @@ mod tests {
     }
 
     #[test]
-    fn slices_are_projected_like_points() {
-        for radial in [Radial::default(), camera().radial] {
-            let camera = Pinhole { radial, ..camera() };
-            let x_c = Vector3::new(0.7, -0.4, 1.5);
-            let (mut x, mut y) = ([x_c.x as f32], [x_c.y as f32]);
-            camera.project_slices(&mut x, &mut y, &[x_c.z as f32]);
-            let pixel = camera.project(&x_c).unwrap();
-            assert!((f64::from(x[0]) - pixel.x).abs() < 1e-3);
-            assert!((f64::from(y[0]) - pixel.y).abs() < 1e-3);
-        }
-    }
-
-    #[test]
     fn a_lens_that_folds_the_picture_has_no_field() {
         let lens = |k1| Pinhole {
             radial: Radial { k1, k2: 0.0 },

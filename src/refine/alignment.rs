@@ -437,6 +437,7 @@ impl Fit {
 mod tests {
     use super::*;
     use crate::frames::FrameCache;
+    use crate::refine::calibration::{Calibration, Kappa};
     use crate::refine::estimate::FrameEstimate;
     use crate::refine::prior::Prior;
     use crate::test_wall::{TestWall, waves};
@@ -463,14 +464,18 @@ mod tests {
         };
         let scene = Scene {
             surface: &wall.circle,
-            camera: &wall.camera,
+            camera: wall.camera,
+            calibration: Calibration::none(&wall.camera),
+            kappa: Kappa::zeros(),
             frames: &frames,
             prior: &prior,
             noise: 0.0,
+            fused_gradient: true,
         };
         let tracked = Tracked {
             estimates: poses.iter().map(|pose| FrameEstimate::at(*pose)).collect(),
             doubts: vec![None; poses.len()],
+            kappa: Kappa::zeros(),
         };
         alignments(&scene, 0, &tracked).unwrap()
     }

@@ -246,7 +246,7 @@ pub fn place(
 pub fn unexplained(likeness: &Likeness, portrait: &Portrait) -> Option<f64> {
     let compared = likeness.samples >= least_samples(portrait) && likeness.correlation() > 0.0;
     let quality = likeness.match_quality().unwrap_or(1.0);
-    compared.then(|| 1.0 - quality * quality)
+    compared.then_some(1.0 - quality * quality)
 }
 
 /// Which placed frames may show wall that `pose` sees, or would see `margin_m` farther.

@@ -182,8 +182,14 @@ mod tests {
     /// A frame whose grey value is a linear function of the pixel: bilinear sampling must return it exactly.
     #[test]
     fn samples_are_where_the_camera_projects_them() {
+        let straight = Pinhole::from_vertical_fov(160, 120, 60f64.to_radians());
+        sampled_where_projected(straight);
+        let radial = Radial { k1: -0.1, k2: 0.02 };
+        sampled_where_projected(Pinhole { radial, ..straight });
+    }
+
+    fn sampled_where_projected(camera: Pinhole) {
         let circle = Circle::new(3.0).unwrap();
-        let camera = Pinhole::from_vertical_fov(160, 120, 60f64.to_radians());
         let data = (0..160 * 120)
             .map(|k| 0.5 * (k % 160) as f32 + 1.5 * (k / 160) as f32)
             .collect();
