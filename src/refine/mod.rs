@@ -42,6 +42,7 @@ mod choice;
 mod consistency;
 mod covariance;
 mod coverage;
+mod denoise;
 mod doubt;
 mod estimate;
 mod examine;

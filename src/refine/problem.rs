@@ -2,6 +2,7 @@
 
 use super::calibration::{Calibration, Kappa, LENS, RADIUS};
 use super::coverage::{Coverage, Pictures};
+use super::denoise::{Denoiser, TextureSpectrum};
 use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
 use super::factor::{FactorError, Symbolic};
 use super::grid::{TilePoints, WallGrid};
@@ -132,8 +133,6 @@ const BATCH: usize = 64;
 const LEAST_ROWS: u32 = 90;
 /// Tiles looked at to estimate the noise.
 const SCALE_TILES: usize = 600;
-/// Share of a block's squared slopes that counts as texture, at least, however noisy they are.
-const LEAST_TEXTURE: f64 = 0.05;
 /// A camera looks no farther than this many radii, when the lattice is laid out.
 const LONGEST_VIEW_RADII: f64 = 3.0;
 /// Factor by which the variance of residuals may be short of the sensor's.
@@ -197,8 +196,8 @@ pub struct Problem<'a> {
     symbolic: Symbolic,
     sigma: f64,
     noise: NoiseModel,
-    /// True if the frames are known to be free of noise.
-    exact: bool,
+    /// Takes the noise from the fused texture for its slopes.
+    denoiser: Option<Denoiser>,
     /// True if the shared unknowns are estimated.
     calibrates: bool,
 }
@@ -293,7 +292,7 @@ impl<'a> Problem<'a> {
                 floor: 1.0,
                 steepness: 0.0,
             },
-            exact: false,
+            denoiser: None,
             calibrates: false,
         };
         problem.estimate_noise()?;
@@ -309,7 +308,7 @@ impl<'a> Problem<'a> {
                 floor: f32::MAX,
                 steepness: 0.0,
             },
-            exact: true,
+            denoiser: None,
             ..self
         }
     }
@@ -391,10 +390,11 @@ impl<'a> Problem<'a> {
         estimates
     }
 
-    /// Reads the noise from the residuals around the plain mean in every few tiles.
+    /// Reads the noise from the residuals around the plain mean in every few tiles, and what is typical of the texture.
     fn estimate_noise(&mut self) -> Result<(), ProblemError> {
         let stride = (self.coverage.tiles / SCALE_TILES).max(1);
         let mut histogram = NoiseHistogram::default();
+        let mut spectrum = TextureSpectrum::default();
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch)?;
             let pictures = self.pictures.of(self.coverage.frames(stretch))?;
@@ -405,6 +405,7 @@ impl<'a> Problem<'a> {
                 .map(|tiles| {
                     let mut work = TileWork::default();
                     let mut histogram = NoiseHistogram::default();
+                    let mut spectrum = TextureSpectrum::default();
                     let mut scratch = Vec::new();
                     for tile in tiles {
                         let points =
@@ -414,14 +415,17 @@ impl<'a> Problem<'a> {
                             #[inline(always)]
                             || {
                                 let seen = observers.iter().map(|o| o.seen(&views));
-                                work.count_residuals(&points, seen, &mut histogram);
+                                work.count_residuals(&points, seen, &mut histogram, &mut spectrum);
                             },
                         );
                     }
-                    histogram
+                    (histogram, spectrum)
                 })
-                .reduce(NoiseHistogram::default, |a, b| a.merge(&b));
-            histogram = histogram.merge(&counted);
+                .collect::<Vec<_>>();
+            for (counted, seen) in &counted {
+                histogram = histogram.merge(counted);
+                spectrum = spectrum.merge(seen);
+            }
         }
         self.noise = histogram.fit();
         // Residuals are a little too small, for S has fitted itself to them; single pictures know the noise better, but
@@ -430,6 +434,11 @@ impl<'a> Problem<'a> {
         let fitted = f64::from(self.noise.floor);
         if single > fitted && single < MOST_UNDERESTIMATE * fitted {
             self.noise.floor = single as f32;
+        }
+        // Before the frames are aligned at full size, residuals are mostly misalignment.
+        if self.sampling.level == 0 && self.held_frames() == 0 {
+            let floor = f64::from(self.noise.floor);
+            self.denoiser = Some(spectrum.denoiser(floor, 1.0 / self.grid.density));
         }
         self.sigma = PIXEL_OVER_SAMPLE * f64::from(self.noise.floor).sqrt();
         Ok(())
@@ -549,28 +558,6 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// How much of the slopes of a block of the wall is texture and not noise: D, by which M becomes `D M D`.
-    ///
-    /// The slopes of S are noisy, and their squares add up where the slopes themselves would cancel: on a wall of low
-    /// contrast H would be several times too stiff, steps too short, and the covariance too small. The noise is known
-    /// once the frames are aligned at full size; before that, residuals are mostly misalignment.
-    ///
-    /// `D_kk² = 1 − noise/M_kk` with both summed over a block of tiles (over a single one, M's own scatter would bias it),
-    /// but no less than [`LEAST_TEXTURE`], so that M stays positive semidefinite.
-    fn texture_share(&self, tiles: &[TileSums]) -> Matrix4<f64> {
-        let mut share = nalgebra::Vector4::repeat(1.0);
-        let fused = self.scene.fused_gradient;
-        if self.sampling.level == 0 && self.held_frames() == 0 && !self.exact && fused {
-            for k in 0..2 {
-                let noise: f64 = tiles.iter().map(|tile| tile.slope_noise[k]).sum();
-                let all: f64 = tiles.iter().map(|tile| tile.features[(k, k)]).sum();
-                let texture = 1.0 - noise / all.max(f64::MIN_POSITIVE);
-                share[k] = texture.max(LEAST_TEXTURE).sqrt();
-            }
-        }
-        Matrix4::from_diagonal(&share)
-    }
-
     fn held_frames(&self) -> usize {
         self.participants.len() - self.active.len()
     }
@@ -662,6 +649,7 @@ impl<'a> Problem<'a> {
                         spacing,
                         &self.noise,
                         self.scene.fused_gradient,
+                        self.denoiser.as_ref(),
                     );
                 },
             );
@@ -688,19 +676,16 @@ impl<'a> Problem<'a> {
             summed.push(TileSums {
                 columns,
                 features: work.features,
-                slope_noise: work.slope_noise,
                 total: total_weight(&work),
             });
         }
-        let share = self.texture_share(&summed);
         wide(
             #[inline(always)]
             || {
                 for tile in &summed {
-                    let features = share * tile.features * share;
-                    sums.add_tile(&tile.columns, &features, tile.total);
+                    sums.add_tile(&tile.columns, &tile.features, tile.total);
                     if let Some(lens) = &mut sums.lens {
-                        lens.add_tile(&tile.columns, &features, tile.total);
+                        lens.add_tile(&tile.columns, &tile.features, tile.total);
                     }
                 }
             },
@@ -801,8 +786,6 @@ struct TileSums {
     columns: Vec<Column>,
     /// M.
     features: Matrix4<f64>,
-    /// What noise has added to its first two diagonal elements.
-    slope_noise: [f64; 2],
     /// Weight of all observers, held ones too.
     total: f64,
 }

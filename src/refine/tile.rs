@@ -24,13 +24,14 @@
 //! - `M = Σ_x p φ φᵀ` (4 × 4), p the sample's share of the information, and the mean weights `w̄_i`: eliminating S leaves
 //!   `H_ij = (w̄_i δ_ij − w̄_i w̄_j / Σ_k w̄_k) B_iᵀ M B_j`.
 //!
-//! M counts the noise of the slopes as if it were texture; [`TileWork::slope_noise`] says how much that is.
+//! The slopes in φ are those of the denoised texture ([`super::denoise`]) once the frames are aligned at full size.
 //!
 //! Where a frame has no value (clipped pixels) its weight is zero, and its cost that of plain noise.
 //!
 //! Rows of the bracket sum to zero, so what moves all frames of a tile alike costs nothing: the gauge
 //! directions are exact null vectors of the data term.
 
+use super::denoise::{Denoiser, TextureSpectrum};
 use super::grid::{LANES, Plane, SIDE, TILE, TilePoints, ZERO};
 use super::robust::{Loss, NoiseHistogram, NoiseModel};
 use super::view::View;
@@ -116,8 +117,6 @@ pub struct TileWork {
     pub features: Matrix4<f64>,
     /// M of each observer's own gradient, if that is asked for.
     pub own_features: Vec<Matrix4<f64>>,
-    /// What the noise of S has added to the first two diagonal elements of `features`, on average.
-    pub slope_noise: [f64; 2],
 }
 
 // Everything here is inlined into its caller, which is compiled for the processor's widest vectors.
@@ -212,20 +211,15 @@ impl TileWork {
         })
     }
 
-    /// Variance of `S(x + 1) − S(x − 1)` by the sensor's noise, grey levels².
-    ///
-    /// With v the variance of a sample, S has `v Σ q²a² / (Σ q a²)²`. Bilinear samples L pixels apart correlate by
-    /// `β(L)/β(0)` with β the cubic B-spline (the autocorrelation of the triangular kernel); the two are 2√q apart.
-    fn slope_variance(&self, noise: &NoiseModel) -> f32 {
-        let (mut square, mut sum, mut pixels) = (0.0f32, 0.0f32, 0.0f32);
+    /// Variance of a sample of S over that of a frame's: `Σ q²a² / (Σ q a²)²`.
+    fn variance(&self) -> f64 {
+        let (mut square, mut sum) = (0.0, 0.0);
         for frame in &self.samples {
-            square += (frame.pixels * frame.gain).powi(2);
-            sum += frame.pixels * frame.gain * frame.gain;
-            pixels += frame.pixels;
+            let (q, a) = (f64::from(frame.pixels), f64::from(frame.gain));
+            square += (q * a).powi(2);
+            sum += q * a * a;
         }
-        let apart = 2.0 * (pixels / self.samples.len().max(1) as f32).sqrt();
-        let correlation = cubic_b_spline(apart) / cubic_b_spline(0.0);
-        noise.floor * square / (sum * sum) * 2.0 * (1.0 - correlation)
+        square / (sum * sum)
     }
 
     /// One step of iteratively reweighted least squares: sets every weight by the residual from `reference`
@@ -261,7 +255,7 @@ impl TileWork {
     /// Fills [`TileWork::observers`] and [`TileWork::features`] for a tile's observers.
     ///
     /// `spacing_m`: distance between samples along s and h; `fused`: the derivative takes the gradient of S, and not each
-    /// frame's own.
+    /// frame's own; `denoiser`: what takes the noise from S for its slopes.
     #[inline(always)]
     pub fn moments<'a>(
         &mut self,
@@ -270,6 +264,7 @@ impl TileWork {
         spacing_m: (f64, f64),
         noise: &NoiseModel,
         fused: bool,
+        denoiser: Option<&Denoiser>,
     ) {
         self.sample(points, observers);
         let precision = self.activity().map(
@@ -282,16 +277,17 @@ impl TileWork {
         }
         let slopes = [spacing_m.0, spacing_m.1].map(|spacing_m| (0.5 / spacing_m) as f32);
         let covered = self.covered();
-        let phi = features(&texture, slopes, &covered);
+        let mut phi = features(&texture, slopes, &covered);
+        if let Some(denoiser) = denoiser {
+            let clean = features(&denoiser.apply(&texture), slopes, &covered);
+            (phi[0], phi[1]) = (clean[0], clean[1]);
+        }
         let mut variance = NO_ROWS;
         for k in 0..NO_ROWS.len() {
             variance[k] = 1.0 / precision[k + SIDE];
         }
         let shares = self.shares();
         self.features = feature_moments(&phi, &shares);
-        let noise_variance = self.slope_variance(noise);
-        self.slope_noise =
-            slopes.map(|slope| SAMPLES as f64 * f64::from(noise_variance * slope * slope));
         self.observers.clear();
         self.own_features.clear();
         for frame in &self.samples {
@@ -338,18 +334,22 @@ impl TileWork {
     }
 
     /// Counts the residuals around the plain mean, each scaled by `√(n/(n−1))` for the share of the mean
-    /// that it has itself made.
+    /// that it has itself made; and the texture, if all of it is known.
     #[inline(always)]
     pub fn count_residuals<'a>(
         &mut self,
         points: &TilePoints,
         observers: impl Iterator<Item = Seen<'a>>,
         histogram: &mut NoiseHistogram,
+        spectrum: &mut TextureSpectrum,
     ) {
         self.sample(points, observers);
         let n = self.samples.len() as f32;
         let scale = (n / (n - 1.0)).sqrt();
         let mean = self.mean();
+        if !self.gaps {
+            spectrum.add(&mean, self.variance());
+        }
         let gains: f32 = self.samples.iter().map(|frame| frame.gain.powi(2)).sum();
         let square_gain = gains / self.samples.len().max(1) as f32;
         // Of the mean: a single frame's gradient would go with its own noise.
@@ -363,15 +363,6 @@ impl TileWork {
                 }
             }
         }
-    }
-}
-
-/// The cubic B-spline β(x), `x ≥ 0`.
-fn cubic_b_spline(x: f32) -> f32 {
-    if x < 1.0 {
-        2.0 / 3.0 - x * x * (1.0 - 0.5 * x)
-    } else {
-        (2.0 - x).max(0.0).powi(3) / 6.0
     }
 }
 
@@ -563,34 +554,39 @@ mod tests {
         };
         for density in [1.0, 2.0] {
             let grid = WallGrid::new(&circle, 3.0 / camera.fy, density);
-            let (mut found, mut expected) = ([0.0; 2], [0.0; 2]);
-            let mut work = TileWork::default();
+            let spacing = (grid.spacing_s_m, grid.spacing_h_m);
             let reach = (4.0 * density) as i64;
-            for row in -reach..reach {
-                for column in -reach..reach {
+            let tiles: Vec<TilePoints> = (-reach..reach)
+                .flat_map(|row| (-reach..reach).map(move |column| (row, column)))
+                .map(|(row, column)| {
                     let column = column.rem_euclid(grid.columns);
-                    let tile = TileId { column, row };
-                    let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
-                    let seen = views.iter().map(|view| Seen {
-                        view,
-                        pixels: (1.0 / (density * density)) as f32,
-                        shade: 1.0,
-                    });
-                    let spacing = (grid.spacing_s_m, grid.spacing_h_m);
-                    work.moments(&points, seen, spacing, &model, true);
-                    for k in 0..2 {
-                        found[k] += work.features[(k, k)];
-                        expected[k] += work.slope_noise[k];
-                    }
+                    TilePoints::new(&grid, &circle, TileId { column, row }, &mut Vec::new())
+                })
+                .collect();
+            let seen = || {
+                views.iter().map(|view| Seen {
+                    view,
+                    pixels: (1.0 / (density * density)) as f32,
+                    shade: 1.0,
+                })
+            };
+            let mut work = TileWork::default();
+            let (mut histogram, mut spectrum) =
+                (NoiseHistogram::default(), TextureSpectrum::default());
+            for points in &tiles {
+                work.count_residuals(points, seen(), &mut histogram, &mut spectrum);
+            }
+            let denoiser = spectrum.denoiser(f64::from(model.floor), 1.0 / density);
+            let mut slopes = |denoiser: Option<&Denoiser>| {
+                let mut sum = 0.0;
+                for points in &tiles {
+                    work.moments(points, seen(), spacing, &model, true, denoiser);
+                    sum += work.features[(0, 0)] + work.features[(1, 1)];
                 }
-            }
-            for k in 0..2 {
-                let ratio = found[k] / expected[k];
-                assert!(
-                    (ratio - 1.0).abs() < 0.1,
-                    "density {density}, axis {k}: {ratio}"
-                );
-            }
+                sum
+            };
+            let left = slopes(Some(&denoiser)) / slopes(None);
+            assert!(left < 0.1, "density {density}: {left}");
         }
     }
 }

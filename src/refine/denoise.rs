@@ -1,0 +1,253 @@
+//! What of the fused texture is texture and not noise.
+//!
+//! The derivative of a residual takes the slopes of the fused texture S, and S is noisy. On a wall of low contrast most
+//! of a slope between neighbouring samples is noise: the score `Σ e φ` then picks up noise times noise. So at full size
+//! slopes are taken of the texture as it most likely is, given what is typical of the wall.
+//!
+//! A tile of S (10 × 10 samples with its ring) is written in polynomials `p_k(s) p_l(h)`, orthonormal on the samples, so
+//! that a ramp is one of them and does not bend at the tile's border. A coefficient `c_kl` has the noise variance
+//! `n_kl = v ν_k ν_l` and, over many tiles of the wall, the mean square `m_kl`. The share
+//!
+//! `W_kl = max(0, 1 − n_kl/m_kl)`
+//!
+//! of its square is texture, and `W_kl c_kl` is the best linear estimate of it. Let `φ̂` be the slopes of what is left: the
+//! mean of `φ̂φ̂ᵀ` is that of `φ̂φᵀ` with the true slopes φ, the derivative of the score; so M needs no correction for
+//! the noise in it.
+//!
+//! v is the variance of a sample of S, and `ν_k = Σ_ij p_k(i) p_k(j) β(|i − j| d)/β(0)`: bilinear samples d pixels apart
+//! correlate so, with β the cubic B-spline (the autocorrelation of the triangular kernel).
+//!
+//! Source: N. Wiener, "Extrapolation, Interpolation, and Smoothing of Stationary Time Series", 1949; J. P. Gram, "Ueber die
+//! Entwickelung reeller Functionen in Reihen mittelst der Methode der kleinsten Quadrate", 1883 (the polynomials).
+
+use super::grid::{Plane, SIDE, ZERO};
+
+type Square<T> = [[T; SIDE]; SIDE];
+
+/// Mean squares of the coefficients over tiles of the wall.
+#[derive(Clone, Debug)]
+pub struct TextureSpectrum {
+    basis: Square<f64>,
+    squares: Square<f64>,
+    /// Sum of the variance of S over that of a sample.
+    variance: f64,
+}
+
+impl Default for TextureSpectrum {
+    fn default() -> Self {
+        Self {
+            basis: polynomials(),
+            squares: [[0.0; SIDE]; SIDE],
+            variance: 0.0,
+        }
+    }
+}
+
+impl TextureSpectrum {
+    /// Counts a tile of S; `variance`: that of a sample of S over that of a frame's.
+    pub fn add(&mut self, texture: &Plane, variance: f64) {
+        let mut along_s = [[0.0; SIDE]; SIDE];
+        for (row, samples) in along_s.iter_mut().zip(texture.chunks_exact(SIDE)) {
+            for (sum, p) in row.iter_mut().zip(&self.basis) {
+                *sum = p.iter().zip(samples).map(|(p, t)| p * f64::from(*t)).sum();
+            }
+        }
+        for (squares, p) in self.squares.iter_mut().zip(&self.basis) {
+            for (k, square) in squares.iter_mut().enumerate() {
+                let c: f64 = p.iter().zip(&along_s).map(|(p, row)| p * row[k]).sum();
+                *square += c * c;
+            }
+        }
+        self.variance += variance;
+    }
+
+    /// Adds the counts of another.
+    pub fn merge(mut self, other: &Self) -> Self {
+        let others = other.squares.iter().flatten();
+        for (a, b) in self.squares.iter_mut().flatten().zip(others) {
+            *a += b;
+        }
+        self.variance += other.variance;
+        self
+    }
+
+    /// The filter for samples with noise of variance `floor` (grey levels²), `spacing_px` pixels apart.
+    pub fn denoiser(&self, floor: f64, spacing_px: f64) -> Denoiser {
+        let correlation = |i: usize, j: usize| {
+            cubic_b_spline(i.abs_diff(j) as f64 * spacing_px) / cubic_b_spline(0.0)
+        };
+        let nu: [f64; SIDE] = std::array::from_fn(|k| {
+            let p = &self.basis[k];
+            let pairs = (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| (i, j)));
+            pairs.map(|(i, j)| p[i] * p[j] * correlation(i, j)).sum()
+        });
+        let v = floor * self.variance;
+        let share = |l: usize, k: usize| {
+            // The mean has no slope.
+            let noise = if k + l == 0 { 0.0 } else { v * nu[k] * nu[l] };
+            (1.0 - noise / self.squares[l][k].max(f64::MIN_POSITIVE)).max(0.0) as f32
+        };
+        Denoiser {
+            basis: self.basis.map(|p| p.map(|v| v as f32)),
+            transposed: std::array::from_fn(|i| std::array::from_fn(|k| self.basis[k][i] as f32)),
+            shares: std::array::from_fn(|l| std::array::from_fn(|k| share(l, k))),
+        }
+    }
+}
+
+/// The Wiener filter of a tile.
+#[derive(Clone, Debug)]
+pub struct Denoiser {
+    /// `p_k(i)`, k the row.
+    basis: Square<f32>,
+    transposed: Square<f32>,
+    /// `W_kl`, l (along h) the row.
+    shares: Square<f32>,
+}
+
+impl Denoiser {
+    /// What of a tile is texture.
+    #[inline(always)]
+    pub fn apply(&self, texture: &Plane) -> Plane {
+        let mut samples = [[0.0f32; SIDE]; SIDE];
+        for (row, samples) in samples.iter_mut().zip(texture.chunks_exact(SIDE)) {
+            row.copy_from_slice(samples);
+        }
+        let mut coefficients = product(&product(&self.basis, &samples), &self.transposed);
+        for (row, shares) in coefficients.iter_mut().zip(&self.shares) {
+            for (c, share) in row.iter_mut().zip(shares) {
+                *c *= share;
+            }
+        }
+        let left = product(&product(&self.transposed, &coefficients), &self.basis);
+        let mut plane = ZERO;
+        for (samples, row) in plane.chunks_exact_mut(SIDE).zip(&left) {
+            samples.copy_from_slice(row);
+        }
+        plane
+    }
+}
+
+#[inline(always)]
+fn product(a: &Square<f32>, b: &Square<f32>) -> Square<f32> {
+    let mut product = [[0.0f32; SIDE]; SIDE];
+    for (sums, a) in product.iter_mut().zip(a) {
+        for (a, b) in a.iter().zip(b) {
+            for (sum, b) in sums.iter_mut().zip(b) {
+                *sum += a * b;
+            }
+        }
+    }
+    product
+}
+
+/// Polynomials of degree 0, 1, … (rows), orthonormal on [`SIDE`] evenly spaced points.
+fn polynomials() -> Square<f64> {
+    let mut basis = [[0.0; SIDE]; SIDE];
+    for k in 0..SIDE {
+        let x = |i: usize| (2 * i) as f64 / (SIDE - 1) as f64 - 1.0;
+        let mut row: [f64; SIDE] = match k {
+            0 => [1.0; SIDE],
+            _ => std::array::from_fn(|i| x(i) * basis[k - 1][i]),
+        };
+        // Twice, for rounding's sake.
+        for _ in 0..2 {
+            for earlier in &basis[..k] {
+                let part: f64 = row.iter().zip(earlier).map(|(a, b)| a * b).sum();
+                row.iter_mut()
+                    .zip(earlier)
+                    .for_each(|(a, b)| *a -= part * b);
+            }
+        }
+        let norm = row.iter().map(|v| v * v).sum::<f64>().sqrt();
+        basis[k] = row.map(|v| v / norm);
+    }
+    basis
+}
+
+/// The cubic B-spline β(x), `x ≥ 0`.
+fn cubic_b_spline(x: f64) -> f64 {
+    if x < 1.0 {
+        2.0 / 3.0 - x * x * (1.0 - 0.5 * x)
+    } else {
+        (2.0 - x).max(0.0).powi(3) / 6.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, Normal};
+
+    #[test]
+    fn the_polynomials_are_orthonormal_and_the_second_is_a_ramp() {
+        let basis = polynomials();
+        for (k, a) in basis.iter().enumerate() {
+            for (l, b) in basis.iter().enumerate() {
+                let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
+                let expected = if k == l { 1.0 } else { 0.0 };
+                assert!((dot - expected).abs() < 1e-12);
+            }
+        }
+        let step = basis[1][1] - basis[1][0];
+        assert!(
+            basis[1]
+                .windows(2)
+                .all(|p| (p[1] - p[0] - step).abs() < 1e-12)
+        );
+    }
+
+    /// Ramps of all slopes in noise that does not correlate: of each filtered tile, the slope is nearer to the truth than of
+    /// the noisy one, and `φ̂²` is on average `φ̂φ`.
+    #[test]
+    fn slopes_are_nearer_to_the_truth_and_their_squares_unbiased() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let (slopes, noise) = (
+            Normal::new(0.0f32, 0.5).unwrap(),
+            Normal::new(0.0f32, 2.0).unwrap(),
+        );
+        let mut spectrum = TextureSpectrum::default();
+        let tiles: Vec<(f32, Plane)> = (0..2000)
+            .map(|_| {
+                let slope = slopes.sample(&mut rng);
+                let mut tile = ZERO;
+                for (k, value) in tile[..SIDE * SIDE].iter_mut().enumerate() {
+                    *value = slope * (k % SIDE) as f32 + noise.sample(&mut rng);
+                }
+                spectrum.add(&tile, 1.0);
+                (slope, tile)
+            })
+            .collect();
+        // Far apart: no correlation.
+        let denoiser = spectrum.denoiser(4.0, 2.0);
+        let (mut before, mut after, mut square, mut product) = (0.0, 0.0, 0.0, 0.0);
+        for (slope, tile) in &tiles {
+            let clean = denoiser.apply(tile);
+            for row in 1..SIDE - 1 {
+                for k in row * SIDE + 1..(row + 1) * SIDE - 1 {
+                    let at = |tile: &Plane| f64::from(0.5 * (tile[k + 1] - tile[k - 1]));
+                    let (truth, noisy, left) = (f64::from(*slope), at(tile), at(&clean));
+                    before += (noisy - truth).powi(2);
+                    after += (left - truth).powi(2);
+                    square += left * left;
+                    product += left * truth;
+                }
+            }
+        }
+        assert!(after < 0.05 * before, "{before} → {after}");
+        assert!((square / product - 1.0).abs() < 0.05, "{square} {product}");
+    }
+
+    #[test]
+    fn without_noise_everything_stays() {
+        let mut tile = ZERO;
+        for (k, value) in tile[..SIDE * SIDE].iter_mut().enumerate() {
+            *value = (7.3 * k as f32).sin() * 50.0;
+        }
+        let mut spectrum = TextureSpectrum::default();
+        spectrum.add(&tile, 1.0);
+        let same = spectrum.denoiser(0.0, 0.5).apply(&tile);
+        assert!(tile.iter().zip(&same).all(|(a, b)| (a - b).abs() < 1e-3));
+    }
+}
