@@ -26,7 +26,7 @@ const STOPPING: Stopping = Stopping {
 /// Correlation of local contrast with the wall, noise aside, that a placed frame must reach.
 const LEAST_QUALITY: f64 = 0.5;
 /// Share of the texture that even the right pose leaves unexplained: blur, interpolation.
-const LEAST_UNEXPLAINED: f64 = 0.05;
+pub const LEAST_UNEXPLAINED: f64 = 0.05;
 /// Correlation from which on a pose is settled and is not looked for any closer.
 const SETTLED: f64 = 0.9;
 /// Closer looks at the most, and half their σ, radians.
@@ -239,7 +239,7 @@ pub fn place(
 pub fn unexplained(likeness: &Likeness, portrait: &Portrait) -> Option<f64> {
     let compared = likeness.samples >= least_samples(portrait) && likeness.correlation() > 0.0;
     let quality = likeness.match_quality().unwrap_or(1.0);
-    compared.then(|| 1.0 - quality * quality)
+    compared.then_some(1.0 - quality * quality)
 }
 
 /// Which placed frames may show wall that `pose` sees, or would see `margin_m` farther.
