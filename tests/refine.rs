@@ -231,3 +231,23 @@ fn a_wrong_prior_costs_one_frame() {
     let px = believed_wall_px(&survey, &out);
     assert!(px < 0.05, "{px}");
 }
+
+/// On a wall that repeats every 0.45 m, with steps of 6° and 9 cm: no frame is a tile off and called sure, and one that the
+/// prior leaves undecided has both poses.
+#[test]
+fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
+    let options = "--wall tiled-brick --frames 24 --size 320x240 --seed 1 \
+                   --rotation-sigma-deg 6 --translation-sigma-m 0.06,0.06,0.09";
+    let dir = repaired(&options.split_whitespace().collect::<Vec<_>>());
+    let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
+    let px = believed_wall_px(&survey, &out);
+    assert!(px < 0.3, "{px}");
+    let report: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    let frames = report["frames"].as_array().unwrap();
+    let ambiguous = frames.iter().filter(|frame| frame["flag"] == "ambiguous");
+    assert!(ambiguous.clone().count() > 0);
+    for frame in ambiguous {
+        assert!(frame["other_pose"]["translation_m"].is_array(), "{frame}");
+    }
+}

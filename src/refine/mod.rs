@@ -13,6 +13,8 @@
 //! | a first look: useless frames, common light, noise | [`examine`] |
 //! | one frame after another, sliding windows | [`track`]; a single frame: [`place`], [`search`] on the fused [`wall`]; again with a better camera: [`retrack`] |
 //! | do overlapping frames show the same? take out, try again | [`consistency`], [`doubt`] |
+//! | displaced pairs at full size, what nothing ties to the rest; unbend and place again | [`alignment`], [`verdict`], [`repair`] |
+//! | walls that repeat | [`repeats`] |
 //! | all frames together, coarse to fine | [`run`](mod@run) |
 //! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
 //! | how sure | [`certainty`], [`covariance`]; how sure it could be at best: [`bound`] |

@@ -26,7 +26,7 @@ const STOPPING: Stopping = Stopping {
 /// Correlation of local contrast with the wall, noise aside, that a placed frame must reach.
 const LEAST_QUALITY: f64 = 0.5;
 /// Share of the texture that even the right pose leaves unexplained: blur, interpolation.
-const LEAST_UNEXPLAINED: f64 = 0.05;
+pub const LEAST_UNEXPLAINED: f64 = 0.05;
 /// Correlation from which on a pose is settled and is not looked for any closer.
 const SETTLED: f64 = 0.9;
 /// Closer looks at the most, and half their σ, radians.

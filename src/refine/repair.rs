@@ -37,7 +37,8 @@ pub fn repair(
     let side = scene.camera.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
     let mut best: Option<Tracked> = None;
-    let mut rivals = Vec::new();
+    // Known for the poses as they are.
+    let mut rivals = None;
     for round in 0..ROUNDS {
         changed |= judge(scene, finest, tracked)?;
         if !changed
@@ -53,8 +54,8 @@ pub fn repair(
         };
         if !changed && placed == 0 {
             let (moved, undecided) = settle_repeats(scene, options, tracked)?;
-            rivals = undecided;
             if !moved || round + 1 == ROUNDS {
+                rivals = Some(undecided);
                 break;
             }
         }
@@ -65,9 +66,12 @@ pub fn repair(
     }
     if let Some(best) = best.filter(|best| believed(best) > believed(tracked)) {
         *tracked = best;
-        (_, rivals) = settle_repeats(scene, options, tracked)?;
+        rivals = None;
     }
-    Ok(rivals)
+    match rivals {
+        Some(rivals) => Ok(rivals),
+        None => Ok(settle_repeats(scene, options, tracked)?.1),
+    }
 }
 
 fn believed(tracked: &Tracked) -> usize {

@@ -10,7 +10,9 @@
 //! been settled by the others.
 
 use super::options::RefineOptions;
-use super::place::{MOST_DEVIATION, Surroundings, UNEXPLAINED, near, unexplained};
+use super::place::{
+    LEAST_UNEXPLAINED, MOST_DEVIATION, Surroundings, UNEXPLAINED, near, unexplained,
+};
 use super::prior::Prior;
 use super::problem::{ProblemError, Scene};
 use super::search::matches;
@@ -21,6 +23,8 @@ use crate::trajectory::{JitterModel, Pose};
 
 /// Difference of log-posteriors from which on one place is believed: odds of 1000 to 1.
 const CLEAR: f64 = 6.9;
+/// Share of the squared correlation that is left, at least, where the shift is known to a whole sample only.
+const LEFT_BY_STEPS: f64 = 0.5;
 /// Motions closer to none than this are none, samples of the search level.
 const APART: f64 = 3.0;
 /// Sweeps over all frames until no choice changes, at the most.
@@ -133,6 +137,7 @@ fn repeats_of(
     let Some(here) = left(&pose) else {
         return Ok(Vec::new());
     };
+    let most = UNEXPLAINED * here.max(LEAST_UNEXPLAINED);
     let gauge = scene.surface.gauge();
     let motion = |[s_m, h_m]: [f64; 2]| GaugeMotion {
         turn_rad: if gauge.turn { s_m / radius_m } else { 0.0 },
@@ -140,13 +145,8 @@ fn repeats_of(
     };
     let spacing = wall.lattice.spacing_m;
     let mut found = Vec::new();
-    for shift_m in matches(
-        &wall,
-        &portrait,
-        &pose,
-        reach_m,
-        (1.0 - UNEXPLAINED * here).max(0.0),
-    ) {
+    let least = LEFT_BY_STEPS * (1.0 - most).max(0.0);
+    for shift_m in matches(&wall, &portrait, &pose, reach_m, least) {
         if shift_m[0].hypot(shift_m[1]) < APART * spacing {
             continue;
         }
@@ -164,7 +164,7 @@ fn repeats_of(
             }
             step *= 0.5;
         }
-        if best.0.is_some_and(|there| there < UNEXPLAINED * here) {
+        if best.0.is_some_and(|there| there < most) {
             found.push(motion(best.1));
         }
     }
