@@ -23,7 +23,7 @@ pub struct RefineArguments {
     /// Folder for the results; made if missing.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-    /// End the last solve with the first step shorter than twice the uncertainty, most often its first: less time.
+    /// End the last solve with the first step shorter than 0.1 px or twice the uncertainty, most often its first: less time.
     #[arg(long)]
     fast: bool,
     /// Steps of each global solve, at the most.

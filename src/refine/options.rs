@@ -56,10 +56,11 @@ impl Default for RefineOptions {
 }
 
 impl RefineOptions {
-    /// For speed: the last solve ends with a step shorter than twice the uncertainty, most often its first. What such a
-    /// step leaves is shorter by as much as Gauss–Newton converges, a small share of the uncertainty.
+    /// For speed: the last solve ends with the first step shorter than a tenth of a pixel or twice the uncertainty, most
+    /// often its first. Gauss–Newton leaves a few hundredths of such a step.
     pub fn fast() -> Self {
         Self {
+            step_tolerance_px: 0.1,
             step_tolerance_sigma: 2.0,
             ..Self::default()
         }
