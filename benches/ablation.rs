@@ -81,7 +81,7 @@ fn variants() -> Vec<(&'static str, RefineOptions)> {
             },
         ),
         (
-            "`--fast`: last solve with two thirds of the information",
+            "`--fast`: last solve most often of a single step",
             RefineOptions::fast(),
         ),
     ]

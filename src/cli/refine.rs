@@ -24,7 +24,7 @@ pub struct RefineArguments {
     /// Folder for the results; made if missing.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-    /// Use only the parts of the wall that tell most in the last solve, two thirds of the information: less time.
+    /// End the last solve with the first step shorter than 0.1 px or twice the uncertainty, most often its first: less time.
     #[arg(long)]
     fast: bool,
     /// Estimate what all frames share, too: focal, centre, distortion, radius, axis, or all, with commas between. How far

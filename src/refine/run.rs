@@ -57,8 +57,9 @@ pub struct Refined {
     pub covariances: Covariances,
 }
 
-/// How much coarser the tolerances of all solves but the last are.
-const CLOSE: f64 = 20.0;
+/// All solves but the last end with a step shorter than this, pixels of their level, or this share of the uncertainty.
+const CLOSE_PX: f64 = 0.01;
+const CLOSE_SIGMA: f64 = 2.0;
 /// Share of a frame's pixels that must overlap other frames for its pose to count as photometric.
 const LEAST_PIXEL_SHARE: f64 = 0.02;
 /// Largest step left of a pose that counts as photometric: pixels on the wall, or multiples of σ if that is more.
@@ -338,7 +339,7 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
     let finest = Sampling {
         level: 0,
         density: options.final_density,
-        information: options.final_information,
+        information: 1.0,
     };
     let first = options.handover_level(side);
     let sampling = move |level| Sampling {
@@ -359,8 +360,8 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
 fn close(options: &RefineOptions, level: usize) -> Stopping {
     Stopping {
         max_iterations: options.max_iterations,
-        step_px: CLOSE * options.step_tolerance_px * 2f64.powi(level as i32),
-        step_sigma: CLOSE * options.step_tolerance_sigma,
+        step_px: CLOSE_PX * 2f64.powi(level as i32),
+        step_sigma: CLOSE_SIGMA,
     }
 }
 
