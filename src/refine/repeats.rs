@@ -20,6 +20,7 @@ use super::track::{FARTHEST, Tracked};
 use super::wall::{FusedWall, Portrait};
 use crate::surface::{Gauge, GaugeMotion};
 use crate::trajectory::{JitterModel, Pose};
+use rayon::prelude::*;
 
 /// Difference of log-posteriors from which on one place is believed: odds of 1000 to 1.
 const CLEAR: f64 = 6.9;
@@ -55,10 +56,10 @@ pub fn settle_repeats(
     let all = 0..tracked.estimates.len();
     let believed = tracked.believed(&all);
     let frames: Vec<usize> = all.filter(|k| believed[*k]).collect();
-    let mut repeats = Vec::with_capacity(frames.len());
-    for k in &frames {
-        repeats.push(repeats_of(scene, options, *k, tracked)?);
-    }
+    let repeats = frames
+        .par_iter()
+        .map(|k| repeats_of(scene, options, *k, tracked))
+        .collect::<Result<Vec<_>, _>>()?;
     if repeats.iter().all(Vec::is_empty) {
         return Ok((false, Vec::new()));
     }
