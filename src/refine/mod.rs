@@ -28,8 +28,8 @@
 //!
 //! - The work on a tile is loops over whole vectors ([`tile`], [`view`]), compiled for several processors, the one at
 //!   hand chosen when it runs; sums keep their order, so results stay the same.
-//! - The last solve looks at the wall twice a pixel; those before it at the parts that tell most ([`choice`]). With
-//!   `--fast` the last takes a single step, if it is short.
+//! - The last solve looks at the wall twice a pixel along each axis; those before it at the parts that tell most
+//!   ([`choice`]). With `--fast` the last takes a single step, if it is short.
 //! - Each linearisation serves twice: its cost judges the step that led there, its equations make the next. The last step
 //!   of a solve is within its tolerance and is not judged ([`gauss_newton`]).
 //! - Where a tile's corners are is computed once for all frames ([`visibility`]), local contrast once for a picture.
