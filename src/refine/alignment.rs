@@ -63,6 +63,9 @@ pub struct Alignment {
     pub error_px: f64,
     /// σ, likewise; infinite where the texture is too faint to tell.
     pub sigma_px: f64,
+    /// Correlation of their grey values at the poses as they are, all samples alike: no robust weight hides that two frames
+    /// show different things.
+    pub correlation: f64,
 }
 
 /// Measures how all believed frames that overlap are aligned; `finest` is the finest level that tracking uses.
@@ -299,7 +302,11 @@ impl Template {
             let first = *first.get_or_insert(alignment);
             let lost = fit.rms(&p) > MOST_PX;
             let ended = !lost && moved < 10.0 * LAST_STEP_PX;
-            result = Some(if ended { alignment } else { first });
+            let known = if ended { alignment } else { first };
+            result = Some(Alignment {
+                correlation: first.correlation,
+                ..known
+            });
             if lost || moved < LAST_STEP_PX {
                 break;
             }
@@ -329,6 +336,20 @@ fn line(seen: &[(&Sample, f32)]) -> (f64, f64) {
     (gain, (y - gain * x) / n)
 }
 
+/// Correlation of grey values, −1 to 1.
+fn correlation(seen: &[(&Sample, f32)]) -> f64 {
+    let mut m = [0.0f64; 6];
+    for (sample, value) in seen {
+        let (x, y) = (f64::from(sample.grey), f64::from(*value));
+        for (sum, term) in m.iter_mut().zip([1.0, x, y, x * x, y * y, x * y]) {
+            *sum += term;
+        }
+    }
+    let [n, x, y, xx, yy, xy] = m;
+    let spread = (xx - x * x / n) * (yy - y * y / n);
+    (xy - x * y / n) / spread.sqrt().max(f64::MIN_POSITIVE)
+}
+
 /// Normal equations of one step: displacement field, gain, bias.
 struct Fit {
     n: SMatrix<f64, 8, 8>,
@@ -336,6 +357,7 @@ struct Fit {
     /// `Σ x xᵀ / Σ 1` of the regressors.
     w: Matrix3<f64>,
     samples: f64,
+    correlation: f64,
     /// False if the slopes are mostly noise.
     textured: bool,
 }
@@ -388,6 +410,7 @@ impl Fit {
             right,
             w: w / seen.len() as f64,
             samples: seen.len() as f64,
+            correlation: correlation(seen),
             textured,
         }
     }
@@ -429,6 +452,7 @@ impl Fit {
             samples: self.samples,
             error_px: scale * self.rms(p),
             sigma_px: scale * (variance * noise).sqrt(),
+            correlation: self.correlation,
         }
     }
 }

@@ -6,6 +6,7 @@
 //! then.
 
 use super::alignment::alignments;
+use super::consistency::{compare_pairs, contradictions};
 use super::doubt::Doubt;
 use super::options::RefineOptions;
 use super::problem::{ProblemError, Scene};
@@ -40,7 +41,13 @@ pub fn repair(
     // Known for the poses as they are.
     let mut rivals = None;
     for round in 0..ROUNDS {
-        changed |= judge(scene, finest, tracked)?;
+        // The first time the pairs have been compared already.
+        if round > 0 {
+            let pairs = compare_pairs(scene, finest, tracked)?;
+            changed |= take_out(contradictions(&pairs, tracked.doubts.len()), tracked);
+        }
+        let displaced = unsupported(&alignments(scene, finest, tracked)?, tracked.doubts.len());
+        changed |= take_out(displaced, tracked);
         if !changed
             && best
                 .as_ref()
@@ -82,13 +89,11 @@ fn believed(tracked: &Tracked) -> usize {
         .count()
 }
 
-/// Doubts the frames that are not borne out; true if there are any.
-fn judge(scene: &Scene, finest: usize, tracked: &mut Tracked) -> Result<bool, ProblemError> {
-    let found: Vec<(usize, Doubt)> =
-        unsupported(&alignments(scene, finest, tracked)?, tracked.doubts.len());
+/// Doubts the frames found wrong; true if there are any.
+fn take_out(found: Vec<(usize, Doubt)>, tracked: &mut Tracked) -> bool {
     let any = !found.is_empty();
     for (frame, doubt) in found {
         tracked.doubts[frame] = Some(doubt);
     }
-    Ok(any)
+    any
 }

@@ -13,6 +13,8 @@ const TOLERANCE_PX: f64 = 0.5;
 const TIMES_USUAL: f64 = 4.0;
 /// z: a pair that is aligned to the tolerance is called misaligned about once in a million.
 const SURE: f64 = 5.0;
+/// Correlation below which two frames, sharp enough to be measured, do not show the same.
+const LEAST_CORRELATION: f64 = 0.3;
 /// σ of a displacement, pixels, up to which a pair ties its frames to each other.
 const TIED_PX: f64 = 1.0;
 
@@ -72,7 +74,8 @@ pub fn unsupported(alignments: &[Alignment], frames: usize) -> Vec<(usize, Doubt
 }
 
 fn misaligned(pair: &Alignment, most_px: f64) -> bool {
-    pair.error_px > most_px + SURE * pair.sigma_px
+    let different = pair.sigma_px.is_finite() && pair.correlation < LEAST_CORRELATION;
+    different || pair.error_px > most_px + SURE * pair.sigma_px
 }
 
 /// The alignment error that is borne, pixels.
@@ -111,6 +114,7 @@ mod tests {
             samples: 100.0,
             error_px,
             sigma_px: 0.03,
+            correlation: 0.9,
         }
     }
 
@@ -160,6 +164,18 @@ mod tests {
         assert_eq!(unsupported(&pairs, 9).len(), 4);
         pairs.push(pair(2, 4, 0.1));
         assert!(unsupported(&pairs, 9).is_empty());
+    }
+
+    /// A robust fit of two different things may end anywhere, near none too.
+    #[test]
+    fn frames_that_show_different_things_are_not_aligned() {
+        let mut pairs = chain(0..4);
+        pairs.extend(chain(4..9));
+        let mut chance = pair(3, 4, 0.1);
+        chance.correlation = 0.1;
+        pairs.push(chance);
+        let doubted = unsupported(&pairs, 9);
+        assert!((0..4).all(|k| doubted.iter().any(|(frame, _)| *frame == k)));
     }
 
     #[test]
