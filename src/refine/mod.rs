@@ -20,9 +20,9 @@
 //! | how sure | [`certainty`], [`covariance`]; how sure it could be at best: [`bound`] |
 //!
 //! Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`], [`coverage`]
-//! and [`choice`] choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, [`problem`] reduces
+//! and [`choice`] choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, with the slopes of S as
+//! [`denoise`] finds them, [`problem`] reduces
 //! to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
-
 //!
 //! # Speed
 //!

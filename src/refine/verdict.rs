@@ -170,11 +170,11 @@ mod tests {
     #[test]
     fn frames_that_show_different_things_are_not_aligned() {
         let mut pairs = chain(0..4);
-        pairs.extend(chain(4..9));
+        pairs.extend(chain(4..11));
         let mut chance = pair(3, 4, 0.1);
         chance.correlation = 0.1;
         pairs.push(chance);
-        let doubted = unsupported(&pairs, 9);
+        let doubted = unsupported(&pairs, 11);
         assert!((0..4).all(|k| doubted.iter().any(|(frame, _)| *frame == k)));
     }
 
