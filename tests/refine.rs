@@ -168,6 +168,19 @@ fn uneven_light_glints_and_moving_things_do_no_harm() {
     assert!(px < 0.15, "{px}");
 }
 
+/// The same light on concrete, whose contrast is 3 to 4 grey levels: what the light leaves is steeper than the wall.
+#[test]
+fn hard_light_does_no_harm_on_a_faint_wall() {
+    let light = "--frames 48 --wall concrete --gain-percent 30 --lamp-corner 0.4 --specular-percent 3 --seed 2";
+    let dir = repaired(&light.split_whitespace().collect::<Vec<_>>());
+    let out = dir.path().join("out");
+    let px = believed_wall_px(&dir.path().join("survey"), &out);
+    assert!(px < 0.15, "{px}");
+    let report: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    assert_eq!(report["frames_on_prior"], 0);
+}
+
 /// Bad frames are named with the reason, and the others are as exact as without them.
 #[test]
 fn bad_frames_are_flagged_and_the_rest_stays_exact() {

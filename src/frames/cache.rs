@@ -3,7 +3,7 @@
 use super::{FrameError, FrameFile, Pyramid, Shading, load_grey};
 use crate::camera::Pinhole;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 /// The grey pyramids of a survey's frames: decoded when first asked for, kept while there is room.
 ///
@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub struct FrameCache {
     source: Source,
     levels: usize,
-    shading: Option<Shading>,
+    shading: RwLock<Option<Arc<Shading>>>,
     room: usize,
     shelf: Mutex<Shelf>,
 }
@@ -38,7 +38,7 @@ impl FrameCache {
         Self {
             source: Source::Files(files.to_vec(), *camera),
             levels,
-            shading: None,
+            shading: RwLock::default(),
             room: (bytes / each).max(1),
             shelf: Mutex::default(),
         }
@@ -49,7 +49,7 @@ impl FrameCache {
         Self {
             source: Source::Memory(pyramids.into_iter().map(Arc::new).collect()),
             levels: 1,
-            shading: None,
+            shading: RwLock::default(),
             room: 1,
             shelf: Mutex::default(),
         }
@@ -64,13 +64,15 @@ impl FrameCache {
     }
 
     /// The shading that frames are divided by.
-    pub fn shading(&self) -> Option<&Shading> {
-        self.shading.as_ref()
+    pub fn shading(&self) -> Option<Arc<Shading>> {
+        let shading = self.shading.read();
+        shading.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
     /// From now on, frames are divided by `shading`. What was kept is dropped.
-    pub fn set_shading(&mut self, shading: Option<Shading>) {
-        self.shading = shading;
+    pub fn set_shading(&self, shading: Shading) {
+        let mut present = self.shading.write().unwrap_or_else(PoisonError::into_inner);
+        *present = Some(Arc::new(shading));
         self.shelf().kept.clear();
     }
 
@@ -94,7 +96,7 @@ impl FrameCache {
         }
         // Decoded without the lock; if two threads do the same frame at once, one result is dropped.
         let mut image = load_grey(&files[frame], camera.width, camera.height)?;
-        if let Some(shading) = &self.shading {
+        if let Some(shading) = self.shading() {
             shading.divide(&mut image);
         }
         let pyramid = Arc::new(Pyramid::new(image, self.levels));

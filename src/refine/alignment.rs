@@ -16,10 +16,11 @@
 //! 1981.
 
 use super::problem::{ProblemError, Scene};
-use super::robust::Loss;
+use super::robust::{Loss, robust_correlation};
+use super::sampler::Sampler;
 use super::track::Tracked;
 use super::visibility::reach_m;
-use super::wall::{Lattice, Sampler, pixel_m};
+use super::wall::{Lattice, pixel_m};
 use crate::camera::Pinhole;
 use crate::frames::{Pyramid, noise_at_level};
 use crate::surface::{Footprint, WallPoint};
@@ -31,7 +32,7 @@ use std::sync::Arc;
 /// Pyramid level at which displacements are measured: small against a brick's edge, and half the noise of full size.
 const LEVEL: usize = 1;
 /// Every how many pixels of it a sample is taken, along each axis.
-const STRIDE: f64 = 3.0;
+const STRIDE: f64 = 4.0;
 /// Gauss–Newton steps.
 const STEPS: usize = 8;
 /// How far apart in the survey frames are compared.
@@ -45,8 +46,12 @@ const LEAST_OVERLAP: f64 = 0.02;
 const MOST_PX: f64 = 8.0;
 /// Share of the squared slopes that must be texture and not noise: with less, N is chance.
 const LEAST_TEXTURE: f64 = 0.3;
-/// A step shorter than this, pixels of the level, is the last; one longer than ten times this is no end.
-const LAST_STEP_PX: f64 = 0.01;
+/// Squared slope, over the median one, from which on a sample's influence no longer grows.
+const STEEPEST: f32 = 10.0;
+/// Samples along the side of a patch: larger than most glints.
+const PATCH: usize = 4;
+/// A step shorter than this, pixels of the level, is the last; one longer than three times this is no end.
+const LAST_STEP_PX: f64 = 0.03;
 /// Noise of the residuals that is assumed at least, grey levels: rounding.
 const LEAST_SIGMA: f32 = 0.3;
 
@@ -155,13 +160,11 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    fn sampler(&self, origin: &Vector3<f64>) -> Sampler<'_> {
-        Sampler::new(
-            self.picture.level(self.level),
-            self.camera,
-            self.pose,
-            origin,
-        )
+    /// The frame's grey values at wall points relative to `origin`.
+    fn greys(&self, origin: &Vector3<f64>) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
+        let sampler = Sampler::new(self.camera, self.pose, origin);
+        let image = self.picture.level(self.level);
+        move |point| sampler.at(point)?.known(image)
     }
 }
 
@@ -177,12 +180,18 @@ struct Sample {
     grey: f32,
     /// Slope along s and h, grey levels per pixel.
     slope: [f32; 2],
+    /// Weight that bounds its influence.
+    bound: f32,
+    /// The patch of neighbouring samples it belongs to.
+    patch: usize,
 }
 
 /// A frame on the wall, ready to be compared with others.
 struct Template {
     origin: Vector3<f64>,
     samples: Vec<Sample>,
+    /// Patches that they are counted by.
+    patches: usize,
     /// A pixel of the level on the wall, metres.
     pixel_m: f64,
     /// Pixels of full size per pixel of the level.
@@ -202,13 +211,14 @@ impl Template {
             h_m: 0.5 * (footprint.h_min_m + footprint.h_max_m),
         };
         let origin = scene.surface.frame(middle).x_w;
-        let sampler = look.sampler(&origin);
+        let grey = look.greys(&origin);
         let mut samples = Vec::new();
         let half = [
             0.5 * (footprint.s_max_m - footprint.s_min_m),
             0.5 * (footprint.h_max_m - footprint.h_min_m),
         ];
         let [width, height] = half.map(|half| half.max(pixel_m));
+        let patch_columns = lattice.columns.div_ceil(PATCH);
         for row in 0..lattice.rows {
             for column in 0..lattice.columns {
                 let wall = WallPoint {
@@ -220,9 +230,9 @@ impl Template {
                 let (e_s, e_h): ([f32; 3], [f32; 3]) =
                     (frame.e_s.cast().into(), frame.e_h.cast().into());
                 let step = pixel_m as f32;
-                let at = |ds: f32, dh: f32| sampler.at(&moved(&point, &e_s, &e_h, ds, dh));
-                let (Some(grey), Some(left), Some(right), Some(up), Some(down)) = (
-                    sampler.at(&point),
+                let at = |ds: f32, dh: f32| grey(&moved(&point, &e_s, &e_h, ds, dh));
+                let (Some(value), Some(left), Some(right), Some(up), Some(down)) = (
+                    grey(&point),
                     at(-step, 0.0),
                     at(step, 0.0),
                     at(0.0, -step),
@@ -240,15 +250,19 @@ impl Template {
                     e_s,
                     e_h,
                     x,
-                    grey,
+                    grey: value,
                     slope: [0.5 * (right - left), 0.5 * (down - up)],
+                    bound: 1.0,
+                    patch: row / PATCH * patch_columns + column / PATCH,
                 });
             }
         }
+        bound_influence(&mut samples);
         let noise = scene.noise * scene.noise * noise_at_level(look.level);
         Self {
             origin,
             samples,
+            patches: lattice.rows.div_ceil(PATCH) * patch_columns,
             pixel_m,
             scale: f64::from(1u32 << look.level),
             slope_noise: 0.5 * noise,
@@ -258,7 +272,7 @@ impl Template {
 
     /// The displacement of another frame; none if the two share too little.
     fn align(&self, other: &Look) -> Option<Alignment> {
-        let sampler = other.sampler(&self.origin);
+        let grey = other.greys(&self.origin);
         let mut p = Vector6::<f64>::zeros();
         let mut exposure: Option<(f64, f64)> = None;
         let mut first = None;
@@ -271,7 +285,7 @@ impl Template {
                 let ds = field[0] * x[0] + field[1] * x[1] + field[2] * x[2];
                 let dh = field[3] * x[0] + field[4] * x[1] + field[5] * x[2];
                 let point = moved(&sample.point, &sample.e_s, &sample.e_h, ds, dh);
-                if let Some(value) = sampler.at(&point) {
+                if let Some(value) = grey(&point) {
                     seen.push((sample, value));
                 }
             }
@@ -290,7 +304,7 @@ impl Template {
                 .powi(2)
                 .max(2.0 * self.noise)
                 .max(LEAST_SIGMA * LEAST_SIGMA);
-            let fit = Fit::new(&seen, gain, bias, variance, self.slope_noise);
+            let fit = Fit::new(self, &seen, gain, bias, variance);
             let Some(step) = fit.step() else {
                 return Some(fit.silent(self.scale));
             };
@@ -301,7 +315,7 @@ impl Template {
             // Where the steps lead nowhere, the first is what is known: small where the poses are right.
             let first = *first.get_or_insert(alignment);
             let lost = fit.rms(&p) > MOST_PX;
-            let ended = !lost && moved < 10.0 * LAST_STEP_PX;
+            let ended = !lost && moved < 3.0 * LAST_STEP_PX;
             let known = if ended { alignment } else { first };
             result = Some(Alignment {
                 correlation: first.correlation,
@@ -312,6 +326,21 @@ impl Template {
             }
         }
         result
+    }
+}
+
+/// Gives samples steeper than most a weight such that none has more influence than `√STEEPEST` times the usual.
+fn bound_influence(samples: &mut [Sample]) {
+    let square = |sample: &Sample| sample.slope[0].powi(2) + sample.slope[1].powi(2);
+    let mut squares: Vec<f32> = samples.iter().map(square).collect();
+    if squares.is_empty() {
+        return;
+    }
+    let middle = squares.len() / 2;
+    let (_, median, _) = squares.select_nth_unstable_by(middle, f32::total_cmp);
+    let most = STEEPEST * *median;
+    for sample in samples {
+        sample.bound = (most / square(sample).max(most)).min(1.0);
     }
 }
 
@@ -336,24 +365,29 @@ fn line(seen: &[(&Sample, f32)]) -> (f64, f64) {
     (gain, (y - gain * x) / n)
 }
 
-/// Correlation of grey values, −1 to 1.
+/// Correlation of grey values, −1 to 1: of all samples or of most, whichever is greater. Glints outweigh a faint wall in
+/// the former; where most of the wall is flat, the latter is that of noise.
 fn correlation(seen: &[(&Sample, f32)]) -> f64 {
+    let pairs: Vec<(f32, f32)> = seen.iter().map(|(s, value)| (s.grey, *value)).collect();
     let mut m = [0.0f64; 6];
-    for (sample, value) in seen {
-        let (x, y) = (f64::from(sample.grey), f64::from(*value));
+    for (x, y) in &pairs {
+        let (x, y) = (f64::from(*x), f64::from(*y));
         for (sum, term) in m.iter_mut().zip([1.0, x, y, x * x, y * y, x * y]) {
             *sum += term;
         }
     }
     let [n, x, y, xx, yy, xy] = m;
     let spread = (xx - x * x / n) * (yy - y * y / n);
-    (xy - x * y / n) / spread.sqrt().max(f64::MIN_POSITIVE)
+    let of_all = (xy - x * y / n) / spread.sqrt().max(f64::MIN_POSITIVE);
+    of_all.max(robust_correlation(&pairs))
 }
 
 /// Normal equations of one step: displacement field, gain, bias.
 struct Fit {
     n: SMatrix<f64, 8, 8>,
     right: SVector<f64, 8>,
+    /// Scatter of the scores `Σ g gᵀ`, g the part of a patch in the right side.
+    scatter: SMatrix<f64, 8, 8>,
     /// `Σ x xᵀ / Σ 1` of the regressors.
     w: Matrix3<f64>,
     samples: f64,
@@ -363,7 +397,14 @@ struct Fit {
 }
 
 impl Fit {
-    fn new(seen: &[(&Sample, f32)], gain: f64, bias: f64, variance: f32, slope_noise: f64) -> Self {
+    fn new(
+        template: &Template,
+        seen: &[(&Sample, f32)],
+        gain: f64,
+        bias: f64,
+        variance: f32,
+    ) -> Self {
+        let mut scores = vec![SVector::<f64, 8>::zeros(); template.patches];
         let mut n = SMatrix::<f64, 8, 8>::zeros();
         let mut right = SVector::<f64, 8>::zeros();
         let mut w = Matrix3::<f64>::zeros();
@@ -371,7 +412,7 @@ impl Fit {
         let (gain32, bias32) = (gain as f32, bias as f32);
         for (sample, value) in seen {
             let e = value - (gain32 * sample.grey + bias32);
-            let omega = Loss::weight(e * e, 1.0 / variance);
+            let omega = sample.bound * Loss::weight(e * e, 1.0 / variance);
             let x = sample.x;
             let regressors = Vector3::from(x.map(f64::from));
             let outer = regressors * regressors.transpose();
@@ -390,9 +431,15 @@ impl Fit {
             ]);
             let omega = f64::from(omega);
             n += omega * row * row.transpose();
-            right += omega * f64::from(e) * row;
+            scores[sample.patch] += omega * f64::from(e) * row;
             weighted += omega * outer;
         }
+        let mut scatter = SMatrix::<f64, 8, 8>::zeros();
+        for score in &scores {
+            right += score;
+            scatter += score * score.transpose();
+        }
+        let slope_noise = template.slope_noise;
         let noise = gain * gain * slope_noise * weighted[(0, 0)];
         let textured = [0, 3].iter().all(|k| {
             let all: f64 = n[(*k, *k)];
@@ -408,6 +455,7 @@ impl Fit {
         Self {
             n,
             right,
+            scatter,
             w: w / seen.len() as f64,
             samples: seen.len() as f64,
             correlation: correlation(seen),
@@ -441,17 +489,21 @@ impl Fit {
     }
 
     fn alignment(&self, p: &Vector6<f64>, scale: f64, variance: f64) -> Alignment {
-        let inverse = self.n.cholesky().map(|c| c.inverse());
-        let noise = inverse.map_or(f64::INFINITY, |z| {
-            let along = z.fixed_view::<3, 3>(0, 0).component_mul(&self.w).sum();
-            along + z.fixed_view::<3, 3>(3, 3).component_mul(&self.w).sum()
+        let square = |covariance: &SMatrix<f64, 8, 8>| {
+            let of = |k| covariance.fixed_view::<3, 3>(k, k).component_mul(&self.w);
+            of(0).sum() + of(3).sum()
+        };
+        let square = self.n.cholesky().map_or(f64::INFINITY, |n| {
+            let inverse = n.inverse();
+            let sandwich = inverse * self.scatter * inverse;
+            square(&(variance * inverse)).max(square(&sandwich))
         });
         Alignment {
             a: 0,
             b: 0,
             samples: self.samples,
             error_px: scale * self.rms(p),
-            sigma_px: scale * (variance * noise).sqrt(),
+            sigma_px: scale * square.sqrt(),
             correlation: self.correlation,
         }
     }

@@ -7,6 +7,7 @@
 
 use super::doubt::Doubt;
 use super::problem::{ProblemError, Scene};
+use super::robust::robust_correlation;
 use super::track::Tracked;
 use super::visibility::reach_m;
 use super::wall::{Lattice, Likeness, Portrait, pixel_m};
@@ -206,15 +207,13 @@ fn compare(
     let points = lattice.points(scene);
     let origin = points[points.len() / 2];
     let gain = |k: usize| tracked.estimates[k].log_gain.exp();
-    let (contrast, detail) = (own.contrast(pose, &origin), own.detail(pose, &origin));
-    let noise = own.noise(scene, pose, &origin);
-    let seen: Vec<([f32; 3], [f32; 3])> = points
+    let gaze = own.at(scene, pose, &origin);
+    let seen: Vec<([f32; 3], (f32, f32, f32))> = points
         .iter()
         .filter_map(|x_w| {
             let offset = x_w - origin;
             let point = [offset.x as f32, offset.y as f32, offset.z as f32];
-            let values = [contrast.at(&point)?, noise.at(&point)?, detail.at(&point)?];
-            Some((point, values))
+            Some((point, gaze.contrast_and_detail(&point)?))
         })
         .collect();
     let least = LEAST_OVERLAP * seen.len() as f64;
@@ -223,16 +222,14 @@ fn compare(
         .filter_map(|b| {
             let portrait = portraits.get(b)?;
             let pose = &tracked.estimates[*b].pose;
-            let contrast = portrait.contrast(pose, &origin);
-            let detail = portrait.detail(pose, &origin);
-            let noise = portrait.noise(scene, pose, &origin);
+            let gaze = portrait.at(scene, pose, &origin);
             let mut likeness = Likeness::default();
             let (mut own_detail, mut other_detail) = (0.0f64, 0.0f64);
-            for (point, [x, noise_x, own]) in &seen {
-                if let (Some(y), Some(noise_y), Some(other)) =
-                    (contrast.at(point), noise.at(point), detail.at(point))
-                {
+            let mut shared = Vec::with_capacity(seen.len());
+            for (point, (x, noise_x, own)) in &seen {
+                if let Some((y, noise_y, other)) = gaze.contrast_and_detail(point) {
                     likeness.add((*x, *noise_x), (y, noise_y));
+                    shared.push((*x, y));
                     own_detail += f64::from(*own).powi(2);
                     other_detail += f64::from(other).powi(2);
                 }
@@ -242,11 +239,22 @@ fn compare(
                 a,
                 b: *b,
                 samples: likeness.samples,
-                quality: likeness.match_quality(),
+                quality: quality(&likeness, &shared),
                 sharpness: exposure * exposure * own_detail / other_detail.max(f64::MIN_POSITIVE),
             })
         })
         .collect()
+}
+
+/// Correlation of the textures behind the noise, of all samples or of most, whichever is greater: a few glints
+/// outweigh a faint wall.
+fn quality(likeness: &Likeness, shared: &[(f32, f32)]) -> Option<f64> {
+    let of_all = likeness.match_quality()?;
+    if of_all > LEAST_FINE_QUALITY {
+        return Some(of_all);
+    }
+    let of_most = robust_correlation(shared) / likeness.texture();
+    Some(of_all.max(of_most.min(1.0)))
 }
 
 /// The frames that contradict the rest, worst first.

@@ -5,6 +5,7 @@
 
 use super::choice::most_informative;
 use super::estimate::FrameEstimate;
+use super::foreign::Marks;
 use super::grid::{BLOCK, WallGrid};
 use super::view::View;
 use super::visibility::{Placed, Visibility, rows_of};
@@ -65,6 +66,8 @@ pub struct Coverage<'a> {
     placed: Vec<Option<Placed>>,
     stretches: Vec<Stretch>,
     kept: Vec<Option<Visibility>>,
+    /// Which observers are left out, stretch by stretch; empty where none is.
+    left_out: Vec<Marks>,
     /// Number of tiles that are compared.
     pub tiles: usize,
     /// Number of tiles there are.
@@ -96,6 +99,7 @@ impl<'a> Coverage<'a> {
             information,
             placed,
             kept: Vec::new(),
+            left_out: Vec::new(),
             tiles: 0,
             all_tiles: 0,
             pairs: Vec::new(),
@@ -116,6 +120,11 @@ impl<'a> Coverage<'a> {
         Ok(coverage)
     }
 
+    /// Which participants are compared.
+    pub fn compared(&self) -> Vec<bool> {
+        self.placed.iter().map(Option::is_some).collect()
+    }
+
     /// Number of stretches.
     pub fn len(&self) -> usize {
         self.stretches.len()
@@ -133,8 +142,24 @@ impl<'a> Coverage<'a> {
     pub fn visibility(&self, stretch: usize) -> Result<Cow<'_, Visibility>, FrameError> {
         Ok(match &self.kept[stretch] {
             Some(visibility) => Cow::Borrowed(visibility),
-            None => Cow::Owned(self.find(stretch)?.0),
+            None => {
+                let all = self.find(stretch)?.0;
+                Cow::Owned(match self.left_out.get(stretch) {
+                    Some(marks) => all.without(marks),
+                    None => all,
+                })
+            }
         })
+    }
+
+    /// Leaves out the observers that are marked, stretch by stretch.
+    pub fn leave_out(&mut self, marks: Vec<Marks>) {
+        for (kept, marks) in self.kept.iter_mut().zip(&marks) {
+            if let Some(kept) = kept {
+                *kept = kept.without(marks);
+            }
+        }
+        self.left_out = marks;
     }
 
     /// The observations of a stretch, and the number of tiles they are chosen from.
@@ -145,7 +170,7 @@ impl<'a> Coverage<'a> {
             self.surface,
             &self.grid,
             &self.camera,
-            self.pictures.frames.shading(),
+            self.pictures.frames.shading().as_deref(),
             &placed,
             rows,
         );

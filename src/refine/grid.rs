@@ -34,7 +34,7 @@ pub struct WallGrid {
 }
 
 /// Name of a tile: column around the section, row along the axis (row 0 begins at h = 0).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TileId {
     /// `0..columns`.
     pub column: i64,
@@ -69,6 +69,17 @@ impl WallGrid {
             self.spacing_s_m * TILE as f64,
             self.spacing_h_m * TILE as f64,
         )
+    }
+
+    /// The tile of this lattice around the middle of a tile of another lattice on the same wall.
+    pub fn tile_around(&self, other: &Self, tile: &TileId) -> TileId {
+        let (width, height) = self.tile_size_m();
+        let (other_width, other_height) = other.tile_size_m();
+        let index = |k: i64, other: f64, own: f64| ((k as f64 + 0.5) * other / own).floor() as i64;
+        TileId {
+            column: index(tile.column, other_width, width).rem_euclid(self.columns),
+            row: index(tile.row, other_height, height),
+        }
     }
 
     /// The middle of a tile, a fraction of a sample off the regular place.
@@ -163,6 +174,30 @@ mod tests {
         let (width, _) = grid.tile_size_m();
         assert!((width * grid.columns as f64 - circle.perimeter_m()).abs() < 1e-9);
         assert!((grid.spacing_s_m / 0.0072 - 1.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_tile_lies_in_one_of_a_coarser_lattice() {
+        let circle = Circle::new(3.0).unwrap();
+        let (fine, coarse) = (
+            WallGrid::new(&circle, 0.02, 2.0),
+            WallGrid::new(&circle, 0.02, 1.0),
+        );
+        let (width, height) = coarse.tile_size_m();
+        for (column, row) in [(0, 0), (5, -7), (fine.columns - 1, 13)] {
+            let tile = TileId { column, row };
+            let around = coarse.tile_around(&fine, &tile);
+            assert!((0..coarse.columns).contains(&around.column));
+            let (a, b) = (fine.centre(tile), coarse.centre(around));
+            // Middles are moved by up to a sample from their regular places.
+            let along = shortest_arc(a.s_m - b.s_m, circle.perimeter_m()).abs();
+            assert!(along < 0.5 * width + 0.02, "{along}");
+            assert!((a.h_m - b.h_m).abs() < 0.5 * height + 0.02);
+        }
+        assert_eq!(
+            fine.tile_around(&fine, &TileId { column: 3, row: -2 }),
+            TileId { column: 3, row: -2 }
+        );
     }
 
     /// No gap and no overlap of more than a sample between neighbours, across the wrap too.

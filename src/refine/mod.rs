@@ -12,6 +12,7 @@
 //! | --- | --- |
 //! | a first look: useless frames, common light, noise | [`examine`] |
 //! | one frame after another, sliding windows | [`track`]; a single frame: [`place`], [`search`] on the fused [`wall`]; again with a better camera: [`retrack`] |
+//! | light that moves with the camera, from the overlaps | [`flat_field`] |
 //! | do overlapping frames show the same? take out, try again | [`consistency`], [`doubt`] |
 //! | displaced pairs at full size, what nothing ties to the rest; unbend and place again | [`alignment`], [`verdict`], [`repair`] |
 //! | walls that repeat | [`repeats`] |
@@ -19,7 +20,7 @@
 //! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
 //! | how sure | [`certainty`], [`covariance`]; how sure it could be at best: [`bound`] |
 //!
-//! Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`], [`coverage`]
+//! At full size what is in a frame but not on the wall is left out of a solve beforehand: [`foreign`]. Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`], [`coverage`]
 //! and [`choice`] choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, with the slopes of S as
 //! [`denoise`] finds them, [`problem`] reduces
 //! to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
@@ -29,7 +30,7 @@
 //! - The work on a tile is loops over whole vectors ([`tile`], [`view`]), compiled for several processors, the one at
 //!   hand chosen when it runs; sums keep their order, so results stay the same.
 //! - The last solve looks at the wall twice a pixel along each axis; those before it at the parts that tell most
-//!   ([`choice`]). With `--fast` the last takes a single step, if it is short.
+//!   ([`choice`]). With `--fast` it does so 1.5 times a pixel and takes a single step, if that is short.
 //! - Each linearisation serves twice: its cost judges the step that led there, its equations make the next. The last step
 //!   of a solve is within its tolerance and is not judged ([`gauss_newton`]).
 //! - Where a tile's corners are is computed once for all frames ([`visibility`]), local contrast once for a picture.
@@ -49,6 +50,8 @@ mod doubt;
 mod estimate;
 mod examine;
 mod factor;
+mod flat_field;
+mod foreign;
 mod gauss_newton;
 mod grid;
 mod lens;
@@ -64,6 +67,7 @@ mod report;
 mod retrack;
 mod robust;
 mod run;
+mod sampler;
 mod search;
 mod selected_inverse;
 mod shared;

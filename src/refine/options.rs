@@ -20,6 +20,9 @@ pub struct RefineOptions {
     pub window_stride: usize,
     /// Wall samples per pixel along each axis in the last solve.
     pub final_density: f64,
+    /// Wall samples per pixel along each axis where, before the last solve, the frames are searched for what is not wall; if
+    /// None, the samples of that solve.
+    pub foreign_density: Option<f64>,
     /// Share of the information that the global solves before it use, below the level where tracking ends: they look at
     /// the parts of the wall that tell most.
     pub close_information: f64,
@@ -49,6 +52,7 @@ impl Default for RefineOptions {
             tracking_levels: 3,
             window_stride: 6,
             final_density: 2.0,
+            foreign_density: None,
             close_information: 0.5,
             search: true,
             windows: true,
@@ -63,9 +67,11 @@ impl Default for RefineOptions {
 
 impl RefineOptions {
     /// For speed: the last solve ends with the first step shorter than a tenth of a pixel or twice the uncertainty, most
-    /// often its first. Gauss–Newton leaves a few hundredths of such a step.
+    /// often its first. Gauss–Newton leaves a few hundredths of such a step. What is not wall is looked for more coarsely.
     pub fn fast() -> Self {
         Self {
+            final_density: 1.5,
+            foreign_density: Some(1.0),
             step_tolerance_px: 0.1,
             step_tolerance_sigma: 2.0,
             ..Self::default()

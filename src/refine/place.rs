@@ -87,6 +87,8 @@ pub struct Surroundings<'s> {
     pub estimates: &'s [FrameEstimate],
     /// Which of them show the wall: those placed already.
     pub placed: &'s [bool],
+    /// What they see of it.
+    pub footprints: &'s [Footprint],
 }
 
 /// Places frame `frame` on the wall that the placed frames around it show.
@@ -149,7 +151,7 @@ pub fn place(
     };
     // Gauss–Newton from a pose; None if it leads out of the tunnel or off the wall.
     let refined = |pose: &Pose| -> Result<Option<Candidate>, ProblemError> {
-        let mut estimate = wall.exposed(&portrait, pose);
+        let mut estimate = wall.exposed(scene, &portrait, pose);
         for level in (level..=coarsest).rev() {
             estimate = match refine_at(level, estimate) {
                 Ok(refined) => refined,
@@ -249,6 +251,15 @@ pub fn unexplained(likeness: &Likeness, portrait: &Portrait) -> Option<f64> {
     compared.then_some(1.0 - quality * quality)
 }
 
+/// What a frame at `pose` sees of the wall.
+///
+/// # Errors
+/// [`ProblemError::Placement`].
+pub fn footprint(scene: &Scene, frame: usize, pose: &Pose) -> Result<Footprint, ProblemError> {
+    Footprint::within(scene.surface, &scene.camera, pose, reach_m(scene.surface))
+        .map_err(|source| ProblemError::Placement { frame, source })
+}
+
 /// Which placed frames may show wall that `pose` sees, or would see `margin_m` farther.
 pub fn near(
     scene: &Scene,
@@ -257,25 +268,13 @@ pub fn near(
     margin_m: f64,
     surroundings: &Surroundings,
 ) -> Result<Vec<bool>, ProblemError> {
-    let reach = reach_m(scene.surface);
     let perimeter = scene.surface.perimeter_m();
-    let trace = |frame: usize, pose: &Pose| {
-        Footprint::within(scene.surface, &scene.camera, pose, reach)
-            .map_err(|source| ProblemError::Placement { frame, source })
-    };
-    let own = trace(frame, pose)?.widened(margin_m);
-    let frames = surroundings.estimates.iter().zip(surroundings.placed);
-    frames
-        .enumerate()
-        .map(|(k, (estimate, placed))| {
-            let other = surroundings.run.start + k;
-            Ok(
-                *placed
-                    && other != frame
-                    && trace(other, &estimate.pose)?.overlaps(&own, perimeter),
-            )
-        })
-        .collect()
+    let own = footprint(scene, frame, pose)?.widened(margin_m);
+    let frames = surroundings.footprints.iter().zip(surroundings.placed);
+    let near = frames.enumerate().map(|(k, (footprint, placed))| {
+        *placed && surroundings.run.start + k != frame && footprint.overlaps(&own, perimeter)
+    });
+    Ok(near.collect())
 }
 
 /// σ of pitch, yaw and roll as they appear in the picture: a shift across the view looks like a turn.

@@ -16,9 +16,9 @@ use super::place::{
 use super::prior::Prior;
 use super::problem::{ProblemError, Scene};
 use super::search::matches;
-use super::track::{FARTHEST, Tracked};
+use super::track::{FARTHEST, Tracked, footprints};
 use super::wall::{FusedWall, Portrait};
-use crate::surface::{Gauge, GaugeMotion};
+use crate::surface::{Footprint, Gauge, GaugeMotion};
 use crate::trajectory::{JitterModel, Pose};
 use rayon::prelude::*;
 
@@ -56,9 +56,10 @@ pub fn settle_repeats(
     let all = 0..tracked.estimates.len();
     let believed = tracked.believed(&all);
     let frames: Vec<usize> = all.filter(|k| believed[*k]).collect();
+    let footprints = footprints(scene, tracked)?;
     let repeats = frames
         .par_iter()
-        .map(|k| repeats_of(scene, options, *k, tracked))
+        .map(|k| repeats_of(scene, options, *k, tracked, &footprints))
         .collect::<Result<Vec<_>, _>>()?;
     if repeats.iter().all(Vec::is_empty) {
         return Ok((false, Vec::new()));
@@ -75,6 +76,10 @@ pub fn settle_repeats(
     let undecided = choice.rival.iter().flatten().count();
     if 2 * undecided > frames.len() {
         choice = choose(f64::INFINITY);
+        // Nor is the one that the others were compared with.
+        for (rival, repeats) in choice.rival.iter_mut().zip(&repeats) {
+            *rival = rival.or(repeats.first().copied());
+        }
     }
     let mut moved = false;
     for (k, motion) in frames.iter().zip(&choice.motion) {
@@ -97,6 +102,7 @@ fn repeats_of(
     options: &RefineOptions,
     frame: usize,
     tracked: &Tracked,
+    footprints: &[Footprint],
 ) -> Result<Vec<GaugeMotion>, ProblemError> {
     let side = scene.camera.shorter_side();
     let level = options
@@ -109,6 +115,7 @@ fn repeats_of(
     let surroundings = Surroundings {
         estimates: &tracked.estimates[run.clone()],
         placed: &placed,
+        footprints: &footprints[run.clone()],
         run: run.clone(),
     };
     let pose = tracked.estimates[frame].pose;
@@ -147,7 +154,7 @@ fn repeats_of(
     let spacing = wall.lattice.spacing_m;
     let mut found = Vec::new();
     let least = LEFT_BY_STEPS * (1.0 - most).max(0.0);
-    for shift_m in matches(&wall, &portrait, &pose, reach_m, least) {
+    for shift_m in matches(scene, &wall, &portrait, &pose, reach_m, least) {
         if shift_m[0].hypot(shift_m[1]) < APART * spacing {
             continue;
         }

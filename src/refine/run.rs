@@ -8,6 +8,7 @@ use super::covariance::Covariances;
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::examine::examine;
+use super::flat_field::{correct, flatten};
 use super::gauss_newton::{Solution, StopReason, Stopping, solve};
 use super::observed::{CalibrationReport, Refusal};
 use super::options::RefineOptions;
@@ -64,8 +65,8 @@ const CLOSE_SIGMA: f64 = 2.0;
 const LEAST_PIXEL_SHARE: f64 = 0.02;
 /// Largest step left of a pose that counts as photometric: pixels on the wall, or multiples of σ if that is more.
 const LARGEST_STEP: (f64, f64) = (0.25, 2.0);
-/// Largest 1-σ on the wall of a pose that counts as photometric, pixels.
-const LARGEST_SIGMA_PX: f64 = 1.0;
+/// Largest 1-σ on the wall of a pose that counts as photometric, pixels: twice that is half a pixel.
+const LARGEST_SIGMA_PX: f64 = 0.25;
 /// Share of a frame's weight that the robust loss may reject. Things before the wall, glints and oblique views cost a
 /// right frame some; whether its pose is right is asked of its alignment with others.
 const MOST_REJECTED: f64 = 0.3;
@@ -88,7 +89,7 @@ pub fn refine(
     let mut clock = Clock::default();
     let side = survey.camera.shorter_side();
     let coarsest = options.coarsest_level(side);
-    let mut frames = FrameCache::new(
+    let frames = FrameCache::new(
         &survey.frames,
         &survey.camera,
         coarsest + 1,
@@ -113,8 +114,8 @@ pub fn refine(
         coarsest,
         progress.as_ref(),
     )?;
-    if examined.shading.is_some() {
-        frames.set_shading(examined.shading);
+    if let Some(shading) = examined.shading {
+        frames.set_shading(shading);
     }
     clock.lap("decode");
     let rough = Prior {
@@ -136,6 +137,16 @@ pub fn refine(
         progress.as_ref(),
     )?;
     clock.lap("track");
+    let rough = scene(
+        survey,
+        options,
+        &calibration,
+        &prior,
+        &frames,
+        examined.noise,
+    );
+    flatten(&rough.at(tracked.kappa), options, &mut tracked)?;
+    clock.lap("shading");
 
     let scene = scene(
         survey,
@@ -162,7 +173,12 @@ pub fn refine(
             density,
             information,
         } = sampling;
-        let problem = Problem::new(&scene, sampling, tracked.members())?.calibrating();
+        let mut problem = Problem::new(&scene, sampling, tracked.members())?.calibrating();
+        // Before the frames are aligned at full size, residuals are mostly misalignment.
+        if level == 0 {
+            let last = stages.is_empty();
+            problem = problem.without_foreign(options.foreign_density.filter(|_| last))?;
+        }
         // Where no frame can be believed, the prior is all there is to report.
         if problem.tiles() == 0 && tracked.doubts.iter().all(Option::is_none) {
             continue;
@@ -202,6 +218,9 @@ pub fn refine(
             solve: solution.record.clone(),
         });
         last = Some(solution);
+        if !stages.is_empty() && frames.shading().is_some() {
+            correct(&scene, options, &tracked)?;
+        }
         clock.lap(&format!("global {stage}"));
         if check {
             recheck(&scene, options, &mut tracked)?;
@@ -233,7 +252,7 @@ pub fn refine(
     }
     // No step without a covariance, whose lack is told already.
     let steps_px = steps_left(&solution).unwrap_or_else(|_| vec![0.0; count]);
-    let reports: Vec<FrameReport> = (0..count)
+    let mut reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = certainty.of_frame(&scene, k, &estimates[k]);
             frame_report(
@@ -246,6 +265,7 @@ pub fn refine(
             )
         })
         .collect();
+    leave_none_alone(&mut reports);
     clock.lap("covariance");
 
     let on_prior = reports
@@ -501,6 +521,16 @@ fn frame_report(
         gain: estimate.log_gain.exp(),
         bias: estimate.bias,
         sigma,
+    }
+}
+
+/// One frame by itself agrees with nobody.
+fn leave_none_alone(reports: &mut [FrameReport]) {
+    let photometric = |report: &&mut FrameReport| report.flag == FrameFlag::Photometric;
+    let mut left = reports.iter_mut().filter(photometric);
+    if let (Some(alone), None) = (left.next(), left.next()) {
+        alone.flag = FrameFlag::Prior;
+        alone.reason = Some(Doubt::Apart { frames: 1 }.to_string());
     }
 }
 

@@ -26,6 +26,7 @@
 //!
 //! The slopes in φ are those of the denoised texture ([`super::denoise`]) once the frames are aligned at full size.
 //!
+//! Frames that do not show the wall in a tile take no part in it ([`super::foreign`]).
 //! Where a frame has no value (clipped pixels) its weight is zero, and its cost that of plain noise.
 //!
 //! Rows of the bracket sum to zero, so what moves all frames of a tile alike costs nothing: the gauge
@@ -81,6 +82,15 @@ pub struct ObserverMoments {
     pub inliers: f64,
 }
 
+/// How a frame fits the others over a tile.
+#[derive(Clone, Copy, Debug)]
+pub struct Misfit {
+    /// Mean loss, each sample by its variance: R of [`super::foreign`].
+    pub loss: f32,
+    /// Mean variance: how steep the texture is.
+    pub steepness: f32,
+}
+
 /// A frame that sees a tile.
 pub struct Seen<'a> {
     /// The frame.
@@ -117,6 +127,10 @@ pub struct TileWork {
     pub features: Matrix4<f64>,
     /// M of each observer's own gradient, if that is asked for.
     pub own_features: Vec<Matrix4<f64>>,
+    /// How each observer fits the others, if that is asked for.
+    pub misfits: Vec<Misfit>,
+    /// Values in ascending order, sample by sample.
+    sorted: Vec<Plane>,
 }
 
 // Everything here is inlined into its caller, which is compiled for the processor's widest vectors.
@@ -331,6 +345,93 @@ impl TileWork {
             shares[k] = (total[k] - square[k] / total[k].max(1e-12)) / usual;
         }
         shares
+    }
+
+    /// The mean value of each observer, NaN where it lacks some.
+    #[inline(always)]
+    pub fn means<'a>(
+        &mut self,
+        points: &TilePoints,
+        observers: impl Iterator<Item = Seen<'a>>,
+    ) -> Vec<f64> {
+        self.sample(points, observers);
+        let means = self.samples.iter().map(|frame| {
+            if sum(&frame.known) < frame.known.len() as f32 {
+                return f64::NAN;
+            }
+            let mut own = NO_ROWS;
+            for k in 0..NO_ROWS.len() {
+                own[k] = OWN[k] * frame.values[k + SIDE];
+            }
+            f64::from(sum(&own)) / SAMPLES as f64
+        });
+        means.collect()
+    }
+
+    /// Fills [`TileWork::misfits`] for a tile's observers.
+    #[inline(always)]
+    pub fn misfit<'a>(
+        &mut self,
+        points: &TilePoints,
+        observers: impl Iterator<Item = Seen<'a>>,
+        noise: &NoiseModel,
+    ) {
+        self.sample(points, observers);
+        let precision = self.activity().map(
+            #[inline(always)]
+            |g2| noise.precision(g2),
+        );
+        let mut texture = self.median();
+        for _ in 0..REWEIGHTINGS {
+            texture = self.reweight(&texture, &precision);
+        }
+        self.misfits.clear();
+        for frame in &self.samples {
+            let (mut loss, mut variance) = (NO_ROWS, NO_ROWS);
+            for k in 0..NO_ROWS.len() {
+                let c = k + SIDE;
+                let e = frame.gain * (frame.values[c] - texture[c]);
+                variance[k] = OWN[k] * frame.known[c] / precision[c];
+                loss[k] = variance[k] * Loss::share(e * e, precision[c]);
+            }
+            let all = sum(&variance);
+            self.misfits.push(Misfit {
+                loss: sum(&loss) / all.max(1e-9),
+                steepness: all / SAMPLES as f32,
+            });
+        }
+    }
+
+    /// The median of all observers, where they have values; else 0.
+    #[inline(always)]
+    fn median(&mut self) -> Plane {
+        let mean = self.mean();
+        let n = self.samples.len();
+        self.sorted.clear();
+        for frame in &self.samples {
+            let mut values = frame.values;
+            if self.gaps {
+                for k in 0..ZERO.len() {
+                    values[k] += (1.0 - frame.known[k]) * (mean[k] - values[k]);
+                }
+            }
+            self.sorted.push(values);
+        }
+        // Odd–even transposition: all samples are sorted alike, in whole vectors.
+        for round in 0..n {
+            for pair in self.sorted[round % 2..].chunks_exact_mut(2) {
+                let [low, high] = pair else { continue };
+                for k in 0..ZERO.len() {
+                    let (a, b) = (low[k], high[k]);
+                    (low[k], high[k]) = (a.min(b), a.max(b));
+                }
+            }
+        }
+        let mut median = self.sorted[(n - 1) / 2];
+        for (median, upper) in median.iter_mut().zip(&self.sorted[n / 2]) {
+            *median = 0.5 * (*median + upper);
+        }
+        median
     }
 
     /// Counts the residuals around the plain mean, each scaled by `√(n/(n−1))` for the share of the mean

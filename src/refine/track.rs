@@ -11,13 +11,13 @@ use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
-use super::place::{Expectation, Surroundings, place};
+use super::place::{Expectation, Surroundings, footprint, place};
 use super::prior::predict;
 use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
-use super::visibility::reach_m;
 use crate::progress::Progress;
 use crate::surface::Footprint;
 use crate::trajectory::{JitterModel, Pose};
+use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -94,7 +94,7 @@ pub fn track(
         let scene = &scene;
         let expected = expect(scene, k, &tracked);
         tracked.estimates.push(FrameEstimate::at(expected.pose));
-        footprints.push(footprint(scene, k, &tracked)?);
+        footprints.push(footprint(scene, k, &expected.pose)?);
         let first = earliest_overlap(scene, &footprints);
         let mut settled = true;
         if tracked.doubts[k].is_none() && first < k {
@@ -105,6 +105,7 @@ pub fn track(
                 let surroundings = Surroundings {
                     estimates: &tracked.estimates[run.clone()],
                     placed: &placed,
+                    footprints: &footprints[run.clone()],
                     run,
                 };
                 match place(scene, options, k, &expected, &surroundings)? {
@@ -144,7 +145,7 @@ pub fn track(
             let scene = scene.at(tracked.kappa);
             solve_window(&scene, level, start..k + 1, held, &mut tracked)?;
         }
-        footprints[k] = footprint(scene, k, &tracked)?;
+        footprints[k] = footprint(scene, k, &tracked.estimates[k].pose)?;
         progress.advance(1);
     }
     progress.finish();
@@ -175,11 +176,15 @@ fn solve_window(
     Ok(())
 }
 
-/// What the last frame sees of the wall.
-fn footprint(scene: &Scene, k: usize, tracked: &Tracked) -> Result<Footprint, ProblemError> {
-    let pose = &tracked.estimates[k].pose;
-    Footprint::within(scene.surface, &scene.camera, pose, reach_m(scene.surface))
-        .map_err(|source| ProblemError::Placement { frame: k, source })
+/// What each frame sees of the wall at its present pose.
+///
+/// # Errors
+/// [`ProblemError::Placement`].
+pub fn footprints(scene: &Scene, tracked: &Tracked) -> Result<Vec<Footprint>, ProblemError> {
+    let estimates = tracked.estimates.par_iter().enumerate();
+    estimates
+        .map(|(k, estimate)| footprint(scene, k, &estimate.pose))
+        .collect()
 }
 
 /// The first frame that may share wall with the last one.
@@ -253,6 +258,7 @@ pub fn retry(
 ) -> Result<usize, ProblemError> {
     let count = tracked.estimates.len();
     let mut won = 0;
+    let mut footprints = footprints(scene, tracked)?;
     for k in 0..count {
         if !tracked.doubts[k].as_ref().is_some_and(Doubt::may_pass) {
             continue;
@@ -263,6 +269,7 @@ pub fn retry(
         let surroundings = Surroundings {
             estimates: &tracked.estimates[run.clone()],
             placed: &placed,
+            footprints: &footprints[run.clone()],
             run,
         };
         tracked.estimates[k] = match place(scene, options, k, &expected, &surroundings)? {
@@ -273,6 +280,7 @@ pub fn retry(
             }
             Err(_) => FrameEstimate::at(expected.pose),
         };
+        footprints[k] = footprint(scene, k, &tracked.estimates[k].pose)?;
     }
     Ok(won)
 }

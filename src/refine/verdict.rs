@@ -74,7 +74,7 @@ pub fn unsupported(alignments: &[Alignment], frames: usize) -> Vec<(usize, Doubt
 }
 
 fn misaligned(pair: &Alignment, most_px: f64) -> bool {
-    let different = pair.sigma_px.is_finite() && pair.correlation < LEAST_CORRELATION;
+    let different = pair.sigma_px <= TIED_PX && pair.correlation < LEAST_CORRELATION;
     different || pair.error_px > most_px + SURE * pair.sigma_px
 }
 

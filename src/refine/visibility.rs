@@ -1,6 +1,9 @@
 //! Which frames see which tiles of the wall.
 
+use super::foreign::Marks;
 use super::grid::{BLOCK, SIDE, TileId, WallGrid};
+use super::tile::Seen;
+use super::view::View;
 use crate::camera::Pinhole;
 use crate::frames::Shading;
 use crate::surface::{Footprint, Surface};
@@ -38,6 +41,18 @@ pub struct Observer {
     pub pixels: f32,
     /// The camera's shading V at the tile's middle; it stays as it is, too.
     pub shade: f32,
+}
+
+impl Observer {
+    /// As the work on its tile wants it; `views` are those of the [`Visibility`]'s frames.
+    #[inline(always)]
+    pub fn seen<'v>(&self, views: &'v [View<'v>]) -> Seen<'v> {
+        Seen {
+            view: &views[self.frame as usize],
+            pixels: self.pixels,
+            shade: self.shade,
+        }
+    }
 }
 
 /// A tile and the frames that see all of it.
@@ -165,6 +180,30 @@ impl Visibility {
         for tile in kept.iter().flatten().map(|k| &self.tiles[*k]) {
             let start = visibility.observers.len();
             visibility.observers.extend(self.observers(tile));
+            visibility.tiles.push(Tile {
+                id: tile.id,
+                observers: start..visibility.observers.len(),
+            });
+        }
+        visibility.find_blocks();
+        visibility
+    }
+
+    /// Without the observers that are marked, and the tiles of which fewer than two are left.
+    pub fn without(&self, marks: &Marks) -> Self {
+        let mut visibility = Self {
+            tiles: Vec::new(),
+            observers: Vec::new(),
+            blocks: Vec::new(),
+        };
+        for tile in &self.tiles {
+            let start = visibility.observers.len();
+            let left = tile.observers.clone().filter(|k| !marks.has(*k));
+            visibility.observers.extend(left.map(|k| self.observers[k]));
+            if visibility.observers.len() < start + 2 {
+                visibility.observers.truncate(start);
+                continue;
+            }
             visibility.tiles.push(Tile {
                 id: tile.id,
                 observers: start..visibility.observers.len(),

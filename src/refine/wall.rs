@@ -2,12 +2,13 @@
 
 use super::estimate::FrameEstimate;
 use super::problem::{ProblemError, Scene};
+use super::sampler::{Sampler, Spot};
 use super::visibility::reach_m;
 use crate::camera::Pinhole;
 use crate::frames::{GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level};
 use crate::surface::{Footprint, WallPoint, viewing_distance};
 use crate::trajectory::Pose;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -120,123 +121,73 @@ impl Portrait {
         &self.camera
     }
 
-    /// Local contrast as `pose` would put it on the wall.
-    pub fn contrast(&self, pose: &Pose, origin: &Vector3<f64>) -> Sampler<'_> {
-        Sampler::new(&self.local.contrast, &self.camera, pose, origin)
-    }
-
-    /// Variance of the contrast's noise at a wall point, as `pose` would put it there.
-    pub fn noise(&self, scene: &Scene, pose: &Pose, origin: &Vector3<f64>) -> NoiseSampler<'_> {
-        NoiseSampler {
-            sensitivity: Sampler::new(&self.local.sensitivity, &self.camera, pose, origin),
+    /// The frame as `pose` would put it on the wall; points will be relative to `origin`.
+    pub fn at(&self, scene: &Scene, pose: &Pose, origin: &Vector3<f64>) -> Gaze<'_> {
+        Gaze {
+            portrait: self,
+            sampler: Sampler::new(&self.camera, pose, origin),
             variance: (scene.noise * scene.noise * noise_at_level(self.level)) as f32,
         }
     }
 
-    /// Detail, grey levels, as `pose` would put it on the wall.
-    pub fn detail(&self, pose: &Pose, origin: &Vector3<f64>) -> Sampler<'_> {
-        Sampler::new(&self.local.detail, &self.camera, pose, origin)
-    }
-
-    /// Grey values as `pose` would put them on the wall.
-    fn grey(&self, pose: &Pose, origin: &Vector3<f64>) -> Sampler<'_> {
-        Sampler::new(self.picture.level(self.level), &self.camera, pose, origin)
+    fn picture(&self) -> &GreyImage {
+        self.picture.level(self.level)
     }
 }
 
-/// The lens's distortion in single precision ([`crate::camera::Radial`]).
-struct Lens {
-    k1: f32,
-    k2: f32,
-    limit: f32,
-}
-
-impl Lens {
-    /// None for a lens without distortion.
-    fn of(camera: &Pinhole) -> Option<Self> {
-        let radial = &camera.radial;
-        (!radial.is_none()).then(|| Self {
-            k1: radial.k1 as f32,
-            k2: radial.k2 as f32,
-            limit: radial.limit() as f32,
-        })
-    }
-
-    /// `1 + k1 q + k2 q²`, within the limit.
-    #[inline]
-    fn factor(&self, q: f32) -> Option<f32> {
-        (q < self.limit).then_some(1.0 + q * (self.k1 + q * self.k2))
-    }
-}
-
-/// A picture and a pose, ready to be sampled at wall points relative to an origin near them.
-pub struct Sampler<'a> {
-    image: &'a GreyImage,
-    r_cw: Matrix3<f32>,
-    centre: Vector3<f32>,
-    focal: (f32, f32),
-    principal: (f32, f32),
-    radial: Option<Lens>,
-    limit: (f32, f32),
-}
-
-impl<'a> Sampler<'a> {
-    /// `image` of `camera` at `pose`; points will be relative to `origin`.
-    pub fn new(image: &'a GreyImage, camera: &Pinhole, pose: &Pose, origin: &Vector3<f64>) -> Self {
-        let r_wc = pose.r_wc.to_rotation_matrix();
-        Self {
-            image,
-            r_cw: r_wc.matrix().transpose().cast(),
-            centre: pose.to_camera(origin).cast(),
-            focal: (camera.fx as f32, camera.fy as f32),
-            principal: (camera.cx as f32, camera.cy as f32),
-            radial: Lens::of(camera),
-            limit: ((image.width() - 1) as f32, (image.height() - 1) as f32),
-        }
-    }
-
-    /// The picture's value at a wall point (relative to the origin), if it has one there.
-    #[inline]
-    pub fn at(&self, point: &[f32; 3]) -> Option<f32> {
-        let r = &self.r_cw;
-        let dot =
-            |row: usize| r[(row, 0)] * point[0] + r[(row, 1)] * point[1] + r[(row, 2)] * point[2];
-        let z = self.centre.z + dot(2);
-        if z <= 0.0 {
-            return None;
-        }
-        let mut inverse = 1.0 / z;
-        let (x, y) = (self.centre.x + dot(0), self.centre.y + dot(1));
-        if let Some(lens) = &self.radial {
-            inverse *= lens.factor((x * x + y * y) * inverse * inverse)?;
-        }
-        let u = self.focal.0 * x * inverse + self.principal.0;
-        let v = self.focal.1 * y * inverse + self.principal.1;
-        if !(u >= 0.0 && v >= 0.0 && u < self.limit.0 && v < self.limit.1) {
-            return None;
-        }
-        let (x, y) = (u as usize, v as usize);
-        let (fu, fv) = (u - x as f32, v - y as f32);
-        let width = self.image.width();
-        let data = &self.image.data()[y * width + x..][..width + 2];
-        let a = data[0] + fu * (data[1] - data[0]);
-        let b = data[width] + fu * (data[width + 1] - data[width]);
-        let value = a + fv * (b - a);
-        (!value.is_nan()).then_some(value)
-    }
-}
-
-/// The noise of a [`Portrait`]'s contrast.
-pub struct NoiseSampler<'a> {
-    sensitivity: Sampler<'a>,
+/// A frame on the wall, ready to be looked at.
+pub struct Gaze<'a> {
+    portrait: &'a Portrait,
+    sampler: Sampler,
+    /// Variance of a pixel's noise.
     variance: f32,
 }
 
-impl NoiseSampler<'_> {
-    /// Variance at a wall point (relative to the origin), where the picture has a value.
+impl Gaze<'_> {
+    /// Local contrast at a wall point (relative to the origin), where the frame has a value.
     #[inline]
-    pub fn at(&self, point: &[f32; 3]) -> Option<f32> {
-        Some(self.variance * self.sensitivity.at(point)?)
+    pub fn contrast(&self, point: &[f32; 3]) -> Option<f32> {
+        self.sampler.at(point)?.known(&self.portrait.local.contrast)
+    }
+
+    /// Local contrast and the variance of its noise, likewise.
+    #[inline]
+    pub fn contrast_and_noise(&self, point: &[f32; 3]) -> Option<(f32, f32)> {
+        let spot = self.sampler.at(point)?;
+        let contrast = spot.known(&self.portrait.local.contrast)?;
+        Some((contrast, self.noise(&spot)))
+    }
+
+    /// Local contrast, the variance of its noise, and the detail in grey levels, likewise.
+    #[inline]
+    pub fn contrast_and_detail(&self, point: &[f32; 3]) -> Option<(f32, f32, f32)> {
+        let spot = self.sampler.at(point)?;
+        let contrast = spot.known(&self.portrait.local.contrast)?;
+        let detail = spot.of(&self.portrait.local.detail);
+        Some((contrast, self.noise(&spot), detail))
+    }
+
+    /// Local contrast, the variance of its noise, and the grey value, likewise.
+    #[inline]
+    fn contrast_and_grey(&self, point: &[f32; 3]) -> Option<(f32, f32, f32)> {
+        let spot = self.sampler.at(point)?;
+        let contrast = spot.known(&self.portrait.local.contrast)?;
+        Some((
+            contrast,
+            self.noise(&spot),
+            spot.of(self.portrait.picture()),
+        ))
+    }
+
+    /// Grey value, likewise.
+    #[inline]
+    fn grey(&self, point: &[f32; 3]) -> Option<f32> {
+        self.sampler.at(point)?.known(self.portrait.picture())
+    }
+
+    #[inline]
+    fn noise(&self, spot: &Spot) -> f32 {
+        self.variance * spot.of(&self.portrait.local.sensitivity)
     }
 }
 
@@ -376,14 +327,12 @@ impl FusedWall {
             |sight: &Sight, k: usize| sight.sees(&points[k], &normals[k % lattice.columns]);
         let own = sight(pose);
         let visible: Vec<bool> = (0..points.len()).map(|k| in_sight(&own, k)).collect();
-        let samplers: Vec<(Sight, Sampler, NoiseSampler, Sampler, f32, f32)> = placed
+        let gazes: Vec<(Sight, Gaze, f32, f32)> = placed
             .iter()
             .map(|(portrait, estimate)| {
                 (
                     sight(&estimate.pose),
-                    portrait.contrast(&estimate.pose, &origin),
-                    portrait.noise(scene, &estimate.pose, &origin),
-                    portrait.grey(&estimate.pose, &origin),
+                    portrait.at(scene, &estimate.pose, &origin),
                     (-estimate.log_gain).exp() as f32,
                     estimate.bias as f32,
                 )
@@ -394,13 +343,11 @@ impl FusedWall {
             .enumerate()
             .map(|(k, point)| {
                 let (mut sum, mut seen) = ([0.0f32; 3], 0.0f32);
-                for (sight, contrast, noise, grey, inverse_gain, bias) in &samplers {
+                for (sight, gaze, inverse_gain, bias) in &gazes {
                     if !in_sight(sight, k) {
                         continue;
                     }
-                    if let (Some(contrast), Some(noise), Some(grey)) =
-                        (contrast.at(point), noise.at(point), grey.at(point))
-                    {
+                    if let Some((contrast, noise, grey)) = gaze.contrast_and_grey(point) {
                         sum[0] += contrast;
                         sum[1] += noise;
                         sum[2] += (grey - bias) * inverse_gain;
@@ -424,30 +371,29 @@ impl FusedWall {
 
     /// Compares a frame at `pose` with the wall.
     pub fn likeness(&self, scene: &Scene, portrait: &Portrait, pose: &Pose) -> Likeness {
-        let contrast = portrait.contrast(pose, &self.origin);
-        let noise = portrait.noise(scene, pose, &self.origin);
+        let gaze = portrait.at(scene, pose, &self.origin);
         let mut likeness = Likeness::default();
         let wall = self.contrast.iter().zip(&self.noise);
         for (point, (wall, wall_noise)) in self.points.iter().zip(wall) {
             if wall.is_nan() {
                 continue;
             }
-            if let (Some(value), Some(noise)) = (contrast.at(point), noise.at(point)) {
-                likeness.add((*wall, *wall_noise), (value, noise));
+            if let Some(own) = gaze.contrast_and_noise(point) {
+                likeness.add((*wall, *wall_noise), own);
             }
         }
         likeness
     }
 
     /// The estimate with `pose` and the gain and bias that fit the wall best: a line through its grey values.
-    pub fn exposed(&self, portrait: &Portrait, pose: &Pose) -> FrameEstimate {
-        let sampler = portrait.grey(pose, &self.origin);
+    pub fn exposed(&self, scene: &Scene, portrait: &Portrait, pose: &Pose) -> FrameEstimate {
+        let gaze = portrait.at(scene, pose, &self.origin);
         let (mut n, mut x, mut y, mut xx, mut xy) = (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
         for (point, wall) in self.points.iter().zip(&self.grey) {
             if wall.is_nan() {
                 continue;
             }
-            if let Some(value) = sampler.at(point) {
+            if let Some(value) = gaze.grey(point) {
                 let (wall, value) = (f64::from(*wall), f64::from(value));
                 n += 1.0;
                 x += wall;

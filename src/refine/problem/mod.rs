@@ -1,147 +1,40 @@
 //! The photometric problem over a run of frames at one pyramid level: cost and normal equations.
 
-use super::calibration::{Calibration, Kappa, LENS, RADIUS};
+mod block_sums;
+mod looks;
+mod scene;
+
+pub use block_sums::Column;
+pub use scene::{Members, ProblemError, Sampling, Scene};
+
+use self::block_sums::BlockSums;
+use super::calibration::{Kappa, LENS, RADIUS};
 use super::coverage::{Coverage, Pictures};
-use super::denoise::{Denoiser, TextureSpectrum};
-use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
+use super::denoise::Denoiser;
+use super::estimate::{FrameEstimate, FrameStep};
 use super::factor::{FactorError, Symbolic};
-use super::grid::{TilePoints, WallGrid};
-use super::lens::LensSums;
+use super::grid::WallGrid;
 use super::normal::{Block, NormalEquations, Pattern};
-use super::prior::Prior;
-use super::robust::{NoiseHistogram, NoiseModel};
+use super::robust::NoiseModel;
 use super::shared::Border;
-use super::tile::{ObserverMoments, SAMPLES, Seen, TileWork};
 use super::view::View;
-use super::visibility::{Observer, Placed, Tile, Visibility, reach_m};
+use super::visibility::{Placed, reach_m};
 use crate::camera::Pinhole;
-use crate::frames::{FrameCache, FrameError, Pyramid, noise_at_level};
-use crate::surface::{
-    Footprint, Surface, SurfaceError, lens_jacobian, viewing_distance, wall_jacobian,
-};
-use crate::vectors::wide;
-use nalgebra::{Matrix2x5, Matrix2x6, Matrix4, SMatrix, Vector2, Vector5};
+use crate::frames::Pyramid;
+use crate::surface::{Footprint, Surface, lens_jacobian, viewing_distance, wall_jacobian};
+use nalgebra::{Vector2, Vector5};
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// How finely a problem looks at the wall.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sampling {
-    /// Pyramid level of the frames; 0 is full size.
-    pub level: usize,
-    /// Wall samples per pixel along each axis.
-    pub density: f64,
-    /// Share of the information that is used: the tiles that tell most are chosen until they hold it
-    /// ([`super::choice`]).
-    pub information: f64,
-}
-
-impl Sampling {
-    /// A pyramid level with one sample per pixel, everywhere.
-    pub fn of(level: usize) -> Self {
-        Self {
-            level,
-            density: 1.0,
-            information: 1.0,
-        }
-    }
-}
-
-/// Everything the estimator is given.
-#[derive(Clone, Copy)]
-pub struct Scene<'a> {
-    /// The tunnel.
-    pub surface: &'a dyn Surface,
-    /// The camera at full size, as far as it is known by now.
-    pub camera: Pinhole,
-    /// What all frames share and may be estimated.
-    pub calibration: Calibration,
-    /// Its unknowns by now; the camera is that of these.
-    pub kappa: Kappa,
-    /// The frames.
-    pub frames: &'a FrameCache,
-    /// Noise of the initial poses and exposures.
-    pub prior: &'a Prior,
-    /// The sensor's noise, 1-σ in grey levels, as single pictures show it.
-    pub noise: f64,
-    /// Whether the derivative takes the gradient of the fused texture, or each frame's own.
-    pub fused_gradient: bool,
-}
-
-impl Scene<'_> {
-    /// The same with the shared unknowns at `kappa`; as it is where they make no camera.
-    pub fn at(self, kappa: Kappa) -> Self {
-        match self.calibration.camera(&kappa) {
-            Some(camera) => Self {
-                camera,
-                kappa,
-                ..self
-            },
-            None => self,
-        }
-    }
-}
-
-/// The frames that take part in a problem.
-pub struct Members<'m> {
-    /// A run of frames.
-    pub participants: Range<usize>,
-    /// Those of them that are estimated; the others are held.
-    pub active: Range<usize>,
-    /// Estimates of the participants.
-    pub estimates: &'m [FrameEstimate],
-    /// Which participants' pixels are compared; for the others only the prior speaks.
-    pub compared: Cow<'m, [bool]>,
-}
-
-/// Why a problem cannot be set up or solved.
-#[derive(Debug, thiserror::Error)]
-pub enum ProblemError {
-    /// A frame cannot be read any more.
-    #[error(transparent)]
-    Frame(#[from] FrameError),
-    /// A frame's pose does not go with the tunnel.
-    #[error("frame {frame}: {source}; check the initial poses, radius_m and the calibration")]
-    Placement {
-        /// The frame.
-        frame: usize,
-        /// What is wrong.
-        source: SurfaceError,
-    },
-    /// The normal equations have no solution.
-    #[error(
-        "frames {first} to {last}: {source}; check that the poses are camera-to-world, radius_m, the calibration, and that [prior] is neither absurdly wide nor narrow"
-    )]
-    Factor {
-        /// First estimated frame.
-        first: usize,
-        /// Last estimated frame.
-        last: usize,
-        /// What is wrong.
-        source: FactorError,
-    },
-    /// The iteration broke off for a reason of its own.
-    #[error("the solver stopped: {0}")]
-    Solver(String),
-}
 
 /// Blocks of tiles worked on before their sums are added up: bounds the memory, whatever the length.
 const BATCH: usize = 64;
 /// Samples over a frame's height, at least.
 const LEAST_ROWS: u32 = 90;
-/// Tiles looked at to estimate the noise.
-const SCALE_TILES: usize = 600;
 /// A camera looks no farther than this many radii, when the lattice is laid out.
 const LONGEST_VIEW_RADII: f64 = 3.0;
-/// Factor by which the variance of residuals may be short of the sensor's.
-const MOST_UNDERESTIMATE: f64 = 1.25;
 /// Stiffness of the gauge at the first frame over that of its pixels.
 const GAUGE_TIE: f64 = 1e6;
-/// Noise of a pixel over that of a bilinear sample between pixels: each axis averages `f² + (1−f)²` of the
-/// variance, 2/3 over all phases f, so 4/9 for both.
-const PIXEL_OVER_SAMPLE: f64 = 1.5;
 
 /// Cost and normal equations at one estimate.
 #[derive(Clone, Debug)]
@@ -390,60 +283,6 @@ impl<'a> Problem<'a> {
         estimates
     }
 
-    /// Reads the noise from the residuals around the plain mean in every few tiles, and what is typical of the texture.
-    fn estimate_noise(&mut self) -> Result<(), ProblemError> {
-        let stride = (self.coverage.tiles / SCALE_TILES).max(1);
-        let mut histogram = NoiseHistogram::default();
-        let mut spectrum = TextureSpectrum::default();
-        for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch)?;
-            let pictures = self.pictures.of(self.coverage.frames(stretch))?;
-            let views = self.views(stretch, &pictures, &self.held, self.camera);
-            let sample: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
-            let counted = sample
-                .par_chunks(32)
-                .map(|tiles| {
-                    let mut work = TileWork::default();
-                    let mut histogram = NoiseHistogram::default();
-                    let mut spectrum = TextureSpectrum::default();
-                    let mut scratch = Vec::new();
-                    for tile in tiles {
-                        let points =
-                            TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
-                        let observers = visibility.observers(tile);
-                        wide(
-                            #[inline(always)]
-                            || {
-                                let seen = observers.iter().map(|o| o.seen(&views));
-                                work.count_residuals(&points, seen, &mut histogram, &mut spectrum);
-                            },
-                        );
-                    }
-                    (histogram, spectrum)
-                })
-                .collect::<Vec<_>>();
-            for (counted, seen) in &counted {
-                histogram = histogram.merge(counted);
-                spectrum = spectrum.merge(seen);
-            }
-        }
-        self.noise = histogram.fit();
-        // Residuals are a little too small, for S has fitted itself to them; single pictures know the noise better, but
-        // take fine texture for noise.
-        let single = self.scene.noise.powi(2) * noise_at_level(self.sampling.level);
-        let fitted = f64::from(self.noise.floor);
-        if single > fitted && single < MOST_UNDERESTIMATE * fitted {
-            self.noise.floor = single as f32;
-        }
-        // Before the frames are aligned at full size, residuals are mostly misalignment.
-        if self.sampling.level == 0 && self.held_frames() == 0 {
-            let floor = f64::from(self.noise.floor);
-            self.denoiser = Some(spectrum.denoiser(floor, 1.0 / self.grid.density));
-        }
-        self.sigma = PIXEL_OVER_SAMPLE * f64::from(self.noise.floor).sqrt();
-        Ok(())
-    }
-
     /// Cost and normal equations at the given estimates of the active frames and the problem's own shared unknowns.
     ///
     /// # Errors
@@ -587,7 +426,7 @@ impl<'a> Problem<'a> {
 
     /// Stiffens the first compared frame against moving along the gauge, where the pixels say nothing and rounding
     /// would otherwise decide. Neither cost nor gradient change: where the trajectory stands along the gauge
-    /// is settled in closed form, by [`Prior::settle_gauge`].
+    /// is settled in closed form, by [`super::prior::Prior::settle_gauge`].
     fn tie_gauge(&self, slot: usize, first: &FrameEstimate, normal: &mut NormalEquations) {
         let Some(place) = self.pattern.place(slot, slot) else {
             return;
@@ -607,90 +446,6 @@ impl<'a> Problem<'a> {
         self.active
             .contains(&frame)
             .then(|| frame - self.active.start)
-    }
-
-    fn sum_block(
-        &self,
-        stretch: usize,
-        visibility: &Visibility,
-        block: &Range<usize>,
-        views: &[View],
-        lens: &Pinhole,
-    ) -> BlockSums {
-        let tiles = &visibility.tiles[block.clone()];
-        let stretch_slots: Vec<Option<usize>> = self
-            .coverage
-            .frames(stretch)
-            .iter()
-            .map(|k| self.slot(*k))
-            .collect();
-        let mut slots: Vec<usize> = tiles
-            .iter()
-            .flat_map(|tile| visibility.observers(tile))
-            .filter_map(|o| stretch_slots[o.frame as usize])
-            .collect();
-        slots.sort_unstable();
-        slots.dedup();
-        let mut sums = BlockSums::new(slots, self.calibrates);
-        let mut work = TileWork::default();
-        let mut scratch = Vec::new();
-        let spacing = (self.grid.spacing_s_m, self.grid.spacing_h_m);
-        let mut summed: Vec<TileSums> = Vec::with_capacity(tiles.len());
-        for tile in tiles {
-            let points = TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
-            let observers = visibility.observers(tile);
-            wide(
-                #[inline(always)]
-                || {
-                    let seen = observers.iter().map(|o| o.seen(views));
-                    work.moments(
-                        &points,
-                        seen,
-                        spacing,
-                        &self.noise,
-                        self.scene.fused_gradient,
-                        self.denoiser.as_ref(),
-                    );
-                },
-            );
-            let mut columns = Vec::with_capacity(observers.len());
-            for (k, (observer, moments)) in observers.iter().zip(&work.observers).enumerate() {
-                sums.cost += moments.cost;
-                let view = &views[observer.frame as usize];
-                if let Some(slot) = stretch_slots[observer.frame as usize] {
-                    let a = view.wall_jacobian(&points);
-                    let c = match self.calibrates {
-                        true => view.lens_jacobian(&points, &a, lens),
-                        false => Matrix2x5::zeros(),
-                    };
-                    columns.push(Column {
-                        place: sums.place(slot),
-                        moments: *moments,
-                        own_features: work.own_features.get(k).copied(),
-                        a,
-                        c,
-                        inverse_gain: 1.0 / f64::from(view.gain() * observer.shade),
-                    });
-                }
-            }
-            summed.push(TileSums {
-                columns,
-                features: work.features,
-                total: total_weight(&work),
-            });
-        }
-        wide(
-            #[inline(always)]
-            || {
-                for tile in &summed {
-                    sums.add_tile(&tile.columns, &tile.features, tile.total);
-                    if let Some(lens) = &mut sums.lens {
-                        lens.add_tile(&tile.columns, &tile.features, tile.total);
-                    }
-                }
-            },
-        );
-        sums
     }
 
     /// How far a step, with `shared` that of the shared unknowns, moves the wall under each active frame, in pixels of full
@@ -765,182 +520,17 @@ fn pixel_on_wall<'p>(
         / camera.fy
 }
 
-impl Observer {
-    #[inline(always)]
-    fn seen<'v>(&self, views: &'v [View<'v>]) -> Seen<'v> {
-        Seen {
-            view: &views[self.frame as usize],
-            pixels: self.pixels,
-            shade: self.shade,
-        }
-    }
-}
-
-/// Weight of all observers of a tile, per sample.
-fn total_weight(work: &TileWork) -> f64 {
-    work.observers.iter().map(|observer| observer.weight).sum()
-}
-
-/// What a tile adds to the normal equations.
-struct TileSums {
-    columns: Vec<Column>,
-    /// M.
-    features: Matrix4<f64>,
-    /// Weight of all observers, held ones too.
-    total: f64,
-}
-
-/// An active observer of a tile.
-pub(super) struct Column {
-    /// Which of the block's frames.
-    pub place: usize,
-    pub moments: ObserverMoments,
-    /// M of the frame's own gradient, where that is what the derivative takes.
-    own_features: Option<Matrix4<f64>>,
-    /// A.
-    pub a: Matrix2x6<f64>,
-    /// C; zero unless the lens is estimated.
-    pub c: Matrix2x5<f64>,
-    /// `1/a`, shading included.
-    pub inverse_gain: f64,
-}
-
-impl Column {
-    /// `M B` (4 × 8) for this observer's `B = diag(A, 1, 1/a)`.
-    #[inline(always)]
-    fn features_times_b(&self, m: &Matrix4<f64>) -> SMatrix<f64, 4, UNKNOWNS> {
-        let mut product = SMatrix::<f64, 4, UNKNOWNS>::zeros();
-        for c in 0..6 {
-            for r in 0..4 {
-                product[(r, c)] = m[(r, 0)] * self.a[(0, c)] + m[(r, 1)] * self.a[(1, c)];
-            }
-        }
-        for r in 0..4 {
-            product[(r, 6)] = m[(r, 2)];
-            product[(r, 7)] = m[(r, 3)] * self.inverse_gain;
-        }
-        product
-    }
-
-    /// Adds `scale · Bᵀ F` to a block.
-    #[inline(always)]
-    fn add_b_transposed_times(&self, f: &SMatrix<f64, 4, UNKNOWNS>, scale: f64, block: &mut Block) {
-        for c in 0..UNKNOWNS {
-            let (f0, f1) = (scale * f[(0, c)], scale * f[(1, c)]);
-            for r in 0..6 {
-                block[(r, c)] += self.a[(0, r)] * f0 + self.a[(1, r)] * f1;
-            }
-            block[(6, c)] += scale * f[(2, c)];
-            block[(7, c)] += scale * f[(3, c)] * self.inverse_gain;
-        }
-    }
-}
-
-/// Sums over the tiles of one block, for the few active frames that see it.
-struct BlockSums {
-    slots: Vec<usize>,
-    cost: f64,
-    gradient: Vec<FrameStep>,
-    shares: Vec<FrameShare>,
-    /// Upper triangle, row by row.
-    blocks: Vec<Block>,
-    /// The lens's part, if it is estimated.
-    lens: Option<LensSums>,
-}
-
-impl BlockSums {
-    fn new(slots: Vec<usize>, calibrates: bool) -> Self {
-        let n = slots.len();
-        Self {
-            slots,
-            cost: 0.0,
-            gradient: vec![FrameStep::zeros(); n],
-            shares: vec![FrameShare::default(); n],
-            blocks: vec![Block::zeros(); n * (n + 1) / 2],
-            lens: calibrates.then(|| LensSums::new(n)),
-        }
-    }
-
-    /// Place of a slot among this block's; it must be one of them.
-    fn place(&self, slot: usize) -> usize {
-        self.slots.partition_point(|s| *s < slot)
-    }
-
-    #[inline(always)]
-    fn block_index(&self, row: usize, column: usize) -> usize {
-        let n = self.slots.len();
-        row * n - row * (row + 1) / 2 + column
-    }
-
-    /// `features`: M of the tile; `total`: weight of all its observers, held ones too.
-    #[inline(always)]
-    fn add_tile(&mut self, columns: &[Column], features: &Matrix4<f64>, total: f64) {
-        for (n, b) in columns.iter().enumerate() {
-            let moments = &b.moments;
-            let share = &mut self.shares[b.place];
-            share.samples += SAMPLES;
-            share.pixels += moments.pixels;
-            share.inliers += moments.inliers;
-            share.square += moments.square;
-            let gradient = &mut self.gradient[b.place];
-            for k in 0..6 {
-                gradient[k] -=
-                    b.a[(0, k)] * moments.gradient[0] + b.a[(1, k)] * moments.gradient[1];
-            }
-            gradient[6] -= moments.gradient[2];
-            gradient[7] -= moments.gradient[3] * b.inverse_gain;
-            let f = b.features_times_b(features);
-            if let Some(own) = &b.own_features {
-                // Its noise is in the diagonal blocks only: `w̄ Bᵀ (M_i − M) B` more.
-                let index = self.block_index(b.place, b.place);
-                let more = b.features_times_b(&(own - features));
-                b.add_b_transposed_times(&more, moments.weight, &mut self.blocks[index]);
-            }
-            for a in &columns[..=n] {
-                let own = if a.place == b.place {
-                    a.moments.weight
-                } else {
-                    0.0
-                };
-                let scale = own - a.moments.weight * moments.weight / total.max(1e-12);
-                let index = self.block_index(a.place, b.place);
-                a.add_b_transposed_times(&f, scale, &mut self.blocks[index]);
-            }
-        }
-    }
-
-    fn add_to(
-        &self,
-        pattern: &Pattern,
-        normal: &mut NormalEquations,
-        scatter: &mut [Block],
-        frames: &mut [FrameShare],
-    ) {
-        for (column, slot) in self.slots.iter().enumerate() {
-            normal.gradient[*slot] += self.gradient[column];
-            let (share, sum) = (&mut frames[*slot], &self.shares[column]);
-            share.samples += sum.samples;
-            share.pixels += sum.pixels;
-            share.inliers += sum.inliers;
-            share.square += sum.square;
-            for row in 0..=column {
-                let block = &self.blocks[self.block_index(row, column)];
-                normal.add_block(pattern, self.slots[row], *slot, block);
-                if let Some(place) = pattern.place(self.slots[row], *slot) {
-                    scatter[place] += self.gradient[row] * self.gradient[column].transpose();
-                }
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::refine::calibration::SHARED;
+    use crate::frames::FrameCache;
+    use crate::refine::calibration::{Calibration, SHARED};
+    use crate::refine::estimate::UNKNOWNS;
+    use crate::refine::prior::Prior;
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::{Jitter, JitterModel};
     use nalgebra::Vector6;
+    use std::borrow::Cow;
 
     /// A ring of frames of a smooth wall, each with an exposure of its own, and estimates near the truth.
     struct Ring {

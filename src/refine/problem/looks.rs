@@ -1,0 +1,188 @@
+//! A look at the samples before a solve: the noise, and what is not wall.
+
+use super::{Members, Problem, ProblemError, Sampling};
+use crate::frames::noise_at_level;
+use crate::refine::denoise::TextureSpectrum;
+use crate::refine::foreign::Foreign;
+use crate::refine::grid::TilePoints;
+use crate::refine::robust::NoiseHistogram;
+use crate::refine::tile::{Misfit, Seen, TileWork};
+use crate::refine::view::View;
+use crate::refine::visibility::{Observer, Tile};
+use crate::vectors::wide;
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// Tiles looked at to estimate the noise.
+const SCALE_TILES: usize = 600;
+/// Factor by which the variance of residuals may be short of the sensor's.
+const MOST_UNDERESTIMATE: f64 = 1.25;
+/// Noise of a pixel over that of a bilinear sample between pixels: each axis averages `f² + (1−f)²` of the
+/// variance, 2/3 over all phases f, so 4/9 for both.
+const PIXEL_OVER_SAMPLE: f64 = 1.5;
+
+impl Problem<'_> {
+    /// Reads the noise from the residuals around the plain mean in every few tiles, and what is typical of the texture.
+    pub(super) fn estimate_noise(&mut self) -> Result<(), ProblemError> {
+        let counted = self.at_tiles(
+            SCALE_TILES,
+            |(histogram, spectrum): &mut (NoiseHistogram, TextureSpectrum), look| {
+                wide(
+                    #[inline(always)]
+                    || {
+                        look.work
+                            .count_residuals(look.points, look.seen(), histogram, spectrum)
+                    },
+                );
+            },
+        )?;
+        let (mut histogram, mut spectrum) = (NoiseHistogram::default(), TextureSpectrum::default());
+        for (counted, seen) in &counted {
+            histogram = histogram.merge(counted);
+            spectrum = spectrum.merge(seen);
+        }
+        self.noise = histogram.fit();
+        // Residuals are a little too small, for S has fitted itself to them; single pictures know the noise better, but
+        // take fine texture for noise.
+        let single = self.scene.noise.powi(2) * noise_at_level(self.sampling.level);
+        let fitted = f64::from(self.noise.floor);
+        if single > fitted && single < MOST_UNDERESTIMATE * fitted {
+            self.noise.floor = single as f32;
+        }
+        // Before the frames are aligned at full size, residuals are mostly misalignment.
+        if self.sampling.level == 0 && self.held_frames() == 0 {
+            let floor = f64::from(self.noise.floor);
+            self.denoiser = Some(spectrum.denoiser(floor, 1.0 / self.grid.density));
+        }
+        self.sigma = PIXEL_OVER_SAMPLE * f64::from(self.noise.floor).sqrt();
+        Ok(())
+    }
+
+    /// Leaves out what is in a frame but not on the wall, as its own tiles show it or, if a `density` is given, those of
+    /// another lattice over all of the wall.
+    ///
+    /// # Errors
+    /// [`ProblemError`].
+    pub fn without_foreign(mut self, density: Option<f64>) -> Result<Self, ProblemError> {
+        let mut foreign = match density {
+            None => self.no_foreign()?,
+            Some(density) => {
+                let sampling = Sampling {
+                    density,
+                    information: 1.0,
+                    ..self.sampling
+                };
+                let members = Members {
+                    participants: self.participants.clone(),
+                    active: self.active.clone(),
+                    estimates: &self.held,
+                    compared: Cow::Owned(self.coverage.compared()),
+                };
+                let other = Self::new(&self.scene, sampling, members)?;
+                let mut foreign = other.no_foreign()?;
+                for stretch in 0..other.coverage.len() {
+                    other.find_foreign(stretch, &mut foreign)?;
+                }
+                foreign
+            }
+        };
+        let mut left_out = Vec::new();
+        for stretch in 0..self.coverage.len() {
+            if density.is_none() {
+                foreign.forget();
+                self.find_foreign(stretch, &mut foreign)?;
+            }
+            let visibility = self.coverage.visibility(stretch)?;
+            let frames = self.coverage.frames(stretch);
+            left_out.push(foreign.among(&visibility, &self.grid, frames));
+        }
+        self.coverage.leave_out(left_out);
+        Ok(self)
+    }
+
+    /// Nothing found yet, and what misfit is usual.
+    fn no_foreign(&self) -> Result<Foreign, ProblemError> {
+        let found = self.at_tiles(SCALE_TILES, |misfits: &mut Vec<Misfit>, look| {
+            wide(
+                #[inline(always)]
+                || look.work.misfit(look.points, look.seen(), &self.noise),
+            );
+            misfits.append(&mut look.work.misfits);
+        })?;
+        Ok(Foreign::new(self.grid, found.concat()))
+    }
+
+    /// Adds what is in a frame but not on the wall in a stretch.
+    fn find_foreign(&self, stretch: usize, foreign: &mut Foreign) -> Result<(), ProblemError> {
+        let visibility = self.coverage.visibility(stretch)?;
+        let frames = self.coverage.frames(stretch);
+        let pictures = self.pictures.of(frames)?;
+        let views = self.views(stretch, &pictures, &self.held, self.camera);
+        foreign.look(self.scene.surface, &visibility, frames, &views, &self.noise);
+        Ok(())
+    }
+
+    /// Works on about `count` tiles spread over all of the wall, or all tiles if there are fewer, with the estimates the
+    /// problem was made with; returns what each run of tiles has gathered, always in the same order.
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`].
+    pub fn at_tiles<T: Default + Send>(
+        &self,
+        count: usize,
+        work: impl Fn(&mut T, &mut Look) + Sync,
+    ) -> Result<Vec<T>, ProblemError> {
+        let stride = (self.coverage.tiles / count).max(1);
+        let mut gathered = Vec::new();
+        for stretch in 0..self.coverage.len() {
+            let visibility = self.coverage.visibility(stretch)?;
+            let frames = self.coverage.frames(stretch);
+            let pictures = self.pictures.of(frames)?;
+            let views = self.views(stretch, &pictures, &self.held, self.camera);
+            let tiles: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
+            let runs = tiles.par_chunks(32).map(|tiles| {
+                let mut gathered = T::default();
+                let mut tile_work = TileWork::default();
+                let mut scratch = Vec::new();
+                for tile in tiles {
+                    let points =
+                        TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
+                    let mut look = Look {
+                        work: &mut tile_work,
+                        points: &points,
+                        observers: visibility.observers(tile),
+                        views: &views,
+                        frames,
+                    };
+                    work(&mut gathered, &mut look);
+                }
+                gathered
+            });
+            gathered.extend(runs.collect::<Vec<T>>());
+        }
+        Ok(gathered)
+    }
+}
+
+/// A tile and those who see it.
+pub struct Look<'l> {
+    /// Room to work in.
+    pub work: &'l mut TileWork,
+    /// The tile's samples.
+    pub points: &'l TilePoints,
+    /// The frames that see it.
+    pub observers: &'l [Observer],
+    /// The frames of the stretch, and which participants they are.
+    pub views: &'l [View<'l>],
+    /// See `views`.
+    pub frames: &'l [usize],
+}
+
+impl<'l> Look<'l> {
+    /// The observers as the tile's work wants them.
+    #[inline(always)]
+    pub fn seen(&self) -> impl Iterator<Item = Seen<'l>> + use<'l> {
+        let views = self.views;
+        self.observers.iter().map(move |o| o.seen(views))
+    }
+}

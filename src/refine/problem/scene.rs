@@ -1,0 +1,112 @@
+//! What a problem is made of.
+
+use crate::camera::Pinhole;
+use crate::frames::{FrameCache, FrameError};
+use crate::refine::calibration::{Calibration, Kappa};
+use crate::refine::estimate::FrameEstimate;
+use crate::refine::factor::FactorError;
+use crate::refine::prior::Prior;
+use crate::surface::{Surface, SurfaceError};
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// How finely a problem looks at the wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sampling {
+    /// Pyramid level of the frames; 0 is full size.
+    pub level: usize,
+    /// Wall samples per pixel along each axis.
+    pub density: f64,
+    /// Share of the information that is used: the tiles that tell most are chosen until they hold it
+    /// ([`crate::refine::choice`]).
+    pub information: f64,
+}
+
+impl Sampling {
+    /// A pyramid level with one sample per pixel, everywhere.
+    pub fn of(level: usize) -> Self {
+        Self {
+            level,
+            density: 1.0,
+            information: 1.0,
+        }
+    }
+}
+
+/// Everything the estimator is given.
+#[derive(Clone, Copy)]
+pub struct Scene<'a> {
+    /// The tunnel.
+    pub surface: &'a dyn Surface,
+    /// The camera at full size, as far as it is known by now.
+    pub camera: Pinhole,
+    /// What all frames share and may be estimated.
+    pub calibration: Calibration,
+    /// Its unknowns by now; the camera is that of these.
+    pub kappa: Kappa,
+    /// The frames.
+    pub frames: &'a FrameCache,
+    /// Noise of the initial poses and exposures.
+    pub prior: &'a Prior,
+    /// The sensor's noise, 1-σ in grey levels, as single pictures show it.
+    pub noise: f64,
+    /// Whether the derivative takes the gradient of the fused texture, or each frame's own.
+    pub fused_gradient: bool,
+}
+
+impl Scene<'_> {
+    /// The same with the shared unknowns at `kappa`; as it is where they make no camera.
+    pub fn at(self, kappa: Kappa) -> Self {
+        match self.calibration.camera(&kappa) {
+            Some(camera) => Self {
+                camera,
+                kappa,
+                ..self
+            },
+            None => self,
+        }
+    }
+}
+
+/// The frames that take part in a problem.
+pub struct Members<'m> {
+    /// A run of frames.
+    pub participants: Range<usize>,
+    /// Those of them that are estimated; the others are held.
+    pub active: Range<usize>,
+    /// Estimates of the participants.
+    pub estimates: &'m [FrameEstimate],
+    /// Which participants' pixels are compared; for the others only the prior speaks.
+    pub compared: Cow<'m, [bool]>,
+}
+
+/// Why a problem cannot be set up or solved.
+#[derive(Debug, thiserror::Error)]
+pub enum ProblemError {
+    /// A frame cannot be read any more.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// A frame's pose does not go with the tunnel.
+    #[error("frame {frame}: {source}; check the initial poses, radius_m and the calibration")]
+    Placement {
+        /// The frame.
+        frame: usize,
+        /// What is wrong.
+        source: SurfaceError,
+    },
+    /// The normal equations have no solution.
+    #[error(
+        "frames {first} to {last}: {source}; check that the poses are camera-to-world, radius_m, the calibration, and that [prior] is neither absurdly wide nor narrow"
+    )]
+    Factor {
+        /// First estimated frame.
+        first: usize,
+        /// Last estimated frame.
+        last: usize,
+        /// What is wrong.
+        source: FactorError,
+    },
+    /// The iteration broke off for a reason of its own.
+    #[error("the solver stopped: {0}")]
+    Solver(String),
+}

@@ -1,0 +1,160 @@
+//! Where single wall points appear in a frame.
+
+use crate::camera::Pinhole;
+use crate::frames::GreyImage;
+use crate::trajectory::Pose;
+use nalgebra::{Matrix3, Vector3};
+
+/// The lens's distortion in single precision ([`crate::camera::Radial`]).
+struct Lens {
+    k1: f32,
+    k2: f32,
+    limit: f32,
+}
+
+impl Lens {
+    /// None for a lens without distortion.
+    fn of(camera: &Pinhole) -> Option<Self> {
+        let radial = &camera.radial;
+        (!radial.is_none()).then(|| Self {
+            k1: radial.k1 as f32,
+            k2: radial.k2 as f32,
+            limit: radial.limit() as f32,
+        })
+    }
+
+    /// `1 + k1 q + k2 q²`, within the limit.
+    #[inline]
+    fn factor(&self, q: f32) -> Option<f32> {
+        (q < self.limit).then_some(1.0 + q * (self.k1 + q * self.k2))
+    }
+}
+
+/// A camera at a pose, ready to look at wall points relative to an origin near them.
+pub struct Sampler {
+    r_cw: Matrix3<f32>,
+    centre: Vector3<f32>,
+    focal: (f32, f32),
+    principal: (f32, f32),
+    radial: Option<Lens>,
+    limit: (f32, f32),
+    width: usize,
+}
+
+/// A place between four pixels of a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Spot {
+    /// The upper left one.
+    index: usize,
+    width: usize,
+    /// How far from it to the right and down.
+    fu: f32,
+    fv: f32,
+}
+
+impl Sampler {
+    /// The `camera` at `pose`; points will be relative to `origin`.
+    pub fn new(camera: &Pinhole, pose: &Pose, origin: &Vector3<f64>) -> Self {
+        let r_wc = pose.r_wc.to_rotation_matrix();
+        Self {
+            r_cw: r_wc.matrix().transpose().cast(),
+            centre: pose.to_camera(origin).cast(),
+            focal: (camera.fx as f32, camera.fy as f32),
+            principal: (camera.cx as f32, camera.cy as f32),
+            radial: Lens::of(camera),
+            limit: ((camera.width - 1) as f32, (camera.height - 1) as f32),
+            width: camera.width as usize,
+        }
+    }
+
+    /// Where a wall point (relative to the origin) appears, if it does.
+    #[inline]
+    pub fn at(&self, point: &[f32; 3]) -> Option<Spot> {
+        let r = &self.r_cw;
+        let dot =
+            |row: usize| r[(row, 0)] * point[0] + r[(row, 1)] * point[1] + r[(row, 2)] * point[2];
+        let z = self.centre.z + dot(2);
+        if z <= 0.0 {
+            return None;
+        }
+        let mut inverse = 1.0 / z;
+        let (x, y) = (self.centre.x + dot(0), self.centre.y + dot(1));
+        if let Some(lens) = &self.radial {
+            inverse *= lens.factor((x * x + y * y) * inverse * inverse)?;
+        }
+        let u = self.focal.0 * x * inverse + self.principal.0;
+        let v = self.focal.1 * y * inverse + self.principal.1;
+        if !(u >= 0.0 && v >= 0.0 && u < self.limit.0 && v < self.limit.1) {
+            return None;
+        }
+        let (x, y) = (u as usize, v as usize);
+        Some(Spot {
+            index: y * self.width + x,
+            width: self.width,
+            fu: u - x as f32,
+            fv: v - y as f32,
+        })
+    }
+}
+
+impl Spot {
+    /// The value there in a picture of the camera's size, bilinear; NaN where a pixel has none.
+    #[inline]
+    pub fn of(&self, image: &GreyImage) -> f32 {
+        let data = &image.data()[self.index..][..self.width + 2];
+        let a = data[0] + self.fu * (data[1] - data[0]);
+        let b = data[self.width] + self.fu * (data[self.width + 1] - data[self.width]);
+        a + self.fv * (b - a)
+    }
+
+    /// The same; None where a pixel has none.
+    #[inline]
+    pub fn known(&self, image: &GreyImage) -> Option<f32> {
+        let value = self.of(image);
+        (!value.is_nan()).then_some(value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Radial;
+    use crate::trajectory::so3;
+
+    /// A picture of its own pixel coordinates, sampled where the camera itself projects a point, lens included.
+    #[test]
+    fn a_point_is_seen_where_the_camera_projects_it() {
+        let mut camera = Pinhole::from_vertical_fov(64, 48, 1.0);
+        camera.radial = Radial { k1: -0.1, k2: 0.02 };
+        let pose = Pose::new(
+            so3::exp(&Vector3::new(0.1, 0.4, -0.2)),
+            Vector3::new(0.3, 5.0, 0.1),
+        );
+        let across = (0..64 * 48).map(|k| (k % 64) as f32).collect();
+        let down = (0..64 * 48).map(|k| (k / 64) as f32).collect();
+        let across = GreyImage::new(64, 48, across);
+        let down = GreyImage::new(64, 48, down);
+        let origin = pose.to_world(&Vector3::new(0.1, -0.1, 2.0));
+        let sampler = Sampler::new(&camera, &pose, &origin);
+        let mut seen = 0;
+        for k in 0..400 {
+            let offset = Vector3::new(
+                0.2 * f64::from(k % 20) - 2.0,
+                0.2 * f64::from(k / 20) - 2.0,
+                0.1,
+            );
+            let point = offset.cast::<f32>().into();
+            let pixel = camera.project(&pose.to_camera(&(origin + offset)));
+            let Some(spot) = sampler.at(&point) else {
+                let inside = pixel.is_some_and(|p| camera.sees(&p, 0.001));
+                assert!(!inside, "{pixel:?}");
+                continue;
+            };
+            let pixel = pixel.unwrap();
+            assert!((f64::from(spot.of(&across)) - pixel.x).abs() < 1e-3);
+            assert!((f64::from(spot.of(&down)) - pixel.y).abs() < 1e-3);
+            seen += 1;
+        }
+        assert!(seen > 50, "{seen}");
+    }
+}
