@@ -8,18 +8,21 @@
 //!
 //! that minimises `Σ ω (a I_a(x) + b − I_b(x + d(x)))²` at a fine pyramid level, with the exposure a, b and the biweight ω of
 //! [`Loss`] for what is not wall. With N the normal matrix, freed of the noise in its slopes, and v the variance of the
-//! residuals, P has covariance `v N⁻¹`. Its root mean square over the overlap is `e = √(pᵀWp)`, of which noise alone makes
-//! `σ = √tr(v N⁻¹ W)`. By the triangle inequality, frames that are aligned to τ show `e > τ + z σ` no more often than a
-//! Gaussian exceeds z standard deviations.
+//! residuals, P has covariance `v N⁻¹` if they are noise. Glints are not: steeper than a faint wall, they move with the
+//! camera. So no sample has more influence than one a few times as steep as usual, and with g the parts that patches of
+//! samples have in the gradient, the covariance is `C = N⁻¹ (Σ g gᵀ) N⁻¹` where that makes σ larger, whatever the residuals
+//! are like. The root mean square of the displacement over the overlap is `e = √(pᵀWp)`, of which errors alone make
+//! `σ = √tr(C W)`. By the triangle inequality, frames that are aligned to τ show `e > τ + z σ` no more often than a Gaussian
+//! exceeds z standard deviations.
 //!
 //! Source: B. D. Lucas and T. Kanade, "An iterative image registration technique with an application to stereo vision",
 //! 1981.
 
+use super::overlaps::Overlaps;
 use super::problem::{ProblemError, Scene};
-use super::robust::{Loss, robust_correlation};
+use super::robust::{Loss, MAD_TO_SIGMA, robust_correlation};
 use super::sampler::Sampler;
 use super::track::Tracked;
-use super::visibility::reach_m;
 use super::wall::{Lattice, pixel_m};
 use crate::camera::Pinhole;
 use crate::frames::{Pyramid, noise_at_level};
@@ -35,8 +38,6 @@ const LEVEL: usize = 1;
 const STRIDE: f64 = 4.0;
 /// Gauss–Newton steps.
 const STEPS: usize = 8;
-/// How far apart in the survey frames are compared.
-const FARTHEST: usize = 256;
 /// Frames compared at once: bounds the memory.
 const RUN: usize = 32;
 /// Least samples that two frames share, and as a share of the one's own.
@@ -68,8 +69,8 @@ pub struct Alignment {
     pub error_px: f64,
     /// σ, likewise; infinite where the texture is too faint to tell.
     pub sigma_px: f64,
-    /// Correlation of their grey values at the poses as they are, all samples alike: no robust weight hides that two frames
-    /// show different things.
+    /// Correlation of their grey values at the poses as they are, with no weight that could hide that two frames show
+    /// different things: of all samples or of most, whichever is greater.
     pub correlation: f64,
 }
 
@@ -85,32 +86,11 @@ pub fn alignments(
     let count = tracked.estimates.len();
     let level = LEVEL.min(finest);
     let camera = scene.camera.at_level(level);
-    let reach = reach_m(scene.surface);
-    let perimeter = scene.surface.perimeter_m();
-    let footprints = (0..count)
-        .into_par_iter()
-        .map(|k| {
-            if tracked.doubts[k].is_some() {
-                return Ok(None);
-            }
-            let pose = &tracked.estimates[k].pose;
-            Footprint::within(scene.surface, &camera, pose, reach)
-                .map(Some)
-                .map_err(|source| ProblemError::Placement { frame: k, source })
-        })
-        .collect::<Result<Vec<Option<Footprint>>, _>>()?;
-    let others = |a: usize| -> Vec<usize> {
-        let last = (a + FARTHEST + 1).min(count);
-        let overlaps = |b: &usize| match (&footprints[a], &footprints[*b]) {
-            (Some(a), Some(b)) => b.overlaps(a, perimeter),
-            _ => false,
-        };
-        (a + 1..last).filter(overlaps).collect()
-    };
+    let overlaps = Overlaps::of(scene, &camera, tracked)?;
     let mut found = Vec::new();
     for start in (0..count).step_by(RUN) {
         let run = start..(start + RUN).min(count);
-        let partners: Vec<(usize, Vec<usize>)> = run.map(|a| (a, others(a))).collect();
+        let partners: Vec<(usize, Vec<usize>)> = run.map(|a| (a, overlaps.after(a))).collect();
         let mut needed: Vec<usize> = partners
             .iter()
             .filter(|(_, others)| !others.is_empty())
@@ -133,7 +113,7 @@ pub fn alignments(
                     picture: &pictures[&k],
                     pose: &tracked.estimates[k].pose,
                 };
-                let Some(footprint) = footprints[*a].filter(|_| !others.is_empty()) else {
+                let Some(footprint) = overlaps.footprints[*a].filter(|_| !others.is_empty()) else {
                     return Vec::new();
                 };
                 let template = Template::new(&look(*a), &footprint);
@@ -275,6 +255,7 @@ impl Template {
         let grey = other.greys(&self.origin);
         let mut p = Vector6::<f64>::zeros();
         let mut exposure: Option<(f64, f64)> = None;
+        let mut correlated = None;
         let mut first = None;
         let mut result = None;
         for _ in 0..STEPS {
@@ -294,17 +275,18 @@ impl Template {
                 return None;
             }
             let (gain, bias) = *exposure.get_or_insert_with(|| line(&seen));
+            let correlation = *correlated.get_or_insert_with(|| correlation(&seen));
             let mut sizes: Vec<f32> = seen
                 .iter()
                 .map(|(sample, value)| (gain as f32 * sample.grey + bias as f32 - value).abs())
                 .collect();
             let middle = sizes.len() / 2;
             let (_, median, _) = sizes.select_nth_unstable_by(middle, f32::total_cmp);
-            let variance = (1.4826 * *median)
+            let variance = (MAD_TO_SIGMA as f32 * *median)
                 .powi(2)
                 .max(2.0 * self.noise)
                 .max(LEAST_SIGMA * LEAST_SIGMA);
-            let fit = Fit::new(self, &seen, gain, bias, variance);
+            let fit = Fit::new(self, &seen, (gain, bias), variance, correlation);
             let Some(step) = fit.step() else {
                 return Some(fit.silent(self.scale));
             };
@@ -316,11 +298,7 @@ impl Template {
             let first = *first.get_or_insert(alignment);
             let lost = fit.rms(&p) > MOST_PX;
             let ended = !lost && moved < 3.0 * LAST_STEP_PX;
-            let known = if ended { alignment } else { first };
-            result = Some(Alignment {
-                correlation: first.correlation,
-                ..known
-            });
+            result = Some(if ended { alignment } else { first });
             if lost || moved < LAST_STEP_PX {
                 break;
             }
@@ -391,6 +369,7 @@ struct Fit {
     /// `Σ x xᵀ / Σ 1` of the regressors.
     w: Matrix3<f64>,
     samples: f64,
+    /// At the poses as they are.
     correlation: f64,
     /// False if the slopes are mostly noise.
     textured: bool,
@@ -400,9 +379,9 @@ impl Fit {
     fn new(
         template: &Template,
         seen: &[(&Sample, f32)],
-        gain: f64,
-        bias: f64,
+        (gain, bias): (f64, f64),
         variance: f32,
+        correlation: f64,
     ) -> Self {
         let mut scores = vec![SVector::<f64, 8>::zeros(); template.patches];
         let mut n = SMatrix::<f64, 8, 8>::zeros();
@@ -458,7 +437,7 @@ impl Fit {
             scatter,
             w: w / seen.len() as f64,
             samples: seen.len() as f64,
-            correlation: correlation(seen),
+            correlation,
             textured,
         }
     }
@@ -513,11 +492,9 @@ impl Fit {
 mod tests {
     use super::*;
     use crate::frames::FrameCache;
-    use crate::refine::calibration::{Calibration, Kappa};
-    use crate::refine::estimate::FrameEstimate;
-    use crate::refine::prior::Prior;
+    use crate::refine::test_scene::{prior, scene, tracked};
     use crate::test_wall::{TestWall, waves};
-    use crate::trajectory::{Jitter, JitterModel, Pose};
+    use crate::trajectory::Pose;
 
     /// Alignments of a ring of frames at the given poses.
     fn measured(wall: &TestWall, poses: &[Pose]) -> Vec<Alignment> {
@@ -526,33 +503,9 @@ mod tests {
             .into_iter()
             .map(|frame| Pyramid::new(frame, 1));
         let frames = FrameCache::of_pyramids(pictures.collect());
-        let prior = Prior {
-            jitter: Jitter {
-                model: JitterModel::Independent,
-                rotation_sigma_rad: 0.05,
-                translation_sigma_m: [0.05; 3],
-            },
-            times_s: (0..poses.len()).map(|k| k as f64).collect(),
-            usual_step_s: 1.0,
-            initial: poses.to_vec(),
-            log_gain_sigma: 0.3,
-            bias_sigma: 10.0,
-        };
-        let scene = Scene {
-            surface: &wall.circle,
-            camera: wall.camera,
-            calibration: Calibration::none(&wall.camera),
-            kappa: Kappa::zeros(),
-            frames: &frames,
-            prior: &prior,
-            noise: 0.0,
-            fused_gradient: true,
-        };
-        let tracked = Tracked {
-            estimates: poses.iter().map(|pose| FrameEstimate::at(*pose)).collect(),
-            doubts: vec![None; poses.len()],
-            kappa: Kappa::zeros(),
-        };
+        let prior = prior(poses);
+        let scene = scene(wall, &frames, &prior);
+        let tracked = tracked(poses);
         alignments(&scene, 0, &tracked).unwrap()
     }
 

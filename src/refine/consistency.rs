@@ -6,10 +6,10 @@
 //! residual fused from several frames cannot hide it.
 
 use super::doubt::Doubt;
+use super::overlaps::Overlaps;
 use super::problem::{ProblemError, Scene};
 use super::robust::robust_correlation;
 use super::track::Tracked;
-use super::visibility::reach_m;
 use super::wall::{Lattice, Likeness, Portrait, pixel_m};
 use crate::surface::Footprint;
 use rayon::prelude::*;
@@ -17,8 +17,6 @@ use std::collections::BTreeMap;
 
 /// Frames compared at once: bounds the memory.
 const RUN: usize = 32;
-/// How far apart in the survey frames are compared.
-const FARTHEST: usize = 256;
 /// Least samples that two frames share, as a share of the lattice over one.
 const LEAST_OVERLAP: f64 = 0.03;
 /// Correlation, noise aside, that a right pair reaches, ...
@@ -135,34 +133,12 @@ fn compare_at(
     } = comparison;
     let count = tracked.estimates.len();
     let camera = scene.camera.at_level(level);
-    let reach = reach_m(scene.surface);
-    let perimeter = scene.surface.perimeter_m();
-    let footprints = (0..count)
-        .into_par_iter()
-        .map(|k| {
-            if tracked.doubts[k].is_some() {
-                return Ok(None);
-            }
-            let pose = &tracked.estimates[k].pose;
-            Footprint::within(scene.surface, &camera, pose, reach)
-                .map(Some)
-                .map_err(|source| ProblemError::Placement { frame: k, source })
-        })
-        .collect::<Result<Vec<Option<Footprint>>, _>>()?;
-    let others = |a: usize| -> Vec<usize> {
-        let Some(own) = &footprints[a] else {
-            return Vec::new();
-        };
-        let last = (a + FARTHEST + 1).min(count);
-        (a + 1..last)
-            .filter(|b| footprints[*b].is_some_and(|other| other.overlaps(own, perimeter)))
-            .collect()
-    };
+    let overlaps = Overlaps::of(scene, &camera, tracked)?;
     let mut pairs = Vec::new();
     let mut portraits: BTreeMap<usize, Portrait> = BTreeMap::new();
     for start in (0..count).step_by(RUN) {
         let run = start..(start + RUN).min(count);
-        let partners: Vec<(usize, Vec<usize>)> = run.map(|a| (a, others(a))).collect();
+        let partners: Vec<(usize, Vec<usize>)> = run.map(|a| (a, overlaps.after(a))).collect();
         let mut needed: Vec<usize> = partners
             .iter()
             .flat_map(|(a, others)| std::iter::once(a).chain(others))
@@ -180,7 +156,17 @@ fn compare_at(
         portraits.extend(made);
         let compared: Vec<Vec<Compared>> = partners
             .par_iter()
-            .map(|(a, others)| compare(scene, *a, others, stride, &footprints, &portraits, tracked))
+            .map(|(a, others)| {
+                compare(
+                    scene,
+                    *a,
+                    others,
+                    stride,
+                    &overlaps.footprints,
+                    &portraits,
+                    tracked,
+                )
+            })
             .collect();
         pairs.extend(compared.into_iter().flatten());
     }

@@ -49,7 +49,6 @@ const LEAST_GREY: f64 = 4.0;
 const OWN: usize = 2;
 
 /// What one frame shows of a tile.
-#[derive(Clone, Debug)]
 struct Glimpse {
     /// The frame, counted in the run.
     frame: usize,
@@ -127,12 +126,13 @@ pub fn correct(
             tiles.push(glimpses);
         }
     })?;
+    let tiles: Vec<Vec<Glimpse>> = tiles.into_iter().flatten().collect();
     let sigma = [scene.prior.log_gain_sigma, scene.prior.bias_sigma];
     let (before, sure) = match scene.frames.shading() {
         Some(shading) => ((*shading).clone(), WORTHWHILE),
         None => (Shading::none(size), SURE),
     };
-    let Some(delta) = fit(&tiles.concat(), run.len(), &sigma, sure) else {
+    let Some(delta) = fit(&tiles, run.len(), &sigma, sure) else {
         return Ok(false);
     };
     scene.frames.set_shading(before.changed(&delta));
@@ -164,7 +164,7 @@ fn fit(
         }
         let half = sums.sizes.len() / 2;
         sums.sizes.sort_unstable_by(f64::total_cmp);
-        variance = (f64::from(MAD_TO_SIGMA) * sums.sizes.get(half)?)
+        variance = (MAD_TO_SIGMA * sums.sizes.get(half)?)
             .powi(2)
             .max(LEAST_VARIANCE);
         sums.n.fill_lower_triangle_with_upper_triangle();
@@ -277,11 +277,9 @@ impl Glimpse {
 mod tests {
     use super::*;
     use crate::frames::{FrameCache, GreyImage, Pyramid};
-    use crate::refine::calibration::{Calibration, Kappa};
-    use crate::refine::estimate::FrameEstimate;
-    use crate::refine::prior::Prior;
+    use crate::refine::test_scene::{prior, scene, tracked};
     use crate::test_wall::{TestWall, waves};
-    use crate::trajectory::{Jitter, JitterModel, spiral};
+    use crate::trajectory::spiral;
     use nalgebra::Vector2;
 
     /// Two and a half turns past a wall in a light that depends on the pixel, and exposures that depend on the frame.
@@ -298,34 +296,9 @@ mod tests {
             Pyramid::new(GreyImage::new(w, h, lit.collect()), 1)
         });
         let frames = FrameCache::of_pyramids(pictures.collect());
-        let prior = Prior {
-            jitter: Jitter {
-                model: JitterModel::Independent,
-                rotation_sigma_rad: 0.05,
-                translation_sigma_m: [0.05; 3],
-            },
-            times_s: (0..wall.poses.len()).map(|k| k as f64).collect(),
-            usual_step_s: 1.0,
-            initial: wall.poses.clone(),
-            log_gain_sigma: 0.3,
-            bias_sigma: 10.0,
-        };
-        let scene = Scene {
-            surface: &wall.circle,
-            camera: wall.camera,
-            calibration: Calibration::none(&wall.camera),
-            kappa: Kappa::zeros(),
-            frames: &frames,
-            prior: &prior,
-            noise: 0.0,
-            fused_gradient: true,
-        };
-        let estimates = wall.poses.iter().map(|pose| FrameEstimate::at(*pose));
-        let tracked = Tracked {
-            estimates: estimates.collect(),
-            doubts: vec![None; wall.poses.len()],
-            kappa: Kappa::zeros(),
-        };
+        let prior = prior(&wall.poses);
+        let scene = scene(&wall, &frames, &prior);
+        let tracked = tracked(&wall.poses);
         let any = correct(&scene, &RefineOptions::default(), &tracked).unwrap();
         assert_eq!(any, frames.shading().is_some());
         let shading = frames.shading()?;

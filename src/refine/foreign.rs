@@ -13,7 +13,7 @@
 //! Decided once before a solve, not step by step: the observations stay the same while the poses move.
 
 use super::grid::{BLOCK, TileId, TilePoints, WallGrid};
-use super::robust::NoiseModel;
+use super::robust::{NoiseModel, median_and_sigma};
 use super::tile::{Misfit, TileWork};
 use super::view::View;
 use super::visibility::{Tile, Visibility};
@@ -45,14 +45,9 @@ impl Usual {
         let size = misfits.len().div_ceil(CLASSES).max(1);
         let classes = misfits.chunks(size).map(|class| {
             let mut values: Vec<f32> = class.iter().map(|m| m.loss).collect();
-            let middle = values.len() / 2;
-            let median = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
-            for value in &mut values {
-                *value = (*value - median).abs();
-            }
-            let deviation = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
+            let (median, sigma) = median_and_sigma(&mut values);
             let last = class.last().map_or(0.0, |m| m.steepness);
-            (last, median, (1.4826 * deviation).max(LEAST_SPREAD))
+            (last, median, sigma.max(LEAST_SPREAD))
         });
         Self {
             classes: classes.collect(),

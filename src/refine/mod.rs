@@ -58,6 +58,7 @@ mod lens;
 mod normal;
 mod observed;
 mod options;
+mod overlaps;
 mod place;
 mod prior;
 mod problem;
@@ -72,6 +73,8 @@ mod search;
 mod selected_inverse;
 mod shared;
 mod spectrum;
+#[cfg(test)]
+mod test_scene;
 mod tile;
 mod track;
 mod verdict;

@@ -4,9 +4,9 @@ use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
+use super::overlaps::footprint;
 use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
 use super::search::{Hypothesis, REACH, least_samples, log_likelihood, search};
-use super::visibility::reach_m;
 use super::wall::{FusedWall, Likeness, Portrait, pixel_m};
 use crate::surface::{Footprint, shortest_arc, viewing_distance};
 use crate::trajectory::{Jitter, Pose};
@@ -151,7 +151,7 @@ pub fn place(
     };
     // Gauss–Newton from a pose; None if it leads out of the tunnel or off the wall.
     let refined = |pose: &Pose| -> Result<Option<Candidate>, ProblemError> {
-        let mut estimate = wall.exposed(scene, &portrait, pose);
+        let mut estimate = wall.exposed(&portrait, pose);
         for level in (level..=coarsest).rev() {
             estimate = match refine_at(level, estimate) {
                 Ok(refined) => refined,
@@ -251,15 +251,6 @@ pub fn unexplained(likeness: &Likeness, portrait: &Portrait) -> Option<f64> {
     compared.then_some(1.0 - quality * quality)
 }
 
-/// What a frame at `pose` sees of the wall.
-///
-/// # Errors
-/// [`ProblemError::Placement`].
-pub fn footprint(scene: &Scene, frame: usize, pose: &Pose) -> Result<Footprint, ProblemError> {
-    Footprint::within(scene.surface, &scene.camera, pose, reach_m(scene.surface))
-        .map_err(|source| ProblemError::Placement { frame, source })
-}
-
 /// Which placed frames may show wall that `pose` sees, or would see `margin_m` farther.
 pub fn near(
     scene: &Scene,
@@ -269,7 +260,7 @@ pub fn near(
     surroundings: &Surroundings,
 ) -> Result<Vec<bool>, ProblemError> {
     let perimeter = scene.surface.perimeter_m();
-    let own = footprint(scene, frame, pose)?.widened(margin_m);
+    let own = footprint(scene, &scene.camera, frame, pose)?.widened(margin_m);
     let frames = surroundings.footprints.iter().zip(surroundings.placed);
     let near = frames.enumerate().map(|(k, (footprint, placed))| {
         *placed && surroundings.run.start + k != frame && footprint.overlaps(&own, perimeter)

@@ -154,7 +154,7 @@ fn repeats_of(
     let spacing = wall.lattice.spacing_m;
     let mut found = Vec::new();
     let least = LEFT_BY_STEPS * (1.0 - most).max(0.0);
-    for shift_m in matches(scene, &wall, &portrait, &pose, reach_m, least) {
+    for shift_m in matches(&wall, &portrait, &pose, reach_m, least) {
         if shift_m[0].hypot(shift_m[1]) < APART * spacing {
             continue;
         }

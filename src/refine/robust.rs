@@ -53,8 +53,8 @@ impl Loss {
     }
 }
 
-/// Median of |x − median x| in a Gaussian's standard deviation: its reciprocal.
-pub const MAD_TO_SIGMA: f32 = 1.4826;
+/// A Gaussian's standard deviation over the median of its distances from the middle.
+pub const MAD_TO_SIGMA: f64 = 1.4826;
 
 /// Median of some values and their robust standard deviation: the median distance from it, as a Gaussian's σ. The values are
 /// lost; 0, 0 of none.
@@ -68,7 +68,7 @@ pub fn median_and_sigma(values: &mut [f32]) -> (f32, f32) {
         *value = (*value - median).abs();
     }
     let deviation = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
-    (median, MAD_TO_SIGMA * deviation)
+    (median, MAD_TO_SIGMA as f32 * deviation)
 }
 
 /// Robust correlation, −1 to 1, of pairs of values: with both scaled to robust σ 1,
@@ -148,7 +148,9 @@ impl NoiseHistogram {
             } else {
                 1.5 * 2f64.powi(row as i32 - 1)
             };
-            let y = (1.4826 * median(counts, total)).max(LEAST_SIGMA).powi(2);
+            let y = (MAD_TO_SIGMA * median(counts, total))
+                .max(LEAST_SIGMA)
+                .powi(2);
             let w = total as f64 / (y * y);
             for (sum, term) in m.iter_mut().zip([1.0, x, x * x, y, x * y]) {
                 *sum += w * term;

@@ -137,16 +137,6 @@ pub fn refine(
         progress.as_ref(),
     )?;
     clock.lap("track");
-    let rough = scene(
-        survey,
-        options,
-        &calibration,
-        &prior,
-        &frames,
-        examined.noise,
-    );
-    flatten(&rough.at(tracked.kappa), options, &mut tracked)?;
-    clock.lap("shading");
 
     let scene = scene(
         survey,
@@ -157,6 +147,9 @@ pub fn refine(
         examined.noise,
     );
     let mut scene = scene.at(tracked.kappa);
+    flatten(&scene, options, &mut tracked)?;
+    clock.lap("shading");
+
     let mut levels = Vec::new();
     let mut last = None;
     let mut refusals = Vec::new();

@@ -126,7 +126,7 @@ pub fn search(
             let turn = so3::exp(&(tilt * pitch)) * so3::exp(&(Vector3::z() * roll));
             let pose = Pose::new(predicted.r_wc * turn, predicted.t_wc);
             let mut own: Vec<Peak> = correlator
-                .correlate(scene, wall, portrait, &pose)
+                .correlate(wall, portrait, &pose)
                 .into_iter()
                 .filter(|found| found.samples >= least)
                 .map(|found| {
@@ -191,7 +191,6 @@ fn tilt_axis(pose: &Pose) -> Option<Vector3<f64>> {
 /// Where else on the wall a frame at `pose` fits: shifts along s and h, metres, up to `reach_m`, at which the squared
 /// correlation has a maximum of at least `least`; the shift of none is one of them, where the pose is right.
 pub fn matches(
-    scene: &Scene,
     wall: &FusedWall,
     portrait: &Portrait,
     pose: &Pose,
@@ -203,7 +202,7 @@ pub fn matches(
     let correlator = Correlator::new(wall, (cells(reach_m[0]), cells(reach_m[1])));
     let samples = least_samples(portrait);
     correlator
-        .correlate(scene, wall, portrait, pose)
+        .correlate(wall, portrait, pose)
         .into_iter()
         .filter(|found| found.samples >= samples && found.correlation.powi(2) >= least)
         .map(|found| (found.shift * spacing).into())
@@ -281,20 +280,14 @@ impl Correlator {
     }
 
     /// Local maxima of the correlation of the frame at `pose` over shifts, in samples.
-    fn correlate(
-        &self,
-        scene: &Scene,
-        wall: &FusedWall,
-        portrait: &Portrait,
-        pose: &Pose,
-    ) -> Vec<Maximum> {
-        let gaze = portrait.at(scene, pose, &wall.origin);
+    fn correlate(&self, wall: &FusedWall, portrait: &Portrait, pose: &Pose) -> Vec<Maximum> {
+        let contrast = portrait.contrast(pose, &wall.origin);
         let unrolled: Vec<f32> = wall
             .points
             .iter()
             .zip(&wall.visible)
             .map(|(point, visible)| match visible {
-                true => gaze.contrast(point).unwrap_or(f32::NAN),
+                true => contrast(point).unwrap_or(f32::NAN),
                 false => f32::NAN,
             })
             .collect();

@@ -225,6 +225,15 @@ impl TileWork {
         })
     }
 
+    /// `1/v` at every wall sample.
+    #[inline(always)]
+    fn precision(&self, noise: &NoiseModel) -> Plane {
+        self.activity().map(
+            #[inline(always)]
+            |g2| noise.precision(g2),
+        )
+    }
+
     /// Variance of a sample of S over that of a frame's: `Σ q²a² / (Σ q a²)²`.
     fn variance(&self) -> f64 {
         let (mut square, mut sum) = (0.0, 0.0);
@@ -281,10 +290,7 @@ impl TileWork {
         denoiser: Option<&Denoiser>,
     ) {
         self.sample(points, observers);
-        let precision = self.activity().map(
-            #[inline(always)]
-            |g2| noise.precision(g2),
-        );
+        let precision = self.precision(noise);
         let mut texture = self.mean();
         for _ in 0..REWEIGHTINGS {
             texture = self.reweight(&texture, &precision);
@@ -377,10 +383,7 @@ impl TileWork {
         noise: &NoiseModel,
     ) {
         self.sample(points, observers);
-        let precision = self.activity().map(
-            #[inline(always)]
-            |g2| noise.precision(g2),
-        );
+        let precision = self.precision(noise);
         let mut texture = self.median();
         for _ in 0..REWEIGHTINGS {
             texture = self.reweight(&texture, &precision);

@@ -11,7 +11,8 @@ use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
-use super::place::{Expectation, Surroundings, footprint, place};
+use super::overlaps::footprint;
+use super::place::{Expectation, Surroundings, place};
 use super::prior::predict;
 use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
 use crate::progress::Progress;
@@ -94,7 +95,7 @@ pub fn track(
         let scene = &scene;
         let expected = expect(scene, k, &tracked);
         tracked.estimates.push(FrameEstimate::at(expected.pose));
-        footprints.push(footprint(scene, k, &expected.pose)?);
+        footprints.push(footprint(scene, &scene.camera, k, &expected.pose)?);
         let first = earliest_overlap(scene, &footprints);
         let mut settled = true;
         if tracked.doubts[k].is_none() && first < k {
@@ -145,7 +146,7 @@ pub fn track(
             let scene = scene.at(tracked.kappa);
             solve_window(&scene, level, start..k + 1, held, &mut tracked)?;
         }
-        footprints[k] = footprint(scene, k, &tracked.estimates[k].pose)?;
+        footprints[k] = footprint(scene, &scene.camera, k, &tracked.estimates[k].pose)?;
         progress.advance(1);
     }
     progress.finish();
@@ -183,7 +184,7 @@ fn solve_window(
 pub fn footprints(scene: &Scene, tracked: &Tracked) -> Result<Vec<Footprint>, ProblemError> {
     let estimates = tracked.estimates.par_iter().enumerate();
     estimates
-        .map(|(k, estimate)| footprint(scene, k, &estimate.pose))
+        .map(|(k, estimate)| footprint(scene, &scene.camera, k, &estimate.pose))
         .collect()
 }
 
@@ -280,7 +281,7 @@ pub fn retry(
             }
             Err(_) => FrameEstimate::at(expected.pose),
         };
-        footprints[k] = footprint(scene, k, &tracked.estimates[k].pose)?;
+        footprints[k] = footprint(scene, &scene.camera, k, &tracked.estimates[k].pose)?;
     }
     Ok(won)
 }

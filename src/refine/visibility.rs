@@ -80,7 +80,7 @@ pub struct Placed {
 /// A frame either sees a whole tile (with the ring its gradients need) or does not count there at all: every sample of
 /// a tile averages the same frames, and the set stays the same while the poses move, so that costs before and after
 /// a step are of the same points.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Visibility {
     /// Tiles, block by block.
     pub tiles: Vec<Tile>,
@@ -141,25 +141,26 @@ impl Visibility {
             next[*tile] += 1;
         }
 
-        let mut visibility = Self {
-            tiles: Vec::new(),
-            observers: Vec::new(),
-            blocks: Vec::new(),
-        };
+        let mut visibility = Self::default();
         for tile in 0..cells.count() {
             let group = &sorted[starts[tile]..starts[tile + 1]];
             if group.len() < 2 || !group.iter().any(|o| placed[o.frame as usize].active) {
                 continue;
             }
-            let start = visibility.observers.len();
-            visibility.observers.extend(group);
-            visibility.tiles.push(Tile {
-                id: cells.id(tile),
-                observers: start..visibility.observers.len(),
-            });
+            visibility.push(cells.id(tile), group.iter().copied());
         }
         visibility.find_blocks();
         visibility
+    }
+
+    /// Adds a tile; the blocks are found when all are there.
+    fn push(&mut self, id: TileId, observers: impl Iterator<Item = Observer>) {
+        let start = self.observers.len();
+        self.observers.extend(observers);
+        self.tiles.push(Tile {
+            id,
+            observers: start..self.observers.len(),
+        });
     }
 
     fn find_blocks(&mut self) {
@@ -172,18 +173,9 @@ impl Visibility {
 
     /// Nothing but the tiles `kept`, which are given block by block, ascending.
     pub fn only(&self, kept: &[Vec<usize>]) -> Self {
-        let mut visibility = Self {
-            tiles: Vec::new(),
-            observers: Vec::new(),
-            blocks: Vec::new(),
-        };
+        let mut visibility = Self::default();
         for tile in kept.iter().flatten().map(|k| &self.tiles[*k]) {
-            let start = visibility.observers.len();
-            visibility.observers.extend(self.observers(tile));
-            visibility.tiles.push(Tile {
-                id: tile.id,
-                observers: start..visibility.observers.len(),
-            });
+            visibility.push(tile.id, self.observers(tile).iter().copied());
         }
         visibility.find_blocks();
         visibility
@@ -191,23 +183,12 @@ impl Visibility {
 
     /// Without the observers that are marked, and the tiles of which fewer than two are left.
     pub fn without(&self, marks: &Marks) -> Self {
-        let mut visibility = Self {
-            tiles: Vec::new(),
-            observers: Vec::new(),
-            blocks: Vec::new(),
-        };
+        let mut visibility = Self::default();
         for tile in &self.tiles {
-            let start = visibility.observers.len();
             let left = tile.observers.clone().filter(|k| !marks.has(*k));
-            visibility.observers.extend(left.map(|k| self.observers[k]));
-            if visibility.observers.len() < start + 2 {
-                visibility.observers.truncate(start);
-                continue;
+            if left.clone().nth(1).is_some() {
+                visibility.push(tile.id, left.map(|k| self.observers[k]));
             }
-            visibility.tiles.push(Tile {
-                id: tile.id,
-                observers: start..visibility.observers.len(),
-            });
         }
         visibility.find_blocks();
         visibility

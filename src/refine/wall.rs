@@ -130,6 +130,26 @@ impl Portrait {
         }
     }
 
+    /// Its local contrast at wall points relative to `origin`, as `pose` would put it there.
+    pub fn contrast(
+        &self,
+        pose: &Pose,
+        origin: &Vector3<f64>,
+    ) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
+        let sampler = Sampler::new(&self.camera, pose, origin);
+        move |point| sampler.at(point)?.known(&self.local.contrast)
+    }
+
+    /// Its grey values, likewise.
+    fn grey(
+        &self,
+        pose: &Pose,
+        origin: &Vector3<f64>,
+    ) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
+        let sampler = Sampler::new(&self.camera, pose, origin);
+        move |point| sampler.at(point)?.known(self.picture())
+    }
+
     fn picture(&self) -> &GreyImage {
         self.picture.level(self.level)
     }
@@ -144,13 +164,7 @@ pub struct Gaze<'a> {
 }
 
 impl Gaze<'_> {
-    /// Local contrast at a wall point (relative to the origin), where the frame has a value.
-    #[inline]
-    pub fn contrast(&self, point: &[f32; 3]) -> Option<f32> {
-        self.sampler.at(point)?.known(&self.portrait.local.contrast)
-    }
-
-    /// Local contrast and the variance of its noise, likewise.
+    /// Local contrast at a wall point (relative to the origin) and the variance of its noise, where the frame has a value.
     #[inline]
     pub fn contrast_and_noise(&self, point: &[f32; 3]) -> Option<(f32, f32)> {
         let spot = self.sampler.at(point)?;
@@ -177,12 +191,6 @@ impl Gaze<'_> {
             self.noise(&spot),
             spot.of(self.portrait.picture()),
         ))
-    }
-
-    /// Grey value, likewise.
-    #[inline]
-    fn grey(&self, point: &[f32; 3]) -> Option<f32> {
-        self.sampler.at(point)?.known(self.portrait.picture())
     }
 
     #[inline]
@@ -386,14 +394,14 @@ impl FusedWall {
     }
 
     /// The estimate with `pose` and the gain and bias that fit the wall best: a line through its grey values.
-    pub fn exposed(&self, scene: &Scene, portrait: &Portrait, pose: &Pose) -> FrameEstimate {
-        let gaze = portrait.at(scene, pose, &self.origin);
+    pub fn exposed(&self, portrait: &Portrait, pose: &Pose) -> FrameEstimate {
+        let grey = portrait.grey(pose, &self.origin);
         let (mut n, mut x, mut y, mut xx, mut xy) = (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
         for (point, wall) in self.points.iter().zip(&self.grey) {
             if wall.is_nan() {
                 continue;
             }
-            if let Some(value) = gaze.grey(point) {
+            if let Some(value) = grey(point) {
                 let (wall, value) = (f64::from(*wall), f64::from(value));
                 n += 1.0;
                 x += wall;

@@ -8,7 +8,7 @@ use crate::refine::grid::TilePoints;
 use crate::refine::robust::NoiseHistogram;
 use crate::refine::tile::{Misfit, Seen, TileWork};
 use crate::refine::view::View;
-use crate::refine::visibility::{Observer, Tile};
+use crate::refine::visibility::{Observer, Tile, Visibility};
 use crate::vectors::wide;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -81,18 +81,19 @@ impl Problem<'_> {
                 let other = Self::new(&self.scene, sampling, members)?;
                 let mut foreign = other.no_foreign()?;
                 for stretch in 0..other.coverage.len() {
-                    other.find_foreign(stretch, &mut foreign)?;
+                    let visibility = other.coverage.visibility(stretch)?;
+                    other.find_foreign(stretch, &visibility, &mut foreign)?;
                 }
                 foreign
             }
         };
         let mut left_out = Vec::new();
         for stretch in 0..self.coverage.len() {
+            let visibility = self.coverage.visibility(stretch)?;
             if density.is_none() {
                 foreign.forget();
-                self.find_foreign(stretch, &mut foreign)?;
+                self.find_foreign(stretch, &visibility, &mut foreign)?;
             }
-            let visibility = self.coverage.visibility(stretch)?;
             let frames = self.coverage.frames(stretch);
             left_out.push(foreign.among(&visibility, &self.grid, frames));
         }
@@ -113,12 +114,16 @@ impl Problem<'_> {
     }
 
     /// Adds what is in a frame but not on the wall in a stretch.
-    fn find_foreign(&self, stretch: usize, foreign: &mut Foreign) -> Result<(), ProblemError> {
-        let visibility = self.coverage.visibility(stretch)?;
+    fn find_foreign(
+        &self,
+        stretch: usize,
+        visibility: &Visibility,
+        foreign: &mut Foreign,
+    ) -> Result<(), ProblemError> {
         let frames = self.coverage.frames(stretch);
         let pictures = self.pictures.of(frames)?;
         let views = self.views(stretch, &pictures, &self.held, self.camera);
-        foreign.look(self.scene.surface, &visibility, frames, &views, &self.noise);
+        foreign.look(self.scene.surface, visibility, frames, &views, &self.noise);
         Ok(())
     }
 

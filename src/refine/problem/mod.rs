@@ -15,13 +15,14 @@ use super::estimate::{FrameEstimate, FrameStep};
 use super::factor::{FactorError, Symbolic};
 use super::grid::WallGrid;
 use super::normal::{Block, NormalEquations, Pattern};
+use super::overlaps::footprint;
 use super::robust::NoiseModel;
 use super::shared::Border;
 use super::view::View;
-use super::visibility::{Placed, reach_m};
+use super::visibility::Placed;
 use crate::camera::Pinhole;
 use crate::frames::Pyramid;
-use crate::surface::{Footprint, Surface, lens_jacobian, viewing_distance, wall_jacobian};
+use crate::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
 use nalgebra::{Vector2, Vector5};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -117,7 +118,6 @@ impl<'a> Problem<'a> {
             compared,
         } = members;
         let camera = scene.camera.at_level(level);
-        let reach_m = reach_m(scene.surface);
         let compared_frames = compared.iter().filter(|compared| **compared).count();
         let tied = active
             .clone()
@@ -131,17 +131,13 @@ impl<'a> Problem<'a> {
                     return Ok(None);
                 }
                 let pose = estimate.pose;
-                Footprint::within(scene.surface, &camera, &pose, reach_m)
-                    .map(|footprint| {
-                        Some(Placed {
-                            pose,
-                            footprint,
-                            active: active.contains(&frame),
-                        })
-                    })
-                    .map_err(|source| ProblemError::Placement { frame, source })
+                Ok(Some(Placed {
+                    pose,
+                    footprint: footprint(scene, &camera, frame, &pose)?,
+                    active: active.contains(&frame),
+                }))
             })
-            .collect::<Result<Vec<Option<Placed>>, _>>()?;
+            .collect::<Result<Vec<Option<Placed>>, ProblemError>>()?;
         let pixel_m = pixel_on_wall(scene.surface, &camera, placed.iter().flatten());
         let grid = WallGrid::new(
             scene.surface,
@@ -357,15 +353,7 @@ impl<'a> Problem<'a> {
             border.scale(information);
             scatter.scale(information * information);
         }
-        cost += self.scene.prior.add(
-            &self.participants,
-            &estimates,
-            &self.active,
-            &calibration.metric(kappa),
-            &self.pattern,
-            &mut normal,
-            border.as_mut(),
-        );
+        cost += self.add_prior(&estimates, kappa, &mut normal, border.as_mut());
         if let Some(border) = &mut border {
             cost += calibration.prior_cost(kappa) - self.volume() * kappa[RADIUS];
             border.gradient[RADIUS] -= self.volume();
@@ -410,18 +398,28 @@ impl<'a> Problem<'a> {
         let mut normal = NormalEquations::zeros(&self.pattern);
         let mut border = Border::zeros(self.active.len());
         let estimates = self.with_active(active);
-        let calibration = self.scene.calibration;
+        self.add_prior(&estimates, kappa, &mut normal, Some(&mut border));
+        border.close(&self.scene.calibration, kappa);
+        (normal.blocks, border)
+    }
+
+    /// Adds the prior of the poses and exposures at the `estimates` of all participants; returns its cost.
+    fn add_prior(
+        &self,
+        estimates: &[FrameEstimate],
+        kappa: &Kappa,
+        normal: &mut NormalEquations,
+        border: Option<&mut Border>,
+    ) -> f64 {
         self.scene.prior.add(
             &self.participants,
-            &estimates,
+            estimates,
             &self.active,
-            &calibration.metric(kappa),
+            &self.scene.calibration.metric(kappa),
             &self.pattern,
-            &mut normal,
-            Some(&mut border),
-        );
-        border.close(&calibration, kappa);
-        (normal.blocks, border)
+            normal,
+            border,
+        )
     }
 
     /// Stiffens the first compared frame against moving along the gauge, where the pixels say nothing and rounding
@@ -527,8 +525,8 @@ mod tests {
     use crate::refine::calibration::{Calibration, SHARED};
     use crate::refine::estimate::UNKNOWNS;
     use crate::refine::prior::Prior;
+    use crate::refine::test_scene::{prior, scene};
     use crate::test_wall::{TestWall, waves};
-    use crate::trajectory::{Jitter, JitterModel};
     use nalgebra::Vector6;
     use std::borrow::Cow;
 
@@ -567,18 +565,7 @@ mod tests {
                     bias: bias + 1e3 * off_by * number(k, 10.0),
                 });
             }
-            let prior = Prior {
-                jitter: Jitter {
-                    model: JitterModel::Independent,
-                    rotation_sigma_rad: 0.05,
-                    translation_sigma_m: [0.05; 3],
-                },
-                times_s: (0..wall.poses.len()).map(|k| k as f64).collect(),
-                usual_step_s: 1.0,
-                initial: wall.poses.clone(),
-                log_gain_sigma: 0.3,
-                bias_sigma: 10.0,
-            };
+            let prior = prior(&wall.poses);
             Self {
                 calibration: Calibration {
                     free: [true; SHARED],
@@ -598,14 +585,8 @@ mod tests {
 
         fn problem_with(&self, information: f64) -> Problem<'_> {
             let scene = Scene {
-                surface: &self.wall.circle,
-                camera: self.wall.camera,
                 calibration: self.calibration,
-                kappa: Kappa::zeros(),
-                frames: &self.frames,
-                prior: &self.prior,
-                noise: 0.0,
-                fused_gradient: true,
+                ..scene(&self.wall, &self.frames, &self.prior)
             };
             let all = 0..self.estimates.len();
             let sampling = Sampling {

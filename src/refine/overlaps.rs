@@ -1,0 +1,63 @@
+//! Which frames see wall in common.
+
+use super::problem::{ProblemError, Scene};
+use super::track::{FARTHEST, Tracked};
+use super::visibility::reach_m;
+use crate::camera::Pinhole;
+use crate::surface::Footprint;
+use crate::trajectory::Pose;
+use rayon::prelude::*;
+
+/// What frame `frame` at `pose` sees of the wall through `camera`.
+///
+/// # Errors
+/// [`ProblemError::Placement`].
+pub fn footprint(
+    scene: &Scene,
+    camera: &Pinhole,
+    frame: usize,
+    pose: &Pose,
+) -> Result<Footprint, ProblemError> {
+    Footprint::within(scene.surface, camera, pose, reach_m(scene.surface))
+        .map_err(|source| ProblemError::Placement { frame, source })
+}
+
+/// The believed frames on the wall.
+pub struct Overlaps {
+    /// What each sees; None for those in doubt.
+    pub footprints: Vec<Option<Footprint>>,
+    perimeter_m: f64,
+}
+
+impl Overlaps {
+    /// Of all frames at their present poses, through `camera`.
+    ///
+    /// # Errors
+    /// [`ProblemError::Placement`].
+    pub fn of(scene: &Scene, camera: &Pinhole, tracked: &Tracked) -> Result<Self, ProblemError> {
+        let frames = tracked.estimates.par_iter().zip(&tracked.doubts);
+        let footprints = frames
+            .enumerate()
+            .map(|(k, (estimate, doubt))| match doubt {
+                Some(_) => Ok(None),
+                None => footprint(scene, camera, k, &estimate.pose).map(Some),
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            footprints,
+            perimeter_m: scene.surface.perimeter_m(),
+        })
+    }
+
+    /// The frames after frame `a` that may share wall with it, as far on as overlap is looked for.
+    pub fn after(&self, a: usize) -> Vec<usize> {
+        let Some(own) = &self.footprints[a] else {
+            return Vec::new();
+        };
+        let last = (a + FARTHEST + 1).min(self.footprints.len());
+        let overlaps = |other: &Footprint| other.overlaps(own, self.perimeter_m);
+        (a + 1..last)
+            .filter(|b| self.footprints[*b].as_ref().is_some_and(overlaps))
+            .collect()
+    }
+}

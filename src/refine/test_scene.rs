@@ -1,0 +1,49 @@
+//! A scene of a [`TestWall`], for tests.
+
+use super::calibration::{Calibration, Kappa};
+use super::estimate::FrameEstimate;
+use super::prior::Prior;
+use super::problem::Scene;
+use super::track::Tracked;
+use crate::frames::FrameCache;
+use crate::test_wall::TestWall;
+use crate::trajectory::{Jitter, JitterModel, Pose};
+
+/// A frame a second, each off by 0.05 rad and 5 cm by itself.
+pub fn prior(initial: &[Pose]) -> Prior {
+    Prior {
+        jitter: Jitter {
+            model: JitterModel::Independent,
+            rotation_sigma_rad: 0.05,
+            translation_sigma_m: [0.05; 3],
+        },
+        times_s: (0..initial.len()).map(|k| k as f64).collect(),
+        usual_step_s: 1.0,
+        initial: initial.to_vec(),
+        log_gain_sigma: 0.3,
+        bias_sigma: 10.0,
+    }
+}
+
+/// The wall with frames without noise, nothing but poses and exposures unknown.
+pub fn scene<'a>(wall: &'a TestWall, frames: &'a FrameCache, prior: &'a Prior) -> Scene<'a> {
+    Scene {
+        surface: &wall.circle,
+        camera: wall.camera,
+        calibration: Calibration::none(&wall.camera),
+        kappa: Kappa::zeros(),
+        frames,
+        prior,
+        noise: 0.0,
+        fused_gradient: true,
+    }
+}
+
+/// Frames at these poses, all believed.
+pub fn tracked(poses: &[Pose]) -> Tracked {
+    Tracked {
+        estimates: poses.iter().map(|pose| FrameEstimate::at(*pose)).collect(),
+        doubts: vec![None; poses.len()],
+        kappa: Kappa::zeros(),
+    }
+}
