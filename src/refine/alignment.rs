@@ -30,6 +30,7 @@ use crate::surface::{Footprint, WallPoint};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Pyramid level at which displacements are measured: small against a brick's edge, and half the noise of full size.
@@ -74,7 +75,8 @@ pub struct Alignment {
     pub correlation: f64,
 }
 
-/// Measures how all believed frames that overlap are aligned; `finest` is the finest level that tracking uses.
+/// Measures how those of a run of frames that are believed and overlap are aligned; `finest` is the finest level that
+/// tracking uses.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -82,15 +84,16 @@ pub fn alignments(
     scene: &Scene,
     finest: usize,
     tracked: &Tracked,
+    frames: &Range<usize>,
 ) -> Result<Vec<Alignment>, ProblemError> {
-    let count = tracked.estimates.len();
     let level = LEVEL.min(finest);
     let camera = scene.camera.at_level(level);
     let overlaps = Overlaps::of(scene, &camera, tracked)?;
     let mut found = Vec::new();
-    for start in (0..count).step_by(RUN) {
-        let run = start..(start + RUN).min(count);
-        let partners: Vec<(usize, Vec<usize>)> = run.map(|a| (a, overlaps.after(a))).collect();
+    for start in frames.clone().step_by(RUN) {
+        let run = start..(start + RUN).min(frames.end);
+        let partners: Vec<(usize, Vec<usize>)> =
+            run.map(|a| (a, overlaps.after(a, frames.end))).collect();
         let mut needed: Vec<usize> = partners
             .iter()
             .filter(|(_, others)| !others.is_empty())
@@ -506,7 +509,7 @@ mod tests {
         let prior = prior(poses);
         let scene = scene(wall, &frames, &prior);
         let tracked = tracked(poses);
-        alignments(&scene, 0, &tracked).unwrap()
+        alignments(&scene, 0, &tracked, &(0..tracked.estimates.len())).unwrap()
     }
 
     #[test]

@@ -14,6 +14,7 @@ use super::wall::{Lattice, Likeness, Portrait, pixel_m};
 use crate::surface::Footprint;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Frames compared at once: bounds the memory.
 const RUN: usize = 32;
@@ -46,7 +47,7 @@ pub struct Pair {
     pub sharpness: Option<f64>,
 }
 
-/// Compares all believed frames that overlap: at pyramid level `level`, in windows that hold a brick or two, and in
+/// Compares those of a run of frames that are believed and overlap: at pyramid level `level`, in windows that hold a brick or two, and in
 /// finest detail.
 ///
 /// Either alone can be misled: the first by glints and things before the wall, the second by the edges of a pattern
@@ -58,13 +59,14 @@ pub fn compare_pairs(
     scene: &Scene,
     level: usize,
     tracked: &Tracked,
+    frames: &Range<usize>,
 ) -> Result<Vec<Pair>, ProblemError> {
-    let coarse = compare_at(scene, Comparison { level, ..COARSE }, tracked)?;
+    let coarse = compare_at(scene, Comparison { level, ..COARSE }, tracked, frames)?;
     let fine = Comparison {
         level: FINE.level.min(level),
         ..FINE
     };
-    let fine: BTreeMap<(usize, usize), Compared> = compare_at(scene, fine, tracked)?
+    let fine: BTreeMap<(usize, usize), Compared> = compare_at(scene, fine, tracked, frames)?
         .into_iter()
         .map(|compared| ((compared.a, compared.b), compared))
         .collect();
@@ -125,20 +127,21 @@ fn compare_at(
     scene: &Scene,
     comparison: Comparison,
     tracked: &Tracked,
+    frames: &Range<usize>,
 ) -> Result<Vec<Compared>, ProblemError> {
     let Comparison {
         level,
         stride,
         window,
     } = comparison;
-    let count = tracked.estimates.len();
     let camera = scene.camera.at_level(level);
     let overlaps = Overlaps::of(scene, &camera, tracked)?;
     let mut pairs = Vec::new();
     let mut portraits: BTreeMap<usize, Portrait> = BTreeMap::new();
-    for start in (0..count).step_by(RUN) {
-        let run = start..(start + RUN).min(count);
-        let partners: Vec<(usize, Vec<usize>)> = run.map(|a| (a, overlaps.after(a))).collect();
+    for start in frames.clone().step_by(RUN) {
+        let run = start..(start + RUN).min(frames.end);
+        let partners: Vec<(usize, Vec<usize>)> =
+            run.map(|a| (a, overlaps.after(a, frames.end))).collect();
         let mut needed: Vec<usize> = partners
             .iter()
             .flat_map(|(a, others)| std::iter::once(a).chain(others))

@@ -14,7 +14,7 @@
 //! | one frame after another, sliding windows | [`track`]; a single frame: [`place`], [`search`] on the fused [`wall`]; again with a better camera: [`retrack`] |
 //! | light that moves with the camera, from the overlaps | [`flat_field`] |
 //! | do overlapping frames show the same? take out, try again | [`consistency`], [`doubt`] |
-//! | displaced pairs at full size, what nothing ties to the rest; unbend and place again | [`alignment`], [`verdict`], [`repair`] |
+//! | displaced pairs at full size, what nothing ties to the rest; unbend and place again | [`alignment`], [`verdict`], [`repair`], [`neighbourhood`] |
 //! | walls that repeat | [`repeats`] |
 //! | all frames together, coarse to fine | [`run`](mod@run) |
 //! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
@@ -55,6 +55,7 @@ mod foreign;
 mod gauss_newton;
 mod grid;
 mod lens;
+mod neighbourhood;
 mod normal;
 mod observed;
 mod options;

@@ -49,12 +49,12 @@ impl Overlaps {
         })
     }
 
-    /// The frames after frame `a` that may share wall with it, as far on as overlap is looked for.
-    pub fn after(&self, a: usize) -> Vec<usize> {
+    /// The frames after frame `a` and before `end` that may share wall with it, as far on as overlap is looked for.
+    pub fn after(&self, a: usize, end: usize) -> Vec<usize> {
         let Some(own) = &self.footprints[a] else {
             return Vec::new();
         };
-        let last = (a + FARTHEST + 1).min(self.footprints.len());
+        let last = (a + FARTHEST + 1).min(end);
         let overlaps = |other: &Footprint| other.overlaps(own, self.perimeter_m);
         (a + 1..last)
             .filter(|b| self.footprints[*b].as_ref().is_some_and(overlaps))

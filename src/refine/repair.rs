@@ -8,10 +8,11 @@
 use super::alignment::alignments;
 use super::consistency::{compare_pairs, contradictions};
 use super::doubt::Doubt;
+use super::neighbourhood::{Neighbourhood, changes};
 use super::options::RefineOptions;
 use super::problem::{ProblemError, Scene};
 use super::repeats::{Rival, settle_repeats};
-use super::run::{disagreements, solve_level};
+use super::run::disagreements;
 use super::track::{Tracked, retry};
 use super::verdict::unsupported;
 
@@ -20,8 +21,8 @@ const TRIES: usize = 3;
 /// Times that frames are taken out, at the most.
 const ROUNDS: usize = 8;
 
-/// Takes out the frames that the others do not bear out, places them again, and solves, until nothing changes.
-/// `changed`: frames have been taken out already since the last solve.
+/// Takes out the frames that the others do not bear out, places them again, and solves their neighbourhood, until
+/// nothing changes. `solved`: the survey as the last solve left it.
 ///
 /// Returns the frames that the wall's repeats leave undecided.
 ///
@@ -33,21 +34,18 @@ pub fn repair(
     scene: &Scene,
     options: &RefineOptions,
     tracked: &mut Tracked,
-    mut changed: bool,
+    mut solved: Tracked,
 ) -> Result<Vec<Rival>, ProblemError> {
     let side = scene.camera.shorter_side();
+    let count = tracked.estimates.len();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
+    let mut aligned = alignments(scene, finest, tracked, &(0..count))?;
     let mut best: Option<Tracked> = None;
     // Known for the poses as they are.
     let mut rivals = None;
     for round in 0..ROUNDS {
-        // The first time the pairs have been compared already.
-        if round > 0 {
-            let pairs = compare_pairs(scene, finest, tracked)?;
-            changed |= take_out(contradictions(&pairs, tracked.doubts.len()), tracked);
-        }
-        let displaced = unsupported(&alignments(scene, finest, tracked)?, tracked.doubts.len());
-        changed |= take_out(displaced, tracked);
+        take_out(unsupported(&aligned, count), tracked);
+        let changed = !changes(&solved, tracked).is_empty();
         if !changed
             && best
                 .as_ref()
@@ -66,9 +64,24 @@ pub fn repair(
                 break;
             }
         }
-        for level in (0..=coarsest).rev() {
-            let shares = solve_level(scene, options, level, tracked)?;
-            changed = level == 0 && disagreements(&shares, &mut tracked.doubts);
+        let runs = Neighbourhood::of_changes(scene, &solved, tracked)?;
+        let mut shares = Vec::new();
+        for run in &runs {
+            for level in (1..=coarsest).rev() {
+                run.solve(scene, options, level, tracked)?;
+            }
+            shares.push(run.solve(scene, options, 0, tracked)?);
+        }
+        solved.clone_from(tracked);
+        for (run, shares) in runs.iter().zip(&shares) {
+            disagreements(shares, &mut tracked.doubts[run.active.clone()]);
+        }
+        for run in &runs {
+            let frames = &run.participants;
+            let pairs = compare_pairs(scene, finest, tracked, frames)?;
+            take_out(contradictions(&pairs, count), tracked);
+            aligned.retain(|pair| !(frames.contains(&pair.a) && frames.contains(&pair.b)));
+            aligned.extend(alignments(scene, finest, tracked, frames)?);
         }
     }
     if let Some(best) = best.filter(|best| believed(best) > believed(tracked)) {
@@ -89,11 +102,9 @@ fn believed(tracked: &Tracked) -> usize {
         .count()
 }
 
-/// Doubts the frames found wrong; true if there are any.
-fn take_out(found: Vec<(usize, Doubt)>, tracked: &mut Tracked) -> bool {
-    let any = !found.is_empty();
+/// Doubts the frames found wrong.
+fn take_out(found: Vec<(usize, Doubt)>, tracked: &mut Tracked) {
     for (frame, doubt) in found {
         tracked.doubts[frame] = Some(doubt);
     }
-    any
 }

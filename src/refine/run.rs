@@ -154,11 +154,13 @@ pub fn refine(
     let mut last = None;
     let mut refusals = Vec::new();
     let mut stages: VecDeque<_> = stages(options, side).collect();
-    let (mut first, mut changed, mut rivals) = (true, false, None);
+    let (mut first, mut rivals) = (true, None);
+    // As the last solve left it, to see what has changed since.
+    let mut solved = tracked.clone();
     while let Some((sampling, stopping)) = stages.pop_front() {
         let check = std::mem::take(&mut first);
         if last.is_some() && stages.is_empty() && rivals.is_none() {
-            rivals = Some(repair(&scene, options, &mut tracked, changed)?);
+            rivals = Some(repair(&scene, options, &mut tracked, solved.clone())?);
             clock.lap("repair");
         }
         let Sampling {
@@ -201,8 +203,9 @@ pub fn refine(
             stages.push_back((sampling, stopping));
         }
         refusals.extend(refused);
+        solved.clone_from(&tracked);
         if level == 0 {
-            changed = disagreements(&solution.linearisation.frames, &mut tracked.doubts);
+            disagreements(&solution.linearisation.frames, &mut tracked.doubts);
         }
         levels.push(LevelReport {
             level,
@@ -222,7 +225,7 @@ pub fn refine(
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
     let finest = options.handover_level(side);
-    let late = unsupported(&alignments(&scene, finest, &tracked)?, count);
+    let late = unsupported(&alignments(&scene, finest, &tracked, &(0..count))?, count);
     let rivals = rivals.unwrap_or_default();
     let ambiguous = rivals.into_iter().map(|(frame, motion): Rival| {
         let pose = &tracked.estimates[frame].pose;
@@ -370,7 +373,7 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
 }
 
 /// When a solve has come close enough for the next.
-fn close(options: &RefineOptions, level: usize) -> Stopping {
+pub fn close(options: &RefineOptions, level: usize) -> Stopping {
     Stopping {
         max_iterations: options.max_iterations,
         step_px: CLOSE_PX * 2f64.powi(level as i32),
@@ -389,7 +392,7 @@ fn recheck(
     let count = tracked.estimates.len();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
     for round in 0..ROUNDS {
-        let pairs = compare_pairs(scene, finest, tracked)?;
+        let pairs = compare_pairs(scene, finest, tracked, &(0..count))?;
         let mut doubts = contradictions(&pairs, count);
         doubts.extend(blurred(&pairs, count));
         for (frame, doubt) in doubts {
@@ -405,7 +408,7 @@ fn recheck(
     Ok(())
 }
 
-/// Solves all believed frames at a pyramid level, close enough for the next; returns how each took part.
+/// Solves all believed frames at a pyramid level, close enough for the next.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -414,27 +417,22 @@ pub fn solve_level(
     options: &RefineOptions,
     level: usize,
     tracked: &mut Tracked,
-) -> Result<Vec<FrameShare>, ProblemError> {
+) -> Result<(), ProblemError> {
     let problem = Problem::new(scene, Sampling::of(level), tracked.members())?;
-    let solution = solve(problem, close(options, level), None)?;
-    tracked.estimates = solution.estimates;
-    Ok(solution.linearisation.frames)
+    tracked.estimates = solve(problem, close(options, level), None)?.estimates;
+    Ok(())
 }
 
 /// Times that contradictions are looked for, and frames in doubt tried again between.
 const ROUNDS: usize = 3;
 
-/// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve does without them;
-/// true if there are any.
-pub fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) -> bool {
-    let mut any = false;
+/// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve does without them.
+pub fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) {
     for (share, doubt) in shares.iter().zip(doubts) {
         if doubt.is_none() && share.pixels > 0.0 {
             *doubt = disagreement(share);
-            any |= doubt.is_some();
         }
     }
-    any
 }
 
 /// How far an undamped step of the poses would still move each frame, for want of steps or of descent, pixels on the wall.

@@ -59,8 +59,11 @@ pub fn unsupported(alignments: &[Alignment], frames: usize) -> Vec<(usize, Doubt
     let group = groups(good.map(|pair| (pair.a, pair.b)), frames);
     let mut sizes = vec![0usize; frames];
     // Frames that no pair was measured for are not judged here.
-    let judged = |k: &usize| !out[*k] && alignments.iter().any(|p| p.a == *k || p.b == *k);
-    let judged: Vec<usize> = (0..frames).filter(judged).collect();
+    let mut measured = vec![false; frames];
+    for pair in alignments {
+        (measured[pair.a], measured[pair.b]) = (true, true);
+    }
+    let judged: Vec<usize> = (0..frames).filter(|k| measured[*k] && !out[*k]).collect();
     for k in &judged {
         sizes[group[*k]] += 1;
     }
