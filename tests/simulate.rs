@@ -4,7 +4,7 @@ mod support;
 
 use std::path::Path;
 use support::{fail, succeed, text};
-use tunnelstitch::frames::load_grey;
+use tunnelstitch::frames::StoredFrame;
 use tunnelstitch::survey::Survey;
 
 /// Options of a survey small enough for a test.
@@ -179,7 +179,9 @@ fn sixteen_bit_frames_hold_what_eight_bits_round_away() {
         let out = dir.path().join(bits);
         simulate("centred", &out, &["--bits", bits]);
         let survey = Survey::open(&out).unwrap();
-        load_grey(&survey.frames[1], 64, 48).unwrap()
+        StoredFrame::decode(&survey.frames[1], 64, 48)
+            .unwrap()
+            .grey()
     };
     let (coarse, fine) = (grey("8"), grey("16"));
     assert!(coarse.data().iter().all(|v| v.fract() == 0.0));

@@ -1,11 +1,20 @@
 //! Frames on demand, in bounded memory.
 
-use super::{FrameError, FrameFile, Pyramid, Shading, load_grey};
+use super::{FrameError, FrameFile, Pyramid, Shading, StoredFrame};
 use crate::camera::Pinhole;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
+/// Part of the memory that is for pyramids where not all of them fit; the rest holds frames as they are stored.
+const PYRAMIDS: f64 = 0.25;
+/// Bytes of a pyramid per pixel: four, a third of it more for the smaller levels, and the contrast of one of those.
+const PYRAMID_BYTES: f64 = 6.0;
+
 /// The grey pyramids of a survey's frames: decoded when first asked for, kept while there is room.
+///
+/// Where there is no room for all pyramids, those used last are kept, and of the other frames as many as there is room for
+/// in the form of [`StoredFrame`], from which a pyramid is soon made. Which ones does not change: a survey is gone through
+/// from one end to the other, again and again, and what was used longest ago is needed next.
 ///
 /// Results never depend on what happens to be kept: a frame that is decoded again is the same frame.
 #[derive(Debug)]
@@ -13,8 +22,10 @@ pub struct FrameCache {
     source: Source,
     levels: usize,
     shading: RwLock<Option<Arc<Shading>>>,
+    /// Pyramids that there is room for.
     room: usize,
     shelf: Mutex<Shelf>,
+    stored: Mutex<Store>,
 }
 
 #[derive(Debug)]
@@ -23,24 +34,44 @@ enum Source {
     Memory(Vec<Arc<Pyramid>>),
 }
 
+/// The pyramids used last.
 #[derive(Debug, Default)]
 struct Shelf {
     kept: HashMap<usize, (u64, Arc<Pyramid>)>,
     clock: u64,
 }
 
+/// Frames as they are stored.
+#[derive(Debug, Default)]
+struct Store {
+    kept: HashMap<usize, Arc<StoredFrame>>,
+    /// Bytes left.
+    room: usize,
+}
+
 impl FrameCache {
     /// The frames `files` of `camera`, with `levels` pyramid levels each, in no more than `bytes` of memory (but
     /// always room for one).
     pub fn new(files: &[FrameFile], camera: &Pinhole, levels: usize, bytes: usize) -> Self {
-        // Levels add a quarter, a sixteenth … to four bytes a pixel.
-        let each = (camera.width as usize * camera.height as usize * 16 / 3).max(1);
+        let pixels = f64::from(camera.width) * f64::from(camera.height);
+        let pyramids = |share: f64| (share * bytes as f64 / (PYRAMID_BYTES * pixels)) as usize;
+        let (room, stored) = match pyramids(1.0) >= files.len() {
+            true => (files.len(), 0),
+            false => (
+                pyramids(PYRAMIDS),
+                ((1.0 - PYRAMIDS) * bytes as f64) as usize,
+            ),
+        };
         Self {
             source: Source::Files(files.to_vec(), *camera),
             levels,
             shading: RwLock::default(),
-            room: (bytes / each).max(1),
+            room: room.max(1),
             shelf: Mutex::default(),
+            stored: Mutex::new(Store {
+                kept: HashMap::new(),
+                room: stored,
+            }),
         }
     }
 
@@ -52,6 +83,7 @@ impl FrameCache {
             shading: RwLock::default(),
             room: 1,
             shelf: Mutex::default(),
+            stored: Mutex::default(),
         }
     }
 
@@ -69,24 +101,24 @@ impl FrameCache {
         shading.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// From now on, frames are divided by `shading`. What was kept is dropped.
+    /// From now on, frames are divided by `shading`. The pyramids made so far are dropped.
     pub fn set_shading(&self, shading: Shading) {
         let mut present = self.shading.write().unwrap_or_else(PoisonError::into_inner);
         *present = Some(Arc::new(shading));
-        self.shelf().kept.clear();
+        lock(&self.shelf).kept.clear();
     }
 
     /// A frame, divided by the shading; pixels without a value are NaN.
     ///
     /// # Errors
-    /// As [`load_grey`].
+    /// As [`StoredFrame::decode`].
     pub fn get(&self, frame: usize) -> Result<Arc<Pyramid>, FrameError> {
         let (files, camera) = match &self.source {
             Source::Files(files, camera) => (files, camera),
             Source::Memory(pyramids) => return Ok(Arc::clone(&pyramids[frame])),
         };
         {
-            let mut shelf = self.shelf();
+            let mut shelf = lock(&self.shelf);
             shelf.clock += 1;
             let now = shelf.clock;
             if let Some((used, pyramid)) = shelf.kept.get_mut(&frame) {
@@ -95,12 +127,12 @@ impl FrameCache {
             }
         }
         // Decoded without the lock; if two threads do the same frame at once, one result is dropped.
-        let mut image = load_grey(&files[frame], camera.width, camera.height)?;
+        let mut image = self.stored(&files[frame], camera)?.grey();
         if let Some(shading) = self.shading() {
             shading.divide(&mut image);
         }
         let pyramid = Arc::new(Pyramid::new(image, self.levels));
-        let mut shelf = self.shelf();
+        let mut shelf = lock(&self.shelf);
         let now = shelf.clock;
         shelf.kept.insert(frame, (now, Arc::clone(&pyramid)));
         while shelf.kept.len() > self.room {
@@ -113,10 +145,25 @@ impl FrameCache {
         Ok(pyramid)
     }
 
-    fn shelf(&self) -> MutexGuard<'_, Shelf> {
-        // A panic while the lock is held leaves a map that is still a map.
-        self.shelf.lock().unwrap_or_else(PoisonError::into_inner)
+    /// A frame as its file holds it; kept if there is room.
+    fn stored(&self, file: &FrameFile, camera: &Pinhole) -> Result<Arc<StoredFrame>, FrameError> {
+        if let Some(frame) = lock(&self.stored).kept.get(&file.index) {
+            return Ok(Arc::clone(frame));
+        }
+        let frame = Arc::new(StoredFrame::decode(file, camera.width, camera.height)?);
+        let mut store = lock(&self.stored);
+        if let Some(left) = store.room.checked_sub(frame.bytes())
+            && store.kept.insert(file.index, Arc::clone(&frame)).is_none()
+        {
+            store.room = left;
+        }
+        Ok(frame)
     }
+}
+
+/// A panic while the lock is held leaves a map that is still a map.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
@@ -141,13 +188,22 @@ mod tests {
     fn no_more_is_kept_than_there_is_room_for() {
         let folder = tempfile::tempdir().unwrap();
         let camera = Pinhole::from_vertical_fov(32, 24, 1.0);
-        let cache = FrameCache::new(&files(folder.path()), &camera, 2, 2 * 32 * 24 * 16 / 3);
+        let files = files(folder.path());
+        // Three quarters of it for three frames as they are stored, the rest for a pyramid.
+        let cache = FrameCache::new(&files, &camera, 2, 4 * 32 * 24);
+        let get = |frame: usize| Ok::<_, FrameError>(cache.get(frame)?.level(0).at(3, 3));
         for frame in [0, 1, 2, 0, 3, 4, 0] {
-            let pyramid = cache.get(frame).unwrap();
-            assert_eq!(pyramid.level(0).at(3, 3), 10.0 + frame as f32);
-            assert!(cache.shelf().kept.len() <= 2);
+            assert_eq!(get(frame).unwrap(), 10.0 + frame as f32);
+            assert_eq!(lock(&cache.shelf).kept.len(), 1);
         }
-        assert!(cache.shelf().kept.contains_key(&0));
+        // The first three are not read again.
+        for file in &files {
+            std::fs::remove_file(&file.path).unwrap();
+        }
+        for frame in [0, 1, 2] {
+            assert_eq!(get(frame).unwrap(), 10.0 + frame as f32);
+        }
+        assert!(get(3).is_err());
     }
 
     #[test]

@@ -1,6 +1,5 @@
 //! Finding and decoding frames.
 
-use super::GreyImage;
 use image::DynamicImage;
 use std::path::{Path, PathBuf};
 
@@ -131,61 +130,4 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
 fn jpeg_is_complete(bytes: &[u8]) -> bool {
     let end = bytes.len().saturating_sub(4096);
     bytes[end..].windows(2).any(|pair| pair == [0xff, 0xd9])
-}
-
-/// Decodes a frame to grey levels (0–255, Rec. 709 luma of colour pictures; 16-bit pictures keep their finer steps).
-///
-/// Full white and full black are NaN: the sensor or the encoder has clipped them, so they only say that the wall is at
-/// least as bright or as dark.
-///
-/// # Errors
-/// As [`load_colour`].
-pub fn load_grey(file: &FrameFile, width: u32, height: u32) -> Result<GreyImage, FrameError> {
-    let mut data: Vec<f32> = match load_colour(file, width, height)? {
-        DynamicImage::ImageLuma8(grey) => grey.into_raw().into_iter().map(f32::from).collect(),
-        // 65535 = 255 · 257.
-        DynamicImage::ImageLuma16(grey) => {
-            let values = grey.into_raw().into_iter();
-            values.map(|v| f32::from(v) / 257.0).collect()
-        }
-        other => other
-            .to_luma32f()
-            .into_raw()
-            .into_iter()
-            .map(|v| v * 255.0)
-            .collect(),
-    };
-    // Luma of white may be a rounding error short of 255.
-    for value in &mut data {
-        if *value <= 1e-3 || *value >= 255.0 - 1e-3 {
-            *value = f32::NAN;
-        }
-    }
-    Ok(GreyImage::new(width as usize, height as usize, data))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::frames::{PictureFormat, write_picture};
-    use image::ImageBuffer;
-
-    #[test]
-    fn sixteen_bits_keep_their_fractions_of_grey_levels() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("frame.png");
-        // Every value there is.
-        let all = ImageBuffer::from_fn(256, 256, |u, v| image::Luma([(256 * v + u) as u16]));
-        write_picture(&path, &all.into(), PictureFormat::Png).unwrap();
-        let grey = load_grey(&FrameFile { index: 0, path }, 256, 256).unwrap();
-        let last = grey.data().len() - 1;
-        for (value, level) in grey.data().iter().enumerate().take(last).skip(1) {
-            assert_eq!((f64::from(*level) * 257.0).round() as usize, value);
-        }
-        // Black and white are clipped.
-        assert!(grey.data()[0].is_nan() && grey.data()[last].is_nan());
-        for level in 1..255u16 {
-            assert_eq!(grey.data()[usize::from(257 * level)], f32::from(level));
-        }
-    }
 }

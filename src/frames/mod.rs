@@ -7,13 +7,15 @@ mod load;
 mod noise;
 mod pyramid;
 mod shading;
+mod stored;
 mod write;
 
 pub use cache::FrameCache;
 pub use contrast::{LocalContrast, local_contrast};
 pub use grey::GreyImage;
-pub use load::{FrameError, FrameFile, list, load_colour, load_grey};
+pub use load::{FrameError, FrameFile, list, load_colour};
 pub use noise::{noise_at_level, noise_sigma};
 pub use pyramid::Pyramid;
 pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
+pub use stored::StoredFrame;
 pub use write::{FormatError, PictureFormat, write_picture};

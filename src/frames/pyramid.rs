@@ -8,33 +8,37 @@ use std::sync::{Arc, OnceLock};
 /// ([`super::contrast::subdued`]).
 #[derive(Clone, Debug)]
 pub struct Pyramid {
-    levels: Vec<GreyImage>,
-    /// What has been asked for.
+    full: GreyImage,
+    /// Level 1 and on, made when first asked for.
+    halved: Vec<OnceLock<GreyImage>>,
+    /// What has been asked for, level by level.
     contrasts: Vec<OnceLock<Arc<LocalContrast>>>,
 }
 
 impl Pyramid {
-    /// Builds `levels` levels (at least one).
+    /// Of `levels` levels (at least one).
     pub fn new(image: GreyImage, levels: usize) -> Self {
-        let mut pyramid = vec![image];
-        while pyramid.len() < levels {
-            let next = pyramid[pyramid.len() - 1].halved();
-            pyramid.push(subdued(&next));
-        }
         Self {
-            contrasts: vec![OnceLock::new(); pyramid.len()],
-            levels: pyramid,
+            full: image,
+            halved: vec![OnceLock::new(); levels.saturating_sub(1)],
+            contrasts: vec![OnceLock::new(); levels.max(1)],
         }
     }
 
     /// The image at `level`; 0 is full size.
+    ///
+    /// # Panics
+    /// If there is no such level.
     pub fn level(&self, level: usize) -> &GreyImage {
-        &self.levels[level]
+        match level.checked_sub(1) {
+            None => &self.full,
+            Some(finer) => self.halved[finer].get_or_init(|| subdued(&self.level(finer).halved())),
+        }
     }
 
     /// The local contrast at `level`, over a window as wide as light is smooth; made when first asked for.
     pub fn contrast(&self, level: usize) -> Arc<LocalContrast> {
-        let image = &self.levels[level];
+        let image = self.level(level);
         let made = self.contrasts[level]
             .get_or_init(|| Arc::new(local_contrast(image, wide_window(image))));
         Arc::clone(made)

@@ -19,6 +19,9 @@ use std::sync::Arc;
 
 /// Observations of a stretch at the least: enough work for all threads, little enough to hold in memory.
 const STRETCH_OBSERVATIONS: f64 = 1e6;
+/// Frames of a stretch at the most, apart from those that reach over from its neighbours: at coarse levels so many
+/// observations would be more frames than there is room for.
+const STRETCH_FRAMES: f64 = 256.0;
 /// Observations whose visibility is kept from one linearisation to the next; beyond, it is found anew each time.
 const KEPT_OBSERVATIONS: usize = 16_000_000;
 
@@ -212,7 +215,7 @@ impl<'a> Coverage<'a> {
     }
 }
 
-/// Cuts the lattice's rows into stretches of about [`STRETCH_OBSERVATIONS`].
+/// Cuts the lattice's rows into stretches of about [`STRETCH_OBSERVATIONS`] or [`STRETCH_FRAMES`].
 fn stretches(grid: &WallGrid, placed: &[Option<Placed>]) -> Vec<Stretch> {
     let rows: Vec<Option<Range<i64>>> = placed
         .iter()
@@ -224,12 +227,16 @@ fn stretches(grid: &WallGrid, placed: &[Option<Placed>]) -> Vec<Stretch> {
     let last = rows.iter().flatten().map(|r| r.end).max().unwrap_or(first);
     // Whole blocks of rows, so that no block is cut.
     let (first, last) = (first.div_euclid(BLOCK), (last - 1).div_euclid(BLOCK));
+    // Shares of a stretch.
     let mut load = vec![0.0; (last - first + 1) as usize];
     let (width, _) = grid.tile_size_m();
     for (frame, rows) in placed.iter().flatten().zip(rows.iter().flatten()) {
         let columns = (frame.footprint.s_max_m - frame.footprint.s_min_m) / width;
-        for row in rows.start.div_euclid(BLOCK)..=(rows.end - 1).div_euclid(BLOCK) {
-            load[(row - first) as usize] += columns * BLOCK as f64;
+        let blocks = rows.start.div_euclid(BLOCK)..(rows.end - 1).div_euclid(BLOCK) + 1;
+        let of_frames = 1.0 / (STRETCH_FRAMES * (blocks.end - blocks.start) as f64);
+        let of_observations = columns * BLOCK as f64 / STRETCH_OBSERVATIONS;
+        for row in blocks {
+            load[(row - first) as usize] += of_observations.max(of_frames);
         }
     }
     let mut stretches: Vec<Stretch> = Vec::new();
@@ -237,7 +244,7 @@ fn stretches(grid: &WallGrid, placed: &[Option<Placed>]) -> Vec<Stretch> {
     for (k, load) in load.iter().enumerate() {
         let end = first + k as i64 + 1;
         sum += load;
-        if sum >= STRETCH_OBSERVATIONS || end == last + 1 {
+        if sum >= 1.0 || end == last + 1 {
             let span = start * BLOCK..end * BLOCK;
             let meets = |rows: &Range<i64>| rows.start < span.end && span.start < rows.end;
             let frames: Vec<usize> = (0..rows.len())
