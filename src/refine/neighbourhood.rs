@@ -12,7 +12,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 /// Frames on either side of a changed one that are solved again.
-const REACH: usize = 128;
+const REACH: usize = 64;
 
 /// A run of frames that are solved again.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -15,6 +15,7 @@ use super::repeats::{Rival, settle_repeats};
 use super::run::disagreements;
 use super::track::{Tracked, retry};
 use super::verdict::unsupported;
+use crate::progress::Progress;
 
 /// Times that frames in doubt are placed once more.
 const TRIES: usize = 3;
@@ -35,10 +36,12 @@ pub fn repair(
     options: &RefineOptions,
     tracked: &mut Tracked,
     mut solved: Tracked,
+    progress: &dyn Progress,
 ) -> Result<Vec<Rival>, ProblemError> {
     let side = scene.camera.shorter_side();
     let count = tracked.estimates.len();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
+    progress.start("repair", ROUNDS);
     let mut aligned = alignments(scene, finest, tracked, &(0..count))?;
     let mut best: Option<Tracked> = None;
     // Known for the poses as they are.
@@ -83,7 +86,9 @@ pub fn repair(
             aligned.retain(|pair| !(frames.contains(&pair.a) && frames.contains(&pair.b)));
             aligned.extend(alignments(scene, finest, tracked, frames)?);
         }
+        progress.advance(1);
     }
+    progress.finish();
     if let Some(best) = best.filter(|best| believed(best) > believed(tracked)) {
         *tracked = best;
         rivals = None;

@@ -160,7 +160,13 @@ pub fn refine(
     while let Some((sampling, stopping)) = stages.pop_front() {
         let check = std::mem::take(&mut first);
         if last.is_some() && stages.is_empty() && rivals.is_none() {
-            rivals = Some(repair(&scene, options, &mut tracked, solved.clone())?);
+            rivals = Some(repair(
+                &scene,
+                options,
+                &mut tracked,
+                solved.clone(),
+                progress.as_ref(),
+            )?);
             clock.lap("repair");
         }
         let Sampling {
@@ -219,11 +225,12 @@ pub fn refine(
         }
         clock.lap(&format!("global {stage}"));
         if check {
-            recheck(&scene, options, &mut tracked)?;
+            recheck(&scene, options, &mut tracked, progress.as_ref())?;
             clock.lap("check");
         }
     }
     let solution = last.ok_or(RefineError::NoOverlap)?;
+    progress.start("covariance", 1);
     let finest = options.handover_level(side);
     let late = unsupported(&alignments(&scene, finest, &tracked, &(0..count))?, count);
     let rivals = rivals.unwrap_or_default();
@@ -262,6 +269,7 @@ pub fn refine(
         })
         .collect();
     leave_none_alone(&mut reports);
+    progress.finish();
     clock.lap("covariance");
 
     let on_prior = reports
@@ -387,10 +395,12 @@ fn recheck(
     scene: &Scene,
     options: &RefineOptions,
     tracked: &mut Tracked,
+    progress: &dyn Progress,
 ) -> Result<(), ProblemError> {
     let side = scene.camera.shorter_side();
     let count = tracked.estimates.len();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
+    progress.start("check", ROUNDS);
     for round in 0..ROUNDS {
         let pairs = compare_pairs(scene, finest, tracked, &(0..count))?;
         let mut doubts = contradictions(&pairs, count);
@@ -404,7 +414,9 @@ fn recheck(
         for level in (finest..=coarsest).rev() {
             solve_level(scene, options, level, tracked)?;
         }
+        progress.advance(1);
     }
+    progress.finish();
     Ok(())
 }
 
