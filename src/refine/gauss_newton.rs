@@ -83,8 +83,8 @@ const TRIES: usize = 8;
 
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
 ///
-/// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples; such a
-/// step is never taken. Only the last step, shorter than the tolerance, is taken on trust: cost and equations are those
+/// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples, or leads where no
+/// camera can be ([`Problem::admits`]); such a step is never taken. Only the last step, shorter than the tolerance, is taken on trust: cost and equations are those
 /// before it.
 struct DampedGaussNewton {
     stopping: Stopping,
@@ -170,6 +170,10 @@ impl DampedGaussNewton {
                 .map(|(estimate, step)| estimate.retract(step))
                 .collect();
             let candidate = (candidate, kappa + shared);
+            if !problem.admits(&candidate.0) {
+                self.raise_damping();
+                continue;
+            }
             if stop.is_some() {
                 self.iterations += 1;
                 self.last_step_px = step_px;

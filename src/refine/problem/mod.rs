@@ -34,6 +34,9 @@ const BATCH: usize = 64;
 const LEAST_ROWS: u32 = 90;
 /// A camera looks no farther than this many radii, when the lattice is laid out.
 const LONGEST_VIEW_RADII: f64 = 3.0;
+/// Largest gain that a step may lead to, standard deviations of the prior. A frame that fits nowhere is tempted to say
+/// nothing, with a gain of naught, which rounding then makes something of.
+const MOST_GAIN_SIGMA: f64 = 10.0;
 /// Stiffness of the gauge at the first frame over that of its pixels.
 const GAUGE_TIE: f64 = 1e6;
 
@@ -277,6 +280,22 @@ impl<'a> Problem<'a> {
         let first = self.active.start - self.participants.start;
         estimates[first..first + active.len()].copy_from_slice(active);
         estimates
+    }
+
+    /// True if the active frames that are compared can be so: each camera inside the tunnel, each gain within
+    /// [`MOST_GAIN_SIGMA`].
+    pub fn admits(&self, active: &[FrameEstimate]) -> bool {
+        let first = self.active.start - self.participants.start;
+        let compared = &self.coverage.compared()[first..first + active.len()];
+        let most_gain = MOST_GAIN_SIGMA * self.scene.prior.log_gain_sigma;
+        let mut compared = active
+            .iter()
+            .zip(compared)
+            .filter(|(_, compared)| **compared);
+        compared.all(|(estimate, _)| {
+            let inside = self.scene.surface.check_inside(&estimate.pose.t_wc);
+            inside.is_ok() && estimate.log_gain.abs() <= most_gain
+        })
     }
 
     /// Cost and normal equations at the given estimates of the active frames and the problem's own shared unknowns.
@@ -680,6 +699,19 @@ mod tests {
         };
         let share = trace(&half) / trace(&all);
         assert!((0.4..0.65).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn no_camera_leaves_the_tunnel_and_no_frame_falls_silent() {
+        let ring = Ring::new(1e-4);
+        let problem = ring.problem();
+        assert!(problem.admits(&ring.estimates));
+        let mut outside = ring.estimates.clone();
+        outside[2].pose.t_wc.z += 2.0 * ring.wall.circle.perimeter_m() / std::f64::consts::TAU;
+        assert!(!problem.admits(&outside));
+        let mut silent = ring.estimates.clone();
+        silent[1].log_gain = -14.0;
+        assert!(!problem.admits(&silent));
     }
 
     /// From 2 mrad and 2 mm off to the truth, along the gauge's freedoms, in undamped steps.
