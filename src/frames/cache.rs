@@ -95,6 +95,14 @@ impl FrameCache {
         }
     }
 
+    /// Pyramids that may be held at once.
+    pub fn room(&self) -> usize {
+        match &self.source {
+            Source::Files(..) => self.room,
+            Source::Memory(pyramids) => pyramids.len(),
+        }
+    }
+
     /// The shading that frames are divided by.
     pub fn shading(&self) -> Option<Arc<Shading>> {
         let shading = self.shading.read();

@@ -4,7 +4,7 @@ use super::GreyImage;
 use super::load::{FrameError, FrameFile, load_colour};
 use image::DynamicImage;
 
-/// A decoded frame in a quarter (8 bits) or half of the memory of a [`GreyImage`], the same to the last bit.
+/// A decoded frame in a quarter (8 bits) or half (16 bits, colour) of the memory of a [`GreyImage`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StoredFrame {
     width: usize,

@@ -88,7 +88,7 @@ pub fn alignments(
 ) -> Result<Vec<Alignment>, ProblemError> {
     let level = LEVEL.min(finest);
     let camera = scene.camera.at_level(level);
-    let overlaps = Overlaps::of(scene, &camera, tracked)?;
+    let overlaps = Overlaps::of(scene, &camera, tracked, frames)?;
     let mut found = Vec::new();
     for start in frames.clone().step_by(RUN) {
         let run = start..(start + RUN).min(frames.end);

@@ -135,7 +135,7 @@ fn compare_at(
         window,
     } = comparison;
     let camera = scene.camera.at_level(level);
-    let overlaps = Overlaps::of(scene, &camera, tracked)?;
+    let overlaps = Overlaps::of(scene, &camera, tracked, frames)?;
     let mut pairs = Vec::new();
     let mut portraits: BTreeMap<usize, Portrait> = BTreeMap::new();
     for start in frames.clone().step_by(RUN) {

@@ -17,10 +17,10 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Observations of a stretch at the least: enough work for all threads, little enough to hold in memory.
+/// Observations of a stretch: enough work for all threads, little enough to hold in memory.
 const STRETCH_OBSERVATIONS: f64 = 1e6;
-/// Frames of a stretch at the most, apart from those that reach over from its neighbours: at coarse levels so many
-/// observations would be more frames than there is room for.
+/// Frames of a stretch, apart from those that reach over from its neighbours, or as many as there is room for: at coarse
+/// levels so many observations would be more.
 const STRETCH_FRAMES: f64 = 256.0;
 /// Observations whose visibility is kept from one linearisation to the next; beyond, it is found anew each time.
 const KEPT_OBSERVATIONS: usize = 16_000_000;
@@ -94,7 +94,7 @@ impl<'a> Coverage<'a> {
         placed: Vec<Option<Placed>>,
     ) -> Result<Self, FrameError> {
         let mut coverage = Self {
-            stretches: stretches(&grid, &placed),
+            stretches: stretches(&grid, &placed, pictures.frames.room()),
             surface,
             grid,
             camera,
@@ -216,7 +216,8 @@ impl<'a> Coverage<'a> {
 }
 
 /// Cuts the lattice's rows into stretches of about [`STRETCH_OBSERVATIONS`] or [`STRETCH_FRAMES`].
-fn stretches(grid: &WallGrid, placed: &[Option<Placed>]) -> Vec<Stretch> {
+fn stretches(grid: &WallGrid, placed: &[Option<Placed>], room: usize) -> Vec<Stretch> {
+    let most_frames = STRETCH_FRAMES.min(room as f64);
     let rows: Vec<Option<Range<i64>>> = placed
         .iter()
         .map(|frame| frame.as_ref().map(|frame| rows_of(grid, &frame.footprint)))
@@ -233,7 +234,7 @@ fn stretches(grid: &WallGrid, placed: &[Option<Placed>]) -> Vec<Stretch> {
     for (frame, rows) in placed.iter().flatten().zip(rows.iter().flatten()) {
         let columns = (frame.footprint.s_max_m - frame.footprint.s_min_m) / width;
         let blocks = rows.start.div_euclid(BLOCK)..(rows.end - 1).div_euclid(BLOCK) + 1;
-        let of_frames = 1.0 / (STRETCH_FRAMES * (blocks.end - blocks.start) as f64);
+        let of_frames = 1.0 / (most_frames * (blocks.end - blocks.start) as f64);
         let of_observations = columns * BLOCK as f64 / STRETCH_OBSERVATIONS;
         for row in blocks {
             load[(row - first) as usize] += of_observations.max(of_frames);

@@ -1,7 +1,7 @@
 //! Damped Gauss–Newton on the manifold of poses, as a solver for argmin's executor.
 
 use super::calibration::Kappa;
-use super::estimate::{FrameEstimate, UNKNOWNS};
+use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
 use super::factor::FactorError;
 use super::problem::{Linearisation, Problem, ProblemError};
 use crate::progress::Progress;
@@ -83,8 +83,8 @@ const TRIES: usize = 8;
 
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
 ///
-/// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples, or leads where no
-/// camera can be ([`Problem::admits`]); such a step is never taken. Only the last step, shorter than the tolerance, is taken on trust: cost and equations are those
+/// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples; such a
+/// step is never taken. Frames that a step would bring where they cannot be ([`Problem::admits`]) stay where they are. Only the last step, shorter than the tolerance, is taken on trust: cost and equations are those
 /// before it.
 struct DampedGaussNewton {
     stopping: Stopping,
@@ -142,7 +142,7 @@ impl DampedGaussNewton {
                 Err(source) => return Err(problem.factor_error(source)),
             };
             let gradient = &current.normal.gradient;
-            let (step, shared) = match &current.border {
+            let (mut step, shared) = match &current.border {
                 None => (factor.step(gradient), Kappa::zeros()),
                 Some(border) => match border.step(&factor, gradient, self.lambda) {
                     Some(step) => step,
@@ -153,6 +153,12 @@ impl DampedGaussNewton {
                     None => return Err(problem.factor_error(FactorError::NotPositiveDefinite)),
                 },
             };
+            // One frame that fits nowhere must not hold back the others.
+            for (estimate, step) in estimates.iter().zip(&mut step) {
+                if !problem.admits(&estimate.retract(step)) {
+                    *step = FrameStep::zeros();
+                }
+            }
             let moved = problem.wall_step_px(estimates, &step, &shared);
             let step_px = moved.into_iter().fold(0.0, f64::max);
             let mut decrement: f64 = step
@@ -170,10 +176,6 @@ impl DampedGaussNewton {
                 .map(|(estimate, step)| estimate.retract(step))
                 .collect();
             let candidate = (candidate, kappa + shared);
-            if !problem.admits(&candidate.0) {
-                self.raise_damping();
-                continue;
-            }
             if stop.is_some() {
                 self.iterations += 1;
                 self.last_step_px = step_px;

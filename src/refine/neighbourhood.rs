@@ -1,7 +1,7 @@
 //! What is solved again when few of many frames have changed: their neighbourhood, with all else held.
 //!
-//! A wrong frame bends its neighbours over a few turns; a survey may have hundreds. So the work that a doubted frame makes
-//! does not grow with the length of the survey.
+//! A wrong frame bends its neighbours over a few turns; a survey may have hundreds. So what a doubted frame makes to be
+//! solved does not grow with the length of the survey. What it has bent farther off is left to the next solve of all.
 
 use super::gauss_newton::solve;
 use super::options::RefineOptions;
@@ -48,9 +48,12 @@ impl Neighbourhood {
             let earlier = active.start.saturating_sub(FARTHEST)..active.start;
             let later = active.end..(active.end + FARTHEST).min(footprints.len());
             let first = earlier.clone().find(|k| shares(k, &active));
-            let last = later.rev().find(|k| shares(k, &active));
+            let last = later.clone().rev().find(|k| shares(k, &active));
+            // The prior ties the first and the last to their neighbours, wall in common or not.
+            let first = first.or(earlier.last()).unwrap_or(active.start);
+            let last = last.or(later.min()).map_or(active.end, |k| k + 1);
             Self {
-                participants: first.unwrap_or(active.start)..last.map_or(active.end, |k| k + 1),
+                participants: first..last,
                 active,
             }
         });

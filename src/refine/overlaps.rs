@@ -7,6 +7,7 @@ use crate::camera::Pinhole;
 use crate::surface::Footprint;
 use crate::trajectory::Pose;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// What frame `frame` at `pose` sees of the wall through `camera`.
 ///
@@ -24,24 +25,31 @@ pub fn footprint(
 
 /// The believed frames on the wall.
 pub struct Overlaps {
-    /// What each sees; None for those in doubt.
+    /// What each sees; None for those in doubt and outside the run.
     pub footprints: Vec<Option<Footprint>>,
     perimeter_m: f64,
 }
 
 impl Overlaps {
-    /// Of all frames at their present poses, through `camera`.
+    /// Of a run of frames at their present poses, through `camera`.
     ///
     /// # Errors
     /// [`ProblemError::Placement`].
-    pub fn of(scene: &Scene, camera: &Pinhole, tracked: &Tracked) -> Result<Self, ProblemError> {
+    pub fn of(
+        scene: &Scene,
+        camera: &Pinhole,
+        tracked: &Tracked,
+        run: &Range<usize>,
+    ) -> Result<Self, ProblemError> {
         let frames = tracked.estimates.par_iter().zip(&tracked.doubts);
         let footprints = frames
             .enumerate()
-            .map(|(k, (estimate, doubt))| match doubt {
-                Some(_) => Ok(None),
-                None => footprint(scene, camera, k, &estimate.pose).map(Some),
-            })
+            .map(
+                |(k, (estimate, doubt))| match run.contains(&k) && doubt.is_none() {
+                    false => Ok(None),
+                    true => footprint(scene, camera, k, &estimate.pose).map(Some),
+                },
+            )
             .collect::<Result<_, _>>()?;
         Ok(Self {
             footprints,

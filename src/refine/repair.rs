@@ -5,7 +5,7 @@
 //! the others are solved again from the coarsest level, and the frames in doubt are placed once more on the wall as it is
 //! then.
 
-use super::alignment::alignments;
+use super::alignment::{Alignment, alignments};
 use super::consistency::{compare_pairs, contradictions};
 use super::doubt::Doubt;
 use super::neighbourhood::{Neighbourhood, changes};
@@ -16,6 +16,7 @@ use super::run::disagreements;
 use super::track::{Tracked, retry};
 use super::verdict::unsupported;
 use crate::progress::Progress;
+use std::ops::Range;
 
 /// Times that frames in doubt are placed once more.
 const TRIES: usize = 3;
@@ -47,6 +48,11 @@ pub fn repair(
     // Known for the poses as they are.
     let mut rivals = None;
     for round in 0..ROUNDS {
+        aligned.retain(|pair| {
+            [pair.a, pair.b]
+                .iter()
+                .all(|k| tracked.doubts[*k].is_none())
+        });
         take_out(unsupported(&aligned, count), tracked);
         let changed = !changes(&solved, tracked).is_empty();
         if !changed
@@ -80,11 +86,24 @@ pub fn repair(
             disagreements(shares, &mut tracked.doubts[run.active.clone()]);
         }
         for run in &runs {
-            let frames = &run.participants;
-            let pairs = compare_pairs(scene, finest, tracked, frames)?;
-            take_out(contradictions(&pairs, count), tracked);
-            aligned.retain(|pair| !(frames.contains(&pair.a) && frames.contains(&pair.b)));
-            aligned.extend(alignments(scene, finest, tracked, frames)?);
+            let pairs = compare_pairs(scene, finest, tracked, &run.participants)?;
+            let mut found = contradictions(&pairs, count);
+            // Of those held, some pairs are missing.
+            found.retain(|(frame, _)| run.active.contains(frame));
+            take_out(found, tracked);
+        }
+        for Neighbourhood {
+            active,
+            participants,
+        } in &runs
+        {
+            let within = |frames: &Range<usize>, pair: &Alignment| {
+                [pair.a, pair.b].map(|k| frames.contains(&k))
+            };
+            aligned.retain(|pair| {
+                within(participants, pair) != [true; 2] && within(active, pair) == [false; 2]
+            });
+            aligned.extend(alignments(scene, finest, tracked, participants)?);
         }
         progress.advance(1);
     }

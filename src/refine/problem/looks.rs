@@ -50,7 +50,7 @@ impl Problem<'_> {
             self.noise.floor = single as f32;
         }
         // Before the frames are aligned at full size, residuals are mostly misalignment.
-        if self.sampling.level == 0 && self.held_frames() == 0 {
+        if self.sampling.level == 0 && self.active.len() > 1 {
             let floor = f64::from(self.noise.floor);
             self.denoiser = Some(spectrum.denoiser(floor, 1.0 / self.grid.density));
         }

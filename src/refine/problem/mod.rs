@@ -282,20 +282,11 @@ impl<'a> Problem<'a> {
         estimates
     }
 
-    /// True if the active frames that are compared can be so: each camera inside the tunnel, each gain within
-    /// [`MOST_GAIN_SIGMA`].
-    pub fn admits(&self, active: &[FrameEstimate]) -> bool {
-        let first = self.active.start - self.participants.start;
-        let compared = &self.coverage.compared()[first..first + active.len()];
+    /// True if a frame can be so: its camera inside the tunnel, its gain within [`MOST_GAIN_SIGMA`].
+    pub fn admits(&self, estimate: &FrameEstimate) -> bool {
         let most_gain = MOST_GAIN_SIGMA * self.scene.prior.log_gain_sigma;
-        let mut compared = active
-            .iter()
-            .zip(compared)
-            .filter(|(_, compared)| **compared);
-        compared.all(|(estimate, _)| {
-            let inside = self.scene.surface.check_inside(&estimate.pose.t_wc);
-            inside.is_ok() && estimate.log_gain.abs() <= most_gain
-        })
+        let inside = self.scene.surface.check_inside(&estimate.pose.t_wc);
+        inside.is_ok() && estimate.log_gain.abs() <= most_gain
     }
 
     /// Cost and normal equations at the given estimates of the active frames and the problem's own shared unknowns.
@@ -705,12 +696,15 @@ mod tests {
     fn no_camera_leaves_the_tunnel_and_no_frame_falls_silent() {
         let ring = Ring::new(1e-4);
         let problem = ring.problem();
-        assert!(problem.admits(&ring.estimates));
-        let mut outside = ring.estimates.clone();
-        outside[2].pose.t_wc.z += 2.0 * ring.wall.circle.perimeter_m() / std::f64::consts::TAU;
+        let estimate = ring.estimates[2];
+        assert!(problem.admits(&estimate));
+        let mut outside = estimate;
+        outside.pose.t_wc.z += 2.0 * ring.wall.circle.perimeter_m() / std::f64::consts::TAU;
         assert!(!problem.admits(&outside));
-        let mut silent = ring.estimates.clone();
-        silent[1].log_gain = -14.0;
+        let silent = FrameEstimate {
+            log_gain: -14.0,
+            ..estimate
+        };
         assert!(!problem.admits(&silent));
     }
 
