@@ -77,11 +77,12 @@ impl FrameCache {
 
     /// Frames that are in memory anyway, with whatever levels they have.
     pub fn of_pyramids(pyramids: Vec<Pyramid>) -> Self {
+        let frames = pyramids.len();
         Self {
             source: Source::Memory(pyramids.into_iter().map(Arc::new).collect()),
             levels: 1,
             shading: RwLock::default(),
-            room: 1,
+            room: frames,
             shelf: Mutex::default(),
             stored: Mutex::default(),
         }
@@ -97,10 +98,7 @@ impl FrameCache {
 
     /// Pyramids that may be held at once.
     pub fn room(&self) -> usize {
-        match &self.source {
-            Source::Files(..) => self.room,
-            Source::Memory(pyramids) => pyramids.len(),
-        }
+        self.room
     }
 
     /// The shading that frames are divided by.

@@ -1,6 +1,6 @@
 //! Local contrast: a picture freed of light and exposure, for comparing frames before either is known.
 
-use super::GreyImage;
+use super::{GreyImage, MAD_TO_SIGMA};
 
 /// Half width of the widest sensible window, as a share of the picture's shorter side.
 const REACH: f64 = 1.0 / 8.0;
@@ -67,7 +67,7 @@ fn without_extremes(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
     }
     let middle = sizes.len() / 2;
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f32::total_cmp);
-    let most = most * 1.4826 * *median;
+    let most = most * MAD_TO_SIGMA as f32 * *median;
     for (value, mean) in values.iter_mut().zip(&means) {
         // NaN stays NaN.
         *value = value.clamp(mean - most, mean + most);

@@ -14,6 +14,7 @@ pub use cache::FrameCache;
 pub use contrast::{LocalContrast, local_contrast};
 pub use grey::GreyImage;
 pub use load::{FrameError, FrameFile, list, load_colour};
+pub(crate) use noise::MAD_TO_SIGMA;
 pub use noise::{noise_at_level, noise_sigma};
 pub use pyramid::Pyramid;
 pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};

@@ -2,6 +2,8 @@
 
 use super::GreyImage;
 
+/// A Gaussian's standard deviation over the median of its distances from the middle.
+pub(crate) const MAD_TO_SIGMA: f64 = 1.4826;
 /// Every how many rows and columns the noise is looked at.
 const STRIDE: usize = 3;
 
@@ -27,8 +29,7 @@ pub fn noise_sigma(image: &GreyImage) -> Option<f64> {
     }
     let middle = found.len() / 2;
     let (_, median, _) = found.select_nth_unstable_by(middle, f32::total_cmp);
-    // The median of |x| of a unit Gaussian is 1/1.4826.
-    Some(1.4826 * f64::from(*median) / 6.0)
+    Some(MAD_TO_SIGMA * f64::from(*median) / 6.0)
 }
 
 /// Variance of a bilinear sample between the pixels of a pyramid level, over the variance of a pixel at full size.

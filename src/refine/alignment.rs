@@ -18,14 +18,14 @@
 //! Source: B. D. Lucas and T. Kanade, "An iterative image registration technique with an application to stereo vision",
 //! 1981.
 
-use super::overlaps::Overlaps;
+use super::overlaps::{Batch, Overlaps};
 use super::problem::{ProblemError, Scene};
-use super::robust::{Loss, MAD_TO_SIGMA, robust_correlation};
+use super::robust::{Loss, robust_correlation};
 use super::sampler::Sampler;
 use super::track::Tracked;
 use super::wall::{Lattice, pixel_m};
 use crate::camera::Pinhole;
-use crate::frames::{Pyramid, noise_at_level};
+use crate::frames::{MAD_TO_SIGMA, Pyramid, noise_at_level};
 use crate::surface::{Footprint, WallPoint};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
 use rayon::prelude::*;
@@ -39,8 +39,6 @@ const LEVEL: usize = 1;
 const STRIDE: f64 = 4.0;
 /// Gauss–Newton steps.
 const STEPS: usize = 8;
-/// Frames compared at once: bounds the memory.
-const RUN: usize = 32;
 /// Least samples that two frames share, and as a share of the one's own.
 const LEAST_SAMPLES: usize = 40;
 const LEAST_OVERLAP: f64 = 0.02;
@@ -90,18 +88,7 @@ pub fn alignments(
     let camera = scene.camera.at_level(level);
     let overlaps = Overlaps::of(scene, &camera, tracked, frames)?;
     let mut found = Vec::new();
-    for start in frames.clone().step_by(RUN) {
-        let run = start..(start + RUN).min(frames.end);
-        let partners: Vec<(usize, Vec<usize>)> =
-            run.map(|a| (a, overlaps.after(a, frames.end))).collect();
-        let mut needed: Vec<usize> = partners
-            .iter()
-            .filter(|(_, others)| !others.is_empty())
-            .flat_map(|(a, others)| std::iter::once(a).chain(others))
-            .copied()
-            .collect();
-        needed.sort_unstable();
-        needed.dedup();
+    for Batch { partners, needed } in overlaps.batches() {
         let pictures: BTreeMap<usize, Arc<Pyramid>> = needed
             .into_par_iter()
             .map(|k| Ok((k, scene.frames.get(k)?)))
@@ -116,10 +103,10 @@ pub fn alignments(
                     picture: &pictures[&k],
                     pose: &tracked.estimates[k].pose,
                 };
-                let Some(footprint) = overlaps.footprints[*a].filter(|_| !others.is_empty()) else {
+                let Some(footprint) = &overlaps.footprints[*a] else {
                     return Vec::new();
                 };
-                let template = Template::new(&look(*a), &footprint);
+                let template = Template::new(&look(*a), footprint);
                 let aligned = |b: &usize| {
                     let mut alignment = template.align(&look(*b))?;
                     (alignment.a, alignment.b) = (*a, *b);

@@ -6,7 +6,7 @@
 //! residual fused from several frames cannot hide it.
 
 use super::doubt::Doubt;
-use super::overlaps::Overlaps;
+use super::overlaps::{Batch, Overlaps};
 use super::problem::{ProblemError, Scene};
 use super::robust::robust_correlation;
 use super::track::Tracked;
@@ -16,8 +16,6 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Frames compared at once: bounds the memory.
-const RUN: usize = 32;
 /// Least samples that two frames share, as a share of the lattice over one.
 const LEAST_OVERLAP: f64 = 0.03;
 /// Correlation, noise aside, that a right pair reaches, ...
@@ -138,22 +136,12 @@ fn compare_at(
     let overlaps = Overlaps::of(scene, &camera, tracked, frames)?;
     let mut pairs = Vec::new();
     let mut portraits: BTreeMap<usize, Portrait> = BTreeMap::new();
-    for start in frames.clone().step_by(RUN) {
-        let run = start..(start + RUN).min(frames.end);
-        let partners: Vec<(usize, Vec<usize>)> =
-            run.map(|a| (a, overlaps.after(a, frames.end))).collect();
-        let mut needed: Vec<usize> = partners
-            .iter()
-            .flat_map(|(a, others)| std::iter::once(a).chain(others))
-            .copied()
-            .collect();
-        needed.sort_unstable();
-        needed.dedup();
-        // What the run before has left is not made again.
+    for Batch { partners, needed } in overlaps.batches() {
+        // What the batch before has left is not made again.
         portraits.retain(|k, _| needed.binary_search(k).is_ok());
         let made: Vec<(usize, Portrait)> = needed
             .into_par_iter()
-            .filter(|k| tracked.doubts[*k].is_none() && !portraits.contains_key(k))
+            .filter(|k| !portraits.contains_key(k))
             .map(|k| Ok((k, Portrait::fine(scene, level, k, window)?)))
             .collect::<Result<_, ProblemError>>()?;
         portraits.extend(made);

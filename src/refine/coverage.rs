@@ -198,13 +198,8 @@ impl<'a> Coverage<'a> {
         let frames = self.frames(stretch);
         let mut pairs = Vec::new();
         for block in &visibility.blocks {
-            let mut seen: Vec<usize> = visibility.tiles[block.clone()]
-                .iter()
-                .flat_map(|tile| visibility.observers(tile))
-                .map(|o| frames[o.frame as usize])
-                .collect();
-            seen.sort_unstable();
-            seen.dedup();
+            let seen = visibility.frames(block).into_iter().map(|k| frames[k]);
+            let seen: Vec<usize> = seen.collect();
             for (n, a) in seen.iter().enumerate() {
                 pairs.extend(seen[n..].iter().map(|b| (*a, *b)));
             }

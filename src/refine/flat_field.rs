@@ -15,15 +15,13 @@
 //! Source: D. J. Fixsen, S. H. Moseley and R. G. Arendt, "Calibrating array detectors", Astrophysical Journal Supplement
 //! 128, 2000 (flat fields from pictures that show the same sky in different places).
 
+use super::neighbourhood::Neighbourhood;
 use super::options::RefineOptions;
-use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
-use super::robust::MAD_TO_SIGMA;
-use super::run::solve_level;
+use super::problem::{Problem, ProblemError, Sampling, Scene};
 use super::track::Tracked;
-use crate::frames::{SHADING_TERMS, Shading, shading_terms};
+use crate::frames::{MAD_TO_SIGMA, SHADING_TERMS, Shading, shading_terms};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::borrow::Cow;
 
 /// Frames that are used, at the most: the shading is the camera's, the same in all.
 const MOST_FRAMES: usize = 60;
@@ -75,9 +73,7 @@ pub fn flatten(
         if !correct(scene, options, tracked)? {
             break;
         }
-        for level in (finest..=coarsest).rev() {
-            solve_level(scene, options, level, tracked)?;
-        }
+        Neighbourhood::of_all(tracked).solve(scene, options, finest..=coarsest, tracked)?;
     }
     Ok(())
 }
@@ -95,12 +91,7 @@ pub fn correct(
     let count = tracked.estimates.len();
     let first = count.saturating_sub(MOST_FRAMES) / 2;
     let run = first..(first + MOST_FRAMES).min(count);
-    let members = Members {
-        participants: run.clone(),
-        active: run.clone(),
-        estimates: &tracked.estimates[run.clone()],
-        compared: Cow::Owned(tracked.believed(&run)),
-    };
+    let members = tracked.members_of(run.clone(), run.clone());
     let problem = Problem::new(scene, Sampling::of(level), members)?;
     let size = (scene.camera.width as usize, scene.camera.height as usize);
     let tiles = problem.at_tiles(TILES, |tiles: &mut Vec<Vec<Glimpse>>, look| {

@@ -20,10 +20,10 @@
 //! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
 //! | how sure | [`certainty`], [`covariance`]; how sure it could be at best: [`bound`] |
 //!
-//! At full size what is in a frame but not on the wall is left out of a solve beforehand: [`foreign`]. Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`], [`coverage`]
-//! and [`choice`] choose the samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, with the slopes of S as
-//! [`denoise`] finds them, [`problem`] reduces
-//! to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
+//! At full size what is in a frame but not on the wall is left out of a solve beforehand: [`foreign`]. Every solve is the
+//! same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`], [`coverage`] and [`choice`] choose the
+//! samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, with the slopes of S as
+//! [`denoise`] finds them, [`problem`] reduces to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
 //!
 //! # Speed
 //!

@@ -5,11 +5,10 @@
 
 use super::gauss_newton::solve;
 use super::options::RefineOptions;
-use super::problem::{FrameShare, Members, Problem, ProblemError, Sampling, Scene};
+use super::problem::{FrameShare, Problem, ProblemError, Sampling, Scene};
 use super::run::close;
 use super::track::{FARTHEST, Tracked, footprints};
-use std::borrow::Cow;
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 /// Frames on either side of a changed one that are solved again.
 const REACH: usize = 64;
@@ -60,7 +59,17 @@ impl Neighbourhood {
         Ok(widened.collect())
     }
 
-    /// Solves the believed frames at a pyramid level, close enough for the next; returns how each frame took part.
+    /// All frames.
+    pub fn of_all(tracked: &Tracked) -> Self {
+        let all = 0..tracked.estimates.len();
+        Self {
+            active: all.clone(),
+            participants: all,
+        }
+    }
+
+    /// Solves the believed frames at some pyramid levels, coarse to fine, each close enough for the next; returns how each
+    /// frame took part in the last.
     ///
     /// # Errors
     /// [`ProblemError`].
@@ -68,19 +77,18 @@ impl Neighbourhood {
         &self,
         scene: &Scene,
         options: &RefineOptions,
-        level: usize,
+        levels: RangeInclusive<usize>,
         tracked: &mut Tracked,
     ) -> Result<Vec<FrameShare>, ProblemError> {
-        let members = Members {
-            participants: self.participants.clone(),
-            active: self.active.clone(),
-            estimates: &tracked.estimates[self.participants.clone()],
-            compared: Cow::Owned(tracked.believed(&self.participants)),
-        };
-        let problem = Problem::new(scene, Sampling::of(level), members)?;
-        let solution = solve(problem, close(options, level), None)?;
-        tracked.estimates[self.active.clone()].copy_from_slice(&solution.estimates);
-        Ok(solution.linearisation.frames)
+        let mut shares = Vec::new();
+        for level in levels.rev() {
+            let members = tracked.members_of(self.participants.clone(), self.active.clone());
+            let problem = Problem::new(scene, Sampling::of(level), members)?;
+            let solution = solve(problem, close(options, level), None)?;
+            tracked.estimates[self.active.clone()].copy_from_slice(&solution.estimates);
+            shares = solution.linearisation.frames;
+        }
+        Ok(shares)
     }
 }
 

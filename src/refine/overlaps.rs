@@ -23,11 +23,23 @@ pub fn footprint(
         .map_err(|source| ProblemError::Placement { frame, source })
 }
 
-/// The believed frames on the wall.
+/// Frames compared at once: bounds the memory.
+const BATCH: usize = 32;
+
+/// The believed frames of a run on the wall.
 pub struct Overlaps {
     /// What each sees; None for those in doubt and outside the run.
     pub footprints: Vec<Option<Footprint>>,
+    run: Range<usize>,
     perimeter_m: f64,
+}
+
+/// Some frames and those after them that may share wall with them.
+pub struct Batch {
+    /// A frame and those after it, for every frame that has any.
+    pub partners: Vec<(usize, Vec<usize>)>,
+    /// All of them, ascending.
+    pub needed: Vec<usize>,
 }
 
 impl Overlaps {
@@ -53,16 +65,35 @@ impl Overlaps {
             .collect::<Result<_, _>>()?;
         Ok(Self {
             footprints,
+            run: run.clone(),
             perimeter_m: scene.surface.perimeter_m(),
         })
     }
 
-    /// The frames after frame `a` and before `end` that may share wall with it, as far on as overlap is looked for.
-    pub fn after(&self, a: usize, end: usize) -> Vec<usize> {
+    /// The frames of the run, a few at a time.
+    pub fn batches(&self) -> impl Iterator<Item = Batch> {
+        self.run.clone().step_by(BATCH).map(|start| {
+            let frames = start..(start + BATCH).min(self.run.end);
+            let partners: Vec<(usize, Vec<usize>)> = frames
+                .map(|a| (a, self.after(a)))
+                .filter(|(_, others)| !others.is_empty())
+                .collect();
+            let all = partners
+                .iter()
+                .flat_map(|(a, others)| std::iter::once(a).chain(others));
+            let mut needed: Vec<usize> = all.copied().collect();
+            needed.sort_unstable();
+            needed.dedup();
+            Batch { partners, needed }
+        })
+    }
+
+    /// The frames after frame `a` that may share wall with it, as far on as overlap is looked for.
+    fn after(&self, a: usize) -> Vec<usize> {
         let Some(own) = &self.footprints[a] else {
             return Vec::new();
         };
-        let last = (a + FARTHEST + 1).min(end);
+        let last = (a + FARTHEST + 1).min(self.run.end);
         let overlaps = |other: &Footprint| other.overlaps(own, self.perimeter_m);
         (a + 1..last)
             .filter(|b| self.footprints[*b].as_ref().is_some_and(overlaps))

@@ -76,10 +76,7 @@ pub fn repair(
         let runs = Neighbourhood::of_changes(scene, &solved, tracked)?;
         let mut shares = Vec::new();
         for run in &runs {
-            for level in (1..=coarsest).rev() {
-                run.solve(scene, options, level, tracked)?;
-            }
-            shares.push(run.solve(scene, options, 0, tracked)?);
+            shares.push(run.solve(scene, options, 0..=coarsest, tracked)?);
         }
         solved.clone_from(tracked);
         for (run, shares) in runs.iter().zip(&shares) {

@@ -1,5 +1,7 @@
 //! The noise of residuals and the robust loss that goes with it.
 
+use crate::frames::MAD_TO_SIGMA;
+
 /// Residuals' variance at a wall point whose texture changes by g grey levels from one sample to the next:
 /// `v(g) = σ² + κ g²`.
 ///
@@ -52,9 +54,6 @@ impl Loss {
         (1.0 - left * left * left) * (1.0 / (6.0 * SHARPNESS))
     }
 }
-
-/// A Gaussian's standard deviation over the median of its distances from the middle.
-pub const MAD_TO_SIGMA: f64 = 1.4826;
 
 /// Median of some values and their robust standard deviation: the median distance from it, as a Gaussian's σ. The values are
 /// lost; 0, 0 of none.

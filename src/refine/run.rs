@@ -10,6 +10,7 @@ use super::estimate::FrameEstimate;
 use super::examine::examine;
 use super::flat_field::{correct, flatten};
 use super::gauss_newton::{Solution, StopReason, Stopping, solve};
+use super::neighbourhood::Neighbourhood;
 use super::observed::{CalibrationReport, Refusal};
 use super::options::RefineOptions;
 use super::place::apart_m;
@@ -411,27 +412,10 @@ fn recheck(
         if round + 1 == ROUNDS || retry(scene, options, tracked)? == 0 {
             break;
         }
-        for level in (finest..=coarsest).rev() {
-            solve_level(scene, options, level, tracked)?;
-        }
+        Neighbourhood::of_all(tracked).solve(scene, options, finest..=coarsest, tracked)?;
         progress.advance(1);
     }
     progress.finish();
-    Ok(())
-}
-
-/// Solves all believed frames at a pyramid level, close enough for the next.
-///
-/// # Errors
-/// [`ProblemError`].
-pub fn solve_level(
-    scene: &Scene,
-    options: &RefineOptions,
-    level: usize,
-    tracked: &mut Tracked,
-) -> Result<(), ProblemError> {
-    let problem = Problem::new(scene, Sampling::of(level), tracked.members())?;
-    tracked.estimates = solve(problem, close(options, level), None)?.estimates;
     Ok(())
 }
 

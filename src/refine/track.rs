@@ -50,11 +50,17 @@ impl Tracked {
     /// All frames, all to be estimated; those in doubt by the prior alone.
     pub fn members(&self) -> Members<'_> {
         let all = 0..self.estimates.len();
+        self.members_of(all.clone(), all)
+    }
+
+    /// The frames `participants`, of which those `active` are to be estimated and the others held; those in doubt by the
+    /// prior alone.
+    pub fn members_of(&self, participants: Range<usize>, active: Range<usize>) -> Members<'_> {
         Members {
-            compared: Cow::Owned(self.believed(&all)),
-            participants: all.clone(),
-            active: all,
-            estimates: &self.estimates,
+            estimates: &self.estimates[participants.clone()],
+            compared: Cow::Owned(self.believed(&participants)),
+            participants,
+            active,
         }
     }
 
@@ -162,12 +168,7 @@ fn solve_window(
     tracked: &mut Tracked,
 ) -> Result<(), ProblemError> {
     let active = window.start + held..window.end;
-    let members = Members {
-        active: active.clone(),
-        estimates: &tracked.estimates[window.clone()],
-        compared: Cow::Owned(tracked.believed(&window)),
-        participants: window,
-    };
+    let members = tracked.members_of(window, active.clone());
     let problem = Problem::new(scene, Sampling::of(level), members)?.calibrating();
     if problem.tiles() > 0 {
         let solution = solve(problem, WINDOW_STOPPING, None)?;

@@ -194,6 +194,16 @@ impl Visibility {
         visibility
     }
 
+    /// The frames that see some tile of a run, ascending.
+    pub fn frames(&self, tiles: &Range<usize>) -> Vec<usize> {
+        let tiles = self.tiles[tiles.clone()].iter();
+        let observers = tiles.flat_map(|tile| self.observers(tile));
+        let mut frames: Vec<usize> = observers.map(|o| o.frame as usize).collect();
+        frames.sort_unstable();
+        frames.dedup();
+        frames
+    }
+
     /// The frames that see `tile`.
     pub fn observers(&self, tile: &Tile) -> &[Observer] {
         &self.observers[tile.observers.clone()]

@@ -30,13 +30,8 @@ impl Problem<'_> {
             .iter()
             .map(|k| self.slot(*k))
             .collect();
-        let mut slots: Vec<usize> = tiles
-            .iter()
-            .flat_map(|tile| visibility.observers(tile))
-            .filter_map(|o| stretch_slots[o.frame as usize])
-            .collect();
-        slots.sort_unstable();
-        slots.dedup();
+        let frames = visibility.frames(block).into_iter();
+        let slots = frames.filter_map(|k| stretch_slots[k]).collect();
         let mut sums = BlockSums::new(slots, self.calibrates);
         let mut work = TileWork::default();
         let mut scratch = Vec::new();
