@@ -100,8 +100,8 @@ pub struct SimulateArguments {
     /// 1-σ of the sensor's noise, grey levels.
     #[arg(long, value_name = "GREY", default_value_t = 2.0)]
     noise: f64,
-    /// Rays along each side of a pixel.
-    #[arg(long, value_name = "N", default_value_t = 4)]
+    /// Points along each side of a pixel; fewer are faster, and alias where the wall is sharp.
+    #[arg(long, value_name = "N", default_value_t = 8)]
     supersample: u32,
     #[command(flatten)]
     hardships: HardshipArguments,

@@ -88,7 +88,8 @@ pub struct SimulateOptions {
     /// Frames that are no good.
     #[serde(skip_serializing_if = "is_default")]
     pub bad_frames: BadFrames,
-    /// Rays along each side of a pixel; a pixel is the mean of its square.
+    /// Points along each side of a pixel; a pixel is the mean of its square. The wall is painted with up to 6 texels over the
+    /// width of a pixel, and fewer points than that alias.
     pub supersample: u32,
     /// Seed of everything that is random.
     pub seed: u64,
@@ -133,7 +134,7 @@ impl SimulateOptions {
             moving: 0,
             bits: Bits::default(),
             bad_frames: BadFrames::default(),
-            supersample: 4,
+            supersample: 8,
             seed: 1,
         }
     }
