@@ -6,6 +6,7 @@ mod demo;
 mod failure;
 mod hardships;
 mod json;
+mod locate;
 mod project;
 mod refine;
 mod simulate;
@@ -52,6 +53,7 @@ enum Command {
     Simulate(simulate::SimulateArguments),
     Refine(refine::RefineArguments),
     Stitch(stitch::StitchArguments),
+    Locate(locate::LocateArguments),
     Compare(compare::CompareArguments),
     Converge(converge::ConvergeArguments),
     Project(project::ProjectArguments),
@@ -81,6 +83,7 @@ pub fn run() -> Result<(), Failure> {
         Command::Simulate(arguments) => simulate::run(&arguments, &terminal),
         Command::Refine(arguments) => refine::run(&arguments, &terminal),
         Command::Stitch(arguments) => stitch::run(&arguments, &terminal),
+        Command::Locate(arguments) => locate::run(&arguments, &terminal),
         Command::Compare(arguments) => compare::run(&arguments, &terminal),
         Command::Converge(arguments) => converge::run(&arguments, &terminal),
         Command::Project(arguments) => project::run(&arguments, &terminal),

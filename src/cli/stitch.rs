@@ -189,7 +189,10 @@ pub fn picture_output(path: &Path) -> Result<PictureFormat, Failure> {
 }
 
 /// The poses that `initial`, `truth` or the name of a TUM file stand for.
-fn poses_by_name(survey: &Survey, name: &str) -> Result<Vec<Pose>, Failure> {
+///
+/// # Errors
+/// No true poses where they are asked for; a file that cannot be read or is no list of the frames' poses.
+pub fn poses_by_name(survey: &Survey, name: &str) -> Result<Vec<Pose>, Failure> {
     match name {
         "initial" => Ok(survey.initial_poses()),
         "truth" => match &survey.truth {

@@ -11,7 +11,17 @@
 //! null space is the gauge, fixed at the first frame. `cov(ξ̂) ⪰ J⁻¹` for any unbiased estimate, and with the prior's
 //! information added the Bayesian bound (van Trees) for any estimate at all.
 //!
-//! Source: C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection, Estimation, and Modulation Theory", 1968.
+//! # What can be reached
+//!
+//! The bound takes the slopes of the texture for known, and an estimator has them from the same pixels. Where the texture is a
+//! Gaussian process with the spectrum P(f) that N frames see with noise of the spectrum σ² each, the information with the
+//! texture integrated out is J with the part of each frequency multiplied by `Nρ/(1 + Nρ)`, `ρ = P/σ²` (Hahn and Tretter's
+//! delays of N receivers, in two dimensions). Detail below the noise of the mean of all frames that see it counts for the bound,
+//! but is of no use to an estimator that does not know it beforehand. So on faint walls the bound is not to be reached, the
+//! less the more noise there is.
+//!
+//! Source: W. R. Hahn and S. A. Tretter, "Optimum processing for delay-vector estimation in passive signal arrays", IEEE
+//! Transactions on Information Theory 19(5), 1973; C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection, Estimation, and Modulation Theory", 1968.
 
 use super::calibration::{Calibration, Kappa};
 use super::covariance::Covariances;

@@ -26,6 +26,36 @@ impl Layout {
             Self::ChainageRight => image.rotate270(),
         }
     }
+
+    /// Where column and row of a canvas lie in the picture: x and y (integers are pixels' centres).
+    pub fn to_picture(self, canvas: &Canvas, [column, row]: [f64; 2]) -> [f64; 2] {
+        match self {
+            Self::ThetaRight => [column, row],
+            Self::ChainageRight => [row, f64::from(canvas.columns) - 1.0 - column],
+        }
+    }
+
+    /// The inverse of [`Layout::to_picture`].
+    pub fn from_picture(self, canvas: &Canvas, [x, y]: [f64; 2]) -> [f64; 2] {
+        match self {
+            Self::ThetaRight => [x, y],
+            Self::ChainageRight => [f64::from(canvas.columns) - 1.0 - y, x],
+        }
+    }
+
+    /// True if the picture has a pixel there.
+    pub fn holds(self, canvas: &Canvas, [x, y]: [f64; 2]) -> bool {
+        let [width, height] = self.size(canvas).map(f64::from);
+        (-0.5..width - 0.5).contains(&x) && (-0.5..height - 0.5).contains(&y)
+    }
+
+    /// Width and height of the picture, pixels.
+    pub fn size(self, canvas: &Canvas) -> [u32; 2] {
+        match self {
+            Self::ThetaRight => [canvas.columns, canvas.rows],
+            Self::ChainageRight => [canvas.rows, canvas.columns],
+        }
+    }
 }
 
 /// The pixels of a panorama: once around the tunnel, and along it as far as the frames see.
@@ -118,10 +148,24 @@ impl Canvas {
 
     /// The wall point at the centre of a pixel.
     pub fn wall(&self, column: u32, row: u32) -> WallPoint {
+        self.wall_at([f64::from(column), f64::from(row)])
+    }
+
+    /// The wall point at column and row (integers are pixels' centres).
+    pub fn wall_at(&self, [column, row]: [f64; 2]) -> WallPoint {
         WallPoint {
-            s_m: (f64::from(column) + 0.5) / self.px_per_metre,
-            h_m: self.h_start_m + (f64::from(row) + 0.5) / self.px_per_metre,
+            s_m: (column + 0.5) / self.px_per_metre,
+            h_m: self.h_start_m + (row + 0.5) / self.px_per_metre,
         }
+    }
+
+    /// Column and row of a wall point, the inverse of [`Canvas::wall_at`] for columns from −½ to all less ½.
+    pub fn pixel_of(&self, wall: WallPoint) -> [f64; 2] {
+        let around_m = f64::from(self.columns) / self.px_per_metre;
+        [
+            wall.s_m.rem_euclid(around_m) * self.px_per_metre - 0.5,
+            (wall.h_m - self.h_start_m) * self.px_per_metre - 0.5,
+        ]
     }
 
     /// Chainage of the first row's upper and of the last row's lower edge, metres.
@@ -181,6 +225,28 @@ mod tests {
         // The first and the last column are one pixel apart across θ = 0.
         let gap = canvas.wall(0, 0).s_m - (canvas.wall(1884, 0).s_m - circle.perimeter_m());
         assert!((gap * canvas.px_per_metre - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn picture_and_wall_go_back_and_forth_in_either_layout() {
+        let circle = Circle::new(3.0).unwrap();
+        let canvas = Canvas::covering(&circle, &[footprint(-1.5, 2.0)], 20.0).unwrap();
+        let (column, row) = (310.25, 12.5);
+        let [again_column, again_row] = canvas.pixel_of(canvas.wall_at([column, row]));
+        assert!((again_column - column).abs() < 1e-9 && (again_row - row).abs() < 1e-9);
+        // A mark in the picture, turned as the picture is.
+        let mut image = image::GrayImage::new(canvas.columns, canvas.rows);
+        image.put_pixel(300, 7, image::Luma([200]));
+        for layout in [Layout::ThetaRight, Layout::ChainageRight] {
+            let turned = layout.turn(DynamicImage::from(image.clone())).to_luma8();
+            assert_eq!([turned.width(), turned.height()], layout.size(&canvas));
+            let [x, y] = layout.to_picture(&canvas, [300.0, 7.0]);
+            assert_eq!(turned.get_pixel(x as u32, y as u32).0, [200]);
+            assert_eq!(layout.from_picture(&canvas, [x, y]), [300.0, 7.0]);
+            let [width, height] = layout.size(&canvas).map(f64::from);
+            assert!(layout.holds(&canvas, [-0.5, height - 0.6]));
+            assert!(!layout.holds(&canvas, [width - 0.5, 3.0]));
+        }
     }
 
     #[test]

@@ -9,12 +9,15 @@
 //! that sees it, and the samples are averaged with weights that fall to zero at the frame's border. The
 //! same function draws the initial, the refined and the true poses, so pictures differ by their poses only.
 //!
+//! [`sightings`] goes the other way: from a point of the wall to the frames and pixels that show it.
+//!
 //! [`cylinder`] is the odd one out: the cylindrical projection of one single photo.
 
 mod blend;
 mod canvas;
 pub mod cylinder;
 mod error;
+mod locate;
 mod memory;
 mod panorama;
 mod picture;
@@ -26,6 +29,7 @@ mod tiles;
 pub use blend::render;
 pub use canvas::{Canvas, Layout};
 pub use error::RenderError;
+pub use locate::{Sighting, sightings};
 pub use panorama::Panorama;
 pub use picture::{Interpolation, Picture};
 pub use placement::{Placement, native_px_per_metre, place};

@@ -88,8 +88,8 @@ pub struct SimulateOptions {
     /// Frames that are no good.
     #[serde(skip_serializing_if = "is_default")]
     pub bad_frames: BadFrames,
-    /// Points along each side of a pixel; a pixel is the mean of its square. The wall is painted with up to 6 texels over the
-    /// width of a pixel, and fewer points than that alias.
+    /// Points along each side of a pixel; a pixel is the mean of its square. The wall is painted with some three to six
+    /// texels over the width of a pixel (more where pixels are large), and fewer points than that alias.
     pub supersample: u32,
     /// Seed of everything that is random.
     pub seed: u64,
@@ -239,7 +239,7 @@ impl SimulateOptions {
         )?;
         check(
             (1..=16).contains(&self.supersample),
-            "1 to 16 rays may be cast along each side of a pixel",
+            "1 to 16 points may be looked at along each side of a pixel",
         )?;
         check(
             (0.0..100.0).contains(&self.gain_percent),

@@ -1,0 +1,350 @@
+//! `tunnelstitch locate`: from the panorama to the frames and back.
+
+use super::stitch::{LayoutArgument, poses_by_name, positive};
+use super::{Failure, Terminal, json};
+use crate::render::{Canvas, Layout, Sighting, native_px_per_metre, place, sightings};
+use crate::surface::WallPoint;
+use crate::survey::Survey;
+use crate::trajectory::Pose;
+use nalgebra::Vector2;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Finds a point of the wall in the panorama, in the tunnel and in the frames.
+///
+/// The point is given in any one of these ways, and told in all of them: as a pixel of the panorama, as chainage and angle
+/// or clock position on the wall, or as a pixel of a frame. Pixels count from 0 at the centre of the first.
+///
+/// The clock position is that of θ seen along increasing chainage, twelve o'clock being at θ = 0 unless --twelve-at says
+/// where.
+#[derive(Debug, clap::Args)]
+#[command(
+    group = clap::ArgGroup::new("point").required(true),
+    after_help = "Examples:\n  \
+    tunnelstitch locate survey --poses refined/poses.tum --panorama 1200,345\n      \
+    where is this crack, and which frames show it?\n  \
+    tunnelstitch locate survey --poses refined/poses.tum --clock 12.30,4:30\n      \
+    what shows the wall at chainage 12.30 m, half past four?\n  \
+    tunnelstitch locate survey --poses refined/poses.tum --frame 000017.png,320,240 --json\n      \
+    where is what the middle of this frame shows?"
+)]
+pub struct LocateArguments {
+    /// Folder of the survey, or its survey.toml.
+    survey: PathBuf,
+    /// A pixel of the panorama that `stitch` draws from these poses with the same --px-per-metre and --layout (not of the
+    /// pictures of `compare`, nor of one with --ignore-offset).
+    #[arg(long, group = "point", value_name = "X,Y", value_parser = pair, allow_hyphen_values = true)]
+    panorama: Option<[f64; 2]>,
+    /// Chainage in metres and angle θ in degrees.
+    #[arg(long, group = "point", value_name = "CHAINAGE,DEG", value_parser = pair, allow_hyphen_values = true)]
+    wall: Option<[f64; 2]>,
+    /// Chainage in metres and clock position.
+    #[arg(long, group = "point", value_name = "CHAINAGE,H:MM", value_parser = clock, allow_hyphen_values = true)]
+    clock: Option<[f64; 2]>,
+    /// A frame (its file's name or its index from 0) and a pixel of it.
+    #[arg(long, group = "point", value_name = "FRAME,U,V", value_parser = frame_pixel, allow_hyphen_values = true)]
+    frame: Option<FramePixel>,
+    /// Which poses: `initial` and `truth` are those of survey.toml, anything else is a TUM file.
+    #[arg(long, default_value = "initial", value_name = "initial|truth|FILE")]
+    poses: String,
+    /// Pixels per metre of the panorama [default: the frames' own resolution at the wall].
+    #[arg(long, value_name = "N", value_parser = positive)]
+    px_per_metre: Option<f64>,
+    /// How the panorama lies in its file.
+    #[arg(long, value_enum, default_value_t)]
+    layout: LayoutArgument,
+    /// The angle θ of twelve o'clock, degrees.
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 0.0,
+        value_parser = number,
+        allow_hyphen_values = true
+    )]
+    twelve_at: f64,
+    /// Print the answer as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// A pixel of a frame.
+#[derive(Clone, Debug)]
+struct FramePixel {
+    frame: String,
+    pixel: [f64; 2],
+}
+
+/// Beyond this no number is a place in a tunnel.
+const MOST: f64 = 1e9;
+
+fn number(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(value) if value.abs() <= MOST => Ok(value),
+        _ => Err(format!("`{text}` is not a number within ±{MOST:e}")),
+    }
+}
+
+fn pair(text: &str) -> Result<[f64; 2], String> {
+    let (first, second) = text
+        .split_once(',')
+        .ok_or("must be two numbers with a comma between")?;
+    Ok([number(first)?, number(second)?])
+}
+
+/// Chainage, and degrees from twelve o'clock.
+fn clock(text: &str) -> Result<[f64; 2], String> {
+    const FORM: &str = "must be chainage and clock position, as 12.30,4:30";
+    let (chainage, position) = text.split_once(',').ok_or(FORM)?;
+    let (hours, minutes) = position.split_once(':').unwrap_or((position, "0"));
+    let parsed = hours
+        .trim()
+        .parse::<u32>()
+        .ok()
+        .zip(minutes.trim().parse::<u32>().ok());
+    match parsed {
+        Some((hours, minutes)) if hours <= 12 && minutes < 60 => Ok([
+            number(chainage)?,
+            f64::from(hours % 12) * 30.0 + f64::from(minutes) * 0.5,
+        ]),
+        _ => Err(FORM.to_owned()),
+    }
+}
+
+fn frame_pixel(text: &str) -> Result<FramePixel, String> {
+    const FORM: &str = "must be a frame and a pixel of it, as 000017.png,320,240";
+    let mut parts = text.rsplitn(3, ',');
+    let (Some(v), Some(u), Some(frame)) = (parts.next(), parts.next(), parts.next()) else {
+        return Err(FORM.to_owned());
+    };
+    Ok(FramePixel {
+        frame: frame.trim().to_owned(),
+        pixel: [number(u)?, number(v)?],
+    })
+}
+
+/// The answer.
+#[derive(Serialize)]
+struct Located {
+    chainage_m: f64,
+    theta_deg: f64,
+    /// Hours and minutes.
+    clock: String,
+    /// In the picture, as it lies.
+    panorama_px: [f64; 2],
+    panorama_size_px: [u32; 2],
+    in_panorama: bool,
+    panorama_px_per_metre: f64,
+    layout: Layout,
+    frames: Vec<InFrame>,
+}
+
+#[derive(Serialize)]
+struct InFrame {
+    file: String,
+    #[serde(flatten)]
+    sighting: Sighting,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for everything wrong with the survey, the poses or the point.
+pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failure> {
+    let survey = Survey::open(&arguments.survey)?;
+    let poses = poses_by_name(&survey, &arguments.poses)?;
+    let surface = survey.surface.as_ref();
+    let placements = place(surface, &survey.camera, &poses)?;
+    let px_per_metre = match arguments.px_per_metre {
+        Some(given) => given,
+        None => native_px_per_metre(surface, &survey.camera, &poses)?,
+    };
+    let canvas = Canvas::of_placements(surface, &placements, px_per_metre)?;
+    let layout = Layout::from(arguments.layout);
+    let wall = point(arguments, &survey, &poses, &canvas)?;
+    let perimeter_m = surface.perimeter_m();
+    let theta_deg = wall.s_m.rem_euclid(perimeter_m) / perimeter_m * 360.0;
+    let found = sightings(surface, &survey.camera, &placements, wall);
+    let panorama_px = layout.to_picture(&canvas, canvas.pixel_of(wall));
+    let located = Located {
+        chainage_m: wall.h_m,
+        theta_deg,
+        clock: clock_position(theta_deg - arguments.twelve_at),
+        panorama_px,
+        panorama_size_px: layout.size(&canvas),
+        in_panorama: layout.holds(&canvas, panorama_px),
+        panorama_px_per_metre: canvas.px_per_metre,
+        layout,
+        frames: found
+            .into_iter()
+            .map(|sighting| InFrame {
+                file: file_name(&survey, sighting.frame),
+                sighting,
+            })
+            .collect(),
+    };
+    if arguments.json {
+        return json::print(&located);
+    }
+    tell(&located, survey.frames.len(), terminal);
+    Ok(())
+}
+
+/// The point that is asked for.
+fn point(
+    arguments: &LocateArguments,
+    survey: &Survey,
+    poses: &[Pose],
+    canvas: &Canvas,
+) -> Result<WallPoint, Failure> {
+    let on_wall = |[h_m, theta_deg]: [f64; 2]| WallPoint {
+        s_m: theta_deg.rem_euclid(360.0) / 360.0 * survey.surface.perimeter_m(),
+        h_m,
+    };
+    if let Some(wall) = arguments.wall {
+        return Ok(on_wall(wall));
+    }
+    if let Some([h_m, from_twelve]) = arguments.clock {
+        return Ok(on_wall([h_m, from_twelve + arguments.twelve_at]));
+    }
+    if let Some(pixel) = arguments.panorama {
+        let layout = Layout::from(arguments.layout);
+        if !layout.holds(canvas, pixel) {
+            let size = layout.size(canvas);
+            return Err(Failure::usage(format!(
+                "--panorama {},{}: the panorama of these poses has {} × {} px; give the --px-per-metre and --layout that it was drawn with",
+                pixel[0], pixel[1], size[0], size[1]
+            )));
+        }
+        return Ok(canvas.wall_at(layout.from_picture(canvas, pixel)));
+    }
+    let Some(FramePixel { frame, pixel }) = &arguments.frame else {
+        return Err(Failure::usage(
+            "say which point: --panorama, --wall, --clock or --frame",
+        ));
+    };
+    let k = frame_by_name(survey, frame)?;
+    let camera = &survey.camera;
+    if !camera.sees(&Vector2::from(*pixel), 0.0) {
+        return Err(Failure::usage(format!(
+            "--frame {frame}: no pixel {},{}; they are 0 to {} and 0 to {}",
+            pixel[0],
+            pixel[1],
+            camera.width - 1,
+            camera.height - 1
+        )));
+    }
+    let ray = poses[k].r_wc * camera.ray(pixel[0], pixel[1]);
+    match survey.surface.hit(&poses[k].t_wc, &ray) {
+        Ok(hit) => Ok(hit.wall),
+        Err(error) => Err(Failure::input(format!("frame {k}: {error}"))),
+    }
+}
+
+/// The frame that a file's name, the end of its path or an index stands for.
+fn frame_by_name(survey: &Survey, name: &str) -> Result<usize, Failure> {
+    let count = survey.frames.len();
+    let named = |k: &usize| survey.frames[*k].path.ends_with(name);
+    let mut found = (0..count).filter(named);
+    match (found.next(), found.next()) {
+        (Some(only), None) => Ok(only),
+        (Some(first), Some(second)) => Err(Failure::usage(format!(
+            "--frame {name}: {} and {} are both called so; give the folder, too, or an index from 0 to {}",
+            survey.frames[first].path.display(),
+            survey.frames[second].path.display(),
+            count - 1
+        ))),
+        _ => name.parse().ok().filter(|k| *k < count).ok_or_else(|| {
+            Failure::usage(format!(
+                "--frame {name}: no such frame; give the name of a file, as {}, or an index from 0 to {}",
+                file_name(survey, 0),
+                count - 1
+            ))
+        }),
+    }
+}
+
+fn file_name(survey: &Survey, frame: usize) -> String {
+    let name = survey.frames[frame].path.file_name();
+    name.map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+/// Hours and minutes, 12:00 at 0°, half a degree a minute.
+fn clock_position(from_twelve_deg: f64) -> String {
+    let minutes = (from_twelve_deg.rem_euclid(360.0) * 2.0).round() as u32 % 720;
+    let hours = match minutes / 60 {
+        0 => 12,
+        hours => hours,
+    };
+    format!("{hours}:{:02}", minutes % 60)
+}
+
+fn tell(located: &Located, frames: usize, terminal: &Terminal) {
+    let [x, y] = located.panorama_px;
+    let [width, height] = located.panorama_size_px;
+    terminal.say(format!(
+        "chainage {:.4} m, {:.3}°, {} o'clock",
+        located.chainage_m, located.theta_deg, located.clock
+    ));
+    let outside = match located.in_panorama {
+        true => "",
+        false => ", outside of it",
+    };
+    terminal.say(format!(
+        "panorama pixel {x:.2}, {y:.2} of {width} × {height} px{outside}"
+    ));
+    if located.frames.is_empty() {
+        terminal.say(format!("none of the {frames} frames shows it"));
+        return;
+    }
+    terminal.say(format!(
+        "shown by {} of {frames} frames, the sharpest first:",
+        located.frames.len()
+    ));
+    terminal.say(format!(
+        "{:>6}  {:20} {:>9} {:>9} {:>8} {:>9} {:>8}",
+        "frame", "file", "u", "v", "mm/px", "distance", "oblique"
+    ));
+    for InFrame { file, sighting } in &located.frames {
+        let [u, v] = sighting.pixel;
+        terminal.say(format!(
+            "{:>6}  {file:20} {u:>9.2} {v:>9.2} {:>8.2} {:>7.3} m {:>7.1}°",
+            sighting.frame,
+            1e3 / sighting.px_per_metre,
+            sighting.distance_m,
+            sighting.obliqueness_deg
+        ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_clock_goes_round_in_half_degrees() {
+        for (degrees, text) in [
+            (0.0, "12:00"),
+            (14.9, "12:30"),
+            (135.0, "4:30"),
+            (359.9, "12:00"),
+            (-30.0, "11:00"),
+        ] {
+            assert_eq!(clock_position(degrees), text);
+        }
+        assert_eq!(clock("12.30,4:30"), Ok([12.3, 135.0]));
+        assert_eq!(clock("-1,12"), Ok([-1.0, 0.0]));
+        for wrong in ["1", "1,13:00", "1,4:75", "x,4:30", "1,four"] {
+            assert!(clock(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_frame_may_have_commas_in_its_name() {
+        let parsed = frame_pixel("a,b.png,3.5,4").unwrap();
+        assert_eq!(
+            (parsed.frame.as_str(), parsed.pixel),
+            ("a,b.png", [3.5, 4.0])
+        );
+        assert!(frame_pixel("7,8").is_err() && frame_pixel("f,nan,1").is_err());
+    }
+}
