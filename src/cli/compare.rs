@@ -102,11 +102,11 @@ pub fn compare_into(
         initial: &initial,
         refined: &refined,
         truth: truth.as_deref(),
-        px_per_metre: picture.px_per_metre,
+        px_per_metre: picture.canvas.px_per_metre,
         interpolation: picture.interpolation.into(),
     };
     let (comparison, panoramas) = compare(&input, terminal)?;
-    let layout = picture.layout.into();
+    let layout = picture.canvas.layout.into();
     let json = json::text(&Report {
         program: PROGRAM,
         survey: &survey.folder,

@@ -1,8 +1,8 @@
 //! `tunnelstitch locate`: from the panorama to the frames and back.
 
-use super::stitch::{LayoutArgument, poses_by_name, positive};
+use super::stitch::{CanvasArguments, PosesArgument};
 use super::{Failure, Terminal, json};
-use crate::render::{Canvas, Layout, Sighting, native_px_per_metre, place, sightings};
+use crate::render::{Canvas, LaidOut, Layout, Sighting, lay_out, sightings};
 use crate::surface::WallPoint;
 use crate::survey::Survey;
 use crate::trajectory::Pose;
@@ -44,15 +44,10 @@ pub struct LocateArguments {
     /// A frame (its file's name or its index from 0) and a pixel of it.
     #[arg(long, group = "point", value_name = "FRAME,U,V", value_parser = frame_pixel, allow_hyphen_values = true)]
     frame: Option<FramePixel>,
-    /// Which poses: `initial` and `truth` are those of survey.toml, anything else is a TUM file.
-    #[arg(long, default_value = "initial", value_name = "initial|truth|FILE")]
-    poses: String,
-    /// Pixels per metre of the panorama [default: the frames' own resolution at the wall].
-    #[arg(long, value_name = "N", value_parser = positive)]
-    px_per_metre: Option<f64>,
-    /// How the panorama lies in its file.
-    #[arg(long, value_enum, default_value_t)]
-    layout: LayoutArgument,
+    #[command(flatten)]
+    poses: PosesArgument,
+    #[command(flatten)]
+    canvas: CanvasArguments,
     /// The angle θ of twelve o'clock, degrees.
     #[arg(
         long,
@@ -151,15 +146,13 @@ struct InFrame {
 /// [`Failure`] for everything wrong with the survey, the poses or the point.
 pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failure> {
     let survey = Survey::open(&arguments.survey)?;
-    let poses = poses_by_name(&survey, &arguments.poses)?;
+    let poses = arguments.poses.of(&survey)?;
     let surface = survey.surface.as_ref();
-    let placements = place(surface, &survey.camera, &poses)?;
-    let px_per_metre = match arguments.px_per_metre {
-        Some(given) => given,
-        None => native_px_per_metre(surface, &survey.camera, &poses)?,
-    };
-    let canvas = Canvas::of_placements(surface, &placements, px_per_metre)?;
-    let layout = Layout::from(arguments.layout);
+    let px_per_metre = arguments.canvas.px_per_metre;
+    let LaidOut {
+        placements, canvas, ..
+    } = lay_out(surface, &survey.camera, &poses, px_per_metre)?;
+    let layout = Layout::from(arguments.canvas.layout);
     let wall = point(arguments, &survey, &poses, &canvas)?;
     let perimeter_m = surface.perimeter_m();
     let theta_deg = wall.s_m.rem_euclid(perimeter_m) / perimeter_m * 360.0;
@@ -177,7 +170,7 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
         frames: found
             .into_iter()
             .map(|sighting| InFrame {
-                file: file_name(&survey, sighting.frame),
+                file: survey.frames[sighting.frame].name(),
                 sighting,
             })
             .collect(),
@@ -207,7 +200,7 @@ fn point(
         return Ok(on_wall([h_m, from_twelve + arguments.twelve_at]));
     }
     if let Some(pixel) = arguments.panorama {
-        let layout = Layout::from(arguments.layout);
+        let layout = Layout::from(arguments.canvas.layout);
         if !layout.holds(canvas, pixel) {
             let size = layout.size(canvas);
             return Err(Failure::usage(format!(
@@ -218,9 +211,7 @@ fn point(
         return Ok(canvas.wall_at(layout.from_picture(canvas, pixel)));
     }
     let Some(FramePixel { frame, pixel }) = &arguments.frame else {
-        return Err(Failure::usage(
-            "say which point: --panorama, --wall, --clock or --frame",
-        ));
+        return Err(Failure::bug("no point was asked for"));
     };
     let k = frame_by_name(survey, frame)?;
     let camera = &survey.camera;
@@ -256,16 +247,11 @@ fn frame_by_name(survey: &Survey, name: &str) -> Result<usize, Failure> {
         _ => name.parse().ok().filter(|k| *k < count).ok_or_else(|| {
             Failure::usage(format!(
                 "--frame {name}: no such frame; give the name of a file, as {}, or an index from 0 to {}",
-                file_name(survey, 0),
+                survey.frames[0].name(),
                 count - 1
             ))
         }),
     }
-}
-
-fn file_name(survey: &Survey, frame: usize) -> String {
-    let name = survey.frames[frame].path.file_name();
-    name.map_or_else(String::new, |name| name.to_string_lossy().into_owned())
 }
 
 /// Hours and minutes, 12:00 at 0°, half a degree a minute.

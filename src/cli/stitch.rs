@@ -18,9 +18,8 @@ use std::path::{Path, PathBuf};
 pub struct StitchArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
-    /// Which poses: `initial` and `truth` are those of survey.toml, anything else is a TUM file.
-    #[arg(long, default_value = "initial", value_name = "initial|truth|FILE")]
-    poses: String,
+    #[command(flatten)]
+    poses: PosesArgument,
     /// The panorama, .png or .tif.
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
@@ -34,15 +33,55 @@ pub struct StitchArguments {
     json: bool,
 }
 
-/// How panoramas are drawn.
+/// Which poses.
+#[derive(Debug, clap::Args)]
+pub struct PosesArgument {
+    /// Which poses: `initial` and `truth` are those of survey.toml, anything else is a TUM file.
+    #[arg(
+        id = "poses",
+        long = "poses",
+        default_value = "initial",
+        value_name = "initial|truth|FILE"
+    )]
+    name: String,
+}
+
+impl PosesArgument {
+    /// The poses that `initial`, `truth` or the name of a TUM file stand for.
+    ///
+    /// # Errors
+    /// No true poses where they are asked for; a file that cannot be read or is no list of the frames' poses.
+    pub fn of(&self, survey: &Survey) -> Result<Vec<Pose>, Failure> {
+        match self.name.as_str() {
+            "initial" => Ok(survey.initial_poses()),
+            "truth" => match &survey.truth {
+                Some(truth) => Ok(poses_of(truth)),
+                None => Err(Failure::usage(
+                    "--poses truth: the survey has no poses.truth; use --poses initial or a TUM file",
+                )),
+            },
+            file => Ok(poses_of(&survey.read_poses(Path::new(file))?)),
+        }
+    }
+}
+
+/// The canvas of panoramas.
 #[derive(Debug, Default, clap::Args)]
-pub struct PictureArguments {
+pub struct CanvasArguments {
     /// Pixels per metre of wall [default: the frames' own resolution at the wall].
     #[arg(long, value_name = "N", value_parser = positive)]
     pub px_per_metre: Option<f64>,
     /// How the panorama lies in its file.
     #[arg(long, value_enum, default_value_t)]
     pub layout: LayoutArgument,
+}
+
+/// How panoramas are drawn.
+#[derive(Debug, Default, clap::Args)]
+pub struct PictureArguments {
+    /// What they are drawn on.
+    #[command(flatten)]
+    pub canvas: CanvasArguments,
     /// How frames are sampled between their pixels.
     #[arg(long, value_enum, default_value_t)]
     pub interpolation: InterpolationArgument,
@@ -113,9 +152,9 @@ struct Report {
 pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failure> {
     let format = picture_output(&arguments.out)?;
     let survey = Survey::open(&arguments.survey)?;
-    let poses = poses_by_name(&survey, &arguments.poses)?;
+    let poses = arguments.poses.of(&survey)?;
     let options = StitchOptions {
-        px_per_metre: arguments.picture.px_per_metre,
+        px_per_metre: arguments.picture.canvas.px_per_metre,
         interpolation: arguments.picture.interpolation.into(),
         ignore_offset: arguments.ignore_offset,
     };
@@ -134,7 +173,7 @@ pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failu
             "no frame covers a single pixel of the panorama; check the calibration (cx, cy) and --px-per-metre",
         ));
     }
-    let layout = arguments.picture.layout.into();
+    let layout = arguments.picture.canvas.layout.into();
     let image = panorama.into_image(layout);
     let report = Report {
         out: arguments.out.clone(),
@@ -186,21 +225,4 @@ pub fn picture_output(path: &Path) -> Result<PictureFormat, Failure> {
         atomic::create_folder(folder)?;
     }
     Ok(format)
-}
-
-/// The poses that `initial`, `truth` or the name of a TUM file stand for.
-///
-/// # Errors
-/// No true poses where they are asked for; a file that cannot be read or is no list of the frames' poses.
-pub fn poses_by_name(survey: &Survey, name: &str) -> Result<Vec<Pose>, Failure> {
-    match name {
-        "initial" => Ok(survey.initial_poses()),
-        "truth" => match &survey.truth {
-            Some(truth) => Ok(poses_of(truth)),
-            None => Err(Failure::usage(
-                "--poses truth: the survey has no poses.truth; use --poses initial or a TUM file",
-            )),
-        },
-        file => Ok(poses_of(&survey.read_poses(Path::new(file))?)),
-    }
 }

@@ -62,6 +62,14 @@ pub struct FrameFile {
     pub path: PathBuf,
 }
 
+impl FrameFile {
+    /// The picture's name without its folder.
+    pub fn name(&self) -> String {
+        let name = self.path.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    }
+}
+
 /// The files that match `pattern` (glob syntax, relative to `folder`), sorted by name.
 ///
 /// # Errors

@@ -21,7 +21,8 @@
 //! less the more noise there is.
 //!
 //! Source: W. R. Hahn and S. A. Tretter, "Optimum processing for delay-vector estimation in passive signal arrays", IEEE
-//! Transactions on Information Theory 19(5), 1973; C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection, Estimation, and Modulation Theory", 1968.
+//! Transactions on Information Theory 19(5), 1973; C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection,
+//! Estimation, and Modulation Theory", 1968.
 
 use super::calibration::{Calibration, Kappa};
 use super::covariance::Covariances;

@@ -84,8 +84,8 @@ const TRIES: usize = 8;
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
 ///
 /// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples; such a
-/// step is never taken. Frames that a step would bring where they cannot be ([`Problem::admits`]) stay where they are. Only the last step, shorter than the tolerance, is taken on trust: cost and equations are those
-/// before it.
+/// step is never taken. Frames that a step would bring where they cannot be ([`Problem::admits`]) stay where they are.
+/// Only the last step, shorter than the tolerance, is taken on trust: cost and equations are those before it.
 struct DampedGaussNewton {
     stopping: Stopping,
     lambda: f64,

@@ -487,11 +487,7 @@ fn frame_report(
     let doubt = doubt.cloned().or(late);
     FrameReport {
         index: k,
-        file: survey.frames[k]
-            .path
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned())
-            .unwrap_or_default(),
+        file: survey.frames[k].name(),
         flag: match &doubt {
             None => FrameFlag::Photometric,
             Some(Doubt::Ambiguous { .. }) => FrameFlag::Ambiguous,

@@ -99,10 +99,9 @@ mod tests {
                     })
                     .fold(0.0, f64::max);
                 assert!((farthest * sighting.px_per_metre - 1.0).abs() < 1e-2);
-                let facing = sighting.obliqueness_deg.to_radians().cos();
-                assert!(
-                    facing * wall.camera.fy / sighting.distance_m > 0.5 * sighting.px_per_metre
-                );
+                let outwards = nalgebra::Vector3::new(x_w.x, 0.0, x_w.z);
+                let angle_deg = (x_w - pose.t_wc).angle(&outwards).to_degrees();
+                assert!((sighting.obliqueness_deg - angle_deg).abs() < 1e-5);
             }
         }
         assert!(seen > 40, "{seen}");

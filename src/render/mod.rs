@@ -35,5 +35,5 @@ pub use picture::{Interpolation, Picture};
 pub use placement::{Placement, native_px_per_metre, place};
 pub use stack::{FrameStack, level_for};
 pub(crate) use stitch::check_memory;
-pub use stitch::{StitchOptions, on_the_axis, stitch};
+pub use stitch::{LaidOut, StitchOptions, lay_out, on_the_axis, stitch};
 pub(crate) use tiles::{Tile, tiles};

@@ -1,7 +1,7 @@
 //! Frames and poses in, panorama out.
 
 use super::{
-    Canvas, FrameStack, Interpolation, Panorama, RenderError, level_for, memory,
+    Canvas, FrameStack, Interpolation, Panorama, Placement, RenderError, level_for, memory,
     native_px_per_metre, place, render,
 };
 use crate::camera::Pinhole;
@@ -35,6 +35,37 @@ pub fn on_the_axis(poses: &[Pose]) -> Vec<Pose> {
         .collect()
 }
 
+/// Frames laid out on a canvas that holds all they see.
+#[derive(Clone, Debug)]
+pub struct LaidOut {
+    /// Every frame's place.
+    pub placements: Vec<Placement>,
+    /// The frames' own resolution at the wall, pixels per metre ([`native_px_per_metre`]).
+    pub native_px_per_metre: f64,
+    /// The canvas.
+    pub canvas: Canvas,
+}
+
+/// Lays frames out for given poses, at `px_per_metre` or the frames' own resolution: the canvas that [`stitch()`] draws.
+///
+/// # Errors
+/// As [`place`], [`native_px_per_metre`] and [`Canvas::covering`].
+pub fn lay_out(
+    surface: &dyn Surface,
+    camera: &Pinhole,
+    poses: &[Pose],
+    px_per_metre: Option<f64>,
+) -> Result<LaidOut, RenderError> {
+    let placements = place(surface, camera, poses)?;
+    let native = native_px_per_metre(surface, camera, poses)?;
+    let canvas = Canvas::of_placements(surface, &placements, px_per_metre.unwrap_or(native))?;
+    Ok(LaidOut {
+        placements,
+        native_px_per_metre: native,
+        canvas,
+    })
+}
+
 /// Draws the panorama of frames on disk for given poses: places the frames, lays out the canvas, loads the
 /// frames (halved where the canvas is coarser than half their resolution) and renders.
 ///
@@ -61,11 +92,12 @@ pub fn stitch(
     } else {
         poses
     };
-    let placements = place(surface, camera, poses)?;
-    let native = native_px_per_metre(surface, camera, poses)?;
-    let canvas =
-        Canvas::of_placements(surface, &placements, options.px_per_metre.unwrap_or(native))?;
-    let level = level_for(camera, native, canvas.px_per_metre);
+    let LaidOut {
+        placements,
+        native_px_per_metre,
+        canvas,
+    } = lay_out(surface, camera, poses, options.px_per_metre)?;
+    let level = level_for(camera, native_px_per_metre, canvas.px_per_metre);
     // Whether there is colour shows only in the files; grey is the least that is needed.
     let copies = 2;
     check_memory(&canvas, copies, &camera.at_level(level), files.len(), 1)?;

@@ -26,11 +26,14 @@ pub(super) fn cast(band: &Band, radius_m: f64, camera: &Pinhole, pose: &Pose, n:
     };
     let share = 1.0 / (n * n) as f32;
     let mut data = vec![0.0f32; width * height];
+    let mut lines = vec![caster.line(camera, pose, -0.5)];
     for (v, row) in data.chunks_exact_mut(width).enumerate() {
-        let lines: [Vec<Corner>; CELLS + 1] = std::array::from_fn(|line| {
+        // The last line of a row of pixels is the first of the next.
+        lines.drain(..lines.len() - 1);
+        lines.extend((1..=CELLS).map(|line| {
             let v = v as f64 - 0.5 + line as f64 / CELLS as f64;
             caster.line(camera, pose, v)
-        });
+        }));
         for (u, pixel) in row.iter_mut().enumerate() {
             for down in &points {
                 let (upper, lower) = (&lines[down.cell], &lines[down.cell + 1]);
@@ -84,10 +87,12 @@ impl Corner {
     #[inline]
     fn towards(&self, other: &Self, share: f64) -> Self {
         let turn = other.theta - self.theta;
-        let (from, turn) = match turn {
-            _ if turn > 0.5 * TAU => (self.theta + TAU, turn - TAU),
-            _ if turn < -0.5 * TAU => (self.theta, turn + TAU),
-            _ => (self.theta, turn),
+        let (from, turn) = if turn > 0.5 * TAU {
+            (self.theta + TAU, turn - TAU)
+        } else if turn < -0.5 * TAU {
+            (self.theta, turn + TAU)
+        } else {
+            (self.theta, turn)
         };
         Self {
             theta: from + turn * share,
