@@ -69,7 +69,7 @@ impl TestWall {
     /// The frames as pictures of whole grey levels.
     pub fn stack(&self) -> FrameStack {
         let pictures = self.frames().into_iter().map(|frame| {
-            let data = frame.data().iter().map(|v| v.round() as u8).collect();
+            let data: Vec<u8> = frame.data().iter().map(|v| v.round() as u8).collect();
             Picture::new(frame.width(), frame.height(), 1, data)
         });
         FrameStack::from_pictures(self.camera, pictures.collect())

@@ -7,7 +7,7 @@ use crate::atomic::{self, WriteError};
 use crate::evaluate::{CompareInput, Comparison, before_after, compare};
 use crate::frames::{PictureFormat, write_picture};
 use crate::progress::Progress;
-use crate::render::Layout;
+use crate::render::{Layout, Mode, RenderOptions};
 use crate::survey::Survey;
 use crate::trajectory::poses_of;
 use image::DynamicImage;
@@ -103,7 +103,12 @@ pub fn compare_into(
         refined: &refined,
         truth: truth.as_deref(),
         px_per_metre: picture.canvas.px_per_metre,
-        interpolation: picture.interpolation.into(),
+        // Pictures of different poses differ by their poses only.
+        render: RenderOptions {
+            interpolation: picture.interpolation.into(),
+            mode: Mode::Average,
+            blend: false,
+        },
     };
     let (comparison, panoramas) = compare(&input, terminal)?;
     let layout = picture.canvas.layout.into();

@@ -4,7 +4,7 @@ use super::{Failure, Terminal, json};
 use crate::atomic;
 use crate::frames::{PictureFormat, write_picture};
 use crate::progress::Progress;
-use crate::render::{Interpolation, Layout, StitchOptions, stitch};
+use crate::render::{Interpolation, Layout, Mode, RenderOptions, StitchOptions, stitch};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
 use clap::ValueEnum;
@@ -25,6 +25,8 @@ pub struct StitchArguments {
     out: PathBuf,
     #[command(flatten)]
     picture: PictureArguments,
+    #[command(flatten)]
+    blend: BlendArguments,
     /// Treat every camera as standing on the tunnel's axis (to see what its position does).
     #[arg(long)]
     ignore_offset: bool,
@@ -87,6 +89,40 @@ pub struct PictureArguments {
     pub interpolation: InterpolationArgument,
 }
 
+/// Which frames a panorama shows, and how they pass into each other.
+#[derive(Debug, clap::Args)]
+pub struct BlendArguments {
+    /// Which frames a pixel shows.
+    #[arg(long, value_enum, default_value_t)]
+    pub mode: ModeArgument,
+    /// Leave the frames' values as they are: undo no exposure, level out no light, blend nothing over seams. With
+    /// --interpolation nearest every pixel is one of a frame, unchanged.
+    #[arg(long)]
+    pub no_blend: bool,
+}
+
+/// Modes by name.
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub enum ModeArgument {
+    /// The frame that shows the wall best there; seams run where frames agree.
+    #[default]
+    BestView,
+    /// The mean of all frames, weighted towards their middles: least noise.
+    Average,
+    /// The median of all frames: what most of them show.
+    Median,
+}
+
+impl From<ModeArgument> for Mode {
+    fn from(mode: ModeArgument) -> Self {
+        match mode {
+            ModeArgument::BestView => Self::BestView,
+            ModeArgument::Average => Self::Average,
+            ModeArgument::Median => Self::Median,
+        }
+    }
+}
+
 /// Layouts by name.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub enum LayoutArgument {
@@ -114,6 +150,11 @@ pub enum InterpolationArgument {
     Bicubic,
     /// Softer and faster.
     Bilinear,
+    /// Three lobes: sharpest, slower, rings a little beside edges.
+    #[value(name = "lanczos3")]
+    Lanczos3,
+    /// The nearest pixel, unchanged.
+    Nearest,
 }
 
 impl From<InterpolationArgument> for Interpolation {
@@ -121,6 +162,8 @@ impl From<InterpolationArgument> for Interpolation {
         match interpolation {
             InterpolationArgument::Bicubic => Self::Bicubic,
             InterpolationArgument::Bilinear => Self::Bilinear,
+            InterpolationArgument::Lanczos3 => Self::Lanczos3,
+            InterpolationArgument::Nearest => Self::Nearest,
         }
     }
 }
@@ -155,8 +198,12 @@ pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failu
     let poses = arguments.poses.of(&survey)?;
     let options = StitchOptions {
         px_per_metre: arguments.picture.canvas.px_per_metre,
-        interpolation: arguments.picture.interpolation.into(),
         ignore_offset: arguments.ignore_offset,
+        render: RenderOptions {
+            interpolation: arguments.picture.interpolation.into(),
+            mode: arguments.blend.mode.into(),
+            blend: !arguments.blend.no_blend,
+        },
     };
     let panorama = stitch(
         survey.surface.as_ref(),

@@ -9,7 +9,7 @@ use crate::camera::Pinhole;
 use crate::frames::FrameFile;
 use crate::progress::Progress;
 use crate::render::{
-    Canvas, FrameStack, Interpolation, Panorama, Placement, check_memory, level_for,
+    Canvas, FrameStack, Panorama, Placement, RenderOptions, check_memory, level_for,
     native_px_per_metre, place, render,
 };
 use crate::surface::Surface;
@@ -33,8 +33,8 @@ pub struct CompareInput<'a> {
     pub truth: Option<&'a [Pose]>,
     /// Resolution of the panoramas, pixels per metre; without it the frames' own at the wall.
     pub px_per_metre: Option<f64>,
-    /// How frames are sampled between their pixels.
-    pub interpolation: Interpolation,
+    /// How frames become panoramas.
+    pub render: RenderOptions,
 }
 
 /// What the comparison found.
@@ -187,7 +187,7 @@ impl<'a> Candidate<'a> {
             frames,
             &self.placements,
             canvas,
-            input.interpolation,
+            &input.render,
             progress,
         )
         .map_err(|source| EvaluateError::Render {
@@ -240,9 +240,8 @@ fn prepare(
     .map_err(fail)?;
     let level = level_for(input.camera, native, canvas.px_per_metre);
     let copies = 4;
-    let halved = input.camera.at_level(level);
-    check_memory(&canvas, copies, &halved, input.files.len(), 1).map_err(fail)?;
-    let frames = FrameStack::load(input.files, input.camera, level, progress).map_err(fail)?;
-    check_memory(&canvas, copies, &halved, 0, frames.channels()).map_err(fail)?;
+    let mut frames = FrameStack::open(input.files, input.camera, level).map_err(fail)?;
+    check_memory(&canvas, copies, &frames).map_err(fail)?;
+    frames.hold_all(progress).map_err(fail)?;
     Ok((frames, canvas))
 }

@@ -1,6 +1,6 @@
 //! How well the frames agree where they overlap, without any truth.
 
-use crate::render::{Canvas, FrameStack, Placement, tiles};
+use crate::render::{Canvas, FrameStack, Interpolation, Kernel, Placement, tiles};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -28,7 +28,7 @@ const MARGIN_PX: f64 = 1.0;
 /// that see it is `2/(n−1) Σ (I_i(x) − Ī(x))²`; the result is the root of its mean over the points with
 /// n ≥ 2. With true poses what remains is noise, light and interpolation.
 ///
-/// `frames` and `placements` in the same order; pictures sampled bilinearly, luma of colour.
+/// `frames` (those that are held) and `placements` in the same order; pictures sampled bilinearly, luma of colour.
 pub fn seam_residual(
     surface: &dyn Surface,
     frames: &FrameStack,
@@ -37,6 +37,7 @@ pub fn seam_residual(
 ) -> Option<SeamResidual> {
     let grid = canvas.coarser(POINTS);
     let camera = frames.camera();
+    let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
     let bands = tiles(surface, &grid, placements);
     // Collected before they are added: the sum does not depend on the threads.
     let parts: Vec<Sums> = bands
@@ -46,13 +47,16 @@ pub fn seam_residual(
             let points = tile.points(surface, &grid);
             let mut seen = vec![Seen::default(); points.len()];
             for frame in &tile.frames {
-                let (pose, picture) = (&placements[*frame].pose, &frames.pictures()[*frame]);
+                let Some(picture) = frames.picture(*frame) else {
+                    continue;
+                };
+                let pose = &placements[*frame].pose;
                 for (x_w, seen) in points.iter().zip(&mut seen) {
                     let pixel = camera
                         .project(&pose.to_camera(x_w))
                         .filter(|pixel| camera.sees(pixel, MARGIN_PX));
                     if let Some(pixel) = pixel {
-                        seen.add(f64::from(picture.grey(pixel.x, pixel.y)));
+                        seen.add(f64::from(picture.grey(&pixel, &bilinear)));
                     }
                 }
             }
@@ -132,7 +136,7 @@ mod tests {
     fn two_flat_frames_differ_by_their_difference() {
         let wall = TestWall::one(waves);
         let (w, h) = (wall.camera.width as usize, wall.camera.height as usize);
-        let flat = |value| Picture::new(w, h, 1, vec![value; w * h]);
+        let flat = |value| Picture::new(w, h, 1, vec![value as u8; w * h]);
         let poses = vec![wall.poses[0]; 3];
         let placements = place(&wall.circle, &wall.camera, &poses).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();

@@ -1,6 +1,6 @@
 //! Finding and decoding frames.
 
-use image::DynamicImage;
+use image::{ColorType, DynamicImage, ImageDecoder};
 use std::path::{Path, PathBuf};
 
 /// Why a frame cannot be used.
@@ -131,6 +131,25 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
         });
     }
     Ok(picture)
+}
+
+/// What the pixels of a frame are, by its file's header.
+///
+/// # Errors
+/// A missing or unknown file.
+pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
+    let fail = |what: String| FrameError::Decode {
+        index: file.index,
+        path: file.path.clone(),
+        what,
+    };
+    let reader = image::ImageReader::open(&file.path)
+        .and_then(image::ImageReader::with_guessed_format)
+        .map_err(|error| fail(error.to_string()))?;
+    let decoder = reader
+        .into_decoder()
+        .map_err(|error| fail(error.to_string()))?;
+    Ok(decoder.color_type())
 }
 
 /// True if a JPEG file holds its end-of-image marker (the decoder fills what is missing with grey and

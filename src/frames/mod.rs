@@ -13,7 +13,7 @@ mod write;
 pub use cache::FrameCache;
 pub use contrast::{LocalContrast, local_contrast};
 pub use grey::GreyImage;
-pub use load::{FrameError, FrameFile, list, load_colour};
+pub use load::{FrameError, FrameFile, colour_type, list, load_colour};
 pub(crate) use noise::MAD_TO_SIGMA;
 pub use noise::{noise_at_level, noise_sigma};
 pub use pyramid::Pyramid;

@@ -184,8 +184,17 @@ impl Canvas {
         let shrink = (self.pixels() as f64 / pixels.max(1) as f64)
             .sqrt()
             .max(1.0);
+        self.with_columns((f64::from(self.columns) / shrink).round().max(1.0))
+    }
+
+    /// The same stretch of wall with pixels `step` times as large, about: a multiple of `multiple` columns.
+    pub fn grid(&self, step: f64, multiple: u32) -> Self {
+        let columns = f64::from(self.columns) / step / f64::from(multiple);
+        self.with_columns(columns.round().max(1.0) * f64::from(multiple))
+    }
+
+    fn with_columns(&self, columns: f64) -> Self {
         let perimeter_m = f64::from(self.columns) / self.px_per_metre;
-        let columns = (f64::from(self.columns) / shrink).round().max(1.0);
         let px_per_metre = columns / perimeter_m;
         let rows = f64::from(self.rows) / self.px_per_metre * px_per_metre;
         Self {

@@ -1,8 +1,9 @@
 //! The cylindrical projection of one photo.
 
-use super::{Interpolation, Picture};
+use super::sample::{Sample, Samples};
+use super::{Interpolation, Kernel, Picture};
 use crate::camera::Pinhole;
-use image::{DynamicImage, GrayAlphaImage, RgbaImage};
+use image::{DynamicImage, ImageBuffer};
 use rayon::prelude::*;
 
 /// A photo on the unit cylinder around its camera, unrolled.
@@ -34,16 +35,27 @@ pub fn project(photo: &Picture, camera: &Pinhole, interpolation: Interpolation) 
     let (first_u, first_v) = (ceil(left), ceil(top));
     let width = (floor(right) - first_u + 1).max(1) as usize;
     let height = (floor(bottom) - first_v + 1).max(1) as usize;
-    let origin = [first_u, first_v];
-    let pixels = match photo.channels() {
-        1 => unroll::<1>(photo, camera, interpolation, origin, [width, height]),
-        _ => unroll::<3>(photo, camera, interpolation, origin, [width, height]),
-    };
+    let kernel = Kernel::new(interpolation, 1.0);
+    let (origin, size) = ([first_u, first_v], [width, height]);
     let (w, h) = (width as u32, height as u32);
-    // `unroll` made exactly these many pixels.
-    let image = match photo.channels() {
-        1 => GrayAlphaImage::from_raw(w, h, pixels).map(DynamicImage::from),
-        _ => RgbaImage::from_raw(w, h, pixels).map(DynamicImage::from),
+    // `unroll` makes exactly these many pixels.
+    let image = match (photo.samples(), photo.format().channels) {
+        (Samples::Eight(_), 1) => {
+            ImageBuffer::from_raw(w, h, unroll::<u8, 1>(photo, camera, &kernel, origin, size))
+                .map(DynamicImage::ImageLumaA8)
+        }
+        (Samples::Eight(_), _) => {
+            ImageBuffer::from_raw(w, h, unroll::<u8, 3>(photo, camera, &kernel, origin, size))
+                .map(DynamicImage::ImageRgba8)
+        }
+        (Samples::Sixteen(_), 1) => {
+            ImageBuffer::from_raw(w, h, unroll::<u16, 1>(photo, camera, &kernel, origin, size))
+                .map(DynamicImage::ImageLumaA16)
+        }
+        (Samples::Sixteen(_), _) => {
+            ImageBuffer::from_raw(w, h, unroll::<u16, 3>(photo, camera, &kernel, origin, size))
+                .map(DynamicImage::ImageRgba16)
+        }
     }
     .unwrap_or_default();
     CylinderPicture {
@@ -91,14 +103,14 @@ fn extent(camera: &Pinhole) -> [f64; 4] {
     ]
 }
 
-fn unroll<const C: usize>(
+fn unroll<T: Sample, const C: usize>(
     photo: &Picture,
     camera: &Pinhole,
-    interpolation: Interpolation,
+    kernel: &Kernel,
     origin: [i64; 2],
     [width, height]: [usize; 2],
-) -> Vec<u8> {
-    let mut pixels = vec![0u8; width * height * (C + 1)];
+) -> Vec<T> {
+    let mut pixels = vec![T::default(); width * height * (C + 1)];
     pixels
         .par_chunks_exact_mut(width * (C + 1))
         .enumerate()
@@ -109,12 +121,11 @@ fn unroll<const C: usize>(
                 let seen = from_cylinder(camera, u_hat, v_hat)
                     .filter(|[u, v]| camera.sees(&nalgebra::Vector2::new(*u, *v), -1e-9));
                 if let Some([u, v]) = seen {
-                    let value: [f32; C] = photo.sample(u, v, interpolation);
-                    for (sample, value) in pixel.iter_mut().zip(value) {
-                        // The cast saturates: a cubic overshoots at edges.
-                        *sample = value.round() as u8;
+                    let value = photo.at(u as f32, v as f32, kernel);
+                    for (sample, value) in pixel.iter_mut().take(C).zip(value) {
+                        *sample = T::nearest(value);
                     }
-                    pixel[C] = u8::MAX;
+                    pixel[C] = T::nearest(T::WHITE);
                 }
             }
         });
@@ -154,7 +165,7 @@ mod tests {
     #[test]
     fn the_crop_is_tight_and_the_middle_column_stays() {
         let camera = camera();
-        let data = (0..161 * 121).map(|k| (k / 161) as u8).collect();
+        let data: Vec<u8> = (0..161 * 121).map(|k| (k / 161) as u8).collect();
         let photo = Picture::new(161, 121, 1, data);
         let cylinder = project(&photo, &camera, Interpolation::Bicubic);
         let image = cylinder.image.to_luma_alpha8();

@@ -1,39 +1,53 @@
 //! From frames and poses to one metric panorama of the unrolled wall.
 //!
 //! ```text
-//! poses ─ place ──> footprints ─ Canvas::covering ──> canvas
-//! files ─ FrameStack::load ──────────────────────────> render ──> Panorama
+//! poses ─ place ──> footprints ─ Canvas::covering ──────────────────> canvas ─┐
+//! files ─ Thumbnails ─ Exposure::solve ─> exposure ─ Seams::find ───> seams ──┼─ Scene::draw ──> tiles
+//!     └── FrameStack::hold, band by band ───────────────────────────> frames ─┘
 //! ```
 //!
-//! [`stitch()`] does all of it. Every canvas pixel is taken back to its wall point, from there into each frame
-//! that sees it, and the samples are averaged with weights that fall to zero at the frame's border. The
+//! [`stitch()`] does all of it. Every canvas pixel is taken back to its wall point, from there into the frame
+//! that shows it best ([`Mode`] has other ways), and the frame's exposure is undone. The
 //! same function draws the initial, the refined and the true poses, so pictures differ by their poses only.
 //!
 //! [`sightings`] goes the other way: from a point of the wall to the frames and pixels that show it.
 //!
 //! [`cylinder`] is the odd one out: the cylindrical projection of one single photo.
 
-mod blend;
 mod canvas;
 pub mod cylinder;
+mod draw;
 mod error;
+mod exposure;
+mod glimpses;
+mod kernel;
+mod labels;
+mod levelling;
 mod locate;
 mod memory;
 mod panorama;
 mod picture;
 mod placement;
+mod sample;
+mod seams;
 mod stack;
 mod stitch;
+mod thumbnails;
 mod tiles;
+mod view;
+mod warp;
 
-pub use blend::render;
 pub use canvas::{Canvas, Layout};
+pub use draw::{Drawn, Mode, NO_FRAME};
 pub use error::RenderError;
+pub use exposure::{Exposure, FrameExposure};
+pub use kernel::{Interpolation, Kernel};
 pub use locate::{Sighting, sightings};
 pub use panorama::Panorama;
-pub use picture::{Interpolation, Picture};
+pub use picture::{Picture, PixelFormat};
 pub use placement::{Placement, native_px_per_metre, place};
+pub use sample::{Sample, Samples};
 pub use stack::{FrameStack, level_for};
 pub(crate) use stitch::check_memory;
-pub use stitch::{LaidOut, StitchOptions, lay_out, on_the_axis, stitch};
+pub use stitch::{LaidOut, RenderOptions, StitchOptions, lay_out, on_the_axis, render, stitch};
 pub(crate) use tiles::{Tile, tiles};

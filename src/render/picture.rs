@@ -1,58 +1,61 @@
 //! A decoded picture and its values between the pixels.
 
-use image::DynamicImage;
-use serde::Serialize;
+use super::kernel::Kernel;
+use super::sample::{Sample, Samples};
+use image::{ColorType, DynamicImage};
+use nalgebra::Vector2;
 
-/// How values between pixel centres are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Interpolation {
-    /// Weighted mean of the 2 × 2 pixels around; soft.
-    Bilinear,
-    /// Catmull–Rom cubic through the 4 × 4 pixels around; keeps the frames' sharpness, exact for
-    /// quadratics, may overshoot at edges.
-    #[default]
-    Bicubic,
-}
-
-/// A picture of 8-bit samples, row-major, channels interleaved: 1 (grey) or 3 (red, green, blue).
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A picture of 8- or 16-bit samples, row-major, channels interleaved: 1 (grey) or 3 (red, green, blue).
+#[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     width: usize,
     height: usize,
     channels: usize,
-    data: Vec<u8>,
+    /// One sample more than there are: a colour pixel is read four samples wide.
+    samples: Samples,
 }
 
 impl Picture {
     /// A picture from its samples.
     ///
     /// # Panics
-    /// If `channels` is neither 1 nor 3 or `data` does not hold `width · height · channels` samples.
-    pub fn new(width: usize, height: usize, channels: usize, data: Vec<u8>) -> Self {
+    /// If `channels` is neither 1 nor 3 or there are not `width · height · channels` samples.
+    pub fn new(
+        width: usize,
+        height: usize,
+        channels: usize,
+        samples: impl Into<Samples>,
+    ) -> Self {
+        let mut samples = samples.into();
         assert!(channels == 1 || channels == 3, "grey or colour");
         assert_eq!(
-            data.len(),
+            samples.len(),
             width * height * channels,
             "samples of a picture"
         );
+        match &mut samples {
+            Samples::Eight(samples) => samples.push(0),
+            Samples::Sixteen(samples) => samples.push(0),
+        }
         Self {
             width,
             height,
             channels,
-            data,
+            samples,
         }
     }
 
-    /// A decoded file: grey stays grey, everything else becomes colour; transparency is ignored, 16-bit
-    /// samples are rounded to 8.
+    /// A decoded file in the format that [`PixelFormat::of`] says; transparency is ignored.
     pub fn from_decoded(decoded: DynamicImage) -> Self {
         let (width, height) = (decoded.width() as usize, decoded.height() as usize);
-        if decoded.color().has_color() {
-            Self::new(width, height, 3, decoded.into_rgb8().into_raw())
-        } else {
-            Self::new(width, height, 1, decoded.into_luma8().into_raw())
-        }
+        let format = PixelFormat::of(decoded.color());
+        let samples: Samples = match (format.channels, format.deep) {
+            (1, false) => decoded.into_luma8().into_raw().into(),
+            (1, true) => decoded.into_luma16().into_raw().into(),
+            (_, false) => decoded.into_rgb8().into_raw().into(),
+            (_, true) => decoded.into_rgb16().into_raw().into(),
+        };
+        Self::new(width, height, format.channels, samples)
     }
 
     /// Width in pixels.
@@ -65,108 +68,191 @@ impl Picture {
         self.height
     }
 
-    /// Samples a pixel: 1 or 3.
-    pub fn channels(&self) -> usize {
-        self.channels
+    /// What the pixels are.
+    pub fn format(&self) -> PixelFormat {
+        PixelFormat {
+            channels: self.channels,
+            deep: matches!(self.samples, Samples::Sixteen(_)),
+        }
     }
 
-    /// The same picture with three channels.
-    pub fn into_colour(self) -> Self {
-        if self.channels == 3 {
-            return self;
+    /// The samples, and one more at the end.
+    pub(super) fn samples(&self) -> &Samples {
+        &self.samples
+    }
+
+    /// The same picture in a format that holds at least as much: grey becomes colour, and 8 bits become 16
+    /// (65535 = 255 · 257).
+    pub fn widened(self, format: PixelFormat) -> Self {
+        let (width, height) = (self.width, self.height);
+        let copies = if format.channels > self.channels { 3 } else { 1 };
+        let count = width * height * self.channels;
+        let channels = self.channels * copies;
+        match self.samples {
+            Samples::Eight(samples) if format.deep => {
+                let samples = samples[..count].iter();
+                let wide = samples.flat_map(|v| std::iter::repeat_n(257 * u16::from(*v), copies));
+                Self::new(width, height, channels, wide.collect::<Vec<u16>>())
+            }
+            Samples::Eight(samples) if copies > 1 => {
+                let wide = samples[..count].iter().flat_map(|v| [*v; 3]);
+                Self::new(width, height, channels, wide.collect::<Vec<u8>>())
+            }
+            Samples::Sixteen(samples) if copies > 1 => {
+                let wide = samples[..count].iter().flat_map(|v| [*v; 3]);
+                Self::new(width, height, channels, wide.collect::<Vec<u16>>())
+            }
+            samples => Self { samples, ..self },
         }
-        let data = self.data.iter().flat_map(|value| [*value; 3]).collect();
-        Self::new(self.width, self.height, 3, data)
     }
 
     /// Half the size: the mean of 2 × 2 pixels; an odd last row or column is dropped (see
     /// [`crate::camera::Pinhole::at_level`]).
     pub fn halved(&self) -> Self {
+        let size = (self.width / 2, self.height / 2);
+        match &self.samples {
+            Samples::Eight(samples) => Self::new(size.0, size.1, self.channels, self.mean(samples)),
+            Samples::Sixteen(samples) => {
+                Self::new(size.0, size.1, self.channels, self.mean(samples))
+            }
+        }
+    }
+
+    /// The means of `2^level × 2^level` pixels, 16 bits deep; odd rows and columns at the end are dropped.
+    pub(super) fn thumbnail(&self, level: usize) -> Self {
+        let (width, height) = (self.width >> level, self.height >> level);
+        let data = match &self.samples {
+            Samples::Eight(samples) => self.sums(samples, level, 257.0),
+            Samples::Sixteen(samples) => self.sums(samples, level, 1.0),
+        };
+        Self::new(width, height, self.channels, data)
+    }
+
+    fn sums<T: Sample>(&self, samples: &[T], level: usize, scale: f32) -> Vec<u16> {
+        let (width, height, c) = (self.width >> level, self.height >> level, self.channels);
+        let edge = 1 << level;
+        let factor = scale / (edge * edge) as f32;
+        let mut sums = vec![0.0f32; width * c];
+        let mut data = Vec::with_capacity(width * height * c + 1);
+        for y in 0..height {
+            sums.fill(0.0);
+            for row in 0..edge {
+                let row = &samples[(y * edge + row) * self.width * c..][..width * edge * c];
+                for (block, sums) in row.chunks_exact(edge * c).zip(sums.chunks_exact_mut(c)) {
+                    for pixel in block.chunks_exact(c) {
+                        for (sum, sample) in sums.iter_mut().zip(pixel) {
+                            *sum += sample.value();
+                        }
+                    }
+                }
+            }
+            data.extend(sums.iter().map(|sum| u16::nearest(factor * sum)));
+        }
+        data
+    }
+
+    fn mean<T: Sample>(&self, samples: &[T]) -> Vec<T> {
         let (width, height, c) = (self.width / 2, self.height / 2, self.channels);
         let stride = self.width * c;
-        let mut data = Vec::with_capacity(width * height * c);
+        let mut data = Vec::with_capacity(width * height * c + 1);
         for y in 0..height {
-            let upper = &self.data[2 * y * stride..(2 * y + 1) * stride];
-            let lower = &self.data[(2 * y + 1) * stride..(2 * y + 2) * stride];
+            let upper = &samples[2 * y * stride..][..stride];
+            let lower = &samples[(2 * y + 1) * stride..][..stride];
             for x in 0..width {
                 for k in 0..c {
                     let (a, b) = (2 * x * c + k, (2 * x + 1) * c + k);
-                    let sum = u16::from(upper[a])
-                        + u16::from(upper[b])
-                        + u16::from(lower[a])
-                        + u16::from(lower[b]);
-                    data.push(((sum + 2) / 4) as u8);
+                    let sum =
+                        upper[a].value() + upper[b].value() + lower[a].value() + lower[b].value();
+                    data.push(T::nearest(0.25 * sum));
                 }
             }
         }
-        Self::new(width, height, c, data)
+        data
     }
 
     /// The value at pixel `(u, v)`, which must lie within the outermost pixel centres. Pixels beyond the
-    /// border repeat the outermost one.
-    ///
-    /// `C` must be the number of channels.
-    #[inline]
-    pub fn sample<const C: usize>(&self, u: f64, v: f64, interpolation: Interpolation) -> [f32; C] {
-        match interpolation {
-            Interpolation::Bilinear => self.weighted::<C, 2>(u, v, 0, |t| [1.0 - t, t]),
-            Interpolation::Bicubic => self.weighted::<C, 4>(u, v, 1, catmull_rom),
-        }
-    }
-
-    /// `Σ_y w_y Σ_x w_x I(x, y)` over the `N × N` pixels of which `before` lie before `(u, v)`'s own.
-    #[inline]
-    fn weighted<const C: usize, const N: usize>(
-        &self,
-        u: f64,
-        v: f64,
-        before: usize,
-        weights: impl Fn(f32) -> [f32; N],
-    ) -> [f32; C] {
-        debug_assert_eq!(C, self.channels);
-        // Never the last pixel as the first of a pair, so that (width − 1, ·) has a right neighbour.
-        let x = (u as usize).min(self.width.saturating_sub(2));
-        let y = (v as usize).min(self.height.saturating_sub(2));
-        let (w_x, w_y) = (
-            weights((u - x as f64) as f32),
-            weights((v - y as f64) as f32),
-        );
-        let mut value = [0.0; C];
-        let after = N - before;
-        if x >= before && y >= before && x + after <= self.width && y + after <= self.height {
-            let mut start = ((y - before) * self.width + x - before) * C;
-            for w in w_y {
-                let row = &self.data[start..start + N * C];
-                for c in 0..C {
-                    let mut sum = 0.0;
-                    for k in 0..N {
-                        sum += w_x[k] * f32::from(row[k * C + c]);
-                    }
-                    value[c] += w * sum;
+    /// border repeat the outermost one. A grey picture has it in all three channels.
+    pub fn at(&self, u: f32, v: f32, kernel: &Kernel) -> [f32; 3] {
+        let weights = |t: f32| {
+            let t = t + kernel.rounding();
+            let whole = t.floor();
+            (whole as i64, kernel.at(Kernel::phase(t - whole) as usize))
+        };
+        let ((x, w_x), (y, w_y)) = (weights(u), weights(v));
+        let pixel = |at: i64, size: usize| at.clamp(0, size as i64 - 1) as usize;
+        let mut value = [0.0; 3];
+        for (j, w_y) in w_y.iter().enumerate() {
+            let row = pixel(y + j as i64 - kernel.before() as i64, self.height) * self.width;
+            let mut sum = [0.0; 3];
+            for (k, w_x) in w_x.iter().enumerate() {
+                let column = pixel(x + k as i64 - kernel.before() as i64, self.width);
+                let first = (row + column) * self.channels;
+                for (c, sum) in sum.iter_mut().enumerate() {
+                    let sample = first + c.min(self.channels - 1);
+                    *sum += w_x
+                        * match &self.samples {
+                            Samples::Eight(samples) => samples[sample].value(),
+                            Samples::Sixteen(samples) => samples[sample].value(),
+                        };
                 }
-                start += self.width * C;
             }
-            return value;
-        }
-        for (j, w) in w_y.iter().enumerate() {
-            let row = (y + j).saturating_sub(before).min(self.height - 1) * self.width;
-            for (k, w_across) in w_x.iter().enumerate() {
-                let at = (row + (x + k).saturating_sub(before).min(self.width - 1)) * C;
-                for (c, value) in value.iter_mut().enumerate() {
-                    *value += w * w_across * f32::from(self.data[at + c]);
-                }
+            for (value, sum) in value.iter_mut().zip(sum) {
+                *value += w_y * sum;
             }
         }
         value
     }
 
-    /// The grey value at pixel `(u, v)`, bilinear: Rec. 709 luma of colour pictures.
-    pub fn grey(&self, u: f64, v: f64) -> f32 {
-        if self.channels == 1 {
-            self.sample::<1>(u, v, Interpolation::Bilinear)[0]
-        } else {
-            luma(self.sample::<3>(u, v, Interpolation::Bilinear))
+    /// The grey value at a pixel, 0 to 255, bilinear: Rec. 709 luma of colour pictures.
+    pub fn grey(&self, pixel: &Vector2<f64>, bilinear: &Kernel) -> f32 {
+        let value = self.at(pixel.x as f32, pixel.y as f32, bilinear);
+        luma(value) * (255.0 / self.format().white())
+    }
+}
+
+/// What the pixels of a picture are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PixelFormat {
+    /// 1 (grey) or 3 (red, green, blue).
+    pub channels: usize,
+    /// 16 bits a sample instead of 8.
+    pub deep: bool,
+}
+
+impl PixelFormat {
+    /// How pictures of a file's colour type are held: grey stays grey and everything else becomes colour, 16 bits stay 16
+    /// and everything else becomes 8.
+    pub fn of(colour: ColorType) -> Self {
+        Self {
+            channels: if colour.has_color() { 3 } else { 1 },
+            deep: matches!(
+                colour,
+                ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16
+            ),
         }
+    }
+
+    /// The least format that holds both.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            channels: self.channels.max(other.channels),
+            deep: self.deep || other.deep,
+        }
+    }
+
+    /// Full scale.
+    pub fn white(self) -> f32 {
+        if self.deep { u16::WHITE } else { u8::WHITE }
+    }
+
+    /// Bytes of a sample.
+    pub fn sample_bytes(self) -> usize {
+        if self.deep { 2 } else { 1 }
+    }
+
+    /// Bytes of a pixel, with its alpha if it has one.
+    pub fn pixel_bytes(self, alpha: bool) -> usize {
+        (self.channels + usize::from(alpha)) * self.sample_bytes()
     }
 }
 
@@ -175,69 +261,77 @@ pub(crate) fn luma([red, green, blue]: [f32; 3]) -> f32 {
     0.2126 * red + 0.7152 * green + 0.0722 * blue
 }
 
-/// Weights of the pixels at −1, 0, 1, 2 for a point at `t ∈ [0, 1]`: the cubic through the middle two whose
-/// slopes there are central differences.
-///
-/// Source: E. Catmull, R. Rom, "A class of local interpolating splines", 1974 (a = −½ in Keys' kernel).
-fn catmull_rom(t: f32) -> [f32; 4] {
-    [
-        t * (-0.5 + t * (1.0 - 0.5 * t)),
-        1.0 + t * t * (-2.5 + 1.5 * t),
-        t * (0.5 + t * (2.0 - 1.5 * t)),
-        t * t * (-0.5 + 0.5 * t),
-    ]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Interpolation;
 
     fn parabola() -> Picture {
-        let data = (0..10 * 9)
+        let data: Vec<u8> = (0..10 * 9)
             .map(|k| (2 * (k % 10) * (k % 10) + 5 * (k / 10)) as u8)
             .collect();
         Picture::new(10, 9, 1, data)
     }
 
+    fn at(picture: &Picture, u: f64, v: f64, interpolation: Interpolation) -> [f64; 3] {
+        let kernel = Kernel::new(interpolation, 1.0);
+        picture.at(u as f32, v as f32, &kernel).map(f64::from)
+    }
+
     #[test]
     fn bicubic_is_exact_for_quadratics_inside() {
         for (u, v) in [(3.25, 4.5), (1.0, 1.0), (6.75, 5.125)] {
-            let [value] = parabola().sample::<1>(u, v, Interpolation::Bicubic);
-            assert!(
-                (f64::from(value) - (2.0 * u * u + 5.0 * v)).abs() < 1e-3,
-                "{value}"
-            );
+            let [value, ..] = at(&parabola(), u, v, Interpolation::Bicubic);
+            assert!((value - (2.0 * u * u + 5.0 * v)).abs() < 1e-3, "{value}");
         }
     }
 
     #[test]
     fn pixel_centres_give_the_pixels_up_to_the_border() {
-        let picture = parabola();
-        for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
+        use Interpolation::{Bicubic, Bilinear, Lanczos3, Nearest};
+        for interpolation in [Nearest, Bilinear, Bicubic, Lanczos3] {
             for (x, y) in [(0, 0), (9, 0), (0, 8), (9, 8), (4, 4)] {
-                let [value] = picture.sample::<1>(f64::from(x), f64::from(y), interpolation);
-                assert!((value - (2 * x * x + 5 * y) as f32).abs() < 1e-4);
+                let [value, ..] = at(&parabola(), f64::from(x), f64::from(y), interpolation);
+                assert!((value - f64::from(2 * x * x + 5 * y)).abs() < 1e-3);
             }
         }
+        assert_eq!(at(&parabola(), 3.4, 3.6, Interpolation::Nearest)[0], 38.0);
     }
 
     #[test]
     fn channels_do_not_mix() {
-        let data = (0..8 * 8).flat_map(|k| [k as u8, 100, 200]).collect();
+        let data: Vec<u8> = (0..8 * 8).flat_map(|k| [k as u8, 100, 200]).collect();
         let picture = Picture::new(8, 8, 3, data);
         for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
             for (u, v) in [(0.5, 0.5), (3.5, 3.5), (6.9, 6.9)] {
-                let [_, green, blue] = picture.sample::<3>(u, v, interpolation);
+                let [_, green, blue] = at(&picture, u, v, interpolation);
                 assert!((green - 100.0).abs() < 1e-3 && (blue - 200.0).abs() < 1e-3);
             }
         }
-        let grey = Picture::new(2, 2, 1, vec![1, 2, 3, 4]).into_colour();
-        assert!((grey.grey(0.5, 0.5) - 2.5).abs() < 1e-5);
+    }
+
+    #[test]
+    fn widening_keeps_the_values() {
+        let narrow = Picture::new(2, 2, 1, vec![1u8, 2, 3, 4]);
+        let wide = narrow.clone().widened(PixelFormat {
+            channels: 3,
+            deep: true,
+        });
+        assert_eq!(wide.format().pixel_bytes(true), 8);
+        let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
+        let middle = Vector2::new(0.5, 0.5);
+        assert!((narrow.grey(&middle, &bilinear) - 2.5).abs() < 1e-5);
+        assert!((wide.grey(&middle, &bilinear) - 2.5).abs() < 1e-4);
+        assert_eq!(
+            wide.clone().widened(narrow.format().and(wide.format())),
+            wide
+        );
     }
 
     #[test]
     fn halving_averages_and_drops_the_odd_row() {
-        let half = Picture::new(4, 3, 1, vec![0, 4, 8, 8, 8, 12, 8, 8, 99, 99, 99, 99]).halved();
-        assert_eq!(half, Picture::new(2, 1, 1, vec![6, 8]));
+        let picture: Vec<u8> = vec![0, 4, 8, 8, 8, 12, 8, 8, 99, 99, 99, 99];
+        let half = Picture::new(4, 3, 1, picture).halved();
+        assert_eq!(half, Picture::new(2, 1, 1, vec![6u8, 8]));
     }
 }

@@ -1,16 +1,24 @@
-//! All frames of a survey in memory.
+//! The frames of a survey, as many in memory as are needed.
 
-use super::{Picture, RenderError};
+use super::{Picture, PixelFormat, RenderError};
 use crate::camera::Pinhole;
-use crate::frames::{FrameFile, load_colour};
+use crate::frames::{FrameFile, colour_type, load_colour};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
-/// The frames of a survey, all grey or all colour, with the camera that took them.
+/// The frames of a survey, all in the same format, with the camera that took them.
+///
+/// Frames are decoded when [`FrameStack::hold`] asks for them and stay until there is no room: a frame that is decoded again
+/// is the same frame.
 #[derive(Clone, Debug)]
 pub struct FrameStack {
     camera: Pinhole,
-    pictures: Vec<Picture>,
+    format: PixelFormat,
+    files: Vec<FrameFile>,
+    /// Width and height of the files' pictures.
+    full_size: [u32; 2],
+    level: usize,
+    pictures: Vec<Option<Picture>>,
 }
 
 /// How many times frames of resolution `native` may be halved before they are coarser than a canvas of
@@ -26,49 +34,145 @@ pub fn level_for(camera: &Pinhole, native_px_per_metre: f64, px_per_metre: f64) 
 }
 
 impl FrameStack {
-    /// Decodes every frame (in parallel) and halves it `level` times. If any frame has colour, all are held
-    /// in colour.
+    /// Frames on disk, to be halved `level` times. None is decoded yet; their headers tell the format: colour if any frame has
+    /// colour, 16 bits if any has.
     ///
     /// # Errors
-    /// A frame that is missing, damaged or of another size than the calibration's; the first in the order
-    /// of the files.
-    pub fn load(
+    /// A frame that is missing or is no picture; the first in the order of the files.
+    pub fn open(
         files: &[FrameFile],
         camera: &Pinhole,
         level: usize,
-        progress: &dyn Progress,
     ) -> Result<Self, RenderError> {
-        progress.start("frames", files.len());
-        let decoded: Vec<Result<Picture, RenderError>> = files
+        let formats: Vec<Result<PixelFormat, RenderError>> = files
             .par_iter()
-            .map(|file| {
-                let mut picture =
-                    Picture::from_decoded(load_colour(file, camera.width, camera.height)?);
-                for _ in 0..level {
-                    picture = picture.halved();
-                }
-                progress.advance(1);
-                Ok(picture)
-            })
+            .map(|file| Ok(PixelFormat::of(colour_type(file)?)))
             .collect();
-        progress.finish();
-        let pictures = decoded.into_iter().collect::<Result<Vec<_>, _>>()?;
-        Ok(Self::from_pictures(camera.at_level(level), pictures))
+        let mut format = PixelFormat {
+            channels: 1,
+            deep: false,
+        };
+        for found in formats {
+            format = format.and(found?);
+        }
+        Ok(Self {
+            camera: camera.at_level(level),
+            format,
+            files: files.to_vec(),
+            full_size: [camera.width, camera.height],
+            level,
+            pictures: vec![None; files.len()],
+        })
     }
 
     /// Frames that are in memory already, with the camera that took them.
     ///
     /// # Panics
     /// If a picture is not as large as the camera's.
-    pub fn from_pictures(camera: Pinhole, mut pictures: Vec<Picture>) -> Self {
+    pub fn from_pictures(camera: Pinhole, pictures: Vec<Picture>) -> Self {
+        let mut format = PixelFormat {
+            channels: 1,
+            deep: false,
+        };
         for picture in &pictures {
             let size = (picture.width() as u32, picture.height() as u32);
             assert_eq!(size, (camera.width, camera.height), "size of a frame");
+            format = format.and(picture.format());
         }
-        if pictures.iter().any(|picture| picture.channels() == 3) {
-            pictures = pictures.into_iter().map(Picture::into_colour).collect();
+        let widened = pictures.into_iter().map(|p| Some(p.widened(format)));
+        Self {
+            camera,
+            format,
+            files: Vec::new(),
+            full_size: [camera.width, camera.height],
+            level: 0,
+            pictures: widened.collect(),
         }
-        Self { camera, pictures }
+    }
+
+    /// Decodes those of `frames` that are not there yet (in parallel). Others stay while all take no more than `room` bytes;
+    /// those go first that come last in `later`, the frames in the order in which they will be needed again.
+    ///
+    /// # Errors
+    /// A frame that is missing, damaged or of another size than the calibration's; the first of them.
+    pub fn hold(
+        &mut self,
+        frames: &[usize],
+        later: &[usize],
+        room: u64,
+        progress: &dyn Progress,
+    ) -> Result<(), RenderError> {
+        let missing: Vec<usize> = frames
+            .iter()
+            .copied()
+            .filter(|frame| self.pictures[*frame].is_none())
+            .collect();
+        self.make_room(frames, later, room, missing.len());
+        let decoded: Vec<Result<Picture, RenderError>> = missing
+            .par_iter()
+            .map(|frame| {
+                let picture = self.decode(*frame);
+                progress.advance(1);
+                picture
+            })
+            .collect();
+        for (frame, picture) in missing.iter().zip(decoded) {
+            self.pictures[*frame] = Some(picture?);
+        }
+        Ok(())
+    }
+
+    fn make_room(&mut self, frames: &[usize], later: &[usize], room: u64, coming: usize) {
+        let most = (room / self.frame_bytes().max(1)) as usize;
+        let mut keep = vec![false; self.pictures.len()];
+        let held = self.pictures.iter().filter(|p| p.is_some()).count();
+        let mut excess = (held + coming).saturating_sub(most);
+        for frame in frames {
+            keep[*frame] = true;
+        }
+        if excess == 0 {
+            return;
+        }
+        // Those that are not needed any more, then those that are needed last.
+        let mut needed = keep.clone();
+        for frame in later {
+            needed[*frame] = true;
+        }
+        let useless = (0..self.pictures.len()).filter(|frame| !needed[*frame]);
+        for frame in useless.chain(later.iter().rev().copied()) {
+            if excess > 0 && !keep[frame] && self.pictures[frame].take().is_some() {
+                excess -= 1;
+            }
+        }
+    }
+
+    /// Decodes a frame without keeping it.
+    ///
+    /// # Errors
+    /// As [`load_colour`].
+    pub fn decode(&self, frame: usize) -> Result<Picture, RenderError> {
+        if let Some(picture) = &self.pictures[frame] {
+            return Ok(picture.clone());
+        }
+        let [width, height] = self.full_size;
+        let decoded = load_colour(&self.files[frame], width, height)?;
+        let mut picture = Picture::from_decoded(decoded).widened(self.format);
+        for _ in 0..self.level {
+            picture = picture.halved();
+        }
+        Ok(picture)
+    }
+
+    /// Decodes all frames.
+    ///
+    /// # Errors
+    /// As [`FrameStack::hold`].
+    pub fn hold_all(&mut self, progress: &dyn Progress) -> Result<(), RenderError> {
+        let all: Vec<usize> = (0..self.len()).collect();
+        progress.start("frames", all.len());
+        let held = self.hold(&all, &[], u64::MAX, progress);
+        progress.finish();
+        held
     }
 
     /// The camera of the pictures as they are held (halved as they are).
@@ -76,20 +180,37 @@ impl FrameStack {
         &self.camera
     }
 
-    /// The pictures, in the order of the frames.
-    pub fn pictures(&self) -> &[Picture] {
-        &self.pictures
+    /// The picture of a frame, if it is held.
+    pub fn picture(&self, frame: usize) -> Option<&Picture> {
+        self.pictures[frame].as_ref()
     }
 
-    /// Samples a pixel: 1 (grey) or 3 (colour).
-    pub fn channels(&self) -> usize {
-        self.pictures.first().map_or(1, Picture::channels)
+    /// Number of frames.
+    pub fn len(&self) -> usize {
+        self.pictures.len()
+    }
+
+    /// True without any frame.
+    pub fn is_empty(&self) -> bool {
+        self.pictures.is_empty()
+    }
+
+    /// What the pixels are.
+    pub fn format(&self) -> PixelFormat {
+        self.format
+    }
+
+    /// Memory of one frame, bytes.
+    pub fn frame_bytes(&self) -> u64 {
+        let pixels = u64::from(self.camera.width) * u64::from(self.camera.height);
+        pixels * self.format.pixel_bytes(false) as u64
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::progress::Silent;
 
     #[test]
     fn frames_are_halved_only_for_coarse_canvases() {
@@ -109,10 +230,43 @@ mod tests {
     #[test]
     fn one_colour_frame_makes_all_colour() {
         let camera = Pinhole::from_vertical_fov(2, 2, 1.0);
-        let grey = Picture::new(2, 2, 1, vec![7; 4]);
-        let colour = Picture::new(2, 2, 3, vec![9; 12]);
+        let grey = Picture::new(2, 2, 1, vec![7u8; 4]);
+        let colour = Picture::new(2, 2, 3, vec![9u8; 12]);
         let stack = FrameStack::from_pictures(camera, vec![grey, colour]);
-        assert_eq!(stack.channels(), 3);
-        assert!((stack.pictures()[0].grey(0.5, 0.5) - 7.0).abs() < 1e-4);
+        assert_eq!(stack.format().channels, 3);
+        assert_eq!(
+            stack.picture(0),
+            Some(&Picture::new(2, 2, 3, vec![7u8; 12]))
+        );
+    }
+
+    #[test]
+    fn what_is_needed_last_goes_first_and_comes_back_the_same() {
+        let folder = tempfile::tempdir().unwrap();
+        let files: Vec<FrameFile> = (0..4)
+            .map(|index| {
+                let path = folder.path().join(format!("{index}.png"));
+                let grey = image::GrayImage::from_pixel(16, 16, image::Luma([index as u8]));
+                grey.save(&path).unwrap();
+                FrameFile { index, path }
+            })
+            .collect();
+        let camera = Pinhole::from_vertical_fov(16, 16, 1.0);
+        let mut stack = FrameStack::open(&files, &camera, 0).unwrap();
+        let held = |stack: &FrameStack| -> Vec<usize> {
+            (0..4).filter(|k| stack.picture(*k).is_some()).collect()
+        };
+        let room = 3 * stack.frame_bytes();
+        stack.hold(&[0, 1, 2], &[3, 2, 0], room, &Silent).unwrap();
+        assert_eq!(held(&stack), [0, 1, 2]);
+        // 1 is not needed any more, 2 sooner than 0.
+        stack.hold(&[3], &[2, 0], room, &Silent).unwrap();
+        assert_eq!(held(&stack), [0, 2, 3]);
+        stack.hold(&[1], &[3, 2, 0], room, &Silent).unwrap();
+        assert_eq!(held(&stack), [1, 2, 3]);
+        let before = stack.picture(2).cloned();
+        stack.hold(&[0, 1, 3], &[], 0, &Silent).unwrap();
+        assert_eq!(held(&stack), [0, 1, 3]);
+        assert_eq!(stack.decode(2).ok(), before);
     }
 }

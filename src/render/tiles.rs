@@ -1,11 +1,12 @@
 //! The canvas in small squares, each with the frames that may see it.
 
 use super::{Canvas, Placement};
-use crate::surface::{Footprint, Surface};
+use super::warp::RUN;
+use crate::surface::{Footprint, Surface, WallPoint};
 use nalgebra::Vector3;
 
-/// Edge of a tile, pixels: its wall points and sums stay in the second-level cache.
-const EDGE: u32 = 128;
+/// Edge of a tile, pixels: a row is one run, and its wall points stay in the second-level cache.
+pub(super) const EDGE: u32 = RUN as u32;
 
 /// A rectangle of the canvas.
 pub(crate) struct Tile {
@@ -22,14 +23,26 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
+    /// Number of pixels.
+    pub fn pixels(&self) -> usize {
+        self.columns as usize * self.rows as usize
+    }
+
+    /// The pixels' centres on the unrolled wall, row-major.
+    pub fn walls(&self, canvas: &Canvas) -> impl Iterator<Item = WallPoint> {
+        let (canvas, columns) = (*canvas, self.column..self.column + self.columns);
+        (self.row..self.row + self.rows)
+            .flat_map(move |row| columns.clone().map(move |column| canvas.wall(column, row)))
+    }
+
     /// The wall points of the pixels' centres, row-major, metres.
     pub fn points(&self, surface: &dyn Surface, canvas: &Canvas) -> Vec<Vector3<f64>> {
-        let mut points = Vec::with_capacity(self.columns as usize * self.rows as usize);
-        for row in self.row..self.row + self.rows {
-            for column in self.column..self.column + self.columns {
-                points.push(surface.frame(canvas.wall(column, row)).x_w);
-            }
-        }
+        let columns = self.column..self.column + self.columns;
+        let s_m: Vec<f64> = columns.map(|column| canvas.wall(column, 0).s_m).collect();
+        let rows = self.row..self.row + self.rows;
+        let h_m: Vec<f64> = rows.map(|row| canvas.wall(0, row).h_m).collect();
+        let mut points = Vec::new();
+        surface.lattice(&s_m, &h_m, &mut points);
         points
     }
 }

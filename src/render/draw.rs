@@ -1,0 +1,295 @@
+//! Tiles of the panorama, row by row.
+
+use super::exposure::Exposure;
+use super::sample::{Sample, Samples};
+use super::seams::Seams;
+use super::view::{Kernels, View};
+use super::warp::{Points, RUN, Run};
+use super::{Canvas, FrameStack, Placement, Tile};
+use crate::surface::Surface;
+use crate::vectors::wide;
+use serde::Serialize;
+
+/// Which frames a pixel of the panorama shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mode {
+    /// The frame that shows the wall best there; frames change along seams where they agree.
+    #[default]
+    BestView,
+    /// The mean of all frames, weighted by `tent(u) tent(v)`: 1 in the middle of a frame, 0 at its edge.
+    Average,
+    /// The median of all frames: what most of them show.
+    Median,
+}
+
+/// What tiles are drawn from.
+pub struct Scene<'a> {
+    /// The tunnel.
+    pub surface: &'a dyn Surface,
+    /// The frames.
+    pub frames: &'a FrameStack,
+    /// Where they lie, in their order.
+    pub placements: &'a [Placement],
+    /// What is drawn.
+    pub canvas: &'a Canvas,
+    /// How frames are sampled.
+    pub kernels: &'a Kernels,
+    /// What is undone of the frames' exposure.
+    pub exposure: &'a Exposure,
+    /// Which frames are shown where.
+    pub composition: Composition<'a>,
+}
+
+/// Which frames are shown where.
+#[derive(Clone, Copy)]
+pub enum Composition<'a> {
+    /// One frame at each place, with seams between.
+    Seams(&'a Seams),
+    /// See [`Mode::Average`].
+    Average,
+    /// See [`Mode::Median`].
+    Median,
+}
+
+/// No frame, in a map of frames.
+pub const NO_FRAME: u32 = u32::MAX;
+
+/// A drawn tile.
+pub struct Drawn {
+    /// Its pixels, row-major, alpha last: full where some frame sees the wall, 0 in holes.
+    pub samples: Samples,
+    /// The frame that each pixel shows most of, [`NO_FRAME`] in holes and where frames are mixed all over.
+    pub sources: Vec<u32>,
+}
+
+impl Scene<'_> {
+    /// Draws a tile. The frames that it needs must be held ([`Scene::needed`]).
+    pub fn draw(&self, tile: &Tile) -> Drawn {
+        let format = self.frames.format();
+        match (format.channels, format.deep) {
+            (1, false) => self.draw_as::<u8, 1>(tile),
+            (_, false) => self.draw_as::<u8, 3>(tile),
+            (1, true) => self.draw_as::<u16, 1>(tile),
+            (_, true) => self.draw_as::<u16, 3>(tile),
+        }
+    }
+
+    /// The frames that a tile is drawn from, in their order.
+    pub fn needed(&self, tile: &Tile) -> Vec<usize> {
+        match self.composition {
+            Composition::Seams(seams) => seams.frames_of(self.canvas, tile),
+            Composition::Average | Composition::Median => tile.frames.clone(),
+        }
+    }
+
+    fn draw_as<T: Sample, const C: usize>(&self, tile: &Tile) -> Drawn
+    where
+        Samples: From<Vec<T>>,
+    {
+        let points = Points::new(&tile.points(self.surface, self.canvas));
+        let camera = self.frames.camera();
+        let views = self.needed(tile).into_iter().filter_map(|frame| {
+            let picture = self.frames.picture(frame)?;
+            Some(View::new(
+                frame,
+                self.surface,
+                camera,
+                &self.placements[frame],
+                picture,
+                self.kernels,
+                self.exposure.of(frame),
+                self.canvas,
+                tile,
+                &points,
+            ))
+        });
+        let views: Vec<View> = views.collect();
+        let mut brush = Brush::<T, C> {
+            pixels: Vec::with_capacity(tile.pixels() * (C + 1)),
+            sources: Vec::with_capacity(tile.pixels()),
+            run: Run::default(),
+        };
+        wide(
+            #[inline(always)]
+            || match self.composition {
+                Composition::Seams(seams) => {
+                    brush.best_view(tile, &points, &views, seams, self.canvas);
+                }
+                Composition::Average => brush.average(tile, &points, &views),
+                Composition::Median => brush.median(tile, &points, &views),
+            },
+        );
+        Drawn {
+            samples: brush.pixels.into(),
+            sources: brush.sources,
+        }
+    }
+}
+
+/// Values of a row of a tile, added up.
+struct Row {
+    sums: [[f32; 4]; RUN],
+    weights: [f32; RUN],
+}
+
+impl Row {
+    fn new() -> Self {
+        Self {
+            sums: [[0.0; 4]; RUN],
+            weights: [0.0; RUN],
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, k: usize, value: &[f32; 4], w: f32) {
+        for (sum, value) in self.sums[k].iter_mut().zip(value) {
+            *sum += w * value;
+        }
+        self.weights[k] += w;
+    }
+}
+
+/// Draws rows of a tile with `C` channels of `T`.
+struct Brush<T, const C: usize> {
+    pixels: Vec<T>,
+    sources: Vec<u32>,
+    run: Run,
+}
+
+impl<T: Sample, const C: usize> Brush<T, C> {
+    #[inline(always)]
+    fn put(&mut self, value: Option<[f32; 4]>) {
+        match value {
+            Some(value) => {
+                self.pixels
+                    .extend((0..C).map(|c| T::nearest(value[c])));
+                self.pixels.push(T::nearest(T::WHITE));
+            }
+            None => self.pixels.extend((0..=C).map(|_| T::default())),
+        }
+    }
+
+    #[inline(always)]
+    fn average(&mut self, tile: &Tile, points: &Points, views: &[View]) {
+        let columns = tile.columns as usize;
+        for row in 0..tile.rows as usize {
+            let mut sums = Row::new();
+            for view in views {
+                view.look_at(&mut self.run, points, row * columns, columns);
+                let (u, v) = self.run.pixels();
+                for k in 0..columns {
+                    if self.run.seen()[k] {
+                        let w = view.feather(u[k], v[k]);
+                        sums.add(k, &self.run.values()[k], w);
+                    }
+                }
+            }
+            for k in 0..columns {
+                let w = sums.weights[k];
+                self.put((w > 0.0).then(|| sums.sums[k].map(|sum| sum / w)));
+                self.sources.push(NO_FRAME);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn median(&mut self, tile: &Tile, points: &Points, views: &[View]) {
+        let columns = tile.columns as usize;
+        let mut stacks: Vec<Vec<[f32; 4]>> = vec![Vec::with_capacity(views.len()); columns];
+        let mut values = Vec::with_capacity(views.len());
+        for row in 0..tile.rows as usize {
+            for view in views {
+                view.look_at(&mut self.run, points, row * columns, columns);
+                for (k, stack) in stacks.iter_mut().enumerate() {
+                    if self.run.seen()[k] {
+                        stack.push(self.run.values()[k]);
+                    }
+                }
+            }
+            for stack in &mut stacks {
+                let middle = (!stack.is_empty()).then(|| {
+                    let mut middle = [0.0; 4];
+                    for (c, middle) in middle.iter_mut().enumerate().take(C) {
+                        values.clear();
+                        values.extend(stack.iter().map(|value| value[c]));
+                        *middle = median(&mut values);
+                    }
+                    middle
+                });
+                self.put(middle);
+                self.sources.push(NO_FRAME);
+                stack.clear();
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn best_view(
+        &mut self,
+        tile: &Tile,
+        points: &Points,
+        views: &[View],
+        seams: &Seams,
+        canvas: &Canvas,
+    ) {
+        let columns = tile.columns as usize;
+        let places = seams.columns_of(canvas, tile);
+        for row in 0..tile.rows as usize {
+            let start = row * columns;
+            let across = seams.row_of(canvas, tile.row + row as u32);
+            let mut sums = Row::new();
+            let mut best = [(0.0f32, NO_FRAME); RUN];
+            seams.shares(&places, &across, |frame, from, to, weights| {
+                let Ok(view) = views.binary_search_by_key(&frame, |view| view.frame) else {
+                    return;
+                };
+                views[view].look_at(&mut self.run, points, start + from, to - from);
+                for k in from..to {
+                    let w = weights[k - from];
+                    if w > 0.0 && self.run.seen()[k - from] {
+                        sums.add(k, &self.run.values()[k - from], w);
+                        if w > best[k].0 {
+                            best[k] = (w, frame as u32);
+                        }
+                    }
+                }
+            });
+            // At the edge of what is seen: frames that no node of the grid shows.
+            for view in views {
+                let holes = |k: &usize| sums.weights[*k] == 0.0;
+                let (Some(from), Some(last)) =
+                    ((0..columns).find(holes), (0..columns).rev().find(holes))
+                else {
+                    break;
+                };
+                view.look_at(&mut self.run, points, start + from, last + 1 - from);
+                for k in from..=last {
+                    if sums.weights[k] == 0.0 && self.run.seen()[k - from] {
+                        sums.add(k, &self.run.values()[k - from], 1.0);
+                        best[k] = (1.0, view.frame as u32);
+                    }
+                }
+            }
+            for k in 0..columns {
+                let w = sums.weights[k];
+                let value = (w > 0.0).then(|| {
+                    let correction = seams.correction(&places[k], &across);
+                    std::array::from_fn(|c| sums.sums[k][c] / w + correction[c])
+                });
+                self.put(value);
+                self.sources.push(best[k].1);
+            }
+        }
+    }
+}
+
+/// The median; the mean of the middle two of an even number. NaN of none.
+pub(super) fn median(values: &mut [f32]) -> f32 {
+    let n = values.len();
+    if n == 0 {
+        return f32::NAN;
+    }
+    values.sort_unstable_by(f32::total_cmp);
+    0.5 * (values[(n - 1) / 2] + values[n / 2])
+}

@@ -1,0 +1,382 @@
+//! The frame that shows a place of the wall best, with seams where frames agree.
+//!
+//! Each node p of the grid is given to one frame `l_p`, so that
+//!
+//! `E = Σ_p D_p(l_p) + Σ_{p,q neighbours} V_pq(l_p, l_q)`
+//!
+//! is small. D prefers frames that show the wall finely and squarely, away from their edges, and that show what the others
+//! show, too; V is zero between nodes of the same frame, else a seam's length and what the two frames differ by on both sides of it.
+//!
+//! Rows and columns of nodes are solved exactly, one at a time with their neighbours held, by dynamic programming
+//! (Viterbi): E never rises. Every other row at once, which does not depend on the number of threads.
+//!
+//! Sources: J. Davis, "Mosaics of scenes with moving objects", CVPR 1998 (seams where pictures agree); A. Agarwala et al.,
+//! "Interactive digital photomontage", SIGGRAPH 2004 (the energy).
+
+use super::draw::{NO_FRAME, median};
+use super::kernel::{Interpolation, Kernel};
+use super::picture::luma;
+use super::thumbnails::Thumbnails;
+use super::warp::{Look, Points, Run};
+use super::{Canvas, Exposure, Placement, Tile, tiles};
+use crate::surface::{Surface, WallFrame};
+use crate::vectors::wide;
+use rayon::prelude::*;
+
+/// Frames that a node chooses among.
+const CHOICES: usize = 4;
+/// Times that all rows and columns are solved.
+const ROUNDS: usize = 2;
+/// Grey levels (of 255) that frames differ by without reason.
+const SIGMA: f32 = 2.0;
+/// Cost of half the resolution.
+const RESOLUTION: f32 = 2.0;
+/// Cost at a frame's very edge, ...
+const EDGE: f32 = 2.0;
+/// ... which begins at this share of half its width or height from it.
+const EDGE_SHARE: f32 = 0.15;
+/// Cost of one σ beyond the first two from the median of all frames, ...
+const OUTLIER: f32 = 1.0;
+/// ... and of the most.
+const MOST_OUTLYING: f32 = 12.0;
+/// Cost of being clipped white.
+const CLIPPED: f32 = 4.0;
+/// Grey level (of 255) from which a frame is taken for clipped.
+const WHITE: f32 = 250.0;
+/// Cost of one step of a seam, ...
+const SEAM: f32 = 0.5;
+/// ... of one σ that the frames differ by along it, ...
+const DIFFERENCE: f32 = 0.5;
+/// ... and of the most, or where they cannot be compared.
+const MOST_DIFFERENT: f32 = 6.0;
+
+/// A frame that a node may be given to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Choice {
+    frame: u32,
+    /// D.
+    cost: f32,
+    /// Grey value there, of 255.
+    grey: f32,
+}
+
+const NONE: Choice = Choice {
+    frame: NO_FRAME,
+    cost: 0.0,
+    grey: 0.0,
+};
+
+/// The choices of a node, the best first; [`NONE`] where there are no more.
+type Choices = [Choice; CHOICES];
+
+/// The frame of each node of `grid`, row-major; [`NO_FRAME`] where no thumbnail shows the wall.
+pub fn best(
+    surface: &dyn Surface,
+    thumbnails: &Thumbnails,
+    exposure: &Exposure,
+    placements: &[Placement],
+    grid: &Canvas,
+) -> Vec<u32> {
+    let columns = grid.columns as usize;
+    let mut labels: Vec<u32> = Vec::with_capacity(grid.pixels());
+    // Band by band, each held to the one before.
+    for band in tiles(surface, grid, placements) {
+        let parts: Vec<Vec<Choices>> = band
+            .par_iter()
+            .map(|tile| choices(surface, thumbnails, exposure, placements, grid, tile))
+            .collect();
+        let rows = band.first().map_or(0, |tile| tile.rows as usize);
+        let mut choices = Vec::with_capacity(rows * columns);
+        for row in 0..rows {
+            for (tile, part) in band.iter().zip(&parts) {
+                let width = tile.columns as usize;
+                choices.extend_from_slice(&part[row * width..][..width]);
+            }
+        }
+        let above = labels.len().checked_sub(columns);
+        let above = above.map(|start| labels[start..].to_vec());
+        let mut lattice = Lattice {
+            columns,
+            choices,
+            chosen: vec![0; rows * columns],
+        };
+        lattice.settle(above.as_deref());
+        let chosen = lattice.choices.iter().zip(&lattice.chosen);
+        labels.extend(chosen.map(|(choices, chosen)| choices[*chosen as usize].frame));
+    }
+    labels
+}
+
+/// The best choices of a tile's nodes.
+fn choices(
+    surface: &dyn Surface,
+    thumbnails: &Thumbnails,
+    exposure: &Exposure,
+    placements: &[Placement],
+    grid: &Canvas,
+    tile: &Tile,
+) -> Vec<Choices> {
+    let walls: Vec<WallFrame> = tile
+        .walls(grid)
+        .map(|wall| surface.frame(wall))
+        .collect();
+    let points: Vec<_> = walls.iter().map(|wall| wall.x_w).collect();
+    let points = Points::new(&points);
+    let sights: Vec<Vec<Sight>> = tile
+        .frames
+        .iter()
+        .map(|frame| sights(thumbnails, exposure, placements, *frame, tile, &points, &walls))
+        .collect();
+    let mut greys = Vec::new();
+    let mut found: Vec<Choice> = Vec::new();
+    (0..walls.len())
+        .map(|node| {
+            let seen = || {
+                let all = tile.frames.iter().zip(&sights);
+                all.filter_map(|(frame, sights)| Some((*frame, sights[node])).filter(|(_, s)| s.fineness > 0.0))
+            };
+            greys.clear();
+            greys.extend(seen().map(|(_, sight)| sight.grey));
+            let comparable = greys.len() > 2;
+            let middle = median(&mut greys);
+            let finest = seen().map(|(_, sight)| sight.fineness).fold(0.0, f32::max);
+            found.clear();
+            found.extend(seen().map(|(frame, sight)| {
+                let mut cost = RESOLUTION * (finest / sight.fineness).log2();
+                cost += EDGE * (1.0 - sight.inset / EDGE_SHARE).max(0.0);
+                if comparable {
+                    let off = ((sight.grey - middle).abs() / SIGMA - 2.0).max(0.0);
+                    cost += (OUTLIER * off).min(MOST_OUTLYING);
+                }
+                if sight.raw > WHITE {
+                    cost += CLIPPED;
+                }
+                Choice {
+                    frame: frame as u32,
+                    cost,
+                    grey: sight.grey,
+                }
+            }));
+            // Stable: of equals the earlier frame.
+            found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+            std::array::from_fn(|k| found.get(k).copied().unwrap_or(NONE))
+        })
+        .collect()
+}
+
+/// What a frame shows of a node.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sight {
+    /// Pixels per length of wall along the direction in which they are fewest, in units of the focal length; 0: does not show it.
+    fineness: f32,
+    /// Distance from the nearest edge, of half the width or height.
+    inset: f32,
+    /// Grey value of 255, exposure undone, ...
+    grey: f32,
+    /// ... and as it is.
+    raw: f32,
+}
+
+fn sights(
+    thumbnails: &Thumbnails,
+    exposure: &Exposure,
+    placements: &[Placement],
+    frame: usize,
+    tile: &Tile,
+    points: &Points,
+    walls: &[WallFrame],
+) -> Vec<Sight> {
+    let camera = thumbnails.camera();
+    let pose = &placements[frame].pose;
+    let look = Look::new(camera, pose, &points.origin);
+    let picture = thumbnails.picture(frame);
+    let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
+    let response = exposure.of(frame);
+    let colour = picture.format().channels == 3;
+    let scale = 255.0 / picture.format().white();
+    let grey = |[red, green, blue, _]: [f32; 4]| {
+        scale * if colour { luma([red, green, blue]) } else { red }
+    };
+    let forwards = pose.r_wc * nalgebra::Vector3::z();
+    let columns = tile.columns as usize;
+    let mut run = Run::default();
+    let mut raw = [[0.0; 4]; super::warp::RUN];
+    let mut found = vec![Sight::default(); walls.len()];
+    for row in 0..tile.rows as usize {
+        let start = row * columns;
+        wide(
+            #[inline(always)]
+            || {
+                run.project(&look, points, start, columns);
+                run.sample(picture, &bilinear, columns);
+                raw = *run.values();
+                response.undo(&mut run, columns);
+            },
+        );
+        let (u, v) = run.pixels();
+        for k in 0..columns {
+            if !run.seen()[k] {
+                continue;
+            }
+            // On a plane at distance d from the camera, at the point x: f cos α/|x| with cos α = d/|x| across, f/z along:
+            // the least is d f/(z |x|) up to the angle between the view and the optical axis.
+            let wall = &walls[start + k];
+            let ray = wall.x_w - pose.t_wc;
+            let normal = wall.e_s.cross(&wall.e_h);
+            let fineness = ray.dot(&normal).abs() / (ray.dot(&forwards) * ray.norm());
+            let inset = |at: f32, last: u32| {
+                let last = (last - 1) as f32;
+                at.min(last - at) * 2.0 / last
+            };
+            found[start + k] = Sight {
+                fineness: fineness as f32,
+                inset: inset(u[k], camera.width).min(inset(v[k], camera.height)),
+                grey: grey(run.values()[k]),
+                raw: grey(raw[k]),
+            };
+        }
+    }
+    found
+}
+
+/// Nodes of a band and what they chose.
+struct Lattice {
+    columns: usize,
+    choices: Vec<Choices>,
+    /// Which of its choices each node has taken.
+    chosen: Vec<u8>,
+}
+
+impl Lattice {
+    /// Solves rows and columns in turn; `above`: the frames of the row above, which stay.
+    fn settle(&mut self, above: Option<&[u32]>) {
+        let (columns, rows) = (self.columns, self.choices.len() / self.columns.max(1));
+        for _ in 0..ROUNDS {
+            for parity in 0..2 {
+                let lines: Vec<Vec<usize>> = (parity..columns)
+                    .step_by(2)
+                    .map(|column| (0..rows).map(|row| row * columns + column).collect())
+                    .collect();
+                self.solve(&lines, above);
+            }
+            for parity in 0..2 {
+                let lines: Vec<Vec<usize>> = (parity..rows)
+                    .step_by(2)
+                    .map(|row| (row * columns..(row + 1) * columns).collect())
+                    .collect();
+                self.solve(&lines, above);
+            }
+        }
+    }
+
+    /// Solves lines of nodes that are no neighbours of one another.
+    fn solve(&mut self, lines: &[Vec<usize>], above: Option<&[u32]>) {
+        let solved: Vec<Vec<u8>> = lines
+            .par_iter()
+            .map(|line| self.viterbi(line, above))
+            .collect();
+        for (line, solved) in lines.iter().zip(solved) {
+            for (node, chosen) in line.iter().zip(solved) {
+                self.chosen[*node] = chosen;
+            }
+        }
+    }
+
+    /// The best choices along a line, all other nodes held.
+    fn viterbi(&self, line: &[usize], above: Option<&[u32]>) -> Vec<u8> {
+        let mut costs = [0.0f32; CHOICES];
+        let mut back: Vec<[u8; CHOICES]> = Vec::with_capacity(line.len());
+        for (n, node) in line.iter().enumerate() {
+            let before = n.checked_sub(1).map(|n| line[n]);
+            let after = line.get(n + 1).copied();
+            let mut next = [0.0; CHOICES];
+            let mut from = [0u8; CHOICES];
+            for (k, next) in next.iter_mut().enumerate() {
+                let choice = &self.choices[*node][k];
+                if choice.frame == NO_FRAME && k > 0 {
+                    *next = f32::INFINITY;
+                    continue;
+                }
+                *next = choice.cost + self.held(*node, choice, before, after, above);
+                if let Some(before) = before {
+                    let reached = |j: usize| {
+                        costs[j] + seam(&self.choices[before], &self.choices[before][j], &self.choices[*node], choice)
+                    };
+                    let mut best = (f32::INFINITY, 0);
+                    for j in 0..CHOICES {
+                        if costs[j].is_finite() {
+                            let cost = reached(j);
+                            if cost < best.0 {
+                                best = (cost, j as u8);
+                            }
+                        }
+                    }
+                    *next += best.0;
+                    from[k] = best.1;
+                }
+            }
+            costs = next;
+            back.push(from);
+        }
+        let mut k = (0..CHOICES).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).unwrap_or(0) as u8;
+        let mut chosen: Vec<u8> = back
+            .iter()
+            .rev()
+            .map(|from| {
+                let own = k;
+                k = from[usize::from(own)];
+                own
+            })
+            .collect();
+        chosen.reverse();
+        chosen
+    }
+
+    /// Seams between a node and those neighbours that are held.
+    fn held(
+        &self,
+        node: usize,
+        choice: &Choice,
+        before: Option<usize>,
+        after: Option<usize>,
+        above: Option<&[u32]>,
+    ) -> f32 {
+        let columns = self.columns;
+        let (row, column) = (node / columns, node % columns);
+        let start = row * columns;
+        let neighbours = [
+            Some(start + (column + 1) % columns),
+            Some(start + (column + columns - 1) % columns),
+            row.checked_sub(1).map(|row| row * columns + column),
+            Some(node + columns).filter(|below| *below < self.choices.len()),
+        ];
+        let mut cost = 0.0;
+        for other in neighbours.into_iter().flatten() {
+            if Some(other) != before && Some(other) != after && other != node {
+                let held = &self.choices[other][usize::from(self.chosen[other])];
+                cost += seam(&self.choices[other], held, &self.choices[node], choice);
+            }
+        }
+        if let (0, Some(above)) = (row, above)
+            && above[column] != choice.frame
+        {
+            cost += SEAM;
+        }
+        cost
+    }
+}
+
+/// V of two neighbours with their choices.
+fn seam(first: &Choices, a: &Choice, second: &Choices, b: &Choice) -> f32 {
+    if a.frame == b.frame || a.frame == NO_FRAME || b.frame == NO_FRAME {
+        return 0.0;
+    }
+    // What frame b shows at the first node against a there, and the other way round.
+    let difference = |choices: &Choices, here: &Choice, other: u32| {
+        let found = choices.iter().find(|choice| choice.frame == other);
+        found.map_or(MOST_DIFFERENT, |choice| {
+            (DIFFERENCE * (choice.grey - here.grey).abs() / SIGMA).min(MOST_DIFFERENT)
+        })
+    };
+    SEAM + difference(first, a, b.frame) + difference(second, b, a.frame)
+}

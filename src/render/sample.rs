@@ -1,0 +1,85 @@
+//! The numbers that pictures are made of.
+
+/// A sample of a picture: 8 or 16 bits.
+pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + 'static {
+    /// Full scale.
+    const WHITE: f32;
+
+    /// As a number from 0 to [`Sample::WHITE`].
+    fn value(self) -> f32;
+
+    /// The nearest sample; numbers beyond the scale become its end (a cubic overshoots at edges).
+    fn nearest(value: f32) -> Self;
+}
+
+impl Sample for u8 {
+    const WHITE: f32 = 255.0;
+
+    #[inline(always)]
+    fn value(self) -> f32 {
+        f32::from(self)
+    }
+
+    #[inline(always)]
+    fn nearest(value: f32) -> Self {
+        (value + 0.5) as Self
+    }
+}
+
+impl Sample for u16 {
+    const WHITE: f32 = 65535.0;
+
+    #[inline(always)]
+    fn value(self) -> f32 {
+        f32::from(self)
+    }
+
+    #[inline(always)]
+    fn nearest(value: f32) -> Self {
+        (value + 0.5) as Self
+    }
+}
+
+/// Samples of one kind, row-major, channels interleaved.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Samples {
+    /// 8 bits.
+    Eight(Vec<u8>),
+    /// 16 bits.
+    Sixteen(Vec<u16>),
+}
+
+impl Samples {
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Eight(samples) => samples.len(),
+            Self::Sixteen(samples) => samples.len(),
+        }
+    }
+
+    /// True if there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Memory they take, bytes.
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Eight(samples) => samples.len(),
+            Self::Sixteen(samples) => 2 * samples.len(),
+        }
+    }
+}
+
+impl From<Vec<u8>> for Samples {
+    fn from(samples: Vec<u8>) -> Self {
+        Self::Eight(samples)
+    }
+}
+
+impl From<Vec<u16>> for Samples {
+    fn from(samples: Vec<u16>) -> Self {
+        Self::Sixteen(samples)
+    }
+}

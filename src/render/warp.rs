@@ -1,0 +1,301 @@
+//! The inverse warp: from wall points into a frame and to its values there, geometry and sampling in one pass.
+
+use super::kernel::Kernel;
+use super::picture::Picture;
+use super::sample::{Sample, Samples};
+use crate::camera::Pinhole;
+use crate::trajectory::Pose;
+use nalgebra::{Matrix3, Vector3};
+
+/// Most points of a run: all that is known of a run stays in the first-level cache.
+pub const RUN: usize = 128;
+
+/// Wall points in single precision, relative to an origin near them: coordinates are exact to 10⁻⁷ of the patch's size.
+#[derive(Debug, Default)]
+pub struct Points {
+    /// The origin in the world, metres.
+    pub origin: Vector3<f64>,
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
+}
+
+impl Points {
+    /// The points, in order, relative to the first.
+    pub fn new(points: &[Vector3<f64>]) -> Self {
+        let origin = points.first().copied().unwrap_or_default();
+        let axis = |k: usize| points.iter().map(|p| (p[k] - origin[k]) as f32).collect();
+        Self {
+            origin,
+            x: axis(0),
+            y: axis(1),
+            z: axis(2),
+        }
+    }
+}
+
+/// A camera at a pose, ready to look at wall points relative to an origin: `x_c = R_wcᵀ x + R_wcᵀ (origin − t_wc)`, then the
+/// lens and `u = fx x + cx`, `v = fy y + cy` ([`Pinhole::project`]).
+///
+/// Single precision: to about 10⁻⁴ px.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    r_cw: [[f32; 3]; 3],
+    centre: [f32; 3],
+    focal: [f32; 2],
+    principal: [f32; 2],
+    distortion: [f32; 2],
+    lens_limit: f32,
+    limit: [f32; 2],
+}
+
+impl Look {
+    /// The camera at `pose`, for points relative to `origin`.
+    pub fn new(camera: &Pinhole, pose: &Pose, origin: &Vector3<f64>) -> Self {
+        let r_wc = pose.r_wc.to_rotation_matrix();
+        let r_cw: Matrix3<f32> = r_wc.matrix().transpose().cast();
+        let radial = &camera.radial;
+        Self {
+            r_cw: std::array::from_fn(|row| std::array::from_fn(|k| r_cw[(row, k)])),
+            centre: pose.to_camera(origin).cast().into(),
+            focal: [camera.fx as f32, camera.fy as f32],
+            principal: [camera.cx as f32, camera.cy as f32],
+            distortion: [radial.k1 as f32, radial.k2 as f32],
+            lens_limit: radial.limit() as f32,
+            limit: [(camera.width - 1) as f32, (camera.height - 1) as f32],
+        }
+    }
+
+    /// Where point `k` appears, and whether that is within the outermost pixel centres.
+    #[inline(always)]
+    fn project(&self, [x, y, z]: [f32; 3]) -> (f32, f32, bool) {
+        let [a, b, c]: [f32; 3] = std::array::from_fn(|row| {
+            let r = &self.r_cw[row];
+            self.centre[row] + (r[0] * x + r[1] * y + r[2] * z)
+        });
+        let inverse = 1.0 / c;
+        let (p, q) = (a * inverse, b * inverse);
+        let square = p * p + q * q;
+        let factor = 1.0 + square * (self.distortion[0] + square * self.distortion[1]);
+        let u = self.focal[0] * (p * factor) + self.principal[0];
+        let v = self.focal[1] * (q * factor) + self.principal[1];
+        let seen = (c > 0.0)
+            & (square < self.lens_limit)
+            & (u >= 0.0)
+            & (v >= 0.0)
+            & (u <= self.limit[0])
+            & (v <= self.limit[1]);
+        (u, v, seen)
+    }
+}
+
+/// Where a run of points appears in a frame, and the values there: colour in the first three of four lanes, grey in the
+/// first.
+pub struct Run {
+    u: [f32; RUN],
+    v: [f32; RUN],
+    seen: [bool; RUN],
+    /// Index of the first sample under the kernel.
+    first: [u32; RUN],
+    /// Tabulated phases along u and v.
+    phases: [[i32; RUN]; 2],
+    /// True where the kernel lies within the picture.
+    inside: [bool; RUN],
+    values: [[f32; 4]; RUN],
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        Self {
+            u: [0.0; RUN],
+            v: [0.0; RUN],
+            seen: [false; RUN],
+            first: [0; RUN],
+            phases: [[0; RUN]; 2],
+            inside: [false; RUN],
+            values: [[0.0; 4]; RUN],
+        }
+    }
+}
+
+impl Run {
+    /// Which of the points the frame shows.
+    pub fn seen(&self) -> &[bool; RUN] {
+        &self.seen
+    }
+
+    /// The pixel coordinates of the points, u and v.
+    pub fn pixels(&self) -> (&[f32; RUN], &[f32; RUN]) {
+        (&self.u, &self.v)
+    }
+
+    /// The values at the points that the frame shows.
+    pub fn values(&self) -> &[[f32; 4]; RUN] {
+        &self.values
+    }
+
+    /// The pixel coordinates, and the values to be changed.
+    pub fn pixels_and_values(
+        &mut self,
+    ) -> (&[f32; RUN], &[f32; RUN], &mut [[f32; 4]; RUN]) {
+        (&self.u, &self.v, &mut self.values)
+    }
+
+    /// Finds the pixels of `count` points from index `start`.
+    #[inline(always)]
+    pub fn project(&mut self, look: &Look, points: &Points, start: usize, count: usize) {
+        let (x, y, z) = (
+            &points.x[start..][..count],
+            &points.y[start..][..count],
+            &points.z[start..][..count],
+        );
+        let (u, v, seen) = (
+            &mut self.u[..count],
+            &mut self.v[..count],
+            &mut self.seen[..count],
+        );
+        for k in 0..count {
+            (u[k], v[k], seen[k]) = look.project([x[k], y[k], z[k]]);
+        }
+    }
+
+    /// Looks up the values of the `count` points projected before.
+    #[inline(always)]
+    pub fn sample(&mut self, picture: &Picture, kernel: &Kernel, count: usize) {
+        match (picture.samples(), picture.format().channels) {
+            (Samples::Eight(samples), 1) => self.sample_of::<u8, 1>(picture, samples, kernel, count),
+            (Samples::Eight(samples), _) => self.sample_of::<u8, 3>(picture, samples, kernel, count),
+            (Samples::Sixteen(samples), 1) => {
+                self.sample_of::<u16, 1>(picture, samples, kernel, count);
+            }
+            (Samples::Sixteen(samples), _) => {
+                self.sample_of::<u16, 3>(picture, samples, kernel, count);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn sample_of<T: Sample, const C: usize>(
+        &mut self,
+        picture: &Picture,
+        samples: &[T],
+        kernel: &Kernel,
+        count: usize,
+    ) {
+        self.address(picture, kernel, count);
+        let stride = picture.width() * C;
+        match kernel.taps() {
+            1 => self.gather::<T, C, 1>(samples, stride, kernel, count),
+            2 => self.gather::<T, C, 2>(samples, stride, kernel, count),
+            4 => self.gather::<T, C, 4>(samples, stride, kernel, count),
+            6 => self.gather::<T, C, 6>(samples, stride, kernel, count),
+            _ => self.inside[..count].fill(false),
+        }
+        for k in 0..count {
+            if self.seen[k] && !self.inside[k] {
+                let [red, green, blue] = picture.at(self.u[k], self.v[k], kernel);
+                self.values[k] = [red, green, blue, 0.0];
+            }
+        }
+    }
+
+    /// The samples and phases that each point needs.
+    #[inline(always)]
+    fn address(&mut self, picture: &Picture, kernel: &Kernel, count: usize) {
+        let (taps, before) = (kernel.taps() as i32, kernel.before() as i32);
+        let (width, height) = (picture.width() as i32, picture.height() as i32);
+        let channels = picture.format().channels as i32;
+        let rounding = kernel.rounding();
+        let (u, v, seen) = (&self.u[..count], &self.v[..count], &self.seen[..count]);
+        let (first, inside) = (&mut self.first[..count], &mut self.inside[..count]);
+        let [across, down] = &mut self.phases;
+        let (across, down) = (&mut across[..count], &mut down[..count]);
+        for k in 0..count {
+            // Not below zero where seen, so that cutting is rounding down.
+            let (s, t) = (u[k] + rounding, v[k] + rounding);
+            let (x, y) = (s as i32, t as i32);
+            across[k] = Kernel::phase(s - x as f32);
+            down[k] = Kernel::phase(t - y as f32);
+            let (left, top) = (x - before, y - before);
+            inside[k] = seen[k]
+                & (left >= 0)
+                & (top >= 0)
+                & (left <= width - taps)
+                & (top <= height - taps);
+            first[k] = (top.wrapping_mul(width).wrapping_add(left)).wrapping_mul(channels) as u32;
+        }
+    }
+
+    /// `Σ_y w_y Σ_x w_x I(x, y)` over `N × N` pixels, where all of them lie in the picture.
+    #[inline(always)]
+    fn gather<T: Sample, const C: usize, const N: usize>(
+        &mut self,
+        samples: &[T],
+        stride: usize,
+        kernel: &Kernel,
+        count: usize,
+    ) {
+        for k in 0..count {
+            if !self.inside[k] {
+                continue;
+            }
+            let w_x = kernel.at(self.phases[0][k] as usize);
+            let w_y = kernel.at(self.phases[1][k] as usize);
+            let first = self.first[k] as usize;
+            self.values[k] = if C == 1 {
+                [grey::<T, N>(samples, first, stride, w_x, w_y), 0.0, 0.0, 0.0]
+            } else {
+                colour::<T, N>(samples, first, stride, w_x, w_y)
+            };
+        }
+    }
+}
+
+/// The grey value under a kernel: down the columns first, side by side.
+#[inline(always)]
+fn grey<T: Sample, const N: usize>(
+    samples: &[T],
+    first: usize,
+    stride: usize,
+    w_x: &[f32],
+    w_y: &[f32],
+) -> f32 {
+    let mut columns = [0.0f32; N];
+    for (j, w) in w_y[..N].iter().enumerate() {
+        let row = &samples[first + j * stride..][..N];
+        for (column, sample) in columns.iter_mut().zip(row) {
+            *column += w * sample.value();
+        }
+    }
+    let mut value = 0.0;
+    for (w, column) in w_x[..N].iter().zip(columns) {
+        value += w * column;
+    }
+    value
+}
+
+/// The colour under a kernel. Pixels are read four samples wide; the fourth lane is the neighbour's and means nothing.
+#[inline(always)]
+fn colour<T: Sample, const N: usize>(
+    samples: &[T],
+    first: usize,
+    stride: usize,
+    w_x: &[f32],
+    w_y: &[f32],
+) -> [f32; 4] {
+    let mut value = [0.0f32; 4];
+    for (j, w_y) in w_y[..N].iter().enumerate() {
+        let row = &samples[first + j * stride..][..3 * N + 1];
+        let mut sum = [0.0f32; 4];
+        for (k, w_x) in w_x[..N].iter().enumerate() {
+            let pixel = &row[3 * k..3 * k + 4];
+            for (sum, sample) in sum.iter_mut().zip(pixel) {
+                *sum += w_x * sample.value();
+            }
+        }
+        for (value, sum) in value.iter_mut().zip(sum) {
+            *value += w_y * sum;
+        }
+    }
+    value
+}
