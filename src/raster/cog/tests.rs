@@ -1,7 +1,6 @@
 use super::*;
 use crate::raster::Reduce;
 use crate::raster::test_picture::{grey_alpha, pixel, tiles};
-use std::fs::File;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
