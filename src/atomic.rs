@@ -102,7 +102,7 @@ pub fn write_text(path: &Path, text: &str) -> Result<(), WriteError> {
 const PREFIX: &str = ".tunnelstitch-";
 
 /// The folder that holds `path`.
-fn beside(path: &Path) -> &Path {
+pub(crate) fn beside(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),

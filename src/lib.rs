@@ -90,6 +90,7 @@ pub mod cli;
 pub mod evaluate;
 pub mod frames;
 pub mod progress;
+pub mod raster;
 pub mod refine;
 pub mod render;
 pub mod simulate;

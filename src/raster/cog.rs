@@ -1,0 +1,315 @@
+//! Cloud-Optimised GeoTIFF: one file of which any window at any resolution is read without the rest.
+
+use super::compression::Packed;
+use super::directory::{self, Directory, Values, tag};
+use super::pyramid::{LevelTile, Pyramid};
+use super::spool::{Spool, Stored};
+use super::{Compression, EDGE, Georeference, RasterError, RasterSpec, RasterTile, SampleType};
+use super::{Nodata, deflate, jpeg};
+use crate::atomic::{self, WriteError};
+use rayon::prelude::*;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Writes a picture as Cloud-Optimised GeoTIFF (BigTIFF, tiles of [`EDGE`] pixels, overviews down to one tile).
+///
+/// Packed tiles wait in a temporary file beside the target and are copied into it by [`CogWriter::finish`], smallest
+/// overview first, so for that time twice the size of the file is needed on the disk. Tiles with nothing in them take
+/// no room.
+pub struct CogWriter {
+    spec: RasterSpec,
+    compression: Compression,
+    target: PathBuf,
+    pyramid: Pyramid,
+    spool: Spool,
+    /// The tiles of every level, row by row.
+    stored: Vec<Vec<Option<Stored>>>,
+}
+
+/// Places of the tiles of a level in the file and their bytes; 0 if there is nothing in them.
+#[derive(Debug, Default)]
+struct Places {
+    offsets: Vec<u64>,
+    bytes: Vec<u32>,
+}
+
+impl Places {
+    /// Adds a tile behind its leader at `at`, and moves on behind its trailer.
+    fn push(&mut self, at: &mut u64, bytes: u32) {
+        self.bytes.push(bytes);
+        if bytes == 0 {
+            self.offsets.push(0);
+            return;
+        }
+        self.offsets.push(*at + FRAME);
+        *at += u64::from(bytes) + 2 * FRAME;
+    }
+}
+
+/// Bytes of a tile's leader, and of its trailer.
+const FRAME: u64 = 4;
+
+impl CogWriter {
+    /// Begins the file that will be `target`.
+    ///
+    /// # Errors
+    /// [`RasterError::Unsupported`] for a raster that contradicts itself or that `compression` cannot hold; whatever
+    /// the system says about the temporary file.
+    pub fn begin(
+        target: &Path,
+        spec: RasterSpec,
+        compression: Compression,
+    ) -> Result<Self, RasterError> {
+        let levels = spec.levels_to_one_tile();
+        let pyramid = Pyramid::new(spec, levels)?;
+        compression.check(&spec)?;
+        if target.is_dir() {
+            let what = io::Error::other("it is a folder, and a file is to be written");
+            return Err(WriteError::new(target, what).into());
+        }
+        let stored = (0..levels)
+            .map(|level| vec![None; spec.tiles_of(level)])
+            .collect();
+        Ok(Self {
+            spec,
+            compression,
+            target: target.to_owned(),
+            pyramid,
+            spool: Spool::beside(target)?,
+            stored,
+        })
+    }
+
+    /// Takes tiles of full resolution, each of the picture once, in any order. It is given up if this fails.
+    ///
+    /// # Errors
+    /// [`RasterError::Tile`] for one that is no part of the picture, came twice or is of the wrong size; whatever the
+    /// system says.
+    pub fn add(&mut self, batch: Vec<RasterTile>) -> Result<(), RasterError> {
+        let fail = |source| WriteError::new(&self.target, source);
+        let (spec, compression) = (self.spec, self.compression);
+        let complete = self.pyramid.add(batch)?;
+        let packed: Vec<Packed> = complete
+            .par_iter()
+            .map(|tile| compression.pack(&spec, tile))
+            .collect::<io::Result<_>>()
+            .map_err(fail)?;
+        for (LevelTile { level, tile }, packed) in complete.iter().zip(&packed) {
+            let place = spec.place(*level, tile.column, tile.row);
+            self.stored[*level][place] = Some(self.spool.append(packed).map_err(fail)?);
+        }
+        Ok(())
+    }
+
+    /// Writes the file; a file of that name is replaced.
+    ///
+    /// # Errors
+    /// [`RasterError::Incomplete`]; whatever the system says.
+    pub fn finish(mut self) -> Result<(), RasterError> {
+        let tiles = self.spec.tiles(self.stored.len());
+        let levels: Vec<Vec<Stored>> = (self.stored.iter())
+            .map(|tiles| tiles.iter().copied().flatten().collect())
+            .collect();
+        let missing = tiles - levels.iter().map(|tiles| tiles.len() as u64).sum::<u64>();
+        if missing > 0 {
+            return Err(RasterError::Incomplete { missing, tiles });
+        }
+        let head = self.head(&levels);
+        atomic::write(&self.target, |writer| {
+            writer.write_all(&head)?;
+            let mut packed = Packed::default();
+            for stored in levels.iter().rev().flatten() {
+                self.spool.read(stored, &mut packed)?;
+                for block in [&packed.image, &packed.mask] {
+                    write_block(writer, block)?;
+                }
+            }
+            Ok(())
+        })?;
+        Ok(())
+    }
+
+    /// All before the first tile.
+    fn head(&self, levels: &[Vec<Stored>]) -> Vec<u8> {
+        let ghost = ghost(self.compression.masks(&self.spec));
+        // The first time for its length only.
+        let length = directory::encode(&ghost, &self.directories(levels, 0)).len();
+        directory::encode(&ghost, &self.directories(levels, length as u64))
+    }
+
+    /// The directories of all levels, full resolution first, each before that of its mask; `at` is where the first tile
+    /// begins.
+    fn directories(&self, levels: &[Vec<Stored>], mut at: u64) -> Vec<Directory> {
+        let mut directories = Vec::new();
+        for (level, tiles) in levels.iter().enumerate().rev() {
+            let (mut images, mut masks) = (Places::default(), Places::default());
+            for tile in tiles {
+                images.push(&mut at, tile.image);
+                masks.push(&mut at, tile.mask);
+            }
+            if self.compression.masks(&self.spec) {
+                directories.push(self.mask_directory(level, masks));
+            }
+            directories.push(self.image_directory(level, images));
+        }
+        directories.reverse();
+        directories
+    }
+
+    fn image_directory(&self, level: usize, places: Places) -> Directory {
+        let spec = &self.spec;
+        let masked = self.compression.masks(spec);
+        let alpha = spec.alpha && !masked;
+        let samples = usize::from(spec.channels) + usize::from(alpha);
+        let bits = 8 * spec.samples.bytes() as u16;
+        let (compression, photometric) = match (self.compression, spec.channels) {
+            (Compression::Deflate, 1) => (ADOBE_DEFLATE, BLACK_IS_ZERO),
+            (Compression::Deflate, _) => (ADOBE_DEFLATE, RGB),
+            (Compression::Jpeg { .. }, 1) => (JPEG, BLACK_IS_ZERO),
+            (Compression::Jpeg { .. }, _) => (JPEG, YCBCR),
+        };
+        let kind = if level > 0 { REDUCED } else { 0 };
+        let mut tags = self.common_tags(level, kind, compression, photometric, places);
+        tags.push((tag::BITS_PER_SAMPLE, Values::Short(vec![bits; samples])));
+        tags.push((tag::SAMPLES_PER_PIXEL, Values::Short(vec![samples as u16])));
+        let format = match spec.samples {
+            SampleType::F32 => IEEE_FLOAT,
+            _ => UNSIGNED,
+        };
+        tags.push((tag::SAMPLE_FORMAT, Values::Short(vec![format; samples])));
+        if alpha {
+            tags.push((tag::EXTRA_SAMPLES, Values::Short(vec![UNASSOCIATED_ALPHA])));
+        }
+        if self.compression == Compression::Deflate {
+            let predictor = deflate::predictor(spec.samples);
+            tags.push((tag::PREDICTOR, Values::Short(vec![predictor])));
+        }
+        if photometric == YCBCR {
+            let subsampling = vec![jpeg::SUBSAMPLING; 2];
+            tags.push((tag::YCBCR_SUBSAMPLING, Values::Short(subsampling)));
+            let range = [0, 255, 128, 255, 128, 255].map(|value| [value, 1]);
+            tags.push((tag::REFERENCE_BLACK_WHITE, Values::Rational(range.to_vec())));
+        }
+        let nothing = match (spec.samples, spec.nodata) {
+            (SampleType::F32, _) => Some("nan".to_owned()),
+            (_, Some(Nodata::Zero | Nodata::Max)) => Some(spec.nothing().to_string()),
+            (_, None) => None,
+        };
+        if let Some(nothing) = nothing {
+            tags.push((tag::GDAL_NODATA, Values::Ascii(nothing)));
+        }
+        if let Some(georeference) = spec.georeference.filter(|_| level == 0) {
+            tags.extend(geo_tags(&georeference));
+        }
+        tags.sort_by_key(|&(number, _)| number);
+        tags
+    }
+
+    fn mask_directory(&self, level: usize, places: Places) -> Directory {
+        let kind = if level > 0 { MASK | REDUCED } else { MASK };
+        let mut tags = self.common_tags(level, kind, ADOBE_DEFLATE, TRANSPARENCY_MASK, places);
+        tags.push((tag::BITS_PER_SAMPLE, Values::Short(vec![1])));
+        tags.push((tag::SAMPLES_PER_PIXEL, Values::Short(vec![1])));
+        tags.sort_by_key(|&(number, _)| number);
+        tags
+    }
+
+    /// The tags of pictures and masks alike.
+    fn common_tags(
+        &self,
+        level: usize,
+        kind: u32,
+        compression: u16,
+        photometric: u16,
+        places: Places,
+    ) -> Directory {
+        let [width, height] = self.spec.size(level);
+        vec![
+            (tag::NEW_SUBFILE_TYPE, Values::Long(vec![kind])),
+            (tag::IMAGE_WIDTH, Values::Long(vec![width])),
+            (tag::IMAGE_LENGTH, Values::Long(vec![height])),
+            (tag::COMPRESSION, Values::Short(vec![compression])),
+            (
+                tag::PHOTOMETRIC_INTERPRETATION,
+                Values::Short(vec![photometric]),
+            ),
+            (tag::PLANAR_CONFIGURATION, Values::Short(vec![CONTIGUOUS])),
+            (tag::TILE_WIDTH, Values::Short(vec![EDGE as u16])),
+            (tag::TILE_LENGTH, Values::Short(vec![EDGE as u16])),
+            (tag::TILE_OFFSETS, Values::Long8(places.offsets)),
+            (tag::TILE_BYTE_COUNTS, Values::Long(places.bytes)),
+        ]
+    }
+}
+
+// Values of tags.
+const REDUCED: u32 = 1;
+const MASK: u32 = 4;
+const JPEG: u16 = 7;
+const ADOBE_DEFLATE: u16 = 8;
+const BLACK_IS_ZERO: u16 = 1;
+const RGB: u16 = 2;
+const TRANSPARENCY_MASK: u16 = 4;
+const YCBCR: u16 = 6;
+const CONTIGUOUS: u16 = 1;
+const UNSIGNED: u16 = 1;
+const IEEE_FLOAT: u16 = 3;
+const UNASSOCIATED_ALPHA: u16 = 2;
+
+/// What GDAL's readers may rely on.
+fn ghost(masked: bool) -> String {
+    let mut text = "LAYOUT=IFDS_BEFORE_DATA\n\
+                    BLOCK_ORDER=ROW_MAJOR\n\
+                    BLOCK_LEADER=SIZE_AS_UINT4\n\
+                    BLOCK_TRAILER=LAST_4_BYTES_REPEATED\n\
+                    KNOWN_INCOMPATIBLE_EDITION=NO\n "
+        .to_owned();
+    if masked {
+        text += "MASK_INTERLEAVED_WITH_IMAGERY=YES\n";
+    }
+    format!(
+        "GDAL_STRUCTURAL_METADATA_SIZE={:06} bytes\n{text}",
+        text.len()
+    )
+}
+
+/// A tile between its leader, the number of its bytes, and its trailer, the last four of them; nothing if it is empty.
+fn write_block(writer: &mut impl Write, block: &[u8]) -> io::Result<()> {
+    let Some(last) = block.last_chunk::<{ FRAME as usize }>() else {
+        return Ok(());
+    };
+    writer.write_all(&(block.len() as u32).to_le_bytes())?;
+    writer.write_all(block)?;
+    writer.write_all(last)
+}
+
+/// Where the picture lies: a plane of metres that belongs to no map of the world. The matrix says it for axes of any
+/// direction.
+fn geo_tags(georeference: &Georeference) -> [(u16, Values); 2] {
+    let Georeference {
+        origin_m: [x, y],
+        step_m: [right, down],
+    } = *georeference;
+    #[rustfmt::skip]
+    let matrix = vec![
+        right, 0.0,  0.0, x,
+        0.0,   down, 0.0, y,
+        0.0,   0.0,  0.0, 0.0,
+        0.0,   0.0,  0.0, 1.0,
+    ];
+    #[rustfmt::skip]
+    let keys = vec![
+        1, 1, 0, 4, // version, revision, number of keys
+        1024, 0, 1, 1, // model type: projected
+        1025, 0, 1, 1, // raster type: pixel is area
+        3072, 0, 1, 32767, // projected system: user-defined
+        3076, 0, 1, 9001, // unit: metre
+    ];
+    [
+        (tag::MODEL_TRANSFORMATION, Values::Double(matrix)),
+        (tag::GEO_KEY_DIRECTORY, Values::Short(keys)),
+    ]
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,144 @@
+//! The head of a BigTIFF file: what is in it and where.
+
+/// The values of a tag.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Values {
+    Ascii(String),
+    Short(Vec<u16>),
+    Long(Vec<u32>),
+    Rational(Vec<[u32; 2]>),
+    Double(Vec<f64>),
+    Long8(Vec<u64>),
+}
+
+impl Values {
+    /// The format's number for the type, how many values there are, and their bytes.
+    fn encode(&self) -> (u16, usize, Vec<u8>) {
+        fn bytes<T, const N: usize>(values: &[T], of: impl Fn(&T) -> [u8; N]) -> Vec<u8> {
+            values.iter().flat_map(of).collect()
+        }
+        match self {
+            Self::Ascii(text) => {
+                let text = [text.as_bytes(), &[0]].concat();
+                (2, text.len(), text)
+            }
+            Self::Short(values) => (3, values.len(), bytes(values, |value| value.to_le_bytes())),
+            Self::Long(values) => (4, values.len(), bytes(values, |value| value.to_le_bytes())),
+            Self::Rational(values) => {
+                let parts: Vec<u32> = values.iter().copied().flatten().collect();
+                (5, values.len(), bytes(&parts, |part| part.to_le_bytes()))
+            }
+            Self::Double(values) => (12, values.len(), bytes(values, |value| value.to_le_bytes())),
+            Self::Long8(values) => (16, values.len(), bytes(values, |value| value.to_le_bytes())),
+        }
+    }
+}
+
+/// Numbers of tags.
+pub(super) mod tag {
+    pub(in super::super) const NEW_SUBFILE_TYPE: u16 = 254;
+    pub(in super::super) const IMAGE_WIDTH: u16 = 256;
+    pub(in super::super) const IMAGE_LENGTH: u16 = 257;
+    pub(in super::super) const BITS_PER_SAMPLE: u16 = 258;
+    pub(in super::super) const COMPRESSION: u16 = 259;
+    pub(in super::super) const PHOTOMETRIC_INTERPRETATION: u16 = 262;
+    pub(in super::super) const SAMPLES_PER_PIXEL: u16 = 277;
+    pub(in super::super) const PLANAR_CONFIGURATION: u16 = 284;
+    pub(in super::super) const PREDICTOR: u16 = 317;
+    pub(in super::super) const TILE_WIDTH: u16 = 322;
+    pub(in super::super) const TILE_LENGTH: u16 = 323;
+    pub(in super::super) const TILE_OFFSETS: u16 = 324;
+    pub(in super::super) const TILE_BYTE_COUNTS: u16 = 325;
+    pub(in super::super) const EXTRA_SAMPLES: u16 = 338;
+    pub(in super::super) const SAMPLE_FORMAT: u16 = 339;
+    pub(in super::super) const YCBCR_SUBSAMPLING: u16 = 530;
+    pub(in super::super) const REFERENCE_BLACK_WHITE: u16 = 532;
+    pub(in super::super) const MODEL_TRANSFORMATION: u16 = 34264;
+    pub(in super::super) const GEO_KEY_DIRECTORY: u16 = 34735;
+    pub(in super::super) const GDAL_NODATA: u16 = 42113;
+}
+
+/// Tags and their values, in the order of the numbers.
+pub(super) type Directory = Vec<(u16, Values)>;
+
+/// Most bytes of values that stand in the directory itself.
+const INLINE: usize = 8;
+
+/// Header, `ghost` area and directories of a BigTIFF file. The places of the tiles come after all else: whoever reads
+/// a part of the file has all directories at once.
+///
+/// Its length depends on how many values there are, and not on the values.
+pub(super) fn encode(ghost: &str, directories: &[Directory]) -> Vec<u8> {
+    let mut out = b"II\x2b\0\x08\0\0\0".to_vec();
+    let mut link = out.len();
+    out.extend([0; 8]);
+    out.extend(ghost.as_bytes());
+    align(&mut out);
+    let mut late = Vec::new();
+    for directory in directories {
+        let start = out.len();
+        set(&mut out, link, start);
+        out.extend((directory.len() as u64).to_le_bytes());
+        let mut values = Vec::new();
+        let after = start + 8 + 20 * directory.len() + 8;
+        for (tag, of_tag) in directory {
+            let (kind, count, mut bytes) = of_tag.encode();
+            out.extend(tag.to_le_bytes());
+            out.extend(kind.to_le_bytes());
+            out.extend((count as u64).to_le_bytes());
+            if bytes.len() <= INLINE {
+                bytes.resize(INLINE, 0);
+                out.extend(bytes);
+                continue;
+            }
+            if matches!(*tag, tag::TILE_OFFSETS | tag::TILE_BYTE_COUNTS) {
+                late.push((out.len(), bytes));
+                out.extend([0; 8]);
+            } else {
+                out.extend(((after + values.len()) as u64).to_le_bytes());
+                values.extend(bytes);
+                align(&mut values);
+            }
+        }
+        link = out.len();
+        out.extend([0; 8]);
+        out.extend(values);
+    }
+    for (place, bytes) in late {
+        let start = out.len();
+        set(&mut out, place, start);
+        out.extend(bytes);
+        align(&mut out);
+    }
+    out
+}
+
+/// Fills up to a multiple of eight bytes.
+fn align(out: &mut Vec<u8>) {
+    out.resize(out.len().next_multiple_of(8), 0);
+}
+
+/// Writes an offset at `place`.
+fn set(out: &mut [u8], place: usize, offset: usize) {
+    out[place..place + 8].copy_from_slice(&(offset as u64).to_le_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_length_does_not_depend_on_the_values() {
+        let of = |offsets: Vec<u64>| {
+            let one = vec![
+                (tag::IMAGE_WIDTH, Values::Long(vec![7])),
+                (tag::TILE_OFFSETS, Values::Long8(offsets)),
+            ];
+            encode("ghost", &[one.clone(), one])
+        };
+        let (few, many) = (of(vec![0; 3]), of(vec![u64::MAX; 3]));
+        assert_eq!(few.len(), many.len());
+        assert_eq!(few[8], 24, "the first directory comes after the ghost area");
+        assert_eq!(few.len(), 24 + 2 * (8 + 2 * 20 + 8) + 2 * 24);
+    }
+}

@@ -1,0 +1,268 @@
+//! Deep Zoom: a folder of small pictures that a viewer in the browser reads without a server's help.
+
+use super::pyramid::{LevelTile, Pyramid};
+use super::{EDGE, RasterError, RasterSpec, RasterTile, SampleType, jpeg};
+use crate::atomic::{self, StagedFolder, WriteError};
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+use rayon::prelude::*;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// The format of the pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DziFormat {
+    /// With loss; what is nothing is black.
+    Jpeg {
+        /// 1 to 100.
+        quality: u8,
+    },
+    /// Without loss, alpha included.
+    Png,
+}
+
+/// Writes a picture as Deep Zoom: `NAME.dzi` and the folder `NAME_files/LEVEL/COLUMN_ROW.jpg` or `.png`, from one pixel
+/// at level 0 to full resolution, in tiles of [`EDGE`] pixels without overlap. 8-bit samples only.
+pub struct DziWriter {
+    spec: RasterSpec,
+    format: DziFormat,
+    target: PathBuf,
+    pyramid: Pyramid,
+    levels: usize,
+    folder: StagedFolder,
+    /// Tiles written.
+    written: u64,
+}
+
+impl DziWriter {
+    /// Begins the picture that will be `target`, a name that ends in `.dzi`, and the folder beside it.
+    ///
+    /// # Errors
+    /// [`RasterError::Unsupported`] for another name, or a raster that contradicts itself or has no samples of 8 bits;
+    /// whatever the system says.
+    pub fn begin(target: &Path, spec: RasterSpec, format: DziFormat) -> Result<Self, RasterError> {
+        let levels = spec.levels_to(1);
+        let pyramid = Pyramid::new(spec, levels)?;
+        if let DziFormat::Jpeg { quality } = format {
+            jpeg::check(&spec, quality)?;
+        }
+        if spec.samples != SampleType::U8 {
+            return Err(RasterError::Unsupported("Deep Zoom has samples of 8 bits"));
+        }
+        if target
+            .extension()
+            .is_none_or(|extension| extension != "dzi")
+        {
+            return Err(RasterError::Unsupported(
+                "the name of a Deep Zoom picture ends in .dzi",
+            ));
+        }
+        if target.is_dir() {
+            let what = io::Error::other("it is a folder, and a file is to be written");
+            return Err(WriteError::new(target, what).into());
+        }
+        let folder = StagedFolder::begin(&files_folder(target))?;
+        for level in 0..levels {
+            atomic::create_folder(&folder.path().join(level.to_string()))?;
+        }
+        Ok(Self {
+            spec,
+            format,
+            target: target.to_owned(),
+            pyramid,
+            levels,
+            folder,
+            written: 0,
+        })
+    }
+
+    /// Takes tiles of full resolution, each of the picture once, in any order. It is given up if this fails.
+    ///
+    /// # Errors
+    /// [`RasterError::Tile`] for one that is no part of the picture, came twice or is of the wrong size; whatever the
+    /// system says.
+    pub fn add(&mut self, batch: Vec<RasterTile>) -> Result<(), RasterError> {
+        let complete = self.pyramid.add(batch)?;
+        complete.par_iter().try_for_each(|tile| self.write(tile))?;
+        self.written += complete.len() as u64;
+        Ok(())
+    }
+
+    /// Gives the folder its name and then writes the `.dzi`; what had those names is replaced.
+    ///
+    /// # Errors
+    /// [`RasterError::Incomplete`]; whatever the system says.
+    pub fn finish(self) -> Result<(), RasterError> {
+        let tiles = self.spec.tiles(self.levels);
+        let missing = tiles - self.written;
+        if missing > 0 {
+            return Err(RasterError::Incomplete { missing, tiles });
+        }
+        // An old description would go with the new folder for a moment.
+        match std::fs::remove_file(&self.target) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                return Err(WriteError::new(&self.target, source).into());
+            }
+            _ => {}
+        }
+        self.folder.finish()?;
+        let description = description(&self.spec, self.format);
+        atomic::write_text(&self.target, &description).inspect_err(|_| {
+            // The error at hand says more than a failure of this.
+            let _ = std::fs::remove_dir_all(files_folder(&self.target));
+        })?;
+        Ok(())
+    }
+
+    /// Writes a tile, as much of it as is within the picture.
+    fn write(&self, LevelTile { level, tile }: &LevelTile) -> Result<(), WriteError> {
+        let RasterTile {
+            column,
+            row,
+            pixels,
+        } = tile;
+        let extent = self.spec.extent(*level, *column, *row);
+        // Deep Zoom counts from the smallest.
+        let level = self.levels - 1 - level;
+        let name = format!("{level}/{column}_{row}.{}", self.format.extension());
+        let path = self.folder.path().join(name);
+        let encoded = match self.format {
+            DziFormat::Jpeg { quality } => {
+                jpeg::encode(&self.spec, pixels, extent, extent, quality)
+            }
+            DziFormat::Png => encode_png(&self.spec, pixels, extent),
+        };
+        encoded
+            .and_then(|bytes| std::fs::write(&path, bytes))
+            .map_err(|source| WriteError::new(&path, source))
+    }
+}
+
+impl DziFormat {
+    fn extension(self) -> &'static str {
+        match self {
+            Self::Jpeg { .. } => "jpg",
+            Self::Png => "png",
+        }
+    }
+}
+
+/// The folder of the tiles of `NAME.dzi`: `NAME_files`.
+fn files_folder(target: &Path) -> PathBuf {
+    let mut name = target.file_stem().unwrap_or_default().to_owned();
+    name.push("_files");
+    target.with_file_name(name)
+}
+
+/// The content of the `.dzi`.
+fn description(spec: &RasterSpec, format: DziFormat) -> String {
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <Image xmlns=\"http://schemas.microsoft.com/deepzoom/2008\" \
+         Format=\"{}\" Overlap=\"0\" TileSize=\"{EDGE}\">\
+         <Size Width=\"{}\" Height=\"{}\"/></Image>\n",
+        format.extension(),
+        spec.width,
+        spec.height
+    )
+}
+
+/// The upper left `extent` of a tile.
+fn encode_png(spec: &RasterSpec, pixels: &[u8], extent: [usize; 2]) -> io::Result<Vec<u8>> {
+    let [width, height] = extent;
+    let bytes = spec.pixel_bytes();
+    let rows = pixels.chunks_exact(EDGE * bytes).take(height);
+    let visible: Vec<u8> = rows
+        .flat_map(|row| &row[..width * bytes])
+        .copied()
+        .collect();
+    let colour = match (spec.channels, spec.alpha) {
+        (1, false) => ExtendedColorType::L8,
+        (1, true) => ExtendedColorType::La8,
+        (_, false) => ExtendedColorType::Rgb8,
+        (_, true) => ExtendedColorType::Rgba8,
+    };
+    let mut encoded = Vec::new();
+    PngEncoder::new_with_quality(&mut encoded, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(&visible, width as u32, height as u32, colour)
+        .map_err(io::Error::other)?;
+    Ok(encoded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::test_picture::{grey_alpha, pixel, tiles};
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_picture_of_all_levels_appears_when_it_is_whole() {
+        let dir = tempfile::tempdir().unwrap();
+        let spec = grey_alpha(700, 1100);
+        let target = dir.path().join("wall.dzi");
+        let mut writer = DziWriter::begin(&target, spec, DziFormat::Png).unwrap();
+        let mut all = tiles(&spec);
+        let last = all.pop().unwrap();
+        writer.add(all).unwrap();
+        assert_eq!(names(dir.path()).len(), 1, "a temporary folder only");
+        writer.add(vec![last]).unwrap();
+        writer.finish().unwrap();
+        assert_eq!(names(dir.path()), ["wall.dzi", "wall_files"]);
+
+        let files = dir.path().join("wall_files");
+        assert_eq!(names(&files).len(), 12);
+        let tile = image::open(files.join("11/1_2.png"))
+            .unwrap()
+            .to_luma_alpha8();
+        assert_eq!(tile.dimensions(), (700 - 512, 1100 - 1024));
+        assert_eq!(tile.get_pixel(9, 7).0.to_vec(), pixel(&spec, 521, 1031));
+        let smallest = image::open(files.join("0/0_0.png")).unwrap();
+        assert_eq!((smallest.width(), smallest.height()), (1, 1));
+        let text = std::fs::read_to_string(&target).unwrap();
+        assert!(text.contains("Width=\"700\" Height=\"1100\""), "{text}");
+    }
+
+    #[test]
+    fn jpeg_puts_holes_on_black() {
+        let dir = tempfile::tempdir().unwrap();
+        let spec = grey_alpha(700, 100);
+        let target = dir.path().join("wall.dzi");
+        let format = DziFormat::Jpeg { quality: 90 };
+        let mut writer = DziWriter::begin(&target, spec, format).unwrap();
+        writer.add(tiles(&spec)).unwrap();
+        writer.finish().unwrap();
+        let path = dir.path().join("wall_files/10/1_0.jpg");
+        let tile = image::open(path).unwrap().to_luma8();
+        assert_eq!(tile.dimensions(), (188, 100));
+        assert_eq!(tile.get_pixel(0, 0).0, [0]);
+    }
+
+    #[test]
+    fn what_is_not_whole_leaves_the_old_picture_and_no_litter() {
+        let dir = tempfile::tempdir().unwrap();
+        let spec = grey_alpha(700, 100);
+        let target = dir.path().join("wall.dzi");
+        for whole in [true, false] {
+            let mut writer = DziWriter::begin(&target, spec, DziFormat::Png).unwrap();
+            let mut all = tiles(&spec);
+            if !whole {
+                all.pop();
+            }
+            writer.add(all).unwrap();
+            assert_eq!(writer.finish().is_ok(), whole);
+            assert_eq!(names(dir.path()), ["wall.dzi", "wall_files"]);
+        }
+        assert_eq!(names(&dir.path().join("wall_files/10")).len(), 2);
+        for bad in ["wall", "wall.jpg"] {
+            assert!(DziWriter::begin(&dir.path().join(bad), spec, DziFormat::Png).is_err());
+        }
+    }
+}

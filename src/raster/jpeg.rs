@@ -1,0 +1,61 @@
+//! Tiles with loss.
+
+use super::{EDGE, RasterError, RasterSpec, SampleType};
+use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
+use std::io;
+
+/// Columns and rows of pixels that share their colour, but not their brightness.
+pub(super) const SUBSAMPLING: u16 = 2;
+
+/// Refuses what cannot be a JPEG.
+pub(super) fn check(spec: &RasterSpec, quality: u8) -> Result<(), RasterError> {
+    let refuse = |what| Err(RasterError::Unsupported(what));
+    if !(1..=100).contains(&quality) {
+        return refuse("the quality of a JPEG is a number from 1 to 100");
+    }
+    if spec.samples != SampleType::U8 {
+        return refuse("a JPEG has samples of 8 bits");
+    }
+    if spec.nodata.is_some() {
+        return refuse(
+            "a JPEG's values are not exact, so none can stand for nothing; give it an alpha",
+        );
+    }
+    Ok(())
+}
+
+/// The upper left `size` (columns, rows) of a tile without its alpha. What lies beyond `extent` repeats the last column and row, so
+/// that no false edge is there to be drawn.
+pub(super) fn encode(
+    spec: &RasterSpec,
+    pixels: &[u8],
+    extent: [usize; 2],
+    size: [usize; 2],
+    quality: u8,
+) -> io::Result<Vec<u8>> {
+    let [width, height] = size;
+    let channels = usize::from(spec.channels);
+    let bytes = spec.pixel_bytes();
+    let mut visible = Vec::with_capacity(width * height * channels);
+    for y in 0..height {
+        let row = &pixels[y.min(extent[1] - 1) * EDGE * bytes..][..extent[0] * bytes];
+        for pixel in row[..extent[0].min(width) * bytes].chunks_exact(bytes) {
+            visible.extend_from_slice(&pixel[..channels]);
+        }
+        for _ in extent[0]..width {
+            visible.extend_from_slice(&row[row.len() - bytes..][..channels]);
+        }
+    }
+    let mut stream = Vec::with_capacity(visible.len() / 4);
+    let mut encoder = Encoder::new(&mut stream, quality);
+    encoder.set_sampling_factor(SamplingFactor::F_2_2);
+    let colour = match channels {
+        1 => ColorType::Luma,
+        _ => ColorType::Rgb,
+    };
+    // No tile is wider than EDGE.
+    encoder
+        .encode(&visible, width as u16, height as u16, colour)
+        .map_err(io::Error::other)?;
+    Ok(stream)
+}

@@ -1,0 +1,34 @@
+//! Pictures too large for memory, written tile by tile.
+//!
+//! ```text
+//!                      ┌─ Pyramid: overviews, reduced 2 × 2 on the way ─┐
+//! RasterTile batches ──┤                                                ├──> CogWriter ──> NAME.tif
+//!  in any order        └─ tiles of all levels ──────────────────────────┘    DziWriter ──> NAME.dzi, NAME_files/
+//! ```
+//!
+//! A [`RasterSpec`] says what a pixel is and what *nothing* looks like in it; the picture then arrives as squares of
+//! [`EDGE`] pixels, each exactly once. A batch is reduced and compressed on all threads of the current rayon pool.
+//! The files do not depend on the order of the tiles, how they were batched, or the number of threads, to the byte.
+//!
+//! What is held in memory is the batch and the overview tiles that wait for a part of theirs:
+//! [`RasterSpec::pending_bytes`]. Tiles that arrive along the shorter side of the picture keep that small.
+
+mod cog;
+mod compression;
+mod deflate;
+mod directory;
+mod dzi;
+mod error;
+mod jpeg;
+mod pyramid;
+mod reduce;
+mod spec;
+mod spool;
+#[cfg(test)]
+mod test_picture;
+
+pub use cog::CogWriter;
+pub use compression::Compression;
+pub use dzi::{DziFormat, DziWriter};
+pub use error::RasterError;
+pub use spec::{EDGE, Georeference, Nodata, RasterSpec, RasterTile, Reduce, SampleType, TileOrder};

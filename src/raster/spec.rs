@@ -1,0 +1,279 @@
+//! What a raster is: its size, its pixels and its place.
+
+use super::RasterError;
+
+/// Columns and rows of a tile, pixels.
+pub const EDGE: usize = 512;
+
+/// The numbers that pixels are made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SampleType {
+    /// Whole numbers of 8 bits.
+    U8,
+    /// Whole numbers of 16 bits.
+    U16,
+    /// Whole numbers of 32 bits.
+    U32,
+    /// Single precision; NaN is nothing.
+    F32,
+}
+
+impl SampleType {
+    /// Bytes of a sample.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::U8 => 1,
+            Self::U16 => 2,
+            Self::U32 | Self::F32 => 4,
+        }
+    }
+
+    /// The largest whole number; nothing for [`SampleType::F32`].
+    pub(super) fn max(self) -> Option<u32> {
+        match self {
+            Self::U8 => Some(u8::MAX.into()),
+            Self::U16 => Some(u16::MAX.into()),
+            Self::U32 => Some(u32::MAX),
+            Self::F32 => None,
+        }
+    }
+}
+
+/// What becomes of 2 × 2 pixels in an overview.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reduce {
+    /// The mean of those that are not nothing.
+    Mean,
+    /// The first, row by row, that is not nothing: for labels, of which there is no mean.
+    First,
+}
+
+/// The whole number that stands for nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Nodata {
+    /// 0.
+    Zero,
+    /// The largest number of the type.
+    Max,
+}
+
+/// Where the picture lies in a plane of metres; its axes are those of the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Georeference {
+    /// x and y of the upper left corner of the first pixel, metres.
+    pub origin_m: [f64; 2],
+    /// What a column to the right adds to x and a row down to y, metres; negative where the coordinate falls.
+    pub step_m: [f64; 2],
+}
+
+/// What a raster is.
+///
+/// A pixel is its channels and then, if there is one, its alpha, in native byte order. *Nothing* is an alpha of 0, NaN,
+/// or the number that [`RasterSpec::nodata`] names; where there is an alpha it is either 0 or the largest number, and
+/// the channels of a pixel that is nothing are 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RasterSpec {
+    /// Columns, pixels; at least 1.
+    pub width: u32,
+    /// Rows, pixels; at least 1.
+    pub height: u32,
+    /// What a pixel is made of.
+    pub samples: SampleType,
+    /// 1, grey or a quantity, or 3, red, green and blue.
+    pub channels: u8,
+    /// Whether an alpha follows the channels; [`SampleType::U8`] and [`SampleType::U16`] only.
+    pub alpha: bool,
+    /// The number for nothing in whole numbers without alpha.
+    pub nodata: Option<Nodata>,
+    /// How overviews are made.
+    pub reduce: Reduce,
+    /// Where the picture lies.
+    pub georeference: Option<Georeference>,
+}
+
+/// A square of [`EDGE`] × [`EDGE`] pixels.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RasterTile {
+    /// Column in the grid of tiles, from the left.
+    pub column: u32,
+    /// Row in the grid of tiles, from the top.
+    pub row: u32,
+    /// Its pixels, row by row; what lies beyond the right and lower border of the picture is there and 0.
+    pub pixels: Vec<u8>,
+}
+
+/// How tiles arrive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TileOrder {
+    /// All of the upper row, then the next.
+    Rows,
+    /// All of the left column, then the next.
+    Columns,
+}
+
+impl RasterSpec {
+    /// Most bytes of overview tiles that wait for a part of theirs while tiles arrive in `order`.
+    ///
+    /// Each level holds at most a row (or column) of its tiles. Besides there is what [`CogWriter::add`] was given: the
+    /// batch itself, a quarter of it as the batch is reduced, and its compressed form.
+    ///
+    /// [`CogWriter::add`]: super::CogWriter::add
+    pub fn pending_bytes(&self, order: TileOrder) -> u64 {
+        let tiles: u64 = (1..self.levels_to_one_tile())
+            .map(|level| {
+                let [columns, rows] = self.grid(level);
+                u64::from(match order {
+                    TileOrder::Rows => columns,
+                    TileOrder::Columns => rows,
+                })
+            })
+            .sum();
+        tiles * self.tile_bytes() as u64
+    }
+
+    /// Samples of a pixel, alpha included.
+    pub fn samples_per_pixel(&self) -> usize {
+        usize::from(self.channels) + usize::from(self.alpha)
+    }
+
+    /// Bytes of a tile.
+    pub fn tile_bytes(&self) -> usize {
+        EDGE * EDGE * self.pixel_bytes()
+    }
+
+    /// Bytes of a pixel.
+    pub(super) fn pixel_bytes(&self) -> usize {
+        self.samples_per_pixel() * self.samples.bytes()
+    }
+
+    /// Columns and rows of pixels at `level`, where 0 is full resolution.
+    pub(super) fn size(&self, level: usize) -> [u32; 2] {
+        [self.width, self.height].map(|side| (0..level).fold(side, |side, _| side.div_ceil(2)))
+    }
+
+    /// Columns and rows of tiles at `level`.
+    pub(super) fn grid(&self, level: usize) -> [u32; 2] {
+        self.size(level).map(|side| side.div_ceil(EDGE as u32))
+    }
+
+    /// Tiles of `level`.
+    pub(super) fn tiles_of(&self, level: usize) -> usize {
+        let [columns, rows] = self.grid(level);
+        columns as usize * rows as usize
+    }
+
+    /// Tiles of the first `levels` levels.
+    pub(super) fn tiles(&self, levels: usize) -> u64 {
+        (0..levels).map(|level| self.tiles_of(level) as u64).sum()
+    }
+
+    /// The index of a tile among those of its level, row by row.
+    pub(super) fn place(&self, level: usize, column: u32, row: u32) -> usize {
+        let [columns, _] = self.grid(level);
+        row as usize * columns as usize + column as usize
+    }
+
+    /// Columns and rows of a tile that are within the picture.
+    pub(super) fn extent(&self, level: usize, column: u32, row: u32) -> [usize; 2] {
+        let [width, height] = self.size(level);
+        let within = |side: u32, place: u32| (side as usize - place as usize * EDGE).min(EDGE);
+        [within(width, column), within(height, row)]
+    }
+
+    /// Levels until one has both sides within a tile.
+    pub(super) fn levels_to_one_tile(&self) -> usize {
+        self.levels_to(EDGE as u32)
+    }
+
+    /// Levels until one has no side longer than `side` pixels, at least 1.
+    pub(super) fn levels_to(&self, side: u32) -> usize {
+        let longest = self.width.max(self.height);
+        std::iter::successors(Some(longest), |&longest| {
+            (longest > side).then(|| longest.div_ceil(2))
+        })
+        .count()
+    }
+
+    /// The number that a sample without value has where there is no alpha and it is no NaN; 0 otherwise.
+    pub(super) fn nothing(&self) -> u32 {
+        match self.nodata {
+            Some(Nodata::Max) => self.samples.max().unwrap_or_default(),
+            _ => 0,
+        }
+    }
+
+    /// Refuses what contradicts itself.
+    pub(super) fn check(&self) -> Result<(), RasterError> {
+        let refuse = |what| Err(RasterError::Unsupported(what));
+        if self.width == 0 || self.height == 0 {
+            return refuse("a picture needs at least one pixel");
+        }
+        if self.width.max(self.height) > i32::MAX as u32 {
+            return refuse("a side of a picture is at most 2147483647 px long");
+        }
+        if !matches!(self.channels, 1 | 3) {
+            return refuse("a picture has one channel or three");
+        }
+        let narrow = matches!(self.samples, SampleType::U8 | SampleType::U16);
+        if self.alpha && !narrow {
+            return refuse("only samples of 8 and 16 bits can have an alpha");
+        }
+        if self.nodata.is_some() && (self.alpha || self.samples == SampleType::F32) {
+            return refuse(
+                "a picture with alpha or of floating point needs no other number for nothing",
+            );
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::raster::test_picture::grey_alpha;
+
+    #[test]
+    fn levels_halve_until_one_tile_or_one_pixel() {
+        let spec = grey_alpha(1900, 5000);
+        assert_eq!(spec.levels_to_one_tile(), 5);
+        assert_eq!(spec.size(4), [119, 313]);
+        assert_eq!(spec.grid(0), [4, 10]);
+        assert_eq!(spec.extent(0, 3, 9), [364, 392]);
+        assert_eq!(spec.tiles(5), 40 + 10 + 3 + 2 + 1);
+        assert_eq!(spec.levels_to(1), 14);
+        assert_eq!(spec.size(13), [1, 1]);
+        assert_eq!(grey_alpha(300, 200).levels_to_one_tile(), 1);
+        assert_eq!(grey_alpha(1, 1).levels_to(1), 1);
+    }
+
+    #[test]
+    fn a_long_tunnel_along_its_short_side_takes_little_memory() {
+        let spec = grey_alpha(10_000, 1_000_000);
+        let mib = |order| spec.pending_bytes(order) >> 20;
+        assert!(mib(TileOrder::Rows) < 16, "{}", mib(TileOrder::Rows));
+        assert!(mib(TileOrder::Columns) > 900);
+    }
+
+    #[test]
+    fn contradictions_are_refused() {
+        let good = grey_alpha(10, 10);
+        assert!(good.check().is_ok());
+        for bad in [
+            RasterSpec { width: 0, ..good },
+            RasterSpec {
+                channels: 2,
+                ..good
+            },
+            RasterSpec {
+                samples: SampleType::F32,
+                ..good
+            },
+            RasterSpec {
+                nodata: Some(Nodata::Zero),
+                ..good
+            },
+        ] {
+            assert!(bad.check().is_err(), "{bad:?}");
+        }
+    }
+}

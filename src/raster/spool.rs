@@ -1,0 +1,72 @@
+//! Packed tiles on disk until their order is known.
+
+use super::compression::Packed;
+use crate::atomic::{ScratchFolder, WriteError, beside};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+
+/// Packed tiles in the order of their arrival, in a file beside the target that goes when this is dropped or the program
+/// is interrupted.
+pub(super) struct Spool {
+    file: File,
+    end: u64,
+    _folder: ScratchFolder,
+}
+
+/// A tile in a [`Spool`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stored {
+    offset: u64,
+    /// Bytes of the picture; 0 if there is nothing in the tile.
+    pub(super) image: u32,
+    /// Bytes of the mask, which follows it.
+    pub(super) mask: u32,
+}
+
+impl Spool {
+    /// An empty one beside `target`.
+    pub(super) fn beside(target: &Path) -> Result<Self, WriteError> {
+        let folder = ScratchFolder::inside(beside(target))?;
+        let path = folder.path().join("tiles");
+        let file = File::options()
+            .read(true)
+            .write(true)
+            .create_new(true)
+            .open(&path)
+            .map_err(|source| WriteError::new(&path, source))?;
+        Ok(Self {
+            file,
+            end: 0,
+            _folder: folder,
+        })
+    }
+
+    /// Adds a tile.
+    pub(super) fn append(&mut self, packed: &Packed) -> io::Result<Stored> {
+        let offset = self.end;
+        for part in [&packed.image, &packed.mask] {
+            self.file.write_all(part)?;
+            self.end += part.len() as u64;
+        }
+        // A packed tile is not much larger than its pixels: 4 MiB at most.
+        Ok(Stored {
+            offset,
+            image: packed.image.len() as u32,
+            mask: packed.mask.len() as u32,
+        })
+    }
+
+    /// Reads a tile into `packed`.
+    pub(super) fn read(&mut self, stored: &Stored, packed: &mut Packed) -> io::Result<()> {
+        self.file.seek(SeekFrom::Start(stored.offset))?;
+        for (part, bytes) in [
+            (&mut packed.image, stored.image),
+            (&mut packed.mask, stored.mask),
+        ] {
+            part.resize(bytes as usize, 0);
+            self.file.read_exact(part)?;
+        }
+        Ok(())
+    }
+}
