@@ -89,6 +89,7 @@ pub mod camera;
 pub mod cli;
 pub mod evaluate;
 pub mod frames;
+mod lettering;
 pub mod progress;
 pub mod raster;
 pub mod refine;

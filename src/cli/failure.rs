@@ -5,7 +5,8 @@ use crate::camera::CalibrationError;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::converge::ConvergeError;
 use crate::frames::FrameError;
-use crate::refine::RefineError;
+use crate::raster::RasterError;
+use crate::refine::{CovarianceError, RefineError};
 use crate::render::RenderError;
 use crate::simulate::SimulateError;
 use crate::surface::SurfaceError;
@@ -95,6 +96,25 @@ impl From<ConvergeError> for Failure {
     }
 }
 
+impl From<RasterError> for Failure {
+    fn from(error: RasterError) -> Self {
+        match error {
+            RasterError::Write(error) => error.into(),
+            RasterError::Unsupported(_) => Self::usage(error.to_string()),
+            _ => Self::bug(error.to_string()),
+        }
+    }
+}
+
+impl From<RenderError> for Failure {
+    fn from(error: RenderError) -> Self {
+        match error {
+            RenderError::Raster(error) => error.into(),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
 macro_rules! bad_input {
     ($($error:ty),* $(,)?) => {
         $(impl From<$error> for Failure {
@@ -110,7 +130,7 @@ bad_input!(
     EvaluateError,
     FrameError,
     RefineError,
-    RenderError,
+    CovarianceError,
     SurfaceError,
     SurveyError,
     TumError

@@ -7,6 +7,7 @@ mod failure;
 mod hardships;
 mod json;
 mod locate;
+mod outputs;
 mod project;
 mod refine;
 mod simulate;

@@ -1,13 +1,18 @@
 //! `tunnelstitch stitch`: one panorama from given poses.
 
+use super::outputs::{MapInput, OutputArguments};
 use super::{Failure, Terminal, json};
 use crate::atomic;
-use crate::frames::{PictureFormat, write_picture};
+use crate::frames::PictureFormat;
 use crate::progress::Progress;
-use crate::render::{Interpolation, Layout, Mode, RenderOptions, StitchOptions, stitch};
+use crate::refine::read_covariances;
+use crate::render::{
+    Budget, FrameExposure, Gap, Interpolation, Layout, Mode, RenderOptions, Stitch, StitchOptions,
+};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
 use clap::ValueEnum;
+use nalgebra::Matrix6;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -20,13 +25,15 @@ pub struct StitchArguments {
     survey: PathBuf,
     #[command(flatten)]
     poses: PosesArgument,
-    /// The panorama, .png or .tif.
-    #[arg(long, short, value_name = "FILE")]
-    out: PathBuf,
+    #[command(flatten)]
+    output: OutputArguments,
     #[command(flatten)]
     picture: PictureArguments,
     #[command(flatten)]
     blend: BlendArguments,
+    /// Memory to work with, as 512MiB or 2GiB. Frames that have no room are decoded again when they are needed.
+    #[arg(long, value_name = "SIZE", default_value = "2GiB", value_parser = memory_size)]
+    memory: u64,
     /// Treat every camera as standing on the tunnel's axis (to see what its position does).
     #[arg(long)]
     ignore_offset: bool,
@@ -49,6 +56,14 @@ pub struct PosesArgument {
 }
 
 impl PosesArgument {
+    /// The TUM file, if it is one.
+    pub fn file(&self) -> Option<&Path> {
+        match self.name.as_str() {
+            "initial" | "truth" => None,
+            file => Some(Path::new(file)),
+        }
+    }
+
     /// The poses that `initial`, `truth` or the name of a TUM file stand for.
     ///
     /// # Errors
@@ -168,6 +183,21 @@ impl From<InterpolationArgument> for Interpolation {
     }
 }
 
+/// A size of memory in bytes, for clap.
+fn memory_size(text: &str) -> Result<u64, String> {
+    const FORM: &str = "must be a size as 512MiB or 2GiB";
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match text[digits.len()..].to_ascii_lowercase().as_str() {
+        "mib" | "m" => 1u64 << 20,
+        "gib" | "g" => 1 << 30,
+        _ => return Err(FORM.to_owned()),
+    };
+    match digits.trim().parse::<f64>() {
+        Ok(size) if size.is_finite() && size > 0.0 => Ok((size * unit as f64) as u64),
+        _ => Err(FORM.to_owned()),
+    }
+}
+
 /// A number above zero, for clap.
 pub fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -177,15 +207,19 @@ pub fn positive(text: &str) -> Result<f64, String> {
 }
 
 #[derive(Serialize)]
-struct Report {
-    out: PathBuf,
+struct Report<'a> {
+    out: &'a Path,
     width: u32,
     height: u32,
     px_per_metre: f64,
     layout: Layout,
     chainage_m: [f64; 2],
     coverage: f64,
+    gaps: Vec<Gap>,
     frames: usize,
+    render: RenderOptions,
+    exposure: &'a [FrameExposure],
+    memory: Budget,
 }
 
 /// Runs the command.
@@ -193,9 +227,10 @@ struct Report {
 /// # Errors
 /// [`Failure`] for everything wrong with the survey, the poses or the output.
 pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failure> {
-    let format = picture_output(&arguments.out)?;
+    arguments.output.check()?;
     let survey = Survey::open(&arguments.survey)?;
     let poses = arguments.poses.of(&survey)?;
+    let covariances = covariances(arguments, &survey)?;
     let options = StitchOptions {
         px_per_metre: arguments.picture.canvas.px_per_metre,
         ignore_offset: arguments.ignore_offset,
@@ -204,53 +239,110 @@ pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failu
             mode: arguments.blend.mode.into(),
             blend: !arguments.blend.no_blend,
         },
+        memory: arguments.memory,
     };
-    let panorama = stitch(
-        survey.surface.as_ref(),
-        &survey.camera,
-        &survey.frames,
-        &poses,
-        &options,
-        terminal,
-    )?;
-    let canvas = *panorama.canvas();
-    let coverage = panorama.coverage();
+    let surface = survey.surface.as_ref();
+    let layout: Layout = arguments.picture.canvas.layout.into();
+    let mut stitch = Stitch::new(surface, &survey.camera, &survey.frames, &poses, &options)?;
+    let (canvas, format) = (*stitch.canvas(), stitch.frames().format());
+    let [width, height] = layout.size(&canvas);
+    let budget = stitch.budget(arguments.output.bytes(&canvas, format, layout))?;
+    let frames_bytes = stitch.frames().frame_bytes() * survey.frames.len() as u64;
+    let say = |text: String| {
+        if !arguments.json {
+            terminal.say(text);
+        }
+    };
+    say(format!(
+        "{width} × {height} px; at most {} MiB of memory, {} of them for frames",
+        budget.most(frames_bytes) >> 20,
+        frames_bytes.min(budget.room) >> 20
+    ));
+    let mut outputs = arguments.output.begin(&canvas, format, layout)?;
+    let placements = stitch.placements().to_vec();
+    let (plan, frames) = stitch.plan(&budget, terminal)?;
+    plan.draw(frames, budget.room, &mut outputs.targets(), terminal)?;
+    let coverage = outputs.share();
     if coverage == 0.0 {
         return Err(Failure::input(
             "no frame covers a single pixel of the panorama; check the calibration (cx, cy) and --px-per-metre",
         ));
     }
-    let layout = arguments.picture.canvas.layout.into();
-    let image = panorama.into_image(layout);
-    let report = Report {
-        out: arguments.out.clone(),
-        width: image.width(),
-        height: image.height(),
-        px_per_metre: canvas.px_per_metre,
-        layout,
-        chainage_m: canvas.chainage_m(),
-        coverage,
-        frames: survey.frames.len(),
-    };
+    let gaps = outputs.gaps();
     terminal.start("writing", 1);
-    let written = write_picture(&arguments.out, &image, format);
+    let written = outputs.finish(
+        &plan,
+        &MapInput {
+            surface,
+            camera: &survey.camera,
+            placements: &placements,
+            covariances: covariances.as_deref(),
+            budget: &budget,
+        },
+    );
     terminal.finish();
     written?;
     if arguments.json {
-        return json::print(&report);
+        return json::print(&Report {
+            out: &arguments.output.out,
+            width,
+            height,
+            px_per_metre: canvas.px_per_metre,
+            layout,
+            chainage_m: canvas.chainage_m(),
+            coverage,
+            gaps,
+            frames: survey.frames.len(),
+            render: options.render,
+            exposure: plan.exposure().frames(),
+            memory: budget,
+        });
     }
-    terminal.say(format!(
-        "{}: {} × {} px, {:.2} px per metre, chainage {:.3} to {:.3} m, {:.1} % covered by {} frames",
-        arguments.out.display(),
-        report.width,
-        report.height,
-        report.px_per_metre,
-        report.chainage_m[0],
-        report.chainage_m[1],
-        100.0 * report.coverage,
-        report.frames
+    let [from_m, to_m] = canvas.chainage_m();
+    say(format!(
+        "{}: {width} × {height} px, {:.2} px per metre, chainage {from_m:.3} to {to_m:.3} m, {:.1} % covered by {} frames",
+        arguments.output.out.display(),
+        canvas.px_per_metre,
+        100.0 * coverage,
+        survey.frames.len()
     ));
+    let inner: Vec<&Gap> = gaps.iter().filter(|gap| !gap.at_the_end).collect();
+    for gap in inner.iter().take(SHOWN_GAPS) {
+        say(format!(
+            "  nothing seen at chainage {:.3} to {:.3} m, {:.1}° to {:.1}° ({:.4} m²)",
+            gap.chainage_from_m,
+            gap.chainage_to_m,
+            gap.angle_from_deg,
+            gap.angle_to_deg,
+            gap.area_m2
+        ));
+    }
+    if inner.len() > SHOWN_GAPS {
+        say(format!(
+            "  and {} gaps more; --maps lists all of them",
+            inner.len() - SHOWN_GAPS
+        ));
+    }
     Ok(())
+}
+
+/// Gaps that the summary lists.
+const SHOWN_GAPS: usize = 5;
+
+/// The covariances of the poses: those asked for, or those beside the poses.
+fn covariances(
+    arguments: &StitchArguments,
+    survey: &Survey,
+) -> Result<Option<Vec<Matrix6<f64>>>, Failure> {
+    let beside = arguments.poses.file().map(|file| file.with_file_name("covariance.csv"));
+    let path = match &arguments.output.covariance {
+        Some(path) => Some(path.clone()),
+        None => beside.filter(|path| path.is_file()),
+    };
+    match path {
+        Some(path) => Ok(Some(read_covariances(&path, survey.frames.len())?)),
+        None => Ok(None),
+    }
 }
 
 /// The format of a picture to be written; its folder is made if missing. Checked before any work is done.
@@ -265,11 +357,17 @@ pub fn picture_output(path: &Path) -> Result<PictureFormat, Failure> {
             path.display()
         )));
     }
-    if let Some(folder) = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-    {
-        atomic::create_folder(folder)?;
-    }
+    parent_folder(path)?;
     Ok(format)
+}
+
+/// Makes the folder of a file to be written, if it is missing.
+///
+/// # Errors
+/// Whatever the system says.
+pub fn parent_folder(path: &Path) -> Result<(), Failure> {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => Ok(atomic::create_folder(folder)?),
+        _ => Ok(()),
+    }
 }

@@ -102,14 +102,14 @@ pub fn compare(
         Some(poses) => Some(Candidate::new("true", input, poses)?),
         None => None,
     };
-    let (frames, canvas) = prepare(input, &baseline, &refined, truth.as_ref(), progress)?;
+    let (mut frames, canvas) = prepare(input, &baseline, &refined, truth.as_ref(), progress)?;
 
     let true_panorama = match &truth {
-        Some(truth) => Some(truth.draw(input, &frames, &canvas, progress)?),
+        Some(truth) => Some(truth.draw(input, &mut frames, &canvas, progress)?),
         None => None,
     };
-    let score = |candidate: &Candidate| -> Result<(Scores, Panorama), EvaluateError> {
-        let panorama = candidate.draw(input, &frames, &canvas, progress)?;
+    let mut score = |candidate: &Candidate| -> Result<(Scores, Panorama), EvaluateError> {
+        let panorama = candidate.draw(input, &mut frames, &canvas, progress)?;
         let mut scores = candidate.scores(input, &frames, &canvas, &panorama);
         if let (Some(poses), Some(true_panorama)) = (input.truth, &true_panorama) {
             scores.trajectory = Some(trajectory_error(
@@ -178,7 +178,7 @@ impl<'a> Candidate<'a> {
     fn draw(
         &self,
         input: &CompareInput,
-        frames: &FrameStack,
+        frames: &mut FrameStack,
         canvas: &Canvas,
         progress: &dyn Progress,
     ) -> Result<Panorama, EvaluateError> {

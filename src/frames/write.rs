@@ -1,6 +1,7 @@
-//! Picture files with transparency.
+//! Picture files.
 
 use crate::atomic::{self, WriteError};
+use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::tiff::TiffEncoder;
 use image::{DynamicImage, ImageError};
@@ -12,15 +13,26 @@ use std::path::Path;
 #[error("{0}")]
 pub struct FormatError(String);
 
-/// A picture format that can hold holes.
+/// A picture format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureFormat {
     /// `.png`: grey or colour with alpha.
     Png,
+    /// `.jpg`, `.jpeg`: 8 bits, with loss; holes are black.
+    Jpeg {
+        /// 1 to 100.
+        quality: u8,
+    },
     /// `.tif`, `.tiff`: uncompressed, colour with alpha (grey too, since few programs read grey with
     /// alpha from TIFF).
     Tiff,
 }
+
+/// Quality of JPEG files, unless it is asked for.
+pub const JPEG_QUALITY: u8 = 90;
+
+/// The longest side of a JPEG picture, pixels.
+const JPEG_LIMIT_PX: u32 = 65_535;
 
 /// Most pixels of four bytes that fit into a TIFF's 32-bit offsets, with room for its header.
 const TIFF_LIMIT_PX: u64 = (1 << 30) - (1 << 16);
@@ -38,12 +50,11 @@ impl PictureFormat {
         match extension.as_str() {
             "png" => Ok(Self::Png),
             "tif" | "tiff" => Ok(Self::Tiff),
-            "jpg" | "jpeg" => Err(FormatError(format!(
-                "{}: JPEG knows no transparency, and what no frame sees must be transparent; write .png or .tif instead",
-                path.display()
-            ))),
+            "jpg" | "jpeg" => Ok(Self::Jpeg {
+                quality: JPEG_QUALITY,
+            }),
             _ => Err(FormatError(format!(
-                "{}: the name must end in .png or .tif",
+                "{}: the name must end in .png, .jpg or .tif",
                 path.display()
             ))),
         }
@@ -59,14 +70,18 @@ pub fn write_picture(
     image: &DynamicImage,
     format: PictureFormat,
 ) -> Result<(), WriteError> {
+    let refuse = |what: &str| {
+        let size = format!("{} × {} px", image.width(), image.height());
+        let what = format!("{size} are more than {what}, or lower --px-per-metre");
+        Err(WriteError::new(path, io::Error::other(what)))
+    };
+    let longest = image.width().max(image.height());
+    if matches!(format, PictureFormat::Jpeg { .. }) && longest > JPEG_LIMIT_PX {
+        return refuse("a JPEG file holds; write .tif");
+    }
     let pixels = u64::from(image.width()) * u64::from(image.height());
     if format == PictureFormat::Tiff && pixels > TIFF_LIMIT_PX {
-        let what = format!(
-            "{} × {} px are more than a TIFF file holds; write .png, or lower --px-per-metre",
-            image.width(),
-            image.height()
-        );
-        return Err(WriteError::new(path, io::Error::other(what)));
+        return refuse("a TIFF file holds; write .png");
     }
     atomic::write(path, |writer| {
         match format {
@@ -77,6 +92,13 @@ pub fn write_picture(
                     FilterType::Adaptive,
                 );
                 image.write_with_encoder(encoder)
+            }
+            PictureFormat::Jpeg { quality } => {
+                let encoder = JpegEncoder::new_with_quality(writer, quality);
+                match image.color().has_color() {
+                    true => image.to_rgb8().write_with_encoder(encoder),
+                    false => image.to_luma8().write_with_encoder(encoder),
+                }
             }
             PictureFormat::Tiff => {
                 DynamicImage::from(image.to_rgba8()).write_with_encoder(TiffEncoder::new(writer))
@@ -110,8 +132,7 @@ mod tests {
     #[test]
     fn other_formats_are_refused_with_the_remedy() {
         for (name, expected) in [
-            ("a.jpg", "transparen"),
-            ("a", ".png or .tif"),
+            ("a", ".png, .jpg or .tif"),
             ("a.bmp", ".tif"),
         ] {
             let message = PictureFormat::of(Path::new(name)).unwrap_err().to_string();

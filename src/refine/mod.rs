@@ -44,6 +44,7 @@ mod certainty;
 mod choice;
 mod consistency;
 mod covariance;
+mod covariance_file;
 mod coverage;
 mod denoise;
 mod doubt;
@@ -84,6 +85,7 @@ mod visibility;
 mod wall;
 
 pub use bound::pose_bound;
+pub use covariance_file::{CovarianceError, read_covariances};
 pub use covariance::{Covariances, FrameSigma};
 pub use gauss_newton::{SolveRecord, StopReason};
 pub use observed::{CalibrationReport, UnknownReport};

@@ -1,6 +1,7 @@
 //! Why a panorama cannot be drawn.
 
 use crate::frames::FrameError;
+use crate::raster::RasterError;
 use crate::surface::SurfaceError;
 
 /// Why a panorama cannot be drawn.
@@ -56,20 +57,23 @@ pub enum RenderError {
     },
     /// A picture for which this machine is too small.
     #[error(
-        "a panorama of {columns} × {rows} px and its {frames} frames need {needed_mib} MiB of memory, and {available_mib} MiB are free; lower --px-per-metre, or render fewer frames"
+        "a panorama of {columns} × {rows} px from {frames} frames needs at least {needed_mib} MiB of memory, and {available_mib} MiB may be used; raise --memory if there is more, write .tif (a .png or .jpg is held in memory as a whole), or lower --px-per-metre"
     )]
     Memory {
         /// Columns around the section.
         columns: u32,
         /// Rows along the axis.
         rows: u32,
-        /// Frames to be held.
+        /// Number of frames.
         frames: usize,
         /// Memory needed, MiB.
         needed_mib: u64,
-        /// Memory free, MiB.
+        /// Memory that may be used or is free, MiB.
         available_mib: u64,
     },
+    /// The output.
+    #[error(transparent)]
+    Raster(#[from] RasterError),
     /// A frame's file.
     #[error(transparent)]
     Frames(#[from] FrameError),

@@ -35,7 +35,7 @@ const OWN: usize = 2;
 /// 1-σ of α beforehand: a third more or less light.
 const GAIN_SIGMA: f64 = 0.3;
 /// 1-σ of β beforehand, grey levels.
-const BIAS_SIGMA: f64 = 2.0;
+const BIAS_SIGMA: f64 = 1.0;
 /// 1-σ of the shading's coefficients beforehand.
 const SHADING_SIGMA: f64 = 0.5;
 /// Wall points a frame, and at the least.
@@ -108,7 +108,6 @@ impl Exposure {
         let brightest = shading.range()[1];
         let mean_log = (0..count).map(|k| x[OWN * k]).sum::<f64>() / count as f64;
         let level = mean_log.exp();
-        if std::env::var("DBG").is_ok() { for k in 0..count { eprintln!("{k} {:.4} {:.3}", own(k).gain/level, own(k).bias); } }
         let frames = (0..count).map(|k| FrameExposure {
             gain: own(k).gain / level,
             ..own(k)

@@ -2,7 +2,8 @@
 
 use super::Placement;
 use crate::camera::Pinhole;
-use crate::surface::{Surface, WallPoint};
+use crate::surface::{Surface, WallFrame, WallPoint};
+use crate::trajectory::Pose;
 use nalgebra::{Matrix2, Vector2};
 use serde::Serialize;
 
@@ -24,9 +25,24 @@ pub struct Sighting {
 /// How far beyond the outermost pixel centres a frame still shows, pixels: what going to the wall and back rounds.
 const ROUNDING_PX: f64 = 1e-6;
 
+/// Resolution at a wall point, pixels per metre, along the direction in which it is least: the smaller singular value of
+/// `∂(u, v)/∂(s, h) = ∂π/∂x_c R_wcᵀ (e_s, e_h)`.
+fn least_stretch(camera: &Pinhole, pose: &Pose, point: &WallFrame) -> f64 {
+    let jacobian = camera.project_jacobian(&pose.to_camera(&point.x_w));
+    let tangents = [point.e_s, point.e_h].map(|e| pose.r_wc.inverse_transform_vector(&e));
+    let stretch = Matrix2::from_columns(&tangents.map(|e| jacobian * e));
+    stretch.singular_values().min()
+}
+
+/// The same if the frame shows the point.
+pub(super) fn px_per_metre(camera: &Pinhole, pose: &Pose, point: &WallFrame) -> Option<f64> {
+    let pixel = camera.project(&pose.to_camera(&point.x_w))?;
+    camera
+        .sees(&pixel, -ROUNDING_PX)
+        .then(|| least_stretch(camera, pose, point))
+}
+
 /// The frames that show `wall`, the one with the highest resolution there first.
-///
-/// The resolution is the smaller singular value of `∂(u, v)/∂(s, h) = ∂π/∂x_c R_wcᵀ (e_s, e_h)`.
 pub fn sightings(
     surface: &dyn Surface,
     camera: &Pinhole,
@@ -40,9 +56,6 @@ pub fn sightings(
         let pixel = camera
             .project(&x_c)
             .filter(|pixel| camera.sees(pixel, -ROUNDING_PX))?;
-        let tangents = [point.e_s, point.e_h].map(|e| pose.r_wc.inverse_transform_vector(&e));
-        let jacobian = camera.project_jacobian(&x_c);
-        let stretch = Matrix2::from_columns(&tangents.map(|e| jacobian * e));
         let normal = point.e_s.cross(&point.e_h);
         let ray = point.x_w - pose.t_wc;
         let cosine = ray.dot(&normal).abs() / (ray.norm() * normal.norm());
@@ -50,7 +63,7 @@ pub fn sightings(
             frame,
             pixel: Vector2::into(pixel),
             distance_m: ray.norm(),
-            px_per_metre: stretch.singular_values().min(),
+            px_per_metre: least_stretch(camera, pose, &point),
             obliqueness_deg: cosine.min(1.0).acos().to_degrees(),
         })
     };

@@ -14,20 +14,27 @@
 //!
 //! [`cylinder`] is the odd one out: the cylindrical projection of one single photo.
 
+mod band;
+mod budget;
 mod canvas;
 pub mod cylinder;
 mod draw;
 mod error;
 mod exposure;
+mod gaps;
 mod glimpses;
 mod kernel;
 mod labels;
 mod levelling;
 mod locate;
+mod maps;
 mod memory;
 mod panorama;
 mod picture;
 mod placement;
+mod plan;
+mod preview;
+mod raster_target;
 mod sample;
 mod seams;
 mod stack;
@@ -37,17 +44,25 @@ mod tiles;
 mod view;
 mod warp;
 
+pub use band::{Band, Target};
+pub use budget::Budget;
 pub use canvas::{Canvas, Layout};
 pub use draw::{Drawn, Mode, NO_FRAME};
 pub use error::RenderError;
 pub use exposure::{Exposure, FrameExposure};
+pub use gaps::{Coverage, Gap, gaps_csv};
 pub use kernel::{Interpolation, Kernel};
 pub use locate::{Sighting, sightings};
+pub use maps::Map;
 pub use panorama::Panorama;
 pub use picture::{Picture, PixelFormat};
 pub use placement::{Placement, native_px_per_metre, place};
+pub use plan::{Plan, RenderOptions};
+pub use preview::Preview;
+pub use raster_target::{RasterLayer, RasterTarget};
 pub use sample::{Sample, Samples};
 pub use stack::{FrameStack, level_for};
 pub(crate) use stitch::check_memory;
-pub use stitch::{LaidOut, RenderOptions, StitchOptions, lay_out, on_the_axis, render, stitch};
+pub use seams::Seams;
+pub use stitch::{LaidOut, Stitch, StitchOptions, lay_out, on_the_axis, render, stitch};
 pub(crate) use tiles::{Tile, tiles};

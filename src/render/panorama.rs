@@ -2,7 +2,7 @@
 
 use super::picture::{PixelFormat, luma};
 use super::sample::{Sample, Samples};
-use super::{Canvas, Drawn, Layout, Tile};
+use super::{Band, Canvas, Layout, RenderError, Target};
 use crate::frames::GreyImage;
 use image::{DynamicImage, ImageBuffer};
 
@@ -17,7 +17,7 @@ pub struct Panorama {
 
 impl Panorama {
     /// A panorama that is one hole.
-    pub(super) fn empty(canvas: Canvas, format: PixelFormat) -> Self {
+    pub fn empty(canvas: Canvas, format: PixelFormat) -> Self {
         let count = canvas.pixels() * (format.channels + 1);
         Self {
             canvas,
@@ -29,18 +29,9 @@ impl Panorama {
         }
     }
 
-    /// Puts a tile into its place.
-    pub(super) fn put(&mut self, tile: &Tile, drawn: &Drawn) {
-        let channels = self.format.channels + 1;
-        match (&mut self.samples, &drawn.samples) {
-            (Samples::Eight(all), Samples::Eight(part)) => {
-                copy(all, self.canvas.columns, part, tile, channels);
-            }
-            (Samples::Sixteen(all), Samples::Sixteen(part)) => {
-                copy(all, self.canvas.columns, part, tile, channels);
-            }
-            _ => debug_assert!(false, "tiles have the frames' format"),
-        }
+    /// Memory of its pixels, bytes.
+    pub fn bytes(&self) -> u64 {
+        self.samples.bytes() as u64
     }
 
     /// Its place on the wall.
@@ -93,15 +84,20 @@ impl Panorama {
     }
 }
 
-fn copy<T: Sample>(all: &mut [T], columns: u32, part: &[T], tile: &Tile, channels: usize) {
-    let stride = columns as usize * channels;
-    let (start, length) = (
-        tile.column as usize * channels,
-        tile.columns as usize * channels,
-    );
-    let rows = all[tile.row as usize * stride..].chunks_exact_mut(stride);
-    for (row, source) in rows.zip(part.chunks_exact(length)) {
-        row[start..start + length].copy_from_slice(source);
+impl Target for Panorama {
+    fn put(&mut self, canvas: &Canvas, band: &Band) -> Result<(), RenderError> {
+        let channels = self.format.channels + 1;
+        let start = canvas.columns as usize * band.row as usize * channels;
+        match (&mut self.samples, &band.samples) {
+            (Samples::Eight(all), Samples::Eight(part)) => {
+                all[start..start + part.len()].copy_from_slice(part);
+            }
+            (Samples::Sixteen(all), Samples::Sixteen(part)) => {
+                all[start..start + part.len()].copy_from_slice(part);
+            }
+            _ => debug_assert!(false, "bands have the frames' format"),
+        }
+        Ok(())
     }
 }
 

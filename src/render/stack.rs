@@ -100,7 +100,6 @@ impl FrameStack {
         frames: &[usize],
         later: &[usize],
         room: u64,
-        progress: &dyn Progress,
     ) -> Result<(), RenderError> {
         let missing: Vec<usize> = frames
             .iter()
@@ -110,11 +109,7 @@ impl FrameStack {
         self.make_room(frames, later, room, missing.len());
         let decoded: Vec<Result<Picture, RenderError>> = missing
             .par_iter()
-            .map(|frame| {
-                let picture = self.decode(*frame);
-                progress.advance(1);
-                picture
-            })
+            .map(|frame| self.decode(*frame))
             .collect();
         for (frame, picture) in missing.iter().zip(decoded) {
             self.pictures[*frame] = Some(picture?);
@@ -170,9 +165,12 @@ impl FrameStack {
     pub fn hold_all(&mut self, progress: &dyn Progress) -> Result<(), RenderError> {
         let all: Vec<usize> = (0..self.len()).collect();
         progress.start("frames", all.len());
-        let held = self.hold(&all, &[], u64::MAX, progress);
+        for run in all.chunks(8 * rayon::current_num_threads().max(1)) {
+            self.hold(run, &[], u64::MAX)?;
+            progress.advance(run.len());
+        }
         progress.finish();
-        held
+        Ok(())
     }
 
     /// The camera of the pictures as they are held (halved as they are).
@@ -200,6 +198,12 @@ impl FrameStack {
         self.format
     }
 
+    /// Memory of one frame as its file has it, bytes.
+    pub fn full_frame_bytes(&self) -> u64 {
+        let [width, height] = self.full_size.map(u64::from);
+        width * height * self.format.pixel_bytes(false) as u64
+    }
+
     /// Memory of one frame, bytes.
     pub fn frame_bytes(&self) -> u64 {
         let pixels = u64::from(self.camera.width) * u64::from(self.camera.height);
@@ -210,7 +214,6 @@ impl FrameStack {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::progress::Silent;
 
     #[test]
     fn frames_are_halved_only_for_coarse_canvases() {
@@ -257,15 +260,15 @@ mod tests {
             (0..4).filter(|k| stack.picture(*k).is_some()).collect()
         };
         let room = 3 * stack.frame_bytes();
-        stack.hold(&[0, 1, 2], &[3, 2, 0], room, &Silent).unwrap();
+        stack.hold(&[0, 1, 2], &[3, 2, 0], room).unwrap();
         assert_eq!(held(&stack), [0, 1, 2]);
         // 1 is not needed any more, 2 sooner than 0.
-        stack.hold(&[3], &[2, 0], room, &Silent).unwrap();
+        stack.hold(&[3], &[2, 0], room).unwrap();
         assert_eq!(held(&stack), [0, 2, 3]);
-        stack.hold(&[1], &[3, 2, 0], room, &Silent).unwrap();
+        stack.hold(&[1], &[3, 2, 0], room).unwrap();
         assert_eq!(held(&stack), [1, 2, 3]);
         let before = stack.picture(2).cloned();
-        stack.hold(&[0, 1, 3], &[], 0, &Silent).unwrap();
+        stack.hold(&[0, 1, 3], &[], 0).unwrap();
         assert_eq!(held(&stack), [0, 1, 3]);
         assert_eq!(stack.decode(2).ok(), before);
     }

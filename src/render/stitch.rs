@@ -1,44 +1,20 @@
 //! Frames and poses in, panorama out.
 
-use super::draw::{Composition, Mode, Scene};
-use super::levelling::COARSEST;
-use super::seams::{STEP_PX, Seams};
-use super::thumbnails::Thumbnails;
-use super::view::Kernels;
+use super::budget::Budget;
+use super::plan::{Plan, RenderOptions};
+use super::seams::STEP_PX;
 use super::{
-    Canvas, Drawn, Exposure, FrameStack, Interpolation, Panorama, Placement, RenderError, Tile,
-    level_for, memory, native_px_per_metre, place, tiles,
+    Canvas, FrameStack, Panorama, Placement, RenderError, Target, level_for, memory,
+    native_px_per_metre, place,
 };
 use crate::camera::Pinhole;
 use crate::frames::FrameFile;
 use crate::progress::Progress;
 use crate::surface::Surface;
 use crate::trajectory::Pose;
-use rayon::prelude::*;
-
-/// How frames become a panorama.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RenderOptions {
-    /// How frames are sampled between their pixels.
-    pub interpolation: Interpolation,
-    /// Which frames a pixel shows.
-    pub mode: Mode,
-    /// Whether exposure is undone and light levelled out over seams; else frames keep the values they have.
-    pub blend: bool,
-}
-
-impl Default for RenderOptions {
-    fn default() -> Self {
-        Self {
-            interpolation: Interpolation::default(),
-            mode: Mode::default(),
-            blend: true,
-        }
-    }
-}
 
 /// How a panorama is drawn from frames on disk.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StitchOptions {
     /// Resolution, pixels per metre; without it the frames' own at the wall.
     pub px_per_metre: Option<f64>,
@@ -46,6 +22,19 @@ pub struct StitchOptions {
     pub ignore_offset: bool,
     /// How frames become a panorama.
     pub render: RenderOptions,
+    /// Memory that may be used, bytes.
+    pub memory: u64,
+}
+
+impl Default for StitchOptions {
+    fn default() -> Self {
+        Self {
+            px_per_metre: None,
+            ignore_offset: false,
+            render: RenderOptions::default(),
+            memory: 2 << 30,
+        }
+    }
 }
 
 /// The poses with `t_x = t_z = 0`: chainage and rotation kept, the distance from the axis forgotten. What a
@@ -93,8 +82,108 @@ pub fn lay_out(
     })
 }
 
-/// Draws the panorama of frames on disk for given poses: places the frames, lays out the canvas, loads the
-/// frames (halved where the canvas is coarser than half their resolution) and renders.
+/// Frames on disk, laid out to be drawn.
+pub struct Stitch<'a> {
+    surface: &'a dyn Surface,
+    frames: FrameStack,
+    laid_out: LaidOut,
+    options: StitchOptions,
+}
+
+impl<'a> Stitch<'a> {
+    /// Places the frames for given poses, lays out the canvas and looks at the frames' headers. Frames are to be halved where the
+    /// canvas is coarser than half their resolution.
+    ///
+    /// # Errors
+    /// Everything in [`RenderError`]; no frame is decoded yet.
+    pub fn new(
+        surface: &'a dyn Surface,
+        camera: &Pinhole,
+        files: &[FrameFile],
+        poses: &[Pose],
+        options: &StitchOptions,
+    ) -> Result<Self, RenderError> {
+        if poses.len() != files.len() {
+            return Err(RenderError::Count {
+                poses: poses.len(),
+                frames: files.len(),
+            });
+        }
+        let moved;
+        let poses = if options.ignore_offset {
+            moved = on_the_axis(poses);
+            &moved
+        } else {
+            poses
+        };
+        let laid_out = lay_out(surface, camera, poses, options.px_per_metre)?;
+        let canvas = &laid_out.canvas;
+        let level = level_for(camera, laid_out.native_px_per_metre, canvas.px_per_metre);
+        Ok(Self {
+            surface,
+            frames: FrameStack::open(files, camera, level)?,
+            laid_out,
+            options: *options,
+        })
+    }
+
+    /// The canvas.
+    pub fn canvas(&self) -> &Canvas {
+        &self.laid_out.canvas
+    }
+
+    /// The frames.
+    pub fn frames(&self) -> &FrameStack {
+        &self.frames
+    }
+
+    /// Where they lie.
+    pub fn placements(&self) -> &[Placement] {
+        &self.laid_out.placements
+    }
+
+    /// The memory that drawing takes if the output holds `output` bytes of it.
+    ///
+    /// # Errors
+    /// [`RenderError::Memory`] if the least that is needed is more than may be used.
+    pub fn budget(&self, output: u64) -> Result<Budget, RenderError> {
+        Budget::new(
+            &self.laid_out.canvas,
+            &self.frames,
+            &self.laid_out.placements,
+            self.laid_out.native_px_per_metre,
+            &self.options.render,
+            output,
+            self.options.memory,
+        )
+    }
+
+    /// Finds exposures and seams, within a budget. Frames are kept if there is room for all of them.
+    ///
+    /// # Errors
+    /// A frame that cannot be decoded.
+    pub fn plan(
+        &mut self,
+        budget: &Budget,
+        progress: &dyn Progress,
+    ) -> Result<(Plan<'_>, &mut FrameStack), RenderError> {
+        if self.frames.frame_bytes() * self.frames.len() as u64 <= budget.room {
+            self.frames.hold_all(progress)?;
+        }
+        let plan = Plan::new(
+            self.surface,
+            &self.frames,
+            &self.laid_out.placements,
+            &self.laid_out.canvas,
+            &self.options.render,
+            budget.grid_step_px,
+            progress,
+        )?;
+        Ok((plan, &mut self.frames))
+    }
+}
+
+/// Draws the panorama of frames on disk for given poses into memory.
 ///
 /// # Errors
 /// Everything in [`RenderError`]; sizes are checked before a frame is read.
@@ -106,150 +195,33 @@ pub fn stitch(
     options: &StitchOptions,
     progress: &dyn Progress,
 ) -> Result<Panorama, RenderError> {
-    if poses.len() != files.len() {
-        return Err(RenderError::Count {
-            poses: poses.len(),
-            frames: files.len(),
-        });
-    }
-    let moved;
-    let poses = if options.ignore_offset {
-        moved = on_the_axis(poses);
-        &moved
-    } else {
-        poses
-    };
-    let LaidOut {
-        placements,
-        native_px_per_metre,
-        canvas,
-    } = lay_out(surface, camera, poses, options.px_per_metre)?;
-    let level = level_for(camera, native_px_per_metre, canvas.px_per_metre);
-    let mut frames = FrameStack::open(files, camera, level)?;
-    let copies = 2;
-    check_memory(&canvas, copies, &frames)?;
-    frames.hold_all(progress)?;
-    render(
-        surface,
-        &frames,
-        &placements,
-        &canvas,
-        &options.render,
-        progress,
-    )
+    let mut stitch = Stitch::new(surface, camera, files, poses, options)?;
+    let mut panorama = Panorama::empty(*stitch.canvas(), stitch.frames().format());
+    let budget = stitch.budget(panorama.bytes())?;
+    let (plan, frames) = stitch.plan(&budget, progress)?;
+    plan.draw(frames, budget.room, &mut [&mut panorama], progress)?;
+    Ok(panorama)
 }
 
 /// Draws the canvas from placed frames that are held.
-///
-/// The bytes do not depend on the number of threads.
 ///
 /// # Errors
 /// [`RenderError::Count`] unless there is one placement per frame.
 pub fn render(
     surface: &dyn Surface,
-    frames: &FrameStack,
+    frames: &mut FrameStack,
     placements: &[Placement],
     canvas: &Canvas,
     options: &RenderOptions,
     progress: &dyn Progress,
 ) -> Result<Panorama, RenderError> {
-    if frames.len() != placements.len() {
-        return Err(RenderError::Count {
-            poses: placements.len(),
-            frames: frames.len(),
-        });
-    }
-    let plan = Plan::new(surface, frames, placements, canvas, options, progress)?;
-    let scene = plan.scene(surface, frames, placements, canvas);
+    let plan = Plan::new(
+        surface, frames, placements, canvas, options, STEP_PX, progress,
+    )?;
     let mut panorama = Panorama::empty(*canvas, frames.format());
-    let bands = tiles(surface, canvas, placements);
-    progress.start("panorama", bands.iter().map(Vec::len).sum());
-    // As many tiles at once as keep all threads busy.
-    let tiles: Vec<Tile> = bands.into_iter().flatten().collect();
-    for run in tiles.chunks(16 * rayon::current_num_threads().max(1)) {
-        let drawn: Vec<Drawn> = run.par_iter().map(|tile| scene.draw(tile)).collect();
-        for (tile, drawn) in run.iter().zip(&drawn) {
-            panorama.put(tile, drawn);
-        }
-        progress.advance(run.len());
-    }
-    progress.finish();
+    let targets: &mut [&mut dyn Target] = &mut [&mut panorama];
+    plan.draw(frames, u64::MAX, targets, progress)?;
     Ok(panorama)
-}
-
-/// All that is settled before the first tile is drawn.
-struct Plan {
-    mode: Mode,
-    kernels: Kernels,
-    exposure: Exposure,
-    seams: Option<Seams>,
-}
-
-impl Plan {
-    fn new(
-        surface: &dyn Surface,
-        frames: &FrameStack,
-        placements: &[Placement],
-        canvas: &Canvas,
-        options: &RenderOptions,
-        progress: &dyn Progress,
-    ) -> Result<Self, RenderError> {
-        let mut plan = Self {
-            mode: options.mode,
-            kernels: Kernels::new(options.interpolation),
-            exposure: Exposure::none(frames.len()),
-            seams: None,
-        };
-        if !options.blend && options.mode != Mode::BestView {
-            return Ok(plan);
-        }
-        let camera = frames.camera();
-        let grid = canvas.grid(STEP_PX, COARSEST);
-        let poses: Vec<Pose> = placements.iter().map(|placement| placement.pose).collect();
-        let native = native_px_per_metre(surface, camera, &poses)?;
-        let level = Thumbnails::level(camera, native, grid.px_per_metre);
-        let thumbnails = Thumbnails::of(frames, level, progress)?;
-        // Seams are sought in evenly lit frames, even where frames are to stay as they are.
-        let white = frames.format().white();
-        let exposure = Exposure::solve(surface, &thumbnails, placements, canvas, white);
-        if options.mode == Mode::BestView {
-            plan.seams = Some(Seams::find(
-                surface,
-                &thumbnails,
-                &exposure.of_thumbnails(&thumbnails),
-                placements,
-                grid,
-                options.blend.then_some(white),
-            ));
-        }
-        if options.blend {
-            plan.exposure = exposure;
-        }
-        Ok(plan)
-    }
-
-    fn scene<'a>(
-        &'a self,
-        surface: &'a dyn Surface,
-        frames: &'a FrameStack,
-        placements: &'a [Placement],
-        canvas: &'a Canvas,
-    ) -> Scene<'a> {
-        let composition = match (self.mode, &self.seams) {
-            (Mode::BestView, Some(seams)) => Composition::Seams(seams),
-            (Mode::Median, _) => Composition::Median,
-            _ => Composition::Average,
-        };
-        Scene {
-            surface,
-            frames,
-            placements,
-            canvas,
-            kernels: &self.kernels,
-            exposure: &self.exposure,
-            composition,
-        }
-    }
 }
 
 /// Checks that `copies` panoramas (each drawn one, and one on its way to the file) and the frames, all of them held, fit into the

@@ -54,47 +54,55 @@ pub(crate) fn tiles(
     canvas: &Canvas,
     placements: &[Placement],
 ) -> Vec<Vec<Tile>> {
+    (0..canvas.rows)
+        .step_by(EDGE as usize)
+        .map(|row| tiles_at(surface, canvas, placements, row))
+        .collect()
+}
+
+/// The tiles of the band that begins at `row`.
+pub(super) fn tiles_at(
+    surface: &dyn Surface,
+    canvas: &Canvas,
+    placements: &[Placement],
+    row: u32,
+) -> Vec<Tile> {
     let perimeter_m = surface.perimeter_m();
     let pixel_m = 1.0 / canvas.px_per_metre;
-    (0..canvas.rows.div_ceil(EDGE))
-        .map(|band| {
-            let row = band * EDGE;
-            let rows = EDGE.min(canvas.rows - row);
-            let h_m = canvas.h_start_m + f64::from(row) * pixel_m;
-            let frames_in = |s_m: f64, width_m: f64, among: &mut dyn Iterator<Item = usize>| {
-                let tile = Footprint {
-                    s_min_m: s_m,
-                    s_max_m: s_m + width_m,
-                    h_min_m: h_m,
-                    h_max_m: h_m + f64::from(rows) * pixel_m,
-                };
-                among
-                    .filter(|frame| {
-                        let footprint = &placements[*frame].footprint;
-                        // The box comes from single rays: 2 % cover what bulges between them.
-                        let span_m = (footprint.s_max_m - footprint.s_min_m)
-                            .max(footprint.h_max_m - footprint.h_min_m);
-                        let margin_m = pixel_m + 0.02 * span_m;
-                        footprint.widened(margin_m).overlaps(&tile, perimeter_m)
-                    })
-                    .collect::<Vec<usize>>()
-            };
-            let in_band = frames_in(0.0, perimeter_m, &mut (0..placements.len()));
-            (0..canvas.columns.div_ceil(EDGE))
-                .map(|across| {
-                    let column = across * EDGE;
-                    let columns = EDGE.min(canvas.columns - column);
-                    let s_m = f64::from(column) * pixel_m;
-                    let width_m = f64::from(columns) * pixel_m;
-                    Tile {
-                        column,
-                        row,
-                        columns,
-                        rows,
-                        frames: frames_in(s_m, width_m, &mut in_band.iter().copied()),
-                    }
-                })
-                .collect()
+    let rows = EDGE.min(canvas.rows - row);
+    let h_m = canvas.h_start_m + f64::from(row) * pixel_m;
+    let frames_in = |s_m: f64, width_m: f64, among: &mut dyn Iterator<Item = usize>| {
+        let tile = Footprint {
+            s_min_m: s_m,
+            s_max_m: s_m + width_m,
+            h_min_m: h_m,
+            h_max_m: h_m + f64::from(rows) * pixel_m,
+        };
+        among
+            .filter(|frame| {
+                let footprint = &placements[*frame].footprint;
+                // The box comes from single rays: 2 % cover what bulges between them.
+                let span_m = (footprint.s_max_m - footprint.s_min_m)
+                    .max(footprint.h_max_m - footprint.h_min_m);
+                let margin_m = pixel_m + 0.02 * span_m;
+                footprint.widened(margin_m).overlaps(&tile, perimeter_m)
+            })
+            .collect::<Vec<usize>>()
+    };
+    let in_band = frames_in(0.0, perimeter_m, &mut (0..placements.len()));
+    (0..canvas.columns)
+        .step_by(EDGE as usize)
+        .map(|column| {
+            let columns = EDGE.min(canvas.columns - column);
+            let s_m = f64::from(column) * pixel_m;
+            let width_m = f64::from(columns) * pixel_m;
+            Tile {
+                column,
+                row,
+                columns,
+                rows,
+                frames: frames_in(s_m, width_m, &mut in_band.iter().copied()),
+            }
         })
         .collect()
 }

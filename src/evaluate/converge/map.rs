@@ -4,7 +4,7 @@
 //! column for each rotation sigma; in each cell the success rate, the runs it is of, and the false successes if any.
 
 use super::cell::{jitter_name, unit};
-use super::lettering::{self, LETTER};
+use crate::lettering::{self, LETTER};
 use super::{CellSummary, Convergence, TranslationScale};
 use image::{Rgb, RgbImage};
 

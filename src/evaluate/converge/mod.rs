@@ -23,7 +23,7 @@ mod cell;
 mod draw;
 mod efficiency;
 mod error;
-mod lettering;
+
 mod log;
 mod majority;
 mod map;

@@ -1,0 +1,136 @@
+//! What a panorama takes of the memory, known before the first frame is read.
+
+use super::levelling::COARSEST;
+use super::plan::{BAND_ROWS, RenderOptions};
+use super::seams::{STEP_PX, Seams};
+use super::thumbnails::Thumbnails;
+use super::{Canvas, FrameStack, Placement, RenderError, memory};
+use serde::Serialize;
+
+/// The memory of a panorama, bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Budget {
+    /// Thumbnails of all frames.
+    pub thumbnails: u64,
+    /// The grid of seams.
+    pub grid: u64,
+    /// Distance of its nodes, canvas pixels.
+    pub grid_step_px: f64,
+    /// The band being drawn and written.
+    pub band: u64,
+    /// What the output holds until it is finished.
+    pub output: u64,
+    /// Frames being decoded.
+    pub decoding: u64,
+    /// Frames of one band, the least that must be held.
+    pub frames_least: u64,
+    /// Room for frames.
+    pub room: u64,
+}
+
+/// Copies of a band: drawn tiles, the band, the tiles that are written, and what becomes of them.
+const COPIES: u64 = 5;
+/// The most of the memory that the grid may take; beyond, its nodes are farther apart.
+const GRID_SHARE: u64 = 4;
+/// Copies of a frame while it is decoded: the file, the decoder's picture, and what it is turned into.
+const DECODING: u64 = 4;
+
+impl Budget {
+    /// Bands whose frames are kept in view of what is to come.
+    pub const BANDS_AHEAD: usize = 8;
+
+    /// The memory for drawing `canvas` within `limit` bytes, of which the output holds `output`.
+    ///
+    /// # Errors
+    /// [`RenderError::Memory`] if even the least is more than the limit, or than the system has free.
+    pub fn new(
+        canvas: &Canvas,
+        frames: &FrameStack,
+        placements: &[Placement],
+        native_px_per_metre: f64,
+        options: &RenderOptions,
+        output: u64,
+        limit: u64,
+    ) -> Result<Self, RenderError> {
+        let limit = memory::available_bytes().map_or(limit, |available| limit.min(available));
+        let format = frames.format();
+        let mut grid_step_px = STEP_PX;
+        let grid_bytes = |step: f64| {
+            let grid = canvas.grid(step, COARSEST);
+            grid.pixels() as u64 * Seams::bytes_per_node(format.channels)
+        };
+        let (mut thumbnails, mut grid) = (0, 0);
+        if options.needs_thumbnails() {
+            while grid_bytes(grid_step_px) > limit / GRID_SHARE {
+                grid_step_px *= 2.0;
+            }
+            grid = grid_bytes(grid_step_px);
+            let level = Thumbnails::level(
+                frames.camera(),
+                native_px_per_metre,
+                canvas.px_per_metre / grid_step_px,
+            );
+            thumbnails =
+                Thumbnails::bytes(frames.camera(), level, format.channels, frames.len());
+        }
+        let rows = BAND_ROWS.min(canvas.rows);
+        let pixel = format.pixel_bytes(true) as u64 + 4;
+        let band = COPIES * u64::from(rows) * u64::from(canvas.columns) * pixel;
+        let threads = rayon::current_num_threads() as u64;
+        let decoding = DECODING * threads * frames.full_frame_bytes();
+        let frames_least = most_in_a_band(canvas, placements) as u64 * frames.frame_bytes();
+        let fixed = thumbnails + grid + band + output + decoding;
+        let needed = fixed + frames_least;
+        if needed > limit {
+            return Err(RenderError::Memory {
+                columns: canvas.columns,
+                rows: canvas.rows,
+                frames: frames.len(),
+                needed_mib: needed.div_ceil(1 << 20),
+                available_mib: limit >> 20,
+            });
+        }
+        Ok(Self {
+            thumbnails,
+            grid,
+            grid_step_px,
+            band,
+            output,
+            decoding,
+            frames_least,
+            room: limit - fixed,
+        })
+    }
+
+    /// The most that is used at any time, with `frames` bytes of frames in all.
+    pub fn most(&self, frames: u64) -> u64 {
+        self.thumbnails
+            + self.grid
+            + self.band
+            + self.output
+            + self.decoding
+            + frames.min(self.room)
+    }
+}
+
+/// Frames that meet the same band, at most.
+fn most_in_a_band(canvas: &Canvas, placements: &[Placement]) -> usize {
+    let band_m = f64::from(BAND_ROWS) / canvas.px_per_metre;
+    let band = |h_m: f64| ((h_m - canvas.h_start_m) / band_m).floor();
+    let count = canvas.rows.div_ceil(BAND_ROWS) as usize;
+    // Where frames begin and end.
+    let mut steps = vec![0i64; count + 1];
+    for placement in placements {
+        let margin_m = band_m / f64::from(BAND_ROWS) + 0.02 * band_m;
+        let footprint = placement.footprint.widened(margin_m);
+        let last = (count - 1) as f64;
+        steps[band(footprint.h_min_m).clamp(0.0, last) as usize] += 1;
+        steps[band(footprint.h_max_m).clamp(0.0, last) as usize + 1] -= 1;
+    }
+    let mut now = 0;
+    let counts = steps.iter().map(|step| {
+        now += step;
+        now
+    });
+    counts.max().unwrap_or(0) as usize
+}

@@ -1,0 +1,224 @@
+//! From what is settled before the first tile is drawn to the bands of the panorama.
+
+use super::band::{Band, Target};
+use super::budget::Budget;
+use super::draw::{Composition, Drawn, Mode, Scene};
+use super::levelling::COARSEST;
+use super::seams::Seams;
+use super::thumbnails::Thumbnails;
+use super::tiles::{EDGE, tiles_at};
+use super::view::Kernels;
+use super::{
+    Canvas, Exposure, FrameStack, Interpolation, Placement, RenderError, Tile, native_px_per_metre,
+};
+use crate::progress::Progress;
+use crate::surface::Surface;
+use crate::trajectory::Pose;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// Rows of a band: those of a raster's tiles.
+pub const BAND_ROWS: u32 = crate::raster::EDGE as u32;
+
+/// How frames become a panorama.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct RenderOptions {
+    /// How frames are sampled between their pixels.
+    pub interpolation: Interpolation,
+    /// Which frames a pixel shows.
+    pub mode: Mode,
+    /// Whether exposure is undone and light levelled out over seams; else frames keep the values they have.
+    pub blend: bool,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self {
+            interpolation: Interpolation::default(),
+            mode: Mode::default(),
+            blend: true,
+        }
+    }
+}
+
+impl RenderOptions {
+    /// Whether small pictures of all frames are needed before the first tile is drawn.
+    pub(super) fn needs_thumbnails(&self) -> bool {
+        self.blend || self.mode == Mode::BestView
+    }
+}
+
+/// A panorama about to be drawn.
+pub struct Plan<'a> {
+    surface: &'a dyn Surface,
+    placements: &'a [Placement],
+    canvas: Canvas,
+    mode: Mode,
+    kernels: Kernels,
+    exposure: Exposure,
+    seams: Option<Seams>,
+}
+
+impl<'a> Plan<'a> {
+    /// Finds exposures and seams.
+    ///
+    /// # Errors
+    /// [`RenderError::Count`] unless there is one placement per frame; a frame that cannot be decoded.
+    pub fn new(
+        surface: &'a dyn Surface,
+        frames: &FrameStack,
+        placements: &'a [Placement],
+        canvas: &Canvas,
+        options: &RenderOptions,
+        grid_step_px: f64,
+        progress: &dyn Progress,
+    ) -> Result<Self, RenderError> {
+        if frames.len() != placements.len() {
+            return Err(RenderError::Count {
+                poses: placements.len(),
+                frames: frames.len(),
+            });
+        }
+        let mut plan = Self {
+            surface,
+            placements,
+            canvas: *canvas,
+            mode: options.mode,
+            kernels: Kernels::new(options.interpolation),
+            exposure: Exposure::none(frames.len()),
+            seams: None,
+        };
+        if !options.needs_thumbnails() {
+            return Ok(plan);
+        }
+        let grid = canvas.grid(grid_step_px, COARSEST);
+        let poses: Vec<Pose> = placements.iter().map(|placement| placement.pose).collect();
+        let native = native_px_per_metre(surface, frames.camera(), &poses)?;
+        let level = Thumbnails::level(frames.camera(), native, grid.px_per_metre);
+        let thumbnails = Thumbnails::of(frames, level, progress)?;
+        progress.start("seams", 1);
+        // Seams are sought in evenly lit frames, even where frames are to stay as they are.
+        let white = frames.format().white();
+        let exposure = Exposure::solve(surface, &thumbnails, placements, canvas, white);
+        if options.mode == Mode::BestView {
+            plan.seams = Some(Seams::find(
+                surface,
+                &thumbnails,
+                &exposure.of_thumbnails(&thumbnails),
+                placements,
+                grid,
+                options.blend.then_some(white),
+            ));
+        }
+        if options.blend {
+            plan.exposure = exposure;
+        }
+        progress.finish();
+        Ok(plan)
+    }
+
+    /// The canvas.
+    pub fn canvas(&self) -> &Canvas {
+        &self.canvas
+    }
+
+    /// The grid of the seams, or the one they would have at nodes `step_px` apart.
+    pub fn grid(&self, step_px: f64) -> Canvas {
+        match &self.seams {
+            Some(seams) => *seams.grid(),
+            None => self.canvas.grid(step_px, COARSEST),
+        }
+    }
+
+    /// The exposure that is undone.
+    pub fn exposure(&self) -> &Exposure {
+        &self.exposure
+    }
+
+    /// Which frames are shown where, if one is shown at each place.
+    pub fn seams(&self) -> Option<&Seams> {
+        self.seams.as_ref()
+    }
+
+    /// Draws all bands into `targets`. The bytes do not depend on the number of threads, nor on the memory that
+    /// frames may take (`room` bytes, and at least those of one band).
+    ///
+    /// # Errors
+    /// A frame that cannot be decoded; what the targets say.
+    pub fn draw(
+        &self,
+        frames: &mut FrameStack,
+        room: u64,
+        targets: &mut [&mut dyn Target],
+        progress: &dyn Progress,
+    ) -> Result<(), RenderError> {
+        let starts: Vec<u32> = (0..self.canvas.rows).step_by(BAND_ROWS as usize).collect();
+        let needs: Vec<Vec<usize>> = starts
+            .par_iter()
+            .map(|row| self.needed(frames, &self.tiles(*row)))
+            .collect();
+        progress.start("panorama", starts.len());
+        for (k, row) in starts.iter().enumerate() {
+            let later: Vec<usize> = needs[k + 1..]
+                .iter()
+                .take(Budget::BANDS_AHEAD)
+                .flatten()
+                .copied()
+                .collect();
+            frames.hold(&needs[k], &later, room)?;
+            let band = self.band(frames, *row);
+            for target in &mut *targets {
+                target.put(&self.canvas, &band)?;
+            }
+            progress.advance(1);
+        }
+        progress.finish();
+        Ok(())
+    }
+
+    /// The tiles of the band that begins at `row`.
+    fn tiles(&self, row: u32) -> Vec<Tile> {
+        let end = (row + BAND_ROWS).min(self.canvas.rows);
+        (row..end)
+            .step_by(EDGE as usize)
+            .flat_map(|row| tiles_at(self.surface, &self.canvas, self.placements, row))
+            .collect()
+    }
+
+    fn needed(&self, frames: &FrameStack, tiles: &[Tile]) -> Vec<usize> {
+        let scene = self.scene(frames);
+        let mut needed: Vec<usize> = tiles.iter().flat_map(|tile| scene.needed(tile)).collect();
+        needed.sort_unstable();
+        needed.dedup();
+        needed
+    }
+
+    fn band(&self, frames: &FrameStack, row: u32) -> Band {
+        let scene = self.scene(frames);
+        let tiles = self.tiles(row);
+        let drawn: Vec<Drawn> = tiles.par_iter().map(|tile| scene.draw(tile)).collect();
+        let rows = BAND_ROWS.min(self.canvas.rows - row);
+        let mut band = Band::empty(&self.canvas, row, rows, frames.format());
+        for (tile, drawn) in tiles.iter().zip(&drawn) {
+            band.put(&self.canvas, tile, drawn);
+        }
+        band
+    }
+
+    fn scene<'b>(&'b self, frames: &'b FrameStack) -> Scene<'b> {
+        let composition = match (self.mode, &self.seams) {
+            (Mode::BestView, Some(seams)) => Composition::Seams(seams),
+            (Mode::Median, _) => Composition::Median,
+            _ => Composition::Average,
+        };
+        Scene {
+            surface: self.surface,
+            frames,
+            placements: self.placements,
+            canvas: &self.canvas,
+            kernels: &self.kernels,
+            exposure: &self.exposure,
+            composition,
+        }
+    }
+}
