@@ -59,10 +59,10 @@ macro_rules! whole_number {
                 let sum: $sum = (0..4)
                     .map(|i| <$sum>::from(values[i]) * <$sum>::from(there[i]))
                     .sum();
-                // Constants are divided by faster. The mean fits where its parts did.
+                // To the nearest, halves up. Constants are divided by faster; the mean fits where its parts did.
                 (match count {
                     1 => sum,
-                    2 => (sum + 1) / 2,
+                    2 => sum.div_ceil(2),
                     3 => (sum + 1) / 3,
                     _ => (sum + 2) / 4,
                 }) as Self
