@@ -119,7 +119,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// The bytes of a pixel: blots of colour, a large hole above and small ones everywhere.
 fn pixel(spec: &RasterSpec, x: usize, y: usize) -> Vec<u8> {
-    let hole = ((400..1100).contains(&x) && y < 600 + x / 3) || (x / 9 + y / 7) % 31 == 0;
+    let hole = ((400..1100).contains(&x) && y < 600 + x / 3) || (x / 9 + y / 7).is_multiple_of(31);
     let blot = (x / 60 + y / 90 * 7) % 29;
     let value = |k: usize| (blot * 30 + (x + y) % 60 + 40 * k + 20) as f64 / 1024.0;
     (0..spec.samples_per_pixel())
