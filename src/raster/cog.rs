@@ -4,8 +4,10 @@ use super::compression::Packed;
 use super::directory::{self, Directory, Values, tag};
 use super::pyramid::{LevelTile, Pyramid};
 use super::spool::{Spool, Stored};
-use super::{Compression, EDGE, Georeference, RasterError, RasterSpec, RasterTile, SampleType};
-use super::{Nodata, deflate, jpeg};
+use super::{
+    Compression, EDGE, Georeference, Nodata, RasterError, RasterSpec, RasterTile, SampleType,
+    deflate, jpeg,
+};
 use crate::atomic::{self, WriteError};
 use rayon::prelude::*;
 use std::io::{self, Write};

@@ -32,21 +32,25 @@ fn wide(bytes: &[u8]) -> Vec<u8> {
     miniz_oxide::deflate::compress_to_vec_zlib(bytes, LEVEL)
 }
 
-/// One bit per pixel, the highest first, that says whether the last sample of the pixel (alpha) is more than 0; as a
+/// One bit per pixel of 8-bit samples, the highest first, that says whether its last sample, alpha, is more than 0; as a
 /// zlib stream.
 pub(super) fn deflate_mask(spec: &RasterSpec, pixels: &[u8]) -> Vec<u8> {
-    let bytes = spec.pixel_bytes();
-    let last = spec.samples.bytes();
-    let mask: Vec<u8> = pixels
-        .chunks(8 * bytes)
+    wide(&match spec.channels {
+        1 => mask::<2>(pixels),
+        _ => mask::<4>(pixels),
+    })
+}
+
+/// The bits of [`deflate_mask`] for pixels of `N` samples.
+fn mask<const N: usize>(pixels: &[u8]) -> Vec<u8> {
+    let eights = pixels.chunks_exact(8 * N);
+    eights
         .map(|eight| {
-            eight.chunks(bytes).fold(0, |bits, pixel| {
-                let covered = pixel[bytes - last..].iter().any(|&byte| byte > 0);
-                bits << 1 | u8::from(covered)
-            })
+            eight
+                .chunks_exact(N)
+                .fold(0, |bits, pixel| bits << 1 | u8::from(pixel[N - 1] > 0))
         })
-        .collect();
-    wide(&mask)
+        .collect()
 }
 
 fn u8_difference(sample: u8, before: u8) -> [u8; 1] {

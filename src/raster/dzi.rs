@@ -172,10 +172,8 @@ fn encode_png(spec: &RasterSpec, pixels: &[u8], extent: [usize; 2]) -> io::Resul
     let [width, height] = extent;
     let bytes = spec.pixel_bytes();
     let rows = pixels.chunks_exact(EDGE * bytes).take(height);
-    let visible: Vec<u8> = rows
-        .flat_map(|row| &row[..width * bytes])
-        .copied()
-        .collect();
+    let visible: Vec<&[u8]> = rows.map(|row| &row[..width * bytes]).collect();
+    let visible = visible.concat();
     let colour = match (spec.channels, spec.alpha) {
         (1, false) => ExtendedColorType::L8,
         (1, true) => ExtendedColorType::La8,

@@ -24,8 +24,8 @@ pub(super) fn check(spec: &RasterSpec, quality: u8) -> Result<(), RasterError> {
     Ok(())
 }
 
-/// The upper left `size` (columns, rows) of a tile without its alpha. What lies beyond `extent` repeats the last column and row, so
-/// that no false edge is there to be drawn.
+/// The upper left `size` (columns, rows) of a tile without its alpha. What lies beyond `extent` repeats the last column
+/// and row, so that no false edge is there to be drawn.
 pub(super) fn encode(
     spec: &RasterSpec,
     pixels: &[u8],
@@ -36,14 +36,18 @@ pub(super) fn encode(
     let [width, height] = size;
     let channels = usize::from(spec.channels);
     let bytes = spec.pixel_bytes();
-    let mut visible = Vec::with_capacity(width * height * channels);
-    for y in 0..height {
+    let mut visible = vec![0; width * height * channels];
+    for (y, out) in visible.chunks_exact_mut(width * channels).enumerate() {
         let row = &pixels[y.min(extent[1] - 1) * EDGE * bytes..][..extent[0] * bytes];
-        for pixel in row[..extent[0].min(width) * bytes].chunks_exact(bytes) {
-            visible.extend_from_slice(&pixel[..channels]);
+        let (within, beyond) = out.split_at_mut(extent[0].min(width) * channels);
+        match (channels, spec.alpha) {
+            (_, false) => within.copy_from_slice(&row[..within.len()]),
+            (1, true) => channels_of::<2, 1>(row, within),
+            (_, true) => channels_of::<4, 3>(row, within),
         }
-        for _ in extent[0]..width {
-            visible.extend_from_slice(&row[row.len() - bytes..][..channels]);
+        let last = &row[row.len() - bytes..][..channels];
+        for pixel in beyond.chunks_exact_mut(channels) {
+            pixel.copy_from_slice(last);
         }
     }
     let mut stream = Vec::with_capacity(visible.len() / 4);
@@ -58,4 +62,11 @@ pub(super) fn encode(
         .encode(&visible, width as u16, height as u16, colour)
         .map_err(io::Error::other)?;
     Ok(stream)
+}
+
+/// The first `C` of the `B` samples of every pixel.
+fn channels_of<const B: usize, const C: usize>(row: &[u8], out: &mut [u8]) {
+    for (pixel, out) in row.chunks_exact(B).zip(out.chunks_exact_mut(C)) {
+        out.copy_from_slice(&pixel[..C]);
+    }
 }

@@ -47,7 +47,7 @@ impl Pyramid {
     /// Takes tiles of full resolution and hands on all that are complete by that: these, and overview tiles.
     ///
     /// # Errors
-    /// [`RasterError::Tile`]; then nothing was taken from the batch on from the tile named.
+    /// [`RasterError::Tile`]; the batch is lost then, and the picture will not be whole.
     pub(super) fn add(&mut self, batch: Vec<RasterTile>) -> Result<Vec<LevelTile>, RasterError> {
         for tile in &batch {
             self.take(tile)?;
