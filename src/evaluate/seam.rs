@@ -1,6 +1,6 @@
 //! How well the frames agree where they overlap, without any truth.
 
-use crate::render::{Canvas, FrameStack, Interpolation, Kernel, Placement, tiles};
+use crate::render::{Canvas, FrameStack, Interpolation, Kernel, Placement, EDGE, tiles};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -38,7 +38,7 @@ pub fn seam_residual(
     let grid = canvas.coarser(POINTS);
     let camera = frames.camera();
     let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
-    let bands = tiles(surface, &grid, placements);
+    let bands = tiles(surface, &grid, placements, EDGE);
     // Collected before they are added: the sum does not depend on the threads.
     let parts: Vec<Sums> = bands
         .par_iter()

@@ -1,6 +1,5 @@
 //! `covariance.csv`, read back.
 
-use super::covariance::Covariances;
 use nalgebra::Matrix6;
 use std::path::{Path, PathBuf};
 
@@ -27,7 +26,7 @@ pub enum CovarianceError {
     },
 }
 
-/// The covariances of the frames ([`Covariances::frames`]) in a file that [`Covariances::csv`] has written.
+/// The covariances of the frames ([`super::Covariances::frames`]) in a file that [`super::Covariances::csv`] has written.
 ///
 /// # Errors
 /// [`CovarianceError`]; other frames than 0 to `frames − 1` in their order.
@@ -71,6 +70,7 @@ pub fn read_covariances(path: &Path, frames: usize) -> Result<Vec<Matrix6<f64>>,
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::refine::Covariances;
 
     #[test]
     fn what_was_written_is_read() {

@@ -2,12 +2,11 @@
 
 use super::exposure::Exposure;
 use super::sample::{Sample, Samples};
-use super::seams::Seams;
+use super::seams::{Seams, Shares};
 use super::view::{Kernels, View};
 use super::warp::{Points, RUN, Run};
 use super::{Canvas, FrameStack, Placement, Tile};
 use crate::surface::Surface;
-use crate::vectors::wide;
 use serde::Serialize;
 
 /// Which frames a pixel of the panorama shows.
@@ -110,16 +109,13 @@ impl Scene<'_> {
             sources: Vec::with_capacity(tile.pixels()),
             run: Run::default(),
         };
-        wide(
-            #[inline(always)]
-            || match self.composition {
-                Composition::Seams(seams) => {
-                    brush.best_view(tile, &points, &views, seams, self.canvas);
-                }
-                Composition::Average => brush.average(tile, &points, &views),
-                Composition::Median => brush.median(tile, &points, &views),
-            },
-        );
+        match self.composition {
+            Composition::Seams(seams) => {
+                brush.best_view(tile, &points, &views, seams, self.canvas);
+            }
+            Composition::Average => brush.average(tile, &points, &views),
+            Composition::Median => brush.median(tile, &points, &views),
+        }
         Drawn {
             samples: brush.pixels.into(),
             sources: brush.sources,
@@ -141,6 +137,11 @@ impl Row {
         }
     }
 
+    fn clear(&mut self, count: usize) {
+        self.sums[..count].fill([0.0; 4]);
+        self.weights[..count].fill(0.0);
+    }
+
     #[inline(always)]
     fn add(&mut self, k: usize, value: &[f32; 4], w: f32) {
         for (sum, value) in self.sums[k].iter_mut().zip(value) {
@@ -160,21 +161,22 @@ struct Brush<T, const C: usize> {
 impl<T: Sample, const C: usize> Brush<T, C> {
     #[inline(always)]
     fn put(&mut self, value: Option<[f32; 4]>) {
-        match value {
-            Some(value) => {
-                self.pixels
-                    .extend((0..C).map(|c| T::nearest(value[c])));
-                self.pixels.push(T::nearest(T::WHITE));
+        // Colour and alpha, of which grey leaves out the middle two.
+        let mut pixel = [T::default(); 4];
+        if let Some(value) = value {
+            for (sample, value) in pixel.iter_mut().zip(&value[..C]) {
+                *sample = T::nearest(*value);
             }
-            None => self.pixels.extend((0..=C).map(|_| T::default())),
+            pixel[C] = T::nearest(T::WHITE);
         }
+        self.pixels.extend_from_slice(&pixel[..=C]);
     }
 
-    #[inline(always)]
     fn average(&mut self, tile: &Tile, points: &Points, views: &[View]) {
         let columns = tile.columns as usize;
+        let mut sums = Row::new();
         for row in 0..tile.rows as usize {
-            let mut sums = Row::new();
+            sums.clear(columns);
             for view in views {
                 view.look_at(&mut self.run, points, row * columns, columns);
                 let (u, v) = self.run.pixels();
@@ -193,7 +195,6 @@ impl<T: Sample, const C: usize> Brush<T, C> {
         }
     }
 
-    #[inline(always)]
     fn median(&mut self, tile: &Tile, points: &Points, views: &[View]) {
         let columns = tile.columns as usize;
         let mut stacks: Vec<Vec<[f32; 4]>> = vec![Vec::with_capacity(views.len()); columns];
@@ -224,7 +225,6 @@ impl<T: Sample, const C: usize> Brush<T, C> {
         }
     }
 
-    #[inline(always)]
     fn best_view(
         &mut self,
         tile: &Tile,
@@ -235,49 +235,50 @@ impl<T: Sample, const C: usize> Brush<T, C> {
     ) {
         let columns = tile.columns as usize;
         let places = seams.columns_of(canvas, tile);
+        let (mut shares, mut corrections) = (Shares::default(), Vec::new());
+        let mut sums = Row::new();
+        let mut best = [(0.0f32, NO_FRAME); RUN];
         for row in 0..tile.rows as usize {
             let start = row * columns;
-            let across = seams.row_of(canvas, tile.row + row as u32);
-            let mut sums = Row::new();
-            let mut best = [(0.0f32, NO_FRAME); RUN];
-            seams.shares(&places, &across, |frame, from, to, weights| {
-                let Ok(view) = views.binary_search_by_key(&frame, |view| view.frame) else {
-                    return;
+            let between = seams.row_of(canvas, tile.row + row as u32);
+            seams.shares(&places, &between, &mut shares);
+            seams.corrections(&places, &between, &mut corrections);
+            sums.clear(columns);
+            best[..columns].fill((0.0, NO_FRAME));
+            for (share, weights) in shares.iter() {
+                let Ok(view) = views.binary_search_by_key(&share.frame, |view| view.frame) else {
+                    continue;
                 };
-                views[view].look_at(&mut self.run, points, start + from, to - from);
-                for k in from..to {
-                    let w = weights[k - from];
-                    if w > 0.0 && self.run.seen()[k - from] {
-                        sums.add(k, &self.run.values()[k - from], w);
-                        if w > best[k].0 {
-                            best[k] = (w, frame as u32);
+                let (from, count) = (share.from, share.to - share.from);
+                views[view].look_at(&mut self.run, points, start + from, count);
+                let (seen, values) = (self.run.seen(), self.run.values());
+                for k in 0..count {
+                    let w = weights.map_or(1.0, |weights| weights[k]);
+                    if seen[k] && w > 0.0 {
+                        sums.add(from + k, &values[k], w);
+                        if w > best[from + k].0 {
+                            best[from + k] = (w, share.frame as u32);
                         }
                     }
                 }
-            });
+            }
             // At the edge of what is seen: frames that no node of the grid shows.
-            for view in views {
-                let holes = |k: &usize| sums.weights[*k] == 0.0;
-                let (Some(from), Some(last)) =
-                    ((0..columns).find(holes), (0..columns).rev().find(holes))
-                else {
-                    break;
-                };
-                view.look_at(&mut self.run, points, start + from, last + 1 - from);
-                for k in from..=last {
-                    if sums.weights[k] == 0.0 && self.run.seen()[k - from] {
-                        sums.add(k, &self.run.values()[k - from], 1.0);
-                        best[k] = (1.0, view.frame as u32);
+            if sums.weights[..columns].contains(&0.0) {
+                for view in views {
+                    view.look_at(&mut self.run, points, start, columns);
+                    for k in 0..columns {
+                        if sums.weights[k] == 0.0 && self.run.seen()[k] {
+                            sums.add(k, &self.run.values()[k], 1.0);
+                            best[k] = (1.0, view.frame as u32);
+                        }
                     }
                 }
             }
             for k in 0..columns {
                 let w = sums.weights[k];
-                let value = (w > 0.0).then(|| {
-                    let correction = seams.correction(&places[k], &across);
-                    std::array::from_fn(|c| sums.sums[k][c] / w + correction[c])
-                });
-                self.put(value);
+                let inverse = 1.0 / w;
+                let value = std::array::from_fn(|c| sums.sums[k][c] * inverse + corrections[k][c]);
+                self.put((w > 0.0).then_some(value));
                 self.sources.push(best[k].1);
             }
         }

@@ -159,21 +159,45 @@ pub struct Response<'a> {
 
 impl Response<'_> {
     /// Undoes it in the first `count` values of a run.
-    #[inline(always)]
     pub fn undo(&self, run: &mut Run, count: usize) {
         if self.shading.is_none() && self.gain == 1.0 && self.bias == 0.0 {
             return;
         }
-        let (u, v, values) = run.pixels_and_values();
-        for k in 0..count {
-            let light = self.shading.map_or(1.0, |table| table.at(u[k], v[k]));
-            let factor = self.gain * light;
-            for value in &mut values[k][..3] {
-                *value = (*value - self.bias) * factor;
+        let (u, v, seen, values) = run.parts();
+        let Some(table) = self.shading else {
+            for value in &mut values[..count] {
+                *value = self.undone(value, self.gain);
+            }
+            return;
+        };
+        // Light changes so slowly that it is looked up at the ends of short steps only.
+        for start in (0..count).step_by(STEP) {
+            let end = (start + STEP).min(count);
+            let last = end.min(count - 1);
+            if seen[start] && seen[last] {
+                let first = self.gain * table.at(u[start], v[start]);
+                let slope = (self.gain * table.at(u[last], v[last]) - first)
+                    / (last - start).max(1) as f32;
+                for k in start..end {
+                    let factor = first + (k - start) as f32 * slope;
+                    values[k] = self.undone(&values[k], factor);
+                }
+            } else {
+                for k in start..end {
+                    values[k] = self.undone(&values[k], self.gain * table.at(u[k], v[k]));
+                }
             }
         }
     }
+
+    #[inline(always)]
+    fn undone(&self, value: &[f32; 4], factor: f32) -> [f32; 4] {
+        value.map(|value| (value - self.bias) * factor)
+    }
 }
+
+/// Points of a run between which light is taken for linear.
+const STEP: usize = 8;
 
 /// Nodes of [`Table`] across and down.
 const NODES: (usize, usize) = (65, 49);

@@ -4,10 +4,10 @@ use super::kernel::{Interpolation, Kernel};
 use super::picture::luma;
 use super::thumbnails::Thumbnails;
 use super::warp::{Look, Points, Run};
-use super::{Canvas, Placement, Tile, tiles};
+use super::tiles::{EDGE, Tile, tiles};
+use super::{Canvas, Placement};
 use crate::frames::{SHADING_TERMS, shading_terms};
 use crate::surface::Surface;
-use crate::vectors::wide;
 use nalgebra::Vector2;
 use rayon::prelude::*;
 
@@ -40,7 +40,7 @@ pub fn glimpses(
     placements: &[Placement],
     grid: &Canvas,
 ) -> Vec<Vec<Glimpse>> {
-    let bands = tiles(surface, grid, placements);
+    let bands = tiles(surface, grid, placements, EDGE);
     let found: Vec<Vec<Vec<Glimpse>>> = bands
         .par_iter()
         .flatten()
@@ -68,13 +68,7 @@ fn of_tile(
         let white = picture.format().white();
         let colour = picture.format().channels == 3;
         for row in 0..tile.rows as usize {
-            wide(
-                #[inline(always)]
-                || {
-                    run.project(&look, &points, row * columns, columns);
-                    run.sample(picture, &bilinear, columns);
-                },
-            );
+            run.look(&look, picture, &bilinear, &points, row * columns, columns);
             let (u, v) = run.pixels();
             for k in 0..columns {
                 if !run.seen()[k] {

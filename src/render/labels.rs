@@ -20,9 +20,10 @@ use super::thumbnails::Thumbnails;
 use super::warp::{Look, Points, Run};
 use super::{Canvas, Exposure, Placement, Tile, tiles};
 use crate::surface::{Surface, WallFrame};
-use crate::vectors::wide;
 use rayon::prelude::*;
 
+/// Edge of a tile of nodes: what its frames show of them stays in the second-level cache.
+const TILE: u32 = 32;
 /// Frames that a node chooses among.
 const CHOICES: usize = 4;
 /// Times that all rows and columns are solved.
@@ -35,7 +36,9 @@ const RESOLUTION: f32 = 2.0;
 const EDGE: f32 = 2.0;
 /// ... which begins at this share of half its width or height from it.
 const EDGE_SHARE: f32 = 0.15;
-/// Cost of one σ beyond the first two from the median of all frames, ...
+/// Nodes to each side that are a node's surroundings.
+const AROUND: usize = 4;
+/// Cost of one σ beyond the first two that a frame is farther from the median of all frames than the nearest, ...
 const OUTLIER: f32 = 1.0;
 /// ... and of the most.
 const MOST_OUTLYING: f32 = 12.0;
@@ -80,7 +83,7 @@ pub fn best(
     let columns = grid.columns as usize;
     let mut labels: Vec<u32> = Vec::with_capacity(grid.pixels());
     // Band by band, each held to the one before.
-    for band in tiles(surface, grid, placements) {
+    for band in tiles(surface, grid, placements, TILE) {
         let parts: Vec<Vec<Choices>> = band
             .par_iter()
             .map(|tile| choices(surface, thumbnails, exposure, placements, grid, tile))
@@ -127,32 +130,48 @@ fn choices(
         .iter()
         .map(|frame| sights(thumbnails, exposure, placements, *frame, tile, &points, &walls))
         .collect();
+    // Node by node, in the order of the frames.
+    let mut seen: Vec<Vec<(usize, Sight)>> = vec![Vec::new(); walls.len()];
+    for (frame, sights) in tile.frames.iter().zip(&sights) {
+        for (seen, sight) in seen.iter_mut().zip(sights) {
+            if sight.fineness > 0.0 {
+                seen.push((*frame, *sight));
+            }
+        }
+    }
     let mut greys = Vec::new();
-    let mut found: Vec<Choice> = Vec::new();
-    (0..walls.len())
-        .map(|node| {
-            let seen = || {
-                let all = tile.frames.iter().zip(&sights);
-                all.filter_map(|(frame, sights)| Some((*frame, sights[node])).filter(|(_, s)| s.fineness > 0.0))
-            };
+    let middles: Vec<f32> = seen
+        .iter()
+        .map(|seen| {
             greys.clear();
-            greys.extend(seen().map(|(_, sight)| sight.grey));
-            let comparable = greys.len() > 2;
-            let middle = median(&mut greys);
-            let finest = seen().map(|(_, sight)| sight.fineness).fold(0.0, f32::max);
+            greys.extend(seen.iter().map(|(_, sight)| sight.grey));
+            median(&mut greys)
+        })
+        .collect();
+    let around = surroundings(&middles, tile.columns as usize);
+    let mut found: Vec<Choice> = Vec::new();
+    seen.iter()
+        .enumerate()
+        .map(|(node, seen)| {
+            let finest = seen.iter().map(|(_, sight)| sight.fineness).fold(0.0, f32::max);
+            // Of two that differ, neither is nearer to their median: what is around decides.
+            let usual = match seen.len() {
+                2 => around[node],
+                _ => middles[node],
+            };
+            let least = seen.iter().map(|(_, sight)| (sight.grey - usual).abs());
+            let least = least.fold(f32::INFINITY, f32::min);
             found.clear();
-            found.extend(seen().map(|(frame, sight)| {
+            found.extend(seen.iter().map(|(frame, sight)| {
                 let mut cost = RESOLUTION * (finest / sight.fineness).log2();
                 cost += EDGE * (1.0 - sight.inset / EDGE_SHARE).max(0.0);
-                if comparable {
-                    let off = ((sight.grey - middle).abs() / SIGMA - 2.0).max(0.0);
-                    cost += (OUTLIER * off).min(MOST_OUTLYING);
-                }
+                let off = ((sight.grey - usual).abs() - least) / SIGMA - 2.0;
+                cost += (OUTLIER * off.max(0.0)).min(MOST_OUTLYING);
                 if sight.raw > WHITE {
                     cost += CLIPPED;
                 }
                 Choice {
-                    frame: frame as u32,
+                    frame: *frame as u32,
                     cost,
                     grey: sight.grey,
                 }
@@ -160,6 +179,27 @@ fn choices(
             // Stable: of equals the earlier frame.
             found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
             std::array::from_fn(|k| found.get(k).copied().unwrap_or(NONE))
+        })
+        .collect()
+}
+
+/// Means of the values (those there are) in squares of [`AROUND`] nodes to each side.
+fn surroundings(values: &[f32], columns: usize) -> Vec<f32> {
+    let rows = values.len() / columns.max(1);
+    let near = |at: usize, size: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(size);
+    (0..values.len())
+        .map(|node| {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for row in near(node / columns, rows) {
+                for column in near(node % columns, columns) {
+                    let value = values[row * columns + column];
+                    if !value.is_nan() {
+                        sum += value;
+                        count += 1.0;
+                    }
+                }
+            }
+            sum / count
         })
         .collect()
 }
@@ -204,15 +244,9 @@ fn sights(
     let mut found = vec![Sight::default(); walls.len()];
     for row in 0..tile.rows as usize {
         let start = row * columns;
-        wide(
-            #[inline(always)]
-            || {
-                run.project(&look, points, start, columns);
-                run.sample(picture, &bilinear, columns);
-                raw = *run.values();
-                response.undo(&mut run, columns);
-            },
-        );
+        run.look(&look, picture, &bilinear, points, start, columns);
+        raw[..columns].copy_from_slice(&run.values()[..columns]);
+        response.undo(&mut run, columns);
         let (u, v) = run.pixels();
         for k in 0..columns {
             if !run.seen()[k] {

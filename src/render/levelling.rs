@@ -18,11 +18,10 @@ use super::thumbnails::Thumbnails;
 use super::warp::{Look, Points, RUN, Run};
 use super::{Canvas, Exposure, Placement};
 use crate::surface::Surface;
-use crate::vectors::wide;
 use rayon::prelude::*;
 
 /// Bands; the coarsest grid's nodes are `2^(BANDS − 1)` as far apart. The grid has a multiple of as many columns.
-pub const BANDS: usize = 5;
+pub const BANDS: usize = 4;
 /// Distance of the coarsest grid's nodes, in nodes of the finest.
 pub const COARSEST: u32 = 1 << (BANDS - 1);
 /// What is more different than this (grey levels of 255) is no light: something has moved, or glints.
@@ -187,7 +186,7 @@ fn windows(grid: &Canvas, labels: &[u32], frames: usize) -> Vec<(usize, Window)>
         bounds[2] = bounds[2].max(near);
         bounds[4] = bounds[4].max(row);
     }
-    let (edge, reach) = (i64::from(COARSEST), 3 * i64::from(COARSEST));
+    let (edge, reach) = (i64::from(COARSEST), 2 * i64::from(COARSEST));
     let window = |[_, left, right, top, bottom]: [i64; 5]| {
         let down = |at: i64| at.div_euclid(edge) * edge;
         let up = |at: i64| (at.div_euclid(edge) + 1) * edge;
@@ -263,14 +262,8 @@ fn shown(
     let mut run = Run::default();
     for start in (0..count).step_by(RUN) {
         let length = RUN.min(count - start);
-        wide(
-            #[inline(always)]
-            || {
-                run.project(&look, &points, start, length);
-                run.sample(picture, &bilinear, length);
-                response.undo(&mut run, length);
-            },
-        );
+        run.look(&look, picture, &bilinear, &points, start, length);
+        response.undo(&mut run, length);
         for k in 0..length {
             let value = run.values()[k];
             let seen = run.seen()[k];

@@ -3,10 +3,11 @@
 use super::draw::NO_FRAME;
 use super::locate::px_per_metre;
 use super::raster_target::georeference;
-use super::{Canvas, Layout, Placement, tiles};
+use super::tiles::{EDGE, tiles};
+use super::{Canvas, Layout, Placement};
 use crate::camera::Pinhole;
 use crate::raster::{
-    CogWriter, Compression, EDGE, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
+    CogWriter, Compression, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
 };
 use crate::surface::{Surface, wall_jacobian};
 use nalgebra::{Matrix2, Matrix6};
@@ -68,7 +69,7 @@ impl Map {
     ) -> Self {
         let columns = grid.columns as usize;
         let mut values = vec![f32::NAN; grid.pixels()];
-        for band in tiles(surface, grid, placements) {
+        for band in tiles(surface, grid, placements, EDGE) {
             let parts: Vec<Vec<f32>> = band
                 .par_iter()
                 .map(|tile| {
@@ -130,7 +131,7 @@ impl Map {
             georeference: Some(georeference(&self.grid, layout)),
         };
         let mut writer = CogWriter::begin(path, spec, Compression::Deflate)?;
-        let edge = EDGE as u32;
+        let edge = crate::raster::EDGE as u32;
         for row in 0..height.div_ceil(edge) {
             let tiles = (0..width.div_ceil(edge)).map(|column| {
                 let pixels = (0..edge * edge).flat_map(|k| {

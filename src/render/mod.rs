@@ -65,4 +65,4 @@ pub use stack::{FrameStack, level_for};
 pub(crate) use stitch::check_memory;
 pub use seams::Seams;
 pub use stitch::{LaidOut, Stitch, StitchOptions, lay_out, on_the_axis, render, stitch};
-pub(crate) use tiles::{Tile, tiles};
+pub(crate) use tiles::{EDGE, Tile, tiles};

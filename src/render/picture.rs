@@ -132,21 +132,23 @@ impl Picture {
         let (width, height, c) = (self.width >> level, self.height >> level, self.channels);
         let edge = 1 << level;
         let factor = scale / (edge * edge) as f32;
-        let mut sums = vec![0.0f32; width * c];
+        let mut sums = vec![0.0f32; width * edge * c];
         let mut data = Vec::with_capacity(width * height * c + 1);
         for y in 0..height {
             sums.fill(0.0);
+            // Down the columns first, side by side.
             for row in 0..edge {
                 let row = &samples[(y * edge + row) * self.width * c..][..width * edge * c];
-                for (block, sums) in row.chunks_exact(edge * c).zip(sums.chunks_exact_mut(c)) {
-                    for pixel in block.chunks_exact(c) {
-                        for (sum, sample) in sums.iter_mut().zip(pixel) {
-                            *sum += sample.value();
-                        }
-                    }
+                for (sum, sample) in sums.iter_mut().zip(row) {
+                    *sum += sample.value();
                 }
             }
-            data.extend(sums.iter().map(|sum| u16::nearest(factor * sum)));
+            for block in sums.chunks_exact(edge * c) {
+                for channel in 0..c {
+                    let sum: f32 = block.iter().skip(channel).step_by(c).sum();
+                    data.push(u16::nearest(factor * sum));
+                }
+            }
         }
         data
     }

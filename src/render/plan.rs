@@ -181,7 +181,7 @@ impl<'a> Plan<'a> {
         let end = (row + BAND_ROWS).min(self.canvas.rows);
         (row..end)
             .step_by(EDGE as usize)
-            .flat_map(|row| tiles_at(self.surface, &self.canvas, self.placements, row))
+            .flat_map(|row| tiles_at(self.surface, &self.canvas, self.placements, EDGE, row))
             .collect()
     }
 

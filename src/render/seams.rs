@@ -8,7 +8,6 @@ use super::draw::NO_FRAME;
 use super::labels;
 use super::levelling;
 use super::thumbnails::Thumbnails;
-use super::warp::RUN;
 use super::{Canvas, Exposure, Placement, Tile};
 use crate::surface::Surface;
 
@@ -39,7 +38,7 @@ pub struct Between {
 impl Seams {
     /// Finds the best frame for each node of `grid`, by thumbnails whose exposure is undone; with `blend`, also the
     /// correction. `white`: full scale of the frames.
-    pub fn find(
+    pub(super) fn find(
         surface: &dyn Surface,
         thumbnails: &Thumbnails,
         exposure: &Exposure,
@@ -74,7 +73,7 @@ impl Seams {
     }
 
     /// Memory of the grid while it is made, bytes a node.
-    pub fn bytes_per_node(channels: usize) -> u64 {
+    pub(super) fn bytes_per_node(channels: usize) -> u64 {
         // Labels; composite, corrections and those of the coarser grids.
         (4 + 4 * (channels + 3 * (channels + 1))) as u64
     }
@@ -84,26 +83,26 @@ impl Seams {
     }
 
     /// The frames that a tile may be drawn from, in their order.
-    pub fn frames_of(&self, canvas: &Canvas, tile: &Tile) -> Vec<usize> {
-        let columns = self.columns_of(canvas, tile);
-        let mut frames = Vec::new();
-        let mut rows: Vec<usize> = (tile.row..tile.row + tile.rows)
-            .flat_map(|row| {
-                let between = self.row_of(canvas, row);
-                [between.before, between.after]
-            })
+    pub(super) fn frames_of(&self, canvas: &Canvas, tile: &Tile) -> Vec<usize> {
+        let ends = |between: &[Between]| {
+            let mut nodes: Vec<usize> = between.iter().flat_map(|b| [b.before, b.after]).collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            nodes
+        };
+        let rows: Vec<Between> = (tile.row..tile.row + tile.rows)
+            .map(|row| self.row_of(canvas, row))
             .collect();
-        rows.dedup();
+        let columns = ends(&self.columns_of(canvas, tile));
+        let mut frames = Vec::new();
         let mut open = false;
-        for row in rows {
-            for between in &columns {
-                for column in [between.before, between.after] {
-                    match self.frame(row, column) {
-                        NO_FRAME => open = true,
-                        frame => {
-                            if frames.last() != Some(&(frame as usize)) {
-                                frames.push(frame as usize);
-                            }
+        for row in ends(&rows) {
+            for column in &columns {
+                match self.frame(row, *column) {
+                    NO_FRAME => open = true,
+                    frame => {
+                        if frames.last() != Some(&(frame as usize)) {
+                            frames.push(frame as usize);
                         }
                     }
                 }
@@ -119,7 +118,7 @@ impl Seams {
     }
 
     /// Where the columns of a tile lie between the nodes.
-    pub fn columns_of(&self, canvas: &Canvas, tile: &Tile) -> Vec<Between> {
+    pub(super) fn columns_of(&self, canvas: &Canvas, tile: &Tile) -> Vec<Between> {
         let count = self.grid.columns as usize;
         let scale = f64::from(self.grid.columns) / f64::from(canvas.columns);
         let between = |column: u32| {
@@ -137,7 +136,7 @@ impl Seams {
     }
 
     /// Where a row of the canvas lies between the nodes.
-    pub fn row_of(&self, canvas: &Canvas, row: u32) -> Between {
+    pub(super) fn row_of(&self, canvas: &Canvas, row: u32) -> Between {
         let last = self.grid.rows as usize - 1;
         let scale = self.grid.px_per_metre / canvas.px_per_metre;
         let at = ((f64::from(row) + 0.5) * scale - 0.5).max(0.0);
@@ -149,18 +148,11 @@ impl Seams {
         }
     }
 
-    /// Calls `draw(frame, from, to, weights)` for all frames that the columns `from..to` of a row are made of.
+    /// What the columns of a row are made of.
     ///
     /// Without blending each pixel is one frame's, the one with the largest weight.
-    #[inline(always)]
-    pub fn shares(
-        &self,
-        columns: &[Between],
-        row: &Between,
-        mut draw: impl FnMut(usize, usize, usize, &[f32]),
-    ) {
-        let ones = [1.0f32; RUN];
-        let mut run: Option<(u32, usize)> = None;
+    pub(super) fn shares(&self, columns: &[Between], row: &Between, shares: &mut Shares) {
+        shares.clear();
         let mut from = 0;
         while from < columns.len() {
             let cell = &columns[from];
@@ -174,97 +166,137 @@ impl Seams {
                 self.frame(row.after, cell.before),
                 self.frame(row.after, cell.after),
             ];
-            let uniform = corners.iter().all(|frame| *frame == corners[0]);
-            if let Some((frame, start)) = run
-                && !(uniform && corners[0] == frame)
-            {
-                draw(frame as usize, start, from, &ones);
-                run = None;
-            }
-            if uniform {
-                if run.is_none() && corners[0] != NO_FRAME {
-                    run = Some((corners[0], from));
-                }
-            } else {
-                self.mixed(&corners, &columns[from..to], row, from, &mut draw);
+            if corners.iter().any(|frame| *frame != corners[0]) {
+                self.mixed(&corners, &columns[from..to], row, from, shares);
+            } else if corners[0] != NO_FRAME {
+                shares.whole(corners[0] as usize, from, to);
             }
             from = to;
-        }
-        if let Some((frame, start)) = run {
-            draw(frame as usize, start, columns.len(), &ones);
         }
     }
 
     /// A cell with different frames at its corners.
-    #[inline(always)]
     fn mixed(
         &self,
         corners: &[u32; 4],
         columns: &[Between],
         row: &Between,
         from: usize,
-        draw: &mut impl FnMut(usize, usize, usize, &[f32]),
+        shares: &mut Shares,
     ) {
         let hard = self.corrections.is_empty();
         let mut frames = *corners;
         frames.sort_unstable();
-        let mut shares = [[0.0f32; RUN]; 4];
-        for (k, between) in columns.iter().enumerate() {
+        let weight = |between: &Between, frame: u32| {
             let (s, t) = (between.t, row.t);
-            let weights = [
-                (1.0 - s) * (1.0 - t),
-                s * (1.0 - t),
-                (1.0 - s) * t,
-                s * t,
-            ];
-            let mut best = 0;
-            for (n, frame) in frames.iter().enumerate() {
-                // Each frame once.
-                if *frame == NO_FRAME || n > 0 && frames[n - 1] == *frame {
-                    continue;
-                }
-                for (corner, w) in corners.iter().zip(weights) {
-                    if corner == frame {
-                        shares[n][k] += w;
-                    }
-                }
-                if shares[n][k] > shares[best][k] {
-                    best = n;
-                }
-            }
-            if hard {
-                for (n, share) in shares.iter_mut().enumerate() {
-                    share[k] = if n == best { 1.0 } else { 0.0 };
-                }
-            }
-        }
+            let weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t];
+            let own = corners.iter().zip(weights).filter(|(corner, _)| **corner == frame);
+            own.map(|(_, w)| w).sum::<f32>()
+        };
         for (n, frame) in frames.iter().enumerate() {
-            if *frame != NO_FRAME && (n == 0 || frames[n - 1] != *frame) {
-                draw(*frame as usize, from, from + columns.len(), &shares[n]);
+            // Each frame once.
+            if *frame == NO_FRAME || n > 0 && frames[n - 1] == *frame {
+                continue;
             }
+            let start = shares.weights.len();
+            shares.weights.extend(columns.iter().map(|between| {
+                let own = weight(between, *frame);
+                if !hard {
+                    return own;
+                }
+                // Of equals the earlier frame.
+                let beaten = frames.iter().any(|other| {
+                    let theirs = weight(between, *other);
+                    *other != NO_FRAME && (theirs > own || theirs == own && other < frame)
+                });
+                if beaten { 0.0 } else { 1.0 }
+            }));
+            shares.list.push(Share {
+                frame: *frame as usize,
+                from,
+                to: from + columns.len(),
+                weights: Some(start),
+            });
         }
     }
 
-    /// What is added to the values at a place.
-    #[inline(always)]
-    pub fn correction(&self, column: &Between, row: &Between) -> [f32; 4] {
-        let mut sum = [0.0; 4];
+    /// What is added to the values along a row, at each of its columns.
+    pub(super) fn corrections(&self, columns: &[Between], row: &Between, found: &mut Vec<[f32; 4]>) {
+        found.clear();
         if self.corrections.is_empty() {
-            return sum;
+            found.resize(columns.len(), [0.0; 4]);
+            return;
         }
-        let (s, t) = (column.t, row.t);
-        let corners = [
-            (row.before, column.before, (1.0 - s) * (1.0 - t)),
-            (row.before, column.after, s * (1.0 - t)),
-            (row.after, column.before, (1.0 - s) * t),
-            (row.after, column.after, s * t),
-        ];
-        for (i, j, w) in corners {
-            let node = (i * self.grid.columns as usize + j) * self.channels;
-            for (sum, value) in sum.iter_mut().zip(&self.corrections[node..][..self.channels]) {
-                *sum += w * value;
+        let node = |row: usize, column: usize| {
+            let first = (row * self.grid.columns as usize + column) * self.channels;
+            &self.corrections[first..][..self.channels]
+        };
+        let between = |column: usize| {
+            let mut value = [0.0; 4];
+            let ends = node(row.before, column).iter().zip(node(row.after, column));
+            for (value, (upper, lower)) in value.iter_mut().zip(ends) {
+                *value = upper + row.t * (lower - upper);
             }
+            value
+        };
+        let mut cell = usize::MAX;
+        let (mut left, mut right) = ([0.0; 4], [0.0; 4]);
+        for column in columns {
+            if column.before != cell {
+                cell = column.before;
+                (left, right) = (between(column.before), between(column.after));
+            }
+            found.push(std::array::from_fn(|c| left[c] + column.t * (right[c] - left[c])));
         }
-        sum
+    }
+}
+
+/// What a row of a tile is made of.
+#[derive(Debug, Default)]
+pub struct Shares {
+    list: Vec<Share>,
+    weights: Vec<f32>,
+}
+
+/// A frame's part in the columns `from..to`.
+#[derive(Clone, Copy, Debug)]
+pub struct Share {
+    /// The frame.
+    pub frame: usize,
+    /// First column.
+    pub from: usize,
+    /// The column after the last.
+    pub to: usize,
+    /// Where its weights begin; none where it is alone.
+    weights: Option<usize>,
+}
+
+impl Shares {
+    fn clear(&mut self) {
+        self.list.clear();
+        self.weights.clear();
+    }
+
+    /// Columns that are one frame's.
+    fn whole(&mut self, frame: usize, from: usize, to: usize) {
+        match self.list.last_mut() {
+            Some(last) if last.weights.is_none() && last.frame == frame && last.to == from => {
+                last.to = to;
+            }
+            _ => self.list.push(Share {
+                frame,
+                from,
+                to,
+                weights: None,
+            }),
+        }
+    }
+
+    /// All of them, each with its weights or none if it is alone.
+    pub fn iter(&self) -> impl Iterator<Item = (&Share, Option<&[f32]>)> {
+        self.list.iter().map(|share| {
+            let weights = share.weights.map(|start| &self.weights[start..][..share.to - share.from]);
+            (share, weights)
+        })
     }
 }

@@ -6,7 +6,7 @@ use crate::surface::{Footprint, Surface, WallPoint};
 use nalgebra::Vector3;
 
 /// Edge of a tile, pixels: a row is one run, and its wall points stay in the second-level cache.
-pub(super) const EDGE: u32 = RUN as u32;
+pub(crate) const EDGE: u32 = RUN as u32;
 
 /// A rectangle of the canvas.
 pub(crate) struct Tile {
@@ -47,16 +47,17 @@ impl Tile {
     }
 }
 
-/// The tiles of a canvas, in bands from the first row to the last, each band from the first column to the
-/// last.
+/// The tiles of a canvas, `edge` pixels (at most [`EDGE`]) wide and high, in bands from the first row to the last, each band
+/// from the first column to the last.
 pub(crate) fn tiles(
     surface: &dyn Surface,
     canvas: &Canvas,
     placements: &[Placement],
+    edge: u32,
 ) -> Vec<Vec<Tile>> {
     (0..canvas.rows)
-        .step_by(EDGE as usize)
-        .map(|row| tiles_at(surface, canvas, placements, row))
+        .step_by(edge as usize)
+        .map(|row| tiles_at(surface, canvas, placements, edge, row))
         .collect()
 }
 
@@ -65,11 +66,12 @@ pub(super) fn tiles_at(
     surface: &dyn Surface,
     canvas: &Canvas,
     placements: &[Placement],
+    edge: u32,
     row: u32,
 ) -> Vec<Tile> {
     let perimeter_m = surface.perimeter_m();
     let pixel_m = 1.0 / canvas.px_per_metre;
-    let rows = EDGE.min(canvas.rows - row);
+    let rows = edge.min(canvas.rows - row);
     let h_m = canvas.h_start_m + f64::from(row) * pixel_m;
     let frames_in = |s_m: f64, width_m: f64, among: &mut dyn Iterator<Item = usize>| {
         let tile = Footprint {
@@ -91,9 +93,9 @@ pub(super) fn tiles_at(
     };
     let in_band = frames_in(0.0, perimeter_m, &mut (0..placements.len()));
     (0..canvas.columns)
-        .step_by(EDGE as usize)
+        .step_by(edge as usize)
         .map(|column| {
-            let columns = EDGE.min(canvas.columns - column);
+            let columns = edge.min(canvas.columns - column);
             let s_m = f64::from(column) * pixel_m;
             let width_m = f64::from(columns) * pixel_m;
             Tile {
@@ -122,7 +124,7 @@ mod tests {
         let poses = spiral(12, 0.5, 30f64.to_radians());
         let placements = place(&circle, &camera, &poses).unwrap();
         let canvas = Canvas::of_placements(&circle, &placements, 40.0).unwrap();
-        let bands = tiles(&circle, &canvas, &placements);
+        let bands = tiles(&circle, &canvas, &placements, EDGE);
         let pixels: u32 = bands
             .iter()
             .flatten()

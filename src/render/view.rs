@@ -74,10 +74,8 @@ impl<'a> View<'a> {
     }
 
     /// Looks at `count` points from index `start`: where they appear, and the values there with the frame's exposure undone.
-    #[inline(always)]
     pub fn look_at(&self, run: &mut Run, points: &Points, start: usize, count: usize) {
-        run.project(&self.look, points, start, count);
-        run.sample(self.picture, self.kernel, count);
+        run.look(&self.look, self.picture, self.kernel, points, start, count);
         self.response.undo(run, count);
     }
 

@@ -5,6 +5,7 @@ use super::picture::Picture;
 use super::sample::{Sample, Samples};
 use crate::camera::Pinhole;
 use crate::trajectory::Pose;
+use crate::vectors::wide;
 use nalgebra::{Matrix3, Vector3};
 
 /// Most points of a run: all that is known of a run stays in the first-level cache.
@@ -24,13 +25,19 @@ impl Points {
     /// The points, in order, relative to the first.
     pub fn new(points: &[Vector3<f64>]) -> Self {
         let origin = points.first().copied().unwrap_or_default();
-        let axis = |k: usize| points.iter().map(|p| (p[k] - origin[k]) as f32).collect();
-        Self {
+        let mut all = Self {
             origin,
-            x: axis(0),
-            y: axis(1),
-            z: axis(2),
+            x: vec![0.0; points.len()],
+            y: vec![0.0; points.len()],
+            z: vec![0.0; points.len()],
+        };
+        let axes = all.x.iter_mut().zip(&mut all.y).zip(&mut all.z);
+        for (point, ((x, y), z)) in points.iter().zip(axes) {
+            *x = (point.x - origin.x) as f32;
+            *y = (point.y - origin.y) as f32;
+            *z = (point.z - origin.z) as f32;
         }
+        all
     }
 }
 
@@ -120,30 +127,59 @@ impl Default for Run {
 
 impl Run {
     /// Which of the points the frame shows.
+    #[inline(always)]
     pub fn seen(&self) -> &[bool; RUN] {
         &self.seen
     }
 
     /// The pixel coordinates of the points, u and v.
+    #[inline(always)]
     pub fn pixels(&self) -> (&[f32; RUN], &[f32; RUN]) {
         (&self.u, &self.v)
     }
 
     /// The values at the points that the frame shows.
+    #[inline(always)]
     pub fn values(&self) -> &[[f32; 4]; RUN] {
         &self.values
     }
 
-    /// The pixel coordinates, and the values to be changed.
-    pub fn pixels_and_values(
+    /// The pixel coordinates, which of them are seen, and the values to be changed.
+    #[inline(always)]
+    #[expect(clippy::type_complexity, reason = "parts of the run, side by side")]
+    pub fn parts(
         &mut self,
-    ) -> (&[f32; RUN], &[f32; RUN], &mut [[f32; 4]; RUN]) {
-        (&self.u, &self.v, &mut self.values)
+    ) -> (
+        &[f32; RUN],
+        &[f32; RUN],
+        &[bool; RUN],
+        &mut [[f32; 4]; RUN],
+    ) {
+        (&self.u, &self.v, &self.seen, &mut self.values)
+    }
+
+    /// Looks at `count` points from index `start`: where they appear, and the values there in the camera's picture.
+    pub fn look(
+        &mut self,
+        look: &Look,
+        picture: &Picture,
+        kernel: &Kernel,
+        points: &Points,
+        start: usize,
+        count: usize,
+    ) {
+        wide(
+            #[inline(always)]
+            || {
+                self.project(look, points, start, count);
+                self.sample(picture, kernel, count);
+            },
+        );
     }
 
     /// Finds the pixels of `count` points from index `start`.
     #[inline(always)]
-    pub fn project(&mut self, look: &Look, points: &Points, start: usize, count: usize) {
+    fn project(&mut self, look: &Look, points: &Points, start: usize, count: usize) {
         let (x, y, z) = (
             &points.x[start..][..count],
             &points.y[start..][..count],
@@ -161,7 +197,7 @@ impl Run {
 
     /// Looks up the values of the `count` points projected before.
     #[inline(always)]
-    pub fn sample(&mut self, picture: &Picture, kernel: &Kernel, count: usize) {
+    fn sample(&mut self, picture: &Picture, kernel: &Kernel, count: usize) {
         match (picture.samples(), picture.format().channels) {
             (Samples::Eight(samples), 1) => self.sample_of::<u8, 1>(picture, samples, kernel, count),
             (Samples::Eight(samples), _) => self.sample_of::<u8, 3>(picture, samples, kernel, count),
@@ -239,63 +275,64 @@ impl Run {
             if !self.inside[k] {
                 continue;
             }
-            let w_x = kernel.at(self.phases[0][k] as usize);
-            let w_y = kernel.at(self.phases[1][k] as usize);
-            let first = self.first[k] as usize;
+            let w_x = kernel.at(self.phases[0][k] as usize).first_chunk();
+            let w_y = kernel.at(self.phases[1][k] as usize).first_chunk();
+            // A kernel of N taps has N weights.
+            let (Some(w_x), Some(w_y)) = (w_x, w_y) else {
+                continue;
+            };
+            let own = &samples[self.first[k] as usize..];
             self.values[k] = if C == 1 {
-                [grey::<T, N>(samples, first, stride, w_x, w_y), 0.0, 0.0, 0.0]
+                [grey::<T, N>(own, stride, w_x, w_y), 0.0, 0.0, 0.0]
             } else {
-                colour::<T, N>(samples, first, stride, w_x, w_y)
+                colour::<T, N>(own, stride, w_x, w_y)
             };
         }
     }
 }
 
-/// The grey value under a kernel: down the columns first, side by side.
+/// The grey value under a kernel that begins with the first sample: down the columns first, side by side.
+///
+/// Arrays of fixed size, here and in [`colour`], are what the compiler makes vectors of.
 #[inline(always)]
 fn grey<T: Sample, const N: usize>(
     samples: &[T],
-    first: usize,
     stride: usize,
-    w_x: &[f32],
-    w_y: &[f32],
+    w_x: &[f32; N],
+    w_y: &[f32; N],
 ) -> f32 {
     let mut columns = [0.0f32; N];
-    for (j, w) in w_y[..N].iter().enumerate() {
-        let row = &samples[first + j * stride..][..N];
-        for (column, sample) in columns.iter_mut().zip(row) {
-            *column += w * sample.value();
+    for (j, w) in w_y.iter().enumerate() {
+        if let Some(row) = samples[j * stride..].first_chunk::<N>() {
+            columns = std::array::from_fn(|k| columns[k] + w * row[k].value());
         }
     }
     let mut value = 0.0;
-    for (w, column) in w_x[..N].iter().zip(columns) {
+    for (w, column) in w_x.iter().zip(columns) {
         value += w * column;
     }
     value
 }
 
-/// The colour under a kernel. Pixels are read four samples wide; the fourth lane is the neighbour's and means nothing.
+/// The colour under a kernel that begins with the first sample. Pixels are read four samples wide; the fourth lane is the
+/// neighbour's and means nothing.
 #[inline(always)]
 fn colour<T: Sample, const N: usize>(
     samples: &[T],
-    first: usize,
     stride: usize,
-    w_x: &[f32],
-    w_y: &[f32],
+    w_x: &[f32; N],
+    w_y: &[f32; N],
 ) -> [f32; 4] {
     let mut value = [0.0f32; 4];
-    for (j, w_y) in w_y[..N].iter().enumerate() {
-        let row = &samples[first + j * stride..][..3 * N + 1];
+    for (j, w_y) in w_y.iter().enumerate() {
+        let row = &samples[j * stride..][..3 * N + 1];
         let mut sum = [0.0f32; 4];
-        for (k, w_x) in w_x[..N].iter().enumerate() {
-            let pixel = &row[3 * k..3 * k + 4];
-            for (sum, sample) in sum.iter_mut().zip(pixel) {
-                *sum += w_x * sample.value();
+        for (k, w_x) in w_x.iter().enumerate() {
+            if let Some(pixel) = row[3 * k..].first_chunk::<4>() {
+                sum = std::array::from_fn(|c| sum[c] + w_x * pixel[c].value());
             }
         }
-        for (value, sum) in value.iter_mut().zip(sum) {
-            *value += w_y * sum;
-        }
+        value = std::array::from_fn(|c| value[c] + w_y * sum[c]);
     }
     value
 }
