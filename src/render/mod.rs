@@ -24,6 +24,7 @@ mod picture;
 mod placement;
 mod stack;
 mod stitch;
+pub mod super_resolve;
 mod tiles;
 
 pub use blend::render;
