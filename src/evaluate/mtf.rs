@@ -56,7 +56,10 @@ fn edge_spread(samples: impl IntoIterator<Item = (f64, f64)>, bin_m: f64) -> Opt
     }
     // The outermost bins are cut off.
     let inner = sums.get(1..sums.len() - 1)?;
-    inner.iter().map(|(sum, count)| (*count > 0.0).then(|| sum / count)).collect()
+    inner
+        .iter()
+        .map(|(sum, count)| (*count > 0.0).then(|| sum / count))
+        .collect()
 }
 
 /// Central differences under a Hann window.
@@ -68,7 +71,11 @@ fn line_spread(esf: &[f64]) -> Vec<f64> {
 }
 
 fn sinc(x: f64) -> f64 {
-    if x.abs() < 1e-9 { 1.0 } else { (PI * x).sin() / (PI * x) }
+    if x.abs() < 1e-9 {
+        1.0
+    } else {
+        (PI * x).sin() / (PI * x)
+    }
 }
 
 #[cfg(test)]
@@ -99,14 +106,17 @@ mod tests {
             // An approximation of the error function, good to 1.5e-7 (Abramowitz and Stegun, 7.1.26).
             let erf = |x: f64| {
                 let t = 1.0 / (1.0 + 0.3275911 * x.abs());
-                let tail = ((((1.061405429 * t - 1.453152027) * t + 1.421413741) * t - 0.284496736)
-                    * t
-                    + 0.254829592)
-                    * t
-                    * (-x * x).exp();
+                let tail =
+                    ((((1.061405429 * t - 1.453152027) * t + 1.421413741) * t - 0.284496736) * t
+                        + 0.254829592)
+                        * t
+                        * (-x * x).exp();
                 (1.0 - tail).copysign(x)
             };
-            let found = mtf50(samples(|d| 100.0 + 50.0 * erf(d / sigma_m / 2f64.sqrt())), PIXEL_M);
+            let found = mtf50(
+                samples(|d| 100.0 + 50.0 * erf(d / sigma_m / 2f64.sqrt())),
+                PIXEL_M,
+            );
             let expected = (2f64.ln() / 2.0).sqrt() / (PI * sigma_m);
             let found = found.unwrap();
             assert!((found / expected - 1.0).abs() < 0.03, "{found} {expected}");

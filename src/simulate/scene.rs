@@ -436,10 +436,15 @@ mod tests {
         // The first pixel's middle lies half a pixel off θ = 0.
         let wall = scene.wall(columns, 4, -2.0 * pixel_m);
         for (u, v) in [(0, 1), (2, 2), (3, 0)] {
-            let seen: f32 = (0..2).flat_map(|k| (0..2).map(move |l| (k, l)))
+            let seen: f32 = (0..2)
+                .flat_map(|k| (0..2).map(move |l| (k, l)))
                 .map(|(k, l)| 0.25 * frame.at(80 + u + k, 58 + v + l))
                 .sum();
-            assert!((wall.at(u, v) - seen).abs() < 1.0, "{} {seen}", wall.at(u, v));
+            assert!(
+                (wall.at(u, v) - seen).abs() < 1.0,
+                "{} {seen}",
+                wall.at(u, v)
+            );
         }
     }
 

@@ -17,7 +17,7 @@ const SQUARES: [f32; 2] = [72.0, 184.0];
 /// Squares in rows and columns, dark and bright in turn, each turned by 5°: slanted edges, as ISO 12233 measures
 /// sharpness by.
 pub(super) struct TargetWall {
-    perimeter_m: f64,
+    /// Distance from square to square along s, metres.
     pitch_s_m: f64,
 }
 
@@ -25,7 +25,6 @@ impl TargetWall {
     /// A wall of the given perimeter (metres).
     pub fn new(perimeter_m: f64) -> Self {
         Self {
-            perimeter_m,
             pitch_s_m: perimeter_m / squares_around(perimeter_m),
         }
     }
@@ -128,8 +127,13 @@ mod tests {
                 let h_m = edge.middle.h_m + f64::from(line) * texel_m;
                 wall.row(h_m, texel_m, &mut row);
                 for (k, value) in row.iter().enumerate() {
-                    let point = WallPoint { s_m: (k as f64 + 0.5) * texel_m, h_m };
-                    let Some(distance_m) = edge.distance_m(&point, perimeter_m) else { continue };
+                    let point = WallPoint {
+                        s_m: (k as f64 + 0.5) * texel_m,
+                        h_m,
+                    };
+                    let Some(distance_m) = edge.distance_m(&point, perimeter_m) else {
+                        continue;
+                    };
                     if distance_m.abs() > 1.2 * texel_m {
                         assert_eq!(*value == GROUND, distance_m > 0.0, "{edge:?} {point:?}");
                         seen += 1;

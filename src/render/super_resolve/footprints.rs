@@ -344,3 +344,96 @@ fn shares([from, to]: [f32; 2]) -> impl Iterator<Item = (usize, f32)> {
         (overlap > 0.0).then_some((cell, overlap * scale))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_wall::{TestWall, waves};
+
+    /// A region of 60 × 40 fine pixels that the fourth frame of the ring shows, across θ = 0 if asked for.
+    fn seen(across: bool) -> (TestWall, Canvas, Footprints, usize) {
+        let wall = TestWall::ring(waves);
+        let frame = if across { 0 } else { 3 };
+        let canvas = Canvas {
+            columns: 1738,
+            rows: 400,
+            px_per_metre: 1738.0 / wall.perimeter_m(),
+            h_start_m: -0.7,
+        };
+        let pose = wall.poses[frame];
+        let ray = pose.r_wc * wall.camera.ray(wall.camera.cx, wall.camera.cy);
+        let [column, row] = canvas.pixel_of(wall.circle.hit(&pose.t_wc, &ray).unwrap().wall);
+        let region = Region {
+            column: if across { -30 } else { column as i64 - 30 },
+            row: row as i64 - 20,
+            columns: 60,
+            rows: 40,
+        };
+        let view = View {
+            camera: &wall.camera,
+            pose: &pose,
+        };
+        let footprints = Footprints::new(&wall.circle, &canvas, region, &[view]);
+        (wall, canvas, footprints, frame)
+    }
+
+    /// Of a wall that grows evenly, a pixel reads what lies under its middle.
+    #[test]
+    fn a_footprint_is_centred_where_the_pixel_looks() {
+        for across in [false, true] {
+            let (wall, canvas, footprints, frame) = seen(across);
+            let (region, stencils) = (footprints.region, &footprints.views[0]);
+            assert!(stencils.len() > 300, "{}", stencils.len());
+            let read = |value: &dyn Fn(usize) -> f32| {
+                let (mut read, x) = (Vec::new(), (0..2400).map(value).collect::<Vec<f32>>());
+                stencils.read(&x, &mut read);
+                read
+            };
+            let ones = read(&|_| 1.0);
+            let [s, h] = [
+                read(&|k| (k % 60) as f32 + 0.5),
+                read(&|k| (k / 60) as f32 + 0.5),
+            ];
+            for (n, pixel) in stencils.pixels.iter().enumerate() {
+                let (u, v) = (f64::from(pixel % 160), f64::from(pixel / 160));
+                let pose = wall.poses[frame];
+                let hit = wall
+                    .circle
+                    .hit(&pose.t_wc, &(pose.r_wc * wall.camera.ray(u, v)));
+                let place = region.place(&canvas, &hit.unwrap().wall);
+                assert!((ones[n] - 1.0).abs() < 1e-5);
+                assert!((s[n] - place[0]).abs() < 1e-3 && (h[n] - place[1]).abs() < 1e-3);
+            }
+        }
+    }
+
+    /// `⟨W x, v⟩ = ⟨x, Wᵀ v⟩`; the normal matrix is `Wᵀ Ω W`, and its diagonal is its own.
+    #[test]
+    fn spreading_is_the_transpose_of_reading() {
+        let (_, _, footprints, _) = seen(false);
+        let stencils = &footprints.views[0];
+        let number = |k: usize| (12.9 * k as f32).sin();
+        let x: Vec<f32> = (0..2400).map(number).collect();
+        let mut read = Vec::new();
+        stencils.read(&x, &mut read);
+        let v: Vec<f32> = (0..stencils.len()).map(|k| number(k + 7).abs()).collect();
+        let dot =
+            |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum::<f64>();
+        let mut spread = vec![0.0; 2400];
+        stencils.spread(&v, &mut spread);
+        assert!((dot(&read, &v) - dot(&x, &spread)).abs() < 1e-3);
+        let normal = |x: &[f32]| {
+            let mut y = vec![0.0; 2400];
+            stencils.add_normal(&v, x, &mut y);
+            y
+        };
+        let squares: f64 = read.iter().zip(&v).map(|(r, v)| f64::from(r * r * v)).sum();
+        assert!((dot(&x, &normal(&x)) - squares).abs() < 1e-3);
+        let mut diagonal = vec![0.0; 2400];
+        stencils.add_diagonal(&v, &mut diagonal);
+        let unit: Vec<f32> = (0..2400)
+            .map(|k| if k == 1230 { 1.0 } else { 0.0 })
+            .collect();
+        assert!((normal(&unit)[1230] - diagonal[1230]).abs() < 1e-6);
+    }
+}

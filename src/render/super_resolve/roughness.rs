@@ -1,5 +1,6 @@
 //! What is known of a wall before a pixel is seen: how rough it is.
 
+use super::huber;
 use crate::vectors::wide;
 use std::f64::consts::PI;
 
@@ -13,6 +14,8 @@ const DIFFERENCES: [&[(usize, usize, f32)]; 5] = [
 ];
 /// Number of kinds of differences.
 pub const KINDS: usize = DIFFERENCES.len();
+/// Least weight of a difference.
+const LEAST_WEIGHT: f32 = 1e-4;
 /// Frequencies along each axis at which spectra are looked at.
 const FREQUENCIES: usize = 24;
 
@@ -30,7 +33,7 @@ pub struct Roughness {
 }
 
 impl Roughness {
-    /// For a raster of which the fine pixels `seen` are known to be anything.
+    /// For a raster; differences of what is not `seen` do not count. All strengths are 0.
     pub fn new(columns: usize, rows: usize, seen: &[bool]) -> Self {
         let weights = DIFFERENCES.map(|taps| {
             let mut weights = vec![0.0; columns * rows];
@@ -52,8 +55,13 @@ impl Roughness {
         }
     }
 
-    /// `D_i x`, at the first of each difference's pixels.
-    pub fn differences(&self, kind: usize, x: &[f32], out: &mut [f32]) {
+    /// Number of fine pixels.
+    pub fn pixels(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// Sets `out` to `D_i x`, at the first of each difference's pixels.
+    fn differences(&self, kind: usize, x: &[f32], out: &mut [f32]) {
         let taps = DIFFERENCES[kind];
         let [reach_s, reach_h] = reach(taps);
         out.fill(0.0);
@@ -73,6 +81,23 @@ impl Roughness {
                 }
             },
         );
+    }
+
+    /// Weighs each difference of x by Huber's loss, beyond `limit` of the robust standard deviation of its kind: where
+    /// the wall has an edge, it may.
+    pub fn weigh(&mut self, x: &[f32], limit: f32) {
+        let mut differences = vec![0.0; x.len()];
+        for kind in 0..KINDS {
+            self.differences(kind, x, &mut differences);
+            let weights = &mut self.weights[kind];
+            let seen = differences.iter().zip(weights.iter());
+            let sigma = huber::sigma(seen.filter(|(_, w)| **w > 0.0).map(|(d, _)| *d));
+            for (w, d) in weights.iter_mut().zip(&differences) {
+                if *w > 0.0 {
+                    *w = huber::weight(*d, limit * sigma).max(LEAST_WEIGHT);
+                }
+            }
+        }
     }
 
     /// `xᵀ D_iᵀ w_i D_i y` for each kind.
@@ -151,5 +176,74 @@ impl Roughness {
 
 /// Columns and rows from a difference's first pixel to its last.
 fn reach(taps: &[(usize, usize, f32)]) -> [usize; 2] {
-    taps.iter().fold([0, 0], |[s, h], tap| [s.max(tap.0), h.max(tap.1)])
+    taps.iter()
+        .fold([0, 0], |[s, h], tap| [s.max(tap.0), h.max(tap.1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn roughness() -> Roughness {
+        let seen: Vec<bool> = (0..63).map(|k| k != 40).collect();
+        let mut rough = Roughness::new(9, 7, &seen);
+        rough.strengths = [1.0, 2.0, 0.5, 3.0, 0.25];
+        rough
+    }
+
+    fn numbers(seed: f32) -> Vec<f32> {
+        (0..63).map(|k| (12.9 * k as f32 + seed).sin()).collect()
+    }
+
+    #[test]
+    fn the_matrix_is_that_of_the_quadratic_form_and_its_diagonal_is_its_own() {
+        let rough = roughness();
+        let (x, y) = (numbers(0.1), numbers(2.0));
+        let times = |x: &[f32]| {
+            let mut out = vec![0.0; 63];
+            rough.add_to(x, &mut vec![0.0; 63], &mut out);
+            out
+        };
+        let dot =
+            |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum::<f64>();
+        let products = rough.products(&x, &y);
+        let form: f64 = products
+            .iter()
+            .zip(rough.strengths)
+            .map(|(p, a)| a * p)
+            .sum();
+        assert!((dot(&y, &times(&x)) - form).abs() < 1e-4);
+        let mut diagonal = vec![0.0; 63];
+        rough.add_diagonal(&mut diagonal);
+        for k in [0, 13, 31, 40, 62] {
+            let unit: Vec<f32> = (0..63).map(|n| if n == k { 1.0 } else { 0.0 }).collect();
+            assert!((times(&unit)[k] - diagonal[k]).abs() < 1e-5);
+        }
+        assert_eq!(diagonal[40], 0.0);
+    }
+
+    #[test]
+    fn planes_and_edges_along_the_tunnel_are_smooth_to_the_differences_that_say_so() {
+        let rough = roughness();
+        let plane: Vec<f32> = (0..63)
+            .map(|k| (k % 9) as f32 - 2.0 * (k / 9) as f32)
+            .collect();
+        let edge: Vec<f32> = (0..63).map(|k| if k % 9 < 4 { 0.0 } else { 5.0 }).collect();
+        assert!(
+            rough.products(&plane, &plane)[2..]
+                .iter()
+                .all(|e| *e < 1e-6)
+        );
+        let energies = rough.products(&edge, &edge);
+        assert!(energies[0] > 100.0 && energies[4] == 0.0);
+        let mut soft = roughness();
+        soft.weigh(&edge, 1.5);
+        assert!(soft.products(&edge, &edge)[0] < 0.01 * energies[0]);
+    }
+
+    #[test]
+    fn shares_add_up() {
+        let rough = roughness();
+        assert!((rough.shares().iter().sum::<f64>() - 1.0).abs() < 1e-9);
+    }
 }

@@ -1,193 +1,161 @@
 //! The most likely fine pixels, given what frames show of them.
 
+use super::conjugate_gradients::conjugate_gradients;
 use super::footprints::Footprints;
+use super::observations::{Channel, Observations};
 use super::roughness::{KINDS, Roughness};
-use crate::frames::MAD_TO_SIGMA;
-use crate::vectors::wide;
 
-/// Rounds of solving and learning how rough the wall is.
+/// Fine pixels on every side of a tile that its region should reach beyond it.
+pub const MARGIN: usize = 8;
+/// Rounds of solving, weighing, and learning how rough the wall is.
 const ROUNDS: usize = 4;
 /// Steps of conjugate gradients a round.
 const STEPS: usize = 10;
-/// Huber's loss is quadratic up to this many σ.
-const HUBER: f32 = 2.0;
+/// Huber's losses are linear beyond so many σ: of pixels and of differences.
+const LIMITS: [f32; 2] = [2.0, 1.5];
+/// Least share of the residuals that is free of what was fitted to them.
+const LEAST_FREE: f64 = 0.05;
+/// Least share of the fine pixels that each kind of difference is learned from.
+const LEAST_LEARNED: f64 = 1e-3;
+/// Most that a round changes a strength by, up or down.
+const MOST_CHANGE: f64 = 10.0;
+/// Mean square of differences below which a wall has none, grey levels².
+const SMOOTH: f64 = 1e-6;
 
 impl Footprints {
-    /// TODO
-    pub fn solve(&self, values: &[&[f32]], noise: &[f32], start: &[f32]) -> Vec<f32> {
-        let mut problem = Problem::new(self, values, noise);
-        problem.solve(start)
-    }
-}
-
-struct Problem<'a> {
-    footprints: &'a Footprints,
-    /// Values over noise and noise precision of each view's pixels.
-    values: Vec<Vec<f32>>,
-    precision: Vec<Vec<f32>>,
-    omega: Vec<Vec<f32>>,
-    seen: Vec<bool>,
-}
-
-impl<'a> Problem<'a> {
-    fn new(footprints: &'a Footprints, values: &[&[f32]], noise: &[f32]) -> Self {
-        let pixels = footprints.region.pixels();
-        let mut weight = vec![0.0f32; pixels];
-        let (mut read, mut precisions) = (Vec::new(), Vec::new());
-        for ((stencils, values), noise) in footprints.views.iter().zip(values).zip(noise) {
-            let found: Vec<f32> = stencils.pixels.iter().map(|p| values[*p as usize]).collect();
-            let precision: Vec<f32> = found
-                .iter()
-                .map(|v| if v.is_finite() { 1.0 / (noise * noise) } else { 0.0 })
-                .collect();
-            let ones: Vec<f32> = precision.iter().map(|p| if *p > 0.0 { 1.0 } else { 0.0 }).collect();
-            stencils.spread(&ones, &mut weight);
-            read.push(found.iter().map(|v| if v.is_finite() { *v } else { 0.0 }).collect());
-            precisions.push(precision);
+    /// The most likely fine pixels of the region, row-major, for one channel.
+    ///
+    /// `channels`: that of each view's frame, in the order the views were given in. `start`: a panorama of the region,
+    /// row-major, NaN in its holes; what no pixel shows stays as it is there.
+    ///
+    /// Each round improves x by conjugate gradients, then finds the strengths `a_i` of the roughness under which the
+    /// pixels are most likely: of the fine pixels' n degrees of freedom
+    ///
+    /// ```text
+    /// γ_i = n E_f[a_i |D_i(f)|² P(f)] − a_i tr(A⁻¹ D_iᵀ w_i D_i),    a_i = γ_i/(xᵀ D_iᵀ w_i D_i x)
+    /// ```
+    ///
+    /// are determined by the pixels rather than by the prior and belong to kind i; A is the matrix of the normal equations,
+    /// and the trace is taken with one vector of random signs.
+    ///
+    /// The same input gives the same numbers; nothing runs in parallel.
+    ///
+    /// Sources: D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4(3), 1992; M. F. Hutchinson, "A stochastic
+    /// estimator of the trace of the influence matrix", Communications in Statistics 18, 1989.
+    ///
+    /// # Panics
+    /// If `start` has not the region's size, or a channel has fewer pixels than its camera.
+    pub fn super_resolve(&self, channels: &[Channel], start: &[f32]) -> Vec<f32> {
+        let region = self.region;
+        assert_eq!(start.len(), region.pixels(), "fine pixels to start from");
+        let mut observations = Observations::new(self, channels);
+        let seen = observations.seen();
+        let count = seen.iter().filter(|seen| **seen).count() as f64;
+        let observed = observations.count() as f64;
+        if count == 0.0 {
+            return start.to_vec();
         }
-        Self {
-            footprints,
-            values: read,
-            omega: precisions.clone(),
-            precision: precisions,
-            seen: weight.iter().map(|w| *w > 0.05).collect(),
-        }
-    }
-
-    fn solve(&mut self, start: &[f32]) -> Vec<f32> {
-        let region = self.footprints.region;
-        let n = region.pixels();
-        let known: Vec<f32> = start.iter().copied().filter(|v| v.is_finite()).collect();
-        let mean = known.iter().sum::<f32>() / known.len().max(1) as f32;
-        let mut x: Vec<f32> = start.iter().map(|v| if v.is_finite() { *v } else { mean }).collect();
-        let mut rough = Roughness::new(region.columns, region.rows, &self.seen);
-        let n_seen = self.seen.iter().filter(|s| **s).count() as f64;
+        let mut x = without_holes(start);
+        let mut rough = Roughness::new(region.columns, region.rows, &seen);
         let energies = rough.products(&x, &x);
-        for kind in 0..KINDS {
-            rough.strengths[kind] = n_seen / KINDS as f64 / energies[kind].max(1e-6 * n_seen);
-        }
-        let probe: Vec<f32> = (0..n).map(|k| {
-            let s = hash(k as u64);
-            if self.seen[k] { s } else { 0.0 }
-        }).collect();
-        let mut u = vec![0.0; n];
-        let mut scale = 1.0f32;
-        let observed: f64 = self.precision.iter().flatten().filter(|p| **p > 0.0).count() as f64;
-        let mut gamma_all = 0.0;
-        let debug = std::env::var("SR_DEBUG").is_ok();
-        let huber_prior: f32 = std::env::var("SR_HP").ok().and_then(|v| v.parse().ok()).unwrap_or(0.0);
-        let rounds: usize = std::env::var("SR_ROUNDS").ok().and_then(|v| v.parse().ok()).unwrap_or(ROUNDS);
-        let steps: usize = std::env::var("SR_STEPS").ok().and_then(|v| v.parse().ok()).unwrap_or(STEPS);
-        for round in 0..rounds {
-            if round > 0 {
-                let residuals = self.residuals(&x);
-                let mut all: Vec<f32> = residuals.iter().flatten().filter(|r| !r.is_nan()).map(|r| r.abs()).collect();
-                if all.is_empty() { break; }
-                let middle = all.len() / 2;
-                let mad = MAD_TO_SIGMA as f32 * *all.select_nth_unstable_by(middle, f32::total_cmp).1;
-                let left = (1.0 - gamma_all / observed).max(0.05) as f32;
-                scale = (mad * mad / left).max(1.0);
-                if debug { eprintln!("round {round}: mad {mad:.3} left {left:.3} scale {scale:.3} strengths {:?} gamma {gamma_all:.0} n {n_seen} obs {observed}", rough.strengths.map(|a| (1e4*a).round()/1e4)); }
-                let limit = HUBER * mad.max(left.sqrt());
-                for ((omega, precision), r) in self.omega.iter_mut().zip(&self.precision).zip(&residuals) {
-                    for ((o, p), r) in omega.iter_mut().zip(precision).zip(r) {
-                        *o = if *p > 0.0 { p / scale * (limit / r.abs()).min(1.0) } else { 0.0 };
-                    }
-                }
-                if huber_prior > 0.0 {
-                    let mut d = vec![0.0; n];
-                    for kind in 0..KINDS {
-                        rough.differences(kind, &x, &mut d);
-                        let w = &mut rough.weights[kind];
-                        let mut all: Vec<f32> = d.iter().zip(w.iter()).filter(|(_, w)| **w > 0.0).map(|(d, _)| d.abs()).collect();
-                        if all.is_empty() { continue; }
-                        let middle = all.len() / 2;
-                        let limit = huber_prior * MAD_TO_SIGMA as f32 * *all.select_nth_unstable_by(middle, f32::total_cmp).1;
-                        for (w, d) in w.iter_mut().zip(&d) {
-                            if *w > 0.0 { *w = (limit / d.abs()).min(1.0).max(1e-4); }
-                        }
-                    }
-                }
-            }
-            let mut right = vec![0.0; n];
-            for ((stencils, omega), values) in self.footprints.views.iter().zip(&self.omega).zip(&self.values) {
-                let weighted: Vec<f32> = omega.iter().zip(values).map(|(o, v)| o * v).collect();
-                stencils.spread(&weighted, &mut right);
-            }
-            self.improve(&rough, &right, steps, &mut x);
-            self.improve(&rough, &probe, steps, &mut u);
-            let (energies, traces, shares) = (rough.products(&x, &x), rough.products(&u, &probe), rough.shares());
-            gamma_all = 0.0;
-            for kind in 0..KINDS {
-                let a = rough.strengths[kind];
-                let gamma = (shares[kind] * n_seen - a * traces[kind]).max(1e-3 * n_seen);
-                gamma_all += gamma;
-                rough.strengths[kind] = (gamma / energies[kind].max(1e-9 * n_seen)).clamp(0.1 * a, 10.0 * a);
-            }
-        }
-        x.iter().zip(&self.seen).zip(start).map(|((x, seen), start)| if *seen { *x } else { *start }).collect()
-    }
-
-    fn residuals(&self, x: &[f32]) -> Vec<Vec<f32>> {
-        let views = self.footprints.views.iter().zip(&self.values).zip(&self.precision);
-        views.map(|((stencils, values), precision)| {
-            let mut read = Vec::new();
-            stencils.read(x, &mut read);
-            read.iter().zip(values).zip(precision).map(|((r, v), p)| if *p > 0.0 { (v - r) * p.sqrt() } else { f32::NAN }).collect()
-        }).collect()
-    }
-
-    fn improve(&self, rough: &Roughness, right: &[f32], steps: usize, x: &mut [f32]) {
-        let n = x.len();
-        let mut scratch = vec![0.0; n];
-        let mut times = |x: &[f32], y: &mut [f32]| {
-            y.fill(0.0);
-            for (stencils, omega) in self.footprints.views.iter().zip(&self.omega) {
-                wide(
-                    #[inline(always)]
-                    || stencils.add_normal(omega, x, y),
-                );
-            }
-            rough.add_to(x, &mut scratch, y);
-        };
-        let mut diagonal = vec![0.0; n];
-        for (stencils, omega) in self.footprints.views.iter().zip(&self.omega) {
-            stencils.add_diagonal(omega, &mut diagonal);
-        }
-        rough.add_diagonal(&mut diagonal);
-        for d in &mut diagonal {
-            *d = if *d > 0.0 { 1.0 / *d } else { 1.0 };
-        }
-        let mut product = vec![0.0; n];
-        times(x, &mut product);
-        let mut residual: Vec<f32> = right.iter().zip(&product).map(|(b, p)| b - p).collect();
-        let mut direction = vec![0.0f32; n];
-        let mut last = 0.0;
-        for step in 0..steps {
-            let rho: f64 = residual.iter().zip(&diagonal).map(|(r, d)| f64::from(r * r * d)).sum();
-            if rho <= 0.0 || !rho.is_finite() {
+        rough.strengths = energies.map(|energy| count / KINDS as f64 / energy.max(SMOOTH * count));
+        let signs = signs(&seen);
+        let mut inverse_signs = vec![0.0; x.len()];
+        for round in 0..ROUNDS {
+            let system = System::new(&observations, &rough);
+            system.improve(&observations.right(), &mut x);
+            if round + 1 == ROUNDS {
                 break;
             }
-            let beta = if step == 0 { 0.0 } else { (rho / last) as f32 };
-            last = rho;
-            for ((p, r), d) in direction.iter_mut().zip(&residual).zip(&diagonal) {
-                *p = d * r + beta * *p;
-            }
-            times(&direction, &mut product);
-            let curvature: f64 = direction.iter().zip(&product).map(|(p, q)| f64::from(p * q)).sum();
-            if curvature <= 0.0 { break; }
-            let alpha = (rho / curvature) as f32;
-            for k in 0..n {
-                x[k] += alpha * direction[k];
-                residual[k] -= alpha * product[k];
-            }
+            system.improve(&signs, &mut inverse_signs);
+            let determined = learn(&mut rough, count, &x, &signs, &inverse_signs);
+            let free = (1.0 - determined / observed).max(LEAST_FREE);
+            observations.weigh(&x, free as f32, LIMITS[0]);
+            rough.weigh(&x, LIMITS[1]);
         }
+        let found = x.iter().zip(&seen).zip(start);
+        found
+            .map(|((x, seen), start)| if *seen { *x } else { *start })
+            .collect()
     }
 }
 
-fn hash(k: u64) -> f32 {
-    let mut z = k.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    if (z ^ (z >> 31)) & 1 == 0 { 1.0 } else { -1.0 }
+/// The normal equations of one round.
+struct System<'a> {
+    observations: &'a Observations<'a>,
+    rough: &'a Roughness,
+    diagonal: Vec<f32>,
+}
+
+impl<'a> System<'a> {
+    fn new(observations: &'a Observations<'a>, rough: &'a Roughness) -> Self {
+        let mut diagonal = vec![0.0; rough.pixels()];
+        observations.add_diagonal(&mut diagonal);
+        rough.add_diagonal(&mut diagonal);
+        Self {
+            observations,
+            rough,
+            diagonal,
+        }
+    }
+
+    /// Brings x closer to `A⁻¹ right`.
+    fn improve(&self, right: &[f32], x: &mut [f32]) {
+        let mut scratch = vec![0.0; x.len()];
+        let times = |x: &[f32], y: &mut [f32]| {
+            y.fill(0.0);
+            self.observations.add_to(x, y);
+            self.rough.add_to(x, &mut scratch, y);
+        };
+        conjugate_gradients(times, &self.diagonal, right, STEPS, x);
+    }
+}
+
+/// Sets the strengths to `γ_i/(xᵀ D_iᵀ w_i D_i x)`; `Σ γ_i`.
+fn learn(
+    rough: &mut Roughness,
+    count: f64,
+    x: &[f32],
+    signs: &[f32],
+    inverse_signs: &[f32],
+) -> f64 {
+    let energies = rough.products(x, x);
+    let traces = rough.products(inverse_signs, signs);
+    let shares = rough.shares();
+    let mut determined = 0.0;
+    for kind in 0..KINDS {
+        let strength = rough.strengths[kind];
+        let gamma = shares[kind] * count - strength * traces[kind];
+        let gamma = gamma.max(LEAST_LEARNED * count);
+        determined += gamma;
+        rough.strengths[kind] = (gamma / energies[kind].max(SMOOTH * count))
+            .clamp(strength / MOST_CHANGE, strength * MOST_CHANGE);
+    }
+    determined
+}
+
+/// The panorama with the mean of what is known in its holes.
+fn without_holes(start: &[f32]) -> Vec<f32> {
+    let known = || start.iter().copied().filter(|v| v.is_finite());
+    let mean = known().sum::<f32>() / known().count().max(1) as f32;
+    start
+        .iter()
+        .map(|v| if v.is_finite() { *v } else { mean })
+        .collect()
+}
+
+/// A random sign for each fine pixel that is seen, 0 elsewhere.
+///
+/// Source: the finaliser of SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
+fn signs(seen: &[bool]) -> Vec<f32> {
+    let sign = |k: u64| {
+        let mut z = k.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        if (z ^ (z >> 31)) & 1 == 0 { 1.0 } else { -1.0 }
+    };
+    (0..)
+        .zip(seen)
+        .map(|(k, seen)| if *seen { sign(k) } else { 0.0 })
+        .collect()
 }
