@@ -103,9 +103,9 @@ impl Stencils {
         let mut spots = spots(surface, canvas, region, view);
         let most = |spots: &[Spot], axis| spots.iter().map(|spot| spot.span(axis)).max();
         let width = match most(&spots, 0).unwrap_or(1) {
-            ..=4 => 4,
-            ..=6 => 6,
-            ..=8 => 8,
+            0..=4 => 4,
+            5..=6 => 6,
+            7..=8 => 8,
             _ => REACH,
         };
         let height = most(&spots, 1).unwrap_or(1);
