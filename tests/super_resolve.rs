@@ -268,7 +268,7 @@ fn figures() {
     {
         for noise_grey in [0.0, 1.0, 2.0, 4.0] {
             let target = wall == Wall::Target;
-            if frames == 120 && noise_grey != 2.0 || target && noise_grey != 2.0 {
+            if noise_grey != 2.0 && (frames == 120 || target) {
                 continue;
             }
             let survey = Simulated::new(&SimulateOptions {
