@@ -315,6 +315,7 @@ fn window(
 
 /// Fills a pixel's stencil (all zeros before) whose first fine pixel is `corner`.
 fn fill(spot: &Spot, corner: [usize; 2], stencil: &mut [f32], width: usize) {
+    let height = stencil.len() / width;
     let weight = 1.0 / (PARTS * PARTS) as f32;
     let at = |k: usize| (k as f32 + 0.5) / PARTS as f32 - 0.5;
     let reach = [0, 1].map(|axis| spot.reach(axis) / PARTS as f32);
@@ -326,8 +327,8 @@ fn fill(spot: &Spot, corner: [usize; 2], stencil: &mut [f32], width: usize) {
                     + part_v * spot.sides[1][axis];
                 [middle - reach[axis], middle + reach[axis]]
             });
-            for (j, share_v) in shares(down) {
-                for (i, share_u) in shares(across) {
+            for (j, share_v) in shares(down, height) {
+                for (i, share_u) in shares(across, width) {
                     stencil[j * width + i] += weight * share_v * share_u;
                 }
             }
@@ -335,11 +336,11 @@ fn fill(spot: &Spot, corner: [usize; 2], stencil: &mut [f32], width: usize) {
     }
 }
 
-/// The unit cells that an interval meets, each with its share of it.
-fn shares([from, to]: [f32; 2]) -> impl Iterator<Item = (usize, f32)> {
-    let from = from.max(0.0);
+/// The unit cells that an interval meets, of the first so many (it ends there but for rounding), each with its share of it.
+fn shares([from, to]: [f32; 2], cells: usize) -> impl Iterator<Item = (usize, f32)> {
+    let (from, to) = (from.max(0.0), to.min(cells as f32));
     let scale = 1.0 / (to - from).max(f32::MIN_POSITIVE);
-    (from as usize..=to as usize).filter_map(move |cell| {
+    (from as usize..cells.min(to as usize + 1)).filter_map(move |cell| {
         let overlap = to.min(cell as f32 + 1.0) - from.max(cell as f32);
         (overlap > 0.0).then_some((cell, overlap * scale))
     })
@@ -377,7 +378,8 @@ mod tests {
         (wall, canvas, footprints, frame)
     }
 
-    /// Of a wall that grows evenly, a pixel reads what lies under its middle.
+    /// Of a wall that grows evenly, a pixel reads what lies under its middle, but for what a fine pixel is even in itself:
+    /// an eighth of a fine pixel over the pixel's width at the most.
     #[test]
     fn a_footprint_is_centred_where_the_pixel_looks() {
         for across in [false, true] {
@@ -402,7 +404,12 @@ mod tests {
                     .hit(&pose.t_wc, &(pose.r_wc * wall.camera.ray(u, v)));
                 let place = region.place(&canvas, &hit.unwrap().wall);
                 assert!((ones[n] - 1.0).abs() < 1e-5);
-                assert!((s[n] - place[0]).abs() < 1e-3 && (h[n] - place[1]).abs() < 1e-3);
+                assert!(
+                    (s[n] - place[0]).abs() < 0.06 && (h[n] - place[1]).abs() < 0.06,
+                    "{place:?}: {} {}",
+                    s[n],
+                    h[n]
+                );
             }
         }
     }
