@@ -116,6 +116,7 @@ impl ConvergeArguments {
                     WallArgument::Brick => SweepWall::Brick,
                     WallArgument::Concrete => SweepWall::Concrete,
                     WallArgument::TiledBrick => SweepWall::TiledBrick,
+                    WallArgument::Target => SweepWall::Target,
                 })
                 .collect(),
             seeds: self.seeds,

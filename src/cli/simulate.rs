@@ -151,6 +151,8 @@ pub enum WallArgument {
     Concrete,
     /// A tile of 8 × 6 bricks that repeats.
     TiledBrick,
+    /// Dark and bright squares on mid grey, turned by 5°: slanted edges, as ISO 12233 measures sharpness by.
+    Target,
 }
 
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
@@ -198,6 +200,7 @@ impl SimulateArguments {
             (None, WallArgument::Brick) => Wall::Brick,
             (None, WallArgument::Concrete) => Wall::Concrete,
             (None, WallArgument::TiledBrick) => Wall::TiledBrick,
+            (None, WallArgument::Target) => Wall::Target,
         };
         self.hardships.add_to(SimulateOptions {
             frames,

@@ -5,6 +5,7 @@
 //! | how far off are the poses? | [`trajectory_error()`], after removing the gauge |
 //! | how far off is each pixel on the wall? | [`wall_error()`] |
 //! | how like the true panorama is this one? | [`image_metrics()`] |
+//! | how fine is the detail that a panorama shows? | [`mtf50`] |
 //! | how well do the frames agree, without any truth? | [`seam_residual`] |
 //! | is the stated uncertainty true? | [`normalised_errors`] |
 //! | how much noise can the refinement take? | [`converge`] |
@@ -16,6 +17,7 @@ mod compare;
 pub mod converge;
 mod error;
 mod image_metrics;
+mod mtf;
 mod seam;
 mod spread;
 mod ssim;
@@ -28,6 +30,7 @@ pub use before_after::before_after;
 pub use compare::{CompareInput, Comparison, Panoramas, Scores, compare};
 pub use error::EvaluateError;
 pub use image_metrics::{ImageMetrics, image_metrics};
+pub use mtf::mtf50;
 pub use seam::{SeamResidual, seam_residual};
 pub use spread::Spread;
 pub use table::Row;

@@ -86,6 +86,12 @@ impl Scene<'_> {
     where
         Samples: From<Vec<T>>,
     {
+        if tile.frames.is_empty() {
+            return Drawn {
+                samples: vec![T::default(); tile.pixels() * (C + 1)].into(),
+                sources: vec![NO_FRAME; tile.pixels()],
+            };
+        }
         let points = Points::new(&tile.points(self.surface, self.canvas));
         let camera = self.frames.camera();
         let views = self.needed(tile).into_iter().filter_map(|frame| {

@@ -72,7 +72,7 @@ impl Kernel {
     /// The kernel of an interpolation, `stretch` (at least 1) times as wide as for a picture that is looked at pixel by
     /// pixel.
     ///
-    /// Weights are `k((x − t)/stretch)` normalised to a sum of 1, x the pixels and t the point. The nearest pixel is
+    /// Taps are 1, 2 or a multiple of 4, for the sake of vectors; those that are not needed weigh nothing. Weights are `k((x − t)/stretch)` normalised to a sum of 1, x the pixels and t the point. The nearest pixel is
     /// never stretched: it is for pictures that must stay what they are.
     pub fn new(interpolation: Interpolation, stretch: f64) -> Self {
         if interpolation == Interpolation::Nearest {
@@ -82,6 +82,7 @@ impl Kernel {
             };
         }
         let half = (interpolation.reach() * stretch.max(1.0) - 1e-9).ceil() as usize;
+        let half = if half > 1 { half.next_multiple_of(2) } else { half };
         let taps = 2 * half;
         let mut weights = Vec::with_capacity((PHASES + 1) * taps);
         for phase in 0..=PHASES {
@@ -151,7 +152,7 @@ mod tests {
         }
         assert_eq!(
             ALL.map(|interpolation| Kernel::new(interpolation, 1.0).taps()),
-            [1, 2, 4, 6]
+            [1, 2, 4, 8]
         );
     }
 

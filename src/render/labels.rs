@@ -25,9 +25,7 @@ use rayon::prelude::*;
 /// Edge of a tile of nodes: what its frames show of them stays in the second-level cache.
 const TILE: u32 = 32;
 /// Frames that a node chooses among.
-const CHOICES: usize = 4;
-/// Times that all rows and columns are solved.
-const ROUNDS: usize = 2;
+const CHOICES: usize = 3;
 /// Grey levels (of 255) that frames differ by without reason.
 const SIGMA: f32 = 2.0;
 /// Cost of half the resolution.
@@ -282,24 +280,22 @@ struct Lattice {
 }
 
 impl Lattice {
-    /// Solves rows and columns in turn; `above`: the frames of the row above, which stay.
+    /// Solves columns, then rows; `above`: the frames of the row above, which stay.
     fn settle(&mut self, above: Option<&[u32]>) {
         let (columns, rows) = (self.columns, self.choices.len() / self.columns.max(1));
-        for _ in 0..ROUNDS {
-            for parity in 0..2 {
-                let lines: Vec<Vec<usize>> = (parity..columns)
-                    .step_by(2)
-                    .map(|column| (0..rows).map(|row| row * columns + column).collect())
-                    .collect();
-                self.solve(&lines, above);
-            }
-            for parity in 0..2 {
-                let lines: Vec<Vec<usize>> = (parity..rows)
-                    .step_by(2)
-                    .map(|row| (row * columns..(row + 1) * columns).collect())
-                    .collect();
-                self.solve(&lines, above);
-            }
+        for parity in 0..2 {
+            let lines: Vec<Vec<usize>> = (parity..columns)
+                .step_by(2)
+                .map(|column| (0..rows).map(|row| row * columns + column).collect())
+                .collect();
+            self.solve(&lines, above);
+        }
+        for parity in 0..2 {
+            let lines: Vec<Vec<usize>> = (parity..rows)
+                .step_by(2)
+                .map(|row| (row * columns..(row + 1) * columns).collect())
+                .collect();
+            self.solve(&lines, above);
         }
     }
 

@@ -9,7 +9,7 @@ use crate::surface::Surface;
 use nalgebra::Vector2;
 
 /// Kernels are made for stretches of this step from 1 upwards.
-const STRETCH_STEP: f64 = 0.125;
+const STRETCH_STEP: f64 = 0.25;
 /// The widest kernel: frames are halved before they are more than twice as fine as the canvas, save where a camera stands
 /// much nearer to the wall than the others.
 const MOST_STRETCH: f64 = 4.0;

@@ -224,7 +224,8 @@ impl Run {
             1 => self.gather::<T, C, 1>(samples, stride, kernel, count),
             2 => self.gather::<T, C, 2>(samples, stride, kernel, count),
             4 => self.gather::<T, C, 4>(samples, stride, kernel, count),
-            6 => self.gather::<T, C, 6>(samples, stride, kernel, count),
+            8 => self.gather::<T, C, 8>(samples, stride, kernel, count),
+            12 => self.gather::<T, C, 12>(samples, stride, kernel, count),
             _ => self.inside[..count].fill(false),
         }
         for k in 0..count {

@@ -35,6 +35,7 @@ mod run;
 mod scene;
 mod sensor;
 mod spoil;
+mod target;
 mod wall;
 
 pub use bad_frames::{BadFrames, BadFramesError, Fault};
@@ -44,3 +45,4 @@ pub use options::{Light, SimulateOptions, Wall};
 pub use run::{Simulated, run};
 pub use scene::Scene;
 pub use sensor::Bits;
+pub use target::SlantedEdge;

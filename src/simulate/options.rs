@@ -17,6 +17,8 @@ pub enum Wall {
     Concrete,
     /// A tile of 8 × 6 bricks that repeats all over the tunnel: pictures of different places look alike.
     TiledBrick,
+    /// Dark and bright squares on mid grey, turned by 5° ([`super::SlantedEdge`]): a test target for sharpness.
+    Target,
     /// A picture that repeats all over the tunnel.
     Texture {
         /// The picture.

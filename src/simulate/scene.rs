@@ -17,6 +17,7 @@ use image::DynamicImage;
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// How far the wall reaches from a camera along the tunnel, radii.
@@ -27,6 +28,9 @@ const MOST_TEXELS: usize = 1 << 26;
 const TEXELS_PER_PIXEL: f64 = 3.0;
 /// Largest texel, metres: finer than the joints of bricks.
 const LARGEST_TEXEL_M: f64 = 0.004;
+
+/// Rows of [`Scene::wall`] that are painted at a time.
+const STRIP_ROWS: usize = 128;
 
 /// A tunnel with its camera on its way through.
 pub struct Scene {
@@ -142,6 +146,34 @@ impl Scene {
     pub fn render(&self, frame: usize) -> Option<DynamicImage> {
         let shown = self.options.bad_frames.shown(frame)?;
         Some(self.delivered(&self.band(self.reaches[shown]), shown))
+    }
+
+    /// The wall as it is, in the light that falls on it but without glints: `rows` rows of `columns` square pixels once
+    /// around from θ = 0, the first beginning at chainage `h_start_m` (metres). Each pixel is the mean of points spread
+    /// over its square, as many as over a frame's pixel, of the raster that frames are cast from.
+    pub fn wall(&self, columns: usize, rows: usize, h_start_m: f64) -> GreyImage {
+        let n = self.options.supersample as usize;
+        let pixel_m = TAU * self.options.radius_m / columns as f64;
+        let share = |k: usize| (k as f64 + 0.5) / n as f64;
+        let mut data = vec![0.0; columns * rows];
+        for (strip, pixels) in data.chunks_mut(columns * STRIP_ROWS).enumerate() {
+            let from_m = h_start_m + (strip * STRIP_ROWS) as f64 * pixel_m;
+            let band = self.band([from_m, from_m + STRIP_ROWS as f64 * pixel_m]);
+            let lines = pixels.par_chunks_mut(columns).enumerate();
+            lines.for_each(|(row, line)| {
+                for (column, pixel) in line.iter_mut().enumerate() {
+                    for down in 0..n {
+                        let h_m = from_m + (row as f64 + share(down)) * pixel_m;
+                        for across in 0..n {
+                            let theta = (column as f64 + share(across)) * TAU / columns as f64;
+                            *pixel += band.at(theta, h_m);
+                        }
+                    }
+                    *pixel /= (n * n) as f32;
+                }
+            });
+        }
+        GreyImage::new(columns, rows, data)
     }
 
     /// Runs of the frames that are there, each with the chainages that their pictures show, so short that a band of
@@ -386,6 +418,34 @@ mod tests {
         );
         let along = message(&jitter(40.0, 0.01));
         assert!(along.contains("along the tunnel"), "{along}");
+    }
+
+    /// Where a frame of a centred camera looks straight at the wall, its pixels are squares of the wall.
+    #[test]
+    fn the_wall_is_what_frames_show() {
+        let options = SimulateOptions {
+            wall: Wall::Concrete,
+            width: 161,
+            height: 121,
+            ..SimulateOptions::centred()
+        };
+        let scene = Scene::new(&options).unwrap();
+        let frame = scene.render_exact(0);
+        let columns = (TAU * scene.camera().fy).round() as usize;
+        let pixel_m = TAU * options.radius_m / columns as f64;
+        // The first pixel's middle lies half a pixel off θ = 0.
+        let wall = scene.wall(columns, 4, -2.0 * pixel_m);
+        for (u, v) in [(0, 1), (2, 2), (3, 0)] {
+            let seen: f32 = (0..2)
+                .flat_map(|k| (0..2).map(move |l| (k, l)))
+                .map(|(k, l)| 0.25 * frame.at(80 + u + k, 58 + v + l))
+                .sum();
+            assert!(
+                (wall.at(u, v) - seen).abs() < 1.0,
+                "{} {seen}",
+                wall.at(u, v)
+            );
+        }
     }
 
     /// The bright side faces θ = 0.

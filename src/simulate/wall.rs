@@ -3,6 +3,7 @@
 use super::brick::BrickWall;
 use super::concrete::ConcreteWall;
 use super::picture::PictureWall;
+use super::target::TargetWall;
 use super::{SimulateError, Wall};
 
 /// Grey levels of an evenly lit wall.
@@ -25,6 +26,7 @@ pub(super) fn texture(
         Wall::Brick => Box::new(BrickWall::unique(seed, perimeter_m)),
         Wall::TiledBrick => Box::new(BrickWall::tiled(seed, perimeter_m)),
         Wall::Concrete => Box::new(ConcreteWall::new(seed, perimeter_m)),
+        Wall::Target => Box::new(TargetWall::new(perimeter_m)),
         Wall::Texture { path, width_m } => {
             Box::new(PictureWall::open(path, *width_m, perimeter_m)?)
         }

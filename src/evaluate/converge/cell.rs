@@ -16,6 +16,8 @@ pub enum SweepWall {
     Concrete,
     /// [`Wall::TiledBrick`].
     TiledBrick,
+    /// [`Wall::Target`].
+    Target,
 }
 
 impl SweepWall {
@@ -25,6 +27,7 @@ impl SweepWall {
             Self::Brick => "brick",
             Self::Concrete => "concrete",
             Self::TiledBrick => "tiled-brick",
+            Self::Target => "target",
         }
     }
 }
@@ -35,6 +38,7 @@ impl From<SweepWall> for Wall {
             SweepWall::Brick => Self::Brick,
             SweepWall::Concrete => Self::Concrete,
             SweepWall::TiledBrick => Self::TiledBrick,
+            SweepWall::Target => Self::Target,
         }
     }
 }

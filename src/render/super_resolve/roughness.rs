@@ -1,0 +1,249 @@
+//! What is known of a wall before a pixel is seen: how rough it is.
+
+use super::huber;
+use crate::vectors::wide;
+use std::f64::consts::PI;
+
+/// Differences of neighbouring fine pixels: `∂s`, `∂h`, `∂ss`, `∂hh`, `∂sh`, each as (column, row, factor).
+const DIFFERENCES: [&[(usize, usize, f32)]; 5] = [
+    &[(0, 0, -1.0), (1, 0, 1.0)],
+    &[(0, 0, -1.0), (0, 1, 1.0)],
+    &[(0, 0, 1.0), (1, 0, -2.0), (2, 0, 1.0)],
+    &[(0, 0, 1.0), (0, 1, -2.0), (0, 2, 1.0)],
+    &[(0, 0, 1.0), (1, 0, -1.0), (0, 1, -1.0), (1, 1, 1.0)],
+];
+/// Number of kinds of differences.
+pub const KINDS: usize = DIFFERENCES.len();
+/// Least weight of a difference.
+const LEAST_WEIGHT: f32 = 1e-4;
+/// Frequencies along each axis at which spectra are looked at.
+const FREQUENCIES: usize = 24;
+
+/// The roughness of a raster, `Σ_i a_i Σ_n w_in (D_i x)_n²`: the negative logarithm (times two) of a Gaussian prior.
+///
+/// Its spectrum is `1/P(f) = Σ_i a_i |D_i(f)|²`: between first differences, the `1/f²` of natural scenes, second ones,
+/// the `1/f⁴` of smooth ones, and mixed ones, of walls whose edges run along and across the tunnel.
+pub struct Roughness {
+    columns: usize,
+    rows: usize,
+    /// `a`, grey levels⁻².
+    pub strengths: [f64; KINDS],
+    /// `w`, difference by difference, at the first of its fine pixels; 0 where one of them is not seen.
+    pub weights: [Vec<f32>; KINDS],
+}
+
+impl Roughness {
+    /// For a raster; differences of what is not `seen` do not count. All strengths are 0.
+    pub fn new(columns: usize, rows: usize, seen: &[bool]) -> Self {
+        let weights = DIFFERENCES.map(|taps| {
+            let mut weights = vec![0.0; columns * rows];
+            let [reach_s, reach_h] = reach(taps);
+            for row in 0..rows.saturating_sub(reach_h) {
+                for column in 0..columns.saturating_sub(reach_s) {
+                    let at = row * columns + column;
+                    let all = taps.iter().all(|(s, h, _)| seen[at + h * columns + s]);
+                    weights[at] = if all { 1.0 } else { 0.0 };
+                }
+            }
+            weights
+        });
+        Self {
+            columns,
+            rows,
+            strengths: [0.0; KINDS],
+            weights,
+        }
+    }
+
+    /// Number of fine pixels.
+    pub fn pixels(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// Sets `out` to `D_i x`, at the first of each difference's pixels.
+    fn differences(&self, kind: usize, x: &[f32], out: &mut [f32]) {
+        let taps = DIFFERENCES[kind];
+        let [reach_s, reach_h] = reach(taps);
+        out.fill(0.0);
+        let columns = self.columns.saturating_sub(reach_s);
+        wide(
+            #[inline(always)]
+            || {
+                for row in 0..self.rows.saturating_sub(reach_h) {
+                    let start = row * self.columns;
+                    for (s, h, factor) in taps {
+                        let from = start + h * self.columns + s;
+                        let source = &x[from..from + columns];
+                        for (out, x) in out[start..start + columns].iter_mut().zip(source) {
+                            *out += factor * x;
+                        }
+                    }
+                }
+            },
+        );
+    }
+
+    /// Weighs each difference of x by Huber's loss, beyond `limit` of the robust standard deviation of its kind: where
+    /// the wall has an edge, it may.
+    pub fn weigh(&mut self, x: &[f32], limit: f32) {
+        let mut differences = vec![0.0; x.len()];
+        for kind in 0..KINDS {
+            self.differences(kind, x, &mut differences);
+            let weights = &mut self.weights[kind];
+            let seen = differences.iter().zip(weights.iter());
+            let sigma = huber::sigma(seen.filter(|(_, w)| **w > 0.0).map(|(d, _)| *d));
+            for (w, d) in weights.iter_mut().zip(&differences) {
+                if *w > 0.0 {
+                    *w = huber::weight(*d, limit * sigma).max(LEAST_WEIGHT);
+                }
+            }
+        }
+    }
+
+    /// `xᵀ D_iᵀ w_i D_i y` for each kind.
+    pub fn products(&self, x: &[f32], y: &[f32]) -> [f64; KINDS] {
+        let mut d_x = vec![0.0; x.len()];
+        let mut d_y = vec![0.0; x.len()];
+        std::array::from_fn(|kind| {
+            self.differences(kind, x, &mut d_x);
+            self.differences(kind, y, &mut d_y);
+            let both = d_x.iter().zip(&d_y).zip(&self.weights[kind]);
+            both.map(|((x, y), w)| f64::from(w * x * y)).sum()
+        })
+    }
+
+    /// Adds `Σ_i a_i D_iᵀ w_i D_i x` to y; `scratch` has the raster's size.
+    pub fn add_to(&self, x: &[f32], scratch: &mut [f32], y: &mut [f32]) {
+        for (kind, taps) in DIFFERENCES.iter().enumerate() {
+            self.differences(kind, x, scratch);
+            let strength = self.strengths[kind] as f32;
+            let weights = &self.weights[kind];
+            let [reach_s, reach_h] = reach(taps);
+            let columns = self.columns.saturating_sub(reach_s);
+            wide(
+                #[inline(always)]
+                || {
+                    for (d, w) in scratch.iter_mut().zip(weights) {
+                        *d *= strength * w;
+                    }
+                    for row in 0..self.rows.saturating_sub(reach_h) {
+                        let start = row * self.columns;
+                        for (s, h, factor) in *taps {
+                            let to = start + h * self.columns + s;
+                            let target = &mut y[to..to + columns];
+                            for (y, d) in target.iter_mut().zip(&scratch[start..start + columns]) {
+                                *y += factor * d;
+                            }
+                        }
+                    }
+                },
+            );
+        }
+    }
+
+    /// Adds the diagonal of `Σ_i a_i D_iᵀ w_i D_i`.
+    pub fn add_diagonal(&self, y: &mut [f32]) {
+        for (kind, taps) in DIFFERENCES.iter().enumerate() {
+            let strength = self.strengths[kind] as f32;
+            for (at, w) in self.weights[kind].iter().enumerate() {
+                if *w > 0.0 {
+                    for (s, h, factor) in *taps {
+                        y[at + h * self.columns + s] += strength * w * factor * factor;
+                    }
+                }
+            }
+        }
+    }
+
+    /// The mean over all frequencies of each kind's share of `1/P(f)`.
+    pub fn shares(&self) -> [f64; KINDS] {
+        let mut shares = [0.0; KINDS];
+        let at = |k: usize| ((k as f64 + 0.5) / FREQUENCIES as f64) * PI;
+        for (k, l) in (0..FREQUENCIES).flat_map(|k| (0..FREQUENCIES).map(move |l| (k, l))) {
+            // |1 − exp(iω)|² along s and h.
+            let [s, h] = [at(k), at(l)].map(|omega| 2.0 - 2.0 * omega.cos());
+            let responses = [s, h, s * s, h * h, s * h];
+            let parts: [f64; KINDS] =
+                std::array::from_fn(|kind| self.strengths[kind] * responses[kind]);
+            let all: f64 = parts.iter().sum();
+            for (share, part) in shares.iter_mut().zip(parts) {
+                *share += part / all.max(f64::MIN_POSITIVE) / (FREQUENCIES * FREQUENCIES) as f64;
+            }
+        }
+        shares
+    }
+}
+
+/// Columns and rows from a difference's first pixel to its last.
+fn reach(taps: &[(usize, usize, f32)]) -> [usize; 2] {
+    taps.iter()
+        .fold([0, 0], |[s, h], tap| [s.max(tap.0), h.max(tap.1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn roughness() -> Roughness {
+        let seen: Vec<bool> = (0..63).map(|k| k != 40).collect();
+        let mut rough = Roughness::new(9, 7, &seen);
+        rough.strengths = [1.0, 2.0, 0.5, 3.0, 0.25];
+        rough
+    }
+
+    fn numbers(seed: f32) -> Vec<f32> {
+        (0..63).map(|k| (12.9 * k as f32 + seed).sin()).collect()
+    }
+
+    #[test]
+    fn the_matrix_is_that_of_the_quadratic_form_and_its_diagonal_is_its_own() {
+        let rough = roughness();
+        let (x, y) = (numbers(0.1), numbers(2.0));
+        let times = |x: &[f32]| {
+            let mut out = vec![0.0; 63];
+            rough.add_to(x, &mut vec![0.0; 63], &mut out);
+            out
+        };
+        let dot =
+            |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum::<f64>();
+        let products = rough.products(&x, &y);
+        let form: f64 = products
+            .iter()
+            .zip(rough.strengths)
+            .map(|(p, a)| a * p)
+            .sum();
+        assert!((dot(&y, &times(&x)) - form).abs() < 1e-4);
+        let mut diagonal = vec![0.0; 63];
+        rough.add_diagonal(&mut diagonal);
+        for k in [0, 13, 31, 40, 62] {
+            let unit: Vec<f32> = (0..63).map(|n| if n == k { 1.0 } else { 0.0 }).collect();
+            assert!((times(&unit)[k] - diagonal[k]).abs() < 1e-5);
+        }
+        assert_eq!(diagonal[40], 0.0);
+    }
+
+    #[test]
+    fn planes_and_edges_along_the_tunnel_are_smooth_to_the_differences_that_say_so() {
+        let rough = roughness();
+        let plane: Vec<f32> = (0..63)
+            .map(|k| (k % 9) as f32 - 2.0 * (k / 9) as f32)
+            .collect();
+        let edge: Vec<f32> = (0..63).map(|k| if k % 9 < 4 { 0.0 } else { 5.0 }).collect();
+        assert!(
+            rough.products(&plane, &plane)[2..]
+                .iter()
+                .all(|e| *e < 1e-6)
+        );
+        let energies = rough.products(&edge, &edge);
+        assert!(energies[0] > 100.0 && energies[4] == 0.0);
+        let mut soft = roughness();
+        soft.weigh(&edge, 1.5);
+        assert!(soft.products(&edge, &edge)[0] < 0.01 * energies[0]);
+    }
+
+    #[test]
+    fn shares_add_up() {
+        let rough = roughness();
+        assert!((rough.shares().iter().sum::<f64>() - 1.0).abs() < 1e-9);
+    }
+}
