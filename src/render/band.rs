@@ -1,6 +1,7 @@
 //! The panorama as it is drawn: band by band, and who takes it.
 
-use super::draw::Drawn;
+use super::draw::{Drawn, NO_FRAME};
+use super::plan::BAND_ROWS;
 use super::sample::{Sample, Samples};
 use super::{Canvas, PixelFormat, RenderError, Tile};
 
@@ -15,7 +16,7 @@ pub struct Band {
     pub format: PixelFormat,
     /// The pixels, row-major over all columns, alpha last: full where some frame sees the wall, 0 in holes.
     pub samples: Samples,
-    /// The frame that each pixel shows most of; [`super::NO_FRAME`] in holes and where frames are mixed everywhere.
+    /// The frame that each pixel shows most of; [`NO_FRAME`] in holes and where frames are mixed everywhere.
     pub sources: Vec<u32>,
 }
 
@@ -29,20 +30,32 @@ pub trait Target {
 }
 
 impl Band {
-    /// A band without anything in it.
-    pub(super) fn empty(canvas: &Canvas, row: u32, rows: u32, format: PixelFormat) -> Self {
-        let pixels = canvas.columns as usize * rows as usize;
-        let count = pixels * (format.channels + 1);
+    /// A band without rows.
+    pub(super) fn empty(canvas: &Canvas, format: PixelFormat) -> Self {
+        let most = canvas.columns as usize * BAND_ROWS.min(canvas.rows) as usize;
+        let count = most * (format.channels + 1);
         Self {
-            row,
-            rows,
+            row: 0,
+            rows: 0,
             format,
             samples: match format.deep {
-                true => Samples::Sixteen(vec![0; count]),
-                false => Samples::Eight(vec![0; count]),
+                true => Samples::Sixteen(Vec::with_capacity(count)),
+                false => Samples::Eight(Vec::with_capacity(count)),
             },
-            sources: vec![super::NO_FRAME; pixels],
+            sources: Vec::with_capacity(most),
         }
+    }
+
+    /// Makes it the band of other rows, in which all tiles are still to be put.
+    pub(super) fn begin(&mut self, canvas: &Canvas, row: u32, rows: u32) {
+        (self.row, self.rows) = (row, rows);
+        let pixels = canvas.columns as usize * rows as usize;
+        let count = pixels * (self.format.channels + 1);
+        match &mut self.samples {
+            Samples::Eight(samples) => samples.resize(count, 0),
+            Samples::Sixteen(samples) => samples.resize(count, 0),
+        }
+        self.sources.resize(pixels, NO_FRAME);
     }
 
     /// Puts a tile into its place.

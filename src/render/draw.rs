@@ -7,6 +7,7 @@ use super::view::{Kernels, View};
 use super::warp::{Points, RUN, Run};
 use super::{Canvas, FrameStack, Placement, Tile};
 use crate::surface::Surface;
+use nalgebra::Vector3;
 use serde::Serialize;
 
 /// Which frames a pixel of the panorama shows.
@@ -54,6 +55,16 @@ pub enum Composition<'a> {
 /// No frame, in a map of frames.
 pub const NO_FRAME: u32 = u32::MAX;
 
+/// What drawing a tile needs for a while: made once a thread, since fresh memory costs as much as the work in it.
+#[derive(Default)]
+pub struct Scratch {
+    exact: Vec<Vector3<f64>>,
+    points: Points,
+    run: Run,
+    shares: Shares,
+    corrections: Vec<[f32; 4]>,
+}
+
 /// A drawn tile.
 pub struct Drawn {
     /// Its pixels, row-major, alpha last: full where some frame sees the wall, 0 in holes.
@@ -64,13 +75,13 @@ pub struct Drawn {
 
 impl Scene<'_> {
     /// Draws a tile. The frames that it needs must be held ([`Scene::needed`]).
-    pub fn draw(&self, tile: &Tile) -> Drawn {
+    pub fn draw(&self, tile: &Tile, scratch: &mut Scratch) -> Drawn {
         let format = self.frames.format();
         match (format.channels, format.deep) {
-            (1, false) => self.draw_as::<u8, 1>(tile),
-            (_, false) => self.draw_as::<u8, 3>(tile),
-            (1, true) => self.draw_as::<u16, 1>(tile),
-            (_, true) => self.draw_as::<u16, 3>(tile),
+            (1, false) => self.draw_as::<u8, 1>(tile, scratch),
+            (_, false) => self.draw_as::<u8, 3>(tile, scratch),
+            (1, true) => self.draw_as::<u16, 1>(tile, scratch),
+            (_, true) => self.draw_as::<u16, 3>(tile, scratch),
         }
     }
 
@@ -82,7 +93,7 @@ impl Scene<'_> {
         }
     }
 
-    fn draw_as<T: Sample, const C: usize>(&self, tile: &Tile) -> Drawn
+    fn draw_as<T: Sample, const C: usize>(&self, tile: &Tile, scratch: &mut Scratch) -> Drawn
     where
         Samples: From<Vec<T>>,
     {
@@ -92,7 +103,15 @@ impl Scene<'_> {
                 sources: vec![NO_FRAME; tile.pixels()],
             };
         }
-        let points = Points::new(&tile.points(self.surface, self.canvas));
+        let Scratch {
+            exact,
+            points,
+            run,
+            shares,
+            corrections,
+        } = scratch;
+        tile.points_into(self.surface, self.canvas, exact);
+        points.set(exact);
         let camera = self.frames.camera();
         let views = self.needed(tile).into_iter().filter_map(|frame| {
             let picture = self.frames.picture(frame)?;
@@ -106,21 +125,22 @@ impl Scene<'_> {
                 self.exposure.of(frame),
                 self.canvas,
                 tile,
-                &points,
+                points,
             ))
         });
         let views: Vec<View> = views.collect();
-        let mut brush = Brush::<T, C> {
+        let mut brush = Brush::<'_, T, C> {
             pixels: Vec::with_capacity(tile.pixels() * (C + 1)),
             sources: Vec::with_capacity(tile.pixels()),
-            run: Run::default(),
+            run,
         };
         match self.composition {
             Composition::Seams(seams) => {
-                brush.best_view(tile, &points, &views, seams, self.canvas);
+                let row = (shares, corrections);
+                brush.best_view(tile, points, &views, seams, self.canvas, row);
             }
-            Composition::Average => brush.average(tile, &points, &views),
-            Composition::Median => brush.median(tile, &points, &views),
+            Composition::Average => brush.average(tile, points, &views),
+            Composition::Median => brush.median(tile, points, &views),
         }
         Drawn {
             samples: brush.pixels.into(),
@@ -158,13 +178,13 @@ impl Row {
 }
 
 /// Draws rows of a tile with `C` channels of `T`.
-struct Brush<T, const C: usize> {
+struct Brush<'a, T, const C: usize> {
     pixels: Vec<T>,
     sources: Vec<u32>,
-    run: Run,
+    run: &'a mut Run,
 }
 
-impl<T: Sample, const C: usize> Brush<T, C> {
+impl<T: Sample, const C: usize> Brush<'_, T, C> {
     #[inline(always)]
     fn put(&mut self, value: Option<[f32; 4]>) {
         // Colour and alpha, of which grey leaves out the middle two.
@@ -184,7 +204,7 @@ impl<T: Sample, const C: usize> Brush<T, C> {
         for row in 0..tile.rows as usize {
             sums.clear(columns);
             for view in views {
-                view.look_at(&mut self.run, points, row * columns, columns);
+                view.look_at(self.run, points, row * columns, columns);
                 let (u, v) = self.run.pixels();
                 for k in 0..columns {
                     if self.run.seen()[k] {
@@ -207,7 +227,7 @@ impl<T: Sample, const C: usize> Brush<T, C> {
         let mut values = Vec::with_capacity(views.len());
         for row in 0..tile.rows as usize {
             for view in views {
-                view.look_at(&mut self.run, points, row * columns, columns);
+                view.look_at(self.run, points, row * columns, columns);
                 for (k, stack) in stacks.iter_mut().enumerate() {
                     if self.run.seen()[k] {
                         stack.push(self.run.values()[k]);
@@ -238,17 +258,17 @@ impl<T: Sample, const C: usize> Brush<T, C> {
         views: &[View],
         seams: &Seams,
         canvas: &Canvas,
+        (shares, corrections): (&mut Shares, &mut Vec<[f32; 4]>),
     ) {
         let columns = tile.columns as usize;
         let places = seams.columns_of(canvas, tile);
-        let (mut shares, mut corrections) = (Shares::default(), Vec::new());
         let mut sums = Row::new();
         let mut best = [(0.0f32, NO_FRAME); RUN];
         for row in 0..tile.rows as usize {
             let start = row * columns;
             let between = seams.row_of(canvas, tile.row + row as u32);
-            seams.shares(&places, &between, &mut shares);
-            seams.corrections(&places, &between, &mut corrections);
+            seams.shares(&places, &between, shares);
+            seams.corrections(&places, &between, corrections);
             sums.clear(columns);
             best[..columns].fill((0.0, NO_FRAME));
             for (share, weights) in shares.iter() {
@@ -256,7 +276,7 @@ impl<T: Sample, const C: usize> Brush<T, C> {
                     continue;
                 };
                 let (from, count) = (share.from, share.to - share.from);
-                views[view].look_at(&mut self.run, points, start + from, count);
+                views[view].look_at(self.run, points, start + from, count);
                 let (seen, values) = (self.run.seen(), self.run.values());
                 for k in 0..count {
                     let w = weights.map_or(1.0, |weights| weights[k]);
@@ -271,7 +291,7 @@ impl<T: Sample, const C: usize> Brush<T, C> {
             // At the edge of what is seen: frames that no node of the grid shows.
             if sums.weights[..columns].contains(&0.0) {
                 for view in views {
-                    view.look_at(&mut self.run, points, start, columns);
+                    view.look_at(self.run, points, start, columns);
                     for k in 0..columns {
                         if sums.weights[k] == 0.0 && self.run.seen()[k] {
                             sums.add(k, &self.run.values()[k], 1.0);

@@ -159,7 +159,7 @@ pub fn gaps_csv(gaps: &[Gap]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::{NO_FRAME, PixelFormat, Samples};
+    use crate::render::{PixelFormat, Samples};
 
     const CANVAS: Canvas = Canvas {
         columns: 80,
@@ -175,8 +175,8 @@ mod tests {
         };
         let mut coverage = Coverage::new(&CANVAS);
         for row in [0, 32] {
-            let mut band = Band::empty(&CANVAS, row, 32, format);
-            band.sources.fill(NO_FRAME);
+            let mut band = Band::empty(&CANVAS, format);
+            band.begin(&CANVAS, row, 32);
             let samples = (0..32 * 80).flat_map(|at| {
                 let hole = hole(row as usize + at / 80, at % 80);
                 [9, if hole { 0 } else { u8::MAX }]

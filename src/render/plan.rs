@@ -2,7 +2,7 @@
 
 use super::band::{Band, Target};
 use super::budget::Budget;
-use super::draw::{Composition, Drawn, Mode, Scene};
+use super::draw::{Composition, Drawn, Mode, Scene, Scratch};
 use super::levelling::COARSEST;
 use super::seams::Seams;
 use super::thumbnails::Thumbnails;
@@ -158,6 +158,7 @@ impl<'a> Plan<'a> {
             .map(|row| self.needed(frames, &self.tiles(*row)))
             .collect();
         progress.start("panorama", starts.len());
+        let mut band = Band::empty(&self.canvas, frames.format());
         for (k, row) in starts.iter().enumerate() {
             let later: Vec<usize> = needs[k + 1..]
                 .iter()
@@ -166,7 +167,7 @@ impl<'a> Plan<'a> {
                 .copied()
                 .collect();
             frames.hold(&needs[k], &later, room)?;
-            let band = self.band(frames, *row);
+            self.fill(&mut band, frames, *row);
             for target in &mut *targets {
                 target.put(&self.canvas, &band)?;
             }
@@ -193,16 +194,20 @@ impl<'a> Plan<'a> {
         needed
     }
 
-    fn band(&self, frames: &FrameStack, row: u32) -> Band {
+    fn fill(&self, band: &mut Band, frames: &FrameStack, row: u32) {
         let scene = self.scene(frames);
         let tiles = self.tiles(row);
-        let drawn: Vec<Drawn> = tiles.par_iter().map(|tile| scene.draw(tile)).collect();
-        let rows = BAND_ROWS.min(self.canvas.rows - row);
-        let mut band = Band::empty(&self.canvas, row, rows, frames.format());
-        for (tile, drawn) in tiles.iter().zip(&drawn) {
-            band.put(&self.canvas, tile, drawn);
+        band.begin(&self.canvas, row, BAND_ROWS.min(self.canvas.rows - row));
+        // As many at once as keep all threads busy, and no more than stay in the cache until they are put in place.
+        for run in tiles.chunks(16 * rayon::current_num_threads().max(1)) {
+            let drawn: Vec<Drawn> = run
+                .par_iter()
+                .map_init(Scratch::default, |scratch, tile| scene.draw(tile, scratch))
+                .collect();
+            for (tile, drawn) in run.iter().zip(&drawn) {
+                band.put(&self.canvas, tile, drawn);
+            }
         }
-        band
     }
 
     fn scene<'b>(&'b self, frames: &'b FrameStack) -> Scene<'b> {

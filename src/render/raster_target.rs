@@ -8,6 +8,8 @@ use crate::raster::{
     CogWriter, Compression, DziFormat, DziWriter, EDGE, Georeference, Nodata, RasterError,
     RasterSpec, RasterTile, Reduce, SampleType, TileOrder,
 };
+use rayon::prelude::*;
+use std::borrow::Cow;
 use std::path::Path;
 
 /// What of a band goes into the file.
@@ -147,10 +149,10 @@ impl RasterTarget {
         }
     }
 
-    fn bytes(&self, band: &Band) -> Vec<u8> {
+    fn bytes<'b>(&self, band: &'b Band) -> Cow<'b, [u8]> {
         match self.layer {
             RasterLayer::Panorama => match &band.samples {
-                Samples::Eight(samples) => samples.clone(),
+                Samples::Eight(samples) => Cow::from(samples),
                 Samples::Sixteen(samples) => {
                     samples.iter().flat_map(|v| v.to_ne_bytes()).collect()
                 }
@@ -169,6 +171,7 @@ impl Target for RasterTarget {
         let pixels = self.bytes(band);
         let places = (canvas.columns as usize).div_ceil(EDGE);
         let tiles = (0..places)
+            .into_par_iter()
             .map(|place| self.tile(canvas, band, &pixels, place))
             .collect();
         match &mut self.writer {

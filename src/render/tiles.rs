@@ -37,13 +37,23 @@ impl Tile {
 
     /// The wall points of the pixels' centres, row-major, metres.
     pub fn points(&self, surface: &dyn Surface, canvas: &Canvas) -> Vec<Vector3<f64>> {
+        let mut points = Vec::new();
+        self.points_into(surface, canvas, &mut points);
+        points
+    }
+
+    /// The same, in `points`.
+    pub fn points_into(
+        &self,
+        surface: &dyn Surface,
+        canvas: &Canvas,
+        points: &mut Vec<Vector3<f64>>,
+    ) {
         let columns = self.column..self.column + self.columns;
         let s_m: Vec<f64> = columns.map(|column| canvas.wall(column, 0).s_m).collect();
         let rows = self.row..self.row + self.rows;
         let h_m: Vec<f64> = rows.map(|row| canvas.wall(0, row).h_m).collect();
-        let mut points = Vec::new();
-        surface.lattice(&s_m, &h_m, &mut points);
-        points
+        surface.lattice(&s_m, &h_m, points);
     }
 }
 

@@ -24,20 +24,24 @@ pub struct Points {
 impl Points {
     /// The points, in order, relative to the first.
     pub fn new(points: &[Vector3<f64>]) -> Self {
+        let mut all = Self::default();
+        all.set(points);
+        all
+    }
+
+    /// Puts other points in their place.
+    pub fn set(&mut self, points: &[Vector3<f64>]) {
         let origin = points.first().copied().unwrap_or_default();
-        let mut all = Self {
-            origin,
-            x: vec![0.0; points.len()],
-            y: vec![0.0; points.len()],
-            z: vec![0.0; points.len()],
-        };
-        let axes = all.x.iter_mut().zip(&mut all.y).zip(&mut all.z);
+        self.origin = origin;
+        for axis in [&mut self.x, &mut self.y, &mut self.z] {
+            axis.resize(points.len(), 0.0);
+        }
+        let axes = self.x.iter_mut().zip(&mut self.y).zip(&mut self.z);
         for (point, ((x, y), z)) in points.iter().zip(axes) {
             *x = (point.x - origin.x) as f32;
             *y = (point.y - origin.y) as f32;
             *z = (point.z - origin.z) as f32;
         }
-        all
     }
 }
 

@@ -1,0 +1,87 @@
+#!/usr/bin/env python3
+"""The warp against OpenCV's, in one run and with one thread each.
+
+Needs opencv-python-headless and numpy (PyPI) and a Rust toolchain. Runs `cargo bench --bench warp -- --json` and, before
+and after it, OpenCV's `remap` (RGB8, 1920 x 1080, ready-made float maps of the same cylinder) and its cylindrical
+`PyRotationWarper`; prints Mpx/s and the ratios.
+"""
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+
+import cv2
+import numpy as np
+
+WIDTH, HEIGHT, ROUNDS = 1920, 1080, 30
+THREADS = int(sys.argv[1]) if len(sys.argv) > 1 else 1
+
+
+def maps():
+    """Pixels of the frame for each pixel of the unrolled wall that it sees, at its own resolution."""
+    f = 0.5 * HEIGHT / np.tan(np.radians(30))
+    cx, cy = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
+    half = np.arctan(cx / f)
+    theta = np.arange(-half, half, 1 / f)
+    h = np.arange(-cy / f, cy / f, 1 / f)
+    theta, h = np.meshgrid(theta, h)
+    u = f * np.tan(theta) + cx
+    v = f * h / np.cos(theta) + cy
+    return u.astype(np.float32), v.astype(np.float32), f, (cx, cy)
+
+
+def speed(pixels, work):
+    times = []
+    for _ in range(ROUNDS):
+        since = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - since)
+    return pixels / statistics.median(times) / 1e6
+
+
+def opencv():
+    u, v, f, (cx, cy) = maps()
+    photo = np.random.default_rng(1).integers(0, 256, (HEIGHT, WIDTH, 3), dtype=np.uint8)
+    out = np.empty(u.shape + (3,), np.uint8)
+    found = {}
+    for name, flag in [("bilinear", cv2.INTER_LINEAR), ("bicubic", cv2.INTER_CUBIC), ("lanczos4", cv2.INTER_LANCZOS4)]:
+        found[f"remap {name}"] = speed(u.size, lambda: cv2.remap(photo, u, v, flag, dst=out))
+    warper = cv2.PyRotationWarper("cylindrical", f)
+    k = np.array([[f, 0, cx], [0, f, cy], [0, 0, 1]], np.float32)
+    r = np.eye(3, dtype=np.float32)
+    _, warped = warper.warp(photo, k, r, cv2.INTER_LINEAR, cv2.BORDER_CONSTANT)
+    pixels = warped.shape[0] * warped.shape[1]
+    found["PyRotationWarper bilinear"] = speed(
+        pixels, lambda: warper.warp(photo, k, r, cv2.INTER_LINEAR, cv2.BORDER_CONSTANT))
+    return found
+
+
+def ours():
+    environment = dict(os.environ, RAYON_NUM_THREADS=str(THREADS))
+    text = subprocess.run(["cargo", "bench", "--quiet", "--bench", "warp", "--", "--json"],
+                          env=environment, check=True, capture_output=True, text=True).stdout
+    return {row["what"]: row["mpx_per_s"] for row in map(json.loads, filter(None, text.splitlines()))}
+
+
+def main():
+    cv2.setNumThreads(THREADS)
+    before, own, after = opencv(), ours(), opencv()
+    theirs = {name: 0.5 * (before[name] + after[name]) for name in before}
+    print(f"{THREADS} thread(s), Mpx/s")
+    for name, value in {**theirs, **{f"tunnelstitch {k}": v for k, v in own.items()}}.items():
+        print(f"  {name:28} {value:10.1f}")
+    print("ratios")
+    for name, mine, other in [
+        ("bilinear / remap", "bilinear", "remap bilinear"),
+        ("bilinear / PyRotationWarper", "bilinear", "PyRotationWarper bilinear"),
+        ("bicubic / remap", "bicubic", "remap bicubic"),
+        ("lanczos3 / remap (lanczos4)", "lanczos3", "remap lanczos4"),
+    ]:
+        print(f"  {name:28} {own[mine] / theirs[other]:10.2f}")
+    print(f"  {'bilinear / copy':28} {own['bilinear'] / own['copy']:10.4f}")
+
+
+if __name__ == "__main__":
+    main()
