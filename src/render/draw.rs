@@ -153,6 +153,9 @@ impl Scene<'_> {
 struct Row {
     sums: [[f32; 4]; RUN],
     weights: [f32; RUN],
+    /// The largest weight so far, and whose it is.
+    largest: [f32; RUN],
+    sources: [u32; RUN],
 }
 
 impl Row {
@@ -160,20 +163,58 @@ impl Row {
         Self {
             sums: [[0.0; 4]; RUN],
             weights: [0.0; RUN],
+            largest: [0.0; RUN],
+            sources: [NO_FRAME; RUN],
         }
     }
 
     fn clear(&mut self, count: usize) {
         self.sums[..count].fill([0.0; 4]);
         self.weights[..count].fill(0.0);
+        self.largest[..count].fill(0.0);
+        self.sources[..count].fill(NO_FRAME);
     }
 
     #[inline(always)]
     fn add(&mut self, k: usize, value: &[f32; 4], w: f32) {
-        for (sum, value) in self.sums[k].iter_mut().zip(value) {
-            *sum += w * value;
-        }
+        let sum = &mut self.sums[k];
+        *sum = std::array::from_fn(|c| sum[c] + w * value[c]);
         self.weights[k] += w;
+    }
+
+    /// Columns from `from` that show nothing but a frame.
+    fn set(&mut self, run: &Run, frame: usize, from: usize, count: usize) {
+        self.sums[from..from + count].copy_from_slice(&run.values()[..count]);
+        let seen = run.seen()[..count].iter();
+        let columns = self.weights[from..].iter_mut().zip(&mut self.sources[from..]);
+        for (seen, (weight, source)) in seen.zip(columns) {
+            *weight = if *seen { 1.0 } else { 0.0 };
+            *source = if *seen { frame as u32 } else { NO_FRAME };
+        }
+    }
+
+    /// Columns from `from` that show a frame with some weight.
+    fn mix(&mut self, run: &Run, frame: usize, from: usize, weights: &[f32]) {
+        for (k, w) in weights.iter().enumerate() {
+            if run.seen()[k] && *w > 0.0 {
+                self.add(from + k, &run.values()[k], *w);
+                if *w > self.largest[from + k] {
+                    self.largest[from + k] = *w;
+                    self.sources[from + k] = frame as u32;
+                }
+            }
+        }
+    }
+
+    /// Columns that show nothing yet.
+    fn fill(&mut self, run: &Run, frame: usize, count: usize) {
+        for k in 0..count {
+            if self.weights[k] == 0.0 && run.seen()[k] {
+                self.sums[k] = run.values()[k];
+                self.weights[k] = 1.0;
+                self.sources[k] = frame as u32;
+            }
+        }
     }
 }
 
@@ -263,50 +304,38 @@ impl<T: Sample, const C: usize> Brush<'_, T, C> {
         let columns = tile.columns as usize;
         let places = seams.columns_of(canvas, tile);
         let mut sums = Row::new();
-        let mut best = [(0.0f32, NO_FRAME); RUN];
         for row in 0..tile.rows as usize {
             let start = row * columns;
             let between = seams.row_of(canvas, tile.row + row as u32);
             seams.shares(&places, &between, shares);
             seams.corrections(&places, &between, corrections);
             sums.clear(columns);
-            best[..columns].fill((0.0, NO_FRAME));
             for (share, weights) in shares.iter() {
                 let Ok(view) = views.binary_search_by_key(&share.frame, |view| view.frame) else {
                     continue;
                 };
                 let (from, count) = (share.from, share.to - share.from);
                 views[view].look_at(self.run, points, start + from, count);
-                let (seen, values) = (self.run.seen(), self.run.values());
-                for k in 0..count {
-                    let w = weights.map_or(1.0, |weights| weights[k]);
-                    if seen[k] && w > 0.0 {
-                        sums.add(from + k, &values[k], w);
-                        if w > best[from + k].0 {
-                            best[from + k] = (w, share.frame as u32);
-                        }
-                    }
+                match weights {
+                    Some(weights) => sums.mix(self.run, share.frame, from, weights),
+                    None => sums.set(self.run, share.frame, from, count),
                 }
             }
             // At the edge of what is seen: frames that no node of the grid shows.
             if sums.weights[..columns].contains(&0.0) {
                 for view in views {
                     view.look_at(self.run, points, start, columns);
-                    for k in 0..columns {
-                        if sums.weights[k] == 0.0 && self.run.seen()[k] {
-                            sums.add(k, &self.run.values()[k], 1.0);
-                            best[k] = (1.0, view.frame as u32);
-                        }
-                    }
+                    sums.fill(self.run, view.frame, columns);
                 }
             }
-            for k in 0..columns {
+            for (k, correction) in corrections.iter().enumerate() {
                 let w = sums.weights[k];
                 let inverse = 1.0 / w;
-                let value = std::array::from_fn(|c| sums.sums[k][c] * inverse + corrections[k][c]);
+                let sum = &sums.sums[k];
+                let value = std::array::from_fn(|c| sum[c] * inverse + correction[c]);
                 self.put((w > 0.0).then_some(value));
-                self.sources.push(best[k].1);
             }
+            self.sources.extend_from_slice(&sums.sources[..columns]);
         }
     }
 }

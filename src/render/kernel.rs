@@ -1,5 +1,6 @@
 //! Interpolation: the weights of the pixels around a point.
 
+use super::sample::WHOLE;
 use serde::Serialize;
 use std::f64::consts::PI;
 
@@ -58,6 +59,8 @@ fn sinc(x: f64) -> f64 {
 
 /// Steps from one pixel to the next for which weights are tabulated: 1/1024 px off at the most.
 const PHASES: usize = 512;
+/// The bits that hold a phase.
+const PHASE_BITS: u32 = 2 * PHASES as u32 - 1;
 
 /// The weights of an interpolation along one axis, tabulated, and stretched where the picture is finer than
 /// the canvas so that no pixel is left out (anti-aliasing).
@@ -113,7 +116,7 @@ impl Kernel {
     /// The tabulated phase of the fraction `t` in `[0, 1]` of a coordinate.
     #[inline(always)]
     pub fn phase(t: f32) -> i32 {
-        (t * PHASES as f32 + 0.5) as i32
+        ((t * PHASES as f32 + WHOLE).to_bits() & PHASE_BITS) as i32
     }
 
     /// The weights of a phase.

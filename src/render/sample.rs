@@ -12,6 +12,10 @@ pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + '
     fn nearest(value: f32) -> Self;
 }
 
+/// 2²³: added to a number from 0 to 2²³, it leaves the nearest whole number (of two equally near the even one) in the last bits of the
+/// sum. Unlike a cast, this is what vectors do well.
+pub const WHOLE: f32 = 8_388_608.0;
+
 impl Sample for u8 {
     const WHITE: f32 = 255.0;
 
@@ -22,7 +26,7 @@ impl Sample for u8 {
 
     #[inline(always)]
     fn nearest(value: f32) -> Self {
-        (value + 0.5) as Self
+        (value.clamp(0.0, Self::WHITE) + WHOLE).to_bits() as Self
     }
 }
 
@@ -36,7 +40,7 @@ impl Sample for u16 {
 
     #[inline(always)]
     fn nearest(value: f32) -> Self {
-        (value + 0.5) as Self
+        (value.clamp(0.0, Self::WHITE) + WHOLE).to_bits() as Self
     }
 }
 
@@ -81,5 +85,25 @@ impl From<Vec<u8>> for Samples {
 impl From<Vec<u16>> for Samples {
     fn from(samples: Vec<u16>) -> Self {
         Self::Sixteen(samples)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_sample_is_nearest_and_within_the_scale() {
+        for (value, eight, sixteen) in [
+            (-3.0, 0, 0),
+            (0.49, 0, 0),
+            (0.51, 1, 1),
+            (254.6, 255, 255),
+            (300.2, 255, 300),
+            (65534.7, 255, 65535),
+            (1e9, 255, 65535),
+        ] {
+            assert_eq!((u8::nearest(value), u16::nearest(value)), (eight, sixteen));
+        }
     }
 }

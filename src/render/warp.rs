@@ -2,7 +2,7 @@
 
 use super::kernel::Kernel;
 use super::picture::Picture;
-use super::sample::{Sample, Samples};
+use super::sample::{Sample, Samples, WHOLE};
 use crate::camera::Pinhole;
 use crate::trajectory::Pose;
 use crate::vectors::wide;
@@ -252,11 +252,10 @@ impl Run {
         let [across, down] = &mut self.phases;
         let (across, down) = (&mut across[..count], &mut down[..count]);
         for k in 0..count {
-            // Not below zero where seen, so that cutting is rounding down.
-            let (s, t) = (u[k] + rounding, v[k] + rounding);
-            let (x, y) = (s as i32, t as i32);
-            across[k] = Kernel::phase(s - x as f32);
-            down[k] = Kernel::phase(t - y as f32);
+            let (x, s) = whole(u[k] + rounding);
+            let (y, t) = whole(v[k] + rounding);
+            across[k] = Kernel::phase(s);
+            down[k] = Kernel::phase(t);
             let (left, top) = (x - before, y - before);
             inside[k] = seen[k]
                 & (left >= 0)
@@ -294,6 +293,14 @@ impl Run {
             };
         }
     }
+}
+
+/// A number from 0 to 2²² cut to the whole number below it, and what was cut off; anything for other numbers.
+#[inline(always)]
+fn whole(value: f32) -> (i32, f32) {
+    let nearest = (value + WHOLE) - WHOLE;
+    let below = if nearest > value { nearest - 1.0 } else { nearest };
+    (((below + WHOLE).to_bits() & 0x7f_ffff) as i32, value - below)
 }
 
 /// The grey value under a kernel that begins with the first sample: down the columns first, side by side.
@@ -340,4 +347,16 @@ fn colour<T: Sample, const N: usize>(
         value = std::array::from_fn(|c| value[c] + w_y * sum[c]);
     }
     value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_cut_to_the_whole_below() {
+        for (value, below, rest) in [(0.0, 0, 0.0), (0.75, 0, 0.75), (1.0, 1, 0.0), (4095.5, 4095, 0.5)] {
+            assert_eq!(whole(value), (below, rest));
+        }
+    }
 }
