@@ -47,6 +47,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             interpolation,
             mode: Mode::BestView,
             blend: false,
+            super_resolve: false,
         };
         let plan = Plan::new(&circle, &frames, &placements, &canvas, &options, 8.0, &Silent)?;
         let mut speeds = Vec::new();

@@ -108,6 +108,7 @@ pub fn compare_into(
             interpolation: picture.interpolation.into(),
             mode: Mode::Average,
             blend: false,
+            super_resolve: false,
         },
     };
     let (comparison, panoramas) = compare(&input, terminal)?;

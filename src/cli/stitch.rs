@@ -114,6 +114,10 @@ pub struct BlendArguments {
     /// --interpolation nearest every pixel is one of a frame, unchanged.
     #[arg(long)]
     pub no_blend: bool,
+    /// Solve for the wall from all frames that show it, 2 times as fine as any of them. Needs poses good to some hundredths of a
+    /// pixel (refine's), and takes microseconds per pixel and frame.
+    #[arg(long, value_name = "2", value_parser = clap::value_parser!(u8).range(2..=2), conflicts_with_all = ["no_blend", "mode"])]
+    pub super_resolve: Option<u8>,
 }
 
 /// Modes by name.
@@ -238,6 +242,7 @@ pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failu
             interpolation: arguments.picture.interpolation.into(),
             mode: arguments.blend.mode.into(),
             blend: !arguments.blend.no_blend,
+            super_resolve: arguments.blend.super_resolve.is_some(),
         },
         memory: arguments.memory,
     };

@@ -3,6 +3,7 @@
 use super::draw::{Drawn, NO_FRAME};
 use super::plan::BAND_ROWS;
 use super::sample::{Sample, Samples};
+use super::super_resolve::Region;
 use super::{Canvas, PixelFormat, RenderError, Tile};
 
 /// A stretch of the canvas, all around and some rows along.
@@ -75,6 +76,45 @@ impl Band {
         place.copy(&mut self.sources, &drawn.sources, 1);
     }
 
+    /// One channel of a region, grey levels of 255; NaN in holes. Rows beyond the band's are those next to them.
+    pub(super) fn region(&self, canvas: &Canvas, region: &Region, channel: usize) -> Vec<f32> {
+        let step = self.format.channels + 1;
+        let columns = i64::from(canvas.columns);
+        let last = i64::from(self.row + self.rows) - 1;
+        let mut values = Vec::with_capacity(region.pixels());
+        for row in 0..region.rows as i64 {
+            let row = (region.row + row).clamp(i64::from(self.row), last) - i64::from(self.row);
+            for column in 0..region.columns as i64 {
+                let column = (region.column + column).rem_euclid(columns);
+                let pixel = (row * columns + column) as usize * step;
+                values.push(match &self.samples {
+                    Samples::Eight(samples) => grey(&samples[pixel..][..step], channel),
+                    Samples::Sixteen(samples) => grey(&samples[pixel..][..step], channel),
+                });
+            }
+        }
+        values
+    }
+
+    /// Puts one channel of a tile into its place, grey levels of 255; NaN changes nothing.
+    pub(super) fn put_channel(&mut self, canvas: &Canvas, tile: &Tile, channel: usize, values: &[f32]) {
+        let step = self.format.channels + 1;
+        for (k, value) in values.iter().enumerate() {
+            if value.is_nan() {
+                continue;
+            }
+            let (row, column) = (k / tile.columns as usize, k % tile.columns as usize);
+            let row = (tile.row - self.row) as usize + row;
+            let pixel = row * canvas.columns as usize + tile.column as usize + column;
+            match &mut self.samples {
+                Samples::Eight(samples) => put(&mut samples[pixel * step..][..step], channel, *value),
+                Samples::Sixteen(samples) => {
+                    put(&mut samples[pixel * step..][..step], channel, *value);
+                }
+            }
+        }
+    }
+
     /// Whether each pixel is covered.
     pub fn covered(&self) -> Vec<bool> {
         let step = self.format.channels + 1;
@@ -82,6 +122,21 @@ impl Band {
             Samples::Eight(samples) => alpha(samples, step),
             Samples::Sixteen(samples) => alpha(samples, step),
         }
+    }
+}
+
+fn grey<T: Sample>(pixel: &[T], channel: usize) -> f32 {
+    let covered = pixel[pixel.len() - 1] != T::default();
+    match covered {
+        true => pixel[channel].value() * (255.0 / T::WHITE),
+        false => f32::NAN,
+    }
+}
+
+/// Covered pixels only: a frame's edge runs through some that it does not quite show.
+fn put<T: Sample>(pixel: &mut [T], channel: usize, grey: f32) {
+    if pixel[pixel.len() - 1] != T::default() {
+        pixel[channel] = T::nearest(grey * (T::WHITE / 255.0));
     }
 }
 

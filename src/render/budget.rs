@@ -1,5 +1,6 @@
 //! What a panorama takes of the memory, known before the first frame is read.
 
+use super::detail::Readings;
 use super::levelling::COARSEST;
 use super::plan::{BAND_ROWS, RenderOptions};
 use super::seams::{STEP_PX, Seams};
@@ -22,6 +23,8 @@ pub struct Budget {
     pub output: u64,
     /// Frames being decoded.
     pub decoding: u64,
+    /// What frames read of the wall, where it is solved from all of them.
+    pub readings: u64,
     /// Frames of one band, the least that must be held.
     pub frames_least: u64,
     /// Room for frames.
@@ -34,6 +37,9 @@ const COPIES: u64 = 5;
 const GRID_SHARE: u64 = 4;
 /// Copies of a frame while it is decoded: the file, the decoder's picture, and what it is turned into.
 const DECODING: u64 = 4;
+
+/// Memory of one tile that is solved, bytes.
+const SOLVING: u64 = 32 << 20;
 
 impl Budget {
     /// Bands whose frames are kept in view of what is to come.
@@ -78,8 +84,16 @@ impl Budget {
         let band = COPIES * u64::from(rows) * u64::from(canvas.columns) * pixel;
         let threads = rayon::current_num_threads() as u64;
         let decoding = DECODING * threads * frames.full_frame_bytes();
-        let frames_least = most_in_a_band(canvas, placements) as u64 * frames.frame_bytes();
-        let fixed = thumbnails + grid + band + output + decoding;
+        let most = most_in_a_band(canvas, placements) as u64;
+        let frames_least = most * frames.frame_bytes();
+        let readings = match options.super_resolve {
+            true => {
+                let samples = frames.frame_bytes() / format.sample_bytes() as u64;
+                most * samples * Readings::SAMPLE_BYTES + threads * SOLVING
+            }
+            false => 0,
+        };
+        let fixed = thumbnails + grid + band + output + decoding + readings;
         let needed = fixed + frames_least;
         if needed > limit {
             return Err(RenderError::Memory {
@@ -97,6 +111,7 @@ impl Budget {
             band,
             output,
             decoding,
+            readings,
             frames_least,
             room: limit - fixed,
         })
@@ -109,6 +124,7 @@ impl Budget {
             + self.band
             + self.output
             + self.decoding
+            + self.readings
             + frames.min(self.room)
     }
 }

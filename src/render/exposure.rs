@@ -190,6 +190,12 @@ impl Response<'_> {
         }
     }
 
+    /// The value of the evenly lit wall for one of the frame at a pixel.
+    pub fn wall(&self, value: f32, u: f32, v: f32) -> f32 {
+        let light = self.shading.map_or(1.0, |table| table.at(u, v));
+        (value - self.bias) * (self.gain * light)
+    }
+
     #[inline(always)]
     fn undone(&self, value: &[f32; 4], factor: f32) -> [f32; 4] {
         value.map(|value| (value - self.bias) * factor)

@@ -18,6 +18,7 @@ mod band;
 mod budget;
 mod canvas;
 pub mod cylinder;
+mod detail;
 mod draw;
 mod error;
 mod exposure;

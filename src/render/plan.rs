@@ -2,6 +2,7 @@
 
 use super::band::{Band, Target};
 use super::budget::Budget;
+use super::detail::Readings;
 use super::draw::{Composition, Drawn, Mode, Scene, Scratch};
 use super::levelling::COARSEST;
 use super::seams::Seams;
@@ -29,6 +30,8 @@ pub struct RenderOptions {
     pub mode: Mode,
     /// Whether exposure is undone and light levelled out over seams; else frames keep the values they have.
     pub blend: bool,
+    /// Whether the wall is solved from all frames, finer than any of them ([`super::super_resolve`]); exposure must be undone for it.
+    pub super_resolve: bool,
 }
 
 impl Default for RenderOptions {
@@ -37,6 +40,7 @@ impl Default for RenderOptions {
             interpolation: Interpolation::default(),
             mode: Mode::default(),
             blend: true,
+            super_resolve: false,
         }
     }
 }
@@ -57,6 +61,7 @@ pub struct Plan<'a> {
     kernels: Kernels,
     exposure: Exposure,
     seams: Option<Seams>,
+    super_resolve: bool,
 }
 
 impl<'a> Plan<'a> {
@@ -87,6 +92,7 @@ impl<'a> Plan<'a> {
             kernels: Kernels::new(options.interpolation),
             exposure: Exposure::none(frames.len()),
             seams: None,
+            super_resolve: options.super_resolve,
         };
         if !options.needs_thumbnails() {
             return Ok(plan);
@@ -159,6 +165,7 @@ impl<'a> Plan<'a> {
             .collect();
         progress.start("panorama", starts.len());
         let mut band = Band::empty(&self.canvas, frames.format());
+        let mut readings = Readings::default();
         for (k, row) in starts.iter().enumerate() {
             let later: Vec<usize> = needs[k + 1..]
                 .iter()
@@ -168,6 +175,12 @@ impl<'a> Plan<'a> {
                 .collect();
             frames.hold(&needs[k], &later, room)?;
             self.fill(&mut band, frames, *row);
+            if self.super_resolve {
+                readings.keep(frames, &self.exposure, &needs[k]);
+                let (surface, placements) = (self.surface, self.placements);
+                let tiles = self.tiles(*row);
+                readings.resolve(surface, frames, placements, &self.canvas, &tiles, &mut band);
+            }
             for target in &mut *targets {
                 target.put(&self.canvas, &band)?;
             }
@@ -188,7 +201,11 @@ impl<'a> Plan<'a> {
 
     fn needed(&self, frames: &FrameStack, tiles: &[Tile]) -> Vec<usize> {
         let scene = self.scene(frames);
-        let mut needed: Vec<usize> = tiles.iter().flat_map(|tile| scene.needed(tile)).collect();
+        let of_tile = |tile: &Tile| match self.super_resolve {
+            true => tile.frames.clone(),
+            false => scene.needed(tile),
+        };
+        let mut needed: Vec<usize> = tiles.iter().flat_map(of_tile).collect();
         needed.sort_unstable();
         needed.dedup();
         needed

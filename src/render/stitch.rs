@@ -16,7 +16,8 @@ use crate::trajectory::Pose;
 /// How a panorama is drawn from frames on disk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StitchOptions {
-    /// Resolution, pixels per metre; without it the frames' own at the wall.
+    /// Resolution, pixels per metre; without it the frames' own at the wall, or twice that with
+    /// [`RenderOptions::super_resolve`].
     pub px_per_metre: Option<f64>,
     /// Treats every camera as standing on the axis; see [`on_the_axis`].
     pub ignore_offset: bool,
@@ -25,6 +26,9 @@ pub struct StitchOptions {
     /// Memory that may be used, bytes.
     pub memory: u64,
 }
+
+/// How much finer than the frames a wall is that is solved from all of them.
+const FINER: f64 = 2.0;
 
 impl Default for StitchOptions {
     fn default() -> Self {
@@ -116,7 +120,10 @@ impl<'a> Stitch<'a> {
         } else {
             poses
         };
-        let laid_out = lay_out(surface, camera, poses, options.px_per_metre)?;
+        let native = native_px_per_metre(surface, camera, poses)?;
+        let finer = if options.render.super_resolve { FINER } else { 1.0 };
+        let px_per_metre = options.px_per_metre.unwrap_or(finer * native);
+        let laid_out = lay_out(surface, camera, poses, Some(px_per_metre))?;
         let canvas = &laid_out.canvas;
         let level = level_for(camera, laid_out.native_px_per_metre, canvas.px_per_metre);
         Ok(Self {
