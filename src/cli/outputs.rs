@@ -3,13 +3,13 @@
 use super::Failure;
 use super::stitch::picture_output;
 use crate::atomic;
+use crate::camera::Pinhole;
 use crate::frames::{JPEG_QUALITY, PictureFormat, write_picture};
 use crate::raster::{Compression, DziFormat};
 use crate::render::{
-    Budget, Canvas, Coverage, Gap, Layout, Map, Panorama, PixelFormat, Plan, Placement, Preview,
+    Budget, Canvas, Coverage, Gap, Layout, Map, Panorama, PixelFormat, Placement, Plan, Preview,
     RasterLayer, RasterTarget, Target, gaps_csv,
 };
-use crate::camera::Pinhole;
 use crate::surface::Surface;
 use image::DynamicImage;
 use nalgebra::Matrix6;
@@ -272,7 +272,11 @@ impl Maps {
             map.write(&self.folder.join("uncertainty.tif"), layout)?;
         }
         let preview = DynamicImage::from(self.preview.picture(layout, 0.0));
-        write_picture(&self.folder.join("preview.png"), &preview, PictureFormat::Png)?;
+        write_picture(
+            &self.folder.join("preview.png"),
+            &preview,
+            PictureFormat::Png,
+        )?;
         atomic::write_text(&self.folder.join("gaps.csv"), &gaps_csv(gaps))?;
         Ok(())
     }

@@ -339,7 +339,10 @@ fn covariances(
     arguments: &StitchArguments,
     survey: &Survey,
 ) -> Result<Option<Vec<Matrix6<f64>>>, Failure> {
-    let beside = arguments.poses.file().map(|file| file.with_file_name("covariance.csv"));
+    let beside = arguments
+        .poses
+        .file()
+        .map(|file| file.with_file_name("covariance.csv"));
     let path = match &arguments.output.covariance {
         Some(path) => Some(path.clone()),
         None => beside.filter(|path| path.is_file()),

@@ -57,18 +57,22 @@ pub fn image_metrics(first: &Panorama, second: &Panorama) -> Result<ImageMetrics
 mod tests {
     use super::*;
     use crate::progress::Silent;
-    use crate::render::{Canvas, FrameStack, Interpolation, Picture, place, render};
+    use crate::render::{Canvas, FrameStack, Mode, Picture, RenderOptions, place, render};
     use crate::test_wall::{TestWall, waves};
 
-    fn panorama(wall: &TestWall, stack: &FrameStack, ppm: f64) -> Panorama {
+    fn panorama(wall: &TestWall, mut stack: FrameStack, ppm: f64) -> Panorama {
         let placements = place(&wall.circle, &wall.camera, &wall.poses).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, ppm).unwrap();
         render(
             &wall.circle,
-            stack,
+            &mut stack,
             &placements,
             &canvas,
-            Interpolation::Bilinear,
+            &RenderOptions {
+                mode: Mode::Average,
+                blend: false,
+                ..RenderOptions::default()
+            },
             &Silent,
         )
         .unwrap()
@@ -82,7 +86,7 @@ mod tests {
             let picture = Picture::new(w, h, 1, vec![value; w * h]);
             panorama(
                 &wall,
-                &FrameStack::from_pictures(wall.camera, vec![picture]),
+                FrameStack::from_pictures(wall.camera, vec![picture]),
                 50.0,
             )
         };
@@ -99,10 +103,9 @@ mod tests {
     #[test]
     fn different_canvases_are_refused() {
         let wall = TestWall::one(waves);
-        let stack = wall.stack();
         let error = image_metrics(
-            &panorama(&wall, &stack, 50.0),
-            &panorama(&wall, &stack, 40.0),
+            &panorama(&wall, wall.stack(), 50.0),
+            &panorama(&wall, wall.stack(), 40.0),
         );
         assert!(matches!(error, Err(EvaluateError::Canvas { .. })));
     }

@@ -1,6 +1,6 @@
 //! How well the frames agree where they overlap, without any truth.
 
-use crate::render::{Canvas, FrameStack, Interpolation, Kernel, Placement, EDGE, tiles};
+use crate::render::{Canvas, EDGE, FrameStack, Interpolation, Kernel, Placement, tiles};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use serde::Serialize;

@@ -131,10 +131,7 @@ mod tests {
 
     #[test]
     fn other_formats_are_refused_with_the_remedy() {
-        for (name, expected) in [
-            ("a", ".png, .jpg or .tif"),
-            ("a.bmp", ".tif"),
-        ] {
+        for (name, expected) in [("a", ".png, .jpg or .tif"), ("a.bmp", ".tif")] {
             let message = PictureFormat::of(Path::new(name)).unwrap_err().to_string();
             assert!(message.contains(expected), "{message}");
         }

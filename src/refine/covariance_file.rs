@@ -74,9 +74,7 @@ mod tests {
 
     #[test]
     fn what_was_written_is_read() {
-        let element = |k: usize| {
-            move |r: usize, c: usize| (100 * k + 10 * r + c) as f64 * 1e-7
-        };
+        let element = |k: usize| move |r: usize, c: usize| (100 * k + 10 * r + c) as f64 * 1e-7;
         let covariances = Covariances {
             frames: (0..3).map(|k| Matrix6::from_fn(element(k))).collect(),
             next: vec![Matrix6::from_element(f64::NAN); 2],

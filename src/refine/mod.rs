@@ -85,8 +85,8 @@ mod visibility;
 mod wall;
 
 pub use bound::pose_bound;
-pub use covariance_file::{CovarianceError, read_covariances};
 pub use covariance::{Covariances, FrameSigma};
+pub use covariance_file::{CovarianceError, read_covariances};
 pub use gauss_newton::{SolveRecord, StopReason};
 pub use observed::{CalibrationReport, UnknownReport};
 pub use options::RefineOptions;

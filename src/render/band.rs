@@ -97,7 +97,13 @@ impl Band {
     }
 
     /// Puts one channel of a tile into its place, grey levels of 255; NaN changes nothing.
-    pub(super) fn put_channel(&mut self, canvas: &Canvas, tile: &Tile, channel: usize, values: &[f32]) {
+    pub(super) fn put_channel(
+        &mut self,
+        canvas: &Canvas,
+        tile: &Tile,
+        channel: usize,
+        values: &[f32],
+    ) {
         let step = self.format.channels + 1;
         for (k, value) in values.iter().enumerate() {
             if value.is_nan() {
@@ -107,7 +113,9 @@ impl Band {
             let row = (tile.row - self.row) as usize + row;
             let pixel = row * canvas.columns as usize + tile.column as usize + column;
             match &mut self.samples {
-                Samples::Eight(samples) => put(&mut samples[pixel * step..][..step], channel, *value),
+                Samples::Eight(samples) => {
+                    put(&mut samples[pixel * step..][..step], channel, *value)
+                }
                 Samples::Sixteen(samples) => {
                     put(&mut samples[pixel * step..][..step], channel, *value);
                 }
@@ -142,7 +150,9 @@ fn put<T: Sample>(pixel: &mut [T], channel: usize, grey: f32) {
 
 fn alpha<T: Sample>(samples: &[T], step: usize) -> Vec<bool> {
     let pixels = samples.chunks_exact(step);
-    pixels.map(|pixel| pixel[step - 1] != T::default()).collect()
+    pixels
+        .map(|pixel| pixel[step - 1] != T::default())
+        .collect()
 }
 
 /// Where a tile lies in a band, pixels.

@@ -76,8 +76,7 @@ impl Budget {
                 native_px_per_metre,
                 canvas.px_per_metre / grid_step_px,
             );
-            thumbnails =
-                Thumbnails::bytes(frames.camera(), level, format.channels, frames.len());
+            thumbnails = Thumbnails::bytes(frames.camera(), level, format.channels, frames.len());
         }
         let rows = BAND_ROWS.min(canvas.rows);
         let pixel = format.pixel_bytes(true) as u64 + 4;

@@ -32,7 +32,8 @@ impl Readings {
 
     /// Keeps those of `frames`, which must be held, and no others.
     pub fn keep(&mut self, stack: &FrameStack, exposure: &Exposure, frames: &[usize]) {
-        self.frames.retain(|frame, _| frames.binary_search(frame).is_ok());
+        self.frames
+            .retain(|frame, _| frames.binary_search(frame).is_ok());
         let missing: Vec<usize> = frames
             .iter()
             .copied()
@@ -40,7 +41,12 @@ impl Readings {
             .collect();
         let read: Vec<Option<(usize, Reading)>> = missing
             .into_par_iter()
-            .map(|frame| Some((frame, Reading::of(stack.picture(frame)?, exposure.of(frame)))))
+            .map(|frame| {
+                Some((
+                    frame,
+                    Reading::of(stack.picture(frame)?, exposure.of(frame)),
+                ))
+            })
             .collect();
         self.frames.extend(read.into_iter().flatten());
     }

@@ -186,7 +186,9 @@ impl Row {
     fn set(&mut self, run: &Run, frame: usize, from: usize, count: usize) {
         self.sums[from..from + count].copy_from_slice(&run.values()[..count]);
         let seen = run.seen()[..count].iter();
-        let columns = self.weights[from..].iter_mut().zip(&mut self.sources[from..]);
+        let columns = self.weights[from..]
+            .iter_mut()
+            .zip(&mut self.sources[from..]);
         for (seen, (weight, source)) in seen.zip(columns) {
             *weight = if *seen { 1.0 } else { 0.0 };
             *source = if *seen { frame as u32 } else { NO_FRAME };

@@ -16,8 +16,8 @@
 //! 128, 2000; for panoramas D. B. Goldman, "Vignette and exposure calibration and compensation", PAMI 32(12), 2010.
 
 use super::glimpses::{Glimpse, glimpses};
-use super::thumbnails::Thumbnails;
 use super::sample::Sample;
+use super::thumbnails::Thumbnails;
 use super::warp::Run;
 use super::{Canvas, Placement};
 use crate::frames::{MAD_TO_SIGMA, SHADING_TERMS, Shading};
@@ -176,8 +176,8 @@ impl Response<'_> {
             let last = end.min(count - 1);
             if seen[start] && seen[last] {
                 let first = self.gain * table.at(u[start], v[start]);
-                let slope = (self.gain * table.at(u[last], v[last]) - first)
-                    / (last - start).max(1) as f32;
+                let slope =
+                    (self.gain * table.at(u[last], v[last]) - first) / (last - start).max(1) as f32;
                 for k in start..end {
                     let factor = first + (k - start) as f32 * slope;
                     values[k] = self.undone(&values[k], factor);
@@ -221,7 +221,8 @@ struct Table {
 impl Table {
     fn new(shading: &Shading, brightest: f64, size: (usize, usize)) -> Self {
         let last = |size: usize| (size.max(2) - 1) as f64;
-        let pixel = |k: usize, nodes: usize, size: usize| k as f64 / (nodes - 1) as f64 * last(size);
+        let pixel =
+            |k: usize, nodes: usize, size: usize| k as f64 / (nodes - 1) as f64 * last(size);
         let values = (0..NODES.1).flat_map(|j| {
             (0..NODES.0).map(move |i| {
                 let at = Vector2::new(pixel(i, NODES.0, size.0), pixel(j, NODES.1, size.1));
@@ -241,10 +242,7 @@ impl Table {
         // Points that are not seen may be anywhere: the casts saturate, and what comes out is not used.
         let x = u * self.scale[0] + self.offset[0];
         let y = v * self.scale[1] + self.offset[1];
-        let (i, j) = (
-            (x as usize).min(NODES.0 - 2),
-            (y as usize).min(NODES.1 - 2),
-        );
+        let (i, j) = ((x as usize).min(NODES.0 - 2), (y as usize).min(NODES.1 - 2));
         let (s, t) = (x - i as f32, y - j as f32);
         let nodes = &self.values[j * NODES.0 + i..][..NODES.0 + 2];
         let upper = nodes[0] + s * (nodes[1] - nodes[0]);

@@ -3,8 +3,8 @@
 use super::kernel::{Interpolation, Kernel};
 use super::picture::luma;
 use super::thumbnails::Thumbnails;
-use super::warp::{Look, Points, Run};
 use super::tiles::{EDGE, Tile, tiles};
+use super::warp::{Look, Points, Run};
 use super::{Canvas, Placement};
 use crate::frames::{SHADING_TERMS, shading_terms};
 use crate::surface::Surface;

@@ -85,7 +85,11 @@ impl Kernel {
             };
         }
         let half = (interpolation.reach() * stretch.max(1.0) - 1e-9).ceil() as usize;
-        let half = if half > 1 { half.next_multiple_of(2) } else { half };
+        let half = if half > 1 {
+            half.next_multiple_of(2)
+        } else {
+            half
+        };
         let taps = 2 * half;
         let mut weights = Vec::with_capacity((PHASES + 1) * taps);
         for phase in 0..=PHASES {

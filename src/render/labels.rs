@@ -117,16 +117,17 @@ fn choices(
     grid: &Canvas,
     tile: &Tile,
 ) -> Vec<Choices> {
-    let walls: Vec<WallFrame> = tile
-        .walls(grid)
-        .map(|wall| surface.frame(wall))
-        .collect();
+    let walls: Vec<WallFrame> = tile.walls(grid).map(|wall| surface.frame(wall)).collect();
     let points: Vec<_> = walls.iter().map(|wall| wall.x_w).collect();
     let points = Points::new(&points);
     let sights: Vec<Vec<Sight>> = tile
         .frames
         .iter()
-        .map(|frame| sights(thumbnails, exposure, placements, *frame, tile, &points, &walls))
+        .map(|frame| {
+            sights(
+                thumbnails, exposure, placements, *frame, tile, &points, &walls,
+            )
+        })
         .collect();
     // Node by node, in the order of the frames.
     let mut seen: Vec<Vec<(usize, Sight)>> = vec![Vec::new(); walls.len()];
@@ -151,7 +152,10 @@ fn choices(
     seen.iter()
         .enumerate()
         .map(|(node, seen)| {
-            let finest = seen.iter().map(|(_, sight)| sight.fineness).fold(0.0, f32::max);
+            let finest = seen
+                .iter()
+                .map(|(_, sight)| sight.fineness)
+                .fold(0.0, f32::max);
             // Of two that differ, neither is nearer to their median: what is around decides.
             let usual = match seen.len() {
                 2 => around[node],
@@ -233,7 +237,12 @@ fn sights(
     let colour = picture.format().channels == 3;
     let scale = 255.0 / picture.format().white();
     let grey = |[red, green, blue, _]: [f32; 4]| {
-        scale * if colour { luma([red, green, blue]) } else { red }
+        scale
+            * if colour {
+                luma([red, green, blue])
+            } else {
+                red
+            }
     };
     let forwards = pose.r_wc * nalgebra::Vector3::z();
     let columns = tile.columns as usize;
@@ -330,7 +339,13 @@ impl Lattice {
                 *next = choice.cost + self.held(*node, choice, before, after, above);
                 if let Some(before) = before {
                     let reached = |j: usize| {
-                        costs[j] + seam(&self.choices[before], &self.choices[before][j], &self.choices[*node], choice)
+                        costs[j]
+                            + seam(
+                                &self.choices[before],
+                                &self.choices[before][j],
+                                &self.choices[*node],
+                                choice,
+                            )
                     };
                     let mut best = (f32::INFINITY, 0);
                     for j in 0..CHOICES {
@@ -348,7 +363,9 @@ impl Lattice {
             costs = next;
             back.push(from);
         }
-        let mut k = (0..CHOICES).min_by(|a, b| costs[*a].total_cmp(&costs[*b])).unwrap_or(0) as u8;
+        let mut k = (0..CHOICES)
+            .min_by(|a, b| costs[*a].total_cmp(&costs[*b]))
+            .unwrap_or(0) as u8;
         let mut chosen: Vec<u8> = back
             .iter()
             .rev()

@@ -65,7 +65,9 @@ pub fn corrections(
     let channels = thumbnails.channels();
     let windows = windows(grid, labels, placements.len());
     let sight = |frame: usize, window: &Window| {
-        shown(surface, thumbnails, exposure, placements, grid, frame, window)
+        shown(
+            surface, thumbnails, exposure, placements, grid, frame, window,
+        )
     };
     // The composite.
     let mut composite = vec![0.0f32; labels.len() * channels];
@@ -249,11 +251,7 @@ fn shown(
     let mut points = Vec::new();
     surface.lattice(&s_m, &h_m, &mut points);
     let points = Points::new(&points);
-    let look = Look::new(
-        thumbnails.camera(),
-        &placements[frame].pose,
-        &points.origin,
-    );
+    let look = Look::new(thumbnails.camera(), &placements[frame].pose, &points.origin);
     let picture = thumbnails.picture(frame);
     let response = exposure.of(frame);
     let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);

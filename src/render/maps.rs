@@ -32,9 +32,14 @@ impl Map {
         grid: &Canvas,
         labels: Option<&[u32]>,
     ) -> Self {
-        Self::of(surface, camera, placements, grid, labels, |_, px_per_metre| {
-            (1e3 / px_per_metre) as f32
-        })
+        Self::of(
+            surface,
+            camera,
+            placements,
+            grid,
+            labels,
+            |_, px_per_metre| (1e3 / px_per_metre) as f32,
+        )
     }
 
     /// 1-σ of where the wall point that is shown really lies, millimetres, along the direction in which it is largest:
@@ -79,9 +84,8 @@ impl Map {
                     };
                     let of_point = |(k, point)| {
                         let wall = surface.frame(point);
-                        let fine = |frame: usize| {
-                            px_per_metre(camera, &placements[frame].pose, &wall)
-                        };
+                        let fine =
+                            |frame: usize| px_per_metre(camera, &placements[frame].pose, &wall);
                         let label = labels.map(|labels| labels[node(k)]);
                         let shown = match label {
                             Some(NO_FRAME) => None,

@@ -46,6 +46,9 @@ mod tiles;
 mod view;
 mod warp;
 
+#[cfg(test)]
+mod tests;
+
 pub use band::{Band, Target};
 pub use budget::Budget;
 pub use canvas::{Canvas, Layout};
@@ -63,8 +66,8 @@ pub use plan::{Plan, RenderOptions};
 pub use preview::Preview;
 pub use raster_target::{RasterLayer, RasterTarget};
 pub use sample::{Sample, Samples};
+pub use seams::Seams;
 pub use stack::{FrameStack, level_for};
 pub(crate) use stitch::check_memory;
-pub use seams::Seams;
 pub use stitch::{LaidOut, Stitch, StitchOptions, lay_out, on_the_axis, render, stitch};
 pub(crate) use tiles::{EDGE, Tile, tiles};

@@ -20,12 +20,7 @@ impl Picture {
     ///
     /// # Panics
     /// If `channels` is neither 1 nor 3 or there are not `width · height · channels` samples.
-    pub fn new(
-        width: usize,
-        height: usize,
-        channels: usize,
-        samples: impl Into<Samples>,
-    ) -> Self {
+    pub fn new(width: usize, height: usize, channels: usize, samples: impl Into<Samples>) -> Self {
         let mut samples = samples.into();
         assert!(channels == 1 || channels == 3, "grey or colour");
         assert_eq!(
@@ -85,7 +80,11 @@ impl Picture {
     /// (65535 = 255 · 257).
     pub fn widened(self, format: PixelFormat) -> Self {
         let (width, height) = (self.width, self.height);
-        let copies = if format.channels > self.channels { 3 } else { 1 };
+        let copies = if format.channels > self.channels {
+            3
+        } else {
+            1
+        };
         let count = width * height * self.channels;
         let channels = self.channels * copies;
         match self.samples {

@@ -36,7 +36,10 @@ pub struct Preview {
 impl Preview {
     /// Nothing has been drawn yet.
     pub fn new(canvas: &Canvas) -> Self {
-        let shrink = canvas.columns.max(canvas.rows).div_ceil(LONGEST - 2 * MARGIN);
+        let shrink = canvas
+            .columns
+            .max(canvas.rows)
+            .div_ceil(LONGEST - 2 * MARGIN);
         let columns = canvas.columns.div_ceil(shrink) as usize;
         let rows = canvas.rows.div_ceil(shrink) as usize;
         Self {
@@ -74,7 +77,12 @@ impl Preview {
         let pixels = f64::from(self.shrink);
         let along = |h_m: f64| (h_m - self.canvas.h_start_m) * self.canvas.px_per_metre / pixels;
         for (h_m, text) in self.chainages() {
-            axis(&mut image, layout == Layout::ChainageRight, along(h_m), &text);
+            axis(
+                &mut image,
+                layout == Layout::ChainageRight,
+                along(h_m),
+                &text,
+            );
         }
         let around = f64::from(self.canvas.columns) / pixels;
         for hour in 0..12u32 {
@@ -84,7 +92,12 @@ impl Preview {
                 Layout::ChainageRight => (1.0 - turn) * around,
             };
             let name = if hour == 0 { 12 } else { hour };
-            axis(&mut image, layout == Layout::ThetaRight, at, &format!("{name}:00"));
+            axis(
+                &mut image,
+                layout == Layout::ThetaRight,
+                at,
+                &format!("{name}:00"),
+            );
         }
         image
     }
@@ -216,10 +229,11 @@ mod tests {
                     Layout::ThetaRight => [share_around, share_along],
                     Layout::ChainageRight => [share_along, 1.0 - share_around],
                 };
-                let inner = |share: f64, side: u32| {
-                    MARGIN + (share * f64::from(side - 2 * MARGIN)) as u32
-                };
-                picture.get_pixel(inner(x, picture.width()), inner(y, picture.height())).0
+                let inner =
+                    |share: f64, side: u32| MARGIN + (share * f64::from(side - 2 * MARGIN)) as u32;
+                picture
+                    .get_pixel(inner(x, picture.width()), inner(y, picture.height()))
+                    .0
             };
             assert_eq!(at(0.9, 0.98), [240; 3]);
             assert_eq!(at(0.6, 0.98), [10; 3]);

@@ -153,9 +153,7 @@ impl RasterTarget {
         match self.layer {
             RasterLayer::Panorama => match &band.samples {
                 Samples::Eight(samples) => Cow::from(samples),
-                Samples::Sixteen(samples) => {
-                    samples.iter().flat_map(|v| v.to_ne_bytes()).collect()
-                }
+                Samples::Sixteen(samples) => samples.iter().flat_map(|v| v.to_ne_bytes()).collect(),
             },
             RasterLayer::Coverage => {
                 let covered = band.covered().into_iter();

@@ -49,9 +49,9 @@ impl Seams {
         let labels = labels::best(surface, thumbnails, exposure, placements, &grid);
         let channels = thumbnails.channels();
         let corrections = match blend {
-            Some(white) => {
-                levelling::corrections(surface, thumbnails, exposure, placements, &grid, &labels, white)
-            }
+            Some(white) => levelling::corrections(
+                surface, thumbnails, exposure, placements, &grid, &labels, white,
+            ),
             None => Vec::new(),
         };
         Self {
@@ -190,7 +190,10 @@ impl Seams {
         let weight = |between: &Between, frame: u32| {
             let (s, t) = (between.t, row.t);
             let weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t];
-            let own = corners.iter().zip(weights).filter(|(corner, _)| **corner == frame);
+            let own = corners
+                .iter()
+                .zip(weights)
+                .filter(|(corner, _)| **corner == frame);
             own.map(|(_, w)| w).sum::<f32>()
         };
         for (n, frame) in frames.iter().enumerate() {
@@ -221,7 +224,12 @@ impl Seams {
     }
 
     /// What is added to the values along a row, at each of its columns.
-    pub(super) fn corrections(&self, columns: &[Between], row: &Between, found: &mut Vec<[f32; 4]>) {
+    pub(super) fn corrections(
+        &self,
+        columns: &[Between],
+        row: &Between,
+        found: &mut Vec<[f32; 4]>,
+    ) {
         found.clear();
         if self.corrections.is_empty() {
             found.resize(columns.len(), [0.0; 4]);
@@ -246,7 +254,9 @@ impl Seams {
                 cell = column.before;
                 (left, right) = (between(column.before), between(column.after));
             }
-            found.push(std::array::from_fn(|c| left[c] + column.t * (right[c] - left[c])));
+            found.push(std::array::from_fn(|c| {
+                left[c] + column.t * (right[c] - left[c])
+            }));
         }
     }
 }
@@ -295,7 +305,9 @@ impl Shares {
     /// All of them, each with its weights or none if it is alone.
     pub fn iter(&self) -> impl Iterator<Item = (&Share, Option<&[f32]>)> {
         self.list.iter().map(|share| {
-            let weights = share.weights.map(|start| &self.weights[start..][..share.to - share.from]);
+            let weights = share
+                .weights
+                .map(|start| &self.weights[start..][..share.to - share.from]);
             (share, weights)
         })
     }

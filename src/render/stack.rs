@@ -39,11 +39,7 @@ impl FrameStack {
     ///
     /// # Errors
     /// A frame that is missing or is no picture; the first in the order of the files.
-    pub fn open(
-        files: &[FrameFile],
-        camera: &Pinhole,
-        level: usize,
-    ) -> Result<Self, RenderError> {
+    pub fn open(files: &[FrameFile], camera: &Pinhole, level: usize) -> Result<Self, RenderError> {
         let formats: Vec<Result<PixelFormat, RenderError>> = files
             .par_iter()
             .map(|file| Ok(PixelFormat::of(colour_type(file)?)))

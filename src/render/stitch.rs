@@ -121,7 +121,11 @@ impl<'a> Stitch<'a> {
             poses
         };
         let native = native_px_per_metre(surface, camera, poses)?;
-        let finer = if options.render.super_resolve { FINER } else { 1.0 };
+        let finer = if options.render.super_resolve {
+            FINER
+        } else {
+            1.0
+        };
         let px_per_metre = options.px_per_metre.unwrap_or(finer * native);
         let laid_out = lay_out(surface, camera, poses, Some(px_per_metre))?;
         let canvas = &laid_out.canvas;

@@ -1,7 +1,7 @@
 //! The canvas in small squares, each with the frames that may see it.
 
-use super::{Canvas, Placement};
 use super::warp::RUN;
+use super::{Canvas, Placement};
 use crate::surface::{Footprint, Surface, WallPoint};
 use nalgebra::Vector3;
 

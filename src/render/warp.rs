@@ -151,14 +151,7 @@ impl Run {
     /// The pixel coordinates, which of them are seen, and the values to be changed.
     #[inline(always)]
     #[expect(clippy::type_complexity, reason = "parts of the run, side by side")]
-    pub fn parts(
-        &mut self,
-    ) -> (
-        &[f32; RUN],
-        &[f32; RUN],
-        &[bool; RUN],
-        &mut [[f32; 4]; RUN],
-    ) {
+    pub fn parts(&mut self) -> (&[f32; RUN], &[f32; RUN], &[bool; RUN], &mut [[f32; 4]; RUN]) {
         (&self.u, &self.v, &self.seen, &mut self.values)
     }
 
@@ -203,8 +196,12 @@ impl Run {
     #[inline(always)]
     fn sample(&mut self, picture: &Picture, kernel: &Kernel, count: usize) {
         match (picture.samples(), picture.format().channels) {
-            (Samples::Eight(samples), 1) => self.sample_of::<u8, 1>(picture, samples, kernel, count),
-            (Samples::Eight(samples), _) => self.sample_of::<u8, 3>(picture, samples, kernel, count),
+            (Samples::Eight(samples), 1) => {
+                self.sample_of::<u8, 1>(picture, samples, kernel, count)
+            }
+            (Samples::Eight(samples), _) => {
+                self.sample_of::<u8, 3>(picture, samples, kernel, count)
+            }
             (Samples::Sixteen(samples), 1) => {
                 self.sample_of::<u16, 1>(picture, samples, kernel, count);
             }
@@ -299,8 +296,15 @@ impl Run {
 #[inline(always)]
 fn whole(value: f32) -> (i32, f32) {
     let nearest = (value + WHOLE) - WHOLE;
-    let below = if nearest > value { nearest - 1.0 } else { nearest };
-    (((below + WHOLE).to_bits() & 0x7f_ffff) as i32, value - below)
+    let below = if nearest > value {
+        nearest - 1.0
+    } else {
+        nearest
+    };
+    (
+        ((below + WHOLE).to_bits() & 0x7f_ffff) as i32,
+        value - below,
+    )
 }
 
 /// The grey value under a kernel that begins with the first sample: down the columns first, side by side.
@@ -355,7 +359,12 @@ mod tests {
 
     #[test]
     fn numbers_are_cut_to_the_whole_below() {
-        for (value, below, rest) in [(0.0, 0, 0.0), (0.75, 0, 0.75), (1.0, 1, 0.0), (4095.5, 4095, 0.5)] {
+        for (value, below, rest) in [
+            (0.0, 0, 0.0),
+            (0.75, 0, 0.75),
+            (1.0, 1, 0.0),
+            (4095.5, 4095, 0.5),
+        ] {
             assert_eq!(whole(value), (below, rest));
         }
     }

@@ -4,8 +4,8 @@
 //! column for each rotation sigma; in each cell the success rate, the runs it is of, and the false successes if any.
 
 use super::cell::{jitter_name, unit};
-use crate::lettering::{self, LETTER};
 use super::{CellSummary, Convergence, TranslationScale};
+use crate::lettering::{self, LETTER};
 use image::{Rgb, RgbImage};
 
 /// Scale of the lettering; of the fine print it is 1.
