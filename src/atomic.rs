@@ -7,10 +7,14 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 use tempfile::{TempDir, TempPath};
 
 /// Temporary names in use.
 static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// Times that a folder is removed before it is left to the system.
+const REMOVALS: usize = 20;
 
 /// A temporary name on the list of unfinished ones for as long as this lives.
 struct Listed(PathBuf);
@@ -35,8 +39,15 @@ impl Drop for Listed {
 pub fn remove_unfinished() {
     let list = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     for path in list.iter() {
-        // Nobody is left to tell if the system refuses.
-        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
+        // A writer that was about to make a file in a folder may still do so while it is removed.
+        for _ in 0..REMOVALS {
+            // Nobody is left to tell if the system refuses.
+            let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir_all(path));
+            if !path.exists() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
     }
     std::mem::forget(list);
 }

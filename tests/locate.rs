@@ -104,6 +104,7 @@ fn the_frames_show_there_what_the_panorama_shows() {
     let out = survey.path().join("panorama.png");
     let mut arguments = vec!["stitch", text(survey.path()), "--out", text(&out)];
     arguments.extend(["--poses", "truth", "--quiet"]);
+    arguments.extend(["--mode", "average", "--no-blend"]);
     succeed(&arguments);
     let panorama = image::open(&out).unwrap().to_rgba8();
     let (width, height) = panorama.dimensions();

@@ -24,23 +24,31 @@ fn stitch(survey: &Path, out: &Path, more: &[&str]) -> DynamicImage {
 fn the_panorama_is_the_golden_picture() {
     let survey = first_frames(12);
     let out = survey.path().join("panorama.png");
-    let drawn = stitch(survey.path(), &out, &["--poses", "truth"]).to_rgba8();
-    let golden =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/golden/free12_truth_30px.png");
-    let golden = image::open(golden).unwrap().to_rgba8();
-    assert_eq!(drawn.dimensions(), golden.dimensions());
-    let (mut sum, mut worst) = (0u64, 0u8);
-    for (a, b) in drawn.pixels().zip(golden.pixels()) {
-        assert_eq!(a[3], b[3], "holes are where they were");
-        for channel in 0..3 {
-            let difference = a[channel].abs_diff(b[channel]);
-            sum += u64::from(difference);
-            worst = worst.max(difference);
+    for (name, options) in [
+        (
+            "free12_truth_30px.png",
+            &["--mode", "average", "--no-blend"][..],
+        ),
+        ("free12_truth_30px_best.png", &[]),
+    ] {
+        let arguments = [&["--poses", "truth"], options].concat();
+        let drawn = stitch(survey.path(), &out, &arguments).to_rgba8();
+        let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/golden");
+        let golden = image::open(golden.join(name)).unwrap().to_rgba8();
+        assert_eq!(drawn.dimensions(), golden.dimensions());
+        let (mut sum, mut worst) = (0u64, 0u8);
+        for (a, b) in drawn.pixels().zip(golden.pixels()) {
+            assert_eq!(a[3], b[3], "holes are where they were");
+            for channel in 0..3 {
+                let difference = a[channel].abs_diff(b[channel]);
+                sum += u64::from(difference);
+                worst = worst.max(difference);
+            }
         }
+        let mean = sum as f64 / (3 * golden.pixels().count()) as f64;
+        assert!(mean < 0.05, "{name}: mean difference {mean} grey levels");
+        assert!(worst <= 2, "{name}: largest difference {worst} grey levels");
     }
-    let mean = sum as f64 / (3 * golden.pixels().count()) as f64;
-    assert!(mean < 0.05, "mean difference {mean} grey levels");
-    assert!(worst <= 2, "largest difference {worst} grey levels");
 }
 
 #[test]
@@ -132,8 +140,14 @@ fn what_cannot_be_drawn_is_refused_with_the_remedy() {
     let survey = first_frames(2);
     let folder = text(survey.path());
     let at = |name: &str| survey.path().join(name);
-    let message = fail(&["stitch", folder, "--out", text(&at("a.jpg"))], 2);
-    assert!(message.contains("transparen") && message.contains(".png"));
+    let message = fail(&["stitch", folder, "--out", text(&at("a.bmp"))], 2);
+    assert!(message.contains(".png"), "{message}");
+    let message = fail(&["stitch", folder, "--out", "a.tif", "--dzi", "a.xml"], 2);
+    assert!(message.contains(".dzi"), "{message}");
+    let message = fail(&["stitch", folder, "--out", "a.tif", "--memory", "1MiB"], 3);
+    assert!(message.contains("--memory"), "{message}");
+    let message = fail(&["stitch", folder, "--out", "a.tif", "--memory", "much"], 2);
+    assert!(message.contains("2GiB"), "{message}");
     let message = fail(
         &["stitch", folder, "--out", "a.png", "--px-per-metre", "1e9"],
         3,
@@ -154,7 +168,7 @@ fn what_cannot_be_drawn_is_refused_with_the_remedy() {
     let blocked = at("survey.toml").join("folder/a.png");
     let message = fail(&["stitch", folder, "--out", text(&blocked)], 3);
     assert!(message.contains("survey.toml/folder"), "{message}");
-    assert!(!at("a.jpg").exists() && !Path::new("a.png").exists());
+    assert!(!at("a.bmp").exists() && !Path::new("a.png").exists() && !Path::new("a.tif").exists());
 }
 
 #[test]
@@ -210,4 +224,121 @@ fn a_photo_is_projected_onto_the_cylinder() {
         2,
     );
     assert!(message.contains("between 0 and 180"), "{message}");
+}
+
+/// The colours of a picture where it is covered, and how much of it is.
+fn covered(picture: &DynamicImage) -> (Vec<f64>, Vec<bool>) {
+    let pixels = picture.to_luma_alpha8();
+    let grey = pixels.pixels().map(|p| f64::from(p[0])).collect();
+    (grey, pixels.pixels().map(|p| p[1] > 0).collect())
+}
+
+fn simulate(folder: &Path, more: &[&str]) {
+    let mut arguments = vec![
+        "simulate",
+        "free",
+        "--out",
+        text(folder),
+        "--size",
+        "320x240",
+    ];
+    arguments.extend(["--frames", "24", "--supersample", "4"]);
+    arguments.extend(more);
+    succeed(&arguments);
+}
+
+/// Gain ±30 % and a headlight undone, against the same wall evenly lit and without noise.
+#[test]
+fn light_and_exposure_are_undone() {
+    let dir = tempfile::tempdir().unwrap();
+    for wall in ["brick", "concrete"] {
+        let [lit, even] = ["lit", "even"].map(|name| dir.path().join(format!("{wall}-{name}")));
+        let light = [
+            "--gain-percent",
+            "30",
+            "--lamp-corner",
+            "0.4",
+            "--noise",
+            "2",
+        ];
+        simulate(&lit, &[&["--wall", wall][..], &light].concat());
+        simulate(&even, &["--wall", wall, "--noise", "0"]);
+        let drawn = |survey: &Path, more: &[&str]| {
+            let out = survey.join("panorama.png");
+            let mut arguments = vec!["stitch", text(survey), "--poses", "truth"];
+            arguments.extend(["--out", text(&out)]);
+            arguments.extend(more);
+            succeed(&arguments);
+            covered(&image::open(out).unwrap())
+        };
+        let (truth, seen) = drawn(&even, &["--no-blend"]);
+        let (found, _) = drawn(&lit, &[]);
+        let pairs = truth
+            .iter()
+            .zip(&found)
+            .zip(&seen)
+            .filter(|(_, seen)| **seen);
+        let squares: f64 = pairs.clone().map(|((a, b), _)| (a - b).powi(2)).sum();
+        let psnr_db = 10.0 * (255.0 * 255.0 * pairs.count() as f64 / squares).log10();
+        assert!(psnr_db > 34.0, "{wall}: {psnr_db} dB");
+    }
+}
+
+#[test]
+fn maps_lie_beside_the_panorama() {
+    let survey = first_frames(12);
+    let at = |name: &str| survey.path().join(name);
+    let [out, dzi, maps] = ["p.tif", "p.dzi", "maps"].map(at);
+    let mut arguments = vec!["stitch", text(survey.path()), "--poses", "truth", "--json"];
+    arguments.extend(["--px-per-metre", PX_PER_METRE, "--out", text(&out)]);
+    arguments.extend(["--dzi", text(&dzi), "--maps", text(&maps)]);
+    let report: serde_json::Value = serde_json::from_str(&succeed(&arguments)).unwrap();
+    let picture = image::open(&out).unwrap().to_rgba8();
+    let coverage = image::open(maps.join("coverage.tif")).unwrap().to_luma8();
+    assert_eq!(picture.dimensions(), coverage.dimensions());
+    for (pixel, covered) in picture.pixels().zip(coverage.pixels()) {
+        assert_eq!(pixel[3], covered[0]);
+    }
+    for name in ["frames.tif", "resolution.tif", "preview.png", "gaps.csv"] {
+        assert!(maps.join(name).is_file(), "{name}");
+    }
+    assert!(!maps.join("uncertainty.tif").exists());
+    let preview = image::open(maps.join("preview.png")).unwrap();
+    assert!(preview.width().max(preview.height()) <= 4096);
+    let gaps = std::fs::read_to_string(maps.join("gaps.csv")).unwrap();
+    let listed = report["gaps"].as_array().unwrap().len();
+    assert!(listed > 0);
+    assert_eq!(gaps.lines().count(), 1 + listed);
+    // The whole picture in one tile.
+    let levels = std::fs::read_dir(at("p_files")).unwrap().count();
+    let whole = image::open(at(&format!("p_files/{}/0_0.jpg", levels - 1))).unwrap();
+    assert_eq!(whole.width(), picture.width().min(512));
+    assert!(std::fs::read_to_string(&dzi).unwrap().contains("512"));
+}
+
+/// Ctrl-C while it is drawn: its exit code, and nothing half-written.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_panorama_leaves_nothing_behind() {
+    let survey = first_frames(48);
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("p.tif");
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+        .args(["stitch", text(survey.path()), "--px-per-metre", "3000"])
+        .args(["--out", text(&out), "--quiet"])
+        .spawn()
+        .unwrap();
+    let entries = || std::fs::read_dir(dir.path()).unwrap().count();
+    while entries() == 0 {
+        assert!(child.try_wait().unwrap().is_none(), "it ended too early");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let id = child.id().to_string();
+    let interrupt = std::process::Command::new("kill")
+        .args(["-INT", &id])
+        .status()
+        .unwrap();
+    assert!(interrupt.success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert_eq!(entries(), 0);
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 use tunnelstitch::evaluate::mtf50;
 use tunnelstitch::frames::GreyImage;
 use tunnelstitch::render::super_resolve::{Channel, Footprints, MARGIN, Region, View};
-use tunnelstitch::render::{Canvas, Interpolation, Picture, native_px_per_metre, place};
+use tunnelstitch::render::{Canvas, Interpolation, Kernel, Picture, native_px_per_metre, place};
 use tunnelstitch::simulate::{Light, Scene, SimulateOptions, SlantedEdge, Wall};
 use tunnelstitch::surface::{Circle, Surface, WallPoint};
 
@@ -20,6 +20,7 @@ struct Simulated {
     pictures: Vec<Picture>,
     values: Vec<Vec<f32>>,
     noise: f32,
+    bicubic: Kernel,
 }
 
 /// What is drawn of a fine pixel, and what there is.
@@ -58,12 +59,14 @@ impl Simulated {
             // Rounding adds 1/12.
             noise: (options.noise_grey.powi(2) + 1.0 / 12.0).sqrt() as f32,
             scene,
+            bicubic: Kernel::new(Interpolation::Bicubic, 1.0),
         }
     }
 
     /// The frame with the highest resolution at a wall point, bicubic; the feathered mean of all; how many there are.
     fn bicubic(&self, wall: WallPoint) -> Option<(f32, f32, usize)> {
         let (frame, camera) = (self.circle.frame(wall), self.scene.camera());
+        let kernel = &self.bicubic;
         let (mut best, mut finest, mut sum, mut weights, mut views) = (0.0, 0.0, 0.0, 0.0, 0);
         for (pose, picture) in self.scene.truth().iter().zip(&self.pictures) {
             let x_c = pose.to_camera(&frame.x_w);
@@ -71,7 +74,7 @@ impl Simulated {
             let Some(pixel) = pixel.filter(|pixel| camera.sees(pixel, 0.0)) else {
                 continue;
             };
-            let [value]: [f32; 1] = picture.sample(pixel.x, pixel.y, Interpolation::Bicubic);
+            let [value, ..] = picture.at(pixel.x as f32, pixel.y as f32, kernel);
             let jacobian = camera.project_jacobian(&x_c);
             let along = |e: &_| jacobian * pose.r_wc.inverse_transform_vector(e);
             let pixels = along(&frame.e_s).perp(&along(&frame.e_h)).abs();

@@ -116,21 +116,18 @@ impl Scene<'_> {
         let views = self.needed(tile).into_iter().filter_map(|frame| {
             let picture = self.frames.picture(frame)?;
             Some(View::new(
-                frame,
-                self.surface,
+                (frame, &self.placements[frame], picture),
                 camera,
-                &self.placements[frame],
-                picture,
                 self.kernels,
                 self.exposure.of(frame),
-                self.canvas,
-                tile,
                 points,
+                tile.columns as usize,
             ))
         });
         let views: Vec<View> = views.collect();
         let mut brush = Brush::<'_, T, C> {
-            pixels: Vec::with_capacity(tile.pixels() * (C + 1)),
+            pixels: vec![T::default(); tile.pixels() * (C + 1)],
+            next: 0,
             sources: Vec::with_capacity(tile.pixels()),
             run,
         };
@@ -222,7 +219,10 @@ impl Row {
 
 /// Draws rows of a tile with `C` channels of `T`.
 struct Brush<'a, T, const C: usize> {
+    /// All that the tile has, in holes to begin with.
     pixels: Vec<T>,
+    /// The pixel to be drawn next.
+    next: usize,
     sources: Vec<u32>,
     run: &'a mut Run,
 }
@@ -230,15 +230,15 @@ struct Brush<'a, T, const C: usize> {
 impl<T: Sample, const C: usize> Brush<'_, T, C> {
     #[inline(always)]
     fn put(&mut self, value: Option<[f32; 4]>) {
-        // Colour and alpha, of which grey leaves out the middle two.
-        let mut pixel = [T::default(); 4];
-        if let Some(value) = value {
-            for (sample, value) in pixel.iter_mut().zip(&value[..C]) {
-                *sample = T::nearest(*value);
-            }
-            pixel[C] = T::nearest(T::WHITE);
+        let at = self.next * (C + 1);
+        self.next += 1;
+        let (Some(value), Some(pixel)) = (value, self.pixels.get_mut(at..=at + C)) else {
+            return;
+        };
+        for (sample, value) in pixel.iter_mut().zip(&value[..C]) {
+            *sample = T::nearest(*value);
         }
-        self.pixels.extend_from_slice(&pixel[..=C]);
+        pixel[C] = T::nearest(T::WHITE);
     }
 
     fn average(&mut self, tile: &Tile, points: &Points, views: &[View]) {

@@ -189,7 +189,7 @@ fn spec(canvas: &Canvas, format: PixelFormat, layout: Layout, layer: RasterLayer
         channels: 1,
         alpha: false,
         nodata: None,
-        reduce: Reduce::First,
+        reduce: Reduce::Mean,
         georeference: Some(georeference(canvas, layout)),
     };
     match layer {
@@ -200,13 +200,13 @@ fn spec(canvas: &Canvas, format: PixelFormat, layout: Layout, layer: RasterLayer
             },
             channels: format.channels as u8,
             alpha: true,
-            reduce: Reduce::Mean,
             ..plain
         },
         RasterLayer::Coverage => plain,
         RasterLayer::Frames => RasterSpec {
             samples: SampleType::U32,
             nodata: Some(Nodata::Max),
+            reduce: Reduce::First,
             ..plain
         },
     }

@@ -3,10 +3,8 @@
 use super::exposure::Response;
 use super::kernel::{Interpolation, Kernel};
 use super::warp::{Look, Points, Run};
-use super::{Canvas, Picture, Placement, Tile};
+use super::{Picture, Placement};
 use crate::camera::Pinhole;
-use crate::surface::Surface;
-use nalgebra::Vector2;
 
 /// Kernels are made for stretches of this step from 1 upwards.
 const STRETCH_STEP: f64 = 0.25;
@@ -27,9 +25,9 @@ impl Kernels {
     }
 
     /// The widest kernel that is no wider than `stretch`.
-    fn stretched(&self, stretch: f64) -> &Kernel {
+    fn stretched(&self, stretch: f32) -> &Kernel {
         // The cast saturates, so that anything odd gets an end of the list.
-        let step = ((stretch - 1.0) / STRETCH_STEP) as usize;
+        let step = ((f64::from(stretch) - 1.0) / STRETCH_STEP) as usize;
         &self.0[step.min(self.0.len() - 1)]
     }
 }
@@ -40,43 +38,70 @@ pub struct View<'a> {
     pub frame: usize,
     look: Look,
     picture: &'a Picture,
-    kernel: &'a Kernel,
+    kernels: &'a Kernels,
     response: Response<'a>,
+    /// Points in a row of the tile.
+    columns: usize,
     /// `2/width`, `2/height` of the picture, and the last pixel centres.
     feather: [f32; 4],
 }
 
 impl<'a> View<'a> {
-    /// The frame with the given picture, as it is seen from `tile`, whose points are relative to `points.origin`.
-    #[expect(clippy::too_many_arguments, reason = "a view is all of these")]
+    /// A frame (its index, place and picture) as it is seen from a tile with the given `points`, `columns` in a row.
     pub fn new(
-        frame: usize,
-        surface: &dyn Surface,
+        (frame, placement, picture): (usize, &Placement, &'a Picture),
         camera: &Pinhole,
-        placement: &Placement,
-        picture: &'a Picture,
         kernels: &'a Kernels,
         response: Response<'a>,
-        canvas: &Canvas,
-        tile: &Tile,
         points: &Points,
+        columns: usize,
     ) -> Self {
-        let stretch = stretch(surface, camera, placement, canvas, tile);
         let (width, height) = (camera.width as f32, camera.height as f32);
         Self {
             frame,
             look: Look::new(camera, &placement.pose, &points.origin),
             picture,
-            kernel: kernels.stretched(stretch),
+            kernels,
             response,
+            columns,
             feather: [2.0 / width, 2.0 / height, width - 0.5, height - 0.5],
         }
     }
 
-    /// Looks at `count` points from index `start`: where they appear, and the values there with the frame's exposure undone.
+    /// Looks at `count` points of a row from index `start`: where they appear, and the values there with the frame's exposure
+    /// undone.
     pub fn look_at(&self, run: &mut Run, points: &Points, start: usize, count: usize) {
-        run.look(&self.look, self.picture, self.kernel, points, start, count);
+        run.project(&self.look, points, start, count);
+        let half = count / 2;
+        let seen = &run.seen()[..count];
+        let found = seen[half..].iter().position(|seen| *seen).map(|k| half + k);
+        let Some(k) = found.or_else(|| seen[..half].iter().rposition(|seen| *seen)) else {
+            return;
+        };
+        let stretch = self.stretch(points, start + k);
+        run.sample(self.picture, self.kernels.stretched(stretch), count);
         self.response.undo(run, count);
+    }
+
+    /// How many pixels of the frame a step of one canvas pixel covers at a point, along that axis of the frame along which
+    /// it covers more.
+    fn stretch(&self, points: &Points, at: usize) -> f32 {
+        let (u, v) = self.look.pixel(points, at);
+        // The neighbours after it, or before it at the end of a row or column.
+        let step = |after: usize, before: Option<usize>, ends: bool| {
+            let other = match (ends || after >= points.len(), before) {
+                (false, _) => after,
+                (true, Some(before)) => before,
+                (true, None) => at,
+            };
+            let (s, t) = self.look.pixel(points, other);
+            (s - u, t - v)
+        };
+        let ends = (at + 1).is_multiple_of(self.columns);
+        let before = at.checked_sub(1).filter(|_| self.columns > 1);
+        let (u_s, v_s) = step(at + 1, before, ends);
+        let (u_h, v_h) = step(at + self.columns, at.checked_sub(self.columns), false);
+        u_s.hypot(u_h).max(v_s.hypot(v_h))
     }
 
     /// `tent(u) tent(v)`: 1 in the middle, falling to 0 half a pixel beyond the outermost pixel centres.
@@ -85,28 +110,4 @@ impl<'a> View<'a> {
         let [across, down, right, bottom] = self.feather;
         (u + 0.5).min(right - u) * across * ((v + 0.5).min(bottom - v) * down)
     }
-}
-
-/// How many pixels of a frame a step of one canvas pixel covers in the middle of a tile, along that axis of the frame along
-/// which it covers more.
-fn stretch(
-    surface: &dyn Surface,
-    camera: &Pinhole,
-    placement: &Placement,
-    canvas: &Canvas,
-    tile: &Tile,
-) -> f64 {
-    let middle = [
-        f64::from(tile.column) + 0.5 * f64::from(tile.columns),
-        f64::from(tile.row) + 0.5 * f64::from(tile.rows),
-    ];
-    let wall = surface.frame(canvas.wall_at(middle));
-    let x_c = placement.pose.to_camera(&wall.x_w);
-    if x_c.z <= 0.0 {
-        return 1.0;
-    }
-    let jacobian = camera.project_jacobian(&x_c);
-    let step = |e| jacobian * placement.pose.r_wc.inverse_transform_vector(&e);
-    let (s, h): (Vector2<f64>, Vector2<f64>) = (step(wall.e_s), step(wall.e_h));
-    s.x.hypot(h.x).max(s.y.hypot(h.y)) / canvas.px_per_metre
 }

@@ -29,6 +29,11 @@ impl Points {
         all
     }
 
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.x.len()
+    }
+
     /// Puts other points in their place.
     pub fn set(&mut self, points: &[Vector3<f64>]) {
         let origin = points.first().copied().unwrap_or_default();
@@ -75,6 +80,12 @@ impl Look {
             lens_limit: radial.limit() as f32,
             limit: [(camera.width - 1) as f32, (camera.height - 1) as f32],
         }
+    }
+
+    /// The pixel of one of the points, wherever it lies.
+    pub fn pixel(&self, points: &Points, at: usize) -> (f32, f32) {
+        let (u, v, _) = self.project([points.x[at], points.y[at], points.z[at]]);
+        (u, v)
     }
 
     /// Where point `k` appears, and whether that is within the outermost pixel centres.
@@ -165,18 +176,12 @@ impl Run {
         start: usize,
         count: usize,
     ) {
-        wide(
-            #[inline(always)]
-            || {
-                self.project(look, points, start, count);
-                self.sample(picture, kernel, count);
-            },
-        );
+        self.project(look, points, start, count);
+        self.sample(picture, kernel, count);
     }
 
     /// Finds the pixels of `count` points from index `start`.
-    #[inline(always)]
-    fn project(&mut self, look: &Look, points: &Points, start: usize, count: usize) {
+    pub fn project(&mut self, look: &Look, points: &Points, start: usize, count: usize) {
         let (x, y, z) = (
             &points.x[start..][..count],
             &points.y[start..][..count],
@@ -187,28 +192,35 @@ impl Run {
             &mut self.v[..count],
             &mut self.seen[..count],
         );
-        for k in 0..count {
-            (u[k], v[k], seen[k]) = look.project([x[k], y[k], z[k]]);
-        }
+        wide(
+            #[inline(always)]
+            || {
+                for k in 0..count {
+                    (u[k], v[k], seen[k]) = look.project([x[k], y[k], z[k]]);
+                }
+            },
+        );
     }
 
     /// Looks up the values of the `count` points projected before.
-    #[inline(always)]
-    fn sample(&mut self, picture: &Picture, kernel: &Kernel, count: usize) {
-        match (picture.samples(), picture.format().channels) {
-            (Samples::Eight(samples), 1) => {
-                self.sample_of::<u8, 1>(picture, samples, kernel, count)
-            }
-            (Samples::Eight(samples), _) => {
-                self.sample_of::<u8, 3>(picture, samples, kernel, count)
-            }
-            (Samples::Sixteen(samples), 1) => {
-                self.sample_of::<u16, 1>(picture, samples, kernel, count);
-            }
-            (Samples::Sixteen(samples), _) => {
-                self.sample_of::<u16, 3>(picture, samples, kernel, count);
-            }
-        }
+    pub fn sample(&mut self, picture: &Picture, kernel: &Kernel, count: usize) {
+        wide(
+            #[inline(always)]
+            || match (picture.samples(), picture.format().channels) {
+                (Samples::Eight(samples), 1) => {
+                    self.sample_of::<u8, 1>(picture, samples, kernel, count);
+                }
+                (Samples::Eight(samples), _) => {
+                    self.sample_of::<u8, 3>(picture, samples, kernel, count);
+                }
+                (Samples::Sixteen(samples), 1) => {
+                    self.sample_of::<u16, 1>(picture, samples, kernel, count);
+                }
+                (Samples::Sixteen(samples), _) => {
+                    self.sample_of::<u16, 3>(picture, samples, kernel, count);
+                }
+            },
+        );
     }
 
     #[inline(always)]
