@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let camera = Pinhole::from_vertical_fov(1920, 1080, 60f64.to_radians());
     let circle = Circle::new(3.0)?;
     let samples: Vec<u8> = (0..1920 * 1080 * 3)
-        .map(|k: usize| (k * 2_654_435_761 >> 13) as u8)
+        .map(|k: usize| ((k * 2_654_435_761) >> 13) as u8)
         .collect();
     let pictures = (0..12).map(|_| Picture::new(1920, 1080, 3, samples.clone()));
     let mut frames = FrameStack::from_pictures(camera, pictures.collect());

@@ -136,7 +136,7 @@ mod tests {
     fn two_flat_frames_differ_by_their_difference() {
         let wall = TestWall::one(waves);
         let (w, h) = (wall.camera.width as usize, wall.camera.height as usize);
-        let flat = |value| Picture::new(w, h, 1, vec![value as u8; w * h]);
+        let flat = |value| Picture::new(w, h, 1, vec![value; w * h]);
         let poses = vec![wall.poses[0]; 3];
         let placements = place(&wall.circle, &wall.camera, &poses).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();

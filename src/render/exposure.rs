@@ -178,13 +178,13 @@ impl Response<'_> {
                 let first = self.gain * table.at(u[start], v[start]);
                 let slope =
                     (self.gain * table.at(u[last], v[last]) - first) / (last - start).max(1) as f32;
-                for k in start..end {
-                    let factor = first + (k - start) as f32 * slope;
-                    values[k] = self.undone(&values[k], factor);
+                for (k, value) in values[start..end].iter_mut().enumerate() {
+                    *value = self.undone(value, first + k as f32 * slope);
                 }
             } else {
-                for k in start..end {
-                    values[k] = self.undone(&values[k], self.gain * table.at(u[k], v[k]));
+                let places = u[start..end].iter().zip(&v[start..end]);
+                for (value, (u, v)) in values[start..end].iter_mut().zip(places) {
+                    *value = self.undone(value, self.gain * table.at(*u, *v));
                 }
             }
         }

@@ -348,8 +348,8 @@ impl Lattice {
                             )
                     };
                     let mut best = (f32::INFINITY, 0);
-                    for j in 0..CHOICES {
-                        if costs[j].is_finite() {
+                    for (j, cost) in costs.iter().enumerate() {
+                        if cost.is_finite() {
                             let cost = reached(j);
                             if cost < best.0 {
                                 best = (cost, j as u8);
