@@ -1,6 +1,5 @@
 //! What the frames show of single points of the wall.
 
-use super::kernel::{Interpolation, Kernel};
 use super::picture::luma;
 use super::thumbnails::Thumbnails;
 use super::tiles::{EDGE, Tile, tiles};
@@ -58,7 +57,7 @@ fn of_tile(
 ) -> Vec<Vec<Glimpse>> {
     let camera = thumbnails.camera();
     let points = Points::new(&tile.points(surface, grid));
-    let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
+    let bilinear = thumbnails.bilinear();
     let mut found: Vec<Vec<Glimpse>> = vec![Vec::new(); tile.pixels()];
     let columns = tile.columns as usize;
     let mut run = Run::default();
@@ -68,7 +67,7 @@ fn of_tile(
         let white = picture.format().white();
         let colour = picture.format().channels == 3;
         for row in 0..tile.rows as usize {
-            run.look(&look, picture, &bilinear, &points, row * columns, columns);
+            run.look(&look, picture, bilinear, &points, row * columns, columns);
             let (u, v) = run.pixels();
             for k in 0..columns {
                 if !run.seen()[k] {

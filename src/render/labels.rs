@@ -14,7 +14,6 @@
 //! "Interactive digital photomontage", SIGGRAPH 2004 (the energy).
 
 use super::draw::{NO_FRAME, median};
-use super::kernel::{Interpolation, Kernel};
 use super::picture::luma;
 use super::thumbnails::Thumbnails;
 use super::warp::{Look, Points, Run};
@@ -232,7 +231,6 @@ fn sights(
     let pose = &placements[frame].pose;
     let look = Look::new(camera, pose, &points.origin);
     let picture = thumbnails.picture(frame);
-    let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
     let response = exposure.of(frame);
     let colour = picture.format().channels == 3;
     let scale = 255.0 / picture.format().white();
@@ -251,7 +249,14 @@ fn sights(
     let mut found = vec![Sight::default(); walls.len()];
     for row in 0..tile.rows as usize {
         let start = row * columns;
-        run.look(&look, picture, &bilinear, points, start, columns);
+        run.look(
+            &look,
+            picture,
+            thumbnails.bilinear(),
+            points,
+            start,
+            columns,
+        );
         raw[..columns].copy_from_slice(&run.values()[..columns]);
         response.undo(&mut run, columns);
         let (u, v) = run.pixels();

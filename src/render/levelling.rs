@@ -13,7 +13,6 @@
 //! on Graphics 2(4), 1983.
 
 use super::draw::NO_FRAME;
-use super::kernel::{Interpolation, Kernel};
 use super::thumbnails::Thumbnails;
 use super::warp::{Look, Points, RUN, Run};
 use super::{Canvas, Exposure, Placement};
@@ -254,13 +253,13 @@ fn shown(
     let look = Look::new(thumbnails.camera(), &placements[frame].pose, &points.origin);
     let picture = thumbnails.picture(frame);
     let response = exposure.of(frame);
-    let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
+    let bilinear = thumbnails.bilinear();
     let count = window.columns * window.rows;
     let mut values = Vec::with_capacity(count * channels);
     let mut run = Run::default();
     for start in (0..count).step_by(RUN) {
         let length = RUN.min(count - start);
-        run.look(&look, picture, &bilinear, &points, start, length);
+        run.look(&look, picture, bilinear, &points, start, length);
         response.undo(&mut run, length);
         for k in 0..length {
             let value = run.values()[k];

@@ -1,5 +1,6 @@
 //! All frames, small: enough to find out how they were exposed and where they agree.
 
+use super::kernel::{Interpolation, Kernel};
 use super::{FrameStack, Picture, RenderError};
 use crate::camera::Pinhole;
 use crate::progress::Progress;
@@ -12,6 +13,7 @@ pub struct Thumbnails {
     full_size: (usize, usize),
     scale: f32,
     pictures: Vec<Picture>,
+    bilinear: Kernel,
 }
 
 impl Thumbnails {
@@ -44,6 +46,7 @@ impl Thumbnails {
             camera: camera.at_level(level),
             full_size: (camera.width as usize, camera.height as usize),
             scale: (1 << level) as f32,
+            bilinear: Kernel::new(Interpolation::Bilinear, 1.0),
             pictures: pictures.into_iter().collect::<Result<Vec<_>, _>>()?,
         })
     }
@@ -86,6 +89,11 @@ impl Thumbnails {
     #[inline(always)]
     pub fn full(&self, t: f32) -> f32 {
         self.scale * t + 0.5 * (self.scale - 1.0)
+    }
+
+    /// How thumbnails are sampled.
+    pub fn bilinear(&self) -> &Kernel {
+        &self.bilinear
     }
 
     /// The thumbnail of a frame.

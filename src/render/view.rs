@@ -101,7 +101,7 @@ impl<'a> View<'a> {
         let before = at.checked_sub(1).filter(|_| self.columns > 1);
         let (u_s, v_s) = step(at + 1, before, ends);
         let (u_h, v_h) = step(at + self.columns, at.checked_sub(self.columns), false);
-        u_s.hypot(u_h).max(v_s.hypot(v_h))
+        (u_s * u_s + u_h * u_h).max(v_s * v_s + v_h * v_h).sqrt()
     }
 
     /// `tent(u) tent(v)`: 1 in the middle, falling to 0 half a pixel beyond the outermost pixel centres.
