@@ -31,7 +31,8 @@ pub struct StitchArguments {
     picture: PictureArguments,
     #[command(flatten)]
     blend: BlendArguments,
-    /// Memory to work with, as 512MiB or 2GiB. Frames that have no room are decoded again when they are needed.
+    /// Memory to work with, as 512MiB or 2GiB. Frames that have no room are decoded again when they are needed; seams are
+    /// sought on a coarser grid if theirs would take more than half.
     #[arg(long, value_name = "SIZE", default_value = "2GiB", value_parser = memory_size)]
     memory: u64,
     /// Treat every camera as standing on the tunnel's axis (to see what its position does).

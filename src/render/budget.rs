@@ -33,8 +33,8 @@ pub struct Budget {
 
 /// Copies of a band: drawn tiles, the band, the tiles that are written, and what becomes of them.
 const COPIES: u64 = 5;
-/// The most of the memory that the grid may take; beyond, its nodes are farther apart.
-const GRID_SHARE: u64 = 4;
+/// One over the most of the memory that the grid may take; beyond, its nodes are farther apart.
+const GRID_SHARE: u64 = 2;
 /// Copies of a frame while it is decoded: the file, the decoder's picture, and what it is turned into.
 const DECODING: u64 = 4;
 

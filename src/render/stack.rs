@@ -160,8 +160,20 @@ impl FrameStack {
     /// As [`FrameStack::hold`].
     pub fn hold_all(&mut self, progress: &dyn Progress) -> Result<(), RenderError> {
         let all: Vec<usize> = (0..self.len()).collect();
-        progress.start("frames", all.len());
-        for run in all.chunks(8 * rayon::current_num_threads().max(1)) {
+        self.hold_early(&all, progress)
+    }
+
+    /// Decodes `frames`, before they are needed.
+    ///
+    /// # Errors
+    /// As [`FrameStack::hold`].
+    pub fn hold_early(
+        &mut self,
+        frames: &[usize],
+        progress: &dyn Progress,
+    ) -> Result<(), RenderError> {
+        progress.start("frames", frames.len());
+        for run in frames.chunks(8 * rayon::current_num_threads().max(1)) {
             self.hold(run, &[], u64::MAX)?;
             progress.advance(run.len());
         }

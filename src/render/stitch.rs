@@ -169,7 +169,7 @@ impl<'a> Stitch<'a> {
         )
     }
 
-    /// Finds exposures and seams, within a budget. Frames are kept if there is room for all of them.
+    /// Finds exposures and seams, within a budget. As many frames as there is room for are kept.
     ///
     /// # Errors
     /// A frame that cannot be decoded.
@@ -178,9 +178,12 @@ impl<'a> Stitch<'a> {
         budget: &Budget,
         progress: &dyn Progress,
     ) -> Result<(Plan<'_>, &mut FrameStack), RenderError> {
-        if self.frames.frame_bytes() * self.frames.len() as u64 <= budget.room {
-            self.frames.hold_all(progress)?;
-        }
+        // Those that are drawn first, since all are looked at now.
+        let mut first: Vec<usize> = (0..self.frames.len()).collect();
+        let start = |frame: &usize| self.laid_out.placements[*frame].footprint.h_min_m;
+        first.sort_by(|a, b| start(a).total_cmp(&start(b)));
+        first.truncate((budget.room / self.frames.frame_bytes().max(1)) as usize);
+        self.frames.hold_early(&first, progress)?;
         let plan = Plan::new(
             self.surface,
             &self.frames,
