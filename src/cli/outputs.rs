@@ -2,15 +2,16 @@
 
 use super::Failure;
 use super::stitch::picture_output;
-use crate::atomic;
+use crate::atomic::{self, WriteError};
 use crate::camera::Pinhole;
-use crate::frames::{JPEG_QUALITY, PictureFormat, write_picture};
+use crate::frames::{JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};
 use crate::raster::{Compression, DziFormat};
 use crate::render::{
     Budget, Canvas, Coverage, Gap, Layout, Map, Panorama, PixelFormat, Placement, Plan, Preview,
     RasterLayer, RasterTarget, Target, gaps_csv,
 };
 use crate::surface::Surface;
+use crate::survey::{SURVEY_FILE, Survey};
 use image::DynamicImage;
 use nalgebra::Matrix6;
 use std::path::{Path, PathBuf};
@@ -50,6 +51,16 @@ enum CompressionArgument {
     /// With loss, 8 bits: a tenth of the size, and faster.
     Jpeg,
 }
+
+const COVERAGE: &str = "coverage.tif";
+const FRAMES: &str = "frames.tif";
+const RESOLUTION: &str = "resolution.tif";
+const UNCERTAINTY: &str = "uncertainty.tif";
+const PREVIEW: &str = "preview.png";
+const GAPS: &str = "gaps.csv";
+
+/// Names of all maps.
+const MAPS: [&str; 6] = [COVERAGE, FRAMES, RESOLUTION, UNCERTAINTY, PREVIEW, GAPS];
 
 /// The outputs of one panorama, begun.
 pub struct Outputs {
@@ -92,6 +103,58 @@ impl OutputArguments {
         Ok(())
     }
 
+    /// Refuses outputs that would replace one another, or what the survey is made of.
+    ///
+    /// # Errors
+    /// The two names.
+    pub fn check_apart(&self, survey: &Survey, poses: Option<&Path>) -> Result<(), Failure> {
+        let mut inputs: Vec<PathBuf> = survey.frames.iter().map(|f| f.path.clone()).collect();
+        let file = &survey.file;
+        let own = [
+            Path::new(SURVEY_FILE),
+            &file.camera.file,
+            &file.poses.initial,
+        ];
+        let named = own.into_iter().chain(file.poses.truth.as_deref());
+        inputs.extend(named.map(|name| survey.folder.join(name)));
+        inputs.extend(poses.map(Path::to_owned));
+        inputs.extend(self.covariance.clone());
+        let mut taken: Vec<PathBuf> = inputs.iter().map(|path| full(path)).collect();
+        for output in self.paths() {
+            let place = full(&output);
+            // A folder of tiles replaces all that is in it.
+            let other = taken.iter().find(|other| other.starts_with(&place));
+            if let Some(other) = other {
+                return Err(Failure::usage(format!(
+                    "{}: would replace {}; choose another name",
+                    output.display(),
+                    other.display()
+                )));
+            }
+            taken.push(place);
+        }
+        Ok(())
+    }
+
+    /// Everything that is written.
+    fn paths(&self) -> Vec<PathBuf> {
+        let mut paths = vec![self.out.clone()];
+        if let Some(dzi) = &self.dzi {
+            let mut tiles = dzi.with_extension("").into_os_string();
+            tiles.push("_files");
+            paths.extend([dzi.clone(), tiles.into()]);
+        }
+        if let Some(folder) = &self.maps {
+            paths.extend(MAPS.map(|name| folder.join(name)));
+        }
+        paths
+    }
+
+    /// Whether there are to be maps.
+    pub fn wants_maps(&self) -> bool {
+        self.maps.is_some()
+    }
+
     /// Memory that the outputs hold until they are finished, bytes.
     pub fn bytes(&self, canvas: &Canvas, format: PixelFormat, layout: Layout) -> u64 {
         let pending = |layer| RasterTarget::pending_bytes(canvas, format, layout, layer);
@@ -105,8 +168,9 @@ impl OutputArguments {
         }
         if self.maps.is_some() {
             bytes += pending(RasterLayer::Coverage) + pending(RasterLayer::Frames);
+            bytes += Preview::bytes(canvas);
         }
-        bytes
+        bytes + Coverage::bytes(canvas)
     }
 
     fn is_tiff(&self) -> bool {
@@ -129,16 +193,30 @@ impl OutputArguments {
                 quality: self.quality,
             },
         };
-        let jpeg = self.is_tiff() && self.compression == CompressionArgument::Jpeg;
-        if format.deep && (jpeg || self.dzi.is_some()) {
-            return Err(Failure::usage(
-                "the frames have 16 bits, and JPEG and Deep Zoom hold 8: use --compression deflate without --dzi",
-            ));
+        let picture_format = PictureFormat::of(&self.out);
+        let jpg = matches!(picture_format, Ok(PictureFormat::Jpeg { .. }));
+        let packed = self.is_tiff() && self.compression == CompressionArgument::Jpeg;
+        let narrow = [
+            (jpg, "a .jpg", "write .png or .tif"),
+            (packed, "--compression jpeg", "use --compression deflate"),
+            (self.dzi.is_some(), "--dzi", "leave it out"),
+        ];
+        if let Some((_, what, remedy)) = narrow.iter().find(|(wanted, ..)| *wanted && format.deep) {
+            return Err(Failure::usage(format!(
+                "the frames have 16 bits, and {what} holds 8: {remedy}"
+            )));
+        }
+        let [width, height] = layout.size(canvas);
+        if jpg && width.max(height) > JPEG_LIMIT_PX {
+            return Err(Failure::usage(format!(
+                "{}: {width} × {height} px are more than a JPEG file holds; write .tif, or lower --px-per-metre",
+                self.out.display()
+            )));
         }
         let cog = |path: &Path, layer, compression| {
             RasterTarget::cog(path, canvas, format, layout, layer, compression)
         };
-        let picture = match PictureFormat::of(&self.out) {
+        let picture = match picture_format {
             Ok(PictureFormat::Tiff) | Err(_) => None,
             Ok(PictureFormat::Jpeg { .. }) => Some(PictureFormat::Jpeg {
                 quality: self.quality,
@@ -149,12 +227,12 @@ impl OutputArguments {
             Some(folder) => Some(Maps {
                 folder: folder.clone(),
                 coverage: cog(
-                    &folder.join("coverage.tif"),
+                    &folder.join(COVERAGE),
                     RasterLayer::Coverage,
                     Compression::Deflate,
                 )?,
                 frames: cog(
-                    &folder.join("frames.tif"),
+                    &folder.join(FRAMES),
                     RasterLayer::Frames,
                     Compression::Deflate,
                 )?,
@@ -228,10 +306,9 @@ impl Outputs {
     ///
     /// # Errors
     /// Whatever the system says.
-    pub fn finish(self, plan: &Plan, input: &MapInput) -> Result<(), Failure> {
-        let gaps = self.gaps();
+    pub fn finish(self, plan: &Plan, gaps: &[Gap], input: &MapInput) -> Result<(), Failure> {
         if let Some(maps) = self.maps {
-            maps.finish(self.layout, plan, input, &gaps)?;
+            maps.finish(self.layout, plan, input, gaps)?;
         }
         if let Some(dzi) = self.dzi {
             dzi.finish()?;
@@ -266,18 +343,42 @@ impl Maps {
         let grid = plan.grid(budget.grid_step_px);
         let labels = plan.seams().map(|seams| seams.labels());
         let resolution = Map::resolution(surface, camera, placements, &grid, labels);
-        resolution.write(&self.folder.join("resolution.tif"), layout)?;
+        resolution.write(&self.folder.join(RESOLUTION), layout)?;
         if let Some(covariances) = covariances {
             let map = Map::uncertainty(surface, camera, placements, &grid, labels, covariances);
-            map.write(&self.folder.join("uncertainty.tif"), layout)?;
+            map.write(&self.folder.join(UNCERTAINTY), layout)?;
+        } else {
+            // One from an earlier panorama would belong to other poses.
+            remove(&self.folder.join(UNCERTAINTY))?;
         }
         let preview = DynamicImage::from(self.preview.picture(layout, 0.0));
-        write_picture(
-            &self.folder.join("preview.png"),
-            &preview,
-            PictureFormat::Png,
-        )?;
-        atomic::write_text(&self.folder.join("gaps.csv"), &gaps_csv(gaps))?;
+        write_picture(&self.folder.join(PREVIEW), &preview, PictureFormat::Png)?;
+        atomic::write_text(&self.folder.join(GAPS), &gaps_csv(gaps))?;
         Ok(())
+    }
+}
+
+/// A name in full, of a file that may not be there yet.
+fn full(path: &Path) -> PathBuf {
+    if let Ok(full) = path.canonicalize() {
+        return full;
+    }
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.canonicalize(),
+        _ => Path::new(".").canonicalize(),
+    };
+    match (folder, path.file_name()) {
+        (Ok(folder), Some(name)) => folder.join(name),
+        _ => path.to_owned(),
+    }
+}
+
+/// Removes a file if it is there.
+fn remove(path: &Path) -> Result<(), WriteError> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(WriteError::new(path, error))
+        }
+        _ => Ok(()),
     }
 }

@@ -31,8 +31,7 @@ pub struct StitchArguments {
     picture: PictureArguments,
     #[command(flatten)]
     blend: BlendArguments,
-    /// Memory to work with, as 512MiB or 2GiB. Frames that have no room are decoded again when they are needed; seams are
-    /// sought on a coarser grid if theirs would take more than half.
+    /// Memory to work with, as 512MiB or 2GiB. Frames that have no room are decoded again when they are needed.
     #[arg(long, value_name = "SIZE", default_value = "2GiB", value_parser = memory_size)]
     memory: u64,
     /// Treat every camera as standing on the tunnel's axis (to see what its position does).
@@ -234,6 +233,9 @@ struct Report<'a> {
 pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failure> {
     arguments.output.check()?;
     let survey = Survey::open(&arguments.survey)?;
+    arguments
+        .output
+        .check_apart(&survey, arguments.poses.file())?;
     let poses = arguments.poses.of(&survey)?;
     let covariances = covariances(arguments, &survey)?;
     let options = StitchOptions {
@@ -278,6 +280,7 @@ pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failu
     terminal.start("writing", 1);
     let written = outputs.finish(
         &plan,
+        &gaps,
         &MapInput {
             surface,
             camera: &survey.camera,
@@ -340,6 +343,9 @@ fn covariances(
     arguments: &StitchArguments,
     survey: &Survey,
 ) -> Result<Option<Vec<Matrix6<f64>>>, Failure> {
+    if !arguments.output.wants_maps() {
+        return Ok(None);
+    }
     let beside = arguments
         .poses
         .file()

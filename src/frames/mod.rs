@@ -19,4 +19,4 @@ pub use noise::{noise_at_level, noise_sigma};
 pub use pyramid::Pyramid;
 pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
 pub use stored::StoredFrame;
-pub use write::{FormatError, JPEG_QUALITY, PictureFormat, write_picture};
+pub use write::{FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};

@@ -32,7 +32,7 @@ pub enum PictureFormat {
 pub const JPEG_QUALITY: u8 = 90;
 
 /// The longest side of a JPEG picture, pixels.
-const JPEG_LIMIT_PX: u32 = 65_535;
+pub const JPEG_LIMIT_PX: u32 = 65_535;
 
 /// Most pixels of four bytes that fit into a TIFF's 32-bit offsets, with room for its header.
 const TIFF_LIMIT_PX: u64 = (1 << 30) - (1 << 16);

@@ -33,8 +33,8 @@ pub struct Budget {
 
 /// Copies of a band: drawn tiles, the band, the tiles that are written, and what becomes of them.
 const COPIES: u64 = 5;
-/// One over the most of the memory that the grid may take; beyond, its nodes are farther apart.
-const GRID_SHARE: u64 = 2;
+/// The most nodes of the grid of seams; beyond, they are farther apart.
+const NODES: usize = 12 << 20;
 /// Copies of a frame while it is decoded: the file, the decoder's picture, and what it is turned into.
 const DECODING: u64 = 4;
 
@@ -60,17 +60,11 @@ impl Budget {
     ) -> Result<Self, RenderError> {
         let limit = memory::available_bytes().map_or(limit, |available| limit.min(available));
         let format = frames.format();
-        let mut grid_step_px = STEP_PX;
-        let grid_bytes = |step: f64| {
-            let grid = canvas.grid(step, COARSEST);
-            grid.pixels() as u64 * Seams::bytes_per_node(format.channels)
-        };
+        let grid_step_px = grid_step_px(canvas);
         let (mut thumbnails, mut grid) = (0, 0);
         if options.needs_thumbnails() {
-            while grid_bytes(grid_step_px) > limit / GRID_SHARE {
-                grid_step_px *= 2.0;
-            }
-            grid = grid_bytes(grid_step_px);
+            let nodes = canvas.grid(grid_step_px, COARSEST).pixels() as u64;
+            grid = nodes * Seams::bytes_per_node(format.channels);
             let level = Thumbnails::level(
                 frames.camera(),
                 native_px_per_metre,
@@ -128,6 +122,18 @@ impl Budget {
     }
 }
 
+/// Distance of the grid's nodes, by the canvas alone, so that the panorama does not depend on the memory.
+fn grid_step_px(canvas: &Canvas) -> f64 {
+    let mut step = STEP_PX;
+    loop {
+        let grid = canvas.grid(step, COARSEST);
+        if grid.pixels() <= NODES || grid.columns <= COARSEST {
+            return step;
+        }
+        step *= 2.0;
+    }
+}
+
 /// Frames that meet the same band, at most.
 fn most_in_a_band(canvas: &Canvas, placements: &[Placement]) -> usize {
     let band_m = f64::from(BAND_ROWS) / canvas.px_per_metre;
@@ -136,8 +142,8 @@ fn most_in_a_band(canvas: &Canvas, placements: &[Placement]) -> usize {
     // Where frames begin and end.
     let mut steps = vec![0i64; count + 1];
     for placement in placements {
-        let margin_m = band_m / f64::from(BAND_ROWS) + 0.02 * band_m;
-        let footprint = placement.footprint.widened(margin_m);
+        let pixel_m = band_m / f64::from(BAND_ROWS);
+        let footprint = placement.footprint.widened_to_be_sure(pixel_m);
         let last = (count - 1) as f64;
         steps[band(footprint.h_min_m).clamp(0.0, last) as usize] += 1;
         steps[band(footprint.h_max_m).clamp(0.0, last) as usize + 1] -= 1;

@@ -75,7 +75,9 @@ pub struct Canvas {
 }
 
 /// Most pixels of a panorama: beyond this, units or poses are wrong rather than the ambition.
-const LIMIT_PX: f64 = 2e9;
+const LIMIT_PX: f64 = 1e12;
+/// Most pixels of a side.
+const LIMIT_SIDE: f64 = i32::MAX as f64;
 
 impl Canvas {
     /// The canvas that holds every footprint at about `px_per_metre`: the resolution is changed by less than
@@ -113,7 +115,7 @@ impl Canvas {
         let px_per_metre = columns / perimeter_m;
         // A row that would hold less than a thousandth of a pixel is rounding noise.
         let rows = ((h_max - h_min) * px_per_metre - 1e-3).ceil().max(1.0);
-        if columns * rows > LIMIT_PX {
+        if columns * rows > LIMIT_PX || columns.max(rows) > LIMIT_SIDE {
             return Err(RenderError::TooManyPixels {
                 columns,
                 rows,

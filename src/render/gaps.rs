@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Edge of a cell, canvas pixels, unless the canvas is so large that there would be too many.
 const CELL_PX: u32 = 8;
 /// The most cells.
-const CELLS: u64 = 64 << 20;
+const CELLS: u64 = 8 << 20;
 
 /// A stretch of wall that no frame shows: what hangs together, in a box.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -26,6 +26,20 @@ pub struct Gap {
     pub at_the_end: bool,
 }
 
+/// Edge of a canvas' cells, pixels.
+fn cell(canvas: &Canvas) -> u32 {
+    let mut cell = CELL_PX;
+    while cells(canvas, cell) > CELLS {
+        cell *= 2;
+    }
+    cell
+}
+
+/// Number of cells with the given edge.
+fn cells(canvas: &Canvas, cell: u32) -> u64 {
+    u64::from(canvas.columns.div_ceil(cell)) * u64::from(canvas.rows.div_ceil(cell))
+}
+
 /// Adds up what is covered, in cells.
 #[derive(Clone, Debug)]
 pub struct Coverage {
@@ -41,13 +55,7 @@ pub struct Coverage {
 impl Coverage {
     /// Nothing has been seen of the canvas yet.
     pub fn new(canvas: &Canvas) -> Self {
-        let mut cell = CELL_PX;
-        let count = |cell: u32| {
-            u64::from(canvas.columns.div_ceil(cell)) * u64::from(canvas.rows.div_ceil(cell))
-        };
-        while count(cell) > CELLS {
-            cell *= 2;
-        }
+        let cell = cell(canvas);
         let (columns, rows) = (canvas.columns.div_ceil(cell), canvas.rows.div_ceil(cell));
         Self {
             canvas: *canvas,
@@ -57,6 +65,11 @@ impl Coverage {
             holes: vec![0; columns as usize * rows as usize],
             covered: 0,
         }
+    }
+
+    /// Memory for a canvas, bytes: the cells, which of them have been looked at, and a way through all of them.
+    pub fn bytes(canvas: &Canvas) -> u64 {
+        21 * cells(canvas, cell(canvas))
     }
 
     /// Share of the canvas that some frame sees, 0–1.
@@ -105,10 +118,14 @@ impl Coverage {
         let ppm = self.canvas.px_per_metre;
         let cell_m = f64::from(self.cell) / ppm;
         let [start_m, end_m] = self.canvas.chainage_m();
-        let degrees = 360.0 * f64::from(self.cell) / f64::from(self.canvas.columns);
         let whole = right - left + 1 >= around;
-        let from = left.rem_euclid(around) as f64 * degrees;
-        let to = from + (right - left + 1) as f64 * degrees;
+        // The last cell may be narrower than the others.
+        let degrees = |edge: i64| {
+            let pixels = (edge.rem_euclid(around) * i64::from(self.cell)) as f64;
+            360.0 * (edge.div_euclid(around) as f64 + pixels / f64::from(self.canvas.columns))
+        };
+        let turns = 360.0 * left.div_euclid(around) as f64;
+        let (from, to) = (degrees(left) - turns, degrees(right + 1) - turns);
         Gap {
             chainage_from_m: start_m + top as f64 * cell_m,
             chainage_to_m: (start_m + (bottom + 1) as f64 * cell_m).min(end_m),

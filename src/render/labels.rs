@@ -7,8 +7,9 @@
 //! is small. D prefers frames that show the wall finely and squarely, away from their edges, and that show what the others
 //! show, too; V is zero between nodes of the same frame, else a seam's length and what the two frames differ by on both sides of it.
 //!
-//! Rows and columns of nodes are solved exactly, one at a time with their neighbours held, by dynamic programming
-//! (Viterbi): E never rises. Every other row at once, which does not depend on the number of threads.
+//! Rows and columns of nodes are solved one at a time with their neighbours held, by dynamic programming (Viterbi). A
+//! row is cut open at θ = 0, where its ends are held to what they were. Every other row at once, which does not depend on the
+//! number of threads.
 //!
 //! Sources: J. Davis, "Mosaics of scenes with moving objects", CVPR 1998 (seams where pictures agree); A. Agarwala et al.,
 //! "Interactive digital photomontage", SIGGRAPH 2004 (the energy).

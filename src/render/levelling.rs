@@ -121,7 +121,7 @@ pub fn corrections(
                         different.values[at * channels..][..channels].fill(0.0);
                     }
                 }
-                weighted_bands(different, mask)
+                weighted_bands(different, mask, window.columns == grid.columns as usize)
             })
             .collect();
         for ((_, window), part) in run.iter().zip(&parts) {
@@ -148,15 +148,16 @@ pub fn corrections(
     blend.values
 }
 
-/// The bands of `different`, weighted by the mask's pyramid, and as a last channel the weights.
-fn weighted_bands(different: Layer, mask: Layer) -> Vec<Layer> {
+/// The bands of `different`, weighted by the mask's pyramid, and as a last channel the weights; `around`: the window
+/// closes around the tunnel.
+fn weighted_bands(different: Layer, mask: Layer, around: bool) -> Vec<Layer> {
     let mut bands = Vec::with_capacity(BANDS);
     let (mut fine, mut mask) = (different, mask);
     for band in 0..BANDS {
-        let coarse = (band + 1 < BANDS).then(|| (fine.reduced(), mask.reduced()));
+        let coarse = (band + 1 < BANDS).then(|| (fine.reduced(around), mask.reduced(around)));
         let mut detail = fine;
         if let Some((coarse, _)) = &coarse {
-            let smooth = coarse.expanded(false);
+            let smooth = coarse.expanded(around);
             for (value, smooth) in detail.values.iter_mut().zip(&smooth.values) {
                 *value -= smooth;
             }
@@ -257,14 +258,17 @@ fn shown(
     let count = window.columns * window.rows;
     let mut values = Vec::with_capacity(count * channels);
     let mut run = Run::default();
-    for start in (0..count).step_by(RUN) {
-        let length = RUN.min(count - start);
-        run.look(&look, picture, bilinear, &points, start, length);
-        response.undo(&mut run, length);
-        for k in 0..length {
-            let value = run.values()[k];
-            let seen = run.seen()[k];
-            values.extend((0..channels).map(|c| if seen { value[c] } else { f32::NAN }));
+    // Row by row: along a run the light changes little by little.
+    for row in 0..window.rows {
+        for column in (0..window.columns).step_by(RUN) {
+            let length = RUN.min(window.columns - column);
+            let start = row * window.columns + column;
+            run.look(&look, picture, bilinear, &points, start, length);
+            response.undo(&mut run, length);
+            for k in 0..length {
+                let (value, seen) = (run.values()[k], run.seen()[k]);
+                values.extend((0..channels).map(|c| if seen { value[c] } else { f32::NAN }));
+            }
         }
     }
     Layer {
@@ -314,8 +318,9 @@ impl Layer {
         }
     }
 
-    /// Half as many nodes each way, at the middles of 2 × 2: weights (1, 3, 3, 1)/8 along each axis; the border is repeated.
-    fn reduced(&self) -> Self {
+    /// Half as many nodes each way, at the middles of 2 × 2: weights (1, 3, 3, 1)/8 along each axis; `around`: the last
+    /// column is followed by the first, else the border is repeated.
+    fn reduced(&self, around: bool) -> Self {
         let (columns, rows, c) = (self.columns / 2, self.rows / 2, self.channels);
         let weights = [0.125, 0.375, 0.375, 0.125];
         let near = |at: usize, k: usize, size: usize| (2 * at + k).saturating_sub(1).min(size - 1);
@@ -323,7 +328,11 @@ impl Layer {
         for row in 0..self.rows {
             for column in 0..columns {
                 for (k, w) in weights.iter().enumerate() {
-                    let from = (row * self.columns + near(column, k, self.columns)) * c;
+                    let near = match around {
+                        true => (2 * column + k + self.columns - 1) % self.columns,
+                        false => near(column, k, self.columns),
+                    };
+                    let from = (row * self.columns + near) * c;
                     for channel in 0..c {
                         across.values[(row * columns + column) * c + channel] +=
                             w * self.values[from + channel];

@@ -33,13 +33,22 @@ pub struct Preview {
     sums: Vec<[f32; 4]>,
 }
 
+/// Canvas pixels along each side of one of the preview's.
+fn shrink(canvas: &Canvas) -> u32 {
+    let longest = canvas.columns.max(canvas.rows);
+    longest.div_ceil(LONGEST - 2 * MARGIN)
+}
+
 impl Preview {
+    /// Memory for a canvas, bytes: the sums and the picture.
+    pub fn bytes(canvas: &Canvas) -> u64 {
+        let pixels = canvas.pixels() as u64 / u64::from(shrink(canvas)).pow(2);
+        pixels * (size_of::<[f32; 4]>() as u64 + 3)
+    }
+
     /// Nothing has been drawn yet.
     pub fn new(canvas: &Canvas) -> Self {
-        let shrink = canvas
-            .columns
-            .max(canvas.rows)
-            .div_ceil(LONGEST - 2 * MARGIN);
+        let shrink = shrink(canvas);
         let columns = canvas.columns.div_ceil(shrink) as usize;
         let rows = canvas.rows.div_ceil(shrink) as usize;
         Self {

@@ -93,11 +93,8 @@ pub(super) fn tiles_at(
         among
             .filter(|frame| {
                 let footprint = &placements[*frame].footprint;
-                // The box comes from single rays: 2 % cover what bulges between them.
-                let span_m = (footprint.s_max_m - footprint.s_min_m)
-                    .max(footprint.h_max_m - footprint.h_min_m);
-                let margin_m = pixel_m + 0.02 * span_m;
-                footprint.widened(margin_m).overlaps(&tile, perimeter_m)
+                let around = footprint.widened_to_be_sure(pixel_m);
+                around.overlaps(&tile, perimeter_m)
             })
             .collect::<Vec<usize>>()
     };

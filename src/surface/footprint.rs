@@ -131,6 +131,13 @@ impl Footprint {
             || behind + other.s_max_m - other.s_min_m >= perimeter_m
     }
 
+    /// The box with so much more on every side that it holds all that the frame sees and `pixel_m` around it, metres: the box comes
+    /// from single rays, and 2 % of its size cover what bulges between them.
+    pub fn widened_to_be_sure(&self, pixel_m: f64) -> Self {
+        let span_m = (self.s_max_m - self.s_min_m).max(self.h_max_m - self.h_min_m);
+        self.widened(pixel_m + 0.02 * span_m)
+    }
+
     /// The box with `margin_m` more on every side, metres.
     pub fn widened(&self, margin_m: f64) -> Self {
         Self {
