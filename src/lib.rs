@@ -17,7 +17,8 @@
 //!
 //! [`camera`], [`trajectory`] and [`surface`] are the geometry; [`frames`] loads the pictures; [`refine`],
 //! [`render`] and [`simulate`] know nothing of each other and share the geometry only (the simulator not even
-//! the ray–wall intersection, so that it can judge the others); [`evaluate`] measures; [`cli`] prints.
+//! the ray–wall intersection, so that it can judge the others); [`raster`] writes pictures larger than the memory;
+//! [`evaluate`] measures; [`cli`] prints.
 //!
 //! # An example
 //!

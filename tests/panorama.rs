@@ -150,13 +150,6 @@ fn what_cannot_be_drawn_is_refused_with_the_remedy() {
     let both = ["--out", text(&within), "--maps", text(&maps)];
     let message = fail(&[&["stitch", folder][..], &both].concat(), 2);
     assert!(message.contains("would replace"), "{message}");
-    let tiles = [
-        &["stitch", folder, "--out", text(&at("a.png"))][..],
-        &["--dzi", text(&at("frames.dzi"))],
-    ];
-    std::fs::create_dir(at("frames_files")).unwrap();
-    succeed(&[&tiles.concat()[..], &["--px-per-metre", "10"]].concat());
-    std::fs::remove_file(at("a.png")).unwrap();
     let message = fail(&["stitch", folder, "--out", "a.tif", "--dzi", "a.xml"], 2);
     assert!(message.contains(".dzi"), "{message}");
     let message = fail(&["stitch", folder, "--out", "a.tif", "--memory", "1MiB"], 3);
