@@ -49,15 +49,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             blend: false,
             super_resolve: false,
         };
-        let plan = Plan::new(
-            &circle,
-            &frames,
-            &placements,
-            &canvas,
-            &options,
-            8.0,
-            &Silent,
-        )?;
+        let plan = Plan::new(&circle, &frames, &placements, &canvas, &options, &Silent)?;
         let mut speeds = Vec::new();
         for _ in 0..ROUNDS {
             let since = Instant::now();

@@ -244,6 +244,19 @@ impl ScratchFolder {
     }
 }
 
+/// Removes a file, if it is there.
+///
+/// # Errors
+/// Whatever the system says.
+pub fn remove_file(path: &Path) -> Result<(), WriteError> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(WriteError::new(path, error))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Makes a folder and those above it.
 ///
 /// # Errors

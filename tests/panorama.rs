@@ -334,22 +334,8 @@ fn an_interrupted_panorama_leaves_nothing_behind() {
     let survey = first_frames(48);
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("p.tif");
-    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
-        .args(["stitch", text(survey.path()), "--px-per-metre", "3000"])
-        .args(["--out", text(&out), "--quiet"])
-        .spawn()
-        .unwrap();
-    let entries = || std::fs::read_dir(dir.path()).unwrap().count();
-    while entries() == 0 {
-        assert!(child.try_wait().unwrap().is_none(), "it ended too early");
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
-    let id = child.id().to_string();
-    let interrupt = std::process::Command::new("kill")
-        .args(["-INT", &id])
-        .status()
-        .unwrap();
-    assert!(interrupt.success());
-    assert_eq!(child.wait().unwrap().code(), Some(130));
-    assert_eq!(entries(), 0);
+    let mut arguments = vec!["stitch", text(survey.path()), "--px-per-metre", "3000"];
+    arguments.extend(["--out", text(&out), "--quiet"]);
+    assert_eq!(support::interrupt(&arguments, dir.path()), Some(130));
+    assert_eq!(support::entries(dir.path()), 0);
 }

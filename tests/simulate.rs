@@ -373,23 +373,8 @@ fn the_demo_does_the_whole_job_and_can_be_repeated() {
 fn an_interrupted_survey_leaves_nothing_behind() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("survey");
-    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
-        .args([
-            "simulate", "centred", "--frames", "5000", "--size", "320x240",
-        ])
-        .args(["--out", text(&out)])
-        .spawn()
-        .unwrap();
-    let entries = || std::fs::read_dir(dir.path()).unwrap().count();
-    while entries() == 0 {
-        assert!(child.try_wait().unwrap().is_none(), "it ended too early");
-        std::thread::sleep(std::time::Duration::from_millis(20));
-    }
-    let interrupt = std::process::Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(interrupt.success());
-    assert_eq!(child.wait().unwrap().code(), Some(130));
-    assert_eq!(entries(), 0);
+    let mut arguments = vec!["simulate", "centred", "--frames", "5000"];
+    arguments.extend(["--size", "320x240", "--out", text(&out)]);
+    assert_eq!(support::interrupt(&arguments, dir.path()), Some(130));
+    assert_eq!(support::entries(dir.path()), 0);
 }

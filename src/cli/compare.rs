@@ -3,7 +3,7 @@
 use super::stitch::{PictureArguments, positive};
 use super::{Failure, Terminal, json};
 use crate::PROGRAM;
-use crate::atomic::{self, WriteError};
+use crate::atomic;
 use crate::evaluate::{CompareInput, Comparison, before_after, compare};
 use crate::frames::{PictureFormat, write_picture};
 use crate::progress::Progress;
@@ -137,12 +137,7 @@ pub fn compare_into(
     match panoramas.truth {
         Some(truth) => write("truth.png", &truth.into_image(layout))?,
         // One from an earlier comparison would belong to other pictures.
-        None => match std::fs::remove_file(out.join("truth.png")) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                return Err(WriteError::new(&out.join("truth.png"), error).into());
-            }
-            _ => {}
-        },
+        None => atomic::remove_file(&out.join("truth.png"))?,
     }
     terminal.finish();
     atomic::write_text(&out.join("compare.json"), &json)?;

@@ -151,7 +151,7 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
     let px_per_metre = arguments.canvas.px_per_metre;
     let LaidOut {
         placements, canvas, ..
-    } = lay_out(surface, &survey.camera, &poses, px_per_metre)?;
+    } = lay_out(surface, &survey.camera, &poses, px_per_metre, 1.0)?;
     let layout = Layout::from(arguments.canvas.layout);
     let wall = point(arguments, &survey, &poses, &canvas)?;
     let perimeter_m = surface.perimeter_m();

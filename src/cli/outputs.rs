@@ -2,15 +2,14 @@
 
 use super::Failure;
 use super::stitch::picture_output;
-use crate::atomic::{self, WriteError};
+use crate::atomic;
 use crate::camera::Pinhole;
 use crate::frames::{JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};
 use crate::raster::{Compression, DziFormat};
 use crate::render::{
-    Budget, Canvas, Coverage, Gap, Layout, Map, Panorama, PixelFormat, Placement, Plan, Preview,
-    RasterLayer, RasterTarget, Target, gaps_csv,
+    Canvas, Coverage, Gap, Layout, Map, Panorama, PixelFormat, Plan, Preview, RasterLayer,
+    RasterTarget, Target, gaps_csv,
 };
-use crate::surface::Surface;
 use crate::survey::{SURVEY_FILE, Survey};
 use image::DynamicImage;
 use nalgebra::Matrix6;
@@ -261,20 +260,6 @@ impl OutputArguments {
     }
 }
 
-/// What maps of single places need to know.
-pub struct MapInput<'a> {
-    /// The tunnel.
-    pub surface: &'a dyn Surface,
-    /// The camera of the frames as they are.
-    pub camera: &'a Pinhole,
-    /// Where the frames lie.
-    pub placements: &'a [Placement],
-    /// Covariances of their poses, if known.
-    pub covariances: Option<&'a [Matrix6<f64>]>,
-    /// The memory of the panorama, which says how fine its grid is.
-    pub budget: &'a Budget,
-}
-
 impl Outputs {
     /// Everything that wants bands.
     pub fn targets(&mut self) -> Vec<&mut dyn Target> {
@@ -302,13 +287,20 @@ impl Outputs {
         self.coverage.gaps()
     }
 
-    /// Gives all files their names; the panorama last.
+    /// Gives all files their names; the panorama last. `camera`: that of the frames as they are; `covariances`: those of their
+    /// poses, if known.
     ///
     /// # Errors
     /// Whatever the system says.
-    pub fn finish(self, plan: &Plan, gaps: &[Gap], input: &MapInput) -> Result<(), Failure> {
+    pub fn finish(
+        self,
+        plan: &Plan,
+        gaps: &[Gap],
+        camera: &Pinhole,
+        covariances: Option<&[Matrix6<f64>]>,
+    ) -> Result<(), Failure> {
         if let Some(maps) = self.maps {
-            maps.finish(self.layout, plan, input, gaps)?;
+            maps.finish(self.layout, plan, gaps, camera, covariances)?;
         }
         if let Some(dzi) = self.dzi {
             dzi.finish()?;
@@ -328,19 +320,14 @@ impl Maps {
         self,
         layout: Layout,
         plan: &Plan,
-        input: &MapInput,
         gaps: &[Gap],
+        camera: &Pinhole,
+        covariances: Option<&[Matrix6<f64>]>,
     ) -> Result<(), Failure> {
-        let MapInput {
-            surface,
-            camera,
-            placements,
-            covariances,
-            budget,
-        } = *input;
+        let (surface, placements) = (plan.surface(), plan.placements());
         self.coverage.finish()?;
         self.frames.finish()?;
-        let grid = plan.grid(budget.grid_step_px);
+        let grid = plan.grid();
         let labels = plan.seams().map(|seams| seams.labels());
         let resolution = Map::resolution(surface, camera, placements, &grid, labels);
         resolution.write(&self.folder.join(RESOLUTION), layout)?;
@@ -349,7 +336,7 @@ impl Maps {
             map.write(&self.folder.join(UNCERTAINTY), layout)?;
         } else {
             // One from an earlier panorama would belong to other poses.
-            remove(&self.folder.join(UNCERTAINTY))?;
+            atomic::remove_file(&self.folder.join(UNCERTAINTY))?;
         }
         let preview = DynamicImage::from(self.preview.picture(layout, 0.0));
         write_picture(&self.folder.join(PREVIEW), &preview, PictureFormat::Png)?;
@@ -370,15 +357,5 @@ fn full(path: &Path) -> PathBuf {
     match (folder, path.file_name()) {
         (Ok(folder), Some(name)) => folder.join(name),
         _ => path.to_owned(),
-    }
-}
-
-/// Removes a file if it is there.
-fn remove(path: &Path) -> Result<(), WriteError> {
-    match std::fs::remove_file(path) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(WriteError::new(path, error))
-        }
-        _ => Ok(()),
     }
 }

@@ -1,6 +1,6 @@
 //! `tunnelstitch stitch`: one panorama from given poses.
 
-use super::outputs::{MapInput, OutputArguments};
+use super::outputs::OutputArguments;
 use super::{Failure, Terminal, json};
 use crate::atomic;
 use crate::frames::PictureFormat;
@@ -267,7 +267,6 @@ pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failu
         frames_bytes.min(budget.room) >> 20
     ));
     let mut outputs = arguments.output.begin(&canvas, format, layout)?;
-    let placements = stitch.placements().to_vec();
     let (plan, frames) = stitch.plan(&budget, terminal)?;
     plan.draw(frames, budget.room, &mut outputs.targets(), terminal)?;
     let coverage = outputs.share();
@@ -278,17 +277,7 @@ pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failu
     }
     let gaps = outputs.gaps();
     terminal.start("writing", 1);
-    let written = outputs.finish(
-        &plan,
-        &gaps,
-        &MapInput {
-            surface,
-            camera: &survey.camera,
-            placements: &placements,
-            covariances: covariances.as_deref(),
-            budget: &budget,
-        },
-    );
+    let written = outputs.finish(&plan, &gaps, &survey.camera, covariances.as_deref());
     terminal.finish();
     written?;
     if arguments.json {

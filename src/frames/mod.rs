@@ -1,5 +1,6 @@
 //! The pictures: loading, grey values, pyramids, writing.
 
+mod agreement;
 mod cache;
 mod contrast;
 mod grey;
@@ -10,6 +11,7 @@ mod shading;
 mod stored;
 mod write;
 
+pub(crate) use agreement::Agreement;
 pub use cache::FrameCache;
 pub use contrast::{LocalContrast, local_contrast};
 pub use grey::GreyImage;

@@ -99,12 +99,7 @@ impl DziWriter {
             return Err(RasterError::Incomplete { missing, tiles });
         }
         // An old description would go with the new folder for a moment.
-        match std::fs::remove_file(&self.target) {
-            Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                return Err(WriteError::new(&self.target, source).into());
-            }
-            _ => {}
-        }
+        atomic::remove_file(&self.target)?;
         self.folder.finish()?;
         let description = description(&self.spec, self.format);
         atomic::write_text(&self.target, &description).inspect_err(|_| {

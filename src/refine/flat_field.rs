@@ -19,7 +19,7 @@ use super::neighbourhood::Neighbourhood;
 use super::options::RefineOptions;
 use super::problem::{Problem, ProblemError, Sampling, Scene};
 use super::track::Tracked;
-use crate::frames::{MAD_TO_SIGMA, SHADING_TERMS, Shading, shading_terms};
+use crate::frames::{Agreement, MAD_TO_SIGMA, SHADING_TERMS, Shading, shading_terms};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -39,8 +39,6 @@ const SURE: f64 = 3.0;
 const WORTHWHILE: f64 = 1.5;
 /// Variance of a logarithm at the least: pictures without noise.
 const LEAST_VARIANCE: f64 = 1e-12;
-/// Cut of the biweight, standard deviations.
-const CUT: f64 = 5.0;
 /// Tiles darker than this tell little of a factor, grey levels.
 const LEAST_GREY: f64 = 4.0;
 /// Unknowns of a frame: α, β.
@@ -200,16 +198,12 @@ impl Sums {
     /// right side.
     fn add(&mut self, tile: &[Glimpse], x: &DVector<f64>, variance: f64) {
         let left: Vec<f64> = tile.iter().map(|glimpse| glimpse.left(x)).collect();
-        let mut sorted = left.clone();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let middle = 0.5 * (sorted[(left.len() - 1) / 2] + sorted[left.len() / 2]);
-        // The median has fitted itself to one of the values.
-        let freedom = (1.0 - 1.0 / left.len() as f64).sqrt();
-        let sizes = left.iter().map(|e| (e - middle).abs() / freedom);
+        let Agreement {
+            sizes,
+            weights,
+            total,
+        } = Agreement::of(&left, variance);
         self.sizes.extend(sizes);
-        let weight = |e: f64| (1.0 - e * e / (CUT * CUT * variance)).max(0.0).powi(2);
-        let weights: Vec<f64> = left.iter().map(|e| weight(e - middle)).collect();
-        let total: f64 = weights.iter().sum();
         if total <= 0.0 {
             return;
         }

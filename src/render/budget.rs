@@ -1,11 +1,11 @@
 //! What a panorama takes of the memory, known before the first frame is read.
 
 use super::detail::Readings;
-use super::levelling::COARSEST;
 use super::plan::{BAND_ROWS, RenderOptions};
-use super::seams::{STEP_PX, Seams};
+use super::seams::{self, Seams};
 use super::thumbnails::Thumbnails;
 use super::{Canvas, FrameStack, Placement, RenderError, memory};
+use crate::surface::Surface;
 use serde::Serialize;
 
 /// The memory of a panorama, bytes.
@@ -33,8 +33,6 @@ pub struct Budget {
 
 /// Copies of a band: drawn tiles, the band, the tiles that are written, and what becomes of them.
 const COPIES: u64 = 5;
-/// The most nodes of the grid of seams; beyond, they are farther apart.
-const NODES: usize = 12 << 20;
 /// Copies of a frame while it is decoded: the file, the decoder's picture, and what it is turned into.
 const DECODING: u64 = 4;
 
@@ -50,26 +48,21 @@ impl Budget {
     /// # Errors
     /// [`RenderError::Memory`] if even the least is more than the limit, or than the system has free.
     pub fn new(
+        surface: &dyn Surface,
         canvas: &Canvas,
         frames: &FrameStack,
         placements: &[Placement],
-        native_px_per_metre: f64,
         options: &RenderOptions,
         output: u64,
         limit: u64,
     ) -> Result<Self, RenderError> {
         let limit = memory::available_bytes().map_or(limit, |available| limit.min(available));
         let format = frames.format();
-        let grid_step_px = grid_step_px(canvas);
         let (mut thumbnails, mut grid) = (0, 0);
         if options.needs_thumbnails() {
-            let nodes = canvas.grid(grid_step_px, COARSEST).pixels() as u64;
-            grid = nodes * Seams::bytes_per_node(format.channels);
-            let level = Thumbnails::level(
-                frames.camera(),
-                native_px_per_metre,
-                canvas.px_per_metre / grid_step_px,
-            );
+            let nodes = seams::grid(canvas);
+            grid = nodes.pixels() as u64 * Seams::bytes_per_node(format.channels);
+            let level = Thumbnails::level(surface, frames, placements, &nodes)?;
             thumbnails = Thumbnails::bytes(frames.camera(), level, format.channels, frames.len());
         }
         let rows = BAND_ROWS.min(canvas.rows);
@@ -88,19 +81,11 @@ impl Budget {
         };
         let fixed = thumbnails + grid + band + output + decoding + readings;
         let needed = fixed + frames_least;
-        if needed > limit {
-            return Err(RenderError::Memory {
-                columns: canvas.columns,
-                rows: canvas.rows,
-                frames: frames.len(),
-                needed_mib: needed.div_ceil(1 << 20),
-                available_mib: limit >> 20,
-            });
-        }
+        memory::check(canvas, frames, needed, Some(limit))?;
         Ok(Self {
             thumbnails,
             grid,
-            grid_step_px,
+            grid_step_px: seams::step_px(canvas),
             band,
             output,
             decoding,
@@ -119,18 +104,6 @@ impl Budget {
             + self.decoding
             + self.readings
             + frames.min(self.room)
-    }
-}
-
-/// Distance of the grid's nodes, by the canvas alone, so that the panorama does not depend on the memory.
-fn grid_step_px(canvas: &Canvas) -> f64 {
-    let mut step = STEP_PX;
-    loop {
-        let grid = canvas.grid(step, COARSEST);
-        if grid.pixels() <= NODES || grid.columns <= COARSEST {
-            return step;
-        }
-        step *= 2.0;
     }
 }
 

@@ -3,7 +3,7 @@
 use super::sample::{Sample, Samples};
 use super::{Interpolation, Kernel, Picture};
 use crate::camera::Pinhole;
-use image::{DynamicImage, ImageBuffer};
+use image::DynamicImage;
 use rayon::prelude::*;
 
 /// A photo on the unit cylinder around its camera, unrolled.
@@ -37,27 +37,14 @@ pub fn project(photo: &Picture, camera: &Pinhole, interpolation: Interpolation) 
     let height = (floor(bottom) - first_v + 1).max(1) as usize;
     let kernel = Kernel::new(interpolation, 1.0);
     let (origin, size) = ([first_u, first_v], [width, height]);
-    let (w, h) = (width as u32, height as u32);
-    // `unroll` makes exactly these many pixels.
-    let image = match (photo.samples(), photo.format().channels) {
-        (Samples::Eight(_), 1) => {
-            ImageBuffer::from_raw(w, h, unroll::<u8, 1>(photo, camera, &kernel, origin, size))
-                .map(DynamicImage::ImageLumaA8)
-        }
-        (Samples::Eight(_), _) => {
-            ImageBuffer::from_raw(w, h, unroll::<u8, 3>(photo, camera, &kernel, origin, size))
-                .map(DynamicImage::ImageRgba8)
-        }
-        (Samples::Sixteen(_), 1) => {
-            ImageBuffer::from_raw(w, h, unroll::<u16, 1>(photo, camera, &kernel, origin, size))
-                .map(DynamicImage::ImageLumaA16)
-        }
-        (Samples::Sixteen(_), _) => {
-            ImageBuffer::from_raw(w, h, unroll::<u16, 3>(photo, camera, &kernel, origin, size))
-                .map(DynamicImage::ImageRgba16)
-        }
-    }
-    .unwrap_or_default();
+    let channels = photo.format().channels;
+    let samples: Samples = match (photo.samples(), channels) {
+        (Samples::Eight(_), 1) => unroll::<u8, 1>(photo, camera, &kernel, origin, size).into(),
+        (Samples::Eight(_), _) => unroll::<u8, 3>(photo, camera, &kernel, origin, size).into(),
+        (Samples::Sixteen(_), 1) => unroll::<u16, 1>(photo, camera, &kernel, origin, size).into(),
+        (Samples::Sixteen(_), _) => unroll::<u16, 3>(photo, camera, &kernel, origin, size).into(),
+    };
+    let image = samples.into_image([width as u32, height as u32], channels);
     CylinderPicture {
         image,
         origin_px: origin,

@@ -20,7 +20,7 @@ use super::sample::Sample;
 use super::thumbnails::Thumbnails;
 use super::warp::Run;
 use super::{Canvas, Placement};
-use crate::frames::{MAD_TO_SIGMA, SHADING_TERMS, Shading};
+use crate::frames::{Agreement, MAD_TO_SIGMA, SHADING_TERMS, Shading};
 use crate::surface::Surface;
 use faer::Side;
 use faer::prelude::Solve;
@@ -42,8 +42,6 @@ const SHADING_SIGMA: f64 = 0.5;
 const POINTS: (usize, usize) = (40, 20_000);
 /// Steps of reweighting.
 const STEPS: usize = 4;
-/// Cut of the biweight, standard deviations.
-const CUT: f64 = 5.0;
 /// Variance of a logarithm at the least: pictures without noise.
 const LEAST_VARIANCE: f64 = 1e-10;
 
@@ -353,16 +351,12 @@ impl Normal {
                 row.log - own - light
             })
             .collect();
-        let mut sorted = left.clone();
-        sorted.sort_unstable_by(f64::total_cmp);
-        let middle = 0.5 * (sorted[(left.len() - 1) / 2] + sorted[left.len() / 2]);
-        // The median has fitted itself to one of the values.
-        let freedom = (1.0 - 1.0 / left.len() as f64).sqrt();
-        self.sizes
-            .extend(left.iter().map(|e| (e - middle).abs() / freedom));
-        let weight = |e: f64| (1.0 - e * e / (CUT * CUT * variance)).max(0.0).powi(2);
-        let weights: Vec<f64> = left.iter().map(|e| weight(e - middle)).collect();
-        let total: f64 = weights.iter().sum();
+        let Agreement {
+            sizes,
+            weights,
+            total,
+        } = Agreement::of(&left, variance);
+        self.sizes.extend(sizes);
         if total <= 0.0 {
             return;
         }

@@ -1,9 +1,8 @@
 //! What the frames show of single points of the wall.
 
-use super::picture::luma;
 use super::thumbnails::Thumbnails;
 use super::tiles::{EDGE, Tile, tiles};
-use super::warp::{Look, Points, Run};
+use super::warp::{Points, Run};
 use super::{Canvas, Placement};
 use crate::frames::{SHADING_TERMS, shading_terms};
 use crate::surface::Surface;
@@ -55,31 +54,20 @@ fn of_tile(
     grid: &Canvas,
     tile: &Tile,
 ) -> Vec<Vec<Glimpse>> {
-    let camera = thumbnails.camera();
     let points = Points::new(&tile.points(surface, grid));
-    let bilinear = thumbnails.bilinear();
     let mut found: Vec<Vec<Glimpse>> = vec![Vec::new(); tile.pixels()];
     let columns = tile.columns as usize;
     let mut run = Run::default();
     for &frame in &tile.frames {
-        let look = Look::new(camera, &placements[frame].pose, &points.origin);
-        let picture = thumbnails.picture(frame);
-        let white = picture.format().white();
-        let colour = picture.format().channels == 3;
+        let view = thumbnails.view(frame, &placements[frame], &points);
         for row in 0..tile.rows as usize {
-            run.look(&look, picture, bilinear, &points, row * columns, columns);
+            view.look_at(&mut run, row * columns, columns);
             let (u, v) = run.pixels();
             for k in 0..columns {
                 if !run.seen()[k] {
                     continue;
                 }
-                let [first, second, third, _] = run.values()[k];
-                let value = if colour {
-                    luma([first, second, third])
-                } else {
-                    first
-                };
-                let grey = value * (255.0 / white);
+                let grey = thumbnails.format().grey(run.values()[k]);
                 if USEFUL.contains(&grey) {
                     found[row * columns + k].push(Glimpse {
                         frame,

@@ -15,9 +15,8 @@
 //! "Interactive digital photomontage", SIGGRAPH 2004 (the energy).
 
 use super::draw::{NO_FRAME, median};
-use super::picture::luma;
 use super::thumbnails::Thumbnails;
-use super::warp::{Look, Points, Run};
+use super::warp::{Points, RUN, Run};
 use super::{Canvas, Exposure, Placement, Tile, tiles};
 use crate::surface::{Surface, WallFrame};
 use rayon::prelude::*;
@@ -230,34 +229,17 @@ fn sights(
 ) -> Vec<Sight> {
     let camera = thumbnails.camera();
     let pose = &placements[frame].pose;
-    let look = Look::new(camera, pose, &points.origin);
-    let picture = thumbnails.picture(frame);
+    let view = thumbnails.view(frame, &placements[frame], points);
     let response = exposure.of(frame);
-    let colour = picture.format().channels == 3;
-    let scale = 255.0 / picture.format().white();
-    let grey = |[red, green, blue, _]: [f32; 4]| {
-        scale
-            * if colour {
-                luma([red, green, blue])
-            } else {
-                red
-            }
-    };
+    let format = thumbnails.format();
     let forwards = pose.r_wc * nalgebra::Vector3::z();
     let columns = tile.columns as usize;
     let mut run = Run::default();
-    let mut raw = [[0.0; 4]; super::warp::RUN];
+    let mut raw = [[0.0; 4]; RUN];
     let mut found = vec![Sight::default(); walls.len()];
     for row in 0..tile.rows as usize {
         let start = row * columns;
-        run.look(
-            &look,
-            picture,
-            thumbnails.bilinear(),
-            points,
-            start,
-            columns,
-        );
+        view.look_at(&mut run, start, columns);
         raw[..columns].copy_from_slice(&run.values()[..columns]);
         response.undo(&mut run, columns);
         let (u, v) = run.pixels();
@@ -278,8 +260,8 @@ fn sights(
             found[start + k] = Sight {
                 fineness: fineness as f32,
                 inset: inset(u[k], camera.width).min(inset(v[k], camera.height)),
-                grey: grey(run.values()[k]),
-                raw: grey(raw[k]),
+                grey: format.grey(run.values()[k]),
+                raw: format.grey(raw[k]),
             };
         }
     }

@@ -14,7 +14,7 @@
 
 use super::draw::NO_FRAME;
 use super::thumbnails::Thumbnails;
-use super::warp::{Look, Points, RUN, Run};
+use super::warp::{Points, RUN, Run};
 use super::{Canvas, Exposure, Placement};
 use crate::surface::Surface;
 use rayon::prelude::*;
@@ -251,10 +251,8 @@ fn shown(
     let mut points = Vec::new();
     surface.lattice(&s_m, &h_m, &mut points);
     let points = Points::new(&points);
-    let look = Look::new(thumbnails.camera(), &placements[frame].pose, &points.origin);
-    let picture = thumbnails.picture(frame);
+    let view = thumbnails.view(frame, &placements[frame], &points);
     let response = exposure.of(frame);
-    let bilinear = thumbnails.bilinear();
     let count = window.columns * window.rows;
     let mut values = Vec::with_capacity(count * channels);
     let mut run = Run::default();
@@ -263,7 +261,7 @@ fn shown(
         for column in (0..window.columns).step_by(RUN) {
             let length = RUN.min(window.columns - column);
             let start = row * window.columns + column;
-            run.look(&look, picture, bilinear, &points, start, length);
+            view.look_at(&mut run, start, length);
             response.undo(&mut run, length);
             for k in 0..length {
                 let (value, seen) = (run.values()[k], run.seen()[k]);

@@ -4,7 +4,7 @@ use super::picture::{PixelFormat, luma};
 use super::sample::{Sample, Samples};
 use super::{Band, Canvas, Layout, RenderError, Target};
 use crate::frames::GreyImage;
-use image::{DynamicImage, ImageBuffer};
+use image::DynamicImage;
 
 /// A panorama in memory: samples with an alpha that is full where some frame sees the wall and 0 in holes.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,23 +64,8 @@ impl Panorama {
 
     /// The picture to be written: grey or red-green-blue, with alpha.
     pub fn into_image(self, layout: Layout) -> DynamicImage {
-        let (width, height) = (self.canvas.columns, self.canvas.rows);
-        // The length was checked when the panorama was made, so the pictures exist.
-        let image = match (self.samples, self.format.channels) {
-            (Samples::Eight(samples), 1) => {
-                ImageBuffer::from_raw(width, height, samples).map(DynamicImage::ImageLumaA8)
-            }
-            (Samples::Eight(samples), _) => {
-                ImageBuffer::from_raw(width, height, samples).map(DynamicImage::ImageRgba8)
-            }
-            (Samples::Sixteen(samples), 1) => {
-                ImageBuffer::from_raw(width, height, samples).map(DynamicImage::ImageLumaA16)
-            }
-            (Samples::Sixteen(samples), _) => {
-                ImageBuffer::from_raw(width, height, samples).map(DynamicImage::ImageRgba16)
-            }
-        };
-        layout.turn(image.unwrap_or_default())
+        let size = [self.canvas.columns, self.canvas.rows];
+        layout.turn(self.samples.into_image(size, self.format.channels))
     }
 }
 

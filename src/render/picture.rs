@@ -246,6 +246,15 @@ impl PixelFormat {
         if self.deep { u16::WHITE } else { u8::WHITE }
     }
 
+    /// The grey value, 0 to 255, of values side by side: Rec. 709 luma of colour.
+    pub fn grey(self, [first, second, third, _]: [f32; 4]) -> f32 {
+        let value = match self.channels {
+            1 => first,
+            _ => luma([first, second, third]),
+        };
+        value * (255.0 / self.white())
+    }
+
     /// Bytes of a sample.
     pub fn sample_bytes(self) -> usize {
         if self.deep { 2 } else { 1 }

@@ -41,14 +41,14 @@ pub fn place(
 ///
 /// # Errors
 /// [`RenderError::Frame`] for a camera that stands outside or looks along the axis.
-pub fn native_px_per_metre(
+pub fn native_px_per_metre<'a>(
     surface: &dyn Surface,
     camera: &Pinhole,
-    poses: &[Pose],
+    poses: impl IntoIterator<Item = &'a Pose>,
 ) -> Result<f64, RenderError> {
     let focal_px = (camera.fx * camera.fy).sqrt();
-    let mut resolutions = Vec::with_capacity(poses.len());
-    for (frame, pose) in poses.iter().enumerate() {
+    let mut resolutions = Vec::new();
+    for (frame, pose) in poses.into_iter().enumerate() {
         let distance_m = viewing_distance(surface, pose)
             .map_err(|source| RenderError::Frame { frame, source })?;
         resolutions.push(focal_px / distance_m);

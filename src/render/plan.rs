@@ -4,17 +4,13 @@ use super::band::{Band, Target};
 use super::budget::Budget;
 use super::detail::Readings;
 use super::draw::{Composition, Drawn, Mode, Scene, Scratch};
-use super::levelling::COARSEST;
-use super::seams::Seams;
+use super::seams::{self, Seams};
 use super::thumbnails::Thumbnails;
 use super::tiles::{EDGE, tiles_at};
 use super::view::Kernels;
-use super::{
-    Canvas, Exposure, FrameStack, Interpolation, Placement, RenderError, Tile, native_px_per_metre,
-};
+use super::{Canvas, Exposure, FrameStack, Interpolation, Placement, RenderError, Tile};
 use crate::progress::Progress;
 use crate::surface::Surface;
-use crate::trajectory::Pose;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -75,7 +71,6 @@ impl<'a> Plan<'a> {
         placements: &'a [Placement],
         canvas: &Canvas,
         options: &RenderOptions,
-        grid_step_px: f64,
         progress: &dyn Progress,
     ) -> Result<Self, RenderError> {
         if frames.len() != placements.len() {
@@ -97,10 +92,7 @@ impl<'a> Plan<'a> {
         if !options.needs_thumbnails() {
             return Ok(plan);
         }
-        let grid = canvas.grid(grid_step_px, COARSEST);
-        let poses: Vec<Pose> = placements.iter().map(|placement| placement.pose).collect();
-        let native = native_px_per_metre(surface, frames.camera(), &poses)?;
-        let level = Thumbnails::level(frames.camera(), native, grid.px_per_metre);
+        let level = Thumbnails::level(surface, frames, placements, &seams::grid(canvas))?;
         let thumbnails = Thumbnails::of(frames, level, progress)?;
         progress.start("seams", 1);
         // Seams are sought in evenly lit frames, even where frames are to stay as they are.
@@ -112,7 +104,7 @@ impl<'a> Plan<'a> {
                 &thumbnails,
                 &exposure.of_thumbnails(&thumbnails),
                 placements,
-                grid,
+                canvas,
                 options.blend.then_some(white),
             ));
         }
@@ -128,12 +120,19 @@ impl<'a> Plan<'a> {
         &self.canvas
     }
 
-    /// The grid of the seams, or the one they would have at nodes `step_px` apart.
-    pub fn grid(&self, step_px: f64) -> Canvas {
-        match &self.seams {
-            Some(seams) => *seams.grid(),
-            None => self.canvas.grid(step_px, COARSEST),
-        }
+    /// The tunnel.
+    pub fn surface(&self) -> &dyn Surface {
+        self.surface
+    }
+
+    /// Where the frames lie.
+    pub fn placements(&self) -> &[Placement] {
+        self.placements
+    }
+
+    /// The grid of the seams, or the one they would have.
+    pub fn grid(&self) -> Canvas {
+        seams::grid(&self.canvas)
     }
 
     /// The exposure that is undone.
@@ -174,11 +173,11 @@ impl<'a> Plan<'a> {
                 .copied()
                 .collect();
             frames.hold(&needs[k], &later, room)?;
-            self.fill(&mut band, frames, *row);
+            let tiles = self.tiles(*row);
+            self.fill(&mut band, frames, *row, &tiles);
             if self.super_resolve {
                 readings.keep(frames, &self.exposure, &needs[k]);
                 let (surface, placements) = (self.surface, self.placements);
-                let tiles = self.tiles(*row);
                 readings.resolve(surface, frames, placements, &self.canvas, &tiles, &mut band);
             }
             for target in &mut *targets {
@@ -211,9 +210,8 @@ impl<'a> Plan<'a> {
         needed
     }
 
-    fn fill(&self, band: &mut Band, frames: &FrameStack, row: u32) {
+    fn fill(&self, band: &mut Band, frames: &FrameStack, row: u32, tiles: &[Tile]) {
         let scene = self.scene(frames);
-        let tiles = self.tiles(row);
         band.begin(&self.canvas, row, BAND_ROWS.min(self.canvas.rows - row));
         // As many at once as keep all threads busy, and no more than stay in the cache until they are put in place.
         for run in tiles.chunks(16 * rayon::current_num_threads().max(1)) {

@@ -1,5 +1,7 @@
 //! The numbers that pictures are made of.
 
+use image::{DynamicImage, ImageBuffer};
+
 /// A sample of a picture: 8 or 16 bits.
 pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + 'static {
     /// Full scale.
@@ -16,33 +18,25 @@ pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + '
 /// sum. Unlike a cast, this is what vectors do well.
 pub const WHOLE: f32 = 8_388_608.0;
 
-impl Sample for u8 {
-    const WHITE: f32 = 255.0;
+macro_rules! sample {
+    ($($bits:ty),*) => {
+        $(impl Sample for $bits {
+            const WHITE: f32 = <$bits>::MAX as f32;
 
-    #[inline(always)]
-    fn value(self) -> f32 {
-        f32::from(self)
-    }
+            #[inline(always)]
+            fn value(self) -> f32 {
+                f32::from(self)
+            }
 
-    #[inline(always)]
-    fn nearest(value: f32) -> Self {
-        (value.clamp(0.0, Self::WHITE) + WHOLE).to_bits() as Self
-    }
+            #[inline(always)]
+            fn nearest(value: f32) -> Self {
+                (value.clamp(0.0, Self::WHITE) + WHOLE).to_bits() as Self
+            }
+        })*
+    };
 }
 
-impl Sample for u16 {
-    const WHITE: f32 = 65535.0;
-
-    #[inline(always)]
-    fn value(self) -> f32 {
-        f32::from(self)
-    }
-
-    #[inline(always)]
-    fn nearest(value: f32) -> Self {
-        (value.clamp(0.0, Self::WHITE) + WHOLE).to_bits() as Self
-    }
-}
+sample!(u8, u16);
 
 /// Samples of one kind, row-major, channels interleaved.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +59,26 @@ impl Samples {
     /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// The picture of `width × height` pixels that they are: grey (one channel) or red-green-blue, each pixel's alpha
+    /// last. An empty one if there are too few.
+    pub(super) fn into_image(self, [width, height]: [u32; 2], channels: usize) -> DynamicImage {
+        match (self, channels) {
+            (Self::Eight(samples), 1) => {
+                ImageBuffer::from_raw(width, height, samples).map(DynamicImage::ImageLumaA8)
+            }
+            (Self::Eight(samples), _) => {
+                ImageBuffer::from_raw(width, height, samples).map(DynamicImage::ImageRgba8)
+            }
+            (Self::Sixteen(samples), 1) => {
+                ImageBuffer::from_raw(width, height, samples).map(DynamicImage::ImageLumaA16)
+            }
+            (Self::Sixteen(samples), _) => {
+                ImageBuffer::from_raw(width, height, samples).map(DynamicImage::ImageRgba16)
+            }
+        }
+        .unwrap_or_default()
     }
 
     /// Memory they take, bytes.

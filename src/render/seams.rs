@@ -6,14 +6,32 @@
 
 use super::draw::NO_FRAME;
 use super::labels;
-use super::levelling;
+use super::levelling::{self, COARSEST};
 use super::thumbnails::Thumbnails;
 use super::{Canvas, Exposure, Placement, Tile};
 use crate::surface::Surface;
 
-/// Distance of the grid's nodes, canvas pixels, unless the panorama is so large that the grid would need more memory
-/// than it may have.
-pub const STEP_PX: f64 = 8.0;
+/// Distance of the grid's nodes, canvas pixels, unless there would be too many.
+const STEP_PX: f64 = 8.0;
+/// The most nodes of a grid; beyond, they are farther apart.
+const NODES: usize = 12 << 20;
+
+/// Distance of the nodes on a canvas, pixels: by the canvas alone, so that the panorama does not depend on the memory.
+pub(super) fn step_px(canvas: &Canvas) -> f64 {
+    let mut step = STEP_PX;
+    loop {
+        let grid = canvas.grid(step, COARSEST);
+        if grid.pixels() <= NODES || grid.columns <= COARSEST {
+            return step;
+        }
+        step *= 2.0;
+    }
+}
+
+/// The grid over a canvas.
+pub(super) fn grid(canvas: &Canvas) -> Canvas {
+    canvas.grid(step_px(canvas), COARSEST)
+}
 
 /// Which frame shows what.
 #[derive(Clone, Debug)]
@@ -36,16 +54,17 @@ pub struct Between {
 }
 
 impl Seams {
-    /// Finds the best frame for each node of `grid`, by thumbnails whose exposure is undone; with `blend`, also the
+    /// Finds the best frame for each node of the grid over `canvas`, by thumbnails whose exposure is undone; with `blend`, also the
     /// correction. `white`: full scale of the frames.
     pub(super) fn find(
         surface: &dyn Surface,
         thumbnails: &Thumbnails,
         exposure: &Exposure,
         placements: &[Placement],
-        grid: Canvas,
+        canvas: &Canvas,
         blend: Option<f32>,
     ) -> Self {
+        let grid = grid(canvas);
         let labels = labels::best(surface, thumbnails, exposure, placements, &grid);
         let channels = thumbnails.channels();
         let corrections = match blend {
@@ -60,11 +79,6 @@ impl Seams {
             corrections,
             channels,
         }
-    }
-
-    /// The grid.
-    pub fn grid(&self) -> &Canvas {
-        &self.grid
     }
 
     /// The frame of each node, row-major.

@@ -2,7 +2,6 @@
 
 use super::budget::Budget;
 use super::plan::{Plan, RenderOptions};
-use super::seams::STEP_PX;
 use super::{
     Canvas, FrameStack, Panorama, Placement, RenderError, Target, level_for, memory,
     native_px_per_metre, place,
@@ -66,7 +65,7 @@ pub struct LaidOut {
     pub canvas: Canvas,
 }
 
-/// Lays frames out for given poses, at `px_per_metre` or the frames' own resolution: the canvas that [`stitch()`] draws.
+/// Lays frames out for given poses, at `px_per_metre` or `finer` times the frames' own resolution: the canvas that [`stitch()`] draws.
 ///
 /// # Errors
 /// As [`place`], [`native_px_per_metre`] and [`Canvas::covering`].
@@ -75,10 +74,12 @@ pub fn lay_out(
     camera: &Pinhole,
     poses: &[Pose],
     px_per_metre: Option<f64>,
+    finer: f64,
 ) -> Result<LaidOut, RenderError> {
     let placements = place(surface, camera, poses)?;
     let native = native_px_per_metre(surface, camera, poses)?;
-    let canvas = Canvas::of_placements(surface, &placements, px_per_metre.unwrap_or(native))?;
+    let px_per_metre = px_per_metre.unwrap_or(finer * native);
+    let canvas = Canvas::of_placements(surface, &placements, px_per_metre)?;
     Ok(LaidOut {
         placements,
         native_px_per_metre: native,
@@ -120,14 +121,11 @@ impl<'a> Stitch<'a> {
         } else {
             poses
         };
-        let native = native_px_per_metre(surface, camera, poses)?;
-        let finer = if options.render.super_resolve {
-            FINER
-        } else {
-            1.0
+        let finer = match options.render.super_resolve {
+            true => FINER,
+            false => 1.0,
         };
-        let px_per_metre = options.px_per_metre.unwrap_or(finer * native);
-        let laid_out = lay_out(surface, camera, poses, Some(px_per_metre))?;
+        let laid_out = lay_out(surface, camera, poses, options.px_per_metre, finer)?;
         let canvas = &laid_out.canvas;
         let level = level_for(camera, laid_out.native_px_per_metre, canvas.px_per_metre);
         Ok(Self {
@@ -148,21 +146,16 @@ impl<'a> Stitch<'a> {
         &self.frames
     }
 
-    /// Where they lie.
-    pub fn placements(&self) -> &[Placement] {
-        &self.laid_out.placements
-    }
-
     /// The memory that drawing takes if the output holds `output` bytes of it.
     ///
     /// # Errors
     /// [`RenderError::Memory`] if the least that is needed is more than may be used.
     pub fn budget(&self, output: u64) -> Result<Budget, RenderError> {
         Budget::new(
+            self.surface,
             &self.laid_out.canvas,
             &self.frames,
             &self.laid_out.placements,
-            self.laid_out.native_px_per_metre,
             &self.options.render,
             output,
             self.options.memory,
@@ -190,7 +183,6 @@ impl<'a> Stitch<'a> {
             &self.laid_out.placements,
             &self.laid_out.canvas,
             &self.options.render,
-            budget.grid_step_px,
             progress,
         )?;
         Ok((plan, &mut self.frames))
@@ -229,9 +221,7 @@ pub fn render(
     options: &RenderOptions,
     progress: &dyn Progress,
 ) -> Result<Panorama, RenderError> {
-    let plan = Plan::new(
-        surface, frames, placements, canvas, options, STEP_PX, progress,
-    )?;
+    let plan = Plan::new(surface, frames, placements, canvas, options, progress)?;
     let mut panorama = Panorama::empty(*canvas, frames.format());
     let targets: &mut [&mut dyn Target] = &mut [&mut panorama];
     plan.draw(frames, u64::MAX, targets, progress)?;
@@ -250,44 +240,5 @@ pub(crate) fn check_memory(
 ) -> Result<(), RenderError> {
     let picture = canvas.pixels() as u64 * frames.format().pixel_bytes(true) as u64;
     let needed = frames.frame_bytes() * frames.len() as u64 + picture * copies;
-    fits(canvas, frames.len(), needed, memory::available_bytes())
-}
-
-fn fits(
-    canvas: &Canvas,
-    frames: usize,
-    needed: u64,
-    available: Option<u64>,
-) -> Result<(), RenderError> {
-    match available {
-        Some(available) if needed > available => Err(RenderError::Memory {
-            columns: canvas.columns,
-            rows: canvas.rows,
-            frames,
-            needed_mib: needed >> 20,
-            available_mib: available >> 20,
-        }),
-        _ => Ok(()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_beyond_the_memory_is_refused() {
-        let canvas = Canvas {
-            columns: 10_000,
-            rows: 10_000,
-            px_per_metre: 100.0,
-            h_start_m: 0.0,
-        };
-        assert!(fits(&canvas, 100, 500_000_000, Some(500_000_000)).is_ok());
-        assert!(fits(&canvas, 100, 500_000_001, None).is_ok());
-        let message = fits(&canvas, 100, 500_000_001, Some(500_000_000))
-            .unwrap_err()
-            .to_string();
-        assert!(message.contains("10000 × 10000 px") && message.contains("--px-per-metre"));
-    }
+    memory::check(canvas, frames, needed, memory::available_bytes())
 }

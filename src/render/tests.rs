@@ -236,7 +236,6 @@ fn raw_pixels_are_those_of_the_frames() {
         &placements,
         &canvas,
         &options,
-        8.0,
         &Silent,
     )
     .unwrap();
@@ -386,15 +385,7 @@ fn little_memory_changes_nothing_but_the_time() {
     let canvas = Canvas::of_placements(&wall.circle, &placements, 700.0).unwrap();
     let draw = |room| {
         let mut frames = FrameStack::open(&files, &wall.camera, 0).unwrap();
-        let plan = Plan::new(
-            &wall.circle,
-            &frames,
-            &placements,
-            &canvas,
-            &BEST,
-            8.0,
-            &Silent,
-        );
+        let plan = Plan::new(&wall.circle, &frames, &placements, &canvas, &BEST, &Silent);
         let plan = plan.unwrap();
         let mut panorama = Panorama::empty(canvas, frames.format());
         plan.draw(&mut frames, room, &mut [&mut panorama], &Silent)

@@ -1,9 +1,13 @@
 //! All frames, small: enough to find out how they were exposed and where they agree.
 
 use super::kernel::{Interpolation, Kernel};
-use super::{FrameStack, Picture, RenderError};
+use super::warp::{Look, Points, Run};
+use super::{
+    Canvas, FrameStack, Picture, PixelFormat, Placement, RenderError, native_px_per_metre,
+};
 use crate::camera::Pinhole;
 use crate::progress::Progress;
+use crate::surface::Surface;
 use rayon::prelude::*;
 
 /// Small 16-bit pictures of all frames.
@@ -51,11 +55,22 @@ impl Thumbnails {
         })
     }
 
-    /// The level at which frames of resolution `native` are about as fine as a canvas of `px_per_metre`.
-    pub fn level(camera: &Pinhole, native_px_per_metre: f64, px_per_metre: f64) -> usize {
+    /// The level at which frames, as they are held, are about as fine as `grid`.
+    ///
+    /// # Errors
+    /// As [`native_px_per_metre`].
+    pub fn level(
+        surface: &dyn Surface,
+        frames: &FrameStack,
+        placements: &[Placement],
+        grid: &Canvas,
+    ) -> Result<usize, RenderError> {
+        let camera = frames.camera();
+        let poses = placements.iter().map(|placement| &placement.pose);
+        let native = native_px_per_metre(surface, camera, poses)?;
         let most = camera.shorter_side().max(16).ilog2() - 4;
-        let level = (native_px_per_metre / px_per_metre).log2().round();
-        level.clamp(0.0, f64::from(most)) as usize
+        let level = (native / grid.px_per_metre).log2().round();
+        Ok(level.clamp(0.0, f64::from(most)) as usize)
     }
 
     /// Memory of the thumbnails of `frames` frames of the given camera, bytes.
@@ -91,13 +106,42 @@ impl Thumbnails {
         self.scale * t + 0.5 * (self.scale - 1.0)
     }
 
-    /// How thumbnails are sampled.
-    pub fn bilinear(&self) -> &Kernel {
-        &self.bilinear
+    /// What the pixels are.
+    pub fn format(&self) -> PixelFormat {
+        PixelFormat {
+            channels: self.channels(),
+            deep: true,
+        }
     }
 
-    /// The thumbnail of a frame.
-    pub fn picture(&self, frame: usize) -> &Picture {
-        &self.pictures[frame]
+    /// The thumbnail of a frame, ready to be looked at from `points`.
+    pub fn view<'a>(
+        &'a self,
+        frame: usize,
+        placement: &Placement,
+        points: &'a Points,
+    ) -> ThumbnailView<'a> {
+        ThumbnailView {
+            look: Look::new(&self.camera, &placement.pose, &points.origin),
+            picture: &self.pictures[frame],
+            bilinear: &self.bilinear,
+            points,
+        }
+    }
+}
+
+/// A thumbnail, ready to be looked at from points of the wall.
+pub struct ThumbnailView<'a> {
+    look: Look,
+    picture: &'a Picture,
+    bilinear: &'a Kernel,
+    points: &'a Points,
+}
+
+impl ThumbnailView<'_> {
+    /// Looks at `count` of the points from index `start`: where they appear, and the values there, bilinear.
+    pub fn look_at(&self, run: &mut Run, start: usize, count: usize) {
+        run.project(&self.look, self.points, start, count);
+        run.sample(self.picture, self.bilinear, count);
     }
 }

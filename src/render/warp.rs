@@ -166,20 +166,6 @@ impl Run {
         (&self.u, &self.v, &self.seen, &mut self.values)
     }
 
-    /// Looks at `count` points from index `start`: where they appear, and the values there in the camera's picture.
-    pub fn look(
-        &mut self,
-        look: &Look,
-        picture: &Picture,
-        kernel: &Kernel,
-        points: &Points,
-        start: usize,
-        count: usize,
-    ) {
-        self.project(look, points, start, count);
-        self.sample(picture, kernel, count);
-    }
-
     /// Finds the pixels of `count` points from index `start`.
     pub fn project(&mut self, look: &Look, points: &Points, start: usize, count: usize) {
         let (x, y, z) = (

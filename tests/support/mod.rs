@@ -70,3 +70,28 @@ pub fn fail(arguments: &[&str], code: i32) -> String {
 pub fn text(path: &Path) -> &str {
     path.to_str().expect("a path in UTF-8")
 }
+
+/// Runs the program until something appears in `folder`, interrupts it as Ctrl-C does, and returns its exit code.
+#[cfg(unix)]
+pub fn interrupt(arguments: &[&str], folder: &Path) -> Option<i32> {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+        .args(arguments)
+        .spawn()
+        .expect("the program starts");
+    while entries(folder) == 0 {
+        let ended = child.try_wait().expect("a child");
+        assert!(ended.is_none(), "it ended too early");
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    let interrupt = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .expect("kill starts");
+    assert!(interrupt.success());
+    child.wait().expect("a child").code()
+}
+
+/// Number of files and folders in a folder.
+pub fn entries(folder: &Path) -> usize {
+    std::fs::read_dir(folder).expect("a folder").count()
+}
