@@ -5,7 +5,7 @@
 //! rounds. `benches/opencv_warp.py` runs this beside OpenCV.
 
 use std::time::Instant;
-use tunnelstitch::camera::Pinhole;
+use tunnelstitch::camera::Camera;
 use tunnelstitch::progress::Silent;
 use tunnelstitch::render::{
     Band, Canvas, FrameStack, Interpolation, Mode, Picture, Plan, RenderError, RenderOptions,
@@ -28,7 +28,7 @@ impl Target for Nowhere {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let json = std::env::args().any(|argument| argument == "--json");
-    let camera = Pinhole::from_vertical_fov(1920, 1080, 60f64.to_radians());
+    let camera = Camera::from_vertical_fov(1920, 1080, 60f64.to_radians());
     let circle = Circle::new(3.0)?;
     let samples: Vec<u8> = (0..1920 * 1080 * 3)
         .map(|k: usize| ((k * 2_654_435_761) >> 13) as u8)

@@ -27,6 +27,7 @@
 //! ```
 //! use std::sync::Arc;
 //! use tunnelstitch::evaluate::wall_error;
+//! use tunnelstitch::camera::Camera;
 //! use tunnelstitch::progress::{Progress, Silent};
 //! use tunnelstitch::refine::{RefineOptions, refine};
 //! use tunnelstitch::simulate::{self, SimulateOptions};
@@ -37,8 +38,7 @@
 //! let path = folder.path().join("survey");
 //! let options = SimulateOptions {
 //!     frames: 24,
-//!     width: 320,
-//!     height: 240,
+//!     camera: Camera::from_vertical_fov(320, 240, 60f64.to_radians()),
 //!     ..SimulateOptions::free()
 //! };
 //! simulate::run(&options, &path, false, &Silent)?;

@@ -33,7 +33,7 @@
 //!
 //! Relative paths are relative to `survey.toml`. Unknown keys are errors with line and column.
 
-use crate::camera::{CalibrationError, Pinhole, read_calibration};
+use crate::camera::{CalibrationError, Camera, read_calibration};
 use crate::frames::{self, FrameError, FrameFile};
 use crate::surface::{Circle, Surface, SurfaceError};
 use crate::trajectory::tum::{self, TumError};
@@ -153,6 +153,9 @@ pub struct TunnelSection {
 pub struct CameraSection {
     /// Calibration file.
     pub file: PathBuf,
+    /// Which camera, if the file has several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
 }
 
 /// `[frames]`.
@@ -300,7 +303,7 @@ pub struct Survey {
     /// `survey.toml` as written.
     pub file: SurveyFile,
     /// The camera.
-    pub camera: Pinhole,
+    pub camera: Camera,
     /// The tunnel.
     pub surface: Box<dyn Surface>,
     /// The frames, sorted by name.
@@ -356,7 +359,8 @@ impl Survey {
         if let Some(fault) = file.calibrate.as_ref().and_then(CalibrateSection::fault) {
             return Err(value(fault));
         }
-        let camera = read_calibration(&folder.join(&file.camera.file))?;
+        let camera =
+            read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
         let frames = frames::list(&folder, &file.frames.images)?;
         let surface: Box<dyn Surface> = Box::new(circle);
         let mut survey = Self {
@@ -444,6 +448,7 @@ mod tests {
             },
             camera: CameraSection {
                 file: "camera.json".into(),
+                name: None,
             },
             frames: FramesSection {
                 images: "frames/*.png".into(),

@@ -1,6 +1,6 @@
 //! A wall with a known texture and frames of it, for tests.
 
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::GreyImage;
 use crate::render::{FrameStack, Picture};
 use crate::surface::{Circle, Surface, WallPoint};
@@ -14,7 +14,7 @@ pub type Texture = fn(WallPoint, f64) -> f64;
 /// A tunnel of 1 m radius with frames of its wall.
 pub struct TestWall {
     pub circle: Circle,
-    pub camera: Pinhole,
+    pub camera: Camera,
     pub poses: Vec<Pose>,
     texture: Texture,
 }
@@ -51,7 +51,7 @@ impl TestWall {
     fn new(poses: Vec<Pose>, texture: Texture) -> Self {
         Self {
             circle: Circle::new(1.0).unwrap(),
-            camera: Pinhole::from_vertical_fov(160, 120, 60f64.to_radians()),
+            camera: Camera::from_vertical_fov(160, 120, 60f64.to_radians()),
             poses,
             texture,
         }
@@ -80,7 +80,8 @@ impl TestWall {
         let mut data = Vec::new();
         for v in 0..height {
             for u in 0..width {
-                let ray = pose.r_wc * self.camera.ray(f64::from(u), f64::from(v));
+                let ray = self.camera.ray(f64::from(u), f64::from(v)).unwrap();
+                let ray = pose.r_wc * ray;
                 let hit = self.circle.hit(&pose.t_wc, &ray).unwrap();
                 data.push((self.texture)(hit.wall, self.perimeter_m()) as f32);
             }

@@ -85,7 +85,7 @@ fn everything_wrong_at_once_is_found_or_refused() {
         &survey,
         &["--frames", "30", "--size", "320x240", "--k1", "-0.05"],
     );
-    let truth = tunnelstitch::camera::read_calibration(&survey.join("camera.json")).unwrap();
+    let truth = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
     change_camera(&survey, |camera| {
         for name in ["fx", "fy"] {
             camera[name] = (0.98 * camera[name].as_f64().unwrap()).into();
@@ -103,8 +103,8 @@ fn everything_wrong_at_once_is_found_or_refused() {
         ("focal", truth.fx),
         ("cx", truth.cx),
         ("cy", truth.cy),
-        ("k1", truth.radial.k1),
-        ("k2", truth.radial.k2),
+        ("k1", truth.lens.k1_k2()[0]),
+        ("k2", truth.lens.k1_k2()[1]),
     ] {
         assert_eq!(unknown(name)["observed"], true, "{}", unknown(name));
         assert_honest(&unknown(name), truth);
@@ -172,7 +172,7 @@ fn two_frames_are_honest() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     simulate(&survey, &["--frames", "2", "--size", "320x240"]);
-    let truth = tunnelstitch::camera::read_calibration(&survey.join("camera.json")).unwrap();
+    let truth = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
     scale_focal(&survey, 1.02);
     let unknown = calibrate(&survey, &out, "focal,centre,distortion");
     assert_honest(&unknown("focal"), truth.fx);

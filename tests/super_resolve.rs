@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 use std::time::Instant;
+use tunnelstitch::camera::Camera;
 use tunnelstitch::evaluate::mtf50;
 use tunnelstitch::frames::GreyImage;
 use tunnelstitch::render::super_resolve::{Channel, Footprints, MARGIN, Region, View};
@@ -213,8 +214,7 @@ fn small(wall: Wall, noise_grey: f64) -> SimulateOptions {
         frames: 24,
         radius_m: 1.5,
         advance_m: 0.05,
-        width: 320,
-        height: 240,
+        camera: Camera::from_vertical_fov(320, 240, 60f64.to_radians()),
         wall,
         noise_grey,
         ..SimulateOptions::free()

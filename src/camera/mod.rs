@@ -2,12 +2,19 @@
 //! come from.
 //!
 //! Pixel convention: the centre of the first pixel is (0, 0). Files that count from the corner
-//! (`pixel_centre = "half"`) are converted when read.
+//! (`pixel_centre = "half"`, COLMAP, nerfstudio) are converted when read.
 
+mod brown_conrady;
 mod calibration;
-mod pinhole;
-mod radial;
+mod kannala_brandt;
+mod lens;
+mod projection;
+mod rising;
+mod single;
 
+pub use brown_conrady::{BrownCoefficients, BrownConrady};
 pub use calibration::{CalibrationError, format_calibration, read_calibration};
-pub use pinhole::Pinhole;
-pub use radial::Radial;
+pub use kannala_brandt::KannalaBrandt;
+pub use lens::Lens;
+pub use projection::Camera;
+pub use single::{Bend, SingleLens};

@@ -224,7 +224,13 @@ fn point(
             camera.height - 1
         )));
     }
-    let ray = poses[k].r_wc * camera.ray(pixel[0], pixel[1]);
+    let Some(ray) = camera.ray(pixel[0], pixel[1]) else {
+        return Err(Failure::input(format!(
+            "--frame {frame}: the lens shows nothing at {},{}",
+            pixel[0], pixel[1]
+        )));
+    };
+    let ray = poses[k].r_wc * ray;
     match survey.surface.hit(&poses[k].t_wc, &ray) {
         Ok(hit) => Ok(hit.wall),
         Err(error) => Err(Failure::input(format!("frame {k}: {error}"))),

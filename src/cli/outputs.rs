@@ -3,7 +3,7 @@
 use super::Failure;
 use super::stitch::picture_output;
 use crate::atomic;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::{JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};
 use crate::raster::{Compression, DziFormat};
 use crate::render::{
@@ -296,7 +296,7 @@ impl Outputs {
         self,
         plan: &Plan,
         gaps: &[Gap],
-        camera: &Pinhole,
+        camera: &Camera,
         covariances: Option<&[Matrix6<f64>]>,
     ) -> Result<(), Failure> {
         if let Some(maps) = self.maps {
@@ -321,7 +321,7 @@ impl Maps {
         layout: Layout,
         plan: &Plan,
         gaps: &[Gap],
-        camera: &Pinhole,
+        camera: &Camera,
         covariances: Option<&[Matrix6<f64>]>,
     ) -> Result<(), Failure> {
         let (surface, placements) = (plan.surface(), plan.placements());

@@ -2,7 +2,7 @@
 
 use super::stitch::{InterpolationArgument, picture_output, positive};
 use super::{Failure, Terminal};
-use crate::camera::{Pinhole, read_calibration};
+use crate::camera::{Camera, read_calibration};
 use crate::frames::{FrameFile, load_colour, write_picture};
 use crate::render::{Picture, cylinder};
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ fn field_of_view(text: &str) -> Result<f64, String> {
 pub fn run(arguments: &ProjectArguments, terminal: &Terminal) -> Result<(), Failure> {
     let format = picture_output(&arguments.out)?;
     let camera = match &arguments.camera {
-        Some(path) => read_calibration(path)?,
+        Some(path) => read_calibration(path, None)?,
         None => camera_of(arguments)?,
     };
     let file = FrameFile {
@@ -69,7 +69,7 @@ pub fn run(arguments: &ProjectArguments, terminal: &Terminal) -> Result<(), Fail
 }
 
 /// The camera that the arguments describe, for a photo of this size.
-fn camera_of(arguments: &ProjectArguments) -> Result<Pinhole, Failure> {
+fn camera_of(arguments: &ProjectArguments) -> Result<Camera, Failure> {
     let (width, height) = dimensions(&arguments.image)?;
     if width < 2 || height < 2 {
         return Err(Failure::input(format!(
@@ -77,7 +77,7 @@ fn camera_of(arguments: &ProjectArguments) -> Result<Pinhole, Failure> {
             arguments.image.display()
         )));
     }
-    let mut camera = Pinhole::from_vertical_fov(width, height, arguments.fov_deg.to_radians());
+    let mut camera = Camera::from_vertical_fov(width, height, arguments.fov_deg.to_radians());
     if let Some(focal_px) = arguments.focal_px {
         (camera.fx, camera.fy) = (focal_px, focal_px);
     }

@@ -196,6 +196,7 @@ fn calibrated(
     let mut file = survey.file.clone();
     file.tunnel.radius_m = calibration.radius_m;
     file.camera.file = CAMERA_FILE.into();
+    file.camera.name = None;
     let escaped = glob::Pattern::escape(&folder.to_string_lossy());
     let images = Path::new(&escaped).join(&file.frames.images);
     file.frames.images = images.to_string_lossy().into_owned();

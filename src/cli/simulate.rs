@@ -3,6 +3,7 @@
 use super::hardships::HardshipArguments;
 use super::stitch::positive;
 use super::{Failure, Terminal, json};
+use crate::camera::{Camera, Lens, read_calibration};
 use crate::simulate::{self, Light, SimulateOptions, Wall};
 use crate::survey::PriorSection;
 use crate::trajectory::JitterModel;
@@ -53,6 +54,9 @@ pub struct SimulateArguments {
     /// Radius of the tunnel, metres.
     #[arg(long, value_name = "M", default_value_t = 3.0)]
     radius_m: f64,
+    /// Calibration file of the camera: any lens, of any of the kinds that `survey.toml` takes.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "fov_deg", "k1", "k2"])]
+    camera: Option<PathBuf>,
     /// Width and height of the frames, pixels.
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
     size: [u32; 2],
@@ -181,7 +185,7 @@ fn three_numbers(text: &str) -> Result<[f64; 3], String> {
 }
 
 impl SimulateArguments {
-    fn options(&self) -> SimulateOptions {
+    fn options(&self) -> Result<SimulateOptions, Failure> {
         let preset = match self.experiment {
             Experiment::Centred => SimulateOptions::centred(),
             Experiment::OffCentre => SimulateOptions::off_centre(),
@@ -202,15 +206,13 @@ impl SimulateArguments {
             (None, WallArgument::TiledBrick) => Wall::TiledBrick,
             (None, WallArgument::Target) => Wall::Target,
         };
-        self.hardships.add_to(SimulateOptions {
+        let camera = self.camera()?;
+        Ok(self.hardships.add_to(SimulateOptions {
             frames,
             advance_m: self.advance_m.unwrap_or(preset.advance_m),
             turn_deg: self.turn_deg,
             radius_m: self.radius_m,
-            width: self.size[0],
-            height: self.size[1],
-            vertical_fov_deg: self.fov_deg,
-            distortion: [self.k1, self.k2],
+            camera,
             jitter: self.jitter_of(preset.jitter),
             wall,
             light: match self.light {
@@ -221,7 +223,29 @@ impl SimulateArguments {
             supersample: self.supersample,
             seed: self.seed,
             ..preset
-        })
+        }))
+    }
+
+    fn camera(&self) -> Result<Camera, Failure> {
+        if let Some(path) = &self.camera {
+            return Ok(read_calibration(path, None)?);
+        }
+        let [width, height] = self.size;
+        if !(self.fov_deg > 0.0 && self.fov_deg < 170.0) {
+            return Err(Failure::usage(
+                "--fov-deg must lie between 0 and 170 degrees; a --camera file may describe a fisheye",
+            ));
+        }
+        let camera = Camera {
+            lens: Lens::radial(self.k1, self.k2),
+            ..Camera::from_vertical_fov(width, height, self.fov_deg.to_radians())
+        };
+        if camera.shown_share() < 1.0 {
+            return Err(Failure::usage(
+                "--k1 and --k2 must not fold the picture back on itself before its corners",
+            ));
+        }
+        Ok(camera)
     }
 
     /// The preset's jitter with the arguments' changes; any of them asks for jitter.
@@ -250,7 +274,7 @@ pub fn run(arguments: &SimulateArguments, terminal: &Terminal) -> Result<(), Fai
             "--turns needs a --turn-deg other than 0; or give a number of --frames",
         ));
     }
-    let options = arguments.options();
+    let options = arguments.options()?;
     let simulated = simulate::run(&options, &arguments.out, arguments.force, terminal)?;
     if arguments.json {
         return json::print(&simulated);
@@ -267,8 +291,8 @@ pub fn run(arguments: &SimulateArguments, terminal: &Terminal) -> Result<(), Fai
     terminal.say(format!(
         "{out}: {} frames of {} × {} px, with true poses\nnext: tunnelstitch {next}",
         options.frames - options.bad_frames.missing(),
-        options.width,
-        options.height
+        options.camera.width,
+        options.camera.height
     ));
     Ok(())
 }

@@ -5,7 +5,7 @@ use super::{
     EvaluateError, ImageMetrics, SeamResidual, TrajectoryError, WallError, image_metrics,
     seam_residual, trajectory_error, wall_error,
 };
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::FrameFile;
 use crate::progress::Progress;
 use crate::render::{
@@ -22,7 +22,7 @@ pub struct CompareInput<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
     /// The camera.
-    pub camera: &'a Pinhole,
+    pub camera: &'a Camera,
     /// The frames on disk.
     pub files: &'a [FrameFile],
     /// Poses before refinement, one per frame.

@@ -2,9 +2,10 @@
 
 use super::error::check_pairs;
 use super::{EvaluateError, Spread, spread::root_mean_square};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::surface::{Surface, WallPoint, shortest_arc};
 use crate::trajectory::Pose;
+use nalgebra::Vector3;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
@@ -44,7 +45,7 @@ const GRID: [u32; 2] = [9, 7];
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`]; [`EvaluateError::Frame`] if a ray meets no wall.
 pub fn wall_error(
     surface: &dyn Surface,
-    camera: &Pinhole,
+    camera: &Camera,
     estimated: &[Pose],
     truth: &[Pose],
 ) -> Result<WallError, EvaluateError> {
@@ -116,14 +117,14 @@ pub(super) struct FrameOffsets {
 /// [`EvaluateError::Frame`] if a ray meets no wall.
 pub(super) fn frame_offsets(
     surface: &dyn Surface,
-    camera: &Pinhole,
+    camera: &Camera,
     frame: usize,
     estimate: &Pose,
     truth: &Pose,
 ) -> Result<FrameOffsets, EvaluateError> {
-    let hit = |pose: &Pose, which, u, v| {
+    let hit = |pose: &Pose, which, ray: &Vector3<f64>| {
         surface
-            .hit(&pose.t_wc, &(pose.r_wc * camera.ray(u, v)))
+            .hit(&pose.t_wc, &(pose.r_wc * *ray))
             .map_err(|source| EvaluateError::Frame {
                 frame,
                 which,
@@ -135,8 +136,12 @@ pub(super) fn frame_offsets(
         for i in 0..GRID[0] {
             let u = f64::from((camera.width - 1) * i) / f64::from(GRID[0] - 1);
             let v = f64::from((camera.height - 1) * j) / f64::from(GRID[1] - 1);
-            let here: WallPoint = hit(estimate, "estimated", u, v)?.wall;
-            let there: WallPoint = hit(truth, "true", u, v)?.wall;
+            // What the lens does not show has no place on the wall.
+            let Some(ray) = camera.ray(u, v) else {
+                continue;
+            };
+            let here: WallPoint = hit(estimate, "estimated", &ray)?.wall;
+            let there: WallPoint = hit(truth, "true", &ray)?.wall;
             delta_s_m.push(here.s_m - there.s_m);
             delta_h_m.push(here.h_m - there.h_m);
         }
@@ -145,7 +150,7 @@ pub(super) fn frame_offsets(
     Ok(FrameOffsets {
         delta_s_m,
         delta_h_m,
-        pixel_m: hit(truth, "true", camera.cx, camera.cy)?.range / focal_px,
+        pixel_m: hit(truth, "true", &Vector3::z())?.range / focal_px,
     })
 }
 
@@ -180,9 +185,9 @@ mod tests {
     use crate::surface::{Circle, GaugeMotion};
     use crate::trajectory::spiral;
 
-    fn scene() -> (Circle, Pinhole, Vec<Pose>) {
+    fn scene() -> (Circle, Camera, Vec<Pose>) {
         let circle = Circle::new(3.0).unwrap();
-        let camera = Pinhole::from_vertical_fov(640, 480, 60f64.to_radians());
+        let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
         (circle, camera, spiral(24, 0.1, 30f64.to_radians()))
     }
 

@@ -1,7 +1,7 @@
 //! Frames on demand, in bounded memory.
 
 use super::{FrameError, FrameFile, Pyramid, Shading, StoredFrame};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
@@ -30,7 +30,7 @@ pub struct FrameCache {
 
 #[derive(Debug)]
 enum Source {
-    Files(Vec<FrameFile>, Pinhole),
+    Files(Vec<FrameFile>, Camera),
     Memory(Vec<Arc<Pyramid>>),
 }
 
@@ -52,7 +52,7 @@ struct Store {
 impl FrameCache {
     /// The frames `files` of `camera`, with `levels` pyramid levels each, in no more than `bytes` of memory (but
     /// always room for one).
-    pub fn new(files: &[FrameFile], camera: &Pinhole, levels: usize, bytes: usize) -> Self {
+    pub fn new(files: &[FrameFile], camera: &Camera, levels: usize, bytes: usize) -> Self {
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let pyramids = |share: f64| (share * bytes as f64 / (PYRAMID_BYTES * pixels)) as usize;
         let (room, stored) = match pyramids(1.0) >= files.len() {
@@ -152,7 +152,7 @@ impl FrameCache {
     }
 
     /// A frame as its file holds it; kept if there is room.
-    fn stored(&self, file: &FrameFile, camera: &Pinhole) -> Result<Arc<StoredFrame>, FrameError> {
+    fn stored(&self, file: &FrameFile, camera: &Camera) -> Result<Arc<StoredFrame>, FrameError> {
         if let Some(frame) = lock(&self.stored).kept.get(&file.index) {
             return Ok(Arc::clone(frame));
         }
@@ -193,7 +193,7 @@ mod tests {
     #[test]
     fn no_more_is_kept_than_there_is_room_for() {
         let folder = tempfile::tempdir().unwrap();
-        let camera = Pinhole::from_vertical_fov(32, 24, 1.0);
+        let camera = Camera::from_vertical_fov(32, 24, 1.0);
         let files = files(folder.path());
         // Three quarters of it for three frames as they are stored, the rest for a pyramid.
         let cache = FrameCache::new(&files, &camera, 2, 4 * 32 * 24);
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn a_frame_that_is_gone_is_an_error_that_names_it() {
         let folder = tempfile::tempdir().unwrap();
-        let camera = Pinhole::from_vertical_fov(32, 24, 1.0);
+        let camera = Camera::from_vertical_fov(32, 24, 1.0);
         let files = files(folder.path());
         std::fs::remove_file(&files[3].path).unwrap();
         let cache = FrameCache::new(&files, &camera, 1, 0);

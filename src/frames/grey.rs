@@ -56,7 +56,7 @@ impl GreyImage {
     /// Half the size: each pixel is the `[1 3 3 1]/8 ⊗ [1 3 3 1]/8` mean around the corner shared by four.
     ///
     /// The filter is even, so the new centre lies exactly between the old ones
-    /// (see [`crate::camera::Pinhole::at_level`]); borders repeat the outermost pixel.
+    /// (see [`crate::camera::Camera::at_level`]); borders repeat the outermost pixel.
     ///
     /// Pixels without a value count for nothing; where they make up more than half of the weight, the result
     /// has no value either.

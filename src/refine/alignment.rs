@@ -24,7 +24,7 @@ use super::robust::{Loss, robust_correlation};
 use super::sampler::Sampler;
 use super::track::Tracked;
 use super::wall::{Lattice, pixel_m};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::{MAD_TO_SIGMA, Pyramid, noise_at_level};
 use crate::surface::{Footprint, WallPoint};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
@@ -124,7 +124,7 @@ pub fn alignments(
 struct Look<'a> {
     scene: &'a Scene<'a>,
     level: usize,
-    camera: &'a Pinhole,
+    camera: &'a Camera,
     picture: &'a Pyramid,
     pose: &'a crate::trajectory::Pose,
 }

@@ -32,7 +32,7 @@ use super::prior::{Prior, usual_step_s};
 use super::problem::{Members, Problem, Sampling, Scene};
 use super::run::RefineError;
 use super::selected_inverse::SelectedInverse;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::{FrameCache, GreyImage, Pyramid};
 use crate::survey::Survey;
 use crate::trajectory::poses_of;
@@ -137,15 +137,15 @@ fn of_pose(block: &Block) -> Block {
 
 /// The camera of frames with pixels half as wide, each averaged with its neighbours to the right and below: pixel
 /// `(u', v')` is centred at `(u'/2, v'/2)` of the camera's own.
-fn doubled_camera(camera: &Pinhole) -> Pinhole {
-    Pinhole {
+fn doubled_camera(camera: &Camera) -> Camera {
+    Camera {
         width: 2 * camera.width - 1,
         height: 2 * camera.height - 1,
         fx: 2.0 * camera.fx,
         fy: 2.0 * camera.fy,
         cx: 2.0 * camera.cx,
         cy: 2.0 * camera.cy,
-        radial: camera.radial,
+        lens: camera.lens,
     }
 }
 

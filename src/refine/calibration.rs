@@ -3,7 +3,7 @@
 //! The shared unknowns are deviations from what was given, `κ = (ln f, cx, cy, k1, k2, ln r, τ_x, τ_z, o_x, o_z)`.
 //!
 //! - Focal length (fx and fy alike), principal point and distortion enter through the rays, so pixels see them
-//!   ([`crate::camera::Pinhole::ray_jacobian`]).
+//!   ([`crate::camera::Camera::intrinsics_jacobian`]).
 //! - Pictures stay as they are when the radius and all positions grow together. So poses are estimated in the tunnel of the
 //!   radius given, and the radius is `exp(ln r)` times that: only the prior, which is in metres, sees it.
 //! - Pictures show how the cameras stand in the tunnel, whatever frame the initial poses are in. So where that frame
@@ -13,7 +13,7 @@
 //! The latter five are [`Metric`]. Every unknown has a Gaussian prior around 0; one that the data leave nearly as uncertain
 //! as that is refused ([`super::observed`]).
 
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::survey::{CalibrateSection, CalibrationGroup};
 use crate::trajectory::{Jitter, JitterModel, Pose, so3};
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
@@ -32,7 +32,7 @@ pub type Kappa = SVector<f64, SHARED>;
 #[derive(Clone, Copy, Debug)]
 pub struct Calibration {
     /// The camera as given.
-    pub given: Pinhole,
+    pub given: Camera,
     /// Prior 1-σ of κ.
     pub sigma: Kappa,
     /// Which are estimated; the others stay 0.
@@ -43,7 +43,7 @@ pub struct Calibration {
 
 impl Calibration {
     /// Estimates nothing.
-    pub fn none(camera: &Pinhole) -> Self {
+    pub fn none(camera: &Camera) -> Self {
         Self {
             given: *camera,
             sigma: Kappa::repeat(1.0),
@@ -56,7 +56,7 @@ impl Calibration {
     pub fn new(
         groups: &[CalibrationGroup],
         section: &CalibrateSection,
-        camera: &Pinhole,
+        camera: &Camera,
         initial: &[Pose],
     ) -> Self {
         use CalibrationGroup::{Axis, Centre, Distortion, Focal, Radius};
@@ -114,15 +114,18 @@ impl Calibration {
     }
 
     /// The camera at κ; None where its lens would fold the picture.
-    pub fn camera(&self, kappa: &Kappa) -> Option<Pinhole> {
+    pub fn camera(&self, kappa: &Kappa) -> Option<Camera> {
         let mut camera = self.given;
         camera.fx *= kappa[0].exp();
         camera.fy *= kappa[0].exp();
         camera.cx += kappa[1];
         camera.cy += kappa[2];
-        camera.radial.k1 += kappa[3];
-        camera.radial.k2 += kappa[4];
-        camera.field().is_some().then_some(camera)
+        let [k1, k2] = camera.lens.k1_k2();
+        camera.lens = camera.lens.with_k1_k2(k1 + kappa[3], k2 + kappa[4]);
+        // Without a change of the lens, and so usually, nothing is to be asked.
+        let shows =
+            camera.lens == self.given.lens || camera.shown_share() >= self.given.shown_share();
+        shows.then_some(camera)
     }
 
     /// How the initial poses lie in the tunnel at κ.
@@ -205,7 +208,7 @@ mod tests {
     fn calibration() -> Calibration {
         Calibration {
             middle_h_m: 4.0,
-            ..Calibration::none(&Pinhole::from_vertical_fov(160, 120, 1.0))
+            ..Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0))
         }
     }
 

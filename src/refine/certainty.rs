@@ -119,12 +119,12 @@ fn refuse_all(calibration: &Calibration, reason: &str) -> Vec<Refusal> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Pinhole;
+    use crate::camera::Camera;
     use crate::refine::calibration::Kappa;
 
     #[test]
     fn all_that_was_asked_for_is_refused() {
-        let mut calibration = Calibration::none(&Pinhole::from_vertical_fov(160, 120, 1.0));
+        let mut calibration = Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0));
         calibration.sigma = Kappa::repeat(0.1);
         calibration.free[3] = true;
         let refusals = refuse_all(&calibration, "because");

@@ -20,7 +20,7 @@ use super::factor::FactorError;
 use super::normal::{Block, NormalEquations, Pattern};
 use super::selected_inverse::SelectedInverse;
 use super::shared::{BorderBlock, SharedBlock};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::surface::{GaugeMotion, Surface, lens_jacobian, wall_jacobian};
 use crate::trajectory::so3;
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -171,7 +171,7 @@ pub fn covariances(
 /// and what a pixel shows, `A ξ + C κ`, is more certain than the pose alone.
 pub fn frame_sigma(
     surface: &dyn Surface,
-    camera: &Pinhole,
+    camera: &Camera,
     estimate: &FrameEstimate,
     covariance: &Matrix6<f64>,
     shared: Option<(&BorderBlock, &SharedBlock)>,
@@ -185,9 +185,7 @@ pub fn frame_sigma(
     let mut wall = 0.0;
     let mut wall_px = 0.0;
     let mut points = 0.0;
-    let middle = nalgebra::Vector2::new(camera.cx, camera.cy);
-    for pixel in camera.border(1, 0.0).iter().chain([&middle]) {
-        let ray_c = camera.ray(pixel.x, pixel.y);
+    for ray_c in camera.probes() {
         let ray = pose.r_wc * ray_c;
         if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
             let a = wall_jacobian(pose, &surface.frame(hit.wall));

@@ -9,7 +9,7 @@ use super::foreign::Marks;
 use super::grid::{BLOCK, WallGrid};
 use super::view::View;
 use super::visibility::{Placed, Visibility, rows_of};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::{FrameCache, FrameError, Pyramid};
 use crate::surface::Surface;
 use rayon::prelude::*;
@@ -61,7 +61,7 @@ pub struct Coverage<'a> {
     surface: &'a dyn Surface,
     grid: WallGrid,
     /// Of the level.
-    camera: Pinhole,
+    camera: Camera,
     pictures: Pictures<'a>,
     /// Share of the information that the tiles compared hold.
     information: f64,
@@ -88,7 +88,7 @@ impl<'a> Coverage<'a> {
     pub fn new(
         surface: &'a dyn Surface,
         grid: WallGrid,
-        camera: Pinhole,
+        camera: Camera,
         pictures: Pictures<'a>,
         information: f64,
         placed: Vec<Option<Placed>>,

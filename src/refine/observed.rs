@@ -7,7 +7,7 @@ use super::calibration::{Calibration, Kappa, SHARED};
 use super::factor::FactorError;
 use super::gauss_newton::Solution;
 use super::shared::{BorderBlock, Eliminated, SharedBlock, reduce};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -187,7 +187,7 @@ pub struct CalibrationReport {
     /// What was to be estimated.
     pub unknowns: Vec<UnknownReport>,
     /// The camera to use with the poses.
-    pub camera: Pinhole,
+    pub camera: Camera,
     /// The tunnel's radius to use with the poses, metres.
     pub radius_m: f64,
     /// The tunnel's axis in the frame of the initial poses: a point, metres, and the direction.
@@ -206,6 +206,7 @@ impl CalibrationReport {
         given_radius_m: f64,
     ) -> Self {
         let given = &calibration.given;
+        let [k1, k2] = given.lens.k1_k2();
         // The axis moves in the initial poses' frame as that frame would have to move back.
         let (point, direction) = calibration.metric(kappa).axis();
         let tilt = [direction.z, -direction.x].map(|sine| sine.asin());
@@ -214,8 +215,8 @@ impl CalibrationReport {
             given.fx * kappa[0].exp(),
             given.cx + kappa[1],
             given.cy + kappa[2],
-            given.radial.k1 + kappa[3],
-            given.radial.k2 + kappa[4],
+            k1 + kappa[3],
+            k2 + kappa[4],
             radius_m,
             tilt[0].to_degrees(),
             tilt[1].to_degrees(),
@@ -226,8 +227,8 @@ impl CalibrationReport {
             given.fx,
             given.cx,
             given.cy,
-            given.radial.k1,
-            given.radial.k2,
+            k1,
+            k2,
             given_radius_m,
             0.0,
             0.0,
@@ -277,7 +278,7 @@ mod tests {
         Calibration {
             free: [true; SHARED],
             sigma: Kappa::repeat(0.1),
-            ..Calibration::none(&Pinhole::from_vertical_fov(160, 120, 1.0))
+            ..Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0))
         }
     }
 

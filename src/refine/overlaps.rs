@@ -3,7 +3,7 @@
 use super::problem::{ProblemError, Scene};
 use super::track::{FARTHEST, Tracked};
 use super::visibility::reach_m;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::surface::Footprint;
 use crate::trajectory::Pose;
 use rayon::prelude::*;
@@ -15,7 +15,7 @@ use std::ops::Range;
 /// [`ProblemError::Placement`].
 pub fn footprint(
     scene: &Scene,
-    camera: &Pinhole,
+    camera: &Camera,
     frame: usize,
     pose: &Pose,
 ) -> Result<Footprint, ProblemError> {
@@ -49,7 +49,7 @@ impl Overlaps {
     /// [`ProblemError::Placement`].
     pub fn of(
         scene: &Scene,
-        camera: &Pinhole,
+        camera: &Camera,
         tracked: &Tracked,
         run: &Range<usize>,
     ) -> Result<Self, ProblemError> {

@@ -278,16 +278,11 @@ fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
 
 /// How far apart two poses put the frame on the wall: the mean over its middle and corners, metres.
 pub fn apart_m(scene: &Scene, a: &Pose, b: &Pose) -> f64 {
-    let camera = scene.camera;
-    let middle = nalgebra::Vector2::new(camera.cx, camera.cy);
-    let corners = camera.border(1, 0.0);
     let perimeter = scene.surface.perimeter_m();
-    corners
-        .iter()
-        .chain([&middle])
-        .filter_map(|pixel| {
+    (scene.camera.probes().iter())
+        .filter_map(|ray_c| {
             let look = |pose: &Pose| {
-                let ray = pose.r_wc * camera.ray(pixel.x, pixel.y);
+                let ray = pose.r_wc * ray_c;
                 scene.surface.hit(&pose.t_wc, &ray).ok()
             };
             let (a, b) = (look(a)?.wall, look(b)?.wall);

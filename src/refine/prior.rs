@@ -352,7 +352,7 @@ fn add_gradient(normal: &mut NormalEquations, slot: usize, gradient: &Vector6<f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Pinhole;
+    use crate::camera::Camera;
     use crate::refine::calibration::{Calibration, Kappa};
 
     fn pose(seed: f64) -> Pose {
@@ -384,7 +384,7 @@ mod tests {
     fn calibration() -> Calibration {
         Calibration {
             middle_h_m: 0.4,
-            ..Calibration::none(&Pinhole::from_vertical_fov(16, 16, 1.0))
+            ..Calibration::none(&Camera::from_vertical_fov(16, 16, 1.0))
         }
     }
 

@@ -8,7 +8,7 @@ use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
 use super::problem::{Problem, ProblemError, Sampling, Scene};
 use super::track::{Tracked, track};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::progress::Progress;
 
 /// Times that the frames are tracked, at the most.
@@ -57,10 +57,10 @@ pub fn track_calibrating(
 }
 
 /// How far the rays of one camera's border appear from there in another, pixels, at the most.
-fn moved_px(before: &Pinhole, after: &Pinhole) -> f64 {
+fn moved_px(before: &Camera, after: &Camera) -> f64 {
     let border = before.border(STEPS_PER_EDGE, 0.0);
     let apart = border.iter().map(|pixel| {
-        let seen = after.project(&before.ray(pixel.x, pixel.y));
+        let seen = (before.ray(pixel.x, pixel.y)).and_then(|ray| after.project(&ray));
         seen.map_or(f64::INFINITY, |seen| (seen - pixel).norm())
     });
     apart.fold(0.0, f64::max)
@@ -72,7 +72,7 @@ mod tests {
 
     #[test]
     fn a_longer_lens_moves_the_border_outwards() {
-        let before = Pinhole::from_vertical_fov(640, 480, 60f64.to_radians());
+        let before = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
         let mut after = before;
         (after.fx, after.fy) = (1.02 * before.fx, 1.02 * before.fy);
         // The corners are half a diagonal from the middle.

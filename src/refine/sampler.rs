@@ -1,34 +1,9 @@
 //! Where single wall points appear in a frame.
 
-use crate::camera::Pinhole;
+use crate::camera::{Bend, Camera, SingleLens};
 use crate::frames::GreyImage;
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Vector3};
-
-/// The lens's distortion in single precision ([`crate::camera::Radial`]).
-struct Lens {
-    k1: f32,
-    k2: f32,
-    limit: f32,
-}
-
-impl Lens {
-    /// None for a lens without distortion.
-    fn of(camera: &Pinhole) -> Option<Self> {
-        let radial = &camera.radial;
-        (!radial.is_none()).then(|| Self {
-            k1: radial.k1 as f32,
-            k2: radial.k2 as f32,
-            limit: radial.limit() as f32,
-        })
-    }
-
-    /// `1 + k1 q + k2 q²`, within the limit.
-    #[inline]
-    fn factor(&self, q: f32) -> Option<f32> {
-        (q < self.limit).then_some(1.0 + q * (self.k1 + q * self.k2))
-    }
-}
 
 /// A camera at a pose, ready to look at wall points relative to an origin near them.
 pub struct Sampler {
@@ -36,7 +11,7 @@ pub struct Sampler {
     centre: Vector3<f32>,
     focal: (f32, f32),
     principal: (f32, f32),
-    radial: Option<Lens>,
+    lens: SingleLens,
     limit: (f32, f32),
     width: usize,
 }
@@ -54,14 +29,14 @@ pub struct Spot {
 
 impl Sampler {
     /// The `camera` at `pose`; points will be relative to `origin`.
-    pub fn new(camera: &Pinhole, pose: &Pose, origin: &Vector3<f64>) -> Self {
+    pub fn new(camera: &Camera, pose: &Pose, origin: &Vector3<f64>) -> Self {
         let r_wc = pose.r_wc.to_rotation_matrix();
         Self {
             r_cw: r_wc.matrix().transpose().cast(),
             centre: pose.to_camera(origin).cast(),
             focal: (camera.fx as f32, camera.fy as f32),
             principal: (camera.cx as f32, camera.cy as f32),
-            radial: Lens::of(camera),
+            lens: SingleLens::new(&camera.lens),
             limit: ((camera.width - 1) as f32, (camera.height - 1) as f32),
             width: camera.width as usize,
         }
@@ -73,18 +48,12 @@ impl Sampler {
         let r = &self.r_cw;
         let dot =
             |row: usize| r[(row, 0)] * point[0] + r[(row, 1)] * point[1] + r[(row, 2)] * point[2];
-        let z = self.centre.z + dot(2);
-        if z <= 0.0 {
-            return None;
-        }
-        let mut inverse = 1.0 / z;
         let (x, y) = (self.centre.x + dot(0), self.centre.y + dot(1));
-        if let Some(lens) = &self.radial {
-            inverse *= lens.factor((x * x + y * y) * inverse * inverse)?;
-        }
-        let u = self.focal.0 * x * inverse + self.principal.0;
-        let v = self.focal.1 * y * inverse + self.principal.1;
-        if !(u >= 0.0 && v >= 0.0 && u < self.limit.0 && v < self.limit.1) {
+        let z = self.centre.z + dot(2);
+        let (p, q, shown) = self.lens.bend(x, y, z);
+        let u = self.focal.0 * p + self.principal.0;
+        let v = self.focal.1 * q + self.principal.1;
+        if !(shown && u >= 0.0 && v >= 0.0 && u < self.limit.0 && v < self.limit.1) {
             return None;
         }
         let (x, y) = (u as usize, v as usize);
@@ -118,14 +87,14 @@ impl Spot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Radial;
+    use crate::camera::Lens;
     use crate::trajectory::so3;
 
     /// A picture of its own pixel coordinates, sampled where the camera itself projects a point, lens included.
     #[test]
     fn a_point_is_seen_where_the_camera_projects_it() {
-        let mut camera = Pinhole::from_vertical_fov(64, 48, 1.0);
-        camera.radial = Radial { k1: -0.1, k2: 0.02 };
+        let mut camera = Camera::from_vertical_fov(64, 48, 1.0);
+        camera.lens = Lens::radial(-0.1, 0.02);
         let pose = Pose::new(
             so3::exp(&Vector3::new(0.1, 0.4, -0.2)),
             Vector3::new(0.3, 5.0, 0.1),

@@ -153,7 +153,7 @@ pub struct Eliminated {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Pinhole;
+    use crate::camera::Camera;
     use crate::refine::factor::Symbolic;
     use crate::refine::normal::{Block, NormalEquations, Pattern};
     use nalgebra::{DMatrix, DVector};
@@ -196,7 +196,7 @@ mod tests {
         border.gradient = Kappa::from_fn(|k, _| number(k, 0.7));
         border.own = SharedBlock::identity() * 40.0;
         // One unknown is held.
-        let mut calibration = Calibration::none(&Pinhole::from_vertical_fov(16, 16, 1.0));
+        let mut calibration = Calibration::none(&Camera::from_vertical_fov(16, 16, 1.0));
         calibration.free = [true; SHARED];
         calibration.free[4] = false;
         let kappa = Kappa::from_fn(|k, _| 0.1 * number(k, 0.2));

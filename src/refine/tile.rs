@@ -619,7 +619,7 @@ fn across(s: [f32; LANES]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Pinhole;
+    use crate::camera::Camera;
     use crate::frames::GreyImage;
     use crate::refine::estimate::FrameEstimate;
     use crate::refine::grid::{TileId, WallGrid};
@@ -633,7 +633,7 @@ mod tests {
     #[test]
     fn the_noise_of_slopes_is_known() {
         let circle = Circle::new(3.0).unwrap();
-        let camera = Pinhole::from_vertical_fov(160, 120, 60f64.to_radians());
+        let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let noise = Normal::new(100.0f32, 5.0).unwrap();
         let images: Vec<GreyImage> = (0..3)

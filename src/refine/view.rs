@@ -2,7 +2,7 @@
 
 use super::estimate::FrameEstimate;
 use super::grid::{Plane, TilePoints, ZERO};
-use crate::camera::{Pinhole, Radial};
+use crate::camera::{Bend, Camera, SingleLens};
 use crate::frames::GreyImage;
 use crate::surface::{lens_jacobian, wall_jacobian};
 use crate::trajectory::Pose;
@@ -17,7 +17,7 @@ pub struct View<'a> {
     image: &'a GreyImage,
     /// `fx, fy, cx, cy`.
     intrinsics: [f32; 4],
-    radial: Radial,
+    lens: SingleLens,
     pose: Pose,
     r_cw: Matrix3<f32>,
     gain: f32,
@@ -26,12 +26,12 @@ pub struct View<'a> {
 
 impl<'a> View<'a> {
     /// A frame's `image` seen by `camera` (of the same level).
-    pub fn new(image: &'a GreyImage, camera: Pinhole, estimate: &FrameEstimate) -> Self {
+    pub fn new(image: &'a GreyImage, camera: Camera, estimate: &FrameEstimate) -> Self {
         let r_wc = estimate.pose.r_wc.to_rotation_matrix();
         Self {
             image,
             intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy].map(|v| v as f32),
-            radial: camera.radial,
+            lens: SingleLens::new(&camera.lens),
             pose: estimate.pose,
             r_cw: r_wc.matrix().transpose().cast(),
             gain: estimate.log_gain.exp() as f32,
@@ -55,7 +55,7 @@ impl<'a> View<'a> {
         &self,
         points: &TilePoints,
         a: &Matrix2x6<f64>,
-        camera: &Pinhole,
+        camera: &Camera,
     ) -> Matrix2x5<f64> {
         let x_c = self.pose.to_camera(&points.centre.x_w);
         lens_jacobian(&self.pose, a, camera, &x_c)
@@ -66,23 +66,15 @@ impl<'a> View<'a> {
     /// Samples that a step has moved out of the picture repeat its border.
     #[inline(always)]
     pub fn sample(&self, points: &TilePoints, shade: f32, values: &mut Plane) {
-        if self.radial.is_none() {
-            self.sample_through::<false>(points, shade, values);
-        } else {
-            self.sample_through::<true>(points, shade, values);
+        match self.lens {
+            SingleLens::Straight(lens) => self.sample_through(lens, points, shade, values),
+            SingleLens::Brown(lens) => self.sample_through(lens, points, shade, values),
+            SingleLens::Fisheye(lens) => self.sample_through(lens, points, shade, values),
         }
     }
 
-    /// `DISTORTS`: the lens does.
     #[inline(always)]
-    fn sample_through<const DISTORTS: bool>(
-        &self,
-        points: &TilePoints,
-        shade: f32,
-        values: &mut Plane,
-    ) {
-        let (k1, k2) = (self.radial.k1 as f32, self.radial.k2 as f32);
-        let limit = self.radial.limit() as f32;
+    fn sample_through(&self, lens: impl Bend, points: &TilePoints, shade: f32, values: &mut Plane) {
         let c: Vector3<f32> = self.pose.to_camera(&points.centre.x_w).cast();
         let r = &self.r_cw;
         let [fx, fy, cx, cy] = self.intrinsics;
@@ -95,13 +87,8 @@ impl<'a> View<'a> {
             let x = c.x + r[(0, 0)] * dx + r[(0, 1)] * dy + r[(0, 2)] * dz;
             let y = c.y + r[(1, 0)] * dx + r[(1, 1)] * dy + r[(1, 2)] * dz;
             let z = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
-            let inverse = 1.0 / z;
-            let mut scale = inverse;
-            if DISTORTS {
-                let q = ((x * x + y * y) * (inverse * inverse)).min(limit);
-                scale *= 1.0 + q * (k1 + q * k2);
-            }
-            let (u, v) = (fx * x * scale + cx, fy * y * scale + cy);
+            let (p, q, _) = lens.bend(x, y, z);
+            let (u, v) = (fx * p + cx, fy * q + cy);
             // `max` first: a NaN (a sample behind the camera) becomes the first pixel.
             let x0 = (u - 0.5).max(0.0).min(last_u) + INTEGER;
             let y0 = (v - 0.5).max(0.0).min(last_v) + INTEGER;
@@ -129,6 +116,7 @@ impl<'a> View<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::{KannalaBrandt, Lens};
     use crate::refine::calibration::{Calibration, Kappa, LENS};
     use crate::refine::grid::{AREA, SIDE, TileId, WallGrid};
     use crate::surface::{Circle, Surface, WallPoint};
@@ -138,9 +126,9 @@ mod tests {
     #[test]
     fn the_wall_follows_the_lens() {
         let circle = Circle::new(3.0).unwrap();
-        let calibration = Calibration::none(&Pinhole {
-            radial: Radial { k1: -0.1, k2: 0.02 },
-            ..Pinhole::from_vertical_fov(160, 120, 60f64.to_radians())
+        let calibration = Calibration::none(&Camera {
+            lens: Lens::radial(-0.1, 0.02),
+            ..Camera::from_vertical_fov(160, 120, 60f64.to_radians())
         });
         let image = GreyImage::new(160, 120, vec![0.0; 160 * 120]);
         let estimate = FrameEstimate::at(Pose::new(
@@ -151,8 +139,8 @@ mod tests {
         let camera = calibration.given;
         let view = View::new(&image, camera.at_level(1), &estimate);
         let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
-        let wall_of = |camera: &Pinhole, pixel: &nalgebra::Vector2<f64>| {
-            let ray = pose.r_wc * camera.ray(pixel.x, pixel.y);
+        let wall_of = |camera: &Camera, pixel: &nalgebra::Vector2<f64>| {
+            let ray = pose.r_wc * camera.ray(pixel.x, pixel.y).unwrap();
             circle.hit(&pose.t_wc, &ray).unwrap().wall
         };
         let seen = wall_of(&camera, &nalgebra::Vector2::new(130.0, 25.0));
@@ -182,13 +170,15 @@ mod tests {
     /// A frame whose grey value is a linear function of the pixel: bilinear sampling must return it exactly.
     #[test]
     fn samples_are_where_the_camera_projects_them() {
-        let straight = Pinhole::from_vertical_fov(160, 120, 60f64.to_radians());
+        let straight = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
         sampled_where_projected(straight);
-        let radial = Radial { k1: -0.1, k2: 0.02 };
-        sampled_where_projected(Pinhole { radial, ..straight });
+        let fisheye = KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]);
+        for lens in [Lens::radial(-0.1, 0.02), Lens::KannalaBrandt(fisheye)] {
+            sampled_where_projected(Camera { lens, ..straight });
+        }
     }
 
-    fn sampled_where_projected(camera: Pinhole) {
+    fn sampled_where_projected(camera: Camera) {
         let circle = Circle::new(3.0).unwrap();
         let data = (0..160 * 120)
             .map(|k| 0.5 * (k % 160) as f32 + 1.5 * (k / 160) as f32)

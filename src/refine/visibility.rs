@@ -4,7 +4,7 @@ use super::foreign::Marks;
 use super::grid::{BLOCK, SIDE, TileId, WallGrid};
 use super::tile::Seen;
 use super::view::View;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::Shading;
 use crate::surface::{Footprint, Surface};
 use crate::trajectory::Pose;
@@ -95,7 +95,7 @@ impl Visibility {
     pub fn find(
         surface: &dyn Surface,
         grid: &WallGrid,
-        camera: &Pinhole,
+        camera: &Camera,
         shading: Option<&Shading>,
         placed: &[Placed],
         rows: &Range<i64>,
@@ -314,7 +314,7 @@ impl Field {
 /// Frame `frame` at `pose` as an observer of the tile with these corners, if it sees all of it.
 fn observe(
     grid: &WallGrid,
-    camera: &Pinhole,
+    camera: &Camera,
     shading: Option<&Shading>,
     pose: &Pose,
     frame: usize,
@@ -351,7 +351,7 @@ mod tests {
     #[test]
     fn every_tile_is_seen_by_an_active_frame_and_another() {
         let circle = Circle::new(3.0).unwrap();
-        let camera = Pinhole::from_vertical_fov(160, 120, 60f64.to_radians());
+        let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
         let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
         let poses = spiral(24, 0.1, 30f64.to_radians());
         let active = 20..24;
@@ -391,7 +391,7 @@ mod tests {
     #[test]
     fn pieces_make_up_the_whole() {
         let circle = Circle::new(3.0).unwrap();
-        let camera = Pinhole::from_vertical_fov(160, 120, 60f64.to_radians());
+        let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
         let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
         let placed: Vec<Placed> = spiral(12, 0.1, 30f64.to_radians())
             .into_iter()

@@ -4,7 +4,7 @@ use super::estimate::FrameEstimate;
 use super::problem::{ProblemError, Scene};
 use super::sampler::{Sampler, Spot};
 use super::visibility::reach_m;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::{GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level};
 use crate::surface::{Footprint, WallPoint, viewing_distance};
 use crate::trajectory::Pose;
@@ -68,7 +68,7 @@ impl Lattice {
 }
 
 /// A pixel's width on the wall where `pose` looks, metres.
-pub fn pixel_m(scene: &Scene, camera: &Pinhole, pose: &Pose) -> f64 {
+pub fn pixel_m(scene: &Scene, camera: &Camera, pose: &Pose) -> f64 {
     let radius_m = scene.surface.perimeter_m() / std::f64::consts::TAU;
     let range = viewing_distance(scene.surface, pose).unwrap_or(radius_m);
     range.min(3.0 * radius_m) / camera.fy
@@ -76,7 +76,7 @@ pub fn pixel_m(scene: &Scene, camera: &Pinhole, pose: &Pose) -> f64 {
 
 /// One frame at a pyramid level: its grey values and its local contrast.
 pub struct Portrait {
-    camera: Pinhole,
+    camera: Camera,
     level: usize,
     picture: Arc<Pyramid>,
     local: Arc<LocalContrast>,
@@ -117,7 +117,7 @@ impl Portrait {
     }
 
     /// The camera of the level.
-    pub fn camera(&self) -> &Pinhole {
+    pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
@@ -295,7 +295,7 @@ impl FusedWall {
     pub fn new(
         scene: &Scene,
         placed: &[(Portrait, FrameEstimate)],
-        camera: &Pinhole,
+        camera: &Camera,
         (frame, pose): (usize, &Pose),
         margin_m: f64,
     ) -> Result<Self, ProblemError> {

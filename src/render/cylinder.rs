@@ -2,7 +2,7 @@
 
 use super::sample::{Sample, Samples};
 use super::{Interpolation, Kernel, Picture};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use image::DynamicImage;
 use rayon::prelude::*;
 
@@ -25,7 +25,7 @@ pub struct CylinderPicture {
 /// the photo covers. `photo` must be as large as the camera's pictures.
 ///
 /// Source: arXiv 1806.10278, Section III.
-pub fn project(photo: &Picture, camera: &Pinhole, interpolation: Interpolation) -> CylinderPicture {
+pub fn project(photo: &Picture, camera: &Camera, interpolation: Interpolation) -> CylinderPicture {
     let [left, right, top, bottom] = extent(camera);
     // Rounding errors do not cost a row or a column.
     let (ceil, floor) = (
@@ -51,48 +51,62 @@ pub fn project(photo: &Picture, camera: &Pinhole, interpolation: Interpolation) 
     }
 }
 
-/// Pixel of the photo → pixel of the unrolled cylinder.
-pub fn to_cylinder(camera: &Pinhole, u: f64, v: f64) -> [f64; 2] {
-    let ray = camera.ray(u, v);
-    let theta = ray.x.atan();
-    let h = ray.y / ray.x.hypot(1.0);
-    [camera.fx * theta + camera.cx, camera.fy * h + camera.cy]
+/// Pixel of the photo → pixel of the unrolled cylinder; `None` where the lens shows nothing.
+pub fn to_cylinder(camera: &Camera, u: f64, v: f64) -> Option<[f64; 2]> {
+    let ray = camera.ray(u, v)?;
+    let theta = ray.x.atan2(ray.z);
+    let h = ray.y / ray.x.hypot(ray.z);
+    Some([camera.fx * theta + camera.cx, camera.fy * h + camera.cy])
 }
 
-/// Pixel of the unrolled cylinder → pixel of the photo, `None` behind the camera.
-pub fn from_cylinder(camera: &Pinhole, u_hat: f64, v_hat: f64) -> Option<[f64; 2]> {
+/// Pixel of the unrolled cylinder → pixel of the photo; `None` where the lens shows nothing, behind a pinhole for one.
+pub fn from_cylinder(camera: &Camera, u_hat: f64, v_hat: f64) -> Option<[f64; 2]> {
     let theta = (u_hat - camera.cx) / camera.fx;
-    if theta.abs() >= std::f64::consts::FRAC_PI_2 {
+    if theta.abs() >= std::f64::consts::PI {
         return None;
     }
-    let x = theta.tan();
-    let y = (v_hat - camera.cy) / camera.fy * x.hypot(1.0);
-    let pixel = camera.project(&nalgebra::Vector3::new(x, y, 1.0))?;
+    let h = (v_hat - camera.cy) / camera.fy;
+    let (sin, cos) = theta.sin_cos();
+    let pixel = camera.project(&nalgebra::Vector3::new(sin, h, cos))?;
     Some([pixel.x, pixel.y])
 }
 
+/// Points of each of a photo's edges that are asked where they lie on the cylinder.
+const STEPS_PER_EDGE: usize = 64;
+
 /// Least and greatest û, least and greatest v̂ of the photo's pixel centres in whole columns of the result.
-fn extent(camera: &Pinhole) -> [f64; 4] {
-    let last_u = f64::from(camera.width - 1);
-    let last_v = f64::from(camera.height - 1);
-    let [left, _] = to_cylinder(camera, 0.0, 0.0);
-    let [right, _] = to_cylinder(camera, last_u, 0.0);
-    // h = y / √(x² + 1) has its extremes at the sides and in the column where x is nearest to zero.
+///
+/// They lie on the photo's border: û and v̂ are smooth and one-to-one.
+fn extent(camera: &Camera) -> [f64; 4] {
+    let mut border = camera.border(STEPS_PER_EDGE, 0.0);
+    // Without distortion h has its extremes at the sides and in the column where x is nearest to zero.
+    let last = [camera.width - 1, camera.height - 1].map(f64::from);
     let middle = from_cylinder(camera, camera.cx.round(), camera.cy).map_or(0.0, |[u, _]| u);
-    let columns = [0.0, last_u, middle.clamp(0.0, last_u)];
-    let top = columns.map(|u| to_cylinder(camera, u, 0.0)[1]);
-    let bottom = columns.map(|u| to_cylinder(camera, u, last_v)[1]);
-    [
-        left,
-        right,
-        top.into_iter().fold(f64::INFINITY, f64::min),
-        bottom.into_iter().fold(f64::NEG_INFINITY, f64::max),
-    ]
+    let middle = middle.clamp(0.0, last[0]);
+    border.extend([0.0, last[1]].map(|v| nalgebra::Vector2::new(middle, v)));
+    let mut extent = [
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+    ];
+    for [u_hat, v_hat] in border
+        .iter()
+        .filter_map(|pixel| to_cylinder(camera, pixel.x, pixel.y))
+    {
+        extent = [
+            extent[0].min(u_hat),
+            extent[1].max(u_hat),
+            extent[2].min(v_hat),
+            extent[3].max(v_hat),
+        ];
+    }
+    extent
 }
 
 fn unroll<T: Sample, const C: usize>(
     photo: &Picture,
-    camera: &Pinhole,
+    camera: &Camera,
     kernel: &Kernel,
     origin: [i64; 2],
     [width, height]: [usize; 2],
@@ -123,15 +137,15 @@ fn unroll<T: Sample, const C: usize>(
 mod tests {
     use super::*;
 
-    fn camera() -> Pinhole {
-        Pinhole::from_vertical_fov(161, 121, 60f64.to_radians())
+    fn camera() -> Camera {
+        Camera::from_vertical_fov(161, 121, 60f64.to_radians())
     }
 
     #[test]
     fn the_two_maps_are_inverse() {
         let camera = camera();
         for (u, v) in [(0.0, 0.0), (160.0, 30.0), (80.0, 60.0), (17.5, 119.25)] {
-            let [u_hat, v_hat] = to_cylinder(&camera, u, v);
+            let [u_hat, v_hat] = to_cylinder(&camera, u, v).unwrap();
             let [again_u, again_v] = from_cylinder(&camera, u_hat, v_hat).unwrap();
             assert!((again_u - u).abs() < 1e-9 && (again_v - v).abs() < 1e-9);
         }
@@ -144,7 +158,7 @@ mod tests {
         let camera = camera();
         let f = 60.5 / 30f64.to_radians().tan();
         let x: f64 = -80.0 / f;
-        let [u_hat, v_hat] = to_cylinder(&camera, 0.0, 0.0);
+        let [u_hat, v_hat] = to_cylinder(&camera, 0.0, 0.0).unwrap();
         assert!((u_hat - (f * x.atan() + 80.0)).abs() < 1e-9);
         assert!((v_hat - (-60.0 / (x * x + 1.0).sqrt() + 60.0)).abs() < 1e-9);
     }

@@ -1,7 +1,7 @@
 //! From a point of the wall to the frames that show it.
 
 use super::Placement;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::surface::{Surface, WallFrame, WallPoint};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix2, Vector2};
@@ -27,7 +27,7 @@ const ROUNDING_PX: f64 = 1e-6;
 
 /// Resolution at a wall point, pixels per metre, along the direction in which it is least: the smaller singular value of
 /// `∂(u, v)/∂(s, h) = ∂π/∂x_c R_wcᵀ (e_s, e_h)`.
-fn least_stretch(camera: &Pinhole, pose: &Pose, point: &WallFrame) -> f64 {
+fn least_stretch(camera: &Camera, pose: &Pose, point: &WallFrame) -> f64 {
     let jacobian = camera.project_jacobian(&pose.to_camera(&point.x_w));
     let tangents = [point.e_s, point.e_h].map(|e| pose.r_wc.inverse_transform_vector(&e));
     let stretch = Matrix2::from_columns(&tangents.map(|e| jacobian * e));
@@ -35,7 +35,7 @@ fn least_stretch(camera: &Pinhole, pose: &Pose, point: &WallFrame) -> f64 {
 }
 
 /// The same if the frame shows the point.
-pub(super) fn px_per_metre(camera: &Pinhole, pose: &Pose, point: &WallFrame) -> Option<f64> {
+pub(super) fn px_per_metre(camera: &Camera, pose: &Pose, point: &WallFrame) -> Option<f64> {
     let pixel = camera.project(&pose.to_camera(&point.x_w))?;
     camera
         .sees(&pixel, -ROUNDING_PX)
@@ -45,7 +45,7 @@ pub(super) fn px_per_metre(camera: &Pinhole, pose: &Pose, point: &WallFrame) -> 
 /// The frames that show `wall`, the one with the highest resolution there first.
 pub fn sightings(
     surface: &dyn Surface,
-    camera: &Pinhole,
+    camera: &Camera,
     placements: &[Placement],
     wall: WallPoint,
 ) -> Vec<Sighting> {
@@ -97,7 +97,7 @@ mod tests {
                 let pose = &wall.poses[sighting.frame];
                 let [u, v] = sighting.pixel;
                 let meets = |u: f64, v: f64| {
-                    let ray = pose.r_wc * wall.camera.ray(u, v);
+                    let ray = pose.r_wc * wall.camera.ray(u, v).unwrap();
                     wall.circle.hit(&pose.t_wc, &ray).unwrap()
                 };
                 let hit = meets(u, v);

@@ -5,7 +5,7 @@ use super::locate::px_per_metre;
 use super::raster_target::georeference;
 use super::tiles::{EDGE, tiles};
 use super::{Canvas, Layout, Placement};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::raster::{
     CogWriter, Compression, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
 };
@@ -27,7 +27,7 @@ impl Map {
     /// `labels`: the frames of the grid's nodes; without them, the frame that is finest there.
     pub fn resolution(
         surface: &dyn Surface,
-        camera: &Pinhole,
+        camera: &Camera,
         placements: &[Placement],
         grid: &Canvas,
         labels: Option<&[u32]>,
@@ -46,7 +46,7 @@ impl Map {
     /// `√λ_max(A Σ Aᵀ)` with the covariance Σ of the frame's pose and `A = ∂(s, h)/∂ξ` ([`wall_jacobian`]).
     pub fn uncertainty(
         surface: &dyn Surface,
-        camera: &Pinhole,
+        camera: &Camera,
         placements: &[Placement],
         grid: &Canvas,
         labels: Option<&[u32]>,
@@ -66,7 +66,7 @@ impl Map {
 
     fn of(
         surface: &dyn Surface,
-        camera: &Pinhole,
+        camera: &Camera,
         placements: &[Placement],
         grid: &Canvas,
         labels: Option<&[u32]>,

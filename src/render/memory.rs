@@ -41,7 +41,7 @@ fn parse(meminfo: &str) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Pinhole;
+    use crate::camera::Camera;
 
     #[test]
     fn the_available_line_is_read() {
@@ -58,7 +58,7 @@ mod tests {
             px_per_metre: 100.0,
             h_start_m: 0.0,
         };
-        let frames = FrameStack::from_pictures(Pinhole::from_vertical_fov(2, 2, 1.0), vec![]);
+        let frames = FrameStack::from_pictures(Camera::from_vertical_fov(2, 2, 1.0), vec![]);
         assert!(check(&canvas, &frames, 500_000_000, Some(500_000_000)).is_ok());
         assert!(check(&canvas, &frames, 500_000_001, None).is_ok());
         let message = check(&canvas, &frames, 500_000_001, Some(500_000_000))

@@ -106,7 +106,7 @@ impl Picture {
     }
 
     /// Half the size: the mean of 2 × 2 pixels; an odd last row or column is dropped (see
-    /// [`crate::camera::Pinhole::at_level`]).
+    /// [`crate::camera::Camera::at_level`]).
     pub fn halved(&self) -> Self {
         let size = (self.width / 2, self.height / 2);
         match &self.samples {

@@ -1,7 +1,7 @@
 //! Where the frames lie on the unrolled wall.
 
 use super::RenderError;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::surface::{Footprint, Surface, viewing_distance};
 use crate::trajectory::Pose;
 
@@ -20,7 +20,7 @@ pub struct Placement {
 /// [`RenderError::Frame`], for the first frame that has no place.
 pub fn place(
     surface: &dyn Surface,
-    camera: &Pinhole,
+    camera: &Camera,
     poses: &[Pose],
 ) -> Result<Vec<Placement>, RenderError> {
     poses
@@ -43,7 +43,7 @@ pub fn place(
 /// [`RenderError::Frame`] for a camera that stands outside or looks along the axis.
 pub fn native_px_per_metre<'a>(
     surface: &dyn Surface,
-    camera: &Pinhole,
+    camera: &Camera,
     poses: impl IntoIterator<Item = &'a Pose>,
 ) -> Result<f64, RenderError> {
     let focal_px = (camera.fx * camera.fy).sqrt();
@@ -71,8 +71,8 @@ mod tests {
     use nalgebra::Vector3;
     use std::f64::consts::TAU;
 
-    fn camera() -> Pinhole {
-        Pinhole::from_vertical_fov(640, 480, 60f64.to_radians())
+    fn camera() -> Camera {
+        Camera::from_vertical_fov(640, 480, 60f64.to_radians())
     }
 
     fn facing(turn: Vector3<f64>) -> Pose {

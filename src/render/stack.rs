@@ -1,7 +1,7 @@
 //! The frames of a survey, as many in memory as are needed.
 
 use super::{Picture, PixelFormat, RenderError};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::{FrameFile, colour_type, load_colour};
 use crate::progress::Progress;
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use rayon::prelude::*;
 /// is the same frame.
 #[derive(Clone, Debug)]
 pub struct FrameStack {
-    camera: Pinhole,
+    camera: Camera,
     format: PixelFormat,
     files: Vec<FrameFile>,
     /// Width and height of the files' pictures.
@@ -23,7 +23,7 @@ pub struct FrameStack {
 
 /// How many times frames of resolution `native` may be halved before they are coarser than a canvas of
 /// `px_per_metre`: a canvas much coarser than the frames would otherwise pick single pixels out of them.
-pub fn level_for(camera: &Pinhole, native_px_per_metre: f64, px_per_metre: f64) -> usize {
+pub fn level_for(camera: &Camera, native_px_per_metre: f64, px_per_metre: f64) -> usize {
     let mut level = 0;
     while native_px_per_metre * 0.5f64.powi(level as i32 + 1) >= px_per_metre
         && camera.width.min(camera.height) >> (level + 1) >= 16
@@ -39,7 +39,7 @@ impl FrameStack {
     ///
     /// # Errors
     /// A frame that is missing or is no picture; the first in the order of the files.
-    pub fn open(files: &[FrameFile], camera: &Pinhole, level: usize) -> Result<Self, RenderError> {
+    pub fn open(files: &[FrameFile], camera: &Camera, level: usize) -> Result<Self, RenderError> {
         let formats: Vec<Result<PixelFormat, RenderError>> = files
             .par_iter()
             .map(|file| Ok(PixelFormat::of(colour_type(file)?)))
@@ -65,7 +65,7 @@ impl FrameStack {
     ///
     /// # Panics
     /// If a picture is not as large as the camera's.
-    pub fn from_pictures(camera: Pinhole, pictures: Vec<Picture>) -> Self {
+    pub fn from_pictures(camera: Camera, pictures: Vec<Picture>) -> Self {
         let mut format = PixelFormat {
             channels: 1,
             deep: false,
@@ -182,7 +182,7 @@ impl FrameStack {
     }
 
     /// The camera of the pictures as they are held (halved as they are).
-    pub fn camera(&self) -> &Pinhole {
+    pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn frames_are_halved_only_for_coarse_canvases() {
-        let camera = Pinhole::from_vertical_fov(640, 480, 1.0);
+        let camera = Camera::from_vertical_fov(640, 480, 1.0);
         for (px_per_metre, level) in [
             (150.0, 0),
             (101.0, 0),
@@ -240,7 +240,7 @@ mod tests {
 
     #[test]
     fn one_colour_frame_makes_all_colour() {
-        let camera = Pinhole::from_vertical_fov(2, 2, 1.0);
+        let camera = Camera::from_vertical_fov(2, 2, 1.0);
         let grey = Picture::new(2, 2, 1, vec![7u8; 4]);
         let colour = Picture::new(2, 2, 3, vec![9u8; 12]);
         let stack = FrameStack::from_pictures(camera, vec![grey, colour]);
@@ -262,7 +262,7 @@ mod tests {
                 FrameFile { index, path }
             })
             .collect();
-        let camera = Pinhole::from_vertical_fov(16, 16, 1.0);
+        let camera = Camera::from_vertical_fov(16, 16, 1.0);
         let mut stack = FrameStack::open(&files, &camera, 0).unwrap();
         let held = |stack: &FrameStack| -> Vec<usize> {
             (0..4).filter(|k| stack.picture(*k).is_some()).collect()

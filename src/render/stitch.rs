@@ -6,7 +6,7 @@ use super::{
     Canvas, FrameStack, Panorama, Placement, RenderError, Target, level_for, memory,
     native_px_per_metre, place,
 };
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::FrameFile;
 use crate::progress::Progress;
 use crate::surface::Surface;
@@ -71,7 +71,7 @@ pub struct LaidOut {
 /// As [`place`], [`native_px_per_metre`] and [`Canvas::covering`].
 pub fn lay_out(
     surface: &dyn Surface,
-    camera: &Pinhole,
+    camera: &Camera,
     poses: &[Pose],
     px_per_metre: Option<f64>,
     finer: f64,
@@ -103,7 +103,7 @@ impl<'a> Stitch<'a> {
     /// Everything in [`RenderError`]; no frame is decoded yet.
     pub fn new(
         surface: &'a dyn Surface,
-        camera: &Pinhole,
+        camera: &Camera,
         files: &[FrameFile],
         poses: &[Pose],
         options: &StitchOptions,
@@ -195,7 +195,7 @@ impl<'a> Stitch<'a> {
 /// Everything in [`RenderError`]; sizes are checked before a frame is read.
 pub fn stitch(
     surface: &dyn Surface,
-    camera: &Pinhole,
+    camera: &Camera,
     files: &[FrameFile],
     poses: &[Pose],
     options: &StitchOptions,

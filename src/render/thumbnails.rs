@@ -5,7 +5,7 @@ use super::warp::{Look, Points, Run};
 use super::{
     Canvas, FrameStack, Picture, PixelFormat, Placement, RenderError, native_px_per_metre,
 };
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::progress::Progress;
 use crate::surface::Surface;
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use rayon::prelude::*;
 /// Small 16-bit pictures of all frames.
 #[derive(Clone, Debug)]
 pub struct Thumbnails {
-    camera: Pinhole,
+    camera: Camera,
     full_size: (usize, usize),
     scale: f32,
     pictures: Vec<Picture>,
@@ -74,7 +74,7 @@ impl Thumbnails {
     }
 
     /// Memory of the thumbnails of `frames` frames of the given camera, bytes.
-    pub fn bytes(camera: &Pinhole, level: usize, channels: usize, frames: usize) -> u64 {
+    pub fn bytes(camera: &Camera, level: usize, channels: usize, frames: usize) -> u64 {
         let small = camera.at_level(level);
         let pixels = u64::from(small.width) * u64::from(small.height);
         2 * pixels * (channels * frames) as u64
@@ -86,7 +86,7 @@ impl Thumbnails {
     }
 
     /// The camera of the thumbnails.
-    pub fn camera(&self) -> &Pinhole {
+    pub fn camera(&self) -> &Camera {
         &self.camera
     }
 

@@ -119,7 +119,7 @@ pub(super) fn tiles_at(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Pinhole;
+    use crate::camera::Camera;
     use crate::render::place;
     use crate::surface::Circle;
     use crate::trajectory::spiral;
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn tiles_cover_the_canvas_once_and_know_their_frames() {
         let circle = Circle::new(3.0).unwrap();
-        let camera = Pinhole::from_vertical_fov(64, 48, 1.0);
+        let camera = Camera::from_vertical_fov(64, 48, 1.0);
         let poses = spiral(12, 0.5, 30f64.to_radians());
         let placements = place(&circle, &camera, &poses).unwrap();
         let canvas = Canvas::of_placements(&circle, &placements, 40.0).unwrap();

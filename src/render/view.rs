@@ -4,7 +4,7 @@ use super::exposure::Response;
 use super::kernel::{Interpolation, Kernel};
 use super::warp::{Look, Points, Run};
 use super::{Picture, Placement};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 
 /// Kernels are made for stretches of this step from 1 upwards.
 const STRETCH_STEP: f64 = 0.25;
@@ -50,7 +50,7 @@ impl<'a> View<'a> {
     /// A frame (its index, place and picture) as it is seen from a tile with the given `points`, `columns` in a row.
     pub fn new(
         (frame, placement, picture): (usize, &Placement, &'a Picture),
-        camera: &Pinhole,
+        camera: &Camera,
         kernels: &'a Kernels,
         response: Response<'a>,
         points: &Points,

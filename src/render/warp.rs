@@ -3,7 +3,7 @@
 use super::kernel::Kernel;
 use super::picture::Picture;
 use super::sample::{Sample, Samples, WHOLE};
-use crate::camera::Pinhole;
+use crate::camera::{Bend, Camera, SingleLens};
 use crate::trajectory::Pose;
 use crate::vectors::wide;
 use nalgebra::{Matrix3, Vector3};
@@ -51,7 +51,7 @@ impl Points {
 }
 
 /// A camera at a pose, ready to look at wall points relative to an origin: `x_c = R_wcᵀ x + R_wcᵀ (origin − t_wc)`, then the
-/// lens and `u = fx x + cx`, `v = fy y + cy` ([`Pinhole::project`]).
+/// lens and `u = fx x + cx`, `v = fy y + cy` ([`Camera::project`]).
 ///
 /// Single precision: to about 10⁻⁴ px.
 #[derive(Clone, Copy, Debug)]
@@ -60,53 +60,42 @@ pub struct Look {
     centre: [f32; 3],
     focal: [f32; 2],
     principal: [f32; 2],
-    distortion: [f32; 2],
-    lens_limit: f32,
+    lens: SingleLens,
     limit: [f32; 2],
 }
 
 impl Look {
     /// The camera at `pose`, for points relative to `origin`.
-    pub fn new(camera: &Pinhole, pose: &Pose, origin: &Vector3<f64>) -> Self {
+    pub fn new(camera: &Camera, pose: &Pose, origin: &Vector3<f64>) -> Self {
         let r_wc = pose.r_wc.to_rotation_matrix();
         let r_cw: Matrix3<f32> = r_wc.matrix().transpose().cast();
-        let radial = &camera.radial;
         Self {
             r_cw: std::array::from_fn(|row| std::array::from_fn(|k| r_cw[(row, k)])),
             centre: pose.to_camera(origin).cast().into(),
             focal: [camera.fx as f32, camera.fy as f32],
             principal: [camera.cx as f32, camera.cy as f32],
-            distortion: [radial.k1 as f32, radial.k2 as f32],
-            lens_limit: radial.limit() as f32,
+            lens: SingleLens::new(&camera.lens),
             limit: [(camera.width - 1) as f32, (camera.height - 1) as f32],
         }
     }
 
     /// The pixel of one of the points, wherever it lies.
     pub fn pixel(&self, points: &Points, at: usize) -> (f32, f32) {
-        let (u, v, _) = self.project([points.x[at], points.y[at], points.z[at]]);
+        let (u, v, _) = self.project(self.lens, [points.x[at], points.y[at], points.z[at]]);
         (u, v)
     }
 
     /// Where point `k` appears, and whether that is within the outermost pixel centres.
     #[inline(always)]
-    fn project(&self, [x, y, z]: [f32; 3]) -> (f32, f32, bool) {
+    fn project(&self, lens: impl Bend, [x, y, z]: [f32; 3]) -> (f32, f32, bool) {
         let [a, b, c]: [f32; 3] = std::array::from_fn(|row| {
             let r = &self.r_cw[row];
             self.centre[row] + (r[0] * x + r[1] * y + r[2] * z)
         });
-        let inverse = 1.0 / c;
-        let (p, q) = (a * inverse, b * inverse);
-        let square = p * p + q * q;
-        let factor = 1.0 + square * (self.distortion[0] + square * self.distortion[1]);
-        let u = self.focal[0] * (p * factor) + self.principal[0];
-        let v = self.focal[1] * (q * factor) + self.principal[1];
-        let seen = (c > 0.0)
-            & (square < self.lens_limit)
-            & (u >= 0.0)
-            & (v >= 0.0)
-            & (u <= self.limit[0])
-            & (v <= self.limit[1]);
+        let (p, q, shown) = lens.bend(a, b, c);
+        let u = self.focal[0] * p + self.principal[0];
+        let v = self.focal[1] * q + self.principal[1];
+        let seen = shown & (u >= 0.0) & (v >= 0.0) & (u <= self.limit[0]) & (v <= self.limit[1]);
         (u, v, seen)
     }
 }
@@ -168,6 +157,21 @@ impl Run {
 
     /// Finds the pixels of `count` points from index `start`.
     pub fn project(&mut self, look: &Look, points: &Points, start: usize, count: usize) {
+        match look.lens {
+            SingleLens::Straight(lens) => self.project_through(lens, look, points, start, count),
+            SingleLens::Brown(lens) => self.project_through(lens, look, points, start, count),
+            SingleLens::Fisheye(lens) => self.project_through(lens, look, points, start, count),
+        }
+    }
+
+    fn project_through(
+        &mut self,
+        lens: impl Bend,
+        look: &Look,
+        points: &Points,
+        start: usize,
+        count: usize,
+    ) {
         let (x, y, z) = (
             &points.x[start..][..count],
             &points.y[start..][..count],
@@ -182,7 +186,7 @@ impl Run {
             #[inline(always)]
             || {
                 for k in 0..count {
-                    (u[k], v[k], seen[k]) = look.project([x[k], y[k], z[k]]);
+                    (u[k], v[k], seen[k]) = look.project(lens, [x[k], y[k], z[k]]);
                 }
             },
         );

@@ -1,7 +1,7 @@
 //! The ray caster.
 
 use super::band::Band;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::GreyImage;
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
@@ -17,7 +17,7 @@ const CELLS: usize = 2;
 /// stand inside. Rays are cast through the corners of half pixels; what lies between meets the wall between them, to within
 /// some 10⁻⁴ of a pixel (an eighth of the square of half a pixel times the map's curvature; more towards the axis's
 /// vanishing points).
-pub(super) fn cast(band: &Band, radius_m: f64, camera: &Pinhole, pose: &Pose, n: u32) -> GreyImage {
+pub(super) fn cast(band: &Band, radius_m: f64, camera: &Camera, pose: &Pose, n: u32) -> GreyImage {
     let (width, height) = (camera.width as usize, camera.height as usize);
     let points: Vec<Point> = (0..n).map(|k| Point::new(k, n)).collect();
     let caster = Caster {
@@ -43,6 +43,9 @@ pub(super) fn cast(band: &Band, radius_m: f64, camera: &Pinhole, pose: &Pose, n:
                 for across in &points {
                     let (left, right) = (&edges[across.cell], &edges[across.cell + 1]);
                     let Corner { theta, h_m, d } = left.towards(right, across.share);
+                    if theta.is_nan() {
+                        continue;
+                    }
                     let theta = if theta < TAU { theta } else { theta - TAU };
                     *pixel += band.at(theta, h_m) + band.glint(theta, h_m, &d);
                 }
@@ -83,6 +86,13 @@ struct Corner {
 }
 
 impl Corner {
+    /// Where the lens shows nothing; so is all that lies next to it.
+    const DARK: Self = Self {
+        theta: f64::NAN,
+        h_m: f64::NAN,
+        d: Vector3::new(f64::NAN, f64::NAN, f64::NAN),
+    };
+
     /// What lies between two, the shorter way around.
     #[inline]
     fn towards(&self, other: &Self, share: f64) -> Self {
@@ -112,22 +122,23 @@ pub(super) struct Caster {
 
 impl Caster {
     /// The rays through the corners of the cells along a line of the picture at row `v`.
-    fn line(&self, camera: &Pinhole, pose: &Pose, v: f64) -> Vec<Corner> {
+    fn line(&self, camera: &Camera, pose: &Pose, v: f64) -> Vec<Corner> {
         let corners = camera.width as usize * CELLS + 1;
         let column = |k: usize| k as f64 / CELLS as f64 - 0.5;
-        // Without distortion rays move evenly along a row.
-        let (first, right) = (
-            pose.r_wc * camera.ray(0.0, v),
-            pose.r_wc * Vector3::x() / camera.fx,
-        );
-        let ray = |u: f64| match camera.radial.is_none() {
-            true => first + right * u,
-            false => pose.r_wc * camera.ray(u, v),
-        };
-        let cast = |k: usize| {
-            let d = ray(column(k));
+        let corner = |d: Vector3<f64>| {
             let (theta, h_m) = self.hit(&d);
             Corner { theta, h_m, d }
+        };
+        // Without distortion rays move evenly along a row.
+        if let (true, Some(first)) = (camera.lens.is_straight(), camera.ray(0.0, v)) {
+            let first = pose.r_wc * first;
+            let right = pose.r_wc * Vector3::x() / camera.fx;
+            let cast = |k: usize| corner(first + right * column(k));
+            return (0..corners).map(cast).collect();
+        }
+        let cast = |k: usize| {
+            let ray = camera.ray(column(k), v);
+            ray.map_or(Corner::DARK, |ray| corner(pose.r_wc * ray))
         };
         (0..corners).map(cast).collect()
     }
@@ -149,6 +160,7 @@ impl Caster {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Lens;
     use crate::simulate::Light;
     use crate::simulate::wall::Texture;
     use crate::trajectory::so3;
@@ -198,9 +210,9 @@ mod tests {
             radius_m: 2.0,
             t: pose.t_wc,
         };
-        let mut camera = Pinhole::from_vertical_fov(160, 120, 1.0);
+        let mut camera = Camera::from_vertical_fov(160, 120, 1.0);
         for k1 in [0.0, -0.08] {
-            camera.radial.k1 = k1;
+            camera.lens = Lens::radial(k1, 0.0);
             let pixel_m = 2.0 / camera.fy;
             for v in [0.0, 59.0, 119.0] {
                 let lines = [v, v + 0.5].map(|v| caster.line(&camera, &pose, v));
@@ -209,7 +221,7 @@ mod tests {
                     let right = lines[0][k + 1].towards(&lines[1][k + 1], 0.3);
                     let between = left.towards(&right, 0.6);
                     let u = 0.5 * (k as f64 + 0.6) - 0.5;
-                    let d = pose.r_wc * camera.ray(u, v + 0.15);
+                    let d = pose.r_wc * camera.ray(u, v + 0.15).unwrap();
                     let (theta, h_m) = caster.hit(&d);
                     let turned = (between.theta - theta + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
                     assert!(2.0 * turned.abs() < 1e-3 * pixel_m, "{u} {v}: {turned}");
@@ -224,7 +236,7 @@ mod tests {
     fn pixels_show_the_wall_that_projects_onto_them() {
         let (radius_m, columns) = (2.0, 4000);
         let texel_m = TAU * radius_m / columns as f64;
-        let camera = Pinhole::from_vertical_fov(160, 120, 1.0);
+        let camera = Camera::from_vertical_fov(160, 120, 1.0);
         let band = Band::paint(&Waves, Light::Even, None, columns, texel_m, [-2.0, 3.0]);
         // The second looks across θ = 0.
         for turn_rad in [0.7, 0.0] {
@@ -234,7 +246,7 @@ mod tests {
         }
     }
 
-    fn shows_the_wall(band: &Band, radius_m: f64, camera: &Pinhole, pose: &Pose) {
+    fn shows_the_wall(band: &Band, radius_m: f64, camera: &Camera, pose: &Pose) {
         let frame = cast(band, radius_m, camera, pose, 4);
         let mut compared = 0;
         for k in 0..160_000 {

@@ -1,7 +1,7 @@
 //! What to simulate.
 
 use super::{BadFrames, Bits, SimulateError};
-use crate::camera::{Pinhole, Radial};
+use crate::camera::Camera;
 use crate::survey::PriorSection;
 use crate::trajectory::JitterModel;
 use serde::Serialize;
@@ -45,15 +45,8 @@ pub struct SimulateOptions {
     pub frames: usize,
     /// Radius of the tunnel, metres.
     pub radius_m: f64,
-    /// Width of a frame, pixels.
-    pub width: u32,
-    /// Height of a frame, pixels.
-    pub height: u32,
-    /// Vertical field of view, degrees.
-    pub vertical_fov_deg: f64,
-    /// k1 and k2 of the lens ([`crate::camera::Radial`]).
-    #[serde(skip_serializing_if = "is_default")]
-    pub distortion: [f64; 2],
+    /// The camera.
+    pub camera: Camera,
     /// Advance along the axis from frame to frame, metres.
     pub advance_m: f64,
     /// Turn about the axis from frame to frame, degrees.
@@ -103,25 +96,12 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 }
 
 impl SimulateOptions {
-    /// The camera.
-    pub fn camera(&self) -> Pinhole {
-        let fov_rad = self.vertical_fov_deg.to_radians();
-        let [k1, k2] = self.distortion;
-        Pinhole {
-            radial: Radial { k1, k2 },
-            ..Pinhole::from_vertical_fov(self.width, self.height, fov_rad)
-        }
-    }
-
     /// The paper's first experiment: 12 frames, 30° apart, from the axis of a tunnel of 3 m radius.
     pub fn centred() -> Self {
         Self {
             frames: 12,
             radius_m: 3.0,
-            width: 640,
-            height: 480,
-            vertical_fov_deg: 60.0,
-            distortion: [0.0; 2],
+            camera: Camera::from_vertical_fov(640, 480, 60f64.to_radians()),
             advance_m: 0.0,
             turn_deg: 30.0,
             offset_m: [0.0; 3],
@@ -203,16 +183,18 @@ impl SimulateOptions {
         )?;
         let side = |pixels| (16..=16_384).contains(&pixels);
         check(
-            side(self.width) && side(self.height),
+            side(self.camera.width) && side(self.camera.height),
             "a frame must be 16 to 16384 pixels wide and high",
         )?;
+        let camera = &self.camera;
+        let numbers = [camera.fx, camera.fy, camera.cx, camera.cy];
         check(
-            positive(self.vertical_fov_deg) && self.vertical_fov_deg < 170.0,
-            "the vertical field of view must lie between 0 and 170 degrees",
+            numbers.iter().all(|v| v.is_finite()) && positive(camera.fx) && positive(camera.fy),
+            "the focal lengths must be positive, and the field of view below 180 degrees",
         )?;
         check(
-            self.distortion.iter().all(|k| k.is_finite()) && self.camera().field().is_some(),
-            "k1 and k2 must not fold the picture back on itself before its corners",
+            camera.shown_share() > 0.0,
+            "the lens must show some of the picture",
         )?;
         check(
             self.advance_m.abs() <= 1000.0 && self.turn_deg.is_finite(),
@@ -270,6 +252,7 @@ impl SimulateOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     #[test]
     fn presets_are_possible_and_nonsense_is_not() {
@@ -294,9 +277,12 @@ mod tests {
                 radius_m: f64::NAN,
                 ..free()
             },
-            SimulateOptions { width: 8, ..free() },
             SimulateOptions {
-                vertical_fov_deg: 180.0,
+                camera: Camera::from_vertical_fov(8, 480, 1.0),
+                ..free()
+            },
+            SimulateOptions {
+                camera: Camera::from_vertical_fov(640, 480, TAU),
                 ..free()
             },
             SimulateOptions {

@@ -115,6 +115,7 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
         },
         camera: CameraSection {
             file: "camera.json".into(),
+            name: None,
         },
         frames: FramesSection {
             images: "frames/*.png".to_owned(),

@@ -10,7 +10,7 @@ use super::sensor::deliver;
 use super::spoil::spoil;
 use super::wall::{Texture, texture};
 use super::{Exposure, SimulateError, SimulateOptions};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::GreyImage;
 use crate::trajectory::{Jitter, Pose, spiral};
 use image::DynamicImage;
@@ -35,7 +35,7 @@ const STRIP_ROWS: usize = 128;
 /// A tunnel with its camera on its way through.
 pub struct Scene {
     options: SimulateOptions,
-    camera: Pinhole,
+    camera: Camera,
     plan: Vec<Pose>,
     truth: Vec<Pose>,
     /// Least and greatest chainage that each frame sees, metres.
@@ -54,7 +54,7 @@ impl Scene {
     /// view along it.
     pub fn new(options: &SimulateOptions) -> Result<Self, SimulateError> {
         options.check()?;
-        let camera = options.camera();
+        let camera = options.camera;
         let plan = spiral(
             options.frames,
             options.advance_m,
@@ -105,7 +105,7 @@ impl Scene {
     }
 
     /// The camera.
-    pub fn camera(&self) -> &Pinhole {
+    pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
@@ -267,7 +267,7 @@ pub(super) struct Batch {
 fn reach(
     frame: usize,
     pose: &Pose,
-    camera: &Pinhole,
+    camera: &Camera,
     radius_m: f64,
 ) -> Result<[f64; 2], SimulateError> {
     let distance_m = pose.t_wc.x.hypot(pose.t_wc.z);
@@ -295,9 +295,9 @@ fn reach(
     };
     let mut reach = [f64::INFINITY, f64::NEG_INFINITY];
     // Without a vanishing point inside, h takes its extremes on the border.
-    for pixel in camera.border(64, 0.5) {
-        let ray = pose.r_wc * camera.ray(pixel.x, pixel.y);
-        let (_, h_m) = caster.hit(&ray);
+    let border = camera.border(64, 0.5).into_iter();
+    for ray in border.filter_map(|pixel| camera.ray(pixel.x, pixel.y)) {
+        let (_, h_m) = caster.hit(&(pose.r_wc * ray));
         reach = [reach[0].min(h_m), reach[1].max(h_m)];
     }
     // The border is followed in steps; 1 % covers what bulges between them.
@@ -312,7 +312,7 @@ fn reach(
 
 /// Size of a texel: a third of a pixel where a camera comes nearest to the wall, but of one at half the radius at
 /// the finest, metres.
-fn texel_m(options: &SimulateOptions, camera: &Pinhole, truth: &[Pose]) -> f64 {
+fn texel_m(options: &SimulateOptions, camera: &Camera, truth: &[Pose]) -> f64 {
     let farthest = truth
         .iter()
         .map(|pose| pose.t_wc.x.hypot(pose.t_wc.z))
@@ -329,8 +329,7 @@ mod tests {
 
     fn small() -> SimulateOptions {
         SimulateOptions {
-            width: 80,
-            height: 60,
+            camera: Camera::from_vertical_fov(80, 60, 60f64.to_radians()),
             frames: 12,
             ..SimulateOptions::free()
         }
@@ -341,8 +340,7 @@ mod tests {
         let options = SimulateOptions {
             wall: Wall::Concrete,
             noise_grey: 3.0,
-            width: 200,
-            height: 150,
+            camera: Camera::from_vertical_fov(200, 150, 60f64.to_radians()),
             ..small()
         };
         let scene = Scene::new(&options).unwrap();
@@ -392,7 +390,7 @@ mod tests {
             first,
             truth(SimulateOptions {
                 noise_grey: 0.0,
-                width: 64,
+                camera: Camera::from_vertical_fov(64, 60, 60f64.to_radians()),
                 ..small()
             })
         );
@@ -425,8 +423,7 @@ mod tests {
     fn the_wall_is_what_frames_show() {
         let options = SimulateOptions {
             wall: Wall::Concrete,
-            width: 161,
-            height: 121,
+            camera: Camera::from_vertical_fov(161, 121, 60f64.to_radians()),
             ..SimulateOptions::centred()
         };
         let scene = Scene::new(&options).unwrap();
@@ -454,8 +451,7 @@ mod tests {
         let options = SimulateOptions {
             wall: Wall::Concrete,
             ..SimulateOptions {
-                width: 80,
-                height: 60,
+                camera: Camera::from_vertical_fov(80, 60, 60f64.to_radians()),
                 ..SimulateOptions::centred()
             }
         };

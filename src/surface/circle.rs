@@ -122,7 +122,7 @@ impl Surface for Circle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Pinhole;
+    use crate::camera::Camera;
     use crate::trajectory::{Pose, so3};
     use proptest::prelude::*;
 
@@ -138,10 +138,10 @@ mod tests {
             turn in vector(-3.0..3.0), u in 0.0f64..639.0, v in 0.0f64..479.0,
         ) {
             let circle = Circle::new(radius).unwrap();
-            let camera = Pinhole::from_vertical_fov(640, 480, 60f64.to_radians());
+            let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
             let t = Vector3::new(share * radius * around.sin(), chainage, share * radius * around.cos());
             let pose = Pose::new(so3::exp(&turn), t);
-            let ray = pose.r_wc * camera.ray(u, v);
+            let ray = pose.r_wc * camera.ray(u, v).unwrap();
             // Rays nearly along the axis meet the wall too far away to be told apart.
             prop_assume!(ray.x.hypot(ray.z) > 0.02 * ray.norm());
             let hit = circle.hit(&pose.t_wc, &ray).unwrap();

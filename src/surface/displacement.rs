@@ -1,7 +1,7 @@
 //! How the wall point of a fixed pixel moves when the pose moves.
 
 use super::WallFrame;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::trajectory::{Pose, so3};
 use nalgebra::{Matrix2x5, Matrix2x6, Vector3};
 
@@ -36,18 +36,21 @@ pub fn wall_jacobian(pose: &Pose, wall: &WallFrame) -> Matrix2x6<f64> {
 
 /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2)` of the wall point `x_c` (camera coordinates) seen through a fixed pixel.
 ///
-/// If the ray `(x, y, 1)` of the pixel turns, the point at depth z moves across by `m = R z (∂x, ∂y, 0)`, as if the camera
-/// had moved so: `C = A_ρ R z ∂(x, y)/∂κ`, with `A_ρ` the last three columns of `a` ([`wall_jacobian`]) and the rays'
-/// [`Pinhole::ray_jacobian`]. Rows: s, h (metres).
+/// With `π(x_c, κ)` the pixel, a point on its ray moves across by `∂x_c = −J⁺ ∂π/∂κ`, `J = ∂π/∂x_c`, `J⁺ = Jᵀ (J Jᵀ)⁻¹`, when κ
+/// changes, and the wall as if the camera had moved so: `C = A_ρ R ∂x_c`, with `A_ρ` the last three columns of `a`
+/// ([`wall_jacobian`]). Rows: s, h (metres).
 pub fn lens_jacobian(
     pose: &Pose,
     a: &Matrix2x6<f64>,
-    camera: &Pinhole,
+    camera: &Camera,
     x_c: &Vector3<f64>,
 ) -> Matrix2x5<f64> {
     let r_wc = pose.r_wc.to_rotation_matrix();
-    let across = a.fixed_columns::<3>(3) * r_wc.matrix().fixed_columns::<2>(0);
-    across * camera.ray_jacobian(&(x_c / x_c.z)) * x_c.z
+    let j = camera.project_jacobian(x_c);
+    // Singular only where the lens's picture folds.
+    let square = (j * j.transpose()).try_inverse().unwrap_or_default();
+    let moved = j.transpose() * square * -camera.intrinsics_jacobian(x_c);
+    a.fixed_columns::<3>(3) * (r_wc.matrix() * moved)
 }
 
 #[cfg(test)]
@@ -59,14 +62,14 @@ mod tests {
     #[test]
     fn jacobian_matches_central_differences() {
         let circle = Circle::new(3.0).unwrap();
-        let camera = Pinhole::from_vertical_fov(640, 480, 60f64.to_radians());
+        let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
         for (turn, t) in [
             (Vector3::new(0.1, 0.7, -0.2), Vector3::new(0.5, 2.0, -0.4)),
             (Vector3::new(-0.3, 2.9, 0.4), Vector3::new(-1.5, 0.0, 1.0)),
         ] {
             let pose = Pose::new(so3::exp(&turn), t);
             for (u, v) in [(0.0, 0.0), (320.0, 240.0), (600.0, 50.0), (10.0, 470.0)] {
-                let ray = camera.ray(u, v);
+                let ray = camera.ray(u, v).unwrap();
                 let wall_of =
                     |pose: &Pose| circle.hit(&pose.t_wc, &(pose.r_wc * ray)).unwrap().wall;
                 let analytic = wall_jacobian(&pose, &circle.frame(wall_of(&pose)));

@@ -1,7 +1,7 @@
 //! The part of the wall that a frame sees.
 
 use super::{Surface, SurfaceError};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::trajectory::Pose;
 use nalgebra::Vector2;
 
@@ -42,13 +42,14 @@ impl Footprint {
     /// [`SurfaceError::LooksAlongTheAxis`] if the axis's vanishing point lies within the picture.
     pub fn trace(
         surface: &dyn Surface,
-        camera: &Pinhole,
+        camera: &Camera,
         pose: &Pose,
     ) -> Result<Self, SurfaceError> {
         let perimeter_m = surface.perimeter_m();
         let wall = |pixel: &Vector2<f64>| {
+            let ray = camera.ray(pixel.x, pixel.y).ok_or(SurfaceError::NotShown)?;
             surface
-                .hit(&pose.t_wc, &(pose.r_wc * camera.ray(pixel.x, pixel.y)))
+                .hit(&pose.t_wc, &(pose.r_wc * ray))
                 .map(|hit| hit.wall)
         };
         let border = camera.border(STEPS_PER_EDGE, 0.0);
@@ -96,7 +97,7 @@ impl Footprint {
     /// [`SurfaceError::CameraOutside`], [`SurfaceError::NotFinite`].
     pub fn within(
         surface: &dyn Surface,
-        camera: &Pinhole,
+        camera: &Camera,
         pose: &Pose,
         reach_m: f64,
     ) -> Result<Self, SurfaceError> {
@@ -157,8 +158,8 @@ mod tests {
     use nalgebra::Vector3;
     use std::f64::consts::TAU;
 
-    fn camera() -> Pinhole {
-        Pinhole::from_vertical_fov(640, 480, 60f64.to_radians())
+    fn camera() -> Camera {
+        Camera::from_vertical_fov(640, 480, 60f64.to_radians())
     }
 
     fn facing(turn: Vector3<f64>) -> Pose {
@@ -230,7 +231,7 @@ mod tests {
     fn frames_without_an_end_and_cameras_outside_are_refused() {
         let circle = Circle::new(3.0).unwrap();
         let camera = camera();
-        let trace = |camera: &Pinhole, pose: &Pose| Footprint::trace(&circle, camera, pose);
+        let trace = |camera: &Camera, pose: &Pose| Footprint::trace(&circle, camera, pose);
         let along = facing(Vector3::x() * (-TAU / 4.0));
         assert_eq!(trace(&camera, &along), Err(SurfaceError::LooksAlongTheAxis));
         // The vanishing point within the picture, on no ray that is traced.

@@ -67,6 +67,11 @@ pub enum SurfaceError {
     /// The end of the tunnel lies within the picture.
     #[error("the picture holds the vanishing point of the tunnel's axis, and so wall without end")]
     LooksAlongTheAxis,
+    /// The lens shows nothing there.
+    #[error(
+        "the lens shows nothing in the middle of the picture; check the principal point and max_angle_deg"
+    )]
+    NotShown,
     /// The ray or the camera's position is not a number.
     #[error("the camera's position or viewing direction is not finite")]
     NotFinite,

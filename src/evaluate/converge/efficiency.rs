@@ -3,7 +3,7 @@
 use super::draw::draw;
 use super::{Cell, ConvergeError, ConvergeOptions};
 use crate::atomic::{self, ScratchFolder};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::evaluate::{normalised_errors, tied_errors};
 use crate::frames::{GreyImage, load_colour};
 use crate::progress::{Progress, Silent};
@@ -12,7 +12,7 @@ use crate::simulate::{self, SimulateOptions};
 use crate::surface::{Surface, wall_jacobian};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
-use nalgebra::{Matrix6, Vector2, Vector6};
+use nalgebra::{Matrix6, Vector6};
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
@@ -72,16 +72,14 @@ struct Squares {
 
 impl Squares {
     /// Adds a frame's `E[ξξᵀ]`, expected or made.
-    fn add(&mut self, surface: &dyn Surface, camera: &Pinhole, pose: &Pose, square: &Matrix6<f64>) {
+    fn add(&mut self, surface: &dyn Surface, camera: &Camera, pose: &Pose, square: &Matrix6<f64>) {
         let trace =
             |first: usize| (0..3).map(|k| square[(first + k, first + k)]).sum::<f64>() / 3.0;
         self.rotation += trace(0);
         self.translation += trace(3);
-        let middle = Vector2::new(camera.cx, camera.cy);
-        let corners = camera.border(1, 0.0);
         let (mut wall, mut points) = (0.0, 0.0);
-        for pixel in corners.iter().chain([&middle]) {
-            let ray = pose.r_wc * camera.ray(pixel.x, pixel.y);
+        for ray_c in camera.probes() {
+            let ray = pose.r_wc * ray_c;
             if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
                 let a = wall_jacobian(pose, &surface.frame(hit.wall));
                 wall += (a * square * a.transpose()).trace() * (camera.fy / hit.range).powi(2);
@@ -220,8 +218,7 @@ fn doubled_frames(
     folder: &Path,
 ) -> Result<Vec<GreyImage>, ConvergeError> {
     let doubled = SimulateOptions {
-        width: 2 * options.width,
-        height: 2 * options.height,
+        camera: options.camera.doubled(),
         noise_grey: 0.0,
         bits: simulate::Bits::Sixteen,
         ..options.clone()
@@ -232,12 +229,12 @@ fn doubled_frames(
         .frames
         .iter()
         .map(|file| {
-            let picture = load_colour(file, doubled.width, doubled.height)
+            let picture = load_colour(file, doubled.camera.width, doubled.camera.height)
                 .map_err(crate::survey::SurveyError::from)?;
             let data = picture.to_luma32f().into_raw();
             Ok(GreyImage::new(
-                doubled.width as usize,
-                doubled.height as usize,
+                doubled.camera.width as usize,
+                doubled.camera.height as usize,
                 data.into_iter().map(|v| 255.0 * v).collect(),
             ))
         })

@@ -1,7 +1,7 @@
 //! Wall errors of frames relative to the majority of them.
 
 use super::GOOD_PX;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::error::check_pairs;
 use crate::evaluate::wall_error::{FrameOffsets, frame_offsets, mean_arc};
@@ -45,7 +45,7 @@ impl MajorityError {
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`].
 pub fn majority_error(
     surface: &dyn Surface,
-    camera: &Pinhole,
+    camera: &Camera,
     estimated: &[Pose],
     truth: &[Pose],
 ) -> Result<MajorityError, EvaluateError> {
@@ -160,9 +160,9 @@ mod tests {
     use crate::surface::{Circle, GaugeMotion};
     use crate::trajectory::spiral;
 
-    fn scene() -> (Circle, Pinhole, Vec<Pose>) {
+    fn scene() -> (Circle, Camera, Vec<Pose>) {
         let circle = Circle::new(3.0).unwrap();
-        let camera = Pinhole::from_vertical_fov(640, 480, 60f64.to_radians());
+        let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
         (circle, camera, spiral(24, 0.1, 30f64.to_radians()))
     }
 

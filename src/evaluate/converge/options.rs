@@ -2,10 +2,14 @@
 
 use super::cell::unit;
 use super::{Cell, ConvergeError, Settings, SweepWall};
+use crate::camera::Camera;
 use crate::simulate::SimulateOptions;
 use crate::trajectory::JitterModel;
 use serde::Serialize;
 use std::collections::HashSet;
+
+/// Vertical field of view of the paper's camera: 60°.
+const VERTICAL_FOV_RAD: f64 = std::f64::consts::FRAC_PI_3;
 
 /// How the translation's noise goes with the rotation's.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -114,8 +118,7 @@ impl ConvergeOptions {
     pub(super) fn survey(&self, cell: &Cell, seed: u64) -> SimulateOptions {
         SimulateOptions {
             frames: self.frames,
-            width: self.width,
-            height: self.height,
+            camera: Camera::from_vertical_fov(self.width, self.height, VERTICAL_FOV_RAD),
             turn_deg: cell.turn_deg,
             jitter: Some(cell.prior()),
             wall: cell.wall.into(),

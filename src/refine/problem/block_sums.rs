@@ -1,7 +1,7 @@
 //! What a block of the wall adds to the normal equations.
 
 use super::{FrameShare, Problem};
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::refine::estimate::{FrameStep, UNKNOWNS};
 use crate::refine::grid::TilePoints;
 use crate::refine::lens::LensSums;
@@ -21,7 +21,7 @@ impl Problem<'_> {
         visibility: &Visibility,
         block: &Range<usize>,
         views: &[View],
-        lens: &Pinhole,
+        lens: &Camera,
     ) -> BlockSums {
         let tiles = &visibility.tiles[block.clone()];
         let stretch_slots: Vec<Option<usize>> = self

@@ -20,10 +20,10 @@ use super::robust::NoiseModel;
 use super::shared::Border;
 use super::view::View;
 use super::visibility::Placed;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::Pyramid;
 use crate::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
-use nalgebra::{Vector2, Vector5};
+use nalgebra::Vector5;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
@@ -79,7 +79,7 @@ pub struct Problem<'a> {
     scene: Scene<'a>,
     sampling: Sampling,
     pictures: Pictures<'a>,
-    camera: Pinhole,
+    camera: Camera,
     grid: WallGrid,
     participants: Range<usize>,
     active: Range<usize>,
@@ -264,7 +264,7 @@ impl<'a> Problem<'a> {
         stretch: usize,
         pictures: &'s [Arc<Pyramid>],
         estimates: &[FrameEstimate],
-        camera: Pinhole,
+        camera: Camera,
     ) -> Vec<View<'s>> {
         let frames = self.coverage.frames(stretch).iter();
         frames
@@ -481,13 +481,8 @@ impl<'a> Problem<'a> {
     ) -> f64 {
         let xi: nalgebra::Vector6<f64> = step.fixed_rows::<6>(0).into();
         let pose = &estimate.pose;
-        let corners = self.camera.border(1, 0.0);
-        let middle = Vector2::new(self.camera.cx, self.camera.cy);
-        corners
-            .iter()
-            .chain([&middle])
-            .filter_map(|pixel| {
-                let ray_c = self.camera.ray(pixel.x, pixel.y);
+        (self.camera.probes().into_iter())
+            .filter_map(|ray_c| {
                 let ray = pose.r_wc * ray_c;
                 let hit = self.scene.surface.hit(&pose.t_wc, &ray).ok()?;
                 let wall = self.scene.surface.frame(hit.wall);
@@ -512,7 +507,7 @@ fn least_density(rows: u32) -> f64 {
 /// A pixel's width on the wall in the median frame's middle, metres. Frames that look along the tunnel do not count.
 fn pixel_on_wall<'p>(
     surface: &dyn Surface,
-    camera: &Pinhole,
+    camera: &Camera,
     placed: impl Iterator<Item = &'p Placed>,
 ) -> f64 {
     let mut ranges: Vec<f64> = placed

@@ -1,6 +1,6 @@
 //! What a problem is made of.
 
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::frames::{FrameCache, FrameError};
 use crate::refine::calibration::{Calibration, Kappa};
 use crate::refine::estimate::FrameEstimate;
@@ -39,7 +39,7 @@ pub struct Scene<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
     /// The camera at full size, as far as it is known by now.
-    pub camera: Pinhole,
+    pub camera: Camera,
     /// What all frames share and may be estimated.
     pub calibration: Calibration,
     /// Its unknowns by now; the camera is that of these.

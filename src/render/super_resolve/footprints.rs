@@ -1,7 +1,7 @@
 //! The pixels of all frames that show a region of the wall, each with its footprint as a stencil of fine pixels.
 
 use super::Region;
-use crate::camera::Pinhole;
+use crate::camera::Camera;
 use crate::render::Canvas;
 use crate::surface::Surface;
 use crate::trajectory::Pose;
@@ -18,7 +18,7 @@ const PARTS: usize = 4;
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// The camera.
-    pub camera: &'a Pinhole,
+    pub camera: &'a Camera,
     /// Where it stood.
     pub pose: &'a Pose,
 }
@@ -247,8 +247,9 @@ fn spots(surface: &dyn Surface, canvas: &Canvas, region: &Region, view: &View) -
     let mut places: Vec<[f32; 2]> = Vec::with_capacity(wide * (rows[1] - rows[0] + 2) as usize);
     for v in rows[0] - 1..=rows[1] {
         places.extend((columns[0] - 1..=columns[1]).map(|u| {
-            let ray = pose.r_wc * camera.ray(u as f64, v as f64);
-            let hit = surface.hit(&pose.t_wc, &ray);
+            let hit = camera
+                .ray(u as f64, v as f64)
+                .and_then(|ray| surface.hit(&pose.t_wc, &(pose.r_wc * ray)).ok());
             hit.map_or([f32::NAN; 2], |hit| region.place(canvas, &hit.wall))
         }));
     }
@@ -362,7 +363,7 @@ mod tests {
             h_start_m: -0.7,
         };
         let pose = wall.poses[frame];
-        let ray = pose.r_wc * wall.camera.ray(wall.camera.cx, wall.camera.cy);
+        let ray = pose.r_wc * nalgebra::Vector3::z();
         let [column, row] = canvas.pixel_of(wall.circle.hit(&pose.t_wc, &ray).unwrap().wall);
         let region = Region {
             column: if across { -30 } else { column as i64 - 30 },
@@ -401,7 +402,7 @@ mod tests {
                 let pose = wall.poses[frame];
                 let hit = wall
                     .circle
-                    .hit(&pose.t_wc, &(pose.r_wc * wall.camera.ray(u, v)));
+                    .hit(&pose.t_wc, &(pose.r_wc * wall.camera.ray(u, v).unwrap()));
                 let place = region.place(&canvas, &hit.unwrap().wall);
                 assert!((ones[n] - 1.0).abs() < 1e-5);
                 assert!(

@@ -1,0 +1,85 @@
+//! COLMAP's cameras.txt.
+
+use super::coefficients::{brown_conrady, kannala_brandt};
+use super::{Fault, choose};
+use crate::camera::Camera;
+
+/// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixels are counted from the corner of the first and converted.
+pub fn read(text: &str, name: Option<&str>) -> Result<Camera, Fault> {
+    let lines = text.lines().enumerate();
+    let cameras: Vec<_> = lines
+        .map(|(k, line)| (k + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+        .map(|(number, line)| {
+            let id = line
+                .split_whitespace()
+                .next()
+                .unwrap_or_default()
+                .to_owned();
+            (id, (number, line))
+        })
+        .collect();
+    let (number, line) = choose(cameras, name)?;
+    camera(line).map_err(|what| Fault::at(number, what))
+}
+
+fn camera(line: &str) -> Result<Camera, String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let [_, model, width, height, params @ ..] = &words[..] else {
+        return Err("a camera is `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`".to_owned());
+    };
+    let size = |word: &str| {
+        word.parse::<u32>()
+            .map_err(|_| format!("{word:?} is no number of pixels"))
+    };
+    let (width, height) = (size(width)?, size(height)?);
+    let params: Vec<f64> = params
+        .iter()
+        .map(|word| match word.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(format!("{word:?} is no number")),
+        })
+        .collect::<Result<_, String>>()?;
+    let fail = |count: usize| {
+        format!(
+            "{model} has {count} parameters, and here are {}",
+            params.len()
+        )
+    };
+    // Focal lengths and principal point, and how many coefficients follow.
+    let (central, rest, lens): (_, _, fn(&[f64]) -> Result<_, Fault>) = match *model {
+        "SIMPLE_PINHOLE" => (3, 0, brown_conrady),
+        "PINHOLE" => (4, 0, brown_conrady),
+        "SIMPLE_RADIAL" => (3, 1, |d| brown_conrady(&[d[0], 0.0])),
+        "RADIAL" => (3, 2, brown_conrady),
+        "OPENCV" => (4, 4, brown_conrady),
+        "FULL_OPENCV" => (4, 8, brown_conrady),
+        "SIMPLE_RADIAL_FISHEYE" => (3, 1, kannala_brandt),
+        "RADIAL_FISHEYE" => (3, 2, kannala_brandt),
+        "OPENCV_FISHEYE" => (4, 4, kannala_brandt),
+        _ => {
+            return Err(format!(
+                "the camera model {model} is not supported; known are SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, \
+                 FULL_OPENCV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE (`colmap model_converter` and \
+                 `colmap image_undistorter` make one)"
+            ));
+        }
+    };
+    if params.len() != central + rest {
+        return Err(fail(central + rest));
+    }
+    let [fx, fy, cx, cy] = match params[..central] {
+        [f, cx, cy] => [f, f, cx, cy],
+        [fx, fy, cx, cy] => [fx, fy, cx, cy],
+        _ => return Err(fail(central + rest)),
+    };
+    Ok(Camera {
+        width,
+        height,
+        fx,
+        fy,
+        cx: cx - 0.5,
+        cy: cy - 0.5,
+        lens: lens(&params[central..]).map_err(|fault| fault.what)?,
+    })
+}

@@ -1,0 +1,69 @@
+//! Kalibr's camchain.
+
+use super::coefficients::{brown_conrady, kannala_brandt};
+use super::tree::{numbers, word};
+use super::{Fault, choose};
+use crate::camera::{Camera, Lens};
+use serde_json::Value;
+
+/// True of a tree with `cam0`, `cam1`, …
+pub fn is_camchain(tree: &Value) -> bool {
+    cameras(tree).next().is_some()
+}
+
+fn cameras(tree: &Value) -> impl Iterator<Item = (String, &Value)> {
+    let entries = tree.as_object().into_iter().flatten();
+    entries
+        .filter(|(name, value)| {
+            let number = name.strip_prefix("cam").unwrap_or_default();
+            number.parse::<u32>().is_ok() && value.is_object()
+        })
+        .map(|(name, value)| (name.clone(), value))
+}
+
+/// Reads `camera_model: pinhole`, `intrinsics: [fx, fy, cx, cy]`, `distortion_model`, `distortion_coeffs` and `resolution`.
+pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
+    let camera = choose(cameras(tree).collect(), name)?;
+    let model = word(camera, "camera_model").unwrap_or("pinhole");
+    if model != "pinhole" {
+        return Err(Fault::new(format!(
+            "the camera model {model:?} is not supported; calibrate with pinhole-radtan or pinhole-equi"
+        )));
+    }
+    let list = |name: &str| match camera.get(name) {
+        Some(value) => numbers(value, name),
+        None => Err(Fault::new(format!("the entry `{name}` is missing"))),
+    };
+    let intrinsics = list("intrinsics")?;
+    let [fx, fy, cx, cy] = intrinsics[..] else {
+        return Err(Fault::new(format!(
+            "`intrinsics` has {} numbers; a pinhole has fx, fy, cx, cy",
+            intrinsics.len()
+        )));
+    };
+    let resolution = list("resolution")?;
+    let whole = |value: f64| value.fract() == 0.0 && (1.0..=1e6).contains(&value);
+    let (width, height) = match resolution[..] {
+        [width, height] if whole(width) && whole(height) => (width as u32, height as u32),
+        _ => return Err(Fault::new("`resolution` must be [width, height] in pixels")),
+    };
+    let lens = match word(camera, "distortion_model") {
+        None | Some("none") => Lens::default(),
+        Some("radtan") => brown_conrady(&list("distortion_coeffs")?)?,
+        Some("equidistant" | "equi") => kannala_brandt(&list("distortion_coeffs")?)?,
+        Some(other) => {
+            return Err(Fault::new(format!(
+                "the distortion model {other:?} is not supported; known are radtan, equidistant and none"
+            )));
+        }
+    };
+    Ok(Camera {
+        width,
+        height,
+        fx,
+        fy,
+        cx,
+        cy,
+        lens,
+    })
+}

@@ -1,0 +1,89 @@
+//! OpenCV's YAML, and ROS's camera_info, which is alike.
+
+use super::Fault;
+use super::coefficients::{brown_conrady, kannala_brandt};
+use super::tree::{entry, numbers, pixels, word};
+use crate::camera::{Camera, Lens};
+use serde_json::Value;
+
+const MATRIX: [&str; 6] = [
+    "camera_matrix",
+    "cameraMatrix",
+    "Camera_Matrix",
+    "K",
+    "k",
+    "intrinsics",
+];
+const DISTORTION: [&str; 7] = [
+    "distortion_coefficients",
+    "distCoeffs",
+    "dist_coeffs",
+    "Distortion_Coefficients",
+    "D",
+    "d",
+    "distortion",
+];
+const WIDTH: [&str; 3] = ["image_width", "width", "image_Width"];
+const HEIGHT: [&str; 3] = ["image_height", "height", "image_Height"];
+
+/// Reads `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height` (or what else these are called).
+///
+/// ROS names the lens in `distortion_model`; OpenCV's own files have a fisheye if `fisheye_model` is 1.
+pub fn read(tree: &Value) -> Result<Camera, Fault> {
+    let matrix = entry(tree, &MATRIX).ok_or_else(|| {
+        Fault::new(
+            "no `camera_matrix`: this is no calibration of OpenCV, ROS or Kalibr that is known here",
+        )
+    })?;
+    let k = numbers(matrix, "camera_matrix")?;
+    let [fx, skew, cx, _, fy, cy, ..] = k[..] else {
+        return Err(Fault::new(format!(
+            "`camera_matrix` has {} numbers; it must have 3 × 3",
+            k.len()
+        )));
+    };
+    if k.len() != 9 {
+        return Err(Fault::new(format!(
+            "`camera_matrix` has {} numbers; it must have 3 × 3",
+            k.len()
+        )));
+    }
+    if skew != 0.0 {
+        return Err(Fault::new(format!(
+            "`camera_matrix` has a skew of {skew}; cameras with skew are not supported"
+        )));
+    }
+    let size = |names: &[&str]| {
+        pixels(tree, names).map_err(|fault| {
+            let what = fault.what + "; add the frames' size as image_width and image_height";
+            Fault::new(what)
+        })
+    };
+    let (width, height) = (size(&WIDTH)?, size(&HEIGHT)?);
+    let d = match entry(tree, &DISTORTION) {
+        Some(list) => numbers(list, "distortion_coefficients")?,
+        None => Vec::new(),
+    };
+    let fisheye = entry(tree, &["fisheye_model", "fisheye"])
+        .is_some_and(|flag| flag.as_f64() == Some(1.0) || flag.as_bool() == Some(true));
+    let lens = match word(tree, "distortion_model") {
+        _ if fisheye => kannala_brandt(&d)?,
+        None | Some("plumb_bob" | "rational_polynomial" | "radtan" | "") => brown_conrady(&d)?,
+        Some("equidistant" | "fisheye") => kannala_brandt(&d)?,
+        Some("none") => Lens::default(),
+        Some(other) => {
+            return Err(Fault::new(format!(
+                "the distortion model {other:?} is not supported; known are plumb_bob, rational_polynomial and equidistant"
+            )));
+        }
+    };
+    Ok(Camera {
+        width,
+        height,
+        fx,
+        fy,
+        cx,
+        cy,
+        lens,
+    })
+}

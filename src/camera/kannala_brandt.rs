@@ -1,0 +1,196 @@
+//! The fisheye lens of Kannala and Brandt.
+
+use super::rising::{end_of_rise, invert};
+use nalgebra::{Matrix2, Matrix2x3, RowVector3, Vector2, Vector3};
+use std::f64::consts::PI;
+
+/// A point at the angle θ off the axis appears at the distance `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` from the
+/// middle of the picture, in its own direction: `p_d = θ_d (x, y)/√(x² + y²)`.
+///
+/// The same as OpenCV's `fisheye` and the "equidistant" of ROS and Kalibr. Points may lie beside and behind the camera; they
+/// are seen up to the angle [`KannalaBrandt::limit_rad`], within which θ_d rises.
+///
+/// Source: J. Kannala and S. S. Brandt, "A generic camera model and calibration method for conventional, wide-angle, and
+/// fish-eye lenses", PAMI 28(8), 2006.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KannalaBrandt {
+    k: [f64; 4],
+    /// The largest angle off the axis that is to be used, radians.
+    max_angle_rad: f64,
+    limit_rad: f64,
+}
+
+/// Below this share of z, the distance from the axis is too small to divide by.
+const NEAR_AXIS: f64 = 1e-9;
+
+impl KannalaBrandt {
+    /// The lens with the coefficients k1 to k4, its limit found.
+    pub fn new(k: [f64; 4]) -> Self {
+        let mut lens = Self {
+            k,
+            max_angle_rad: PI,
+            limit_rad: PI,
+        };
+        lens.limit_rad = end_of_rise(|theta| lens.radius(theta).1, PI).min(PI);
+        lens
+    }
+
+    /// The same lens, used no farther than `max_angle_rad` off its axis.
+    pub fn limited_to(mut self, max_angle_rad: f64) -> Self {
+        self.max_angle_rad = max_angle_rad.min(PI);
+        self.limit_rad = self.limit_rad.min(self.max_angle_rad);
+        self
+    }
+
+    /// The largest angle off the axis that is to be used, radians; 180° if all of it.
+    pub fn max_angle_rad(&self) -> f64 {
+        self.max_angle_rad
+    }
+
+    /// k1 to k4.
+    pub fn coefficients(&self) -> &[f64; 4] {
+        &self.k
+    }
+
+    /// The largest angle off the axis that is seen, radians.
+    pub fn limit_rad(&self) -> f64 {
+        self.limit_rad
+    }
+
+    /// θ_d and its slope at the angle θ.
+    pub fn radius(&self, theta: f64) -> (f64, f64) {
+        let [k1, k2, k3, k4] = self.k;
+        let q = theta * theta;
+        let factor = 1.0 + q * (k1 + q * (k2 + q * (k3 + q * k4)));
+        let slope = 1.0 + q * (3.0 * k1 + q * (5.0 * k2 + q * (7.0 * k3 + q * 9.0 * k4)));
+        (theta * factor, slope)
+    }
+
+    /// Where a point appears, or None beyond the limit.
+    pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
+        let rho = x_c.xy().norm();
+        let theta = rho.atan2(x_c.z);
+        if theta >= self.limit_rad || !theta.is_finite() {
+            return None;
+        }
+        if rho <= NEAR_AXIS * x_c.z {
+            return (x_c.z > 0.0).then(|| x_c.xy() / x_c.z);
+        }
+        Some(x_c.xy() * (self.radius(theta).0 / rho))
+    }
+
+    /// `∂p_d/∂x_c = θ_d′ e ∂θ/∂x_c + (θ_d/ρ) (I − e eᵀ) ∂(x, y)/∂x_c` with `e = (x, y)/ρ`, `ρ = √(x² + y²)`,
+    /// `∂θ/∂x_c = (z eᵀ, −ρ)/(ρ² + z²)`.
+    pub fn jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
+        let rho = x_c.xy().norm();
+        if rho <= NEAR_AXIS * x_c.z {
+            return Matrix2x3::identity() / x_c.z;
+        }
+        let e = x_c.xy() / rho;
+        let (radius, slope) = self.radius(rho.atan2(x_c.z));
+        let theta = RowVector3::new(x_c.z * e.x, x_c.z * e.y, -rho) / x_c.norm_squared();
+        let around = (Matrix2::identity() - e * e.transpose()) * (radius / rho);
+        let mut jacobian = e * theta * slope;
+        let mut across = jacobian.fixed_columns_mut::<2>(0);
+        across += around;
+        jacobian
+    }
+
+    /// `∂p_d/∂(k1, k2) = (θ³ e, θ⁵ e)`.
+    pub fn coefficient_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2<f64> {
+        let rho = x_c.xy().norm();
+        if rho <= NEAR_AXIS * x_c.z {
+            return Matrix2::zeros();
+        }
+        let e = x_c.xy() / rho;
+        let theta = rho.atan2(x_c.z);
+        Matrix2::from_columns(&[e * theta.powi(3), e * theta.powi(5)])
+    }
+
+    /// The direction (of unit length) that appears at `p_d`; None beyond the limit.
+    pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
+        let radius = p_d.norm();
+        let theta = invert(|theta| self.radius(theta), radius, self.limit_rad)?;
+        let e = if radius > 0.0 {
+            p_d / radius
+        } else {
+            Vector2::zeros()
+        };
+        let (sin, cos) = theta.sin_cos();
+        Some((e * sin).push(cos))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn lenses() -> [KannalaBrandt; 4] {
+        [
+            KannalaBrandt::new([0.0; 4]),
+            KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]),
+            KannalaBrandt::new([0.05, -0.02, 0.004, -0.0003]),
+            KannalaBrandt::new([-0.12, 0.0, 0.0, 0.0]),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn the_ray_inverts_the_projection(which in 0usize..4, share in 0.0f64..0.99, turn in -3.0f64..3.0, far in 0.1f64..30.0) {
+            let lens = lenses()[which];
+            let (sin, cos) = (lens.limit_rad() * share).sin_cos();
+            let ray = Vector3::new(sin * turn.cos(), sin * turn.sin(), cos);
+            let back = lens.project(&(ray * far)).and_then(|p_d| lens.ray(&p_d));
+            prop_assert!(back.is_some_and(|back| (back - ray).norm() < 1e-9), "{lens:?}: {ray} {back:?}");
+        }
+
+        #[test]
+        fn jacobians_match_central_differences(which in 0usize..3, x in -2.0f64..2.0, y in -2.0f64..2.0, z in 0.1f64..2.0) {
+            let lens = lenses()[which];
+            let (x_c, step) = (Vector3::new(x, y, z), 1e-6);
+            prop_assume!(lens.project(&(x_c - Vector3::z() * 1e-3)).is_some());
+            let jacobian = lens.jacobian(&x_c);
+            for axis in 0..3 {
+                let mut delta = Vector3::zeros();
+                delta[axis] = step;
+                let at = |x_c: Vector3<f64>| lens.project(&x_c).unwrap();
+                let numeric = (at(x_c + delta) - at(x_c - delta)) / (2.0 * step);
+                prop_assert!((numeric - jacobian.column(axis)).norm() < 1e-6);
+            }
+            let by_coefficient = lens.coefficient_jacobian(&x_c);
+            for which in 0..2 {
+                let moved = |amount: f64| {
+                    let mut k = *lens.coefficients();
+                    k[which] += amount;
+                    KannalaBrandt::new(k).project(&x_c).unwrap()
+                };
+                let numeric = (moved(step) - moved(-step)) / (2.0 * step);
+                prop_assert!((numeric - by_coefficient.column(which)).norm() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn the_limit_is_where_the_radius_stops_rising() {
+        // θ − 0.12 θ³ rises up to 1/√0.36.
+        let lens = lenses()[3];
+        assert!((lens.limit_rad() - 1.0 / 0.6).abs() < 1e-12);
+        assert_eq!(lenses()[0].limit_rad(), PI);
+        let beyond = Vector3::new(1.7f64.sin(), 0.0, 1.7f64.cos());
+        assert!(lens.project(&beyond).is_none());
+        assert!(lenses()[0].project(&beyond).is_some(), "behind the camera");
+    }
+
+    #[test]
+    fn the_axis_itself_is_the_middle() {
+        for lens in lenses() {
+            let on_axis = Vector3::new(0.0, 0.0, 2.0);
+            assert_eq!(lens.project(&on_axis), Some(Vector2::zeros()));
+            assert_eq!(lens.ray(&Vector2::zeros()), Some(Vector3::z()));
+            let beside = Vector3::new(1e-5, 0.0, 2.0);
+            assert!((lens.jacobian(&on_axis) - lens.jacobian(&beside)).norm() < 1e-4);
+            assert!(lens.project(&Vector3::new(0.0, 0.0, -1.0)).is_none());
+        }
+    }
+}

@@ -1,0 +1,324 @@
+//! The camera: pixels and rays.
+
+use super::Lens;
+use nalgebra::{Matrix2, Matrix2x3, Matrix2x5, Vector2, Vector3};
+use serde::{Serialize, Serializer};
+
+/// A camera: `u = fx p_d.x + cx`, `v = fy p_d.y + cy`, pixels counted from the centre of the first, with p_d where the lens
+/// shows a point ([`Lens`]).
+///
+/// Serialises as its calibration file ([`super::format_calibration`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Width of the image, pixels.
+    pub width: u32,
+    /// Height of the image, pixels.
+    pub height: u32,
+    /// Focal length along u, pixels.
+    pub fx: f64,
+    /// Focal length along v, pixels.
+    pub fy: f64,
+    /// Principal point, u.
+    pub cx: f64,
+    /// Principal point, v.
+    pub cy: f64,
+    /// The lens.
+    pub lens: Lens,
+}
+
+impl Serialize for Camera {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        super::calibration::CameraFile::of(self).serialize(serializer)
+    }
+}
+
+/// Steps that find where the lens's picture ends on the way to a border pixel.
+const HALVINGS: usize = 50;
+/// Pixels along each side at which the lens is asked whether it shows them.
+const ASKED: usize = 33;
+
+impl Camera {
+    /// A pinhole with square pixels and its principal point in the middle, from its vertical field of view
+    /// (radians): `f = (height / 2) / tan(fov / 2)`.
+    pub fn from_vertical_fov(width: u32, height: u32, fov_rad: f64) -> Self {
+        let f = 0.5 * f64::from(height) / (0.5 * fov_rad).tan();
+        Self {
+            width,
+            height,
+            fx: f,
+            fy: f,
+            cx: 0.5 * (f64::from(width) - 1.0),
+            cy: 0.5 * (f64::from(height) - 1.0),
+            lens: Lens::default(),
+        }
+    }
+
+    /// A vector along the ray of a pixel, in camera coordinates (z = 1, of unit length for a fisheye); None where the lens
+    /// shows nothing.
+    pub fn ray(&self, u: f64, v: f64) -> Option<Vector3<f64>> {
+        self.lens.ray(&Vector2::new(
+            (u - self.cx) / self.fx,
+            (v - self.cy) / self.fy,
+        ))
+    }
+
+    /// The pixel of a point in camera coordinates, within the picture or not; None where the lens shows nothing.
+    pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
+        let p_d = self.lens.project(x_c)?;
+        Some(Vector2::new(
+            self.fx * p_d.x + self.cx,
+            self.fy * p_d.y + self.cy,
+        ))
+    }
+
+    /// `∂(u, v)/∂x_c`, pixels per metre, for a point that the lens shows.
+    pub fn project_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
+        Matrix2::new(self.fx, 0.0, 0.0, self.fy) * self.lens.jacobian(x_c)
+    }
+
+    /// `∂(u, v)/∂(ln f, cx, cy, k1, k2)` of a point that the lens shows, with fx and fy growing alike.
+    pub fn intrinsics_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x5<f64> {
+        let focal = Matrix2::new(self.fx, 0.0, 0.0, self.fy);
+        let p_d = self.lens.project(x_c).unwrap_or_default();
+        let lens = focal * self.lens.coefficient_jacobian(x_c);
+        Matrix2x5::from_columns(&[
+            focal * p_d,
+            Vector2::x(),
+            Vector2::y(),
+            lens.column(0).into(),
+            lens.column(1).into(),
+        ])
+    }
+
+    /// Share of the picture that the lens shows: 1 if it is one-to-one out to the outermost pixels.
+    pub fn shown_share(&self) -> f64 {
+        let place = |k: usize, size: u32| f64::from(size - 1) * k as f64 / (ASKED - 1) as f64;
+        let shown = (0..ASKED * ASKED).filter(|k| {
+            let (column, row) = (k % ASKED, k / ASKED);
+            let (u, v) = (place(column, self.width), place(row, self.height));
+            self.ray(u, v).is_some()
+        });
+        shown.count() as f64 / (ASKED * ASKED) as f64
+    }
+
+    /// Pixels of the image's shorter side.
+    pub fn shorter_side(&self) -> u32 {
+        self.width.min(self.height)
+    }
+
+    /// True if the pixel lies at least `margin` pixels inside the outermost pixel centres.
+    pub fn sees(&self, pixel: &Vector2<f64>, margin: f64) -> bool {
+        pixel.x >= margin
+            && pixel.y >= margin
+            && pixel.x <= f64::from(self.width - 1) - margin
+            && pixel.y <= f64::from(self.height - 1) - margin
+    }
+
+    /// The same camera for an image halved `level` times (odd rows and columns dropped).
+    ///
+    /// A pixel of the halved image covers 2 × 2 of the one below, so centres shift by half a pixel:
+    /// `u_l = (u + ½)/2^l − ½`.
+    pub fn at_level(&self, level: usize) -> Self {
+        let scale = 0.5f64.powi(level as i32);
+        Self {
+            width: self.width >> level,
+            height: self.height >> level,
+            fx: self.fx * scale,
+            fy: self.fy * scale,
+            cx: (self.cx + 0.5) * scale - 0.5,
+            cy: (self.cy + 0.5) * scale - 0.5,
+            lens: self.lens,
+        }
+    }
+
+    /// The same camera with twice as many pixels along each axis: the inverse of a halving.
+    pub fn doubled(&self) -> Self {
+        Self {
+            width: 2 * self.width,
+            height: 2 * self.height,
+            fx: 2.0 * self.fx,
+            fy: 2.0 * self.fy,
+            cx: 2.0 * self.cx + 0.5,
+            cy: 2.0 * self.cy + 0.5,
+            lens: self.lens,
+        }
+    }
+
+    /// Rays through the four corners, as far as the lens shows them, and along the optical axis: where these meet the wall tells how far
+    /// a frame moves.
+    pub fn probes(&self) -> Vec<Vector3<f64>> {
+        let corners = self.border(1, 0.0).into_iter();
+        corners
+            .filter_map(|pixel| self.ray(pixel.x, pixel.y))
+            .chain([Vector3::z()])
+            .collect()
+    }
+
+    /// The border of the picture as pixels, clockwise from the first, `per_edge` steps an edge, along the
+    /// outermost pixel centres widened by `outset` pixels (½ reaches the pixels' outer edges). Where the lens's picture ends
+    /// before, the border is there.
+    pub fn border(&self, per_edge: usize, outset: f64) -> Vec<Vector2<f64>> {
+        let (left, top) = (-outset, -outset);
+        let right = f64::from(self.width - 1) + outset;
+        let bottom = f64::from(self.height - 1) + outset;
+        let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
+        let mut border = Vec::with_capacity(4 * per_edge);
+        for k in 0..4 {
+            let (a, b) = (corners[k], corners[(k + 1) % 4]);
+            for step in 0..per_edge {
+                let part = step as f64 / per_edge as f64;
+                border.push(self.shown_towards(Vector2::new(
+                    a.0 + (b.0 - a.0) * part,
+                    a.1 + (b.1 - a.1) * part,
+                )));
+            }
+        }
+        border
+    }
+
+    /// The last pixel that the lens shows on the way from the principal point to `pixel`.
+    fn shown_towards(&self, pixel: Vector2<f64>) -> Vector2<f64> {
+        let shown = |pixel: &Vector2<f64>| self.ray(pixel.x, pixel.y).is_some();
+        if shown(&pixel) {
+            return pixel;
+        }
+        let centre = Vector2::new(self.cx, self.cy);
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if shown(&(centre + (pixel - centre) * middle)) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        centre + (pixel - centre) * low
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{BrownCoefficients, BrownConrady, KannalaBrandt};
+
+    fn camera() -> Camera {
+        Camera {
+            width: 640,
+            height: 480,
+            fx: 415.0,
+            fy: 417.0,
+            cx: 318.0,
+            cy: 241.0,
+            lens: Lens::radial(-0.06, 0.01),
+        }
+    }
+
+    fn cameras() -> [Camera; 4] {
+        let tangential = BrownCoefficients {
+            k: [-0.06, 0.01, 0.002, 0.0, 0.0, 0.0],
+            p: [1e-3, -2e-3],
+        };
+        let fisheye = KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]);
+        [
+            Lens::default(),
+            camera().lens,
+            Lens::BrownConrady(BrownConrady::new(tangential)),
+            Lens::KannalaBrandt(fisheye),
+        ]
+        .map(|lens| Camera { lens, ..camera() })
+    }
+
+    #[test]
+    fn projection_inverts_the_ray() {
+        for camera in cameras() {
+            let ray = camera.ray(100.25, 33.5).unwrap();
+            let pixel = camera.project(&(ray * 2.7)).unwrap();
+            assert!((pixel - Vector2::new(100.25, 33.5)).norm() < 1e-9);
+            assert!(camera.project(&Vector3::new(0.0, 0.0, -1.0)).is_none());
+        }
+    }
+
+    #[test]
+    fn what_the_lens_does_not_show_has_no_ray() {
+        let lens = |k1| Camera {
+            lens: Lens::radial(k1, 0.0),
+            ..camera()
+        };
+        assert_eq!(lens(-0.1).shown_share(), 1.0);
+        let folding = lens(-0.4);
+        assert!((0.3..0.9).contains(&folding.shown_share()));
+        assert!(folding.ray(0.0, 0.0).is_none());
+        // 1 / (3 · 0.4) is less than 1.
+        assert!(folding.project(&Vector3::new(1.0, 0.0, 1.0)).is_none());
+        // Its border is where the rays end.
+        for pixel in folding.border(8, 0.0) {
+            assert!(folding.ray(pixel.x, pixel.y).is_some());
+            let outwards = pixel - Vector2::new(folding.cx, folding.cy);
+            let beyond = pixel + outwards * 1e-6;
+            assert!(!folding.sees(&beyond, 0.0) || folding.ray(beyond.x, beyond.y).is_none());
+        }
+    }
+
+    #[test]
+    fn the_pixel_follows_the_intrinsics_as_central_differences_do() {
+        for camera in cameras() {
+            let x_c = Vector3::new(0.9, -0.7, 1.5);
+            let analytic = camera.intrinsics_jacobian(&x_c);
+            let step = 1e-6;
+            for k in 0..5 {
+                let moved = |amount: f64| {
+                    let mut camera = camera;
+                    let [k1, k2] = camera.lens.k1_k2();
+                    match k {
+                        0 => {
+                            camera.fx *= amount.exp();
+                            camera.fy *= amount.exp();
+                        }
+                        1 => camera.cx += amount,
+                        2 => camera.cy += amount,
+                        3 => camera.lens = camera.lens.with_k1_k2(k1 + amount, k2),
+                        _ => camera.lens = camera.lens.with_k1_k2(k1, k2 + amount),
+                    }
+                    camera.project(&x_c).unwrap()
+                };
+                let numeric = (moved(step) - moved(-step)) / (2.0 * step);
+                assert!((numeric - analytic.column(k)).norm() < 1e-5, "column {k}");
+            }
+        }
+    }
+
+    #[test]
+    fn jacobian_matches_central_differences() {
+        for camera in cameras() {
+            let x_c = Vector3::new(0.4, -0.9, 2.5);
+            let analytic = camera.project_jacobian(&x_c);
+            let step = 1e-6;
+            for k in 0..3 {
+                let mut delta = Vector3::zeros();
+                delta[k] = step;
+                let numeric = (camera.project(&(x_c + delta)).unwrap()
+                    - camera.project(&(x_c - delta)).unwrap())
+                    / (2.0 * step);
+                assert!((numeric - analytic.column(k)).norm() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn levels_keep_the_same_rays() {
+        for camera in cameras() {
+            let coarse = camera.at_level(2);
+            // The centre of the first coarse pixel is the middle of 4 × 4 fine ones.
+            let (a, b) = (coarse.ray(0.0, 0.0), camera.ray(1.5, 1.5));
+            assert!((a.unwrap() - b.unwrap()).norm() < 1e-12);
+            assert_eq!((coarse.width, coarse.height), (160, 120));
+        }
+    }
+
+    #[test]
+    fn field_of_view_is_what_was_asked_for() {
+        let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
+        let top = camera.ray(camera.cx, -0.5).unwrap();
+        assert!((top.y.abs().atan() - 30f64.to_radians()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,106 @@
+//! Functions that rise from 0: how far they do, and their inverse.
+
+/// Steps of the inverse: bisection alone would end at rounding.
+const STEPS: usize = 80;
+/// Steps, each larger by [`GROWTH`], in which the end of the rise is looked for.
+const SCAN: usize = 1200;
+const FIRST: f64 = 1e-3;
+const GROWTH: f64 = 1.01;
+
+/// The first place up to `end` where `slope` is no longer positive; infinity if there is none.
+///
+/// Looked for from 0.001 on in steps of one percent, then halved to rounding: a dip narrower than a percent is not seen.
+pub fn end_of_rise(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
+    let rises = |at: f64| slope(at) > 0.0;
+    let (mut low, mut high) = (0.0, FIRST);
+    for _ in 0..SCAN {
+        if low >= end {
+            return f64::INFINITY;
+        }
+        if !rises(high.min(end)) {
+            high = high.min(end);
+            while 0.5 * (low + high) > low && 0.5 * (low + high) < high {
+                let middle = 0.5 * (low + high);
+                if rises(middle) {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            return low;
+        }
+        (low, high) = (high, high * GROWTH);
+    }
+    f64::INFINITY
+}
+
+/// The `x` from 0 to `end` with `f(x) = target ≥ 0`, where `f` gives value and slope and rises; None if it does not get that
+/// far.
+///
+/// Newton's method, kept between bounds that close in on the root.
+pub fn invert(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> Option<f64> {
+    if target == 0.0 {
+        return Some(0.0);
+    }
+    if !target.is_finite() || (end.is_finite() && f(end).0 < target) {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, end);
+    let mut x = target.min(end);
+    for _ in 0..STEPS {
+        let (value, slope) = f(x);
+        let error = value - target;
+        if error > 0.0 {
+            high = x;
+        } else {
+            low = x;
+        }
+        let newton = x - error / slope;
+        let next = if newton > low && newton < high {
+            newton
+        } else if high.is_finite() {
+            0.5 * (low + high)
+        } else {
+            2.0 * x
+        };
+        if (next - x).abs() <= 1e-15 * x {
+            return Some(next);
+        }
+        x = next;
+    }
+    // A last bit that goes to and fro.
+    ((f(x).0 - target).abs() <= 1e-12 * target).then_some(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_end_is_where_the_slope_vanishes() {
+        // x − x³ rises to 1/√3.
+        let end = end_of_rise(|x| 1.0 - 3.0 * x * x, 10.0);
+        assert!((end - 3f64.sqrt().recip()).abs() < 1e-12);
+        assert_eq!(end_of_rise(|x| 1.0 + x, 10.0), f64::INFINITY);
+        assert_eq!(
+            end_of_rise(|x| 1.0 - 3.0 * x * x, 0.5),
+            f64::INFINITY,
+            "beyond what is asked for"
+        );
+    }
+
+    #[test]
+    fn the_inverse_is_found_up_to_the_end_and_not_beyond() {
+        let f = |x: f64| (x - x * x * x, 1.0 - 3.0 * x * x);
+        let end = 3f64.sqrt().recip();
+        for k in 0..100 {
+            let x = end * f64::from(k) / 100.0;
+            let back = invert(f, f(x).0, end).unwrap();
+            assert!((back - x).abs() < 1e-8, "{x}: {back}");
+        }
+        assert!(invert(f, 0.4, end).is_none());
+        assert!(invert(f, f64::NAN, end).is_none());
+        let steep = invert(|x| (x * x * x, 3.0 * x * x), 1e6, f64::INFINITY).unwrap();
+        assert!((steep - 100.0).abs() < 1e-9);
+    }
+}
