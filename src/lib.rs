@@ -92,6 +92,7 @@ pub mod evaluate;
 pub mod frames;
 mod lettering;
 pub mod progress;
+pub mod provenance;
 pub mod raster;
 pub mod refine;
 pub mod render;

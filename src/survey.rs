@@ -39,6 +39,7 @@ use crate::surface::{Circle, Surface, SurfaceError};
 use crate::trajectory::tum::{self, TumError};
 use crate::trajectory::{Jitter, JitterModel, Pose, Trajectory, poses_of};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Name of the file that describes a survey.
@@ -127,6 +128,10 @@ pub struct SurveyFile {
     /// Self-calibration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibrate: Option<CalibrateSection>,
+    /// Options of the program's commands, a table each: what their long flags say, with underscores. The program gives them to the
+    /// command; the library reads over them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub options: BTreeMap<String, toml::Table>,
 }
 
 /// Shape of the tunnel.
@@ -300,6 +305,8 @@ impl From<PriorSection> for Jitter {
 pub struct Survey {
     /// The folder of `survey.toml`.
     pub folder: PathBuf,
+    /// `survey.toml` itself.
+    toml_path: PathBuf,
     /// `survey.toml` as written.
     pub file: SurveyFile,
     /// The camera.
@@ -322,11 +329,7 @@ impl Survey {
     /// # Errors
     /// Everything that can be wrong before a pixel is read; see [`SurveyError`].
     pub fn open(path: &Path) -> Result<Self, SurveyError> {
-        let toml_path = if path.is_dir() {
-            path.join(SURVEY_FILE)
-        } else {
-            path.to_owned()
-        };
+        let toml_path = toml_path(path);
         let file = read_survey_file(&toml_path)?;
         let folder = match toml_path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
@@ -371,6 +374,7 @@ impl Survey {
             truth: None,
             prior: file.prior.into(),
             folder,
+            toml_path,
             file,
         };
         survey.initial = survey.read_poses(&survey.folder.join(&survey.file.poses.initial))?;
@@ -379,6 +383,23 @@ impl Survey {
             None => None,
         };
         Ok(survey)
+    }
+
+    /// Reads survey.toml (or the one in the folder `path`), and nothing else.
+    ///
+    /// # Errors
+    /// A missing or malformed file.
+    pub fn read_file(path: &Path) -> Result<SurveyFile, SurveyError> {
+        read_survey_file(&toml_path(path))
+    }
+
+    /// The files that the survey is made of, without the frames.
+    pub fn own_files(&self) -> Vec<PathBuf> {
+        let file = &self.file;
+        let named = [&file.camera.file, &file.poses.initial];
+        let named = named.into_iter().chain(&file.poses.truth);
+        let named = named.map(|name| self.folder.join(name));
+        [self.toml_path.clone()].into_iter().chain(named).collect()
     }
 
     /// Reads a pose file and checks it against the frames and the tunnel.
@@ -409,6 +430,14 @@ impl Survey {
     /// The initial poses without their times.
     pub fn initial_poses(&self) -> Vec<Pose> {
         poses_of(&self.initial)
+    }
+}
+
+/// `survey.toml`, of which `path` is the folder or the name.
+fn toml_path(path: &Path) -> PathBuf {
+    match path.is_dir() {
+        true => path.join(SURVEY_FILE),
+        false => path.to_owned(),
     }
 }
 
@@ -462,6 +491,7 @@ mod tests {
                 unknowns: CalibrationGroup::ALL.to_vec(),
                 ..CalibrateSection::default()
             }),
+            options: BTreeMap::new(),
         };
         let text = toml::to_string(&file).unwrap();
         assert_eq!(toml::from_str::<SurveyFile>(&text).unwrap(), file);

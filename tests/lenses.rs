@@ -51,7 +51,7 @@ fn assert_repaired(report: &serde_json::Value) {
     assert!(wall_px("refined") < 0.05, "{report}");
     // The warp shows what the simulator drew: the same wall from all frames, and nearly that of the true poses.
     assert!(
-        report["refined"]["psnr_db"].as_f64().unwrap() > 35.0,
+        report["refined"]["image"]["psnr_db"].as_f64().unwrap() > 35.0,
         "{report}"
     );
 }

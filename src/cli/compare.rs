@@ -1,5 +1,6 @@
 //! `tunnelstitch compare`: initial against refined poses.
 
+use super::record::{RUN_FILE, Run};
 use super::stitch::{PictureArguments, positive};
 use super::{Failure, Terminal, json};
 use crate::PROGRAM;
@@ -19,6 +20,9 @@ use std::path::{Path, PathBuf};
 /// Writes baseline.png, refined.png, truth.png (all of the same stretch of wall), before-after.png (a small
 /// extract of the first above the second) and compare.json.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  tunnelstitch compare my-survey --refined refined/poses.tum --out compared"
+)]
 pub struct CompareArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
@@ -55,7 +59,7 @@ struct Report<'a> {
 /// # Errors
 /// [`Failure`] for everything wrong with the survey, the poses or the output, and for a quality gate that is
 /// not met (after everything was written).
-pub fn run(arguments: &CompareArguments, terminal: &Terminal) -> Result<(), Failure> {
+pub fn run(arguments: &CompareArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     let survey = Survey::open(&arguments.survey)?;
     if arguments.max_wall_px.is_some() && survey.truth.is_none() {
         return Err(Failure::usage(
@@ -68,6 +72,11 @@ pub fn run(arguments: &CompareArguments, terminal: &Terminal) -> Result<(), Fail
         &arguments.picture,
         &arguments.out,
         terminal,
+    )?;
+    run.write(
+        &arguments.out.join(RUN_FILE),
+        &survey,
+        &[&arguments.refined],
     )?;
     if arguments.json {
         json::print_text(&json)?;

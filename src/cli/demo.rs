@@ -16,6 +16,9 @@ use std::time::Instant;
 /// The survey is a revolving camera's flight through a brick tunnel: ten turns of twelve frames, each step
 /// 2° and a few centimetres off the plan. An earlier demo in the same folder is replaced.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tunnelstitch demo\n  tunnelstitch demo --turns 2 --out small-demo"
+)]
 pub struct DemoArguments {
     /// Folder for everything; made if missing.
     #[arg(long, short, value_name = "DIR", default_value = "tunnelstitch-demo")]
@@ -65,7 +68,14 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
         "\ntunnelstitch refine {survey_path} --out {refined_path}"
     ));
     let refine_options = RefineOptions::default();
-    let (refined, _) = refine_into(&survey_folder, &refine_options, &refined_folder, terminal)?;
+    let survey = Survey::open(&survey_folder)?;
+    let (refined, _) = refine_into(
+        &survey,
+        &survey_folder,
+        &refine_options,
+        &refined_folder,
+        terminal,
+    )?;
     if !arguments.json {
         summarise(&refined, terminal);
     }
@@ -76,7 +86,7 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
         poses.display()
     ));
     let (comparison, json) = compare_into(
-        &Survey::open(&survey_folder)?,
+        &survey,
         &poses,
         &PictureArguments::default(),
         &compare_folder,

@@ -1,6 +1,8 @@
 //! The command line: arguments, printing and exit codes; the work is done by the library.
 
 mod compare;
+mod config;
+mod configuration;
 mod converge;
 mod demo;
 mod failure;
@@ -9,7 +11,9 @@ mod json;
 mod locate;
 mod outputs;
 mod project;
+mod record;
 mod refine;
+mod shell;
 mod simulate;
 mod stitch;
 mod terminal;
@@ -19,6 +23,7 @@ pub use terminal::Terminal;
 
 use crate::atomic;
 use clap::{Parser, Subcommand};
+use std::ffi::OsString;
 use std::sync::Arc;
 
 /// Repairs the trajectory of a revolving tunnel camera by photometric consistency and unrolls the wall into
@@ -44,7 +49,7 @@ pub struct Global {
     #[arg(long, short, global = true)]
     pub quiet: bool,
     /// Threads to work with [default: all cores]. The result does not depend on it.
-    #[arg(long, global = true, value_name = "N", env = "TUNNELSTITCH_THREADS", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
 }
 
@@ -58,6 +63,9 @@ enum Command {
     Compare(compare::CompareArguments),
     Converge(converge::ConvergeArguments),
     Project(project::ProjectArguments),
+    Config(config::ConfigArguments),
+    Completions(shell::CompletionsArguments),
+    Man(shell::ManArguments),
 }
 
 /// Parses the arguments and runs the command.
@@ -65,7 +73,18 @@ enum Command {
 /// # Errors
 /// [`Failure`], with the text to show and the exit code to leave with.
 pub fn run() -> Result<(), Failure> {
-    let cli = Cli::parse();
+    let arguments: Vec<OsString> = std::env::args_os().collect();
+    let given = arguments.iter().skip(1);
+    let given = given
+        .map(|word| word.to_string_lossy().into_owned())
+        .collect();
+    let configuration = configuration::parse(arguments)?;
+    let cli = configuration.cli;
+    let run = record::Run {
+        command: configuration.command,
+        arguments: given,
+        options: configuration.options,
+    };
     if let Some(threads) = cli.global.threads {
         rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(threads))
@@ -82,11 +101,14 @@ pub fn run() -> Result<(), Failure> {
     match cli.command {
         Command::Demo(arguments) => demo::run(&arguments, &terminal),
         Command::Simulate(arguments) => simulate::run(&arguments, &terminal),
-        Command::Refine(arguments) => refine::run(&arguments, &terminal),
-        Command::Stitch(arguments) => stitch::run(&arguments, &terminal),
+        Command::Refine(arguments) => refine::run(&arguments, &run, &terminal),
+        Command::Stitch(arguments) => stitch::run(&arguments, &run, &terminal),
         Command::Locate(arguments) => locate::run(&arguments, &terminal),
-        Command::Compare(arguments) => compare::run(&arguments, &terminal),
+        Command::Compare(arguments) => compare::run(&arguments, &run, &terminal),
         Command::Converge(arguments) => converge::run(&arguments, &terminal),
         Command::Project(arguments) => project::run(&arguments, &terminal),
+        Command::Config(arguments) => config::run(&arguments, &terminal),
+        Command::Completions(arguments) => shell::completions(&arguments),
+        Command::Man(arguments) => shell::man(&arguments, &terminal),
     }
 }

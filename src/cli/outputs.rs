@@ -1,6 +1,7 @@
 //! Where a panorama goes: one picture in memory, or files that are written as it is drawn, and maps beside it.
 
 use super::Failure;
+use super::record::RUN_FILE;
 use super::stitch::picture_output;
 use crate::atomic;
 use crate::camera::Camera;
@@ -10,7 +11,7 @@ use crate::render::{
     Canvas, Coverage, Gap, Layout, Map, Panorama, PixelFormat, Plan, Preview, RasterLayer,
     RasterTarget, Target, gaps_csv,
 };
-use crate::survey::{SURVEY_FILE, Survey};
+use crate::survey::Survey;
 use image::DynamicImage;
 use nalgebra::Matrix6;
 use std::path::{Path, PathBuf};
@@ -108,14 +109,7 @@ impl OutputArguments {
     /// The two names.
     pub fn check_apart(&self, survey: &Survey, poses: Option<&Path>) -> Result<(), Failure> {
         let mut inputs: Vec<PathBuf> = survey.frames.iter().map(|f| f.path.clone()).collect();
-        let file = &survey.file;
-        let own = [
-            Path::new(SURVEY_FILE),
-            &file.camera.file,
-            &file.poses.initial,
-        ];
-        let named = own.into_iter().chain(file.poses.truth.as_deref());
-        inputs.extend(named.map(|name| survey.folder.join(name)));
+        inputs.extend(survey.own_files());
         inputs.extend(poses.map(Path::to_owned));
         inputs.extend(self.covariance.clone());
         let mut taken: Vec<PathBuf> = inputs.iter().map(|path| full(path)).collect();
@@ -135,9 +129,17 @@ impl OutputArguments {
         Ok(())
     }
 
+    /// The record of how the panorama was made: its name with `.run.toml` added.
+    pub fn run_file(&self) -> PathBuf {
+        let mut name = self.out.clone().into_os_string();
+        name.push(".");
+        name.push(RUN_FILE);
+        name.into()
+    }
+
     /// Everything that is written.
     fn paths(&self) -> Vec<PathBuf> {
-        let mut paths = vec![self.out.clone()];
+        let mut paths = vec![self.out.clone(), self.run_file()];
         if let Some(dzi) = &self.dzi {
             let mut tiles = dzi.with_extension("").into_os_string();
             tiles.push("_files");

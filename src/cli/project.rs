@@ -12,6 +12,9 @@ use std::path::{Path, PathBuf};
 /// Without a calibration the photo's principal point is its middle. What the photo does not show is
 /// transparent; the result is cropped to the rest.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Example:\n  tunnelstitch project photo.jpg --fov-deg 60 --out cylinder.png"
+)]
 pub struct ProjectArguments {
     /// The photo.
     image: PathBuf,

@@ -1,5 +1,6 @@
 //! `tunnelstitch refine`.
 
+use super::record::{RUN_FILE, Run};
 use super::{Failure, Terminal, json};
 use crate::PROGRAM;
 use crate::atomic;
@@ -18,6 +19,9 @@ use std::sync::Arc;
 /// TUM), refine.json (costs, residuals, gains, 1-σ of every frame, timings) and covariance.csv (6 × 6
 /// covariance of every frame and of neighbours) into DIR.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tunnelstitch refine my-survey --out refined\n  tunnelstitch refine my-survey --out refined --calibrate focal,radius"
+)]
 pub struct RefineArguments {
     /// Folder of the survey (with survey.toml), or the file itself.
     survey: PathBuf,
@@ -88,7 +92,11 @@ struct ReportFile<'a> {
 ///
 /// # Errors
 /// Bad input, or an output that cannot be written.
-pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), Failure> {
+pub fn run(
+    arguments: &RefineArguments,
+    run: &Run,
+    terminal: &Arc<Terminal>,
+) -> Result<(), Failure> {
     let options = RefineOptions {
         max_iterations: arguments.max_iterations,
         calibrate: arguments
@@ -100,7 +108,15 @@ pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), 
             false => RefineOptions::default(),
         }
     };
-    let (refined, json) = refine_into(&arguments.survey, &options, &arguments.out, terminal)?;
+    let survey = Survey::open(&arguments.survey)?;
+    let (refined, json) = refine_into(
+        &survey,
+        &arguments.survey,
+        &options,
+        &arguments.out,
+        terminal,
+    )?;
+    run.write(&arguments.out.join(RUN_FILE), &survey, &[])?;
     if arguments.json {
         json::print_text(&json)?;
     } else {
@@ -127,12 +143,12 @@ pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), 
 /// # Errors
 /// Bad input, or an output that cannot be written.
 pub fn refine_into(
+    survey: &Survey,
     survey_path: &Path,
     options: &RefineOptions,
     out: &Path,
     terminal: &Arc<Terminal>,
 ) -> Result<(Refined, String), Failure> {
-    let survey = Survey::open(survey_path)?;
     atomic::create_folder(out)?;
     let survey_section = survey.file.calibrate.as_ref();
     let asked = options
@@ -143,7 +159,7 @@ pub fn refine_into(
         check_apart(&survey.folder, out)?;
     }
     let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
-    let refined = refine(&survey, options, &progress)?;
+    let refined = refine(survey, options, &progress)?;
     let json = json::text(&ReportFile {
         program: PROGRAM,
         survey: survey_path,
@@ -165,7 +181,7 @@ pub fn refine_into(
     )?;
     if let Some(calibration) = &refined.report.calibration {
         let file =
-            calibrated(&survey, calibration).map_err(|error| Failure::bug(error.to_string()))?;
+            calibrated(survey, calibration).map_err(|error| Failure::bug(error.to_string()))?;
         let camera = format_calibration(&calibration.camera);
         atomic::write_text(&out.join(CAMERA_FILE), &camera)?;
         atomic::write_text(&out.join(SURVEY_FILE), &file)?;
@@ -203,6 +219,7 @@ fn calibrated(
     file.poses.initial = folder.join(&file.poses.initial);
     file.poses.truth = file.poses.truth.map(|truth| folder.join(truth));
     file.calibrate = None;
+    file.options.clear();
     Ok(format!(
         "# The survey with the calibration that refine has found.\n{}",
         toml::to_string(&file)?

@@ -1,6 +1,7 @@
 //! `tunnelstitch stitch`: one panorama from given poses.
 
 use super::outputs::OutputArguments;
+use super::record::Run;
 use super::{Failure, Terminal, json};
 use crate::atomic;
 use crate::frames::PictureFormat;
@@ -20,6 +21,9 @@ use std::path::{Path, PathBuf};
 ///
 /// The poses are used as they are; `refine` makes them right.
 #[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  tunnelstitch stitch my-survey --poses refined/poses.tum --out after.png\n  tunnelstitch stitch my-survey --poses refined/poses.tum --px-per-metre 400 --out wall.tif --maps maps"
+)]
 pub struct StitchArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
@@ -230,7 +234,7 @@ struct Report<'a> {
 ///
 /// # Errors
 /// [`Failure`] for everything wrong with the survey, the poses or the output.
-pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failure> {
+pub fn run(arguments: &StitchArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     arguments.output.check()?;
     let survey = Survey::open(&arguments.survey)?;
     arguments
@@ -280,6 +284,8 @@ pub fn run(arguments: &StitchArguments, terminal: &Terminal) -> Result<(), Failu
     let written = outputs.finish(&plan, &gaps, &survey.camera, covariances.as_deref());
     terminal.finish();
     written?;
+    let others: Vec<&Path> = arguments.poses.file().into_iter().collect();
+    run.write(&arguments.output.run_file(), &survey, &others)?;
     if arguments.json {
         return json::print(&Report {
             out: &arguments.output.out,

@@ -52,7 +52,7 @@ impl Progress for Terminal {
         }
         let bar = ProgressBar::new(total as u64);
         if let Ok(style) = ProgressStyle::with_template(
-            "{prefix:>12} [{bar:30}] {pos}/{len} {elapsed} (eta {eta}) {msg}",
+            "{prefix:>12} [{bar:30}] {pos}/{len} {per_sec} {elapsed} (eta {eta}) {msg}",
         ) {
             bar.set_style(style.progress_chars("=> "));
         }

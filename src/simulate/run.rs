@@ -126,6 +126,7 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
         },
         prior: options.prior(),
         calibrate: None,
+        options: std::collections::BTreeMap::new(),
     };
     let other = std::io::Error::other;
     let path = |name: &str| folder.join(name);

@@ -1,0 +1,113 @@
+//! What a result was made with and from: `run.toml` beside it.
+
+use super::Failure;
+use super::configuration::{EffectiveOption, Source};
+use crate::provenance::{self, Input};
+use crate::survey::Survey;
+use crate::{PROGRAM, atomic};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The run of a command.
+pub struct Run {
+    /// The command.
+    pub command: String,
+    /// The program's arguments, without its name.
+    pub arguments: Vec<String>,
+    /// Every option of the command.
+    pub options: Vec<EffectiveOption>,
+}
+
+/// `run.toml`. Its options may be put into `survey.toml` as they are.
+#[derive(Serialize)]
+struct RunFile<'a> {
+    schema_version: u32,
+    program: &'static str,
+    arguments: &'a [String],
+    options: BTreeMap<&'a str, toml::Table>,
+    inputs: Vec<Input>,
+}
+
+const SCHEMA_VERSION: u32 = 1;
+
+/// Name of the file in a folder of results.
+pub const RUN_FILE: &str = "run.toml";
+
+impl Run {
+    /// Writes the record of a run on `survey` to `path`, with hashes of everything that the survey is made of and of `others`.
+    ///
+    /// # Errors
+    /// An input that cannot be read any more, a record that cannot be written.
+    pub fn write(&self, path: &Path, survey: &Survey, others: &[&Path]) -> Result<(), Failure> {
+        let hashed = |path: &Path| provenance::input(path);
+        let inputs = survey
+            .own_files()
+            .iter()
+            .map(|file| hashed(file))
+            .chain(others.iter().map(|file| hashed(file)))
+            .chain([provenance::frames(&survey.frames)])
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(|error| Failure::input(error.to_string()))?;
+        let text = toml::to_string(&RunFile {
+            schema_version: SCHEMA_VERSION,
+            program: PROGRAM,
+            arguments: &self.arguments,
+            options: BTreeMap::from([(self.command.as_str(), table(&self.options))]),
+            inputs,
+        })
+        .map_err(|error| Failure::bug(error.to_string()))?;
+        let head = "# How the results beside this file were made. [options] may be put into survey.toml.\n";
+        atomic::write_text(path, &(head.to_owned() + &text))?;
+        Ok(())
+    }
+}
+
+/// Options as `survey.toml` takes them; those without a value are left out.
+pub fn table(options: &[EffectiveOption]) -> toml::Table {
+    let set = options.iter().filter_map(|option| {
+        let value = value(option)?;
+        Some((option.name.clone(), value))
+    });
+    set.collect()
+}
+
+/// The value of an option, if it has one.
+pub fn value(option: &EffectiveOption) -> Option<toml::Value> {
+    if option.switch {
+        // A variable says true in more ways than one.
+        let set = option.values.first().is_some_and(|value| {
+            let value = value.to_lowercase();
+            !matches!(
+                value.as_str(),
+                "" | "false" | "0" | "no" | "n" | "f" | "off"
+            )
+        });
+        return Some(toml::Value::Boolean(set));
+    }
+    let one = |text: &String| -> toml::Value {
+        if let Ok(number) = text.parse::<i64>() {
+            number.into()
+        } else {
+            match text.parse::<f64>() {
+                Ok(number) if number.is_finite() => number.into(),
+                _ => text.clone().into(),
+            }
+        }
+    };
+    match &option.values[..] {
+        [] => None,
+        [value] => Some(one(value)),
+        values => Some(values.iter().map(one).collect::<Vec<_>>().into()),
+    }
+}
+
+/// Where an option comes from, in a few words.
+pub fn origin(source: &Source) -> String {
+    match source {
+        Source::Flag => "flag".to_owned(),
+        Source::Variable(name) => name.clone(),
+        Source::Survey => "survey.toml".to_owned(),
+        Source::Default => "default".to_owned(),
+    }
+}

@@ -1,0 +1,103 @@
+//! What a result was made from: hashes of the files that went into it.
+
+use crate::frames::FrameFile;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// A file that cannot be hashed.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: cannot read: {source}", path.display())]
+pub struct HashError {
+    /// The file.
+    pub path: PathBuf,
+    /// What the system said.
+    pub source: std::io::Error,
+}
+
+/// An input and the BLAKE3 hash of what is in it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Input {
+    /// The file as it was named, or the folder of the frames.
+    pub path: PathBuf,
+    /// How many files, where they are frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub files: Option<usize>,
+    /// Hexadecimal BLAKE3: of the file, or of the frames' names and hashes in their order.
+    pub blake3: String,
+}
+
+fn hash_file(path: &Path) -> Result<blake3::Hash, HashError> {
+    let fail = |source| HashError {
+        path: path.to_owned(),
+        source,
+    };
+    let mut hasher = blake3::Hasher::new();
+    let file = std::fs::File::open(path).map_err(fail)?;
+    hasher.update_reader(file).map_err(fail)?;
+    Ok(hasher.finalize())
+}
+
+/// Hashes a file.
+///
+/// # Errors
+/// [`HashError`] if it cannot be read.
+pub fn input(path: &Path) -> Result<Input, HashError> {
+    Ok(Input {
+        path: path.to_owned(),
+        files: None,
+        blake3: hash_file(path)?.to_hex().to_string(),
+    })
+}
+
+/// Hashes the frames of a survey, several at once: one hash over their names (without folders) and hashes, in order.
+///
+/// # Errors
+/// [`HashError`] of the first that cannot be read.
+pub fn frames(frames: &[FrameFile]) -> Result<Input, HashError> {
+    let hashes: Vec<blake3::Hash> = frames
+        .par_iter()
+        .map(|frame| hash_file(&frame.path))
+        .collect::<Result<_, _>>()?;
+    let mut all = blake3::Hasher::new();
+    for (frame, hash) in frames.iter().zip(&hashes) {
+        let name = frame.path.file_name().unwrap_or_default();
+        // Names have no zero in them, and hashes are of one length: no two lists run together.
+        all.update(name.as_encoded_bytes()).update(&[0]);
+        all.update(hash.as_bytes());
+    }
+    let folder = frames.first().and_then(|frame| frame.path.parent());
+    Ok(Input {
+        path: folder.unwrap_or(Path::new("")).to_owned(),
+        files: Some(frames.len()),
+        blake3: all.finalize().to_hex().to_string(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hashes_follow_content_names_and_order() {
+        let dir = tempfile::tempdir().unwrap();
+        let frame = |name: &str, content: &str| {
+            let path = dir.path().join(name);
+            std::fs::write(&path, content).unwrap();
+            FrameFile { index: 0, path }
+        };
+        let (a, b) = (frame("a.png", "one"), frame("b.png", "two"));
+        let both = frames(&[a.clone(), b.clone()]).unwrap();
+        assert_eq!(both.files, Some(2));
+        assert_ne!(both, frames(&[b.clone(), a.clone()]).unwrap());
+        let c = frame("c.png", "one");
+        assert_ne!(both.blake3, frames(&[c, b.clone()]).unwrap().blake3);
+        assert_eq!(
+            input(&a.path).unwrap().blake3,
+            blake3::hash(b"one").to_hex().to_string()
+        );
+        frame("a.png", "other");
+        assert_ne!(both, frames(&[a, b]).unwrap());
+        assert!(input(&dir.path().join("none")).is_err());
+    }
+}
