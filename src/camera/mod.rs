@@ -5,9 +5,11 @@
 //! (`pixel_centre = "half"`) are converted when read.
 
 mod calibration;
+mod colmap;
 mod pinhole;
 mod radial;
 
 pub use calibration::{CalibrationError, format_calibration, read_calibration};
+pub use colmap::ColmapCamera;
 pub use pinhole::Pinhole;
 pub use radial::Radial;

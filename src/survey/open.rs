@@ -1,0 +1,162 @@
+//! A survey, opened and checked.
+
+use super::associate::TIME_TOLERANCE_S;
+use super::file::read_survey_file;
+use super::reader::{PoseReader, Reading};
+use super::{CalibrateSection, PosesSection, SURVEY_FILE, Shape, SurveyError, SurveyFile};
+use super::{plausible, times};
+use crate::camera::{Pinhole, read_calibration};
+use crate::frames::{self, FrameFile};
+use crate::surface::{Circle, Surface};
+use crate::trajectory::{Jitter, Pose, Trajectory, poses_of};
+use std::path::{Path, PathBuf};
+
+/// A survey, read and checked: everything but the pixels.
+#[derive(Debug)]
+pub struct Survey {
+    /// The folder of `survey.toml`.
+    pub folder: PathBuf,
+    /// `survey.toml` as written.
+    pub file: SurveyFile,
+    /// The camera.
+    pub camera: Pinhole,
+    /// The tunnel.
+    pub surface: Box<dyn Surface>,
+    /// The frames, sorted by name.
+    pub frames: Vec<FrameFile>,
+    /// The initial poses, one per frame.
+    pub initial: Trajectory,
+    /// The true poses, one per frame, where known.
+    pub truth: Option<Trajectory>,
+    /// Noise model of the initial poses.
+    pub prior: Jitter,
+    /// What is possible but suspicious, and what might be meant.
+    pub warnings: Vec<String>,
+    /// The frames' times, seconds, where a file tells them.
+    times_s: Option<Vec<f64>>,
+}
+
+impl Survey {
+    /// Reads a survey: `path` is its folder or its `survey.toml`.
+    ///
+    /// # Errors
+    /// Everything that can be wrong before a pixel is read; see [`SurveyError`].
+    pub fn open(path: &Path) -> Result<Self, SurveyError> {
+        Self::open_with(path, |_| ())
+    }
+
+    /// The same with something else in its `survey.toml` than is written there.
+    ///
+    /// # Errors
+    /// As [`Survey::open`].
+    pub fn open_with(
+        path: &Path,
+        change: impl FnOnce(&mut SurveyFile),
+    ) -> Result<Self, SurveyError> {
+        let toml_path = if path.is_dir() {
+            path.join(SURVEY_FILE)
+        } else {
+            path.to_owned()
+        };
+        let mut file = read_survey_file(&toml_path)?;
+        change(&mut file);
+        let folder = match toml_path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        let value = |what: String| SurveyError::Value {
+            path: toml_path.clone(),
+            what,
+        };
+        let Shape::Circle = file.tunnel.shape;
+        let circle = Circle::new(file.tunnel.radius_m)
+            .map_err(|error| value(format!("tunnel.radius_m: {error}")))?;
+        let prior = &file.prior;
+        if !(1e-6..=180.0).contains(&prior.rotation_sigma_deg) {
+            return Err(value(format!(
+                "prior.rotation_sigma_deg is {}; it must lie between 1e-6 and 180",
+                prior.rotation_sigma_deg
+            )));
+        }
+        if !prior
+            .translation_sigma_m
+            .iter()
+            .all(|s| (1e-9..=10.0 * file.tunnel.radius_m).contains(s))
+        {
+            return Err(value(format!(
+                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times the radius",
+                prior.translation_sigma_m
+            )));
+        }
+        if let Some(fault) = file.calibrate.as_ref().and_then(CalibrateSection::fault) {
+            return Err(value(fault));
+        }
+        let tolerance_s = file.poses.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S);
+        if !(0.0..=1e6).contains(&tolerance_s) {
+            return Err(value(format!(
+                "poses.time_tolerance_s is {tolerance_s}; it must be seconds, 0 or more"
+            )));
+        }
+        let camera = read_calibration(&folder.join(&file.camera.file))?;
+        let frames = frames::list(&folder, &file.frames.images)?;
+        let surface: Box<dyn Surface> = Box::new(circle);
+        let times_s = match &file.frames.times {
+            Some(times) => Some(times::read(&folder.join(times), &frames)?),
+            None => None,
+        };
+        let mut survey = Self {
+            camera,
+            surface,
+            frames,
+            initial: Vec::new(),
+            truth: None,
+            prior: file.prior.into(),
+            warnings: Vec::new(),
+            times_s,
+            folder,
+            file,
+        };
+        let (initial, warnings) = survey.read_as(&survey.file.poses, &survey.file.poses.initial)?;
+        survey.initial = initial;
+        survey.warnings.extend(warnings);
+        if let Some(truth) = &survey.file.poses.truth {
+            let (truth, warnings) = survey.read_as(&survey.file.poses, truth)?;
+            survey.truth = Some(truth);
+            survey.warnings.extend(warnings);
+        }
+        Ok(survey)
+    }
+
+    /// Reads a file of poses in the tunnel, as `refine` and `convert` write them, in its format's own convention, and checks
+    /// it against the frames and the tunnel.
+    ///
+    /// # Errors
+    /// A malformed file, poses that cannot be tied to the frames, a camera outside the tunnel.
+    pub fn read_poses(&self, path: &Path) -> Result<Trajectory, SurveyError> {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        Ok(self.read_as(&PosesSection::of(&path), &path)?.0)
+    }
+
+    /// Reads a file of poses as a section says; its warnings beside it.
+    fn read_as(
+        &self,
+        section: &PosesSection,
+        file: &Path,
+    ) -> Result<(Trajectory, Option<String>), SurveyError> {
+        let path = self.folder.join(file);
+        let times_s = self.times_s.as_deref();
+        let reading: Reading =
+            PoseReader::new(section, &self.folder, &self.frames, times_s)?.read(&path)?;
+        let trajectory = reading.trajectory();
+        let poses = poses_of(&trajectory);
+        let surface = self.surface.as_ref();
+        let warning = plausible::check(surface, &self.camera, &reading, &poses, &path)?;
+        Ok((trajectory, warning))
+    }
+
+    /// The initial poses without their times.
+    pub fn initial_poses(&self) -> Vec<Pose> {
+        poses_of(&self.initial)
+    }
+}
+
