@@ -88,7 +88,10 @@ mod tests {
         let radial = Radial { k1: -0.1, k2: 0.02 };
         let distorted = ColmapCamera::of(&Pinhole { radial, ..camera });
         let text = distorted.cameras_txt();
-        assert!(text.contains("\n1 OPENCV 640 480 ") && text.ends_with(" 320 240 -0.1 0.02 0 0\n"), "{text}");
+        assert!(
+            text.contains("\n1 OPENCV 640 480 ") && text.ends_with(" 320 240 -0.1 0.02 0 0\n"),
+            "{text}"
+        );
         assert_eq!(distorted.nerfstudio()["fl_x"], json!(camera.fx));
     }
 }

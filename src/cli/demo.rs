@@ -65,7 +65,8 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
         "\ntunnelstitch refine {survey_path} --out {refined_path}"
     ));
     let refine_options = RefineOptions::default();
-    let (refined, _) = refine_into(&survey_folder, &refine_options, &refined_folder, terminal)?;
+    let survey = Survey::open(&survey_folder)?;
+    let (refined, _) = refine_into(&survey, &refine_options, &refined_folder, terminal)?;
     if !arguments.json {
         summarise(&refined, terminal);
     }
@@ -76,7 +77,7 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
         poses.display()
     ));
     let (comparison, json) = compare_into(
-        &Survey::open(&survey_folder)?,
+        &survey,
         &poses,
         &PictureArguments::default(),
         &compare_folder,

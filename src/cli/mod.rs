@@ -2,12 +2,14 @@
 
 mod compare;
 mod converge;
+mod convert;
 mod demo;
 mod failure;
 mod hardships;
 mod json;
 mod locate;
 mod outputs;
+mod poses;
 mod project;
 mod refine;
 mod simulate;
@@ -56,6 +58,7 @@ enum Command {
     Stitch(stitch::StitchArguments),
     Locate(locate::LocateArguments),
     Compare(compare::CompareArguments),
+    Convert(convert::ConvertArguments),
     Converge(converge::ConvergeArguments),
     Project(project::ProjectArguments),
 }
@@ -86,6 +89,7 @@ pub fn run() -> Result<(), Failure> {
         Command::Stitch(arguments) => stitch::run(&arguments, &terminal),
         Command::Locate(arguments) => locate::run(&arguments, &terminal),
         Command::Compare(arguments) => compare::run(&arguments, &terminal),
+        Command::Convert(arguments) => convert::run(&arguments, &terminal),
         Command::Converge(arguments) => converge::run(&arguments, &terminal),
         Command::Project(arguments) => project::run(&arguments, &terminal),
     }

@@ -106,17 +106,10 @@ impl OutputArguments {
     ///
     /// # Errors
     /// The two names.
-    pub fn check_apart(&self, survey: &Survey, poses: Option<&Path>) -> Result<(), Failure> {
+    pub fn check_apart(&self, survey: &Survey) -> Result<(), Failure> {
         let mut inputs: Vec<PathBuf> = survey.frames.iter().map(|f| f.path.clone()).collect();
-        let file = &survey.file;
-        let own = [
-            Path::new(SURVEY_FILE),
-            &file.camera.file,
-            &file.poses.initial,
-        ];
-        let named = own.into_iter().chain(file.poses.truth.as_deref());
-        inputs.extend(named.map(|name| survey.folder.join(name)));
-        inputs.extend(poses.map(Path::to_owned));
+        inputs.push(survey.folder.join(SURVEY_FILE));
+        inputs.extend(survey.named_files());
         inputs.extend(self.covariance.clone());
         let mut taken: Vec<PathBuf> = inputs.iter().map(|path| full(path)).collect();
         for output in self.paths() {

@@ -1,5 +1,6 @@
 //! `tunnelstitch refine`.
 
+use super::poses::ReadingArguments;
 use super::{Failure, Terminal, json};
 use crate::PROGRAM;
 use crate::atomic;
@@ -38,6 +39,8 @@ pub struct RefineArguments {
     /// Print refine.json on standard output instead of the summary.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    reading: ReadingArguments,
 }
 
 /// What `--calibrate` takes.
@@ -100,7 +103,8 @@ pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), 
             false => RefineOptions::default(),
         }
     };
-    let (refined, json) = refine_into(&arguments.survey, &options, &arguments.out, terminal)?;
+    let survey = arguments.reading.open(&arguments.survey, terminal)?;
+    let (refined, json) = refine_into(&survey, &options, &arguments.out, terminal)?;
     if arguments.json {
         json::print_text(&json)?;
     } else {
@@ -127,12 +131,11 @@ pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), 
 /// # Errors
 /// Bad input, or an output that cannot be written.
 pub fn refine_into(
-    survey_path: &Path,
+    survey: &Survey,
     options: &RefineOptions,
     out: &Path,
     terminal: &Arc<Terminal>,
 ) -> Result<(Refined, String), Failure> {
-    let survey = Survey::open(survey_path)?;
     atomic::create_folder(out)?;
     let survey_section = survey.file.calibrate.as_ref();
     let asked = options
@@ -143,10 +146,10 @@ pub fn refine_into(
         check_apart(&survey.folder, out)?;
     }
     let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
-    let refined = refine(&survey, options, &progress)?;
+    let refined = refine(survey, options, &progress)?;
     let json = json::text(&ReportFile {
         program: PROGRAM,
-        survey: survey_path,
+        survey: &survey.folder,
         survey_file: &survey.file,
         options,
         report: &refined.report,
@@ -165,7 +168,7 @@ pub fn refine_into(
     )?;
     if let Some(calibration) = &refined.report.calibration {
         let file =
-            calibrated(&survey, calibration).map_err(|error| Failure::bug(error.to_string()))?;
+            calibrated(survey, calibration).map_err(|error| Failure::bug(error.to_string()))?;
         let camera = format_calibration(&calibration.camera);
         atomic::write_text(&out.join(CAMERA_FILE), &camera)?;
         atomic::write_text(&out.join(SURVEY_FILE), &file)?;
@@ -194,13 +197,14 @@ fn calibrated(
 ) -> Result<String, toml::ser::Error> {
     let folder = std::path::absolute(&survey.folder).unwrap_or_else(|_| survey.folder.clone());
     let mut file = survey.file.clone();
+    for path in file.paths_mut() {
+        *path = folder.join(&*path);
+    }
     file.tunnel.radius_m = calibration.radius_m;
     file.camera.file = CAMERA_FILE.into();
     let escaped = glob::Pattern::escape(&folder.to_string_lossy());
     let images = Path::new(&escaped).join(&file.frames.images);
     file.frames.images = images.to_string_lossy().into_owned();
-    file.poses.initial = folder.join(&file.poses.initial);
-    file.poses.truth = file.poses.truth.map(|truth| folder.join(truth));
     file.calibrate = None;
     Ok(format!(
         "# The survey with the calibration that refine has found.\n{}",

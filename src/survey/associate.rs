@@ -55,7 +55,12 @@ pub(super) fn by_order(
             },
         });
     }
-    Ok(file.entries.iter().enumerate().map(|(k, entry)| stamped(entry, k, times_s)).collect())
+    Ok(file
+        .entries
+        .iter()
+        .enumerate()
+        .map(|(k, entry)| stamped(entry, k, times_s))
+        .collect())
 }
 
 /// The pose of each frame's name: the whole path as the file of poses has it, or its end. Poses of other files are left alone.
@@ -77,16 +82,25 @@ pub(super) fn by_name(
             fail("has no names of frames; tie its poses by --associate order or time".to_owned())
         })?);
         let base = path.file_name().unwrap_or_default().to_string_lossy();
-        named.entry(base.into_owned()).or_default().push((path, entry));
+        named
+            .entry(base.into_owned())
+            .or_default()
+            .push((path, entry));
     }
     let of_frame = |frame: &FrameFile| {
         let same = named.get(&frame.name()).map_or(&[][..], Vec::as_slice);
         let entry = match same {
-            [] => Err(fail(format!("no pose of frame {} ({})", frame.index, frame.path.display()))),
+            [] => Err(fail(format!(
+                "no pose of frame {} ({})",
+                frame.index,
+                frame.path.display()
+            ))),
             [(_, only)] => Ok(*only),
             // Several folders hold files of that name: the parts of the path decide.
             several => {
-                let mut fitting = several.iter().filter(|(path, _)| frame.path.ends_with(relative(path)));
+                let mut fitting = several
+                    .iter()
+                    .filter(|(path, _)| frame.path.ends_with(relative(path)));
                 match (fitting.next(), fitting.next()) {
                     (Some((_, only)), None) => Ok(*only),
                     _ => Err(fail(format!(
@@ -147,7 +161,10 @@ pub(super) fn by_time(
             ))
         };
         let after = all.partition_point(|stamped| stamped.time_s < time_s);
-        let (next, last) = (all.get(after), after.checked_sub(1).and_then(|k| all.get(k)));
+        let (next, last) = (
+            all.get(after),
+            after.checked_sub(1).and_then(|k| all.get(k)),
+        );
         let off = |stamped: &StampedPose| (stamped.time_s - time_s).abs();
         let nearest = match (last, next) {
             (Some(last), Some(next)) if off(last) <= off(next) => last,
@@ -219,8 +236,13 @@ mod tests {
         let file = file(&["left/b.png", "./a.png", "right/b.png", "c.png"]);
         let found = by_name(&file, &frames(&["s/a.png", "s/right/b.png"]), None).unwrap();
         assert_eq!([found[0].time_s, found[1].time_s], [11.0, 12.0]);
-        for (path, expected) in [("s/d.png", "no pose of frame 0"), ("s/b.png", "2 poses could be")] {
-            let message = by_name(&file, &frames(&[path]), None).unwrap_err().to_string();
+        for (path, expected) in [
+            ("s/d.png", "no pose of frame 0"),
+            ("s/b.png", "2 poses could be"),
+        ] {
+            let message = by_name(&file, &frames(&[path]), None)
+                .unwrap_err()
+                .to_string();
             assert!(message.contains(expected), "{message}");
         }
     }
@@ -235,24 +257,49 @@ mod tests {
         let two = frames(&["a", "b"]);
         let nearest = by_time(&file, &two, &[9.75, 11.25], how(false)).unwrap();
         assert_eq!(nearest[0].pose, file.entries[0].pose);
-        assert_eq!((nearest[1].time_s, nearest[1].pose), (11.25, file.entries[1].pose));
+        assert_eq!(
+            (nearest[1].time_s, nearest[1].pose),
+            (11.25, file.entries[1].pose)
+        );
         let between = by_time(&file, &two, &[10.0, 11.25], how(true)).unwrap();
         assert_eq!(between[0].pose, file.entries[0].pose);
         let expected = spiral(10, 0.025, 0.125)[5];
         assert!(between[1].pose.local(&expected).norm() < 1e-12);
         for (times_s, interpolate, expected) in [
-            ([10.0, 12.75], false, ["frame 1 (b) at 12.75 s", "nearest pose is at 12 s, 0.75"]),
-            ([10.0, 12.25], true, ["frame 1 (b) at 12.25 s", "nothing is extrapolated"]),
-            ([9.9, 11.0], true, ["frame 0 (a) at 9.9 s", "nearest of which is at 10 s"]),
+            (
+                [10.0, 12.75],
+                false,
+                ["frame 1 (b) at 12.75 s", "nearest pose is at 12 s, 0.75"],
+            ),
+            (
+                [10.0, 12.25],
+                true,
+                ["frame 1 (b) at 12.25 s", "nothing is extrapolated"],
+            ),
+            (
+                [9.9, 11.0],
+                true,
+                ["frame 0 (a) at 9.9 s", "nearest of which is at 10 s"],
+            ),
         ] {
-            let message = by_time(&file, &two, &times_s, how(interpolate)).unwrap_err().to_string();
-            assert!(expected.iter().all(|part| message.contains(part)), "{message}");
+            let message = by_time(&file, &two, &times_s, how(interpolate))
+                .unwrap_err()
+                .to_string();
+            assert!(
+                expected.iter().all(|part| message.contains(part)),
+                "{message}"
+            );
         }
     }
 
     #[test]
     fn the_order_wants_as_many() {
-        let message = by_order(&file(&["a", "b"]), &frames(&["a"]), None).unwrap_err().to_string();
-        assert!(message.contains("2 poses for 1 frames") && message.contains("--associate name"), "{message}");
+        let message = by_order(&file(&["a", "b"]), &frames(&["a"]), None)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("2 poses for 1 frames") && message.contains("--associate name"),
+            "{message}"
+        );
     }
 }

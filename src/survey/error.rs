@@ -94,4 +94,3 @@ pub enum SurveyError {
     #[error(transparent)]
     Poses(#[from] PoseError),
 }
-

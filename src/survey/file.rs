@@ -28,6 +28,23 @@ pub struct SurveyFile {
     pub calibrate: Option<CalibrateSection>,
 }
 
+impl SurveyFile {
+    /// All files that it names, as written; the frames are a pattern and not among them.
+    pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let poses = &mut self.poses;
+        [
+            Some(&mut self.camera.file),
+            self.frames.times.as_mut(),
+            Some(&mut poses.initial),
+            poses.truth.as_mut(),
+            poses.body_to_camera.as_mut(),
+            poses.tunnel_frame.as_mut(),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
 /// Shape of the tunnel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

@@ -116,14 +116,18 @@ impl Survey {
             folder,
             file,
         };
-        let (initial, warnings) = survey.read_as(&survey.file.poses, &survey.file.poses.initial)?;
-        survey.initial = initial;
-        survey.warnings.extend(warnings);
-        if let Some(truth) = &survey.file.poses.truth {
-            let (truth, warnings) = survey.read_as(&survey.file.poses, truth)?;
-            survey.truth = Some(truth);
-            survey.warnings.extend(warnings);
-        }
+        let section = &survey.file.poses;
+        let (initial, mut warnings) =
+            survey.read_as(section, &survey.folder.join(&section.initial))?;
+        let truth = match &section.truth {
+            Some(truth) => {
+                let (truth, more) = survey.read_as(section, &survey.folder.join(truth))?;
+                warnings.extend(more);
+                Some(truth)
+            }
+            None => None,
+        };
+        (survey.initial, survey.truth, survey.warnings) = (initial, truth, warnings);
         Ok(survey)
     }
 
@@ -133,25 +137,30 @@ impl Survey {
     /// # Errors
     /// A malformed file, poses that cannot be tied to the frames, a camera outside the tunnel.
     pub fn read_poses(&self, path: &Path) -> Result<Trajectory, SurveyError> {
-        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        Ok(self.read_as(&PosesSection::of(&path), &path)?.0)
+        Ok(self.read_as(&PosesSection::of(path), path)?.0)
     }
 
     /// Reads a file of poses as a section says; its warnings beside it.
     fn read_as(
         &self,
         section: &PosesSection,
-        file: &Path,
-    ) -> Result<(Trajectory, Option<String>), SurveyError> {
-        let path = self.folder.join(file);
+        path: &Path,
+    ) -> Result<(Trajectory, Vec<String>), SurveyError> {
         let times_s = self.times_s.as_deref();
         let reading: Reading =
-            PoseReader::new(section, &self.folder, &self.frames, times_s)?.read(&path)?;
+            PoseReader::new(section, &self.folder, &self.frames, times_s)?.read(path)?;
         let trajectory = reading.trajectory();
         let poses = poses_of(&trajectory);
         let surface = self.surface.as_ref();
-        let warning = plausible::check(surface, &self.camera, &reading, &poses, &path)?;
+        let warning = plausible::check(surface, &self.camera, &reading, &poses, path)?;
         Ok((trajectory, warning))
+    }
+
+    /// The files besides the frames that `survey.toml` names: calibration, poses, times, motions.
+    pub fn named_files(&self) -> Vec<PathBuf> {
+        let mut file = self.file.clone();
+        let names = file.paths_mut().map(|path| self.folder.join(&*path));
+        names.collect()
     }
 
     /// The initial poses without their times.
@@ -159,4 +168,3 @@ impl Survey {
         poses_of(&self.initial)
     }
 }
-

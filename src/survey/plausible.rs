@@ -36,7 +36,10 @@ impl Stand {
         Self {
             frames: poses.len(),
             outside: poses.iter().filter(outside).count(),
-            axial: poses.iter().filter(|pose| looks_along_the_axis(camera, pose)).count(),
+            axial: poses
+                .iter()
+                .filter(|pose| looks_along_the_axis(camera, pose))
+                .count(),
             course: Course::of(poses),
         }
     }
@@ -77,7 +80,9 @@ fn is_askew(direction: &Vector3<f64>) -> bool {
 fn looks_along_the_axis(camera: &Pinhole, pose: &Pose) -> bool {
     [Vector3::y(), -Vector3::y()].iter().any(|along| {
         let direction = pose.r_wc.inverse_transform_vector(along);
-        camera.project(&direction).is_some_and(|pixel| camera.sees(&pixel, 0.0))
+        camera
+            .project(&direction)
+            .is_some_and(|pixel| camera.sees(&pixel, 0.0))
     })
 }
 
@@ -166,12 +171,16 @@ fn others(reading: &Reading) -> Vec<Other> {
         if direction {
             other.direction = given.direction.other();
             let name = other.direction.name();
-            flags.push(format!("--pose-convention {name} (poses.convention = \"{name}\" in survey.toml)"));
+            flags.push(format!(
+                "--pose-convention {name} (poses.convention = \"{name}\" in survey.toml)"
+            ));
         }
         if axes {
             other.axes = given.axes.other();
             let name = other.axes.name();
-            flags.push(format!("--camera-axes {name} (poses.camera_axes = \"{name}\" in survey.toml)"));
+            flags.push(format!(
+                "--camera-axes {name} (poses.camera_axes = \"{name}\" in survey.toml)"
+            ));
         }
         if mount {
             let Some(camera_in_body) = given.camera_in_body else {
@@ -195,7 +204,9 @@ fn others(reading: &Reading) -> Vec<Other> {
             // What a file says has few digits.
             let Ok(frame) = axis.frame() else { continue };
             let json = serde_json::to_string(&axis).unwrap_or_default();
-            let flag = format!("--tunnel-frame FILE (poses.tunnel_frame in survey.toml) with the FILE {json}");
+            let flag = format!(
+                "--tunnel-frame FILE (poses.tunnel_frame in survey.toml) with the FILE {json}"
+            );
             along_other_axes.push(Other {
                 convention: Convention {
                     tunnel_in_world: Some(frame),
@@ -228,7 +239,11 @@ fn axes_of(reading: &Reading, convention: &Convention) -> Vec<TunnelAxis> {
     let course = Course::of(&poses);
     let towards = course.motion.unwrap_or(Vector3::zeros());
     let axis = |point: Vector3<f64>, direction: Vector3<f64>| {
-        let direction = if direction.dot(&towards) < 0.0 { -direction } else { direction };
+        let direction = if direction.dot(&towards) < 0.0 {
+            -direction
+        } else {
+            direction
+        };
         let rounded = |v: Vector3<f64>| {
             let digits = |value: f64| (value * 1e4).round() / 1e4 + 0.0;
             [digits(v.x), digits(v.y), digits(v.z)]
@@ -239,12 +254,16 @@ fn axes_of(reading: &Reading, convention: &Convention) -> Vec<TunnelAxis> {
             theta_zero: None,
         }
     };
-    let worlds = [Vector3::x(), Vector3::z(), Vector3::y()].map(|along| axis(Vector3::zeros(), along));
+    let worlds =
+        [Vector3::x(), Vector3::z(), Vector3::y()].map(|along| axis(Vector3::zeros(), along));
     let own = [course.motion, course.turning].into_iter().flatten();
-    worlds.into_iter().chain(own.map(|along| axis(course.middle, along))).collect()
+    worlds
+        .into_iter()
+        .chain(own.map(|along| axis(course.middle, along)))
+        .collect()
 }
 
-/// Checks the poses of a file against the tunnel; returns a warning where they are possible but suspicious.
+/// Checks the poses of a file against the tunnel; returns warnings where they are possible but suspicious.
 ///
 /// # Errors
 /// A camera outside; most cameras looking along the axis, where another reading makes sense of them.
@@ -254,7 +273,7 @@ pub(super) fn check(
     reading: &Reading,
     poses: &[Pose],
     path: &Path,
-) -> Result<Option<String>, SurveyError> {
+) -> Result<Vec<String>, SurveyError> {
     let stand = Stand::of(surface, camera, poses);
     let remedy = || {
         let sound = others(reading).into_iter().find(|other| {
@@ -268,7 +287,10 @@ pub(super) fn check(
         sound.map(|other| other.remedy)
     };
     let outside = poses.iter().enumerate().find_map(|(frame, pose)| {
-        surface.check_inside(&pose.t_wc).err().map(|source| (frame, source))
+        surface
+            .check_inside(&pose.t_wc)
+            .err()
+            .map(|source| (frame, source))
     });
     if let Some((frame, source)) = outside {
         let other = stand.is_wrong().then(remedy).flatten();
@@ -298,11 +320,13 @@ pub(super) fn check(
         });
     }
     if stand.is_suspicious() {
-        let likely = remedy().map_or(String::new(), |other| format!("; they would go along it with {other}"));
-        return Ok(Some(format!(
+        let likely = remedy().map_or(String::new(), |other| {
+            format!("; they would go along it with {other}")
+        });
+        return Ok(vec![format!(
             "{}: the cameras move or turn across the tunnel, not along its axis (the world's y){likely}",
             path.display()
-        )));
+        )]);
     }
-    Ok(None)
+    Ok(Vec::new())
 }

@@ -49,16 +49,4 @@ impl PosesSection {
             ..Self::default()
         }
     }
-
-    /// All files it names, as written.
-    pub fn files_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
-        [
-            Some(&mut self.initial),
-            self.truth.as_mut(),
-            self.body_to_camera.as_mut(),
-            self.tunnel_frame.as_mut(),
-        ]
-        .into_iter()
-        .flatten()
-    }
 }

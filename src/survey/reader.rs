@@ -52,8 +52,12 @@ impl<'a> PoseReader<'a> {
         let tunnel = section.tunnel_frame.as_ref();
         Ok(Self {
             section,
-            camera_in_body: mount.map(|file| read_camera_in_body(&folder.join(file))).transpose()?,
-            tunnel_in_world: tunnel.map(|file| read_tunnel_frame(&folder.join(file))).transpose()?,
+            camera_in_body: mount
+                .map(|file| read_camera_in_body(&folder.join(file)))
+                .transpose()?,
+            tunnel_in_world: tunnel
+                .map(|file| read_tunnel_frame(&folder.join(file)))
+                .transpose()?,
             frames,
             times_s,
         })

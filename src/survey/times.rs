@@ -28,10 +28,19 @@ pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, Survey
             [time] => (*time, None),
             [first, second] if times::from_word(first).is_some() => (*first, Some(*second)),
             [first, second] => (*second, Some(*first)),
-            _ => return Err(fail(format!("{} columns where a line is `time`, `time name` or `name time`", words.len())).into()),
+            _ => {
+                return Err(fail(format!(
+                    "{} columns where a line is `time`, `time name` or `name time`",
+                    words.len()
+                ))
+                .into());
+            }
         };
-        let time_s = times::from_word(time)
-            .ok_or_else(|| fail(format!("`{time}` is no time; seconds, or whole nanoseconds")))?;
+        let time_s = times::from_word(time).ok_or_else(|| {
+            fail(format!(
+                "`{time}` is no time; seconds, or whole nanoseconds"
+            ))
+        })?;
         match name {
             None => in_order.push(time_s),
             Some(name) => {
@@ -56,10 +65,13 @@ pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, Survey
         return Err(file("some lines have a name and some do not".to_owned()));
     }
     let of_frame = |frame: &FrameFile| {
-        by_name
-            .get(&frame.name())
-            .copied()
-            .ok_or_else(|| file(format!("no time of frame {} ({})", frame.index, frame.name())))
+        by_name.get(&frame.name()).copied().ok_or_else(|| {
+            file(format!(
+                "no time of frame {} ({})",
+                frame.index,
+                frame.name()
+            ))
+        })
     };
     frames.iter().map(of_frame).collect()
 }
@@ -138,8 +150,16 @@ mod tests {
 
     #[test]
     fn a_counter_is_no_time() {
-        assert_eq!(from_names(&frames(&["1.25.png", "1.5.png"])).unwrap(), [1.25, 1.5]);
-        let message = from_names(&frames(&["000001.png"])).unwrap_err().to_string();
-        assert!(message.contains("frame 0") && message.contains("frames.times"), "{message}");
+        assert_eq!(
+            from_names(&frames(&["1.25.png", "1.5.png"])).unwrap(),
+            [1.25, 1.5]
+        );
+        let message = from_names(&frames(&["000001.png"]))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("frame 0") && message.contains("frames.times"),
+            "{message}"
+        );
     }
 }

@@ -23,7 +23,9 @@ const NUMBERS: usize = 9;
 pub(super) fn is_line(line: &str) -> bool {
     let words: Vec<&str> = line.split_whitespace().collect();
     words.len() > NUMBERS
-        && words[..NUMBERS].iter().all(|word| word.parse::<f64>().is_ok())
+        && words[..NUMBERS]
+            .iter()
+            .all(|word| word.parse::<f64>().is_ok())
         && words[0].parse::<u64>().is_ok()
         && words[NUMBERS].parse::<f64>().is_err()
 }
@@ -41,7 +43,9 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
             points_next = false;
         } else if !line.is_empty() && !line.starts_with('#') {
             let entry = parse_line(line).map_err(fail)?;
-            names.add(entry.name.as_deref().unwrap_or_default()).map_err(fail)?;
+            names
+                .add(entry.name.as_deref().unwrap_or_default())
+                .map_err(fail)?;
             entries.push(entry);
             points_next = true;
         }

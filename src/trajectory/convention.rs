@@ -134,12 +134,13 @@ mod tests {
 
     #[test]
     fn every_part_is_undone() {
-        let (camera_in_tunnel, camera_in_body, tunnel_in_world) =
-            (pose(0.1, 2.0, -0.4), pose(1.0, 0.3, 0.2), pose(-0.5, 0.4, 2.0));
+        let (camera_in_tunnel, camera_in_body, tunnel_in_world) = (
+            pose(0.1, 2.0, -0.4),
+            pose(1.0, 0.3, 0.2),
+            pose(-0.5, 0.4, 2.0),
+        );
         let gl = CameraAxes::OpenGl.turn(&camera_in_tunnel);
-        let body_in_world = tunnel_in_world
-            .after(&gl)
-            .after(&camera_in_body.inverse());
+        let body_in_world = tunnel_in_world.after(&gl).after(&camera_in_body.inverse());
         let convention = Convention {
             direction: Direction::WorldToCamera,
             axes: CameraAxes::OpenGl,
@@ -154,7 +155,11 @@ mod tests {
     fn axes_are_turned_as_the_matrix_says_and_exactly() {
         let pose = pose(0.1, 2.0, -0.4);
         let turned = CameraAxes::OpenGl.turn(&pose);
-        for (axis, sign) in [(Vector3::x(), 1.0), (Vector3::y(), -1.0), (Vector3::z(), -1.0)] {
+        for (axis, sign) in [
+            (Vector3::x(), 1.0),
+            (Vector3::y(), -1.0),
+            (Vector3::z(), -1.0),
+        ] {
             assert!((turned.r_wc * axis - pose.r_wc * axis * sign).norm() < 1e-15);
         }
         // Twice is a whole turn: the same rotation, the quaternion's sign changed.

@@ -50,7 +50,10 @@ impl Columns {
         let mut pose = [0; 7];
         for (at, names) in pose.iter_mut().zip(POSE) {
             *at = find(names)?.ok_or_else(|| {
-                format!("no column `{}`; the columns are `{FORM}`", names.join("` or `"))
+                format!(
+                    "no column `{}`; the columns are `{FORM}`",
+                    names.join("` or `")
+                )
             })?;
         }
         Ok(Self {
@@ -64,9 +67,14 @@ impl Columns {
 
 /// Whether a first line names the columns of poses.
 pub(super) fn is_header(line: &str) -> bool {
-    let words = line.split([',', ';', '\t']).map(|word| word.trim().trim_matches('"'));
+    let words = line
+        .split([',', ';', '\t'])
+        .map(|word| word.trim().trim_matches('"'));
     words
-        .filter(|word| POSE.iter().any(|names| names.contains(&word.to_lowercase().as_str())))
+        .filter(|word| {
+            POSE.iter()
+                .any(|names| names.contains(&word.to_lowercase().as_str()))
+        })
         .count()
         >= 2
 }
@@ -96,8 +104,13 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         let last_s = entries.last().and_then(|entry| entry.time_s);
         let entry = parse_record(&record, expected, &columns)
             .and_then(|entry| {
-                entry.time_s.map_or(Ok(()), |time_s| text::after(time_s, last_s))?;
-                entry.name.as_deref().map_or(Ok(()), |name| names.add(name))?;
+                entry
+                    .time_s
+                    .map_or(Ok(()), |time_s| text::after(time_s, last_s))?;
+                entry
+                    .name
+                    .as_deref()
+                    .map_or(Ok(()), |name| names.add(name))?;
                 Ok(entry)
             })
             .map_err(|what| PoseError::line(path, line as usize, what))?;

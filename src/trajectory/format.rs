@@ -1,7 +1,7 @@
 //! The formats that poses are kept in, and which one a file is.
 
-use super::{PoseError, csv, euroc, kitti, text, tum};
 use super::{CameraAxes, Direction, colmap};
+use super::{PoseError, csv, euroc, kitti, text, tum};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -46,7 +46,10 @@ impl PoseFormat {
             return Ok(Self::Colmap);
         }
         let words: Vec<&str> = line.split_whitespace().collect();
-        let numbers = words.iter().filter(|word| word.parse::<f64>().is_ok()).count();
+        let numbers = words
+            .iter()
+            .filter(|word| word.parse::<f64>().is_ok())
+            .count();
         match (numbers, words.len()) {
             // A line too long or too short is the business of the format it is nearest to.
             (12, 12) => Ok(Self::Kitti),

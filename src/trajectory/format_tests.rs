@@ -19,7 +19,9 @@ fn read_text(text: &str) -> Result<PoseFile, PoseError> {
 }
 
 fn names(count: usize) -> Vec<String> {
-    (0..count).map(|k| format!("frames/a, \"{k}\".png")).collect()
+    (0..count)
+        .map(|k| format!("frames/a, \"{k}\".png"))
+        .collect()
 }
 
 /// The same poses in every format that is written, with what reading tells of it.
@@ -30,7 +32,10 @@ fn written(trajectory: &[StampedPose]) -> Vec<(PoseFormat, String)> {
         (PoseFormat::Tum, tum::format(trajectory)),
         (PoseFormat::Kitti, kitti::format(trajectory)),
         (PoseFormat::Csv, csv::format(&names, trajectory)),
-        (PoseFormat::Colmap, colmap::format_images(&names, trajectory)),
+        (
+            PoseFormat::Colmap,
+            colmap::format_images(&names, trajectory),
+        ),
         (
             PoseFormat::Nerfstudio,
             nerfstudio::format(camera.nerfstudio(), &names, trajectory),
@@ -47,8 +52,14 @@ fn assert_restored(trajectory: &[StampedPose], format: PoseFormat, text: &str, t
     for (k, (entry, stamped)) in file.entries.iter().zip(trajectory).enumerate() {
         let back = convention.to_tunnel(&entry.pose);
         let scale = 1.0 + stamped.pose.t_wc.norm();
-        assert!(back.r_wc.angle_to(&stamped.pose.r_wc) < tolerance, "{format:?}");
-        assert!((back.t_wc - stamped.pose.t_wc).norm() < tolerance * scale, "{format:?}");
+        assert!(
+            back.r_wc.angle_to(&stamped.pose.r_wc) < tolerance,
+            "{format:?}"
+        );
+        assert!(
+            (back.t_wc - stamped.pose.t_wc).norm() < tolerance * scale,
+            "{format:?}"
+        );
         if let Some(time_s) = entry.time_s {
             assert_eq!(time_s, stamped.time_s);
         }
@@ -59,7 +70,10 @@ fn assert_restored(trajectory: &[StampedPose], format: PoseFormat, text: &str, t
     let knows = |format: PoseFormat| {
         (
             matches!(format, PoseFormat::Tum | PoseFormat::Csv),
-            matches!(format, PoseFormat::Csv | PoseFormat::Colmap | PoseFormat::Nerfstudio),
+            matches!(
+                format,
+                PoseFormat::Csv | PoseFormat::Colmap | PoseFormat::Nerfstudio
+            ),
         )
     };
     assert_eq!((file.has_times(), file.has_names()), knows(format));
@@ -106,7 +120,12 @@ fn editors_leave_their_marks() {
         assert_restored(&trajectory, format, &text.replace('\n', "\r\n"), 1e-13);
         assert_restored(&trajectory, format, &format!("\u{feff}{text}"), 1e-13);
         if !matches!(format, PoseFormat::Nerfstudio) {
-            assert_restored(&trajectory, format, &format!("# made by hand\n\n{text}\n"), 1e-13);
+            assert_restored(
+                &trajectory,
+                format,
+                &format!("# made by hand\n\n{text}\n"),
+                1e-13,
+            );
         }
     }
 }
@@ -116,12 +135,18 @@ fn editors_leave_their_marks() {
 fn a_truncated_file_has_no_wrong_poses() {
     let trajectory = indexed(spiral(3, 0.5, 0.75));
     for (format, text) in written(&trajectory) {
-        let whole = read_poses(&file_of(text.as_bytes()).1, Some(format)).unwrap().entries;
+        let whole = read_poses(&file_of(text.as_bytes()).1, Some(format))
+            .unwrap()
+            .entries;
         for end in 0..text.len() {
             let (_dir, path) = file_of(&text.as_bytes()[..end]);
             if let Ok(file) = read_poses(&path, Some(format)) {
                 let complete = file.entries.len() - 1;
-                assert_eq!(file.entries[..complete], whole[..complete], "{format:?} {end}");
+                assert_eq!(
+                    file.entries[..complete],
+                    whole[..complete],
+                    "{format:?} {end}"
+                );
             }
         }
     }
@@ -129,11 +154,17 @@ fn a_truncated_file_has_no_wrong_poses() {
 
 #[test]
 fn what_is_no_text_is_refused() {
-    for bytes in [&[0xff, 0xfe, 0x30, 0x00][..], b"0 0 0 0 0 0 0 1\0\n", &[0x89, b'P', b'N', b'G']] {
+    for bytes in [
+        &[0xff, 0xfe, 0x30, 0x00][..],
+        b"0 0 0 0 0 0 0 1\0\n",
+        &[0x89, b'P', b'N', b'G'],
+    ] {
         let message = read_poses(&file_of(bytes).1, None).unwrap_err().to_string();
         assert!(message.contains("no text"), "{message}");
     }
-    let message = read_poses(Path::new("/nowhere/poses.tum"), None).unwrap_err().to_string();
+    let message = read_poses(Path::new("/nowhere/poses.tum"), None)
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("cannot read the file"), "{message}");
 }
 
@@ -152,7 +183,9 @@ fn euroc_is_read_in_nanoseconds_with_w_first() {
 
 #[test]
 fn columns_are_found_by_their_names() {
-    let plain = read_text("timestamp_ns;x;y;z;qw;qx;qy;qz;speed\n1403636580838555648;1;2;3;1;0;0;0;9\n").unwrap();
+    let plain =
+        read_text("timestamp_ns;x;y;z;qw;qx;qy;qz;speed\n1403636580838555648;1;2;3;1;0;0;0;9\n")
+            .unwrap();
     assert_eq!(plain.format, PoseFormat::Csv);
     assert_eq!(plain.entries[0].time_s, Some(1403636580.838555648));
     assert_eq!(plain.entries[0].pose.t_wc, Vector3::new(1.0, 2.0, 3.0));
@@ -162,13 +195,22 @@ fn columns_are_found_by_their_names() {
 #[test]
 fn nerfstudios_applied_transform_is_undone() {
     let trajectory = indexed(spiral(2, 0.5, 0.75));
-    let applied = Pose::new(so3::exp(&Vector3::new(1.0, 0.0, 0.3)), Vector3::new(0.0, 2.0, 1.0));
+    let applied = Pose::new(
+        so3::exp(&Vector3::new(1.0, 0.0, 0.3)),
+        Vector3::new(0.0, 2.0, 1.0),
+    );
     let moved: Trajectory = trajectory
         .iter()
-        .map(|s| StampedPose { pose: applied.after(&s.pose), ..*s })
+        .map(|s| StampedPose {
+            pose: applied.after(&s.pose),
+            ..*s
+        })
         .collect();
     let mut keys = serde_json::Map::new();
-    keys.insert("applied_transform".to_owned(), serde_json::json!(rigid::rows(&applied)));
+    keys.insert(
+        "applied_transform".to_owned(),
+        serde_json::json!(rigid::rows(&applied)),
+    );
     let text = nerfstudio::format(keys, &names(2), &moved);
     assert_restored(&trajectory, PoseFormat::Nerfstudio, &text, 1e-13);
 }

@@ -9,9 +9,7 @@ pub(super) const FORM: &str = "r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz";
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
     text::lines(text)
-        .map(|(number, line)| {
-            parse_line(line).map_err(|what| PoseError::line(path, number, what))
-        })
+        .map(|(number, line)| parse_line(line).map_err(|what| PoseError::line(path, number, what)))
         .collect()
 }
 

@@ -54,7 +54,11 @@ fn values_after<'a>(text: &'a str, key: &'a str) -> impl Iterator<Item = &'a str
     let mut offset = 0;
     text.split_inclusive('\n').filter_map(move |line| {
         offset += line.len();
-        let rest = line.trim_start().strip_prefix(key)?.trim_start().strip_prefix(':')?;
+        let rest = line
+            .trim_start()
+            .strip_prefix(key)?
+            .trim_start()
+            .strip_prefix(':')?;
         text.get(offset - rest.len()..)
     })
 }
@@ -70,7 +74,10 @@ fn bracketed(text: &str) -> Result<Vec<[f64; 4]>, String> {
         .map(|word| text::number(word, "sixteen numbers in brackets"))
         .collect::<Result<Vec<f64>, String>>()?;
     match numbers.len() {
-        16 => Ok(numbers.chunks_exact(4).map(|row| [row[0], row[1], row[2], row[3]]).collect()),
+        16 => Ok(numbers
+            .chunks_exact(4)
+            .map(|row| [row[0], row[1], row[2], row[3]])
+            .collect()),
         count => Err(format!("{count} numbers where a 4 × 4 matrix has 16")),
     }
 }
@@ -95,7 +102,9 @@ mod tests {
             0.999557249008, 0.0149672133247, 0.025715529948, -0.064676986768,\n        \
             -0.0257744366974, 0.00375618835797, 0.999660727178, 0.00981073058949,\n         \
             0.0, 0.0, 0.0, 1.0]";
-        let euroc = format!("sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: {t_bs}\nrate_hz: 20\n");
+        let euroc = format!(
+            "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n  data: {t_bs}\nrate_hz: 20\n"
+        );
         let camera_in_body = read_text(&euroc).unwrap();
         assert!((camera_in_body.t_wc.y + 0.064676986768).abs() < 1e-12);
         let rows = rigid::rows(&camera_in_body.inverse());
@@ -103,7 +112,9 @@ mod tests {
         let matrix = lines.each_ref().map(|row| row.join(" ")).join("\n") + "\n0 0 0 1\n";
         let kalibr = format!(
             "cam0:\n  T_cam_imu:\n{}  - [0.0, 0.0, 0.0, 1.0]\n  camera_model: pinhole\n",
-            lines.map(|row| format!("  - [{}]\n", row.join(", "))).concat()
+            lines
+                .map(|row| format!("  - [{}]\n", row.join(", ")))
+                .concat()
         );
         for text in [matrix, kalibr] {
             let other = read_text(&text).unwrap();
@@ -127,6 +138,10 @@ mod tests {
             assert!(message.contains(expected), "{message}");
         }
         let pose = read_text(identity).unwrap();
-        assert!(pose.local(&Pose::new(so3::exp(&Vector3::zeros()), Vector3::zeros())).norm() < 1e-15);
+        assert!(
+            pose.local(&Pose::new(so3::exp(&Vector3::zeros()), Vector3::zeros()))
+                .norm()
+                < 1e-15
+        );
     }
 }

@@ -41,7 +41,8 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
     let mut names = text::Names::default();
     let mut entries = Vec::new();
     for (index, frame) in transforms.frames.into_iter().enumerate() {
-        let of_frame = |what: String| fail(format!("frames[{index}] ({}): {what}", frame.file_path));
+        let of_frame =
+            |what: String| fail(format!("frames[{index}] ({}): {what}", frame.file_path));
         names.add(&frame.file_path).map_err(of_frame)?;
         let pose = rigid::motion(&frame.transform_matrix)
             .map_err(|what| of_frame(format!("transform_matrix: {what}")))?;
@@ -56,11 +57,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
 
 /// The text of a `transforms.json`. `camera` are the keys of the camera, `names` the frames' paths from the file's folder;
 /// `trajectory` is camera-to-world in OpenCV's axes.
-pub fn format(
-    camera: Map<String, Value>,
-    names: &[String],
-    trajectory: &[StampedPose],
-) -> String {
+pub fn format(camera: Map<String, Value>, names: &[String], trajectory: &[StampedPose]) -> String {
     let frames: Vec<Value> = names
         .iter()
         .zip(trajectory)

@@ -18,12 +18,20 @@ pub(crate) fn motion(rows: &[[f64; 4]]) -> Result<Pose, String> {
         [a, b, c] => [a, b, c],
         [a, b, c, last] => {
             let off = last.iter().zip([0.0, 0.0, 0.0, 1.0]);
-            if !off.into_iter().all(|(value, should)| (value - should).abs() <= 1e-9) {
+            if !off
+                .into_iter()
+                .all(|(value, should)| (value - should).abs() <= 1e-9)
+            {
                 return Err(format!("the last row is {last:?}, not 0 0 0 1"));
             }
             [a, b, c]
         }
-        _ => return Err(format!("{} rows where a rigid motion has 4, or 3", rows.len())),
+        _ => {
+            return Err(format!(
+                "{} rows where a rigid motion has 4, or 3",
+                rows.len()
+            ));
+        }
     };
     let t = Vector3::new(a[3], b[3], c[3]);
     let r = Matrix3::new(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]);
@@ -82,11 +90,17 @@ mod tests {
         };
         let last = row(3, 1.0);
         for (rows, expected) in [
-            (vec![row(0, 2.0), row(1, 2.0), row(2, 2.0), last], "scaled by 2"),
+            (
+                vec![row(0, 2.0), row(1, 2.0), row(2, 2.0), last],
+                "scaled by 2",
+            ),
             (vec![row(0, 1.0), row(1, -1.0), row(2, 1.0), last], "mirror"),
             (vec![row(0, 1.0), row(0, 1.0), row(2, 1.0)], "no rotation"),
             (vec![row(0, 0.0), row(0, 0.0), row(2, 0.0)], "no rotation"),
-            (vec![row(0, 1.0), row(1, 1.0), row(2, 1.0), row(3, 2.0)], "last row"),
+            (
+                vec![row(0, 1.0), row(1, 1.0), row(2, 1.0), row(3, 2.0)],
+                "last row",
+            ),
             (vec![row(0, f64::NAN), row(1, 1.0), row(2, 1.0)], "finite"),
             (vec![row(0, 1.0)], "1 rows"),
         ] {

@@ -56,14 +56,13 @@ pub(crate) fn numbers<const N: usize>(line: &str, form: &str) -> Result<[f64; N]
 /// The rotation of a quaternion; `order` is that of its numbers in the file.
 ///
 /// Up to 1 % off unit length is taken for rounding and put right.
-pub(crate) fn rotation(
-    [w, x, y, z]: [f64; 4],
-    order: &str,
-) -> Result<UnitQuaternion<f64>, String> {
+pub(crate) fn rotation([w, x, y, z]: [f64; 4], order: &str) -> Result<UnitQuaternion<f64>, String> {
     let quaternion = Quaternion::new(w, x, y, z);
     let norm = quaternion.norm();
     if norm < 1e-6 {
-        return Err("the quaternion is zero; no rotation at all is qw = 1, qx = qy = qz = 0".into());
+        return Err(
+            "the quaternion is zero; no rotation at all is qw = 1, qx = qy = qz = 0".into(),
+        );
     }
     if (norm - 1.0).abs() > 0.01 {
         return Err(format!(

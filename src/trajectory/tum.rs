@@ -22,8 +22,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
     let mut entries: Vec<PoseEntry> = Vec::new();
     for (number, line) in text::lines(text) {
         let last_s = entries.last().and_then(|entry| entry.time_s);
-        let entry =
-            parse_line(line, last_s).map_err(|what| PoseError::line(path, number, what))?;
+        let entry = parse_line(line, last_s).map_err(|what| PoseError::line(path, number, what))?;
         entries.push(entry);
     }
     Ok(entries)

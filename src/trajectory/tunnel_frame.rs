@@ -36,7 +36,9 @@ impl TunnelAxis {
             Vector3::new(x, y, z)
                 .try_normalize(1e-12)
                 .filter(|direction| direction.iter().all(|value| value.is_finite()))
-                .ok_or_else(|| format!("{name} has no direction; it must be three numbers, not all zero"))
+                .ok_or_else(|| {
+                    format!("{name} has no direction; it must be three numbers, not all zero")
+                })
         };
         let y = unit("axis", self.axis)?;
         let towards = match self.theta_zero {
@@ -83,7 +85,8 @@ mod tests {
     #[test]
     fn an_axis_and_a_matrix_say_the_same() {
         // Along the world's x, θ = 0 upwards (the world's z).
-        let axis = read_text(r#"{"point_m": [5, 1, 2], "axis": [2, 0, 0], "theta_zero": [3, 0, 1]}"#);
+        let axis =
+            read_text(r#"{"point_m": [5, 1, 2], "axis": [2, 0, 0], "theta_zero": [3, 0, 1]}"#);
         let matrix = read_text("0 1 0 5\n-1 0 0 1\n0 0 1 2\n0 0 0 1\n").unwrap();
         assert!(axis.unwrap().local(&matrix).norm() < 1e-12);
         let chainage = matrix.to_camera(&Vector3::new(8.0, 1.0, 2.0));
@@ -101,12 +104,18 @@ mod tests {
     #[test]
     fn bad_files_say_what_is_wrong() {
         for (text, expected) in [
-            (r#"{"point_m": [0, 0, 0], "axis": [0, 0, 0]}"#, "axis has no direction"),
+            (
+                r#"{"point_m": [0, 0, 0], "axis": [0, 0, 0]}"#,
+                "axis has no direction",
+            ),
             (
                 r#"{"point_m": [0, 0, 0], "axis": [0, 0, 1], "theta_zero": [0, 0, 2]}"#,
                 "axis's own direction",
             ),
-            (r#"{"point_m": [0, 0, 0], "direction": [0, 0, 1]}"#, "unknown field"),
+            (
+                r#"{"point_m": [0, 0, 0], "direction": [0, 0, 1]}"#,
+                "unknown field",
+            ),
             (r#"{"point_m": [0, 0, 1e999], "axis": [0, 0, 1]}"#, "line 1"),
             ("2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n", "scaled by 2"),
             ("", "0 rows"),
