@@ -161,7 +161,7 @@ fn check_apart(survey: &Survey, out: &Path) -> Result<(), Failure> {
         return Ok(());
     };
     let frames = survey.frames.iter().map(|frame| frame.path.clone());
-    let files = survey.named_files().into_iter();
+    let files = survey.own_files().iter().cloned();
     let replaced = files.chain(frames).find(|path| {
         path.canonicalize()
             .is_ok_and(|path| path.starts_with(&out_full))

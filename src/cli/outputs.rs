@@ -10,7 +10,7 @@ use crate::render::{
     Canvas, Coverage, Gap, Layout, Map, Panorama, PixelFormat, Plan, Preview, RasterLayer,
     RasterTarget, Target, gaps_csv,
 };
-use crate::survey::{SURVEY_FILE, Survey};
+use crate::survey::Survey;
 use image::DynamicImage;
 use nalgebra::Matrix6;
 use std::path::{Path, PathBuf};
@@ -108,8 +108,7 @@ impl OutputArguments {
     /// The two names.
     pub fn check_apart(&self, survey: &Survey) -> Result<(), Failure> {
         let mut inputs: Vec<PathBuf> = survey.frames.iter().map(|f| f.path.clone()).collect();
-        inputs.push(survey.folder.join(SURVEY_FILE));
-        inputs.extend(survey.named_files());
+        inputs.extend_from_slice(survey.own_files());
         inputs.extend(self.covariance.clone());
         let mut taken: Vec<PathBuf> = inputs.iter().map(|path| full(path)).collect();
         for output in self.paths() {

@@ -34,6 +34,8 @@ pub struct Survey {
     pub warnings: Vec<String>,
     /// The frames' times, seconds, where a file tells them.
     times_s: Option<Vec<f64>>,
+    /// See [`Survey::own_files`].
+    own_files: Vec<PathBuf>,
 }
 
 impl Survey {
@@ -59,11 +61,14 @@ impl Survey {
             path.to_owned()
         };
         let mut file = read_survey_file(&toml_path)?;
-        change(&mut file);
         let folder = match toml_path.parent() {
             Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
             _ => PathBuf::from("."),
         };
+        let mut own_files = vec![toml_path.clone()];
+        own_files.extend(file.paths_mut().map(|path| folder.join(&*path)));
+        change(&mut file);
+        own_files.extend(file.paths_mut().map(|path| folder.join(&*path)));
         let value = |what: String| SurveyError::Value {
             path: toml_path.clone(),
             what,
@@ -113,6 +118,7 @@ impl Survey {
             prior: file.prior.into(),
             warnings: Vec::new(),
             times_s,
+            own_files,
             folder,
             file,
         };
@@ -156,11 +162,9 @@ impl Survey {
         Ok((trajectory, warning))
     }
 
-    /// The files besides the frames that `survey.toml` names: calibration, poses, times, motions.
-    pub fn named_files(&self) -> Vec<PathBuf> {
-        let mut file = self.file.clone();
-        let names = file.paths_mut().map(|path| self.folder.join(&*path));
-        names.collect()
+    /// The files besides the frames that the survey is made of, whether or not something else was read in their place.
+    pub fn own_files(&self) -> &[PathBuf] {
+        &self.own_files
     }
 
     /// The initial poses without their times.

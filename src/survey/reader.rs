@@ -35,6 +35,14 @@ impl Reading {
         };
         self.given.iter().map(in_tunnel).collect()
     }
+
+    /// The poses in the tunnel if they meant something else.
+    pub fn poses_in(&self, convention: &Convention) -> Vec<Pose> {
+        let given = self.given.iter();
+        given
+            .map(|stamped| convention.to_tunnel(&stamped.pose))
+            .collect()
+    }
 }
 
 impl<'a> PoseReader<'a> {

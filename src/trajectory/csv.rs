@@ -80,29 +80,24 @@ pub(super) fn is_header(line: &str) -> bool {
 }
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
-    let first = text::lines(text).next().map_or("", |(_, line)| line);
+    let mut lines = text::lines(text);
+    let Some((header_number, header)) = lines.next() else {
+        return Ok(Vec::new());
+    };
     let separator = [b'\t', b';', b',']
         .into_iter()
-        .find(|separator| first.as_bytes().contains(separator))
+        .find(|separator| header.as_bytes().contains(separator))
         .unwrap_or(b',');
-    let mut reader = ReaderBuilder::new()
-        .delimiter(separator)
-        .comment(Some(b'#'))
-        .flexible(true)
-        .trim(csv::Trim::All)
-        .from_reader(text.as_bytes());
-    let malformed = |error: csv::Error| PoseError::file(path, error.to_string());
-    let header_line = text::lines(text).next().map_or(1, |(number, _)| number);
-    let columns = Columns::of(reader.headers().map_err(malformed)?)
-        .map_err(|what| PoseError::line(path, header_line, what))?;
+    let header =
+        split(header, separator).map_err(|what| PoseError::line(path, header_number, what))?;
+    let columns =
+        Columns::of(&header).map_err(|what| PoseError::line(path, header_number, what))?;
     let mut entries: Vec<PoseEntry> = Vec::new();
     let mut names = text::Names::default();
-    let expected = reader.headers().map_err(malformed)?.len();
-    for record in reader.records() {
-        let record = record.map_err(malformed)?;
-        let line = record.position().map_or(0, |position| position.line());
+    for (number, line) in lines {
         let last_s = entries.last().and_then(|entry| entry.time_s);
-        let entry = parse_record(&record, expected, &columns)
+        let entry = split(line, separator)
+            .and_then(|record| parse_record(&record, header.len(), &columns))
             .and_then(|entry| {
                 entry
                     .time_s
@@ -113,10 +108,24 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
                     .map_or(Ok(()), |name| names.add(name))?;
                 Ok(entry)
             })
-            .map_err(|what| PoseError::line(path, line as usize, what))?;
+            .map_err(|what| PoseError::line(path, number, what))?;
         entries.push(entry);
     }
     Ok(entries)
+}
+
+/// The columns of a line.
+fn split(line: &str, separator: u8) -> Result<StringRecord, String> {
+    let mut reader = ReaderBuilder::new()
+        .delimiter(separator)
+        .has_headers(false)
+        .trim(csv::Trim::All)
+        .from_reader(line.as_bytes());
+    let mut record = StringRecord::new();
+    match reader.read_record(&mut record) {
+        Ok(_) => Ok(record),
+        Err(error) => Err(error.to_string()),
+    }
 }
 
 fn parse_record(

@@ -4,7 +4,7 @@ use super::*;
 use crate::camera::{ColmapCamera, Pinhole};
 use nalgebra::Vector3;
 use proptest::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A folder and a file in it with these bytes.
 fn file_of(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
