@@ -6,7 +6,9 @@ use crate::PROGRAM;
 use crate::atomic;
 use crate::camera::format_calibration;
 use crate::progress::Progress;
-use crate::refine::{CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, refine};
+use crate::refine::{
+    CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, other_reading, refine,
+};
 use crate::survey::{CalibrationGroup, SURVEY_FILE, Survey, SurveyFile};
 use crate::trajectory::tum;
 use serde::Serialize;
@@ -105,6 +107,16 @@ pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), 
     };
     let survey = arguments.reading.open(&arguments.survey, terminal)?;
     let (refined, json) = refine_into(&survey, &options, &arguments.out, terminal)?;
+    if 2 * refined.report.frames_on_prior > survey.frames.len() {
+        terminal.start("other conventions", 1);
+        let other = other_reading(&survey);
+        terminal.finish();
+        if let Some(flags) = other? {
+            terminal.warn(format!(
+                "the pictures do not agree with the poses as they are read; they agree with {flags}"
+            ));
+        }
+    }
     if arguments.json {
         json::print_text(&json)?;
     } else {

@@ -84,6 +84,9 @@ pub enum SurveyError {
         /// What might be.
         remedy: String,
     },
+    /// The tunnel's own size.
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
     /// Calibration.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),

@@ -7,8 +7,8 @@ use super::{CalibrateSection, PosesSection, SURVEY_FILE, Shape, SurveyError, Sur
 use super::{plausible, times};
 use crate::camera::{Pinhole, read_calibration};
 use crate::frames::{self, FrameFile};
-use crate::surface::{Circle, Surface};
-use crate::trajectory::{Jitter, Pose, Trajectory, poses_of};
+use crate::surface::{Circle, Surface, SurfaceError};
+use crate::trajectory::{Convention, Jitter, Pose, StampedPose, Trajectory, poses_of};
 use std::path::{Path, PathBuf};
 
 /// A survey, read and checked: everything but the pixels.
@@ -73,9 +73,8 @@ impl Survey {
             path: toml_path.clone(),
             what,
         };
-        let Shape::Circle = file.tunnel.shape;
-        let circle = Circle::new(file.tunnel.radius_m)
-            .map_err(|error| value(format!("tunnel.radius_m: {error}")))?;
+        let surface =
+            surface_of(&file).map_err(|error| value(format!("tunnel.radius_m: {error}")))?;
         let prior = &file.prior;
         if !(1e-6..=180.0).contains(&prior.rotation_sigma_deg) {
             return Err(value(format!(
@@ -104,7 +103,6 @@ impl Survey {
         }
         let camera = read_calibration(&folder.join(&file.camera.file))?;
         let frames = frames::list(&folder, &file.frames.images)?;
-        let surface: Box<dyn Surface> = Box::new(circle);
         let times_s = match &file.frames.times {
             Some(times) => Some(times::read(&folder.join(times), &frames)?),
             None => None,
@@ -162,6 +160,41 @@ impl Survey {
         Ok((trajectory, warning))
     }
 
+    /// The first frames of the survey with their initial poses as they are read, and in every other convention that leaves all
+    /// cameras inside, each with the flags that stand for it (none for the first).
+    ///
+    /// # Errors
+    /// As [`Survey::open`], should the file have changed since.
+    pub fn readings(&self, most_frames: usize) -> Result<Vec<(String, Self)>, SurveyError> {
+        let section = &self.file.poses;
+        let times_s = self.times_s.as_deref();
+        let reading = PoseReader::new(section, &self.folder, &self.frames, times_s)?
+            .read(&self.folder.join(&section.initial))?;
+        let given = (String::new(), reading.convention);
+        let possible = plausible::possible(self.surface.as_ref(), &reading);
+        let survey = |(flags, convention): (String, Convention)| {
+            let stamped = reading.given.iter().map(|stamped| StampedPose {
+                time_s: stamped.time_s,
+                pose: convention.to_tunnel(&stamped.pose),
+            });
+            let survey = Self {
+                folder: self.folder.clone(),
+                file: self.file.clone(),
+                camera: self.camera,
+                surface: surface_of(&self.file)?,
+                frames: self.frames.iter().take(most_frames).cloned().collect(),
+                initial: stamped.take(most_frames).collect(),
+                truth: None,
+                prior: self.prior,
+                warnings: Vec::new(),
+                times_s: None,
+                own_files: self.own_files.clone(),
+            };
+            Ok((flags, survey))
+        };
+        std::iter::once(given).chain(possible).map(survey).collect()
+    }
+
     /// The files besides the frames that the survey is made of, whether or not something else was read in their place.
     pub fn own_files(&self) -> &[PathBuf] {
         &self.own_files
@@ -170,5 +203,15 @@ impl Survey {
     /// The initial poses without their times.
     pub fn initial_poses(&self) -> Vec<Pose> {
         poses_of(&self.initial)
+    }
+}
+
+/// The tunnel that a survey's file describes.
+///
+/// # Errors
+/// An impossible size.
+fn surface_of(file: &SurveyFile) -> Result<Box<dyn Surface>, SurfaceError> {
+    match file.tunnel.shape {
+        Shape::Circle => Ok(Box::new(Circle::new(file.tunnel.radius_m)?)),
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! A wrong convention puts cameras outside, has them look along the axis, or has them move and turn along another direction. Where
 //! that is so, the other readings are tried, the simplest first, and the one that makes sense is named with its flag. A reading
-//! that leaves all cameras inside and looking at the wall cannot be told from a right one here: only the pictures can.
+//! that leaves all cameras inside and looking at the wall cannot be told from a right one here: only the pictures can
+//! ([`Survey::readings`](super::Survey::readings)).
 
 use super::SurveyError;
 use super::reader::Reading;
@@ -293,6 +294,24 @@ fn axes_of(reading: &Reading, convention: &Convention) -> Vec<TunnelAxis> {
     worlds
         .into_iter()
         .chain(own.map(|along| axis(course.middle, along)))
+        .collect()
+}
+
+/// The readings with the tunnel's axis where it is that leave all cameras inside: what only pictures can tell apart.
+pub(super) fn possible(surface: &dyn Surface, reading: &Reading) -> Vec<(String, Convention)> {
+    let tunnel = reading.convention.tunnel_in_world;
+    let is_inside = |other: &Other| {
+        let poses = reading.poses_in(&other.convention);
+        other.convention.tunnel_in_world == tunnel
+            && poses
+                .iter()
+                .all(|pose| surface.check_inside(&pose.t_wc).is_ok())
+    };
+    let mut possible: Vec<Other> = others(reading).into_iter().filter(is_inside).collect();
+    possible.sort_by_key(|other| other.flags.len());
+    possible
+        .into_iter()
+        .map(|other| (other.remedy(), other.convention))
         .collect()
 }
 
