@@ -386,6 +386,36 @@ fn wrong_conventions_are_named_with_their_flags() {
     );
 }
 
+/// Planned poses on the axis look at the wall however they are read: the pictures tell, and each flag that is named mends it.
+#[test]
+fn what_only_pictures_can_tell_is_named_by_refine() {
+    let survey = first_frames(14);
+    let dir = survey.path();
+    let path = dir.join("baseline.tum");
+    let planned = tum::read(&path).unwrap();
+    write_tum(
+        &path,
+        mapped(&planned, |pose| CameraAxes::OpenGl.turn(pose)),
+    );
+    let out = dir.join("refined");
+    let refine = |more: &[&str]| {
+        let arguments = ["refine", text(dir), "--fast", "--out", text(&out)];
+        let output = support::tunnelstitch(&[&arguments, more].concat());
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
+    let said = refine(&[]);
+    assert!(
+        said.contains("they agree with --pose-convention w2c")
+            && said.contains("or with --camera-axes opengl"),
+        "{said}"
+    );
+    for flag in [["--pose-convention", "w2c"], ["--camera-axes", "opengl"]] {
+        let said = refine(&flag);
+        assert!(!said.contains("agree with"), "{flag:?}: {said}");
+    }
+}
+
 /// `refine` takes poses of any format and writes the same, to the byte, as from TUM; `compare` reads what `convert` writes.
 #[test]
 fn refine_and_compare_take_any_format() {

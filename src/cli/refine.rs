@@ -7,7 +7,7 @@ use crate::atomic;
 use crate::camera::format_calibration;
 use crate::progress::Progress;
 use crate::refine::{
-    CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, other_reading, refine,
+    CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, other_readings, refine,
 };
 use crate::survey::{CalibrationGroup, SURVEY_FILE, Survey, SurveyFile};
 use crate::trajectory::tum;
@@ -109,11 +109,13 @@ pub fn run(arguments: &RefineArguments, terminal: &Arc<Terminal>) -> Result<(), 
     let (refined, json) = refine_into(&survey, &options, &arguments.out, terminal)?;
     if 2 * refined.report.frames_on_prior > survey.frames.len() {
         terminal.start("other conventions", 1);
-        let other = other_reading(&survey);
+        let others = other_readings(&survey);
         terminal.finish();
-        if let Some(flags) = other? {
+        let others = others?;
+        if !others.is_empty() {
             terminal.warn(format!(
-                "the pictures do not agree with the poses as they are read; they agree with {flags}"
+                "the pictures do not agree with the poses as they are read; they agree with {}",
+                others.join(", or with ")
             ));
         }
     }
@@ -301,8 +303,7 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
         if report.frames_on_prior == report.frames.len() {
             terminal.warn(
                 "  no frame is sure: too few overlapping frames, a wall without texture, poses in another convention \
-                 (they must be camera-to-world, with the tunnel's axis along y), or a wrong radius_m, calibration or \
-                 [prior]",
+                 (--pose-convention, --camera-axes, --tunnel-frame), or a wrong radius_m, calibration or [prior]",
             );
         }
         for frame in &report.frames {

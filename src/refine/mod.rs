@@ -91,7 +91,7 @@ pub use covariance_file::{CovarianceError, read_covariances};
 pub use gauss_newton::{SolveRecord, StopReason};
 pub use observed::{CalibrationReport, UnknownReport};
 pub use options::RefineOptions;
-pub use otherwise::other_reading;
+pub use otherwise::other_readings;
 pub use problem::ProblemError;
 pub use report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 pub use run::{RefineError, Refined, refine};

@@ -161,18 +161,18 @@ impl Survey {
     }
 
     /// The first frames of the survey with their initial poses as they are read, and in every other convention that leaves all
-    /// cameras inside, each with the flags that stand for it (none for the first).
+    /// cameras inside, each with the flags that stand for it (none for the first; the fewer, the earlier).
     ///
     /// # Errors
     /// As [`Survey::open`], should the file have changed since.
-    pub fn readings(&self, most_frames: usize) -> Result<Vec<(String, Self)>, SurveyError> {
+    pub fn readings(&self, most_frames: usize) -> Result<Vec<(Vec<String>, Self)>, SurveyError> {
         let section = &self.file.poses;
         let times_s = self.times_s.as_deref();
         let reading = PoseReader::new(section, &self.folder, &self.frames, times_s)?
             .read(&self.folder.join(&section.initial))?;
-        let given = (String::new(), reading.convention);
+        let given = (Vec::new(), reading.convention);
         let possible = plausible::possible(self.surface.as_ref(), &reading);
-        let survey = |(flags, convention): (String, Convention)| {
+        let survey = |(flags, convention): (Vec<String>, Convention)| {
             let stamped = reading.given.iter().map(|stamped| StampedPose {
                 time_s: stamped.time_s,
                 pose: convention.to_tunnel(&stamped.pose),

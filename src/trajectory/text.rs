@@ -69,6 +69,10 @@ pub(crate) fn rotation([w, x, y, z]: [f64; 4], order: &str) -> Result<UnitQuater
             "the quaternion has length {norm:.4}, not 1; the order is {order}"
         ));
     }
+    // One that is of unit length to rounding stays to the bit, so that what is written and read again is the same.
+    if (norm - 1.0).abs() <= 4.0 * f64::EPSILON {
+        return Ok(UnitQuaternion::new_unchecked(quaternion));
+    }
     Ok(UnitQuaternion::from_quaternion(quaternion))
 }
 
