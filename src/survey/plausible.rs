@@ -72,7 +72,7 @@ impl Stand {
         let (motion, turning) = (askew(&self.course.motion), askew(&self.course.turning));
         let some_axial = self.share(self.axial) > RIGHT_SHARE;
         self.frames >= LEAST_FRAMES
-            && ((motion && turning) || (turning && some_axial) || (motion && !self.course.turns))
+            && ((turning && (motion || some_axial)) || (motion && !self.course.turns))
     }
 }
 
