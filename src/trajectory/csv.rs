@@ -2,8 +2,8 @@
 //!
 //! Columns are found by their names, in any order; those of other names are left alone. `frame` (or `name`, `file`,
 //! `filename`, `image`), a time in `time_s` (`time`, `timestamp`, `timestamp_s`) or in `time_ns` (`timestamp_ns`), or both, may
-//! be missing. Positions are `tx_m` or `tx`, `x_m`, `x` and so on, metres. Commas, semicolons and tabs separate; names may
-//! stand in quotes.
+//! be missing; whole numbers of 16 digits and more are nanoseconds in any of them. Positions are `tx_m` or `tx`, `x_m`, `x` and
+//! so on, metres. Commas, semicolons and tabs separate; names may stand in quotes.
 
 use super::{Pose, PoseEntry, PoseError, StampedPose, text, times};
 use csv::{ReaderBuilder, StringRecord, WriterBuilder};
@@ -146,7 +146,10 @@ fn parse_record(
     }
     let [tx, ty, tz, qx, qy, qz, qw] = values;
     let time_s = match (columns.time_s, columns.time_ns) {
-        (Some(column), _) => Some(text::number(word(column), FORM)?),
+        (Some(column), _) => {
+            let seconds = text::number(word(column), FORM)?;
+            Some(times::from_word(word(column)).unwrap_or(seconds))
+        }
         (None, Some(column)) => Some(times::from_nanoseconds(word(column))?),
         (None, None) => None,
     };

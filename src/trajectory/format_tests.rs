@@ -190,6 +190,11 @@ fn columns_are_found_by_their_names() {
     assert_eq!(plain.entries[0].time_s, Some(1403636580.8385556));
     assert_eq!(plain.entries[0].pose.t_wc, Vector3::new(1.0, 2.0, 3.0));
     assert!(!plain.has_names());
+    let header = "timestamp,x,y,z,qw,qx,qy,qz\n";
+    for (time, time_s) in [("1403636580838555648", 1403636580.8385556), ("12.5", 12.5)] {
+        let file = read_text(&format!("{header}{time},1,2,3,1,0,0,0\n")).unwrap();
+        assert_eq!(file.entries[0].time_s, Some(time_s));
+    }
 }
 
 #[test]
