@@ -393,10 +393,7 @@ fn what_only_pictures_can_tell_is_named_by_refine() {
     let dir = survey.path();
     let path = dir.join("baseline.tum");
     let planned = tum::read(&path).unwrap();
-    write_tum(
-        &path,
-        mapped(&planned, |pose| CameraAxes::OpenGl.turn(pose)),
-    );
+    write_tum(&path, mapped(&planned, Pose::inverse));
     let out = dir.join("refined");
     let refine = |more: &[&str]| {
         let arguments = ["refine", text(dir), "--fast", "--out", text(&out)];
