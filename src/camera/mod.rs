@@ -6,6 +6,7 @@
 
 mod brown_conrady;
 mod calibration;
+mod colmap;
 mod kannala_brandt;
 mod lens;
 mod projection;
@@ -14,6 +15,7 @@ mod single;
 
 pub use brown_conrady::{BrownCoefficients, BrownConrady};
 pub use calibration::{CalibrationError, format_calibration, read_calibration};
+pub use colmap::ColmapCamera;
 pub use kannala_brandt::KannalaBrandt;
 pub use lens::Lens;
 pub use projection::Camera;

@@ -1,5 +1,6 @@
 //! `tunnelstitch compare`: initial against refined poses.
 
+use super::poses::ReadingArguments;
 use super::record::{RUN_FILE, Run};
 use super::stitch::{PictureArguments, positive};
 use super::{Failure, Terminal, json};
@@ -26,7 +27,8 @@ use std::path::{Path, PathBuf};
 pub struct CompareArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
-    /// The refined poses, TUM.
+    /// The refined poses, in the tunnel's frame as `refine` and `convert` write them, in any format. The flags for reading
+    /// poses are about those of the survey; `convert` first what has another convention.
     #[arg(long, value_name = "FILE")]
     refined: PathBuf,
     /// Folder for the results; made if need be.
@@ -41,6 +43,8 @@ pub struct CompareArguments {
     /// (root mean square, pixels). Needs true poses.
     #[arg(long, value_name = "X", value_parser = positive)]
     max_wall_px: Option<f64>,
+    #[command(flatten)]
+    reading: ReadingArguments,
 }
 
 /// `compare.json`.
@@ -60,7 +64,7 @@ struct Report<'a> {
 /// [`Failure`] for everything wrong with the survey, the poses or the output, and for a quality gate that is
 /// not met (after everything was written).
 pub fn run(arguments: &CompareArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
-    let survey = Survey::open(&arguments.survey)?;
+    let survey = arguments.reading.open(&arguments.survey, terminal)?;
     if arguments.max_wall_px.is_some() && survey.truth.is_none() {
         return Err(Failure::usage(
             "--max-wall-px needs true poses, and the survey has no poses.truth",

@@ -11,7 +11,7 @@ use crate::render::RenderError;
 use crate::simulate::SimulateError;
 use crate::surface::SurfaceError;
 use crate::survey::SurveyError;
-use crate::trajectory::tum::TumError;
+use crate::trajectory::PoseError;
 use std::io::ErrorKind;
 
 /// An error as the user meets it: one text with the remedy, and an exit code.
@@ -133,7 +133,7 @@ bad_input!(
     CovarianceError,
     SurfaceError,
     SurveyError,
-    TumError
+    PoseError
 );
 
 #[cfg(test)]

@@ -1,11 +1,12 @@
 //! `tunnelstitch locate`: from the panorama to the frames and back.
 
-use super::stitch::{CanvasArguments, PosesArgument};
+use super::poses::PosesArgument;
+use super::stitch::CanvasArguments;
 use super::{Failure, Terminal, json};
 use crate::render::{Canvas, LaidOut, Layout, Sighting, lay_out, sightings};
 use crate::surface::WallPoint;
 use crate::survey::Survey;
-use crate::trajectory::Pose;
+use crate::trajectory::{Pose, poses_of};
 use nalgebra::Vector2;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -145,8 +146,8 @@ struct InFrame {
 /// # Errors
 /// [`Failure`] for everything wrong with the survey, the poses or the point.
 pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failure> {
-    let survey = Survey::open(&arguments.survey)?;
-    let poses = arguments.poses.of(&survey)?;
+    let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
+    let poses = poses_of(&trajectory);
     let surface = survey.surface.as_ref();
     let px_per_metre = arguments.canvas.px_per_metre;
     let LaidOut {

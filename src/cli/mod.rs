@@ -4,12 +4,14 @@ mod compare;
 mod config;
 mod configuration;
 mod converge;
+mod convert;
 mod demo;
 mod failure;
 mod hardships;
 mod json;
 mod locate;
 mod outputs;
+mod poses;
 mod project;
 mod record;
 mod refine;
@@ -61,6 +63,7 @@ enum Command {
     Stitch(stitch::StitchArguments),
     Locate(locate::LocateArguments),
     Compare(compare::CompareArguments),
+    Convert(convert::ConvertArguments),
     Converge(converge::ConvergeArguments),
     Project(project::ProjectArguments),
     Config(config::ConfigArguments),
@@ -105,6 +108,7 @@ pub fn run() -> Result<(), Failure> {
         Command::Stitch(arguments) => stitch::run(&arguments, &run, &terminal),
         Command::Locate(arguments) => locate::run(&arguments, &terminal),
         Command::Compare(arguments) => compare::run(&arguments, &run, &terminal),
+        Command::Convert(arguments) => convert::run(&arguments, &terminal),
         Command::Converge(arguments) => converge::run(&arguments, &terminal),
         Command::Project(arguments) => project::run(&arguments, &terminal),
         Command::Config(arguments) => config::run(&arguments, &terminal),

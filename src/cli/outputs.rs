@@ -107,10 +107,9 @@ impl OutputArguments {
     ///
     /// # Errors
     /// The two names.
-    pub fn check_apart(&self, survey: &Survey, poses: Option<&Path>) -> Result<(), Failure> {
+    pub fn check_apart(&self, survey: &Survey) -> Result<(), Failure> {
         let mut inputs: Vec<PathBuf> = survey.frames.iter().map(|f| f.path.clone()).collect();
-        inputs.extend(survey.own_files());
-        inputs.extend(poses.map(Path::to_owned));
+        inputs.extend_from_slice(survey.own_files());
         inputs.extend(self.covariance.clone());
         let mut taken: Vec<PathBuf> = inputs.iter().map(|path| full(path)).collect();
         for output in self.paths() {

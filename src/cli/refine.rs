@@ -1,12 +1,15 @@
 //! `tunnelstitch refine`.
 
+use super::poses::ReadingArguments;
 use super::record::{RUN_FILE, Run};
 use super::{Failure, Terminal, json};
 use crate::PROGRAM;
 use crate::atomic;
 use crate::camera::format_calibration;
 use crate::progress::Progress;
-use crate::refine::{CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, refine};
+use crate::refine::{
+    CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, other_readings, refine,
+};
 use crate::survey::{CalibrationGroup, SURVEY_FILE, Survey, SurveyFile};
 use crate::trajectory::tum;
 use serde::Serialize;
@@ -42,6 +45,8 @@ pub struct RefineArguments {
     /// Print refine.json on standard output instead of the summary.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    reading: ReadingArguments,
 }
 
 /// What `--calibrate` takes.
@@ -108,15 +113,21 @@ pub fn run(
             false => RefineOptions::default(),
         }
     };
-    let survey = Survey::open(&arguments.survey)?;
-    let (refined, json) = refine_into(
-        &survey,
-        &arguments.survey,
-        &options,
-        &arguments.out,
-        terminal,
-    )?;
+    let survey = arguments.reading.open(&arguments.survey, terminal)?;
+    let (refined, json) = refine_into(&survey, &options, &arguments.out, terminal)?;
     run.write(&arguments.out.join(RUN_FILE), &survey, &[])?;
+    if 2 * refined.report.frames_on_prior > survey.frames.len() {
+        terminal.start("other conventions", 1);
+        let others = other_readings(&survey);
+        terminal.finish();
+        let others = others?;
+        if !others.is_empty() {
+            terminal.warn(format!(
+                "the pictures do not agree with the poses as they are read; they agree with {}",
+                others.join(", or with ")
+            ));
+        }
+    }
     if arguments.json {
         json::print_text(&json)?;
     } else {
@@ -144,7 +155,6 @@ pub fn run(
 /// Bad input, or an output that cannot be written.
 pub fn refine_into(
     survey: &Survey,
-    survey_path: &Path,
     options: &RefineOptions,
     out: &Path,
     terminal: &Arc<Terminal>,
@@ -162,7 +172,7 @@ pub fn refine_into(
     let refined = refine(survey, options, &progress)?;
     let json = json::text(&ReportFile {
         program: PROGRAM,
-        survey: survey_path,
+        survey: &survey.folder,
         survey_file: &survey.file,
         options,
         report: &refined.report,
@@ -210,14 +220,15 @@ fn calibrated(
 ) -> Result<String, toml::ser::Error> {
     let folder = std::path::absolute(&survey.folder).unwrap_or_else(|_| survey.folder.clone());
     let mut file = survey.file.clone();
+    for path in file.paths_mut() {
+        *path = folder.join(&*path);
+    }
     file.tunnel.radius_m = calibration.radius_m;
     file.camera.file = CAMERA_FILE.into();
     file.camera.name = None;
     let escaped = glob::Pattern::escape(&folder.to_string_lossy());
     let images = Path::new(&escaped).join(&file.frames.images);
     file.frames.images = images.to_string_lossy().into_owned();
-    file.poses.initial = folder.join(&file.poses.initial);
-    file.poses.truth = file.poses.truth.map(|truth| folder.join(truth));
     file.calibrate = None;
     file.options.clear();
     Ok(format!(
@@ -303,8 +314,7 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
         if report.frames_on_prior == report.frames.len() {
             terminal.warn(
                 "  no frame is sure: too few overlapping frames, a wall without texture, poses in another convention \
-                 (they must be camera-to-world, with the tunnel's axis along y), or a wrong radius_m, calibration or \
-                 [prior]",
+                 (--pose-convention, --camera-axes, --tunnel-frame), or a wrong radius_m, calibration or [prior]",
             );
         }
         for frame in &report.frames {

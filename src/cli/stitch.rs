@@ -1,6 +1,7 @@
 //! `tunnelstitch stitch`: one panorama from given poses.
 
 use super::outputs::OutputArguments;
+use super::poses::PosesArgument;
 use super::record::Run;
 use super::{Failure, Terminal, json};
 use crate::atomic;
@@ -11,7 +12,7 @@ use crate::render::{
     Budget, FrameExposure, Gap, Interpolation, Layout, Mode, RenderOptions, Stitch, StitchOptions,
 };
 use crate::survey::Survey;
-use crate::trajectory::{Pose, poses_of};
+use crate::trajectory::poses_of;
 use clap::ValueEnum;
 use nalgebra::Matrix6;
 use serde::Serialize;
@@ -44,46 +45,6 @@ pub struct StitchArguments {
     /// Print what was drawn as JSON.
     #[arg(long)]
     json: bool,
-}
-
-/// Which poses.
-#[derive(Debug, clap::Args)]
-pub struct PosesArgument {
-    /// Which poses: `initial` and `truth` are those of survey.toml, anything else is a TUM file.
-    #[arg(
-        id = "poses",
-        long = "poses",
-        default_value = "initial",
-        value_name = "initial|truth|FILE"
-    )]
-    name: String,
-}
-
-impl PosesArgument {
-    /// The TUM file, if it is one.
-    pub fn file(&self) -> Option<&Path> {
-        match self.name.as_str() {
-            "initial" | "truth" => None,
-            file => Some(Path::new(file)),
-        }
-    }
-
-    /// The poses that `initial`, `truth` or the name of a TUM file stand for.
-    ///
-    /// # Errors
-    /// No true poses where they are asked for; a file that cannot be read or is no list of the frames' poses.
-    pub fn of(&self, survey: &Survey) -> Result<Vec<Pose>, Failure> {
-        match self.name.as_str() {
-            "initial" => Ok(survey.initial_poses()),
-            "truth" => match &survey.truth {
-                Some(truth) => Ok(poses_of(truth)),
-                None => Err(Failure::usage(
-                    "--poses truth: the survey has no poses.truth; use --poses initial or a TUM file",
-                )),
-            },
-            file => Ok(poses_of(&survey.read_poses(Path::new(file))?)),
-        }
-    }
 }
 
 /// The canvas of panoramas.
@@ -236,11 +197,9 @@ struct Report<'a> {
 /// [`Failure`] for everything wrong with the survey, the poses or the output.
 pub fn run(arguments: &StitchArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     arguments.output.check()?;
-    let survey = Survey::open(&arguments.survey)?;
-    arguments
-        .output
-        .check_apart(&survey, arguments.poses.file())?;
-    let poses = arguments.poses.of(&survey)?;
+    let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
+    let poses = poses_of(&trajectory);
+    arguments.output.check_apart(&survey)?;
     let covariances = covariances(arguments, &survey)?;
     let options = StitchOptions {
         px_per_metre: arguments.picture.canvas.px_per_metre,

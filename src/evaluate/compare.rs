@@ -2,8 +2,8 @@
 
 use super::error::check_pairs;
 use super::{
-    EvaluateError, ImageMetrics, SeamResidual, TrajectoryError, WallError, image_metrics,
-    seam_residual, trajectory_error, wall_error,
+    EvaluateError, ImageMetrics, SeamResidual, TrajectoryError, UnalignedError, WallError,
+    image_metrics, seam_residual, trajectory_error, unaligned_error, wall_error,
 };
 use crate::camera::Camera;
 use crate::frames::FrameFile;
@@ -61,6 +61,8 @@ pub struct Scores {
     pub seam: Option<SeamResidual>,
     /// Errors of the poses.
     pub trajectory: Option<TrajectoryError>,
+    /// Errors of the poses as they stand, to be compared with `evo`.
+    pub unaligned: Option<UnalignedError>,
     /// Errors on the wall.
     pub wall: Option<WallError>,
     /// Likeness to the panorama of the true poses.
@@ -117,6 +119,7 @@ pub fn compare(
                 candidate.given,
                 poses,
             )?);
+            scores.unaligned = Some(unaligned_error(candidate.given, poses)?);
             let wall = wall_error(input.surface, input.camera, candidate.given, poses)?;
             scores.wall = Some(wall);
             scores.image = Some(image_metrics(&panorama, true_panorama)?);
@@ -208,6 +211,7 @@ impl<'a> Candidate<'a> {
             coverage: panorama.coverage(),
             seam: seam_residual(input.surface, frames, &self.placements, canvas),
             trajectory: None,
+            unaligned: None,
             wall: None,
             image: None,
         }

@@ -3,6 +3,7 @@
 //! | question | answer |
 //! | --- | --- |
 //! | how far off are the poses? | [`trajectory_error()`], after removing the gauge |
+//! | and as they stand, as `evo` measures? | [`unaligned_error()`] |
 //! | how far off is each pixel on the wall? | [`wall_error()`] |
 //! | how like the true panorama is this one? | [`image_metrics()`] |
 //! | how fine is the detail that a panorama shows? | [`mtf50`] |
@@ -23,6 +24,7 @@ mod spread;
 mod ssim;
 mod table;
 mod trajectory_error;
+mod unaligned_error;
 mod uncertainty;
 mod wall_error;
 
@@ -35,5 +37,6 @@ pub use seam::{SeamResidual, seam_residual};
 pub use spread::Spread;
 pub use table::Row;
 pub use trajectory_error::{TrajectoryError, trajectory_error};
+pub use unaligned_error::{UnalignedError, unaligned_error};
 pub use uncertainty::{normalised_errors, tied_errors};
 pub use wall_error::{WallError, wall_error};

@@ -130,6 +130,7 @@ mod tests {
                 frames_per_point: 2.0,
             }),
             trajectory: None,
+            unaligned: None,
             wall: None,
             image: None,
         }

@@ -119,10 +119,11 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
         },
         frames: FramesSection {
             images: "frames/*.png".to_owned(),
+            times: None,
         },
         poses: PosesSection {
-            initial: "baseline.tum".into(),
             truth: Some("groundtruth.tum".into()),
+            ..PosesSection::of("baseline.tum")
         },
         prior: options.prior(),
         calibrate: None,

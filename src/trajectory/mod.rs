@@ -1,15 +1,50 @@
 //! Where the camera was: poses, the plan they should have followed, the jitter that moved them off it,
 //! and the files they are kept in.
+//!
+//! | format | its own convention | times | names |
+//! | --- | --- | --- | --- |
+//! | [`tum`] | camera-to-world, OpenCV's axes | seconds | |
+//! | [`kitti`] | camera-to-world, OpenCV's axes | | |
+//! | [`mod@csv`] | camera-to-world, OpenCV's axes | seconds or nanoseconds, if there | if there |
+//! | [`colmap`] | world-to-camera, OpenCV's axes | | yes |
+//! | [`nerfstudio`] | camera-to-world, OpenGL's axes | | yes |
+//! | `euroc` (read only) | body-to-world | nanoseconds | |
+//!
+//! [`read_poses`] reads any of them as they are; a [`Convention`] says what the numbers mean and makes poses of the tunnel of them.
 
+pub mod colmap;
+mod convention;
+pub mod csv;
+mod error;
+mod euroc;
+mod file;
+mod format;
 mod jitter;
+pub mod kitti;
+mod mount;
+pub mod nerfstudio;
 mod plan;
 mod pose;
+mod rigid;
+pub mod se3;
 pub mod so3;
+pub(crate) mod text;
+pub(crate) mod times;
 pub mod tum;
+mod tunnel_frame;
 
+#[cfg(test)]
+mod format_tests;
+
+pub use convention::{CameraAxes, Convention, Direction};
+pub use error::PoseError;
+pub use file::{PoseEntry, PoseFile, read_poses};
+pub use format::PoseFormat;
 pub use jitter::{Jitter, JitterModel};
+pub use mount::read_camera_in_body;
 pub use plan::spiral;
 pub use pose::Pose;
+pub use tunnel_frame::{TunnelAxis, read_tunnel_frame};
 
 /// One pose of a trajectory with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]

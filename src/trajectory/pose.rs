@@ -38,6 +38,17 @@ impl Pose {
         self.r_wc.inverse_transform_vector(&(x_w - self.t_wc))
     }
 
+    /// The motion back: `x_c = R_wcᵀ x_w − R_wcᵀ t_wc`.
+    pub fn inverse(&self) -> Self {
+        let r_cw = self.r_wc.inverse();
+        Self::new(r_cw, -(r_cw * self.t_wc))
+    }
+
+    /// First `other`, then `self`: `R ← R R_other`, `t ← R t_other + t`.
+    pub fn after(&self, other: &Self) -> Self {
+        Self::new(self.r_wc * other.r_wc, self.r_wc * other.t_wc + self.t_wc)
+    }
+
     /// Moves the pose along the tangent vector `ξ = (ω, ρ)`: `R ← R Exp(ω)`, `t ← t + ρ`.
     ///
     /// ω in radians about the camera's axes, ρ in metres along the world's.
@@ -75,6 +86,16 @@ mod tests {
         );
         let xi = Vector6::new(0.05, -0.02, 0.3, 0.1, -0.2, 0.05);
         assert!((pose.local(&pose.retract(&xi)) - xi).norm() < 1e-12);
+    }
+
+    #[test]
+    fn motions_follow_each_other() {
+        let first = Pose::new(so3::exp(&Vector3::new(0.4, -1.0, 0.3)), Vector3::x());
+        let then = Pose::new(so3::exp(&Vector3::new(-0.2, 0.1, 2.0)), Vector3::y());
+        let x = Vector3::new(0.3, -0.8, 2.0);
+        let both = then.to_world(&first.to_world(&x));
+        assert!((then.after(&first).to_world(&x) - both).norm() < 1e-12);
+        assert!((first.inverse().to_world(&x) - first.to_camera(&x)).norm() < 1e-12);
     }
 
     #[test]

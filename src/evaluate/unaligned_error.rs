@@ -1,0 +1,96 @@
+//! How far poses are from the true ones as they stand: the errors that `evo` prints.
+
+use super::error::check_pairs;
+use super::{EvaluateError, Spread};
+use crate::trajectory::Pose;
+use serde::Serialize;
+
+/// Errors of poses without anything removed, not even the gauge: what `evo_ape tum` and `evo_rpe tum` print for the same two
+/// files, without `--align` and with `--delta 1 --delta_unit f`.
+///
+/// The relative errors do not depend on the gauge; the absolute ones do, and mean something only where it is fixed alike in both.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct UnalignedError {
+    /// `|t_est − t_true|`, metres (`evo_ape`).
+    pub ape_translation_m: Spread,
+    /// Angle of `R_trueᵀ R_est`, degrees (`evo_ape -r angle_deg`).
+    pub ape_rotation_deg: Spread,
+    /// Translation of `(Q_k⁻¹ Q_k+1)⁻¹ (P_k⁻¹ P_k+1)` with Q the true poses and P the estimated, metres (`evo_rpe`); zeros for a
+    /// single frame.
+    pub rpe_translation_m: Spread,
+    /// Its angle, degrees (`evo_rpe -r angle_deg`).
+    pub rpe_rotation_deg: Spread,
+}
+
+/// Compares poses with the true ones, frame by frame and step by step.
+///
+/// # Errors
+/// [`EvaluateError::Count`], [`EvaluateError::Empty`].
+pub fn unaligned_error(
+    estimated: &[Pose],
+    truth: &[Pose],
+) -> Result<UnalignedError, EvaluateError> {
+    check_pairs(estimated.len(), truth.len())?;
+    let offs = estimated
+        .iter()
+        .zip(truth)
+        .map(|(p, q)| q.inverse().after(p));
+    let steps = |poses: &[Pose]| -> Vec<Pose> {
+        let pairs = poses.iter().zip(poses.iter().skip(1));
+        pairs
+            .map(|(before, after)| before.inverse().after(after))
+            .collect()
+    };
+    let step_offs = steps(estimated).into_iter().zip(steps(truth));
+    let (ape_translation_m, ape_rotation_deg) = spreads(offs);
+    let (rpe_translation_m, rpe_rotation_deg) =
+        spreads(step_offs.map(|(p, q)| q.inverse().after(&p)));
+    Ok(UnalignedError {
+        ape_translation_m,
+        ape_rotation_deg,
+        rpe_translation_m,
+        rpe_rotation_deg,
+    })
+}
+
+/// Lengths in metres and angles in degrees of motions.
+fn spreads(motions: impl Iterator<Item = Pose>) -> (Spread, Spread) {
+    let (lengths, angles): (Vec<f64>, Vec<f64>) = motions
+        .map(|motion| (motion.t_wc.norm(), motion.r_wc.angle().to_degrees()))
+        .unzip();
+    (Spread::of(&lengths), Spread::of(&angles))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::GaugeMotion;
+    use crate::trajectory::{so3, spiral};
+    use nalgebra::Vector3;
+
+    #[test]
+    fn known_errors_are_measured() {
+        let truth = spiral(3, 0.1, 0.5);
+        let mut estimated = truth.clone();
+        estimated[2].t_wc.x += 0.03;
+        estimated[2].r_wc *= so3::exp(&(Vector3::z() * 2f64.to_radians()));
+        let error = unaligned_error(&estimated, &truth).unwrap();
+        assert!((error.ape_translation_m.rms - 0.03 / 3f64.sqrt()).abs() < 1e-12);
+        assert!((error.ape_rotation_deg.max - 2.0).abs() < 1e-9);
+        assert!((error.rpe_translation_m.rms - 0.03 / 2f64.sqrt()).abs() < 1e-12);
+        assert!((error.rpe_rotation_deg.median - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_gauge_counts_for_the_absolute_errors_only() {
+        let truth = spiral(5, 0.1, 0.5);
+        let motion = GaugeMotion {
+            turn_rad: 0.1,
+            shift_m: 2.0,
+        };
+        let error = unaligned_error(&motion.apply_all(&truth), &truth).unwrap();
+        assert!((error.ape_translation_m.rms - 2.0).abs() < 1e-12);
+        assert!((error.ape_rotation_deg.rms - 0.1f64.to_degrees()).abs() < 1e-9);
+        assert!(error.rpe_translation_m.max < 1e-12 && error.rpe_rotation_deg.max < 1e-6);
+    }
+}

@@ -1,0 +1,88 @@
+//! `[calibrate]`: what all frames share and `refine` can estimate.
+
+use serde::{Deserialize, Serialize};
+
+/// Something that all frames share and `refine` can estimate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CalibrationGroup {
+    /// Focal length; fx and fy grow alike.
+    Focal,
+    /// Principal point.
+    Centre,
+    /// Radial distortion, k1 and k2.
+    Distortion,
+    /// The tunnel's radius.
+    Radius,
+    /// Where the frame of the initial poses has the tunnel's axis: two tilts and two offsets.
+    Axis,
+}
+
+impl CalibrationGroup {
+    /// All there are.
+    pub const ALL: [Self; 5] = [
+        Self::Focal,
+        Self::Centre,
+        Self::Distortion,
+        Self::Radius,
+        Self::Axis,
+    ];
+}
+
+/// `[calibrate]`: what is estimated besides the poses, and how far off the given values may be (1-σ).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct CalibrateSection {
+    /// What is estimated, unless the command line says otherwise.
+    pub unknowns: Vec<CalibrationGroup>,
+    /// Focal length, percent.
+    pub focal_sigma_percent: f64,
+    /// Principal point, percent of the frames' width.
+    pub centre_sigma_percent: f64,
+    /// k1.
+    pub k1_sigma: f64,
+    /// k2.
+    pub k2_sigma: f64,
+    /// Radius, percent.
+    pub radius_sigma_percent: f64,
+    /// Each tilt of the axis, degrees.
+    pub axis_tilt_sigma_deg: f64,
+    /// Each offset of the axis, metres.
+    pub axis_offset_sigma_m: f64,
+}
+
+impl Default for CalibrateSection {
+    fn default() -> Self {
+        Self {
+            unknowns: Vec::new(),
+            focal_sigma_percent: 2.0,
+            centre_sigma_percent: 1.0,
+            k1_sigma: 0.05,
+            k2_sigma: 0.05,
+            radius_sigma_percent: 1.0,
+            axis_tilt_sigma_deg: 1.0,
+            axis_offset_sigma_m: 0.05,
+        }
+    }
+}
+
+impl CalibrateSection {
+    /// What is wrong with the numbers, if anything.
+    pub(super) fn fault(&self) -> Option<String> {
+        let sigmas = [
+            ("focal_sigma_percent", self.focal_sigma_percent, 30.0),
+            ("centre_sigma_percent", self.centre_sigma_percent, 30.0),
+            ("k1_sigma", self.k1_sigma, 1.0),
+            ("k2_sigma", self.k2_sigma, 1.0),
+            ("radius_sigma_percent", self.radius_sigma_percent, 30.0),
+            ("axis_tilt_sigma_deg", self.axis_tilt_sigma_deg, 30.0),
+            ("axis_offset_sigma_m", self.axis_offset_sigma_m, 100.0),
+        ];
+        let wrong = sigmas
+            .iter()
+            .find(|(_, value, most)| !(1e-9..=*most).contains(value));
+        wrong.map(|(name, value, most)| {
+            format!("calibrate.{name} is {value}; it must be more than 0 and no more than {most}")
+        })
+    }
+}

@@ -1,0 +1,216 @@
+//! `survey.toml` as written.
+
+use super::{CalibrateSection, PosesSection, SurveyError};
+use crate::trajectory::{Jitter, JitterModel};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Name of the file that describes a survey.
+pub const SURVEY_FILE: &str = "survey.toml";
+
+/// `survey.toml` as written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurveyFile {
+    /// The tunnel.
+    pub tunnel: TunnelSection,
+    /// The camera.
+    pub camera: CameraSection,
+    /// The frames.
+    pub frames: FramesSection,
+    /// The poses.
+    pub poses: PosesSection,
+    /// Noise of the initial poses.
+    #[serde(default)]
+    pub prior: PriorSection,
+    /// Self-calibration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibrate: Option<CalibrateSection>,
+    /// Options of the program's commands, a table each: what their long flags say, with underscores. The program gives them to the
+    /// command; the library reads over them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub options: BTreeMap<String, toml::Table>,
+}
+
+impl SurveyFile {
+    /// All files that it names, as written; the frames are a pattern and not among them.
+    pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let poses = &mut self.poses;
+        [
+            Some(&mut self.camera.file),
+            self.frames.times.as_mut(),
+            Some(&mut poses.initial),
+            poses.truth.as_mut(),
+            poses.body_to_camera.as_mut(),
+            poses.tunnel_frame.as_mut(),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
+/// Shape of the tunnel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Shape {
+    /// Straight, circular section.
+    Circle,
+}
+
+/// `[tunnel]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TunnelSection {
+    /// Shape of the tunnel.
+    pub shape: Shape,
+    /// Radius, metres.
+    pub radius_m: f64,
+}
+
+/// `[camera]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSection {
+    /// Calibration file.
+    pub file: PathBuf,
+    /// Which camera, if the file has several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+}
+
+/// `[frames]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FramesSection {
+    /// Glob pattern of the frames.
+    pub images: String,
+    /// The frames' times, where they are not in their names.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub times: Option<PathBuf>,
+}
+
+/// `[prior]`: the noise model of the initial poses.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorSection {
+    /// How errors of consecutive poses hang together.
+    pub model: JitterModel,
+    /// 1-σ about each axis, degrees.
+    pub rotation_sigma_deg: f64,
+    /// 1-σ along x, y, z, metres.
+    pub translation_sigma_m: [f64; 3],
+}
+
+impl Default for PriorSection {
+    /// The paper's experiment: 2° and (2, 2, 3) cm a step, accumulating.
+    fn default() -> Self {
+        Self {
+            model: JitterModel::RandomWalk,
+            rotation_sigma_deg: 2.0,
+            translation_sigma_m: [0.02, 0.02, 0.03],
+        }
+    }
+}
+
+impl From<PriorSection> for Jitter {
+    fn from(prior: PriorSection) -> Self {
+        Self {
+            model: prior.model,
+            rotation_sigma_rad: prior.rotation_sigma_deg.to_radians(),
+            translation_sigma_m: prior.translation_sigma_m,
+        }
+    }
+}
+
+/// Reads `survey.toml`.
+///
+/// # Errors
+/// An unreadable file; text that is no TOML, unknown or missing keys, with line and column.
+pub(super) fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
+    let text = std::fs::read_to_string(path).map_err(|source| SurveyError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    toml::from_str(&text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start.min(text.len()));
+        let before = &text.as_bytes()[..at];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        let column = 1 + before
+            .iter()
+            .rev()
+            .take_while(|byte| **byte != b'\n')
+            .count();
+        SurveyError::Parse {
+            path: path.to_owned(),
+            line,
+            column,
+            what: error.message().replace('\n', " "),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::survey::{Associate, CalibrationGroup, Survey};
+    use crate::trajectory::{CameraAxes, Direction, PoseFormat};
+
+    #[test]
+    fn the_file_round_trips() {
+        let file = SurveyFile {
+            tunnel: TunnelSection {
+                shape: Shape::Circle,
+                radius_m: 3.0,
+            },
+            camera: CameraSection {
+                file: "camera.json".into(),
+                name: None,
+            },
+            frames: FramesSection {
+                images: "frames/*.png".into(),
+                times: Some("times.txt".into()),
+            },
+            poses: PosesSection {
+                format: Some(PoseFormat::Csv),
+                convention: Some(Direction::WorldToCamera),
+                camera_axes: Some(CameraAxes::OpenGl),
+                associate: Some(Associate::Time),
+                time_tolerance_s: Some(0.05),
+                interpolate: Some(true),
+                body_to_camera: Some("sensor.yaml".into()),
+                ..PosesSection::of("baseline.csv")
+            },
+            prior: PriorSection::default(),
+            calibrate: Some(CalibrateSection {
+                unknowns: CalibrationGroup::ALL.to_vec(),
+                ..CalibrateSection::default()
+            }),
+            options: BTreeMap::new(),
+        };
+        let text = toml::to_string(&file).unwrap();
+        assert_eq!(toml::from_str::<SurveyFile>(&text).unwrap(), file);
+    }
+
+    #[test]
+    fn an_unknown_unknown_is_named_with_what_is_possible() {
+        let error = toml::from_str::<CalibrateSection>("unknowns = [\"focus\"]").unwrap_err();
+        let message = error.to_string();
+        assert!(
+            message.contains("focus") && message.contains("`centre`"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_line_and_column() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(SURVEY_FILE);
+        std::fs::write(&path, "[tunnel]\nshape = \"circle\"\n  raduis_m = 3.0\n").unwrap();
+        let message = Survey::open(dir.path()).unwrap_err().to_string();
+        assert!(
+            message.contains("survey.toml:3:3: unknown field `raduis_m`"),
+            "{message}"
+        );
+    }
+}

@@ -1,0 +1,62 @@
+//! `survey.toml`: what a data set is.
+//!
+//! ```toml
+//! [tunnel]
+//! shape = "circle"
+//! radius_m = 3.0
+//!
+//! [camera]
+//! file = "camera.json"
+//!
+//! [frames]
+//! images = "frames/*.jpg"     # sorted by name
+//! times = "times.txt"         # optional: `time`, `time name` or `name time` a line; else from the names
+//!
+//! [poses]
+//! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC, told by the content
+//! truth = "groundtruth.tum"   # optional: only for comparison; all below holds for both
+//! format = "tum"              # optional, as all below: the format, where the content does not tell
+//! convention = "c2w"          # or "w2c"; each format has its own
+//! camera_axes = "opencv"      # or "opengl"; each format has its own
+//! body_to_camera = "cam.yaml" # where the poses are a body's; see `trajectory::read_camera_in_body`
+//! tunnel_frame = "axis.json"  # where the axis is not their world's y; see `trajectory::read_tunnel_frame`
+//! associate = "time"          # or "name", the default where the file has names, or "order"
+//! time_tolerance_s = 0.01     # the nearest pose may be this far off; the default
+//! interpolate = true          # between two poses; the default is the nearer one
+//!
+//! [prior]                     # optional: how far off the initial poses may be
+//! model = "random-walk"       # or "independent"
+//! rotation_sigma_deg = 2.0
+//! translation_sigma_m = [0.02, 0.02, 0.03]
+//!
+//! [calibrate]                 # optional: what refine estimates besides the poses, around the values given
+//! unknowns = ["focal", "centre", "distortion", "radius", "axis"]
+//! focal_sigma_percent = 2.0   # 1-σ of the values given; these are the defaults
+//! centre_sigma_percent = 1.0  # of the frames' width
+//! k1_sigma = 0.05
+//! k2_sigma = 0.05
+//! radius_sigma_percent = 1.0
+//! axis_tilt_sigma_deg = 1.0
+//! axis_offset_sigma_m = 0.05
+//! ```
+//!
+//! Relative paths are relative to `survey.toml`. Unknown keys are errors with line and column.
+
+mod associate;
+mod calibrate;
+mod error;
+mod file;
+mod open;
+mod plausible;
+mod poses;
+mod reader;
+mod times;
+
+pub use associate::{Associate, TIME_TOLERANCE_S};
+pub use calibrate::{CalibrateSection, CalibrationGroup};
+pub use error::SurveyError;
+pub use file::{
+    CameraSection, FramesSection, PriorSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
+};
+pub use open::Survey;
+pub use poses::PosesSection;

@@ -1,0 +1,230 @@
+//! A survey, opened and checked.
+
+use super::associate::TIME_TOLERANCE_S;
+use super::file::read_survey_file;
+use super::reader::{PoseReader, Reading};
+use super::{CalibrateSection, PosesSection, SURVEY_FILE, Shape, SurveyError, SurveyFile};
+use super::{plausible, times};
+use crate::camera::{Camera, read_calibration};
+use crate::frames::{self, FrameFile};
+use crate::surface::{Circle, Surface, SurfaceError};
+use crate::trajectory::{Convention, Jitter, Pose, StampedPose, Trajectory, poses_of};
+use std::path::{Path, PathBuf};
+
+/// A survey, read and checked: everything but the pixels.
+#[derive(Debug)]
+pub struct Survey {
+    /// The folder of `survey.toml`.
+    pub folder: PathBuf,
+    /// `survey.toml` as written.
+    pub file: SurveyFile,
+    /// The camera.
+    pub camera: Camera,
+    /// The tunnel.
+    pub surface: Box<dyn Surface>,
+    /// The frames, sorted by name.
+    pub frames: Vec<FrameFile>,
+    /// The initial poses, one per frame.
+    pub initial: Trajectory,
+    /// The true poses, one per frame, where known.
+    pub truth: Option<Trajectory>,
+    /// Noise model of the initial poses.
+    pub prior: Jitter,
+    /// What is possible but suspicious, and what might be meant.
+    pub warnings: Vec<String>,
+    /// The frames' times, seconds, where a file tells them.
+    times_s: Option<Vec<f64>>,
+    /// See [`Survey::own_files`].
+    own_files: Vec<PathBuf>,
+}
+
+impl Survey {
+    /// Reads a survey: `path` is its folder or its `survey.toml`.
+    ///
+    /// # Errors
+    /// Everything that can be wrong before a pixel is read; see [`SurveyError`].
+    pub fn open(path: &Path) -> Result<Self, SurveyError> {
+        Self::open_with(path, |_| ())
+    }
+
+    /// Reads survey.toml (or the one in the folder `path`), and nothing else.
+    ///
+    /// # Errors
+    /// A missing or malformed file.
+    pub fn read_file(path: &Path) -> Result<SurveyFile, SurveyError> {
+        read_survey_file(&toml_path(path))
+    }
+
+    /// The same with something else in its `survey.toml` than is written there.
+    ///
+    /// # Errors
+    /// As [`Survey::open`].
+    pub fn open_with(
+        path: &Path,
+        change: impl FnOnce(&mut SurveyFile),
+    ) -> Result<Self, SurveyError> {
+        let toml_path = toml_path(path);
+        let mut file = read_survey_file(&toml_path)?;
+        let folder = match toml_path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        let mut own_files = vec![toml_path.clone()];
+        own_files.extend(file.paths_mut().map(|path| folder.join(&*path)));
+        change(&mut file);
+        own_files.extend(file.paths_mut().map(|path| folder.join(&*path)));
+        let value = |what: String| SurveyError::Value {
+            path: toml_path.clone(),
+            what,
+        };
+        let surface =
+            surface_of(&file).map_err(|error| value(format!("tunnel.radius_m: {error}")))?;
+        let prior = &file.prior;
+        if !(1e-6..=180.0).contains(&prior.rotation_sigma_deg) {
+            return Err(value(format!(
+                "prior.rotation_sigma_deg is {}; it must lie between 1e-6 and 180",
+                prior.rotation_sigma_deg
+            )));
+        }
+        if !prior
+            .translation_sigma_m
+            .iter()
+            .all(|s| (1e-9..=10.0 * file.tunnel.radius_m).contains(s))
+        {
+            return Err(value(format!(
+                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times the radius",
+                prior.translation_sigma_m
+            )));
+        }
+        if let Some(fault) = file.calibrate.as_ref().and_then(CalibrateSection::fault) {
+            return Err(value(fault));
+        }
+        let tolerance_s = file.poses.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S);
+        if !(0.0..=1e6).contains(&tolerance_s) {
+            return Err(value(format!(
+                "poses.time_tolerance_s is {tolerance_s}; it must be seconds, 0 or more"
+            )));
+        }
+        let camera =
+            read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
+        let frames = frames::list(&folder, &file.frames.images)?;
+        let times_s = match &file.frames.times {
+            Some(times) => Some(times::read(&folder.join(times), &frames)?),
+            None => None,
+        };
+        let mut survey = Self {
+            camera,
+            surface,
+            frames,
+            initial: Vec::new(),
+            truth: None,
+            prior: file.prior.into(),
+            warnings: Vec::new(),
+            times_s,
+            own_files,
+            folder,
+            file,
+        };
+        let section = &survey.file.poses;
+        let (initial, mut warnings) =
+            survey.read_as(section, &survey.folder.join(&section.initial))?;
+        let truth = match &section.truth {
+            Some(truth) => {
+                let (truth, more) = survey.read_as(section, &survey.folder.join(truth))?;
+                warnings.extend(more);
+                Some(truth)
+            }
+            None => None,
+        };
+        (survey.initial, survey.truth, survey.warnings) = (initial, truth, warnings);
+        Ok(survey)
+    }
+
+    /// Reads a file of poses in the tunnel, as `refine` and `convert` write them, in its format's own convention, and checks
+    /// it against the frames and the tunnel.
+    ///
+    /// # Errors
+    /// A malformed file, poses that cannot be tied to the frames, a camera outside the tunnel.
+    pub fn read_poses(&self, path: &Path) -> Result<Trajectory, SurveyError> {
+        Ok(self.read_as(&PosesSection::of(path), path)?.0)
+    }
+
+    /// Reads a file of poses as a section says; its warnings beside it.
+    fn read_as(
+        &self,
+        section: &PosesSection,
+        path: &Path,
+    ) -> Result<(Trajectory, Vec<String>), SurveyError> {
+        let times_s = self.times_s.as_deref();
+        let reading: Reading =
+            PoseReader::new(section, &self.folder, &self.frames, times_s)?.read(path)?;
+        let trajectory = reading.trajectory();
+        let poses = poses_of(&trajectory);
+        let surface = self.surface.as_ref();
+        let warning = plausible::check(surface, &self.camera, &reading, &poses, path)?;
+        Ok((trajectory, warning))
+    }
+
+    /// The first frames of the survey with their initial poses as they are read, and in every other convention that leaves all
+    /// cameras inside, each with the flags that stand for it (none for the first; the fewer, the earlier).
+    ///
+    /// # Errors
+    /// As [`Survey::open`], should the file have changed since.
+    pub fn readings(&self, most_frames: usize) -> Result<Vec<(Vec<String>, Self)>, SurveyError> {
+        let section = &self.file.poses;
+        let times_s = self.times_s.as_deref();
+        let reading = PoseReader::new(section, &self.folder, &self.frames, times_s)?
+            .read(&self.folder.join(&section.initial))?;
+        let given = (Vec::new(), reading.convention);
+        let possible = plausible::possible(self.surface.as_ref(), &reading);
+        let survey = |(flags, convention): (Vec<String>, Convention)| {
+            let stamped = reading.given.iter().map(|stamped| StampedPose {
+                time_s: stamped.time_s,
+                pose: convention.to_tunnel(&stamped.pose),
+            });
+            let survey = Self {
+                folder: self.folder.clone(),
+                file: self.file.clone(),
+                camera: self.camera,
+                surface: surface_of(&self.file)?,
+                frames: self.frames.iter().take(most_frames).cloned().collect(),
+                initial: stamped.take(most_frames).collect(),
+                truth: None,
+                prior: self.prior,
+                warnings: Vec::new(),
+                times_s: None,
+                own_files: self.own_files.clone(),
+            };
+            Ok((flags, survey))
+        };
+        std::iter::once(given).chain(possible).map(survey).collect()
+    }
+
+    /// The files besides the frames that the survey is made of, whether or not something else was read in their place.
+    pub fn own_files(&self) -> &[PathBuf] {
+        &self.own_files
+    }
+
+    /// The initial poses without their times.
+    pub fn initial_poses(&self) -> Vec<Pose> {
+        poses_of(&self.initial)
+    }
+}
+
+/// `survey.toml`, of which `path` is the folder or the name.
+fn toml_path(path: &Path) -> PathBuf {
+    match path.is_dir() {
+        true => path.join(SURVEY_FILE),
+        false => path.to_owned(),
+    }
+}
+
+/// The tunnel that a survey's file describes.
+///
+/// # Errors
+/// An impossible size.
+fn surface_of(file: &SurveyFile) -> Result<Box<dyn Surface>, SurfaceError> {
+    match file.tunnel.shape {
+        Shape::Circle => Ok(Box::new(Circle::new(file.tunnel.radius_m)?)),
+    }
+}

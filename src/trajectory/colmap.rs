@@ -1,0 +1,125 @@
+//! COLMAP's text model: `images.txt`, two lines an image, **world-to-camera**.
+//!
+//! `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then the points of the image, `X Y POINT3D_ID` each; that line may be
+//! empty. The poses alone are read. What is written has no points.
+
+use super::{Pose, PoseEntry, PoseError, StampedPose, text};
+use nalgebra::Vector3;
+use std::fmt::Write;
+use std::path::Path;
+
+/// The file of the poses in the folder of a model.
+pub const IMAGES_FILE: &str = "images.txt";
+/// The file of the cameras.
+pub const CAMERAS_FILE: &str = "cameras.txt";
+/// The file of the points.
+pub const POINTS_FILE: &str = "points3D.txt";
+
+const FORM: &str = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME";
+/// Columns before the name.
+const NUMBERS: usize = 9;
+
+/// Whether a line is the first of an image's two.
+pub(super) fn is_line(line: &str) -> bool {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    words.len() > NUMBERS
+        && words[..NUMBERS]
+            .iter()
+            .all(|word| word.parse::<f64>().is_ok())
+        && words[0].parse::<u64>().is_ok()
+        && words[NUMBERS].parse::<f64>().is_err()
+}
+
+pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
+    let mut entries = Vec::new();
+    let mut names = text::Names::default();
+    // The points' line comes right after the image's, even if it is empty.
+    let mut points_next = false;
+    for (index, line) in text.lines().enumerate() {
+        let line = line.trim();
+        let fail = |what: String| PoseError::line(path, index + 1, what);
+        if points_next {
+            check_points(line).map_err(fail)?;
+            points_next = false;
+        } else if !line.is_empty() && !line.starts_with('#') {
+            let entry = parse_line(line).map_err(fail)?;
+            names
+                .add(entry.name.as_deref().unwrap_or_default())
+                .map_err(fail)?;
+            entries.push(entry);
+            points_next = true;
+        }
+    }
+    Ok(entries)
+}
+
+fn parse_line(line: &str) -> Result<PoseEntry, String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let [_, qw, qx, qy, qz, tx, ty, tz, _, name @ ..] = words.as_slice() else {
+        return Err(format!("{} columns where `{FORM}` has 10", words.len()));
+    };
+    if name.is_empty() {
+        return Err(format!("9 columns where `{FORM}` has 10"));
+    }
+    let mut values = [0.0; 7];
+    for (value, word) in values.iter_mut().zip([qw, qx, qy, qz, tx, ty, tz]) {
+        *value = text::number(word, FORM)?;
+    }
+    let [qw, qx, qy, qz, tx, ty, tz] = values;
+    Ok(PoseEntry {
+        name: Some(name.join(" ")),
+        time_s: None,
+        pose: Pose::new(
+            text::rotation([qw, qx, qy, qz], "QW QX QY QZ")?,
+            Vector3::new(tx, ty, tz),
+        ),
+    })
+}
+
+/// Checks that a line holds points, or nothing.
+fn check_points(line: &str) -> Result<(), String> {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let are_numbers = words.iter().all(|word| word.parse::<f64>().is_ok());
+    match are_numbers && words.len().is_multiple_of(3) {
+        true => Ok(()),
+        false => Err(
+            "should hold the points of the image above, `X Y POINT3D_ID` each, or be empty: an image has two lines"
+                .to_owned(),
+        ),
+    }
+}
+
+/// The text of `images.txt` for frames called `names`, all of camera 1; `trajectory` is camera-to-world.
+pub fn format_images(names: &[String], trajectory: &[StampedPose]) -> String {
+    let mut text = format!(
+        "# Image list with two lines of data per image:\n#   {}\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n\
+         # Number of images: {}, mean observations per image: 0\n",
+        FORM.replace(' ', ", "),
+        trajectory.len()
+    );
+    for (index, (name, stamped)) in names.iter().zip(trajectory).enumerate() {
+        let world_to_camera = stamped.pose.inverse();
+        let (t, q) = (&world_to_camera.t_wc, &world_to_camera.r_wc);
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{} {} {} {} {} {} {} {} 1 {name}\n",
+            index + 1,
+            q.w,
+            q.i,
+            q.j,
+            q.k,
+            t.x,
+            t.y,
+            t.z
+        );
+    }
+    text
+}
+
+/// The text of a `points3D.txt` without points.
+pub fn format_points() -> &'static str {
+    "# 3D point list with one line of data per point:\n\
+     #   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n\
+     # Number of points: 0, mean track length: 0\n"
+}

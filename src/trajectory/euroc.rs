@@ -1,0 +1,55 @@
+//! EuRoC: `timestamp [ns], x, y, z, qw, qx, qy, qz, …`, poses of the **body** (IMU) in the world.
+//!
+//! The first eight columns count; velocities and biases may follow. Read only. Source: Burri et al., "The EuRoC micro aerial
+//! vehicle datasets", 2016.
+
+use super::{Pose, PoseEntry, PoseError, text, times};
+use nalgebra::Vector3;
+use std::path::Path;
+
+const FORM: &str = "timestamp [ns], x, y, z, qw, qx, qy, qz";
+
+/// Whether a line is one of such a file: commas, and a first number with as many digits as nanoseconds since 1970 have, or
+/// more than any other time.
+pub(super) fn is_line(line: &str) -> bool {
+    let mut words = line.split(',');
+    let time = words.next().unwrap_or_default().trim();
+    time.len() >= times::LEAST_NANOSECOND_DIGITS
+        && time.bytes().all(|byte| byte.is_ascii_digit())
+        && words.count() >= 7
+}
+
+pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
+    let mut entries: Vec<PoseEntry> = Vec::new();
+    for (number, line) in text::lines(text) {
+        let last_s = entries.last().and_then(|entry| entry.time_s);
+        let entry = parse_line(line, last_s).map_err(|what| PoseError::line(path, number, what))?;
+        entries.push(entry);
+    }
+    Ok(entries)
+}
+
+fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {
+    let words: Vec<&str> = line.split(',').map(str::trim).collect();
+    let [time, pose @ ..] = words.as_slice() else {
+        return Err(format!("no columns where `{FORM}` has 8"));
+    };
+    if pose.len() < 7 {
+        return Err(format!("{} columns where `{FORM}` has 8", words.len()));
+    }
+    let time_s = times::from_nanoseconds(time)?;
+    text::after(time_s, last_s)?;
+    let mut values = [0.0; 7];
+    for (value, word) in values.iter_mut().zip(pose) {
+        *value = text::number(word, FORM)?;
+    }
+    let [x, y, z, qw, qx, qy, qz] = values;
+    Ok(PoseEntry {
+        name: None,
+        time_s: Some(time_s),
+        pose: Pose::new(
+            text::rotation([qw, qx, qy, qz], "qw qx qy qz")?,
+            Vector3::new(x, y, z),
+        ),
+    })
+}

@@ -1,0 +1,284 @@
+//! Every format: written and read again, and everything that can be wrong with it.
+
+use super::*;
+use crate::camera::{Camera, ColmapCamera};
+use nalgebra::Vector3;
+use proptest::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// A folder and a file in it with these bytes.
+fn file_of(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("poses");
+    std::fs::write(&path, bytes).unwrap();
+    (dir, path)
+}
+
+fn read_text(text: &str) -> Result<PoseFile, PoseError> {
+    read_poses(&file_of(text.as_bytes()).1, None)
+}
+
+fn names(count: usize) -> Vec<String> {
+    (0..count)
+        .map(|k| format!("frames/a, \"{k}\".png"))
+        .collect()
+}
+
+/// The same poses in every format that is written, with what reading tells of it.
+fn written(trajectory: &[StampedPose]) -> Vec<(PoseFormat, String)> {
+    let names = names(trajectory.len());
+    let camera = ColmapCamera::of(&Camera::from_vertical_fov(64, 48, 1.0));
+    vec![
+        (PoseFormat::Tum, tum::format(trajectory)),
+        (PoseFormat::Kitti, kitti::format(trajectory)),
+        (PoseFormat::Csv, csv::format(&names, trajectory)),
+        (
+            PoseFormat::Colmap,
+            colmap::format_images(&names, trajectory),
+        ),
+        (
+            PoseFormat::Nerfstudio,
+            nerfstudio::format(camera.nerfstudio().unwrap(), &names, trajectory),
+        ),
+    ]
+}
+
+fn assert_restored(trajectory: &[StampedPose], format: PoseFormat, text: &str, tolerance: f64) {
+    let (_dir, path) = file_of(text.as_bytes());
+    let file = read_poses(&path, None).unwrap();
+    assert_eq!(file.format, format);
+    assert_eq!(file.entries.len(), trajectory.len());
+    let convention = Convention::of(format);
+    for (k, (entry, stamped)) in file.entries.iter().zip(trajectory).enumerate() {
+        let back = convention.to_tunnel(&entry.pose);
+        let scale = 1.0 + stamped.pose.t_wc.norm();
+        assert!(
+            back.r_wc.angle_to(&stamped.pose.r_wc) < tolerance,
+            "{format:?}"
+        );
+        assert!(
+            (back.t_wc - stamped.pose.t_wc).norm() < tolerance * scale,
+            "{format:?}"
+        );
+        if let Some(time_s) = entry.time_s {
+            assert_eq!(time_s, stamped.time_s);
+        }
+        if let Some(name) = &entry.name {
+            assert_eq!(*name, names(k + 1)[k]);
+        }
+    }
+    let knows = |format: PoseFormat| {
+        (
+            matches!(format, PoseFormat::Tum | PoseFormat::Csv),
+            matches!(
+                format,
+                PoseFormat::Csv | PoseFormat::Colmap | PoseFormat::Nerfstudio
+            ),
+        )
+    };
+    assert_eq!((file.has_times(), file.has_names()), knows(format));
+}
+
+fn any_pose() -> impl Strategy<Value = Pose> {
+    let turn = (-4.0f64..4.0, -4.0f64..4.0, -4.0f64..4.0);
+    let place = (-1e3f64..1e3, -1e5f64..1e5, -1.0f64..1.0);
+    (turn, place).prop_map(|((a, b, c), (x, y, z))| {
+        Pose::new(so3::exp(&Vector3::new(a, b, c)), Vector3::new(x, y, z))
+    })
+}
+
+proptest! {
+    #[test]
+    fn every_format_restores_any_trajectory(
+        poses in prop::collection::vec(any_pose(), 1..6), begin in -1e9f64..2e9, steps in prop::collection::vec(1e-3f64..1e3, 6),
+    ) {
+        let mut time_s = begin;
+        let trajectory: Trajectory = poses.into_iter().zip(steps).map(|(pose, step)| {
+            time_s += step;
+            StampedPose { time_s, pose }
+        }).collect();
+        for (format, text) in written(&trajectory) {
+            assert_restored(&trajectory, format, &text, 1e-13);
+        }
+    }
+
+    #[test]
+    fn no_text_makes_it_panic(text in "[-0-9eE.,;\\[\\]{}\" #a-zA-Z\n\r\t]{0,200}") {
+        let (_dir, path) = file_of(text.as_bytes());
+        let _ = read_poses(&path, None);
+        for format in [PoseFormat::Tum, PoseFormat::Kitti, PoseFormat::Csv, PoseFormat::Colmap, PoseFormat::Nerfstudio, PoseFormat::Euroc] {
+            let _ = read_poses(&path, Some(format));
+        }
+    }
+}
+
+/// Windows' line ends, a byte order mark, comments and blank lines change nothing.
+#[test]
+fn editors_leave_their_marks() {
+    let trajectory = indexed(spiral(5, 0.1234567890123, 0.7));
+    for (format, text) in written(&trajectory) {
+        assert_restored(&trajectory, format, &text.replace('\n', "\r\n"), 1e-13);
+        assert_restored(&trajectory, format, &format!("\u{feff}{text}"), 1e-13);
+        if !matches!(format, PoseFormat::Nerfstudio) {
+            assert_restored(
+                &trajectory,
+                format,
+                &format!("# made by hand\n\n{text}\n"),
+                1e-13,
+            );
+        }
+    }
+}
+
+/// A file cut off anywhere is refused, or has fewer poses if it was cut between two; never others.
+#[test]
+fn a_truncated_file_has_no_wrong_poses() {
+    let trajectory = indexed(spiral(3, 0.5, 0.75));
+    for (format, text) in written(&trajectory) {
+        let whole = read_poses(&file_of(text.as_bytes()).1, Some(format))
+            .unwrap()
+            .entries;
+        for end in 0..text.len() {
+            let (_dir, path) = file_of(&text.as_bytes()[..end]);
+            if let Ok(file) = read_poses(&path, Some(format)) {
+                let complete = file.entries.len() - 1;
+                assert_eq!(
+                    file.entries[..complete],
+                    whole[..complete],
+                    "{format:?} {end}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_no_text_is_refused() {
+    for bytes in [
+        &[0xff, 0xfe, 0x30, 0x00][..],
+        b"0 0 0 0 0 0 0 1\0\n",
+        &[0x89, b'P', b'N', b'G'],
+    ] {
+        let message = read_poses(&file_of(bytes).1, None).unwrap_err().to_string();
+        assert!(message.contains("no text"), "{message}");
+    }
+    let message = read_poses(Path::new("/nowhere/poses.tum"), None)
+        .unwrap_err()
+        .to_string();
+    assert!(message.contains("cannot read the file"), "{message}");
+}
+
+#[test]
+fn euroc_is_read_in_nanoseconds_with_w_first() {
+    let text = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]\n\
+        1403636580838555648,4.688319,-1.786938,0.783338,0.534108,-0.153029,-0.827383,-0.082152,-0.027876\n\
+        1403636580843555328,4.688177,-1.786770,0.787350,0.534640,-0.152990,-0.826976,-0.082863,-0.031\n";
+    let file = read_text(text).unwrap();
+    assert_eq!(file.format, PoseFormat::Euroc);
+    let first = &file.entries[0];
+    assert_eq!(first.time_s, Some(1403636580.8385556));
+    assert!((first.pose.r_wc.w - 0.534108).abs() < 1e-5);
+    assert_eq!(first.pose.t_wc.x, 4.688319);
+}
+
+#[test]
+fn columns_are_found_by_their_names() {
+    let plain =
+        read_text("timestamp_ns;x;y;z;qw;qx;qy;qz;speed\n1403636580838555648;1;2;3;1;0;0;0;9\n")
+            .unwrap();
+    assert_eq!(plain.format, PoseFormat::Csv);
+    assert_eq!(plain.entries[0].time_s, Some(1403636580.8385556));
+    assert_eq!(plain.entries[0].pose.t_wc, Vector3::new(1.0, 2.0, 3.0));
+    assert!(!plain.has_names());
+    let header = "timestamp,x,y,z,qw,qx,qy,qz\n";
+    for (time, time_s) in [("1403636580838555648", 1403636580.8385556), ("12.5", 12.5)] {
+        let file = read_text(&format!("{header}{time},1,2,3,1,0,0,0\n")).unwrap();
+        assert_eq!(file.entries[0].time_s, Some(time_s));
+    }
+}
+
+#[test]
+fn nerfstudios_applied_transform_is_undone() {
+    let trajectory = indexed(spiral(2, 0.5, 0.75));
+    let applied = Pose::new(
+        so3::exp(&Vector3::new(1.0, 0.0, 0.3)),
+        Vector3::new(0.0, 2.0, 1.0),
+    );
+    let moved: Trajectory = trajectory
+        .iter()
+        .map(|s| StampedPose {
+            pose: applied.after(&s.pose),
+            ..*s
+        })
+        .collect();
+    let mut keys = serde_json::Map::new();
+    keys.insert(
+        "applied_transform".to_owned(),
+        serde_json::json!(rigid::rows(&applied)),
+    );
+    let text = nerfstudio::format(keys, &names(2), &moved);
+    assert_restored(&trajectory, PoseFormat::Nerfstudio, &text, 1e-13);
+}
+
+#[test]
+fn wrong_lines_are_named_with_the_remedy() {
+    let header = "time_s,tx_m,ty_m,tz_m,qx,qy,qz,qw\n";
+    let image = "1 1 0 0 0 0 0 0 1 a.png\n";
+    let ns = "1403636580838555648";
+    for (text, expected) in [
+        // TUM.
+        ("0 0 0 0 0 0 0 1\n1 0 0 0 0 0 1\n".to_owned(), ":2: 7 columns"),
+        ("0 0 0 NaN 0 0 0 1\n".into(), ":1: `NaN` is not finite"),
+        ("0 0 0 0 0 0 0 0\n".into(), ":1: the quaternion is zero"),
+        ("0 0 0 0 0 0 0 2\n".into(), ":1: the quaternion has length 2"),
+        ("0 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n".into(), ":2: duplicate timestamp 0"),
+        ("1 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n".into(), ":2: timestamp 0 after 1: sort the file by time"),
+        ("0 x 0 0 0 0 0 1\n".into(), ":1: `x` is not a number"),
+        ("# nothing\n".into(), "holds no poses"),
+        (String::new(), "holds no poses"),
+        // KITTI.
+        ("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1\n".into(), ":2: 11 columns"),
+        ("1 0 0 0 0 1 0 0 0 0 1 inf\n".into(), ":1: `inf` is not finite"),
+        ("2 0 0 0 0 2 0 0 0 0 2 0\n".into(), ":1: its rotation is scaled by 2"),
+        ("1 0 0 0 0 1 0 0 0 0 -1 0\n".into(), ":1: its rotation is a mirror image"),
+        // CSV.
+        (header.into(), "holds no poses"),
+        ("time_s,tx_m,ty_m,qx,qy,qz,qw\n".into(), ":1: no column `tz_m` or `tz`"),
+        ("x,tx,y,z,qx,qy,qz,qw\n".into(), ":1: two columns are called"),
+        (format!("{header}0,0,0,0,0,0,1\n"), ":2: 7 columns where the first line names 8"),
+        (format!("{header}\n0,0,0,nan,0,0,0,1\n"), ":3: `nan` is not finite"),
+        (format!("{header}0,0,0,0,0,0,0,0\n"), ":2: the quaternion is zero"),
+        (format!("{header}0,0,0,0,0,0,0,1\n0,0,0,0,0,0,0,1\n"), ":3: duplicate timestamp"),
+        (format!("frame,{header}a,1,0,0,0,0,0,0,1\nb,0,0,0,0,0,0,0,1\n"), ":3: timestamp 0 after 1"),
+        (format!("frame,{header}a,1,0,0,0,0,0,0,1\na,2,0,0,0,0,0,0,1\n"), ":3: a second pose of a"),
+        (format!("frame,{header},1,0,0,0,0,0,0,1\n"), ":2: the frame has no name"),
+        // COLMAP.
+        (format!("{image}\n1 1 0 0 0 0 0 0 1\n"), ":3: 9 columns"),
+        (format!("{image}{image}"), ":2: should hold the points"),
+        (format!("{image}\n{image}\n"), ":3: a second pose of a.png"),
+        (format!("{image}1.5 2.5 -1 3\n"), ":2: should hold the points"),
+        ("1 0 0 0 0 0 0 0 1 a.png\n".into(), ":1: the quaternion is zero"),
+        ("1 1 0 0 0 0 0 nan 1 a.png\n".into(), ":1: `nan` is not finite"),
+        // nerfstudio.
+        ("{\"frames\": []}".into(), "holds no poses"),
+        ("{\"frames\": [".into(), "line 1 column"),
+        ("{}".into(), "missing field `frames`"),
+        (
+            "{\"frames\": [{\"file_path\": \"a\", \"transform_matrix\": [[1,0,0,0],[0,1,0,0],[0,0,2,0]]}]}".into(),
+            "frames[0] (a): transform_matrix: its first three columns are no rotation",
+        ),
+        ("{\"frames\": [], \"applied_scale\": 0.5}".into(), "applied_scale is 0.5"),
+        // EuRoC.
+        (format!("{ns},0,0,0,1,0,0,0\n{ns},0,0,0,1,0,0,0\n"), ":2: duplicate timestamp"),
+        (format!("{ns},0,0,0,1,0,0,0\n{ns}.5,0,0,0,1,0,0,0\n"), ":2: `1403636580838555648.5` is not a whole number"),
+        (format!("{ns},0,0,0,1,0,0,0\n\n{ns},0,0,0,1,0,0\n"), ":3: 7 columns"),
+        (format!("{ns},0,0,0,0,0,0,0\n"), ":1: the quaternion is zero"),
+        (format!("{ns},0,0,NaN,1,0,0,0\n"), ":1: `NaN` is not finite"),
+        // None of them.
+        ("hello\n".into(), ":1: neither of TUM"),
+        ("1 2 3\n".into(), "--pose-format"),
+    ] {
+        let message = read_text(&text).unwrap_err().to_string();
+        assert!(message.contains(expected), "{text:?}: {message}");
+    }
+}

@@ -1,0 +1,33 @@
+//! KITTI odometry: the twelve numbers of `[R t]` a line, row by row, camera-to-world, metres; no times.
+//!
+//! KITTI's own files have the first camera as their world. Any world is read, and the tunnel's is written.
+
+use super::{PoseEntry, PoseError, StampedPose, rigid, text};
+use std::path::Path;
+
+pub(super) const FORM: &str = "r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz";
+
+pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
+    text::lines(text)
+        .map(|(number, line)| parse_line(line).map_err(|what| PoseError::line(path, number, what)))
+        .collect()
+}
+
+fn parse_line(line: &str) -> Result<PoseEntry, String> {
+    let [a, b, c, d, e, f, g, h, i, j, k, l] = text::numbers(line, FORM)?;
+    Ok(PoseEntry {
+        name: None,
+        time_s: None,
+        pose: rigid::motion(&[[a, b, c, d], [e, f, g, h], [i, j, k, l]])?,
+    })
+}
+
+/// The text of a KITTI file.
+pub fn format(trajectory: &[StampedPose]) -> String {
+    let line = |stamped: &StampedPose| {
+        let numbers = rigid::rows(&stamped.pose).concat();
+        let words: Vec<String> = numbers.iter().map(f64::to_string).collect();
+        words.join(" ") + "\n"
+    };
+    trajectory.iter().map(line).collect()
+}
