@@ -87,6 +87,7 @@ const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
 
 pub mod atomic;
 pub mod camera;
+pub mod check;
 pub mod cli;
 pub mod evaluate;
 pub mod frames;

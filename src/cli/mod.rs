@@ -1,5 +1,6 @@
 //! The command line: arguments, printing and exit codes; the work is done by the library.
 
+mod check;
 mod compare;
 mod config;
 mod configuration;
@@ -8,6 +9,7 @@ mod convert;
 mod demo;
 mod failure;
 mod hardships;
+mod init;
 mod json;
 mod locate;
 mod outputs;
@@ -59,6 +61,8 @@ pub struct Global {
 enum Command {
     Demo(demo::DemoArguments),
     Simulate(simulate::SimulateArguments),
+    Init(init::InitArguments),
+    Check(check::CheckArguments),
     Refine(refine::RefineArguments),
     Stitch(stitch::StitchArguments),
     Locate(locate::LocateArguments),
@@ -104,6 +108,8 @@ pub fn run() -> Result<(), Failure> {
     match cli.command {
         Command::Demo(arguments) => demo::run(&arguments, &terminal),
         Command::Simulate(arguments) => simulate::run(&arguments, &terminal),
+        Command::Init(arguments) => init::run(&arguments, &terminal),
+        Command::Check(arguments) => check::run(&arguments, &terminal),
         Command::Refine(arguments) => refine::run(&arguments, &run, &terminal),
         Command::Stitch(arguments) => stitch::run(&arguments, &run, &terminal),
         Command::Locate(arguments) => locate::run(&arguments, &terminal),

@@ -135,11 +135,19 @@ impl ReadingArguments {
     /// # Errors
     /// Everything that can be wrong with the survey.
     pub fn open(&self, survey: &Path, terminal: &Terminal) -> Result<Survey, Failure> {
-        let survey = Survey::open_with(survey, |file| self.change(file))?;
+        let survey = self.open_quietly(survey)?;
         for warning in &survey.warnings {
             terminal.warn(warning);
         }
         Ok(survey)
+    }
+
+    /// The same, its warnings left to the caller.
+    ///
+    /// # Errors
+    /// Everything that can be wrong with the survey.
+    pub fn open_quietly(&self, survey: &Path) -> Result<Survey, Failure> {
+        Ok(Survey::open_with(survey, |file| self.change(file))?)
     }
 
     /// Puts what the flags say into a survey's file. Their names are relative to the working folder, not to the survey's.

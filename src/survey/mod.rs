@@ -44,6 +44,7 @@
 
 mod associate;
 mod calibrate;
+mod discover;
 mod error;
 mod file;
 mod open;
@@ -54,6 +55,7 @@ mod times;
 
 pub use associate::{Associate, TIME_TOLERANCE_S};
 pub use calibrate::{CalibrateSection, CalibrationGroup};
+pub use discover::{Discovery, PictureGroup};
 pub use error::SurveyError;
 pub use file::{
     CameraSection, FramesSection, PriorSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,

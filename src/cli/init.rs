@@ -1,0 +1,173 @@
+//! `tunnelstitch init`: a `survey.toml` for what a folder holds.
+
+use super::{Failure, Terminal};
+use crate::atomic;
+use crate::survey::{Discovery, SURVEY_FILE, Survey};
+use crate::trajectory::PoseFormat;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+/// Looks into a folder for frames, calibration and poses, and writes a commented survey.toml for them.
+///
+/// Frames are the largest group of pictures of one folder; a calibration that fits their size and poses that are as many are preferred.
+/// What was recognised is printed, and what is still missing.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tunnelstitch init my-survey --radius-m 1.5")]
+pub struct InitArguments {
+    /// The folder.
+    folder: PathBuf,
+    /// Radius of the tunnel, metres; else a line to be filled in.
+    #[arg(long, value_name = "M", value_parser = super::stitch::positive)]
+    radius_m: Option<f64>,
+    /// Replace a survey.toml that is there.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A folder that cannot be read or holds no pictures; a survey.toml that is there already.
+pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure> {
+    let folder = &arguments.folder;
+    let path = folder.join(SURVEY_FILE);
+    if path.exists() && !arguments.force {
+        return Err(Failure::input(format!(
+            "{}: is there already; --force replaces it",
+            path.display()
+        )));
+    }
+    let found = Discovery::of(folder)
+        .map_err(|error| Failure::input(format!("{}: {error}", folder.display())))?;
+    if found.pictures.is_empty() {
+        return Err(Failure::input(format!(
+            "{}: holds no pictures (JPEG, PNG, TIFF, WebP), not even three folders below",
+            folder.display()
+        )));
+    }
+    for line in report(&found) {
+        terminal.say(line);
+    }
+    atomic::write_text(&path, &text(&found, arguments.radius_m))?;
+    terminal.say(format!("wrote {}", path.display()));
+    match Survey::open(folder) {
+        Ok(_) => terminal.say(format!("next: tunnelstitch check {}", folder.display())),
+        Err(error) => terminal.warn(format!("not ready yet: {error}")),
+    }
+    Ok(())
+}
+
+/// What was recognised, a line each.
+fn report(found: &Discovery) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (k, group) in found.pictures.iter().enumerate() {
+        let size = group
+            .size
+            .map_or("unreadable".to_owned(), |(w, h)| format!("{w} × {h} px"));
+        let which = if k == 0 { "frames" } else { "other pictures" };
+        lines.push(format!(
+            "  {which:<16}{} ({}, {size})",
+            group.pattern, group.count
+        ));
+    }
+    for (k, (path, camera)) in found.calibrations.iter().enumerate() {
+        let which = if k == 0 { "calibration" } else { "another" };
+        lines.push(format!(
+            "  {which:<16}{} ({} × {} px)",
+            path.display(),
+            camera.width,
+            camera.height
+        ));
+    }
+    let same = |other: Option<&(PathBuf, _)>, path: &Path| other.is_some_and(|(p, _)| p == path);
+    for (path, poses) in &found.poses {
+        let which = if same(found.initial(), path) {
+            "initial poses"
+        } else if same(found.truth(), path) {
+            "true poses"
+        } else {
+            "other poses"
+        };
+        lines.push(format!(
+            "  {which:<16}{} ({:?}, {} poses)",
+            path.display(),
+            poses.format,
+            poses.entries.len()
+        ));
+    }
+    lines
+}
+
+/// A text as TOML has it.
+fn quoted(text: impl AsRef<Path>) -> String {
+    toml::Value::String(text.as_ref().to_string_lossy().into_owned()).to_string()
+}
+
+fn text(found: &Discovery, radius_m: Option<f64>) -> String {
+    let mut text = String::from(
+        "# A survey for tunnelstitch. Paths are relative to this file.\n\n[tunnel]\nshape = \"circle\"\n",
+    );
+    // Writing into a string cannot fail.
+    let _ = match radius_m {
+        Some(radius_m) => writeln!(text, "radius_m = {radius_m:?}"),
+        None => writeln!(
+            text,
+            "# Measure the tunnel's radius in metres and take away the # of the next line.\n# radius_m = 3.0"
+        ),
+    };
+    text += "\n[camera]\n";
+    let _ = match found.calibrations.first() {
+        Some((path, _)) => writeln!(text, "file = {}", quoted(path)),
+        None => writeln!(
+            text,
+            "# No calibration was found: OpenCV, ROS or Kalibr YAML, COLMAP's cameras.txt, nerfstudio's transforms.json, or our camera.json.\n\
+             file = \"camera.json\""
+        ),
+    };
+    let pattern = found
+        .pictures
+        .first()
+        .map_or("*.jpg", |group| &group.pattern);
+    let _ = writeln!(
+        text,
+        "\n[frames]\nimages = {}    # sorted by name",
+        quoted(pattern)
+    );
+    text += "\n[poses]\n";
+    let count = found.pictures.first().map_or(0, |group| group.count);
+    match found.initial() {
+        None => {
+            text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC.\ninitial = \"baseline.tum\"\n";
+        }
+        Some((path, poses)) => {
+            let _ = writeln!(
+                text,
+                "initial = {}    # {} poses for {count} frames",
+                quoted(path),
+                poses.entries.len()
+            );
+            if poses.entries.len() != count && poses.has_times() && !poses.has_names() {
+                text += "associate = \"time\"       # by the frames' names, or by [frames] times = FILE\n# interpolate = true\n";
+            }
+            if poses.format == PoseFormat::Euroc {
+                text += "# These are a body's poses: how the camera is mounted (its sensor.yaml, or a 4 × 4 matrix).\n\
+                         # body_to_camera = \"sensor.yaml\"\n";
+            }
+        }
+    }
+    if let Some((path, _)) = found.truth() {
+        let _ = writeln!(
+            text,
+            "truth = {}      # only ever used to compare",
+            quoted(path)
+        );
+    }
+    text += "# convention = \"c2w\"       # or \"w2c\"; each format has its own\n\
+             # camera_axes = \"opencv\"   # or \"opengl\"; each format has its own\n\
+             # tunnel_frame = \"axis.json\"   # where the tunnel's axis lies, if it is not the poses' y axis\n\n\
+             [prior]                     # how far off the initial poses may be, 1-σ\n\
+             model = \"random-walk\"       # errors add up from frame to frame; or \"independent\"\n\
+             rotation_sigma_deg = 2.0    # about each axis\n\
+             translation_sigma_m = [0.02, 0.02, 0.03]\n";
+    text
+}

@@ -1,0 +1,199 @@
+//! What a folder holds that a survey can be made of.
+
+use crate::camera::{Camera, read_calibration};
+use crate::survey::SURVEY_FILE;
+use crate::trajectory::{PoseFile, read_poses};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Folders below the one that is looked into.
+const DEPTH: usize = 3;
+/// Larger files hold no calibration, ...
+const CALIBRATION_BYTES: u64 = 4 << 20;
+/// ... and no poses.
+const POSES_BYTES: u64 = 256 << 20;
+/// Endings of pictures.
+const PICTURES: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
+
+/// Pictures of one folder and ending.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PictureGroup {
+    /// Glob pattern, relative to the folder that was looked into.
+    pub pattern: String,
+    /// How many.
+    pub count: usize,
+    /// Width and height of the first, pixels, if it can be read.
+    pub size: Option<(u32, u32)>,
+}
+
+/// What was found; all paths are relative to the folder.
+#[derive(Clone, Debug, Default)]
+pub struct Discovery {
+    /// Groups of pictures, the largest first.
+    pub pictures: Vec<PictureGroup>,
+    /// Calibrations, those that fit the first group of pictures first.
+    pub calibrations: Vec<(PathBuf, Camera)>,
+    /// Files of poses; first those with as many poses as there are pictures, and of these what is not called true.
+    pub poses: Vec<(PathBuf, PoseFile)>,
+}
+
+impl Discovery {
+    /// Looks into `folder` and three levels of folders below; hidden ones are left out.
+    ///
+    /// # Errors
+    /// A folder that cannot be read.
+    pub fn of(folder: &Path) -> std::io::Result<Self> {
+        let mut files = Vec::new();
+        walk(folder, Path::new(""), DEPTH, &mut files)?;
+        files.sort();
+        let mut groups: BTreeMap<(PathBuf, String), Vec<&PathBuf>> = BTreeMap::new();
+        let mut found = Self::default();
+        for file in &files {
+            let extension = file
+                .extension()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned();
+            let lower = extension.to_lowercase();
+            if PICTURES.contains(&lower.as_str()) {
+                let parent = file.parent().unwrap_or(Path::new("")).to_owned();
+                groups.entry((parent, extension)).or_default().push(file);
+                continue;
+            }
+            let path = folder.join(file);
+            let bytes = path.metadata().map_or(0, |metadata| metadata.len());
+            if file.ends_with(SURVEY_FILE) {
+                continue;
+            }
+            if matches!(lower.as_str(), "json" | "toml" | "yaml" | "yml" | "txt")
+                && bytes <= CALIBRATION_BYTES
+                && let Ok(camera) = read_calibration(&path, None)
+            {
+                found.calibrations.push((file.clone(), camera));
+            }
+            if matches!(lower.as_str(), "txt" | "tum" | "csv" | "json" | "kitti")
+                && bytes <= POSES_BYTES
+                && let Ok(poses) = read_poses(&path, None)
+            {
+                found.poses.push((file.clone(), poses));
+            }
+        }
+        found.pictures = groups
+            .into_iter()
+            .map(|((parent, extension), files)| PictureGroup {
+                pattern: parent
+                    .join(format!("*.{extension}"))
+                    .to_string_lossy()
+                    .replace('\\', "/"),
+                count: files.len(),
+                size: image::image_dimensions(folder.join(files[0])).ok(),
+            })
+            .collect();
+        found.sort();
+        Ok(found)
+    }
+
+    fn sort(&mut self) {
+        self.pictures
+            .sort_by_key(|group| std::cmp::Reverse(group.count));
+        let first = self.pictures.first().cloned();
+        let (count, size) = first.map_or((0, None), |group| (group.count, group.size));
+        self.calibrations
+            .sort_by_key(|(_, camera)| Some((camera.width, camera.height)) != size);
+        self.poses.sort_by_key(|(path, poses)| {
+            let other_count = poses.entries.len() != count;
+            (
+                other_count && !poses.has_times() && !poses.has_names(),
+                is_truth(path),
+                other_count,
+            )
+        });
+    }
+
+    /// The poses to begin with: the first that are not called true.
+    pub fn initial(&self) -> Option<&(PathBuf, PoseFile)> {
+        self.poses.iter().find(|(path, _)| !is_truth(path))
+    }
+
+    /// The true poses, if any file is called so.
+    pub fn truth(&self) -> Option<&(PathBuf, PoseFile)> {
+        self.poses.iter().find(|(path, _)| is_truth(path))
+    }
+}
+
+/// Whether a file's name says that it holds the truth.
+fn is_truth(path: &Path) -> bool {
+    let name = path
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy()
+        .to_lowercase();
+    let words = ["truth", "groundtruth", "ground_truth", "ground-truth"];
+    words.iter().any(|word| name.contains(word)) || name == "gt" || name.starts_with("gt_")
+}
+
+fn walk(root: &Path, inner: &Path, depth: usize, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(root.join(inner))? {
+        let entry = entry?;
+        let path = inner.join(entry.file_name());
+        if entry.file_name().to_string_lossy().starts_with('.') {
+            continue;
+        }
+        let kind = root.join(&path).metadata()?;
+        if kind.is_file() {
+            files.push(path);
+        } else if kind.is_dir() && depth > 0 {
+            // A folder that may not be read is none of ours.
+            let _ = walk(root, &path, depth - 1, files);
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_survey_is_found_part_by_part() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/blender_free48");
+        let found = Discovery::of(&folder).unwrap();
+        let group = &found.pictures[0];
+        assert_eq!((group.pattern.as_str(), group.count), ("frames/*.jpg", 48));
+        assert_eq!(group.size, Some((480, 360)));
+        assert_eq!(found.calibrations[0].0, Path::new("camera.json"));
+        assert_eq!(found.initial().unwrap().0, Path::new("baseline.tum"));
+        assert_eq!(found.truth().unwrap().0, Path::new("groundtruth.tum"));
+    }
+
+    #[test]
+    fn what_does_not_fit_the_pictures_comes_last() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+        std::fs::create_dir_all(dir.path().join("images/.hidden")).unwrap();
+        for k in 0..3 {
+            let picture = image::GrayImage::new(64, 48);
+            picture
+                .save(dir.path().join(format!("images/{k}.png")))
+                .unwrap();
+        }
+        image::GrayImage::new(8, 8)
+            .save(dir.path().join("images/.hidden/x.png"))
+            .unwrap();
+        write("a.txt", "1 PINHOLE 128 96 50 50 64 48\n");
+        write("b.txt", "1 PINHOLE 64 48 50 50 32 24\n");
+        write("few.txt", "1 0 0 0 0 0 0 0 1\n1 0 0 1 0 0 0 0 1\n");
+        write("long.tum", "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n");
+        write(
+            "right.tum",
+            "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n",
+        );
+        write("notes.txt", "measured on a Monday\n");
+        let found = Discovery::of(dir.path()).unwrap();
+        assert_eq!(found.pictures.len(), 1);
+        assert_eq!(found.pictures[0].pattern, "images/*.png");
+        assert_eq!(found.calibrations[0].0, Path::new("b.txt"));
+        assert_eq!(found.initial().unwrap().0, Path::new("right.tum"));
+        assert!(found.truth().is_none());
+    }
+}

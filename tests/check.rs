@@ -1,0 +1,77 @@
+//! `init` and `check` through the program.
+
+mod support;
+
+use support::{edit, fail, first_frames, succeed, text, tunnelstitch};
+
+#[test]
+fn a_folder_becomes_a_survey_and_is_sound() {
+    let survey = first_frames(14);
+    let path = survey.path().join("survey.toml");
+    std::fs::remove_file(&path).unwrap();
+    let said = succeed(&["init", text(survey.path()), "--radius-m", "3"]);
+    for part in [
+        "frames/*.jpg (14, 480 × 360 px)",
+        "camera.json",
+        "baseline.tum",
+        "groundtruth.tum",
+        "next: ",
+    ] {
+        assert!(said.contains(part), "no {part} in {said}");
+    }
+    let report = succeed(&["check", text(survey.path()), "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["frames"], 14);
+    assert_eq!(report["faults"].as_array().unwrap().len(), 0);
+    let overlap = report["overlap"]["neighbours"].as_f64().unwrap();
+    assert!((0.3..0.8).contains(&overlap), "{report}");
+    assert!(
+        report["pictures"]["sigma_px"].as_f64().unwrap() < 0.01,
+        "{report}"
+    );
+    // What is there is not replaced.
+    let message = fail(&["init", text(survey.path())], 3);
+    assert!(message.contains("--force"), "{message}");
+}
+
+#[test]
+fn what_is_missing_is_said_and_left_to_be_filled_in() {
+    let survey = first_frames(3);
+    for name in ["survey.toml", "camera.json"] {
+        std::fs::remove_file(survey.path().join(name)).unwrap();
+    }
+    let output = tunnelstitch(&["init", text(survey.path())]);
+    assert!(output.status.success());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("radius_m"), "{said}");
+    let file = std::fs::read_to_string(survey.path().join("survey.toml")).unwrap();
+    assert!(
+        file.contains("# radius_m = 3.0") && file.contains("No calibration was found"),
+        "{file}"
+    );
+    let empty = tempfile::tempdir().unwrap();
+    let message = fail(&["init", text(empty.path())], 3);
+    assert!(message.contains("no pictures"), "{message}");
+}
+
+#[test]
+fn every_frame_that_does_not_fit_is_named() {
+    let survey = first_frames(6);
+    let frame = |k: usize| survey.path().join(format!("frames/{k:06}.jpg"));
+    image::GrayImage::new(64, 48).save(frame(2)).unwrap();
+    std::fs::write(frame(4), "no picture").unwrap();
+    let message = fail(&["check", text(survey.path())], 3);
+    assert!(
+        message.contains("frame 2") && message.contains("64 × 48"),
+        "{message}"
+    );
+    assert!(message.contains("frame 4"), "{message}");
+    // What opening a survey refuses, `check` says in the same words.
+    edit(
+        &survey.path().join("survey.toml"),
+        "radius_m = 3",
+        "radius_m = 0.1",
+    );
+    let message = fail(&["check", text(survey.path())], 3);
+    assert!(message.contains("outside the tunnel"), "{message}");
+}
