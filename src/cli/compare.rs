@@ -111,7 +111,7 @@ pub fn compare_into(
             super_resolve: false,
         },
     };
-    let (comparison, panoramas) = compare(&input, terminal)?;
+    let (comparison, drawings) = compare(&input, terminal)?;
     let layout = picture.canvas.layout.into();
     let json = json::text(&Report {
         program: PROGRAM,
@@ -126,16 +126,16 @@ pub fn compare_into(
         terminal.advance(1);
         Ok(())
     };
-    let baseline = panoramas.baseline.into_image(Layout::ThetaRight);
-    let refined = panoramas.refined.into_image(Layout::ThetaRight);
+    let baseline = drawings.baseline.panorama.into_image(Layout::ThetaRight);
+    let refined = drawings.refined.panorama.into_image(Layout::ThetaRight);
     write(
         "before-after.png",
         &before_after(&baseline, &refined).into(),
     )?;
     write("baseline.png", &layout.turn(baseline))?;
     write("refined.png", &layout.turn(refined))?;
-    match panoramas.truth {
-        Some(truth) => write("truth.png", &truth.into_image(layout))?,
+    match drawings.truth {
+        Some(truth) => write("truth.png", &truth.panorama.into_image(layout))?,
         // One from an earlier comparison would belong to other pictures.
         None => atomic::remove_file(&out.join("truth.png"))?,
     }

@@ -90,3 +90,11 @@ pub fn run() -> Result<(), Failure> {
         Command::Project(arguments) => project::run(&arguments, &terminal),
     }
 }
+
+/// The command line that the program was started with, the program by its name only.
+fn command_line() -> Vec<String> {
+    let arguments = std::env::args_os().skip(1);
+    std::iter::once("tunnelstitch".to_owned())
+        .chain(arguments.map(|argument| argument.to_string_lossy().into_owned()))
+        .collect()
+}
