@@ -10,6 +10,7 @@ mod locate;
 mod outputs;
 mod project;
 mod refine;
+mod report;
 mod simulate;
 mod stitch;
 mod terminal;
@@ -56,6 +57,7 @@ enum Command {
     Stitch(stitch::StitchArguments),
     Locate(locate::LocateArguments),
     Compare(compare::CompareArguments),
+    Report(report::ReportArguments),
     Converge(converge::ConvergeArguments),
     Project(project::ProjectArguments),
 }
@@ -86,6 +88,7 @@ pub fn run() -> Result<(), Failure> {
         Command::Stitch(arguments) => stitch::run(&arguments, &terminal),
         Command::Locate(arguments) => locate::run(&arguments, &terminal),
         Command::Compare(arguments) => compare::run(&arguments, &terminal),
+        Command::Report(arguments) => report::run(&arguments, &terminal),
         Command::Converge(arguments) => converge::run(&arguments, &terminal),
         Command::Project(arguments) => project::run(&arguments, &terminal),
     }
