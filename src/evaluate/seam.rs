@@ -66,12 +66,15 @@ impl SeamMap {
                 let seen = look(surface, frames, placements, &grid, tile);
                 let mut cells: BTreeMap<usize, Sums> = BTreeMap::new();
                 for (k, seen) in (0..).zip(&seen) {
-                    let (row, column) = (tile.row + k / tile.columns, tile.column + k % tile.columns);
+                    let (row, column) =
+                        (tile.row + k / tile.columns, tile.column + k % tile.columns);
                     let cell = |at: u32, of: u32, cells: u32| {
                         (u64::from(at) * u64::from(cells) / u64::from(of)) as usize
                     };
-                    let (row, column) =
-                        (cell(row, grid.rows, along), cell(column, grid.columns, around));
+                    let (row, column) = (
+                        cell(row, grid.rows, along),
+                        cell(column, grid.columns, around),
+                    );
                     let at = row * around as usize + column;
                     cells.entry(at).or_default().add(seen);
                 }
@@ -277,7 +280,10 @@ mod tests {
         let map = SeamMap::new(&wall.circle, &wall.stack(), &placements, &canvas);
         let [around, along] = map.size();
         let (residuals, frames) = (map.rms_grey(), map.frames());
-        assert_eq!((residuals.len(), frames.len()), (around * along, around * along));
+        assert_eq!(
+            (residuals.len(), frames.len()),
+            (around * along, around * along)
+        );
         assert_eq!(map.chainage_m(), canvas.chainage_m());
         let column = |s_m: f64| {
             let share = (s_m / wall.circle.perimeter_m()).rem_euclid(1.0);

@@ -1,7 +1,7 @@
 //! A line chart as inline SVG, coloured by the page's style sheet.
 
 use super::decimate::decimate;
-use super::quantity::significant;
+use super::quantity::{fixed, significant};
 use super::ticks;
 use maud::{Markup, html};
 
@@ -11,8 +11,11 @@ const SIZE: [f64; 2] = [380.0, 214.0];
 const PLOT: [f64; 4] = [48.0, 372.0, 8.0, 172.0];
 /// Share of the values' span that is left free above and below.
 const AIR: f64 = 0.07;
+/// Flagged frames up to so many have lines as high as the plot; more have short ones, which hide nothing.
+const MOST_LINES: usize = 24;
+const SHORT_LINE: f64 = 7.0;
 /// Curves of no more points than this show them.
-const MOST_DOTS: usize = 60;
+const MOST_DOTS: usize = 30;
 
 /// What a curve is, which says how it looks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,6 +66,15 @@ impl Series {
         }
     }
 
+    /// The same curve with the 1-σ of its points, where they have one.
+    pub fn with_sigma(mut self, sigma: impl Iterator<Item = Option<f64>>) -> Self {
+        let sigma: Vec<f64> = sigma.map(|sigma| sigma.unwrap_or(f64::NAN)).collect();
+        if sigma.iter().any(|sigma| sigma.is_finite()) {
+            self.sigma = sigma;
+        }
+        self
+    }
+
     /// The edges of its band of ±1-σ.
     fn band(&self) -> [Vec<[f64; 2]>; 2] {
         let edge = |sign: f64| {
@@ -80,6 +92,8 @@ pub struct Axis {
     pub name: String,
     /// Its ends.
     pub range: [f64; 2],
+    /// Whether there is nothing between whole numbers.
+    pub whole: bool,
 }
 
 /// How a chart's vertical axis runs.
@@ -166,7 +180,10 @@ impl Chart {
             }
             Vertical::FromZero if high > 0.0 => [0.0, high * (1.0 + AIR)],
             _ if high > low => [low - AIR * (high - low), high + AIR * (high - low)],
-            _ => [low - 0.5 * low.abs().max(1e-3), high + 0.5 * high.abs().max(1e-3)],
+            _ => [
+                low - 0.5 * low.abs().max(1e-3),
+                high + 0.5 * high.abs().max(1e-3),
+            ],
         };
         let x = match self.along.range {
             [from, to] if to != from => [from, to],
@@ -193,7 +210,12 @@ impl Chart {
                 ))
             })
             .collect();
-        format!("{} along {}: {}.", self.title, self.along.name, curves.join("; "))
+        format!(
+            "{} along {}: {}.",
+            self.title,
+            self.along.name,
+            curves.join("; ")
+        )
     }
 
     /// The chart with its title.
@@ -206,10 +228,25 @@ impl Chart {
             true => ticks::logarithmic(frame.y[0], frame.y[1], 6),
             false => ticks::linear(frame.y[0], frame.y[1], 5),
         };
-        let x_ticks = ticks::linear(frame.x[0].min(frame.x[1]), frame.x[0].max(frame.x[1]), 6);
-        let mut marks: Vec<i64> = self.marks.iter().map(|x| frame.x(*x).round() as i64).collect();
+        let (from, to) = (frame.x[0].min(frame.x[1]), frame.x[0].max(frame.x[1]));
+        let mut x_ticks = ticks::linear(from, to, 6);
+        if self.along.whole {
+            x_ticks.retain(|(value, _)| value.fract() == 0.0);
+            for (value, text) in &mut x_ticks {
+                *text = fixed(*value, 0);
+            }
+        }
+        let mut marks: Vec<i64> = self
+            .marks
+            .iter()
+            .map(|x| frame.x(*x).round() as i64)
+            .collect();
         marks.sort_unstable();
         marks.dedup();
+        let foot = match marks.len() > MOST_LINES {
+            true => top + SHORT_LINE,
+            false => bottom,
+        };
         let shown = |point: &[f64; 2]| !frame.logarithmic || point[1] > 0.0;
         html! {
             figure.chart {
@@ -226,12 +263,12 @@ impl Chart {
                 {
                     @for (value, text) in &y_ticks {
                         @let y = format!("{:.1}", frame.y(*value));
-                        line.grid x1=(left) x2=(right) y1=(y) y2=(y);
+                        line.grid x1=(left) x2=(right) y1=(y) y2=(y) {}
                         text.tick x=(left - 6.0) y=(y) dy="0.32em" text-anchor="end" { (text) }
                     }
                     @for (value, text) in &x_ticks {
                         @let x = format!("{:.1}", frame.x(*value));
-                        line.stub x1=(x) x2=(x) y1=(bottom) y2=(bottom + 4.0);
+                        line.stub x1=(x) x2=(x) y1=(bottom) y2=(bottom + 4.0) {}
                         text.tick x=(x) y=(bottom + 16.0) text-anchor="middle" { (text) }
                     }
                     text.axis x=(0.5 * (left + right)) y=(SIZE[1] - 6.0) text-anchor="middle" { (self.along.name) }
@@ -239,54 +276,69 @@ impl Chart {
                         viewBox=(format!("{left} {top} {width} {height}"))
                     {
                         @for x in &marks {
-                            line.mark x1=(x) x2=(x) y1=(top) y2=(bottom);
+                            line.mark x1=(x) x2=(x) y1=(top) y2=(foot) {}
                         }
                         @for series in &self.series {
                             @if !series.sigma.is_empty() {
                                 @let [upper, lower] = series.band().map(|edge| decimate(&edge, frame.x, columns));
                                 @let outline: Vec<[f64; 2]> = upper.into_iter().chain(lower.into_iter().rev()).collect();
-                                polygon.(format!("band {}", series.style.class())) points=(frame.polyline(&outline));
+                                polygon.(format!("band {}", series.style.class())) points=(frame.polyline(&outline)) {}
                             }
                         }
                         @for series in &self.series {
                             @let points: Vec<[f64; 2]> = series.points.iter().copied().filter(shown).collect();
                             @let points = decimate(&points, frame.x, columns);
                             polyline.(format!("curve {}", series.style.class()))
-                                data-name=(series.name) points=(frame.polyline(&points));
-                            @if points.len() <= MOST_DOTS {
+                                data-name=(series.name) points=(frame.polyline(&points)) {}
+                            @if points.len() <= MOST_DOTS && !matches!(series.style, Style::Planned | Style::Truth) {
                                 @for point in &points {
                                     circle.(format!("dot {}", series.style.class())) r="2.2"
                                         cx=(format!("{:.1}", frame.x(point[0])))
-                                        cy=(format!("{:.1}", frame.y(point[1])));
+                                        cy=(format!("{:.1}", frame.y(point[1]))) {}
                                 }
                             }
                         }
                     }
-                    line.base x1=(left) x2=(right) y1=(bottom) y2=(bottom);
+                    line.base x1=(left) x2=(right) y1=(bottom) y2=(bottom) {}
                 }
             }
         }
     }
 }
 
-/// Names and looks of curves, for several charts.
-pub fn legend(entries: &[(&str, Style)], extras: &[(&str, &str)]) -> Markup {
+/// Something in a chart that is no curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extra {
+    /// The band of ±1-σ.
+    Band,
+    /// The line of a flagged frame.
+    Mark,
+}
+
+/// Names and looks of curves and of what else there is, for several charts.
+pub fn legend(entries: &[(&str, Style)], extras: &[Extra]) -> Markup {
     html! {
         p.legend {
             @for (name, style) in entries {
                 span.key {
                     svg viewBox="0 0 28 10" aria-hidden="true" {
-                        line.(format!("curve {}", style.class())) x1="1" x2="27" y1="5" y2="5";
+                        line.(format!("curve {}", style.class())) x1="1" x2="27" y1="5" y2="5" {}
                     }
                     (name)
                 }
             }
-            @for (name, class) in extras {
+            @for extra in extras {
                 span.key {
                     svg viewBox="0 0 28 10" aria-hidden="true" {
-                        rect.(class) x="1" y="0" width="26" height="10" {}
+                        @match extra {
+                            Extra::Band => { rect.band.refined x="1" y="0" width="26" height="10" {} }
+                            Extra::Mark => { line.mark x1="14" x2="14" y1="-1" y2="11" {} }
+                        }
                     }
-                    (name)
+                    @match extra {
+                        Extra::Band => { "±1-σ" }
+                        Extra::Mark => { "flagged frame" }
+                    }
                 }
             }
         }
@@ -304,6 +356,7 @@ mod tests {
             along: Axis {
                 name: "chainage (m)".to_owned(),
                 range: [0.0, 10.0],
+                whole: false,
             },
             vertical,
             series: vec![Series::new("refined & more", Style::Refined, points)],
@@ -340,7 +393,9 @@ mod tests {
     #[test]
     fn a_long_curve_is_short_in_the_page() {
         let points = (0..100_000).map(|k| [f64::from(k) * 1e-4, f64::from(k % 97)]);
-        let text = chart(points.collect(), Vertical::Linear).draw().into_string();
+        let text = chart(points.collect(), Vertical::Linear)
+            .draw()
+            .into_string();
         assert!(text.len() < 30_000, "{}", text.len());
     }
 }

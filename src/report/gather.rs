@@ -1,11 +1,11 @@
 //! From the sources to the numbers of the report.
 
+use super::ReportError;
 use super::model::{Abscissa, FrameRow, Report, SCHEMA_VERSION, SurveyFacts, Verdict, WallMaps};
 use super::pictures::{Pictures, panoramas, thumbnails};
 use super::refined::{RefinedFiles, Refinement};
-use super::ReportError;
 use crate::PROGRAM;
-use crate::evaluate::{Comparison, Drawings, SeamMap};
+use crate::evaluate::{Comparison, Drawings, SeamMap, WallError};
 use crate::refine::FrameFlag;
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
@@ -59,7 +59,7 @@ pub fn gather(sources: Sources) -> Result<(Report, Pictures), ReportError> {
         program: PROGRAM.to_owned(),
         commands,
         survey: survey_facts(survey, &refined.path),
-        verdict: verdict(&frames, refined.refinement.as_ref()),
+        verdict: verdict(&frames, refined.refinement.as_ref(), comparison),
         abscissa: abscissa(&frames),
         frames,
         notes: notes(survey, &refined, comparison),
@@ -120,7 +120,8 @@ fn frame_rows(survey: &Survey, refined: &RefinedFiles) -> Vec<FrameRow> {
             let correction = rotation_deg(planned, pose);
             let covariance = refined.covariances.as_ref().and_then(|all| all.get(k));
             let sigma = |first: usize| -> Option<[f64; 3]> {
-                let sigma = [0, 1, 2].map(|axis| covariance.map(|c| c[(first + axis, first + axis)].sqrt()));
+                let sigma = [0, 1, 2]
+                    .map(|axis| covariance.map(|c| c[(first + axis, first + axis)].sqrt()));
                 let [Some(x), Some(y), Some(z)] = sigma else {
                     return None;
                 };
@@ -160,16 +161,27 @@ fn abscissa(frames: &[FrameRow]) -> Abscissa {
     }
 }
 
-fn verdict(frames: &[FrameRow], refinement: Option<&Refinement>) -> Verdict {
+fn verdict(
+    frames: &[FrameRow],
+    refinement: Option<&Refinement>,
+    comparison: &Comparison,
+) -> Verdict {
     let sigma = |pick: fn(&crate::refine::FrameSigma) -> f64| {
         let frames = refinement?.frames.iter();
         let sure = frames.filter(|frame| frame.flag == FrameFlag::Photometric);
         median(sure.map(|frame| pick(&frame.sigma)).collect())
     };
-    let flagged = refinement.map(|refinement| flagged(refinement).count());
-    let of_frames = |pick: fn(&FrameRow) -> f64| {
-        median(frames.iter().map(pick).collect()).unwrap_or_default()
+    let wall = comparison.refined.wall.as_ref();
+    let error = |pick: fn(&WallError) -> &[f64]| {
+        let of_frames = refinement?.frames.iter().zip(pick(wall?));
+        let sure = of_frames.filter(|(frame, _)| frame.flag == FrameFlag::Photometric);
+        let squares: Vec<f64> = sure.map(|(_, rms)| rms * rms).collect();
+        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+        (!squares.is_empty()).then(|| mean.sqrt())
     };
+    let flagged = refinement.map(|refinement| flagged(refinement).count());
+    let of_frames =
+        |pick: fn(&FrameRow) -> f64| median(frames.iter().map(pick).collect()).unwrap_or_default();
     Verdict {
         repaired: flagged.map(|flagged| frames.len() - flagged),
         flagged,
@@ -177,6 +189,8 @@ fn verdict(frames: &[FrameRow], refinement: Option<&Refinement>) -> Verdict {
         correction_translation_m: of_frames(|frame| frame.correction_distance_m),
         sigma_wall_mm: sigma(|sigma| 1e3 * sigma.wall_m),
         sigma_wall_px: sigma(|sigma| sigma.wall_px),
+        error_wall_mm: error(|wall| &wall.frame_rms_mm),
+        error_wall_px: error(|wall| &wall.frame_rms_px),
     }
 }
 
@@ -190,7 +204,10 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
 fn wall_maps(drawings: &Drawings) -> WallMaps {
     let map = &drawings.refined.seams;
     let residual = |map: &SeamMap| -> Vec<Option<f64>> {
-        map.rms_grey().iter().map(|value| value.map(cents)).collect()
+        map.rms_grey()
+            .iter()
+            .map(|value| value.map(cents))
+            .collect()
     };
     let [around, along] = map.size();
     WallMaps {

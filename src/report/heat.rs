@@ -50,7 +50,10 @@ pub fn colour(share: f64) -> [u8; 3] {
     let below = (place.floor() as usize).min(CIVIDIS.len() - 2);
     let part = place - below as f64;
     let mix = |c: usize| {
-        let (a, b) = (f64::from(CIVIDIS[below][c]), f64::from(CIVIDIS[below + 1][c]));
+        let (a, b) = (
+            f64::from(CIVIDIS[below][c]),
+            f64::from(CIVIDIS[below + 1][c]),
+        );
         (a + part * (b - a)).round() as u8
     };
     [mix(0), mix(1), mix(2)]

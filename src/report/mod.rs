@@ -40,5 +40,5 @@ pub use model::{
 };
 pub use page::page;
 pub use pictures::{PICTURES, Pictures};
-pub use refined::{CalibratedUnknown, Calibration, Refinement, RefinedFiles};
+pub use refined::{CalibratedUnknown, Calibration, RefinedFiles, Refinement};
 pub use resolution::resolution;

@@ -80,6 +80,11 @@ pub struct Verdict {
     pub sigma_wall_mm: Option<f64>,
     /// The same in pixels of the frames.
     pub sigma_wall_px: Option<f64>,
+    /// Root mean square error of the repaired frames on the wall, millimetres; null without truth. That of all frames is in
+    /// [`Report::comparison`].
+    pub error_wall_mm: Option<f64>,
+    /// The same in pixels of the frames.
+    pub error_wall_px: Option<f64>,
 }
 
 /// What frames are spread along in charts.

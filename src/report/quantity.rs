@@ -53,8 +53,7 @@ fn minus(text: String) -> String {
 pub fn length_unit(most_m: f64) -> (&'static str, f64) {
     match most_m {
         m if m >= 1.0 => ("m", 1.0),
-        m if m >= 1e-4 => ("mm", 1e3),
-        _ => ("µm", 1e6),
+        _ => ("mm", 1e3),
     }
 }
 
@@ -84,6 +83,5 @@ mod tests {
     fn lengths_have_the_unit_that_suits_them() {
         assert_eq!(length_unit(12.0).0, "m");
         assert_eq!(length_unit(0.3), ("mm", 1e3));
-        assert_eq!(length_unit(2e-5).0, "µm");
     }
 }

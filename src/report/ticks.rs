@@ -28,7 +28,7 @@ pub fn linear(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
 }
 
 /// Powers of ten in `[low, high]` (both positive), about `wanted` of them; within less than two decades 1, 2 and 5 times
-/// them, too.
+/// them, too, and within less than one whatever is round.
 pub fn logarithmic(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let decades = (last - first).max(1) as usize;
@@ -37,12 +37,16 @@ pub fn logarithmic(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
         true => &[1.0, 2.0, 5.0],
         false => &[1.0],
     };
-    (first..=last)
+    let ticks: Vec<(f64, String)> = (first..=last)
         .step_by(stride)
         .flat_map(|decade| factors.iter().map(move |f| f * 10f64.powi(decade)))
         .filter(|value| (0.999 * low..=1.001 * high).contains(value))
         .map(|value| (value, power_text(value)))
-        .collect()
+        .collect();
+    match ticks.len() < 3 && high < 10.0 * low {
+        true => linear(low, high, wanted.min(4)),
+        false => ticks,
+    }
 }
 
 /// Ordinary digits where they are short, else `10` with an exponent.
@@ -87,8 +91,12 @@ mod tests {
         assert_eq!(texts(&linear(-1.45, 13.3, 5)), ["0", "5", "10"]);
         assert_eq!(texts(&linear(0.0, 0.7, 4)), ["0.0", "0.2", "0.4", "0.6"]);
         assert_eq!(texts(&linear(-0.02, 0.021, 4)), ["−0.02", "0.00", "0.02"]);
-        assert_eq!(texts(&logarithmic(0.003, 40.0, 6)), ["0.01", "0.1", "1", "10"]);
-        assert_eq!(texts(&logarithmic(1.5, 9.0, 5)), ["2", "5"]);
+        assert_eq!(
+            texts(&logarithmic(0.003, 40.0, 6)),
+            ["0.01", "0.1", "1", "10"]
+        );
+        assert_eq!(texts(&logarithmic(1.5, 30.0, 5)), ["2", "5", "10", "20"]);
+        assert_eq!(texts(&logarithmic(1.5, 9.0, 5)), ["2", "4", "6", "8"]);
         assert_eq!(texts(&logarithmic(1e-7, 1e-5, 5)), ["10⁻⁷", "10⁻⁶", "10⁻⁵"]);
     }
 

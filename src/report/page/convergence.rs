@@ -17,12 +17,14 @@ pub fn section(view: &View) -> Option<Markup> {
         .collect();
     Some(html! {
         p { "The global solves, from coarse to fine, each a few damped Gauss–Newton steps over all frames. The cost is robust \
-            and compares only within a solve, for each has its own samples of the wall. The last solve ended because "
+            and compares only within a solve, for each has its own samples of the wall; it is not computed after a last step, so a solve of one step has no curve. The last solve ended because "
             (refinement.stopped_because) "." }
         (legend(&entries, &[]))
         div.charts {
-            (chart("Cost per observation", "", levels, costs))
-            (chart("Step on the wall", "px", levels, steps))
+            @for (k, (level, name)) in levels.iter().zip(&names).enumerate() {
+                @if level.solve.steps.len() > 1 { (cost_chart(level, name, k)) }
+            }
+            (step_chart(levels, &names))
         }
         (table(levels, &names))
     })
@@ -31,50 +33,56 @@ pub fn section(view: &View) -> Option<Markup> {
 fn name(level: &LevelReport) -> String {
     let mut name = format!("level {}", level.level);
     if level.samples_per_pixel != 1.0 {
-        name += &format!(", {} samples per px", short(level.samples_per_pixel));
+        name += &format!(", {} samples per px", level.samples_per_pixel);
     }
     if level.share_of_wall < 0.995 {
-        name += &format!(", {} % of the wall", significant(100.0 * level.share_of_wall, 2));
+        name += &format!(
+            ", {} % of the wall",
+            significant(100.0 * level.share_of_wall, 2)
+        );
     }
     name
 }
 
-/// Cost per observation before the first and after each step.
-fn costs(level: &LevelReport) -> Vec<(usize, f64)> {
+/// Cost per observation before the first and after each step of one solve.
+fn cost_chart(level: &LevelReport, name: &str, k: usize) -> Markup {
     let observations = level.solve.observations.max(1) as f64;
     let after = level.solve.steps.iter().map(|step| step.cost);
-    let all = std::iter::once(Some(level.solve.cost_start)).chain(after);
-    all.enumerate()
-        .filter_map(|(k, cost)| Some((k, cost? / observations)))
-        .collect()
+    let costs = std::iter::once(Some(level.solve.cost_start)).chain(after);
+    let points = costs.enumerate();
+    let points = points.filter_map(|(step, cost)| Some([step as f64, cost? / observations]));
+    Chart {
+        title: format!("Cost per observation, {name}"),
+        unit: String::new(),
+        along: Axis {
+            name: "steps".to_owned(),
+            range: [0.0, level.solve.steps.len() as f64],
+            whole: true,
+        },
+        vertical: Vertical::Linear,
+        series: vec![Series::new("cost", Style::Ordered(k), points.collect())],
+        marks: Vec::new(),
+    }
+    .draw()
 }
 
-/// Movement of the wall in each step.
-fn steps(level: &LevelReport) -> Vec<(usize, f64)> {
-    let steps = level.solve.steps.iter().enumerate();
-    steps.map(|(k, step)| (k + 1, step.step_px)).collect()
-}
-
-fn chart(
-    title: &str,
-    unit: &str,
-    levels: &[LevelReport],
-    values: fn(&LevelReport) -> Vec<(usize, f64)>,
-) -> Markup {
+/// Movement of the wall in every step of all solves.
+fn step_chart(levels: &[LevelReport], names: &[String]) -> Markup {
     let mut done = 0;
     let mut series = Vec::new();
-    for (k, level) in levels.iter().enumerate() {
-        let points = values(level).into_iter();
-        let points = points.map(|(step, value)| [(done + step) as f64, value]);
-        series.push(Series::new(&name(level), Style::Ordered(k), points.collect()));
+    for (k, (level, name)) in levels.iter().zip(names).enumerate() {
+        let points = (done + 1..).zip(&level.solve.steps);
+        let points = points.map(|(at, step): (usize, _)| [at as f64, step.step_px]);
+        series.push(Series::new(name, Style::Ordered(k), points.collect()));
         done += level.solve.steps.len();
     }
     Chart {
-        title: title.to_owned(),
-        unit: unit.to_owned(),
+        title: "Largest step on the wall".to_owned(),
+        unit: "px".to_owned(),
         along: Axis {
-            name: "steps in all".to_owned(),
+            name: "steps of all solves".to_owned(),
             range: [0.0, done.max(1) as f64],
+            whole: true,
         },
         vertical: Vertical::Logarithmic,
         series,
@@ -86,7 +94,7 @@ fn chart(
 fn table(levels: &[LevelReport], names: &[String]) -> Markup {
     html! {
         div.wide {
-            table {
+            table.solves {
                 caption { "The global solves" }
                 thead { tr {
                     th scope="col" { "Solve" } th.number scope="col" { "Steps" } th.number scope="col" { "Observations" }

@@ -2,7 +2,9 @@
 
 use super::View;
 use super::trajectory::marks_key;
+use crate::report::Report;
 use crate::report::chart::{Chart, Series, Style, Vertical, legend};
+use crate::report::quantity::{fixed, short};
 use maud::{Markup, html};
 
 /// The section; `None` without truth.
@@ -38,5 +40,42 @@ pub fn section(view: &View) -> Option<Markup> {
             (chart("Translation error", "mm", &turned.frame_translation_m, &now.frame_translation_m, 1e3))
             (chart("Error on the wall, RMS of the frame", "px", &wall_before.frame_rms_px, &wall_after.frame_rms_px, 1.0))
         }
+        (table(view.report))
     })
+}
+
+fn table(report: &Report) -> Markup {
+    let comparison = &report.comparison;
+    let rows = comparison.rows();
+    let truth = comparison.truth.as_ref().and_then(|truth| truth.seam);
+    let [from_m, to_m] = comparison.canvas.chainage_m();
+    html! {
+        div.wide {
+            table {
+                caption {
+                    "Initial and refined poses compared"
+                    @if report.survey.truth { " with the true ones" }
+                    ", over chainage " (fixed(from_m, 2)) " to "
+                    (fixed(to_m, 2)) " m at "
+                    (short(comparison.canvas.px_per_metre)) " pixels per metre"
+                }
+                thead { tr { th scope="col" { "Measure" } th scope="col" { "Unit" }
+                    th.number scope="col" { "Baseline" } th.number scope="col" { "Refined" } } }
+                tbody {
+                    @for row in &rows {
+                        tr {
+                            th scope="row" { (row.measure) }
+                            td { (row.unit) }
+                            td.number { (row.baseline.as_deref().unwrap_or("–")) }
+                            td.number { (row.refined.as_deref().unwrap_or("–")) }
+                        }
+                    }
+                    @if let Some(seam) = truth {
+                        tr { th scope="row" { "seam residual, true poses" } td { "grey" }
+                            td.number colspan="2" { (format!("{:.2}", seam.rms_grey)) } }
+                    }
+                }
+            }
+        }
+    }
 }

@@ -84,7 +84,10 @@ fn facts(view: &View, frame: &FrameReport) -> String {
     }
     if frame.points > 0 {
         facts.push(format!("residual {} grey", short(frame.residual)));
-        facts.push(format!("{} % of its pixels fit", short(100.0 * frame.inlier_share)));
+        facts.push(format!(
+            "{} % of its pixels fit",
+            short(100.0 * frame.inlier_share)
+        ));
     }
     if frame.sigma.wall_px.is_finite() {
         facts.push(format!("1-σ on the wall {} px", short(frame.sigma.wall_px)));

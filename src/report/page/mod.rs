@@ -31,14 +31,26 @@ pub fn page(report: &Report, pictures: &Pictures) -> Result<String, ReportError>
     let view = View { report, pictures };
     let sections: Vec<(&str, &str, Markup)> = [
         ("panorama", "The wall", Some(panorama::section(&view))),
-        ("overlap", "Residual and overlap", Some(wall::section(&view)?)),
+        (
+            "overlap",
+            "Residual and overlap",
+            Some(wall::section(&view)?),
+        ),
         ("trajectory", "Trajectory", Some(trajectory::section(&view))),
-        ("corrections", "Corrections", Some(corrections::section(&view))),
+        (
+            "corrections",
+            "Corrections",
+            Some(corrections::section(&view)),
+        ),
         ("errors", "Errors", errors::section(&view)),
         ("convergence", "Convergence", convergence::section(&view)),
         ("flagged", "Flagged frames", flagged::section(&view)),
         ("parameters", "Parameters", Some(parameters::section(&view))),
-        ("repeat", "How to repeat it", Some(parameters::repeat(&view))),
+        (
+            "repeat",
+            "How to repeat it",
+            Some(parameters::repeat(&view)),
+        ),
     ]
     .into_iter()
     .filter_map(|(id, title, section)| Some((id, title, section?)))
@@ -93,7 +105,10 @@ impl View<'_> {
     /// A picture as a data URI; without a picture of that name, an empty one.
     fn jpeg(&self, file: &str) -> String {
         let bytes = self.pictures.get(file);
-        bytes.map_or_else(|| "data:,".to_owned(), |bytes| data_uri("image/jpeg", bytes))
+        bytes.map_or_else(
+            || "data:,".to_owned(),
+            |bytes| data_uri("image/jpeg", bytes),
+        )
     }
 
     /// Where frames lie along charts.
@@ -119,6 +134,7 @@ impl View<'_> {
                 true => [low, high],
                 false => [0.0, 1.0],
             },
+            whole: self.report.abscissa == Abscissa::Frame,
         }
     }
 

@@ -16,11 +16,14 @@ pub fn section(view: &View) -> Markup {
     let strips = &view.report.panoramas;
     let (way, how) = match strips.layout {
         Layout::ThetaRight => ("down", "Chainage runs down, the clock to the right."),
-        Layout::ChainageRight => ("right", "Chainage runs to the right, the clock upwards."),
+        Layout::ChainageRight => (
+            "right",
+            "Chainage runs to the right, where there is more to scroll to; the clock runs upwards.",
+        ),
     };
     html! {
         p { "The unrolled wall, seen from inside, from the same frames with the initial and with the refined poses. " (how)
-            " Twelve o'clock is the angle θ = 0. Shown at " (short(strips.px_per_metre)) " pixels per metre." }
+            " Twelve o'clock is the angle θ\u{a0}=\u{a0}0. Shown at " (short(strips.px_per_metre)) " pixels per metre." }
         figure.(format!("pano wipe {way}")) style=(aspect(&strips.refined)) {
             div.wiper {
                 span aria-hidden="true" { "baseline" }
@@ -63,7 +66,12 @@ fn picture(view: &View, layers: &[(&str, &str, &Vec<Strip>)]) -> Markup {
     };
     let chainages: Vec<(f64, String)> = ticks::linear(from_m, to_m, (shown / APART) as usize)
         .into_iter()
-        .map(|(h_m, text)| (100.0 * (h_m - from_m) / (to_m - from_m), format!("{text} m")))
+        .map(|(h_m, text)| {
+            (
+                100.0 * (h_m - from_m) / (to_m - from_m),
+                format!("{text} m"),
+            )
+        })
         .collect();
     let hours: Vec<(f64, String)> = [12, 3, 6, 9, 12]
         .iter()
@@ -101,10 +109,19 @@ fn picture(view: &View, layers: &[(&str, &str, &Vec<Strip>)]) -> Markup {
                     div.divider aria-hidden="true" {}
                 }
                 div.below aria-hidden="true" {
-                    @for (share, text) in &below { span style=(format!("left:{share:.2}%")) { (text) } }
+                    @for (share, text) in &below { span.(edge(*share)) style=(format!("left:{share:.2}%")) { (text) } }
                 }
             }
         }
+    }
+}
+
+/// Labels at the ends of an axis stay inside of it.
+fn edge(share: f64) -> &'static str {
+    match share {
+        share if share < 2.0 => "start",
+        share if share > 98.0 => "end",
+        _ => "inside",
     }
 }
 

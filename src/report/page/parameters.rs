@@ -12,8 +12,14 @@ pub fn section(view: &View) -> Markup {
     let perimeter = short(report.survey.perimeter_m);
     let mut survey = vec![
         ("folder".to_owned(), report.survey.folder.clone()),
-        ("refined poses".to_owned(), report.survey.refined_poses.clone()),
-        ("frames".to_owned(), format!("{} of {width} × {height} px", report.frames.len())),
+        (
+            "refined poses".to_owned(),
+            report.survey.refined_poses.clone(),
+        ),
+        (
+            "frames".to_owned(),
+            format!("{} of {width} × {height} px", report.frames.len()),
+        ),
         ("perimeter".to_owned(), format!("{perimeter} m")),
     ];
     flatten("", &report.survey.file, &mut survey);
@@ -78,10 +84,13 @@ pub fn repeat(view: &View) -> Markup {
 /// A command line as a shell takes it.
 fn shell(line: &[String]) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
-    let quoted = line.iter().map(|argument| match argument.chars().all(plain) && !argument.is_empty() {
-        true => argument.clone(),
-        false => format!("'{}'", argument.replace('\'', r"'\''")),
-    });
+    let quoted =
+        line.iter().map(
+            |argument| match argument.chars().all(plain) && !argument.is_empty() {
+                true => argument.clone(),
+                false => format!("'{}'", argument.replace('\'', r"'\''")),
+            },
+        );
     quoted.collect::<Vec<_>>().join(" ")
 }
 
@@ -141,7 +150,11 @@ mod tests {
         if let Value::Object(object) = &file {
             flatten("", object, &mut rows);
         }
-        let value = |name: &str| rows.iter().find(|row| row.0 == name).map(|row| row.1.as_str());
+        let value = |name: &str| {
+            rows.iter()
+                .find(|row| row.0 == name)
+                .map(|row| row.1.as_str())
+        };
         assert_eq!(value("tunnel.radius_m"), Some("3.0"));
         assert_eq!(value("prior.translation_sigma_m"), Some("0.02, 0.03"));
         assert_eq!(value("prior.search"), Some("yes"));

@@ -1,4 +1,4 @@
-//! The result, first in words, then in a table.
+//! The result in words and a few figures.
 
 use super::View;
 use crate::report::Report;
@@ -35,7 +35,7 @@ fn headline(report: &Report) -> (&'static str, String) {
     }
 }
 
-/// Key figures, what they mean, and the table of the comparison.
+/// Key figures and what must be known of them.
 pub fn section(view: &View) -> Markup {
     let report = view.report;
     let (verdict, comparison) = (&report.verdict, &report.comparison);
@@ -49,15 +49,20 @@ pub fn section(view: &View) -> Markup {
                     (tile("Frames repaired", &count(report.frames.len() - flagged), &format!("of {}", count(report.frames.len())),
                         &match flagged { 0 => "none flagged".to_owned(), n => format!("{} flagged", count(n)) }))
                 }
-                (tile("Typical correction", &short(verdict.correction_rotation_deg), "°",
+                (tile("Typical correction", &format!("{}°", short(verdict.correction_rotation_deg)), "",
                     &format!("and {}; median of all frames", length(verdict.correction_translation_m))))
                 @if let Some(sigma) = verdict.sigma_wall_mm {
                     (tile("Sure on the wall to", &length(1e-3 * sigma), "",
                         &format!("{} px; 1-σ, median of repaired frames", maybe(verdict.sigma_wall_px))))
                 }
                 @if let Some((before, after)) = wall {
-                    (tile("Error on the wall", &length(1e-3 * after.mm.rms), "",
-                        &format!("{} px RMS; was {}", short(after.px.rms), length(1e-3 * before.mm.rms))))
+                    @let (mm, px, of) = match (verdict.error_wall_mm, verdict.error_wall_px, verdict.flagged) {
+                        (Some(mm), Some(px), Some(flagged)) if flagged > 0 =>
+                            (mm, px, format!(" of the repaired frames; {} of all", length(1e-3 * after.mm.rms))),
+                        _ => (after.mm.rms, after.px.rms, String::new()),
+                    };
+                    (tile("Error on the wall", &length(1e-3 * mm), "",
+                        &format!("{} px RMS{of}; was {}", short(px), length(1e-3 * before.mm.rms))))
                 }
                 @if let (Some(from), Some(to)) = (seam(before), seam(after)) {
                     (tile("Seam residual", &short(to), "grey",
@@ -70,7 +75,6 @@ pub fn section(view: &View) -> Markup {
             @for note in &report.notes {
                 p.note { (note) }
             }
-            (table(report))
         }
     }
 }
@@ -86,44 +90,8 @@ fn tile(name: &str, value: &str, unit: &str, more: &str) -> Markup {
         div {
             dt { (name) }
             dd {
-                span.value { (value) @if !unit.is_empty() { @if unit != "°" { " " } span.unit { (unit) } } }
+                span.value { (value) @if !unit.is_empty() { " " span.unit { (unit) } } }
                 span.more { (more) }
-            }
-        }
-    }
-}
-
-fn table(report: &Report) -> Markup {
-    let comparison = &report.comparison;
-    let rows = comparison.rows();
-    let truth = comparison.truth.as_ref().and_then(|truth| truth.seam);
-    let [from_m, to_m] = comparison.canvas.chainage_m();
-    html! {
-        div.wide {
-            table {
-                caption {
-                    "Initial and refined poses compared"
-                    @if report.survey.truth { " with the true ones" }
-                    ", over chainage " (crate::report::quantity::fixed(from_m, 2)) " to "
-                    (crate::report::quantity::fixed(to_m, 2)) " m at "
-                    (short(comparison.canvas.px_per_metre)) " pixels per metre"
-                }
-                thead { tr { th scope="col" { "Measure" } th scope="col" { "Unit" }
-                    th.number scope="col" { "Baseline" } th.number scope="col" { "Refined" } } }
-                tbody {
-                    @for row in &rows {
-                        tr {
-                            th scope="row" { (row.measure) }
-                            td { (row.unit) }
-                            td.number { (row.baseline.as_deref().unwrap_or("–")) }
-                            td.number { (row.refined.as_deref().unwrap_or("–")) }
-                        }
-                    }
-                    @if let Some(seam) = truth {
-                        tr { th scope="row" { "seam residual, true poses" } td { "grey" }
-                            td.number colspan="2" { (format!("{:.2}", seam.rms_grey)) } }
-                    }
-                }
             }
         }
     }

@@ -1,7 +1,9 @@
 //! Where on the wall frames agree, how many see it, and how each frame fits.
 
+use super::trajectory::marks_key;
 use super::{View, data_uri};
-use crate::report::chart::{Chart, Series, Style, Vertical};
+use crate::refine::FrameReport;
+use crate::report::chart::{Chart, Series, Style, Vertical, legend};
 use crate::report::heat::{self, Scale};
 use crate::report::quantity::short;
 use crate::report::{ReportError, WallMaps, ticks};
@@ -14,7 +16,11 @@ use maud::{Markup, html};
 pub fn section(view: &View) -> Result<Markup, ReportError> {
     let maps = &view.report.wall;
     let residual = residual_scale(maps);
-    let frames: Vec<Option<f64>> = maps.refined_frames.iter().map(|n| (*n > 0.0).then_some(*n)).collect();
+    let frames: Vec<Option<f64>> = maps
+        .refined_frames
+        .iter()
+        .map(|n| (*n > 0.0).then_some(*n))
+        .collect();
     let most = maps.refined_frames.iter().copied().fold(1.0, f64::max);
     let overlap = Scale {
         range: [0.0, most],
@@ -34,11 +40,13 @@ pub fn section(view: &View) -> Result<Markup, ReportError> {
         (scale("frames that see a place; blank: none", &overlap))
         @if let Some(refinement) = &view.report.refinement {
             h3 { "Frame by frame" }
+            p { "Frames that were compared with others in the last solve." }
+            (legend(&[("frame", Style::Refined)], &marks_key(view)))
             div.charts {
                 @for (title, unit, value) in [
-                    ("Residual against the wall", "grey", (|f| f.residual) as fn(&crate::refine::FrameReport) -> f64),
+                    ("Residual against the wall", "grey", (|f| f.residual) as fn(&FrameReport) -> f64),
                     ("Pixels rejected as outliers", "%", |f| 100.0 * (1.0 - f.inlier_share)),
-                    ("Wall samples compared", "", |f| f.points as f64),
+                    ("Wall samples compared", "thousands", |f| 1e-3 * f.points as f64),
                     ("Gain", "", |f| f.gain),
                     ("Bias", "grey", |f| f.bias),
                 ] {
@@ -47,7 +55,7 @@ pub fn section(view: &View) -> Result<Markup, ReportError> {
                         unit: unit.to_owned(),
                         along: view.axis(),
                         vertical: match title { "Gain" | "Bias" => Vertical::Linear, _ => Vertical::FromZero },
-                        series: vec![Series::new("frame", Style::Refined, view.points(|k| refinement.frames.get(k).map(value)))],
+                        series: vec![Series::new("frame", Style::Refined, view.points(|k| refinement.frames.get(k).filter(|f| f.points > 0).map(value)))],
                         marks: view.marks(),
                     }.draw())
                 }
@@ -59,7 +67,11 @@ pub fn section(view: &View) -> Result<Markup, ReportError> {
 /// From the lowest to the highest residual, but for the extreme hundredth at either end.
 fn residual_scale(maps: &WallMaps) -> Scale {
     let of_truth = maps.true_grey.iter().flatten();
-    let all = maps.baseline_grey.iter().chain(&maps.refined_grey).chain(of_truth);
+    let all = maps
+        .baseline_grey
+        .iter()
+        .chain(&maps.refined_grey)
+        .chain(of_truth);
     let mut values: Vec<f64> = all.copied().flatten().filter(|v| *v > 0.0).collect();
     values.sort_unstable_by(f64::total_cmp);
     let at = |share: f64| {
