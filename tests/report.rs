@@ -265,17 +265,20 @@ fn it_looks_right_wide_and_narrow_light_and_dark() {
     let Some(browser) = chromium::find() else {
         return;
     };
-    let page = work().report.join("report.html");
     let out = tempfile::tempdir().unwrap();
+    let (with, without) = (
+        out.path().join("with.html"),
+        out.path().join("without.html"),
+    );
+    let html = html();
+    std::fs::write(&with, &html).unwrap();
+    let (before, rest) = html.split_once("<script>").expect("a script");
+    let (_, after) = rest.split_once("</script>").expect("its end");
+    std::fs::write(&without, format!("{before}{after}")).unwrap();
     for size in [[1280, 900], [390, 844]] {
-        for (dark, scripts) in [(false, true), (true, true), (false, false)] {
-            let look = Look {
-                size,
-                dark,
-                scripts,
-            };
-            let name = out.path().join(format!("{}-{dark}-{scripts}.png", size[0]));
-            let picture = chromium::screenshot(&browser, &page, look, &name);
+        for (dark, page) in [(false, &with), (true, &with), (false, &without)] {
+            let look = Look { size, dark };
+            let picture = chromium::screenshot(&browser, page, look, &out.path().join("look.png"));
             assert_eq!([picture.width(), picture.height()], size);
             let brightness =
                 |pixel: &image::Rgb<u8>| pixel.0.iter().map(|c| u32::from(*c)).sum::<u32>() / 3;
@@ -297,7 +300,7 @@ fn it_looks_right_wide_and_narrow_light_and_dark() {
     }
 }
 
-/// A script that tells, in the page's title, what a user would see and what happens when it is used.
+/// A script that tells the page around what a user would see, and what happens when it is used.
 const PROBE: &str = r##"<script>
 const slider = document.querySelector(".wiper input");
 const after = () => parseFloat(getComputedStyle(document.querySelector(".wipe .after")).clipPath.split(" ").pop());
@@ -308,7 +311,7 @@ const chart = document.querySelector("#trajectory .chart > svg");
 const box = chart.getBoundingClientRect();
 chart.dispatchEvent(new PointerEvent("pointermove", { clientX: box.left + 0.5 * box.width, clientY: box.top + 9 }));
 const root = document.documentElement;
-document.title = "PROBE " + JSON.stringify({
+parent.postMessage(JSON.stringify({
   width: innerWidth,
   overflow: root.scrollWidth - root.clientWidth,
   moved: after() - before,
@@ -319,7 +322,7 @@ document.title = "PROBE " + JSON.stringify({
   reading: chart.parentElement.querySelector("output").textContent,
   tiny: [...document.querySelectorAll("p, td, th, .tick")].filter((e) => parseFloat(getComputedStyle(e).fontSize) < 10).length,
   errors: window.errors,
-});
+}), "*");
 </script></body>"##;
 
 #[test]
@@ -337,16 +340,22 @@ fn nothing_sticks_out_and_everything_works() {
         )
         .replacen("</body>", PROBE, 1);
     std::fs::write(&probed, html).unwrap();
-    for size in [[1280, 900], [390, 844]] {
+    for [width, height] in [[1280, 900], [390, 844]] {
+        // A frame can be as narrow as a phone, a window cannot.
+        let around = dir.path().join("around.html");
+        let frame = format!(
+            "<script>onmessage = (news) => {{ document.title = 'PROBE ' + news.data; }};</script>\
+             <iframe src='probed.html' style='border:0' width='{width}' height='{height}'></iframe>"
+        );
+        std::fs::write(&around, frame).unwrap();
         let look = Look {
-            size,
+            size: [1400, 1000],
             dark: false,
-            scripts: true,
         };
-        let dump = chromium::dump(&browser, &probed, look);
+        let dump = chromium::dump(&browser, &around, look);
         let (_, rest) = dump.split_once("<title>PROBE ").expect("the probe has run");
         let found: Value = serde_json::from_str(rest.split("</title>").next().unwrap()).unwrap();
-        assert_eq!(found["width"], size[0], "{found}");
+        assert_eq!(found["width"], width, "{found}");
         assert_eq!(found["overflow"], 0, "{found}");
         for none in ["broken", "flat", "tiny", "errors"] {
             assert_eq!(found[none], 0, "{none}: {found}");

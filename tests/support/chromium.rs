@@ -31,8 +31,6 @@ pub struct Look {
     pub size: [u32; 2],
     /// Whether the system is dark.
     pub dark: bool,
-    /// Whether scripts run.
-    pub scripts: bool,
 }
 
 /// A picture of the page.
@@ -42,7 +40,7 @@ pub fn screenshot(browser: &Path, page: &Path, look: Look, out: &Path) -> image:
     image::open(out).expect("a screenshot").to_rgb8()
 }
 
-/// The page as it is after its scripts have run.
+/// The page as it is after its scripts have run. No window is narrower than some 500 pixels.
 pub fn dump(browser: &Path, page: &Path, look: Look) -> String {
     run(browser, page, look, &["--dump-dom"])
 }
@@ -69,10 +67,7 @@ fn run(browser: &Path, page: &Path, look: Look, arguments: &[&str]) -> String {
         ])
         .arg(format!("--user-data-dir={}", path_text(profile.path())))
         .arg(format!("--window-size={width},{height}"))
-        .arg(format!(
-            "--blink-settings=preferredColorScheme={scheme},scriptEnabled={}",
-            look.scripts
-        ))
+        .arg(format!("--blink-settings=preferredColorScheme={scheme}"))
         .args(arguments)
         .arg(format!("file://{}", path_text(page)))
         .stdout(std::fs::File::create(&output).expect("a file"))

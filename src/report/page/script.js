@@ -24,9 +24,9 @@ for (const figure of document.querySelectorAll(".wipe")) {
 }
 
 // Charts tell the values of their curves next to the pointer.
-const short = (value) => {
-  const digits = value === 0 ? 0 : Math.min(9, Math.max(0, 2 - Math.floor(Math.log10(Math.abs(value)))));
-  return value.toFixed(digits).replace("-", "\u2212");
+const rounded = (value, size) => {
+  const digits = size > 0 ? Math.min(9, Math.max(0, 2 - Math.floor(Math.log10(size)))) : 0;
+  return value.toFixed(digits).replace(/^-(?=[0.]*$)/, "").replace("-", "\u2212");
 };
 for (const chart of document.querySelectorAll(".chart > svg")) {
   const output = chart.parentElement.querySelector("output");
@@ -39,7 +39,7 @@ for (const chart of document.querySelectorAll(".chart > svg")) {
     name: line.dataset.name,
     points: (line.getAttribute("points") || "").split(" ").filter(Boolean).map((pair) => pair.split(",").map(Number)),
   }));
-  const cursor = document.createElementNS("http://www.w3.org/2000/svg", "line");
+  const cursor = chart.querySelector("line.base").cloneNode();
   cursor.setAttribute("class", "cursor");
   cursor.setAttribute("y1", top);
   cursor.setAttribute("y2", bottom);
@@ -61,10 +61,11 @@ for (const chart of document.querySelectorAll(".chart > svg")) {
     const read = ({ name, point }) => {
       const share = (bottom - point[1]) / (bottom - top);
       const shown = value(place(y[0]) + share * (place(y[1]) - place(y[0])));
-      return near.length > 1 ? `${name} ${short(shown)}` : short(shown);
+      const text = rounded(shown, chart.dataset.log ? shown : y[1] - y[0]);
+      return near.length > 1 ? `${name} ${text}` : text;
     };
     const where = x[0] + ((u - left) / (right - left)) * (x[1] - x[0]);
-    output.textContent = `${near.map(read).join(" · ")} at ${short(where)}`;
+    output.textContent = `${near.map(read).join(" · ")} at ${rounded(where, Math.abs(x[1] - x[0]))}`;
   });
   chart.addEventListener("pointerleave", () => {
     cursor.remove();
