@@ -31,7 +31,7 @@ pub fn section(view: &View) -> Markup {
                 span aria-hidden="true" { "refined" }
             }
             (picture(view, &[("Baseline", "before", &strips.baseline), ("Refined", "after", &strips.refined)]))
-            figcaption { "Left of the slider the baseline, right of it the refined poses." }
+            figcaption { "Above the baseline, below the refined poses." }
         }
         @if let Some(truth) = &strips.truth {
             h3 { "With the true poses" }
@@ -92,7 +92,12 @@ fn picture(view: &View, layers: &[(&str, &str, &Vec<Strip>)]) -> Markup {
     html! {
         div.frame {
             div.side aria-hidden="true" {
-                @for (share, text) in &side { span style=(format!("top:{share:.2}%")) { (text) } }
+                // Without scripts the layers lie one below the other, each beside its own.
+                @for k in 0..layers.len() {
+                    div.ruler.again[k > 0] {
+                        @for (share, text) in &side { span style=(format!("top:{share:.2}%")) { (text) } }
+                    }
+                }
             }
             div.scroller tabindex="0" role="region" aria-label="Panorama, to be scrolled along" {
                 div.sheet {
