@@ -173,6 +173,7 @@ impl Chart {
         let low = edges.iter().copied().fold(low, f64::min);
         let high = edges.iter().copied().fold(high, f64::max);
         let y = match self.vertical {
+            Vertical::Logarithmic if values.is_empty() => [0.1, 10.0],
             _ if values.is_empty() => [0.0, 1.0],
             Vertical::Logarithmic => {
                 let air = (high / low).powf(AIR).max(1.2);

@@ -2,13 +2,14 @@
 
 use super::quantity::fixed;
 
-/// About `wanted` round values in `[low, high]` with how they are written: multiples of 1, 2 or 5 times a power of ten.
+/// About `wanted` (three or more) round values in `[low, high]` with how they are written: multiples of 1, 2 or 5 times a power of ten.
 pub fn linear(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {
         return vec![(low, super::quantity::short(low))];
     }
-    let least = span / wanted.max(1) as f64;
+    // With fewer, there may be no round value between the ends at all.
+    let least = span / wanted.max(3) as f64;
     let power = 10f64.powf(least.log10().floor());
     let step = [1.0, 2.0, 5.0]
         .map(|factor| factor * power)
@@ -30,6 +31,9 @@ pub fn linear(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
 /// Powers of ten in `[low, high]` (both positive), about `wanted` of them; within less than two decades 1, 2 and 5 times
 /// them, too, and within less than one whatever is round.
 pub fn logarithmic(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
+    if !(low > 0.0 && high > low && high.is_finite()) {
+        return Vec::new();
+    }
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let decades = (last - first).max(1) as usize;
     let stride = decades.div_ceil(wanted.max(1)).max(1);
@@ -97,12 +101,13 @@ mod tests {
         );
         assert_eq!(texts(&logarithmic(1.5, 30.0, 5)), ["2", "5", "10", "20"]);
         assert_eq!(texts(&logarithmic(1.5, 9.0, 5)), ["2", "4", "6", "8"]);
+        assert!(logarithmic(0.0, 1.0, 5).is_empty());
         assert_eq!(texts(&logarithmic(1e-7, 1e-5, 5)), ["10⁻⁷", "10⁻⁶", "10⁻⁵"]);
     }
 
     proptest! {
         #[test]
-        fn there_are_neither_none_nor_too_many(low in -1e4f64..1e4, span in 1e-6f64..1e6, wanted in 2usize..9) {
+        fn there_are_neither_none_nor_too_many(low in -1e4f64..1e4, span in 1e-6f64..1e6, wanted in 3usize..9) {
             let ticks = linear(low, low + span, wanted);
             prop_assert!(!ticks.is_empty() && ticks.len() <= wanted + 2, "{:?}", ticks);
             for (value, _) in &ticks {
