@@ -13,12 +13,13 @@
 //!   surface, frames      └─> render <── initial, refined, true poses ──> panoramas
 //!                                            │
 //! simulate ──> a survey with true poses      └─> evaluate ──> compare.json
+//!                                                   └─> report ──> report.html, report.json
 //! ```
 //!
 //! [`camera`], [`trajectory`] and [`surface`] are the geometry; [`frames`] loads the pictures; [`refine`],
 //! [`render`] and [`simulate`] know nothing of each other and share the geometry only (the simulator not even
 //! the ray–wall intersection, so that it can judge the others); [`raster`] writes pictures larger than the memory;
-//! [`evaluate`] measures; [`cli`] prints.
+//! [`evaluate`] measures; [`report`] makes a page of it all; [`cli`] prints.
 //!
 //! # An example
 //!
@@ -97,6 +98,7 @@ pub mod provenance;
 pub mod raster;
 pub mod refine;
 pub mod render;
+pub mod report;
 pub mod simulate;
 pub mod surface;
 pub mod survey;

@@ -20,10 +20,10 @@ pub struct HashError {
 pub struct Input {
     /// The file as it was named, or the folder of the frames.
     pub path: PathBuf,
-    /// How many files, where they are frames.
+    /// How many files, where they are frames or a folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub files: Option<usize>,
-    /// Hexadecimal BLAKE3: of the file, or of the frames' names and hashes in their order.
+    /// Hexadecimal BLAKE3: of the file, or of several files' names and hashes in their order.
     pub blake3: String,
 }
 
@@ -38,39 +38,61 @@ fn hash_file(path: &Path) -> Result<blake3::Hash, HashError> {
     Ok(hasher.finalize())
 }
 
-/// Hashes a file.
-///
-/// # Errors
-/// [`HashError`] if it cannot be read.
-pub fn input(path: &Path) -> Result<Input, HashError> {
-    Ok(Input {
-        path: path.to_owned(),
-        files: None,
-        blake3: hash_file(path)?.to_hex().to_string(),
-    })
-}
-
-/// Hashes the frames of a survey, several at once: one hash over their names (without folders) and hashes, in order.
-///
-/// # Errors
-/// [`HashError`] of the first that cannot be read.
-pub fn frames(frames: &[FrameFile]) -> Result<Input, HashError> {
-    let hashes: Vec<blake3::Hash> = frames
+/// One hash over the names (without folders) and hashes of files, in order; several are read at once.
+fn hash_files(paths: &[&Path]) -> Result<blake3::Hash, HashError> {
+    let hashes: Vec<blake3::Hash> = paths
         .par_iter()
-        .map(|frame| hash_file(&frame.path))
+        .map(|path| hash_file(path))
         .collect::<Result<_, _>>()?;
     let mut all = blake3::Hasher::new();
-    for (frame, hash) in frames.iter().zip(&hashes) {
-        let name = frame.path.file_name().unwrap_or_default();
+    for (path, hash) in paths.iter().zip(&hashes) {
+        let name = path.file_name().unwrap_or_default();
         // Names have no zero in them, and hashes are of one length: no two lists run together.
         all.update(name.as_encoded_bytes()).update(&[0]);
         all.update(hash.as_bytes());
     }
-    let folder = frames.first().and_then(|frame| frame.path.parent());
+    Ok(all.finalize())
+}
+
+/// Hashes a file, or the files of a folder (a COLMAP model), sorted by name.
+///
+/// # Errors
+/// [`HashError`] if it cannot be read.
+pub fn input(path: &Path) -> Result<Input, HashError> {
+    let fail = |source| HashError {
+        path: path.to_owned(),
+        source,
+    };
+    let (files, hash) = match path.is_dir() {
+        false => (None, hash_file(path)?),
+        true => {
+            let entries = std::fs::read_dir(path).map_err(fail)?;
+            let inner: Result<Vec<PathBuf>, _> = entries.map(|entry| Ok(entry?.path())).collect();
+            let mut inner = inner.map_err(fail)?;
+            inner.retain(|path| path.is_file());
+            inner.sort();
+            let inner: Vec<&Path> = inner.iter().map(PathBuf::as_path).collect();
+            (Some(inner.len()), hash_files(&inner)?)
+        }
+    };
+    Ok(Input {
+        path: path.to_owned(),
+        files,
+        blake3: hash.to_hex().to_string(),
+    })
+}
+
+/// Hashes the frames of a survey, in their order.
+///
+/// # Errors
+/// [`HashError`] of the first that cannot be read.
+pub fn frames(frames: &[FrameFile]) -> Result<Input, HashError> {
+    let paths: Vec<&Path> = frames.iter().map(|frame| frame.path.as_path()).collect();
+    let folder = paths.first().and_then(|path| path.parent());
     Ok(Input {
         path: folder.unwrap_or(Path::new("")).to_owned(),
-        files: Some(frames.len()),
-        blake3: all.finalize().to_hex().to_string(),
+        files: Some(paths.len()),
+        blake3: hash_files(&paths)?.to_hex().to_string(),
     })
 }
 

@@ -6,12 +6,12 @@ use super::stitch::{PictureArguments, positive};
 use super::{Failure, Terminal, json};
 use crate::PROGRAM;
 use crate::atomic;
-use crate::evaluate::{CompareInput, Comparison, before_after, compare};
+use crate::evaluate::{CompareInput, Comparison, Drawings, before_after, compare};
 use crate::frames::{PictureFormat, write_picture};
 use crate::progress::Progress;
-use crate::render::{Layout, Mode, RenderOptions};
+use crate::render::{Interpolation, Layout, Mode, RenderOptions};
 use crate::survey::Survey;
-use crate::trajectory::poses_of;
+use crate::trajectory::{Pose, poses_of};
 use image::DynamicImage;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -70,10 +70,21 @@ pub fn run(arguments: &CompareArguments, run: &Run, terminal: &Terminal) -> Resu
             "--max-wall-px needs true poses, and the survey has no poses.truth",
         ));
     }
-    let (comparison, json) = compare_into(
+    let refined = poses_of(&survey.read_poses(&arguments.refined)?);
+    atomic::create_folder(&arguments.out)?;
+    let (comparison, drawings) = compare_poses(
+        &survey,
+        &refined,
+        arguments.picture.canvas.px_per_metre,
+        arguments.picture.interpolation.into(),
+        terminal,
+    )?;
+    let json = write_comparison(
         &survey,
         &arguments.refined,
-        &arguments.picture,
+        arguments.picture.canvas.layout.into(),
+        &comparison,
+        drawings,
         &arguments.out,
         terminal,
     )?;
@@ -91,47 +102,57 @@ pub fn run(arguments: &CompareArguments, run: &Run, terminal: &Terminal) -> Resu
     gate(&comparison, arguments.max_wall_px)
 }
 
-/// Compares and writes the panoramas and compare.json into `out`; returns the text of the latter too.
+/// Compares a survey's initial with refined poses, and both with the true ones where they are known.
 ///
 /// # Errors
-/// Bad input, or an output that cannot be written.
-pub fn compare_into(
+/// Poses that cannot be laid on the wall, unreadable frames, too little memory.
+pub fn compare_poses(
     survey: &Survey,
-    refined_file: &Path,
-    picture: &PictureArguments,
-    out: &Path,
+    refined: &[Pose],
+    px_per_metre: Option<f64>,
+    interpolation: Interpolation,
     terminal: &Terminal,
-) -> Result<(Comparison, String), Failure> {
-    let (initial, refined) = (
-        survey.initial_poses(),
-        poses_of(&survey.read_poses(refined_file)?),
-    );
+) -> Result<(Comparison, Drawings), Failure> {
+    let initial = survey.initial_poses();
     let truth = survey.truth.as_deref().map(poses_of);
-    atomic::create_folder(out)?;
     let input = CompareInput {
         surface: survey.surface.as_ref(),
         camera: &survey.camera,
         files: &survey.frames,
         initial: &initial,
-        refined: &refined,
+        refined,
         truth: truth.as_deref(),
-        px_per_metre: picture.canvas.px_per_metre,
+        px_per_metre,
         // Pictures of different poses differ by their poses only.
         render: RenderOptions {
-            interpolation: picture.interpolation.into(),
+            interpolation,
             mode: Mode::Average,
             blend: false,
             super_resolve: false,
         },
     };
-    let (comparison, panoramas) = compare(&input, terminal)?;
-    let layout = picture.canvas.layout.into();
+    Ok(compare(&input, terminal)?)
+}
+
+/// Writes the panoramas and compare.json into `out`; returns the text of the latter too.
+///
+/// # Errors
+/// An output that cannot be written.
+pub fn write_comparison(
+    survey: &Survey,
+    refined_file: &Path,
+    layout: Layout,
+    comparison: &Comparison,
+    drawings: Drawings,
+    out: &Path,
+    terminal: &Terminal,
+) -> Result<String, Failure> {
     let json = json::text(&Report {
         program: PROGRAM,
         survey: &survey.folder,
         refined_poses: refined_file,
         layout,
-        comparison: &comparison,
+        comparison,
     })?;
     terminal.start("writing", 4);
     let write = |name: &str, image: &DynamicImage| -> Result<(), Failure> {
@@ -139,22 +160,22 @@ pub fn compare_into(
         terminal.advance(1);
         Ok(())
     };
-    let baseline = panoramas.baseline.into_image(Layout::ThetaRight);
-    let refined = panoramas.refined.into_image(Layout::ThetaRight);
+    let baseline = drawings.baseline.panorama.into_image(Layout::ThetaRight);
+    let refined = drawings.refined.panorama.into_image(Layout::ThetaRight);
     write(
         "before-after.png",
         &before_after(&baseline, &refined).into(),
     )?;
     write("baseline.png", &layout.turn(baseline))?;
     write("refined.png", &layout.turn(refined))?;
-    match panoramas.truth {
-        Some(truth) => write("truth.png", &truth.into_image(layout))?,
+    match drawings.truth {
+        Some(truth) => write("truth.png", &truth.panorama.into_image(layout))?,
         // One from an earlier comparison would belong to other pictures.
         None => atomic::remove_file(&out.join("truth.png"))?,
     }
     terminal.finish();
     atomic::write_text(&out.join("compare.json"), &json)?;
-    Ok((comparison, json))
+    Ok(json)
 }
 
 /// Fails if the refined wall error is above the limit.

@@ -1,10 +1,13 @@
 //! `tunnelstitch demo`: the whole job on a simulated survey.
 
-use super::compare::compare_into;
+use super::compare::{compare_poses, write_comparison};
 use super::refine::{refine_into, summarise};
-use super::stitch::PictureArguments;
-use super::{Failure, Terminal, json};
+use super::report::report_into;
+use super::{Failure, Terminal, command_line, json};
+use crate::atomic;
 use crate::refine::RefineOptions;
+use crate::render::{Interpolation, Layout};
+use crate::report::{RefinedFiles, Sources};
 use crate::simulate::{self, SimulateOptions};
 use crate::survey::Survey;
 use std::path::PathBuf;
@@ -45,12 +48,13 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
             terminal.say(text);
         }
     };
-    let [survey_folder, refined_folder, compare_folder] =
-        ["survey", "refined", "compare"].map(|name| arguments.out.join(name));
-    let (survey_path, refined_path, compare_path) = (
+    let [survey_folder, refined_folder, compare_folder, report_folder] =
+        ["survey", "refined", "compare", "report"].map(|name| arguments.out.join(name));
+    let (survey_path, refined_path, compare_path, report_path) = (
         survey_folder.display(),
         refined_folder.display(),
         compare_folder.display(),
+        report_folder.display(),
     );
 
     let options = SimulateOptions {
@@ -79,10 +83,29 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
         "\ntunnelstitch compare {survey_path} --refined {} --out {compare_path}",
         poses.display()
     ));
-    let (comparison, json) = compare_into(
+    let refined = RefinedFiles::read(&survey, &refined_folder)?;
+    atomic::create_folder(&compare_folder)?;
+    let (comparison, drawings) = compare_poses(
+        &survey,
+        &refined.poses,
+        None,
+        Interpolation::default(),
+        terminal,
+    )?;
+    let sources = Sources {
+        survey: &survey,
+        refined,
+        comparison: &comparison,
+        drawings: &drawings,
+        command: command_line(),
+    };
+    report_into(sources, &report_folder, terminal)?;
+    let json = write_comparison(
         &survey,
         &poses,
-        &PictureArguments::default(),
+        Layout::default(),
+        &comparison,
+        drawings,
         &compare_folder,
         terminal,
     )?;
@@ -91,7 +114,9 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
     }
     say(format!(
         "{comparison}\n\n\
+         tunnelstitch report {survey_path} --refined {refined_path} --out {report_path}\n\n\
          {:.0} s in all. Look at\n  \
+         {report_path}/report.html       everything on one page, for a browser; report.json has its numbers\n  \
          {compare_path}/before-after.png  what the poses did to the panorama, above before, below after\n  \
          {compare_path}/refined.png       the whole panorama; baseline.png and truth.png lie beside it\n  \
          {refined_path}/poses.tum         the refined trajectory; refine.json says how sure it is",

@@ -8,6 +8,7 @@ use crate::frames::FrameError;
 use crate::raster::RasterError;
 use crate::refine::{CovarianceError, RefineError};
 use crate::render::RenderError;
+use crate::report::ReportError;
 use crate::simulate::SimulateError;
 use crate::surface::SurfaceError;
 use crate::survey::SurveyError;
@@ -110,6 +111,16 @@ impl From<RenderError> for Failure {
     fn from(error: RenderError) -> Self {
         match error {
             RenderError::Raster(error) => error.into(),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<ReportError> for Failure {
+    fn from(error: ReportError) -> Self {
+        match error {
+            ReportError::Render(error) => error.into(),
+            ReportError::Encode { .. } => Self::bug(error.to_string()),
             _ => Self::input(error.to_string()),
         }
     }

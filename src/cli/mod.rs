@@ -17,6 +17,7 @@ mod poses;
 mod project;
 mod record;
 mod refine;
+mod report;
 mod shell;
 mod simulate;
 mod stitch;
@@ -27,7 +28,6 @@ pub use terminal::Terminal;
 
 use crate::atomic;
 use clap::{Parser, Subcommand};
-use std::ffi::OsString;
 use std::sync::Arc;
 
 /// Repairs the trajectory of a revolving tunnel camera by photometric consistency and unrolls the wall into
@@ -68,6 +68,7 @@ enum Command {
     Locate(locate::LocateArguments),
     Compare(compare::CompareArguments),
     Convert(convert::ConvertArguments),
+    Report(report::ReportArguments),
     Converge(converge::ConvergeArguments),
     Project(project::ProjectArguments),
     Config(config::ConfigArguments),
@@ -80,16 +81,11 @@ enum Command {
 /// # Errors
 /// [`Failure`], with the text to show and the exit code to leave with.
 pub fn run() -> Result<(), Failure> {
-    let arguments: Vec<OsString> = std::env::args_os().collect();
-    let given = arguments.iter().skip(1);
-    let given = given
-        .map(|word| word.to_string_lossy().into_owned())
-        .collect();
-    let configuration = configuration::parse(arguments)?;
+    let configuration = configuration::parse(std::env::args_os().collect())?;
     let cli = configuration.cli;
     let run = record::Run {
         command: configuration.command,
-        arguments: given,
+        arguments: command_line(),
         options: configuration.options,
     };
     if let Some(threads) = cli.global.threads {
@@ -115,10 +111,19 @@ pub fn run() -> Result<(), Failure> {
         Command::Locate(arguments) => locate::run(&arguments, &terminal),
         Command::Compare(arguments) => compare::run(&arguments, &run, &terminal),
         Command::Convert(arguments) => convert::run(&arguments, &terminal),
+        Command::Report(arguments) => report::run(&arguments, &terminal),
         Command::Converge(arguments) => converge::run(&arguments, &terminal),
         Command::Project(arguments) => project::run(&arguments, &terminal),
         Command::Config(arguments) => config::run(&arguments, &terminal),
         Command::Completions(arguments) => shell::completions(&arguments),
         Command::Man(arguments) => shell::man(&arguments, &terminal),
     }
+}
+
+/// The command line that the program was started with, the program by its name only.
+fn command_line() -> Vec<String> {
+    let arguments = std::env::args_os().skip(1);
+    std::iter::once("tunnelstitch".to_owned())
+        .chain(arguments.map(|argument| argument.to_string_lossy().into_owned()))
+        .collect()
 }

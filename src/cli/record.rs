@@ -13,7 +13,7 @@ use std::path::Path;
 pub struct Run {
     /// The command.
     pub command: String,
-    /// The program's arguments, without its name.
+    /// The command line, the program by its name only.
     pub arguments: Vec<String>,
     /// Every option of the command.
     pub options: Vec<EffectiveOption>,

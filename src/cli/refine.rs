@@ -2,7 +2,7 @@
 
 use super::poses::ReadingArguments;
 use super::record::{RUN_FILE, Run};
-use super::{Failure, Terminal, json};
+use super::{Failure, Terminal, command_line, json};
 use crate::PROGRAM;
 use crate::atomic;
 use crate::camera::format_calibration;
@@ -84,6 +84,8 @@ impl CalibrateArgument {
 struct ReportFile<'a> {
     /// Name and version of the program.
     program: &'static str,
+    /// The command line.
+    command: Vec<String>,
     /// The survey as given, and what its survey.toml says.
     survey: &'a Path,
     survey_file: &'a SurveyFile,
@@ -172,6 +174,7 @@ pub fn refine_into(
     let refined = refine(survey, options, &progress)?;
     let json = json::text(&ReportFile {
         program: PROGRAM,
+        command: command_line(),
         survey: &survey.folder,
         survey_file: &survey.file,
         options,

@@ -2,8 +2,8 @@
 
 use super::error::check_pairs;
 use super::{
-    EvaluateError, ImageMetrics, SeamResidual, TrajectoryError, UnalignedError, WallError,
-    image_metrics, seam_residual, trajectory_error, unaligned_error, wall_error,
+    EvaluateError, ImageMetrics, SeamMap, SeamResidual, TrajectoryError, UnalignedError, WallError,
+    image_metrics, trajectory_error, unaligned_error, wall_error,
 };
 use crate::camera::Camera;
 use crate::frames::FrameFile;
@@ -14,7 +14,7 @@ use crate::render::{
 };
 use crate::surface::Surface;
 use crate::trajectory::Pose;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What is compared.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +38,7 @@ pub struct CompareInput<'a> {
 }
 
 /// What the comparison found.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// Number of frames.
     pub frames: usize,
@@ -53,7 +53,7 @@ pub struct Comparison {
 }
 
 /// Measures of one set of poses; those that need the truth are missing without it.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
     /// Share of the canvas that some frame sees, 0–1.
     pub coverage: f64,
@@ -69,15 +69,24 @@ pub struct Scores {
     pub image: Option<ImageMetrics>,
 }
 
-/// The panoramas of a comparison, all on one canvas.
+/// What the frames make of the wall with one set of poses.
 #[derive(Clone, Debug)]
-pub struct Panoramas {
+pub struct Drawing {
+    /// The panorama.
+    pub panorama: Panorama,
+    /// Where the frames agree.
+    pub seams: SeamMap,
+}
+
+/// The drawings of a comparison, all on one canvas.
+#[derive(Clone, Debug)]
+pub struct Drawings {
     /// From the initial poses.
-    pub baseline: Panorama,
+    pub baseline: Drawing,
     /// From the refined poses.
-    pub refined: Panorama,
+    pub refined: Drawing,
     /// From the true poses, where known.
-    pub truth: Option<Panorama>,
+    pub truth: Option<Drawing>,
 }
 
 /// Compares initial with refined poses, and both with the true ones where they are known.
@@ -91,7 +100,7 @@ pub struct Panoramas {
 pub fn compare(
     input: &CompareInput,
     progress: &dyn Progress,
-) -> Result<(Comparison, Panoramas), EvaluateError> {
+) -> Result<(Comparison, Drawings), EvaluateError> {
     for poses in [Some(input.initial), Some(input.refined), input.truth] {
         check_pairs(
             poses.map_or(input.files.len(), <[Pose]>::len),
@@ -106,14 +115,14 @@ pub fn compare(
     };
     let (mut frames, canvas) = prepare(input, &baseline, &refined, truth.as_ref(), progress)?;
 
-    let true_panorama = match &truth {
+    let true_drawing = match &truth {
         Some(truth) => Some(truth.draw(input, &mut frames, &canvas, progress)?),
         None => None,
     };
-    let mut score = |candidate: &Candidate| -> Result<(Scores, Panorama), EvaluateError> {
-        let panorama = candidate.draw(input, &mut frames, &canvas, progress)?;
-        let mut scores = candidate.scores(input, &frames, &canvas, &panorama);
-        if let (Some(poses), Some(true_panorama)) = (input.truth, &true_panorama) {
+    let mut score = |candidate: &Candidate| -> Result<(Scores, Drawing), EvaluateError> {
+        let drawing = candidate.draw(input, &mut frames, &canvas, progress)?;
+        let mut scores = Scores::without_truth(&drawing);
+        if let (Some(poses), Some(truth)) = (input.truth, &true_drawing) {
             scores.trajectory = Some(trajectory_error(
                 input.surface.gauge(),
                 candidate.given,
@@ -122,30 +131,40 @@ pub fn compare(
             scores.unaligned = Some(unaligned_error(candidate.given, poses)?);
             let wall = wall_error(input.surface, input.camera, candidate.given, poses)?;
             scores.wall = Some(wall);
-            scores.image = Some(image_metrics(&panorama, true_panorama)?);
+            scores.image = Some(image_metrics(&drawing.panorama, &truth.panorama)?);
         }
-        Ok((scores, panorama))
+        Ok((scores, drawing))
     };
-    let (baseline_scores, baseline_panorama) = score(&baseline)?;
-    let (refined_scores, refined_panorama) = score(&refined)?;
-    let truth_scores = match (&truth, &true_panorama) {
-        (Some(truth), Some(panorama)) => Some(truth.scores(input, &frames, &canvas, panorama)),
-        _ => None,
-    };
+    let (baseline_scores, baseline_drawing) = score(&baseline)?;
+    let (refined_scores, refined_drawing) = score(&refined)?;
     Ok((
         Comparison {
             frames: input.files.len(),
             canvas,
             baseline: baseline_scores,
             refined: refined_scores,
-            truth: truth_scores,
+            truth: true_drawing.as_ref().map(Scores::without_truth),
         },
-        Panoramas {
-            baseline: baseline_panorama,
-            refined: refined_panorama,
-            truth: true_panorama,
+        Drawings {
+            baseline: baseline_drawing,
+            refined: refined_drawing,
+            truth: true_drawing,
         },
     ))
+}
+
+impl Scores {
+    /// The measures that need no truth.
+    fn without_truth(drawing: &Drawing) -> Self {
+        Self {
+            coverage: drawing.panorama.coverage(),
+            seam: drawing.seams.residual(),
+            trajectory: None,
+            unaligned: None,
+            wall: None,
+            image: None,
+        }
+    }
 }
 
 /// One set of poses, laid on the wall.
@@ -184,8 +203,8 @@ impl<'a> Candidate<'a> {
         frames: &mut FrameStack,
         canvas: &Canvas,
         progress: &dyn Progress,
-    ) -> Result<Panorama, EvaluateError> {
-        render(
+    ) -> Result<Drawing, EvaluateError> {
+        let panorama = render(
             input.surface,
             frames,
             &self.placements,
@@ -196,25 +215,9 @@ impl<'a> Candidate<'a> {
         .map_err(|source| EvaluateError::Render {
             which: self.which,
             source,
-        })
-    }
-
-    /// The measures that need no truth.
-    fn scores(
-        &self,
-        input: &CompareInput,
-        frames: &FrameStack,
-        canvas: &Canvas,
-        panorama: &Panorama,
-    ) -> Scores {
-        Scores {
-            coverage: panorama.coverage(),
-            seam: seam_residual(input.surface, frames, &self.placements, canvas),
-            trajectory: None,
-            unaligned: None,
-            wall: None,
-            image: None,
-        }
+        })?;
+        let seams = SeamMap::new(input.surface, frames, &self.placements, canvas);
+        Ok(Drawing { panorama, seams })
     }
 }
 

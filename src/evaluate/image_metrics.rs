@@ -2,10 +2,10 @@
 
 use super::{EvaluateError, ssim::sum_of_ssim};
 use crate::render::Panorama;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Likeness of two panoramas on the pixels that both cover.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImageMetrics {
     /// Peak signal-to-noise ratio `10 log₁₀(255² / MSE)`, decibels; `None` if the pictures are equal or
     /// nowhere covered by both.

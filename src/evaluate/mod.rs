@@ -7,7 +7,7 @@
 //! | how far off is each pixel on the wall? | [`wall_error()`] |
 //! | how like the true panorama is this one? | [`image_metrics()`] |
 //! | how fine is the detail that a panorama shows? | [`mtf50`] |
-//! | how well do the frames agree, without any truth? | [`seam_residual`] |
+//! | how well do the frames agree, without any truth? | [`seam_residual`], place by place [`SeamMap`] |
 //! | is the stated uncertainty true? | [`normalised_errors`] |
 //! | how much noise can the refinement take? | [`converge`] |
 //!
@@ -29,11 +29,11 @@ mod uncertainty;
 mod wall_error;
 
 pub use before_after::before_after;
-pub use compare::{CompareInput, Comparison, Panoramas, Scores, compare};
+pub use compare::{CompareInput, Comparison, Drawing, Drawings, Scores, compare};
 pub use error::EvaluateError;
 pub use image_metrics::{ImageMetrics, image_metrics};
 pub use mtf::mtf50;
-pub use seam::{SeamResidual, seam_residual};
+pub use seam::{SeamMap, SeamResidual, seam_residual};
 pub use spread::Spread;
 pub use table::Row;
 pub use trajectory_error::{TrajectoryError, trajectory_error};

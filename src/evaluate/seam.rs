@@ -1,12 +1,13 @@
 //! How well the frames agree where they overlap, without any truth.
 
-use crate::render::{Canvas, EDGE, FrameStack, Interpolation, Kernel, Placement, tiles};
+use crate::render::{Canvas, EDGE, FrameStack, Interpolation, Kernel, Placement, Tile, tiles};
 use crate::surface::Surface;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Grey differences between frames at the same wall points.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeamResidual {
     /// Root mean square difference of two frames at a wall point, grey levels.
     pub rms_grey: f64,
@@ -22,67 +23,150 @@ const POINTS: usize = 300_000;
 /// Distance from the outermost pixel centres within which a frame is not asked, pixels.
 const MARGIN_PX: f64 = 1.0;
 
-/// The seam residual of placed frames on the wall of `canvas`; `None` if no two frames overlap.
-///
-/// At each point x of a square grid on the wall, the mean square difference over the pairs of the n frames
-/// that see it is `2/(n−1) Σ (I_i(x) − Ī(x))²`; the result is the root of its mean over the points with
-/// n ≥ 2. With true poses what remains is noise, light and interpolation.
-///
-/// `frames` (those that are held) and `placements` in the same order; pictures sampled bilinearly, luma of colour.
+/// Cells of the map around the section: half an hour of the clock each.
+const CELLS_AROUND: u32 = 24;
+/// Cells of the map along the axis, at most.
+const CELLS_ALONG: u32 = 480;
+/// Rows of points in a cell, at least.
+const ROWS_PER_CELL: u32 = 4;
+
+/// How well the frames agree, and how many see the wall, cell by cell of the unrolled wall.
+#[derive(Clone, Debug)]
+pub struct SeamMap {
+    around: usize,
+    along: usize,
+    chainage_m: [f64; 2],
+    /// A row per stretch of the axis, from θ = 0 on.
+    cells: Vec<Sums>,
+}
+
+impl SeamMap {
+    /// Compares placed frames on the wall of `canvas`.
+    ///
+    /// At each point x of a square grid on the wall, the mean square difference over the pairs of the n frames
+    /// that see it is `2/(n−1) Σ (I_i(x) − Ī(x))²`; the residual of a part of the wall is the root of its mean over the
+    /// points with n ≥ 2. With true poses what remains is noise, light and interpolation.
+    ///
+    /// `frames` (those that are held) and `placements` in the same order; pictures sampled bilinearly, luma of colour.
+    pub fn new(
+        surface: &dyn Surface,
+        frames: &FrameStack,
+        placements: &[Placement],
+        canvas: &Canvas,
+    ) -> Self {
+        let grid = canvas.coarser(POINTS);
+        let around = CELLS_AROUND.min(grid.columns);
+        let along = grid.rows.div_ceil(ROWS_PER_CELL).clamp(1, CELLS_ALONG);
+        let bands = tiles(surface, &grid, placements, EDGE);
+        // Collected before they are added: the sum does not depend on the threads.
+        let parts: Vec<BTreeMap<usize, Sums>> = bands
+            .par_iter()
+            .flatten()
+            .map(|tile| {
+                let seen = look(surface, frames, placements, &grid, tile);
+                let mut cells: BTreeMap<usize, Sums> = BTreeMap::new();
+                for (k, seen) in (0..).zip(&seen) {
+                    let (row, column) =
+                        (tile.row + k / tile.columns, tile.column + k % tile.columns);
+                    let cell = |at: u32, of: u32, cells: u32| {
+                        (u64::from(at) * u64::from(cells) / u64::from(of)) as usize
+                    };
+                    let (row, column) = (
+                        cell(row, grid.rows, along),
+                        cell(column, grid.columns, around),
+                    );
+                    let at = row * around as usize + column;
+                    cells.entry(at).or_default().add(seen);
+                }
+                cells
+            })
+            .collect();
+        let mut cells = vec![Sums::default(); (along * around) as usize];
+        for (cell, sums) in parts.into_iter().flatten() {
+            cells[cell].merge(&sums);
+        }
+        Self {
+            around: around as usize,
+            along: along as usize,
+            chainage_m: grid.chainage_m(),
+            cells,
+        }
+    }
+
+    /// Over all of the wall; `None` if no two frames overlap.
+    pub fn residual(&self) -> Option<SeamResidual> {
+        let mut total = Sums::default();
+        for cell in &self.cells {
+            total.merge(cell);
+        }
+        let points = total.points as f64;
+        Some(SeamResidual {
+            rms_grey: total.rms_grey()?,
+            points: total.points,
+            frames_per_point: total.frames / points,
+        })
+    }
+
+    /// Cells around the section and along the axis.
+    pub fn size(&self) -> [usize; 2] {
+        [self.around, self.along]
+    }
+
+    /// Chainage of the first cell's beginning and of the last one's end, metres.
+    pub fn chainage_m(&self) -> [f64; 2] {
+        self.chainage_m
+    }
+
+    /// Root mean square difference of two frames in each cell, grey levels; `None` where no two overlap. A row per
+    /// stretch of the axis, from θ = 0 on.
+    pub fn rms_grey(&self) -> Vec<Option<f64>> {
+        self.cells.iter().map(Sums::rms_grey).collect()
+    }
+
+    /// Frames that see a point of each cell, on average.
+    pub fn frames(&self) -> Vec<f64> {
+        let mean = |cell: &Sums| cell.sightings / cell.all.max(1) as f64;
+        self.cells.iter().map(mean).collect()
+    }
+}
+
+/// The seam residual of placed frames on the wall of `canvas`, see [`SeamMap::new`]; `None` if no two frames overlap.
 pub fn seam_residual(
     surface: &dyn Surface,
     frames: &FrameStack,
     placements: &[Placement],
     canvas: &Canvas,
 ) -> Option<SeamResidual> {
-    let grid = canvas.coarser(POINTS);
+    SeamMap::new(surface, frames, placements, canvas).residual()
+}
+
+/// What the frames show of the points of a tile.
+fn look(
+    surface: &dyn Surface,
+    frames: &FrameStack,
+    placements: &[Placement],
+    grid: &Canvas,
+    tile: &Tile,
+) -> Vec<Seen> {
     let camera = frames.camera();
     let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
-    let bands = tiles(surface, &grid, placements, EDGE);
-    // Collected before they are added: the sum does not depend on the threads.
-    let parts: Vec<Sums> = bands
-        .par_iter()
-        .flatten()
-        .map(|tile| {
-            let points = tile.points(surface, &grid);
-            let mut seen = vec![Seen::default(); points.len()];
-            for frame in &tile.frames {
-                let Some(picture) = frames.picture(*frame) else {
-                    continue;
-                };
-                let pose = &placements[*frame].pose;
-                for (x_w, seen) in points.iter().zip(&mut seen) {
-                    let pixel = camera
-                        .project(&pose.to_camera(x_w))
-                        .filter(|pixel| camera.sees(pixel, MARGIN_PX));
-                    if let Some(pixel) = pixel {
-                        seen.add(f64::from(picture.grey(&pixel, &bilinear)));
-                    }
-                }
+    let points = tile.points(surface, grid);
+    let mut seen = vec![Seen::default(); points.len()];
+    for frame in &tile.frames {
+        let Some(picture) = frames.picture(*frame) else {
+            continue;
+        };
+        let pose = &placements[*frame].pose;
+        for (x_w, seen) in points.iter().zip(&mut seen) {
+            let pixel = camera
+                .project(&pose.to_camera(x_w))
+                .filter(|pixel| camera.sees(pixel, MARGIN_PX));
+            if let Some(pixel) = pixel {
+                seen.add(f64::from(picture.grey(&pixel, &bilinear)));
             }
-            let mut sums = Sums::default();
-            for seen in seen.iter().filter(|seen| seen.count >= 2.0) {
-                sums.squares += 2.0 * seen.squares / (seen.count - 1.0);
-                sums.points += 1;
-                sums.frames += seen.count;
-            }
-            sums
-        })
-        .collect();
-    let mut total = Sums::default();
-    for part in parts {
-        total.squares += part.squares;
-        total.points += part.points;
-        total.frames += part.frames;
-    }
-    (total.points > 0).then(|| {
-        let points = total.points as f64;
-        SeamResidual {
-            rms_grey: (total.squares / points).sqrt(),
-            points: total.points,
-            frames_per_point: total.frames / points,
         }
-    })
+    }
+    seen
 }
 
 /// Running count, mean and sum of squares about the mean (Welford).
@@ -102,11 +186,43 @@ impl Seen {
     }
 }
 
-#[derive(Default)]
+/// Sums over the points of a part of the wall.
+#[derive(Clone, Copy, Debug, Default)]
 struct Sums {
+    /// Of the mean square differences.
     squares: f64,
+    /// Points that at least two frames see.
     points: usize,
+    /// Frames that see those.
     frames: f64,
+    /// All points.
+    all: usize,
+    /// Frames that see any of them.
+    sightings: f64,
+}
+
+impl Sums {
+    fn add(&mut self, seen: &Seen) {
+        self.all += 1;
+        self.sightings += seen.count;
+        if seen.count >= 2.0 {
+            self.squares += 2.0 * seen.squares / (seen.count - 1.0);
+            self.points += 1;
+            self.frames += seen.count;
+        }
+    }
+
+    fn merge(&mut self, other: &Self) {
+        self.squares += other.squares;
+        self.points += other.points;
+        self.frames += other.frames;
+        self.all += other.all;
+        self.sightings += other.sightings;
+    }
+
+    fn rms_grey(&self) -> Option<f64> {
+        (self.points > 0).then(|| (self.squares / self.points as f64).sqrt())
+    }
 }
 
 #[cfg(test)]
@@ -151,5 +267,43 @@ mod tests {
         assert!((three.rms_grey - 24f64.sqrt()).abs() < 1e-4);
         assert_eq!(three.frames_per_point, 3.0);
         assert_eq!(of(&[100]), None);
+    }
+
+    /// The one wrong frame is where the map says so, and what no frame sees is empty.
+    #[test]
+    fn the_map_shows_where_frames_disagree() {
+        let wall = TestWall::ring(waves);
+        let mut wrong = wall.poses.clone();
+        wrong[4].t_wc.y += 0.05;
+        let placements = place(&wall.circle, &wall.camera, &wrong).unwrap();
+        let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
+        let map = SeamMap::new(&wall.circle, &wall.stack(), &placements, &canvas);
+        let [around, along] = map.size();
+        let (residuals, frames) = (map.rms_grey(), map.frames());
+        assert_eq!(
+            (residuals.len(), frames.len()),
+            (around * along, around * along)
+        );
+        assert_eq!(map.chainage_m(), canvas.chainage_m());
+        let column = |s_m: f64| {
+            let share = (s_m / wall.circle.perimeter_m()).rem_euclid(1.0);
+            (share * around as f64) as usize
+        };
+        let middle_of = |frame: usize| {
+            let footprint = &placements[frame].footprint;
+            column(0.5 * (footprint.s_min_m + footprint.s_max_m))
+        };
+        let mean = |column: usize| {
+            let values: Vec<f64> = (0..along)
+                .filter_map(|row| residuals[row * around + column])
+                .collect();
+            values.iter().sum::<f64>() / values.len() as f64
+        };
+        let far = (middle_of(4) + around / 2) % around;
+        assert!(mean(middle_of(4)) > 3.0 * mean(far));
+        assert!(frames.iter().any(|n| *n >= 2.0));
+        for (residual, frames) in residuals.iter().zip(&frames) {
+            assert!(residual.is_none() || *frames > 0.0);
+        }
     }
 }

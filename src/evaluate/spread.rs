@@ -1,9 +1,9 @@
 //! A list of errors in three numbers.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Root mean square, median and greatest of a list of errors, in the errors' own unit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// `√(Σ e² / n)`.
     pub rms: f64,

@@ -4,11 +4,11 @@ use super::error::check_pairs;
 use super::{EvaluateError, Spread};
 use crate::surface::{Gauge, GaugeMotion};
 use crate::trajectory::Pose;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Pose errors after the tunnel's gauge is removed, and only it: a similarity fit (Umeyama) would also hide
 /// errors that pictures do show, as an offset from the axis or a wrong scale.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrajectoryError {
     /// What was removed.
     pub gauge: GaugeMotion,

@@ -3,13 +3,13 @@
 use super::error::check_pairs;
 use super::{EvaluateError, Spread};
 use crate::trajectory::Pose;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Errors of poses without anything removed, not even the gauge: what `evo_ape tum` and `evo_rpe tum` print for the same two
 /// files, without `--align` and with `--delta 1 --delta_unit f`.
 ///
 /// The relative errors do not depend on the gauge; the absolute ones do, and mean something only where it is fixed alike in both.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct UnalignedError {
     /// `|t_est − t_true|`, metres (`evo_ape`).
     pub ape_translation_m: Spread,

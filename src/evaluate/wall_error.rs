@@ -6,7 +6,7 @@ use crate::camera::Camera;
 use crate::surface::{Surface, WallPoint, shortest_arc};
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Distances on the unrolled wall between where the estimated and the true pose put a pixel.
@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 /// Over a grid of 9 × 7 pixels a frame, its border included. The mean `Δs` and the mean `Δh` over all pixels
 /// of all frames are removed as far as the tunnel's [gauge](crate::surface::Gauge) leaves them free: no
 /// picture fixes them.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WallError {
     /// Mean `Δs` that was removed, metres.
     pub shift_s_m: f64,

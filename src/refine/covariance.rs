@@ -18,6 +18,7 @@ use super::calibration::LENS;
 use super::estimate::{FrameEstimate, UNKNOWNS};
 use super::factor::FactorError;
 use super::normal::{Block, NormalEquations, Pattern};
+use super::report::nan_if_null;
 use super::selected_inverse::SelectedInverse;
 use super::shared::{BorderBlock, SharedBlock};
 use crate::camera::Camera;
@@ -26,15 +27,21 @@ use crate::trajectory::so3;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
+///
+/// All are NaN where the equations have no answer.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FrameSigma {
     /// Rotation, root mean square over the three axes, degrees.
+    #[serde(deserialize_with = "nan_if_null")]
     pub rotation_deg: f64,
     /// Translation, root mean square over the three axes, metres.
+    #[serde(deserialize_with = "nan_if_null")]
     pub translation_m: f64,
     /// Position on the wall of what the frame shows: root mean square over middle and corners, metres.
+    #[serde(deserialize_with = "nan_if_null")]
     pub wall_m: f64,
     /// The same in pixels of the frame.
+    #[serde(deserialize_with = "nan_if_null")]
     pub wall_px: f64,
 }
 

@@ -9,7 +9,7 @@ use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{
     Error, Executor, IterState, KV, Problem as Counted, Solver, State, TerminationReason,
 };
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// When to stop.
@@ -25,7 +25,7 @@ pub struct Stopping {
 }
 
 /// Why a solve stopped.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum StopReason {
     /// The last step moved the wall by less than the tolerance.
@@ -38,11 +38,24 @@ pub enum StopReason {
     MaxIterations,
 }
 
+/// One step of a solve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepRecord {
+    /// Robust cost after it, on the same wall samples as at the start; None after a last step, which is not judged.
+    pub cost: Option<f64>,
+    /// Largest movement of the wall, pixels of full size.
+    pub step_px: f64,
+    /// λ with which it was taken; 0 is plain Gauss–Newton.
+    pub damping: f64,
+}
+
 /// The course of one solve.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SolveRecord {
-    /// Steps taken.
+    /// Number of steps taken.
     pub iterations: u64,
+    /// The steps.
+    pub steps: Vec<StepRecord>,
     /// Robust cost at the start.
     pub cost_start: f64,
     /// Robust cost at the end, on the same wall samples, before the last step.
@@ -91,8 +104,7 @@ struct DampedGaussNewton {
     lambda: f64,
     current: Option<Linearisation>,
     cost_start: f64,
-    iterations: u64,
-    last_step_px: f64,
+    steps: Vec<StepRecord>,
     stop: Option<StopReason>,
 }
 
@@ -103,8 +115,7 @@ impl DampedGaussNewton {
             lambda: 0.0,
             current: None,
             cost_start: 0.0,
-            iterations: 0,
-            last_step_px: 0.0,
+            steps: Vec::new(),
             stop: None,
         }
     }
@@ -176,16 +187,20 @@ impl DampedGaussNewton {
                 .map(|(estimate, step)| estimate.retract(step))
                 .collect();
             let candidate = (candidate, kappa + shared);
+            let mut record = StepRecord {
+                cost: None,
+                step_px,
+                damping: self.lambda,
+            };
             if stop.is_some() {
-                self.iterations += 1;
-                self.last_step_px = step_px;
+                self.steps.push(record);
                 self.stop = stop;
                 return Ok((candidate, current));
             }
             let next = problem.linearise_at(&candidate.0, &candidate.1)?;
             if next.cost < current.cost {
-                self.iterations += 1;
-                self.last_step_px = step_px;
+                record.cost = Some(next.cost);
+                self.steps.push(record);
                 self.lambda = if self.lambda > DAMPING.0 {
                     self.lambda / DAMPING.1
                 } else {
@@ -303,11 +318,12 @@ pub fn solve<'a>(
         return Err(ProblemError::Solver("no iterate was kept".to_owned()));
     };
     let record = SolveRecord {
-        iterations: solver.iterations,
+        iterations: solver.steps.len() as u64,
+        last_step_px: solver.steps.last().map_or(0.0, |step| step.step_px),
+        steps: solver.steps,
         cost_start: solver.cost_start,
         cost_end: linearisation.cost,
         observations: linearisation.frames.iter().map(|f| f.samples).sum(),
-        last_step_px: solver.last_step_px,
         sigma,
         stop: solver.stop.unwrap_or(StopReason::MaxIterations),
     };

@@ -88,7 +88,7 @@ mod wall;
 pub use bound::pose_bound;
 pub use covariance::{Covariances, FrameSigma};
 pub use covariance_file::{CovarianceError, read_covariances};
-pub use gauss_newton::{SolveRecord, StopReason};
+pub use gauss_newton::{SolveRecord, StepRecord, StopReason};
 pub use observed::{CalibrationReport, UnknownReport};
 pub use options::RefineOptions;
 pub use otherwise::other_readings;

@@ -4,10 +4,10 @@ use super::covariance::FrameSigma;
 use super::gauss_newton::SolveRecord;
 use super::observed::CalibrationReport;
 use crate::trajectory::Pose;
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// What a frame's refined pose rests on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum FrameFlag {
     /// Its pixels.
@@ -19,7 +19,7 @@ pub enum FrameFlag {
 }
 
 /// A pose in the report, as in a TUM file.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PoseReport {
     /// Position, metres.
     pub translation_m: [f64; 3],
@@ -36,8 +36,13 @@ impl From<&Pose> for PoseReport {
     }
 }
 
+/// Reads a number that JSON does not have: NaN is written as null.
+pub(crate) fn nan_if_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
 /// One frame of the report.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameReport {
     /// Index of the frame.
     pub index: usize,
@@ -46,10 +51,10 @@ pub struct FrameReport {
     /// What its pose rests on.
     pub flag: FrameFlag,
     /// Why, if it rests on the prior.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// The other pose, if two are possible.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub other_pose: Option<PoseReport>,
     /// Wall samples at which it was compared with other frames.
     pub points: usize,
@@ -66,7 +71,7 @@ pub struct FrameReport {
 }
 
 /// One global solve of the report.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LevelReport {
     /// Pyramid level; 0 is full size.
     pub level: usize,
@@ -80,7 +85,7 @@ pub struct LevelReport {
 }
 
 /// Wall-clock time of one stage.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StageTime {
     /// Name of the stage.
     pub stage: String,

@@ -3,10 +3,10 @@
 use super::{Placement, RenderError};
 use crate::surface::{Footprint, Surface, WallPoint};
 use image::DynamicImage;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// How the panorama lies in its picture file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Layout {
     /// θ to the right from 0 to 2π, chainage down: the wall as seen from inside, not mirrored.
@@ -62,7 +62,7 @@ impl Layout {
 ///
 /// Column `j` and row `i` (from 0) have their centre at `s = (j + ½)/ppm`, `h = h_start + (i + ½)/ppm`. The
 /// perimeter is a whole number of columns, so the last column meets the first.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Canvas {
     /// Columns around the section.
     pub columns: u32,

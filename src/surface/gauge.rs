@@ -2,7 +2,7 @@
 
 use crate::trajectory::{Pose, so3};
 use nalgebra::{Vector3, Vector6};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The rigid motions that leave a tunnel's shape unchanged. Moving all poses by one of them changes no
 /// picture, so they are fixed by the prior and removed (and only they) before errors are computed.
@@ -55,7 +55,7 @@ impl Gauge {
 }
 
 /// A motion along the gauge: a turn about the axis, then a shift along it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GaugeMotion {
     /// Turn about the axis, radians.
     pub turn_rad: f64,

@@ -1,0 +1,101 @@
+//! `tunnelstitch report`: one page about a refined survey.
+
+use super::compare::compare_poses;
+use super::stitch::positive;
+use super::{Failure, Terminal, command_line, json};
+use crate::atomic::{self, StagedFolder};
+use crate::progress::Progress;
+use crate::render::Interpolation;
+use crate::report::{self, PICTURES, RefinedFiles, Report, Sources};
+use crate::survey::Survey;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Makes a page of a refined survey, to look at and to pass on: what was repaired, and how sure it is.
+///
+/// Writes report.html (one file that needs no other and no network), report.json (the same numbers) and report_pictures/
+/// (the pictures, as they are in the page) into DIR.
+#[derive(Debug, clap::Args)]
+pub struct ReportArguments {
+    /// Folder of the survey, or its survey.toml.
+    survey: PathBuf,
+    /// What refine has written: its folder, or the poses (TUM) in it. Other poses will do; then the page says nothing of how
+    /// they were found.
+    #[arg(long, value_name = "DIR|FILE")]
+    refined: PathBuf,
+    /// Folder for the report; made if missing.
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// Pixels per metre of wall at which baseline, refined and true poses are compared [default: the frames' own resolution
+    /// at the wall, less for long surveys].
+    #[arg(long, value_name = "N", value_parser = positive)]
+    px_per_metre: Option<f64>,
+    /// Print report.json on standard output instead of where it is.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for everything wrong with the survey, the poses, what refine has written, or the output.
+pub fn run(arguments: &ReportArguments, terminal: &Terminal) -> Result<(), Failure> {
+    let survey = Survey::open(&arguments.survey)?;
+    let refined = RefinedFiles::read(&survey, &arguments.refined)?;
+    let px_per_metre = match arguments.px_per_metre {
+        Some(px_per_metre) => Some(px_per_metre),
+        None => report::resolution(&survey, &refined.poses)?,
+    };
+    let (comparison, drawings) = compare_poses(
+        &survey,
+        &refined.poses,
+        px_per_metre,
+        Interpolation::default(),
+        terminal,
+    )?;
+    let sources = Sources {
+        survey: &survey,
+        refined,
+        comparison: &comparison,
+        drawings: &drawings,
+        command: command_line(),
+    };
+    let (report, json) = report_into(sources, &arguments.out, terminal)?;
+    if arguments.json {
+        return json::print_text(&json);
+    }
+    for note in &report.notes {
+        terminal.say(format!("  {note}"));
+    }
+    terminal.say(format!(
+        "wrote {}",
+        arguments.out.join("report.html").display()
+    ));
+    Ok(())
+}
+
+/// Writes report.html, report.json and report_pictures/ into `out`; returns the report and the text of report.json.
+///
+/// # Errors
+/// A flagged frame that cannot be read, or an output that cannot be written.
+pub fn report_into(
+    sources: Sources,
+    out: &Path,
+    terminal: &Terminal,
+) -> Result<(Report, String), Failure> {
+    terminal.start("report", 1);
+    let (report, pictures) = report::gather(sources)?;
+    let page = report::page(&report, &pictures)?;
+    let json = json::text(&report)?;
+    atomic::create_folder(out)?;
+    let folder = StagedFolder::begin(&out.join(PICTURES))?;
+    for (name, bytes) in &pictures {
+        let path = folder.path().join(name);
+        atomic::write(&path, |writer| writer.write_all(bytes))?;
+    }
+    folder.finish()?;
+    atomic::write_text(&out.join("report.json"), &json)?;
+    atomic::write_text(&out.join("report.html"), &page)?;
+    terminal.finish();
+    Ok((report, json))
+}

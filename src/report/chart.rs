@@ -1,0 +1,402 @@
+//! A line chart as inline SVG, coloured by the page's style sheet.
+
+use super::decimate::decimate;
+use super::quantity::{fixed, significant};
+use super::ticks;
+use maud::{Markup, html};
+
+/// Size of the drawing, its own units: about pixels where a chart is as wide as a phone.
+const SIZE: [f64; 2] = [380.0, 214.0];
+/// Left, right, upper and lower edge of the plot in it.
+const PLOT: [f64; 4] = [48.0, 372.0, 8.0, 172.0];
+/// Share of the values' span that is left free above and below.
+const AIR: f64 = 0.07;
+/// Flagged frames up to so many have lines as high as the plot; more have short ones, which hide nothing.
+const MOST_LINES: usize = 24;
+const SHORT_LINE: f64 = 7.0;
+/// Curves of no more points than this show them.
+const MOST_DOTS: usize = 30;
+
+/// What a curve is, which says how it looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// Initial poses.
+    Planned,
+    /// Refined poses.
+    Refined,
+    /// True poses.
+    Truth,
+    /// The n-th of some that have an order, as pyramid levels.
+    Ordered(usize),
+}
+
+impl Style {
+    /// Class of the style sheet.
+    pub fn class(self) -> String {
+        match self {
+            Self::Planned => "planned".to_owned(),
+            Self::Refined => "refined".to_owned(),
+            Self::Truth => "truth".to_owned(),
+            Self::Ordered(k) => format!("ordered-{}", k % 6),
+        }
+    }
+}
+
+/// One curve.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Its name.
+    pub name: String,
+    /// Its look.
+    pub style: Style,
+    /// Its points, along the curve.
+    pub points: Vec<[f64; 2]>,
+    /// 1-σ of each point; empty if there is none.
+    pub sigma: Vec<f64>,
+}
+
+impl Series {
+    /// A curve without uncertainty.
+    pub fn new(name: &str, style: Style, points: Vec<[f64; 2]>) -> Self {
+        Self {
+            name: name.to_owned(),
+            style,
+            points,
+            sigma: Vec::new(),
+        }
+    }
+
+    /// The same curve with the 1-σ of its points, where they have one.
+    pub fn with_sigma(mut self, sigma: impl Iterator<Item = Option<f64>>) -> Self {
+        let sigma: Vec<f64> = sigma.map(|sigma| sigma.unwrap_or(f64::NAN)).collect();
+        if sigma.iter().any(|sigma| sigma.is_finite()) {
+            self.sigma = sigma;
+        }
+        self
+    }
+
+    /// The edges of its band of ±1-σ.
+    fn band(&self) -> [Vec<[f64; 2]>; 2] {
+        let edge = |sign: f64| {
+            let points = self.points.iter().zip(&self.sigma);
+            points.map(|([x, y], s)| [*x, y + sign * s]).collect()
+        };
+        [edge(1.0), edge(-1.0)]
+    }
+}
+
+/// What a chart's horizontal axis counts.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// Its name with the unit.
+    pub name: String,
+    /// Its ends.
+    pub range: [f64; 2],
+    /// Whether there is nothing between whole numbers.
+    pub whole: bool,
+}
+
+/// How a chart's vertical axis runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Vertical {
+    /// Over the values.
+    Linear,
+    /// From zero to the highest value.
+    FromZero,
+    /// Over the values, which are positive, in equal ratios.
+    Logarithmic,
+}
+
+/// A line chart.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// What is shown.
+    pub title: String,
+    /// Unit of the values; empty for pure numbers.
+    pub unit: String,
+    /// The horizontal axis.
+    pub along: Axis,
+    /// The vertical axis.
+    pub vertical: Vertical,
+    /// The curves.
+    pub series: Vec<Series>,
+    /// Places of flagged frames along the axis.
+    pub marks: Vec<f64>,
+}
+
+/// From values to the drawing.
+struct Frame {
+    x: [f64; 2],
+    y: [f64; 2],
+    logarithmic: bool,
+}
+
+impl Frame {
+    fn x(&self, value: f64) -> f64 {
+        let [left, right, ..] = PLOT;
+        left + (value - self.x[0]) / (self.x[1] - self.x[0]) * (right - left)
+    }
+
+    fn y(&self, value: f64) -> f64 {
+        let [_, _, top, bottom] = PLOT;
+        let place = |v: f64| if self.logarithmic { v.ln() } else { v };
+        let share = (place(value) - place(self.y[0])) / (place(self.y[1]) - place(self.y[0]));
+        bottom - share * (bottom - top)
+    }
+
+    /// Points of an SVG polyline. Far beyond the plot nothing is seen.
+    fn polyline(&self, points: &[[f64; 2]]) -> String {
+        let pair = |[x, y]: &[f64; 2]| {
+            let y = self.y(*y).clamp(-1e4, 1e4);
+            format!("{:.1},{:.1}", self.x(*x), y)
+        };
+        points.iter().map(pair).collect::<Vec<_>>().join(" ")
+    }
+}
+
+impl Chart {
+    fn frame(&self) -> Frame {
+        let logarithmic = self.vertical == Vertical::Logarithmic;
+        let shown = |v: &f64| v.is_finite() && (!logarithmic || *v > 0.0);
+        let values: Vec<f64> = self
+            .series
+            .iter()
+            .flat_map(|series| series.points.iter().map(|point| point[1]))
+            .filter(shown)
+            .collect();
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        // Bands belong to the picture as long as they do not make the curve flat.
+        let edges = self.series.iter().flat_map(|series| series.band().concat());
+        let near = |v: &f64| *v > low - (high - low) && *v < high + (high - low);
+        let edges: Vec<f64> = edges.map(|p| p[1]).filter(shown).filter(near).collect();
+        let low = edges.iter().copied().fold(low, f64::min);
+        let high = edges.iter().copied().fold(high, f64::max);
+        let y = match self.vertical {
+            Vertical::Logarithmic if values.is_empty() => [0.1, 10.0],
+            _ if values.is_empty() => [0.0, 1.0],
+            Vertical::Logarithmic => {
+                let air = (high / low).powf(AIR).max(1.2);
+                [low / air, high * air]
+            }
+            Vertical::FromZero if high > 0.0 => [0.0, high * (1.0 + AIR)],
+            _ if high > low => [low - AIR * (high - low), high + AIR * (high - low)],
+            _ => [
+                low - 0.5 * low.abs().max(1e-3),
+                high + 0.5 * high.abs().max(1e-3),
+            ],
+        };
+        let x = match self.along.range {
+            [from, to] if to != from => [from, to],
+            [from, _] => [from - 0.5, from + 0.5],
+        };
+        Frame { x, y, logarithmic }
+    }
+
+    /// What is shown, in words, for those who do not see it.
+    fn words(&self) -> String {
+        let curves: Vec<String> = self
+            .series
+            .iter()
+            .filter_map(|series| {
+                let values = series.points.iter().map(|p| p[1]).filter(|v| v.is_finite());
+                let low = values.clone().reduce(f64::min)?;
+                let high = values.reduce(f64::max)?;
+                Some(format!(
+                    "{} from {} to {} {}",
+                    series.name,
+                    significant(low, 3),
+                    significant(high, 3),
+                    self.unit
+                ))
+            })
+            .collect();
+        format!(
+            "{} along {}: {}.",
+            self.title,
+            self.along.name,
+            curves.join("; ")
+        )
+    }
+
+    /// The chart with its title.
+    pub fn draw(&self) -> Markup {
+        let frame = self.frame();
+        let [left, right, top, bottom] = PLOT;
+        let (width, height) = (right - left, bottom - top);
+        let columns = width as usize;
+        let y_ticks = match frame.logarithmic {
+            true => ticks::logarithmic(frame.y[0], frame.y[1], 6),
+            false => ticks::linear(frame.y[0], frame.y[1], 5),
+        };
+        let (from, to) = (frame.x[0].min(frame.x[1]), frame.x[0].max(frame.x[1]));
+        let mut x_ticks = ticks::linear(from, to, 6);
+        if self.along.whole {
+            x_ticks.retain(|(value, _)| value.fract() == 0.0);
+            for (value, text) in &mut x_ticks {
+                *text = fixed(*value, 0);
+            }
+        }
+        let mut marks: Vec<i64> = self
+            .marks
+            .iter()
+            .map(|x| frame.x(*x).round() as i64)
+            .collect();
+        marks.sort_unstable();
+        marks.dedup();
+        let foot = match marks.len() > MOST_LINES {
+            true => top + SHORT_LINE,
+            false => bottom,
+        };
+        let shown = |point: &[f64; 2]| !frame.logarithmic || point[1] > 0.0;
+        html! {
+            figure.chart {
+                figcaption {
+                    span { (self.title) @if !self.unit.is_empty() { " " span.unit { "(" (self.unit) ")" } } }
+                    output.reading aria-hidden="true" {}
+                }
+                svg role="img" aria-label=(self.words())
+                    viewBox=(format!("0 0 {} {}", SIZE[0], SIZE[1]))
+                    data-plot=(format!("{left} {right} {top} {bottom}"))
+                    data-x=(format!("{} {}", frame.x[0], frame.x[1]))
+                    data-y=(format!("{} {}", frame.y[0], frame.y[1]))
+                    data-log=[frame.logarithmic.then_some("1")]
+                {
+                    @for (value, text) in &y_ticks {
+                        @let y = format!("{:.1}", frame.y(*value));
+                        line.grid x1=(left) x2=(right) y1=(y) y2=(y) {}
+                        text.tick x=(left - 6.0) y=(y) dy="0.32em" text-anchor="end" { (text) }
+                    }
+                    @for (value, text) in &x_ticks {
+                        @let x = format!("{:.1}", frame.x(*value));
+                        line.stub x1=(x) x2=(x) y1=(bottom) y2=(bottom + 4.0) {}
+                        text.tick x=(x) y=(bottom + 16.0) text-anchor="middle" { (text) }
+                    }
+                    text.axis x=(0.5 * (left + right)) y=(SIZE[1] - 6.0) text-anchor="middle" { (self.along.name) }
+                    svg x=(left) y=(top) width=(width) height=(height)
+                        viewBox=(format!("{left} {top} {width} {height}"))
+                    {
+                        @for x in &marks {
+                            line.mark x1=(x) x2=(x) y1=(top) y2=(foot) {}
+                        }
+                        @for series in &self.series {
+                            @if !series.sigma.is_empty() {
+                                @let [upper, lower] = series.band().map(|edge| decimate(&edge, frame.x, columns));
+                                @let outline: Vec<[f64; 2]> = upper.into_iter().chain(lower.into_iter().rev()).collect();
+                                polygon.(format!("band {}", series.style.class())) points=(frame.polyline(&outline)) {}
+                            }
+                        }
+                        @for series in &self.series {
+                            @let points: Vec<[f64; 2]> = series.points.iter().copied().filter(shown).collect();
+                            @let points = decimate(&points, frame.x, columns);
+                            polyline.(format!("curve {}", series.style.class()))
+                                data-name=(series.name) points=(frame.polyline(&points)) {}
+                            @if points.len() <= MOST_DOTS && !matches!(series.style, Style::Planned | Style::Truth) {
+                                @for point in &points {
+                                    circle.(format!("dot {}", series.style.class())) r="2.2"
+                                        cx=(format!("{:.1}", frame.x(point[0])))
+                                        cy=(format!("{:.1}", frame.y(point[1]))) {}
+                                }
+                            }
+                        }
+                    }
+                    line.base x1=(left) x2=(right) y1=(bottom) y2=(bottom) {}
+                }
+            }
+        }
+    }
+}
+
+/// Something in a chart that is no curve.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extra {
+    /// The band of ±1-σ.
+    Band,
+    /// The line of a flagged frame.
+    Mark,
+}
+
+/// Names and looks of curves and of what else there is, for several charts.
+pub fn legend(entries: &[(&str, Style)], extras: &[Extra]) -> Markup {
+    html! {
+        p.legend {
+            @for (name, style) in entries {
+                span.key {
+                    svg viewBox="0 0 28 10" aria-hidden="true" {
+                        line.(format!("curve {}", style.class())) x1="1" x2="27" y1="5" y2="5" {}
+                    }
+                    (name)
+                }
+            }
+            @for extra in extras {
+                span.key {
+                    svg viewBox="0 0 28 10" aria-hidden="true" {
+                        @match extra {
+                            Extra::Band => { rect.band.refined x="1" y="0" width="26" height="10" {} }
+                            Extra::Mark => { line.mark x1="14" x2="14" y1="-1" y2="11" {} }
+                        }
+                    }
+                    @match extra {
+                        Extra::Band => { "±1-σ" }
+                        Extra::Mark => { "flagged frame" }
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chart(points: Vec<[f64; 2]>, vertical: Vertical) -> Chart {
+        Chart {
+            title: "Error <x>".to_owned(),
+            unit: "mm".to_owned(),
+            along: Axis {
+                name: "chainage (m)".to_owned(),
+                range: [0.0, 10.0],
+                whole: false,
+            },
+            vertical,
+            series: vec![Series::new("refined & more", Style::Refined, points)],
+            marks: vec![5.0],
+        }
+    }
+
+    #[test]
+    fn values_lie_where_the_axes_say_and_text_is_escaped() {
+        let chart = chart(vec![[0.0, 0.0], [10.0, 100.0]], Vertical::FromZero);
+        let text = chart.draw().into_string();
+        // From the lower left corner to the right edge, 7 % below the top.
+        assert!(text.contains("points=\"48.0,172.0 372.0,18.7\""), "{text}");
+        assert!(text.contains("Error &lt;x&gt;") && text.contains("refined &amp; more"));
+        assert!(!text.contains("<x>"));
+        assert!(text.contains("x1=\"210\" x2=\"210\""), "{text}");
+    }
+
+    #[test]
+    fn nothing_to_show_and_nothing_positive_are_drawn_without_numbers_that_are_none() {
+        for vertical in [Vertical::Linear, Vertical::FromZero, Vertical::Logarithmic] {
+            for points in [
+                vec![],
+                vec![[3.0, f64::NAN]],
+                vec![[3.0, 0.0], [4.0, 0.0]],
+                vec![[3.0, -2.0]],
+            ] {
+                let text = chart(points, vertical).draw().into_string();
+                assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_long_curve_is_short_in_the_page() {
+        let points = (0..100_000).map(|k| [f64::from(k) * 1e-4, f64::from(k % 97)]);
+        let text = chart(points.collect(), Vertical::Linear)
+            .draw()
+            .into_string();
+        assert!(text.len() < 30_000, "{}", text.len());
+    }
+}

@@ -1,0 +1,74 @@
+//! What can be wrong with what a report is made of.
+
+use crate::frames::FrameError;
+use crate::refine::CovarianceError;
+use crate::render::RenderError;
+use crate::survey::SurveyError;
+use std::path::PathBuf;
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// Nothing that refine has written lies there.
+    #[error(
+        "{}: holds no poses.tum; --refined is the folder that refine has written, or a TUM file",
+        path.display()
+    )]
+    NoPoses {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file cannot be read.
+    #[error("{}: cannot read it: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// `refine.json` is not what this version writes.
+    #[error("{}:{line}:{column}: {what}; refine the survey again with this version", path.display())]
+    Parse {
+        /// The file.
+        path: PathBuf,
+        /// 1-based line.
+        line: usize,
+        /// 1-based column.
+        column: usize,
+        /// What the parser said.
+        what: String,
+    },
+    /// `refine.json` is of another survey.
+    #[error(
+        "{}: is of {found} frames, but the survey has {frames}; give the folder that refine has written for this survey",
+        path.display()
+    )]
+    Count {
+        /// The file.
+        path: PathBuf,
+        /// Frames in it.
+        found: usize,
+        /// Frames of the survey.
+        frames: usize,
+    },
+    /// A picture cannot be encoded.
+    #[error("{name}: cannot encode the picture: {source}")]
+    Encode {
+        /// Its name.
+        name: String,
+        /// What the encoder said.
+        source: image::ImageError,
+    },
+    /// The survey or its poses.
+    #[error(transparent)]
+    Survey(#[from] SurveyError),
+    /// Covariances.
+    #[error(transparent)]
+    Covariance(#[from] CovarianceError),
+    /// Frames.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// Where the frames lie on the wall.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+}

@@ -1,0 +1,131 @@
+//! How the global solves came to rest.
+
+use super::View;
+use crate::refine::{LevelReport, StopReason};
+use crate::report::chart::{Axis, Chart, Series, Style, Vertical, legend};
+use crate::report::quantity::{count, short, significant};
+use maud::{Markup, html};
+
+/// The section; `None` without refine's report.
+pub fn section(view: &View) -> Option<Markup> {
+    let refinement = view.report.refinement.as_ref()?;
+    let levels = &refinement.levels;
+    let names: Vec<String> = levels.iter().map(name).collect();
+    let entries = names.iter().enumerate();
+    let entries: Vec<(&str, Style)> = entries
+        .map(|(k, name)| (name.as_str(), Style::Ordered(k)))
+        .collect();
+    Some(html! {
+        p { "The global solves, from coarse to fine, each a few damped Gauss–Newton steps over all frames. The cost is robust \
+            and compares only within a solve, for each has its own samples of the wall; it is not computed after a last step, so a solve of one step has no curve. The last solve ended because "
+            (refinement.stopped_because) "." }
+        (legend(&entries, &[]))
+        div.charts {
+            @for (k, (level, name)) in levels.iter().zip(&names).enumerate() {
+                @if level.solve.steps.len() > 1 { (cost_chart(level, name, k)) }
+            }
+            (step_chart(levels, &names))
+        }
+        (table(levels, &names))
+    })
+}
+
+fn name(level: &LevelReport) -> String {
+    let mut name = format!("level {}", level.level);
+    if level.samples_per_pixel != 1.0 {
+        name += &format!(", {} samples per px", level.samples_per_pixel);
+    }
+    if level.share_of_wall < 0.995 {
+        name += &format!(
+            ", {} % of the wall",
+            significant(100.0 * level.share_of_wall, 2)
+        );
+    }
+    name
+}
+
+/// Cost per observation before the first and after each step of one solve.
+fn cost_chart(level: &LevelReport, name: &str, k: usize) -> Markup {
+    let observations = level.solve.observations.max(1) as f64;
+    let after = level.solve.steps.iter().map(|step| step.cost);
+    let costs = std::iter::once(Some(level.solve.cost_start)).chain(after);
+    let points = costs.enumerate();
+    let points = points.filter_map(|(step, cost)| Some([step as f64, cost? / observations]));
+    Chart {
+        title: format!("Cost per observation, {name}"),
+        unit: String::new(),
+        along: Axis {
+            name: "steps".to_owned(),
+            range: [0.0, level.solve.steps.len() as f64],
+            whole: true,
+        },
+        vertical: Vertical::Linear,
+        series: vec![Series::new("cost", Style::Ordered(k), points.collect())],
+        marks: Vec::new(),
+    }
+    .draw()
+}
+
+/// Movement of the wall in every step of all solves.
+fn step_chart(levels: &[LevelReport], names: &[String]) -> Markup {
+    let mut done = 0;
+    let mut series = Vec::new();
+    for (k, (level, name)) in levels.iter().zip(names).enumerate() {
+        let points = (done + 1..).zip(&level.solve.steps);
+        let points = points.map(|(at, step): (usize, _)| [at as f64, step.step_px]);
+        series.push(Series::new(name, Style::Ordered(k), points.collect()));
+        done += level.solve.steps.len();
+    }
+    Chart {
+        title: "Largest step on the wall".to_owned(),
+        unit: "px".to_owned(),
+        along: Axis {
+            name: "steps of all solves".to_owned(),
+            range: [0.0, done.max(1) as f64],
+            whole: true,
+        },
+        vertical: Vertical::Logarithmic,
+        series,
+        marks: Vec::new(),
+    }
+    .draw()
+}
+
+fn table(levels: &[LevelReport], names: &[String]) -> Markup {
+    html! {
+        div.wide {
+            table.solves {
+                caption { "The global solves" }
+                thead { tr {
+                    th scope="col" { "Solve" } th.number scope="col" { "Steps" } th.number scope="col" { "Observations" }
+                    th.number scope="col" { "Cost: start" } th.number scope="col" { "end" }
+                    th.number scope="col" { "Last step (px)" } th.number scope="col" { "Noise (grey)" } th scope="col" { "Stopped by" }
+                } }
+                tbody {
+                    @for (level, name) in levels.iter().zip(names) {
+                        @let solve = &level.solve;
+                        tr {
+                            th scope="row" { (name) }
+                            td.number { (solve.iterations) }
+                            td.number { (count(solve.observations)) }
+                            td.number { (count(solve.cost_start.round() as usize)) }
+                            td.number { (count(solve.cost_end.round() as usize)) }
+                            td.number { (short(solve.last_step_px)) }
+                            td.number { (short(solve.sigma)) }
+                            td { (words(solve.stop)) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn words(stop: StopReason) -> &'static str {
+    match stop {
+        StopReason::StepBelowTolerance => "a step below the tolerance",
+        StopReason::StepBelowUncertainty => "a step within the uncertainty",
+        StopReason::NoFurtherDescent => "no further descent",
+        StopReason::MaxIterations => "the number of steps",
+    }
+}

@@ -1,0 +1,87 @@
+//! Numbers as people read them.
+
+/// A number with about `digits` significant digits, without an exponent, with a true minus sign; a dash for none.
+pub fn significant(value: f64, digits: i32) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    let magnitude = value.abs().log10().floor() as i32;
+    let decimals = (digits - 1 - magnitude).clamp(0, 9) as usize;
+    minus(format!("{value:.decimals$}"))
+}
+
+/// A number with so many decimals.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    minus(format!("{value:.decimals$}"))
+}
+
+/// Three significant digits.
+pub fn short(value: f64) -> String {
+    significant(value, 3)
+}
+
+/// The same of a number that may be missing.
+pub fn maybe(value: Option<f64>) -> String {
+    value.map_or_else(|| "–".to_owned(), short)
+}
+
+/// A count with thin spaces between thousands.
+pub fn count(value: usize) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (k, digit) in digits.chars().enumerate() {
+        if k > 0 && (digits.len() - k).is_multiple_of(3) && digits.len() > 4 {
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+fn minus(text: String) -> String {
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        Some(rest) => format!("−{rest}"),
+        None => text,
+    }
+}
+
+/// A unit of length that suits values up to `most_m`, and what metres are multiplied by.
+pub fn length_unit(most_m: f64) -> (&'static str, f64) {
+    match most_m {
+        m if m >= 1.0 => ("m", 1.0),
+        _ => ("mm", 1e3),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_short_and_have_no_exponents() {
+        for (value, text) in [
+            (0.000123456, "0.000123"),
+            (28.713, "28.7"),
+            (-731.49, "−731"),
+            (12345.6, "12346"),
+            (0.0, "0"),
+            (f64::NAN, "–"),
+        ] {
+            assert_eq!(short(value), text);
+        }
+        assert_eq!(fixed(-0.0004, 2), "0.00");
+        assert_eq!(maybe(None), "–");
+        assert_eq!(count(1234567), "1\u{202f}234\u{202f}567");
+        assert_eq!(count(9999), "9999");
+    }
+
+    #[test]
+    fn lengths_have_the_unit_that_suits_them() {
+        assert_eq!(length_unit(12.0).0, "m");
+        assert_eq!(length_unit(0.3), ("mm", 1e3));
+    }
+}

@@ -1,0 +1,94 @@
+//! Looking at pages with headless Chromium.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Longest time for one look.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// The browser. Without one, `None` after saying so; where the environment says CI, a failure.
+pub fn find() -> Option<PathBuf> {
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    let found = std::env::split_paths(&folders)
+        .flat_map(|folder| names.map(|name| folder.join(name)))
+        .find(|path| path.is_file());
+    if found.is_none() {
+        assert!(
+            std::env::var_os("CI").is_none(),
+            "no Chromium; install the package chromium"
+        );
+        eprintln!("no Chromium (package chromium): the page has not been looked at");
+    }
+    found
+}
+
+/// How a page is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Width and height of the window.
+    pub size: [u32; 2],
+    /// Whether the system is dark.
+    pub dark: bool,
+}
+
+/// A picture of the page.
+pub fn screenshot(browser: &Path, page: &Path, look: Look, out: &Path) -> image::RgbImage {
+    let picture = format!("--screenshot={}", path_text(out));
+    run(browser, page, look, &[&picture]);
+    image::open(out).expect("a screenshot").to_rgb8()
+}
+
+/// The page as it is after its scripts have run. No window is narrower than some 500 pixels.
+pub fn dump(browser: &Path, page: &Path, look: Look) -> String {
+    run(browser, page, look, &["--dump-dom"])
+}
+
+fn run(browser: &Path, page: &Path, look: Look, arguments: &[&str]) -> String {
+    let profile = tempfile::tempdir().expect("a folder for the browser");
+    let [width, height] = look.size;
+    let scheme = if look.dark { 0 } else { 1 };
+    let output = profile.path().join("stdout");
+    let mut child = Command::new(browser)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--disable-dev-shm-usage",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            "--hide-scrollbars",
+            "--force-device-scale-factor=1",
+            "--virtual-time-budget=4000",
+        ])
+        .arg(format!("--user-data-dir={}", path_text(profile.path())))
+        .arg(format!("--window-size={width},{height}"))
+        .arg(format!("--blink-settings=preferredColorScheme={scheme}"))
+        .args(arguments)
+        .arg(format!("file://{}", path_text(page)))
+        .stdout(std::fs::File::create(&output).expect("a file"))
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the browser starts");
+    let since = Instant::now();
+    loop {
+        if let Some(status) = child.try_wait().expect("a child") {
+            assert!(status.success(), "the browser: {status}");
+            break;
+        }
+        if since.elapsed() > PATIENCE {
+            let _ = child.kill();
+            panic!("the browser takes more than {PATIENCE:?}");
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    std::fs::read_to_string(&output).expect("what the browser said")
+}
+
+fn path_text(path: &Path) -> &str {
+    path.to_str().expect("a path in UTF-8")
+}
