@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 enum Model {
     /// With the coefficients of [`Model::BrownConrady`], too, if there are any.
-    Camera,
+    Pinhole,
     BrownConrady,
     #[serde(alias = "fisheye", alias = "equidistant")]
     KannalaBrandt,
@@ -95,7 +95,7 @@ impl CameraFile {
             Lens::BrownConrady(lens) => {
                 let BrownCoefficients { k, p } = *lens.coefficients();
                 let model = if lens.is_straight() {
-                    Model::Camera
+                    Model::Pinhole
                 } else {
                     Model::BrownConrady
                 };

@@ -1,0 +1,152 @@
+//! Sound files with random damage: every parser answers, with an error or with something finite, and none panics.
+
+use proptest::prelude::*;
+use std::path::Path;
+use tunnelstitch::camera::read_calibration;
+use tunnelstitch::survey::Survey;
+use tunnelstitch::trajectory::{read_camera_in_body, read_poses, read_tunnel_frame};
+
+const TUM: &str =
+    "# time tx ty tz qx qy qz qw\n0 0 0 0 0 0 0 1\n1 0 0.1 0 0 0.258819045 0 0.965925826\n";
+const KITTI: &str = "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0.5 0 1 0 0.25 0 0 1 0\n";
+const CSV: &str =
+    "time,name,tx,ty,tz,qx,qy,qz,qw\n0,a.jpg,0,0,0,0,0,0,1\n1,b.jpg,0,0.1,0,0,0.26,0,0.97\n";
+const EUROC: &str = "#timestamp [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z\n1000000000,0,0,0,1,0,0,0\n1100000000,0,0,0,1,0,0,0\n";
+const COLMAP: &str =
+    "# Image list\n1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0.5 0 1 b.jpg\n1.5 2.5 -1\n";
+const NERF: &str = r#"{"fl_x": 400, "fl_y": 400, "cx": 320, "cy": 240, "w": 640, "h": 480, "k1": -0.1, "camera_model": "OPENCV",
+ "frames": [{"file_path": "a.jpg", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}"#;
+const OWN: &str = r#"{"model": "kannala-brandt", "width": 640, "height": 480, "fx": 300, "fy": 300, "cx": 320, "cy": 240, "k1": -0.01}"#;
+const OPENCV: &str = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   \
+                      data: [415., 0., 318., 0., 417., 241., 0., 0., 1.]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   \
+                      dt: d\n   data: [-0.3, 0.1, 0.001, -0.002, -0.02]\n";
+const KALIBR: &str = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.3, 0.1, 0.001, -0.002]\n  distortion_model: radtan\n  \
+                      intrinsics: [415, 417, 318, 241]\n  resolution: [640, 480]\n  T_cam_imu:\n  - [1, 0, 0, 0]\n  - [0, 1, 0, 0]\n  - [0, 0, 1, 0]\n  \
+                      - [0, 0, 0, 1]\n";
+const CAMERAS: &str =
+    "# cameras\n1 FULL_OPENCV 640 480 415 417 318 241 4.1 2.0 -0.0004 0.0006 0.1 4.4 3.1 0.45\n";
+const AXIS: &str = r#"{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}"#;
+const SURVEY: &str = "[tunnel]\nshape = \"circle\"\nradius_m = 3.0\n[camera]\nfile = \"camera.json\"\n[frames]\nimages = \"*.jpg\"\n[poses]\n\
+                      initial = \"baseline.tum\"\n[prior]\nmodel = \"random-walk\"\nrotation_sigma_deg = 2.0\ntranslation_sigma_m = [0.02, 0.02, 0.03]\n\
+                      [options.stitch]\nmode = \"average\"\n";
+
+const SAMPLES: [(&str, &str); 12] = [
+    ("poses.tum", TUM),
+    ("poses.txt", KITTI),
+    ("poses.csv", CSV),
+    ("data.csv", EUROC),
+    ("images.txt", COLMAP),
+    ("transforms.json", NERF),
+    ("camera.json", OWN),
+    ("camera.yml", OPENCV),
+    ("camchain.yaml", KALIBR),
+    ("cameras.txt", CAMERAS),
+    ("axis.json", AXIS),
+    ("survey.toml", SURVEY),
+];
+
+/// One change of a text.
+#[derive(Clone, Debug)]
+enum Change {
+    Byte(usize, u8),
+    Cut(usize, usize),
+    Repeat(usize, usize),
+    Insert(usize, &'static str),
+}
+
+fn change() -> impl Strategy<Value = Change> {
+    let odd = prop::sample::select(vec![
+        "nan",
+        "-",
+        "1e999",
+        "1e-999",
+        "\"",
+        "]",
+        "{",
+        "\n",
+        "\r\n",
+        "0",
+        ",",
+        ":",
+        "\t",
+        "é",
+        "\0",
+        "99999999999999999999",
+    ]);
+    prop_oneof![
+        (any::<usize>(), any::<u8>()).prop_map(|(at, byte)| Change::Byte(at, byte)),
+        (any::<usize>(), 1usize..40).prop_map(|(at, count)| Change::Cut(at, count)),
+        (any::<usize>(), 1usize..40).prop_map(|(at, count)| Change::Repeat(at, count)),
+        (any::<usize>(), odd).prop_map(|(at, text)| Change::Insert(at, text)),
+    ]
+}
+
+fn changed(text: &str, changes: &[Change]) -> Vec<u8> {
+    let mut bytes = text.as_bytes().to_vec();
+    for change in changes {
+        let length = bytes.len().max(1);
+        let end = |at: usize, count: usize| (at % length + count).min(bytes.len());
+        match *change {
+            Change::Byte(at, byte) => {
+                if let Some(place) = bytes.get_mut(at % length) {
+                    *place = byte;
+                }
+            }
+            Change::Cut(at, count) => {
+                bytes.drain((at % length).min(bytes.len())..end(at, count));
+            }
+            Change::Repeat(at, count) => {
+                let part = bytes[(at % length).min(bytes.len())..end(at, count)].to_vec();
+                bytes.extend(part);
+            }
+            Change::Insert(at, text) => {
+                let at = (at % length).min(bytes.len());
+                bytes.splice(at..at, text.bytes());
+            }
+        }
+    }
+    bytes
+}
+
+fn read_by_all(path: &Path, name: &str) {
+    if let Ok(camera) = read_calibration(path, None) {
+        assert!(
+            camera.fx > 0.0 && camera.fx.is_finite() && camera.cx.is_finite(),
+            "{camera:?}"
+        );
+        for pixel in camera.border(4, 0.5) {
+            assert!(pixel.iter().all(|v| v.is_finite()), "{camera:?}");
+        }
+    }
+    if let Ok(file) = read_poses(path, None) {
+        for entry in &file.entries {
+            assert!(entry.pose.t_wc.iter().all(|v| v.is_finite()), "{entry:?}");
+            assert!((entry.pose.r_wc.norm() - 1.0).abs() < 1e-9, "{entry:?}");
+        }
+    }
+    for pose in [read_camera_in_body(path), read_tunnel_frame(path)]
+        .into_iter()
+        .flatten()
+    {
+        assert!(pose.t_wc.iter().all(|v| v.is_finite()), "{pose:?}");
+    }
+    if name == "survey.toml" {
+        let message = Survey::open(path).map(|_| ()).unwrap_err().to_string();
+        assert!(!message.is_empty());
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 3000, ..ProptestConfig::default() })]
+
+    #[test]
+    fn damaged_files_never_panic(
+        which in 0..SAMPLES.len(), changes in prop::collection::vec(change(), 0..4),
+    ) {
+        let (name, text) = SAMPLES[which];
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        std::fs::write(&path, changed(text, &changes)).unwrap();
+        read_by_all(&path, name);
+    }
+}
