@@ -123,7 +123,7 @@ const ROWS: &[Row] = &[
         ),
         REFINE,
         3,
-        &["survey.toml:", "translation_sigma_m"],
+        &["survey.toml:18", "array of length 3"],
     ),
     (
         Edit(TOML, "\"random-walk\"", "\"gaussian\""),
@@ -258,10 +258,10 @@ const ROWS: &[Row] = &[
         &["camera.json:", "unknown field `gx`"],
     ),
     (
-        Edit(CAMERA, "\"fx\":", "\"fx\": 0, \"max_angle_deg\":"),
+        Edit(CAMERA, "\"fx\": 311", "\"fx\": -311"),
         REFINE,
         3,
-        &["camera.json", "fx is 0"],
+        &["camera.json", "fx is -311"],
     ),
     (
         Edit(CAMERA, "\"fx\":", "\"fx\": \"wide\", \"max_angle_deg\":"),
@@ -279,7 +279,7 @@ const ROWS: &[Row] = &[
         Edit(CAMERA, "\"width\": 480", "\"width\": 500"),
         REFINE,
         3,
-        &["frame 0", "480 × 360", "500 × 360"],
+        &["frame ", "480 × 360", "500 × 360"],
     ),
     (
         Edit(CAMERA, "{", "{\"k1\": -5,"),
@@ -515,7 +515,7 @@ const ROWS: &[Row] = &[
     (
         WriteAndEdit(
             "e.csv",
-            b"#timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z\n1000000000,0,0,0,1,0,0,0\n",
+            b"#timestamp,p_x,p_y,p_z,q_w,q_x,q_y,q_z\n1403636580838555648,0,0,0,1,0,0,0\n",
             TOML,
             "baseline.tum",
             "e.csv",
@@ -583,7 +583,7 @@ const ROWS: &[Row] = &[
     ),
     (
         None,
-        "stitch S --out O.png --px-per-metre -1",
+        "stitch S --out O.png --px-per-metre=-1",
         2,
         &["--px-per-metre"],
     ),

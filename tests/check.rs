@@ -70,8 +70,8 @@ fn every_frame_that_does_not_fit_is_named() {
     edit(
         &survey.path().join("survey.toml"),
         "radius_m = 3",
-        "radius_m = 0.1",
+        "radius_m = -3",
     );
     let message = fail(&["check", text(survey.path())], 3);
-    assert!(message.contains("outside the tunnel"), "{message}");
+    assert!(message.contains("must be a positive number"), "{message}");
 }
