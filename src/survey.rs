@@ -37,7 +37,7 @@ use crate::camera::{CalibrationError, Camera, read_calibration};
 use crate::frames::{self, FrameError, FrameFile};
 use crate::surface::{Circle, Surface, SurfaceError};
 use crate::trajectory::tum::{self, TumError};
-use crate::trajectory::{Jitter, JitterModel, Pose, Trajectory, poses_of};
+use crate::trajectory::{Jitter, JitterModel, Pose, Shutter, Trajectory, poses_of};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -156,6 +156,10 @@ pub struct CameraSection {
     /// Which camera, if the file has several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
+    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds of the poses' times; negative if
+    /// rows are read bottom-up. Time and pose of a frame are those of its middle row. Without it, all rows are read at once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub readout_ms: Option<f64>,
 }
 
 /// `[frames]`.
@@ -356,6 +360,13 @@ impl Survey {
                 prior.translation_sigma_m
             )));
         }
+        if let Some(readout_ms) = file.camera.readout_ms
+            && !readout_ms.is_finite()
+        {
+            return Err(value(format!(
+                "camera.readout_ms is {readout_ms}; it must be a number of milliseconds"
+            )));
+        }
         if let Some(fault) = file.calibrate.as_ref().and_then(CalibrateSection::fault) {
             return Err(value(fault));
         }
@@ -406,6 +417,12 @@ impl Survey {
         Ok(trajectory)
     }
 
+    /// When the rows of the frames are read, by the times of the initial poses.
+    pub fn shutter(&self) -> Shutter {
+        let readout_s = 1e-3 * self.file.camera.readout_ms.unwrap_or_default();
+        Shutter::new(readout_s, self.camera.height, &self.initial)
+    }
+
     /// The initial poses without their times.
     pub fn initial_poses(&self) -> Vec<Pose> {
         poses_of(&self.initial)
@@ -449,6 +466,7 @@ mod tests {
             camera: CameraSection {
                 file: "camera.json".into(),
                 name: None,
+                readout_ms: Some(-20.0),
             },
             frames: FramesSection {
                 images: "frames/*.png".into(),

@@ -98,6 +98,7 @@ pub fn compare_into(
     let input = CompareInput {
         surface: survey.surface.as_ref(),
         camera: &survey.camera,
+        shutter: &survey.shutter(),
         files: &survey.frames,
         initial: &initial,
         refined: &refined,

@@ -25,7 +25,7 @@ use super::verdict::unsupported;
 use crate::frames::FrameCache;
 use crate::progress::Progress;
 use crate::survey::Survey;
-use crate::trajectory::{Pose, StampedPose, Trajectory};
+use crate::trajectory::{Pose, Shutter, StampedPose, Trajectory};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
@@ -109,9 +109,18 @@ pub fn refine(
         log_gain_sigma: options.log_gain_sigma,
         bias_sigma: options.bias_sigma,
     };
+    let shutter = survey.shutter();
     let mut calibration = calibration_of(survey, options, &prior.initial);
     let examined = examine(
-        &scene(survey, options, &calibration, &prior, &frames, 0.0),
+        &scene(
+            survey,
+            options,
+            &calibration,
+            &prior,
+            &shutter,
+            &frames,
+            0.0,
+        ),
         coarsest,
         progress.as_ref(),
     )?;
@@ -129,6 +138,7 @@ pub fn refine(
             options,
             &calibration,
             &rough,
+            &shutter,
             &frames,
             examined.noise,
         ),
@@ -144,6 +154,7 @@ pub fn refine(
         options,
         &calibration,
         &prior,
+        &shutter,
         &frames,
         examined.noise,
     );
@@ -313,9 +324,13 @@ pub fn refine(
 fn calibration_of(survey: &Survey, options: &RefineOptions, initial: &[Pose]) -> Calibration {
     let section = survey.file.calibrate.clone().unwrap_or_default();
     let groups = options.calibrate.as_ref().unwrap_or(&section.unknowns);
-    match groups.is_empty() {
+    let calibration = match groups.is_empty() {
         true => Calibration::none(&survey.camera),
         false => Calibration::new(groups, &section, &survey.camera, initial),
+    };
+    Calibration {
+        readout_s: survey.shutter().readout_s(),
+        ..calibration
     }
 }
 
@@ -334,12 +349,14 @@ fn scene<'a>(
     options: &RefineOptions,
     calibration: &Calibration,
     prior: &'a Prior,
+    shutter: &'a Shutter,
     frames: &'a FrameCache,
     noise: f64,
 ) -> Scene<'a> {
     Scene {
         surface: survey.surface.as_ref(),
         camera: survey.camera,
+        shutter,
         calibration: *calibration,
         kappa: Kappa::zeros(),
         frames,

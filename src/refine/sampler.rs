@@ -36,7 +36,7 @@ impl Sampler {
             centre: pose.to_camera(origin).cast(),
             focal: (camera.fx as f32, camera.fy as f32),
             principal: (camera.cx as f32, camera.cy as f32),
-            lens: SingleLens::new(&camera.lens),
+            lens: SingleLens::new(camera),
             limit: ((camera.width - 1) as f32, (camera.height - 1) as f32),
             width: camera.width as usize,
         }

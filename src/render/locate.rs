@@ -52,6 +52,7 @@ pub fn sightings(
     let point = surface.frame(wall);
     let sight = |(frame, placement): (usize, &Placement)| {
         let pose = &placement.pose;
+        let camera = &placement.camera(camera);
         let x_c = pose.to_camera(&point.x_w);
         let pixel = camera
             .project(&x_c)
@@ -78,12 +79,14 @@ mod tests {
     use super::*;
     use crate::render::place;
     use crate::test_wall::{TestWall, waves};
+    use crate::trajectory::Shutter;
 
     /// Each pixel's ray meets the point again, and its stretch is what its neighbours say.
     #[test]
     fn every_sighting_looks_at_the_point() {
         let wall = TestWall::ring(waves);
-        let placements = place(&wall.circle, &wall.camera, &wall.poses).unwrap();
+        let placements =
+            place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
         let mut seen = 0;
         for k in 0..40 {
             let point = WallPoint {

@@ -4,12 +4,14 @@
 mod jitter;
 mod plan;
 mod pose;
+mod shutter;
 pub mod so3;
 pub mod tum;
 
 pub use jitter::{Jitter, JitterModel};
 pub use plan::spiral;
 pub use pose::Pose;
+pub use shutter::Shutter;
 
 /// One pose of a trajectory with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::{Fault, choose};
-use crate::camera::Camera;
+use crate::camera::{Camera, Sweep};
 
 /// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixels are counted from the corner of the first and converted.
 pub fn read(text: &str, name: Option<&str>) -> Result<Camera, Fault> {
@@ -81,5 +81,6 @@ fn camera(line: &str) -> Result<Camera, String> {
         cx: cx - 0.5,
         cy: cy - 0.5,
         lens: lens(&params[central..]).map_err(|fault| fault.what)?,
+        sweep: Sweep::default(),
     })
 }
