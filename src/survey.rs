@@ -7,6 +7,7 @@
 //!
 //! [camera]
 //! file = "camera.json"
+//! readout_ms = 20.0           # optional: rolling shutter, from the first row to the last
 //!
 //! [frames]
 //! images = "frames/*.jpg"     # sorted by name
@@ -360,13 +361,6 @@ impl Survey {
                 prior.translation_sigma_m
             )));
         }
-        if let Some(readout_ms) = file.camera.readout_ms
-            && !readout_ms.is_finite()
-        {
-            return Err(value(format!(
-                "camera.readout_ms is {readout_ms}; it must be a number of milliseconds"
-            )));
-        }
         if let Some(fault) = file.calibrate.as_ref().and_then(CalibrateSection::fault) {
             return Err(value(fault));
         }
@@ -385,6 +379,9 @@ impl Survey {
             file,
         };
         survey.initial = survey.read_poses(&survey.folder.join(&survey.file.poses.initial))?;
+        if let Some(fault) = survey.readout_fault() {
+            return Err(value(fault));
+        }
         survey.truth = match &survey.file.poses.truth {
             Some(truth) => Some(survey.read_poses(&survey.folder.join(truth))?),
             None => None,
@@ -415,6 +412,24 @@ impl Survey {
                 })?;
         }
         Ok(trajectory)
+    }
+
+    /// What is wrong with the readout time, if anything: no row of a frame can be read after the next frame's.
+    fn readout_fault(&self) -> Option<String> {
+        let readout_ms = self.file.camera.readout_ms?;
+        let steps = self
+            .initial
+            .windows(2)
+            .map(|pair| pair[1].time_s - pair[0].time_s);
+        let shortest_ms = 1e3 * steps.fold(f64::INFINITY, f64::min);
+        let possible = readout_ms.is_finite() && readout_ms.abs() <= shortest_ms;
+        (!possible).then(|| {
+            format!(
+                "camera.readout_ms is {readout_ms}; it must be a number of milliseconds and no more than the {shortest_ms:.3} ms between \
+                 the times of the nearest two poses in {}",
+                self.file.poses.initial.display()
+            )
+        })
     }
 
     /// When the rows of the frames are read, by the times of the initial poses.

@@ -20,6 +20,7 @@ use super::repair::repair;
 use super::repeats::Rival;
 use super::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 use super::retrack::track_calibrating;
+use super::rows::row_motion;
 use super::track::{Tracked, retry};
 use super::verdict::unsupported;
 use crate::frames::FrameCache;
@@ -256,6 +257,7 @@ pub fn refine(
     for (frame, doubt) in late {
         tracked.doubts[frame].get_or_insert(doubt);
     }
+    let rows = row_motion(&scene, options, &tracked)?;
     let certainty = Certainty::at(&solution, &calibration)?;
     let estimates = &tracked.estimates;
     let metric = calibration.metric(&scene.kappa);
@@ -304,6 +306,7 @@ pub fn refine(
             levels,
             frames: reports,
             frames_on_prior: on_prior,
+            rows,
             variance_factor: certainty.covariances.variance_factor,
             calibration: (calibration.any() || !refusals.is_empty()).then(|| {
                 CalibrationReport::new(
