@@ -3,15 +3,17 @@
 //! A camera that moves while rows are read puts what it sees ever farther off from row to row, by the time since the middle
 //! row. Poses take up most of that where it is ignored: frames roll, and the whole wall is wound around the axis a little. What
 //! they cannot take up is the same in all frames, a residual along the rows. It is asked for in one number: the readout time
-//! with which the frames fit best, with everything else free ([`super::shared`]), and how sure it is.
+//! with which the frames fit best, with everything else free ([`super::shared`]), and how sure it is. The lens is free, too, as far
+//! as it usually may be off: a wrong one must not pass for a wrong time.
 
-use super::calibration::{Calibration, Kappa, READOUT};
+use super::calibration::{Calibration, Kappa, LENS, READOUT};
 use super::gauss_newton::{Stopping, solve};
 use super::observed::Posterior;
 use super::options::RefineOptions;
 use super::problem::{Problem, ProblemError, Sampling, Scene};
 use super::track::Tracked;
 use crate::surface::viewing_distance;
+use crate::survey::{CalibrateSection, CalibrationGroup};
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -24,9 +26,9 @@ const STOPPING: Stopping = Stopping {
     step_sigma: 1.0,
 };
 /// A difference of the time is systematic if it is this many times its 1-σ, ...
-const SURE: f64 = 8.0;
+const SURE: f64 = 6.0;
 /// ... and shifts the picture's rows against one another by this much from the first to the last, pixels.
-const LEAST_SHIFT_PX: f64 = 1.0;
+const LEAST_SHIFT_PX: f64 = 0.5;
 
 /// The readout time that the frames want.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -55,10 +57,7 @@ pub fn row_motion(
     let count = tracked.estimates.len();
     let first = count.saturating_sub(MOST_FRAMES) / 2;
     let run = first..(first + MOST_FRAMES).min(count);
-    let mut calibration: Calibration = scene.calibration.of_camera();
-    calibration.free[READOUT] = true;
-    // Any time between frames is possible.
-    calibration.sigma[READOUT] = scene.prior.usual_step_s;
+    let calibration = with_readout(scene);
     let scene = &Scene {
         calibration,
         ..*scene
@@ -96,6 +95,21 @@ pub fn row_motion(
         shift_px,
         systematic: sure && shift_px > LEAST_SHIFT_PX,
     }))
+}
+
+/// What is estimated of the scene's calibration, the lens, and the readout time.
+fn with_readout(scene: &Scene) -> Calibration {
+    use CalibrationGroup::{Centre, Distortion, Focal};
+    let mut calibration = scene.calibration.of_camera();
+    let section = CalibrateSection::default();
+    let usual = Calibration::new(&[Focal, Centre, Distortion], &section, &scene.camera, &[]);
+    for k in (0..LENS).filter(|k| !scene.calibration.free[*k]) {
+        (calibration.free[k], calibration.sigma[k]) = (true, usual.sigma[k]);
+    }
+    // Any time between frames is possible.
+    calibration.free[READOUT] = true;
+    calibration.sigma[READOUT] = scene.prior.usual_step_s;
+    calibration
 }
 
 /// How far the first row is shifted against the last in the middle of the median frame if the readout takes a second, pixels.

@@ -45,6 +45,8 @@ impl<'a> View<'a> {
     }
 
     /// `∂(s, h)/∂ξ` at the middle of a tile.
+    ///
+    /// With a sweep, the ray starts where the camera is when the row is read, millimetres off: to a thousandth, that is no matter.
     pub fn wall_jacobian(&self, points: &TilePoints) -> Matrix2x6<f64> {
         wall_jacobian(&self.pose, &points.centre)
     }
@@ -197,7 +199,12 @@ mod tests {
         sampled_where_projected(straight);
         let fisheye = KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]);
         for lens in [Lens::radial(-0.1, 0.02), Lens::KannalaBrandt(fisheye)] {
-            sampled_where_projected(Camera { lens, ..straight });
+            let camera = Camera { lens, ..straight };
+            sampled_where_projected(camera);
+            sampled_where_projected(camera.sweeping(&Sweep {
+                omega_rad: Vector3::new(0.01, 0.03, -0.01),
+                nu_m: Vector3::new(0.001, -0.002, 0.001),
+            }));
         }
     }
 
