@@ -176,7 +176,7 @@ fn a_readout_longer_than_the_time_between_frames_is_refused() {
             "--out",
             text(&dir.path().join("out")),
         ],
-        2,
+        3,
     );
     assert!(
         message.contains("camera.readout_ms is 20000") && message.contains("333.333 ms"),
