@@ -12,7 +12,7 @@ use tunnelstitch::render::{
     Target, place,
 };
 use tunnelstitch::surface::Circle;
-use tunnelstitch::trajectory::spiral;
+use tunnelstitch::trajectory::{Shutter, spiral};
 
 const ROUNDS: usize = 15;
 
@@ -35,7 +35,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .collect();
     let pictures = (0..12).map(|_| Picture::new(1920, 1080, 3, samples.clone()));
     let mut frames = FrameStack::from_pictures(camera, pictures.collect());
-    let placements = place(&circle, &camera, &spiral(12, 0.0, 30f64.to_radians()))?;
+    let placements = place(
+        &circle,
+        &camera,
+        &spiral(12, 0.0, 30f64.to_radians()),
+        &Shutter::default(),
+    )?;
     let canvas = Canvas::of_placements(&circle, &placements, camera.fx / 3.0)?;
     let mut rows = Vec::new();
     for interpolation in [

@@ -65,6 +65,7 @@
 //! | R, t | `r_wc`, `t_wc` | camera-to-world pose: x_w = R x_c + t |
 //! | ξ = (ω, ρ) | `xi` | step of a pose: R ← R Exp(ω), t ← t + ρ; radians, metres |
 //! | (u, v) | `pixel`, `u`, `v` | pixel; the centre of the first is (0, 0) |
+//! | (ω, ν), τ | `sweep`, `share` | motion of the camera while a picture's rows are read, and the share of that time at which a row is |
 //! | θ, r | `theta`, `radius_m` | angle atan2(x, z) around the axis (the world's y), radius |
 //! | (s, h) | `WallPoint` | arc length rθ and chainage y on the wall, metres |
 //! | S | `texture` | grey value of the wall |

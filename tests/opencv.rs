@@ -1,7 +1,7 @@
 //! The camera models against numbers that OpenCV made (`fixtures/opencv/make.py`).
 
 use nalgebra::Vector3;
-use tunnelstitch::camera::{BrownCoefficients, BrownConrady, Camera, KannalaBrandt, Lens};
+use tunnelstitch::camera::{BrownCoefficients, BrownConrady, Camera, KannalaBrandt, Lens, Sweep};
 
 /// The lens of a name in `make.py`.
 fn lens(model: &str) -> Lens {
@@ -32,6 +32,7 @@ fn projections_agree_with_opencv() {
             cx: 318.75,
             cy: 241.125,
             lens: lens(model),
+            sweep: Sweep::default(),
         };
         let x_c = Vector3::new(numbers[0], numbers[1], numbers[2]);
         let pixel = camera.project(&x_c).unwrap();

@@ -9,6 +9,7 @@ use tunnelstitch::render::super_resolve::{Channel, Footprints, MARGIN, Region, V
 use tunnelstitch::render::{Canvas, Interpolation, Kernel, Picture, native_px_per_metre, place};
 use tunnelstitch::simulate::{Light, Scene, SimulateOptions, SlantedEdge, Wall};
 use tunnelstitch::surface::{Circle, Surface, WallPoint};
+use tunnelstitch::trajectory::Shutter;
 
 /// Edge of a tile, fine pixels.
 const TILE: usize = 128;
@@ -38,7 +39,8 @@ impl Simulated {
     fn new(options: &SimulateOptions) -> Self {
         let scene = Scene::new(options).unwrap();
         let circle = Circle::new(options.radius_m).unwrap();
-        let placements = place(&circle, scene.camera(), scene.truth()).unwrap();
+        let placements =
+            place(&circle, scene.camera(), scene.truth(), &Shutter::default()).unwrap();
         let native = native_px_per_metre(&circle, scene.camera(), scene.truth()).unwrap();
         let canvas = Canvas::of_placements(&circle, &placements, 2.0 * native).unwrap();
         let frames: Vec<_> = (0..options.frames)
@@ -113,7 +115,7 @@ impl Simulated {
         let poses = self.scene.truth().iter();
         let views: Vec<View> = poses
             .map(|pose| View {
-                camera: self.scene.camera(),
+                camera: *self.scene.camera(),
                 pose,
             })
             .collect();

@@ -12,6 +12,7 @@ mod lens;
 mod projection;
 mod rising;
 mod single;
+mod sweep;
 
 pub use brown_conrady::{BrownCoefficients, BrownConrady};
 pub use calibration::{CalibrationError, format_calibration, read_calibration};
@@ -20,3 +21,4 @@ pub use kannala_brandt::KannalaBrandt;
 pub use lens::Lens;
 pub use projection::Camera;
 pub use single::{Bend, SingleLens};
+pub use sweep::Sweep;

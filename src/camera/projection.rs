@@ -1,11 +1,15 @@
 //! The camera: pixels and rays.
 
-use super::Lens;
+use super::sweep::LARGEST_SHARE;
+use super::{Lens, Sweep};
 use nalgebra::{Matrix2, Matrix2x3, Matrix2x5, Vector2, Vector3};
 use serde::{Serialize, Serializer};
 
 /// A camera: `u = fx p_d.x + cx`, `v = fy p_d.y + cy`, pixels counted from the centre of the first, with p_d where the lens
 /// shows a point ([`Lens`]).
+///
+/// With a [`Sweep`], the camera's coordinates are those of the middle row, the point is that of the row it appears in, and rays
+/// start at the row's own centre ([`Camera::origin`]).
 ///
 /// Serialises as its calibration file ([`super::format_calibration`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +28,8 @@ pub struct Camera {
     pub cy: f64,
     /// The lens.
     pub lens: Lens,
+    /// Its motion while a picture is read; the frames of a survey each have their own.
+    pub sweep: Sweep,
 }
 
 impl Serialize for Camera {
@@ -36,6 +42,9 @@ impl Serialize for Camera {
 const HALVINGS: usize = 50;
 /// Pixels along each side at which the lens is asked whether it shows them.
 const ASKED: usize = 33;
+/// Steps that find the row of a point at the most, and the change of the share that ends them.
+const MOST_SHARES: usize = 30;
+const EXACT_SHARE: f64 = 1e-13;
 
 impl Camera {
     /// A pinhole with square pixels and its principal point in the middle, from its vertical field of view
@@ -50,20 +59,72 @@ impl Camera {
             cx: 0.5 * (f64::from(width) - 1.0),
             cy: 0.5 * (f64::from(height) - 1.0),
             lens: Lens::default(),
+            sweep: Sweep::default(),
         }
+    }
+
+    /// The same camera in motion.
+    pub fn sweeping(&self, sweep: &Sweep) -> Self {
+        Self {
+            sweep: *sweep,
+            ..*self
+        }
+    }
+
+    /// The share of the picture's time at which row `v` is read ([`Sweep`]).
+    pub fn share(&self, v: f64) -> f64 {
+        let height = f64::from(self.height);
+        ((v - 0.5 * (height - 1.0)) / height).clamp(-LARGEST_SHARE, LARGEST_SHARE)
     }
 
     /// A vector along the ray of a pixel, in camera coordinates (z = 1, of unit length for a fisheye); None where the lens
     /// shows nothing.
     pub fn ray(&self, u: f64, v: f64) -> Option<Vector3<f64>> {
-        self.lens.ray(&Vector2::new(
+        let ray = self.lens.ray(&Vector2::new(
             (u - self.cx) / self.fx,
             (v - self.cy) / self.fy,
-        ))
+        ))?;
+        match self.sweep.is_none() {
+            true => Some(ray),
+            false => Some(self.sweep.turn(self.share(v)) * ray),
+        }
+    }
+
+    /// Where the rays of row `v` start, in camera coordinates, metres: 0 without a sweep.
+    pub fn origin(&self, v: f64) -> Vector3<f64> {
+        match self.sweep.is_none() {
+            true => Vector3::zeros(),
+            false => self.sweep.nu_m * self.share(v),
+        }
     }
 
     /// The pixel of a point in camera coordinates, within the picture or not; None where the lens shows nothing.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
+        match self.sweep.is_none() {
+            true => self.project_at(x_c),
+            false => self.project_at(&self.sweep.at(x_c, self.share_of(x_c)?)),
+        }
+    }
+
+    /// The share of the picture's time at which a point appears: the solution of `τ = share(v(x_c(τ)))`.
+    ///
+    /// Fixed-point iteration from the middle row; a camera that moves a point by n pixels during the picture errs by n/H of the
+    /// error before in each step. None where the lens shows nothing on the way.
+    fn share_of(&self, x_c: &Vector3<f64>) -> Option<f64> {
+        let mut share = 0.0;
+        for _ in 0..MOST_SHARES {
+            let next = self.share(self.project_at(&self.sweep.at(x_c, share))?.y);
+            let change = next - share;
+            share = next;
+            if change.abs() < EXACT_SHARE {
+                break;
+            }
+        }
+        Some(share)
+    }
+
+    /// The pixel of a point in the coordinates of its own row.
+    fn project_at(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
         let p_d = self.lens.project(x_c)?;
         Some(Vector2::new(
             self.fx * p_d.x + self.cx,
@@ -72,12 +133,43 @@ impl Camera {
     }
 
     /// `∂(u, v)/∂x_c`, pixels per metre, for a point that the lens shows.
+    ///
+    /// With a sweep, a change of the row changes the row's pose: with J the Jacobian in the row's coordinates, `g = J ∂x_c(τ)/∂τ/H`
+    /// and `e = (0, 1)`, `∂(u, v)/∂x_c = (I − g eᵀ)⁻¹ J Exp(−ω τ)`.
     pub fn project_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
+        if self.sweep.is_none() {
+            return self.jacobian_at(x_c);
+        }
+        let share = self.share_of(x_c).unwrap_or_default();
+        let at = self.sweep.at(x_c, share);
+        let turned = self.jacobian_at(&at) * self.sweep.turn(-share).matrix();
+        self.feedback(&at, share) * turned
+    }
+
+    /// The same for a point in the coordinates of its own row, the row as it is.
+    fn jacobian_at(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
         Matrix2::new(self.fx, 0.0, 0.0, self.fy) * self.lens.jacobian(x_c)
+    }
+
+    /// `(I − g eᵀ)⁻¹` of a point that lies at `at` in the coordinates of its own row.
+    fn feedback(&self, at: &Vector3<f64>, share: f64) -> Matrix2<f64> {
+        let g = self.jacobian_at(at) * self.sweep.rate(at, share) / f64::from(self.height);
+        let inverse = 1.0 / (1.0 - g.y);
+        Matrix2::new(1.0, g.x * inverse, 0.0, inverse)
     }
 
     /// `∂(u, v)/∂(ln f, cx, cy, k1, k2)` of a point that the lens shows, with fx and fy growing alike.
     pub fn intrinsics_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x5<f64> {
+        if self.sweep.is_none() {
+            return self.intrinsics_jacobian_at(x_c);
+        }
+        let share = self.share_of(x_c).unwrap_or_default();
+        let at = self.sweep.at(x_c, share);
+        self.feedback(&at, share) * self.intrinsics_jacobian_at(&at)
+    }
+
+    /// The same for a point in the coordinates of its own row, the row as it is.
+    fn intrinsics_jacobian_at(&self, x_c: &Vector3<f64>) -> Matrix2x5<f64> {
         let focal = Matrix2::new(self.fx, 0.0, 0.0, self.fy);
         let p_d = self.lens.project(x_c).unwrap_or_default();
         let lens = focal * self.lens.coefficient_jacobian(x_c);
@@ -128,6 +220,7 @@ impl Camera {
             cx: (self.cx + 0.5) * scale - 0.5,
             cy: (self.cy + 0.5) * scale - 0.5,
             lens: self.lens,
+            sweep: self.sweep,
         }
     }
 
@@ -141,6 +234,7 @@ impl Camera {
             cx: 2.0 * self.cx + 0.5,
             cy: 2.0 * self.cy + 0.5,
             lens: self.lens,
+            sweep: self.sweep,
         }
     }
 
@@ -200,6 +294,8 @@ impl Camera {
 mod tests {
     use super::*;
     use crate::camera::{BrownCoefficients, BrownConrady, KannalaBrandt};
+    use nalgebra::Rotation3;
+    use proptest::prelude::*;
 
     fn camera() -> Camera {
         Camera {
@@ -210,7 +306,17 @@ mod tests {
             cx: 318.0,
             cy: 241.0,
             lens: Lens::radial(-0.06, 0.01),
+            sweep: Sweep::default(),
         }
+    }
+
+    /// At rest and in motion.
+    fn moving_cameras() -> impl Iterator<Item = Camera> {
+        let sweeps = sweeps();
+        let moving = cameras()
+            .into_iter()
+            .flat_map(move |camera| sweeps.map(|sweep| camera.sweeping(&sweep)));
+        cameras().into_iter().chain(moving)
     }
 
     fn cameras() -> [Camera; 4] {
@@ -238,6 +344,49 @@ mod tests {
         }
     }
 
+    fn sweeps() -> [Sweep; 3] {
+        let sweep = |omega_rad: [f64; 3], nu_m: [f64; 3]| Sweep {
+            omega_rad: omega_rad.into(),
+            nu_m: nu_m.into(),
+        };
+        // 90 °/s about y over 20 ms, something fast about all axes, and read bottom-up.
+        [
+            sweep([0.0, 0.0314, 0.0], [0.0, 0.002, 0.0]),
+            sweep([0.05, -0.1, 0.07], [0.02, -0.03, 0.01]),
+            sweep([0.01, -0.03, 0.02], [0.0, -0.002, 0.001]),
+        ]
+    }
+
+    proptest! {
+        /// A point anywhere on the ray of a pixel appears in that pixel again.
+        #[test]
+        fn rays_of_a_moving_camera_lead_back_to_their_pixels(
+            lens in 0usize..4, sweep in 0usize..3, u in 0.0..639.0f64, v in 0.0..479.0f64, far in 0.5..9.0f64,
+        ) {
+            let camera = cameras()[lens].sweeping(&sweeps()[sweep]);
+            let x_c = camera.origin(v) + camera.ray(u, v).unwrap() * far;
+            let pixel = camera.project(&x_c).unwrap();
+            prop_assert!((pixel - Vector2::new(u, v)).norm() < 1e-8, "{pixel}");
+        }
+    }
+
+    /// Each row is what a camera at rest at the row's own pose shows.
+    #[test]
+    fn rows_of_a_moving_camera_are_those_of_cameras_at_rest() {
+        for (rest, sweep) in cameras().iter().zip(sweeps().iter().cycle()) {
+            let camera = rest.sweeping(sweep);
+            for (u, v) in [(0.0, 0.0), (320.0, 100.0), (639.0, 479.0)] {
+                let x_c = camera.origin(v) + camera.ray(u, v).unwrap() * 2.0;
+                let share = (v - 239.5) / 480.0;
+                let turned = Rotation3::new(sweep.omega_rad * share);
+                let own = turned.inverse() * (x_c - sweep.nu_m * share);
+                let seen = rest.project(&own).unwrap();
+                assert!((seen - Vector2::new(u, v)).norm() < 1e-9);
+                assert!((rest.project(&x_c).unwrap() - seen).norm() > 1e-2 || v == 239.5);
+            }
+        }
+    }
+
     #[test]
     fn what_the_lens_does_not_show_has_no_ray() {
         let lens = |k1| Camera {
@@ -261,7 +410,7 @@ mod tests {
 
     #[test]
     fn the_pixel_follows_the_intrinsics_as_central_differences_do() {
-        for camera in cameras() {
+        for camera in moving_cameras() {
             let x_c = Vector3::new(0.9, -0.7, 1.5);
             let analytic = camera.intrinsics_jacobian(&x_c);
             let step = 1e-6;
@@ -289,7 +438,7 @@ mod tests {
 
     #[test]
     fn jacobian_matches_central_differences() {
-        for camera in cameras() {
+        for camera in moving_cameras() {
             let x_c = Vector3::new(0.4, -0.9, 2.5);
             let analytic = camera.project_jacobian(&x_c);
             let step = 1e-6;
@@ -306,11 +455,12 @@ mod tests {
 
     #[test]
     fn levels_keep_the_same_rays() {
-        for camera in cameras() {
+        for camera in moving_cameras() {
             let coarse = camera.at_level(2);
             // The centre of the first coarse pixel is the middle of 4 × 4 fine ones.
             let (a, b) = (coarse.ray(0.0, 0.0), camera.ray(1.5, 1.5));
             assert!((a.unwrap() - b.unwrap()).norm() < 1e-12);
+            assert!((coarse.origin(0.0) - camera.origin(1.5)).norm() < 1e-12);
             assert_eq!((coarse.width, coarse.height), (160, 120));
         }
     }

@@ -118,6 +118,7 @@ pub fn compare_poses(
     let input = CompareInput {
         surface: survey.surface.as_ref(),
         camera: &survey.camera,
+        shutter: &survey.shutter(),
         files: &survey.frames,
         initial: &initial,
         refined,

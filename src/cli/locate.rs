@@ -3,10 +3,10 @@
 use super::poses::PosesArgument;
 use super::stitch::CanvasArguments;
 use super::{Failure, Terminal, json};
-use crate::render::{Canvas, LaidOut, Layout, Sighting, lay_out, sightings};
+use crate::render::{Canvas, LaidOut, Layout, Placement, Sighting, lay_out, sightings};
 use crate::surface::WallPoint;
 use crate::survey::Survey;
-use crate::trajectory::{Pose, poses_of};
+use crate::trajectory::poses_of;
 use nalgebra::Vector2;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -152,9 +152,16 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
     let px_per_metre = arguments.canvas.px_per_metre;
     let LaidOut {
         placements, canvas, ..
-    } = lay_out(surface, &survey.camera, &poses, px_per_metre, 1.0)?;
+    } = lay_out(
+        surface,
+        &survey.camera,
+        &poses,
+        &survey.shutter(),
+        px_per_metre,
+        1.0,
+    )?;
     let layout = Layout::from(arguments.canvas.layout);
-    let wall = point(arguments, &survey, &poses, &canvas)?;
+    let wall = point(arguments, &survey, &placements, &canvas)?;
     let perimeter_m = surface.perimeter_m();
     let theta_deg = wall.s_m.rem_euclid(perimeter_m) / perimeter_m * 360.0;
     let found = sightings(surface, &survey.camera, &placements, wall);
@@ -187,7 +194,7 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
 fn point(
     arguments: &LocateArguments,
     survey: &Survey,
-    poses: &[Pose],
+    placements: &[Placement],
     canvas: &Canvas,
 ) -> Result<WallPoint, Failure> {
     let on_wall = |[h_m, theta_deg]: [f64; 2]| WallPoint {
@@ -215,7 +222,8 @@ fn point(
         return Err(Failure::bug("no point was asked for"));
     };
     let k = frame_by_name(survey, frame)?;
-    let camera = &survey.camera;
+    let Placement { pose, .. } = &placements[k];
+    let camera = placements[k].camera(&survey.camera);
     if !camera.sees(&Vector2::from(*pixel), 0.0) {
         return Err(Failure::usage(format!(
             "--frame {frame}: no pixel {},{}; they are 0 to {} and 0 to {}",
@@ -231,8 +239,8 @@ fn point(
             pixel[0], pixel[1]
         )));
     };
-    let ray = poses[k].r_wc * ray;
-    match survey.surface.hit(&poses[k].t_wc, &ray) {
+    let start = pose.to_world(&camera.origin(pixel[1]));
+    match survey.surface.hit(&start, &(pose.r_wc * ray)) {
         Ok(hit) => Ok(hit.wall),
         Err(error) => Err(Failure::input(format!("frame {k}: {error}"))),
     }

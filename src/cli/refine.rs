@@ -8,7 +8,8 @@ use crate::atomic;
 use crate::camera::format_calibration;
 use crate::progress::Progress;
 use crate::refine::{
-    CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, other_readings, refine,
+    CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, RowMotion, other_readings,
+    refine,
 };
 use crate::survey::{CalibrationGroup, SURVEY_FILE, Survey, SurveyFile};
 use crate::trajectory::tum;
@@ -269,6 +270,25 @@ fn summarise_calibration(calibration: &CalibrationReport, terminal: &Terminal) {
     }
 }
 
+/// What a systematic residual along the rows looks like, and what to do about it.
+fn warn_of_rows(rows: &RowMotion) -> String {
+    let remedy = match rows.given_ms == 0.0 {
+        true => format!(
+            "a rolling shutter? give [camera] readout_ms = {:.1} in survey.toml",
+            rows.estimate_ms
+        ),
+        false => format!(
+            "and not {} ms; check [camera] readout_ms and the times of the initial poses",
+            rows.given_ms
+        ),
+    };
+    format!(
+        "a systematic residual along the rows, the same in all frames: {:.1} px from the first row to the last, as if rows were read \
+         over {:.1} ms (1-σ {:.2}): {remedy}",
+        rows.shift_px, rows.estimate_ms, rows.sigma_ms
+    )
+}
+
 /// Prints what the refinement did.
 pub fn summarise(refined: &Refined, terminal: &Terminal) {
     let report = &refined.report;
@@ -298,6 +318,9 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
     ));
     if let Some(calibration) = &report.calibration {
         summarise_calibration(calibration, terminal);
+    }
+    if let Some(rows) = report.rows.filter(|rows| rows.systematic) {
+        terminal.warn(warn_of_rows(&rows));
     }
     let seconds: f64 = report.timings.iter().map(|t| t.seconds).sum();
     let stages: Vec<String> = report

@@ -22,6 +22,7 @@ use std::path::PathBuf;
     tunnelstitch simulate free --wall concrete --jitter independent --seed 7 --out survey\n  \
     tunnelstitch simulate off-centre --texture bricks.jpg --texture-width-m 2 --out survey\n  \
     tunnelstitch simulate free --lamp-corner 0.4 --gain-percent 20 --bias-grey 5 --specular-percent 3 --out damp\n  \
+    tunnelstitch simulate free --interval-s 0.333 --readout-ms 20 --out rolling\n  \
     tunnelstitch simulate free --turns 2 --moving 8 --bad-frames 5:black,18-20:missing --out bad"
 )]
 pub struct SimulateArguments {
@@ -51,6 +52,18 @@ pub struct SimulateArguments {
         allow_hyphen_values = true
     )]
     turn_deg: f64,
+    /// Time from frame to frame, seconds: the poses' times.
+    #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = positive)]
+    interval_s: f64,
+    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds; negative: bottom-up. Poses are
+    /// those of the middle row.
+    #[arg(
+        long,
+        value_name = "MS",
+        default_value_t = 0.0,
+        allow_hyphen_values = true
+    )]
+    readout_ms: f64,
     /// Radius of the tunnel, metres.
     #[arg(long, value_name = "M", default_value_t = 3.0)]
     radius_m: f64,
@@ -211,6 +224,8 @@ impl SimulateArguments {
             frames,
             advance_m: self.advance_m.unwrap_or(preset.advance_m),
             turn_deg: self.turn_deg,
+            interval_s: self.interval_s,
+            readout_ms: self.readout_ms,
             radius_m: self.radius_m,
             camera,
             jitter: self.jitter_of(preset.jitter),

@@ -214,7 +214,15 @@ pub fn run(arguments: &StitchArguments, run: &Run, terminal: &Terminal) -> Resul
     };
     let surface = survey.surface.as_ref();
     let layout: Layout = arguments.picture.canvas.layout.into();
-    let mut stitch = Stitch::new(surface, &survey.camera, &survey.frames, &poses, &options)?;
+    let shutter = survey.shutter();
+    let mut stitch = Stitch::new(
+        surface,
+        &survey.camera,
+        &survey.frames,
+        &poses,
+        &shutter,
+        &options,
+    )?;
     let (canvas, format) = (*stitch.canvas(), stitch.frames().format());
     let [width, height] = layout.size(&canvas);
     let budget = stitch.budget(arguments.output.bytes(&canvas, format, layout))?;

@@ -13,7 +13,7 @@ use crate::render::{
     native_px_per_metre, place, render,
 };
 use crate::surface::Surface;
-use crate::trajectory::Pose;
+use crate::trajectory::{Pose, Shutter};
 use serde::{Deserialize, Serialize};
 
 /// What is compared.
@@ -29,6 +29,8 @@ pub struct CompareInput<'a> {
     pub initial: &'a [Pose],
     /// Poses after refinement, one per frame.
     pub refined: &'a [Pose],
+    /// When the rows of frames are read.
+    pub shutter: &'a Shutter,
     /// True poses, one per frame, where known.
     pub truth: Option<&'a [Pose]>,
     /// Resolution of the panoramas, pixels per metre; without it the frames' own at the wall.
@@ -188,7 +190,7 @@ impl<'a> Candidate<'a> {
             }
             None => given.to_vec(),
         };
-        let placements = place(input.surface, input.camera, &aligned)
+        let placements = place(input.surface, input.camera, &aligned, input.shutter)
             .map_err(|source| EvaluateError::Render { which, source })?;
         Ok(Self {
             which,

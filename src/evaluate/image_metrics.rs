@@ -59,9 +59,11 @@ mod tests {
     use crate::progress::Silent;
     use crate::render::{Canvas, FrameStack, Mode, Picture, RenderOptions, place, render};
     use crate::test_wall::{TestWall, waves};
+    use crate::trajectory::Shutter;
 
     fn panorama(wall: &TestWall, mut stack: FrameStack, ppm: f64) -> Panorama {
-        let placements = place(&wall.circle, &wall.camera, &wall.poses).unwrap();
+        let placements =
+            place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, ppm).unwrap();
         render(
             &wall.circle,

@@ -157,6 +157,7 @@ fn look(
             continue;
         };
         let pose = &placements[*frame].pose;
+        let camera = placements[*frame].camera(camera);
         for (x_w, seen) in points.iter().zip(&mut seen) {
             let pixel = camera
                 .project(&pose.to_camera(x_w))
@@ -230,13 +231,14 @@ mod tests {
     use super::*;
     use crate::render::{Picture, place};
     use crate::test_wall::{TestWall, waves};
+    use crate::trajectory::Shutter;
 
     #[test]
     fn true_poses_leave_rounding_noise_and_wrong_ones_much_more() {
         let wall = TestWall::ring(waves);
         let stack = wall.stack();
         let residual = |poses: &[crate::trajectory::Pose]| {
-            let placements = place(&wall.circle, &wall.camera, poses).unwrap();
+            let placements = place(&wall.circle, &wall.camera, poses, &Shutter::default()).unwrap();
             let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
             seam_residual(&wall.circle, &stack, &placements, &canvas).unwrap()
         };
@@ -254,7 +256,7 @@ mod tests {
         let (w, h) = (wall.camera.width as usize, wall.camera.height as usize);
         let flat = |value| Picture::new(w, h, 1, vec![value; w * h]);
         let poses = vec![wall.poses[0]; 3];
-        let placements = place(&wall.circle, &wall.camera, &poses).unwrap();
+        let placements = place(&wall.circle, &wall.camera, &poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
         let of = |values: &[u8]| {
             let pictures: Vec<Picture> = values.iter().map(|value| flat(*value)).collect();
@@ -275,7 +277,7 @@ mod tests {
         let wall = TestWall::ring(waves);
         let mut wrong = wall.poses.clone();
         wrong[4].t_wc.y += 0.05;
-        let placements = place(&wall.circle, &wall.camera, &wrong).unwrap();
+        let placements = place(&wall.circle, &wall.camera, &wrong, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
         let map = SeamMap::new(&wall.circle, &wall.stack(), &placements, &canvas);
         let [around, along] = map.size();

@@ -99,7 +99,7 @@ pub fn alignments(
                 let look = |k: usize| Look {
                     scene,
                     level,
-                    camera: &camera,
+                    camera: camera.sweeping(&tracked.sweep(scene, k)),
                     picture: &pictures[&k],
                     pose: &tracked.estimates[k].pose,
                 };
@@ -124,7 +124,7 @@ pub fn alignments(
 struct Look<'a> {
     scene: &'a Scene<'a>,
     level: usize,
-    camera: &'a Camera,
+    camera: Camera,
     picture: &'a Pyramid,
     pose: &'a crate::trajectory::Pose,
 }
@@ -132,7 +132,7 @@ struct Look<'a> {
 impl Look<'_> {
     /// The frame's grey values at wall points relative to `origin`.
     fn greys(&self, origin: &Vector3<f64>) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
-        let sampler = Sampler::new(self.camera, self.pose, origin);
+        let sampler = Sampler::new(&self.camera, self.pose, origin);
         let image = self.picture.level(self.level);
         move |point| sampler.at(point)?.known(image)
     }
@@ -174,7 +174,7 @@ struct Template {
 impl Template {
     fn new(look: &Look, footprint: &Footprint) -> Self {
         let scene = look.scene;
-        let pixel_m = pixel_m(scene, look.camera, look.pose);
+        let pixel_m = pixel_m(scene, &look.camera, look.pose);
         let lattice = Lattice::over(footprint, STRIDE * pixel_m);
         let middle = WallPoint {
             s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),

@@ -35,7 +35,7 @@ use super::selected_inverse::SelectedInverse;
 use crate::camera::Camera;
 use crate::frames::{FrameCache, GreyImage, Pyramid};
 use crate::survey::Survey;
-use crate::trajectory::poses_of;
+use crate::trajectory::{Shutter, poses_of};
 use nalgebra::Matrix6;
 use std::borrow::Cow;
 
@@ -79,9 +79,12 @@ pub fn pose_bound(
         .iter()
         .map(|frame| Pyramid::new(as_pixels_see(frame), 1));
     let frames = FrameCache::of_pyramids(frames.collect());
+    // The rows' own poses change next to nothing of what can be known.
+    let shutter = Shutter::default();
     let scene = Scene {
         surface: survey.surface.as_ref(),
         camera,
+        shutter: &shutter,
         calibration: Calibration::none(&camera),
         kappa: Kappa::zeros(),
         frames: &frames,
@@ -146,6 +149,7 @@ fn doubled_camera(camera: &Camera) -> Camera {
         cx: 2.0 * camera.cx,
         cy: 2.0 * camera.cy,
         lens: camera.lens,
+        sweep: camera.sweep,
     }
 }
 

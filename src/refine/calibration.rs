@@ -1,6 +1,6 @@
 //! Self-calibration: what all frames have in common and nobody has measured well enough.
 //!
-//! The shared unknowns are deviations from what was given, `κ = (ln f, cx, cy, k1, k2, ln r, τ_x, τ_z, o_x, o_z)`.
+//! The shared unknowns are deviations from what was given, `κ = (ln f, cx, cy, k1, k2, ln r, τ_x, τ_z, o_x, o_z, ρ)`.
 //!
 //! - Focal length (fx and fy alike), principal point and distortion enter through the rays, so pixels see them
 //!   ([`crate::camera::Camera::intrinsics_jacobian`]).
@@ -10,7 +10,8 @@
 //!   has the axis is seen by the prior alone, too: two tilts τ and two offsets o (turning about the axis and shifting along
 //!   it are the gauge).
 //!
-//! The latter five are [`Metric`]. Every unknown has a Gaussian prior around 0; one that the data leave nearly as uncertain
+//! The latter five are [`Metric`]. The last, ρ, is the time from reading a frame's first row to reading its last; it is free only to
+//! ask whether the frames want another one ([`super::rows`]). Every unknown has a Gaussian prior around 0; one that the data leave nearly as uncertain
 //! as that is refused ([`super::observed`]).
 
 use crate::camera::Camera;
@@ -19,11 +20,15 @@ use crate::trajectory::{Jitter, JitterModel, Pose, so3};
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 
 /// Number of shared unknowns.
-pub const SHARED: usize = 10;
+pub const SHARED: usize = 11;
 /// The first of them belong to the camera.
 pub const LENS: usize = 5;
+/// So many after them belong to [`Metric`].
+pub const METRIC: usize = 5;
 /// Place of the logarithm of the radius among them.
 pub const RADIUS: usize = 5;
+/// Place of the readout time, seconds.
+pub const READOUT: usize = LENS + METRIC;
 
 /// The shared unknowns κ, or a step of them.
 pub type Kappa = SVector<f64, SHARED>;
@@ -33,6 +38,8 @@ pub type Kappa = SVector<f64, SHARED>;
 pub struct Calibration {
     /// The camera as given.
     pub given: Camera,
+    /// Time from reading a frame's first row to reading its last as given, seconds.
+    pub readout_s: f64,
     /// Prior 1-σ of κ.
     pub sigma: Kappa,
     /// Which are estimated; the others stay 0.
@@ -46,6 +53,7 @@ impl Calibration {
     pub fn none(camera: &Camera) -> Self {
         Self {
             given: *camera,
+            readout_s: 0.0,
             sigma: Kappa::repeat(1.0),
             free: [false; SHARED],
             middle_h_m: 0.0,
@@ -78,8 +86,11 @@ impl Calibration {
         let sum: f64 = initial.iter().map(|pose| pose.t_wc.y).sum();
         Self {
             given: *camera,
-            sigma: Kappa::from_iterator(all.iter().map(|(_, sigma)| *sigma)),
-            free: all.map(|(group, _)| groups.contains(&group)),
+            readout_s: 0.0,
+            sigma: Kappa::from_fn(|k, _| all.get(k).map_or(1.0, |(_, sigma)| *sigma)),
+            free: std::array::from_fn(|k| {
+                all.get(k).is_some_and(|(group, _)| groups.contains(group))
+            }),
             middle_h_m: sum / initial.len().max(1) as f64,
         }
     }
@@ -126,6 +137,11 @@ impl Calibration {
         let shows =
             camera.lens == self.given.lens || camera.shown_share() >= self.given.shown_share();
         shows.then_some(camera)
+    }
+
+    /// The readout time at κ, seconds.
+    pub fn readout_s(&self, kappa: &Kappa) -> f64 {
+        self.readout_s + kappa[READOUT]
     }
 
     /// How the initial poses lie in the tunnel at κ.

@@ -142,7 +142,10 @@ fn compare_at(
         let made: Vec<(usize, Portrait)> = needed
             .into_par_iter()
             .filter(|k| !portraits.contains_key(k))
-            .map(|k| Ok((k, Portrait::fine(scene, level, k, window)?)))
+            .map(|k| {
+                let sweep = tracked.sweep(scene, k);
+                Ok((k, Portrait::fine(scene, level, k, &sweep, window)?))
+            })
             .collect::<Result<_, ProblemError>>()?;
         portraits.extend(made);
         let compared: Vec<Vec<Compared>> = partners

@@ -187,7 +187,8 @@ impl<'a> Coverage<'a> {
             .zip(&placed)
             .map(|(picture, placed)| {
                 let picture = picture.level(self.pictures.level);
-                View::new(picture, self.camera, &FrameEstimate::at(placed.pose))
+                let camera = self.camera.sweeping(&placed.sweep);
+                View::new(picture, camera, &FrameEstimate::at(placed.pose))
             })
             .collect();
         let chosen = most_informative(&all, self.information, &self.grid, self.surface, &views);

@@ -99,8 +99,8 @@ pub fn correct(
         let glimpses = bright.filter_map(|(observer, mean)| {
             let frame = look.frames[observer.frame as usize];
             let pose = &tracked.estimates[run.start + frame].pose;
-            let pixel = scene
-                .camera
+            let pixel = problem
+                .camera_of(frame)
                 .project(&pose.to_camera(&look.points.centre.x_w))?;
             let gain = f64::from(look.views[observer.frame as usize].gain() * observer.shade);
             Some(Glimpse {

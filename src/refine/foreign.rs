@@ -211,6 +211,7 @@ impl Neighbourhood {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::Sweep;
     use crate::frames::GreyImage;
     use crate::refine::estimate::FrameEstimate;
     use crate::refine::visibility::Placed;
@@ -248,6 +249,7 @@ mod tests {
             .poses
             .iter()
             .map(|pose| Placed {
+                sweep: Sweep::default(),
                 pose: *pose,
                 footprint: Footprint::within(&wall.circle, &camera, pose, 6.0).unwrap(),
                 active: true,

@@ -1,20 +1,25 @@
 //! What a block of the wall adds to the border of the normal equations ([`super::shared`]).
 
-use super::calibration::{Kappa, LENS};
+use super::calibration::{Kappa, LENS, READOUT};
 use super::estimate::{FrameStep, UNKNOWNS};
 use super::problem::Column;
 use super::shared::Border;
-use nalgebra::{Matrix2x5, Matrix4, Matrix4x2, Matrix5, SMatrix, Vector5};
+use nalgebra::{Matrix2x6, Matrix4, Matrix4x2, Matrix6, SMatrix, Vector6};
 
-/// Sums over the tiles of one block for the unknowns of the lens, for the few frames that see it.
+/// Shared unknowns that pixels see: those of the lens and the readout time.
+const SEEN: usize = LENS + 1;
+/// Their places among all.
+const PLACES: [usize; SEEN] = [0, 1, 2, 3, 4, READOUT];
+
+/// Sums over the tiles of one block for the unknowns that pixels see, for the few frames that see it.
 #[derive(Clone, Debug)]
 pub struct LensSums {
     /// `H_pκ`, a block a frame.
-    frames: Vec<SMatrix<f64, UNKNOWNS, LENS>>,
+    frames: Vec<SMatrix<f64, UNKNOWNS, SEEN>>,
     /// `H_κκ`.
-    own: Matrix5<f64>,
+    own: Matrix6<f64>,
     /// `g_κ`.
-    gradient: Vector5<f64>,
+    gradient: Vector6<f64>,
 }
 
 impl LensSums {
@@ -22,8 +27,8 @@ impl LensSums {
     pub fn new(frames: usize) -> Self {
         Self {
             frames: vec![SMatrix::zeros(); frames],
-            own: Matrix5::zeros(),
-            gradient: Vector5::zeros(),
+            own: Matrix6::zeros(),
+            gradient: Vector6::zeros(),
         }
     }
 
@@ -32,14 +37,14 @@ impl LensSums {
     /// `columns` are all its observers, `features`: M, `total`: their weight.
     pub fn add_tile(&mut self, columns: &[Column], features: &Matrix4<f64>, total: f64) {
         let weighted = columns.iter().map(|i| i.c * i.moments.weight);
-        let mean = weighted.sum::<Matrix2x5<f64>>() / total.max(1e-12);
+        let mean = weighted.sum::<Matrix2x6<f64>>() / total.max(1e-12);
         // C moves the wall along s and h only.
         let slopes: Matrix4x2<f64> = features.fixed_columns::<2>(0).into_owned();
         for i in columns {
             let apart = i.c - mean;
             let f = slopes * apart * i.moments.weight;
             let block = &mut self.frames[i.place];
-            for column in 0..LENS {
+            for column in 0..SEEN {
                 for row in 0..6 {
                     block[(row, column)] +=
                         i.a[(0, row)] * f[(0, column)] + i.a[(1, row)] * f[(1, column)];
@@ -61,15 +66,19 @@ impl LensSums {
         scatter: &mut Border,
     ) {
         for (slot, block) in slots.iter().zip(&self.frames) {
-            let mut target = border.frames[*slot].fixed_view_mut::<UNKNOWNS, LENS>(0, 0);
-            target += block;
+            for (column, place) in PLACES.into_iter().enumerate() {
+                let mut target = border.frames[*slot].column_mut(place);
+                target += block.column(column);
+            }
         }
-        let mut own = border.own.fixed_view_mut::<LENS, LENS>(0, 0);
-        own += self.own;
-        let mut target = border.gradient.fixed_rows_mut::<LENS>(0);
-        target += self.gradient;
         let mut shared = Kappa::zeros();
-        shared.fixed_rows_mut::<LENS>(0).copy_from(&self.gradient);
+        for (column, place) in PLACES.into_iter().enumerate() {
+            shared[place] = self.gradient[column];
+            for (row, other) in PLACES.into_iter().enumerate() {
+                border.own[(other, place)] += self.own[(row, column)];
+            }
+        }
+        border.gradient += shared;
         let frames = slots.iter().copied().zip(gradient.iter().copied());
         scatter.count(frames, &shared);
     }

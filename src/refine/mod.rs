@@ -18,6 +18,7 @@
 //! | walls that repeat | [`repeats`] |
 //! | all frames together, coarse to fine | [`run`](mod@run) |
 //! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
+//! | are rows read when they are said to be | [`rows`] |
 //! | how sure | [`certainty`], [`covariance`]; how sure it could be at best: [`bound`] |
 //!
 //! At full size what is in a frame but not on the wall is left out of a solve beforehand: [`foreign`]. Every solve is the
@@ -70,6 +71,7 @@ mod repeats;
 mod report;
 mod retrack;
 mod robust;
+mod rows;
 mod run;
 mod sampler;
 mod search;
@@ -94,4 +96,5 @@ pub use options::RefineOptions;
 pub use otherwise::other_readings;
 pub use problem::ProblemError;
 pub use report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
+pub use rows::RowMotion;
 pub use run::{RefineError, Refined, refine};

@@ -111,7 +111,7 @@ fn reason(unknown: usize, covariance: &SharedBlock, free: &[bool; SHARED]) -> St
         Kind::Tilt | Kind::Offset => "pictures show how the cameras stand in the tunnel, whatever the frame of the initial poses; \
                          only these poses themselves can tell, and they are not sure enough"
             .to_owned(),
-        Kind::Focal | Kind::Pixel | Kind::Plain => {
+        Kind::Focal | Kind::Pixel | Kind::Plain | Kind::Time => {
             "the frames leave it nearly as uncertain as it was: too little overlap, texture, or width of view".to_owned()
         }
     };
@@ -139,6 +139,7 @@ enum Kind {
     Focal,
     Pixel,
     Plain,
+    Time,
     Radius,
     Tilt,
     Offset,
@@ -156,6 +157,7 @@ const NAMES: [(&str, Kind); SHARED] = [
     ("axis_tilt_z", Kind::Tilt),
     ("axis_offset_x", Kind::Offset),
     ("axis_offset_z", Kind::Offset),
+    ("readout", Kind::Time),
 ];
 
 /// One shared unknown of the report.
@@ -222,6 +224,7 @@ impl CalibrationReport {
             tilt[1].to_degrees(),
             point.x,
             point.z,
+            1e3 * calibration.readout_s(kappa),
         ];
         let initial = [
             given.fx,
@@ -234,6 +237,7 @@ impl CalibrationReport {
             0.0,
             0.0,
             0.0,
+            1e3 * calibration.readout_s,
         ];
         let asked = |k: &usize| calibration.free[*k] || refusals.iter().any(|r| r.unknown == *k);
         let unknowns = (0..SHARED).filter(asked).map(|k| {
@@ -247,6 +251,7 @@ impl CalibrationReport {
                 Kind::Radius => ("m", estimates[k]),
                 Kind::Tilt => ("deg", 1f64.to_degrees()),
                 Kind::Offset => ("m", 1.0),
+                Kind::Time => ("ms", 1e3),
             };
             let sigma = refusal.map_or(covariance[(k, k)].sqrt(), |refusal| refusal.sigma);
             UnknownReport {

@@ -59,7 +59,10 @@ impl Overlaps {
             .map(
                 |(k, (estimate, doubt))| match run.contains(&k) && doubt.is_none() {
                     false => Ok(None),
-                    true => footprint(scene, camera, k, &estimate.pose).map(Some),
+                    true => {
+                        let camera = camera.sweeping(&tracked.sweep(scene, k));
+                        footprint(scene, &camera, k, &estimate.pose).map(Some)
+                    }
                 },
             )
             .collect::<Result<_, _>>()?;

@@ -8,6 +8,7 @@ use super::overlaps::footprint;
 use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
 use super::search::{Hypothesis, REACH, least_samples, log_likelihood, search};
 use super::wall::{FusedWall, Likeness, Portrait, pixel_m};
+use crate::camera::Sweep;
 use crate::surface::{Footprint, shortest_arc, viewing_distance};
 use crate::trajectory::{Jitter, Pose};
 use std::borrow::Cow;
@@ -91,6 +92,13 @@ pub struct Surroundings<'s> {
     pub footprints: &'s [Footprint],
 }
 
+impl Surroundings<'_> {
+    /// How the camera of one of the run moves while its rows are read.
+    pub fn sweep(&self, scene: &Scene, frame: usize) -> Sweep {
+        scene.sweep(frame, &self.run, self.estimates)
+    }
+}
+
 /// Places frame `frame` on the wall that the placed frames around it show.
 ///
 /// # Errors
@@ -117,10 +125,12 @@ pub fn place(
     let near = near(scene, frame, &expected.pose, margin, surroundings)?;
     let mut portraits = Vec::new();
     for (k, _) in near.iter().enumerate().filter(|(_, near)| **near) {
-        let portrait = Portrait::new(scene, level, surroundings.run.start + k)?;
+        let sweep = surroundings.sweep(scene, surroundings.run.start + k);
+        let portrait = Portrait::new(scene, level, surroundings.run.start + k, &sweep)?;
         portraits.push((portrait, surroundings.estimates[k]));
     }
-    let portrait = Portrait::new(scene, level, frame)?;
+    let sweep = surroundings.sweep(scene, frame);
+    let portrait = Portrait::new(scene, level, frame, &sweep)?;
     let wall = FusedWall::new(scene, &portraits, &camera, (frame, &expected.pose), margin)?;
     let found = match options.search {
         true => search(scene, &wall, &portrait, &expected.pose, sigma, HYPOTHESES),

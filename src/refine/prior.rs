@@ -1,6 +1,6 @@
 //! What is known before a pixel is read: how far the initial poses and plain exposures may be off.
 
-use super::calibration::{LENS, Metric, SHARED};
+use super::calibration::{LENS, METRIC, Metric};
 use super::estimate::{FrameEstimate, FrameStep};
 use super::normal::{Block, NormalEquations, Pattern};
 use super::shared::Border;
@@ -238,7 +238,7 @@ struct Sums<'s> {
 }
 
 /// Derivative of an error by `(ln r, τ_x, τ_z, o_x, o_z)`.
-type ByMetric = SMatrix<f64, 6, { SHARED - LENS }>;
+type ByMetric = SMatrix<f64, 6, METRIC>;
 
 /// Error of a pose around its initial value (as placed in the tunnel), and its derivative by the pose's step.
 fn absolute(initial: &Pose, pose: &Pose, scale: f64) -> (Vector6<f64>, Matrix6<f64>) {
@@ -322,7 +322,6 @@ fn add_shared<const N: usize>(
     e: &Vector6<f64>,
     frames: [(Option<usize>, &Matrix6<f64>); N],
 ) {
-    const METRIC: usize = SHARED - LENS;
     let scaled = weighted * j_shared;
     for (slot, j) in frames {
         if let Some(slot) = slot {
@@ -414,7 +413,7 @@ mod tests {
         let (placed_a, placed_b) = (metric.place(&a), metric.place(&b));
         let alone = absolute_by_metric(&metric, &placed_a, &c, &e);
         let step = relative_by_metric(&metric, (&placed_a, &placed_b), (&c, &d));
-        for k in 0..SHARED - LENS {
+        for k in 0..METRIC {
             let moved = |amount: f64| {
                 let mut kappa = kappa();
                 kappa[LENS + k] += amount;
@@ -468,7 +467,7 @@ mod tests {
                 (cost, normal, border)
             };
             let (_, normal, border) = evaluate(&estimates, &kappa());
-            for k in LENS..SHARED {
+            for k in LENS..LENS + METRIC {
                 let cost_at = |amount: f64| {
                     let mut moved = kappa();
                     moved[k] += amount;

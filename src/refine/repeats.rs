@@ -130,13 +130,15 @@ fn repeats_of(
     let near = near(scene, frame, &pose, margin, &surroundings)?;
     let mut portraits = Vec::new();
     for (k, _) in near.iter().enumerate().filter(|(_, near)| **near) {
-        let portrait = Portrait::new(scene, level, run.start + k)?;
+        let sweep = surroundings.sweep(scene, surroundings.run.start + k);
+        let portrait = Portrait::new(scene, level, surroundings.run.start + k, &sweep)?;
         portraits.push((portrait, surroundings.estimates[k]));
     }
     if portraits.is_empty() {
         return Ok(Vec::new());
     }
-    let portrait = Portrait::new(scene, level, frame)?;
+    let sweep = surroundings.sweep(scene, frame);
+    let portrait = Portrait::new(scene, level, frame, &sweep)?;
     let wall = FusedWall::new(scene, &portraits, &camera, (frame, &pose), margin)?;
     let left = |pose: &Pose| {
         let likeness = wall.likeness(scene, &portrait, pose);

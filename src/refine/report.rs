@@ -3,6 +3,7 @@
 use super::covariance::FrameSigma;
 use super::gauss_newton::SolveRecord;
 use super::observed::CalibrationReport;
+use super::rows::RowMotion;
 use crate::trajectory::Pose;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -104,6 +105,9 @@ pub struct RefineReport {
     pub frames_on_prior: usize,
     /// Factor by which the covariance exceeds that of independent noise: what aliasing adds.
     pub variance_factor: f64,
+    /// The readout time that the frames want, as far as they can tell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rows: Option<RowMotion>,
     /// Self-calibration, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,

@@ -20,12 +20,13 @@ use super::repair::repair;
 use super::repeats::Rival;
 use super::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 use super::retrack::track_calibrating;
+use super::rows::row_motion;
 use super::track::{Tracked, retry};
 use super::verdict::unsupported;
 use crate::frames::FrameCache;
 use crate::progress::Progress;
 use crate::survey::Survey;
-use crate::trajectory::{Pose, StampedPose, Trajectory};
+use crate::trajectory::{Pose, Shutter, StampedPose, Trajectory};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
@@ -109,9 +110,18 @@ pub fn refine(
         log_gain_sigma: options.log_gain_sigma,
         bias_sigma: options.bias_sigma,
     };
+    let shutter = survey.shutter();
     let mut calibration = calibration_of(survey, options, &prior.initial);
     let examined = examine(
-        &scene(survey, options, &calibration, &prior, &frames, 0.0),
+        &scene(
+            survey,
+            options,
+            &calibration,
+            &prior,
+            &shutter,
+            &frames,
+            0.0,
+        ),
         coarsest,
         progress.as_ref(),
     )?;
@@ -129,6 +139,7 @@ pub fn refine(
             options,
             &calibration,
             &rough,
+            &shutter,
             &frames,
             examined.noise,
         ),
@@ -144,6 +155,7 @@ pub fn refine(
         options,
         &calibration,
         &prior,
+        &shutter,
         &frames,
         examined.noise,
     );
@@ -245,6 +257,7 @@ pub fn refine(
     for (frame, doubt) in late {
         tracked.doubts[frame].get_or_insert(doubt);
     }
+    let rows = row_motion(&scene, options, &tracked)?;
     let certainty = Certainty::at(&solution, &calibration)?;
     let estimates = &tracked.estimates;
     let metric = calibration.metric(&scene.kappa);
@@ -293,6 +306,7 @@ pub fn refine(
             levels,
             frames: reports,
             frames_on_prior: on_prior,
+            rows,
             variance_factor: certainty.covariances.variance_factor,
             calibration: (calibration.any() || !refusals.is_empty()).then(|| {
                 CalibrationReport::new(
@@ -313,9 +327,13 @@ pub fn refine(
 fn calibration_of(survey: &Survey, options: &RefineOptions, initial: &[Pose]) -> Calibration {
     let section = survey.file.calibrate.clone().unwrap_or_default();
     let groups = options.calibrate.as_ref().unwrap_or(&section.unknowns);
-    match groups.is_empty() {
+    let calibration = match groups.is_empty() {
         true => Calibration::none(&survey.camera),
         false => Calibration::new(groups, &section, &survey.camera, initial),
+    };
+    Calibration {
+        readout_s: survey.shutter().readout_s(),
+        ..calibration
     }
 }
 
@@ -334,12 +352,14 @@ fn scene<'a>(
     options: &RefineOptions,
     calibration: &Calibration,
     prior: &'a Prior,
+    shutter: &'a Shutter,
     frames: &'a FrameCache,
     noise: f64,
 ) -> Scene<'a> {
     Scene {
         surface: survey.surface.as_ref(),
         camera: survey.camera,
+        shutter,
         calibration: *calibration,
         kappa: Kappa::zeros(),
         frames,

@@ -36,7 +36,7 @@ impl Sampler {
             centre: pose.to_camera(origin).cast(),
             focal: (camera.fx as f32, camera.fy as f32),
             principal: (camera.cx as f32, camera.cy as f32),
-            lens: SingleLens::new(&camera.lens),
+            lens: SingleLens::new(camera),
             limit: ((camera.width - 1) as f32, (camera.height - 1) as f32),
             width: camera.width as usize,
         }
@@ -87,7 +87,7 @@ impl Spot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::Lens;
+    use crate::camera::{Lens, Sweep};
     use crate::trajectory::so3;
 
     /// A picture of its own pixel coordinates, sampled where the camera itself projects a point, lens included.
@@ -95,6 +95,14 @@ mod tests {
     fn a_point_is_seen_where_the_camera_projects_it() {
         let mut camera = Camera::from_vertical_fov(64, 48, 1.0);
         camera.lens = Lens::radial(-0.1, 0.02);
+        seen_where_projected(&camera);
+        seen_where_projected(&camera.sweeping(&Sweep {
+            omega_rad: Vector3::new(0.01, 0.03, -0.01),
+            nu_m: Vector3::new(0.001, -0.002, 0.001),
+        }));
+    }
+
+    fn seen_where_projected(camera: &Camera) {
         let pose = Pose::new(
             so3::exp(&Vector3::new(0.1, 0.4, -0.2)),
             Vector3::new(0.3, 5.0, 0.1),
@@ -104,7 +112,7 @@ mod tests {
         let across = GreyImage::new(64, 48, across);
         let down = GreyImage::new(64, 48, down);
         let origin = pose.to_world(&Vector3::new(0.1, -0.1, 2.0));
-        let sampler = Sampler::new(&camera, &pose, &origin);
+        let sampler = Sampler::new(camera, &pose, &origin);
         let mut seen = 0;
         for k in 0..400 {
             let offset = Vector3::new(

@@ -7,7 +7,8 @@ use super::problem::Scene;
 use super::track::Tracked;
 use crate::frames::FrameCache;
 use crate::test_wall::TestWall;
-use crate::trajectory::{Jitter, JitterModel, Pose};
+use crate::trajectory::{Jitter, JitterModel, Pose, Shutter};
+use std::sync::LazyLock;
 
 /// A frame a second, each off by 0.05 rad and 5 cm by itself.
 pub fn prior(initial: &[Pose]) -> Prior {
@@ -25,11 +26,15 @@ pub fn prior(initial: &[Pose]) -> Prior {
     }
 }
 
+/// All rows at once.
+static GLOBAL: LazyLock<Shutter> = LazyLock::new(Shutter::default);
+
 /// The wall with frames without noise, nothing but poses and exposures unknown.
 pub fn scene<'a>(wall: &'a TestWall, frames: &'a FrameCache, prior: &'a Prior) -> Scene<'a> {
     Scene {
         surface: &wall.circle,
         camera: wall.camera,
+        shutter: &GLOBAL,
         calibration: Calibration::none(&wall.camera),
         kappa: Kappa::zeros(),
         frames,

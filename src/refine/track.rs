@@ -15,6 +15,7 @@ use super::overlaps::footprint;
 use super::place::{Expectation, Surroundings, place};
 use super::prior::predict;
 use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
+use crate::camera::Sweep;
 use crate::progress::Progress;
 use crate::surface::Footprint;
 use crate::trajectory::{JitterModel, Pose};
@@ -62,6 +63,11 @@ impl Tracked {
             participants,
             active,
         }
+    }
+
+    /// How the camera of a frame moves while its rows are read.
+    pub fn sweep(&self, scene: &Scene, frame: usize) -> Sweep {
+        scene.sweep(frame, &(0..self.estimates.len()), &self.estimates)
     }
 
     /// Which frames of a run are believed.
@@ -185,7 +191,10 @@ fn solve_window(
 pub fn footprints(scene: &Scene, tracked: &Tracked) -> Result<Vec<Footprint>, ProblemError> {
     let estimates = tracked.estimates.par_iter().enumerate();
     estimates
-        .map(|(k, estimate)| footprint(scene, &scene.camera, k, &estimate.pose))
+        .map(|(k, estimate)| {
+            let camera = scene.camera.sweeping(&tracked.sweep(scene, k));
+            footprint(scene, &camera, k, &estimate.pose)
+        })
         .collect()
 }
 

@@ -2,11 +2,11 @@
 
 use super::estimate::FrameEstimate;
 use super::grid::{Plane, TilePoints, ZERO};
-use crate::camera::{Bend, Camera, SingleLens};
+use crate::camera::{Bend, Camera, SingleLens, Sweep};
 use crate::frames::GreyImage;
 use crate::surface::{lens_jacobian, wall_jacobian};
 use crate::trajectory::Pose;
-use nalgebra::{Matrix2x5, Matrix2x6, Matrix3, Vector3};
+use nalgebra::{Matrix2x6, Matrix3, Vector3};
 
 /// Added to a float from 0 on, 2²³ rounds it to an integer that stands in the last bits of the sum. Unlike a cast, which
 /// saturates, this is done on whole vectors.
@@ -31,7 +31,7 @@ impl<'a> View<'a> {
         Self {
             image,
             intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy].map(|v| v as f32),
-            lens: SingleLens::new(&camera.lens),
+            lens: SingleLens::new(&camera),
             pose: estimate.pose,
             r_cw: r_wc.matrix().transpose().cast(),
             gain: estimate.log_gain.exp() as f32,
@@ -45,20 +45,33 @@ impl<'a> View<'a> {
     }
 
     /// `∂(s, h)/∂ξ` at the middle of a tile.
+    ///
+    /// With a sweep, the ray starts where the camera is when the row is read, millimetres off: to a thousandth, that is no matter.
     pub fn wall_jacobian(&self, points: &TilePoints) -> Matrix2x6<f64> {
         wall_jacobian(&self.pose, &points.centre)
     }
 
-    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2)` at the middle of a tile, for the `camera` at full size; `a`: the pose's
-    /// Jacobian there.
-    pub fn lens_jacobian(
+    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2, ρ)` at the middle of a tile, for the `camera` at full size; `a`: the pose's
+    /// Jacobian there, `rate`: the motion of the frame's camera during a readout of one second.
+    ///
+    /// A row read at the share τ of the picture's time is where the pose moved by `(ω τ, R ν τ)` would put it, with ω and ν in
+    /// proportion to the readout time ρ: `∂(s, h)/∂ρ = A (ω, R ν) τ`.
+    pub fn shared_jacobian(
         &self,
         points: &TilePoints,
         a: &Matrix2x6<f64>,
         camera: &Camera,
-    ) -> Matrix2x5<f64> {
+        rate: &Sweep,
+    ) -> Matrix2x6<f64> {
         let x_c = self.pose.to_camera(&points.centre.x_w);
-        lens_jacobian(&self.pose, a, camera, &x_c)
+        let lens = lens_jacobian(&self.pose, a, camera, &x_c);
+        let share = (camera.project(&x_c)).map_or(0.0, |pixel| camera.share(pixel.y));
+        let shift = self.pose.r_wc * rate.nu_m;
+        let moved = a.fixed_columns::<3>(0) * rate.omega_rad + a.fixed_columns::<3>(3) * shift;
+        let mut seen = Matrix2x6::zeros();
+        seen.fixed_columns_mut::<5>(0).copy_from(&lens);
+        seen.set_column(5, &(moved * share));
+        seen
     }
 
     /// The wall's values `(I/V − b/V)/a` as this frame shows them, bilinearly interpolated, into `values`; the frame
@@ -70,6 +83,9 @@ impl<'a> View<'a> {
             SingleLens::Straight(lens) => self.sample_through(lens, points, shade, values),
             SingleLens::Brown(lens) => self.sample_through(lens, points, shade, values),
             SingleLens::Fisheye(lens) => self.sample_through(lens, points, shade, values),
+            SingleLens::RollingStraight(lens) => self.sample_through(lens, points, shade, values),
+            SingleLens::RollingBrown(lens) => self.sample_through(lens, points, shade, values),
+            SingleLens::RollingFisheye(lens) => self.sample_through(lens, points, shade, values),
         }
     }
 
@@ -137,11 +153,16 @@ mod tests {
         ));
         let pose = estimate.pose;
         let camera = calibration.given;
+        let rate = Sweep {
+            omega_rad: Vector3::new(0.1, 0.5, -0.2),
+            nu_m: Vector3::new(0.3, -0.1, 0.2),
+        };
         let view = View::new(&image, camera.at_level(1), &estimate);
         let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
         let wall_of = |camera: &Camera, pixel: &nalgebra::Vector2<f64>| {
             let ray = pose.r_wc * camera.ray(pixel.x, pixel.y).unwrap();
-            circle.hit(&pose.t_wc, &ray).unwrap().wall
+            let start = pose.to_world(&camera.origin(pixel.y));
+            circle.hit(&start, &ray).unwrap().wall
         };
         let seen = wall_of(&camera, &nalgebra::Vector2::new(130.0, 25.0));
         let (width, height) = grid.tile_size_m();
@@ -151,13 +172,17 @@ mod tests {
         };
         let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
         let pixel = camera.project(&pose.to_camera(&points.centre.x_w)).unwrap();
-        let analytic = view.lens_jacobian(&points, &view.wall_jacobian(&points), &camera);
+        let analytic = view.shared_jacobian(&points, &view.wall_jacobian(&points), &camera, &rate);
         let step = 1e-6;
-        for k in 0..LENS {
+        for k in 0..=LENS {
             let moved = |amount: f64| {
                 let mut kappa = Kappa::zeros();
-                kappa[k] = amount;
-                wall_of(&calibration.camera(&kappa).unwrap(), &pixel)
+                if k < LENS {
+                    kappa[k] = amount;
+                }
+                let camera = calibration.camera(&kappa).unwrap();
+                let readout_s = if k == LENS { amount } else { 0.0 };
+                wall_of(&camera.sweeping(&rate.times(readout_s)), &pixel)
             };
             let (plus, minus) = (moved(step), moved(-step));
             let s = (plus.s_m - minus.s_m) / (2.0 * step);
@@ -174,7 +199,12 @@ mod tests {
         sampled_where_projected(straight);
         let fisheye = KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]);
         for lens in [Lens::radial(-0.1, 0.02), Lens::KannalaBrandt(fisheye)] {
-            sampled_where_projected(Camera { lens, ..straight });
+            let camera = Camera { lens, ..straight };
+            sampled_where_projected(camera);
+            sampled_where_projected(camera.sweeping(&Sweep {
+                omega_rad: Vector3::new(0.01, 0.03, -0.01),
+                nu_m: Vector3::new(0.001, -0.002, 0.001),
+            }));
         }
     }
 

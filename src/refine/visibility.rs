@@ -4,7 +4,7 @@ use super::foreign::Marks;
 use super::grid::{BLOCK, SIDE, TileId, WallGrid};
 use super::tile::Seen;
 use super::view::View;
-use crate::camera::Camera;
+use crate::camera::{Camera, Sweep};
 use crate::frames::Shading;
 use crate::surface::{Footprint, Surface};
 use crate::trajectory::Pose;
@@ -69,6 +69,8 @@ pub struct Tile {
 pub struct Placed {
     /// Its pose.
     pub pose: Pose,
+    /// Its motion while the rows are read.
+    pub sweep: Sweep,
     /// What it sees of the wall.
     pub footprint: Footprint,
     /// True if it is to be estimated.
@@ -111,6 +113,7 @@ impl Visibility {
             .zip(&fields)
             .enumerate()
             .map(|(k, (frame, field))| {
+                let camera = &camera.sweeping(&frame.sweep);
                 let mut tiles = Vec::new();
                 for tile in cells.of(field) {
                     if let Some(observer) =
@@ -359,6 +362,7 @@ mod tests {
             .iter()
             .enumerate()
             .map(|(k, pose)| Placed {
+                sweep: Sweep::default(),
                 pose: *pose,
                 footprint: Footprint::trace(&circle, &camera, pose).unwrap(),
                 active: active.contains(&k),
@@ -396,6 +400,7 @@ mod tests {
         let placed: Vec<Placed> = spiral(12, 0.1, 30f64.to_radians())
             .into_iter()
             .map(|pose| Placed {
+                sweep: Sweep::default(),
                 pose,
                 footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),
                 active: true,

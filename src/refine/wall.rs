@@ -4,7 +4,7 @@ use super::estimate::FrameEstimate;
 use super::problem::{ProblemError, Scene};
 use super::sampler::{Sampler, Spot};
 use super::visibility::reach_m;
-use crate::camera::Camera;
+use crate::camera::{Camera, Sweep};
 use crate::frames::{GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level};
 use crate::surface::{Footprint, WallPoint, viewing_distance};
 use crate::trajectory::Pose;
@@ -83,21 +83,26 @@ pub struct Portrait {
 }
 
 impl Portrait {
-    /// Frame `frame` with its contrast over a window as wide as light is smooth.
+    /// Frame `frame`, its camera moving by `sweep`, with its contrast over a window as wide as light is smooth.
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
-    pub fn new(scene: &Scene, level: usize, frame: usize) -> Result<Self, ProblemError> {
+    pub fn new(
+        scene: &Scene,
+        level: usize,
+        frame: usize,
+        sweep: &Sweep,
+    ) -> Result<Self, ProblemError> {
         let picture = scene.frames.get(frame)?;
         Ok(Self {
-            camera: scene.camera.at_level(level),
+            camera: scene.camera.at_level(level).sweeping(sweep),
             local: picture.contrast(level),
             level,
             picture,
         })
     }
 
-    /// Frame `frame` with its contrast over no more than `window` pixels to each side: fine detail only.
+    /// Frame `frame`, its camera moving by `sweep`, with its contrast over no more than `window` pixels to each side: fine detail only.
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
@@ -105,18 +110,19 @@ impl Portrait {
         scene: &Scene,
         level: usize,
         frame: usize,
+        sweep: &Sweep,
         window: usize,
     ) -> Result<Self, ProblemError> {
         let picture = scene.frames.get(frame)?;
         Ok(Self {
-            camera: scene.camera.at_level(level),
+            camera: scene.camera.at_level(level).sweeping(sweep),
             local: Arc::new(local_contrast(picture.level(level), window)),
             level,
             picture,
         })
     }
 
-    /// The camera of the level.
+    /// The camera of the level, with its motion.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }

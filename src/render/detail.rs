@@ -98,7 +98,7 @@ impl Readings {
         let views: Vec<View> = seen
             .iter()
             .map(|(frame, _)| View {
-                camera: stack.camera(),
+                camera: placements[**frame].camera(stack.camera()),
                 pose: &placements[**frame].pose,
             })
             .collect();

@@ -52,6 +52,7 @@ pub fn sightings(
     let point = surface.frame(wall);
     let sight = |(frame, placement): (usize, &Placement)| {
         let pose = &placement.pose;
+        let camera = &placement.camera(camera);
         let x_c = pose.to_camera(&point.x_w);
         let pixel = camera
             .project(&x_c)
@@ -78,12 +79,21 @@ mod tests {
     use super::*;
     use crate::render::place;
     use crate::test_wall::{TestWall, waves};
+    use crate::trajectory::{Shutter, indexed};
 
     /// Each pixel's ray meets the point again, and its stretch is what its neighbours say.
     #[test]
     fn every_sighting_looks_at_the_point() {
         let wall = TestWall::ring(waves);
-        let placements = place(&wall.circle, &wall.camera, &wall.poses).unwrap();
+        let times = indexed(wall.poses.iter().copied());
+        for readout_s in [0.0, 0.06] {
+            let shutter = Shutter::new(readout_s, wall.camera.height, &times);
+            look_at_points(&wall, &shutter);
+        }
+    }
+
+    fn look_at_points(wall: &TestWall, shutter: &Shutter) {
+        let placements = place(&wall.circle, &wall.camera, &wall.poses, shutter).unwrap();
         let mut seen = 0;
         for k in 0..40 {
             let point = WallPoint {
@@ -95,10 +105,12 @@ mod tests {
             for sighting in &found {
                 seen += 1;
                 let pose = &wall.poses[sighting.frame];
+                let camera = placements[sighting.frame].camera(&wall.camera);
                 let [u, v] = sighting.pixel;
                 let meets = |u: f64, v: f64| {
-                    let ray = pose.r_wc * wall.camera.ray(u, v).unwrap();
-                    wall.circle.hit(&pose.t_wc, &ray).unwrap()
+                    let start = pose.to_world(&camera.origin(v));
+                    let ray = pose.r_wc * camera.ray(u, v).unwrap();
+                    wall.circle.hit(&start, &ray).unwrap()
                 };
                 let hit = meets(u, v);
                 let x_w = wall.circle.frame(point).x_w;

@@ -84,8 +84,10 @@ impl Map {
                     };
                     let of_point = |(k, point)| {
                         let wall = surface.frame(point);
-                        let fine =
-                            |frame: usize| px_per_metre(camera, &placements[frame].pose, &wall);
+                        let fine = |frame: usize| {
+                            let placement = &placements[frame];
+                            px_per_metre(&placement.camera(camera), &placement.pose, &wall)
+                        };
                         let label = labels.map(|labels| labels[node(k)]);
                         let shown = match label {
                             Some(NO_FRAME) => None,

@@ -1,20 +1,29 @@
 //! Where the frames lie on the unrolled wall.
 
 use super::RenderError;
-use crate::camera::Camera;
+use crate::camera::{Camera, Sweep};
 use crate::surface::{Footprint, Surface, viewing_distance};
-use crate::trajectory::Pose;
+use crate::trajectory::{Pose, Shutter};
 
 /// A frame with its pose and its place on the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
-    /// Camera-to-world pose.
+    /// Camera-to-world pose; with a sweep, that of the middle row.
     pub pose: Pose,
+    /// Its motion while the rows are read.
+    pub sweep: Sweep,
     /// The part of the wall it sees.
     pub footprint: Footprint,
 }
 
-/// Places every frame on the wall.
+impl Placement {
+    /// The frames' camera with the motion of this one.
+    pub fn camera(&self, camera: &Camera) -> Camera {
+        camera.sweeping(&self.sweep)
+    }
+}
+
+/// Places every frame on the wall, its rows read by `shutter`.
 ///
 /// # Errors
 /// [`RenderError::Frame`], for the first frame that has no place.
@@ -22,14 +31,17 @@ pub fn place(
     surface: &dyn Surface,
     camera: &Camera,
     poses: &[Pose],
+    shutter: &Shutter,
 ) -> Result<Vec<Placement>, RenderError> {
     poses
         .iter()
+        .zip(shutter.sweeps(poses))
         .enumerate()
-        .map(|(frame, pose)| {
+        .map(|(frame, (pose, sweep))| {
             Ok(Placement {
                 pose: *pose,
-                footprint: Footprint::trace(surface, camera, pose)
+                sweep,
+                footprint: Footprint::trace(surface, &camera.sweeping(&sweep), pose)
                     .map_err(|source| RenderError::Frame { frame, source })?,
             })
         })
@@ -94,7 +106,9 @@ mod tests {
             facing(Vector3::zeros()),
             facing(Vector3::x() * (-TAU / 4.0)),
         ];
-        let message = place(&circle, &camera(), &poses).unwrap_err().to_string();
+        let message = place(&circle, &camera(), &poses, &Shutter::default())
+            .unwrap_err()
+            .to_string();
         for part in ["frame 1", "vanishing point", "check its pose"] {
             assert!(message.contains(part), "{message}");
         }

@@ -10,7 +10,7 @@ use crate::camera::Camera;
 use crate::frames::FrameFile;
 use crate::progress::Progress;
 use crate::surface::Surface;
-use crate::trajectory::Pose;
+use crate::trajectory::{Pose, Shutter};
 
 /// How a panorama is drawn from frames on disk.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,7 @@ pub struct LaidOut {
     pub canvas: Canvas,
 }
 
-/// Lays frames out for given poses, at `px_per_metre` or `finer` times the frames' own resolution: the canvas that [`stitch()`] draws.
+/// Lays frames out for given poses, their rows read by `shutter`, at `px_per_metre` or `finer` times the frames' own resolution: the canvas that [`stitch()`] draws.
 ///
 /// # Errors
 /// As [`place`], [`native_px_per_metre`] and [`Canvas::covering`].
@@ -73,10 +73,11 @@ pub fn lay_out(
     surface: &dyn Surface,
     camera: &Camera,
     poses: &[Pose],
+    shutter: &Shutter,
     px_per_metre: Option<f64>,
     finer: f64,
 ) -> Result<LaidOut, RenderError> {
-    let placements = place(surface, camera, poses)?;
+    let placements = place(surface, camera, poses, shutter)?;
     let native = native_px_per_metre(surface, camera, poses)?;
     let px_per_metre = px_per_metre.unwrap_or(finer * native);
     let canvas = Canvas::of_placements(surface, &placements, px_per_metre)?;
@@ -96,7 +97,7 @@ pub struct Stitch<'a> {
 }
 
 impl<'a> Stitch<'a> {
-    /// Places the frames for given poses, lays out the canvas and looks at the frames' headers. Frames are to be halved where the
+    /// Places the frames for given poses, their rows read by `shutter`, lays out the canvas and looks at the frames' headers. Frames are to be halved where the
     /// canvas is coarser than half their resolution.
     ///
     /// # Errors
@@ -106,6 +107,7 @@ impl<'a> Stitch<'a> {
         camera: &Camera,
         files: &[FrameFile],
         poses: &[Pose],
+        shutter: &Shutter,
         options: &StitchOptions,
     ) -> Result<Self, RenderError> {
         if poses.len() != files.len() {
@@ -125,7 +127,7 @@ impl<'a> Stitch<'a> {
             true => FINER,
             false => 1.0,
         };
-        let laid_out = lay_out(surface, camera, poses, options.px_per_metre, finer)?;
+        let laid_out = lay_out(surface, camera, poses, shutter, options.px_per_metre, finer)?;
         let canvas = &laid_out.canvas;
         let level = level_for(camera, laid_out.native_px_per_metre, canvas.px_per_metre);
         Ok(Self {
@@ -189,7 +191,7 @@ impl<'a> Stitch<'a> {
     }
 }
 
-/// Draws the panorama of frames on disk for given poses into memory.
+/// Draws the panorama of frames on disk for given poses into memory, their rows read by `shutter`.
 ///
 /// # Errors
 /// Everything in [`RenderError`]; sizes are checked before a frame is read.
@@ -198,10 +200,11 @@ pub fn stitch(
     camera: &Camera,
     files: &[FrameFile],
     poses: &[Pose],
+    shutter: &Shutter,
     options: &StitchOptions,
     progress: &dyn Progress,
 ) -> Result<Panorama, RenderError> {
-    let mut stitch = Stitch::new(surface, camera, files, poses, options)?;
+    let mut stitch = Stitch::new(surface, camera, files, poses, shutter, options)?;
     let mut panorama = Panorama::empty(*stitch.canvas(), stitch.frames().format());
     let budget = stitch.budget(panorama.bytes())?;
     let (plan, frames) = stitch.plan(&budget, progress)?;

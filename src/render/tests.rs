@@ -3,6 +3,7 @@
 use super::*;
 use crate::progress::Silent;
 use crate::test_wall::{self, TestWall};
+use crate::trajectory::Shutter;
 
 /// Frames as they are, all of them averaged: what shows geometry alone.
 const PLAIN: RenderOptions = RenderOptions {
@@ -19,7 +20,7 @@ const BEST: RenderOptions = RenderOptions {
 };
 
 fn draw(wall: &TestWall, mut stack: FrameStack, ppm: f64, options: &RenderOptions) -> Panorama {
-    let placements = place(&wall.circle, &wall.camera, &wall.poses).unwrap();
+    let placements = place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, ppm).unwrap();
     let progress = &Silent;
     render(
@@ -223,7 +224,7 @@ fn raw_pixels_are_those_of_the_frames() {
         0.8 * value + (2 * k) as f32 + ((7 * u + 13 * v + 5 * k) % 11) as f32
     });
     let frames = stack.clone();
-    let placements = place(&wall.circle, &wall.camera, &wall.poses).unwrap();
+    let placements = place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, 70.0).unwrap();
     let options = RenderOptions {
         interpolation: Interpolation::Nearest,
@@ -381,7 +382,7 @@ fn little_memory_changes_nothing_but_the_time() {
             FrameFile { index, path }
         })
         .collect();
-    let placements = place(&wall.circle, &wall.camera, &wall.poses).unwrap();
+    let placements = place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, 700.0).unwrap();
     let draw = |room| {
         let mut frames = FrameStack::open(&files, &wall.camera, 0).unwrap();

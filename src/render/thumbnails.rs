@@ -122,7 +122,11 @@ impl Thumbnails {
         points: &'a Points,
     ) -> ThumbnailView<'a> {
         ThumbnailView {
-            look: Look::new(&self.camera, &placement.pose, &points.origin),
+            look: Look::new(
+                &placement.camera(&self.camera),
+                &placement.pose,
+                &points.origin,
+            ),
             picture: &self.pictures[frame],
             bilinear: &self.bilinear,
             points,

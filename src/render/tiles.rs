@@ -122,6 +122,7 @@ mod tests {
     use crate::camera::Camera;
     use crate::render::place;
     use crate::surface::Circle;
+    use crate::trajectory::Shutter;
     use crate::trajectory::spiral;
 
     #[test]
@@ -129,7 +130,7 @@ mod tests {
         let circle = Circle::new(3.0).unwrap();
         let camera = Camera::from_vertical_fov(64, 48, 1.0);
         let poses = spiral(12, 0.5, 30f64.to_radians());
-        let placements = place(&circle, &camera, &poses).unwrap();
+        let placements = place(&circle, &camera, &poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&circle, &placements, 40.0).unwrap();
         let bands = tiles(&circle, &canvas, &placements, EDGE);
         let pixels: u32 = bands

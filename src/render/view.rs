@@ -59,7 +59,7 @@ impl<'a> View<'a> {
         let (width, height) = (camera.width as f32, camera.height as f32);
         Self {
             frame,
-            look: Look::new(camera, &placement.pose, &points.origin),
+            look: Look::new(&placement.camera(camera), &placement.pose, &points.origin),
             picture,
             kernels,
             response,

@@ -74,7 +74,7 @@ impl Look {
             centre: pose.to_camera(origin).cast().into(),
             focal: [camera.fx as f32, camera.fy as f32],
             principal: [camera.cx as f32, camera.cy as f32],
-            lens: SingleLens::new(&camera.lens),
+            lens: SingleLens::new(camera),
             limit: [(camera.width - 1) as f32, (camera.height - 1) as f32],
         }
     }
@@ -161,6 +161,15 @@ impl Run {
             SingleLens::Straight(lens) => self.project_through(lens, look, points, start, count),
             SingleLens::Brown(lens) => self.project_through(lens, look, points, start, count),
             SingleLens::Fisheye(lens) => self.project_through(lens, look, points, start, count),
+            SingleLens::RollingStraight(lens) => {
+                self.project_through(lens, look, points, start, count)
+            }
+            SingleLens::RollingBrown(lens) => {
+                self.project_through(lens, look, points, start, count)
+            }
+            SingleLens::RollingFisheye(lens) => {
+                self.project_through(lens, look, points, start, count)
+            }
         }
     }
 

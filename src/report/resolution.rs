@@ -18,7 +18,7 @@ const COARSER: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// [`ReportError::Render`]: poses that lie nowhere on the wall, frames that cannot be read.
 pub fn resolution(survey: &Survey, poses: &[Pose]) -> Result<Option<f64>, ReportError> {
     let (surface, camera) = (survey.surface.as_ref(), &survey.camera);
-    let placements = place(surface, camera, poses)?;
+    let placements = place(surface, camera, poses, &survey.shutter())?;
     let native = native_px_per_metre(surface, camera, poses)?;
     let mut px_per_metre = native;
     loop {

@@ -17,23 +17,29 @@ const CELLS: usize = 2;
 /// stand inside. Rays are cast through the corners of half pixels; what lies between meets the wall between them, to within
 /// some 10⁻⁴ of a pixel (an eighth of the square of half a pixel times the map's curvature; more towards the axis's
 /// vanishing points).
-pub(super) fn cast(band: &Band, radius_m: f64, camera: &Camera, pose: &Pose, n: u32) -> GreyImage {
+///
+/// `pose`: where the camera is when a row is read.
+pub(super) fn cast(
+    band: &Band,
+    radius_m: f64,
+    camera: &Camera,
+    pose: impl Fn(f64) -> Pose,
+    n: u32,
+) -> GreyImage {
     let (width, height) = (camera.width as usize, camera.height as usize);
     let points: Vec<Point> = (0..n).map(|k| Point::new(k, n)).collect();
-    let caster = Caster {
-        radius_m,
-        t: pose.t_wc,
+    let line = |v: f64| {
+        let pose = pose(v);
+        let t = pose.t_wc;
+        Caster { radius_m, t }.line(camera, &pose, v)
     };
     let share = 1.0 / (n * n) as f32;
     let mut data = vec![0.0f32; width * height];
-    let mut lines = vec![caster.line(camera, pose, -0.5)];
+    let mut lines = vec![line(-0.5)];
     for (v, row) in data.chunks_exact_mut(width).enumerate() {
         // The last line of a row of pixels is the first of the next.
         lines.drain(..lines.len() - 1);
-        lines.extend((1..=CELLS).map(|line| {
-            let v = v as f64 - 0.5 + line as f64 / CELLS as f64;
-            caster.line(camera, pose, v)
-        }));
+        lines.extend((1..=CELLS).map(|k| line(v as f64 - 0.5 + k as f64 / CELLS as f64)));
         for (u, pixel) in row.iter_mut().enumerate() {
             for down in &points {
                 let (upper, lower) = (&lines[down.cell], &lines[down.cell + 1]);
@@ -247,7 +253,7 @@ mod tests {
     }
 
     fn shows_the_wall(band: &Band, radius_m: f64, camera: &Camera, pose: &Pose) {
-        let frame = cast(band, radius_m, camera, pose, 4);
+        let frame = cast(band, radius_m, camera, |_| *pose, 4);
         let mut compared = 0;
         for k in 0..160_000 {
             let (theta, h_m) = (

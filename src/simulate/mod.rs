@@ -30,6 +30,7 @@ mod lamp;
 mod moving;
 mod noise;
 mod options;
+mod path;
 mod picture;
 mod run;
 mod scene;

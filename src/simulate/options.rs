@@ -51,6 +51,13 @@ pub struct SimulateOptions {
     pub advance_m: f64,
     /// Turn about the axis from frame to frame, degrees.
     pub turn_deg: f64,
+    /// Time from frame to frame, seconds.
+    #[serde(skip_serializing_if = "is_a_second")]
+    pub interval_s: f64,
+    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds; negative if rows are read
+    /// bottom-up, 0 if all are read at once. Poses are those of the middle row; between them the camera moves smoothly.
+    #[serde(skip_serializing_if = "is_default")]
+    pub readout_ms: f64,
     /// Where the camera really stands, relative to the plan, metres; the initial poses do not know.
     pub offset_m: [f64; 3],
     /// Noise on the plan, if any; the initial poses do not know.
@@ -91,6 +98,11 @@ pub struct SimulateOptions {
 }
 
 /// True of what was not asked for: the record leaves it out.
+fn is_a_second(value: &f64) -> bool {
+    *value == 1.0
+}
+
+/// The same.
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
@@ -104,6 +116,8 @@ impl SimulateOptions {
             camera: Camera::from_vertical_fov(640, 480, 60f64.to_radians()),
             advance_m: 0.0,
             turn_deg: 30.0,
+            interval_s: 1.0,
+            readout_ms: 0.0,
             offset_m: [0.0; 3],
             jitter: None,
             wall: Wall::Brick,
@@ -211,6 +225,14 @@ impl SimulateOptions {
                 "the sigmas of the jitter must not be negative",
             )?;
         }
+        check(
+            positive(self.interval_s),
+            "the time from frame to frame must be a positive number of seconds",
+        )?;
+        check(
+            (1e-3 * self.readout_ms).abs() < self.interval_s,
+            "reading out a frame must take less time than passes from frame to frame",
+        )?;
         if let Wall::Texture { width_m, .. } = self.wall {
             check(
                 positive(width_m),
@@ -287,6 +309,19 @@ mod tests {
             },
             SimulateOptions {
                 noise_grey: -1.0,
+                ..free()
+            },
+            SimulateOptions {
+                interval_s: 0.0,
+                ..free()
+            },
+            SimulateOptions {
+                interval_s: 0.02,
+                readout_ms: -20.0,
+                ..free()
+            },
+            SimulateOptions {
+                readout_ms: f64::NAN,
                 ..free()
             },
             SimulateOptions {

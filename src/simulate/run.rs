@@ -8,7 +8,7 @@ use crate::progress::Progress;
 use crate::survey::{
     CameraSection, FramesSection, PosesSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
 };
-use crate::trajectory::{Pose, StampedPose, indexed, tum};
+use crate::trajectory::{Pose, StampedPose, tum};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
@@ -116,6 +116,7 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
         camera: CameraSection {
             file: "camera.json".into(),
             name: None,
+            readout_ms: (options.readout_ms != 0.0).then_some(options.readout_ms),
         },
         frames: FramesSection {
             images: "frames/*.png".to_owned(),
@@ -137,8 +138,11 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
     let record = serde_json::to_string_pretty(simulated)
         .map_err(|error| WriteError::new(&record_path, other(error.to_string())))?;
     let trajectory = |poses: &[Pose]| {
-        let all = indexed(poses.iter().copied());
-        let there: Vec<StampedPose> = scene.frames().map(|frame| all[frame]).collect();
+        let stamped = |frame: usize| StampedPose {
+            time_s: frame as f64 * options.interval_s,
+            pose: poses[frame],
+        };
+        let there: Vec<StampedPose> = scene.frames().map(stamped).collect();
         tum::format(&there)
     };
     atomic::write_text(&survey_path, &survey)?;

@@ -6,6 +6,7 @@ use super::damp::Damp;
 use super::lamp::Lamp;
 use super::moving::hide_behind_things;
 use super::noise::Purpose;
+use super::path::Path;
 use super::sensor::deliver;
 use super::spoil::spoil;
 use super::wall::{Texture, texture};
@@ -37,7 +38,7 @@ pub struct Scene {
     options: SimulateOptions,
     camera: Camera,
     plan: Vec<Pose>,
-    truth: Vec<Pose>,
+    path: Path,
     /// Least and greatest chainage that each frame sees, metres.
     reaches: Vec<[f64; 2]>,
     texture: Box<dyn Texture>,
@@ -69,11 +70,13 @@ impl Scene {
             let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
             truth = Jitter::from(jitter).apply(&truth, &mut rng);
         }
-        let reaches = (0..truth.len())
-            .map(|frame| reach(frame, &truth[frame], &camera, options.radius_m))
+        let texel_m = texel_m(options, &camera, &truth);
+        let readout_share = 1e-3 * options.readout_ms / options.interval_s;
+        let path = Path::new(truth, readout_share, camera.height);
+        let reaches = (0..options.frames)
+            .map(|frame| reach(frame, &path, &camera, options.radius_m))
             .collect::<Result<Vec<_>, _>>()?;
         let perimeter_m = TAU * options.radius_m;
-        let texel_m = texel_m(options, &camera, &truth);
         let widest = reaches
             .iter()
             .map(|h_m| h_m[1] - h_m[0])
@@ -99,7 +102,7 @@ impl Scene {
             options: options.clone(),
             camera,
             plan,
-            truth,
+            path,
             reaches,
         })
     }
@@ -114,9 +117,9 @@ impl Scene {
         &self.plan
     }
 
-    /// The poses as they are.
+    /// The poses as they are, of each frame's middle row.
     pub fn truth(&self) -> &[Pose] {
-        &self.truth
+        self.path.poses()
     }
 
     /// Gain and bias of a frame.
@@ -126,7 +129,7 @@ impl Scene {
 
     /// The frames that are there, in their order.
     pub fn frames(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.truth.len()).filter(|frame| self.options.bad_frames.shown(*frame).is_some())
+        (0..self.options.frames).filter(|frame| self.options.bad_frames.shown(*frame).is_some())
     }
 
     /// A frame without noise, as if it were a good one, in grey levels that are neither rounded nor saturated: the wall
@@ -180,7 +183,7 @@ impl Scene {
     /// the wall for each fits into bounded memory.
     pub(super) fn batches(&self) -> Vec<Batch> {
         let mut batches: Vec<Batch> = Vec::new();
-        for frame in 0..self.truth.len() {
+        for frame in 0..self.options.frames {
             let Some(shown) = self.options.bad_frames.shown(frame) else {
                 continue;
             };
@@ -217,12 +220,11 @@ impl Scene {
     /// [`Self::render_exact`], of a band that holds all the frame sees.
     fn exact(&self, band: &Band, frame: usize) -> GreyImage {
         let options = &self.options;
-        let pose = &self.truth[frame];
         let wall = cast(
             band,
             options.radius_m,
             &self.camera,
-            pose,
+            |v| self.path.at_row(frame, v),
             options.supersample,
         );
         let seen = hide_behind_things(options.seed, frame, options.moving, wall);
@@ -266,10 +268,11 @@ pub(super) struct Batch {
 /// [`SimulateError::CameraOutside`], [`SimulateError::LooksAlongTheAxis`].
 fn reach(
     frame: usize,
-    pose: &Pose,
+    path: &Path,
     camera: &Camera,
     radius_m: f64,
 ) -> Result<[f64; 2], SimulateError> {
+    let pose = &path.poses()[frame];
     let distance_m = pose.t_wc.x.hypot(pose.t_wc.z);
     if distance_m >= 0.99 * radius_m {
         return Err(SimulateError::CameraOutside {
@@ -281,23 +284,25 @@ fn reach(
     let reach_m = REACH_RADII * radius_m;
     let too_far = SimulateError::LooksAlongTheAxis { frame, reach_m };
     // The axis's vanishing points lie where its directions project to.
+    let last = f64::from(camera.height - 1);
     for axis in [Vector3::y(), -Vector3::y()] {
-        let x_c = pose.r_wc.inverse_transform_vector(&axis);
-        if let Some(pixel) = camera.project(&x_c)
-            && camera.sees(&pixel, -1.0)
-        {
-            return Err(too_far);
+        for row in [0.0, 0.5 * last, last] {
+            let r_wc = path.at_row(frame, row).r_wc;
+            let x_c = r_wc.inverse_transform_vector(&axis);
+            if let Some(pixel) = camera.project(&x_c)
+                && camera.sees(&pixel, -1.0)
+            {
+                return Err(too_far);
+            }
         }
     }
-    let caster = Caster {
-        radius_m,
-        t: pose.t_wc,
-    };
     let mut reach = [f64::INFINITY, f64::NEG_INFINITY];
     // Without a vanishing point inside, h takes its extremes on the border.
     let border = camera.border(64, 0.5).into_iter();
-    for ray in border.filter_map(|pixel| camera.ray(pixel.x, pixel.y)) {
-        let (_, h_m) = caster.hit(&(pose.r_wc * ray));
+    for (v, ray) in border.filter_map(|pixel| Some((pixel.y, camera.ray(pixel.x, pixel.y)?))) {
+        let pose = path.at_row(frame, v);
+        let t = pose.t_wc;
+        let (_, h_m) = Caster { radius_m, t }.hit(&(pose.r_wc * ray));
         reach = [reach[0].min(h_m), reach[1].max(h_m)];
     }
     // The border is followed in steps; 1 % covers what bulges between them.

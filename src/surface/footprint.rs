@@ -48,9 +48,8 @@ impl Footprint {
         let perimeter_m = surface.perimeter_m();
         let wall = |pixel: &Vector2<f64>| {
             let ray = camera.ray(pixel.x, pixel.y).ok_or(SurfaceError::NotShown)?;
-            surface
-                .hit(&pose.t_wc, &(pose.r_wc * ray))
-                .map(|hit| hit.wall)
+            let start = pose.to_world(&camera.origin(pixel.y));
+            surface.hit(&start, &(pose.r_wc * ray)).map(|hit| hit.wall)
         };
         let border = camera.border(STEPS_PER_EDGE, 0.0);
         let middle = 0.5 * Vector2::new(f64::from(camera.width - 1), f64::from(camera.height - 1));

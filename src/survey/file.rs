@@ -77,6 +77,10 @@ pub struct CameraSection {
     /// Which camera, if the file has several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
+    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds of the poses' times; negative if
+    /// rows are read bottom-up. Time and pose of a frame are those of its middle row. Without it, all rows are read at once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub readout_ms: Option<f64>,
 }
 
 /// `[frames]`.
@@ -166,6 +170,7 @@ mod tests {
             camera: CameraSection {
                 file: "camera.json".into(),
                 name: None,
+                readout_ms: Some(-20.0),
             },
             frames: FramesSection {
                 images: "frames/*.png".into(),

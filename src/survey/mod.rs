@@ -7,6 +7,7 @@
 //!
 //! [camera]
 //! file = "camera.json"
+//! readout_ms = 20.0           # optional: rolling shutter, from the first row to the last
 //!
 //! [frames]
 //! images = "frames/*.jpg"     # sorted by name

@@ -8,7 +8,7 @@ use super::{plausible, times};
 use crate::camera::{Camera, read_calibration};
 use crate::frames::{self, FrameFile};
 use crate::surface::{Circle, Surface, SurfaceError};
-use crate::trajectory::{Convention, Jitter, Pose, StampedPose, Trajectory, poses_of};
+use crate::trajectory::{Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of};
 use std::path::{Path, PathBuf};
 
 /// A survey, read and checked: everything but the pixels.
@@ -137,6 +137,9 @@ impl Survey {
             None => None,
         };
         (survey.initial, survey.truth, survey.warnings) = (initial, truth, warnings);
+        if let Some(fault) = survey.readout_fault() {
+            return Err(value(fault));
+        }
         Ok(survey)
     }
 
@@ -203,6 +206,30 @@ impl Survey {
     /// The files besides the frames that the survey is made of, whether or not something else was read in their place.
     pub fn own_files(&self) -> &[PathBuf] {
         &self.own_files
+    }
+
+    /// What is wrong with the readout time, if anything: no row of a frame can be read after the next frame's.
+    fn readout_fault(&self) -> Option<String> {
+        let readout_ms = self.file.camera.readout_ms?;
+        let steps = self
+            .initial
+            .windows(2)
+            .map(|pair| pair[1].time_s - pair[0].time_s);
+        let shortest_ms = 1e3 * steps.fold(f64::INFINITY, f64::min);
+        let possible = readout_ms.is_finite() && readout_ms.abs() <= shortest_ms;
+        (!possible).then(|| {
+            format!(
+                "camera.readout_ms is {readout_ms}; it must be a number of milliseconds and no more than the {shortest_ms:.3} ms between \
+                 the times of the nearest two poses in {}",
+                self.file.poses.initial.display()
+            )
+        })
+    }
+
+    /// When the rows of the frames are read, by the times of the initial poses.
+    pub fn shutter(&self) -> Shutter {
+        let readout_s = 1e-3 * self.file.camera.readout_ms.unwrap_or_default();
+        Shutter::new(readout_s, self.camera.height, &self.initial)
     }
 
     /// The initial poses without their times.

@@ -27,6 +27,7 @@ mod plan;
 mod pose;
 mod rigid;
 pub mod se3;
+mod shutter;
 pub mod so3;
 pub(crate) mod text;
 pub(crate) mod times;
@@ -44,6 +45,7 @@ pub use jitter::{Jitter, JitterModel};
 pub use mount::read_camera_in_body;
 pub use plan::spiral;
 pub use pose::Pose;
+pub use shutter::Shutter;
 pub use tunnel_frame::{TunnelAxis, read_tunnel_frame};
 
 /// One pose of a trajectory with its time.

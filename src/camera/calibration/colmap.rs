@@ -2,7 +2,10 @@
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::{Fault, choose};
-use crate::camera::Camera;
+use crate::camera::{Camera, Lens, Sweep};
+
+/// Makes a lens of its coefficients.
+type ReadLens = fn(&[f64]) -> Result<Lens, Fault>;
 
 /// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixels are counted from the corner of the first and converted.
 pub fn read(text: &str, name: Option<&str>) -> Result<Camera, Fault> {
@@ -47,7 +50,7 @@ fn camera(line: &str) -> Result<Camera, String> {
         )
     };
     // Focal lengths and principal point, and how many coefficients follow.
-    let (central, rest, lens): (_, _, fn(&[f64]) -> Result<_, Fault>) = match *model {
+    let (central, rest, lens): (_, _, ReadLens) = match *model {
         "SIMPLE_PINHOLE" => (3, 0, brown_conrady),
         "PINHOLE" => (4, 0, brown_conrady),
         "SIMPLE_RADIAL" => (3, 1, |d| brown_conrady(&[d[0], 0.0])),
@@ -81,5 +84,6 @@ fn camera(line: &str) -> Result<Camera, String> {
         cx: cx - 0.5,
         cy: cy - 0.5,
         lens: lens(&params[central..]).map_err(|fault| fault.what)?,
+        sweep: Sweep::default(),
     })
 }

@@ -3,7 +3,7 @@
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::tree::{numbers, word};
 use super::{Fault, choose};
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, Lens, Sweep};
 use serde_json::Value;
 
 /// True of a tree with `cam0`, `cam1`, …
@@ -65,5 +65,6 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
         cx,
         cy,
         lens,
+        sweep: Sweep::default(),
     })
 }

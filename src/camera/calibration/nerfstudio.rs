@@ -3,7 +3,7 @@
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::tree::{number, pixels, word};
 use super::{Fault, choose};
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, Lens, Sweep};
 use serde_json::Value;
 
 /// True of a tree with `fl_x`, or with `frames`.
@@ -88,5 +88,6 @@ fn camera(own: &Value, tree: &Value) -> Result<Camera, Fault> {
         cx: number(own, &["cx"])? - 0.5,
         cy: number(own, &["cy"])? - 0.5,
         lens,
+        sweep: Sweep::default(),
     })
 }

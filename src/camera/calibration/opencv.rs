@@ -3,7 +3,7 @@
 use super::Fault;
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::tree::{entry, numbers, pixels, word};
-use crate::camera::{Camera, Lens};
+use crate::camera::{Camera, Lens, Sweep};
 use serde_json::Value;
 
 const MATRIX: [&str; 6] = [
@@ -85,5 +85,6 @@ pub fn read(tree: &Value) -> Result<Camera, Fault> {
         cx,
         cy,
         lens,
+        sweep: Sweep::default(),
     })
 }

@@ -1,7 +1,7 @@
 //! Our own calibration file, `camera.json` or `camera.toml`.
 
 use super::Fault;
-use crate::camera::{BrownCoefficients, BrownConrady, Camera, KannalaBrandt, Lens};
+use crate::camera::{BrownCoefficients, BrownConrady, Camera, KannalaBrandt, Lens, Sweep};
 use serde::{Deserialize, Serialize};
 
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -196,6 +196,7 @@ impl CameraFile {
             cx: self.cx - shift,
             cy: self.cy - shift,
             lens,
+            sweep: Sweep::default(),
         })
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::camera::{BrownCoefficients, BrownConrady, KannalaBrandt, Lens};
+use crate::camera::{BrownCoefficients, BrownConrady, KannalaBrandt, Lens, Sweep};
 
 fn read_as(name: &str, text: &str) -> Result<Camera, CalibrationError> {
     read_camera(name, text, None)
@@ -80,6 +80,7 @@ fn calibrated(lens: Lens) -> Camera {
         cx: 318.0,
         cy: 241.0,
         lens,
+        sweep: Sweep::default(),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::refine::tile::{ObserverMoments, SAMPLES, TileWork};
 use crate::refine::view::View;
 use crate::refine::visibility::Visibility;
 use crate::vectors::wide;
-use nalgebra::{Matrix2x5, Matrix2x6, Matrix4, SMatrix};
+use nalgebra::{Matrix2x6, Matrix4, SMatrix};
 use std::ops::Range;
 
 impl Problem<'_> {
@@ -60,10 +60,12 @@ impl Problem<'_> {
                 let view = &views[observer.frame as usize];
                 if let Some(slot) = stretch_slots[observer.frame as usize] {
                     let a = view.wall_jacobian(&points);
-                    let c = match self.calibrates {
-                        true => view.lens_jacobian(&points, &a, lens),
-                        false => Matrix2x5::zeros(),
-                    };
+                    let mut c = Matrix2x6::zeros();
+                    if self.calibrates {
+                        let frame = self.coverage.frames(stretch)[observer.frame as usize];
+                        let seen = view.shared_jacobian(&points, &a, lens, &self.rates[frame]);
+                        c.copy_from(&seen);
+                    }
                     columns.push(Column {
                         place: sums.place(slot),
                         moments: *moments,
@@ -118,8 +120,8 @@ pub struct Column {
     own_features: Option<Matrix4<f64>>,
     /// A.
     pub a: Matrix2x6<f64>,
-    /// C; zero unless the lens is estimated.
-    pub c: Matrix2x5<f64>,
+    /// C; zero unless shared unknowns are estimated.
+    pub c: Matrix2x6<f64>,
     /// `1/a`, shading included.
     pub inverse_gain: f64,
 }

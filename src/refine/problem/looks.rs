@@ -122,7 +122,7 @@ impl Problem<'_> {
     ) -> Result<(), ProblemError> {
         let frames = self.coverage.frames(stretch);
         let pictures = self.pictures.of(frames)?;
-        let views = self.views(stretch, &pictures, &self.held, self.camera);
+        let views = self.held_views(stretch, &pictures);
         foreign.look(self.scene.surface, visibility, frames, &views, &self.noise);
         Ok(())
     }
@@ -143,7 +143,7 @@ impl Problem<'_> {
             let visibility = self.coverage.visibility(stretch)?;
             let frames = self.coverage.frames(stretch);
             let pictures = self.pictures.of(frames)?;
-            let views = self.views(stretch, &pictures, &self.held, self.camera);
+            let views = self.held_views(stretch, &pictures);
             let tiles: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
             let runs = tiles.par_chunks(32).map(|tiles| {
                 let mut gathered = T::default();

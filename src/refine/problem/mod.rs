@@ -20,7 +20,7 @@ use super::robust::NoiseModel;
 use super::shared::Border;
 use super::view::View;
 use super::visibility::Placed;
-use crate::camera::Camera;
+use crate::camera::{Camera, Sweep};
 use crate::frames::Pyramid;
 use crate::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
 use nalgebra::Vector5;
@@ -75,6 +75,10 @@ pub struct FrameShare {
 ///
 /// `participants` are sampled; of them the `active` frames are estimated and the others held. The wall is worked
 /// through in stretches along the tunnel, so that memory for frames and samples does not grow with its length.
+///
+/// With a rolling shutter, the motion of each camera during its picture is that of the poses the problem was made with, and
+/// stays as it is. A step of a frame by ξ changes its neighbours' motion by `readout/(2 interval) ξ`, a few hundredths, and
+/// what is left of that is taken up by the next solve.
 pub struct Problem<'a> {
     scene: Scene<'a>,
     sampling: Sampling,
@@ -84,6 +88,8 @@ pub struct Problem<'a> {
     participants: Range<usize>,
     active: Range<usize>,
     held: Vec<FrameEstimate>,
+    /// Motion of each participant's camera if its readout took a second.
+    rates: Vec<Sweep>,
     coverage: Coverage<'a>,
     /// The first active frame that is compared, counted from the first active one: the gauge is tied there.
     tied: Option<usize>,
@@ -125,6 +131,9 @@ impl<'a> Problem<'a> {
         let tied = active
             .clone()
             .position(|frame| compared[frame - participants.start]);
+        let rate = |frame| scene.sweep_rate(frame, &participants, estimates);
+        let rates: Vec<Sweep> = participants.clone().map(rate).collect();
+        let readout_s = scene.calibration.readout_s(&scene.kappa);
         let placed = participants
             .clone()
             .into_par_iter()
@@ -134,9 +143,11 @@ impl<'a> Problem<'a> {
                     return Ok(None);
                 }
                 let pose = estimate.pose;
+                let sweep = rates[frame - participants.start].times(readout_s);
                 Ok(Some(Placed {
                     pose,
-                    footprint: footprint(scene, &camera, frame, &pose)?,
+                    sweep,
+                    footprint: footprint(scene, &camera.sweeping(&sweep), frame, &pose)?,
                     active: active.contains(&frame),
                 }))
             })
@@ -172,6 +183,7 @@ impl<'a> Problem<'a> {
             camera,
             grid,
             held: estimates.to_vec(),
+            rates,
             coverage,
             tied,
             compared: compared_frames,
@@ -258,21 +270,39 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The frames of a stretch at the given estimates of all participants, seen by `camera` (of the level).
+    /// The camera at full size with the motion of a participant's.
+    pub fn camera_of(&self, participant: usize) -> Camera {
+        let readout_s = self.scene.calibration.readout_s(&self.scene.kappa);
+        let sweep = self.rates[participant].times(readout_s);
+        self.scene.camera.sweeping(&sweep)
+    }
+
+    /// The frames of a stretch at the given estimates of all participants, seen by `camera` (of the level), read out in `readout_s`.
     fn views<'s>(
         &self,
         stretch: usize,
         pictures: &'s [Arc<Pyramid>],
         estimates: &[FrameEstimate],
         camera: Camera,
+        readout_s: f64,
     ) -> Vec<View<'s>> {
         let frames = self.coverage.frames(stretch).iter();
         frames
             .zip(pictures)
             .map(|(k, picture)| {
-                View::new(picture.level(self.sampling.level), camera, &estimates[*k])
+                View::new(
+                    picture.level(self.sampling.level),
+                    camera.sweeping(&self.rates[*k].times(readout_s)),
+                    &estimates[*k],
+                )
             })
             .collect()
+    }
+
+    /// The same as the problem was made.
+    fn held_views<'s>(&self, stretch: usize, pictures: &'s [Arc<Pyramid>]) -> Vec<View<'s>> {
+        let readout_s = self.scene.calibration.readout_s(&self.scene.kappa);
+        self.views(stretch, pictures, &self.held, self.camera, readout_s)
     }
 
     fn with_active(&self, active: &[FrameEstimate]) -> Vec<FrameEstimate> {
@@ -332,7 +362,13 @@ impl<'a> Problem<'a> {
             let visibility = self.coverage.visibility(stretch)?;
             let pictures = self.pictures.of(self.coverage.frames(stretch))?;
             let camera = lens.at_level(self.sampling.level);
-            let views = self.views(stretch, &pictures, &estimates, camera);
+            let views = self.views(
+                stretch,
+                &pictures,
+                &estimates,
+                camera,
+                calibration.readout_s(kappa),
+            );
             for batch in visibility.blocks.chunks(BATCH) {
                 let sums: Vec<BlockSums> = batch
                     .par_iter()

@@ -1,12 +1,13 @@
 //! What a problem is made of.
 
-use crate::camera::Camera;
+use crate::camera::{Camera, Sweep};
 use crate::frames::{FrameCache, FrameError};
 use crate::refine::calibration::{Calibration, Kappa};
 use crate::refine::estimate::FrameEstimate;
 use crate::refine::factor::FactorError;
-use crate::refine::prior::Prior;
+use crate::refine::prior::{Prior, predict};
 use crate::surface::{Surface, SurfaceError};
+use crate::trajectory::{Pose, Shutter};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -38,8 +39,10 @@ impl Sampling {
 pub struct Scene<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
-    /// The camera at full size, as far as it is known by now.
+    /// The camera at full size, as far as it is known by now, at rest.
     pub camera: Camera,
+    /// When the rows of the frames are read.
+    pub shutter: &'a Shutter,
     /// What all frames share and may be estimated.
     pub calibration: Calibration,
     /// Its unknowns by now; the camera is that of these.
@@ -65,6 +68,39 @@ impl Scene<'_> {
             },
             None => self,
         }
+    }
+
+    /// How the camera moves while frame `frame` is read, with the frames `run` at their `estimates`.
+    ///
+    /// Neighbours outside the run (not placed yet, say) are where the initial steps from the frame lead.
+    pub fn sweep(&self, frame: usize, run: &Range<usize>, estimates: &[FrameEstimate]) -> Sweep {
+        let readout_s = self.calibration.readout_s(&self.kappa);
+        match readout_s == 0.0 {
+            true => Sweep::default(),
+            false => self.sweep_rate(frame, run, estimates).times(readout_s),
+        }
+    }
+
+    /// The same if the readout took a second.
+    pub fn sweep_rate(
+        &self,
+        frame: usize,
+        run: &Range<usize>,
+        estimates: &[FrameEstimate],
+    ) -> Sweep {
+        let estimate = |k: usize| estimates.get(k.checked_sub(run.start)?);
+        let metric = self.calibration.metric(&self.kappa);
+        let initial = |k: usize| {
+            let pose = self.prior.initial.get(k)?;
+            Some(metric.place_nominal(pose))
+        };
+        self.shutter.rate(frame, |k| {
+            let expected = |own: &Pose| Some(predict(own, &initial(frame)?, &initial(k)?));
+            match estimate(k) {
+                Some(estimate) => Some(estimate.pose),
+                None => expected(&estimate(frame)?.pose),
+            }
+        })
     }
 }
 

@@ -17,8 +17,8 @@ const PARTS: usize = 4;
 /// A frame with its place.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// The camera.
-    pub camera: &'a Camera,
+    /// The camera, with its motion.
+    pub camera: Camera,
     /// Where it stood.
     pub pose: &'a Pose,
 }
@@ -238,7 +238,7 @@ impl Stencils {
 
 /// The pixels' places in the region: those whose footprints lie in it entirely and are not too wide.
 fn spots(surface: &dyn Surface, canvas: &Canvas, region: &Region, view: &View) -> Vec<Spot> {
-    let (camera, pose) = (view.camera, view.pose);
+    let (camera, pose) = (&view.camera, view.pose);
     let Some([columns, rows]) = window(surface, canvas, region, view) else {
         return Vec::new();
     };
@@ -246,10 +246,11 @@ fn spots(surface: &dyn Surface, canvas: &Canvas, region: &Region, view: &View) -
     let wide = (columns[1] - columns[0] + 2) as usize;
     let mut places: Vec<[f32; 2]> = Vec::with_capacity(wide * (rows[1] - rows[0] + 2) as usize);
     for v in rows[0] - 1..=rows[1] {
+        let start = pose.to_world(&camera.origin(v as f64));
         places.extend((columns[0] - 1..=columns[1]).map(|u| {
             let hit = camera
                 .ray(u as f64, v as f64)
-                .and_then(|ray| surface.hit(&pose.t_wc, &(pose.r_wc * ray)).ok());
+                .and_then(|ray| surface.hit(&start, &(pose.r_wc * ray)).ok());
             hit.map_or([f32::NAN; 2], |hit| region.place(canvas, &hit.wall))
         }));
     }
@@ -372,7 +373,7 @@ mod tests {
             rows: 40,
         };
         let view = View {
-            camera: &wall.camera,
+            camera: wall.camera,
             pose: &pose,
         };
         let footprints = Footprints::new(&wall.circle, &canvas, region, &[view]);
