@@ -1,5 +1,6 @@
 //! The command line: arguments, printing and exit codes; the work is done by the library.
 
+mod carrier;
 mod compare;
 mod config;
 mod configuration;
@@ -7,10 +8,13 @@ mod converge;
 mod convert;
 mod demo;
 mod failure;
+mod frame_times;
+mod gyro;
 mod hardships;
 mod json;
 mod locate;
 mod outputs;
+mod plan;
 mod poses;
 mod project;
 mod record;
@@ -18,6 +22,7 @@ mod refine;
 mod shell;
 mod simulate;
 mod stitch;
+mod suggestion;
 mod terminal;
 
 pub use failure::Failure;
@@ -59,6 +64,8 @@ pub struct Global {
 enum Command {
     Demo(demo::DemoArguments),
     Simulate(simulate::SimulateArguments),
+    Plan(plan::PlanArguments),
+    Gyro(gyro::GyroArguments),
     Refine(refine::RefineArguments),
     Stitch(stitch::StitchArguments),
     Locate(locate::LocateArguments),
@@ -104,6 +111,8 @@ pub fn run() -> Result<(), Failure> {
     match cli.command {
         Command::Demo(arguments) => demo::run(&arguments, &terminal),
         Command::Simulate(arguments) => simulate::run(&arguments, &terminal),
+        Command::Plan(arguments) => plan::run(&arguments, &terminal),
+        Command::Gyro(arguments) => gyro::run(&arguments, &terminal),
         Command::Refine(arguments) => refine::run(&arguments, &run, &terminal),
         Command::Stitch(arguments) => stitch::run(&arguments, &run, &terminal),
         Command::Locate(arguments) => locate::run(&arguments, &terminal),

@@ -19,6 +19,7 @@ mod error;
 mod euroc;
 mod file;
 mod format;
+pub mod gyro;
 mod jitter;
 pub mod kitti;
 mod mount;
@@ -42,7 +43,7 @@ pub use file::{PoseEntry, PoseFile, read_poses};
 pub use format::PoseFormat;
 pub use jitter::{Jitter, JitterModel};
 pub use mount::read_camera_in_body;
-pub use plan::spiral;
+pub use plan::{Mounting, PlanTable, Rate, Station, Steady, spiral};
 pub use pose::Pose;
 pub use tunnel_frame::{TunnelAxis, read_tunnel_frame};
 
