@@ -7,7 +7,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;
 use std::path::Path;
-use support::{fail, succeed, text};
+use support::{fail, succeed, text, tunnelstitch};
 use tunnelstitch::evaluate::wall_error;
 use tunnelstitch::survey::Survey;
 use tunnelstitch::trajectory::{Pose, poses_of, tum};
@@ -214,6 +214,39 @@ fn the_clock_is_found_by_the_plan() {
     let poses = poses_of(&tum::read(&out).unwrap());
     assert!(poses[29].r_wc.angle_to(&truth[29].r_wc) < 0.01);
     assert!((poses[29].t_wc.y - 1.45).abs() < 1e-9);
+
+    // The same sensor by a matrix from its axes to the camera's, and looked upon in a mirror.
+    let mount = dir.path().join("mount.txt");
+    std::fs::write(&mount, "1 0 0 0\n0 -1 0 0\n0 0 -1 0\n0 0 0 1\n").unwrap();
+    let with = |more: &[&str]| {
+        let all = [
+            "gyro",
+            text(&log),
+            "--frames",
+            "30",
+            "--fps",
+            "1",
+            "--time-offset-s",
+            "4",
+            "--out",
+            text(&out),
+        ];
+        let output = tunnelstitch(&[&all, more].concat());
+        assert!(output.status.success(), "{output:?}");
+        let poses = poses_of(&tum::read(&out).unwrap());
+        (poses, String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (by_word, _) = with(&["--advance-m", "0.1"]);
+    let (by_matrix, _) = with(&["--advance-m", "0.1", "--body-to-camera", text(&mount)]);
+    for (a, b) in by_word.iter().zip(&by_matrix) {
+        assert!(a.local(b).norm() < 1e-9, "{a:?} {b:?}");
+    }
+    let (mirrored, warned) = with(&["--orientation", "yxZ"]);
+    assert!(
+        warned.contains("is a mirror") && warned.contains("stay where it is"),
+        "{warned}"
+    );
+    assert!(mirrored[29].r_wc.angle_to(&by_word[29].r_wc) > 0.1);
 }
 
 #[test]

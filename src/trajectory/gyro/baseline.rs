@@ -268,3 +268,117 @@ fn gaps(rates: &Rates, span_s: [f64; 2]) -> Option<String> {
         )
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trajectory::gyro::GyroSample;
+    use crate::trajectory::so3;
+
+    /// A sensor without noise, with a bias of 0.01 rad/s about every axis: three seconds at rest, then 0.5 rad/s about y.
+    fn log(gap: bool, accelerations: bool) -> GyroLog {
+        let in_gap = |t: f64| gap && t > 5.0 && t < 5.5;
+        let times = (0..1600).map(|k| f64::from(k) / 200.0);
+        let sample = |time_s: f64| GyroSample {
+            time_s,
+            rate_rad_s: Vector3::from_element(0.01)
+                + Vector3::y() * if time_s < 3.0 { 0.0 } else { 0.5 },
+            acceleration_g: accelerations.then(Vector3::y),
+        };
+        GyroLog {
+            path: "log.gcsv".into(),
+            orientation: None,
+            readout: None,
+            samples: times.filter(|t| !in_gap(*t)).map(sample).collect(),
+        }
+    }
+
+    const OPTIONS: GyroOptions = GyroOptions {
+        rest: RestChoice::Find(2.0),
+        bias_rad_s: None,
+        density_rad_sqrt_s: None,
+        scale_sigma: 0.0,
+        total_turn_rad: None,
+        clock: Clock::Offset(3.5),
+        start: Start::Station,
+    };
+
+    fn baseline(log: &GyroLog, options: &GyroOptions) -> Result<GyroBaseline, PoseError> {
+        let times_s: Vec<f64> = (0..5).map(f64::from).collect();
+        let station = |t: &f64| Station {
+            chainage_m: *t,
+            angle_rad: 1.0,
+            offset_m: [0.1, 0.0],
+        };
+        let stations: Vec<Station> = times_s.iter().map(station).collect();
+        let frames = Frames {
+            times_s: &times_s,
+            stations: &stations,
+            mounting: Mounting {
+                arm_m: 0.2,
+                ..Mounting::default()
+            },
+        };
+        baseline_from_gyro(log, &Matrix3::identity(), &frames, options)
+    }
+
+    #[test]
+    fn rotations_are_the_logs_and_places_the_stations() {
+        let found = baseline(&log(false, true), &OPTIONS).unwrap();
+        assert!((found.bias_rad_s - Vector3::from_element(0.01)).norm() < 1e-12);
+        assert!((found.turned_rad - 2.0).abs() < 1e-9 && found.warnings.is_empty());
+        let last = found.trajectory[4];
+        assert_eq!(last.time_s, 4.0);
+        let expected = so3::exp(&(Vector3::y() * 3.0));
+        assert!(last.pose.r_wc.angle_to(&expected) < 1e-9);
+        let place = Vector3::new(0.1 + 0.2 * 3f64.sin(), 4.0, 0.2 * 3f64.cos());
+        assert!((last.pose.t_wc - place).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_known_turn_puts_the_bias_about_the_axis_right() {
+        let options = GyroOptions {
+            bias_rad_s: Some(Vector3::zeros()),
+            density_rad_sqrt_s: Some(1e-4),
+            total_turn_rad: Some(2.0),
+            ..OPTIONS
+        };
+        let found = baseline(&log(false, true), &options).unwrap();
+        assert!((found.bias_rad_s - Vector3::y() * 0.01).norm() < 1e-9);
+        assert_eq!(found.noise.bias_sigma_rad_s, 0.0);
+        assert!((found.step_sigma_rad - 1e-4).abs() < 1e-12);
+    }
+
+    #[test]
+    fn gaps_are_told_of() {
+        let found = baseline(&log(true, true), &OPTIONS).unwrap();
+        let warning = &found.warnings[0];
+        assert!(
+            warning.contains("gap of 0.500 s after 5.000 s"),
+            "{warning}"
+        );
+    }
+
+    #[test]
+    fn what_gravity_cannot_tell_is_refused() {
+        let options = GyroOptions {
+            start: Start::Gravity { down_rad: 0.0 },
+            ..OPTIONS
+        };
+        for (accelerations, expected) in [
+            (false, "no accelerations"),
+            (true, "along the tunnel's axis"),
+        ] {
+            let error = baseline(&log(false, accelerations), &options).unwrap_err();
+            assert!(error.to_string().contains(expected), "{error}");
+        }
+        let beyond = GyroOptions {
+            clock: Clock::Offset(4.5),
+            ..OPTIONS
+        };
+        let error = baseline(&log(false, true), &beyond)
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("frame 4 at 4 s is at 8.500 s"), "{error}");
+    }
+}
