@@ -62,11 +62,16 @@ pub struct GyroArguments {
     way: WayArguments,
     /// θ of the tunnel's bottom, degrees: the first angle is then told by gravity where the sensor rested, rather than by
     /// --start-angle-deg or the table.
-    #[arg(long, value_name = "DEG", conflicts_with = "start_angle_deg")]
+    #[arg(
+        long,
+        value_name = "DEG",
+        conflicts_with = "start_angle_deg",
+        help_heading = "Carrier"
+    )]
     down_deg: Option<f64>,
     /// How far the carrier turned about the axis from the first frame to the last, degrees, if known: the bias about the axis is
     /// changed so that it did.
-    #[arg(long, value_name = "DEG")]
+    #[arg(long, value_name = "DEG", help_heading = "Carrier")]
     total_turn_deg: Option<f64>,
     /// 1-σ of each step along x, y and z, metres: how well the carrier keeps to its way.
     #[arg(long, value_name = "X,Y,Z", default_value = "0.02,0.02,0.03", value_parser = numbers::<3>)]
@@ -97,7 +102,7 @@ struct SensorArguments {
     bias_deg_per_s: Option<[f64; 3]>,
     /// The noise density as data sheets have it, thousandths of a degree a second per √Hz, instead of that at rest.
     #[arg(long, value_name = "MDPS/√HZ", value_parser = positive)]
-    density_mdeg: Option<f64>,
+    density_mdps_sqrt_hz: Option<f64>,
     /// 1-σ of the sensor's scale, per cent of the angle turned: 1 to 3 for most as they come, a tenth of it once calibrated.
     #[arg(long, value_name = "PERCENT", default_value_t = 1.0)]
     scale_sigma_percent: f64,
@@ -160,7 +165,7 @@ pub fn run(arguments: &GyroArguments, terminal: &Terminal) -> Result<(), Failure
         bias_rad_s: sensor
             .bias_deg_per_s
             .map(|b| Vector3::from(b).map(f64::to_radians)),
-        density_rad_sqrt_s: sensor.density_mdeg.map(|d| (1e-3 * d).to_radians()),
+        density_rad_sqrt_s: sensor.density_mdps_sqrt_hz.map(|d| (1e-3 * d).to_radians()),
         scale_sigma: 0.01 * sensor.scale_sigma_percent,
         total_turn_rad: arguments.total_turn_deg.map(f64::to_radians),
         clock: match arguments.match_plan_s {

@@ -42,10 +42,15 @@ pub struct PlanArguments {
     #[command(flatten)]
     way: WayArguments,
     /// Turn about the axis from frame to frame, degrees; positive towards larger θ [default: 0].
-    #[arg(long, value_name = "DEG", conflicts_with_all = ["turn_deg_per_s", "table"])]
+    #[arg(long, value_name = "DEG", conflicts_with_all = ["turn_deg_per_s", "table"], help_heading = "Carrier")]
     turn_deg: Option<f64>,
     /// Turn about the axis each second, degrees.
-    #[arg(long, value_name = "DEG", conflicts_with = "table")]
+    #[arg(
+        long,
+        value_name = "DEG",
+        conflicts_with = "table",
+        help_heading = "Carrier"
+    )]
     turn_deg_per_s: Option<f64>,
     #[command(flatten)]
     mounting: MountingArguments,

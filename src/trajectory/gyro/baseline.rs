@@ -126,7 +126,7 @@ pub fn baseline_from_gyro(
     };
     let density_rad_sqrt_s = match options.density_rad_sqrt_s {
         Some(density) => density,
-        None => rested("give the noise density (--density-mdeg)")?.density_rad_sqrt_s,
+        None => rested("give the noise density (--density-mdps-sqrt-hz)")?.density_rad_sqrt_s,
     };
     let axis = axis_in_camera(&frames.mounting);
     let (offset_s, clock) = match options.clock {
