@@ -9,6 +9,9 @@ pub const MOST_BIAS_RAD_S: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// Windows as quiet as this many times the least variance are all taken for quiet ones.
 const QUIET: f64 = 2.0;
 
+/// Mean rates within this of each other are taken for the same, rad/s: 0.2°/s.
+const SAME_RAD_S: f64 = 0.2 * std::f64::consts::PI / 180.0;
+
 /// A stretch at rest, with what it tells of the gyro.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rest {
@@ -21,8 +24,11 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// The stretch of `length_s` at which the sensor rested: of the windows with no more than twice the least variance, the one
-    /// with the least mean rate. Variance alone cannot tell rest from an even turn.
+    /// The stretch of `length_s` at which the sensor rested: of the windows with no more than twice the least variance, those
+    /// with the least mean rate (to 0.2°/s), and of them the one with the least variance.
+    ///
+    /// Variance alone cannot tell rest from an even turn, and the mean alone would prefer windows with a little turn against the
+    /// bias at their end.
     ///
     /// # Errors
     /// A log shorter than that; no such window with a mean rate below [`MOST_BIAS_RAD_S`]: the carrier never rested.
@@ -58,7 +64,9 @@ impl Rest {
             .map(|w| w.0.max(rounding))
             .fold(f64::INFINITY, f64::min);
         let quiet = windows.iter().filter(|w| w.0 <= QUIET * least);
-        let Some((_, mean, begin)) = quiet.min_by(|a, b| a.1.total_cmp(&b.1)) else {
+        let slowest = quiet.clone().map(|w| w.1).fold(f64::INFINITY, f64::min);
+        let resting = quiet.filter(|w| w.1 <= slowest + SAME_RAD_S);
+        let Some((_, mean, begin)) = resting.min_by(|a, b| a.0.total_cmp(&b.0)) else {
             return Err(format!(
                 "there is no stretch of {length_s} s in a log of {:.3} s with 20 samples and more in it",
                 last_s - first_s
