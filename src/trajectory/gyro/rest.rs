@@ -7,10 +7,10 @@ use nalgebra::Vector3;
 pub const MOST_BIAS_RAD_S: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
 /// Windows as quiet as this many times the least variance are all taken for quiet ones.
-const QUIET: f64 = 2.0;
+const QUIET: f64 = 1.5;
 
-/// Mean rates within this of each other are taken for the same, rad/s: 0.2°/s.
-const SAME_RAD_S: f64 = 0.2 * std::f64::consts::PI / 180.0;
+/// Mean rates within this of each other are taken for the same, rad/s: 0.5°/s.
+const SAME_RAD_S: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 /// A stretch at rest, with what it tells of the gyro.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,8 +24,8 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// The stretch of `length_s` at which the sensor rested: of the windows with no more than twice the least variance, those
-    /// with the least mean rate (to 0.2°/s), and of them the one with the least variance.
+    /// The stretch of `length_s` at which the sensor rested: of the windows with no more than half as much again as the least variance, those
+    /// with the least mean rate (to 0.5°/s), and of them the one with the least variance.
     ///
     /// Variance alone cannot tell rest from an even turn, and the mean alone would prefer windows with a little turn against the
     /// bias at their end.
