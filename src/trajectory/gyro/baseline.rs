@@ -42,7 +42,8 @@ pub enum Clock {
 pub enum Start {
     /// The first frame's station.
     Station,
-    /// Gravity while the sensor rests, with the tunnel's bottom at this θ, radians.
+    /// The angle about the axis by gravity while the sensor rests, with the tunnel's bottom at this θ, radians; the carrier lies
+    /// along the tunnel at the first frame.
     Gravity {
         /// θ of the bottom.
         down_rad: f64,
@@ -170,6 +171,9 @@ pub fn baseline_from_gyro(
         Start::Gravity { down_rad } => {
             let rest = rested("gravity tells no angle (--down-deg)")?;
             let up = to_camera * mean_acceleration(log, rest.span_s).map_err(fail)?;
+            // As the first frame's camera would feel it: the carrier lies along the tunnel there, and perhaps not at the rest.
+            let middle_s = 0.5 * (rest.span_s[0] + rest.span_s[1]);
+            let up = between(first_s, middle_s)? * up;
             let angle_rad =
                 angle_from_gravity_rad(&up, &frames.mounting, down_rad).ok_or_else(|| {
                     fail(
@@ -177,8 +181,7 @@ pub fn baseline_from_gyro(
                             .to_owned(),
                     )
                 })?;
-            let middle_s = 0.5 * (rest.span_s[0] + rest.span_s[1]);
-            attitude(angle_rad) * between(middle_s, first_s)?
+            attitude(angle_rad)
         }
     };
     let mut trajectory = Trajectory::with_capacity(times_s.len());

@@ -24,8 +24,8 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// The stretch of `length_s` at which the sensor rested: of the windows with no more than half as much again as the least variance, those
-    /// with the least mean rate (to 0.5°/s), and of them the one with the least variance.
+    /// The stretch of `length_s` at which the sensor rested: of the windows with no more than half as much again as the least
+    /// variance, those with the least mean rate (to 0.5°/s), and of them the one with the least variance.
     ///
     /// Variance alone cannot tell rest from an even turn, and the mean alone would prefer windows with a little turn against the
     /// bias at their end.
