@@ -1,5 +1,6 @@
 //! The command line: arguments, printing and exit codes; the work is done by the library.
 
+mod carrier;
 mod check;
 mod compare;
 mod config;
@@ -8,11 +9,14 @@ mod converge;
 mod convert;
 mod demo;
 mod failure;
+mod frame_times;
+mod gyro;
 mod hardships;
 mod init;
 mod json;
 mod locate;
 mod outputs;
+mod plan;
 mod poses;
 mod project;
 mod record;
@@ -21,6 +25,7 @@ mod report;
 mod shell;
 mod simulate;
 mod stitch;
+mod suggestion;
 mod terminal;
 
 pub use failure::Failure;
@@ -63,6 +68,8 @@ enum Command {
     Simulate(simulate::SimulateArguments),
     Init(init::InitArguments),
     Check(check::CheckArguments),
+    Plan(plan::PlanArguments),
+    Gyro(gyro::GyroArguments),
     Refine(refine::RefineArguments),
     Stitch(stitch::StitchArguments),
     Locate(locate::LocateArguments),
@@ -106,6 +113,8 @@ pub fn run() -> Result<(), Failure> {
         Command::Simulate(arguments) => simulate::run(&arguments, &terminal),
         Command::Init(arguments) => init::run(&arguments, &terminal),
         Command::Check(arguments) => check::run(&arguments, &terminal),
+        Command::Plan(arguments) => plan::run(&arguments, &terminal),
+        Command::Gyro(arguments) => gyro::run(&arguments, &terminal),
         Command::Refine(arguments) => refine::run(&arguments, &run, &terminal),
         Command::Stitch(arguments) => stitch::run(&arguments, &run, &terminal),
         Command::Locate(arguments) => locate::run(&arguments, &terminal),

@@ -48,6 +48,7 @@ mod calibrate;
 mod discover;
 mod error;
 mod file;
+mod footage;
 mod open;
 mod plausible;
 mod poses;
@@ -61,5 +62,7 @@ pub use error::SurveyError;
 pub use file::{
     CameraSection, FramesSection, PriorSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
 };
+pub use footage::Footage;
 pub use open::Survey;
 pub use poses::PosesSection;
+pub use times::read_frame_times;

@@ -65,10 +65,7 @@ impl Survey {
     ) -> Result<Self, SurveyError> {
         let toml_path = toml_path(path);
         let mut file = read_survey_file(&toml_path)?;
-        let folder = match toml_path.parent() {
-            Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
-            _ => PathBuf::from("."),
-        };
+        let folder = folder_of(&toml_path);
         let mut own_files = vec![toml_path.clone()];
         own_files.extend(file.paths_mut().map(|path| folder.join(&*path)));
         change(&mut file);
@@ -238,8 +235,16 @@ impl Survey {
     }
 }
 
+/// The folder that the paths in `survey.toml` are relative to.
+pub(super) fn folder_of(toml_path: &Path) -> PathBuf {
+    match toml_path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
 /// `survey.toml`, of which `path` is the folder or the name.
-fn toml_path(path: &Path) -> PathBuf {
+pub(super) fn toml_path(path: &Path) -> PathBuf {
     match path.is_dir() {
         true => path.join(SURVEY_FILE),
         false => path.to_owned(),

@@ -15,9 +15,59 @@ use std::path::Path;
 /// # Errors
 /// An unreadable file, a line of another form, a frame without a time, two times of one frame.
 pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, SurveyError> {
+    let lines = read_lines(path)?;
+    let file = |what: String| SurveyError::from(PoseError::file(path, what));
+    if lines.iter().all(|line| line.name.is_none()) {
+        return match lines.len() == frames.len() {
+            true => Ok(lines.iter().map(|line| line.time_s).collect()),
+            false => Err(file(format!(
+                "{} times for {} frames; every frame needs one, in the order of the frames' names, or with its name beside it",
+                lines.len(),
+                frames.len()
+            ))),
+        };
+    }
+    let mut by_name: HashMap<&str, f64> = HashMap::new();
+    for line in &lines {
+        let Some(name) = &line.name else {
+            return Err(file("some lines have a name and some do not".to_owned()));
+        };
+        if by_name.insert(base_name(name), line.time_s).is_some() {
+            let what = format!("a second time of {name}");
+            return Err(PoseError::line(path, line.number, what).into());
+        }
+    }
+    let of_frame = |frame: &FrameFile| {
+        by_name.get(frame.name().as_str()).copied().ok_or_else(|| {
+            file(format!(
+                "no time of frame {} ({})",
+                frame.index,
+                frame.name()
+            ))
+        })
+    };
+    frames.iter().map(of_frame).collect()
+}
+
+/// Reads times of frames that are not at hand, seconds: all lines, in their order.
+///
+/// # Errors
+/// An unreadable file, a line of another form.
+pub fn read_frame_times(path: &Path) -> Result<Vec<f64>, SurveyError> {
+    let lines = read_lines(path)?;
+    Ok(lines.into_iter().map(|line| line.time_s).collect())
+}
+
+/// A line of a list of times.
+struct Line {
+    number: usize,
+    time_s: f64,
+    name: Option<String>,
+}
+
+fn read_lines(path: &Path) -> Result<Vec<Line>, SurveyError> {
     let text = text::read(path)?;
-    let mut in_order = Vec::new();
-    let mut by_name: HashMap<String, f64> = HashMap::new();
+    let mut lines = Vec::new();
     for (number, line) in text::lines(&text) {
         let fail = |what: String| PoseError::line(path, number, what);
         let words: Vec<&str> = line
@@ -41,39 +91,13 @@ pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, Survey
                 "`{time}` is no time; seconds, or whole nanoseconds"
             ))
         })?;
-        match name {
-            None => in_order.push(time_s),
-            Some(name) => {
-                if by_name.insert(base_name(name).to_owned(), time_s).is_some() {
-                    return Err(fail(format!("a second time of {name}")).into());
-                }
-            }
-        }
+        lines.push(Line {
+            number,
+            time_s,
+            name: name.map(str::to_owned),
+        });
     }
-    let file = |what: String| SurveyError::from(PoseError::file(path, what));
-    if by_name.is_empty() {
-        return match in_order.len() == frames.len() {
-            true => Ok(in_order),
-            false => Err(file(format!(
-                "{} times for {} frames; every frame needs one, in the order of the frames' names, or with its name beside it",
-                in_order.len(),
-                frames.len()
-            ))),
-        };
-    }
-    if !in_order.is_empty() {
-        return Err(file("some lines have a name and some do not".to_owned()));
-    }
-    let of_frame = |frame: &FrameFile| {
-        by_name.get(&frame.name()).copied().ok_or_else(|| {
-            file(format!(
-                "no time of frame {} ({})",
-                frame.index,
-                frame.name()
-            ))
-        })
-    };
-    frames.iter().map(of_frame).collect()
+    Ok(lines)
 }
 
 /// The times that the frames' names tell, if all of them do.

@@ -84,10 +84,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
     let Some((header_number, header)) = lines.next() else {
         return Ok(Vec::new());
     };
-    let separator = [b'\t', b';', b',']
-        .into_iter()
-        .find(|separator| header.as_bytes().contains(separator))
-        .unwrap_or(b',');
+    let separator = separator(header);
     let header =
         split(header, separator).map_err(|what| PoseError::line(path, header_number, what))?;
     let columns =
@@ -114,8 +111,17 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
     Ok(entries)
 }
 
+/// What separates the columns of a table, by its first line.
+pub(super) fn separator(header: &str) -> u8 {
+    let is_there = |separator: &u8| header.as_bytes().contains(separator);
+    [b'\t', b';', b',']
+        .into_iter()
+        .find(is_there)
+        .unwrap_or(b',')
+}
+
 /// The columns of a line.
-fn split(line: &str, separator: u8) -> Result<StringRecord, String> {
+pub(super) fn split(line: &str, separator: u8) -> Result<StringRecord, String> {
     let mut reader = ReaderBuilder::new()
         .delimiter(separator)
         .has_headers(false)

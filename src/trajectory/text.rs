@@ -43,6 +43,12 @@ pub(crate) fn number(word: &str, form: &str) -> Result<f64, String> {
     }
 }
 
+/// A finite number of a table that is not one of poses.
+pub(crate) fn finite(word: &str) -> Result<f64, String> {
+    let value = word.parse::<f64>().ok().filter(|value| value.is_finite());
+    value.ok_or_else(|| format!("`{word}` is no finite number"))
+}
+
 /// Exactly N numbers with blanks between; `form` says what they are.
 pub(crate) fn numbers<const N: usize>(line: &str, form: &str) -> Result<[f64; N], String> {
     let values = line

@@ -1,0 +1,36 @@
+//! The frames of a survey that has no poses yet.
+
+use super::file::read_survey_file;
+use super::open::{folder_of, toml_path};
+use super::{SurveyError, times};
+use crate::frames::{self, FrameFile};
+use std::path::Path;
+
+/// The frames of a survey, and when they were taken, before anything is known of their poses.
+#[derive(Clone, Debug)]
+pub struct Footage {
+    /// The frames, sorted by name.
+    pub frames: Vec<FrameFile>,
+    /// Their times, seconds, where a file or all names tell them.
+    pub times_s: Option<Vec<f64>>,
+}
+
+impl Footage {
+    /// Finds the frames of the survey whose folder or `survey.toml` is `path`. `frame_times`: a file of their times, instead of the
+    /// survey's.
+    ///
+    /// # Errors
+    /// A missing or malformed `survey.toml`, no frames, a malformed file of times.
+    pub fn open(path: &Path, frame_times: Option<&Path>) -> Result<Self, SurveyError> {
+        let toml_path = toml_path(path);
+        let file = read_survey_file(&toml_path)?;
+        let folder = folder_of(&toml_path);
+        let frames = frames::list(&folder, &file.frames.images)?;
+        let own = file.frames.times.map(|times| folder.join(times));
+        let times_s = match frame_times.or(own.as_deref()) {
+            Some(path) => Some(times::read(path, &frames)?),
+            None => times::from_names(&frames).ok(),
+        };
+        Ok(Self { frames, times_s })
+    }
+}

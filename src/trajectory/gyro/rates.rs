@@ -1,0 +1,53 @@
+//! Rates of turn over time.
+
+use nalgebra::Vector3;
+
+/// Rates of turn in the camera's axes, rad/s, at times that increase; between them they change evenly.
+#[derive(Clone, Debug)]
+pub struct Rates {
+    times_s: Vec<f64>,
+    rates: Vec<Vector3<f64>>,
+}
+
+impl Rates {
+    /// Rates at times, as many as each other.
+    ///
+    /// # Panics
+    /// If they are not.
+    pub fn new(times_s: Vec<f64>, rates: Vec<Vector3<f64>>) -> Self {
+        assert_eq!(times_s.len(), rates.len(), "a rate for each time");
+        Self { times_s, rates }
+    }
+
+    /// When, seconds.
+    pub fn times_s(&self) -> &[f64] {
+        &self.times_s
+    }
+
+    /// How fast, rad/s.
+    pub fn rates(&self) -> &[Vector3<f64>] {
+        &self.rates
+    }
+
+    /// The first and the last time, seconds.
+    pub fn span_s(&self) -> [f64; 2] {
+        let end = |time: Option<&f64>| time.copied().unwrap_or(f64::NAN);
+        [end(self.times_s.first()), end(self.times_s.last())]
+    }
+
+    /// The median and the longest step between samples, seconds.
+    pub fn steps_s(&self) -> [f64; 2] {
+        let mut steps: Vec<f64> = self.times_s.windows(2).map(|t| t[1] - t[0]).collect();
+        steps.sort_unstable_by(f64::total_cmp);
+        let median = steps.get(steps.len() / 2).copied();
+        [median, steps.last().copied()].map(|step| step.unwrap_or(f64::NAN))
+    }
+
+    /// The same without a bias, rad/s.
+    pub fn without(&self, bias: &Vector3<f64>) -> Self {
+        Self {
+            times_s: self.times_s.clone(),
+            rates: self.rates.iter().map(|rate| rate - bias).collect(),
+        }
+    }
+}
