@@ -143,6 +143,30 @@ fn a_gyros_log_makes_poses_that_refine() {
     // Gravity tells the first angle, to the noise of the way from the rest.
     assert!(poses[0].r_wc.angle_to(&truth[0].r_wc) < 0.01);
 
+    // So does a rest after the last frame, where the carrier is tilted; the bias is known to 0.011°/s there, 0.3° until the first.
+    let late = dir.path().join("late.tum");
+    succeed(&[
+        "gyro",
+        text(&log),
+        "--survey",
+        text(&survey),
+        "--fps",
+        "1",
+        "--time-offset-s",
+        "4",
+        "--advance-m",
+        "0.1",
+        "--down-deg",
+        "180",
+        "--rest-span-s",
+        "27.5,30.5",
+        "--out",
+        text(&late),
+        "--quiet",
+    ]);
+    let late = poses_of(&tum::read(&late).unwrap());
+    assert!(late[0].r_wc.angle_to(&truth[0].r_wc) < 3.0 * 0.3f64.to_radians());
+
     let toml = survey.join("survey.toml");
     let all = std::fs::read_to_string(&toml).unwrap();
     let before = all.split("[poses]").next().unwrap().to_owned();
