@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 /// Writes report.html (one file that needs no other and no network), report.json (the same numbers) and report_pictures/
 /// (the pictures, as they are in the page) into DIR.
 #[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tunnelstitch report my-survey --refined refined --out report")]
 pub struct ReportArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,

@@ -45,9 +45,26 @@ pub fn project(photo: &Picture, camera: &Camera, interpolation: Interpolation) -
         (Samples::Sixteen(_), _) => unroll::<u16, 3>(photo, camera, &kernel, origin, size).into(),
     };
     let image = samples.into_image([width as u32, height as u32], channels);
+    // The photo's outermost points may lie between two columns of the result, and reach no whole row.
+    let [x, y, width, height] = covered(&image);
     CylinderPicture {
-        image,
-        origin_px: origin,
+        image: image.crop_imm(x, y, width, height),
+        origin_px: [origin[0] + i64::from(x), origin[1] + i64::from(y)],
+    }
+}
+
+/// The box around all pixels that are not transparent: its first column and row, width and height; all of the picture if there are none.
+fn covered(image: &DynamicImage) -> [u32; 4] {
+    let (mut from, mut to) = ([u32::MAX; 2], [0; 2]);
+    for (x, y, pixel) in image.to_luma_alpha8().enumerate_pixels() {
+        if pixel[1] > 0 {
+            from = [from[0].min(x), from[1].min(y)];
+            to = [to[0].max(x + 1), to[1].max(y + 1)];
+        }
+    }
+    match from[0] < to[0] {
+        true => [from[0], from[1], to[0] - from[0], to[1] - from[1]],
+        false => [0, 0, image.width(), image.height()],
     }
 }
 
@@ -74,7 +91,7 @@ pub fn from_cylinder(camera: &Camera, u_hat: f64, v_hat: f64) -> Option<[f64; 2]
 /// Points of each of a photo's edges that are asked where they lie on the cylinder.
 const STEPS_PER_EDGE: usize = 64;
 
-/// Least and greatest û, least and greatest v̂ of the photo's pixel centres in whole columns of the result.
+/// Least and greatest û, least and greatest v̂ of the photo's pixel centres.
 ///
 /// They lie on the photo's border: û and v̂ are smooth and one-to-one.
 fn extent(camera: &Camera) -> [f64; 4] {
