@@ -11,6 +11,7 @@ pub use effort::Effort;
 pub use overlap::OverlapCheck;
 pub use pictures::PictureCheck;
 
+use crate::evaluate::upper_median;
 use crate::render::native_px_per_metre;
 use crate::surface::SurfaceError;
 use crate::survey::Survey;
@@ -148,9 +149,7 @@ impl PosesCheck {
 
 /// The middle value; 0 of none.
 fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut values: Vec<f64> = values.collect();
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    upper_median(values.collect()).unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! `TUNNELSTITCH_<COMMAND>_<OPTION>`, else `[options.<command>]` of `survey.toml`, else the default.
 
 use super::{Cli, Failure};
-use crate::survey::{SURVEY_FILE, Survey};
+use crate::survey::{Survey, toml_path};
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches};
@@ -153,10 +153,7 @@ fn of_survey(command: &Command, matches: &ArgMatches) -> Result<Option<Held>, Fa
     let Ok(file) = Survey::read_file(survey) else {
         return Ok(None);
     };
-    let path = match survey.is_dir() {
-        true => survey.join(SURVEY_FILE),
-        false => survey.clone(),
-    };
+    let path = toml_path(survey);
     let fail = |what: String| Failure::input(format!("{}: {what}", path.display()));
     if let Some(other) = file
         .options

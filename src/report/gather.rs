@@ -5,7 +5,7 @@ use super::model::{Abscissa, FrameRow, Report, SCHEMA_VERSION, SurveyFacts, Verd
 use super::pictures::{Pictures, panoramas, thumbnails};
 use super::refined::{RefinedFiles, Refinement};
 use crate::PROGRAM;
-use crate::evaluate::{Comparison, Drawings, SeamMap, WallError};
+use crate::evaluate::{Comparison, Drawings, SeamMap, WallError, upper_median};
 use crate::refine::FrameFlag;
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
@@ -169,7 +169,7 @@ fn verdict(
     let sigma = |pick: fn(&crate::refine::FrameSigma) -> f64| {
         let frames = refinement?.frames.iter();
         let sure = frames.filter(|frame| frame.flag == FrameFlag::Photometric);
-        median(sure.map(|frame| pick(&frame.sigma)).collect())
+        upper_median(sure.map(|frame| pick(&frame.sigma)).collect())
     };
     let wall = comparison.refined.wall.as_ref();
     let error = |pick: fn(&WallError) -> &[f64]| {
@@ -180,8 +180,9 @@ fn verdict(
         (!squares.is_empty()).then(|| mean.sqrt())
     };
     let flagged = refinement.map(|refinement| flagged(refinement).count());
-    let of_frames =
-        |pick: fn(&FrameRow) -> f64| median(frames.iter().map(pick).collect()).unwrap_or_default();
+    let of_frames = |pick: fn(&FrameRow) -> f64| {
+        upper_median(frames.iter().map(pick).collect()).unwrap_or_default()
+    };
     Verdict {
         repaired: flagged.map(|flagged| frames.len() - flagged),
         flagged,
@@ -192,13 +193,6 @@ fn verdict(
         error_wall_mm: error(|wall| &wall.frame_rms_mm),
         error_wall_px: error(|wall| &wall.frame_rms_px),
     }
-}
-
-/// The middle one of the numbers (the upper one of the middle two).
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.retain(|value| value.is_finite());
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
 }
 
 fn wall_maps(drawings: &Drawings) -> WallMaps {
@@ -299,7 +293,7 @@ mod tests {
 
     #[test]
     fn the_median_leaves_out_what_is_no_number() {
-        assert_eq!(median(vec![3.0, f64::NAN, 1.0, 2.0]), Some(2.0));
-        assert_eq!(median(vec![f64::NAN]), None);
+        assert_eq!(upper_median(vec![3.0, f64::NAN, 1.0, 2.0]), Some(2.0));
+        assert_eq!(upper_median(vec![f64::NAN]), None);
     }
 }

@@ -1,6 +1,7 @@
 //! Maps of the wall in colours.
 
 use super::ReportError;
+use super::pictures::encoded;
 use image::codecs::png::PngEncoder;
 use image::{Rgba, RgbaImage};
 
@@ -90,14 +91,9 @@ pub fn png(
             None => Rgba([0; 4]),
         }
     });
-    let mut bytes = Vec::new();
-    match image.write_with_encoder(PngEncoder::new(&mut bytes)) {
-        Ok(()) => Ok(bytes),
-        Err(source) => Err(ReportError::Encode {
-            name: name.to_owned(),
-            source,
-        }),
-    }
+    encoded(name, |bytes| {
+        image.write_with_encoder(PngEncoder::new(bytes))
+    })
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use crate::render::{Canvas, Layout};
 use crate::survey::Survey;
 use image::codecs::jpeg::JpegEncoder;
 use image::imageops::{self, FilterType};
-use image::{DynamicImage, Rgb, RgbImage};
+use image::{DynamicImage, ImageResult, Rgb, RgbImage};
 use std::collections::BTreeMap;
 
 /// Name of the folder beside `report.json` that holds the pictures.
@@ -140,9 +140,18 @@ pub fn thumbnails(
 }
 
 fn jpeg(name: &str, image: &RgbImage, quality: u8) -> Result<Vec<u8>, ReportError> {
+    encoded(name, |bytes| {
+        image.write_with_encoder(JpegEncoder::new_with_quality(bytes, quality))
+    })
+}
+
+/// The bytes that an encoder writes of the picture `name`.
+pub(super) fn encoded(
+    name: &str,
+    encode: impl FnOnce(&mut Vec<u8>) -> ImageResult<()>,
+) -> Result<Vec<u8>, ReportError> {
     let mut bytes = Vec::new();
-    let encoder = JpegEncoder::new_with_quality(&mut bytes, quality);
-    match image.write_with_encoder(encoder) {
+    match encode(&mut bytes) {
         Ok(()) => Ok(bytes),
         Err(source) => Err(ReportError::Encode {
             name: name.to_owned(),

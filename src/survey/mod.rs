@@ -64,5 +64,6 @@ pub use file::{
 };
 pub use footage::Footage;
 pub use open::Survey;
+pub(crate) use open::toml_path;
 pub use poses::PosesSection;
 pub use times::read_frame_times;

@@ -244,7 +244,7 @@ pub(super) fn folder_of(toml_path: &Path) -> PathBuf {
 }
 
 /// `survey.toml`, of which `path` is the folder or the name.
-pub(super) fn toml_path(path: &Path) -> PathBuf {
+pub(crate) fn toml_path(path: &Path) -> PathBuf {
     match path.is_dir() {
         true => path.join(SURVEY_FILE),
         false => path.to_owned(),

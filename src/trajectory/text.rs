@@ -1,6 +1,6 @@
 //! What all text formats are made of: lines, numbers, quaternions, times that increase.
 
-use super::PoseError;
+use super::{PoseEntry, PoseError};
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::collections::HashSet;
 use std::path::Path;
@@ -30,6 +30,21 @@ pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .enumerate()
         .map(|(index, line)| (index + 1, line.trim()))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+/// The pose of each line that says something; `parse_line` is given the line and the time of the pose before.
+pub(super) fn stamped_lines(
+    path: &Path,
+    text: &str,
+    parse_line: impl Fn(&str, Option<f64>) -> Result<PoseEntry, String>,
+) -> Result<Vec<PoseEntry>, PoseError> {
+    let mut entries: Vec<PoseEntry> = Vec::new();
+    for (number, line) in lines(text) {
+        let last_s = entries.last().and_then(|entry| entry.time_s);
+        let entry = parse_line(line, last_s).map_err(|what| PoseError::line(path, number, what))?;
+        entries.push(entry);
+    }
+    Ok(entries)
 }
 
 /// A finite number; `form` says what the line should look like.

@@ -19,13 +19,7 @@ pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
 }
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
-    let mut entries: Vec<PoseEntry> = Vec::new();
-    for (number, line) in text::lines(text) {
-        let last_s = entries.last().and_then(|entry| entry.time_s);
-        let entry = parse_line(line, last_s).map_err(|what| PoseError::line(path, number, what))?;
-        entries.push(entry);
-    }
-    Ok(entries)
+    text::stamped_lines(path, text, parse_line)
 }
 
 fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {

@@ -1,19 +1,16 @@
 //! What the refinement changed of each frame, and how sure it is of it.
 
 use super::View;
-use super::trajectory::marks_key;
+use super::trajectory::{band_and_marks, is_sure};
 use crate::report::FrameRow;
-use crate::report::chart::{Chart, Extra, Series, Style, Vertical, legend};
+use crate::report::chart::{Chart, Series, Style, Vertical, legend};
 use maud::{Markup, html};
 
 /// The section.
 pub fn section(view: &View) -> Markup {
     let frames = &view.report.frames;
-    let sure = frames
-        .iter()
-        .any(|frame| frame.sigma_rotation_deg.is_some());
-    let band = sure.then_some(Extra::Band);
-    let extras: Vec<Extra> = band.into_iter().chain(marks_key(view)).collect();
+    let sure = is_sure(view);
+    let extras = band_and_marks(view);
     html! {
         p { "From the initial to the refined pose of each frame"
             @if sure { ", with its 1-σ relative to the first frame, from the covariance of all poses. Where the band is too \

@@ -14,11 +14,7 @@ pub fn section(view: &View) -> Markup {
     if known {
         entries.push(("true", Style::Truth));
     }
-    let sure = frames
-        .iter()
-        .any(|frame| frame.sigma_rotation_deg.is_some());
-    let band = sure.then_some(Extra::Band);
-    let extras: Vec<Extra> = band.into_iter().chain(marks_key(view)).collect();
+    let extras = band_and_marks(view);
     html! {
         p { "Positions of the camera, metres of the world: the tunnel's axis is y, the chainage; x and z lie across. "
             "Of y, whose size hides everything else, the difference from the plan is shown; so it is of the rotations, "
@@ -41,6 +37,20 @@ pub fn section(view: &View) -> Markup {
             }
         }
     }
+}
+
+/// Whether 1-σ of the poses are known.
+pub fn is_sure(view: &View) -> bool {
+    let frames = &view.report.frames;
+    frames
+        .iter()
+        .any(|frame| frame.sigma_rotation_deg.is_some())
+}
+
+/// Bands of 1-σ and vertical lines, as far as there are any.
+pub fn band_and_marks(view: &View) -> Vec<Extra> {
+    let band = is_sure(view).then_some(Extra::Band);
+    band.into_iter().chain(marks_key(view)).collect()
 }
 
 /// The vertical lines, if there are any.
