@@ -1,4 +1,4 @@
-//! `cargo bench --bench warp [-- --json]`: how fast a frame is laid on the wall.
+//! `cargo bench --bench warp [-- --json] [bilinear] [bicubic] [lanczos3]`: how fast a frame is laid on the wall.
 //!
 //! Twelve RGB frames of 1920 × 1080 px once around a tunnel are drawn at their own resolution with every interpolation, each
 //! pixel from one frame, and a picture of a frame's size is copied. Millions of pixels a second, median and range over
@@ -27,7 +27,10 @@ impl Target for Nowhere {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let json = std::env::args().any(|argument| argument == "--json");
+    let arguments: Vec<String> = std::env::args().collect();
+    let json = arguments.iter().any(|argument| argument == "--json");
+    let named = |name: &str| arguments.iter().any(|argument| argument == name);
+    let all = !["bilinear", "bicubic", "lanczos3"].into_iter().any(named);
     let camera = Camera::from_vertical_fov(1920, 1080, 60f64.to_radians());
     let circle = Circle::new(3.0)?;
     let samples: Vec<u8> = (0..1920 * 1080 * 3)
@@ -48,6 +51,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Interpolation::Bicubic,
         Interpolation::Lanczos3,
     ] {
+        let name = format!("{interpolation:?}").to_lowercase();
+        if !all && !named(&name) {
+            continue;
+        }
         let options = RenderOptions {
             interpolation,
             mode: Mode::BestView,
@@ -61,7 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             plan.draw(&mut frames, u64::MAX, &mut [&mut Nowhere], &Silent)?;
             speeds.push(canvas.pixels() as f64 / since.elapsed().as_secs_f64() / 1e6);
         }
-        rows.push((format!("{interpolation:?}").to_lowercase(), speeds));
+        rows.push((name, speeds));
     }
     let mut copies = Vec::new();
     for _ in 0..ROUNDS {

@@ -18,7 +18,7 @@
 use super::glimpses::{Glimpse, glimpses};
 use super::sample::Sample;
 use super::thumbnails::Thumbnails;
-use super::warp::Run;
+use super::run::Run;
 use super::{Canvas, Placement};
 use crate::frames::{Agreement, MAD_TO_SIGMA, SHADING_TERMS, Shading};
 use crate::surface::Surface;
@@ -29,6 +29,7 @@ use nalgebra::{DMatrix, DVector, Vector2};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Unknowns of a frame: α, β.
 const OWN: usize = 2;
@@ -156,22 +157,27 @@ pub struct Response<'a> {
 }
 
 impl Response<'_> {
-    /// Undoes it in the first `count` values of a run.
-    pub fn undo(&self, run: &mut Run, count: usize) {
-        if self.shading.is_none() && self.gain == 1.0 && self.bias == 0.0 {
+    /// True if there is nothing to undo.
+    pub fn is_none(&self) -> bool {
+        self.shading.is_none() && self.gain == 1.0 && self.bias == 0.0
+    }
+
+    /// Undoes it in some of the values of a run.
+    pub fn undo(&self, run: &mut Run, columns: Range<usize>) {
+        if self.is_none() {
             return;
         }
         let (u, v, seen, values) = run.parts();
         let Some(table) = self.shading else {
-            for value in &mut values[..count] {
+            for value in &mut values[columns] {
                 *value = self.undone(value, self.gain);
             }
             return;
         };
         // Light changes so slowly that it is looked up at the ends of short steps only.
-        for start in (0..count).step_by(STEP) {
-            let end = (start + STEP).min(count);
-            let last = end.min(count - 1);
+        for start in columns.clone().step_by(STEP) {
+            let end = (start + STEP).min(columns.end);
+            let last = end.min(columns.end - 1);
             if seen[start] && seen[last] {
                 let first = self.gain * table.at(u[start], v[start]);
                 let slope =

@@ -2,7 +2,8 @@
 
 use super::thumbnails::Thumbnails;
 use super::tiles::{EDGE, Tile, tiles};
-use super::warp::{Points, Run};
+use super::run::Run;
+use super::warp::Points;
 use super::{Canvas, Placement};
 use crate::frames::{SHADING_TERMS, shading_terms};
 use crate::surface::Surface;

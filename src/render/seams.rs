@@ -92,6 +92,11 @@ impl Seams {
         (4 + 4 * (channels + 3 * (channels + 1))) as u64
     }
 
+    /// True if frames stay as they are: every pixel is one frame's.
+    pub fn are_hard(&self) -> bool {
+        self.corrections.is_empty()
+    }
+
     fn frame(&self, row: usize, column: usize) -> u32 {
         self.labels[row * self.grid.columns as usize + column]
     }
@@ -198,7 +203,6 @@ impl Seams {
         from: usize,
         shares: &mut Shares,
     ) {
-        let hard = self.corrections.is_empty();
         let mut frames = *corners;
         frames.sort_unstable();
         let weight = |between: &Between, frame: u32| {
@@ -210,24 +214,28 @@ impl Seams {
                 .filter(|(corner, _)| **corner == frame);
             own.map(|(_, w)| w).sum::<f32>()
         };
+        if self.are_hard() {
+            for (column, between) in columns.iter().enumerate() {
+                let mut best = (NO_FRAME, f32::NEG_INFINITY);
+                // Of equals the earlier frame.
+                for frame in frames.iter().filter(|frame| **frame != NO_FRAME) {
+                    let own = weight(between, *frame);
+                    if own > best.1 {
+                        best = (*frame, own);
+                    }
+                }
+                shares.whole(best.0 as usize, from + column, from + column + 1);
+            }
+            return;
+        }
         for (n, frame) in frames.iter().enumerate() {
             // Each frame once.
             if *frame == NO_FRAME || n > 0 && frames[n - 1] == *frame {
                 continue;
             }
             let start = shares.weights.len();
-            shares.weights.extend(columns.iter().map(|between| {
-                let own = weight(between, *frame);
-                if !hard {
-                    return own;
-                }
-                // Of equals the earlier frame.
-                let beaten = frames.iter().any(|other| {
-                    let theirs = weight(between, *other);
-                    *other != NO_FRAME && (theirs > own || theirs == own && other < frame)
-                });
-                if beaten { 0.0 } else { 1.0 }
-            }));
+            let own = columns.iter().map(|between| weight(between, *frame));
+            shares.weights.extend(own);
             shares.list.push(Share {
                 frame: *frame as usize,
                 from,
@@ -245,7 +253,7 @@ impl Seams {
         found: &mut Vec<[f32; 4]>,
     ) {
         found.clear();
-        if self.corrections.is_empty() {
+        if self.are_hard() {
             found.resize(columns.len(), [0.0; 4]);
             return;
         }
