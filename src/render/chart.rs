@@ -153,6 +153,11 @@ impl Chart {
         self.stretch
     }
 
+    /// True if no pixel of the tile lies in the frame.
+    pub fn is_outside(&self) -> bool {
+        self.patches.iter().all(|patch| matches!(patch, Patch::Outside))
+    }
+
     /// True if some pixels must be projected one by one.
     pub fn is_rough(&self) -> bool {
         self.patches.iter().any(|patch| matches!(patch, Patch::Rough))
@@ -171,7 +176,12 @@ impl Chart {
         match &self.patches[row / PATCH * self.across + patch] {
             Patch::Smooth(c) => {
                 let y = (row % PATCH) as f32 * (2.0 / PATCH as f32) - 1.0;
-                let at: Lanes = std::array::from_fn(|k| ((c[3][k] * y + c[2][k]) * y + c[1][k]) * y + c[0][k]);
+                let mut at = c[3];
+                for c in [&c[2], &c[1], &c[0]] {
+                    for k in 0..at.len() {
+                        at[k] = at[k] * y + c[k];
+                    }
+                }
                 for k in 0..PATCH {
                     let x = k as f32 * (2.0 / PATCH as f32) - 1.0;
                     u[k] = ((at[3] * x + at[2]) * x + at[1]) * x + at[0];

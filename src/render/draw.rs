@@ -121,7 +121,7 @@ impl Scene<'_> {
                 projected,
             ))
         });
-        let views: Vec<View> = views.collect();
+        let views: Vec<View> = views.filter(View::shows).collect();
         if views.iter().any(View::is_rough) {
             tile.points_into(self.surface, self.canvas, exact);
             points.set(exact);
@@ -137,9 +137,14 @@ impl Scene<'_> {
         match self.composition {
             Composition::Seams(seams) => {
                 let places = seams.columns_of(self.canvas, tile);
+                let mut above = None;
                 for (row, (pixels, sources)) in rows {
                     let between = seams.row_of(self.canvas, tile.row + row as u32);
-                    seams.shares(&places, &between, shares);
+                    // Between the same nodes nothing changes where no frames meet.
+                    if above != Some(between.before()) || !shares.are_whole() {
+                        seams.shares(&places, &between, shares);
+                        above = Some(between.before());
+                    }
                     match T::bytes(pixels) {
                         Some(pixels) if seams.are_hard() && views.iter().all(View::copies) => {
                             brush.copy(row, shares, pixels, sources);
@@ -255,12 +260,12 @@ impl<const C: usize> Brush<'_, C> {
     /// The pixels of a row: `value(k)` where it has some weight.
     #[inline(always)]
     fn put<T: Sample>(&self, pixels: &mut [T], value: impl Fn(usize, f32) -> [f32; 4]) {
-        let weights = &self.sums.weights;
+        let weights = &self.sums.weights[..self.width];
         wide(
             #[inline(always)]
             || {
-                for (k, pixel) in pixels.chunks_exact_mut(C + 1).enumerate() {
-                    let w = weights[k];
+                for (k, (pixel, w)) in pixels.chunks_exact_mut(C + 1).zip(weights).enumerate() {
+                    let w = *w;
                     let value = value(k, 1.0 / w);
                     for (sample, value) in pixel.iter_mut().zip(&value[..C]) {
                         *sample = T::nearest(if w > 0.0 { *value } else { 0.0 });
@@ -284,7 +289,14 @@ impl<const C: usize> Brush<'_, C> {
             }
         }
         let sums = &self.sums.sums;
-        self.put(pixels, |k, inverse| sums[k].map(|sum| sum * inverse));
+        self.put(
+            pixels,
+            #[inline(always)]
+            |k, inverse| {
+                let [a, b, c, d] = sums[k];
+                [a * inverse, b * inverse, c * inverse, d * inverse]
+            },
+        );
     }
 
     /// `stacks`: empty, one a column.
@@ -340,9 +352,19 @@ impl<const C: usize> Brush<'_, C> {
             }
         }
         let sums = &self.sums.sums;
-        self.put(pixels, |k, inverse| {
-            std::array::from_fn(|c| sums[k][c] * inverse + corrections[k][c])
-        });
+        self.put(
+            pixels,
+            #[inline(always)]
+            |k, inverse| {
+                let ([a, b, c, d], [e, f, g, h]) = (sums[k], corrections[k]);
+                [
+                    a * inverse + e,
+                    b * inverse + f,
+                    c * inverse + g,
+                    d * inverse + h,
+                ]
+            },
+        );
         sources.copy_from_slice(&self.sums.sources[..self.width]);
     }
 
@@ -362,9 +384,15 @@ impl<const C: usize> Brush<'_, C> {
             let own = &mut pixels[columns.start * step..columns.end * step];
             view.copy::<C>(self.run, points, place, columns.clone(), own);
             let seen = &self.run.seen()[columns.clone()];
-            for (source, seen) in sources[columns].iter_mut().zip(seen) {
-                *source = if *seen { share.frame as u32 } else { NO_FRAME };
-            }
+            let frame = share.frame as u32;
+            wide(
+                #[inline(always)]
+                || {
+                    for (source, seen) in sources[columns.clone()].iter_mut().zip(seen) {
+                        *source = if *seen { frame } else { NO_FRAME };
+                    }
+                },
+            );
         }
         pixels[covered * step..].fill(0);
         sources[covered..].fill(NO_FRAME);

@@ -22,6 +22,7 @@ use super::run::Run;
 use super::{Canvas, Placement};
 use crate::frames::{Agreement, MAD_TO_SIGMA, SHADING_TERMS, Shading};
 use crate::surface::Surface;
+use crate::vectors::wide;
 use faer::Side;
 use faer::prelude::Solve;
 use faer::sparse::{SparseColMat, Triplet};
@@ -169,40 +170,47 @@ impl Response<'_> {
         }
         let (u, v, seen, values) = run.parts();
         let Some(table) = self.shading else {
-            for value in &mut values[columns] {
-                *value = self.undone(value, self.gain);
+            for value in values[columns].as_flattened_mut() {
+                *value = (*value - self.bias) * self.gain;
             }
             return;
         };
-        // Light changes so slowly that it is looked up at the ends of short steps only.
-        for start in columns.clone().step_by(STEP) {
-            let end = (start + STEP).min(columns.end);
-            let last = end.min(columns.end - 1);
-            if seen[start] && seen[last] {
-                let first = self.gain * table.at(u[start], v[start]);
-                let slope =
-                    (self.gain * table.at(u[last], v[last]) - first) / (last - start).max(1) as f32;
-                for (k, value) in values[start..end].iter_mut().enumerate() {
-                    *value = self.undone(value, first + k as f32 * slope);
+        let last_column = columns.end.saturating_sub(1);
+        wide(
+            #[inline(always)]
+            || {
+                // Light changes so slowly that it is looked up at the ends of short steps only.
+                for start in columns.clone().step_by(STEP) {
+                    let end = (start + STEP).min(columns.end);
+                    let last = end.min(last_column);
+                    if seen[start] && seen[last] {
+                        let first = self.gain * table.at(u[start], v[start]);
+                        let change = self.gain * table.at(u[last], v[last]) - first;
+                        let slope = change / (last - start).max(1) as f32;
+                        for (k, value) in values[start..end].iter_mut().enumerate() {
+                            let factor = first + k as f32 * slope;
+                            for value in value {
+                                *value = (*value - self.bias) * factor;
+                            }
+                        }
+                    } else {
+                        let places = u[start..end].iter().zip(&v[start..end]);
+                        for (value, (u, v)) in values[start..end].iter_mut().zip(places) {
+                            let factor = self.gain * table.at(*u, *v);
+                            for value in value {
+                                *value = (*value - self.bias) * factor;
+                            }
+                        }
+                    }
                 }
-            } else {
-                let places = u[start..end].iter().zip(&v[start..end]);
-                for (value, (u, v)) in values[start..end].iter_mut().zip(places) {
-                    *value = self.undone(value, self.gain * table.at(*u, *v));
-                }
-            }
-        }
+            },
+        );
     }
 
     /// The value of the evenly lit wall for one of the frame at a pixel.
     pub fn wall(&self, value: f32, u: f32, v: f32) -> f32 {
         let light = self.shading.map_or(1.0, |table| table.at(u, v));
         (value - self.bias) * (self.gain * light)
-    }
-
-    #[inline(always)]
-    fn undone(&self, value: &[f32; 4], factor: f32) -> [f32; 4] {
-        value.map(|value| (value - self.bias) * factor)
     }
 }
 

@@ -11,6 +11,8 @@
 //! the cut.
 
 use super::kernel::Kernel;
+#[cfg(target_arch = "x86_64")]
+use crate::vectors;
 
 /// What the kernel needs to know of a picture.
 #[derive(Clone, Copy)]
@@ -41,15 +43,29 @@ pub fn sums<const C: usize>(
     sums: &mut [[i32; 4]],
 ) {
     #[cfg(target_arch = "x86_64")]
-    if let Some(simd) = pulp::x86::V3::try_new() {
-        pulp::Simd::vectorize(
-            simd,
-            #[inline(always)]
-            || avx2::sums::<C>(simd, source, kernel, places, sums),
-        );
+    if vectors::avx2(
+        #[inline(always)]
+        |simd| avx2::sums::<C>(simd, source, kernel, places, sums),
+    ) {
         return;
     }
     plain::sums::<C>(source, kernel, places, sums);
+}
+
+/// The nearest 8-bit samples of sums, alpha last and full.
+pub fn pixels<const C: usize>(kernel: &Kernel, sums: &[[i32; 4]], pixels: &mut [u8]) {
+    let bits = bits(kernel);
+    let half = missing(kernel) + (1 << (bits - 1));
+    let mut more = [half; 4];
+    more[C] = 255 << bits;
+    #[cfg(target_arch = "x86_64")]
+    if vectors::avx2(
+        #[inline(always)]
+        |simd| avx2::pixels::<C>(simd, sums, &more, bits, pixels),
+    ) {
+        return;
+    }
+    plain::pixels::<C>(sums, &more, bits, pixels);
 }
 
 /// Bits of a sum below its whole part.
@@ -99,6 +115,20 @@ mod plain {
         }
     }
 
+    /// Lanes up to the `C`th, with `more` and without their last `bits`.
+    pub fn pixels<const C: usize>(
+        sums: &[[i32; 4]],
+        more: &[i32; 4],
+        bits: u32,
+        pixels: &mut [u8],
+    ) {
+        for (sum, pixel) in sums.iter().zip(pixels.chunks_exact_mut(C + 1)) {
+            for (c, sample) in pixel.iter_mut().enumerate() {
+                *sample = ((sum[c] + more[c]) >> bits).clamp(0, 255) as u8;
+            }
+        }
+    }
+
     fn cut_sum(w_x: &[i16], w_y: &[i16], at: impl Fn(usize, usize) -> i32) -> i32 {
         let row = |y: usize| {
             let part = |first: usize| {
@@ -119,6 +149,9 @@ mod avx2 {
     use pulp::x86::V3;
     use std::arch::x86_64::{__m128i, __m256i};
 
+    /// In an order of bytes: nothing.
+    const NO: i8 = -1;
+
     #[inline(always)]
     pub fn sums<const C: usize>(
         simd: V3,
@@ -128,8 +161,7 @@ mod avx2 {
         sums: &mut [[i32; 4]],
     ) {
         match (kernel.taps(), C) {
-            (2, 1) => bilinear::<C>(simd, source, kernel, places, sums, bilinear_grey),
-            (2, _) => bilinear::<C>(simd, source, kernel, places, sums, bilinear_colour),
+            (2, _) => bilinear::<C>(simd, source, kernel, places, sums),
             (4, 1) => grey(simd, source, kernel, places, sums, 1),
             (4, _) => colour(simd, source, kernel, places, sums, 1),
             (taps, 1) => grey(simd, source, kernel, places, sums, taps / 4),
@@ -137,16 +169,62 @@ mod avx2 {
         }
     }
 
+    #[inline(always)]
+    pub fn pixels<const C: usize>(
+        simd: V3,
+        sums: &[[i32; 4]],
+        more: &[i32; 4],
+        bits: u32,
+        pixels: &mut [u8],
+    ) {
+        let avx2 = simd.avx2;
+        let (eights, rest) = sums.as_chunks::<8>();
+        let (there, there_rest) = pixels.split_at_mut(8 * (C + 1) * eights.len());
+        let more_twice: __m256i = cast([*more; 2]);
+        let count: __m128i = cast([bits, 0, 0, 0]);
+        // Packing leaves pixels 0, 2, 4, 6 in the lower half and 1, 3, 5, 7 in the upper one.
+        let order: __m256i = cast([0, 4, 1, 5, 2, 6, 3, 7]);
+        let first_two: __m256i =
+            cast([[0i8, 1, 4, 5, 8, 9, 12, 13, NO, NO, NO, NO, NO, NO, NO, NO]; 2]);
+        for (eight, there) in eights.iter().zip(there.chunks_exact_mut(8 * (C + 1))) {
+            let [a, b, c, d]: [__m256i; 4] = cast(*eight);
+            let a = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(a, more_twice), count);
+            let b = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(b, more_twice), count);
+            let c = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(c, more_twice), count);
+            let d = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(d, more_twice), count);
+            let (ab, cd) = (
+                avx2._mm256_packs_epi32(a, b),
+                avx2._mm256_packs_epi32(c, d),
+            );
+            let all = avx2._mm256_packus_epi16(ab, cd);
+            let all = avx2._mm256_permutevar8x32_epi32(all, order);
+            if C == 3 {
+                let all: [u8; 32] = cast(all);
+                there.copy_from_slice(&all);
+            } else {
+                let [low, _, high, _]: [[u8; 8]; 4] =
+                    cast(avx2._mm256_shuffle_epi8(all, first_two));
+                let (first, last) = there.split_at_mut(8);
+                first.copy_from_slice(&low);
+                last.copy_from_slice(&high);
+            }
+        }
+        plain::pixels::<C>(rest, more, bits, there_rest);
+    }
+
     /// The `N` samples from `at`; nothing where there are not as many.
     #[inline(always)]
     fn read<const N: usize>(samples: &[u8], at: usize) -> [u8; N] {
-        match samples.get(at..).and_then(|own| own.first_chunk()) {
-            Some(read) => *read,
+        match samples.get(at..at + N) {
+            Some(read) => match read.first_chunk() {
+                Some(read) => *read,
+                None => [0; N],
+            },
             None => [0; N],
         }
     }
 
-    /// Eight at a time with `work`, the rest plainly.
+    /// Eight at a time, the rest plainly.
     #[inline(always)]
     fn bilinear<const C: usize>(
         simd: V3,
@@ -154,27 +232,75 @@ mod avx2 {
         kernel: &Kernel,
         places: Places,
         sums: &mut [[i32; 4]],
-        work: impl Fn(V3, Source, &[u32; 8], [__m256i; 2], &mut [[i32; 4]; 8]),
     ) {
         let (chunks, rest) = sums.as_chunks_mut::<8>();
+        let [across, down] = places.phases;
         let first = places.first.as_chunks::<8>().0;
-        let [across, down] = places.phases.map(|phases| phases.as_chunks::<8>().0);
+        let (s, t) = (across.as_chunks::<8>().0, down.as_chunks::<8>().0);
         let done = 8 * chunks.len();
-        for (((sums, first), s), t) in chunks.iter_mut().zip(first).zip(across).zip(down) {
-            work(simd, source, first, [cast(*s), cast(*t)], sums);
+        for (((sums, first), s), t) in chunks.iter_mut().zip(first).zip(s).zip(t) {
+            if C == 1 {
+                bilinear_grey(simd, source, first, cast(*s), cast(*t), sums);
+            } else {
+                bilinear_colour(simd, source, first, cast(*s), cast(*t), sums);
+            }
         }
         let places = Places {
             first: &places.first[done..],
-            phases: places.phases.map(|phases| &phases[done..]),
+            phases: [&across[done..], &down[done..]],
         };
         plain::sums::<C>(source, kernel, places, rest);
     }
 
-    /// `(128 − w, w)` in the halves of each number.
+    /// `128 − w`.
+    #[inline(always)]
+    fn rest(simd: V3, w: __m256i) -> __m256i {
+        simd.avx2
+            ._mm256_sub_epi32(simd.avx._mm256_set1_epi32(128), w)
+    }
+
+    /// `(128 − w, w)` in the halves of each number: a product of it and a number up to 128 has no carry from half to half, as
+    /// 128 · 128 = 2¹⁴.
     #[inline(always)]
     fn pair(simd: V3, w: __m256i) -> __m256i {
-        let low = simd.avx2._mm256_sub_epi32(simd.avx._mm256_set1_epi32(128), w);
-        simd.avx2._mm256_or_si256(low, simd.avx2._mm256_slli_epi32::<16>(w))
+        let avx2 = simd.avx2;
+        avx2._mm256_or_si256(rest(simd, w), avx2._mm256_slli_epi32::<16>(w))
+    }
+
+    /// Eight bytes of a row and of the next.
+    #[inline(always)]
+    fn two_rows(source: Source, at: u32) -> __m128i {
+        let at = at as usize;
+        let upper: [u8; 8] = read(source.samples, at);
+        let lower: [u8; 8] = read(source.samples, at + source.stride);
+        cast([upper, lower])
+    }
+
+    /// The two pixels of a row side by side, channel by channel: (r, r′, g, g′, b, b′).
+    const UPPER: [i8; 16] = [0, NO, 3, NO, 1, NO, 4, NO, 2, NO, 5, NO, NO, NO, NO, NO];
+    /// The same of the next row.
+    const LOWER: [i8; 16] = [8, NO, 11, NO, 9, NO, 12, NO, 10, NO, 13, NO, NO, NO, NO, NO];
+
+    /// The sums of the two pixels at `a` and `b`, with their rows' weights.
+    #[inline(always)]
+    fn two_colours(
+        simd: V3,
+        source: Source,
+        a: u32,
+        b: u32,
+        upper: __m256i,
+        lower: __m256i,
+    ) -> [[i32; 4]; 2] {
+        let avx2 = simd.avx2;
+        let pixels = simd
+            .avx
+            ._mm256_set_m128i(two_rows(source, b), two_rows(source, a));
+        let above = avx2._mm256_shuffle_epi8(pixels, cast([UPPER; 2]));
+        let below = avx2._mm256_shuffle_epi8(pixels, cast([LOWER; 2]));
+        cast(avx2._mm256_add_epi32(
+            avx2._mm256_madd_epi16(above, upper),
+            avx2._mm256_madd_epi16(below, lower),
+        ))
     }
 
     #[inline(always)]
@@ -182,54 +308,35 @@ mod avx2 {
         simd: V3,
         source: Source,
         first: &[u32; 8],
-        [s, t]: [__m256i; 2],
+        s: __m256i,
+        t: __m256i,
         sums: &mut [[i32; 4]; 8],
     ) {
-        let (avx, avx2) = (simd.avx, simd.avx2);
-        // No carry from half to half: 128 · 128 = 2¹⁴.
+        let avx2 = simd.avx2;
         let across = pair(simd, s);
-        let rest = avx2._mm256_sub_epi32(avx._mm256_set1_epi32(128), t);
-        let upper = avx2._mm256_mullo_epi32(across, rest);
+        let upper = avx2._mm256_mullo_epi32(across, rest(simd, t));
         let lower = avx2._mm256_mullo_epi32(across, t);
-        // The two pixels of a row side by side, channel by channel: (r, r′, g, g′, b, b′).
-        const NO: i8 = -1;
-        let row = |at: i8| {
-            [0, 3, 1, 4, 2, 5].map(|k| at + k)
-        };
-        let order = |at: i8| {
-            let [r, r1, g, g1, b, b1] = row(at);
-            [r, NO, r1, NO, g, NO, g1, NO, b, NO, b1, NO, NO, NO, NO, NO]
-        };
-        let orders: [__m256i; 2] = [0, 8].map(|at| cast([order(at); 2]));
-        let both_rows = |k: usize| -> __m128i {
-            let at = first[k] as usize;
-            let rows: [[u8; 8]; 2] = [
-                read(source.samples, at),
-                read(source.samples, at + source.stride),
-            ];
-            cast(rows)
-        };
-        // Pixels k and k + 4, and their weights in the halves of the vectors.
-        let two = |k: usize, upper: __m256i, lower: __m256i| -> [[i32; 4]; 2] {
-            let pixels = avx._mm256_set_m128i(both_rows(k + 4), both_rows(k));
-            let sum = |order: __m256i, w: __m256i| {
-                avx2._mm256_madd_epi16(avx2._mm256_shuffle_epi8(pixels, order), w)
-            };
-            let [above, below] = orders;
-            cast(avx2._mm256_add_epi32(sum(above, upper), sum(below, lower)))
-        };
-        let each = |w: __m256i| {
-            [
-                avx2._mm256_shuffle_epi32::<0x00>(w),
-                avx2._mm256_shuffle_epi32::<0x55>(w),
-                avx2._mm256_shuffle_epi32::<0xaa>(w),
-                avx2._mm256_shuffle_epi32::<0xff>(w),
-            ]
-        };
-        let (upper, lower) = (each(upper), each(lower));
-        for k in 0..4 {
-            [sums[k], sums[k + 4]] = two(k, upper[k], lower[k]);
-        }
+        // Pixels k and k + 4 in the halves of a vector.
+        let (w, x) = (
+            avx2._mm256_shuffle_epi32::<0x00>(upper),
+            avx2._mm256_shuffle_epi32::<0x00>(lower),
+        );
+        [sums[0], sums[4]] = two_colours(simd, source, first[0], first[4], w, x);
+        let (w, x) = (
+            avx2._mm256_shuffle_epi32::<0x55>(upper),
+            avx2._mm256_shuffle_epi32::<0x55>(lower),
+        );
+        [sums[1], sums[5]] = two_colours(simd, source, first[1], first[5], w, x);
+        let (w, x) = (
+            avx2._mm256_shuffle_epi32::<0xaa>(upper),
+            avx2._mm256_shuffle_epi32::<0xaa>(lower),
+        );
+        [sums[2], sums[6]] = two_colours(simd, source, first[2], first[6], w, x);
+        let (w, x) = (
+            avx2._mm256_shuffle_epi32::<0xff>(upper),
+            avx2._mm256_shuffle_epi32::<0xff>(lower),
+        );
+        [sums[3], sums[7]] = two_colours(simd, source, first[3], first[7], w, x);
     }
 
     #[inline(always)]
@@ -237,21 +344,22 @@ mod avx2 {
         simd: V3,
         source: Source,
         first: &[u32; 8],
-        [s, t]: [__m256i; 2],
+        s: __m256i,
+        t: __m256i,
         sums: &mut [[i32; 4]; 8],
     ) {
         let (avx, avx2) = (simd.avx, simd.avx2);
         let down = pair(simd, t);
-        let rest = avx2._mm256_sub_epi32(avx._mm256_set1_epi32(128), s);
-        let left = avx2._mm256_mullo_epi32(down, rest);
+        let left = avx2._mm256_mullo_epi32(down, rest(simd, s));
         let right = avx2._mm256_mullo_epi32(down, s);
-        let four: [[[u8; 2]; 2]; 8] = std::array::from_fn(|k| {
-            let at = first[k] as usize;
-            [
+        let mut four = [[[0; 2]; 2]; 8];
+        for (four, first) in four.iter_mut().zip(first) {
+            let at = *first as usize;
+            *four = [
                 read(source.samples, at),
                 read(source.samples, at + source.stride),
-            ]
-        });
+            ];
+        }
         let four: __m256i = cast(four);
         // Upper and lower pixel in the halves of each number.
         let bytes = avx._mm256_set1_epi32(0x00ff_00ff);
@@ -270,11 +378,40 @@ mod avx2 {
     /// The four weights from `at`, over and over.
     #[inline(always)]
     fn four(simd: V3, weights: &[i16], at: usize) -> __m256i {
-        let four: [i16; 4] = match weights.get(at..).and_then(|own| own.first_chunk()) {
-            Some(four) => *four,
+        let four: [i16; 4] = match weights.get(at..at + 4) {
+            Some(four) => match four.first_chunk() {
+                Some(four) => *four,
+                None => [0; 4],
+            },
             None => [0; 4],
         };
         simd.avx._mm256_set1_epi64x(cast(four))
+    }
+
+    /// Pixels 0 and 1 side by side in the lower half, 2 and 3 in the upper one.
+    const TWO_BY_TWO: [[i8; 16]; 2] = [
+        UPPER,
+        [6, NO, 9, NO, 7, NO, 10, NO, 8, NO, 11, NO, NO, NO, NO, NO],
+    ];
+    /// The first two of four weights in the lower half, the last two in the upper one.
+    const HALVES: [[i8; 16]; 2] = [
+        [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3],
+        [4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7],
+    ];
+
+    /// The sums of a row that begins at `at`: a in the lower half, b in the upper one.
+    #[inline(always)]
+    fn colour_row(simd: V3, samples: &[u8], at: usize, w_x: &[i16], blocks: usize) -> __m256i {
+        let avx2 = simd.avx2;
+        let mut sum = simd.avx._mm256_setzero_si256();
+        for block in 0..blocks {
+            let four_pixels: [u8; 16] = read(samples, at + 12 * block);
+            let pixels = avx2._mm256_broadcastsi128_si256(cast(four_pixels));
+            let pixels = avx2._mm256_shuffle_epi8(pixels, cast(TWO_BY_TWO));
+            let w = avx2._mm256_shuffle_epi8(four(simd, w_x, 4 * block), cast(HALVES));
+            sum = avx2._mm256_add_epi32(sum, avx2._mm256_madd_epi16(pixels, w));
+        }
+        sum
     }
 
     /// `blocks`: quarters of the taps.
@@ -287,46 +424,35 @@ mod avx2 {
         sums: &mut [[i32; 4]],
         blocks: usize,
     ) {
-        const NO: i8 = -1;
         let (avx, avx2) = (simd.avx, simd.avx2);
-        // Pixels 0 and 1 side by side in the lower half, 2 and 3 in the upper one.
-        let half = |at: i8| {
-            let [r, r1, g, g1, b, b1] = [0, 3, 1, 4, 2, 5].map(|k: i8| at + k);
-            [r, NO, r1, NO, g, NO, g1, NO, b, NO, b1, NO, NO, NO, NO, NO]
-        };
-        let order: __m256i = cast([half(0), half(6)]);
-        let halves: __m256i = cast([[0i8, 1, 2, 3].repeated(), [4i8, 5, 6, 7].repeated()]);
-        for (k, sum) in sums.iter_mut().enumerate() {
-            let w_x = kernel.integers(places.phases[0][k] as usize);
-            let w_y = kernel.integers(places.phases[1][k] as usize);
-            let at = places.first[k] as usize;
-            let row = |j: usize| {
-                let mut sum = avx._mm256_setzero_si256();
-                for block in 0..blocks {
-                    let four_pixels: [u8; 16] =
-                        read(source.samples, at + j * source.stride + 12 * block);
-                    let pixels = avx2._mm256_broadcastsi128_si256(cast(four_pixels));
-                    let pixels = avx2._mm256_shuffle_epi8(pixels, order);
-                    let w = avx2._mm256_shuffle_epi8(four(simd, w_x, 4 * block), halves);
-                    sum = avx2._mm256_add_epi32(sum, avx2._mm256_madd_epi16(pixels, w));
-                }
-                sum
-            };
+        let [across, down] = places.phases;
+        let phases = across.iter().zip(down);
+        for ((sum, first), (s, t)) in sums.iter_mut().zip(places.first).zip(phases) {
+            let (w_x, w_y) = (kernel.integers(*s as usize), kernel.integers(*t as usize));
+            let mut at = *first as usize;
             let mut total = avx._mm256_setzero_si256();
-            for j in (0..4 * blocks).step_by(2) {
+            for pair in 0..2 * blocks {
+                let upper = colour_row(simd, source.samples, at, w_x, blocks);
+                let lower = colour_row(simd, source.samples, at + source.stride, w_x, blocks);
+                at += 2 * source.stride;
                 // Cut, and two rows in the halves of each number.
                 let two = avx2._mm256_blend_epi16::<0b1010_1010>(
-                    avx2._mm256_srai_epi32::<8>(row(j)),
-                    avx2._mm256_slli_epi32::<8>(row(j + 1)),
+                    avx2._mm256_srai_epi32::<8>(upper),
+                    avx2._mm256_slli_epi32::<8>(lower),
                 );
-                let w: [i16; 2] = [w_y[j], w_y[j + 1]];
-                let w = avx._mm256_set1_epi32(cast(w));
+                let w = avx._mm256_set1_epi32(cast([w_y[2 * pair], w_y[2 * pair + 1]]));
                 total = avx2._mm256_add_epi32(total, avx2._mm256_madd_epi16(two, w));
             }
-            let [a, b]: [[i32; 4]; 2] = cast(total);
-            *sum = std::array::from_fn(|c| a[c] + b[c]);
+            let [a, b]: [__m128i; 2] = cast(total);
+            *sum = cast(simd.sse2._mm_add_epi32(a, b));
         }
     }
+
+    /// Each of four weights twice, in the lower halves of the numbers.
+    const TWICE: [i8; 32] = [
+        0, 1, NO, NO, 0, 1, NO, NO, 2, 3, NO, NO, 2, 3, NO, NO, //
+        4, 5, NO, NO, 4, 5, NO, NO, 6, 7, NO, NO, 6, 7, NO, NO,
+    ];
 
     /// `blocks`: quarters of the taps.
     #[inline(always)]
@@ -338,50 +464,33 @@ mod avx2 {
         sums: &mut [[i32; 4]],
         blocks: usize,
     ) {
-        const NO: i8 = -1;
-        let (avx, avx2) = (simd.avx, simd.avx2);
-        // Each row's weight twice, in the lower halves of the numbers.
-        let half = |at: i8| {
-            let twice = |at: i8| [at, at + 1, NO, NO, at, at + 1, NO, NO];
-            [twice(at), twice(at + 2)]
-        };
-        let order: __m256i = cast([half(0), half(4)]);
-        for (k, sum) in sums.iter_mut().enumerate() {
-            let w_x = kernel.integers(places.phases[0][k] as usize);
-            let w_y = kernel.integers(places.phases[1][k] as usize);
-            let at = places.first[k] as usize;
+        let (avx, avx2, stride) = (simd.avx, simd.avx2, source.stride);
+        let [across, down] = places.phases;
+        let phases = across.iter().zip(down);
+        for ((sum, first), (s, t)) in sums.iter_mut().zip(places.first).zip(phases) {
+            let (w_x, w_y) = (kernel.integers(*s as usize), kernel.integers(*t as usize));
             let mut total = avx._mm256_setzero_si256();
             for rows in 0..blocks {
                 let mut four_rows = avx._mm256_setzero_si256();
                 for block in 0..blocks {
-                    let pixels: [[u8; 4]; 4] = std::array::from_fn(|j| {
-                        read(
-                            source.samples,
-                            at + (4 * rows + j) * source.stride + 4 * block,
-                        )
-                    });
+                    let at = *first as usize + 4 * rows * stride + 4 * block;
+                    let pixels: [[u8; 4]; 4] = [
+                        read(source.samples, at),
+                        read(source.samples, at + stride),
+                        read(source.samples, at + 2 * stride),
+                        read(source.samples, at + 3 * stride),
+                    ];
                     let pixels = avx2._mm256_cvtepu8_epi16(cast(pixels));
                     let w = four(simd, w_x, 4 * block);
                     four_rows = avx2._mm256_add_epi32(four_rows, avx2._mm256_madd_epi16(pixels, w));
                 }
                 let cut = avx2._mm256_srai_epi32::<8>(four_rows);
-                let w = avx2._mm256_shuffle_epi8(four(simd, w_y, 4 * rows), order);
+                let w = avx2._mm256_shuffle_epi8(four(simd, w_y, 4 * rows), cast(TWICE));
                 total = avx2._mm256_add_epi32(total, avx2._mm256_madd_epi16(cut, w));
             }
-            let values: [i32; 8] = cast(total);
-            *sum = [values.iter().sum(), 0, 0, 0];
-        }
-    }
-
-    /// Four bytes, four times.
-    trait Repeated {
-        fn repeated(self) -> [i8; 16];
-    }
-
-    impl Repeated for [i8; 4] {
-        #[inline(always)]
-        fn repeated(self) -> [i8; 16] {
-            cast([self; 4])
+            let [a, b]: [__m128i; 2] = cast(total);
+            let [a, b, c, d]: [i32; 4] = cast(simd.sse2._mm_add_epi32(a, b));
+            *sum = [a + b + c + d, 0, 0, 0];
         }
     }
 }
@@ -449,6 +558,13 @@ mod tests {
         sums::<C>(source, &kernel, places, &mut fast);
         plain::sums::<C>(source, &kernel, places, &mut slow);
         assert_eq!(fast, slow, "{interpolation:?} {stretch}");
+        let (bits_of, half) = (bits(&kernel), missing(&kernel) + (1 << (bits(&kernel) - 1)));
+        let mut more = [half; 4];
+        more[C] = 255 << bits_of;
+        let mut bytes = [vec![1; (C + 1) * fast.len()], vec![2; (C + 1) * fast.len()]];
+        pixels::<C>(&kernel, &fast, &mut bytes[0]);
+        plain::pixels::<C>(&fast, &more, bits_of, &mut bytes[1]);
+        assert_eq!(bytes[0], bytes[1]);
         // Against single precision at the same phases, and where phases are 1/1024 px off at the most.
         let scale = f64::from(1u32 << bits(&kernel)).recip();
         let (mut worst, mut squares) = (0.0f64, 0.0);

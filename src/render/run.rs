@@ -73,8 +73,17 @@ impl Run {
     /// Finds the pixels of `count` points from index `start`, one by one.
     pub fn project(&mut self, look: &Look, points: &Points, start: usize, count: usize) {
         let (u, v) = (&mut self.u[..count], &mut self.v[..count]);
-        look.project_all(points, start, (u, v, &mut self.seen[..count]));
-        self.leave_inside(look.limit(), 0..count);
+        let seen = &mut self.seen[..count];
+        look.project_all(points, start, (u, v, seen));
+        let limit = look.limit();
+        wide(
+            #[inline(always)]
+            || {
+                for k in 0..count {
+                    seen[k] &= within(u[k], v[k], limit);
+                }
+            },
+        );
     }
 
     /// Finds the pixels of the points in some columns of a row of a tile by its chart; `points`: all of the tile's, one by one, if the chart
@@ -87,45 +96,35 @@ impl Run {
         (row, width): (usize, usize),
         columns: Range<usize>,
     ) {
-        let patches = columns.start / PATCH..columns.end.div_ceil(PATCH);
-        let all = patches.start * PATCH..patches.end * PATCH;
-        let (u, v, seen) = (&mut self.u, &mut self.v, &mut self.seen);
-        seen[all.clone()].fill(true);
+        let patches = patches(&columns);
+        let limit = look.limit();
         let mut rough = [false; RUN / PATCH];
-        let (u_patches, v_patches) = (
-            u.as_chunks_mut::<PATCH>().0,
-            v.as_chunks_mut::<PATCH>().0,
+        let (u, v) = (
+            self.u.as_chunks_mut::<PATCH>().0,
+            self.v.as_chunks_mut::<PATCH>().0,
         );
+        let seen = self.seen.as_chunks_mut::<PATCH>().0;
         wide(
             #[inline(always)]
             || {
                 for patch in patches.clone() {
-                    rough[patch] =
-                        !chart.row(row, patch, &mut u_patches[patch], &mut v_patches[patch]);
+                    let (u, v) = (&mut u[patch], &mut v[patch]);
+                    rough[patch] = !chart.row(row, patch, u, v);
+                    for (k, seen) in seen[patch].iter_mut().enumerate() {
+                        *seen = within(u[k], v[k], limit);
+                    }
                 }
             },
         );
         for patch in patches.filter(|patch| rough[*patch]) {
-            let own = patch * PATCH..width.min((patch + 1) * PATCH);
-            let start = row * width + own.start;
-            let pixels = (&mut u[own.clone()], &mut v[own.clone()], &mut seen[own]);
-            look.project_all(points, start, pixels);
+            let count = PATCH.min(width - patch * PATCH);
+            let (u, v) = (&mut u[patch][..count], &mut v[patch][..count]);
+            let seen = &mut seen[patch][..count];
+            look.project_all(points, row * width + patch * PATCH, (u, v, seen));
+            for (k, seen) in seen.iter_mut().enumerate() {
+                *seen &= within(u[k], v[k], limit);
+            }
         }
-        self.leave_inside(look.limit(), all);
-    }
-
-    /// Sees no points beyond the outermost pixel centres.
-    fn leave_inside(&mut self, limit: [f32; 2], columns: Range<usize>) {
-        let (u, v) = (&self.u[columns.clone()], &self.v[columns.clone()]);
-        let seen = &mut self.seen[columns];
-        wide(
-            #[inline(always)]
-            || {
-                for ((seen, u), v) in seen.iter_mut().zip(u).zip(v) {
-                    *seen &= (*u >= 0.0) & (*v >= 0.0) & (*u <= limit[0]) & (*v <= limit[1]);
-                }
-            },
-        );
     }
 
     /// Looks up the values in some columns whose pixels were found before.
@@ -164,19 +163,7 @@ impl Run {
     ) {
         let all_inside = self.integer_sums::<C>(picture, samples, kernel, columns.clone());
         let sums = &self.sums[columns.clone()];
-        let bits = integer::bits(kernel);
-        let half = integer::missing(kernel) + (1 << (bits - 1));
-        wide(
-            #[inline(always)]
-            || {
-                for (sum, pixel) in sums.iter().zip(pixels.chunks_exact_mut(C + 1)) {
-                    for (value, sum) in pixel.iter_mut().zip(&sum[..C]) {
-                        *value = ((sum + half) >> bits).clamp(0, 255) as u8;
-                    }
-                    pixel[C] = u8::MAX;
-                }
-            },
-        );
+        integer::pixels::<C>(kernel, sums, pixels);
         if all_inside {
             return;
         }
@@ -210,7 +197,9 @@ impl Run {
             #[inline(always)]
             || {
                 for (value, sum) in values.iter_mut().zip(sums) {
-                    *value = sum.map(|sum| (sum + missing) as f32 * scale);
+                    for (value, sum) in value.iter_mut().zip(sum) {
+                        *value = (sum + missing) as f32 * scale;
+                    }
                 }
             },
         );
@@ -235,6 +224,7 @@ impl Run {
             samples,
             stride: picture.width() * C,
         };
+        touch(samples, &self.first[columns.clone()], (kernel.taps() + 1) * source.stride);
         let places = Places {
             first: &self.first[columns.clone()],
             phases: [
@@ -298,32 +288,39 @@ impl Run {
         let (right, bottom) = (width - taps, height - taps);
         let channels = picture.format().channels as i32;
         let rounding = kernel.rounding();
-        let (u, v) = (&self.u[columns.clone()], &self.v[columns.clone()]);
-        let seen = &self.seen[columns.clone()];
-        let first = &mut self.first[columns.clone()];
-        let inside = &mut self.inside[columns.clone()];
+        let (u, v) = (
+            self.u.as_chunks::<PATCH>().0,
+            self.v.as_chunks::<PATCH>().0,
+        );
+        let seen = self.seen.as_chunks::<PATCH>().0;
+        let first = self.first.as_chunks_mut::<PATCH>().0;
+        let inside = self.inside.as_chunks_mut::<PATCH>().0;
         let [across, down] = &mut self.phases;
-        let (across, down) = (&mut across[columns.clone()], &mut down[columns]);
-        let mut all = true;
+        let across = across.as_chunks_mut::<PATCH>().0;
+        let down = down.as_chunks_mut::<PATCH>().0;
         wide(
             #[inline(always)]
             || {
-                for k in 0..u.len() {
-                    let (x, s) = whole(u[k] + rounding);
-                    let (y, t) = whole(v[k] + rounding);
-                    across[k] = Kernel::phase_of(s, phases);
-                    down[k] = Kernel::phase_of(t, phases);
-                    let (left, top) = (x - before, y - before);
-                    let within =
-                        seen[k] & (left >= 0) & (top >= 0) & (left <= right) & (top <= bottom);
-                    inside[k] = within;
-                    all &= within;
-                    let at = top.wrapping_mul(width).wrapping_add(left);
-                    first[k] = if within { at.wrapping_mul(channels) as u32 } else { 0 };
+                for patch in patches(&columns) {
+                    let (u, v, seen) = (&u[patch], &v[patch], &seen[patch]);
+                    let (across, down) = (&mut across[patch], &mut down[patch]);
+                    let (first, inside) = (&mut first[patch], &mut inside[patch]);
+                    for k in 0..PATCH {
+                        let (x, s) = whole(u[k] + rounding);
+                        let (y, t) = whole(v[k] + rounding);
+                        across[k] = Kernel::phase_of(s, phases);
+                        down[k] = Kernel::phase_of(t, phases);
+                        let (left, top) = (x - before, y - before);
+                        let within =
+                            seen[k] & (left >= 0) & (top >= 0) & (left <= right) & (top <= bottom);
+                        inside[k] = within;
+                        let at = top.wrapping_mul(width).wrapping_add(left);
+                        first[k] = if within { at.wrapping_mul(channels) as u32 } else { 0 };
+                    }
                 }
             },
         );
-        all
+        !self.inside[columns].contains(&false)
     }
 
     /// `Σ_y w_y Σ_x w_x I(x, y)` over `N × N` pixels, where all of them lie in the picture.
@@ -353,6 +350,28 @@ impl Run {
             };
         }
     }
+}
+
+/// Reads what is `ahead` of the samples, so that it is in the cache when the next row needs it.
+fn touch(samples: &[u8], first: &[u32], ahead: usize) {
+    /// Pixels of a cache line, about.
+    const LINE: usize = 16;
+    let mut sum = 0;
+    for first in first.chunks(LINE) {
+        sum ^= samples.get(first[0] as usize + ahead).copied().unwrap_or_default();
+    }
+    std::hint::black_box(sum);
+}
+
+/// The patches that some columns lie in.
+fn patches(columns: &Range<usize>) -> Range<usize> {
+    columns.start / PATCH..columns.end.div_ceil(PATCH)
+}
+
+/// True within the outermost pixel centres.
+#[inline(always)]
+fn within(u: f32, v: f32, limit: [f32; 2]) -> bool {
+    (u >= 0.0) & (v >= 0.0) & (u <= limit[0]) & (v <= limit[1])
 }
 
 /// Whether a picture is as large as the kernel.

@@ -53,6 +53,13 @@ pub struct Between {
     t: f32,
 }
 
+impl Between {
+    /// The node before.
+    pub fn before(&self) -> usize {
+        self.before
+    }
+}
+
 impl Seams {
     /// Finds the best frame for each node of the grid over `canvas`, by thumbnails whose exposure is undone; with `blend`, also the
     /// correction. `white`: full scale of the frames.
@@ -186,6 +193,7 @@ impl Seams {
                 self.frame(row.after, cell.after),
             ];
             if corners.iter().any(|frame| *frame != corners[0]) {
+                shares.mixed = true;
                 self.mixed(&corners, &columns[from..to], row, from, shares);
             } else if corners[0] != NO_FRAME {
                 shares.whole(corners[0] as usize, from, to);
@@ -288,6 +296,8 @@ impl Seams {
 pub struct Shares {
     list: Vec<Share>,
     weights: Vec<f32>,
+    /// True if different frames meet in some cell.
+    mixed: bool,
 }
 
 /// A frame's part in the columns `from..to`.
@@ -307,6 +317,12 @@ impl Shares {
     fn clear(&mut self) {
         self.list.clear();
         self.weights.clear();
+        self.mixed = false;
+    }
+
+    /// True if all columns of every cell are one frame's.
+    pub fn are_whole(&self) -> bool {
+        !self.mixed
     }
 
     /// Columns that are one frame's.

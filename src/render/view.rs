@@ -74,6 +74,11 @@ impl<'a> View<'a> {
         }
     }
 
+    /// True if the frame shows some of the tile.
+    pub fn shows(&self) -> bool {
+        !self.chart.is_outside()
+    }
+
     /// True if some of the tile's points are to be projected one by one.
     pub fn is_rough(&self) -> bool {
         self.chart.is_rough()
@@ -111,7 +116,9 @@ impl<'a> View<'a> {
         pixels: &mut [u8],
     ) {
         run.locate(&self.chart, &self.look, points, place, columns.clone());
-        if let Samples::Eight(samples) = self.picture.samples() {
+        if !run.seen()[columns.clone()].contains(&true) {
+            pixels.fill(0);
+        } else if let Samples::Eight(samples) = self.picture.samples() {
             run.copy::<C>(self.picture, samples, self.kernel, columns, pixels);
         }
     }
