@@ -14,6 +14,7 @@ const EQUATIONS_BYTES: f64 = 0.2e6;
 
 /// Rough sizes, for planning.
 #[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Effort {
     /// Time to refine on this machine's cores, seconds, within a factor of two or three.
     pub refine_s: f64,

@@ -20,6 +20,7 @@ use serde::Serialize;
 
 /// A survey, looked over.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Check {
     /// Number of frames.
     pub frames: usize,
@@ -47,6 +48,7 @@ pub struct Check {
 
 /// The initial poses.
 #[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
 pub struct PosesCheck {
     /// Least and greatest chainage, metres.
     pub chainage_m: [f64; 2],
@@ -62,6 +64,7 @@ pub struct PosesCheck {
 
 /// The noise of the initial poses as it appears in the picture.
 #[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
 pub struct JitterCheck {
     /// 1-σ of the displacement from one frame to the next that the poses do not tell, pixels.
     pub sigma_px: f64,

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 /// Pose errors after the tunnel's gauge is removed, and only it: a similarity fit (Umeyama) would also hide
 /// errors that pictures do show, as an offset from the axis or a wrong scale.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct TrajectoryError {
     /// What was removed.
     pub gauge: GaugeMotion,

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// The relative errors do not depend on the gauge; the absolute ones do, and mean something only where it is fixed alike in both.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct UnalignedError {
     /// `|t_est − t_true|`, metres (`evo_ape`).
     pub ape_translation_m: Spread,

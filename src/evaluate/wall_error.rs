@@ -15,6 +15,7 @@ use std::f64::consts::TAU;
 /// of all frames are removed as far as the tunnel's [gauge](crate::surface::Gauge) leaves them free: no
 /// picture fixes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct WallError {
     /// Mean `Δs` that was removed, metres.
     pub shift_s_m: f64,

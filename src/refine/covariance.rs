@@ -30,6 +30,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 ///
 /// All are NaN where the equations have no answer.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
 pub struct FrameSigma {
     /// Rotation, root mean square over the three axes, degrees.
     #[serde(deserialize_with = "nan_if_null")]

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// When to stop.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Stopping {
     /// Steps at the most.
     pub max_iterations: u64,
@@ -27,6 +27,7 @@ pub struct Stopping {
 /// Why a solve stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum StopReason {
     /// The last step moved the wall by less than the tolerance.
     StepBelowTolerance,
@@ -40,6 +41,7 @@ pub enum StopReason {
 
 /// One step of a solve.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct StepRecord {
     /// Robust cost after it, on the same wall samples as at the start; None after a last step, which is not judged.
     pub cost: Option<f64>,
@@ -51,6 +53,7 @@ pub struct StepRecord {
 
 /// The course of one solve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SolveRecord {
     /// Number of steps taken.
     pub iterations: u64,

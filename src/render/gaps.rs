@@ -2,7 +2,7 @@
 
 use super::band::{Band, Target};
 use super::{Canvas, RenderError};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Edge of a cell, canvas pixels, unless the canvas is so large that there would be too many.
 const CELL_PX: u32 = 8;
@@ -11,6 +11,7 @@ const CELLS: u64 = 8 << 20;
 
 /// A stretch of wall that no frame shows: what hangs together, in a box.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Gap {
     /// From, metres.
     pub chainage_from_m: f64,
@@ -41,7 +42,7 @@ fn cells(canvas: &Canvas, cell: u32) -> u64 {
 }
 
 /// Adds up what is covered, in cells.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Coverage {
     canvas: Canvas,
     cell: u32,

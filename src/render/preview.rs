@@ -5,6 +5,7 @@ use super::sample::{Sample, Samples};
 use super::{Canvas, Layout, RenderError};
 use crate::lettering::{self, LETTER};
 use image::{Rgb, RgbImage};
+use serde::{Deserialize, Serialize};
 
 /// Longest side of the preview, pixels.
 const LONGEST: u32 = 4096;
@@ -22,7 +23,7 @@ const INK: Rgb<u8> = Rgb([20; 3]);
 const HOLE: Rgb<u8> = Rgb([205, 215, 235]);
 
 /// Adds up the panorama, small.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Preview {
     canvas: Canvas,
     /// Canvas pixels along each side of one of the preview's.

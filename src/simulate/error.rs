@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 /// Why a survey cannot be simulated.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SimulateError {
     /// An option is impossible.
     #[error("{what}")]

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 /// What the wall looks like. Grey levels of an evenly lit wall.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Wall {
     /// Bricks of 215 × 65 mm, each with a tone of its own.
     Brick,
@@ -31,6 +32,7 @@ pub enum Wall {
 /// How the wall is lit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Light {
     /// From one side, as the paper's: `0.35 + 0.65 (1 + cos θ)/2`, bright at θ = 0, dark at 180°.
     Downward,

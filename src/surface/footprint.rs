@@ -4,6 +4,7 @@ use super::{Surface, SurfaceError};
 use crate::camera::Camera;
 use crate::trajectory::Pose;
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 
 /// Rays along each edge of a frame. The box of the curved outline is short by the sagitta of one step:
 /// about 0.01 px for a 640 px wide frame.
@@ -20,7 +21,7 @@ pub fn shortest_arc(delta_s_m: f64, perimeter_m: f64) -> f64 {
 /// Bounding box of a frame on the unrolled wall, metres.
 ///
 /// `s` is unwrapped: a frame across θ = 0 has a negative `s_min_m` or an `s_max_m` beyond the perimeter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Footprint {
     /// Least arc length.
     pub s_min_m: f64,

@@ -3,6 +3,19 @@
 //!
 //! A wall point has two coordinates in metres: `s`, the arc length around the section (periodic), and
 //! `h`, the chainage along the axis. One file per shape; each implements [`Surface`].
+//!
+//! # Example
+//!
+//! ```
+//! use nalgebra::Vector3;
+//! use tunnelstitch::surface::{Circle, Surface};
+//!
+//! let tunnel = Circle::new(3.0)?;
+//! let hit = tunnel.hit(&Vector3::new(0.5, 1.0, 0.0), &Vector3::new(0.0, 0.2, 1.0))?;
+//! let wall = tunnel.frame(hit.wall);
+//! assert!((wall.x_w - hit.x_w).norm() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod circle;
 mod displacement;
@@ -50,6 +63,7 @@ pub struct WallFrame {
 
 /// Why a ray or a camera does not go with the tunnel.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SurfaceError {
     /// The camera's centre is not inside the tunnel.
     #[error(

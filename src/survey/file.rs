@@ -12,6 +12,7 @@ pub const SURVEY_FILE: &str = "survey.toml";
 /// `survey.toml` as written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct SurveyFile {
     /// The tunnel.
     pub tunnel: TunnelSection,
@@ -53,6 +54,7 @@ impl SurveyFile {
 /// Shape of the tunnel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Shape {
     /// Straight, circular section.
     Circle,
@@ -61,6 +63,7 @@ pub enum Shape {
 /// `[tunnel]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct TunnelSection {
     /// Shape of the tunnel.
     pub shape: Shape,
@@ -71,6 +74,7 @@ pub struct TunnelSection {
 /// `[camera]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct CameraSection {
     /// Calibration file.
     pub file: PathBuf,
@@ -86,6 +90,7 @@ pub struct CameraSection {
 /// `[frames]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct FramesSection {
     /// Glob pattern of the frames.
     pub images: String,
@@ -97,6 +102,7 @@ pub struct FramesSection {
 /// `[prior]`: the noise model of the initial poses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct PriorSection {
     /// How errors of consecutive poses hang together.
     pub model: JitterModel,

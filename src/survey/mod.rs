@@ -42,6 +42,20 @@
 //! ```
 //!
 //! Relative paths are relative to `survey.toml`. Unknown keys are errors with line and column.
+//!
+//! # Example
+//!
+//! ```
+//! use std::path::Path;
+//! use tunnelstitch::check::check;
+//! use tunnelstitch::survey::Survey;
+//!
+//! let survey = Survey::open(Path::new("fixtures/blender_free48"))?;
+//! let found = check(&survey)?;
+//! assert_eq!(found.frames, survey.frames.len());
+//! assert!(found.faults.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod associate;
 mod calibrate;

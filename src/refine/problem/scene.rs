@@ -8,11 +8,12 @@ use crate::refine::factor::FactorError;
 use crate::refine::prior::{Prior, predict};
 use crate::surface::{Surface, SurfaceError};
 use crate::trajectory::{Pose, Shutter};
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::ops::Range;
 
 /// How finely a problem looks at the wall.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sampling {
     /// Pyramid level of the frames; 0 is full size.
     pub level: usize,
@@ -118,6 +119,7 @@ pub struct Members<'m> {
 
 /// Why a problem cannot be set up or solved.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProblemError {
     /// A frame cannot be read any more.
     #[error(transparent)]
