@@ -123,6 +123,13 @@ impl Scene<'_> {
             ))
         });
         let views: Vec<View> = views.filter(View::shows).collect();
+        if views.is_empty() {
+            for (pixels, sources) in pixels.into_iter().zip(sources) {
+                pixels.fill(T::default());
+                sources.fill(NO_FRAME);
+            }
+            return;
+        }
         if views.iter().any(View::is_rough) {
             tile.points_into(self.surface, self.canvas, exact);
             points.set(exact);
