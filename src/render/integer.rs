@@ -162,9 +162,10 @@ mod avx2 {
     ) {
         match (kernel.taps(), C) {
             (2, _) => bilinear::<C>(simd, source, kernel, places, sums),
-            (4, 1) => grey(simd, source, kernel, places, sums, 1),
+            (4, 1) => grey(simd, source, kernel, places, sums),
             (4, _) => colour(simd, source, kernel, places, sums, 1),
-            (taps, 1) => grey(simd, source, kernel, places, sums, taps / 4),
+            (8, 1) => wide_grey(simd, source, kernel, places, sums, 1),
+            (taps, 1) => wide_grey(simd, source, kernel, places, sums, taps.div_ceil(8)),
             (taps, _) => colour(simd, source, kernel, places, sums, taps / 4),
         }
     }
@@ -375,17 +376,22 @@ mod avx2 {
         }
     }
 
-    /// The four weights from `at`, over and over.
+    /// The four weights from `at`; nothing where there are none.
     #[inline(always)]
-    fn four(simd: V3, weights: &[i16], at: usize) -> __m256i {
-        let four: [i16; 4] = match weights.get(at..at + 4) {
+    fn four_of(weights: &[i16], at: usize) -> [i16; 4] {
+        match weights.get(at..at + 4) {
             Some(four) => match four.first_chunk() {
                 Some(four) => *four,
                 None => [0; 4],
             },
             None => [0; 4],
-        };
-        simd.avx._mm256_set1_epi64x(cast(four))
+        }
+    }
+
+    /// The same, over and over.
+    #[inline(always)]
+    fn four(simd: V3, weights: &[i16], at: usize) -> __m256i {
+        simd.avx._mm256_set1_epi64x(cast(four_of(weights, at)))
     }
 
     /// Pixels 0 and 1 side by side in the lower half, 2 and 3 in the upper one.
@@ -454,9 +460,40 @@ mod avx2 {
         4, 5, NO, NO, 4, 5, NO, NO, 6, 7, NO, NO, 6, 7, NO, NO,
     ];
 
-    /// `blocks`: quarters of the taps.
+    /// Four taps.
     #[inline(always)]
-    fn grey(
+    fn grey(simd: V3, source: Source, kernel: &Kernel, places: Places, sums: &mut [[i32; 4]]) {
+        let (avx2, stride) = (simd.avx2, source.stride);
+        let [across, down] = places.phases;
+        let phases = across.iter().zip(down);
+        for ((sum, first), (s, t)) in sums.iter_mut().zip(places.first).zip(phases) {
+            let (w_x, w_y) = (kernel.integers(*s as usize), kernel.integers(*t as usize));
+            let at = *first as usize;
+            let pixels: [[u8; 4]; 4] = [
+                read(source.samples, at),
+                read(source.samples, at + stride),
+                read(source.samples, at + 2 * stride),
+                read(source.samples, at + 3 * stride),
+            ];
+            let pixels = avx2._mm256_cvtepu8_epi16(cast(pixels));
+            let cut =
+                avx2._mm256_srai_epi32::<8>(avx2._mm256_madd_epi16(pixels, four(simd, w_x, 0)));
+            let w = avx2._mm256_shuffle_epi8(four(simd, w_y, 0), cast(TWICE));
+            let [a, b]: [__m128i; 2] = cast(avx2._mm256_madd_epi16(cut, w));
+            let [a, b, c, d]: [i32; 4] = cast(simd.sse2._mm_add_epi32(a, b));
+            *sum = [a + b + c + d, 0, 0, 0];
+        }
+    }
+
+    /// Two weights: the first twice in the lower half, the second in the upper one.
+    const ROW_BY_ROW: [[i8; 16]; 2] = [
+        [0, 1, NO, NO, 0, 1, NO, NO, NO, NO, NO, NO, NO, NO, NO, NO],
+        [2, 3, NO, NO, 2, 3, NO, NO, NO, NO, NO, NO, NO, NO, NO, NO],
+    ];
+
+    /// Eight taps and more, `blocks` times eight at the most: a row in each half of a vector.
+    #[inline(always)]
+    fn wide_grey(
         simd: V3,
         source: Source,
         kernel: &Kernel,
@@ -464,33 +501,36 @@ mod avx2 {
         sums: &mut [[i32; 4]],
         blocks: usize,
     ) {
-        let (avx, avx2, stride) = (simd.avx, simd.avx2, source.stride);
+        let (avx, avx2) = (simd.avx, simd.avx2);
         let [across, down] = places.phases;
         let phases = across.iter().zip(down);
         for ((sum, first), (s, t)) in sums.iter_mut().zip(places.first).zip(phases) {
             let (w_x, w_y) = (kernel.integers(*s as usize), kernel.integers(*t as usize));
+            let mut at = *first as usize;
             let mut total = avx._mm256_setzero_si256();
-            for rows in 0..blocks {
-                let mut four_rows = avx._mm256_setzero_si256();
+            for w_y in w_y.as_chunks::<2>().0 {
+                let mut rows = avx._mm256_setzero_si256();
                 for block in 0..blocks {
-                    let at = *first as usize + 4 * rows * stride + 4 * block;
-                    let pixels: [[u8; 4]; 4] = [
-                        read(source.samples, at),
-                        read(source.samples, at + stride),
-                        read(source.samples, at + 2 * stride),
-                        read(source.samples, at + 3 * stride),
+                    let pixels: [[u8; 8]; 2] = [
+                        read(source.samples, at + 8 * block),
+                        read(source.samples, at + source.stride + 8 * block),
                     ];
                     let pixels = avx2._mm256_cvtepu8_epi16(cast(pixels));
-                    let w = four(simd, w_x, 4 * block);
-                    four_rows = avx2._mm256_add_epi32(four_rows, avx2._mm256_madd_epi16(pixels, w));
+                    let w = [four_of(w_x, 8 * block), four_of(w_x, 8 * block + 4)];
+                    let w = avx2._mm256_broadcastsi128_si256(cast(w));
+                    rows = avx2._mm256_add_epi32(rows, avx2._mm256_madd_epi16(pixels, w));
                 }
-                let cut = avx2._mm256_srai_epi32::<8>(four_rows);
-                let w = avx2._mm256_shuffle_epi8(four(simd, w_y, 4 * rows), cast(TWICE));
+                at += 2 * source.stride;
+                // a and b of a row: the first and the third number, the second and the fourth.
+                let rows = avx2._mm256_add_epi32(rows, avx2._mm256_shuffle_epi32::<0xee>(rows));
+                let cut = avx2._mm256_srai_epi32::<8>(rows);
+                let w = avx._mm256_set1_epi32(cast(*w_y));
+                let w = avx2._mm256_shuffle_epi8(w, cast(ROW_BY_ROW));
                 total = avx2._mm256_add_epi32(total, avx2._mm256_madd_epi16(cut, w));
             }
-            let [a, b]: [__m128i; 2] = cast(total);
-            let [a, b, c, d]: [i32; 4] = cast(simd.sse2._mm_add_epi32(a, b));
-            *sum = [a + b + c + d, 0, 0, 0];
+            let [upper, lower]: [__m128i; 2] = cast(total);
+            let [a, b, ..]: [i32; 4] = cast(simd.sse2._mm_add_epi32(upper, lower));
+            *sum = [a + b, 0, 0, 0];
         }
     }
 }
