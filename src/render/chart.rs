@@ -17,6 +17,8 @@ use std::f64::consts::SQRT_2;
 
 /// Pixels of the canvas along each side of a patch.
 pub const PATCH: usize = 32;
+/// From pixels to the patch's coordinates.
+const SCALE: f32 = 2.0 / PATCH as f32;
 /// Error of a polynomial at the most, pixels of the frame.
 const MOST_OFF_PX: f32 = 1e-3;
 /// Points of a patch along each side, the last of which are the next one's first; those at 0 are checked, the others fitted.
@@ -86,8 +88,6 @@ pub struct Chart {
     /// Patches across.
     across: usize,
     patches: Vec<Patch>,
-    /// Frame pixels that a canvas pixel covers, see [`Chart::stretch`].
-    stretch: f32,
 }
 
 /// Where the lattice's points appear, and whether the lens shows them.
@@ -128,12 +128,9 @@ impl Chart {
             }
             Self::fit(&u_all, &v_all)
         });
-        let patches = patches.collect();
-        let stretch = stretch(projected, columns, limit);
         Self {
             across,
-            patches,
-            stretch,
+            patches: patches.collect(),
         }
     }
 
@@ -147,10 +144,24 @@ impl Chart {
         }
     }
 
-    /// How many pixels of the frame a step of one canvas pixel covers, along that axis of the frame along which
-    /// it covers more: where the frame shows the tile, next to its middle.
-    pub fn stretch(&self) -> f32 {
-        self.stretch
+    /// How far u and v move from one canvas pixel to the next, along its row and along its column; None where pixels are to be projected
+    /// one by one.
+    pub fn steps(&self, row: usize, column: usize) -> Option<[[f32; 2]; 2]> {
+        let patch = &self.patches[row / PATCH * self.across + column / PATCH];
+        let Patch::Smooth(c) = patch else {
+            return None;
+        };
+        let place = |at: usize| (at % PATCH) as f32 * SCALE - 1.0;
+        let (x, y) = (place(column), place(row));
+        let value = |c: [f32; 4], t: f32| ((c[3] * t + c[2]) * t + c[1]) * t + c[0];
+        let slope = |c: [f32; 4], t: f32| SCALE * ((3.0 * c[3] * t + 2.0 * c[2]) * t + c[1]);
+        let steps = |first: usize| {
+            let of_x = [0, 1, 2, 3].map(|k| value([0, 1, 2, 3].map(|l| c[l][first + k]), y));
+            let of_y = [0, 1, 2, 3].map(|k| slope([0, 1, 2, 3].map(|l| c[l][first + k]), y));
+            [slope(of_x, x), value(of_y, x)]
+        };
+        let ([u_s, u_h], [v_s, v_h]) = (steps(0), steps(4));
+        Some([[u_s, v_s], [u_h, v_h]])
     }
 
     /// True if no pixel of the tile lies in the frame.
@@ -175,7 +186,7 @@ impl Chart {
     ) -> bool {
         match &self.patches[row / PATCH * self.across + patch] {
             Patch::Smooth(c) => {
-                let y = (row % PATCH) as f32 * (2.0 / PATCH as f32) - 1.0;
+                let y = (row % PATCH) as f32 * SCALE - 1.0;
                 let mut at = c[3];
                 for c in [&c[2], &c[1], &c[0]] {
                     for k in 0..at.len() {
@@ -183,7 +194,7 @@ impl Chart {
                     }
                 }
                 for k in 0..PATCH {
-                    let x = k as f32 * (2.0 / PATCH as f32) - 1.0;
+                    let x = k as f32 * SCALE - 1.0;
                     u[k] = ((at[3] * x + at[2]) * x + at[1]) * x + at[0];
                     v[k] = ((at[7] * x + at[6]) * x + at[5]) * x + at[4];
                 }
@@ -250,34 +261,6 @@ fn coefficients(at: &[[f32; 5]; 5]) -> Option<[[f32; 4]; 4]> {
     }
     c[0][0] += middle;
     Some(c)
-}
-
-/// [`Chart::stretch`] by differences of the lattice's points.
-fn stretch(projected: &Projected, columns: usize, limit: [f32; 2]) -> f32 {
-    let Projected { u, v, shown } = projected;
-    let (count, rows) = (u.len(), u.len() / columns);
-    let seen = |at: &usize| {
-        let (u, v) = (u[*at], v[*at]);
-        shown[*at] && (0.0..=limit[0]).contains(&u) && (0.0..=limit[1]).contains(&v)
-    };
-    // From the middle on; of equals the first.
-    let middle = (rows / 2, columns / 2);
-    let far = |at: &usize| (at / columns).abs_diff(middle.0).max((at % columns).abs_diff(middle.1));
-    let Some(at) = (0..count).filter(seen).min_by_key(far) else {
-        return 1.0;
-    };
-    // To the next point, or from the one before where a row or column ends.
-    let change = |place: usize, last: usize, step: usize| {
-        let from = if place == last { place - 1 } else { place };
-        let pixels = (POINTS[from % STEP + 1] - POINTS[from % STEP]) * 0.5 * PATCH as f64;
-        let first = at - (place - from) * step;
-        let per_pixel = (1.0 / pixels) as f32;
-        let change = |of: &[f32]| (of[first + step] - of[first]) * per_pixel;
-        (change(u), change(v))
-    };
-    let (u_s, v_s) = change(at % columns, columns - 1, 1);
-    let (u_h, v_h) = change(at / columns, rows - 1, columns);
-    (u_s * u_s + u_h * u_h).max(v_s * v_s + v_h * v_h).sqrt()
 }
 
 #[cfg(test)]

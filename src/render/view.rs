@@ -43,7 +43,7 @@ pub struct View<'a> {
     look: Look,
     chart: Chart,
     picture: &'a Picture,
-    kernel: &'a Kernel,
+    kernels: &'a Kernels,
     response: Response<'a>,
     /// `2/width`, `2/height` of the picture, and the last pixel centres.
     feather: [f32; 4],
@@ -66,8 +66,8 @@ impl<'a> View<'a> {
         Self {
             frame,
             look,
-            kernel: kernels.stretched(chart.stretch()),
             chart,
+            kernels,
             picture,
             response,
             feather: [2.0 / width, 2.0 / height, width - 0.5, height - 0.5],
@@ -94,8 +94,8 @@ impl<'a> View<'a> {
         columns: Range<usize>,
     ) {
         run.locate(&self.chart, &self.look, points, place, columns.clone());
-        if run.seen()[columns.clone()].contains(&true) {
-            run.sample(self.picture, self.kernel, columns.clone());
+        if let Some(kernel) = self.kernel(run, points, place, columns.clone()) {
+            run.sample(self.picture, kernel, columns.clone());
             self.response.undo(run, columns);
         }
     }
@@ -103,7 +103,7 @@ impl<'a> View<'a> {
     /// Whether [`View::copy`] can do it: 8 bits, more than the nearest pixel, no exposure to be undone.
     pub fn copies(&self) -> bool {
         let eight = matches!(self.picture.samples(), Samples::Eight(_));
-        eight && self.kernel.taps() > 1 && self.response.is_none()
+        eight && self.kernels.stretched(1.0).taps() > 1 && self.response.is_none()
     }
 
     /// As [`View::look_at`], with the values straight into `pixels`, alpha last.
@@ -116,11 +116,54 @@ impl<'a> View<'a> {
         pixels: &mut [u8],
     ) {
         run.locate(&self.chart, &self.look, points, place, columns.clone());
-        if !run.seen()[columns.clone()].contains(&true) {
-            pixels.fill(0);
-        } else if let Samples::Eight(samples) = self.picture.samples() {
-            run.copy::<C>(self.picture, samples, self.kernel, columns, pixels);
+        let kernel = self.kernel(run, points, place, columns.clone());
+        match (kernel, self.picture.samples()) {
+            (Some(kernel), Samples::Eight(samples)) => {
+                run.copy::<C>(self.picture, samples, kernel, columns, pixels);
+            }
+            _ => pixels.fill(0),
         }
+    }
+
+    /// The kernel for points that were found before: as wide as the frame is finer than the canvas where it shows one of them, next to
+    /// the middle. None if it shows none.
+    fn kernel(
+        &self,
+        run: &Run,
+        points: &Points,
+        (row, width): (usize, usize),
+        columns: Range<usize>,
+    ) -> Option<&'a Kernel> {
+        let seen = run.seen();
+        let half = columns.start + columns.len() / 2;
+        let column = (half..columns.end)
+            .find(|k| seen[*k])
+            .or_else(|| (columns.start..half).rev().find(|k| seen[*k]))?;
+        let steps = self.chart.steps(row, column);
+        let [s, h] = steps.unwrap_or_else(|| self.exact_steps(points, (row, width), column));
+        // Frame pixels to a step of one canvas pixel, along that axis of the frame along which there are more.
+        let square = |k: usize| s[k] * s[k] + h[k] * h[k];
+        Some(self.kernels.stretched(square(0).max(square(1)).sqrt()))
+    }
+
+    /// [`Chart::steps`] from one point to the next, or from the one before where a row or column ends.
+    fn exact_steps(
+        &self,
+        points: &Points,
+        (row, width): (usize, usize),
+        column: usize,
+    ) -> [[f32; 2]; 2] {
+        let at = row * width + column;
+        let own = self.look.pixel(points, at);
+        let step = |after: Option<usize>, before: Option<usize>| {
+            let other = after.or(before).unwrap_or(at);
+            let other = self.look.pixel(points, other);
+            [other[0] - own[0], other[1] - own[1]]
+        };
+        let right = (column + 1 < width).then_some(at + 1);
+        let below = Some(at + width).filter(|below| *below < points.len());
+        let left = (column > 0).then(|| at - 1);
+        [step(right, left), step(below, at.checked_sub(width))]
     }
 
     /// `tent(u) tent(v)`: 1 in the middle, falling to 0 half a pixel beyond the outermost pixel centres.

@@ -82,6 +82,12 @@ impl Look {
         self.limit
     }
 
+    /// The pixel of one of the points, wherever it lies.
+    pub fn pixel(&self, points: &Points, at: usize) -> [f32; 2] {
+        let (u, v, _) = self.project(self.lens, [points.x[at], points.y[at], points.z[at]]);
+        [u, v]
+    }
+
     /// Finds the pixels of the points from index `start` on, as many as `u`, `v` and `shown` (by the lens, within the picture or
     /// not) hold.
     pub fn project_all(&self, points: &Points, start: usize, (u, v, shown): Pixels) {
