@@ -16,9 +16,9 @@
 //! 128, 2000; for panoramas D. B. Goldman, "Vignette and exposure calibration and compensation", PAMI 32(12), 2010.
 
 use super::glimpses::{Glimpse, glimpses};
+use super::run::Run;
 use super::sample::Sample;
 use super::thumbnails::Thumbnails;
-use super::run::Run;
 use super::{Canvas, Placement};
 use crate::frames::{Agreement, MAD_TO_SIGMA, SHADING_TERMS, Shading};
 use crate::surface::Surface;

@@ -193,10 +193,7 @@ mod avx2 {
             let b = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(b, more_twice), count);
             let c = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(c, more_twice), count);
             let d = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(d, more_twice), count);
-            let (ab, cd) = (
-                avx2._mm256_packs_epi32(a, b),
-                avx2._mm256_packs_epi32(c, d),
-            );
+            let (ab, cd) = (avx2._mm256_packs_epi32(a, b), avx2._mm256_packs_epi32(c, d));
             let all = avx2._mm256_packus_epi16(ab, cd);
             let all = avx2._mm256_permutevar8x32_epi32(all, order);
             if C == 3 {
@@ -618,7 +615,10 @@ mod tests {
             }
         }
         let rms = (squares / (C * fast.len()) as f64).sqrt();
-        assert!(worst < 0.1 && rms < 0.03, "{interpolation:?} {stretch}: {worst}, {rms}");
+        assert!(
+            worst < 0.1 && rms < 0.03,
+            "{interpolation:?} {stretch}: {worst}, {rms}"
+        );
     }
 
     #[test]

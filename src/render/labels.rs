@@ -15,8 +15,8 @@
 //! "Interactive digital photomontage", SIGGRAPH 2004 (the energy).
 
 use super::draw::{NO_FRAME, median};
-use super::thumbnails::Thumbnails;
 use super::run::{RUN, Run};
+use super::thumbnails::Thumbnails;
 use super::warp::Points;
 use super::{Canvas, Exposure, Placement, Tile, tiles};
 use crate::surface::{Surface, WallFrame};

@@ -13,8 +13,8 @@
 //! on Graphics 2(4), 1983.
 
 use super::draw::NO_FRAME;
-use super::thumbnails::Thumbnails;
 use super::run::{RUN, Run};
+use super::thumbnails::Thumbnails;
 use super::warp::Points;
 use super::{Canvas, Exposure, Placement};
 use crate::surface::Surface;

@@ -224,7 +224,10 @@ impl Run {
             samples,
             stride: picture.width() * C,
         };
-        touch(samples, &self.first[columns.clone()], (kernel.taps() + 1) * source.stride);
+        if columns.len() >= PATCH {
+            let ahead = (kernel.taps() + 1) * source.stride;
+            touch(samples, &self.first[columns.clone()], ahead);
+        }
         let places = Places {
             first: &self.first[columns.clone()],
             phases: [
@@ -288,10 +291,7 @@ impl Run {
         let (right, bottom) = (width - taps, height - taps);
         let channels = picture.format().channels as i32;
         let rounding = kernel.rounding();
-        let (u, v) = (
-            self.u.as_chunks::<PATCH>().0,
-            self.v.as_chunks::<PATCH>().0,
-        );
+        let (u, v) = (self.u.as_chunks::<PATCH>().0, self.v.as_chunks::<PATCH>().0);
         let seen = self.seen.as_chunks::<PATCH>().0;
         let first = self.first.as_chunks_mut::<PATCH>().0;
         let inside = self.inside.as_chunks_mut::<PATCH>().0;
@@ -315,7 +315,11 @@ impl Run {
                             seen[k] & (left >= 0) & (top >= 0) & (left <= right) & (top <= bottom);
                         inside[k] = within;
                         let at = top.wrapping_mul(width).wrapping_add(left);
-                        first[k] = if within { at.wrapping_mul(channels) as u32 } else { 0 };
+                        first[k] = if within {
+                            at.wrapping_mul(channels) as u32
+                        } else {
+                            0
+                        };
                     }
                 }
             },
@@ -358,7 +362,10 @@ fn touch(samples: &[u8], first: &[u32], ahead: usize) {
     const LINE: usize = 16;
     let mut sum = 0;
     for first in first.chunks(LINE) {
-        sum ^= samples.get(first[0] as usize + ahead).copied().unwrap_or_default();
+        sum ^= samples
+            .get(first[0] as usize + ahead)
+            .copied()
+            .unwrap_or_default();
     }
     std::hint::black_box(sum);
 }
