@@ -93,6 +93,7 @@ pub mod check;
 pub mod cli;
 pub mod evaluate;
 pub mod frames;
+pub mod inspect;
 mod lettering;
 pub mod progress;
 pub mod provenance;

@@ -31,4 +31,6 @@ pub use cog::CogWriter;
 pub use compression::Compression;
 pub use dzi::{DziFormat, DziWriter};
 pub use error::RasterError;
+pub(crate) use jpeg::compress as compress_jpeg;
+pub(crate) use pyramid::{LevelTile, Pyramid};
 pub use spec::{EDGE, Georeference, Nodata, RasterSpec, RasterTile, Reduce, SampleType, TileOrder};

@@ -1,0 +1,35 @@
+//! The wall in three dimensions: files for other programs, and a page to walk through.
+//!
+//! ```text
+//! render::Plan ─ bands ─> Cutter ─ blocks of all levels ─> part: Lines, Mesh, JPEG ─> glb ─┬─> GlbTarget ──> FILE.glb
+//!                          (raster::Pyramid, Strip)                                        └─> TilesTarget ─> tileset.json, LEVEL/*.glb
+//!
+//! tunnel.json, wall.json (Manifest, WallPoints) ─┐
+//! tiles of every layer (TilesTarget) ────────────┼─ a folder ─> any web server, or Server ─> the page (web/)
+//! index.html, viewer.js (Viewer) ────────────────┘                            └── Marks: marks.geojson, marks.csv
+//! ```
+//!
+//! Textures are cut from the bands of the panorama as they are drawn; a few hundred rows of every level are held. All of it is
+//! metric and in the world's coordinates; positions are relative to a point nearby.
+
+mod cut;
+mod error;
+mod glb;
+mod manifest;
+mod marks;
+mod mesh;
+mod server;
+mod single;
+mod strip;
+mod tiles;
+mod tileset;
+mod viewer;
+
+pub use error::InspectError;
+pub use manifest::{Layer, MANIFEST, Manifest, MapPlace, WALL, WallPoints};
+pub use marks::{Geometry, MARKS_CSV, MARKS_GEOJSON, Mark, Marks, Properties};
+pub use mesh::{Lines, Mesh, Patch};
+pub use server::{Originals, Served, Server};
+pub use single::GlbTarget;
+pub use tiles::{TilesFolder, TilesTarget, tiles_px_per_metre};
+pub use viewer::Viewer;
