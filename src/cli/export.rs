@@ -2,12 +2,13 @@
 
 use super::poses::PosesArgument;
 use super::stitch::parent_folder;
-use super::textured::{LayersArguments, TextureArguments};
-use super::{Failure, Terminal};
-use crate::atomic::StagedFolder;
-use crate::inspect::{GlbTarget, TilesFolder, Viewer};
+use super::textured::{LayerName, LayersArguments, TextureArguments};
+use super::{Failure, Terminal, json};
+use crate::atomic::{StagedFolder, WriteError};
+use crate::inspect::{GlbTarget, MANIFEST, MARKS_CSV, MARKS_GEOJSON, TILESET, TilesFolder, Viewer};
 use crate::render::{Canvas, Target};
 use crate::trajectory::poses_of;
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Writes the wall in three dimensions, textured with the panorama: metric, in the tunnel's coordinates.
@@ -38,10 +39,26 @@ pub struct ExportArguments {
     /// A folder with the viewer and everything it shows, for any web server. Marks stay in the browser; `view` keeps them in files.
     #[arg(long, value_name = "DIR", group = "output")]
     web: Option<PathBuf>,
+    /// Print what was written as JSON.
+    #[arg(long)]
+    json: bool,
     #[command(flatten, next_help_heading = "Layers of --web")]
     layers: LayersArguments,
     #[command(flatten)]
     textures: TextureArguments,
+}
+
+/// What was written.
+#[derive(Serialize)]
+struct Report<'a> {
+    glb: Option<&'a Path>,
+    tiles: Option<&'a Path>,
+    web: Option<&'a Path>,
+    /// What glb and tiles show.
+    canvas: Option<Canvas>,
+    chainage_m: Option<[f64; 2]>,
+    /// What web shows.
+    layers: Vec<LayerName>,
 }
 
 /// Runs the command.
@@ -49,17 +66,26 @@ pub struct ExportArguments {
 /// # Errors
 /// [`Failure`] for everything wrong with the survey, the poses or the output.
 pub fn run(arguments: &ExportArguments, terminal: &Terminal) -> Result<(), Failure> {
-    if let Some(glb) = &arguments.glb {
-        if glb.extension().is_none_or(|extension| extension != "glb") {
-            return Err(Failure::usage(format!(
-                "--glb {}: the name must end in .glb",
-                glb.display()
-            )));
-        }
-        parent_folder(glb)?;
+    check(arguments)?;
+    let canvas = match arguments.glb.is_some() || arguments.tiles.is_some() {
+        true => Some(files(arguments, terminal)?),
+        false => None,
+    };
+    let layers = match &arguments.web {
+        Some(folder) => web(arguments, folder, terminal)?,
+        None => Vec::new(),
+    };
+    if arguments.json {
+        return json::print(&Report {
+            glb: arguments.glb.as_deref(),
+            tiles: arguments.tiles.as_deref(),
+            web: arguments.web.as_deref(),
+            canvas,
+            chainage_m: canvas.map(|canvas| canvas.chainage_m()),
+            layers,
+        });
     }
-    if arguments.glb.is_some() || arguments.tiles.is_some() {
-        let canvas = files(arguments, terminal)?;
+    if let Some(canvas) = canvas {
         let [from_m, to_m] = canvas.chainage_m();
         for path in arguments.glb.iter().chain(&arguments.tiles) {
             terminal.say(format!(
@@ -71,10 +97,49 @@ pub fn run(arguments: &ExportArguments, terminal: &Terminal) -> Result<(), Failu
             ));
         }
     }
-    match &arguments.web {
-        Some(folder) => web(arguments, folder, terminal),
-        None => Ok(()),
+    if let Some(folder) = &arguments.web {
+        let names: Vec<&str> = layers.iter().map(|name| name.text()).collect();
+        terminal.say(format!(
+            "{}: {}, for any web server, or `tunnelstitch view {0}`",
+            folder.display(),
+            names.join(", "),
+        ));
     }
+    Ok(())
+}
+
+/// Checks the names, and that there is a page, before any work is done.
+fn check(arguments: &ExportArguments) -> Result<(), Failure> {
+    if let Some(glb) = &arguments.glb {
+        if glb.extension().is_none_or(|extension| extension != "glb") {
+            return Err(Failure::usage(format!(
+                "--glb {}: the name must end in .glb",
+                glb.display()
+            )));
+        }
+        parent_folder(glb)?;
+    }
+    for (folder, file) in [(&arguments.tiles, TILESET), (&arguments.web, MANIFEST)] {
+        if let Some(folder) = folder {
+            check_replaceable(folder, file)?;
+        }
+    }
+    if arguments.web.is_some() {
+        Viewer::bundled()?;
+    }
+    Ok(())
+}
+
+/// Refuses a folder that holds something else than an earlier export, known by one of its files: all that is in it would be lost.
+fn check_replaceable(folder: &Path, file: &str) -> Result<(), Failure> {
+    let empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
+    if empty || folder.join(file).is_file() {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "{}: holds other things than an earlier export; name another folder",
+        folder.display()
+    )))
 }
 
 /// Writes `--glb` and `--3dtiles` from one panorama.
@@ -115,9 +180,12 @@ fn files(arguments: &ExportArguments, terminal: &Terminal) -> Result<Canvas, Fai
     Ok(canvas)
 }
 
-/// Writes `--web`.
-fn web(arguments: &ExportArguments, folder: &Path, terminal: &Terminal) -> Result<(), Failure> {
-    let viewer = Viewer::bundled()?;
+/// Writes `--web`; its layers.
+fn web(
+    arguments: &ExportArguments,
+    folder: &Path,
+    terminal: &Terminal,
+) -> Result<Vec<LayerName>, Failure> {
     let layers = &arguments.layers;
     let (survey, all) = layers.open(&arguments.survey, &arguments.poses, terminal)?;
     let staged = StagedFolder::begin(folder)?;
@@ -127,15 +195,15 @@ fn web(arguments: &ExportArguments, folder: &Path, terminal: &Terminal) -> Resul
         staged.path(),
         terminal,
     )?;
-    viewer.write(staged.path())?;
+    Viewer::bundled()?.write(staged.path())?;
+    // Marks of an inspection outlive the pictures.
+    for name in [MARKS_GEOJSON, MARKS_CSV] {
+        let old = folder.join(name);
+        if old.is_file() {
+            let new = staged.path().join(name);
+            std::fs::copy(&old, &new).map_err(|source| WriteError::new(&old, source))?;
+        }
+    }
     staged.finish()?;
-    terminal.say(format!(
-        "{}: {}, for any web server, or `tunnelstitch view {0}`",
-        folder.display(),
-        all.iter()
-            .map(|layer| layer.name.text())
-            .collect::<Vec<_>>()
-            .join(", "),
-    ));
-    Ok(())
+    Ok(all.iter().map(|layer| layer.name).collect())
 }

@@ -6,7 +6,7 @@ use super::{Failure, Terminal};
 use crate::atomic::ScratchFolder;
 use crate::inspect::{MANIFEST, Marks, Originals, Served, Server, Viewer};
 use crate::render::place;
-use crate::survey::Survey;
+use crate::survey::{SURVEY_FILE, Survey};
 use std::path::{Path, PathBuf};
 
 /// Shows the tunnel in the browser: walk along the wall, measure, mark defects, look at the frames behind a place.
@@ -17,10 +17,12 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:\n  \
     tunnelstitch view my-survey --poses refined/poses.tum\n      \
     draws refined, initial and true poses, and says where to look\n  \
+    tunnelstitch view refined\n      \
+    the same\n  \
     tunnelstitch export my-survey --poses refined/poses.tum --web walk; tunnelstitch view walk\n      \
     draws once, shows often; without the frames")]
 pub struct ViewArguments {
-    /// Folder of the survey, or its survey.toml; or a folder that `export --web` has written.
+    /// Folder of the survey, or its survey.toml; or a folder that `refine` or `export --web` has written.
     survey: PathBuf,
     #[command(flatten)]
     poses: PosesArgument,
@@ -48,9 +50,11 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
         };
         return serve(served, arguments.port, terminal);
     }
-    let (survey, layers) = arguments
-        .layers
-        .open(&arguments.survey, &arguments.poses, terminal)?;
+    let (survey, poses) = match refined(&arguments.survey)? {
+        Some(refined) if arguments.poses.file().is_none() => refined,
+        _ => (arguments.survey.clone(), arguments.poses.clone()),
+    };
+    let (survey, layers) = arguments.layers.open(&survey, &poses, terminal)?;
     let marks = Marks::open(&survey.folder)?;
     let scratch = ScratchFolder::inside(&std::env::temp_dir())?;
     arguments.layers.draw(
@@ -66,6 +70,29 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
         marks,
     };
     serve(served, arguments.port, terminal)
+}
+
+/// The survey and the poses of a folder that `refine` has written; nothing for other folders.
+fn refined(folder: &Path) -> Result<Option<(PathBuf, PosesArgument)>, Failure> {
+    let report = folder.join("refine.json");
+    let Ok(text) = std::fs::read_to_string(&report) else {
+        return Ok(None);
+    };
+    let value: Option<serde_json::Value> = serde_json::from_str(&text).ok();
+    let named = value
+        .as_ref()
+        .and_then(|value| value["survey"].as_str())
+        .map(PathBuf::from);
+    let own = Some(folder.to_owned()).filter(|folder| folder.join(SURVEY_FILE).is_file());
+    let poses = folder.join("poses.tum");
+    match own.or(named.filter(|survey| survey.exists())) {
+        Some(survey) => Ok(Some((survey, PosesArgument::of_file(&poses)))),
+        None => Err(Failure::usage(format!(
+            "{}: the survey that it names is not there; use `tunnelstitch view SURVEY --poses {}`",
+            report.display(),
+            poses.display()
+        ))),
+    }
 }
 
 /// The frames of the survey, placed by every layer.

@@ -32,4 +32,5 @@ pub use mesh::{Lines, Mesh, Patch};
 pub use server::{Originals, Served, Server};
 pub use single::GlbTarget;
 pub use tiles::{TilesFolder, TilesTarget, tiles_px_per_metre};
+pub use tileset::TILESET;
 pub use viewer::Viewer;

@@ -41,8 +41,8 @@ fn file_name((level, column, row): Key) -> String {
     format!("{level}_{column}_{row}.json")
 }
 
-/// The file that holds the root.
-pub(super) const TILESET: &str = "tileset.json";
+/// Name of the file that holds the root of the tree of tiles.
+pub const TILESET: &str = "tileset.json";
 
 impl Tree<'_> {
     /// All files of the tree, by name.

@@ -2,7 +2,7 @@
 //!
 //! **What it trusts.** Only programs of this machine can connect, since it listens on the loopback address. But any page open in
 //! a browser here can send requests there, so: a `Host` other than its own is refused (a name that was made to point here),
-//! and what changes marks must come from its own page ([`request::check`]). Paths are names below the folder, taken letter by
+//! and what changes marks must come from its own page ([`Request::check`]). Paths are names below the folder, taken letter by
 //! letter; nothing is decoded, and what they lead to must lie in it. Nothing is written but the marks.
 
 mod files;
@@ -16,13 +16,22 @@ use crate::frames::FrameFile;
 use crate::render::{Placement, sightings};
 use crate::surface::{Surface, WallPoint};
 use reply::Reply;
+use request::Request;
 use serde_json::json;
+use std::io::Read;
+use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
-use tiny_http::{Method, Request};
+use std::time::Duration;
 
-/// Threads that answer; a browser asks for several tiles at once.
-const THREADS: usize = 4;
+/// Threads that answer, a connection each: more than a browser opens to one server.
+const THREADS: usize = 12;
+
+/// The longest silence on a connection.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Bytes of a refused request that are still read, so that its sender gets to the answer.
+const DRAINED: u64 = 8 << 20;
 
 /// The frames behind the layers.
 pub struct Originals {
@@ -50,7 +59,7 @@ pub struct Served {
 
 /// A server that listens.
 pub struct Server {
-    http: tiny_http::Server,
+    listener: TcpListener,
     port: u16,
     folder: PathBuf,
     viewer: Viewer,
@@ -64,13 +73,12 @@ impl Server {
     /// # Errors
     /// [`InspectError::Listen`]; a folder that is not there.
     pub fn listen(served: Served, port: u16) -> Result<Self, InspectError> {
-        let listen = |what: String| InspectError::Listen { port, what };
-        let http = tiny_http::Server::http(("127.0.0.1", port))
-            .map_err(|error| listen(error.to_string()))?;
-        let port = http
-            .server_addr()
-            .to_ip()
-            .map_or(port, |address| address.port());
+        let fail = |error: std::io::Error| InspectError::Listen {
+            port,
+            what: error.to_string(),
+        };
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(fail)?;
+        let port = listener.local_addr().map_err(fail)?.port();
         let folder = served
             .folder
             .canonicalize()
@@ -79,7 +87,7 @@ impl Server {
                 what: error.to_string(),
             })?;
         Ok(Self {
-            http,
+            listener,
             port,
             folder,
             viewer: served.viewer,
@@ -98,23 +106,43 @@ impl Server {
         std::thread::scope(|scope| {
             for _ in 0..THREADS {
                 scope.spawn(|| {
-                    while let Ok(mut request) = self.http.recv() {
-                        let reply = match request::check(&request, self.port) {
-                            Ok(()) => self.answer(&mut request),
-                            Err(refused) => refused,
-                        };
-                        // A browser that has left is no error.
-                        let _ = request.respond(reply.into_response());
+                    loop {
+                        // A connection that ends before it is there is no error, nor is a browser that has left.
+                        if let Ok((stream, _)) = self.listener.accept() {
+                            let _ = self.serve(stream);
+                        }
                     }
                 });
             }
         });
     }
 
-    fn answer(&self, request: &mut Request) -> Reply {
-        let url = request.url().to_owned();
-        let (path, query) = url.split_once('?').unwrap_or((&url, ""));
-        let read = matches!(request.method(), Method::Get | Method::Head);
+    /// Reads a request and answers it.
+    fn serve(&self, mut stream: TcpStream) -> std::io::Result<()> {
+        stream.set_read_timeout(Some(PATIENCE))?;
+        stream.set_write_timeout(Some(PATIENCE))?;
+        stream.set_nodelay(true)?;
+        match Request::read(&stream) {
+            Ok(None) => return Ok(()),
+            Ok(Some(request)) => {
+                let reply = match request.check(self.port) {
+                    Ok(()) => self.answer(&request),
+                    Err(refused) => refused,
+                };
+                reply.write(&mut stream, request.method != "HEAD")?;
+            }
+            Err(refused) => refused.write(&mut stream, true)?,
+        }
+        stream.shutdown(Shutdown::Write)?;
+        // What is left unread would break the connection before the answer arrives.
+        std::io::copy(&mut stream.take(DRAINED), &mut std::io::sink())?;
+        Ok(())
+    }
+
+    fn answer(&self, request: &Request) -> Reply {
+        let target = request.target.as_str();
+        let (path, query) = target.split_once('?').unwrap_or((target, ""));
+        let read = request.reads();
         match path.strip_prefix("/api/") {
             Some(path) => match (path.split_once('/').unwrap_or((path, "")), read) {
                 (("marks", ""), true) => self.marks(),
@@ -148,14 +176,14 @@ impl Server {
         }
     }
 
-    fn change_marks(&self, id: &str, request: &mut Request) -> Reply {
-        let mark = match request.method() {
-            Method::Put => match request::json::<Mark>(request) {
+    fn change_marks(&self, id: &str, request: &Request) -> Reply {
+        let mark = match request.method.as_str() {
+            "PUT" => match request.json::<Mark>() {
                 Ok(mark) if mark.id == id => Some(mark),
                 Ok(_) => return Reply::refuse(400, "the mark has another id than the address"),
                 Err(refused) => return refused,
             },
-            Method::Delete => None,
+            "DELETE" => None,
             _ => return Reply::refuse(405, "marks are PUT or DELETEd"),
         };
         let fault = mark.as_ref().and_then(Mark::fault);

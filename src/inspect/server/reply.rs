@@ -1,8 +1,7 @@
 //! Answers and their headers.
 
 use serde::Serialize;
-use std::io::Cursor;
-use tiny_http::{Header, Response};
+use std::io::Write;
 
 /// An answer.
 #[derive(Debug, PartialEq, Eq)]
@@ -45,23 +44,47 @@ impl Reply {
         Self::refuse(404, "there is nothing of that name")
     }
 
-    pub(super) fn into_response(self) -> Response<Cursor<Vec<u8>>> {
-        let headers = [
+    /// Writes it as the whole of a connection: one answer, then the end. `body`: whether more than its head was asked for.
+    ///
+    /// # Errors
+    /// A browser that has left.
+    pub(super) fn write(&self, stream: &mut impl Write, body: bool) -> std::io::Result<()> {
+        let mut head = format!("HTTP/1.1 {} {}\r\n", self.status, reason(self.status));
+        let length = self.body.len().to_string();
+        for (name, value) in [
             ("Content-Type", self.kind),
+            ("Content-Length", &length),
+            ("Connection", "close"),
             ("Content-Security-Policy", POLICY),
             ("X-Content-Type-Options", "nosniff"),
             ("Cross-Origin-Resource-Policy", "same-origin"),
             ("Referrer-Policy", "no-referrer"),
             // Tiles of another run may have the same names.
             ("Cache-Control", "no-cache"),
-        ];
-        let mut response = Response::from_data(self.body).with_status_code(self.status);
-        for (name, value) in headers {
-            // These are plain ASCII, so none is left out.
-            if let Ok(header) = Header::from_bytes(name, value) {
-                response.add_header(header);
-            }
+        ] {
+            head += &format!("{name}: {value}\r\n");
         }
-        response
+        head += "\r\n";
+        stream.write_all(head.as_bytes())?;
+        if body {
+            stream.write_all(&self.body)?;
+        }
+        stream.flush()
+    }
+}
+
+fn reason(status: u16) -> &'static str {
+    match status {
+        200 => "OK",
+        400 => "Bad Request",
+        403 => "Forbidden",
+        404 => "Not Found",
+        405 => "Method Not Allowed",
+        411 => "Length Required",
+        413 => "Content Too Large",
+        415 => "Unsupported Media Type",
+        421 => "Misdirected Request",
+        431 => "Request Header Fields Too Large",
+        _ => "Internal Server Error",
     }
 }

@@ -8,6 +8,8 @@ import type { WallPlace } from "./wall";
 const MOST_BYTES = 256 * 2 ** 20;
 const KEPT_BYTES = 160 * 2 ** 20;
 const MIB = 2 ** 20;
+/** Updates without anything to wait for, until all is there. */
+const SETTLED = 3;
 
 export class Layers {
   readonly group = new Group();
@@ -16,8 +18,10 @@ export class Layers {
   onProblem: (what: string) => void = () => {};
   private shown: TilesRenderer | null = null;
   private layer: Layer;
-  private settled = false;
   private next: TilesRenderer | null = null;
+  /** Layers that wait for tiles, and updates since none did. */
+  private readonly busy = new Set<TilesRenderer>();
+  private idle = 0;
   private readonly ray = new Raycaster();
 
   constructor(
@@ -35,7 +39,7 @@ export class Layers {
   /** Shows a layer as soon as enough of it is there; until then the one before. */
   show(name: string): void {
     this.layer = this.tunnel.layers.find((layer) => layer.name === name) ?? this.tunnel.layers[0];
-    this.next?.dispose();
+    if (this.next) this.drop(this.next);
     const tiles = new TilesRenderer(this.layer.tileset);
     tiles.lruCache.maxBytesSize = MOST_BYTES;
     tiles.lruCache.minBytesSize = KEPT_BYTES;
@@ -53,8 +57,10 @@ export class Layers {
     for (const event of ["needs-update", "tile-visibility-change", "load-root-tileset", "tiles-load-end"]) {
       tiles.addEventListener(event, () => this.onChange());
     }
+    tiles.addEventListener("tiles-load-start", () => this.busy.add(tiles));
+    tiles.addEventListener("tiles-load-end", () => this.busy.delete(tiles));
     this.next = tiles;
-    this.settled = false;
+    this.idle = 0;
     this.onChange();
   }
 
@@ -65,19 +71,27 @@ export class Layers {
       tiles?.setResolutionFromRenderer(this.camera, this.renderer);
       tiles?.update();
     }
-    if (this.next?.root && this.next.loadProgress === 1 && this.next.visibleTiles.size > 0) {
-      this.shown?.dispose();
-      this.shown?.group.removeFromParent();
+    const waiting = this.busy.size > 0 || (this.next !== null && !this.next.root);
+    this.idle = waiting ? 0 : this.idle + 1;
+    if (this.next && this.complete) {
+      if (this.shown) this.drop(this.shown);
       this.shown = this.next;
       this.next = null;
       this.group.add(this.shown.group);
+      this.onChange();
     }
-    this.settled = this.next === null && this.shown?.loadProgress === 1;
   }
 
   /** Whether all that is in sight is there. */
   get complete(): boolean {
-    return this.settled;
+    // What has just come may ask for more.
+    return this.idle >= SETTLED;
+  }
+
+  private drop(tiles: TilesRenderer): void {
+    tiles.group.removeFromParent();
+    this.busy.delete(tiles);
+    tiles.dispose();
   }
 
   /** The place of the wall under a point of the view (−1 to 1, up). */

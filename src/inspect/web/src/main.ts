@@ -122,7 +122,7 @@ class Page {
     const { h } = this.walk.station;
     const seen = this.layers.pick(0, 0);
     const at = seen ? `; looking at ${this.where(seen)}` : "";
-    byId("place").textContent = `at ${h.toFixed(2)} m${at}`;
+    byId("place").textContent = `at ${h.toFixed(2)} m, ${this.walk.clearance.toFixed(2)} m from the wall${at}`;
     const pins = this.marks.map((mark) => ({ place: placesOf(mark)[0], colour: "#ff5d5d" }));
     this.map.move(h, seen, pins);
     const { triangles } = this.renderer.info.render;
@@ -142,6 +142,7 @@ class Page {
     return `${place.h.toFixed(3)} m, ${this.clock(place)} o'clock`;
   }
 
+  /** Goes to the place that the address names. */
   private goTo(hash: string): void {
     const place = placeOf(hash);
     const theta = place && thetaOf(place.clock, this.tunnel.twelve_at_deg);

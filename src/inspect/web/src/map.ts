@@ -2,6 +2,9 @@
 import type { Layer } from "./tunnel";
 import type { Wall, WallPlace } from "./wall";
 
+/** Least distance of two chainages in the map, pixels. */
+const TICK_PX = 60;
+
 export interface Pin {
   place: WallPlace;
   colour: string;
@@ -66,6 +69,7 @@ export class WallMap {
     const [left, scale] = [this.left, this.scale];
     if (this.layer) this.drawPictures(context, this.layer, left, scale, height);
     const at = ({ s, h }: WallPlace): [number, number] => [(h - left) * scale, (1 - this.wall.around(s) / this.wall.perimeter) * height];
+    this.drawScale(context, left, scale, width, height);
     context.fillStyle = "#ffb02e";
     const [x] = at(this.eye);
     context.fillRect(x - 1, 0, 2, height);
@@ -92,6 +96,23 @@ export class WallMap {
       context.transform(0, -across, along, 0, start, height);
       context.drawImage(picture, map.border_px, map.border_px, columns, rows, 0, 0, columns, rows);
       context.restore();
+    }
+  }
+
+  /** Chainages along the lower edge. */
+  private drawScale(context: CanvasRenderingContext2D, left: number, scale: number, width: number, height: number): void {
+    const [from, to] = this.wall.chainage;
+    const metres = [1, 2, 5, 10, 20, 50, 100].find((step) => step * scale >= TICK_PX) ?? 200;
+    context.font = "11px system-ui, sans-serif";
+    context.textBaseline = "bottom";
+    for (let h = Math.ceil(Math.max(left, from) / metres) * metres; h <= Math.min(to, left + width / scale); h += metres) {
+      const x = (h - left) * scale;
+      context.fillStyle = "#fffa";
+      context.fillRect(x, height - 6, 1, 6);
+      context.strokeStyle = "#000";
+      context.lineWidth = 3;
+      context.strokeText(`${h} m`, x + 3, height);
+      context.fillText(`${h} m`, x + 3, height);
     }
   }
 

@@ -41,12 +41,21 @@ export class Walk {
     this.speed = wall.radius * 0.6;
     camera.near = wall.radius * MARGIN * 0.2;
     camera.far = (wall.chainage[1] - wall.chainage[0]) * 2 + wall.radius * 20;
-    this.eye = wall.station(wall.chainage[0]).centre;
+    // A few steps in, so that there is wall around.
+    const [from, to] = wall.chainage;
+    this.eye = wall.station(from + Math.min(wall.radius, 0.2 * (to - from))).centre;
     this.listen();
   }
 
   get station(): Station {
     return this.wall.stationOf(this.eye);
+  }
+
+  /** Distance from the wall in the eye's section, straight away from the axis. */
+  get clearance(): number {
+    const station = this.station;
+    const offset = this.eye.clone().sub(station.centre);
+    return this.wall.towards(station, offset).distance - offset.length();
   }
 
   /** Goes to the axis and looks at a place of the wall. */

@@ -96,7 +96,7 @@ export class Wall {
       return [point.dot(station.right), point.dot(station.up)];
     };
     let found = { place: { s: this.twelve, h: station.h }, distance: this.radius };
-    let from = this.s.length > 0 ? flat(0) : [0, 0];
+    let from = flat(0);
     for (let column = 1; column < this.s.length; column++) {
       const last = column === this.s.length - 1;
       const to = last ? flat(0) : flat(column);
