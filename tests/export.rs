@@ -229,8 +229,8 @@ fn the_tree_holds_together() {
     assert_eq!(seen.len(), files_below(folder, "glb").len());
     assert_eq!(
         files_below(folder, "json").len(),
-        2,
-        "levels 4 and up, and those below"
+        3,
+        "the top, and one for each of the two tiles of level 4"
     );
     // At full resolution: each vertex belongs to as many tiles as meet there.
     let mut corners = Corners::default();
