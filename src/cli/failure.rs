@@ -7,7 +7,7 @@ use crate::evaluate::EvaluateError;
 use crate::evaluate::converge::ConvergeError;
 use crate::frames::FrameError;
 use crate::raster::RasterError;
-use crate::refine::{CovarianceError, RefineError};
+use crate::refine::{CovarianceError, ProblemError, RefineError};
 use crate::render::RenderError;
 use crate::report::ReportError;
 use crate::simulate::SimulateError;
@@ -101,7 +101,7 @@ impl From<CheckpointError> for Failure {
 impl From<RefineError> for Failure {
     fn from(error: RefineError) -> Self {
         match error {
-            RefineError::Checkpoint(error) => error.into(),
+            RefineError::Problem(ProblemError::Checkpoint(error)) => error.into(),
             _ => Self::input(error.to_string()),
         }
     }

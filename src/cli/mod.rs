@@ -28,6 +28,7 @@ mod simulate;
 mod stitch;
 mod suggestion;
 mod terminal;
+mod tunnel;
 
 pub use failure::Failure;
 pub use terminal::Terminal;

@@ -251,7 +251,9 @@ fn calibrated(
     for path in file.paths_mut() {
         *path = folder.join(&*path);
     }
-    file.tunnel.radius_m = calibration.radius_m;
+    if file.tunnel.is_straight_and_round() {
+        file.tunnel.radius_m = Some(calibration.radius_m);
+    }
     file.camera.file = CAMERA_FILE.into();
     file.camera.name = None;
     let escaped = glob::Pattern::escape(&folder.to_string_lossy());

@@ -270,7 +270,7 @@ pub fn run(arguments: &StitchArguments, run: &Run, terminal: &Terminal) -> Resul
                 "no frame covers a single pixel of the panorama; check the calibration (cx, cy) and --px-per-metre",
             ));
         }
-        let gaps = outputs.gaps();
+        let gaps = outputs.gaps(surface);
         terminal.start("writing", 1);
         let written = outputs.finish(&plan, &gaps, &survey.camera, covariances.as_deref());
         terminal.finish();

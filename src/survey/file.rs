@@ -1,6 +1,6 @@
 //! `survey.toml` as written.
 
-use super::{CalibrateSection, PosesSection, SurveyError};
+use super::{CalibrateSection, PosesSection, SurveyError, TunnelSection};
 use crate::trajectory::{Jitter, JitterModel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -39,6 +39,7 @@ impl SurveyFile {
     pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let poses = &mut self.poses;
         [
+            self.tunnel.centreline.as_mut(),
             Some(&mut self.camera.file),
             self.frames.times.as_mut(),
             Some(&mut poses.initial),
@@ -49,26 +50,6 @@ impl SurveyFile {
         .into_iter()
         .flatten()
     }
-}
-
-/// Shape of the tunnel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum Shape {
-    /// Straight, circular section.
-    Circle,
-}
-
-/// `[tunnel]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct TunnelSection {
-    /// Shape of the tunnel.
-    pub shape: Shape,
-    /// Radius, metres.
-    pub radius_m: f64,
 }
 
 /// `[camera]`.
@@ -163,15 +144,18 @@ pub(super) fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::survey::{Associate, CalibrationGroup, Survey};
+    use crate::survey::{Associate, CalibrationGroup, Shape, Survey};
     use crate::trajectory::{CameraAxes, Direction, PoseFormat};
 
     #[test]
     fn the_file_round_trips() {
         let file = SurveyFile {
             tunnel: TunnelSection {
-                shape: Shape::Circle,
-                radius_m: 3.0,
+                shape: Shape::Box,
+                radius_m: None,
+                width_m: Some(4.0),
+                height_m: Some(3.0),
+                centreline: Some("curve.txt".into()),
             },
             camera: CameraSection {
                 file: "camera.json".into(),

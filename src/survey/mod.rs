@@ -2,8 +2,9 @@
 //!
 //! ```toml
 //! [tunnel]
-//! shape = "circle"
+//! shape = "circle"            # with radius_m; or "ellipse", "box", "horseshoe" with width_m and height_m
 //! radius_m = 3.0
+//! centreline = "curve.txt"    # optional: of a tunnel that is not straight, `x y z [radius]` a line
 //!
 //! [camera]
 //! file = "camera.json"
@@ -68,16 +69,16 @@ mod plausible;
 mod poses;
 mod reader;
 mod times;
+mod tunnel;
 
 pub use associate::{Associate, TIME_TOLERANCE_S};
 pub use calibrate::{CalibrateSection, CalibrationGroup};
 pub use discover::{Discovery, PictureGroup};
 pub use error::SurveyError;
-pub use file::{
-    CameraSection, FramesSection, PriorSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
-};
+pub use file::{CameraSection, FramesSection, PriorSection, SURVEY_FILE, SurveyFile};
 pub use footage::Footage;
 pub use open::Survey;
 pub(crate) use open::toml_path;
 pub use poses::PosesSection;
 pub use times::read_frame_times;
+pub use tunnel::{Shape, TunnelSection, read_centreline};

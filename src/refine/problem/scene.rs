@@ -1,6 +1,7 @@
 //! What a problem is made of.
 
 use crate::camera::{Camera, Sweep};
+use crate::checkpoint::CheckpointError;
 use crate::frames::{FrameCache, FrameError};
 use crate::refine::calibration::{Calibration, Kappa};
 use crate::refine::estimate::FrameEstimate;
@@ -147,4 +148,7 @@ pub enum ProblemError {
     /// The iteration broke off for a reason of its own.
     #[error("the solver stopped: {0}")]
     Solver(String),
+    /// What is done cannot be kept, or not be continued.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
 }
