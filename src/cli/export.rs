@@ -169,7 +169,8 @@ fn files(arguments: &ExportArguments, terminal: &Terminal) -> Result<Canvas, Fai
             .as_mut()
             .map(|tiles| tiles.target() as &mut dyn Target),
     );
-    let (plan, frames) = stitch.plan(&budget, terminal)?;
+    let settled = stitch.settle(&budget, terminal)?;
+    let (plan, frames) = stitch.plan(settled);
     plan.draw(frames, budget.room, &mut targets, terminal)?;
     if let Some(single) = single {
         single.finish()?;

@@ -196,7 +196,8 @@ impl LayersArguments {
             let mut tiles = TilesTarget::new(surface, &canvas, format, &place, textures.quality)?;
             let map = tiles.with_map(&canvas)?;
             let budget = stitch.budget(tiles.most_bytes())?;
-            let (plan, frames) = stitch.plan(&budget, terminal)?;
+            let settled = stitch.settle(&budget, terminal)?;
+            let (plan, frames) = stitch.plan(settled);
             plan.draw(frames, budget.room, &mut [&mut tiles], terminal)?;
             tiles.finish(&canvas)?;
             drawn.push(Layer::new(name, &canvas, map, poses));

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Why a frame cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrameError {
     /// The pattern in survey.toml is malformed.
     #[error("frames.images = \"{pattern}\": {what}")]

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 /// Why a tunnel cannot be exported or shown.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum InspectError {
     /// Too much wall for one file.
     #[error(

@@ -31,8 +31,10 @@ pub struct Manifest {
     pub name: String,
     /// Length of the section's outline, metres.
     pub perimeter_m: f64,
-    /// The angle θ = 360° s/perimeter of twelve o'clock, degrees.
+    /// The angle θ of twelve o'clock, degrees.
     pub twelve_at_deg: f64,
+    /// The angles θ of the arc lengths k/N of the perimeter, k from 0 to N, degrees, as seen from the axis; never falling.
+    theta_deg: Vec<f64>,
     /// From and to, metres, over all layers.
     pub chainage_m: [f64; 2],
     /// Names of the frames.
@@ -133,12 +135,33 @@ impl Manifest {
             name,
             perimeter_m: surface.perimeter_m(),
             twelve_at_deg,
+            theta_deg: angles_deg(surface),
             chainage_m,
             frames,
             corners: corners.into_iter().filter_map(direction).collect(),
             layers,
         }
     }
+}
+
+/// Steps of [`Manifest::theta_deg`] around the section.
+const ANGLES: u32 = 720;
+
+fn angles_deg(surface: &dyn Surface) -> Vec<f64> {
+    let mut last = f64::NEG_INFINITY;
+    let angle = |k: u32| {
+        let share = f64::from(k) / f64::from(ANGLES);
+        let mut theta_deg = surface
+            .angle_rad(share * surface.perimeter_m())
+            .to_degrees();
+        // Beyond 360° it goes on; what rounding took is given back.
+        if theta_deg < last - 180.0 {
+            theta_deg += 360.0;
+        }
+        last = last.max(theta_deg);
+        (last * 1e6).round() / 1e6
+    };
+    (0..=ANGLES).map(angle).collect()
 }
 
 /// Points of the wall between which it is nearly straight: the page finds places by them whatever the tunnel's shape.
@@ -182,6 +205,18 @@ impl WallPoints {
 mod tests {
     use super::*;
     use crate::surface::{Circle, WallPoint};
+
+    #[test]
+    fn angles_go_around_once() {
+        let circle = Circle::new(3.0).unwrap();
+        let angles = angles_deg(&circle);
+        for (k, theta_deg) in angles.iter().enumerate() {
+            assert!(
+                (theta_deg - 0.5 * k as f64).abs() < 1e-6,
+                "{k}: {theta_deg}"
+            );
+        }
+    }
 
     #[test]
     fn lengths_between_the_points_are_those_of_the_wall() {

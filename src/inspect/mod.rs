@@ -11,6 +11,21 @@
 //!
 //! Textures are cut from the bands of the panorama as they are drawn; a few hundred rows of every level are held. All of it is
 //! metric and in the world's coordinates; positions are relative to a point nearby.
+//!
+//! # Example
+//!
+//! A piece of the wall as triangles, within a millimetre:
+//!
+//! ```
+//! use tunnelstitch::inspect::{Lines, Mesh, Patch};
+//! use tunnelstitch::surface::{Circle, Surface};
+//!
+//! let tunnel = Circle::new(3.0)?;
+//! let patch = Patch { s_m: [0.0, tunnel.perimeter_m()], h_m: [0.0, 10.0] };
+//! let mesh = Mesh::new(&tunnel, &Lines::cut(&tunnel, &patch, 1e-3, 0.01));
+//! assert_eq!(mesh.bounds_m()[1].y, 10.0);
+//! # Ok::<(), tunnelstitch::surface::SurfaceError>(())
+//! ```
 
 mod cut;
 mod error;

@@ -4,6 +4,7 @@ use super::kernel::Kernel;
 use super::sample::{Sample, Samples};
 use image::{ColorType, DynamicImage};
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 
 /// A picture of 8- or 16-bit samples, row-major, channels interleaved: 1 (grey) or 3 (red, green, blue).
 #[derive(Clone, Debug, PartialEq)]
@@ -212,7 +213,7 @@ impl Picture {
 }
 
 /// What the pixels of a picture are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PixelFormat {
     /// 1 (grey) or 3 (red, green, blue).
     pub channels: usize,

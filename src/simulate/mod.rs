@@ -30,6 +30,7 @@ mod lamp;
 mod moving;
 mod noise;
 mod options;
+mod outline;
 mod path;
 mod picture;
 mod run;
@@ -37,6 +38,7 @@ mod scene;
 mod sensor;
 mod spoil;
 mod target;
+mod tunnel;
 mod wall;
 
 pub use bad_frames::{BadFrames, BadFramesError, Fault};

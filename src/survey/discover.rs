@@ -28,6 +28,7 @@ pub struct PictureGroup {
 
 /// What was found; all paths are relative to the folder.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Discovery {
     /// Groups of pictures, the largest first.
     pub pictures: Vec<PictureGroup>,

@@ -146,7 +146,7 @@ class Page {
   private goTo(hash: string): void {
     const place = placeOf(hash);
     const theta = place && thetaOf(place.clock, this.tunnel.twelve_at_deg);
-    if (place && theta !== null) this.jump({ s: (theta / 360) * this.wall.perimeter, h: place.h });
+    if (place && theta !== null) this.jump({ s: this.wall.sAt(theta), h: place.h });
   }
 
   private jump(place: WallPlace): void {

@@ -22,6 +22,8 @@ export interface Tunnel {
   name: string;
   perimeter_m: number;
   twelve_at_deg: number;
+  /** Angles θ at equal steps of arc length around the section, from 0 to the perimeter; never falling. */
+  theta_deg: number[];
   chainage_m: [number, number];
   frames: string[];
   corners: [number, number, number][];

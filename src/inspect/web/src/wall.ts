@@ -32,6 +32,7 @@ export class Wall {
   private readonly h: number[];
   private readonly points: number[];
   private readonly centres: Vector3[] = [];
+  private readonly angles: number[];
   private readonly twelve: number;
 
   constructor(tunnel: Tunnel, points: WallPoints) {
@@ -40,7 +41,8 @@ export class Wall {
     this.s = points.s_m;
     this.h = points.h_m;
     this.points = points.points_m;
-    this.twelve = (tunnel.twelve_at_deg / 360) * this.perimeter;
+    this.angles = tunnel.theta_deg;
+    this.twelve = this.sAt(tunnel.twelve_at_deg);
     for (let row = 0; row < this.h.length; row++) {
       const centre = new Vector3();
       for (let column = 1; column < this.s.length; column++) {
@@ -155,8 +157,24 @@ export class Wall {
     return ((s % this.perimeter) + this.perimeter) % this.perimeter;
   }
 
+  /** The angle θ of an arc length as seen from the axis, degrees. */
   thetaDeg(s: number): number {
-    return (this.around(s) / this.perimeter) * 360;
+    const steps = this.angles.length - 1;
+    const at = (this.around(s) / this.perimeter) * steps;
+    const before = Math.min(Math.floor(at), steps - 1);
+    const [from, to] = [this.angles[before], this.angles[before + 1]];
+    return (from + (at - before) * (to - from)) % 360;
+  }
+
+  /** The arc length at an angle θ. */
+  sAt(thetaDeg: number): number {
+    const steps = this.angles.length - 1;
+    const theta = this.angles[0] + ((((thetaDeg - this.angles[0]) % 360) + 360) % 360);
+    let after = this.angles.findIndex((angle) => angle > theta);
+    if (after < 1) after = steps;
+    const [from, to] = [this.angles[after - 1], this.angles[after]];
+    const share = to > from ? (theta - from) / (to - from) : 0;
+    return ((after - 1 + Math.min(share, 1)) / steps) * this.perimeter;
   }
 
   private corner(column: number, row: number): Vector3 {
