@@ -416,3 +416,66 @@ fn an_inspector_walks_measures_marks_and_comes_back() {
     assert_eq!(alone["frames"], false);
     assert_eq!(alone["kept"].as_array().unwrap().len(), 1, "{alone:#}");
 }
+
+/// A box that bends: points found by the page lie where the tiles are, and the eye stays inside.
+#[test]
+fn a_bend_is_walked_through() {
+    if !has_viewer() {
+        return;
+    }
+    let (Some(browser), Some(modules)) = (chromium::find(), npm::find()) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let [line, survey, site, picture] =
+        ["bend.txt", "survey", "site", "bend.png"].map(|name| dir.path().join(name));
+    let points: Vec<String> = (0..=20)
+        .map(|k| {
+            let (sin, cos) = (0.05 * f64::from(k)).sin_cos();
+            format!("{} {} 0", 20.0 - 20.0 * cos, 20.0 * sin)
+        })
+        .collect();
+    std::fs::write(&line, points.join("\n")).unwrap();
+    succeed(&[
+        "simulate",
+        "free",
+        "--frames",
+        "36",
+        "--advance-m",
+        "0.25",
+        "--size",
+        "160x120",
+        "--supersample",
+        "2",
+        "--shape",
+        "box",
+        "--width-m",
+        "4",
+        "--height-m",
+        "3",
+        "--centreline",
+        text(&line),
+        "--out",
+        text(&survey),
+    ]);
+    succeed(&[
+        "export",
+        text(&survey),
+        "--poses",
+        "truth",
+        "--layers",
+        "truth",
+        "--web",
+        text(&site),
+    ]);
+    let seen = run(&browser, &modules, "bend", text(&site), &picture);
+    let number = |state: &str, name: &str| seen[state][name].as_f64().unwrap_or(f64::NAN);
+    assert!((number("start", "seen") - 6.0).abs() < 0.01, "{seen:#}");
+    assert_eq!(seen["start"]["clock"], "3:00");
+    assert!(
+        (0.0..0.15).contains(&number("against", "fromWall")),
+        "{seen:#}"
+    );
+    assert!((number("against", "seen") - 6.0).abs() < 0.1);
+    assert!(number("ridden", "h") > 1.5, "{seen:#}");
+}

@@ -138,7 +138,8 @@ fn bounds(points: &[Vector3<f64>]) -> [Vector3<f64>; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Circle;
+    use crate::surface::section::Pieces;
+    use crate::surface::{CentrePoint, Centreline, Circle, Prism, Swept};
     use std::f64::consts::TAU;
 
     const PATCH: Patch = Patch {
@@ -176,6 +177,47 @@ mod tests {
         }
         let [low, high] = mesh.bounds_m();
         assert!((low.y, high.y) == (9_990.0, 10_050.0) && high.x > 2.99);
+    }
+
+    /// A box and a bend of it: between the corners of its triangles the wall is where they are, and they face inwards.
+    #[test]
+    fn corners_and_bends_are_followed() {
+        let section = || Box::new(Pieces::rectangle(4.0, 3.0).unwrap());
+        let points: Vec<CentrePoint> = (0..=40)
+            .map(|k| {
+                let (sin, cos) = (0.2 * TAU * f64::from(k) / 40.0).sin_cos();
+                CentrePoint {
+                    point: Vector3::new(60.0 - 60.0 * cos, 60.0 * sin, 0.0),
+                    radius_m: None,
+                }
+            })
+            .collect();
+        let line = Centreline::through(&points, 2.5, 2.5).unwrap();
+        let (straight, bent) = (Prism::new(section()), Swept::new(section(), line));
+        let surfaces: [(&dyn Surface, usize); 2] = [(&straight, 2), (&bent, 20)];
+        for (surface, rows) in surfaces {
+            let patch = Patch {
+                s_m: [0.0, surface.perimeter_m()],
+                h_m: [5.0, 45.0],
+            };
+            let tolerance_m = 5e-3;
+            let lines = Lines::cut(surface, &patch, tolerance_m, tolerance_m);
+            assert!(lines.h_m.len() >= rows && lines.s_m.len() < 80, "{lines:?}");
+            let mesh = Mesh::new(surface, &lines);
+            for triangle in &mesh.triangles {
+                let [a, b, c] = triangle.map(|k| mesh.positions_m[k as usize].cast::<f64>());
+                let walls = triangle.map(|k| mesh.wall[k as usize]);
+                let mean = |f: fn(&WallPoint) -> f64| walls.iter().map(f).sum::<f64>() / 3.0;
+                let frame = surface.frame(WallPoint {
+                    s_m: mean(|wall| wall.s_m),
+                    h_m: mean(|wall| wall.h_m),
+                });
+                let middle = (a + b + c) / 3.0 + mesh.origin_m;
+                assert!((middle - frame.x_w).norm() < 3.0 * tolerance_m);
+                let inwards = frame.e_h.cross(&frame.e_s);
+                assert!((b - a).cross(&(c - a)).dot(&inwards) > 0.0);
+            }
+        }
     }
 
     #[test]

@@ -2,7 +2,8 @@
 //
 //     node viewer.mjs NODE_MODULES CHROMIUM SCENARIO ADDRESS|FOLDER SCREENSHOT
 //
-// Scenarios: inspect (a page with a server), again (after a restart), static (a folder, served as it is).
+// Scenarios: inspect (a page with a server), again (after a restart), bend and static (folders, served as they
+// are).
 
 import { createServer } from "node:http";
 import { createRequire } from "node:module";
@@ -156,6 +157,16 @@ const scenarios = {
     seen.kept = await marks();
     await page.click("#marks li button:last-child");
     await page.waitForFunction(() => document.querySelectorAll("#marks li").length === 1);
+  },
+  async bend() {
+    await page.goto(address + "#h=6&clock=3:00");
+    seen.start = await told();
+    await page.screenshot({ path: screenshot });
+    seen.against = await hold(["w", "Shift"], 1500);
+    await go("#h=1&clock=6:00");
+    await page.keyboard.press("Space");
+    await page.waitForTimeout(1500);
+    seen.ridden = await told();
   },
   async static() {
     await page.goto(address + "#h=1.2&clock=3:00");

@@ -39,7 +39,7 @@ export class Overlay {
       }
     }
     const seen = places.map((place) => this.project(place)).filter((at) => at !== null);
-    for (const [cx, cy] of seen) drawn.push(element("circle", { cx, cy, r: 6 }, chosen ? "chosen" : ""));
+    for (const [cx, cy] of seen) drawn.push(element("circle", { cx, cy, r: 5 }, chosen ? "chosen" : ""));
     if (seen.length > 0 && label) {
       const text = element("text", { x: seen[0][0] + 10, y: seen[0][1] - 8 });
       text.textContent = label;

@@ -114,14 +114,15 @@ export class Walk {
 
   private turn(yaw: number, pitch: number): void {
     this.yaw = Math.atan2(Math.sin(this.yaw + yaw), Math.cos(this.yaw + yaw));
-    this.pitch = Math.min(Math.max(this.pitch + pitch, -1.55), 1.55);
+    this.pitch = Math.min(Math.max(this.pitch + pitch, -Math.PI / 2), Math.PI / 2);
     this.changed = true;
   }
 
   private turnTo(station: Station, direction: Vector3): void {
     const [x, y, z] = [direction.dot(station.right), direction.dot(station.up), direction.dot(station.along)];
-    this.pitch = Math.min(Math.max(Math.atan2(y, Math.hypot(x, z)), -1.55), 1.55);
-    this.yaw = Math.hypot(x, z) > 1e-9 ? Math.atan2(x, z) : 0;
+    this.pitch = Math.atan2(y, Math.hypot(x, z));
+    // Straight up or down: as the wall beside it is looked at.
+    this.yaw = Math.hypot(x, z) > 1e-6 * Math.abs(y) ? Math.atan2(x, z) : Math.PI / 2;
     this.changed = true;
   }
 
