@@ -479,3 +479,38 @@ fn a_bend_is_walked_through() {
     assert!((number("against", "seen") - 6.0).abs() < 0.1);
     assert!(number("ridden", "h") > 1.5, "{seen:#}");
 }
+
+/// Jumps over a kilometre and a ride along it: what the page holds stays bounded.
+#[test]
+#[ignore = "a kilometre takes some minutes"]
+fn a_kilometre_streams() {
+    let (browser, modules) = (
+        chromium::find().expect("Chromium"),
+        npm::find().expect("npm"),
+    );
+    let dir = tempfile::tempdir().unwrap();
+    let [survey, site, picture] = ["survey", "site", "last.png"].map(|name| dir.path().join(name));
+    let frames = "--frames 4000 --advance-m 0.25 --size 160x120 --supersample 2 --seed 1";
+    let mut simulate = vec!["simulate", "free", "--out", text(&survey)];
+    simulate.extend(frames.split(' '));
+    succeed(&simulate);
+    let export = "--poses truth --layers truth --px-per-metre 100 --web";
+    let mut arguments = vec!["export", text(&survey)];
+    arguments.extend(export.split(' '));
+    arguments.push(text(&site));
+    succeed(&arguments);
+    let seen = run(&browser, &modules, "kilometre", text(&site), &picture);
+    let places = seen["places"].as_array().unwrap();
+    let most = |name: &str| {
+        places
+            .iter()
+            .filter_map(|p| p[name].as_f64())
+            .fold(0.0, f64::max)
+    };
+    let (triangles, mib) = (most("triangles"), most("textureMiB"));
+    println!(
+        "{} views: at most {triangles} triangles, {mib} MiB of textures",
+        places.len()
+    );
+    assert!(triangles < 100_000.0 && (1.0..512.0).contains(&mib));
+}

@@ -2,8 +2,8 @@
 //
 //     node viewer.mjs NODE_MODULES CHROMIUM SCENARIO ADDRESS|FOLDER SCREENSHOT
 //
-// Scenarios: inspect (a page with a server), again (after a restart), bend and static (folders, served as they
-// are).
+// Scenarios: inspect (a page with a server), again (after a restart), bend, kilometre and static (folders, served
+// as they are).
 
 import { createServer } from "node:http";
 import { createRequire } from "node:module";
@@ -167,6 +167,20 @@ const scenarios = {
     await page.keyboard.press("Space");
     await page.waitForTimeout(1500);
     seen.ridden = await told();
+  },
+  async kilometre() {
+    await page.goto(address);
+    seen.places = [await told()];
+    for (let h = 0; h <= 1000; h += 50) seen.places.push(await go(`#h=${h}&clock=${1 + (h % 12)}:00`));
+    await go("#h=0&clock=3:00");
+    await page.mouse.move(650, 300);
+    for (let k = 0; k < 14; k++) await page.mouse.wheel(0, -100);
+    await page.keyboard.press("Space");
+    for (let k = 0; k < 40; k++) {
+      await page.waitForTimeout(1000);
+      const [, triangles, textureMiB] = /(\d+) triangles, ([\d.]+) MiB/.exec(await page.textContent("#statistics"));
+      seen.places.push({ triangles: Number(triangles), textureMiB: Number(textureMiB) });
+    }
   },
   async static() {
     await page.goto(address + "#h=1.2&clock=3:00");
