@@ -98,6 +98,32 @@ const ROWS: &[Row] = &[
         &["survey.toml:", "string"],
     ),
     (
+        Edit(TOML, "\"circle\"", "\"box\""),
+        STITCH,
+        3,
+        &["survey.toml", "radius_m", "not a size"],
+    ),
+    (
+        Edit(
+            TOML,
+            "radius_m = 3",
+            "centreline = \"none.txt\"\nradius_m = 3",
+        ),
+        CHECK,
+        3,
+        &["none.txt", "cannot read"],
+    ),
+    (
+        Edit(
+            TOML,
+            "radius_m = 3",
+            "centreline = \"camera.json\"\nradius_m = 3",
+        ),
+        REFINE,
+        3,
+        &["camera.json:1", "x y z"],
+    ),
+    (
         Edit(TOML, "\"circle\"", "\"hexagon\""),
         CHECK,
         3,

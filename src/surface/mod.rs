@@ -121,12 +121,6 @@ pub enum SurfaceError {
         /// What is wrong with it.
         what: String,
     },
-    /// The shape's own size is impossible.
-    #[error("the tunnel's radius is {radius_m} m; it must be a positive number of metres")]
-    Radius {
-        /// The radius given, metres.
-        radius_m: f64,
-    },
 }
 
 /// Refuses a size that is not positive and finite.
