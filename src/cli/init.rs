@@ -70,6 +70,9 @@ fn report(found: &Discovery) -> Vec<String> {
             group.pattern, group.count
         ));
     }
+    if let Some(mask) = &found.mask {
+        lines.push(format!("  {:<16}{}", "mask", mask.display()));
+    }
     for (k, (path, camera)) in found.calibrations.iter().enumerate() {
         let which = if k == 0 { "calibration" } else { "another" };
         lines.push(format!(
@@ -115,6 +118,7 @@ fn text(found: &Discovery, radius_m: Option<f64>) -> String {
             "# Measure the tunnel's radius in metres and take away the # of the next line.\n# radius_m = 3.0"
         ),
     };
+    text += "# ignore = [{ theta_deg = [150, 210], chainage_m = [2.0, 5.5] }]    # water, plants: refine does not look there\n";
     text += "\n[camera]\n";
     let _ = match found.calibrations.first() {
         Some((path, _)) => writeln!(text, "file = {}", quoted(path)),
@@ -133,6 +137,10 @@ fn text(found: &Discovery, radius_m: Option<f64>) -> String {
         "\n[frames]\nimages = {}    # sorted by name",
         quoted(pattern)
     );
+    text += &match &found.mask {
+        Some(mask) => format!("mask = {}    # black where no frame shows the wall\n", quoted(mask)),
+        None => "# mask = \"mask.png\"    # a picture of the frames' size, black where none of them shows the wall\n".to_owned(),
+    };
     text += "\n[poses]\n";
     let count = found.pictures.first().map_or(0, |group| group.count);
     match found.initial() {

@@ -32,6 +32,14 @@ pub enum FrameError {
         /// What the decoder said.
         what: String,
     },
+    /// A mask is unreadable or none.
+    #[error("{}: {what}", path.display())]
+    Mask {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and the remedy.
+        what: String,
+    },
     /// A frame is not as large as the calibration says.
     #[error(
         "frame {index} ({}): {width} × {height} px, but the calibration is for {expected_width} × {expected_height} px",
@@ -70,11 +78,15 @@ impl FrameFile {
     }
 }
 
-/// The files that match `pattern` (glob syntax, relative to `folder`), sorted by name.
+/// The files that match `pattern` (glob syntax, relative to `folder`), sorted by name, but for the mask.
 ///
 /// # Errors
 /// A malformed pattern, an unreadable folder, no match.
-pub fn list(folder: &Path, pattern: &str) -> Result<Vec<FrameFile>, FrameError> {
+pub fn list(
+    folder: &Path,
+    pattern: &str,
+    mask: Option<&Path>,
+) -> Result<Vec<FrameFile>, FrameError> {
     let fail = |what: String| FrameError::Pattern {
         pattern: pattern.to_owned(),
         what,
@@ -85,7 +97,7 @@ pub fn list(folder: &Path, pattern: &str) -> Result<Vec<FrameFile>, FrameError> 
     let mut paths = Vec::new();
     for path in found {
         let path = path.map_err(|error| fail(error.to_string()))?;
-        if !path.is_dir() {
+        if !path.is_dir() && Some(path.as_path()) != mask {
             paths.push(path);
         }
     }

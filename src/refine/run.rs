@@ -41,7 +41,7 @@ pub enum RefineError {
     SingleFrame,
     /// Nothing overlaps.
     #[error(
-        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, or take frames closer together"
+        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, whether the mask or tunnel.ignore leaves anything, or take frames closer together"
     )]
     NoOverlap,
     /// The equations.
@@ -358,6 +358,7 @@ fn scene<'a>(
 ) -> Scene<'a> {
     Scene {
         surface: survey.surface.as_ref(),
+        ignored: &survey.ignored,
         camera: survey.camera,
         shutter,
         calibration: *calibration,

@@ -8,11 +8,13 @@ mod circle;
 mod displacement;
 mod footprint;
 mod gauge;
+mod patches;
 
 pub use circle::Circle;
 pub use displacement::{lens_jacobian, wall_jacobian};
 pub use footprint::{Footprint, shortest_arc};
 pub use gauge::{Gauge, GaugeMotion};
+pub use patches::Patches;
 
 use crate::trajectory::Pose;
 use nalgebra::Vector3;

@@ -29,6 +29,8 @@ pub struct PictureGroup {
 /// What was found; all paths are relative to the folder.
 #[derive(Clone, Debug, Default)]
 pub struct Discovery {
+    /// A picture called mask.
+    pub mask: Option<PathBuf>,
     /// Groups of pictures, the largest first.
     pub pictures: Vec<PictureGroup>,
     /// Calibrations, those that fit the first group of pictures first.
@@ -56,6 +58,13 @@ impl Discovery {
                 .into_owned();
             let lower = extension.to_lowercase();
             if PICTURES.contains(&lower.as_str()) {
+                if file
+                    .file_stem()
+                    .is_some_and(|stem| stem.eq_ignore_ascii_case("mask"))
+                {
+                    found.mask.get_or_insert_with(|| file.clone());
+                    continue;
+                }
                 let parent = file.parent().unwrap_or(Path::new("")).to_owned();
                 groups.entry((parent, extension)).or_default().push(file);
                 continue;
@@ -188,10 +197,15 @@ mod tests {
             "right.tum",
             "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n",
         );
+        image::GrayImage::new(64, 48)
+            .save(dir.path().join("images/Mask.png"))
+            .unwrap();
         write("notes.txt", "measured on a Monday\n");
         let found = Discovery::of(dir.path()).unwrap();
         assert_eq!(found.pictures.len(), 1);
         assert_eq!(found.pictures[0].pattern, "images/*.png");
+        assert_eq!(found.pictures[0].count, 3);
+        assert_eq!(found.mask.as_deref(), Some(Path::new("images/Mask.png")));
         assert_eq!(found.calibrations[0].0, Path::new("b.txt"));
         assert_eq!(found.initial().unwrap().0, Path::new("right.tum"));
         assert!(found.truth().is_none());

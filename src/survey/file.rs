@@ -1,6 +1,6 @@
 //! `survey.toml` as written.
 
-use super::{CalibrateSection, PosesSection, SurveyError};
+use super::{CalibrateSection, IgnoreSection, PosesSection, SurveyError};
 use crate::trajectory::{Jitter, JitterModel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -40,6 +40,7 @@ impl SurveyFile {
         [
             Some(&mut self.camera.file),
             self.frames.times.as_mut(),
+            self.frames.mask.as_mut(),
             Some(&mut poses.initial),
             poses.truth.as_mut(),
             poses.body_to_camera.as_mut(),
@@ -66,6 +67,9 @@ pub struct TunnelSection {
     pub shape: Shape,
     /// Radius, metres.
     pub radius_m: f64,
+    /// Parts of the wall by which frames are not compared: water, plants, what moves.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ignore: Vec<IgnoreSection>,
 }
 
 /// `[camera]`.
@@ -92,6 +96,9 @@ pub struct FramesSection {
     /// The frames' times, where they are not in their names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
+    /// A picture of the frames' size, black where they never show the wall; see [`crate::frames::Mask`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mask: Option<PathBuf>,
 }
 
 /// `[prior]`: the noise model of the initial poses.
@@ -166,6 +173,10 @@ mod tests {
             tunnel: TunnelSection {
                 shape: Shape::Circle,
                 radius_m: 3.0,
+                ignore: vec![IgnoreSection {
+                    theta_deg: Some([150.0, 210.0]),
+                    chainage_m: None,
+                }],
             },
             camera: CameraSection {
                 file: "camera.json".into(),
@@ -175,6 +186,7 @@ mod tests {
             frames: FramesSection {
                 images: "frames/*.png".into(),
                 times: Some("times.txt".into()),
+                mask: Some("mask.png".into()),
             },
             poses: PosesSection {
                 format: Some(PoseFormat::Csv),

@@ -2,8 +2,8 @@
 
 use super::file::read_survey_file;
 use super::open::{folder_of, toml_path};
-use super::{SurveyError, times};
-use crate::frames::{self, FrameFile};
+use super::{SurveyError, listing, times};
+use crate::frames::FrameFile;
 use std::path::Path;
 
 /// The frames of a survey, and when they were taken, before anything is known of their poses.
@@ -25,12 +25,8 @@ impl Footage {
         let toml_path = toml_path(path);
         let file = read_survey_file(&toml_path)?;
         let folder = folder_of(&toml_path);
-        let frames = frames::list(&folder, &file.frames.images)?;
-        let own = file.frames.times.map(|times| folder.join(times));
-        let times_s = match frame_times.or(own.as_deref()) {
-            Some(path) => Some(times::read(path, &frames)?),
-            None => times::from_names(&frames).ok(),
-        };
+        let (frames, times_s) = listing::list(&file.frames, &folder, frame_times)?;
+        let times_s = times_s.or_else(|| times::from_names(&frames).ok());
         Ok(Self { frames, times_s })
     }
 }

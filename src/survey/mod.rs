@@ -4,6 +4,9 @@
 //! [tunnel]
 //! shape = "circle"
 //! radius_m = 3.0
+//! ignore = [                  # optional: parts of the wall by which refine does not compare frames
+//!     { theta_deg = [150, 210], chainage_m = [2.0, 5.5] },   # either may be left out: all around, all along
+//! ]
 //!
 //! [camera]
 //! file = "camera.json"
@@ -12,6 +15,7 @@
 //! [frames]
 //! images = "frames/*.jpg"     # sorted by name
 //! times = "times.txt"         # optional: `time`, `time name` or `name time` a line; else from the names
+//! mask = "mask.png"           # optional: a picture of their size, black where they never show the wall
 //!
 //! [poses]
 //! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC, told by the content
@@ -49,6 +53,8 @@ mod discover;
 mod error;
 mod file;
 mod footage;
+mod ignore;
+mod listing;
 mod open;
 mod plausible;
 mod poses;
@@ -63,6 +69,7 @@ pub use file::{
     CameraSection, FramesSection, PriorSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
 };
 pub use footage::Footage;
+pub use ignore::IgnoreSection;
 pub use open::Survey;
 pub(crate) use open::toml_path;
 pub use poses::PosesSection;

@@ -4,10 +4,10 @@ use super::associate::TIME_TOLERANCE_S;
 use super::file::read_survey_file;
 use super::reader::{PoseReader, Reading};
 use super::{CalibrateSection, PosesSection, SURVEY_FILE, Shape, SurveyError, SurveyFile};
-use super::{plausible, times};
+use super::{ignore, listing, plausible};
 use crate::camera::{Camera, read_calibration};
-use crate::frames::{self, FrameFile};
-use crate::surface::{Circle, Surface, SurfaceError};
+use crate::frames::{FrameSet, Mask};
+use crate::surface::{Circle, Patches, Surface, SurfaceError};
 use crate::trajectory::{Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of};
 use std::path::{Path, PathBuf};
 
@@ -22,8 +22,10 @@ pub struct Survey {
     pub camera: Camera,
     /// The tunnel.
     pub surface: Box<dyn Surface>,
-    /// The frames, sorted by name.
-    pub frames: Vec<FrameFile>,
+    /// Parts of the wall by which frames are not compared.
+    pub ignored: Patches,
+    /// The frames, sorted by name, with what none of them shows.
+    pub frames: FrameSet,
     /// The initial poses, one per frame.
     pub initial: Trajectory,
     /// The true poses, one per frame, where known.
@@ -104,15 +106,17 @@ impl Survey {
         }
         let camera =
             read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
-        let frames = frames::list(&folder, &file.frames.images)?;
-        let times_s = match &file.frames.times {
-            Some(times) => Some(times::read(&folder.join(times), &frames)?),
+        let (frames, times_s) = listing::list(&file.frames, &folder, None)?;
+        let mask = match &file.frames.mask {
+            Some(mask) => Some(Mask::read(&folder.join(mask), camera.width, camera.height)?),
             None => None,
         };
+        let ignored = ignore::patches(&file.tunnel.ignore, surface.as_ref()).map_err(value)?;
         let mut survey = Self {
             camera,
             surface,
-            frames,
+            ignored,
+            frames: FrameSet::new(frames, mask),
             initial: Vec::new(),
             truth: None,
             prior: file.prior.into(),
@@ -187,7 +191,8 @@ impl Survey {
                 file: self.file.clone(),
                 camera: self.camera,
                 surface: surface_of(&self.file)?,
-                frames: self.frames.iter().take(most_frames).cloned().collect(),
+                ignored: self.ignored.clone(),
+                frames: self.frames.first(most_frames),
                 initial: stamped.take(most_frames).collect(),
                 truth: None,
                 prior: self.prior,
