@@ -118,16 +118,6 @@ const ROWS: &[Row] = &[
         &["survey.toml:", "unknown field `theta`", "theta_deg"],
     ),
     (
-        Edit(
-            TOML,
-            "radius_m = 3",
-            "ignore = [{ theta_deg = [0, 360] }]\nradius_m = 3",
-        ),
-        REFINE,
-        3,
-        &["no two frames overlap", "tunnel.ignore"],
-    ),
-    (
         Edit(TOML, "[frames]", "[frames]\nmask = \"mask.png\""),
         CHECK,
         3,

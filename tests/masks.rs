@@ -14,14 +14,12 @@ use tunnelstitch::trajectory::{Pose, poses_of};
 /// Percent of a frame's width that the shaft takes.
 const SHAFT: &str = "12";
 
-/// Two turns of a brick tunnel in small frames, with a shaft and its mask or without.
+/// A brick tunnel in small frames, by default two turns of it.
 fn simulated(folder: &Path, name: &str, more: &[&str]) -> std::path::PathBuf {
     let out = folder.join(name);
     let mut arguments = vec![
         "simulate",
         "free",
-        "--turns",
-        "2",
         "--supersample",
         "3",
         "--size",
@@ -30,6 +28,9 @@ fn simulated(folder: &Path, name: &str, more: &[&str]) -> std::path::PathBuf {
         "--out",
         text(&out),
     ];
+    if !more.contains(&"--frames") {
+        arguments.extend(["--turns", "2"]);
+    }
     arguments.extend(more);
     succeed(&arguments);
     out

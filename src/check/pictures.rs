@@ -86,10 +86,8 @@ impl PictureCheck {
 /// What the header of a frame's file says is wrong with it.
 fn fault(file: &FrameFile, size: [u32; 2]) -> Option<String> {
     let name = format!("frame {} ({})", file.index, file.path.display());
-    match image::image_dimensions(&file.path) {
-        Err(error) => Some(format!(
-            "{name}: {error}; restore the file, or remove the frame and its pose"
-        )),
+    match file.size() {
+        Err(error) => Some(error.to_string()),
         Ok((width, height)) if [width, height] != size => Some(format!(
             "{name}: {width} × {height} px, but the calibration is for {} × {} px",
             size[0], size[1]

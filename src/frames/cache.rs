@@ -196,10 +196,7 @@ mod tests {
                 let path = folder.join(format!("{index}.png"));
                 let picture = image::GrayImage::from_pixel(32, 24, image::Luma([10 + index]));
                 picture.save(&path).unwrap();
-                FrameFile {
-                    index: usize::from(index),
-                    path,
-                }
+                FrameFile::picture(usize::from(index), path)
             })
             .collect();
         files.into()

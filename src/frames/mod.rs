@@ -11,6 +11,7 @@ mod pyramid;
 mod set;
 mod shading;
 mod stored;
+mod video;
 mod write;
 
 pub(crate) use agreement::Agreement;
@@ -25,4 +26,5 @@ pub use pyramid::Pyramid;
 pub use set::FrameSet;
 pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
 pub use stored::StoredFrame;
+pub use video::Video;
 pub use write::{FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};

@@ -263,7 +263,7 @@ mod tests {
                 let path = folder.path().join(format!("{index}.png"));
                 let grey = image::GrayImage::from_pixel(16, 16, image::Luma([index as u8]));
                 grey.save(&path).unwrap();
-                FrameFile { index, path }
+                FrameFile::picture(index, path)
             })
             .collect();
         let camera = Camera::from_vertical_fov(16, 16, 1.0);

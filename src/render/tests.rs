@@ -379,7 +379,7 @@ fn little_memory_changes_nothing_but_the_time() {
             let picture = samples[..(width * height) as usize].to_vec();
             let picture = image::GrayImage::from_raw(width, height, picture).unwrap();
             picture.save(&path).unwrap();
-            FrameFile { index, path }
+            FrameFile::picture(index, path)
         })
         .collect();
     let files = FrameSet::from(files);

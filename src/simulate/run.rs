@@ -126,7 +126,9 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
             readout_ms: (options.readout_ms != 0.0).then_some(options.readout_ms),
         },
         frames: FramesSection {
-            images: "frames/*.png".to_owned(),
+            images: Some("frames/*.png".to_owned()),
+            video: None,
+            every: None,
             times: None,
             mask: scene.shaft().map(|_| MASK_FILE.into()),
         },

@@ -34,7 +34,7 @@ pub struct SurveyFile {
 }
 
 impl SurveyFile {
-    /// All files that it names, as written; the frames are a pattern and not among them.
+    /// All files that it names, as written, but for the frames: a pattern, or a video.
     pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let poses = &mut self.poses;
         [
@@ -91,8 +91,15 @@ pub struct CameraSection {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FramesSection {
-    /// Glob pattern of the frames.
-    pub images: String,
+    /// Glob pattern of the frames, if they are files of their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub images: Option<String>,
+    /// The video that they are in, if they are not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub video: Option<PathBuf>,
+    /// Of the video every so many-th picture is a frame, from the first on; without it every one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub every: Option<usize>,
     /// The frames' times, where they are not in their names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
@@ -184,7 +191,9 @@ mod tests {
                 readout_ms: Some(-20.0),
             },
             frames: FramesSection {
-                images: "frames/*.png".into(),
+                images: None,
+                video: Some("survey.mp4".into()),
+                every: Some(5),
                 times: Some("times.txt".into()),
                 mask: Some("mask.png".into()),
             },

@@ -1,8 +1,9 @@
 //! The frames of a survey that has no poses yet.
 
 use super::file::read_survey_file;
+use super::listing::Listing;
 use super::open::{folder_of, toml_path};
-use super::{SurveyError, listing, times};
+use super::{SurveyError, times};
 use crate::frames::FrameFile;
 use std::path::Path;
 
@@ -11,7 +12,7 @@ use std::path::Path;
 pub struct Footage {
     /// The frames, sorted by name.
     pub frames: Vec<FrameFile>,
-    /// Their times, seconds, where a file or all names tell them.
+    /// Their times, seconds, where a file, a video or all names tell them.
     pub times_s: Option<Vec<f64>>,
 }
 
@@ -25,7 +26,9 @@ impl Footage {
         let toml_path = toml_path(path);
         let file = read_survey_file(&toml_path)?;
         let folder = folder_of(&toml_path);
-        let (frames, times_s) = listing::list(&file.frames, &folder, frame_times)?;
+        let Listing {
+            frames, times_s, ..
+        } = Listing::new(&file.frames, &toml_path, &folder, frame_times)?;
         let times_s = times_s.or_else(|| times::from_names(&frames).ok());
         Ok(Self { frames, times_s })
     }

@@ -13,7 +13,9 @@
 //! readout_ms = 20.0           # optional: rolling shutter, from the first row to the last
 //!
 //! [frames]
-//! images = "frames/*.jpg"     # sorted by name
+//! images = "frames/*.jpg"     # sorted by name; or
+//! # video = "survey.mp4"      # pictures of a video, read by ffmpeg, with the times it says
+//! # every = 5                 # every fifth picture of it
 //! times = "times.txt"         # optional: `time`, `time name` or `name time` a line; else from the names
 //! mask = "mask.png"           # optional: a picture of their size, black where they never show the wall
 //!
@@ -63,7 +65,7 @@ mod times;
 
 pub use associate::{Associate, TIME_TOLERANCE_S};
 pub use calibrate::{CalibrateSection, CalibrationGroup};
-pub use discover::{Discovery, PictureGroup};
+pub use discover::{Discovery, PictureGroup, VideoChoice};
 pub use error::SurveyError;
 pub use file::{
     CameraSection, FramesSection, PriorSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,

@@ -2,9 +2,10 @@
 
 use super::associate::TIME_TOLERANCE_S;
 use super::file::read_survey_file;
+use super::listing::Listing;
 use super::reader::{PoseReader, Reading};
 use super::{CalibrateSection, PosesSection, SURVEY_FILE, Shape, SurveyError, SurveyFile};
-use super::{ignore, listing, plausible};
+use super::{ignore, plausible};
 use crate::camera::{Camera, read_calibration};
 use crate::frames::{FrameSet, Mask};
 use crate::surface::{Circle, Patches, Surface, SurfaceError};
@@ -34,7 +35,7 @@ pub struct Survey {
     pub prior: Jitter,
     /// What is possible but suspicious, and what might be meant.
     pub warnings: Vec<String>,
-    /// The frames' times, seconds, where a file tells them.
+    /// The frames' times, seconds, where a file or a video tells them.
     times_s: Option<Vec<f64>>,
     /// See [`Survey::own_files`].
     own_files: Vec<PathBuf>,
@@ -106,7 +107,22 @@ impl Survey {
         }
         let camera =
             read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
-        let (frames, times_s) = listing::list(&file.frames, &folder, None)?;
+        let Listing {
+            frames,
+            times_s,
+            video,
+        } = Listing::new(&file.frames, &toml_path, &folder, None)?;
+        if let Some(video) = &video
+            && video.rotation_deg() != 0
+            && file.camera.readout_ms.is_some()
+        {
+            return Err(value(format!(
+                "camera.readout_ms goes from row to row, but {} is to be shown turned by {}°, so that its rows are not what the sensor \
+                 reads at once; turn the pictures back with ffmpeg -noautorotate and calibrate for these, or leave readout_ms out",
+                video.path().display(),
+                video.rotation_deg()
+            )));
+        }
         let mask = match &file.frames.mask {
             Some(mask) => Some(Mask::read(&folder.join(mask), camera.width, camera.height)?),
             None => None,
@@ -137,6 +153,11 @@ impl Survey {
             }
             None => None,
         };
+        warnings.extend(
+            video
+                .iter()
+                .filter_map(|video| video.warning().map(str::to_owned)),
+        );
         (survey.initial, survey.truth, survey.warnings) = (initial, truth, warnings);
         if let Some(fault) = survey.readout_fault() {
             return Err(value(fault));
