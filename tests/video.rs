@@ -2,6 +2,7 @@
 
 mod support;
 
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use support::{blender_survey, edit, fail, succeed, text};
@@ -273,11 +274,21 @@ fn every_command_takes_a_video() {
         "--force",
     ]);
     assert!(said.contains("12 of every 2"), "{said}");
-    let check: serde_json::Value =
-        serde_json::from_str(&succeed(&["check", folder, "--json"])).unwrap();
+    let check: Value = serde_json::from_str(&succeed(&["check", folder, "--json"])).unwrap();
     assert_eq!(check["frames"], 12);
-    let turned = check["poses"]["step_deg"].as_f64().unwrap();
-    assert!((turned - 60.0).abs() < 0.01, "{turned}");
+    let step_deg = |check: &Value| check["poses"]["step_deg"].as_f64().unwrap();
+    assert!((step_deg(&check) - 60.0).abs() < 0.01, "{check}");
+    // The same by the angle.
+    edit(
+        &survey.join("survey.toml"),
+        "every = 2",
+        "angle_step_deg = 50.0 #",
+    );
+    let again: Value = serde_json::from_str(&succeed(&["check", folder, "--json"])).unwrap();
+    assert_eq!(
+        (&again["frames"], step_deg(&again)),
+        (&check["frames"], step_deg(&check))
+    );
 }
 
 #[test]

@@ -79,7 +79,7 @@ pub struct FrameFile {
     /// The picture, or the video's path with the picture's number as if it were a file in it: `survey.mp4/000012`.
     pub path: PathBuf,
     /// The video that it is in, and which picture of it.
-    video: Option<(Arc<Video>, usize)>,
+    pub(super) video: Option<(Arc<Video>, usize)>,
 }
 
 impl FrameFile {

@@ -26,6 +26,19 @@ impl FrameSet {
         self.mask.as_ref()
     }
 
+    /// Those of the given indices, numbered anew.
+    pub fn only(&self, indices: &[usize]) -> Self {
+        let chosen = indices.iter().filter_map(|k| self.files.get(*k));
+        let numbered = chosen.enumerate().map(|(index, file)| FrameFile {
+            index,
+            ..file.clone()
+        });
+        Self {
+            files: numbered.collect(),
+            mask: self.mask.clone(),
+        }
+    }
+
     /// The first `most` of them.
     pub fn first(&self, most: usize) -> Self {
         Self {

@@ -129,6 +129,7 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
             images: Some("frames/*.png".to_owned()),
             video: None,
             every: None,
+            angle_step_deg: None,
             times: None,
             mask: scene.shaft().map(|_| MASK_FILE.into()),
         },

@@ -100,6 +100,10 @@ pub struct FramesSection {
     /// Of the video every so many-th picture is a frame, from the first on; without it every one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every: Option<usize>,
+    /// Of these, only as many as it takes for the view to turn by so much from one to the next, degrees, by the initial poses, which
+    /// must be tied by time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle_step_deg: Option<f64>,
     /// The frames' times, where they are not in their names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
@@ -194,6 +198,7 @@ mod tests {
                 images: None,
                 video: Some("survey.mp4".into()),
                 every: Some(5),
+                angle_step_deg: Some(15.0),
                 times: Some("times.txt".into()),
                 mask: Some("mask.png".into()),
             },

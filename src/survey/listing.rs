@@ -34,6 +34,11 @@ impl Listing {
             })
         };
         let mut listing = match (&section.images, &section.video, section.every) {
+            (Some(_), None, None) if section.angle_step_deg.is_some() => {
+                return fail(
+                    "frames.angle_step_deg goes with frames.video; for pictures, let frames.images match fewer of them",
+                );
+            }
             (Some(pattern), None, None) => {
                 let mask = section.mask.as_ref().map(|mask| folder.join(mask));
                 Self {

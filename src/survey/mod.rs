@@ -16,6 +16,7 @@
 //! images = "frames/*.jpg"     # sorted by name; or
 //! # video = "survey.mp4"      # pictures of a video, read by ffmpeg, with the times it says
 //! # every = 5                 # every fifth picture of it
+//! # angle_step_deg = 15.0     # of these, those between which the view turns by so much; needs `associate = "time"`
 //! times = "times.txt"         # optional: `time`, `time name` or `name time` a line; else from the names
 //! mask = "mask.png"           # optional: a picture of their size, black where they never show the wall
 //!
@@ -61,6 +62,7 @@ mod open;
 mod plausible;
 mod poses;
 mod reader;
+mod thinning;
 mod times;
 
 pub use associate::{Associate, TIME_TOLERANCE_S};

@@ -36,7 +36,7 @@ pub struct Survey {
     /// What is possible but suspicious, and what might be meant.
     pub warnings: Vec<String>,
     /// The frames' times, seconds, where a file or a video tells them.
-    times_s: Option<Vec<f64>>,
+    pub(super) times_s: Option<Vec<f64>>,
     /// See [`Survey::own_files`].
     own_files: Vec<PathBuf>,
 }
@@ -142,6 +142,9 @@ impl Survey {
             folder,
             file,
         };
+        if let Some(step_deg) = survey.file.frames.angle_step_deg {
+            survey.thin_by_angle(step_deg, &toml_path)?;
+        }
         let section = &survey.file.poses;
         let (initial, mut warnings) =
             survey.read_as(section, &survey.folder.join(&section.initial))?;
@@ -175,7 +178,7 @@ impl Survey {
     }
 
     /// Reads a file of poses as a section says; its warnings beside it.
-    fn read_as(
+    pub(super) fn read_as(
         &self,
         section: &PosesSection,
         path: &Path,
