@@ -120,10 +120,11 @@ pub(crate) fn beside(path: &Path) -> &Path {
     }
 }
 
-/// A folder that is being filled under a temporary name beside its final one.
+/// A folder that is being filled under another name beside its final one.
 pub struct StagedFolder {
-    temporary: TempDir,
-    listed: Listed,
+    folder: PathBuf,
+    /// Unless it stays whatever happens.
+    temporary: Option<(Listed, TempDir)>,
     target: PathBuf,
 }
 
@@ -134,41 +135,37 @@ impl StagedFolder {
     /// Whatever the system says; a target without a name of its own (`.`, `..`, `/`), or one that holds the folder the
     /// program works in.
     pub fn begin(target: &Path) -> Result<Self, WriteError> {
-        let refuse = |what: &str| Err(WriteError::new(target, std::io::Error::other(what)));
-        let named = target
-            .components()
-            .next_back()
-            .is_some_and(|last| matches!(last, std::path::Component::Normal(_)));
-        if !named {
-            return refuse(
-                "it has no name of its own; name a folder that may be replaced as a whole",
-            );
-        }
-        if target.symlink_metadata().is_ok_and(|meta| !meta.is_dir()) {
-            return refuse("it exists and is no folder");
-        }
-        let here = std::env::current_dir().and_then(|here| here.canonicalize());
-        if let (Ok(here), Ok(target)) = (here, target.canonicalize())
-            && here.starts_with(target)
-        {
-            return refuse("the program works in it, so it cannot be replaced");
-        }
+        check_replaceable(target)?;
         let parent = beside(target);
         create_folder(parent)?;
         let temporary = tempfile::Builder::new()
             .prefix(PREFIX)
             .tempdir_in(parent)
             .map_err(|source| WriteError::new(target, source))?;
+        let listed = Listed::new(temporary.path());
         Ok(Self {
-            listed: Listed::new(temporary.path()),
-            temporary,
+            folder: temporary.path().to_owned(),
+            temporary: Some((listed, temporary)),
+            target: target.to_owned(),
+        })
+    }
+
+    /// The folder that will be `target`, with what is in `folder` on the same disk already, which stays whatever happens.
+    ///
+    /// # Errors
+    /// As [`StagedFolder::begin`].
+    pub fn kept(target: &Path, folder: &Path) -> Result<Self, WriteError> {
+        check_replaceable(target)?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            temporary: None,
             target: target.to_owned(),
         })
     }
 
     /// Where to write for now.
     pub fn path(&self) -> &Path {
-        self.temporary.path()
+        &self.folder
     }
 
     /// Gives the folder its final name; a folder of that name is replaced.
@@ -185,11 +182,8 @@ impl StagedFolder {
                 .map_err(fail)?
                 .permissions()
                 .mode();
-            std::fs::set_permissions(
-                self.temporary.path(),
-                std::fs::Permissions::from_mode(mode & 0o777),
-            )
-            .map_err(fail)?;
+            let mode = std::fs::Permissions::from_mode(mode & 0o777);
+            std::fs::set_permissions(&self.folder, mode).map_err(fail)?;
         }
         // The old folder steps aside first and goes only when the new one is in place.
         let mut old = None;
@@ -201,18 +195,42 @@ impl StagedFolder {
             std::fs::rename(&self.target, aside.path().join("old")).map_err(fail)?;
             old = Some(aside);
         }
-        if let Err(error) = std::fs::rename(self.temporary.path(), &self.target) {
+        if let Err(error) = std::fs::rename(&self.folder, &self.target) {
             if let Some(aside) = &old {
                 // If even this fails, the old folder stays where it stepped aside.
                 std::fs::rename(aside.path().join("old"), &self.target).map_err(fail)?;
             }
             return Err(fail(error));
         }
-        drop(self.listed);
-        // It is no longer temporary.
-        let _ = self.temporary.keep();
+        if let Some((listed, folder)) = self.temporary {
+            drop(listed);
+            // It is no longer temporary.
+            let _ = folder.keep();
+        }
         Ok(())
     }
+}
+
+/// Refuses a folder that cannot be replaced as a whole.
+fn check_replaceable(target: &Path) -> Result<(), WriteError> {
+    let refuse = |what: &str| Err(WriteError::new(target, std::io::Error::other(what)));
+    let named = target
+        .components()
+        .next_back()
+        .is_some_and(|last| matches!(last, std::path::Component::Normal(_)));
+    if !named {
+        return refuse("it has no name of its own; name a folder that may be replaced as a whole");
+    }
+    if target.symlink_metadata().is_ok_and(|meta| !meta.is_dir()) {
+        return refuse("it exists and is no folder");
+    }
+    let here = std::env::current_dir().and_then(|here| here.canonicalize());
+    if let (Ok(here), Ok(target)) = (here, target.canonicalize())
+        && here.starts_with(target)
+    {
+        return refuse("the program works in it, so it cannot be replaced");
+    }
+    Ok(())
 }
 
 /// A folder for what is needed for a while; it goes with all that is in it when this is dropped or the program is

@@ -90,6 +90,7 @@ const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
 pub mod atomic;
 pub mod camera;
 pub mod check;
+pub mod checkpoint;
 pub mod cli;
 pub mod evaluate;
 pub mod frames;

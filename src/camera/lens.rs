@@ -5,6 +5,7 @@ use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 /// A lens model. What it gives, `p_d`, becomes a pixel by `u = fx p_d.x + cx`, `v = fy p_d.y + cy` ([`super::Camera`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Lens {
     /// Camera, with radial and tangential distortion or without.
     BrownConrady(BrownConrady),

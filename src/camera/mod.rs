@@ -3,6 +3,19 @@
 //!
 //! Pixel convention: the centre of the first pixel is (0, 0). Files that count from the corner
 //! (`pixel_centre = "half"`, COLMAP, nerfstudio) are converted when read.
+//!
+//! # Example
+//!
+//! ```
+//! use std::path::Path;
+//! use tunnelstitch::camera::read_calibration;
+//!
+//! let camera = read_calibration(Path::new("fixtures/blender_free48/camera.json"), None)?;
+//! let ray = camera.ray(12.5, 40.0).ok_or("the lens shows nothing there")?;
+//! let pixel = camera.project(&ray).ok_or("behind the camera")?;
+//! assert!((pixel.x - 12.5).abs() < 1e-9 && (pixel.y - 40.0).abs() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod brown_conrady;
 mod calibration;

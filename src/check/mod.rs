@@ -20,6 +20,7 @@ use serde::Serialize;
 
 /// A survey, looked over.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Check {
     /// Number of frames.
     pub frames: usize,
@@ -60,6 +61,7 @@ pub struct MaskCheck {
 
 /// The initial poses.
 #[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
 pub struct PosesCheck {
     /// Least and greatest chainage, metres.
     pub chainage_m: [f64; 2],
@@ -75,6 +77,7 @@ pub struct PosesCheck {
 
 /// The noise of the initial poses as it appears in the picture.
 #[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
 pub struct JitterCheck {
     /// 1-σ of the displacement from one frame to the next that the poses do not tell, pixels.
     pub sigma_px: f64,
@@ -167,16 +170,16 @@ impl PosesCheck {
     fn of(survey: &Survey) -> Self {
         let poses = survey.initial_poses();
         let steps = || poses.windows(2);
-        let chainage = poses.iter().map(|pose| pose.t_wc.y);
+        let straight = || poses.iter().map(|pose| survey.surface.straightened(pose));
+        let chainage = || straight().map(|pose| pose.t_wc.y);
         Self {
             chainage_m: [
-                chainage.clone().fold(f64::INFINITY, f64::min),
-                chainage.fold(f64::NEG_INFINITY, f64::max),
+                chainage().fold(f64::INFINITY, f64::min),
+                chainage().fold(f64::NEG_INFINITY, f64::max),
             ],
             step_m: median(steps().map(|pair| (pair[1].t_wc - pair[0].t_wc).norm())),
             step_deg: median(steps().map(|pair| pair[0].r_wc.angle_to(&pair[1].r_wc))).to_degrees(),
-            off_axis_m: poses
-                .iter()
+            off_axis_m: straight()
                 .map(|pose| pose.t_wc.x.hypot(pose.t_wc.z))
                 .fold(0.0, f64::max),
             truth: survey.truth.is_some(),

@@ -13,6 +13,7 @@ const SAME_TURN: usize = 3;
 
 /// What frames share, as boxes on the unrolled wall; medians over the frames.
 #[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
 pub struct OverlapCheck {
     /// Share of a frame that the next one shows, too.
     pub neighbours: f64,

@@ -16,6 +16,7 @@ const LISTED: usize = 5;
 
 /// Medians over a dozen frames.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct PictureCheck {
     /// How many were decoded.
     pub decoded: usize,

@@ -1,7 +1,7 @@
 //! `tunnelstitch compare`: initial against refined poses.
 
 use super::poses::ReadingArguments;
-use super::record::{RUN_FILE, Run};
+use super::record::{self, RUN_FILE, Run};
 use super::stitch::{PictureArguments, positive};
 use super::{Failure, Terminal, json};
 use crate::PROGRAM;
@@ -88,11 +88,8 @@ pub fn run(arguments: &CompareArguments, run: &Run, terminal: &Terminal) -> Resu
         &arguments.out,
         terminal,
     )?;
-    run.write(
-        &arguments.out.join(RUN_FILE),
-        &survey,
-        &[&arguments.refined],
-    )?;
+    let inputs = record::inputs(&survey, &[&arguments.refined])?;
+    run.write(&arguments.out.join(RUN_FILE), &inputs)?;
     if arguments.json {
         json::print_text(&json)?;
     } else {

@@ -73,7 +73,7 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
     ));
     let refine_options = RefineOptions::default();
     let survey = Survey::open(&survey_folder)?;
-    let (refined, _) = refine_into(&survey, &refine_options, &refined_folder, terminal)?;
+    let (refined, _) = refine_into(&survey, &refine_options, &refined_folder, None, terminal)?;
     if !arguments.json {
         summarise(&refined, terminal);
     }

@@ -2,11 +2,12 @@
 
 use crate::atomic::WriteError;
 use crate::camera::CalibrationError;
+use crate::checkpoint::CheckpointError;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::converge::ConvergeError;
 use crate::frames::FrameError;
 use crate::raster::RasterError;
-use crate::refine::{CovarianceError, RefineError};
+use crate::refine::{CovarianceError, ProblemError, RefineError};
 use crate::render::RenderError;
 use crate::report::ReportError;
 use crate::simulate::SimulateError;
@@ -52,6 +53,19 @@ impl Failure {
         }
     }
 
+    /// Something that another try may not meet.
+    pub fn passing(message: impl Into<String>) -> Self {
+        Self {
+            message: message.into(),
+            code: 75,
+        }
+    }
+
+    /// Whether another try may not meet it.
+    pub fn is_passing(&self) -> bool {
+        self.code == 75
+    }
+
     /// A result worse than was asked for.
     pub fn quality(message: impl Into<String>) -> Self {
         Self {
@@ -67,9 +81,28 @@ impl From<WriteError> for Failure {
             error.source.kind(),
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::Interrupted
         );
-        Self {
-            code: if passing { 75 } else { 3 },
-            message: error.to_string(),
+        match passing {
+            true => Self::passing(error.to_string()),
+            false => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<CheckpointError> for Failure {
+    fn from(error: CheckpointError) -> Self {
+        match error {
+            CheckpointError::Write(error) => error.into(),
+            CheckpointError::Busy { .. } => Self::passing(error.to_string()),
+            _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<RefineError> for Failure {
+    fn from(error: RefineError) -> Self {
+        match error {
+            RefineError::Problem(ProblemError::Checkpoint(error)) => error.into(),
+            _ => Self::input(error.to_string()),
         }
     }
 }
@@ -140,7 +173,6 @@ bad_input!(
     CalibrationError,
     EvaluateError,
     FrameError,
-    RefineError,
     CovarianceError,
     SurfaceError,
     SurveyError,

@@ -162,8 +162,7 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
     )?;
     let layout = Layout::from(arguments.canvas.layout);
     let wall = point(arguments, &survey, &placements, &canvas)?;
-    let perimeter_m = surface.perimeter_m();
-    let theta_deg = wall.s_m.rem_euclid(perimeter_m) / perimeter_m * 360.0;
+    let theta_deg = surface.angle_rad(wall.s_m).to_degrees();
     let found = sightings(
         surface,
         &survey.camera,
@@ -204,7 +203,7 @@ fn point(
     canvas: &Canvas,
 ) -> Result<WallPoint, Failure> {
     let on_wall = |[h_m, theta_deg]: [f64; 2]| WallPoint {
-        s_m: theta_deg.rem_euclid(360.0) / 360.0 * survey.surface.perimeter_m(),
+        s_m: survey.surface.s_at_m(theta_deg.to_radians()),
         h_m,
     };
     if let Some(wall) = arguments.wall {

@@ -22,11 +22,13 @@ mod project;
 mod record;
 mod refine;
 mod report;
+mod resume;
 mod shell;
 mod simulate;
 mod stitch;
 mod suggestion;
 mod terminal;
+mod tunnel;
 
 pub use failure::Failure;
 pub use terminal::Terminal;
@@ -102,8 +104,12 @@ pub fn run() -> Result<(), Failure> {
             .map_err(|error| Failure::bug(format!("cannot start {threads} threads: {error}")))?;
     }
     // Nothing half-written stays behind; 130 is what a shell expects after Ctrl-C.
-    ctrlc::set_handler(|| {
+    let goes_on = matches!(cli.command, Command::Refine(_) | Command::Stitch(_));
+    ctrlc::set_handler(move || {
         atomic::remove_unfinished();
+        if goes_on {
+            eprintln!("interrupted; the same command goes on from here");
+        }
         std::process::exit(130);
     })
     .map_err(|error| Failure::bug(format!("cannot watch for Ctrl-C: {error}")))?;

@@ -26,7 +26,7 @@ struct RunFile<'a> {
     program: &'static str,
     arguments: &'a [String],
     options: BTreeMap<&'a str, toml::Table>,
-    inputs: Vec<Input>,
+    inputs: &'a [Input],
 }
 
 const SCHEMA_VERSION: u32 = 1;
@@ -35,20 +35,11 @@ const SCHEMA_VERSION: u32 = 1;
 pub const RUN_FILE: &str = "run.toml";
 
 impl Run {
-    /// Writes the record of a run on `survey` to `path`, with hashes of everything that the survey is made of and of `others`.
+    /// Writes the record of a run on `inputs` to `path`.
     ///
     /// # Errors
-    /// An input that cannot be read any more, a record that cannot be written.
-    pub fn write(&self, path: &Path, survey: &Survey, others: &[&Path]) -> Result<(), Failure> {
-        let hashed = |path: &Path| provenance::input(path);
-        let inputs = survey
-            .own_files()
-            .iter()
-            .map(|file| hashed(file))
-            .chain(others.iter().map(|file| hashed(file)))
-            .chain([provenance::frames(&survey.frames)])
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(|error| Failure::input(error.to_string()))?;
+    /// A record that cannot be written.
+    pub fn write(&self, path: &Path, inputs: &[Input]) -> Result<(), Failure> {
         let text = toml::to_string(&RunFile {
             schema_version: SCHEMA_VERSION,
             program: PROGRAM,
@@ -61,6 +52,23 @@ impl Run {
         atomic::write_text(path, &(head.to_owned() + &text))?;
         Ok(())
     }
+}
+
+/// Hashes of everything that `survey` is made of, and of `others`.
+///
+/// # Errors
+/// An input that cannot be read.
+pub fn inputs(survey: &Survey, others: &[&Path]) -> Result<Vec<Input>, Failure> {
+    let own = survey
+        .own_files()
+        .iter()
+        .map(|file| provenance::input(file));
+    let others = others.iter().map(|file| provenance::input(file));
+    let inputs: Result<Vec<Input>, _> = own
+        .chain(others)
+        .chain([provenance::frames(&survey.frames)])
+        .collect();
+    inputs.map_err(|error| Failure::input(error.to_string()))
 }
 
 /// Options as `survey.toml` takes them; those without a value are left out.

@@ -1,15 +1,17 @@
 //! `tunnelstitch refine`.
 
 use super::poses::ReadingArguments;
-use super::record::{RUN_FILE, Run};
+use super::record::{self, RUN_FILE, Run};
+use super::resume::{self, ResumeArguments};
 use super::{Failure, Terminal, command_line, json};
 use crate::PROGRAM;
 use crate::atomic;
 use crate::camera::format_calibration;
+use crate::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::{
     CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, RowMotion, other_readings,
-    refine,
+    refine_keeping,
 };
 use crate::survey::{CalibrationGroup, SURVEY_FILE, Survey, SurveyFile};
 use crate::trajectory::tum;
@@ -21,7 +23,7 @@ use std::sync::Arc;
 ///
 /// Reads SURVEY/survey.toml and writes poses.tum (camera-to-world, for evo and everything else that reads
 /// TUM), refine.json (costs, residuals, gains, 1-σ of every frame, timings) and covariance.csv (6 × 6
-/// covariance of every frame and of neighbours) into DIR.
+/// covariance of every frame and of neighbours) into DIR. Interrupted or killed, the same command goes on where it was.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tunnelstitch refine my-survey --out refined\n  tunnelstitch refine my-survey --out refined --calibrate focal,radius"
@@ -48,6 +50,8 @@ pub struct RefineArguments {
     json: bool,
     #[command(flatten)]
     reading: ReadingArguments,
+    #[command(flatten)]
+    resume: ResumeArguments,
 }
 
 /// What `--calibrate` takes.
@@ -117,8 +121,26 @@ pub fn run(
         }
     };
     let survey = arguments.reading.open(&arguments.survey, terminal)?;
-    let (refined, json) = refine_into(&survey, &options, &arguments.out, terminal)?;
-    run.write(&arguments.out.join(RUN_FILE), &survey, &[])?;
+    let inputs = record::inputs(&survey, &[])?;
+    let origin = resume::origin(&survey, &options, inputs.clone())?;
+    let say = |text: &str| {
+        if !arguments.json {
+            terminal.say(text);
+        }
+    };
+    atomic::create_folder(&arguments.out)?;
+    let result = arguments.out.join("refine");
+    let (refined, json) = arguments.resume.run(&result, &origin, say, |checkpoint| {
+        let done = refine_into(
+            &survey,
+            &options,
+            &arguments.out,
+            Some(checkpoint),
+            terminal,
+        )?;
+        run.write(&arguments.out.join(RUN_FILE), &inputs)?;
+        Ok(done)
+    })?;
     if 2 * refined.report.frames_on_prior > survey.frames.len() {
         terminal.start("other conventions", 1);
         let others = other_readings(&survey);
@@ -152,7 +174,8 @@ pub fn run(
     Ok(())
 }
 
-/// Refines a survey and writes poses.tum, refine.json and covariance.csv into `out`; returns the text of the latter too.
+/// Refines a survey, going on from a checkpoint if there is one, and writes poses.tum, refine.json and covariance.csv into `out`; returns
+/// the text of refine.json too.
 ///
 /// # Errors
 /// Bad input, or an output that cannot be written.
@@ -160,6 +183,7 @@ pub fn refine_into(
     survey: &Survey,
     options: &RefineOptions,
     out: &Path,
+    checkpoint: Option<&mut Checkpoint>,
     terminal: &Arc<Terminal>,
 ) -> Result<(Refined, String), Failure> {
     atomic::create_folder(out)?;
@@ -172,7 +196,7 @@ pub fn refine_into(
         check_apart(&survey.folder, out)?;
     }
     let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
-    let refined = refine(survey, options, &progress)?;
+    let refined = refine_keeping(survey, options, checkpoint, &progress)?;
     let json = json::text(&ReportFile {
         program: PROGRAM,
         command: command_line(),
@@ -227,7 +251,9 @@ fn calibrated(
     for path in file.paths_mut() {
         *path = folder.join(&*path);
     }
-    file.tunnel.radius_m = calibration.radius_m;
+    if file.tunnel.is_straight_and_round() {
+        file.tunnel.radius_m = Some(calibration.radius_m);
+    }
     file.camera.file = CAMERA_FILE.into();
     file.camera.name = None;
     if let Some(images) = &mut file.frames.images {

@@ -1,8 +1,9 @@
 //! `tunnelstitch stitch`: one panorama from given poses.
 
-use super::outputs::OutputArguments;
+use super::outputs::{Keeping, OutputArguments};
 use super::poses::PosesArgument;
-use super::record::Run;
+use super::record::{self, Run};
+use super::resume::{self, ResumeArguments};
 use super::{Failure, Terminal, json};
 use crate::atomic;
 use crate::frames::PictureFormat;
@@ -20,7 +21,7 @@ use std::path::{Path, PathBuf};
 
 /// Draws one panorama of the unrolled wall from given poses.
 ///
-/// The poses are used as they are; `refine` makes them right.
+/// The poses are used as they are; `refine` makes them right. Interrupted or killed, the same command goes on where it was.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tunnelstitch stitch my-survey --poses refined/poses.tum --out after.png\n  tunnelstitch stitch my-survey --poses refined/poses.tum --px-per-metre 400 --out wall.tif --maps maps"
@@ -45,6 +46,8 @@ pub struct StitchArguments {
     /// Print what was drawn as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    resume: ResumeArguments,
 }
 
 /// The canvas of panoramas.
@@ -237,25 +240,44 @@ pub fn run(arguments: &StitchArguments, run: &Run, terminal: &Terminal) -> Resul
         budget.most(frames_bytes) >> 20,
         frames_bytes.min(budget.room) >> 20
     ));
-    let mut outputs = arguments.output.begin(&canvas, format, layout)?;
-    let (plan, frames) = stitch.plan(&budget, terminal)?;
-    plan.draw(frames, budget.room, &mut outputs.targets(), terminal)?;
-    let coverage = outputs.share();
-    if coverage == 0.0 {
-        return Err(Failure::input(
-            "no frame covers a single pixel of the panorama; check the calibration (cx, cy) and --px-per-metre",
-        ));
-    }
-    let gaps = outputs.gaps();
-    terminal.start("writing", 1);
-    let written = outputs.finish(&plan, &gaps, &survey.camera, covariances.as_deref());
-    terminal.finish();
-    written?;
     let others: Vec<&Path> = arguments.poses.file().into_iter().collect();
-    run.write(&arguments.output.run_file(), &survey, &others)?;
-    if arguments.json {
-        return json::print(&Report {
-            out: &arguments.output.out,
+    let inputs = record::inputs(&survey, &others)?;
+    let origin = resume::origin(&survey, &arguments.result(&options), inputs.clone())?;
+    let out = &arguments.output.out;
+    let resume = &arguments.resume;
+    resume.run(out, &origin, |text| say(text.to_owned()), |checkpoint| {
+        let mut outputs = arguments
+            .output
+            .begin(&canvas, format, layout, checkpoint)?;
+        let settled = match checkpoint.state(SETTLED)? {
+            Some(settled) => settled,
+            None => {
+                let settled = stitch.settle(&budget, terminal)?;
+                checkpoint.keep(SETTLED, &settled)?;
+                settled
+            }
+        };
+        let (plan, frames) = stitch.plan(settled);
+        let first = outputs.bands();
+        let mut keeping = Keeping {
+            outputs: &mut outputs,
+            checkpoint,
+        };
+        plan.draw_from(first, frames, budget.room, &mut [&mut keeping], terminal)?;
+        let coverage = outputs.share();
+        if coverage == 0.0 {
+            return Err(Failure::input(
+                "no frame covers a single pixel of the panorama; check the calibration (cx, cy) and --px-per-metre",
+            ));
+        }
+        let gaps = outputs.gaps(surface);
+        terminal.start("writing", 1);
+        let written = outputs.finish(&plan, &gaps, &survey.camera, covariances.as_deref());
+        terminal.finish();
+        written?;
+        run.write(&arguments.output.run_file(), &inputs)?;
+        let report = Report {
+            out,
             width,
             height,
             px_per_metre: canvas.px_per_metre,
@@ -267,17 +289,51 @@ pub fn run(arguments: &StitchArguments, run: &Run, terminal: &Terminal) -> Resul
             render: options.render,
             exposure: plan.exposure().frames(),
             memory: budget,
-        });
+        };
+        match arguments.json {
+            true => json::print(&report),
+            false => {
+                summarise(&report, terminal);
+                Ok(())
+            }
+        }
+    })
+}
+
+/// Name of the state of what is settled before the first tile is drawn.
+const SETTLED: &str = "settled";
+
+impl StitchArguments {
+    /// Everything that the result depends on, but the survey.
+    fn result(&self, options: &StitchOptions) -> impl Serialize {
+        (
+            options.px_per_metre,
+            options.ignore_offset,
+            options.render,
+            Layout::from(self.picture.canvas.layout),
+            format!("{:?}", self.output),
+        )
     }
-    let [from_m, to_m] = canvas.chainage_m();
+}
+
+/// Prints what was drawn.
+fn summarise(report: &Report, terminal: &Terminal) {
+    let say = |text: String| terminal.say(text);
+    let [from_m, to_m] = report.chainage_m;
+    let &Report {
+        width,
+        height,
+        coverage,
+        ..
+    } = report;
     say(format!(
         "{}: {width} × {height} px, {:.2} px per metre, chainage {from_m:.3} to {to_m:.3} m, {:.1} % covered by {} frames",
-        arguments.output.out.display(),
-        canvas.px_per_metre,
+        report.out.display(),
+        report.px_per_metre,
         100.0 * coverage,
-        survey.frames.len()
+        report.frames
     ));
-    let inner: Vec<&Gap> = gaps.iter().filter(|gap| !gap.at_the_end).collect();
+    let inner: Vec<&Gap> = report.gaps.iter().filter(|gap| !gap.at_the_end).collect();
     for gap in inner.iter().take(SHOWN_GAPS) {
         say(format!(
             "  nothing seen at chainage {:.3} to {:.3} m, {:.1}° to {:.1}° ({:.4} m²)",
@@ -294,7 +350,6 @@ pub fn run(arguments: &StitchArguments, run: &Run, terminal: &Terminal) -> Resul
             inner.len() - SHOWN_GAPS
         ));
     }
-    Ok(())
 }
 
 /// Gaps that the summary lists.

@@ -41,6 +41,7 @@ pub struct CompareInput<'a> {
 
 /// What the comparison found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Comparison {
     /// Number of frames.
     pub frames: usize,
@@ -56,6 +57,7 @@ pub struct Comparison {
 
 /// Measures of one set of poses; those that need the truth are missing without it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Scores {
     /// Share of the canvas that some frame sees, 0–1.
     pub coverage: f64,

@@ -5,6 +5,7 @@ use crate::surface::SurfaceError;
 
 /// Why an evaluation is impossible.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EvaluateError {
     /// Two trajectories cannot be compared frame by frame.
     #[error("{estimated} poses are to be compared with {others}; each needs one pose per frame")]

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// Likeness of two panoramas on the pixels that both cover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ImageMetrics {
     /// Peak signal-to-noise ratio `10 log₁₀(255² / MSE)`, decibels; `None` if the pictures are equal or
     /// nowhere covered by both.

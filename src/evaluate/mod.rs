@@ -12,6 +12,22 @@
 //! | how much noise can the refinement take? | [`converge`] |
 //!
 //! [`compare()`] asks all of it for initial and refined poses at once.
+//!
+//! # Example
+//!
+//! ```
+//! use std::path::Path;
+//! use tunnelstitch::evaluate::wall_error;
+//! use tunnelstitch::survey::Survey;
+//! use tunnelstitch::trajectory::poses_of;
+//!
+//! let survey = Survey::open(Path::new("fixtures/blender_free48"))?;
+//! let truth = poses_of(survey.truth.as_deref().ok_or("no true poses")?);
+//! let initial = survey.initial_poses();
+//! let error = wall_error(survey.surface.as_ref(), &survey.camera, &initial, &truth)?;
+//! assert!(error.px.rms > 1.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod before_after;
 mod compare;

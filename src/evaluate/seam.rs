@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 /// Grey differences between frames at the same wall points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SeamResidual {
     /// Root mean square difference of two frames at a wall point, grey levels.
     pub rms_grey: f64,
@@ -32,6 +33,7 @@ const ROWS_PER_CELL: u32 = 4;
 
 /// How well the frames agree, and how many see the wall, cell by cell of the unrolled wall.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct SeamMap {
     around: usize,
     along: usize,

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// The relative errors do not depend on the gauge; the absolute ones do, and mean something only where it is fixed alike in both.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct UnalignedError {
     /// `|t_est − t_true|`, metres (`evo_ape`).
     pub ape_translation_m: Spread,
@@ -84,10 +85,7 @@ mod tests {
     #[test]
     fn the_gauge_counts_for_the_absolute_errors_only() {
         let truth = spiral(5, 0.1, 0.5);
-        let motion = GaugeMotion {
-            turn_rad: 0.1,
-            shift_m: 2.0,
-        };
+        let motion = GaugeMotion::about_y(0.1, 2.0);
         let error = unaligned_error(&motion.apply_all(&truth), &truth).unwrap();
         assert!((error.ape_translation_m.rms - 2.0).abs() < 1e-12);
         assert!((error.ape_rotation_deg.rms - 0.1f64.to_degrees()).abs() < 1e-9);

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 /// Why a frame cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrameError {
     /// The pattern in survey.toml is malformed.
     #[error("frames.images = \"{pattern}\": {what}")]

@@ -2,6 +2,7 @@
 
 use super::GreyImage;
 use nalgebra::{DMatrix, DVector, Vector2};
+use serde::{Deserialize, Serialize};
 
 /// Highest total degree of the polynomial.
 const DEGREE: usize = 6;
@@ -12,7 +13,7 @@ pub const TERMS: usize = (DEGREE + 1) * (DEGREE + 2) / 2 - 1;
 ///
 /// `B_k` are products of Legendre polynomials in the pixel coordinates scaled to ±1, so that the terms hardly
 /// depend on one another.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Shading {
     size: (usize, usize),
     coefficients: [f64; TERMS],

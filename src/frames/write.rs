@@ -15,6 +15,7 @@ pub struct FormatError(String);
 
 /// A picture format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PictureFormat {
     /// `.png`: grey or colour with alpha.
     Png,

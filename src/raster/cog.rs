@@ -2,7 +2,7 @@
 
 use super::compression::Packed;
 use super::directory::{self, Directory, Values, tag};
-use super::pyramid::{LevelTile, Pyramid};
+use super::pyramid::{LevelTile, Pyramid, Waiting};
 use super::spool::{Spool, Stored};
 use super::{
     Compression, EDGE, Georeference, Nodata, RasterError, RasterSpec, RasterTile, SampleType,
@@ -10,6 +10,8 @@ use super::{
 };
 use crate::atomic::{self, WriteError};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -26,6 +28,15 @@ pub struct CogWriter {
     spool: Spool,
     /// The tiles of every level, row by row.
     stored: Vec<Vec<Option<Stored>>>,
+}
+
+/// How far a [`CogWriter`] has come whose tiles wait in a file that stays.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct CogState<'a> {
+    waiting: Cow<'a, Waiting>,
+    stored: Cow<'a, [Vec<Option<Stored>>]>,
+    /// Bytes of the file.
+    end: u64,
 }
 
 /// Places of the tiles of a level in the file and their bytes; 0 if there is nothing in them.
@@ -62,6 +73,35 @@ impl CogWriter {
         spec: RasterSpec,
         compression: Compression,
     ) -> Result<Self, RasterError> {
+        Self::with(target, spec, compression, || Spool::beside(target))
+    }
+
+    /// Begins it, or goes on from `state`, with the packed tiles in the file `tiles`, which stays whatever happens.
+    ///
+    /// # Errors
+    /// As [`CogWriter::begin`]; fewer tiles in the file than the state tells of.
+    pub fn kept(
+        target: &Path,
+        spec: RasterSpec,
+        compression: Compression,
+        tiles: &Path,
+        state: Option<CogState>,
+    ) -> Result<Self, RasterError> {
+        let end = state.as_ref().map_or(0, |state| state.end);
+        let mut writer = Self::with(target, spec, compression, || Spool::kept(tiles, end))?;
+        if let Some(state) = state {
+            writer.pyramid.go_on(state.waiting.into_owned());
+            writer.stored = state.stored.into_owned();
+        }
+        Ok(writer)
+    }
+
+    fn with(
+        target: &Path,
+        spec: RasterSpec,
+        compression: Compression,
+        spool: impl FnOnce() -> Result<Spool, WriteError>,
+    ) -> Result<Self, RasterError> {
         let levels = spec.levels_to_one_tile();
         let pyramid = Pyramid::new(spec, levels)?;
         compression.check(&spec)?;
@@ -77,8 +117,21 @@ impl CogWriter {
             compression,
             target: target.to_owned(),
             pyramid,
-            spool: Spool::beside(target)?,
+            spool: spool()?,
             stored,
+        })
+    }
+
+    /// How far it has come; all of that is on the disk.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn state(&self) -> Result<CogState<'_>, WriteError> {
+        let end = self.spool.synced();
+        Ok(CogState {
+            waiting: Cow::Borrowed(self.pyramid.waiting()),
+            stored: Cow::Borrowed(&self.stored),
+            end: end.map_err(|source| WriteError::new(&self.target, source))?,
         })
     }
 

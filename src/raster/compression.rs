@@ -6,6 +6,7 @@ use std::io;
 
 /// How the tiles of a [`CogWriter`](super::CogWriter) are packed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Compression {
     /// Without loss.
     Deflate,

@@ -1,16 +1,19 @@
 //! Deep Zoom: a folder of small pictures that a viewer in the browser reads without a server's help.
 
-use super::pyramid::{LevelTile, Pyramid};
+use super::pyramid::{LevelTile, Pyramid, Waiting};
 use super::{EDGE, RasterError, RasterSpec, RasterTile, SampleType, jpeg};
 use crate::atomic::{self, StagedFolder, WriteError};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// The format of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum DziFormat {
     /// With loss; what is nothing is black.
     Jpeg {
@@ -34,6 +37,13 @@ pub struct DziWriter {
     written: u64,
 }
 
+/// How far a [`DziWriter`] has come whose tiles wait in a folder that stays.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct DziState<'a> {
+    waiting: Cow<'a, Waiting>,
+    written: u64,
+}
+
 impl DziWriter {
     /// Begins the picture that will be `target`, a name that ends in `.dzi`, and the folder beside it.
     ///
@@ -41,6 +51,46 @@ impl DziWriter {
     /// [`RasterError::Unsupported`] for another name, or a raster that contradicts itself or has no samples of 8 bits;
     /// whatever the system says.
     pub fn begin(target: &Path, spec: RasterSpec, format: DziFormat) -> Result<Self, RasterError> {
+        Self::with(target, spec, format, || {
+            StagedFolder::begin(&files_folder(target))
+        })
+    }
+
+    /// Begins it, or goes on from `state`, with the tiles in `folder` on the same disk, which stays whatever happens.
+    ///
+    /// # Errors
+    /// As [`DziWriter::begin`].
+    pub fn kept(
+        target: &Path,
+        spec: RasterSpec,
+        format: DziFormat,
+        folder: &Path,
+        state: Option<DziState>,
+    ) -> Result<Self, RasterError> {
+        let mut writer = Self::with(target, spec, format, || {
+            StagedFolder::kept(&files_folder(target), folder)
+        })?;
+        if let Some(state) = state {
+            writer.pyramid.go_on(state.waiting.into_owned());
+            writer.written = state.written;
+        }
+        Ok(writer)
+    }
+
+    /// How far it has come.
+    pub fn state(&self) -> DziState<'_> {
+        DziState {
+            waiting: Cow::Borrowed(self.pyramid.waiting()),
+            written: self.written,
+        }
+    }
+
+    fn with(
+        target: &Path,
+        spec: RasterSpec,
+        format: DziFormat,
+        folder: impl FnOnce() -> Result<StagedFolder, WriteError>,
+    ) -> Result<Self, RasterError> {
         let levels = spec.levels_to(1);
         let pyramid = Pyramid::new(spec, levels)?;
         if let DziFormat::Jpeg { quality } = format {
@@ -61,7 +111,7 @@ impl DziWriter {
             let what = io::Error::other("it is a folder, and a file is to be written");
             return Err(WriteError::new(target, what).into());
         }
-        let folder = StagedFolder::begin(&files_folder(target))?;
+        let folder = folder()?;
         for level in 0..levels {
             atomic::create_folder(&folder.path().join(level.to_string()))?;
         }
@@ -143,7 +193,7 @@ impl DziFormat {
 }
 
 /// The folder of the tiles of `NAME.dzi`: `NAME_files`.
-fn files_folder(target: &Path) -> PathBuf {
+pub fn files_folder(target: &Path) -> PathBuf {
     let mut name = target.file_stem().unwrap_or_default().to_owned();
     name.push("_files");
     target.with_file_name(name)

@@ -4,6 +4,7 @@ use crate::atomic::WriteError;
 
 /// Why a raster cannot be written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RasterError {
     /// The file cannot hold pictures of this kind.
     #[error("{0}")]

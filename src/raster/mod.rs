@@ -12,6 +12,35 @@
 //!
 //! What is held in memory is the batch and the overview tiles that wait for a part of theirs:
 //! [`RasterSpec::pending_bytes`]. Tiles that arrive along the shorter side of the picture keep that small.
+//!
+//! # Example
+//!
+//! ```
+//! use tunnelstitch::raster::{
+//!     CogWriter, Compression, EDGE, RasterSpec, RasterTile, Reduce, SampleType,
+//! };
+//!
+//! let folder = tempfile::tempdir()?;
+//! let spec = RasterSpec {
+//!     width: 700,
+//!     height: 300,
+//!     samples: SampleType::U8,
+//!     channels: 1,
+//!     alpha: false,
+//!     nodata: None,
+//!     reduce: Reduce::Mean,
+//!     georeference: None,
+//! };
+//! let path = folder.path().join("wall.tif");
+//! let mut writer = CogWriter::begin(&path, spec, Compression::Deflate)?;
+//! for column in 0..2 {
+//!     let pixels = vec![128; EDGE * EDGE];
+//!     writer.add(vec![RasterTile { column, row: 0, pixels }])?;
+//! }
+//! writer.finish()?;
+//! assert_eq!(image::image_dimensions(&path)?, (700, 300));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod cog;
 mod compression;
@@ -27,8 +56,8 @@ mod spool;
 #[cfg(test)]
 mod test_picture;
 
-pub use cog::CogWriter;
+pub use cog::{CogState, CogWriter};
 pub use compression::Compression;
-pub use dzi::{DziFormat, DziWriter};
+pub use dzi::{DziFormat, DziState, DziWriter, files_folder};
 pub use error::RasterError;
 pub use spec::{EDGE, Georeference, Nodata, RasterSpec, RasterTile, Reduce, SampleType, TileOrder};

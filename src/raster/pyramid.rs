@@ -3,6 +3,7 @@
 use super::reduce::{HALF, reduce};
 use super::{EDGE, RasterError, RasterSpec, RasterTile};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
 /// A complete tile of some level.
@@ -14,21 +15,28 @@ pub(super) struct LevelTile {
     pub(super) tile: RasterTile,
 }
 
-/// The overview tiles of a picture that wait for a part of theirs.
+/// The overviews of a picture that is arriving.
 #[derive(Debug)]
 pub(super) struct Pyramid {
     spec: RasterSpec,
     levels: usize,
-    /// Tiles of full resolution that have arrived, row by row.
+    waiting: Waiting,
+}
+
+/// How far a picture has arrived.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Waiting {
+    /// Tiles of full resolution that are there, row by row.
     arrived: Vec<bool>,
-    /// By level, column and row.
+    /// The overview tiles that wait for a part of theirs, by level, column and row.
     pending: HashMap<(usize, u32, u32), Pending>,
 }
 
-#[derive(Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Pending {
     /// Tiles under it that are still to come.
     missing: u32,
+    #[serde(with = "serde_bytes")]
     pixels: Vec<u8>,
 }
 
@@ -39,9 +47,21 @@ impl Pyramid {
         Ok(Self {
             spec,
             levels,
-            arrived: vec![false; spec.tiles_of(0)],
-            pending: HashMap::new(),
+            waiting: Waiting {
+                arrived: vec![false; spec.tiles_of(0)],
+                pending: HashMap::new(),
+            },
         })
+    }
+
+    /// How far the picture has arrived.
+    pub(super) fn waiting(&self) -> &Waiting {
+        &self.waiting
+    }
+
+    /// Goes on from where a pyramid of the same picture was.
+    pub(super) fn go_on(&mut self, waiting: Waiting) {
+        self.waiting = waiting;
     }
 
     /// Takes tiles of full resolution and hands on all that are complete by that: these, and overview tiles.
@@ -74,7 +94,7 @@ impl Pyramid {
             return refuse("it has not the bytes of a tile");
         }
         let place = self.spec.place(0, column, row);
-        if std::mem::replace(&mut self.arrived[place], true) {
+        if std::mem::replace(&mut self.waiting.arrived[place], true) {
             return refuse("it came twice");
         }
         Ok(())
@@ -93,11 +113,12 @@ impl Pyramid {
                 reduce(&spec, &tile.pixels, extent)
             })
             .collect();
+        let pending = &mut self.waiting.pending;
         let mut complete = Vec::new();
         for (tile, quarter) in tiles.iter().zip(quarters) {
             let (column, row) = (tile.column / 2, tile.row / 2);
             let key = (level, column, row);
-            let above = self.pending.entry(key).or_insert_with(|| Pending {
+            let above = pending.entry(key).or_insert_with(|| Pending {
                 missing: parts(&spec, level, column, row),
                 pixels: vec![0; spec.tile_bytes()],
             });
@@ -111,7 +132,7 @@ impl Pyramid {
             }
             above.missing -= 1;
             if above.missing == 0
-                && let Some(above) = self.pending.remove(&key)
+                && let Some(above) = pending.remove(&key)
             {
                 complete.push(RasterTile {
                     column,
@@ -151,7 +172,7 @@ mod tests {
         seen.dedup();
         assert_eq!(seen.len(), count);
         assert_eq!(count as u64, spec.tiles(levels));
-        assert!(pyramid.pending.is_empty());
+        assert!(pyramid.waiting.pending.is_empty());
     }
 
     #[test]
@@ -167,7 +188,7 @@ mod tests {
             let mut most = 0;
             for tile in all {
                 pyramid.add(vec![tile]).unwrap();
-                most = most.max(pyramid.pending.len());
+                most = most.max(pyramid.waiting.pending.len());
             }
             let most = (most * spec.tile_bytes()) as u64;
             assert!(most <= spec.pending_bytes(order), "{order:?}: {most}");

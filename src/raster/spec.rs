@@ -7,6 +7,7 @@ pub const EDGE: usize = 512;
 
 /// The numbers that pixels are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SampleType {
     /// Whole numbers of 8 bits.
     U8,
@@ -41,6 +42,7 @@ impl SampleType {
 
 /// What becomes of 2 × 2 pixels in an overview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Reduce {
     /// The mean of those that are not nothing.
     Mean,
@@ -50,6 +52,7 @@ pub enum Reduce {
 
 /// The whole number that stands for nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Nodata {
     /// 0.
     Zero,

@@ -2,20 +2,21 @@
 
 use super::compression::Packed;
 use crate::atomic::{ScratchFolder, WriteError, beside};
+use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Packed tiles in the order of their arrival, in a file beside the target that goes when this is dropped or the program
-/// is interrupted.
+/// Packed tiles in the order of their arrival, in a file.
 pub(super) struct Spool {
     file: File,
     end: u64,
-    _folder: ScratchFolder,
+    /// Goes with the file when this is dropped or the program is interrupted.
+    _folder: Option<ScratchFolder>,
 }
 
 /// A tile in a [`Spool`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Stored {
     offset: u64,
     /// Bytes of the picture; 0 if there is nothing in the tile.
@@ -25,7 +26,7 @@ pub(super) struct Stored {
 }
 
 impl Spool {
-    /// An empty one beside `target`.
+    /// An empty one beside `target`, for a while.
     pub(super) fn beside(target: &Path) -> Result<Self, WriteError> {
         let folder = ScratchFolder::inside(beside(target))?;
         let path = folder.path().join("tiles");
@@ -38,8 +39,33 @@ impl Spool {
         Ok(Self {
             file,
             end: 0,
-            _folder: folder,
+            _folder: Some(folder),
         })
+    }
+
+    /// The one in the file `path`, which stays, as far as `end`; what is beyond is dropped.
+    pub(super) fn kept(path: &Path, end: u64) -> Result<Self, WriteError> {
+        let fail = |source| WriteError::new(path, source);
+        let mut options = File::options();
+        let options = options.read(true).write(true).create(true).truncate(false);
+        let mut file = options.open(path).map_err(fail)?;
+        if file.metadata().map_err(fail)?.len() < end {
+            let what = "tiles of the interrupted run are missing; give --fresh to begin anew";
+            return Err(fail(io::Error::other(what)));
+        }
+        file.set_len(end).map_err(fail)?;
+        file.seek(SeekFrom::End(0)).map_err(fail)?;
+        Ok(Self {
+            file,
+            end,
+            _folder: None,
+        })
+    }
+
+    /// Bytes so far, all of them on the disk.
+    pub(super) fn synced(&self) -> io::Result<u64> {
+        self.file.sync_data()?;
+        Ok(self.end)
     }
 
     /// Adds a tile.

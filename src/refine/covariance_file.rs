@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Why a covariance file cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CovarianceError {
     /// It cannot be read.
     #[error("{}: cannot read the covariances: {source}", path.display())]

@@ -1,10 +1,11 @@
 //! Why a frame's pixels are not believed.
 
 use crate::trajectory::Pose;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A reason to leave a frame at its prior.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Doubt {
     /// Hardly any contrast: black, white, lamp off, lens covered.
     Featureless,

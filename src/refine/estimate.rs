@@ -2,6 +2,7 @@
 
 use crate::trajectory::Pose;
 use nalgebra::{SVector, Vector6};
+use serde::{Deserialize, Serialize};
 
 /// Unknowns of a frame: rotation (3), translation (3), log-gain, bias.
 pub const UNKNOWNS: usize = 8;
@@ -12,7 +13,7 @@ pub type FrameStep = SVector<f64, UNKNOWNS>;
 /// Pose and exposure of one frame.
 ///
 /// A grey value `I` of the frame stands for the wall's value `(I − b)/a` with `a = exp(log_gain)`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameEstimate {
     /// Camera-to-world pose.
     pub pose: Pose,

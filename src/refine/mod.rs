@@ -19,6 +19,7 @@
 //! | all frames together, coarse to fine | [`run`](mod@run) |
 //! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
 //! | are rows read when they are said to be | [`rows`] |
+//! | going on after an interruption | [`state`] |
 //! | how sure | [`certainty`], [`covariance`]; how sure it could be at best: [`bound`] |
 //!
 //! At full size what is in a frame but not on the wall is left out of a solve beforehand: [`foreign`]. Every solve is the
@@ -78,6 +79,7 @@ mod search;
 mod selected_inverse;
 mod shared;
 mod spectrum;
+mod state;
 #[cfg(test)]
 mod test_scene;
 mod tile;
@@ -97,4 +99,4 @@ pub use otherwise::other_readings;
 pub use problem::ProblemError;
 pub use report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 pub use rows::RowMotion;
-pub use run::{RefineError, Refined, refine};
+pub use run::{RefineError, Refined, refine, refine_keeping};

@@ -9,7 +9,7 @@ use super::gauss_newton::Solution;
 use super::shared::{BorderBlock, Eliminated, SharedBlock, reduce};
 use crate::camera::Camera;
 use nalgebra::DMatrix;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A posterior 1-σ beyond this share of the prior's is not an observation.
 const MOST_UNCERTAIN: f64 = 0.5;
@@ -17,7 +17,7 @@ const MOST_UNCERTAIN: f64 = 0.5;
 const CLOSE_CORRELATION: f64 = 0.9;
 
 /// An unknown that was to be estimated and cannot be.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Refusal {
     /// Which.
     pub unknown: usize,
@@ -162,6 +162,7 @@ const NAMES: [(&str, Kind); SHARED] = [
 
 /// One shared unknown of the report.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct UnknownReport {
     /// `focal` (fx), `cx`, `cy`, `k1`, `k2`, `radius`, or of the tunnel's axis in the frame of the initial poses: how far it
     /// tilts about x and z, and how far it lies off along x and z.
@@ -185,6 +186,7 @@ pub struct UnknownReport {
 
 /// Self-calibration in the report.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct CalibrationReport {
     /// What was to be estimated.
     pub unknowns: Vec<UnknownReport>,

@@ -10,6 +10,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 /// What a frame's refined pose rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum FrameFlag {
     /// Its pixels.
     Photometric,
@@ -44,6 +45,7 @@ pub(crate) fn nan_if_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::
 
 /// One frame of the report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FrameReport {
     /// Index of the frame.
     pub index: usize,
@@ -73,6 +75,7 @@ pub struct FrameReport {
 
 /// One global solve of the report.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct LevelReport {
     /// Pyramid level; 0 is full size.
     pub level: usize,
@@ -87,6 +90,7 @@ pub struct LevelReport {
 
 /// Wall-clock time of one stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct StageTime {
     /// Name of the stage.
     pub stage: String,
@@ -96,6 +100,7 @@ pub struct StageTime {
 
 /// The whole report.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct RefineReport {
     /// Global solves, coarse to fine.
     pub levels: Vec<LevelReport>,

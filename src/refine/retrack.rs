@@ -3,13 +3,15 @@
 //! Frames placed with a wrong camera fit badly where they overlap, and some end up in the wrong place. But what they tell of
 //! the camera is much better than what was given, so they are tracked again with that, until the camera stays as it is.
 
+use super::calibration::Kappa;
 use super::doubt::Doubt;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
 use super::problem::{Problem, ProblemError, Sampling, Scene};
-use super::track::{Tracked, track};
+use super::track::{Tracked, Tracking};
 use crate::camera::Camera;
 use crate::progress::Progress;
+use serde::{Deserialize, Serialize};
 
 /// Times that the frames are tracked, at the most.
 const ROUNDS: usize = 5;
@@ -18,41 +20,78 @@ const SAME_CAMERA_PX: f64 = 2.0;
 /// Points on each edge of the picture at which cameras are compared.
 const STEPS_PER_EDGE: usize = 4;
 
-/// Places all frames, with the camera's unknowns if they are to be estimated; see [`track`].
-///
-/// # Errors
-/// [`ProblemError`].
-pub fn track_calibrating(
-    scene: &Scene,
-    options: &RefineOptions,
-    doubts: &[Option<Doubt>],
-    stopping: Stopping,
-    progress: &dyn Progress,
-) -> Result<Tracked, ProblemError> {
-    let mut scene = Scene {
-        calibration: scene.calibration.of_camera(),
-        ..*scene
-    };
-    let mut round = 1;
-    loop {
-        let mut tracked = track(&scene, options, doubts.to_vec(), progress)?;
-        if !scene.calibration.any() {
-            return Ok(tracked);
+/// Frames being placed, in one round after another.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Retracking {
+    /// The round, from 0.
+    round: usize,
+    /// The shared unknowns that it began with.
+    kappa: Kappa,
+    /// Why frames are known to be useless beforehand.
+    useless: Vec<Option<Doubt>>,
+    tracking: Tracking,
+}
+
+impl Retracking {
+    /// Nothing placed yet. `doubts` are frames known to be useless beforehand.
+    pub fn begin(doubts: Vec<Option<Doubt>>) -> Self {
+        let kappa = Kappa::zeros();
+        Self {
+            round: 0,
+            kappa,
+            tracking: Tracking::begin(doubts.clone(), kappa),
+            useless: doubts,
         }
-        let before = scene.camera;
-        scene = scene.at(tracked.kappa);
-        let level = options.handover_level(scene.camera.shorter_side());
-        let problem = Problem::new(&scene, Sampling::of(level), tracked.members())?;
-        if problem.tiles() > 0 {
-            let solution = solve(problem.calibrating(), stopping, None)?;
-            tracked.estimates = solution.estimates;
-            tracked.kappa = solution.kappa;
+    }
+
+    /// Places all frames that are left, with the camera's unknowns if they are to be estimated. `between` is called after
+    /// every frame.
+    ///
+    /// # Errors
+    /// As [`Tracking::place_next`], and those of `between`.
+    pub fn finish(
+        mut self,
+        scene: &Scene,
+        options: &RefineOptions,
+        stopping: Stopping,
+        progress: &dyn Progress,
+        mut between: impl FnMut(&Self) -> Result<(), ProblemError>,
+    ) -> Result<Tracked, ProblemError> {
+        let mut scene = Scene {
+            calibration: scene.calibration.of_camera(),
+            ..*scene
         }
-        scene = scene.at(tracked.kappa);
-        if moved_px(&before, &scene.camera) < SAME_CAMERA_PX || round == ROUNDS {
-            return Ok(tracked);
+        .at(self.kappa);
+        loop {
+            progress.start("tracking", self.useless.len());
+            progress.advance(self.tracking.placed());
+            while !self.tracking.is_complete() {
+                self.tracking.place_next(&scene, options)?;
+                progress.advance(1);
+                between(&self)?;
+            }
+            progress.finish();
+            let mut tracked = self.tracking.clone().finish();
+            if !scene.calibration.any() {
+                return Ok(tracked);
+            }
+            let before = scene.camera;
+            scene = scene.at(tracked.kappa);
+            let level = options.handover_level(scene.camera.shorter_side());
+            let problem = Problem::new(&scene, Sampling::of(level), tracked.members())?;
+            if problem.tiles() > 0 {
+                let solution = solve(problem.calibrating(), stopping, None)?;
+                tracked.estimates = solution.estimates;
+                tracked.kappa = solution.kappa;
+            }
+            scene = scene.at(tracked.kappa);
+            self.round += 1;
+            if moved_px(&before, &scene.camera) < SAME_CAMERA_PX || self.round == ROUNDS {
+                return Ok(tracked);
+            }
+            self.kappa = scene.kappa;
+            self.tracking = Tracking::begin(self.useless.clone(), scene.kappa);
         }
-        round += 1;
     }
 }
 

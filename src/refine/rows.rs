@@ -32,6 +32,7 @@ const LEAST_SHIFT_PX: f64 = 0.5;
 
 /// The readout time that the frames want.
 #[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
 pub struct RowMotion {
     /// Time from reading a frame's first row to reading its last as given, milliseconds; 0 for a global shutter.
     pub given_ms: f64,

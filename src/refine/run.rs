@@ -9,7 +9,7 @@ use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::examine::examine;
 use super::flat_field::{correct, flatten};
-use super::gauss_newton::{Solution, StopReason, Stopping, solve};
+use super::gauss_newton::{Solution, StopReason, Stopping, go_on};
 use super::neighbourhood::Neighbourhood;
 use super::observed::{CalibrationReport, Refusal};
 use super::options::RefineOptions;
@@ -19,20 +19,22 @@ use super::problem::{FrameShare, Problem, ProblemError, Sampling, Scene};
 use super::repair::repair;
 use super::repeats::Rival;
 use super::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
-use super::retrack::track_calibrating;
+use super::retrack::Retracking;
 use super::rows::row_motion;
+use super::state::{Keeper, Phase, RunState, Solving};
 use super::track::{Tracked, retry};
 use super::verdict::unsupported;
+use crate::checkpoint::Checkpoint;
 use crate::frames::FrameCache;
 use crate::progress::Progress;
-use crate::survey::Survey;
-use crate::trajectory::{Pose, Shutter, StampedPose, Trajectory};
-use std::collections::VecDeque;
+use crate::survey::{CalibrationGroup, Survey};
+use crate::trajectory::{Pose, StampedPose, Trajectory};
 use std::sync::Arc;
 use std::time::Instant;
 
 /// Why a survey cannot be refined.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RefineError {
     /// Nothing to compare with.
     #[error(
@@ -44,6 +46,14 @@ pub enum RefineError {
         "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, whether the mask or tunnel.ignore leaves anything, or take frames closer together"
     )]
     NoOverlap,
+    /// Something that is known by its shape only for a straight round tunnel.
+    #[error(
+        "{unknown} can be estimated of a straight round tunnel only; leave it out of --calibrate and [calibrate] unknowns"
+    )]
+    OnlyRound {
+        /// What was to be estimated.
+        unknown: &'static str,
+    },
     /// The equations.
     #[error(transparent)]
     Problem(#[from] ProblemError),
@@ -51,6 +61,7 @@ pub enum RefineError {
 
 /// Result of a refinement.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Refined {
     /// Refined poses with the times of the initial ones.
     pub trajectory: Trajectory,
@@ -84,11 +95,27 @@ pub fn refine(
     options: &RefineOptions,
     progress: &Arc<dyn Progress>,
 ) -> Result<Refined, RefineError> {
+    refine_keeping(survey, options, None, progress)
+}
+
+/// The same, with what is done kept in a checkpoint; goes on from the state that is in it.
+///
+/// The result has the same bytes however often the run was interrupted, but for the times that stages took.
+///
+/// # Errors
+/// [`RefineError`].
+pub fn refine_keeping(
+    survey: &Survey,
+    options: &RefineOptions,
+    checkpoint: Option<&mut Checkpoint>,
+    progress: &Arc<dyn Progress>,
+) -> Result<Refined, RefineError> {
     let count = survey.frames.len();
     if count < 2 {
         return Err(RefineError::SingleFrame);
     }
-    let mut clock = Clock::default();
+    let mut keeper = Keeper(checkpoint);
+    let state: Option<RunState> = keeper.state()?;
     let side = survey.camera.shorter_side();
     let coarsest = options.coarsest_level(side);
     let frames = FrameCache::new(
@@ -111,77 +138,99 @@ pub fn refine(
         bias_sigma: options.bias_sigma,
     };
     let shutter = survey.shutter();
-    let mut calibration = calibration_of(survey, options, &prior.initial);
-    let examined = examine(
-        &scene(
-            survey,
-            options,
-            &calibration,
-            &prior,
-            &shutter,
-            &frames,
-            0.0,
-        ),
-        coarsest,
-        progress.as_ref(),
-    )?;
-    if let Some(shading) = examined.shading {
-        frames.set_shading(shading);
-    }
-    clock.lap("decode");
-    let rough = Prior {
-        jitter: calibration.widened(&prior.jitter, prior.arm_m()),
-        ..prior.clone()
+    let mut calibration = calibration_of(survey, options, &prior.initial)?;
+    let mut scene = Scene {
+        surface: survey.surface.as_ref(),
+        ignored: &survey.ignored,
+        camera: survey.camera,
+        shutter: &shutter,
+        calibration,
+        kappa: Kappa::zeros(),
+        frames: &frames,
+        prior: &prior,
+        noise: 0.0,
+        fused_gradient: options.fused_gradient,
     };
-    let mut tracked = track_calibrating(
-        &scene(
-            survey,
-            options,
-            &calibration,
-            &rough,
-            &shutter,
-            &frames,
-            examined.noise,
-        ),
-        options,
-        &examined.doubts,
-        close(options, options.handover_level(side)),
-        progress.as_ref(),
-    )?;
-    clock.lap("track");
+    let mut clock = Clock::new(Vec::new(), 0.0);
+    let (noise, phase) = match state {
+        Some(state) => {
+            if let Some(shading) = state.shading {
+                frames.set_shading(shading);
+            }
+            clock = Clock::new(state.laps, state.lap_s);
+            (state.noise, state.phase)
+        }
+        None => {
+            let examined = examine(&scene, coarsest, progress.as_ref())?;
+            if let Some(shading) = examined.shading {
+                frames.set_shading(shading);
+            }
+            clock.lap("decode");
+            let tracking = Retracking::begin(examined.doubts);
+            (examined.noise, Phase::Tracking(tracking))
+        }
+    };
+    scene.noise = noise;
+    let keep = |phase: Phase, clock: &Clock| RunState {
+        noise,
+        shading: frames.shading().as_deref().cloned(),
+        phase,
+        laps: clock.laps.clone(),
+        lap_s: clock.lap_s(),
+    };
 
-    let scene = scene(
-        survey,
-        options,
-        &calibration,
-        &prior,
-        &shutter,
-        &frames,
-        examined.noise,
-    );
-    let mut scene = scene.at(tracked.kappa);
-    flatten(&scene, options, &mut tracked)?;
-    clock.lap("shading");
+    let mut solving = match phase {
+        Phase::Solving(solving) => solving,
+        Phase::Tracking(tracking) => {
+            let rough = Prior {
+                jitter: calibration.widened(&prior.jitter, prior.arm_m()),
+                ..prior.clone()
+            };
+            let scene_of_rough = Scene {
+                prior: &rough,
+                ..scene
+            };
+            let stopping = close(options, options.handover_level(side));
+            let between = |tracking: &Retracking| {
+                keeper.if_due(|| keep(Phase::Tracking(tracking.clone()), &clock))?;
+                Ok(())
+            };
+            let mut tracked = tracking.finish(
+                &scene_of_rough,
+                options,
+                stopping,
+                progress.as_ref(),
+                between,
+            )?;
+            clock.lap("track");
+            flatten(&scene.at(tracked.kappa), options, &mut tracked)?;
+            clock.lap("shading");
+            let kappa = scene.at(tracked.kappa).kappa;
+            Solving::begin(tracked, kappa, &calibration, stages(options, side))
+        }
+    };
+    calibration.free = solving.free;
+    scene.calibration = calibration;
+    scene = scene.at(solving.kappa);
 
-    let mut levels = Vec::new();
     let mut last = None;
-    let mut refusals = Vec::new();
-    let mut stages: VecDeque<_> = stages(options, side).collect();
-    let (mut first, mut rivals) = (true, None);
-    // As the last solve left it, to see what has changed since.
-    let mut solved = tracked.clone();
-    while let Some((sampling, stopping)) = stages.pop_front() {
-        let check = std::mem::take(&mut first);
-        if last.is_some() && stages.is_empty() && rivals.is_none() {
-            rivals = Some(repair(
+    while let Some((sampling, stopping)) = solving.stages.front().copied() {
+        keeper.if_due(|| keep(Phase::Solving(solving.clone()), &clock))?;
+        if solving.stages.len() == 1 && !solving.levels.is_empty() && solving.rivals.is_none() {
+            solving.rivals = Some(repair(
                 &scene,
                 options,
-                &mut tracked,
-                solved.clone(),
+                &mut solving.tracked,
+                solving.solved.clone(),
                 progress.as_ref(),
             )?);
             clock.lap("repair");
+            keeper.if_due(|| keep(Phase::Solving(solving.clone()), &clock))?;
         }
+        let before = solving.clone();
+        let begun = solving.solve.take();
+        solving.stages.pop_front();
+        let tracked = &mut solving.tracked;
         let Sampling {
             level,
             density,
@@ -190,11 +239,12 @@ pub fn refine(
         let mut problem = Problem::new(&scene, sampling, tracked.members())?.calibrating();
         // Before the frames are aligned at full size, residuals are mostly misalignment.
         if level == 0 {
-            let last = stages.is_empty();
+            let last = solving.stages.is_empty();
             problem = problem.without_foreign(options.foreign_density.filter(|_| last))?;
         }
         // Where no frame can be believed, the prior is all there is to report.
         if problem.tiles() == 0 && tracked.doubts.iter().all(Option::is_none) {
+            solving.checked = true;
             continue;
         }
         let mut stage = format!("level {level}");
@@ -205,7 +255,19 @@ pub fn refine(
             stage += &format!(", {:.0} % of the information", 100.0 * information);
         }
         progress.start("global", options.max_iterations as usize);
-        let solution = solve(problem, stopping, Some((&stage, progress)))?;
+        let mut between = |solve| {
+            keeper.if_due(|| {
+                let solve = Some(solve);
+                let phase = Phase::Solving(Solving {
+                    solve,
+                    ..before.clone()
+                });
+                keep(phase, &clock)
+            })?;
+            Ok(())
+        };
+        let announce = Some((stage.as_str(), progress));
+        let solution = go_on(problem, stopping, announce, begun, Some(&mut between))?;
         progress.finish();
         tracked.estimates.clone_from(&solution.estimates);
         let refused = match level {
@@ -218,30 +280,38 @@ pub fn refine(
             _ => Vec::new(),
         };
         adopt(&mut scene, &mut calibration, solution.kappa, &refused);
-        if !refused.is_empty() && stages.is_empty() {
-            stages.push_back((sampling, stopping));
+        (solving.kappa, solving.free) = (scene.kappa, calibration.free);
+        if !refused.is_empty() && solving.stages.is_empty() {
+            solving.stages.push_back((sampling, stopping));
         }
-        refusals.extend(refused);
-        solved.clone_from(&tracked);
+        solving.refusals.extend(refused);
+        solving.solved.clone_from(tracked);
         if level == 0 {
             disagreements(&solution.linearisation.frames, &mut tracked.doubts);
         }
-        levels.push(LevelReport {
+        solving.levels.push(LevelReport {
             level,
             samples_per_pixel: density,
             share_of_wall: solution.problem.share_of_wall(),
             solve: solution.record.clone(),
         });
         last = Some(solution);
-        if !stages.is_empty() && frames.shading().is_some() {
-            correct(&scene, options, &tracked)?;
+        if !solving.stages.is_empty() && frames.shading().is_some() {
+            correct(&scene, options, tracked)?;
         }
         clock.lap(&format!("global {stage}"));
-        if check {
-            recheck(&scene, options, &mut tracked, progress.as_ref())?;
+        if !std::mem::replace(&mut solving.checked, true) {
+            recheck(&scene, options, tracked, progress.as_ref())?;
             clock.lap("check");
         }
     }
+    let Solving {
+        mut tracked,
+        levels,
+        refusals,
+        rivals,
+        ..
+    } = solving;
     let solution = last.ok_or(RefineError::NoOverlap)?;
     progress.start("covariance", 1);
     let finest = options.handover_level(side);
@@ -314,7 +384,7 @@ pub fn refine(
                     &scene.kappa,
                     &certainty.shared.unwrap_or_default(),
                     &refusals,
-                    survey.file.tunnel.radius_m,
+                    survey.file.tunnel.nominal_m(),
                 )
             }),
             timings: clock.laps,
@@ -324,17 +394,32 @@ pub fn refine(
 }
 
 /// What is to be estimated of the survey's calibration.
-fn calibration_of(survey: &Survey, options: &RefineOptions, initial: &[Pose]) -> Calibration {
+///
+/// # Errors
+/// [`RefineError::OnlyRound`].
+fn calibration_of(
+    survey: &Survey,
+    options: &RefineOptions,
+    initial: &[Pose],
+) -> Result<Calibration, RefineError> {
     let section = survey.file.calibrate.clone().unwrap_or_default();
     let groups = options.calibrate.as_ref().unwrap_or(&section.unknowns);
     let calibration = match groups.is_empty() {
         true => Calibration::none(&survey.camera),
         false => Calibration::new(groups, &section, &survey.camera, initial),
     };
-    Calibration {
+    for (group, unknown) in [
+        (CalibrationGroup::Radius, "the radius"),
+        (CalibrationGroup::Axis, "the axis"),
+    ] {
+        if groups.contains(&group) && !survey.file.tunnel.is_straight_and_round() {
+            return Err(RefineError::OnlyRound { unknown });
+        }
+    }
+    Ok(Calibration {
         readout_s: survey.shutter().readout_s(),
         ..calibration
-    }
+    })
 }
 
 /// Goes on with the shared unknowns `kappa`, those refused at the values given.
@@ -345,29 +430,6 @@ fn adopt(scene: &mut Scene, calibration: &mut Calibration, mut kappa: Kappa, ref
     }
     scene.calibration = *calibration;
     *scene = scene.at(kappa);
-}
-
-fn scene<'a>(
-    survey: &'a Survey,
-    options: &RefineOptions,
-    calibration: &Calibration,
-    prior: &'a Prior,
-    shutter: &'a Shutter,
-    frames: &'a FrameCache,
-    noise: f64,
-) -> Scene<'a> {
-    Scene {
-        surface: survey.surface.as_ref(),
-        ignored: &survey.ignored,
-        camera: survey.camera,
-        shutter,
-        calibration: *calibration,
-        kappa: Kappa::zeros(),
-        frames,
-        prior,
-        noise,
-        fused_gradient: options.fused_gradient,
-    }
 }
 
 /// The global solves: coarse to fine, and the finest once more with a denser look at the wall.
@@ -561,25 +623,31 @@ fn explain(solution: &Solution, options: &RefineOptions) -> String {
 /// Stopwatch of the stages.
 struct Clock {
     since: Instant,
+    /// Time spent on the present stage before, seconds.
+    before_s: f64,
     laps: Vec<StageTime>,
 }
 
-impl Default for Clock {
-    fn default() -> Self {
+impl Clock {
+    /// Goes on after `laps` and `before_s` seconds of the next.
+    fn new(laps: Vec<StageTime>, before_s: f64) -> Self {
         Self {
             since: Instant::now(),
-            laps: Vec::new(),
+            before_s,
+            laps,
         }
     }
-}
 
-impl Clock {
+    /// Time spent on the present stage, seconds.
+    fn lap_s(&self) -> f64 {
+        self.before_s + self.since.elapsed().as_secs_f64()
+    }
+
     fn lap(&mut self, stage: &str) {
-        let now = Instant::now();
         self.laps.push(StageTime {
             stage: stage.to_owned(),
-            seconds: (now - self.since).as_secs_f64(),
+            seconds: self.lap_s(),
         });
-        self.since = now;
+        (self.since, self.before_s) = (Instant::now(), 0.0);
     }
 }

@@ -16,10 +16,10 @@ use super::place::{Expectation, Surroundings, place};
 use super::prior::predict;
 use super::problem::{Members, Problem, ProblemError, Sampling, Scene};
 use crate::camera::Sweep;
-use crate::progress::Progress;
 use crate::surface::Footprint;
 use crate::trajectory::{JitterModel, Pose};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ const WINDOW_STOPPING: Stopping = Stopping {
 };
 
 /// All frames after tracking.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Tracked {
     /// Their estimates.
     pub estimates: Vec<FrameEstimate>,
@@ -79,36 +79,67 @@ impl Tracked {
     }
 }
 
-/// Places all frames. `doubts` are those that are known to be useless beforehand.
-///
-/// # Errors
-/// [`ProblemError`] if a frame cannot be read, an initial pose stands outside the tunnel, or an equation has no solution.
-pub fn track(
-    scene: &Scene,
-    options: &RefineOptions,
-    doubts: Vec<Option<Doubt>>,
-    progress: &dyn Progress,
-) -> Result<Tracked, ProblemError> {
-    let count = scene.frames.frames();
-    let mut scene = Scene {
-        calibration: scene.calibration.of_camera(),
-        ..*scene
-    };
-    let mut tracked = Tracked {
-        estimates: Vec::with_capacity(count),
-        doubts,
-        kappa: scene.kappa,
-    };
-    let mut footprints = Vec::with_capacity(count);
-    let mut before = 0;
-    progress.start("tracking", count);
-    for k in 0..count {
-        scene = scene.at(tracked.kappa);
-        let scene = &scene;
-        let expected = expect(scene, k, &tracked);
+/// Frames being placed, one after another.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Tracking {
+    /// Those placed so far; the doubts are of all frames.
+    tracked: Tracked,
+    /// What they saw of the wall when they were placed.
+    footprints: Vec<Footprint>,
+    /// The first frame that the last one may share wall with.
+    earliest: usize,
+    /// The shared unknowns, the last that made a camera.
+    kappa: Kappa,
+}
+
+impl Tracking {
+    /// Nothing placed yet. `doubts` are frames known to be useless beforehand.
+    pub fn begin(doubts: Vec<Option<Doubt>>, kappa: Kappa) -> Self {
+        Self {
+            tracked: Tracked {
+                estimates: Vec::with_capacity(doubts.len()),
+                doubts,
+                kappa,
+            },
+            footprints: Vec::new(),
+            earliest: 0,
+            kappa,
+        }
+    }
+
+    /// Number of frames placed.
+    pub fn placed(&self) -> usize {
+        self.tracked.estimates.len()
+    }
+
+    /// Whether all frames are placed.
+    pub fn is_complete(&self) -> bool {
+        self.placed() == self.tracked.doubts.len()
+    }
+
+    /// All frames.
+    pub fn finish(self) -> Tracked {
+        self.tracked
+    }
+
+    /// Places the next frame, and solves the windows that end with it.
+    ///
+    /// # Errors
+    /// [`ProblemError`] if the frame cannot be read, its initial pose stands outside the tunnel, or an equation has no solution.
+    pub fn place_next(
+        &mut self,
+        scene: &Scene,
+        options: &RefineOptions,
+    ) -> Result<(), ProblemError> {
+        let (k, count) = (self.placed(), self.tracked.doubts.len());
+        let scene = &scene.at(self.kappa).at(self.tracked.kappa);
+        self.kappa = scene.kappa;
+        let tracked = &mut self.tracked;
+        let expected = expect(scene, k, tracked);
         tracked.estimates.push(FrameEstimate::at(expected.pose));
-        footprints.push(footprint(scene, &scene.camera, k, &expected.pose)?);
-        let first = earliest_overlap(scene, &footprints);
+        self.footprints
+            .push(footprint(scene, &scene.camera, k, &expected.pose)?);
+        let first = earliest_overlap(scene, &self.footprints);
         let mut settled = true;
         if tracked.doubts[k].is_none() && first < k {
             let run = first..k + 1;
@@ -118,7 +149,7 @@ pub fn track(
                 let surroundings = Surroundings {
                     estimates: &tracked.estimates[run.clone()],
                     placed: &placed,
-                    footprints: &footprints[run.clone()],
+                    footprints: &self.footprints[run.clone()],
                     run,
                 };
                 match place(scene, options, k, &expected, &surroundings)? {
@@ -132,37 +163,33 @@ pub fn track(
         }
         // The frame looks farther back than the one before it did: a turn has closed on wall that was placed
         // without it, and what has drifted apart meanwhile may be many pixels.
-        let closes = first < before;
-        before = first;
+        let closes = first < self.earliest;
+        self.earliest = first;
+        let side = scene.camera.shorter_side();
+        let (finest, coarsest) = (options.handover_level(side), options.coarsest_level(side));
         if k > 0
             && options.windows
             && (closes || !settled || k % options.window_stride == 0 || k + 1 == count)
         {
-            let side = scene.camera.shorter_side();
-            let finest = options.handover_level(side);
             let coarsest = match closes || !settled {
-                true => options.coarsest_level(side),
+                true => coarsest,
                 false => finest,
             };
             let held = if first == 0 { 0 } else { (k + 1 - first) / 3 };
             for level in (finest..=coarsest).rev() {
                 let scene = scene.at(tracked.kappa);
-                solve_window(&scene, level, first..k + 1, held, &mut tracked)?;
+                solve_window(&scene, level, first..k + 1, held, tracked)?;
             }
         }
         if k > 0 && options.windows && k % LONG_STRIDE == 0 {
-            let side = scene.camera.shorter_side();
             let start = (k + 1).saturating_sub(LONG_WINDOW);
             let held = if start == 0 { 0 } else { LONG_WINDOW / 8 };
-            let level = options.handover_level(side);
             let scene = scene.at(tracked.kappa);
-            solve_window(&scene, level, start..k + 1, held, &mut tracked)?;
+            solve_window(&scene, finest, start..k + 1, held, tracked)?;
         }
-        footprints[k] = footprint(scene, &scene.camera, k, &tracked.estimates[k].pose)?;
-        progress.advance(1);
+        self.footprints[k] = footprint(scene, &scene.camera, k, &tracked.estimates[k].pose)?;
+        Ok(())
     }
-    progress.finish();
-    Ok(tracked)
 }
 
 /// Solves the frames of a window together, the oldest `held` of them held; where none is, with the camera's unknowns.

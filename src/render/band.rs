@@ -8,6 +8,7 @@ use super::{Canvas, PixelFormat, RenderError, Tile};
 
 /// A stretch of the canvas, all around and some rows along.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Band {
     /// First row.
     pub row: u32,

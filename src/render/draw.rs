@@ -13,6 +13,7 @@ use serde::Serialize;
 /// Which frames a pixel of the panorama shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Mode {
     /// The frame that shows the wall best there; frames change along seams where they agree.
     #[default]

@@ -6,6 +6,7 @@ use crate::surface::SurfaceError;
 
 /// Why a panorama cannot be drawn.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RenderError {
     /// Some ray of a frame has no place on the wall.
     #[error(

@@ -27,7 +27,7 @@ use faer::prelude::Solve;
 use faer::sparse::{SparseColMat, Triplet};
 use nalgebra::{DMatrix, DVector, Vector2};
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Unknowns of a frame: α, β.
@@ -46,7 +46,7 @@ const STEPS: usize = 4;
 const LEAST_VARIANCE: f64 = 1e-10;
 
 /// The exposure of all frames.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Exposure {
     frames: Vec<FrameExposure>,
     shading: Option<Table>,
@@ -55,7 +55,8 @@ pub struct Exposure {
 }
 
 /// Exposure of one frame: `I = a V S + b`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FrameExposure {
     /// Gain a.
     pub gain: f64,
@@ -207,7 +208,7 @@ const STEP: usize = 8;
 const NODES: (usize, usize) = (65, 49);
 
 /// `1/V` at nodes spread over a picture; bilinear between them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 struct Table {
     values: Vec<f32>,
     /// Nodes per pixel across and down.

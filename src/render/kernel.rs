@@ -7,6 +7,7 @@ use std::f64::consts::PI;
 /// How values between pixel centres are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Interpolation {
     /// The nearest pixel, unchanged.
     Nearest,

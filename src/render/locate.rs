@@ -10,6 +10,7 @@ use serde::Serialize;
 
 /// A frame that shows a point of the wall.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Sighting {
     /// Index of the frame.
     pub frame: usize,

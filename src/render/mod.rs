@@ -13,6 +13,28 @@
 //! [`sightings`] goes the other way: from a point of the wall to the frames and pixels that show it.
 //!
 //! [`cylinder`] is the odd one out: the cylindrical projection of one single photo.
+//!
+//! # Example
+//!
+//! ```
+//! use std::path::Path;
+//! use tunnelstitch::progress::Silent;
+//! use tunnelstitch::render::{Layout, StitchOptions, stitch};
+//! use tunnelstitch::survey::Survey;
+//!
+//! let survey = Survey::open(Path::new("fixtures/blender_free48"))?;
+//! let options = StitchOptions {
+//!     px_per_metre: Some(20.0),
+//!     ..StitchOptions::default()
+//! };
+//! let (surface, poses) = (survey.surface.as_ref(), survey.initial_poses());
+//! let (camera, frames, shutter) = (&survey.camera, &survey.frames, survey.shutter());
+//! let panorama = stitch(surface, camera, frames, &poses, &shutter, &options, &Silent)?;
+//! assert!(panorama.coverage() > 0.5);
+//! let picture = panorama.into_image(Layout::ThetaRight);
+//! assert_eq!(picture.width(), 377);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod band;
 mod budget;
@@ -62,9 +84,9 @@ pub use maps::Map;
 pub use panorama::Panorama;
 pub use picture::{Picture, PixelFormat};
 pub use placement::{Placement, native_px_per_metre, place};
-pub use plan::{Plan, RenderOptions};
+pub use plan::{Plan, RenderOptions, Settled};
 pub use preview::Preview;
-pub use raster_target::{RasterLayer, RasterTarget};
+pub use raster_target::{Kept, RasterLayer, RasterState, RasterTarget};
 pub use sample::{Sample, Samples};
 pub use seams::Seams;
 pub use stack::{FrameStack, level_for};

@@ -5,9 +5,10 @@ use super::sample::{Sample, Samples};
 use super::{Band, Canvas, Layout, RenderError, Target};
 use crate::frames::GreyImage;
 use image::DynamicImage;
+use serde::{Deserialize, Serialize};
 
 /// A panorama in memory: samples with an alpha that is full where some frame sees the wall and 0 in holes.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Panorama {
     canvas: Canvas,
     format: PixelFormat,

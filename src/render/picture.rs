@@ -5,6 +5,7 @@ use super::sample::{Sample, Samples};
 use crate::frames::HalvedMask;
 use image::{ColorType, DynamicImage};
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 
 /// A picture of 8- or 16-bit samples, row-major, channels interleaved: 1 (grey) or 3 (red, green, blue).
 #[derive(Clone, Debug, PartialEq)]
@@ -236,7 +237,7 @@ impl Picture {
 }
 
 /// What the pixels of a picture are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PixelFormat {
     /// 1 (grey) or 3 (red, green, blue).
     pub channels: usize,

@@ -12,7 +12,7 @@ use super::{Canvas, Exposure, FrameStack, Interpolation, Placement, RenderError,
 use crate::progress::Progress;
 use crate::surface::Surface;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Rows of a band: those of a raster's tiles.
 pub const BAND_ROWS: u32 = crate::raster::EDGE as u32;
@@ -48,6 +48,13 @@ impl RenderOptions {
     }
 }
 
+/// What is settled before the first tile is drawn.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Settled {
+    exposure: Exposure,
+    seams: Option<Seams>,
+}
+
 /// A panorama about to be drawn.
 pub struct Plan<'a> {
     surface: &'a dyn Surface,
@@ -55,20 +62,19 @@ pub struct Plan<'a> {
     canvas: Canvas,
     mode: Mode,
     kernels: Kernels,
-    exposure: Exposure,
-    seams: Option<Seams>,
+    settled: Settled,
     super_resolve: bool,
 }
 
-impl<'a> Plan<'a> {
+impl Settled {
     /// Finds exposures and seams.
     ///
     /// # Errors
     /// [`RenderError::Count`] unless there is one placement per frame; a frame that cannot be decoded.
-    pub fn new(
-        surface: &'a dyn Surface,
+    pub fn find(
+        surface: &dyn Surface,
         frames: &FrameStack,
-        placements: &'a [Placement],
+        placements: &[Placement],
         canvas: &Canvas,
         options: &RenderOptions,
         progress: &dyn Progress,
@@ -79,18 +85,12 @@ impl<'a> Plan<'a> {
                 frames: frames.len(),
             });
         }
-        let mut plan = Self {
-            surface,
-            placements,
-            canvas: *canvas,
-            mode: options.mode,
-            kernels: Kernels::new(options.interpolation),
+        let mut settled = Self {
             exposure: Exposure::none(frames.len()),
             seams: None,
-            super_resolve: options.super_resolve,
         };
         if !options.needs_thumbnails() {
-            return Ok(plan);
+            return Ok(settled);
         }
         let level = Thumbnails::level(surface, frames, placements, &seams::grid(canvas))?;
         let thumbnails = Thumbnails::of(frames, level, progress)?;
@@ -99,7 +99,7 @@ impl<'a> Plan<'a> {
         let white = frames.format().white();
         let exposure = Exposure::solve(surface, &thumbnails, placements, canvas, white);
         if options.mode == Mode::BestView {
-            plan.seams = Some(Seams::find(
+            settled.seams = Some(Seams::find(
                 surface,
                 &thumbnails,
                 &exposure.of_thumbnails(&thumbnails),
@@ -109,10 +109,47 @@ impl<'a> Plan<'a> {
             ));
         }
         if options.blend {
-            plan.exposure = exposure;
+            settled.exposure = exposure;
         }
         progress.finish();
-        Ok(plan)
+        Ok(settled)
+    }
+}
+
+impl<'a> Plan<'a> {
+    /// Settles what is to be settled.
+    ///
+    /// # Errors
+    /// As [`Settled::find`].
+    pub fn new(
+        surface: &'a dyn Surface,
+        frames: &FrameStack,
+        placements: &'a [Placement],
+        canvas: &Canvas,
+        options: &RenderOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self, RenderError> {
+        let settled = Settled::find(surface, frames, placements, canvas, options, progress)?;
+        Ok(Self::with(surface, placements, canvas, options, settled))
+    }
+
+    /// With all that settled.
+    pub fn with(
+        surface: &'a dyn Surface,
+        placements: &'a [Placement],
+        canvas: &Canvas,
+        options: &RenderOptions,
+        settled: Settled,
+    ) -> Self {
+        Self {
+            surface,
+            placements,
+            canvas: *canvas,
+            mode: options.mode,
+            kernels: Kernels::new(options.interpolation),
+            settled,
+            super_resolve: options.super_resolve,
+        }
     }
 
     /// The canvas.
@@ -137,12 +174,12 @@ impl<'a> Plan<'a> {
 
     /// The exposure that is undone.
     pub fn exposure(&self) -> &Exposure {
-        &self.exposure
+        &self.settled.exposure
     }
 
     /// Which frames are shown where, if one is shown at each place.
     pub fn seams(&self) -> Option<&Seams> {
-        self.seams.as_ref()
+        self.settled.seams.as_ref()
     }
 
     /// Draws all bands into `targets`. The bytes do not depend on the number of threads, nor on the memory that
@@ -157,15 +194,31 @@ impl<'a> Plan<'a> {
         targets: &mut [&mut dyn Target],
         progress: &dyn Progress,
     ) -> Result<(), RenderError> {
+        self.draw_from(0, frames, room, targets, progress)
+    }
+
+    /// The same without the `first` bands, which the targets have had.
+    ///
+    /// # Errors
+    /// As [`Plan::draw`].
+    pub fn draw_from(
+        &self,
+        first: usize,
+        frames: &mut FrameStack,
+        room: u64,
+        targets: &mut [&mut dyn Target],
+        progress: &dyn Progress,
+    ) -> Result<(), RenderError> {
         let starts: Vec<u32> = (0..self.canvas.rows).step_by(BAND_ROWS as usize).collect();
         let needs: Vec<Vec<usize>> = starts
             .par_iter()
             .map(|row| self.needed(frames, &self.tiles(*row)))
             .collect();
         progress.start("panorama", starts.len());
+        progress.advance(first.min(starts.len()));
         let mut band = Band::empty(&self.canvas, frames.format());
         let mut readings = Readings::default();
-        for (k, row) in starts.iter().enumerate() {
+        for (k, row) in starts.iter().enumerate().skip(first) {
             let later: Vec<usize> = needs[k + 1..]
                 .iter()
                 .take(Budget::BANDS_AHEAD)
@@ -176,7 +229,7 @@ impl<'a> Plan<'a> {
             let tiles = self.tiles(*row);
             self.fill(&mut band, frames, *row, &tiles);
             if self.super_resolve {
-                readings.keep(frames, &self.exposure, &needs[k]);
+                readings.keep(frames, &self.settled.exposure, &needs[k]);
                 let (surface, placements) = (self.surface, self.placements);
                 readings.resolve(surface, frames, placements, &self.canvas, &tiles, &mut band);
             }
@@ -226,7 +279,7 @@ impl<'a> Plan<'a> {
     }
 
     fn scene<'b>(&'b self, frames: &'b FrameStack) -> Scene<'b> {
-        let composition = match (self.mode, &self.seams) {
+        let composition = match (self.mode, &self.settled.seams) {
             (Mode::BestView, Some(seams)) => Composition::Seams(seams),
             (Mode::Median, _) => Composition::Median,
             _ => Composition::Average,
@@ -237,7 +290,7 @@ impl<'a> Plan<'a> {
             placements: self.placements,
             canvas: &self.canvas,
             kernels: &self.kernels,
-            exposure: &self.exposure,
+            exposure: &self.settled.exposure,
             composition,
         }
     }

@@ -4,16 +4,19 @@ use super::band::{Band, Target};
 use super::plan::BAND_ROWS;
 use super::sample::Samples;
 use super::{Canvas, Layout, PixelFormat, RenderError};
+use crate::atomic::WriteError;
 use crate::raster::{
-    CogWriter, Compression, DziFormat, DziWriter, EDGE, Georeference, Nodata, RasterError,
-    RasterSpec, RasterTile, Reduce, SampleType, TileOrder,
+    CogState, CogWriter, Compression, DziFormat, DziState, DziWriter, EDGE, Georeference, Nodata,
+    RasterError, RasterSpec, RasterTile, Reduce, SampleType, TileOrder,
 };
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What of a band goes into the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RasterLayer {
     /// The panorama.
     Panorama,
@@ -21,6 +24,25 @@ pub enum RasterLayer {
     Coverage,
     /// The index of the frame that each pixel shows; the largest number of 32 bits where none is.
     Frames,
+}
+
+/// How far a raster file has come.
+#[derive(Debug, Serialize, Deserialize)]
+#[non_exhaustive]
+pub enum RasterState<'a> {
+    /// A Cloud-Optimised GeoTIFF.
+    Cog(CogState<'a>),
+    /// A Deep Zoom picture.
+    Dzi(DziState<'a>),
+}
+
+/// What a raster file goes on from.
+#[derive(Debug)]
+pub struct Kept<'a> {
+    /// The file of its packed tiles, or the folder of Deep Zoom's. It stays whatever happens.
+    pub place: PathBuf,
+    /// How far it has come, if it has begun.
+    pub state: Option<RasterState<'a>>,
 }
 
 /// A raster file that is fed bands.
@@ -40,7 +62,7 @@ impl RasterTarget {
     /// A Cloud-Optimised GeoTIFF. Its axes are metres: arc length and chainage, as the layout has them.
     ///
     /// # Errors
-    /// As [`CogWriter::begin`].
+    /// As [`CogWriter::kept`].
     pub fn cog(
         path: &Path,
         canvas: &Canvas,
@@ -48,35 +70,48 @@ impl RasterTarget {
         layout: Layout,
         layer: RasterLayer,
         compression: Compression,
+        kept: Kept,
     ) -> Result<Self, RasterError> {
         let spec = spec(canvas, format, layout, layer);
-        Ok(Self::new(
-            layer,
-            layout,
-            &spec,
-            Writer::Cog(CogWriter::begin(path, spec, compression)?),
-        ))
+        let state = match kept.state {
+            Some(RasterState::Cog(state)) => Some(state),
+            _ => None,
+        };
+        let writer = CogWriter::kept(path, spec, compression, &kept.place, state)?;
+        Ok(Self::new(layer, layout, &spec, Writer::Cog(writer)))
     }
 
     /// A Deep Zoom picture of the panorama.
     ///
     /// # Errors
-    /// As [`DziWriter::begin`].
+    /// As [`DziWriter::kept`].
     pub fn dzi(
         path: &Path,
         canvas: &Canvas,
         format: PixelFormat,
         layout: Layout,
         dzi: DziFormat,
+        kept: Kept,
     ) -> Result<Self, RasterError> {
         let layer = RasterLayer::Panorama;
         let spec = spec(canvas, format, layout, layer);
-        Ok(Self::new(
-            layer,
-            layout,
-            &spec,
-            Writer::Dzi(DziWriter::begin(path, spec, dzi)?),
-        ))
+        let state = match kept.state {
+            Some(RasterState::Dzi(state)) => Some(state),
+            _ => None,
+        };
+        let writer = DziWriter::kept(path, spec, dzi, &kept.place, state)?;
+        Ok(Self::new(layer, layout, &spec, Writer::Dzi(writer)))
+    }
+
+    /// How far it has come.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn state(&self) -> Result<RasterState<'_>, WriteError> {
+        Ok(match &self.writer {
+            Writer::Cog(writer) => RasterState::Cog(writer.state()?),
+            Writer::Dzi(writer) => RasterState::Dzi(writer.state()),
+        })
     }
 
     fn new(layer: RasterLayer, layout: Layout, spec: &RasterSpec, writer: Writer) -> Self {

@@ -1,6 +1,7 @@
 //! The numbers that pictures are made of.
 
 use image::{DynamicImage, ImageBuffer};
+use serde::{Deserialize, Serialize};
 
 /// A sample of a picture: 8 or 16 bits.
 pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + 'static {
@@ -39,10 +40,10 @@ macro_rules! sample {
 sample!(u8, u16);
 
 /// Samples of one kind, row-major, channels interleaved.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Samples {
     /// 8 bits.
-    Eight(Vec<u8>),
+    Eight(#[serde(with = "serde_bytes")] Vec<u8>),
     /// 16 bits.
     Sixteen(Vec<u16>),
 }

@@ -10,6 +10,7 @@ use super::levelling::{self, COARSEST};
 use super::thumbnails::Thumbnails;
 use super::{Canvas, Exposure, Placement, Tile};
 use crate::surface::Surface;
+use serde::{Deserialize, Serialize};
 
 /// Distance of the grid's nodes, canvas pixels, unless there would be too many.
 const STEP_PX: f64 = 8.0;
@@ -34,7 +35,7 @@ pub(super) fn grid(canvas: &Canvas) -> Canvas {
 }
 
 /// Which frame shows what.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Seams {
     grid: Canvas,
     /// The frame of each node, row-major; [`NO_FRAME`] where none sees the wall.

@@ -1,7 +1,7 @@
 //! Frames and poses in, panorama out.
 
 use super::budget::Budget;
-use super::plan::{Plan, RenderOptions};
+use super::plan::{Plan, RenderOptions, Settled};
 use super::{
     Canvas, FrameStack, Panorama, Placement, RenderError, Target, level_for, memory,
     native_px_per_metre, place,
@@ -168,26 +168,37 @@ impl<'a> Stitch<'a> {
     ///
     /// # Errors
     /// A frame that cannot be decoded.
-    pub fn plan(
+    pub fn settle(
         &mut self,
         budget: &Budget,
         progress: &dyn Progress,
-    ) -> Result<(Plan<'_>, &mut FrameStack), RenderError> {
+    ) -> Result<Settled, RenderError> {
         // Those that are drawn first, since all are looked at now.
         let mut first: Vec<usize> = (0..self.frames.len()).collect();
         let start = |frame: &usize| self.laid_out.placements[*frame].footprint.h_min_m;
         first.sort_by(|a, b| start(a).total_cmp(&start(b)));
         first.truncate((budget.room / self.frames.frame_bytes().max(1)) as usize);
         self.frames.hold_early(&first, progress)?;
-        let plan = Plan::new(
+        Settled::find(
             self.surface,
             &self.frames,
             &self.laid_out.placements,
             &self.laid_out.canvas,
             &self.options.render,
             progress,
-        )?;
-        Ok((plan, &mut self.frames))
+        )
+    }
+
+    /// What is to be drawn with that settled, and the frames.
+    pub fn plan(&mut self, settled: Settled) -> (Plan<'_>, &mut FrameStack) {
+        let plan = Plan::with(
+            self.surface,
+            &self.laid_out.placements,
+            &self.laid_out.canvas,
+            &self.options.render,
+            settled,
+        );
+        (plan, &mut self.frames)
     }
 }
 
@@ -207,7 +218,8 @@ pub fn stitch(
     let mut stitch = Stitch::new(surface, camera, files, poses, shutter, options)?;
     let mut panorama = Panorama::empty(*stitch.canvas(), stitch.frames().format());
     let budget = stitch.budget(panorama.bytes())?;
-    let (plan, frames) = stitch.plan(&budget, progress)?;
+    let settled = stitch.settle(&budget, progress)?;
+    let (plan, frames) = stitch.plan(settled);
     plan.draw(frames, budget.room, &mut [&mut panorama], progress)?;
     Ok(panorama)
 }

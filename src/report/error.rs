@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 /// Why there is no report.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReportError {
     /// Nothing that refine has written lies there.
     #[error(

@@ -13,6 +13,7 @@ pub const SCHEMA_VERSION: u32 = 1;
 
 /// All that the page says.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Report {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
@@ -44,6 +45,7 @@ pub struct Report {
 
 /// What was surveyed.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct SurveyFacts {
     /// Name of the survey's folder.
     pub name: String,
@@ -67,6 +69,7 @@ pub struct SurveyFacts {
 
 /// The result in a few numbers; residuals and errors against the truth are in [`Report::comparison`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Verdict {
     /// Frames whose pose rests on their pixels; null if refine's report is missing.
     pub repaired: Option<usize>,
@@ -90,6 +93,7 @@ pub struct Verdict {
 /// What frames are spread along in charts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Abscissa {
     /// The chainage of the refined poses, which never turns back.
     Chainage,
@@ -100,6 +104,7 @@ pub enum Abscissa {
 /// The poses of one frame. Initial and refined ones are as in their files; the true one is moved along the tunnel's gauge
 /// (turn about the axis, shift along it) so that all true poses lie as close to the refined ones as they go.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct FrameRow {
     /// Index of the frame.
     pub index: usize,

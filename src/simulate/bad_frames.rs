@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 /// What is wrong with a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Fault {
     /// All zero, but for the sensor's noise.
     Black,

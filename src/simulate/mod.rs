@@ -30,6 +30,7 @@ mod lamp;
 mod moving;
 mod noise;
 mod options;
+mod outline;
 mod path;
 mod picture;
 mod run;
@@ -38,6 +39,7 @@ mod sensor;
 mod shaft;
 mod spoil;
 mod target;
+mod tunnel;
 mod wall;
 
 pub use bad_frames::{BadFrames, BadFramesError, Fault};

@@ -2,7 +2,7 @@
 
 use super::{BadFrames, Bits, SimulateError};
 use crate::camera::Camera;
-use crate::survey::PriorSection;
+use crate::survey::{PriorSection, TunnelSection};
 use crate::trajectory::JitterModel;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -10,6 +10,7 @@ use std::path::PathBuf;
 /// What the wall looks like. Grey levels of an evenly lit wall.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Wall {
     /// Bricks of 215 × 65 mm, each with a tone of its own.
     Brick,
@@ -31,6 +32,7 @@ pub enum Wall {
 /// How the wall is lit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum Light {
     /// From one side, as the paper's: `0.35 + 0.65 (1 + cos θ)/2`, bright at θ = 0, dark at 180°.
     Downward,
@@ -43,8 +45,8 @@ pub enum Light {
 pub struct SimulateOptions {
     /// Number of frames.
     pub frames: usize,
-    /// Radius of the tunnel, metres.
-    pub radius_m: f64,
+    /// The tunnel. Plan and jitter are laid out along it as if it were straight.
+    pub tunnel: TunnelSection,
     /// The camera.
     pub camera: Camera,
     /// Advance along the axis from frame to frame, metres.
@@ -116,7 +118,7 @@ impl SimulateOptions {
     pub fn centred() -> Self {
         Self {
             frames: 12,
-            radius_m: 3.0,
+            tunnel: TunnelSection::round(3.0),
             camera: Camera::from_vertical_fov(640, 480, 60f64.to_radians()),
             advance_m: 0.0,
             turn_deg: 30.0,
@@ -197,8 +199,8 @@ impl SimulateOptions {
             "the number of frames must lie between 1 and 1000000",
         )?;
         check(
-            (0.01..=1000.0).contains(&self.radius_m),
-            "the radius must lie between 0.01 and 1000 metres",
+            (0.01..=1000.0).contains(&self.tunnel.nominal_m()),
+            "the radius (half the width) must lie between 0.01 and 1000 metres",
         )?;
         let side = |pixels| (16..=16_384).contains(&pixels);
         check(
@@ -305,7 +307,7 @@ mod tests {
                 ..free()
             },
             SimulateOptions {
-                radius_m: f64::NAN,
+                tunnel: TunnelSection::round(f64::NAN),
                 ..free()
             },
             SimulateOptions {

@@ -6,7 +6,7 @@ use crate::camera::format_calibration;
 use crate::frames::{PictureFormat, write_picture};
 use crate::progress::Progress;
 use crate::survey::{
-    CameraSection, FramesSection, PosesSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
+    CameraSection, FramesSection, PosesSection, SURVEY_FILE, SurveyFile, TunnelSection,
 };
 use crate::trajectory::{Pose, StampedPose, tum};
 use image::{GrayImage, Luma};
@@ -62,14 +62,18 @@ pub fn run(
 /// What every frame hides of the wall, if anything does.
 const MASK_FILE: &str = "mask.png";
 
+/// The line along the middle of a tunnel that is not straight.
+const CENTRELINE_FILE: &str = "centreline.txt";
+
 /// The record of a simulation; no other survey has one.
 const RECORD_FILE: &str = "simulation.json";
 
 /// What a simulated survey consists of.
-const FILES: [&str; 7] = [
+const FILES: [&str; 8] = [
     SURVEY_FILE,
     RECORD_FILE,
     MASK_FILE,
+    CENTRELINE_FILE,
     "camera.json",
     "baseline.tum",
     "groundtruth.tum",
@@ -116,9 +120,12 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
     let options = &simulated.options;
     let survey = SurveyFile {
         tunnel: TunnelSection {
-            shape: Shape::Circle,
-            radius_m: options.radius_m,
-            ignore: Vec::new(),
+            centreline: options
+                .tunnel
+                .centreline
+                .is_some()
+                .then(|| CENTRELINE_FILE.into()),
+            ..options.tunnel.clone()
         },
         camera: CameraSection {
             file: "camera.json".into(),
@@ -156,6 +163,10 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
         let there: Vec<StampedPose> = scene.frames().map(stamped).collect();
         tum::format(&there)
     };
+    if let Some(centreline) = &options.tunnel.centreline {
+        let copy = path(CENTRELINE_FILE);
+        std::fs::copy(centreline, &copy).map_err(|source| WriteError::new(&copy, source))?;
+    }
     atomic::write_text(&survey_path, &survey)?;
     atomic::write_text(&record_path, &(record + "\n"))?;
     atomic::write_text(&path("camera.json"), &format_calibration(scene.camera()))?;

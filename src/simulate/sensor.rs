@@ -9,6 +9,7 @@ use serde::Serialize;
 /// Bits of a frame's grey values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(into = "u8")]
+#[non_exhaustive]
 pub enum Bits {
     /// 8: a file's values are whole grey levels, 0 to 255.
     #[default]

@@ -98,10 +98,7 @@ impl Surface for Circle {
     }
 
     fn gauge(&self) -> Gauge {
-        Gauge {
-            turn: true,
-            shift: true,
-        }
+        Gauge::round()
     }
 
     fn check_inside(&self, t: &Vector3<f64>) -> Result<(), SurfaceError> {

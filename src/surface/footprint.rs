@@ -4,6 +4,7 @@ use super::{Surface, SurfaceError};
 use crate::camera::Camera;
 use crate::trajectory::Pose;
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 
 /// Rays along each edge of a frame. The box of the curved outline is short by the sagitta of one step:
 /// about 0.01 px for a 640 px wide frame.
@@ -20,7 +21,7 @@ pub fn shortest_arc(delta_s_m: f64, perimeter_m: f64) -> f64 {
 /// Bounding box of a frame on the unrolled wall, metres.
 ///
 /// `s` is unwrapped: a frame across θ = 0 has a negative `s_min_m` or an `s_max_m` beyond the perimeter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Footprint {
     /// Least arc length.
     pub s_min_m: f64,
@@ -100,7 +101,8 @@ impl Footprint {
         pose: &Pose,
         reach_m: f64,
     ) -> Result<Self, SurfaceError> {
-        let near_m = pose.t_wc.y - reach_m..=pose.t_wc.y + reach_m;
+        let h_m = surface.chainage_m(&pose.t_wc);
+        let near_m = h_m - reach_m..=h_m + reach_m;
         let clamp = |h_m: f64| h_m.clamp(*near_m.start(), *near_m.end());
         match Self::trace(surface, camera, pose) {
             Ok(footprint) => Ok(Self {

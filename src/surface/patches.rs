@@ -18,7 +18,7 @@ impl Patches {
     };
 
     /// Adds what lies between two angles θ, in the direction in which it grows, through 0 if the second is the lesser, and between
-    /// two chainages; without either, all around or all along. Angles are shares of the section's arc length, `s = θ P/2π`.
+    /// two chainages; without either, all around or all along. Angles are those of [`Surface::angle_rad`].
     pub fn add(
         &mut self,
         surface: &dyn Surface,
@@ -27,15 +27,15 @@ impl Patches {
     ) {
         self.perimeter_m = surface.perimeter_m();
         let [from, to] = theta_rad.unwrap_or([0.0, TAU]);
-        let span = match to - from {
-            span if span >= TAU => TAU,
-            span => span.rem_euclid(TAU),
+        let from_m = surface.s_at_m(from);
+        let span_m = match to - from {
+            all if all >= TAU => self.perimeter_m,
+            _ => (surface.s_at_m(to) - from_m).rem_euclid(self.perimeter_m),
         };
-        let arc_m = |theta: f64| theta / TAU * self.perimeter_m;
         let [h_min_m, h_max_m] = chainage_m.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
         self.boxes.push(Footprint {
-            s_min_m: arc_m(from),
-            s_max_m: arc_m(from + span),
+            s_min_m: from_m,
+            s_max_m: from_m + span_m,
             h_min_m,
             h_max_m,
         });

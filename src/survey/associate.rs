@@ -10,6 +10,7 @@ use std::path::Path;
 /// What ties poses to frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Associate {
     /// The first pose belongs to the first frame, and so on: as many poses as frames.
     Order,

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Something that all frames share and `refine` can estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum CalibrationGroup {
     /// Focal length; fx and fy grow alike.
     Focal,
@@ -32,6 +33,7 @@ impl CalibrationGroup {
 /// `[calibrate]`: what is estimated besides the poses, and how far off the given values may be (1-σ).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
 pub struct CalibrateSection {
     /// What is estimated, unless the command line says otherwise.
     pub unknowns: Vec<CalibrationGroup>,

@@ -45,6 +45,7 @@ pub struct VideoChoice {
 
 /// What was found; all paths are relative to the folder.
 #[derive(Clone, Debug, Default)]
+#[non_exhaustive]
 pub struct Discovery {
     /// A picture called mask.
     pub mask: Option<PathBuf>,

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 /// Why a survey cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SurveyError {
     /// `survey.toml` cannot be read.
     #[error("{}: cannot read the survey: {source}; a survey is a folder with a survey.toml", path.display())]

@@ -1,6 +1,6 @@
 //! `survey.toml` as written.
 
-use super::{CalibrateSection, IgnoreSection, PosesSection, SurveyError};
+use super::{CalibrateSection, PosesSection, SurveyError, TunnelSection};
 use crate::trajectory::{Jitter, JitterModel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,6 +12,7 @@ pub const SURVEY_FILE: &str = "survey.toml";
 /// `survey.toml` as written.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct SurveyFile {
     /// The tunnel.
     pub tunnel: TunnelSection,
@@ -38,6 +39,7 @@ impl SurveyFile {
     pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let poses = &mut self.poses;
         [
+            self.tunnel.centreline.as_mut(),
             Some(&mut self.camera.file),
             self.frames.times.as_mut(),
             self.frames.mask.as_mut(),
@@ -51,30 +53,10 @@ impl SurveyFile {
     }
 }
 
-/// Shape of the tunnel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Shape {
-    /// Straight, circular section.
-    Circle,
-}
-
-/// `[tunnel]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TunnelSection {
-    /// Shape of the tunnel.
-    pub shape: Shape,
-    /// Radius, metres.
-    pub radius_m: f64,
-    /// Parts of the wall by which frames are not compared: water, plants, what moves.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub ignore: Vec<IgnoreSection>,
-}
-
 /// `[camera]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct CameraSection {
     /// Calibration file.
     pub file: PathBuf,
@@ -90,6 +72,7 @@ pub struct CameraSection {
 /// `[frames]`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct FramesSection {
     /// Glob pattern of the frames, if they are files of their own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -115,6 +98,7 @@ pub struct FramesSection {
 /// `[prior]`: the noise model of the initial poses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct PriorSection {
     /// How errors of consecutive poses hang together.
     pub model: JitterModel,
@@ -175,15 +159,18 @@ pub(super) fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::survey::{Associate, CalibrationGroup, Survey};
+    use crate::survey::{Associate, CalibrationGroup, IgnoreSection, Shape, Survey};
     use crate::trajectory::{CameraAxes, Direction, PoseFormat};
 
     #[test]
     fn the_file_round_trips() {
         let file = SurveyFile {
             tunnel: TunnelSection {
-                shape: Shape::Circle,
-                radius_m: 3.0,
+                shape: Shape::Box,
+                radius_m: None,
+                width_m: Some(4.0),
+                height_m: Some(3.0),
+                centreline: Some("curve.txt".into()),
                 ignore: vec![IgnoreSection {
                     theta_deg: Some([150.0, 210.0]),
                     chainage_m: None,

@@ -9,6 +9,7 @@ use std::path::Path;
 
 /// The frames of a survey, and when they were taken, before anything is known of their poses.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Footage {
     /// The frames, sorted by name.
     pub frames: Vec<FrameFile>,

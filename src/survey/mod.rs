@@ -2,8 +2,9 @@
 //!
 //! ```toml
 //! [tunnel]
-//! shape = "circle"
+//! shape = "circle"            # with radius_m; or "ellipse", "box", "horseshoe" with width_m and height_m
 //! radius_m = 3.0
+//! centreline = "curve.txt"    # optional: of a tunnel that is not straight, `x y z [radius]` a line
 //! ignore = [                  # optional: parts of the wall by which refine does not compare frames
 //!     { theta_deg = [150, 210], chainage_m = [2.0, 5.5] },   # either may be left out: all around, all along
 //! ]
@@ -49,6 +50,20 @@
 //! ```
 //!
 //! Relative paths are relative to `survey.toml`. Unknown keys are errors with line and column.
+//!
+//! # Example
+//!
+//! ```
+//! use std::path::Path;
+//! use tunnelstitch::check::check;
+//! use tunnelstitch::survey::Survey;
+//!
+//! let survey = Survey::open(Path::new("fixtures/blender_free48"))?;
+//! let found = check(&survey)?;
+//! assert_eq!(found.frames, survey.frames.len());
+//! assert!(found.faults.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod associate;
 mod calibrate;
@@ -64,17 +79,17 @@ mod poses;
 mod reader;
 mod thinning;
 mod times;
+mod tunnel;
 
 pub use associate::{Associate, TIME_TOLERANCE_S};
 pub use calibrate::{CalibrateSection, CalibrationGroup};
 pub use discover::{Discovery, PictureGroup, VideoChoice};
 pub use error::SurveyError;
-pub use file::{
-    CameraSection, FramesSection, PriorSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
-};
+pub use file::{CameraSection, FramesSection, PriorSection, SURVEY_FILE, SurveyFile};
 pub use footage::Footage;
 pub use ignore::IgnoreSection;
 pub use open::Survey;
 pub(crate) use open::toml_path;
 pub use poses::PosesSection;
 pub use times::read_frame_times;
+pub use tunnel::{Shape, TunnelSection, read_centreline};

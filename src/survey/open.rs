@@ -4,11 +4,11 @@ use super::associate::TIME_TOLERANCE_S;
 use super::file::read_survey_file;
 use super::listing::Listing;
 use super::reader::{PoseReader, Reading};
-use super::{CalibrateSection, PosesSection, SURVEY_FILE, Shape, SurveyError, SurveyFile};
+use super::{CalibrateSection, PosesSection, SURVEY_FILE, SurveyError, SurveyFile};
 use super::{ignore, plausible};
 use crate::camera::{Camera, read_calibration};
 use crate::frames::{FrameSet, Mask};
-use crate::surface::{Circle, Patches, Surface, SurfaceError};
+use crate::surface::{Patches, Surface};
 use crate::trajectory::{Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of};
 use std::path::{Path, PathBuf};
 
@@ -77,8 +77,7 @@ impl Survey {
             path: toml_path.clone(),
             what,
         };
-        let surface =
-            surface_of(&file).map_err(|error| value(format!("tunnel.radius_m: {error}")))?;
+        let surface = file.tunnel.surface(&toml_path, &folder)?;
         let prior = &file.prior;
         if !(1e-6..=180.0).contains(&prior.rotation_sigma_deg) {
             return Err(value(format!(
@@ -89,10 +88,10 @@ impl Survey {
         if !prior
             .translation_sigma_m
             .iter()
-            .all(|s| (1e-9..=10.0 * file.tunnel.radius_m).contains(s))
+            .all(|s| (1e-9..=10.0 * file.tunnel.nominal_m()).contains(s))
         {
             return Err(value(format!(
-                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times the radius",
+                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times the radius (half the width)",
                 prior.translation_sigma_m
             )));
         }
@@ -214,7 +213,10 @@ impl Survey {
                 folder: self.folder.clone(),
                 file: self.file.clone(),
                 camera: self.camera,
-                surface: surface_of(&self.file)?,
+                surface: self
+                    .file
+                    .tunnel
+                    .surface(Path::new(SURVEY_FILE), &self.folder)?,
                 ignored: self.ignored.clone(),
                 frames: self.frames.first(most_frames),
                 initial: stamped.take(most_frames).collect(),
@@ -277,15 +279,5 @@ pub(crate) fn toml_path(path: &Path) -> PathBuf {
     match path.is_dir() {
         true => path.join(SURVEY_FILE),
         false => path.to_owned(),
-    }
-}
-
-/// The tunnel that a survey's file describes.
-///
-/// # Errors
-/// An impossible size.
-fn surface_of(file: &SurveyFile) -> Result<Box<dyn Surface>, SurfaceError> {
-    match file.tunnel.shape {
-        Shape::Circle => Ok(Box::new(Circle::new(file.tunnel.radius_m)?)),
     }
 }

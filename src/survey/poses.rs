@@ -8,6 +8,7 @@ use std::path::PathBuf;
 /// `[poses]`. What is not given is told by the files' content and their formats' own conventions.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct PosesSection {
     /// The poses to be refined.
     pub initial: PathBuf,

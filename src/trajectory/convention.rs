@@ -36,6 +36,7 @@ impl Direction {
 /// How a camera's axes lie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum CameraAxes {
     /// x right, y down, z forward.
     OpenCv,

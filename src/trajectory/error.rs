@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// Why a file of poses, of frames' times or of a rigid motion cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PoseError {
     /// The file cannot be read.
     #[error("{}: cannot read the file: {source}", path.display())]

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// One pose of a file, in the file's own convention.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct PoseEntry {
     /// The frame it belongs to, if the file says so.
     pub name: Option<String>,
@@ -19,6 +20,7 @@ pub struct PoseEntry {
 
 /// A file of poses, in its own convention; one pose at the least. Its times increase and its names differ, where it has them.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct PoseFile {
     /// Where it is.
     pub path: PathBuf,

@@ -8,6 +8,7 @@ use std::path::Path;
 /// A format of a file of poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum PoseFormat {
     /// `time tx ty tz qx qy qz qw`.
     Tum,

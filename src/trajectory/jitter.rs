@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 /// How the errors of consecutive poses hang together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum JitterModel {
     /// Each step composes its own error onto the running pose, so errors accumulate (odometry, a plan
     /// executed blindly; the paper's "after each image capture").

@@ -11,6 +11,19 @@
 //! | `euroc` (read only) | body-to-world | nanoseconds | |
 //!
 //! [`read_poses`] reads any of them as they are; a [`Convention`] says what the numbers mean and makes poses of the tunnel of them.
+//!
+//! # Example
+//!
+//! ```
+//! use std::path::Path;
+//! use tunnelstitch::trajectory::{PoseFormat, kitti, read_poses};
+//!
+//! let file = read_poses(Path::new("fixtures/blender_free48/baseline.tum"), None)?;
+//! assert_eq!((file.format, file.entries.len()), (PoseFormat::Tum, 48));
+//! let text = kitti::format(&file.trajectory());
+//! assert_eq!(text.lines().count(), 48);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod colmap;
 mod convention;

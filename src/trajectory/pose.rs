@@ -2,11 +2,12 @@
 
 use super::so3;
 use nalgebra::{UnitQuaternion, Vector3, Vector6};
+use serde::{Deserialize, Serialize};
 
 /// Camera-to-world pose: `x_w = R_wc x_c + t_wc` (metres).
 ///
 /// The camera looks along its +z, x to the right, y down; the tunnel's axis is the world's +y.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pose {
     /// Rotation from camera to world.
     pub r_wc: UnitQuaternion<f64>,

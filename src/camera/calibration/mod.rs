@@ -26,6 +26,7 @@ pub use own::format_calibration;
 
 /// Why a calibration file cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CalibrationError {
     /// The file cannot be read.
     #[error("{}: cannot read the calibration: {source}", path.display())]

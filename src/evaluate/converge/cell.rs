@@ -9,6 +9,7 @@ use std::fmt;
 /// Walls that need no file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum SweepWall {
     /// [`Wall::Brick`].
     Brick,

@@ -9,6 +9,7 @@ use std::path::PathBuf;
 
 /// Why a sweep is impossible. A survey that the refinement refuses is no such error but a result.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ConvergeError {
     /// An option is impossible.
     #[error("{what}")]

@@ -14,6 +14,7 @@ const VERTICAL_FOV_RAD: f64 = std::f64::consts::FRAC_PI_3;
 /// How the translation's noise goes with the rotation's.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum TranslationScale {
     /// In proportion: the `free` experiment's sigmas at its rotation sigma (2°), twice them at twice that. One axis
     /// of the grid.

@@ -1,6 +1,7 @@
 //! What a problem is made of.
 
 use crate::camera::{Camera, Sweep};
+use crate::checkpoint::CheckpointError;
 use crate::frames::{FrameCache, FrameError};
 use crate::refine::calibration::{Calibration, Kappa};
 use crate::refine::estimate::FrameEstimate;
@@ -8,11 +9,12 @@ use crate::refine::factor::FactorError;
 use crate::refine::prior::{Prior, predict};
 use crate::surface::{Patches, Surface, SurfaceError};
 use crate::trajectory::{Pose, Shutter};
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::ops::Range;
 
 /// How finely a problem looks at the wall.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sampling {
     /// Pyramid level of the frames; 0 is full size.
     pub level: usize,
@@ -120,6 +122,7 @@ pub struct Members<'m> {
 
 /// Why a problem cannot be set up or solved.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProblemError {
     /// A frame cannot be read any more.
     #[error(transparent)]
@@ -147,4 +150,7 @@ pub enum ProblemError {
     /// The iteration broke off for a reason of its own.
     #[error("the solver stopped: {0}")]
     Solver(String),
+    /// What is done cannot be kept, or not be continued.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
 }

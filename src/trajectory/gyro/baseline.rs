@@ -21,6 +21,7 @@ pub struct Frames<'a> {
 
 /// Where the sensor rested.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum RestChoice {
     /// The best stretch of so many seconds.
     Find(f64),
@@ -30,6 +31,7 @@ pub enum RestChoice {
 
 /// The log's time minus the frames'.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Clock {
     /// Seconds.
     Offset(f64),
@@ -39,6 +41,7 @@ pub enum Clock {
 
 /// What the first attitude is told by.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Start {
     /// The first frame's station.
     Station,

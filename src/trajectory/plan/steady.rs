@@ -4,6 +4,7 @@ use super::Station;
 
 /// How fast something changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Rate {
     /// From frame to frame.
     PerFrame(f64),

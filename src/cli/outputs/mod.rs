@@ -1,19 +1,21 @@
 //! Where a panorama goes: one picture in memory, or files that are written as it is drawn, and maps beside it.
 
+mod files;
+
+pub use files::{Keeping, Outputs};
+
 use super::Failure;
 use super::record::RUN_FILE;
 use super::stitch::picture_output;
 use crate::atomic;
-use crate::camera::Camera;
-use crate::frames::{JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};
-use crate::raster::{Compression, DziFormat};
+use crate::checkpoint::Checkpoint;
+use crate::frames::{JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat};
+use crate::raster::{Compression, DziFormat, files_folder};
 use crate::render::{
-    Canvas, Coverage, Gap, Layout, Map, Panorama, PixelFormat, Plan, Preview, RasterLayer,
-    RasterTarget, Target, gaps_csv,
+    Canvas, Coverage, Kept, Layout, Panorama, PixelFormat, Preview, RasterLayer, RasterTarget,
 };
 use crate::survey::Survey;
-use image::DynamicImage;
-use nalgebra::Matrix6;
+use files::{FilesState, Maps, STATE};
 use std::path::{Path, PathBuf};
 
 /// Files of a panorama.
@@ -61,25 +63,6 @@ const GAPS: &str = "gaps.csv";
 
 /// Names of all maps.
 const MAPS: [&str; 6] = [COVERAGE, FRAMES, RESOLUTION, UNCERTAINTY, PREVIEW, GAPS];
-
-/// The outputs of one panorama, begun.
-pub struct Outputs {
-    layout: Layout,
-    out: PathBuf,
-    picture: Option<(Panorama, PictureFormat)>,
-    cog: Option<RasterTarget>,
-    dzi: Option<RasterTarget>,
-    maps: Option<Maps>,
-    coverage: Coverage,
-}
-
-/// The maps beside it.
-struct Maps {
-    folder: PathBuf,
-    coverage: RasterTarget,
-    frames: RasterTarget,
-    preview: Preview,
-}
 
 impl OutputArguments {
     /// Checks the names, before any work is done; folders are made if missing.
@@ -143,9 +126,7 @@ impl OutputArguments {
     fn paths(&self) -> Vec<PathBuf> {
         let mut paths = vec![self.out.clone(), self.run_file()];
         if let Some(dzi) = &self.dzi {
-            let mut tiles = dzi.with_extension("").into_os_string();
-            tiles.push("_files");
-            paths.extend([dzi.clone(), tiles.into()]);
+            paths.extend([dzi.clone(), files_folder(dzi)]);
         }
         if let Some(folder) = &self.maps {
             paths.extend(MAPS.map(|name| folder.join(name)));
@@ -180,7 +161,7 @@ impl OutputArguments {
         matches!(PictureFormat::of(&self.out), Ok(PictureFormat::Tiff))
     }
 
-    /// Begins all files.
+    /// Begins all files, or goes on with them as `checkpoint` has them.
     ///
     /// # Errors
     /// Whatever the system says; frames of 16 bits where only 8 can be written.
@@ -189,6 +170,7 @@ impl OutputArguments {
         canvas: &Canvas,
         format: PixelFormat,
         layout: Layout,
+        checkpoint: &mut Checkpoint,
     ) -> Result<Outputs, Failure> {
         let compression = match self.compression {
             CompressionArgument::Deflate => Compression::Deflate,
@@ -216,9 +198,6 @@ impl OutputArguments {
                 self.out.display()
             )));
         }
-        let cog = |path: &Path, layer, compression| {
-            RasterTarget::cog(path, canvas, format, layout, layer, compression)
-        };
         let picture = match picture_format {
             Ok(PictureFormat::Tiff) | Err(_) => None,
             Ok(PictureFormat::Jpeg { .. }) => Some(PictureFormat::Jpeg {
@@ -226,126 +205,65 @@ impl OutputArguments {
             }),
             Ok(png) => Some(png),
         };
-        let maps = match &self.maps {
-            Some(folder) => Some(Maps {
-                folder: folder.clone(),
-                coverage: cog(
-                    &folder.join(COVERAGE),
-                    RasterLayer::Coverage,
-                    Compression::Deflate,
-                )?,
-                frames: cog(
-                    &folder.join(FRAMES),
-                    RasterLayer::Frames,
-                    Compression::Deflate,
-                )?,
-                preview: Preview::new(canvas),
-            }),
+        let tiles = match &self.dzi {
+            Some(path) => Some(checkpoint.folder_beside(&files_folder(path))?),
             None => None,
         };
-        let dzi = DziFormat::Jpeg {
+        let kept: FilesState = checkpoint.state(STATE)?.unwrap_or_default();
+        let cog = |path: &Path, layer, compression, place: &str, state| {
+            let place = checkpoint.file(place);
+            let kept = Kept { place, state };
+            RasterTarget::cog(path, canvas, format, layout, layer, compression, kept)
+        };
+        let maps = match &self.maps {
+            Some(folder) => {
+                let path = |name: &str| folder.join(name);
+                let maps = kept.maps.unwrap_or_default();
+                let (coverage, frames) = (RasterLayer::Coverage, RasterLayer::Frames);
+                let deflate = Compression::Deflate;
+                Some(Maps {
+                    folder: folder.clone(),
+                    coverage: cog(&path(COVERAGE), coverage, deflate, COVERAGE, maps.coverage)?,
+                    frames: cog(&path(FRAMES), frames, deflate, FRAMES, maps.frames)?,
+                    preview: match maps.preview {
+                        Some(preview) => preview.into_owned(),
+                        None => Preview::new(canvas),
+                    },
+                })
+            }
+            None => None,
+        };
+        let dzi_format = DziFormat::Jpeg {
             quality: self.quality,
         };
+        let panorama = RasterLayer::Panorama;
         Ok(Outputs {
             layout,
             out: self.out.clone(),
+            bands: kept.bands,
             cog: match self.is_tiff() {
-                true => Some(cog(&self.out, RasterLayer::Panorama, compression)?),
+                true => Some(cog(&self.out, panorama, compression, "panorama", kept.cog)?),
                 false => None,
             },
-            picture: picture.map(|picture| (Panorama::empty(*canvas, format), picture)),
-            dzi: match &self.dzi {
-                Some(path) => Some(RasterTarget::dzi(path, canvas, format, layout, dzi)?),
-                None => None,
+            picture: picture.map(|picture| match kept.picture {
+                Some(drawn) => (drawn.into_owned(), picture),
+                None => (Panorama::empty(*canvas, format), picture),
+            }),
+            dzi: match (&self.dzi, tiles) {
+                (Some(path), Some(place)) => {
+                    let state = kept.dzi;
+                    let kept = Kept { place, state };
+                    let dzi = RasterTarget::dzi(path, canvas, format, layout, dzi_format, kept)?;
+                    Some(dzi)
+                }
+                _ => None,
             },
             maps,
-            coverage: Coverage::new(canvas),
+            coverage: match kept.coverage {
+                Some(coverage) => coverage.into_owned(),
+                None => Coverage::new(canvas),
+            },
         })
-    }
-}
-
-impl Outputs {
-    /// Everything that wants bands.
-    pub fn targets(&mut self) -> Vec<&mut dyn Target> {
-        let mut targets: Vec<&mut dyn Target> = vec![&mut self.coverage];
-        if let Some((picture, _)) = &mut self.picture {
-            targets.push(picture);
-        }
-        targets.extend(self.cog.as_mut().map(|cog| cog as &mut dyn Target));
-        targets.extend(self.dzi.as_mut().map(|dzi| dzi as &mut dyn Target));
-        if let Some(maps) = &mut self.maps {
-            targets.push(&mut maps.coverage);
-            targets.push(&mut maps.frames);
-            targets.push(&mut maps.preview);
-        }
-        targets
-    }
-
-    /// Share of the panorama that some frame sees, 0–1.
-    pub fn share(&self) -> f64 {
-        self.coverage.share()
-    }
-
-    /// What no frame sees.
-    pub fn gaps(&self) -> Vec<Gap> {
-        self.coverage.gaps()
-    }
-
-    /// Gives all files their names; the panorama last. `camera`: that of the frames as they are; `covariances`: those of their
-    /// poses, if known.
-    ///
-    /// # Errors
-    /// Whatever the system says.
-    pub fn finish(
-        self,
-        plan: &Plan,
-        gaps: &[Gap],
-        camera: &Camera,
-        covariances: Option<&[Matrix6<f64>]>,
-    ) -> Result<(), Failure> {
-        if let Some(maps) = self.maps {
-            maps.finish(self.layout, plan, gaps, camera, covariances)?;
-        }
-        if let Some(dzi) = self.dzi {
-            dzi.finish()?;
-        }
-        if let Some(cog) = self.cog {
-            cog.finish()?;
-        }
-        if let Some((picture, format)) = self.picture {
-            write_picture(&self.out, &picture.into_image(self.layout), format)?;
-        }
-        Ok(())
-    }
-}
-
-impl Maps {
-    fn finish(
-        self,
-        layout: Layout,
-        plan: &Plan,
-        gaps: &[Gap],
-        camera: &Camera,
-        covariances: Option<&[Matrix6<f64>]>,
-    ) -> Result<(), Failure> {
-        let (surface, placements) = (plan.surface(), plan.placements());
-        self.coverage.finish()?;
-        self.frames.finish()?;
-        let grid = plan.grid();
-        let labels = plan.seams().map(|seams| seams.labels());
-        let resolution = Map::resolution(surface, camera, placements, &grid, labels);
-        resolution.write(&self.folder.join(RESOLUTION), layout)?;
-        if let Some(covariances) = covariances {
-            let map = Map::uncertainty(surface, camera, placements, &grid, labels, covariances);
-            map.write(&self.folder.join(UNCERTAINTY), layout)?;
-        } else {
-            // One from an earlier panorama would belong to other poses.
-            atomic::remove_file(&self.folder.join(UNCERTAINTY))?;
-        }
-        let preview = DynamicImage::from(self.preview.picture(layout, 0.0));
-        write_picture(&self.folder.join(PREVIEW), &preview, PictureFormat::Png)?;
-        atomic::write_text(&self.folder.join(GAPS), &gaps_csv(gaps))?;
-        Ok(())
     }
 }
 

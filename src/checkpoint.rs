@@ -1,0 +1,437 @@
+//! Where a long run keeps what it has done, so that it can go on after it was interrupted, killed or out of disk.
+//!
+//! A checkpoint is a folder `NAME.unfinished` beside the result, or in it, with files that are each replaced as a whole: `origin`,
+//! what run it is of, and states. Beside them lies whatever the run adds to as it goes, of which a state says how much counts. It
+//! belongs to one run, of the same version of the program with the same options and inputs ([`Origin`]), and is
+//! refused to any other. It goes when the run ends.
+//!
+//! A state is CBOR (RFC 8949), in which every number comes back with all its bits, and then the BLAKE3 hash of that.
+//!
+//! # Example
+//!
+//! ```
+//! use std::sync::Arc;
+//! use tunnelstitch::checkpoint::{Checkpoint, Origin, folder_of};
+//! use tunnelstitch::progress::{Progress, Silent};
+//! use tunnelstitch::refine::{RefineOptions, refine_keeping};
+//! # use tunnelstitch::simulate::{self, SimulateOptions};
+//! use tunnelstitch::survey::Survey;
+//!
+//! # let folder = tempfile::tempdir()?;
+//! # let path = folder.path().join("survey");
+//! # let camera = tunnelstitch::camera::Camera::from_vertical_fov(160, 120, 1.0);
+//! # simulate::run(&SimulateOptions { frames: 4, camera, ..SimulateOptions::free() }, &path, false, &Silent)?;
+//! let survey = Survey::open(&path)?;
+//! let origin = Origin {
+//!     program: "my program 1.0".to_owned(),
+//!     options: String::new(),
+//!     survey: String::new(),
+//!     inputs: Vec::new(),
+//! };
+//! let mut checkpoint = Checkpoint::open(&folder_of(&path), &origin, false)?;
+//! let silent: Arc<dyn Progress> = Arc::new(Silent);
+//! refine_keeping(&survey, &RefineOptions::default(), Some(&mut checkpoint), &silent)?;
+//! checkpoint.finish()?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+use crate::atomic::{self, WriteError};
+use crate::provenance::Input;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::fs::{File, TryLockError};
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// Name of the file that says what run it is.
+const ORIGIN: &str = "origin";
+/// Extension of the files with states.
+const STATE: &str = "state";
+/// Name of the file that the run holds locked.
+const LOCK: &str = "lock";
+/// Time between two states, at the least ...
+const INTERVAL: Duration = Duration::from_millis(250);
+/// ... and in multiples of the time that keeping the last one took.
+const RELATIVE: u32 = 50;
+
+/// Why a run cannot be continued, or not be kept.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CheckpointError {
+    /// It is another run's.
+    #[error(
+        "{}: an interrupted run is kept there that cannot be continued: {what}; give --fresh to begin anew, or another --out",
+        folder.display()
+    )]
+    Other {
+        /// The folder.
+        folder: PathBuf,
+        /// What is different.
+        what: String,
+    },
+    /// It is not what was written.
+    #[error("{}: the interrupted run kept there is damaged ({what}); give --fresh to begin anew", folder.display())]
+    Damaged {
+        /// The folder.
+        folder: PathBuf,
+        /// What is wrong.
+        what: String,
+    },
+    /// Another process works on it.
+    #[error("{}: another run is writing the same result; wait for it, or give another --out", folder.display())]
+    Busy {
+        /// The folder.
+        folder: PathBuf,
+    },
+    /// The system.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+/// What a run is made of: everything that its result depends on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Origin {
+    /// Name and version of the program.
+    pub program: String,
+    /// The effective options.
+    pub options: String,
+    /// `survey.toml` with what flags have changed of it.
+    pub survey: String,
+    /// Hashes of the inputs.
+    pub inputs: Vec<Input>,
+}
+
+impl Origin {
+    /// What is different in another run, in words.
+    fn difference(&self, other: &Self) -> Option<String> {
+        if self.program != other.program {
+            return Some(format!(
+                "it is of {}, and this is {}",
+                other.program, self.program
+            ));
+        }
+        if self.options != other.options {
+            return Some("its options were others".to_owned());
+        }
+        if self.survey != other.survey {
+            return Some(
+                "its survey.toml, or a flag that stands for something in it, was another"
+                    .to_owned(),
+            );
+        }
+        if self.inputs.len() != other.inputs.len() {
+            return Some("it had other inputs".to_owned());
+        }
+        // The same files may be named from another folder.
+        let mut pairs = self.inputs.iter().zip(&other.inputs);
+        let pair = pairs.find(|(own, other)| own.blake3 != other.blake3);
+        pair.map(|(own, _)| format!("{} has changed since", own.path.display()))
+    }
+}
+
+/// The checkpoint of one run, which holds it locked.
+#[derive(Debug)]
+pub struct Checkpoint {
+    folder: PathBuf,
+    /// Folders elsewhere that belong to it.
+    others: Vec<PathBuf>,
+    begun: bool,
+    /// When the last state was kept, ...
+    kept: Instant,
+    /// ... and how long until the next is due.
+    wait: Duration,
+    /// When the one at hand was found due.
+    due: Option<Instant>,
+    _lock: File,
+}
+
+impl Checkpoint {
+    /// The checkpoint in `folder`, made if missing; what is kept there is dropped if the run is to begin anew (`fresh`).
+    ///
+    /// # Errors
+    /// Another run's checkpoint, a damaged one, one in use; whatever the system says.
+    pub fn open(folder: &Path, origin: &Origin, fresh: bool) -> Result<Self, CheckpointError> {
+        atomic::create_folder(folder)?;
+        let mut checkpoint = Self {
+            folder: folder.to_owned(),
+            others: Vec::new(),
+            begun: false,
+            kept: Instant::now(),
+            wait: INTERVAL,
+            due: None,
+            _lock: lock(folder)?,
+        };
+        let kept = checkpoint.kept_files()?;
+        checkpoint.begun = !fresh && kept.iter().any(|path| is_state(path));
+        if checkpoint.begun {
+            let what = match checkpoint.read::<Origin>(ORIGIN)? {
+                Some(kept) => kept.difference(origin),
+                None => Some("it does not say what run it is".to_owned()),
+            };
+            if let Some(what) = what {
+                let folder = checkpoint.folder;
+                return Err(CheckpointError::Other { folder, what });
+            }
+        } else {
+            kept.iter().try_for_each(|path| atomic::remove_file(path))?;
+            checkpoint.write(ORIGIN, origin)?;
+        }
+        Ok(checkpoint)
+    }
+
+    /// The files of the checkpoint, but the lock.
+    fn kept_files(&self) -> Result<Vec<PathBuf>, WriteError> {
+        let entries = std::fs::read_dir(&self.folder)
+            .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
+        let mut paths: Vec<PathBuf> =
+            entries.map_err(|source| WriteError::new(&self.folder, source))?;
+        paths.retain(|path| path.file_name() != Some(LOCK.as_ref()));
+        Ok(paths)
+    }
+
+    /// The file `name` of the checkpoint, for what is added to as the run goes.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// A folder beside `target`, for what must lie on the same disk. It goes with the checkpoint; if it has gone without it,
+    /// the run begins anew. To be asked for before any state.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn folder_beside(&mut self, target: &Path) -> Result<PathBuf, WriteError> {
+        let folder = folder_of(target);
+        if self.begun && !folder.is_dir() {
+            let kept = self.kept_files()?;
+            let mut states = kept.iter().filter(|path| is_state(path));
+            states.try_for_each(|path| atomic::remove_file(path))?;
+            self.begun = false;
+        }
+        if !self.begun && folder.is_dir() {
+            std::fs::remove_dir_all(&folder).map_err(|source| WriteError::new(&folder, source))?;
+        }
+        atomic::create_folder(&folder)?;
+        self.others.push(folder.clone());
+        Ok(folder)
+    }
+
+    /// Whether it goes on from what was kept.
+    pub fn is_begun(&self) -> bool {
+        self.begun
+    }
+
+    /// The state `name`, if it was kept.
+    ///
+    /// # Errors
+    /// [`CheckpointError::Damaged`] if it is not what was written, or no `S`.
+    pub fn state<S: DeserializeOwned>(&self, name: &str) -> Result<Option<S>, CheckpointError> {
+        self.read(&format!("{name}.{STATE}"))
+    }
+
+    /// Keeps the state `name` in place of the one before. How long that takes, since it was found due, spaces the next.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn keep<S: Serialize>(&mut self, name: &str, state: &S) -> Result<(), WriteError> {
+        let since = self.due.take().unwrap_or_else(Instant::now);
+        self.write(&format!("{name}.{STATE}"), state)?;
+        self.kept = Instant::now();
+        self.wait = INTERVAL.max(RELATIVE * since.elapsed());
+        Ok(())
+    }
+
+    /// Whether it is time for another state.
+    pub fn is_due(&mut self) -> bool {
+        let due = self.kept.elapsed() >= self.wait;
+        self.due = due.then(Instant::now);
+        due
+    }
+
+    fn read<S: DeserializeOwned>(&self, file: &str) -> Result<Option<S>, CheckpointError> {
+        let damaged = |what: String| CheckpointError::Damaged {
+            folder: self.folder.clone(),
+            what: format!("{file}: {what}"),
+        };
+        let path = self.folder.join(file);
+        let bytes = match std::fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(WriteError::new(&path, error).into()),
+        };
+        let content = match bytes.split_last_chunk() {
+            Some((content, hash)) if blake3::hash(content) == blake3::Hash::from(*hash) => content,
+            _ => return Err(damaged("it is not what was written".to_owned())),
+        };
+        let state = ciborium::from_reader(content);
+        state.map(Some).map_err(|error| damaged(error.to_string()))
+    }
+
+    fn write<S: Serialize>(&self, file: &str, state: &S) -> Result<(), WriteError> {
+        atomic::write(&self.folder.join(file), |writer| {
+            let mut hashing = Hashing {
+                writer,
+                hasher: blake3::Hasher::new(),
+            };
+            ciborium::into_writer(state, &mut hashing).map_err(io::Error::other)?;
+            let Hashing { writer, hasher } = hashing;
+            writer.write_all(hasher.finalize().as_bytes())
+        })
+    }
+
+    /// Removes all that is kept: the run has ended.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn finish(self) -> Result<(), WriteError> {
+        let folders = self.others.iter().chain([&self.folder]);
+        for folder in folders.filter(|folder| folder.is_dir()) {
+            std::fs::remove_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
+        }
+        Ok(())
+    }
+}
+
+fn is_state(path: &Path) -> bool {
+    path.extension() == Some(STATE.as_ref())
+}
+
+/// Hashes all that is written.
+struct Hashing<'a, W> {
+    writer: &'a mut W,
+    hasher: blake3::Hasher,
+}
+
+impl<W: Write> Write for Hashing<'_, W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.writer.write(bytes)?;
+        self.hasher.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.writer.flush()
+    }
+}
+
+/// The folder in which an interrupted run that makes `result` is kept: its name with `.unfinished` added.
+pub fn folder_of(result: &Path) -> PathBuf {
+    let mut name = result.as_os_str().to_owned();
+    name.push(".unfinished");
+    name.into()
+}
+
+/// Locks the folder for as long as the file lives, or the process.
+fn lock(folder: &Path) -> Result<File, CheckpointError> {
+    let path = folder.join(LOCK);
+    let fail = |source| WriteError::new(&path, source);
+    let file = File::create(&path).map_err(fail)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(CheckpointError::Busy {
+            folder: folder.to_owned(),
+        }),
+        // Some file systems have no locks; the run goes without.
+        Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => Ok(file),
+        Err(TryLockError::Error(error)) => Err(fail(error).into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn origin() -> Origin {
+        let input = |path: &str| Input {
+            path: path.into(),
+            files: None,
+            blake3: "0".to_owned(),
+        };
+        Origin {
+            program: "tunnelstitch 1".to_owned(),
+            options: "fast".to_owned(),
+            survey: "radius_m = 3".to_owned(),
+            inputs: vec![input("a"), input("b")],
+        }
+    }
+
+    #[test]
+    fn a_state_comes_back_with_all_its_bits() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = folder_of(&dir.path().join("wall.tif"));
+        let numbers = vec![0.1f64, f64::NAN, f64::NEG_INFINITY, 5e-324, -0.0];
+        let state = (numbers, Some(0.3f32), "text".to_owned());
+        let mut checkpoint = Checkpoint::open(&folder, &origin(), false).unwrap();
+        assert!(!checkpoint.is_begun());
+        checkpoint.keep("a", &"an earlier one").unwrap();
+        checkpoint.keep("a", &state).unwrap();
+        checkpoint.keep("b", &1).unwrap();
+        assert!(!checkpoint.is_due());
+        drop(checkpoint);
+        let mut checkpoint = Checkpoint::open(&folder, &origin(), false).unwrap();
+        assert!(checkpoint.is_begun());
+        let back: (Vec<f64>, Option<f32>, String) = checkpoint.state("a").unwrap().unwrap();
+        let bits = |values: &[f64]| values.iter().map(|v| v.to_bits()).collect::<Vec<u64>>();
+        assert_eq!(bits(&back.0), bits(&state.0));
+        assert_eq!((back.1, back.2), (state.1, state.2));
+        assert_eq!(checkpoint.state::<u8>("b").unwrap(), Some(1));
+        assert_eq!(checkpoint.state::<u8>("c").unwrap(), None);
+        let beside = checkpoint.folder_beside(&dir.path().join("tiles")).unwrap();
+        assert!(beside.is_dir());
+        checkpoint.finish().unwrap();
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn another_run_is_refused_with_what_is_different() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut checkpoint = Checkpoint::open(dir.path(), &origin(), false).unwrap();
+        checkpoint.keep("a", &1).unwrap();
+        drop(checkpoint);
+        let refused = |change: fn(&mut Origin), what: &str| {
+            let mut other = origin();
+            change(&mut other);
+            let error = Checkpoint::open(dir.path(), &other, false).unwrap_err();
+            let error = error.to_string();
+            assert!(error.contains(what) && error.contains("--fresh"), "{error}");
+        };
+        refused(
+            |o| o.program = "tunnelstitch 2".to_owned(),
+            "of tunnelstitch 1",
+        );
+        refused(|o| o.options.push('!'), "options");
+        refused(|o| o.survey.push('!'), "survey.toml");
+        refused(|o| o.inputs[1].blake3.push('1'), "b has changed");
+        refused(|o| o.inputs.truncate(1), "other inputs");
+        let other = Origin {
+            options: String::new(),
+            ..origin()
+        };
+        let fresh = Checkpoint::open(dir.path(), &other, true).unwrap();
+        assert!(!fresh.is_begun());
+        assert_eq!(fresh.state::<u8>("a").unwrap(), None);
+    }
+
+    #[test]
+    fn a_damaged_state_and_one_in_use_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut checkpoint = Checkpoint::open(dir.path(), &origin(), false).unwrap();
+        checkpoint.keep("a", &vec![1, 2, 3]).unwrap();
+        let busy = Checkpoint::open(dir.path(), &origin(), false);
+        assert!(matches!(busy, Err(CheckpointError::Busy { .. })));
+        let path = checkpoint.file("a.state");
+        let sound = std::fs::read(&path).unwrap();
+        let damaged = |state: Result<Option<Vec<u8>>, CheckpointError>| {
+            matches!(state, Err(CheckpointError::Damaged { .. }))
+        };
+        for length in 0..sound.len() {
+            std::fs::write(&path, &sound[..length]).unwrap();
+            assert!(damaged(checkpoint.state("a")), "{length}");
+        }
+        std::fs::write(&path, &sound).unwrap();
+        assert_eq!(checkpoint.state("a").unwrap(), Some(vec![1, 2, 3]));
+        // What is whole may still be something else.
+        checkpoint.keep("a", &"text").unwrap();
+        assert!(damaged(checkpoint.state("a")));
+    }
+}

@@ -1,0 +1,242 @@
+//! Runs that are killed and go on.
+
+mod support;
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+use support::{succeed, text};
+
+/// Times that each command is killed.
+const KILLS: usize = 10;
+
+/// A simulated survey.
+fn survey(folder: &Path, frames: usize) -> PathBuf {
+    let survey = folder.join("survey");
+    let frames = frames.to_string();
+    let size = ["--size", "320x240"];
+    let simulate = [
+        "simulate",
+        "free",
+        "--frames",
+        &frames,
+        "--out",
+        text(&survey),
+    ];
+    succeed(&[&simulate[..], &size].concat());
+    survey
+}
+
+fn start(arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+        .args(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap()
+}
+
+/// Starts the command and kills it at random moments, and then lets it end.
+fn killed(arguments: &[&str], takes: Duration, seed: u64) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (mut ended, mut resumed) = (0, 0);
+    for _ in 0..KILLS {
+        let mut child = start(arguments);
+        std::thread::sleep(takes.mul_f64(rng.random_range(0.1..0.8)));
+        child.kill().unwrap();
+        let output = child.wait_with_output().unwrap();
+        ended += usize::from(output.status.success());
+        resumed += usize::from(String::from_utf8_lossy(&output.stdout).contains("going on"));
+    }
+    assert!(
+        ended < KILLS / 2 && resumed >= KILLS / 4,
+        "of {KILLS} runs {ended} had ended before they were killed, and {resumed} had gone on with what was there"
+    );
+    succeed(arguments);
+}
+
+/// All files of a folder and those in it.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        match path.is_dir() {
+            true => files.extend(self::files(&path)),
+            false => files.push(path),
+        }
+    }
+    files.sort();
+    files
+}
+
+/// Checks that two folders hold the same files with the same bytes, but for those named in `told`, which `tell` reads.
+fn assert_same(left: &Path, right: &Path, tell: impl Fn(&Path) -> Vec<u8>) {
+    let names = |folder: &Path| -> Vec<PathBuf> {
+        let inside = files(folder).into_iter();
+        let names = inside.map(|path| path.strip_prefix(folder).unwrap().to_owned());
+        // A writer that is killed cannot tidy up.
+        names
+            .filter(|name| !text(name).contains(".tunnelstitch-"))
+            .collect()
+    };
+    assert_eq!(names(left), names(right));
+    for name in names(left) {
+        let same = tell(&left.join(&name)) == tell(&right.join(&name));
+        assert!(same, "{} is different", name.display());
+    }
+}
+
+/// The bytes of a file; of refine.json and run.toml without what tells of the run and not of the result.
+fn result(path: &Path) -> Vec<u8> {
+    let bytes = std::fs::read(path).unwrap();
+    match path.file_name().and_then(|name| name.to_str()) {
+        Some("refine.json") => {
+            let mut json: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+            let timings = json["timings"].take();
+            let stages = timings
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|t| t["stage"].clone());
+            json["timings"] = stages.collect();
+            json["command"].take();
+            json.to_string().into_bytes()
+        }
+        Some(name) if name.ends_with("run.toml") => {
+            let mut run: toml::Table = String::from_utf8(bytes).unwrap().parse().unwrap();
+            run.remove("arguments");
+            run.remove("options");
+            run.to_string().into_bytes()
+        }
+        _ => bytes,
+    }
+}
+
+#[test]
+fn refine_ends_with_the_same_bytes_however_often_it_is_killed() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = survey(dir.path(), 18);
+    let refine = |out: &Path| -> Vec<String> {
+        let arguments = [
+            "refine",
+            text(&survey),
+            "--calibrate",
+            "focal",
+            "--out",
+            text(out),
+        ];
+        arguments.map(str::to_owned).to_vec()
+    };
+    let (whole, broken) = (dir.path().join("whole"), dir.path().join("broken"));
+    let since = Instant::now();
+    let arguments = refine(&whole);
+    succeed(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    let takes = since.elapsed();
+    let arguments = refine(&broken);
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    killed(&arguments, takes, 1);
+    assert_same(&whole, &broken, result);
+}
+
+#[test]
+fn stitch_ends_with_the_same_bytes_however_often_it_is_killed() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = survey(dir.path(), 18);
+    // Every kind of file at once: the panorama in memory or on disk, Deep Zoom, maps.
+    for (picture, scale, seed) in [("wall.tif", "450", 2), ("wall.png", "250", 3)] {
+        let run = |name: &str, kill: Option<Duration>| -> (PathBuf, Duration) {
+            let folder = dir.path().join(format!("{name}-{picture}"));
+            let (out, dzi, maps) = (
+                folder.join(picture),
+                folder.join("wall.dzi"),
+                folder.join("maps"),
+            );
+            let arguments = [
+                "stitch",
+                text(&survey),
+                "--px-per-metre",
+                scale,
+                "--out",
+                text(&out),
+                "--dzi",
+                text(&dzi),
+                "--maps",
+                text(&maps),
+            ];
+            let since = Instant::now();
+            match kill {
+                Some(takes) => killed(&arguments, takes, seed),
+                None => drop(succeed(&arguments)),
+            }
+            (folder, since.elapsed())
+        };
+        let (whole, takes) = run("whole", None);
+        let (broken, _) = run("broken", Some(takes));
+        assert_same(&whole, &broken, result);
+    }
+}
+
+/// Waits until the run has kept a state.
+fn wait_for_a_state(child: &mut Child, folder: &Path) {
+    while !folder.is_dir()
+        || !files(folder)
+            .iter()
+            .any(|path| text(path).ends_with(".state"))
+    {
+        let ended = child.try_wait().unwrap();
+        assert!(ended.is_none(), "ended without a state: {ended:?}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn an_interrupted_run_goes_on_and_another_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = survey(dir.path(), 12);
+    let out = dir.path().join("refined");
+    let kept = out.join("refine.unfinished");
+    let arguments = ["refine", text(&survey), "--out", text(&out)];
+    let mut child = start(&arguments);
+    wait_for_a_state(&mut child, &kept);
+    // Two at a time would write over each other.
+    let second = start(&arguments).wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&second.stderr).into_owned();
+    assert_eq!(second.status.code(), Some(75), "{message}");
+    assert!(message.contains("another run"), "{message}");
+    // Ctrl-C.
+    let interrupted = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(interrupted.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130));
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(message.contains("the same command goes on"), "{message}");
+    assert!(kept.is_dir());
+
+    let other = start(&[&arguments[..], &["--max-iterations", "3"]].concat());
+    let other = other.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&other.stderr).into_owned();
+    assert_eq!(other.status.code(), Some(3), "{message}");
+    assert!(
+        message.contains("options") && message.contains("--fresh"),
+        "{message}"
+    );
+    // The survey has changed.
+    let frame = survey.join("frames/000003.png");
+    let original = std::fs::read(&frame).unwrap();
+    image::GrayImage::new(320, 240).save(&frame).unwrap();
+    let other = start(&arguments).wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&other.stderr).into_owned();
+    assert_eq!(other.status.code(), Some(3), "{message}");
+    assert!(message.contains("frames has changed"), "{message}");
+    std::fs::write(&frame, original).unwrap();
+
+    let said = succeed(&arguments);
+    assert!(said.contains("going on"), "{said}");
+    assert!(!kept.exists());
+    let again = succeed(&[&arguments[..], &["--fresh"]].concat());
+    assert!(!again.contains("going on"), "{again}");
+}
