@@ -50,6 +50,7 @@ pub struct Check {
 
 /// What of the pictures and of the wall is left out.
 #[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
 pub struct MaskCheck {
     /// Share of every picture that the mask hides.
     pub hidden_share: f64,
@@ -148,12 +149,14 @@ const ASKED: [u32; 2] = [360, 200];
 
 impl MaskCheck {
     fn of(survey: &Survey) -> Self {
-        let chainage = survey.initial.iter().map(|stamped| stamped.pose.t_wc.y);
+        let surface = survey.surface.as_ref();
+        let initial = survey.initial.iter();
+        let chainage = initial.map(|stamped| surface.chainage_m(&stamped.pose.t_wc));
         let from_m = chainage.clone().fold(f64::INFINITY, f64::min);
         let to_m = chainage.fold(f64::NEG_INFINITY, f64::max);
         let share = |k: u32, of: u32| (f64::from(k) + 0.5) / f64::from(of);
         let point = |k: u32| WallPoint {
-            s_m: share(k % ASKED[0], ASKED[0]) * survey.surface.perimeter_m(),
+            s_m: share(k % ASKED[0], ASKED[0]) * surface.perimeter_m(),
             h_m: from_m + share(k / ASKED[0], ASKED[1]) * (to_m - from_m),
         };
         let points = ASKED[0] * ASKED[1];

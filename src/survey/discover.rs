@@ -32,6 +32,7 @@ pub struct PictureGroup {
 
 /// A video whose pictures are the frames.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct VideoChoice {
     /// The file, relative to the folder that was looked into.
     pub path: PathBuf,

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// A part of the wall; what is left out goes all the way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct IgnoreSection {
     /// Angles θ from and to, degrees, in the direction in which θ grows; may go through 0, as `[330, 30]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -200,6 +200,7 @@ mod tests {
             width_m: sizes[1],
             height_m: sizes[2],
             centreline: None,
+            ignore: Vec::new(),
         };
         let surface = |tunnel: TunnelSection| {
             let made = tunnel.surface(Path::new("survey.toml"), Path::new("."));
