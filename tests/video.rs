@@ -367,7 +367,7 @@ fn what_is_wrong_with_a_video_is_said() {
     refine(&["b.mp4/0000", "the video is damaged"]);
     std::fs::write(&entangled, &damaged[..length / 2]).unwrap();
     edit(&toml, "a.mkv", "b.mp4");
-    refine(&["b.mp4", "moov atom not found", "copy it anew"]);
+    refine(&["b.mp4", "cut off before its end", "copy it anew"]);
     edit(&toml, "a.mkv", "sound.mkv");
     refine(&["sound.mkv", "no video stream"]);
     edit(&toml, "a.mkv", "gone.mkv");
