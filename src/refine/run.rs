@@ -43,7 +43,7 @@ pub enum RefineError {
     SingleFrame,
     /// Nothing overlaps.
     #[error(
-        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, or take frames closer together"
+        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, whether the mask or tunnel.ignore leaves anything, or take frames closer together"
     )]
     NoOverlap,
     /// Something that is known by its shape only for a straight round tunnel.
@@ -141,6 +141,7 @@ pub fn refine_keeping(
     let mut calibration = calibration_of(survey, options, &prior.initial)?;
     let mut scene = Scene {
         surface: survey.surface.as_ref(),
+        ignored: &survey.ignored,
         camera: survey.camera,
         shutter: &shutter,
         calibration,

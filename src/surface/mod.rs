@@ -22,6 +22,7 @@ mod circle;
 mod displacement;
 mod footprint;
 mod gauge;
+mod patches;
 mod prism;
 pub mod section;
 mod swept;
@@ -31,6 +32,7 @@ pub use circle::Circle;
 pub use displacement::{lens_jacobian, wall_jacobian};
 pub use footprint::{Footprint, shortest_arc};
 pub use gauge::{Axis, Gauge, GaugeMotion};
+pub use patches::Patches;
 pub use prism::Prism;
 pub use swept::Swept;
 
