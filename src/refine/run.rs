@@ -180,7 +180,7 @@ pub fn refine_keeping(
     };
 
     let mut solving = match phase {
-        Phase::Solving(solving) => solving,
+        Phase::Solving(solving) => *solving,
         Phase::Tracking(tracking) => {
             let rough = Prior {
                 jitter: calibration.widened(&prior.jitter, prior.arm_m()),
@@ -215,7 +215,7 @@ pub fn refine_keeping(
 
     let mut last = None;
     while let Some((sampling, stopping)) = solving.stages.front().copied() {
-        keeper.if_due(|| keep(Phase::Solving(solving.clone()), &clock))?;
+        keeper.if_due(|| keep(Phase::Solving(Box::new(solving.clone())), &clock))?;
         if solving.stages.len() == 1 && !solving.levels.is_empty() && solving.rivals.is_none() {
             solving.rivals = Some(repair(
                 &scene,
@@ -225,7 +225,7 @@ pub fn refine_keeping(
                 progress.as_ref(),
             )?);
             clock.lap("repair");
-            keeper.if_due(|| keep(Phase::Solving(solving.clone()), &clock))?;
+            keeper.if_due(|| keep(Phase::Solving(Box::new(solving.clone())), &clock))?;
         }
         let before = solving.clone();
         let begun = solving.solve.take();
@@ -258,11 +258,11 @@ pub fn refine_keeping(
         let mut between = |solve| {
             keeper.if_due(|| {
                 let solve = Some(solve);
-                let phase = Phase::Solving(Solving {
+                let solving = Solving {
                     solve,
                     ..before.clone()
-                });
-                keep(phase, &clock)
+                };
+                keep(Phase::Solving(Box::new(solving)), &clock)
             })?;
             Ok(())
         };
