@@ -163,7 +163,13 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
     let layout = Layout::from(arguments.canvas.layout);
     let wall = point(arguments, &survey, &placements, &canvas)?;
     let theta_deg = surface.angle_rad(wall.s_m).to_degrees();
-    let found = sightings(surface, &survey.camera, &placements, wall);
+    let found = sightings(
+        surface,
+        &survey.camera,
+        survey.frames.mask().map(AsRef::as_ref),
+        &placements,
+        wall,
+    );
     let panorama_px = layout.to_picture(&canvas, canvas.pixel_of(wall));
     let located = Located {
         chainage_m: wall.h_m,
@@ -230,6 +236,14 @@ fn point(
             pixel[1],
             camera.width - 1,
             camera.height - 1
+        )));
+    }
+    if let Some(mask) = survey.frames.mask()
+        && !mask.is_clear(pixel[0] as f32, pixel[1] as f32, 0.0)
+    {
+        return Err(Failure::input(format!(
+            "--frame {frame}: at {},{} the mask of the frames (frames.mask in survey.toml) hides the wall",
+            pixel[0], pixel[1]
         )));
     }
     let Some(ray) = camera.ray(pixel[0], pixel[1]) else {

@@ -58,6 +58,7 @@ impl TunnelArguments {
             width_m: self.width_m,
             height_m: self.height_m,
             centreline: self.centreline.clone(),
+            ignore: Vec::new(),
         }
     }
 }

@@ -43,7 +43,7 @@ pub enum RefineError {
     SingleFrame,
     /// Nothing overlaps.
     #[error(
-        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, or take frames closer together"
+        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, whether the mask or tunnel.ignore leaves anything, or take frames closer together"
     )]
     NoOverlap,
     /// Something that is known by its shape only for a straight round tunnel.
@@ -141,6 +141,7 @@ pub fn refine_keeping(
     let mut calibration = calibration_of(survey, options, &prior.initial)?;
     let mut scene = Scene {
         surface: survey.surface.as_ref(),
+        ignored: &survey.ignored,
         camera: survey.camera,
         shutter: &shutter,
         calibration,
@@ -179,7 +180,7 @@ pub fn refine_keeping(
     };
 
     let mut solving = match phase {
-        Phase::Solving(solving) => solving,
+        Phase::Solving(solving) => *solving,
         Phase::Tracking(tracking) => {
             let rough = Prior {
                 jitter: calibration.widened(&prior.jitter, prior.arm_m()),
@@ -214,7 +215,7 @@ pub fn refine_keeping(
 
     let mut last = None;
     while let Some((sampling, stopping)) = solving.stages.front().copied() {
-        keeper.if_due(|| keep(Phase::Solving(solving.clone()), &clock))?;
+        keeper.if_due(|| keep(Phase::Solving(Box::new(solving.clone())), &clock))?;
         if solving.stages.len() == 1 && !solving.levels.is_empty() && solving.rivals.is_none() {
             solving.rivals = Some(repair(
                 &scene,
@@ -224,7 +225,7 @@ pub fn refine_keeping(
                 progress.as_ref(),
             )?);
             clock.lap("repair");
-            keeper.if_due(|| keep(Phase::Solving(solving.clone()), &clock))?;
+            keeper.if_due(|| keep(Phase::Solving(Box::new(solving.clone())), &clock))?;
         }
         let before = solving.clone();
         let begun = solving.solve.take();
@@ -257,11 +258,11 @@ pub fn refine_keeping(
         let mut between = |solve| {
             keeper.if_due(|| {
                 let solve = Some(solve);
-                let phase = Phase::Solving(Solving {
+                let solving = Solving {
                     solve,
                     ..before.clone()
-                });
-                keep(phase, &clock)
+                };
+                keep(Phase::Solving(Box::new(solving)), &clock)
             })?;
             Ok(())
         };

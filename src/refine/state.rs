@@ -34,7 +34,7 @@ pub enum Phase {
     /// Frames are being placed.
     Tracking(Retracking),
     /// All frames are placed.
-    Solving(Solving),
+    Solving(Box<Solving>),
 }
 
 /// Global solves, one after another.

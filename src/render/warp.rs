@@ -130,7 +130,7 @@ impl Default for Run {
 }
 
 impl Run {
-    /// Which of the points the frame shows.
+    /// Which of the points the frame shows; after [`Run::sample`], without those whose kernel meets a masked pixel.
     #[inline(always)]
     pub fn seen(&self) -> &[bool; RUN] {
         &self.seen
@@ -203,6 +203,11 @@ impl Run {
 
     /// Looks up the values of the `count` points projected before.
     pub fn sample(&mut self, picture: &Picture, kernel: &Kernel, count: usize) {
+        if picture.mask().is_some() {
+            for k in 0..count {
+                self.seen[k] = self.seen[k] && picture.shows(self.u[k], self.v[k], kernel);
+            }
+        }
         wide(
             #[inline(always)]
             || match (picture.samples(), picture.format().channels) {

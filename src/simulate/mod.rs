@@ -36,6 +36,7 @@ mod picture;
 mod run;
 mod scene;
 mod sensor;
+mod shaft;
 mod spoil;
 mod target;
 mod tunnel;

@@ -86,6 +86,10 @@ pub struct SimulateOptions {
     /// Things in each frame that are not on the wall, at other places in every frame.
     #[serde(skip_serializing_if = "is_default")]
     pub moving: u32,
+    /// Width of the carrier's shaft, which hides the wall at the same place of every frame, percent of the frames' width; 0: none.
+    /// The survey has a mask then.
+    #[serde(skip_serializing_if = "is_default")]
+    pub shaft_percent: f64,
     /// Bits of a frame's grey values.
     #[serde(skip_serializing_if = "is_default")]
     pub bits: Bits,
@@ -130,6 +134,7 @@ impl SimulateOptions {
             lamp_corner: None,
             specular_percent: 0.0,
             moving: 0,
+            shaft_percent: 0.0,
             bits: Bits::default(),
             bad_frames: BadFrames::default(),
             supersample: 8,
@@ -269,6 +274,10 @@ impl SimulateOptions {
             self.moving <= 10_000,
             "there may be no more than 10000 moving things in a frame",
         )?;
+        check(
+            (0.0..=50.0).contains(&self.shaft_percent),
+            "the shaft may be 0 to 50 percent of a frame wide",
+        )?;
         Ok(self.bad_frames.check(self.frames)?)
     }
 }
@@ -352,6 +361,10 @@ mod tests {
             },
             SimulateOptions {
                 moving: 10_001,
+                ..free()
+            },
+            SimulateOptions {
+                shaft_percent: 51.0,
                 ..free()
             },
             SimulateOptions {

@@ -8,6 +8,7 @@ use super::moving::hide_behind_things;
 use super::noise::Purpose;
 use super::path::Path;
 use super::sensor::deliver;
+use super::shaft::Shaft;
 use super::spoil::spoil;
 use super::tunnel::{Place, Tunnel};
 use super::wall::{Texture, texture};
@@ -239,7 +240,18 @@ impl Scene {
             Some(corner) => Lamp::new(corner, seen.width(), seen.height()).shine(seen),
             None => seen,
         };
-        self.exposure(frame).expose(lit)
+        let before = match self.shaft() {
+            Some(shaft) => shaft.hide(lit),
+            None => lit,
+        };
+        self.exposure(frame).expose(before)
+    }
+
+    /// What hides the wall in every frame, if anything.
+    pub(super) fn shaft(&self) -> Option<Shaft> {
+        let percent = self.options.shaft_percent;
+        let (width, height) = (self.camera.width as usize, self.camera.height as usize);
+        (percent > 0.0).then(|| Shaft::new(percent, width, height))
     }
 
     /// The picture that a frame takes as the sensor delivers it, of a band that holds all it sees; its noise is a stream

@@ -22,6 +22,7 @@ mod circle;
 mod displacement;
 mod footprint;
 mod gauge;
+mod patches;
 mod prism;
 pub mod section;
 mod swept;
@@ -31,6 +32,7 @@ pub use circle::Circle;
 pub use displacement::{lens_jacobian, wall_jacobian};
 pub use footprint::{Footprint, shortest_arc};
 pub use gauge::{Axis, Gauge, GaugeMotion};
+pub use patches::Patches;
 pub use prism::Prism;
 pub use swept::Swept;
 
@@ -120,12 +122,6 @@ pub enum SurfaceError {
     Centreline {
         /// What is wrong with it.
         what: String,
-    },
-    /// The shape's own size is impossible.
-    #[error("the tunnel's radius is {radius_m} m; it must be a positive number of metres")]
-    Radius {
-        /// The radius given, metres.
-        radius_m: f64,
     },
 }
 

@@ -2,12 +2,13 @@
 
 use super::associate::TIME_TOLERANCE_S;
 use super::file::read_survey_file;
+use super::listing::Listing;
 use super::reader::{PoseReader, Reading};
 use super::{CalibrateSection, PosesSection, SURVEY_FILE, SurveyError, SurveyFile};
-use super::{plausible, times};
+use super::{ignore, plausible};
 use crate::camera::{Camera, read_calibration};
-use crate::frames::{self, FrameFile};
-use crate::surface::Surface;
+use crate::frames::{FrameSet, Mask};
+use crate::surface::{Patches, Surface};
 use crate::trajectory::{Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of};
 use std::path::{Path, PathBuf};
 
@@ -22,8 +23,10 @@ pub struct Survey {
     pub camera: Camera,
     /// The tunnel.
     pub surface: Box<dyn Surface>,
-    /// The frames, sorted by name.
-    pub frames: Vec<FrameFile>,
+    /// Parts of the wall by which frames are not compared.
+    pub ignored: Patches,
+    /// The frames, sorted by name, with what none of them shows.
+    pub frames: FrameSet,
     /// The initial poses, one per frame.
     pub initial: Trajectory,
     /// The true poses, one per frame, where known.
@@ -32,8 +35,8 @@ pub struct Survey {
     pub prior: Jitter,
     /// What is possible but suspicious, and what might be meant.
     pub warnings: Vec<String>,
-    /// The frames' times, seconds, where a file tells them.
-    times_s: Option<Vec<f64>>,
+    /// The frames' times, seconds, where a file or a video tells them.
+    pub(super) times_s: Option<Vec<f64>>,
     /// See [`Survey::own_files`].
     own_files: Vec<PathBuf>,
 }
@@ -103,15 +106,32 @@ impl Survey {
         }
         let camera =
             read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
-        let frames = frames::list(&folder, &file.frames.images)?;
-        let times_s = match &file.frames.times {
-            Some(times) => Some(times::read(&folder.join(times), &frames)?),
+        let Listing {
+            frames,
+            times_s,
+            video,
+        } = Listing::new(&file.frames, &toml_path, &folder, None)?;
+        if let Some(video) = &video
+            && video.rotation_deg() != 0
+            && file.camera.readout_ms.is_some()
+        {
+            return Err(value(format!(
+                "camera.readout_ms goes from row to row, but {} is to be shown turned by {}°, so that its rows are not what the sensor \
+                 reads at once; turn the pictures back with ffmpeg -noautorotate and calibrate for these, or leave readout_ms out",
+                video.path().display(),
+                video.rotation_deg()
+            )));
+        }
+        let mask = match &file.frames.mask {
+            Some(mask) => Some(Mask::read(&folder.join(mask), camera.width, camera.height)?),
             None => None,
         };
+        let ignored = ignore::patches(&file.tunnel.ignore, surface.as_ref()).map_err(value)?;
         let mut survey = Self {
             camera,
             surface,
-            frames,
+            ignored,
+            frames: FrameSet::new(frames, mask),
             initial: Vec::new(),
             truth: None,
             prior: file.prior.into(),
@@ -121,6 +141,9 @@ impl Survey {
             folder,
             file,
         };
+        if let Some(step_deg) = survey.file.frames.angle_step_deg {
+            survey.thin_by_angle(step_deg, &toml_path)?;
+        }
         let section = &survey.file.poses;
         let (initial, mut warnings) =
             survey.read_as(section, &survey.folder.join(&section.initial))?;
@@ -132,6 +155,11 @@ impl Survey {
             }
             None => None,
         };
+        warnings.extend(
+            video
+                .iter()
+                .filter_map(|video| video.warning().map(str::to_owned)),
+        );
         (survey.initial, survey.truth, survey.warnings) = (initial, truth, warnings);
         if let Some(fault) = survey.readout_fault() {
             return Err(value(fault));
@@ -149,7 +177,7 @@ impl Survey {
     }
 
     /// Reads a file of poses as a section says; its warnings beside it.
-    fn read_as(
+    pub(super) fn read_as(
         &self,
         section: &PosesSection,
         path: &Path,
@@ -189,7 +217,8 @@ impl Survey {
                     .file
                     .tunnel
                     .surface(Path::new(SURVEY_FILE), &self.folder)?,
-                frames: self.frames.iter().take(most_frames).cloned().collect(),
+                ignored: self.ignored.clone(),
+                frames: self.frames.first(most_frames),
                 initial: stamped.take(most_frames).collect(),
                 truth: None,
                 prior: self.prior,

@@ -1,6 +1,6 @@
 //! `[tunnel]`: the shape of the tunnel.
 
-use super::SurveyError;
+use super::{IgnoreSection, SurveyError};
 use crate::surface::section::{Ellipse, Pieces, Round, Section};
 use crate::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
 use crate::trajectory::{PoseError, text};
@@ -42,6 +42,9 @@ pub struct TunnelSection {
     /// A file of the line along its middle, if it is not the world's y axis; see [`read_centreline`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centreline: Option<PathBuf>,
+    /// Parts of the wall by which frames are not compared: water, plants, what moves.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ignore: Vec<IgnoreSection>,
 }
 
 impl TunnelSection {
@@ -53,6 +56,7 @@ impl TunnelSection {
             width_m: None,
             height_m: None,
             centreline: None,
+            ignore: Vec::new(),
         }
     }
 
@@ -196,6 +200,7 @@ mod tests {
             width_m: sizes[1],
             height_m: sizes[2],
             centreline: None,
+            ignore: Vec::new(),
         };
         let surface = |tunnel: TunnelSection| {
             let made = tunnel.surface(Path::new("survey.toml"), Path::new("."));

@@ -1,6 +1,8 @@
 //! Files of the folder, and frames.
 
 use super::reply::Reply;
+use crate::camera::Camera;
+use crate::frames::{FrameFile, load_colour};
 use image::ImageFormat;
 use std::io::Cursor;
 use std::path::Path;
@@ -44,26 +46,26 @@ pub(super) fn read(folder: &Path, path: &str) -> Reply {
     }
 }
 
-/// A picture that every browser shows: as it is, or as PNG.
-pub(super) fn picture(path: &Path) -> Reply {
-    let Ok(bytes) = std::fs::read(path) else {
-        return Reply::refuse(404, "the frame is no longer there");
-    };
+/// A frame as every browser shows it: the file itself, or the decoded picture as PNG.
+pub(super) fn picture(frame: &FrameFile, camera: &Camera) -> Reply {
+    let bytes = std::fs::read(&frame.path).unwrap_or_default();
     let kind = match image::guess_format(&bytes) {
         Ok(ImageFormat::Jpeg) => "image/jpeg",
         Ok(ImageFormat::Png) => "image/png",
         Ok(ImageFormat::WebP) => "image/webp",
-        _ => return converted(&bytes),
+        // Another format, or a picture of a video.
+        _ => return decoded(frame, camera),
     };
     Reply::ok(kind, bytes)
 }
 
-fn converted(bytes: &[u8]) -> Reply {
+fn decoded(frame: &FrameFile, camera: &Camera) -> Reply {
     let mut png = Cursor::new(Vec::new());
-    let written = image::load_from_memory(bytes)
-        .map(image::DynamicImage::into_rgb8)
-        .and_then(|picture| picture.write_to(&mut png, ImageFormat::Png));
-    match written {
+    let picture = match load_colour(frame, camera.width, camera.height) {
+        Ok(picture) => picture.into_rgb8(),
+        Err(error) => return Reply::refuse(404, &error.to_string()),
+    };
+    match picture.write_to(&mut png, ImageFormat::Png) {
         Ok(()) => Reply::ok("image/png", png.into_inner()),
         Err(error) => Reply::refuse(500, &error.to_string()),
     }

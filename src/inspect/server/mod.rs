@@ -12,7 +12,7 @@ mod request;
 use super::marks::{Mark, Marks};
 use super::{InspectError, Viewer};
 use crate::camera::Camera;
-use crate::frames::FrameFile;
+use crate::frames::FrameSet;
 use crate::render::{Placement, sightings};
 use crate::surface::{Surface, WallPoint};
 use reply::Reply;
@@ -40,7 +40,7 @@ pub struct Originals {
     /// The camera.
     pub camera: Camera,
     /// The frames.
-    pub frames: Vec<FrameFile>,
+    pub frames: FrameSet,
     /// Names of the layers, and where frames lie by them.
     pub placements: Vec<(String, Vec<Placement>)>,
 }
@@ -224,6 +224,7 @@ impl Server {
         let found = sightings(
             originals.surface.as_ref(),
             &originals.camera,
+            originals.frames.mask().map(AsRef::as_ref),
             placements,
             wall,
         );
@@ -232,17 +233,10 @@ impl Server {
 
     /// The picture of a frame, as the browser can show it.
     fn frame(&self, index: &str) -> Reply {
-        let frames = self
-            .originals
-            .as_ref()
-            .map_or(&[][..], |originals| &originals.frames);
-        match index
-            .parse::<usize>()
-            .ok()
-            .and_then(|index| frames.get(index))
-        {
-            Some(frame) => files::picture(&frame.path),
-            None => Reply::not_found(),
-        }
+        let Some(Originals { camera, frames, .. }) = &self.originals else {
+            return Reply::not_found();
+        };
+        let frame = index.parse::<usize>().ok().and_then(|k| frames.get(k));
+        frame.map_or_else(Reply::not_found, |frame| files::picture(frame, camera))
     }
 }

@@ -7,7 +7,7 @@ use crate::refine::calibration::{Calibration, Kappa};
 use crate::refine::estimate::FrameEstimate;
 use crate::refine::factor::FactorError;
 use crate::refine::prior::{Prior, predict};
-use crate::surface::{Surface, SurfaceError};
+use crate::surface::{Patches, Surface, SurfaceError};
 use crate::trajectory::{Pose, Shutter};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -41,6 +41,8 @@ impl Sampling {
 pub struct Scene<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
+    /// Parts of the wall by which frames are not compared.
+    pub ignored: &'a Patches,
     /// The camera at full size, as far as it is known by now, at rest.
     pub camera: Camera,
     /// When the rows of the frames are read.
