@@ -31,18 +31,23 @@ pub struct ExportArguments {
     #[command(flatten)]
     poses: PosesArgument,
     /// One file of glTF (GLB), for short pieces of tunnel.
-    #[arg(long, value_name = "FILE", group = "output")]
+    #[arg(long, value_name = "FILE", group = "output", help_heading = "Output")]
     glb: Option<PathBuf>,
     /// A folder of OGC 3D Tiles 1.1, for tunnels of any length: tileset.json and tiles in levels of detail.
-    #[arg(long = "3dtiles", value_name = "DIR", group = "output")]
+    #[arg(
+        long = "3dtiles",
+        value_name = "DIR",
+        group = "output",
+        help_heading = "Output"
+    )]
     tiles: Option<PathBuf>,
     /// A folder with the viewer and everything it shows, for any web server. Marks stay in the browser; `view` keeps them in files.
-    #[arg(long, value_name = "DIR", group = "output")]
+    #[arg(long, value_name = "DIR", group = "output", help_heading = "Output")]
     web: Option<PathBuf>,
     /// Print what was written as JSON.
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     json: bool,
-    #[command(flatten, next_help_heading = "Layers of --web")]
+    #[command(flatten)]
     layers: LayersArguments,
     #[command(flatten)]
     textures: TextureArguments,

@@ -72,6 +72,7 @@ impl TextureArguments {
 
 /// Which panoramas the viewer can switch between.
 #[derive(Debug, clap::Args)]
+#[command(next_help_heading = "Layers of the page")]
 pub struct LayersArguments {
     /// Poses to switch between, with commas [default: all there are; `refined` are those of a file of --poses].
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]

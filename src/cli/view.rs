@@ -27,7 +27,12 @@ pub struct ViewArguments {
     #[command(flatten)]
     poses: PosesArgument,
     /// Port to listen on; 0: any that is free.
-    #[arg(long, value_name = "N", default_value_t = 7770)]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 7770,
+        help_heading = "Server"
+    )]
     port: u16,
     #[command(flatten)]
     layers: LayersArguments,
