@@ -10,7 +10,7 @@ import { createRequire } from "node:module";
 import { readFile } from "node:fs/promises";
 import { join } from "node:path";
 
-const [modules, executablePath, scenario, where, screenshot] = process.argv.slice(2);
+const [modules, executablePath, scenario, place, screenshot] = process.argv.slice(2);
 const { chromium } = createRequire(join(modules, "here.js"))("playwright-core");
 
 const KINDS = { html: "text/html", js: "text/javascript", css: "text/css", json: "application/json", jpg: "image/jpeg", glb: "model/gltf-binary" };
@@ -30,7 +30,7 @@ async function hand(folder) {
   return `http://127.0.0.1:${server.address().port}/`;
 }
 
-const address = where.startsWith("http") ? where : await hand(where);
+const address = place.startsWith("http") ? place : await hand(place);
 const browser = await chromium.launch({
   executablePath,
   args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--disable-quic"],
@@ -43,18 +43,24 @@ page.on("dialog", (dialog) => dialog.accept());
 const seen = { problems };
 
 const complete = () => page.waitForFunction(() => document.body.dataset.loading === "0", null, { timeout: 60_000 });
-/** The next state of what is told now and then. */
-const told = async () => {
-  await complete();
-  await page.waitForTimeout(900);
+const number = (text, pattern) => Number(pattern.exec(text)?.[1] ?? NaN);
+/** Where the page says you are. */
+const where = async () => {
   const place = await page.textContent("#place");
-  const statistics = await page.textContent("#statistics");
-  const number = (text, pattern) => Number(pattern.exec(text)?.[1] ?? NaN);
   return {
     h: number(place, /at (-?[\d.]+) m/),
     fromWall: number(place, /([\d.]+) m from the wall/),
     seen: number(place, /looking at (-?[\d.]+) m/),
     clock: /, (\d+:\d\d) o'clock/.exec(place)?.[1],
+  };
+};
+/** The next state of what is told now and then. */
+const told = async () => {
+  await complete();
+  await page.waitForTimeout(900);
+  const statistics = await page.textContent("#statistics");
+  return {
+    ...(await where()),
     triangles: number(statistics, /(\d+) triangles/),
     textureMiB: number(statistics, /([\d.]+) MiB/),
     hash: new URL(page.url()).hash,
@@ -64,10 +70,28 @@ const go = async (hash) => {
   await page.evaluate((hash) => (location.hash = hash), hash);
   return told();
 };
-const hold = async (keys, milliseconds) => {
+/** Waits until it is enough, by where you are and were; how fast one walks depends on how fast the page is drawn. */
+const until = async (enough) => {
+  for (let k = 0, before = await where(); k < 40; k++) {
+    await page.waitForTimeout(500);
+    const now = await where();
+    if (enough(now, before)) break;
+    before = now;
+  }
+};
+const hold = async (keys, enough) => {
   for (const key of keys) await page.keyboard.down(key);
-  await page.waitForTimeout(milliseconds);
+  await until(enough);
   for (const key of keys) await page.keyboard.up(key);
+  return told();
+};
+/** As near to the wall as one gets. */
+const stopped = (now, before) => now.fromWall < 0.5 && now.fromWall === before.fromWall;
+const ride = async (metres) => {
+  const from = (await told()).h;
+  await page.keyboard.press("Space");
+  await until((now) => now.h > from + metres);
+  await page.keyboard.press("Space");
   return told();
 };
 const marks = () => page.$$eval("#marks li button:first-child", (rows) => rows.map((row) => row.textContent));
@@ -109,16 +133,13 @@ const scenarios = {
   async inspect() {
     await page.goto(address);
     seen.start = await told();
-    seen.ahead = await hold(["w"], 700);
+    seen.ahead = await hold(["w"], (now) => now.h > seen.start.h + 0.2);
     seen.wall = await go("#h=1.2&clock=3:00");
-    seen.against = await hold(["w", "Shift"], 1500);
+    seen.against = await hold(["w", "Shift"], stopped);
     const box = await (await page.$("#whole")).boundingBox();
     await page.mouse.click(box.x + box.width * 0.25, box.y + 5);
     seen.jumped = await told();
-    await page.keyboard.press("Space");
-    await page.waitForTimeout(700);
-    await page.keyboard.press("Space");
-    seen.ridden = await told();
+    seen.ridden = await ride(0.2);
 
     seen.target = await go("#h=1.2&clock=3:00");
     seen.dots = await dots();
@@ -162,11 +183,9 @@ const scenarios = {
     await page.goto(address + "#h=6&clock=3:00");
     seen.start = await told();
     await page.screenshot({ path: screenshot });
-    seen.against = await hold(["w", "Shift"], 1500);
+    seen.against = await hold(["w", "Shift"], stopped);
     await go("#h=1&clock=6:00");
-    await page.keyboard.press("Space");
-    await page.waitForTimeout(1500);
-    seen.ridden = await told();
+    seen.ridden = await ride(0.5);
   },
   async kilometre() {
     await page.goto(address);
