@@ -156,7 +156,7 @@ impl From<InterpolationArgument> for Interpolation {
 }
 
 /// A size of memory in bytes, for clap.
-fn memory_size(text: &str) -> Result<u64, String> {
+pub fn memory_size(text: &str) -> Result<u64, String> {
     const FORM: &str = "must be a size as 512MiB or 2GiB";
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let unit = match text[digits.len()..].to_ascii_lowercase().as_str() {
