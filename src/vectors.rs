@@ -22,3 +22,29 @@ impl<R, F: FnMut() -> R> WithSimd for Wide<F> {
         (self.0)()
     }
 }
+
+/// Does `work` with the code compiled for AVX2, which it is handed; false without doing it where the processor has none.
+///
+/// Write it as [`wide`]. What is not inlined is neither fast nor wrong: no closures, no `map` of arrays in loops.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+pub fn avx2(work: impl FnMut(pulp::x86::V3)) -> bool {
+    let Some(simd) = pulp::x86::V3::try_new() else {
+        return false;
+    };
+    Simd::vectorize(simd, Avx2(simd, work));
+    true
+}
+
+#[cfg(target_arch = "x86_64")]
+struct Avx2<F>(pulp::x86::V3, F);
+
+#[cfg(target_arch = "x86_64")]
+impl<F: FnMut(pulp::x86::V3)> WithSimd for Avx2<F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, _: S) {
+        (self.1)(self.0);
+    }
+}

@@ -1,6 +1,6 @@
 //! The panorama as it is drawn: band by band, and who takes it.
 
-use super::draw::{Drawn, NO_FRAME};
+use super::draw::NO_FRAME;
 use super::plan::BAND_ROWS;
 use super::sample::{Sample, Samples};
 use super::super_resolve::Region;
@@ -48,7 +48,7 @@ impl Band {
         }
     }
 
-    /// Makes it the band of other rows, in which all tiles are still to be put.
+    /// Makes it the band of other rows, in which all tiles are still to be drawn.
     pub(super) fn begin(&mut self, canvas: &Canvas, row: u32, rows: u32) {
         (self.row, self.rows) = (row, rows);
         let pixels = canvas.columns as usize * rows as usize;
@@ -60,21 +60,33 @@ impl Band {
         self.sources.resize(pixels, NO_FRAME);
     }
 
-    /// Puts a tile into its place.
-    pub(super) fn put(&mut self, canvas: &Canvas, tile: &Tile, drawn: &Drawn) {
-        let place = Place {
-            row: (tile.row - self.row) as usize,
-            column: tile.column as usize,
-            columns: tile.columns as usize,
-            all: canvas.columns as usize,
-        };
-        let channels = self.format.channels + 1;
-        match (&mut self.samples, &drawn.samples) {
-            (Samples::Eight(all), Samples::Eight(part)) => place.copy(all, part, channels),
-            (Samples::Sixteen(all), Samples::Sixteen(part)) => place.copy(all, part, channels),
-            _ => debug_assert!(false, "tiles have the frames' format"),
+    /// The places of all its tiles, `tiles` row by row of tiles.
+    pub(super) fn places(&mut self, canvas: &Canvas, tiles: &[Tile]) -> Vec<Place<'_>> {
+        let columns = canvas.columns as usize;
+        let step = self.format.channels + 1;
+        let sources = cut(&mut self.sources, columns, 1, tiles);
+        match &mut self.samples {
+            Samples::Eight(samples) => {
+                let pixels = cut(samples, columns, step, tiles).into_iter();
+                let places = pixels.zip(sources);
+                places
+                    .map(|(pixels, sources)| Place {
+                        pixels: Rows::Eight(pixels),
+                        sources,
+                    })
+                    .collect()
+            }
+            Samples::Sixteen(samples) => {
+                let pixels = cut(samples, columns, step, tiles).into_iter();
+                let places = pixels.zip(sources);
+                places
+                    .map(|(pixels, sources)| Place {
+                        pixels: Rows::Sixteen(pixels),
+                        sources,
+                    })
+                    .collect()
+            }
         }
-        place.copy(&mut self.sources, &drawn.sources, 1);
     }
 
     /// One channel of a region, grey levels of 255; NaN in holes. Rows beyond the band's are those next to them.
@@ -156,21 +168,46 @@ fn alpha<T: Sample>(samples: &[T], step: usize) -> Vec<bool> {
         .collect()
 }
 
-/// Where a tile lies in a band, pixels.
-struct Place {
-    row: usize,
-    column: usize,
-    columns: usize,
-    /// Columns of the band.
-    all: usize,
+/// Where a tile is drawn.
+pub struct Place<'a> {
+    /// Its pixels, alpha last: full where some frame sees the wall, 0 in holes.
+    pub(super) pixels: Rows<'a>,
+    /// The frame that each pixel shows most of, [`NO_FRAME`] in holes and where frames are mixed all over; row by row.
+    pub(super) sources: Vec<&'a mut [u32]>,
 }
 
-impl Place {
-    /// Copies a tile's pixels of `step` numbers into those of the band.
-    fn copy<T: Copy>(&self, band: &mut [T], tile: &[T], step: usize) {
-        let rows = band.chunks_exact_mut(self.all * step).skip(self.row);
-        for (to, from) in rows.zip(tile.chunks_exact(self.columns * step)) {
-            to[self.column * step..][..from.len()].copy_from_slice(from);
+/// Rows of samples.
+pub(super) enum Rows<'a> {
+    /// 8 bits.
+    Eight(Vec<&'a mut [u8]>),
+    /// 16 bits.
+    Sixteen(Vec<&'a mut [u16]>),
+}
+
+/// Cuts rows of `columns` pixels of `step` numbers into those of tiles.
+fn cut<'a, T>(
+    all: &'a mut [T],
+    columns: usize,
+    step: usize,
+    tiles: &[Tile],
+) -> Vec<Vec<&'a mut [T]>> {
+    let mut cut: Vec<Vec<&mut [T]>> = tiles
+        .iter()
+        .map(|tile| Vec::with_capacity(tile.rows as usize))
+        .collect();
+    let mut rows = all.chunks_exact_mut(columns * step);
+    // Rows of tiles: from one that begins at the first column to the next.
+    let mut first = 0;
+    for across in tiles.chunk_by(|a, b| a.row == b.row) {
+        for _ in 0..across.first().map_or(0, |tile| tile.rows) {
+            let Some(mut rest) = rows.next() else { break };
+            for (k, tile) in across.iter().enumerate() {
+                let own;
+                (own, rest) = rest.split_at_mut(tile.columns as usize * step);
+                cut[first + k].push(own);
+            }
         }
+        first += across.len();
     }
+    cut
 }

@@ -1,14 +1,19 @@
 //! Tiles of the panorama, row by row.
 
+use super::band::{Place, Rows};
+use super::chart::{Lattice, Projected};
 use super::exposure::Exposure;
-use super::sample::{Sample, Samples};
+use super::run::{RUN, Run};
+use super::sample::Sample;
 use super::seams::{Seams, Shares};
 use super::view::{Kernels, View};
-use super::warp::{Points, RUN, Run};
+use super::warp::Points;
 use super::{Canvas, FrameStack, Placement, Tile};
 use crate::surface::Surface;
+use crate::vectors::wide;
 use nalgebra::Vector3;
 use serde::Serialize;
+use std::ops::Range;
 
 /// Which frames a pixel of the panorama shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -59,6 +64,8 @@ pub const NO_FRAME: u32 = u32::MAX;
 /// What drawing a tile needs for a while: made once a thread, since fresh memory costs as much as the work in it.
 #[derive(Default)]
 pub struct Scratch {
+    lattice: Lattice,
+    projected: Projected,
     exact: Vec<Vector3<f64>>,
     points: Points,
     run: Run,
@@ -66,23 +73,15 @@ pub struct Scratch {
     corrections: Vec<[f32; 4]>,
 }
 
-/// A drawn tile.
-pub struct Drawn {
-    /// Its pixels, row-major, alpha last: full where some frame sees the wall, 0 in holes.
-    pub samples: Samples,
-    /// The frame that each pixel shows most of, [`NO_FRAME`] in holes and where frames are mixed all over.
-    pub sources: Vec<u32>,
-}
-
 impl Scene<'_> {
-    /// Draws a tile. The frames that it needs must be held ([`Scene::needed`]).
-    pub fn draw(&self, tile: &Tile, scratch: &mut Scratch) -> Drawn {
-        let format = self.frames.format();
-        match (format.channels, format.deep) {
-            (1, false) => self.draw_as::<u8, 1>(tile, scratch),
-            (_, false) => self.draw_as::<u8, 3>(tile, scratch),
-            (1, true) => self.draw_as::<u16, 1>(tile, scratch),
-            (_, true) => self.draw_as::<u16, 3>(tile, scratch),
+    /// Draws a tile in its place. The frames that it needs must be held ([`Scene::needed`]).
+    pub fn draw(&self, tile: &Tile, place: Place, scratch: &mut Scratch) {
+        let Place { pixels, sources } = place;
+        match (self.frames.format().channels, pixels) {
+            (1, Rows::Eight(pixels)) => self.draw_as::<u8, 1>(tile, pixels, sources, scratch),
+            (_, Rows::Eight(pixels)) => self.draw_as::<u8, 3>(tile, pixels, sources, scratch),
+            (1, Rows::Sixteen(pixels)) => self.draw_as::<u16, 1>(tile, pixels, sources, scratch),
+            (_, Rows::Sixteen(pixels)) => self.draw_as::<u16, 3>(tile, pixels, sources, scratch),
         }
     }
 
@@ -94,26 +93,24 @@ impl Scene<'_> {
         }
     }
 
-    fn draw_as<T: Sample, const C: usize>(&self, tile: &Tile, scratch: &mut Scratch) -> Drawn
-    where
-        Samples: From<Vec<T>>,
-    {
-        if tile.frames.is_empty() {
-            return Drawn {
-                samples: vec![T::default(); tile.pixels() * (C + 1)].into(),
-                sources: vec![NO_FRAME; tile.pixels()],
-            };
-        }
+    fn draw_as<T: Sample, const C: usize>(
+        &self,
+        tile: &Tile,
+        pixels: Vec<&mut [T]>,
+        sources: Vec<&mut [u32]>,
+        scratch: &mut Scratch,
+    ) {
         let Scratch {
+            lattice,
+            projected,
             exact,
             points,
             run,
             shares,
             corrections,
         } = scratch;
-        tile.points_into(self.surface, self.canvas, exact);
-        points.set(exact);
         let camera = self.frames.camera();
+        lattice.set(self.surface, self.canvas, tile);
         let views = self.needed(tile).into_iter().filter_map(|frame| {
             let picture = self.frames.picture(frame)?;
             Some(View::new(
@@ -121,28 +118,65 @@ impl Scene<'_> {
                 camera,
                 self.kernels,
                 self.exposure.of(frame),
-                points,
-                tile.columns as usize,
+                lattice,
+                projected,
             ))
         });
-        let views: Vec<View> = views.collect();
-        let mut brush = Brush::<'_, T, C> {
-            pixels: vec![T::default(); tile.pixels() * (C + 1)],
-            next: 0,
-            sources: Vec::with_capacity(tile.pixels()),
+        let views: Vec<View> = views.filter(View::shows).collect();
+        if views.is_empty() {
+            for (pixels, sources) in pixels.into_iter().zip(sources) {
+                pixels.fill(T::default());
+                sources.fill(NO_FRAME);
+            }
+            return;
+        }
+        if views.iter().any(View::is_rough) {
+            tile.points_into(self.surface, self.canvas, exact);
+            points.set(exact);
+        }
+        let mut brush = Brush::<'_, C> {
+            width: tile.columns as usize,
+            points,
+            views: &views,
             run,
+            sums: Row::new(),
         };
+        let rows = pixels.into_iter().zip(sources).enumerate();
         match self.composition {
             Composition::Seams(seams) => {
-                let row = (shares, corrections);
-                brush.best_view(tile, points, &views, seams, self.canvas, row);
+                let places = seams.columns_of(self.canvas, tile);
+                let mut above = None;
+                for (row, (pixels, sources)) in rows {
+                    let between = seams.row_of(self.canvas, tile.row + row as u32);
+                    // Between the same nodes nothing changes where no frames meet.
+                    if above != Some(between.before()) || !shares.are_whole() {
+                        seams.shares(&places, &between, shares);
+                        above = Some(between.before());
+                    }
+                    match T::bytes(pixels) {
+                        Some(pixels) if seams.are_hard() && views.iter().all(View::copies) => {
+                            brush.copy(row, shares, pixels, sources);
+                        }
+                        _ => {
+                            seams.corrections(&places, &between, corrections);
+                            brush.best_view(row, shares, corrections, pixels, sources);
+                        }
+                    }
+                }
             }
-            Composition::Average => brush.average(tile, points, &views),
-            Composition::Median => brush.median(tile, points, &views),
-        }
-        Drawn {
-            samples: brush.pixels.into(),
-            sources: brush.sources,
+            Composition::Average => {
+                for (row, (pixels, sources)) in rows {
+                    sources.fill(NO_FRAME);
+                    brush.average(row, pixels);
+                }
+            }
+            Composition::Median => {
+                let mut stacks = vec![Vec::with_capacity(views.len()); tile.columns as usize];
+                for (row, (pixels, sources)) in rows {
+                    sources.fill(NO_FRAME);
+                    brush.median(row, &mut stacks, pixels);
+                }
+            }
         }
     }
 }
@@ -180,13 +214,13 @@ impl Row {
         self.weights[k] += w;
     }
 
-    /// Columns from `from` that show nothing but a frame.
-    fn set(&mut self, run: &Run, frame: usize, from: usize, count: usize) {
-        self.sums[from..from + count].copy_from_slice(&run.values()[..count]);
-        let seen = run.seen()[..count].iter();
-        let columns = self.weights[from..]
+    /// Columns that show nothing but a frame.
+    fn set(&mut self, run: &Run, frame: usize, columns: Range<usize>) {
+        self.sums[columns.clone()].copy_from_slice(&run.values()[columns.clone()]);
+        let seen = run.seen()[columns.clone()].iter();
+        let columns = self.weights[columns.clone()]
             .iter_mut()
-            .zip(&mut self.sources[from..]);
+            .zip(&mut self.sources[columns]);
         for (seen, (weight, source)) in seen.zip(columns) {
             *weight = if *seen { 1.0 } else { 0.0 };
             *source = if *seen { frame as u32 } else { NO_FRAME };
@@ -196,11 +230,12 @@ impl Row {
     /// Columns from `from` that show a frame with some weight.
     fn mix(&mut self, run: &Run, frame: usize, from: usize, weights: &[f32]) {
         for (k, w) in weights.iter().enumerate() {
+            let k = from + k;
             if run.seen()[k] && *w > 0.0 {
-                self.add(from + k, &run.values()[k], *w);
-                if *w > self.largest[from + k] {
-                    self.largest[from + k] = *w;
-                    self.sources[from + k] = frame as u32;
+                self.add(k, &run.values()[k], *w);
+                if *w > self.largest[k] {
+                    self.largest[k] = *w;
+                    self.sources[k] = frame as u32;
                 }
             }
         }
@@ -218,129 +253,179 @@ impl Row {
     }
 }
 
-/// Draws rows of a tile with `C` channels of `T`.
-struct Brush<'a, T, const C: usize> {
-    /// All that the tile has, in holes to begin with.
-    pixels: Vec<T>,
-    /// The pixel to be drawn next.
-    next: usize,
-    sources: Vec<u32>,
+/// Draws rows of a tile with `C` channels.
+struct Brush<'a, const C: usize> {
+    /// Columns of the tile.
+    width: usize,
+    /// The tile's points, if some view is rough.
+    points: &'a Points,
+    views: &'a [View<'a>],
     run: &'a mut Run,
+    sums: Row,
 }
 
-impl<T: Sample, const C: usize> Brush<'_, T, C> {
+impl<const C: usize> Brush<'_, C> {
+    /// The pixels of a row: `value(k)` where it has some weight.
     #[inline(always)]
-    fn put(&mut self, value: Option<[f32; 4]>) {
-        let at = self.next * (C + 1);
-        self.next += 1;
-        let (Some(value), Some(pixel)) = (value, self.pixels.get_mut(at..=at + C)) else {
-            return;
-        };
-        for (sample, value) in pixel.iter_mut().zip(&value[..C]) {
-            *sample = T::nearest(*value);
-        }
-        pixel[C] = T::nearest(T::WHITE);
+    fn put<T: Sample>(&self, pixels: &mut [T], value: impl Fn(usize, f32) -> [f32; 4]) {
+        let weights = &self.sums.weights[..self.width];
+        wide(
+            #[inline(always)]
+            || {
+                for (k, (pixel, w)) in pixels.chunks_exact_mut(C + 1).zip(weights).enumerate() {
+                    let w = *w;
+                    let value = value(k, 1.0 / w);
+                    for (sample, value) in pixel.iter_mut().zip(&value[..C]) {
+                        *sample = T::nearest(if w > 0.0 { *value } else { 0.0 });
+                    }
+                    pixel[C] = T::nearest(if w > 0.0 { T::WHITE } else { 0.0 });
+                }
+            },
+        );
     }
 
-    fn average(&mut self, tile: &Tile, points: &Points, views: &[View]) {
-        let columns = tile.columns as usize;
-        let mut sums = Row::new();
-        for row in 0..tile.rows as usize {
-            sums.clear(columns);
-            for view in views {
-                view.look_at(self.run, points, row * columns, columns);
-                let (u, v) = self.run.pixels();
-                for k in 0..columns {
-                    if self.run.seen()[k] {
-                        let w = view.feather(u[k], v[k]);
-                        sums.add(k, &self.run.values()[k], w);
-                    }
+    fn average<T: Sample>(&mut self, row: usize, pixels: &mut [T]) {
+        self.sums.clear(self.width);
+        for view in self.views {
+            view.look_at(self.run, self.points, (row, self.width), 0..self.width);
+            let (u, v) = self.run.pixels();
+            for k in 0..self.width {
+                if self.run.seen()[k] {
+                    let w = view.feather(u[k], v[k]);
+                    self.sums.add(k, &self.run.values()[k], w);
                 }
             }
-            for k in 0..columns {
-                let w = sums.weights[k];
-                self.put((w > 0.0).then(|| sums.sums[k].map(|sum| sum / w)));
-                self.sources.push(NO_FRAME);
-            }
         }
+        let sums = &self.sums.sums;
+        self.put(
+            pixels,
+            #[inline(always)]
+            |k, inverse| {
+                let [a, b, c, d] = sums[k];
+                [a * inverse, b * inverse, c * inverse, d * inverse]
+            },
+        );
     }
 
-    fn median(&mut self, tile: &Tile, points: &Points, views: &[View]) {
-        let columns = tile.columns as usize;
-        let mut stacks: Vec<Vec<[f32; 4]>> = vec![Vec::with_capacity(views.len()); columns];
-        let mut values = Vec::with_capacity(views.len());
-        for row in 0..tile.rows as usize {
-            for view in views {
-                view.look_at(self.run, points, row * columns, columns);
-                for (k, stack) in stacks.iter_mut().enumerate() {
-                    if self.run.seen()[k] {
-                        stack.push(self.run.values()[k]);
-                    }
+    /// `stacks`: empty, one a column.
+    fn median<T: Sample>(&mut self, row: usize, stacks: &mut [Vec<[f32; 4]>], pixels: &mut [T]) {
+        for view in self.views {
+            view.look_at(self.run, self.points, (row, self.width), 0..self.width);
+            for (k, stack) in stacks.iter_mut().enumerate() {
+                if self.run.seen()[k] {
+                    stack.push(self.run.values()[k]);
                 }
             }
-            for stack in &mut stacks {
-                let middle = (!stack.is_empty()).then(|| {
-                    let mut middle = [0.0; 4];
-                    for (c, middle) in middle.iter_mut().enumerate().take(C) {
-                        values.clear();
-                        values.extend(stack.iter().map(|value| value[c]));
-                        *middle = median(&mut values);
-                    }
-                    middle
-                });
-                self.put(middle);
-                self.sources.push(NO_FRAME);
-                stack.clear();
-            }
         }
+        let mut values = Vec::with_capacity(self.views.len());
+        self.sums.clear(self.width);
+        for (k, stack) in stacks.iter_mut().enumerate().filter(|(_, s)| !s.is_empty()) {
+            self.sums.weights[k] = 1.0;
+            for c in 0..C {
+                values.clear();
+                values.extend(stack.iter().map(|value| value[c]));
+                self.sums.sums[k][c] = median(&mut values);
+            }
+            stack.clear();
+        }
+        let sums = &self.sums.sums;
+        self.put(pixels, |k, _| sums[k]);
     }
 
-    fn best_view(
+    fn best_view<T: Sample>(
         &mut self,
-        tile: &Tile,
-        points: &Points,
-        views: &[View],
-        seams: &Seams,
-        canvas: &Canvas,
-        (shares, corrections): (&mut Shares, &mut Vec<[f32; 4]>),
+        row: usize,
+        shares: &Shares,
+        corrections: &[[f32; 4]],
+        pixels: &mut [T],
+        sources: &mut [u32],
     ) {
-        let columns = tile.columns as usize;
-        let places = seams.columns_of(canvas, tile);
-        let mut sums = Row::new();
-        for row in 0..tile.rows as usize {
-            let start = row * columns;
-            let between = seams.row_of(canvas, tile.row + row as u32);
-            seams.shares(&places, &between, shares);
-            seams.corrections(&places, &between, corrections);
-            sums.clear(columns);
-            for (share, weights) in shares.iter() {
-                let Ok(view) = views.binary_search_by_key(&share.frame, |view| view.frame) else {
-                    continue;
-                };
-                let (from, count) = (share.from, share.to - share.from);
-                views[view].look_at(self.run, points, start + from, count);
-                match weights {
-                    Some(weights) => sums.mix(self.run, share.frame, from, weights),
-                    None => sums.set(self.run, share.frame, from, count),
+        let (points, place) = (self.points, (row, self.width));
+        self.sums.clear(self.width);
+        for (share, weights) in shares.iter() {
+            let Some(view) = view_of(self.views, share.frame) else {
+                continue;
+            };
+            view.look_at(self.run, points, place, share.from..share.to);
+            match weights {
+                Some(weights) => self.sums.mix(self.run, share.frame, share.from, weights),
+                None => self.sums.set(self.run, share.frame, share.from..share.to),
+            }
+        }
+        // At the edge of what is seen: frames that no node of the grid shows.
+        if self.sums.weights[..self.width].contains(&0.0) {
+            for view in self.views {
+                view.look_at(self.run, points, place, 0..self.width);
+                self.sums.fill(self.run, view.frame, self.width);
+            }
+        }
+        let sums = &self.sums.sums;
+        self.put(
+            pixels,
+            #[inline(always)]
+            |k, inverse| {
+                let ([a, b, c, d], [e, f, g, h]) = (sums[k], corrections[k]);
+                [
+                    a * inverse + e,
+                    b * inverse + f,
+                    c * inverse + g,
+                    d * inverse + h,
+                ]
+            },
+        );
+        sources.copy_from_slice(&self.sums.sources[..self.width]);
+    }
+
+    /// The same where every pixel is one frame's as it is.
+    fn copy(&mut self, row: usize, shares: &Shares, pixels: &mut [u8], sources: &mut [u32]) {
+        let (points, place, step) = (self.points, (row, self.width), C + 1);
+        let mut covered = 0;
+        for (share, _) in shares.iter() {
+            let Some(view) = view_of(self.views, share.frame) else {
+                continue;
+            };
+            // Nothing between one share and the next.
+            pixels[covered * step..share.from * step].fill(0);
+            sources[covered..share.from].fill(NO_FRAME);
+            covered = share.to;
+            let columns = share.from..share.to;
+            let own = &mut pixels[columns.start * step..columns.end * step];
+            view.copy::<C>(self.run, points, place, columns.clone(), own);
+            let seen = &self.run.seen()[columns.clone()];
+            let frame = share.frame as u32;
+            wide(
+                #[inline(always)]
+                || {
+                    for (source, seen) in sources[columns.clone()].iter_mut().zip(seen) {
+                        *source = if *seen { frame } else { NO_FRAME };
+                    }
+                },
+            );
+        }
+        pixels[covered * step..].fill(0);
+        sources[covered..].fill(NO_FRAME);
+        if !sources.contains(&NO_FRAME) {
+            return;
+        }
+        let mut other = [0; 4 * RUN];
+        for view in self.views {
+            let own = &mut other[..self.width * step];
+            view.copy::<C>(self.run, points, place, 0..self.width, own);
+            let there = pixels.chunks_exact_mut(step).zip(sources.iter_mut());
+            let found = own.chunks_exact(step).zip(self.run.seen());
+            for ((pixel, source), (own, seen)) in there.zip(found) {
+                if *source == NO_FRAME && *seen {
+                    pixel.copy_from_slice(own);
+                    *source = view.frame as u32;
                 }
             }
-            // At the edge of what is seen: frames that no node of the grid shows.
-            if sums.weights[..columns].contains(&0.0) {
-                for view in views {
-                    view.look_at(self.run, points, start, columns);
-                    sums.fill(self.run, view.frame, columns);
-                }
-            }
-            for (k, correction) in corrections.iter().enumerate() {
-                let w = sums.weights[k];
-                let inverse = 1.0 / w;
-                let sum = &sums.sums[k];
-                let value = std::array::from_fn(|c| sum[c] * inverse + correction[c]);
-                self.put((w > 0.0).then_some(value));
-            }
-            self.sources.extend_from_slice(&sums.sources[..columns]);
         }
     }
+}
+
+fn view_of<'a>(views: &'a [View<'a>], frame: usize) -> Option<&'a View<'a>> {
+    let at = views.binary_search_by_key(&frame, |view| view.frame).ok()?;
+    Some(&views[at])
 }
 
 /// The median; the mean of the middle two of an even number. NaN of none.

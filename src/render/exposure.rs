@@ -16,12 +16,13 @@
 //! 128, 2000; for panoramas D. B. Goldman, "Vignette and exposure calibration and compensation", PAMI 32(12), 2010.
 
 use super::glimpses::{Glimpse, glimpses};
+use super::run::Run;
 use super::sample::Sample;
 use super::thumbnails::Thumbnails;
-use super::warp::Run;
 use super::{Canvas, Placement};
 use crate::frames::{Agreement, MAD_TO_SIGMA, SHADING_TERMS, Shading};
 use crate::surface::Surface;
+use crate::vectors::wide;
 use faer::Side;
 use faer::prelude::Solve;
 use faer::sparse::{SparseColMat, Triplet};
@@ -29,6 +30,7 @@ use nalgebra::{DMatrix, DVector, Vector2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Unknowns of a frame: α, β.
 const OWN: usize = 2;
@@ -157,47 +159,59 @@ pub struct Response<'a> {
 }
 
 impl Response<'_> {
-    /// Undoes it in the first `count` values of a run.
-    pub fn undo(&self, run: &mut Run, count: usize) {
-        if self.shading.is_none() && self.gain == 1.0 && self.bias == 0.0 {
+    /// True if there is nothing to undo.
+    pub fn is_none(&self) -> bool {
+        self.shading.is_none() && self.gain == 1.0 && self.bias == 0.0
+    }
+
+    /// Undoes it in some of the values of a run.
+    pub fn undo(&self, run: &mut Run, columns: Range<usize>) {
+        if self.is_none() {
             return;
         }
         let (u, v, seen, values) = run.parts();
         let Some(table) = self.shading else {
-            for value in &mut values[..count] {
-                *value = self.undone(value, self.gain);
+            for value in values[columns].as_flattened_mut() {
+                *value = (*value - self.bias) * self.gain;
             }
             return;
         };
-        // Light changes so slowly that it is looked up at the ends of short steps only.
-        for start in (0..count).step_by(STEP) {
-            let end = (start + STEP).min(count);
-            let last = end.min(count - 1);
-            if seen[start] && seen[last] {
-                let first = self.gain * table.at(u[start], v[start]);
-                let slope =
-                    (self.gain * table.at(u[last], v[last]) - first) / (last - start).max(1) as f32;
-                for (k, value) in values[start..end].iter_mut().enumerate() {
-                    *value = self.undone(value, first + k as f32 * slope);
+        let last_column = columns.end.saturating_sub(1);
+        wide(
+            #[inline(always)]
+            || {
+                // Light changes so slowly that it is looked up at the ends of short steps only.
+                for start in columns.clone().step_by(STEP) {
+                    let end = (start + STEP).min(columns.end);
+                    let last = end.min(last_column);
+                    if seen[start] && seen[last] {
+                        let first = self.gain * table.at(u[start], v[start]);
+                        let change = self.gain * table.at(u[last], v[last]) - first;
+                        let slope = change / (last - start).max(1) as f32;
+                        for (k, value) in values[start..end].iter_mut().enumerate() {
+                            let factor = first + k as f32 * slope;
+                            for value in value {
+                                *value = (*value - self.bias) * factor;
+                            }
+                        }
+                    } else {
+                        let places = u[start..end].iter().zip(&v[start..end]);
+                        for (value, (u, v)) in values[start..end].iter_mut().zip(places) {
+                            let factor = self.gain * table.at(*u, *v);
+                            for value in value {
+                                *value = (*value - self.bias) * factor;
+                            }
+                        }
+                    }
                 }
-            } else {
-                let places = u[start..end].iter().zip(&v[start..end]);
-                for (value, (u, v)) in values[start..end].iter_mut().zip(places) {
-                    *value = self.undone(value, self.gain * table.at(*u, *v));
-                }
-            }
-        }
+            },
+        );
     }
 
     /// The value of the evenly lit wall for one of the frame at a pixel.
     pub fn wall(&self, value: f32, u: f32, v: f32) -> f32 {
         let light = self.shading.map_or(1.0, |table| table.at(u, v));
         (value - self.bias) * (self.gain * light)
-    }
-
-    #[inline(always)]
-    fn undone(&self, value: &[f32; 4], factor: f32) -> [f32; 4] {
-        value.map(|value| (value - self.bias) * factor)
     }
 }
 

@@ -1,8 +1,9 @@
 //! What the frames show of single points of the wall.
 
+use super::run::Run;
 use super::thumbnails::Thumbnails;
 use super::tiles::{EDGE, Tile, tiles};
-use super::warp::{Points, Run};
+use super::warp::Points;
 use super::{Canvas, Placement};
 use crate::frames::{SHADING_TERMS, shading_terms};
 use crate::surface::Surface;

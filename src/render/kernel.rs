@@ -70,7 +70,12 @@ pub struct Kernel {
     taps: usize,
     /// `PHASES + 1` rows of `taps` weights; each row's sum is 1.
     weights: Vec<f32>,
+    /// The same in units of 2⁻¹⁴.
+    integers: Vec<i16>,
 }
+
+/// One, as a whole number.
+const ONE: f64 = 16384.0;
 
 impl Kernel {
     /// The kernel of an interpolation, `stretch` (at least 1) times as wide as for a picture that is looked at pixel by
@@ -83,6 +88,7 @@ impl Kernel {
             return Self {
                 taps: 1,
                 weights: vec![1.0; PHASES + 1],
+                integers: vec![ONE as i16; PHASES + 1],
             };
         }
         let half = (interpolation.reach() * stretch.max(1.0) - 1e-9).ceil() as usize;
@@ -93,15 +99,24 @@ impl Kernel {
         };
         let taps = 2 * half;
         let mut weights = Vec::with_capacity((PHASES + 1) * taps);
+        let mut integers = Vec::with_capacity((PHASES + 1) * taps);
         for phase in 0..=PHASES {
             let t = (half - 1) as f64 + phase as f64 / PHASES as f64;
             let row = (0..taps).map(|x| interpolation.weight((x as f64 - t) / stretch.max(1.0)));
             let row: Vec<f64> = row.collect();
             let sum: f64 = row.iter().sum();
             weights.extend(row.iter().map(|w| (w / sum) as f32));
+            integers.extend(whole_weights(&row, sum));
         }
-        Self { taps, weights }
+        Self {
+            taps,
+            weights,
+            integers,
+        }
     }
+
+    /// The phases that a pixel is divided into in the table.
+    pub const PHASES: f32 = PHASES as f32;
 
     /// Pixels that count along each axis.
     pub fn taps(&self) -> usize {
@@ -126,7 +141,27 @@ impl Kernel {
     /// The tabulated phase of the fraction `t` in `[0, 1]` of a coordinate.
     #[inline(always)]
     pub fn phase(t: f32) -> i32 {
-        ((t * PHASES as f32 + WHOLE).to_bits() & PHASE_BITS) as i32
+        Self::phase_of(t, Self::PHASES)
+    }
+
+    /// The same of a pixel divided into `phases` (at most as many as are tabulated).
+    #[inline(always)]
+    pub fn phase_of(t: f32, phases: f32) -> i32 {
+        ((t * phases + WHOLE).to_bits() & PHASE_BITS) as i32
+    }
+
+    /// The phases that a pixel is divided into for whole-numbered weights: 128 for two taps, which need no table.
+    pub fn integer_phases(&self) -> f32 {
+        match self.taps {
+            2 => 128.0,
+            _ => Self::PHASES,
+        }
+    }
+
+    /// The weights of a phase in units of 2⁻¹⁴; their sum is one exactly.
+    #[inline(always)]
+    pub fn integers(&self, phase: usize) -> &[i16] {
+        &self.integers[phase * self.taps..][..self.taps]
     }
 
     /// The weights of a phase.
@@ -134,6 +169,16 @@ impl Kernel {
     pub fn at(&self, phase: usize) -> &[f32] {
         &self.weights[phase * self.taps..][..self.taps]
     }
+}
+
+/// Weights whose sum is `sum`, in units of 2⁻¹⁴: what rounding has changed of the sum goes to the largest.
+fn whole_weights(row: &[f64], sum: f64) -> Vec<i16> {
+    let mut whole: Vec<i16> = row.iter().map(|w| (w / sum * ONE).round() as i16).collect();
+    let off = ONE as i16 - whole.iter().sum::<i16>();
+    if let Some(largest) = whole.iter_mut().max() {
+        *largest += off;
+    }
+    whole
 }
 
 #[cfg(test)]

@@ -15,8 +15,9 @@
 //! "Interactive digital photomontage", SIGGRAPH 2004 (the energy).
 
 use super::draw::{NO_FRAME, median};
+use super::run::{RUN, Run};
 use super::thumbnails::Thumbnails;
-use super::warp::{Points, RUN, Run};
+use super::warp::Points;
 use super::{Canvas, Exposure, Placement, Tile, tiles};
 use crate::surface::{Surface, WallFrame};
 use rayon::prelude::*;
@@ -241,7 +242,7 @@ fn sights(
         let start = row * columns;
         view.look_at(&mut run, start, columns);
         raw[..columns].copy_from_slice(&run.values()[..columns]);
-        response.undo(&mut run, columns);
+        response.undo(&mut run, 0..columns);
         let (u, v) = run.pixels();
         for k in 0..columns {
             if !run.seen()[k] {

@@ -13,8 +13,9 @@
 //! on Graphics 2(4), 1983.
 
 use super::draw::NO_FRAME;
+use super::run::{RUN, Run};
 use super::thumbnails::Thumbnails;
-use super::warp::{Points, RUN, Run};
+use super::warp::Points;
 use super::{Canvas, Exposure, Placement};
 use crate::surface::Surface;
 use rayon::prelude::*;
@@ -262,7 +263,7 @@ fn shown(
             let length = RUN.min(window.columns - column);
             let start = row * window.columns + column;
             view.look_at(&mut run, start, length);
-            response.undo(&mut run, length);
+            response.undo(&mut run, 0..length);
             for k in 0..length {
                 let (value, seen) = (run.values()[k], run.seen()[k]);
                 values.extend((0..channels).map(|c| if seen { value[c] } else { f32::NAN }));

@@ -1,5 +1,6 @@
 //! A decoded picture and its values between the pixels.
 
+use super::integer::PADDING;
 use super::kernel::Kernel;
 use super::sample::{Sample, Samples};
 use crate::frames::HalvedMask;
@@ -13,7 +14,7 @@ pub struct Picture {
     width: usize,
     height: usize,
     channels: usize,
-    /// One sample more than there are: a colour pixel is read four samples wide.
+    /// [`PADDING`] samples more than there are: pixels are read several at once.
     samples: Samples,
     /// Which pixels show the wall; all if there is none.
     mask: Option<HalvedMask>,
@@ -33,8 +34,8 @@ impl Picture {
             "samples of a picture"
         );
         match &mut samples {
-            Samples::Eight(samples) => samples.push(0),
-            Samples::Sixteen(samples) => samples.push(0),
+            Samples::Eight(samples) => pad(samples),
+            Samples::Sixteen(samples) => pad(samples),
         }
         Self {
             width,
@@ -93,7 +94,7 @@ impl Picture {
         }
     }
 
-    /// The samples, and one more at the end.
+    /// The samples, and [`PADDING`] more at the end.
     pub(super) fn samples(&self) -> &Samples {
         &self.samples
     }
@@ -157,7 +158,7 @@ impl Picture {
         let edge = 1 << level;
         let factor = scale / (edge * edge) as f32;
         let mut sums = vec![0.0f32; width * edge * c];
-        let mut data = Vec::with_capacity(width * height * c + 1);
+        let mut data = Vec::with_capacity(width * height * c + PADDING);
         for y in 0..height {
             sums.fill(0.0);
             // Down the columns first, side by side.
@@ -180,7 +181,7 @@ impl Picture {
     fn mean<T: Sample>(&self, samples: &[T]) -> Vec<T> {
         let (width, height, c) = (self.width / 2, self.height / 2, self.channels);
         let stride = self.width * c;
-        let mut data = Vec::with_capacity(width * height * c + 1);
+        let mut data = Vec::with_capacity(width * height * c + PADDING);
         for y in 0..height {
             let upper = &samples[2 * y * stride..][..stride];
             let lower = &samples[(2 * y + 1) * stride..][..stride];
@@ -234,6 +235,11 @@ impl Picture {
         let value = self.at(pixel.x as f32, pixel.y as f32, bilinear);
         luma(value) * (255.0 / self.format().white())
     }
+}
+
+fn pad<T: Sample>(samples: &mut Vec<T>) {
+    samples.reserve_exact(PADDING);
+    samples.extend([T::default(); PADDING]);
 }
 
 /// What the pixels of a picture are.

@@ -3,7 +3,7 @@
 use super::band::{Band, Target};
 use super::budget::Budget;
 use super::detail::Readings;
-use super::draw::{Composition, Drawn, Mode, Scene, Scratch};
+use super::draw::{Composition, Mode, Scene, Scratch};
 use super::seams::{self, Seams};
 use super::thumbnails::Thumbnails;
 use super::tiles::{EDGE, tiles_at};
@@ -266,16 +266,10 @@ impl<'a> Plan<'a> {
     fn fill(&self, band: &mut Band, frames: &FrameStack, row: u32, tiles: &[Tile]) {
         let scene = self.scene(frames);
         band.begin(&self.canvas, row, BAND_ROWS.min(self.canvas.rows - row));
-        // As many at once as keep all threads busy, and no more than stay in the cache until they are put in place.
-        for run in tiles.chunks(16 * rayon::current_num_threads().max(1)) {
-            let drawn: Vec<Drawn> = run
-                .par_iter()
-                .map_init(Scratch::default, |scratch, tile| scene.draw(tile, scratch))
-                .collect();
-            for (tile, drawn) in run.iter().zip(&drawn) {
-                band.put(&self.canvas, tile, drawn);
-            }
-        }
+        let places = band.places(&self.canvas, tiles);
+        (tiles.par_iter().zip(places)).for_each_init(Scratch::default, |scratch, (tile, place)| {
+            scene.draw(tile, place, scratch);
+        });
     }
 
     fn scene<'b>(&'b self, frames: &'b FrameStack) -> Scene<'b> {

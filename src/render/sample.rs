@@ -13,6 +13,9 @@ pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + '
 
     /// The nearest sample; numbers beyond the scale become its end (a cubic overshoots at edges).
     fn nearest(value: f32) -> Self;
+
+    /// The samples as bytes, if that is what they are.
+    fn bytes(samples: &mut [Self]) -> Option<&mut [u8]>;
 }
 
 /// 2²³: added to a number from 0 to 2²³, it leaves the nearest whole number (of two equally near the even one) in the last bits of the
@@ -20,7 +23,7 @@ pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + '
 pub const WHOLE: f32 = 8_388_608.0;
 
 macro_rules! sample {
-    ($($bits:ty),*) => {
+    ($($bits:ty, $bytes:expr);*) => {
         $(impl Sample for $bits {
             const WHITE: f32 = <$bits>::MAX as f32;
 
@@ -33,11 +36,16 @@ macro_rules! sample {
             fn nearest(value: f32) -> Self {
                 (value.clamp(0.0, Self::WHITE) + WHOLE).to_bits() as Self
             }
+
+            fn bytes(samples: &mut [Self]) -> Option<&mut [u8]> {
+                let bytes: fn(&mut [Self]) -> Option<&mut [u8]> = $bytes;
+                bytes(samples)
+            }
         })*
     };
 }
 
-sample!(u8, u16);
+sample!(u8, |samples| Some(samples); u16, |_| None);
 
 /// Samples of one kind, row-major, channels interleaved.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

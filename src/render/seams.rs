@@ -54,6 +54,13 @@ pub struct Between {
     t: f32,
 }
 
+impl Between {
+    /// The node before.
+    pub fn before(&self) -> usize {
+        self.before
+    }
+}
+
 impl Seams {
     /// Finds the best frame for each node of the grid over `canvas`, by thumbnails whose exposure is undone; with `blend`, also the
     /// correction. `white`: full scale of the frames.
@@ -91,6 +98,11 @@ impl Seams {
     pub(super) fn bytes_per_node(channels: usize) -> u64 {
         // Labels; composite, corrections and those of the coarser grids.
         (4 + 4 * (channels + 3 * (channels + 1))) as u64
+    }
+
+    /// True if frames stay as they are: every pixel is one frame's.
+    pub fn are_hard(&self) -> bool {
+        self.corrections.is_empty()
     }
 
     fn frame(&self, row: usize, column: usize) -> u32 {
@@ -182,6 +194,7 @@ impl Seams {
                 self.frame(row.after, cell.after),
             ];
             if corners.iter().any(|frame| *frame != corners[0]) {
+                shares.mixed = true;
                 self.mixed(&corners, &columns[from..to], row, from, shares);
             } else if corners[0] != NO_FRAME {
                 shares.whole(corners[0] as usize, from, to);
@@ -199,7 +212,6 @@ impl Seams {
         from: usize,
         shares: &mut Shares,
     ) {
-        let hard = self.corrections.is_empty();
         let mut frames = *corners;
         frames.sort_unstable();
         let weight = |between: &Between, frame: u32| {
@@ -211,24 +223,28 @@ impl Seams {
                 .filter(|(corner, _)| **corner == frame);
             own.map(|(_, w)| w).sum::<f32>()
         };
+        if self.are_hard() {
+            for (column, between) in columns.iter().enumerate() {
+                let mut best = (NO_FRAME, f32::NEG_INFINITY);
+                // Of equals the earlier frame.
+                for frame in frames.iter().filter(|frame| **frame != NO_FRAME) {
+                    let own = weight(between, *frame);
+                    if own > best.1 {
+                        best = (*frame, own);
+                    }
+                }
+                shares.whole(best.0 as usize, from + column, from + column + 1);
+            }
+            return;
+        }
         for (n, frame) in frames.iter().enumerate() {
             // Each frame once.
             if *frame == NO_FRAME || n > 0 && frames[n - 1] == *frame {
                 continue;
             }
             let start = shares.weights.len();
-            shares.weights.extend(columns.iter().map(|between| {
-                let own = weight(between, *frame);
-                if !hard {
-                    return own;
-                }
-                // Of equals the earlier frame.
-                let beaten = frames.iter().any(|other| {
-                    let theirs = weight(between, *other);
-                    *other != NO_FRAME && (theirs > own || theirs == own && other < frame)
-                });
-                if beaten { 0.0 } else { 1.0 }
-            }));
+            let own = columns.iter().map(|between| weight(between, *frame));
+            shares.weights.extend(own);
             shares.list.push(Share {
                 frame: *frame as usize,
                 from,
@@ -246,7 +262,7 @@ impl Seams {
         found: &mut Vec<[f32; 4]>,
     ) {
         found.clear();
-        if self.corrections.is_empty() {
+        if self.are_hard() {
             found.resize(columns.len(), [0.0; 4]);
             return;
         }
@@ -281,6 +297,8 @@ impl Seams {
 pub struct Shares {
     list: Vec<Share>,
     weights: Vec<f32>,
+    /// True if different frames meet in some cell.
+    mixed: bool,
 }
 
 /// A frame's part in the columns `from..to`.
@@ -300,6 +318,12 @@ impl Shares {
     fn clear(&mut self) {
         self.list.clear();
         self.weights.clear();
+        self.mixed = false;
+    }
+
+    /// True if all columns of every cell are one frame's.
+    pub fn are_whole(&self) -> bool {
+        !self.mixed
     }
 
     /// Columns that are one frame's.

@@ -330,8 +330,8 @@ fn colour_and_depth_change_nothing_in_grey() {
             .into_iter()
             .zip(drawn.to_rgba16().into_raw());
         let most = pairs.map(|(a, b)| a.abs_diff(b)).max();
-        // Half a grey level of 8 bits that the deeper picture keeps.
-        assert!(most <= Some(if deep { 129 } else { 0 }), "{most:?}");
+        // Half a grey level of 8 bits that the deeper picture keeps, and 1/40 that sums in whole numbers may be off.
+        assert!(most <= Some(if deep { 135 } else { 0 }), "{most:?}");
     }
 }
 

@@ -1,7 +1,8 @@
 //! All frames, small: enough to find out how they were exposed and where they agree.
 
 use super::kernel::{Interpolation, Kernel};
-use super::warp::{Look, Points, Run};
+use super::run::Run;
+use super::warp::{Look, Points};
 use super::{
     Canvas, FrameStack, Picture, PixelFormat, Placement, RenderError, native_px_per_metre,
 };
@@ -146,6 +147,6 @@ impl ThumbnailView<'_> {
     /// Looks at `count` of the points from index `start`: where they appear, and the values there, bilinear.
     pub fn look_at(&self, run: &mut Run, start: usize, count: usize) {
         run.project(&self.look, self.points, start, count);
-        run.sample(self.picture, self.bilinear, count);
+        run.sample(self.picture, self.bilinear, 0..count);
     }
 }

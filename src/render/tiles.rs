@@ -1,6 +1,6 @@
 //! The canvas in small squares, each with the frames that may see it.
 
-use super::warp::RUN;
+use super::run::RUN;
 use super::{Canvas, Placement};
 use crate::surface::{Footprint, Surface, WallPoint};
 use nalgebra::Vector3;

@@ -1,10 +1,14 @@
 //! A frame as a tile of the canvas looks at it.
 
+use super::chart::{Chart, Lattice, Projected};
 use super::exposure::Response;
 use super::kernel::{Interpolation, Kernel};
-use super::warp::{Look, Points, Run};
+use super::run::Run;
+use super::sample::Samples;
+use super::warp::{Look, Points};
 use super::{Picture, Placement};
 use crate::camera::Camera;
+use std::ops::Range;
 
 /// Kernels are made for stretches of this step from 1 upwards.
 const STRETCH_STEP: f64 = 0.25;
@@ -37,71 +41,129 @@ pub struct View<'a> {
     /// Index of the frame.
     pub frame: usize,
     look: Look,
+    chart: Chart,
     picture: &'a Picture,
     kernels: &'a Kernels,
     response: Response<'a>,
-    /// Points in a row of the tile.
-    columns: usize,
     /// `2/width`, `2/height` of the picture, and the last pixel centres.
     feather: [f32; 4],
 }
 
 impl<'a> View<'a> {
-    /// A frame (its index, place and picture) as it is seen from a tile with the given `points`, `columns` in a row.
+    /// A frame (its index, place and picture) as it is seen from a tile with the given `lattice`.
     pub fn new(
         (frame, placement, picture): (usize, &Placement, &'a Picture),
         camera: &Camera,
         kernels: &'a Kernels,
         response: Response<'a>,
-        points: &Points,
-        columns: usize,
+        lattice: &Lattice,
+        projected: &mut Projected,
     ) -> Self {
         let (width, height) = (camera.width as f32, camera.height as f32);
+        let origin = &lattice.points().origin;
+        let look = Look::new(&placement.camera(camera), &placement.pose, origin);
+        let chart = Chart::new(&look, lattice, projected);
         Self {
             frame,
-            look: Look::new(&placement.camera(camera), &placement.pose, &points.origin),
-            picture,
+            look,
+            chart,
             kernels,
+            picture,
             response,
-            columns,
             feather: [2.0 / width, 2.0 / height, width - 0.5, height - 0.5],
         }
     }
 
-    /// Looks at `count` points of a row from index `start`: where they appear, and the values there with the frame's exposure
-    /// undone.
-    pub fn look_at(&self, run: &mut Run, points: &Points, start: usize, count: usize) {
-        run.project(&self.look, points, start, count);
-        let half = count / 2;
-        let seen = &run.seen()[..count];
-        let found = seen[half..].iter().position(|seen| *seen).map(|k| half + k);
-        let Some(k) = found.or_else(|| seen[..half].iter().rposition(|seen| *seen)) else {
-            return;
-        };
-        let stretch = self.stretch(points, start + k);
-        run.sample(self.picture, self.kernels.stretched(stretch), count);
-        self.response.undo(run, count);
+    /// True if the frame shows some of the tile.
+    pub fn shows(&self) -> bool {
+        !self.chart.is_outside()
     }
 
-    /// How many pixels of the frame a step of one canvas pixel covers at a point, along that axis of the frame along which
-    /// it covers more.
-    fn stretch(&self, points: &Points, at: usize) -> f32 {
-        let (u, v) = self.look.pixel(points, at);
-        // The neighbours after it, or before it at the end of a row or column.
-        let step = |after: usize, before: Option<usize>, ends: bool| {
-            let other = match (ends || after >= points.len(), before) {
-                (false, _) => after,
-                (true, Some(before)) => before,
-                (true, None) => at,
-            };
-            let (s, t) = self.look.pixel(points, other);
-            (s - u, t - v)
+    /// True if some of the tile's points are to be projected one by one.
+    pub fn is_rough(&self) -> bool {
+        self.chart.is_rough()
+    }
+
+    /// Looks at some columns of a row of a tile `width` columns wide: where they appear, and the values there with the frame's exposure
+    /// undone. `points`: all of the tile's, if the view is rough.
+    pub fn look_at(
+        &self,
+        run: &mut Run,
+        points: &Points,
+        place: (usize, usize),
+        columns: Range<usize>,
+    ) {
+        run.locate(&self.chart, &self.look, points, place, columns.clone());
+        if let Some(kernel) = self.kernel(run, points, place, columns.clone()) {
+            run.sample(self.picture, kernel, columns.clone());
+            self.response.undo(run, columns);
+        }
+    }
+
+    /// Whether [`View::copy`] can do it: 8 bits, more than the nearest pixel, no exposure to be undone.
+    pub fn copies(&self) -> bool {
+        let eight = matches!(self.picture.samples(), Samples::Eight(_));
+        eight && self.kernels.stretched(1.0).taps() > 1 && self.response.is_none()
+    }
+
+    /// As [`View::look_at`], with the values straight into `pixels`, alpha last.
+    pub fn copy<const C: usize>(
+        &self,
+        run: &mut Run,
+        points: &Points,
+        place: (usize, usize),
+        columns: Range<usize>,
+        pixels: &mut [u8],
+    ) {
+        run.locate(&self.chart, &self.look, points, place, columns.clone());
+        let kernel = self.kernel(run, points, place, columns.clone());
+        match (kernel, self.picture.samples()) {
+            (Some(kernel), Samples::Eight(samples)) => {
+                run.copy::<C>(self.picture, samples, kernel, columns, pixels);
+            }
+            _ => pixels.fill(0),
+        }
+    }
+
+    /// The kernel for points that were found before: as wide as the frame is finer than the canvas where it shows one of them, next to
+    /// the middle. None if it shows none.
+    fn kernel(
+        &self,
+        run: &Run,
+        points: &Points,
+        (row, width): (usize, usize),
+        columns: Range<usize>,
+    ) -> Option<&'a Kernel> {
+        let seen = run.seen();
+        let half = columns.start + columns.len() / 2;
+        let column = (half..columns.end)
+            .find(|k| seen[*k])
+            .or_else(|| (columns.start..half).rev().find(|k| seen[*k]))?;
+        let steps = self.chart.steps(row, column);
+        let [s, h] = steps.unwrap_or_else(|| self.exact_steps(points, (row, width), column));
+        // Frame pixels to a step of one canvas pixel, along that axis of the frame along which there are more.
+        let square = |k: usize| s[k] * s[k] + h[k] * h[k];
+        Some(self.kernels.stretched(square(0).max(square(1)).sqrt()))
+    }
+
+    /// [`Chart::steps`] from one point to the next, or from the one before where a row or column ends.
+    fn exact_steps(
+        &self,
+        points: &Points,
+        (row, width): (usize, usize),
+        column: usize,
+    ) -> [[f32; 2]; 2] {
+        let at = row * width + column;
+        let own = self.look.pixel(points, at);
+        let step = |after: Option<usize>, before: Option<usize>| {
+            let other = after.or(before).unwrap_or(at);
+            let other = self.look.pixel(points, other);
+            [other[0] - own[0], other[1] - own[1]]
         };
-        let ends = (at + 1).is_multiple_of(self.columns);
-        let before = at.checked_sub(1).filter(|_| self.columns > 1);
-        let (u_s, v_s) = step(at + 1, before, ends);
-        let (u_h, v_h) = step(at + self.columns, at.checked_sub(self.columns), false);
-        (u_s * u_s + u_h * u_h).max(v_s * v_s + v_h * v_h).sqrt()
+        let right = (column + 1 < width).then_some(at + 1);
+        let below = Some(at + width).filter(|below| *below < points.len());
+        let left = (column > 0).then(|| at - 1);
+        [step(right, left), step(below, at.checked_sub(width))]
     }
 
     /// `tent(u) tent(v)`: 1 in the middle, falling to 0 half a pixel beyond the outermost pixel centres.

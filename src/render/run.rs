@@ -1,0 +1,477 @@
+//! What a frame shows of a run of points: geometry and sampling in one pass.
+
+use super::chart::{Chart, PATCH};
+use super::integer::{self, Places, Source};
+use super::kernel::Kernel;
+use super::picture::Picture;
+use super::sample::{Sample, Samples, WHOLE};
+use super::warp::{Look, Points};
+use crate::vectors::wide;
+use std::ops::Range;
+
+/// Most points of a run: all that is known of a run stays in the first-level cache.
+pub const RUN: usize = 128;
+
+/// Where a run of points appears in a frame, and the values there: colour in the first three of four lanes, grey in the
+/// first.
+pub struct Run {
+    u: [f32; RUN],
+    v: [f32; RUN],
+    seen: [bool; RUN],
+    /// Index of the first sample under the kernel.
+    first: [u32; RUN],
+    /// Tabulated phases along u and v.
+    phases: [[i32; RUN]; 2],
+    /// True where the kernel lies within the picture.
+    inside: [bool; RUN],
+    /// Whole-numbered sums under the kernel.
+    sums: [[i32; 4]; RUN],
+    values: [[f32; 4]; RUN],
+}
+
+impl Default for Run {
+    fn default() -> Self {
+        Self {
+            u: [0.0; RUN],
+            v: [0.0; RUN],
+            seen: [false; RUN],
+            first: [0; RUN],
+            phases: [[0; RUN]; 2],
+            inside: [false; RUN],
+            sums: [[0; 4]; RUN],
+            values: [[0.0; 4]; RUN],
+        }
+    }
+}
+
+impl Run {
+    /// Which of the points the frame shows; after [`Run::sample`] and [`Run::copy`], without those whose kernel meets a masked pixel.
+    #[inline(always)]
+    pub fn seen(&self) -> &[bool; RUN] {
+        &self.seen
+    }
+
+    /// The pixel coordinates of the points, u and v.
+    #[inline(always)]
+    pub fn pixels(&self) -> (&[f32; RUN], &[f32; RUN]) {
+        (&self.u, &self.v)
+    }
+
+    /// The values at the points that the frame shows.
+    #[inline(always)]
+    pub fn values(&self) -> &[[f32; 4]; RUN] {
+        &self.values
+    }
+
+    /// The pixel coordinates, which of them are seen, and the values to be changed.
+    #[inline(always)]
+    #[expect(clippy::type_complexity, reason = "parts of the run, side by side")]
+    pub fn parts(&mut self) -> (&[f32; RUN], &[f32; RUN], &[bool; RUN], &mut [[f32; 4]; RUN]) {
+        (&self.u, &self.v, &self.seen, &mut self.values)
+    }
+
+    /// Finds the pixels of `count` points from index `start`, one by one.
+    pub fn project(&mut self, look: &Look, points: &Points, start: usize, count: usize) {
+        let (u, v) = (&mut self.u[..count], &mut self.v[..count]);
+        let seen = &mut self.seen[..count];
+        look.project_all(points, start, (u, v, seen));
+        let limit = look.limit();
+        wide(
+            #[inline(always)]
+            || {
+                for k in 0..count {
+                    seen[k] &= within(u[k], v[k], limit);
+                }
+            },
+        );
+    }
+
+    /// Finds the pixels of the points in some columns of a row of a tile by its chart; `points`: all of the tile's, one by one, if the chart
+    /// is rough somewhere, `width` in a row.
+    pub fn locate(
+        &mut self,
+        chart: &Chart,
+        look: &Look,
+        points: &Points,
+        (row, width): (usize, usize),
+        columns: Range<usize>,
+    ) {
+        let patches = patches(&columns);
+        let limit = look.limit();
+        let mut rough = [false; RUN / PATCH];
+        let (u, v) = (
+            self.u.as_chunks_mut::<PATCH>().0,
+            self.v.as_chunks_mut::<PATCH>().0,
+        );
+        let seen = self.seen.as_chunks_mut::<PATCH>().0;
+        wide(
+            #[inline(always)]
+            || {
+                for patch in patches.clone() {
+                    let (u, v) = (&mut u[patch], &mut v[patch]);
+                    rough[patch] = !chart.row(row, patch, u, v);
+                    for (k, seen) in seen[patch].iter_mut().enumerate() {
+                        *seen = within(u[k], v[k], limit);
+                    }
+                }
+            },
+        );
+        for patch in patches.filter(|patch| rough[*patch]) {
+            let count = PATCH.min(width - patch * PATCH);
+            let (u, v) = (&mut u[patch][..count], &mut v[patch][..count]);
+            let seen = &mut seen[patch][..count];
+            look.project_all(points, row * width + patch * PATCH, (u, v, seen));
+            for (k, seen) in seen.iter_mut().enumerate() {
+                *seen &= within(u[k], v[k], limit);
+            }
+        }
+    }
+
+    /// Points whose kernel meets a masked pixel are not seen.
+    fn hide(&mut self, picture: &Picture, kernel: &Kernel, columns: Range<usize>) {
+        if picture.mask().is_some() {
+            for k in columns {
+                self.seen[k] = self.seen[k] && picture.shows(self.u[k], self.v[k], kernel);
+            }
+        }
+    }
+
+    /// Looks up the values in some columns whose pixels were found before.
+    pub fn sample(&mut self, picture: &Picture, kernel: &Kernel, columns: Range<usize>) {
+        self.hide(picture, kernel, columns.clone());
+        match (picture.samples(), picture.format().channels) {
+            (Samples::Eight(samples), 1) if kernel.taps() > 1 => {
+                self.integer_values::<1>(picture, samples, kernel, columns);
+            }
+            (Samples::Eight(samples), _) if kernel.taps() > 1 => {
+                self.integer_values::<3>(picture, samples, kernel, columns);
+            }
+            (Samples::Eight(samples), 1) => {
+                self.float_values::<u8, 1>(picture, samples, kernel, columns);
+            }
+            (Samples::Eight(samples), _) => {
+                self.float_values::<u8, 3>(picture, samples, kernel, columns);
+            }
+            (Samples::Sixteen(samples), 1) => {
+                self.float_values::<u16, 1>(picture, samples, kernel, columns);
+            }
+            (Samples::Sixteen(samples), _) => {
+                self.float_values::<u16, 3>(picture, samples, kernel, columns);
+            }
+        }
+    }
+
+    /// Puts the values in some columns whose pixels were found before straight into `pixels`, alpha last; nothing where
+    /// the frame does not show the wall.
+    pub fn copy<const C: usize>(
+        &mut self,
+        picture: &Picture,
+        samples: &[u8],
+        kernel: &Kernel,
+        columns: Range<usize>,
+        pixels: &mut [u8],
+    ) {
+        self.hide(picture, kernel, columns.clone());
+        let all_inside = self.integer_sums::<C>(picture, samples, kernel, columns.clone());
+        let sums = &self.sums[columns.clone()];
+        integer::pixels::<C>(kernel, sums, pixels);
+        if all_inside {
+            return;
+        }
+        for (k, pixel) in columns.zip(pixels.chunks_exact_mut(C + 1)) {
+            if !self.seen[k] {
+                pixel.fill(0);
+            } else if !self.inside[k] {
+                let value = picture.at(self.u[k], self.v[k], kernel);
+                for (sample, value) in pixel.iter_mut().zip(&value[..C]) {
+                    *sample = u8::nearest(*value);
+                }
+            }
+        }
+    }
+
+    fn integer_values<const C: usize>(
+        &mut self,
+        picture: &Picture,
+        samples: &[u8],
+        kernel: &Kernel,
+        columns: Range<usize>,
+    ) {
+        let all_inside = self.integer_sums::<C>(picture, samples, kernel, columns.clone());
+        let (sums, values) = (
+            &self.sums[columns.clone()],
+            &mut self.values[columns.clone()],
+        );
+        let missing = integer::missing(kernel);
+        let scale = 1.0 / (1u32 << integer::bits(kernel)) as f32;
+        wide(
+            #[inline(always)]
+            || {
+                for (value, sum) in values.iter_mut().zip(sums) {
+                    for (value, sum) in value.iter_mut().zip(sum) {
+                        *value = (sum + missing) as f32 * scale;
+                    }
+                }
+            },
+        );
+        if !all_inside {
+            self.values_at_the_border(picture, kernel, columns);
+        }
+    }
+
+    /// Sums under the kernel where all of it lies in the picture, anything elsewhere; true if that is everywhere.
+    fn integer_sums<const C: usize>(
+        &mut self,
+        picture: &Picture,
+        samples: &[u8],
+        kernel: &Kernel,
+        columns: Range<usize>,
+    ) -> bool {
+        let all_inside = self.address(picture, kernel, kernel.integer_phases(), columns.clone());
+        if !fits(picture, kernel) {
+            return false;
+        }
+        let source = Source {
+            samples,
+            stride: picture.width() * C,
+        };
+        touch(
+            samples,
+            &self.first[columns.clone()],
+            (kernel.taps() + 1) * source.stride,
+        );
+        let places = Places {
+            first: &self.first[columns.clone()],
+            phases: [
+                &self.phases[0][columns.clone()],
+                &self.phases[1][columns.clone()],
+            ],
+        };
+        integer::sums::<C>(source, kernel, places, &mut self.sums[columns]);
+        all_inside
+    }
+
+    fn float_values<T: Sample, const C: usize>(
+        &mut self,
+        picture: &Picture,
+        samples: &[T],
+        kernel: &Kernel,
+        columns: Range<usize>,
+    ) {
+        let all_inside = self.address(picture, kernel, Kernel::PHASES, columns.clone());
+        let stride = picture.width() * C;
+        wide(
+            #[inline(always)]
+            || {
+                let columns = columns.clone();
+                match kernel.taps() {
+                    1 => self.gather::<T, C, 1>(samples, stride, kernel, columns),
+                    2 => self.gather::<T, C, 2>(samples, stride, kernel, columns),
+                    4 => self.gather::<T, C, 4>(samples, stride, kernel, columns),
+                    8 => self.gather::<T, C, 8>(samples, stride, kernel, columns),
+                    12 => self.gather::<T, C, 12>(samples, stride, kernel, columns),
+                    _ => self.inside[columns].fill(false),
+                }
+            },
+        );
+        if !all_inside || kernel.taps() > 12 {
+            self.values_at_the_border(picture, kernel, columns);
+        }
+    }
+
+    /// Pixels beyond the border repeat the outermost one.
+    fn values_at_the_border(&mut self, picture: &Picture, kernel: &Kernel, columns: Range<usize>) {
+        for k in columns {
+            if self.seen[k] && !self.inside[k] {
+                let [red, green, blue] = picture.at(self.u[k], self.v[k], kernel);
+                self.values[k] = [red, green, blue, 0.0];
+            }
+        }
+    }
+
+    /// The samples and phases that each point needs; those of the first pixel where the kernel does not lie within the picture. True if
+    /// it does everywhere.
+    fn address(
+        &mut self,
+        picture: &Picture,
+        kernel: &Kernel,
+        phases: f32,
+        columns: Range<usize>,
+    ) -> bool {
+        let (taps, before) = (kernel.taps() as i32, kernel.before() as i32);
+        let (width, height) = (picture.width() as i32, picture.height() as i32);
+        let (right, bottom) = (width - taps, height - taps);
+        let channels = picture.format().channels as i32;
+        let rounding = kernel.rounding();
+        let (u, v) = (self.u.as_chunks::<PATCH>().0, self.v.as_chunks::<PATCH>().0);
+        let seen = self.seen.as_chunks::<PATCH>().0;
+        let first = self.first.as_chunks_mut::<PATCH>().0;
+        let inside = self.inside.as_chunks_mut::<PATCH>().0;
+        let [across, down] = &mut self.phases;
+        let across = across.as_chunks_mut::<PATCH>().0;
+        let down = down.as_chunks_mut::<PATCH>().0;
+        wide(
+            #[inline(always)]
+            || {
+                for patch in patches(&columns) {
+                    let (u, v, seen) = (&u[patch], &v[patch], &seen[patch]);
+                    let (across, down) = (&mut across[patch], &mut down[patch]);
+                    let (first, inside) = (&mut first[patch], &mut inside[patch]);
+                    for k in 0..PATCH {
+                        let (x, s) = whole(u[k] + rounding);
+                        let (y, t) = whole(v[k] + rounding);
+                        across[k] = Kernel::phase_of(s, phases);
+                        down[k] = Kernel::phase_of(t, phases);
+                        let (left, top) = (x - before, y - before);
+                        let within =
+                            seen[k] & (left >= 0) & (top >= 0) & (left <= right) & (top <= bottom);
+                        inside[k] = within;
+                        let at = top.wrapping_mul(width).wrapping_add(left);
+                        first[k] = if within {
+                            at.wrapping_mul(channels) as u32
+                        } else {
+                            0
+                        };
+                    }
+                }
+            },
+        );
+        !self.inside[columns].contains(&false)
+    }
+
+    /// `Σ_y w_y Σ_x w_x I(x, y)` over `N × N` pixels, where all of them lie in the picture.
+    #[inline(always)]
+    fn gather<T: Sample, const C: usize, const N: usize>(
+        &mut self,
+        samples: &[T],
+        stride: usize,
+        kernel: &Kernel,
+        columns: Range<usize>,
+    ) {
+        for k in columns {
+            if !self.inside[k] {
+                continue;
+            }
+            let w_x = kernel.at(self.phases[0][k] as usize).first_chunk();
+            let w_y = kernel.at(self.phases[1][k] as usize).first_chunk();
+            // A kernel of N taps has N weights.
+            let (Some(w_x), Some(w_y)) = (w_x, w_y) else {
+                continue;
+            };
+            let own = &samples[self.first[k] as usize..];
+            self.values[k] = if C == 1 {
+                [grey::<T, N>(own, stride, w_x, w_y), 0.0, 0.0, 0.0]
+            } else {
+                colour::<T, N>(own, stride, w_x, w_y)
+            };
+        }
+    }
+}
+
+/// Reads what is `ahead` of the samples, so that it is in the cache when the next row needs it.
+fn touch(samples: &[u8], first: &[u32], ahead: usize) {
+    /// Pixels of a cache line, about.
+    const LINE: usize = 16;
+    let mut sum = 0;
+    for first in first.chunks(LINE) {
+        sum ^= samples
+            .get(first[0] as usize + ahead)
+            .copied()
+            .unwrap_or_default();
+    }
+    std::hint::black_box(sum);
+}
+
+/// The patches that some columns lie in.
+fn patches(columns: &Range<usize>) -> Range<usize> {
+    columns.start / PATCH..columns.end.div_ceil(PATCH)
+}
+
+/// True within the outermost pixel centres.
+#[inline(always)]
+fn within(u: f32, v: f32, limit: [f32; 2]) -> bool {
+    (u >= 0.0) & (v >= 0.0) & (u <= limit[0]) & (v <= limit[1])
+}
+
+/// Whether a picture is as large as the kernel.
+fn fits(picture: &Picture, kernel: &Kernel) -> bool {
+    picture.width().min(picture.height()) >= kernel.taps()
+}
+
+/// A number from 0 to 2²² cut to the whole number below it, and what was cut off; anything for other numbers.
+#[inline(always)]
+fn whole(value: f32) -> (i32, f32) {
+    let nearest = (value + WHOLE) - WHOLE;
+    let below = if nearest > value {
+        nearest - 1.0
+    } else {
+        nearest
+    };
+    (
+        ((below + WHOLE).to_bits() & 0x7f_ffff) as i32,
+        value - below,
+    )
+}
+
+/// The grey value under a kernel that begins with the first sample: down the columns first, side by side.
+///
+/// Arrays of fixed size, here and in [`colour`], are what the compiler makes vectors of.
+#[inline(always)]
+fn grey<T: Sample, const N: usize>(
+    samples: &[T],
+    stride: usize,
+    w_x: &[f32; N],
+    w_y: &[f32; N],
+) -> f32 {
+    let mut columns = [0.0f32; N];
+    for (j, w) in w_y.iter().enumerate() {
+        if let Some(row) = samples[j * stride..].first_chunk::<N>() {
+            columns = std::array::from_fn(|k| columns[k] + w * row[k].value());
+        }
+    }
+    let mut value = 0.0;
+    for (w, column) in w_x.iter().zip(columns) {
+        value += w * column;
+    }
+    value
+}
+
+/// The colour under a kernel that begins with the first sample. Pixels are read four samples wide; the fourth lane is the
+/// neighbour's and means nothing.
+#[inline(always)]
+fn colour<T: Sample, const N: usize>(
+    samples: &[T],
+    stride: usize,
+    w_x: &[f32; N],
+    w_y: &[f32; N],
+) -> [f32; 4] {
+    let mut value = [0.0f32; 4];
+    for (j, w_y) in w_y.iter().enumerate() {
+        let row = &samples[j * stride..][..3 * N + 1];
+        let mut sum = [0.0f32; 4];
+        for (k, w_x) in w_x.iter().enumerate() {
+            if let Some(pixel) = row[3 * k..].first_chunk::<4>() {
+                sum = std::array::from_fn(|c| sum[c] + w_x * pixel[c].value());
+            }
+        }
+        value = std::array::from_fn(|c| value[c] + w_y * sum[c]);
+    }
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_cut_to_the_whole_below() {
+        for (value, below, rest) in [
+            (0.0, 0, 0.0),
+            (0.75, 0, 0.75),
+            (1.0, 1, 0.0),
+            (4095.5, 4095, 0.5),
+        ] {
+            assert_eq!(whole(value), (below, rest));
+        }
+    }
+}
