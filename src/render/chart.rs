@@ -6,8 +6,8 @@
 //! `u(x, y) = Σ_kl c_kl x^k y^l`, `k, l = 0 … 3`,
 //!
 //! through the exact projections of 4 × 4 points at ±1 and ±(√2 − 1). There the error of an interpolated cubic is the same
-//! on the border as in the middle, `0.17/4! ∂⁴u` to first order; in between, at 0, it is measured against the exact projection of nine points more. A patch
-//! where that finds more than [`MOST_OFF_PX`] is projected point by point.
+//! on the border as in the middle, `0.17/4! ∂⁴u` to first order; in between, at 0, it is measured against the exact projection of nine
+//! points more. A patch where that finds more than [`MOST_OFF_PX`] is projected point by point.
 
 use super::warp::{Look, Points};
 use super::{Canvas, Tile};
@@ -153,17 +153,23 @@ impl Chart {
         let Patch::Smooth(c) = patch else {
             return None;
         };
-        let place = |at: usize| (at % PATCH) as f32 * SCALE - 1.0;
-        let (x, y) = (place(column), place(row));
-        let value = |c: [f32; 4], t: f32| ((c[3] * t + c[2]) * t + c[1]) * t + c[0];
-        let slope = |c: [f32; 4], t: f32| SCALE * ((3.0 * c[3] * t + 2.0 * c[2]) * t + c[1]);
-        let steps = |first: usize| {
-            let of_x = [0, 1, 2, 3].map(|k| value([0, 1, 2, 3].map(|l| c[l][first + k]), y));
-            let of_y = [0, 1, 2, 3].map(|k| slope([0, 1, 2, 3].map(|l| c[l][first + k]), y));
-            [slope(of_x, x), value(of_y, x)]
-        };
-        let ([u_s, u_h], [v_s, v_h]) = (steps(0), steps(4));
-        Some([[u_s, v_s], [u_h, v_h]])
+        let x = (column % PATCH) as f32 * SCALE - 1.0;
+        let y = (row % PATCH) as f32 * SCALE - 1.0;
+        // By powers of x, and their slopes along y.
+        let (mut at, mut down) = (c[3], [0.0; 8]);
+        for c in [&c[2], &c[1], &c[0]] {
+            for k in 0..8 {
+                down[k] = down[k] * y + at[k];
+                at[k] = at[k] * y + c[k];
+            }
+        }
+        let mut steps = [[0.0; 2]; 2];
+        for (k, first) in [0, 4].into_iter().enumerate() {
+            let (p, q) = (&at[first..first + 4], &down[first..first + 4]);
+            steps[0][k] = SCALE * ((3.0 * p[3] * x + 2.0 * p[2]) * x + p[1]);
+            steps[1][k] = SCALE * (((q[3] * x + q[2]) * x + q[1]) * x + q[0]);
+        }
+        Some(steps)
     }
 
     /// True if no pixel of the tile lies in the frame.
@@ -260,7 +266,7 @@ fn coefficients(at: &[[f32; 5]; 5]) -> Option<[[f32; 4]; 4]> {
             }
             let off = value(*x as f32, *y as f32) - (at[row][column] - middle);
             // NaN does not fit, either.
-            if !(off.abs() <= MOST_OFF_PX) {
+            if off.is_nan() || off.abs() > MOST_OFF_PX {
                 return None;
             }
         }

@@ -342,14 +342,18 @@ impl<const C: usize> Brush<'_, C> {
     ) {
         let (points, place) = (self.points, (row, self.width));
         self.sums.clear(self.width);
-        for (share, weights) in shares.iter() {
-            let Some(view) = view_of(self.views, share.frame) else {
+        for view in self.views {
+            let own = || shares.iter().filter(|(share, _)| share.frame == view.frame);
+            let Some(from) = own().map(|(share, _)| share.from).min() else {
                 continue;
             };
-            view.look_at(self.run, points, place, share.from..share.to);
-            match weights {
-                Some(weights) => self.sums.mix(self.run, share.frame, share.from, weights),
-                None => self.sums.set(self.run, share.frame, share.from..share.to),
+            let to = own().map(|(share, _)| share.to).max().unwrap_or(from);
+            view.look_at(self.run, points, place, from..to);
+            for (share, weights) in own() {
+                match weights {
+                    Some(weights) => self.sums.mix(self.run, share.frame, share.from, weights),
+                    None => self.sums.set(self.run, share.frame, share.from..share.to),
+                }
             }
         }
         // At the edge of what is seen: frames that no node of the grid shows.

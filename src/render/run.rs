@@ -235,11 +235,10 @@ impl Run {
             samples,
             stride: picture.width() * C,
         };
-        touch(
-            samples,
-            &self.first[columns.clone()],
-            (kernel.taps() + 1) * source.stride,
-        );
+        if columns.len() >= PATCH {
+            let ahead = (kernel.taps() + 1) * source.stride;
+            touch(samples, &self.first[columns.clone()], ahead);
+        }
         let places = Places {
             first: &self.first[columns.clone()],
             phases: [
