@@ -167,7 +167,7 @@ pub fn refine_keeping(
             }
             clock.lap("decode");
             let tracking = Retracking::begin(examined.doubts);
-            (examined.noise, Phase::Tracking(tracking))
+            (examined.noise, Phase::Tracking(Box::new(tracking)))
         }
     };
     scene.noise = noise;
@@ -192,7 +192,7 @@ pub fn refine_keeping(
             };
             let stopping = close(options, options.handover_level(side));
             let between = |tracking: &Retracking| {
-                keeper.if_due(|| keep(Phase::Tracking(tracking.clone()), &clock))?;
+                keeper.if_due(|| keep(Phase::Tracking(Box::new(tracking.clone())), &clock))?;
                 Ok(())
             };
             let mut tracked = tracking.finish(

@@ -32,7 +32,7 @@ pub struct RunState {
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Phase {
     /// Frames are being placed.
-    Tracking(Retracking),
+    Tracking(Box<Retracking>),
     /// All frames are placed.
     Solving(Box<Solving>),
 }
