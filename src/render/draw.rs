@@ -348,8 +348,9 @@ impl<const C: usize> Brush<'_, C> {
                 continue;
             };
             let to = own().map(|(share, _)| share.to).max().unwrap_or(from);
-            view.look_at(self.run, points, place, from..to);
+            view.locate(self.run, points, place, from..to);
             for (share, weights) in own() {
+                view.values(self.run, points, place, share.from..share.to);
                 match weights {
                     Some(weights) => self.sums.mix(self.run, share.frame, share.from, weights),
                     None => self.sums.set(self.run, share.frame, share.from..share.to),

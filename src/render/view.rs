@@ -93,7 +93,29 @@ impl<'a> View<'a> {
         place: (usize, usize),
         columns: Range<usize>,
     ) {
-        run.locate(&self.chart, &self.look, points, place, columns.clone());
+        self.locate(run, points, place, columns.clone());
+        self.values(run, points, place, columns);
+    }
+
+    /// The first half of [`View::look_at`]: where they appear.
+    pub fn locate(
+        &self,
+        run: &mut Run,
+        points: &Points,
+        place: (usize, usize),
+        columns: Range<usize>,
+    ) {
+        run.locate(&self.chart, &self.look, points, place, columns);
+    }
+
+    /// The second half, for columns that were located: one kernel for all of them.
+    pub fn values(
+        &self,
+        run: &mut Run,
+        points: &Points,
+        place: (usize, usize),
+        columns: Range<usize>,
+    ) {
         if let Some(kernel) = self.kernel(run, points, place, columns.clone()) {
             run.sample(self.picture, kernel, columns.clone());
             self.response.undo(run, columns);
