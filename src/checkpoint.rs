@@ -108,7 +108,7 @@ impl Origin {
         if self.program != other.program {
             return Some(format!(
                 "it is of {}, and this is {}",
-                other.program, self.program
+                self.program, other.program
             ));
         }
         if self.options != other.options {

@@ -11,7 +11,7 @@
 //! survey.toml ─ survey ──┬─> refine ──> poses.tum, refine.json ──┐
 //!   camera, trajectory,  │                                       v
 //!   surface, frames      └─> render <── initial, refined, true poses ──> panoramas
-//!                                            │
+//!                                            ├─> inspect ──> GLB, 3D Tiles, a page to walk through
 //! simulate ──> a survey with true poses      └─> evaluate ──> compare.json
 //!                                                   └─> report ──> report.html, report.json
 //! ```
@@ -19,7 +19,8 @@
 //! [`camera`], [`trajectory`] and [`surface`] are the geometry; [`frames`] loads the pictures; [`refine`],
 //! [`render`] and [`simulate`] know nothing of each other and share the geometry only (the simulator not even
 //! the ray–wall intersection, so that it can judge the others); [`raster`] writes pictures larger than the memory;
-//! [`evaluate`] measures; [`report`] makes a page of it all; [`cli`] prints.
+//! [`evaluate`] measures; [`report`] makes a page of it all; [`inspect`] puts the panorama on the wall in three dimensions;
+//! [`cli`] prints.
 //!
 //! # An example
 //!
@@ -94,6 +95,7 @@ pub mod checkpoint;
 pub mod cli;
 pub mod evaluate;
 pub mod frames;
+pub mod inspect;
 mod lettering;
 pub mod progress;
 pub mod provenance;

@@ -82,11 +82,14 @@ pub fn input(path: &Path) -> Result<Input, HashError> {
     })
 }
 
-/// Hashes the frames of a survey, in their order.
+/// Hashes the frames of a survey, in their order, or the video that they are in.
 ///
 /// # Errors
 /// [`HashError`] of the first that cannot be read.
 pub fn frames(frames: &[FrameFile]) -> Result<Input, HashError> {
+    if let Some(frame) = frames.first().filter(|frame| frame.is_in_video()) {
+        return input(frame.file());
+    }
     let paths: Vec<&Path> = frames.iter().map(|frame| frame.path.as_path()).collect();
     let folder = paths.first().and_then(|path| path.parent());
     Ok(Input {
@@ -106,7 +109,7 @@ mod tests {
         let frame = |name: &str, content: &str| {
             let path = dir.path().join(name);
             std::fs::write(&path, content).unwrap();
-            FrameFile { index: 0, path }
+            FrameFile::picture(0, path)
         };
         let (a, b) = (frame("a.png", "one"), frame("b.png", "two"));
         let both = frames(&[a.clone(), b.clone()]).unwrap();

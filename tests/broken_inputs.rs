@@ -98,6 +98,70 @@ const ROWS: &[Row] = &[
         &["survey.toml:", "string"],
     ),
     (
+        Edit(TOML, "\"circle\"", "\"box\""),
+        STITCH,
+        3,
+        &["survey.toml", "radius_m", "not a size"],
+    ),
+    (
+        Edit(
+            TOML,
+            "radius_m = 3",
+            "centreline = \"none.txt\"\nradius_m = 3",
+        ),
+        CHECK,
+        3,
+        &["none.txt", "cannot read"],
+    ),
+    (
+        Edit(
+            TOML,
+            "radius_m = 3",
+            "centreline = \"camera.json\"\nradius_m = 3",
+        ),
+        REFINE,
+        3,
+        &["camera.json:1", "x y z"],
+    ),
+    (
+        Edit(
+            TOML,
+            "radius_m = 3",
+            "ignore = [{ chainage_m = [5, 2] }]\nradius_m = 3",
+        ),
+        REFINE,
+        3,
+        &["survey.toml", "tunnel.ignore, item 1", "the lesser first"],
+    ),
+    (
+        Edit(
+            TOML,
+            "radius_m = 3",
+            "ignore = [{ theta = [5, 2] }]\nradius_m = 3",
+        ),
+        REFINE,
+        3,
+        &["survey.toml:", "unknown field `theta`", "theta_deg"],
+    ),
+    (
+        Edit(TOML, "[frames]", "[frames]\nmask = \"mask.png\""),
+        CHECK,
+        3,
+        &["mask.png", "frames.mask"],
+    ),
+    (
+        Edit(TOML, "[frames]", "[frames]\nmask = \"camera.json\""),
+        STITCH,
+        3,
+        &["camera.json", "PNG"],
+    ),
+    (
+        Edit(TOML, "[frames]", "[frames]\nmask = \"frames/000001.jpg\""),
+        REFINE,
+        3,
+        &["000001.jpg", "neither black nor white"],
+    ),
+    (
         Edit(TOML, "\"circle\"", "\"hexagon\""),
         CHECK,
         3,

@@ -26,7 +26,7 @@ const KALIBR: &str = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.3
 const CAMERAS: &str =
     "# cameras\n1 FULL_OPENCV 640 480 415 417 318 241 4.1 2.0 -0.0004 0.0006 0.1 4.4 3.1 0.45\n";
 const AXIS: &str = r#"{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}"#;
-const SURVEY: &str = "[tunnel]\nshape = \"circle\"\nradius_m = 3.0\n[camera]\nfile = \"camera.json\"\n[frames]\nimages = \"*.jpg\"\n[poses]\n\
+const SURVEY: &str = "[tunnel]\nshape = \"circle\"\nradius_m = 3.0\nignore = [{ theta_deg = [150, 210], chainage_m = [2.0, 5.5] }]\n[camera]\nfile = \"camera.json\"\n[frames]\nimages = \"*.jpg\"\n[poses]\n\
                       initial = \"baseline.tum\"\n[prior]\nmodel = \"random-walk\"\nrotation_sigma_deg = 2.0\ntranslation_sigma_m = [0.02, 0.02, 0.03]\n\
                       [options.stitch]\nmode = \"average\"\n";
 

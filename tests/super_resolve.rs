@@ -9,6 +9,7 @@ use tunnelstitch::render::super_resolve::{Channel, Footprints, MARGIN, Region, V
 use tunnelstitch::render::{Canvas, Interpolation, Kernel, Picture, native_px_per_metre, place};
 use tunnelstitch::simulate::{Light, Scene, SimulateOptions, SlantedEdge, Wall};
 use tunnelstitch::surface::{Circle, Surface, WallPoint};
+use tunnelstitch::survey::TunnelSection;
 use tunnelstitch::trajectory::Shutter;
 
 /// Edge of a tile, fine pixels.
@@ -38,7 +39,7 @@ struct Drawn {
 impl Simulated {
     fn new(options: &SimulateOptions) -> Self {
         let scene = Scene::new(options).unwrap();
-        let circle = Circle::new(options.radius_m).unwrap();
+        let circle = Circle::new(options.tunnel.nominal_m()).unwrap();
         let placements =
             place(&circle, scene.camera(), scene.truth(), &Shutter::default()).unwrap();
         let native = native_px_per_metre(&circle, scene.camera(), scene.truth()).unwrap();
@@ -214,7 +215,7 @@ fn psnr_db(drawn: &[Drawn], value: impl Fn(&Drawn) -> f32) -> f64 {
 fn small(wall: Wall, noise_grey: f64) -> SimulateOptions {
     SimulateOptions {
         frames: 24,
-        radius_m: 1.5,
+        tunnel: TunnelSection::round(1.5),
         advance_m: 0.05,
         camera: Camera::from_vertical_fov(320, 240, 60f64.to_radians()),
         wall,

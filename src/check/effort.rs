@@ -29,9 +29,10 @@ impl Effort {
         let frames = survey.frames.len() as f64;
         let pixels = f64::from(survey.camera.width) * f64::from(survey.camera.height);
         let cache = RefineOptions::default().cache_bytes as f64;
-        let chainage = survey.initial.iter().map(|stamped| stamped.pose.t_wc.y);
-        let from_m = chainage.clone().fold(f64::INFINITY, f64::min);
-        let to_m = chainage.fold(f64::NEG_INFINITY, f64::max);
+        let poses = || survey.initial.iter().map(|stamped| stamped.pose.t_wc);
+        let chainage = || poses().map(|t_wc| survey.surface.chainage_m(&t_wc));
+        let from_m = chainage().fold(f64::INFINITY, f64::min);
+        let to_m = chainage().fold(f64::NEG_INFINITY, f64::max);
         // Half a frame's height beyond the first and the last camera.
         let frame_m = f64::from(survey.camera.height) / px_per_metre;
         let px = |metres: f64| (metres * px_per_metre).max(0.0) as u64;

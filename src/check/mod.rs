@@ -13,7 +13,7 @@ pub use pictures::PictureCheck;
 
 use crate::evaluate::upper_median;
 use crate::render::native_px_per_metre;
-use crate::surface::SurfaceError;
+use crate::surface::{SurfaceError, WallPoint};
 use crate::survey::Survey;
 use crate::trajectory::{Jitter, JitterModel};
 use serde::Serialize;
@@ -28,6 +28,8 @@ pub struct Check {
     pub size_px: [u32; 2],
     /// Share of the picture that the lens shows.
     pub shown_share: f64,
+    /// What is not compared.
+    pub masks: MaskCheck,
     /// Where the initial poses are.
     pub poses: PosesCheck,
     /// What neighbours and turns share.
@@ -44,6 +46,18 @@ pub struct Check {
     pub faults: Vec<String>,
     /// What is possible but asks for attention, and what to do.
     pub warnings: Vec<String>,
+}
+
+/// What of the pictures and of the wall is left out.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
+pub struct MaskCheck {
+    /// Share of every picture that the mask hides.
+    pub hidden_share: f64,
+    /// Parts of the wall by which frames are not compared.
+    pub ignored: usize,
+    /// Share of the wall between the first and the last camera that these are.
+    pub ignored_share: f64,
 }
 
 /// The initial poses.
@@ -89,6 +103,7 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
         frames: survey.frames.len(),
         size_px: [survey.camera.width, survey.camera.height],
         shown_share: survey.camera.shown_share(),
+        masks: MaskCheck::of(survey),
         poses: PosesCheck::of(survey),
         overlap,
         px_per_metre,
@@ -129,20 +144,45 @@ fn jitter(
     }
 }
 
+/// Points around and along at which the wall is asked whether it is ignored.
+const ASKED: [u32; 2] = [360, 200];
+
+impl MaskCheck {
+    fn of(survey: &Survey) -> Self {
+        let surface = survey.surface.as_ref();
+        let initial = survey.initial.iter();
+        let chainage = initial.map(|stamped| surface.chainage_m(&stamped.pose.t_wc));
+        let from_m = chainage.clone().fold(f64::INFINITY, f64::min);
+        let to_m = chainage.fold(f64::NEG_INFINITY, f64::max);
+        let share = |k: u32, of: u32| (f64::from(k) + 0.5) / f64::from(of);
+        let point = |k: u32| WallPoint {
+            s_m: share(k % ASKED[0], ASKED[0]) * surface.perimeter_m(),
+            h_m: from_m + share(k / ASKED[0], ASKED[1]) * (to_m - from_m),
+        };
+        let points = ASKED[0] * ASKED[1];
+        let ignored = (0..points).filter(|k| survey.ignored.hold(&point(*k)));
+        Self {
+            hidden_share: survey.frames.mask().map_or(0.0, |mask| mask.share()),
+            ignored: survey.file.tunnel.ignore.len(),
+            ignored_share: ignored.count() as f64 / f64::from(points),
+        }
+    }
+}
+
 impl PosesCheck {
     fn of(survey: &Survey) -> Self {
         let poses = survey.initial_poses();
         let steps = || poses.windows(2);
-        let chainage = poses.iter().map(|pose| pose.t_wc.y);
+        let straight = || poses.iter().map(|pose| survey.surface.straightened(pose));
+        let chainage = || straight().map(|pose| pose.t_wc.y);
         Self {
             chainage_m: [
-                chainage.clone().fold(f64::INFINITY, f64::min),
-                chainage.fold(f64::NEG_INFINITY, f64::max),
+                chainage().fold(f64::INFINITY, f64::min),
+                chainage().fold(f64::NEG_INFINITY, f64::max),
             ],
             step_m: median(steps().map(|pair| (pair[1].t_wc - pair[0].t_wc).norm())),
             step_deg: median(steps().map(|pair| pair[0].r_wc.angle_to(&pair[1].r_wc))).to_degrees(),
-            off_axis_m: poses
-                .iter()
+            off_axis_m: straight()
                 .map(|pose| pose.t_wc.x.hypot(pose.t_wc.z))
                 .fold(0.0, f64::max),
             truth: survey.truth.is_some(),

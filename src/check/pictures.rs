@@ -22,7 +22,7 @@ pub struct PictureCheck {
     pub decoded: usize,
     /// Mean grey level of 255.
     pub grey: f64,
-    /// Share of pixels that are full white or black.
+    /// Share of pixels that are full white or black, of those that the mask does not hide.
     pub clipped: f64,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise_grey: f64,
@@ -52,14 +52,21 @@ impl PictureCheck {
         let decoded: Vec<Result<GreyImage, String>> = asked
             .par_iter()
             .map(|file| match StoredFrame::decode(file, width, height) {
-                Ok(frame) => Ok(frame.grey()),
+                Ok(frame) => {
+                    let mut grey = frame.grey();
+                    if let Some(mask) = survey.frames.mask() {
+                        mask.blank(&mut grey);
+                    }
+                    Ok(grey)
+                }
                 Err(error) => Err(error.to_string()),
             })
             .collect();
+        let hidden = survey.frames.mask().map_or(0.0, |mask| mask.share());
         let mut pictures = Vec::new();
         for picture in decoded {
             match picture {
-                Ok(picture) => pictures.push(measure(&picture)),
+                Ok(picture) => pictures.push(measure(&picture, hidden)),
                 Err(fault) if !faults.contains(&fault) => faults.push(fault),
                 Err(_) => {}
             }
@@ -80,10 +87,8 @@ impl PictureCheck {
 /// What the header of a frame's file says is wrong with it.
 fn fault(file: &FrameFile, size: [u32; 2]) -> Option<String> {
     let name = format!("frame {} ({})", file.index, file.path.display());
-    match image::image_dimensions(&file.path) {
-        Err(error) => Some(format!(
-            "{name}: {error}; restore the file, or remove the frame and its pose"
-        )),
+    match file.size() {
+        Err(error) => Some(error.to_string()),
         Ok((width, height)) if [width, height] != size => Some(format!(
             "{name}: {width} × {height} px, but the calibration is for {} × {} px",
             size[0], size[1]
@@ -92,8 +97,9 @@ fn fault(file: &FrameFile, size: [u32; 2]) -> Option<String> {
     }
 }
 
-fn measure(picture: &GreyImage) -> PictureCheck {
-    let pixels = picture.data().len().max(1) as f64;
+/// Measures a picture of whose pixels a share is `hidden`, and has no value therefore.
+fn measure(picture: &GreyImage, hidden: f64) -> PictureCheck {
+    let pixels = ((1.0 - hidden) * picture.data().len() as f64).max(1.0);
     let (mut sum, mut known) = (0.0, 0.0);
     for value in picture.data().iter().filter(|value| !value.is_nan()) {
         sum += f64::from(*value);
@@ -141,7 +147,7 @@ mod tests {
         let mut noisy = |slope: f32| {
             let value = |k: usize| 100.0 + slope * 20.0 * ((k % 256) as f32 / 20.0).sin();
             let data = (0..256 * 256).map(|k| value(k) + noise.sample(&mut rng));
-            measure(&GreyImage::new(256, 256, data.collect()))
+            measure(&GreyImage::new(256, 256, data.collect()), 0.0)
         };
         let flat = noisy(0.0);
         assert!((flat.noise_grey / 3.0 - 1.0).abs() < 0.1, "{flat:?}");
@@ -156,7 +162,8 @@ mod tests {
     fn clipped_pixels_are_counted() {
         let mut picture = GreyImage::new(64, 64, vec![90.0; 64 * 64]);
         picture.data_mut()[..64 * 16].fill(f32::NAN);
-        let measured = measure(&picture);
+        let measured = measure(&picture, 0.0);
         assert_eq!((measured.clipped, measured.grey), (0.25, 90.0));
+        assert_eq!(measure(&picture, 0.25).clipped, 0.0);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::poses::ReadingArguments;
 use super::{Failure, Terminal, json};
-use crate::check::{self, Check};
+use crate::check::{self, Check, MaskCheck};
 use std::path::PathBuf;
 
 /// Looks a survey over in seconds: frames, overlap, jitter, texture, and what refining will take.
@@ -41,6 +41,23 @@ pub fn run(arguments: &CheckArguments, terminal: &Terminal) -> Result<(), Failur
     }
 }
 
+/// What of pictures and wall is left out, if anything.
+fn masks(masks: &MaskCheck) -> Option<String> {
+    let picture = format!("{:.1} % of every picture", 100.0 * masks.hidden_share);
+    let wall = format!(
+        "{:.1} % of the wall in {} part{}",
+        100.0 * masks.ignored_share,
+        masks.ignored,
+        if masks.ignored == 1 { "" } else { "s" }
+    );
+    match (masks.hidden_share > 0.0, masks.ignored > 0) {
+        (true, true) => Some(format!("{picture} hidden, {wall} ignored")),
+        (true, false) => Some(format!("{picture} hidden")),
+        (false, true) => Some(format!("{wall} ignored")),
+        (false, false) => None,
+    }
+}
+
 fn text(check: &Check) -> String {
     let (poses, overlap, pictures, effort) =
         (&check.poses, &check.overlap, &check.pictures, &check.effort);
@@ -60,6 +77,7 @@ fn text(check: &Check) -> String {
                 check.frames, check.size_px[0], check.size_px[1], check.px_per_metre
             ),
         ),
+        masks(&check.masks).map_or_else(String::new, |masks| row("masks", masks)),
         row(
             "poses",
             format!(

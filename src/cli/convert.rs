@@ -55,6 +55,19 @@ pub fn run(arguments: &ConvertArguments, terminal: &Terminal) -> Result<(), Fail
     let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
     let out = &arguments.out;
     check_apart(&survey, out)?;
+    let has_names = !matches!(arguments.to, ToArgument::Tum | ToArgument::Kitti);
+    if let Some(frame) = survey
+        .frames
+        .iter()
+        .find(|frame| frame.is_in_video() && has_names)
+    {
+        terminal.warn(format!(
+            "the frames are pictures of a video and called {} and so on; other programs want files: ffmpeg -i {} -fps_mode passthrough \
+             -start_number 0 pictures/%06d.png",
+            frame.path.display(),
+            frame.file().display()
+        ));
+    }
     let camera = ColmapCamera::of(&survey.camera);
     let of_survey = || names(&survey, &survey.folder);
     let text = match arguments.to {
@@ -163,7 +176,7 @@ fn check_apart(survey: &Survey, out: &Path) -> Result<(), Failure> {
         // Not there yet.
         return Ok(());
     };
-    let frames = survey.frames.iter().map(|frame| frame.path.clone());
+    let frames = survey.frames.iter().map(|frame| frame.file().to_owned());
     let files = survey.own_files().iter().cloned();
     let replaced = files.chain(frames).find(|path| {
         path.canonicalize()

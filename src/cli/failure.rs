@@ -6,8 +6,9 @@ use crate::checkpoint::CheckpointError;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::converge::ConvergeError;
 use crate::frames::FrameError;
+use crate::inspect::InspectError;
 use crate::raster::RasterError;
-use crate::refine::{CovarianceError, RefineError};
+use crate::refine::{CovarianceError, ProblemError, RefineError};
 use crate::render::RenderError;
 use crate::report::ReportError;
 use crate::simulate::SimulateError;
@@ -101,7 +102,7 @@ impl From<CheckpointError> for Failure {
 impl From<RefineError> for Failure {
     fn from(error: RefineError) -> Self {
         match error {
-            RefineError::Checkpoint(error) => error.into(),
+            RefineError::Problem(ProblemError::Checkpoint(error)) => error.into(),
             _ => Self::input(error.to_string()),
         }
     }
@@ -145,6 +146,21 @@ impl From<RenderError> for Failure {
         match error {
             RenderError::Raster(error) => error.into(),
             _ => Self::input(error.to_string()),
+        }
+    }
+}
+
+impl From<InspectError> for Failure {
+    fn from(error: InspectError) -> Self {
+        match error {
+            InspectError::Raster(error) => error.into(),
+            InspectError::Write(error) => error.into(),
+            InspectError::TooLong { .. } | InspectError::NoViewer | InspectError::Listen { .. } => {
+                Self::usage(error.to_string())
+            }
+            InspectError::Marks { .. } | InspectError::Folder { .. } => {
+                Self::input(error.to_string())
+            }
         }
     }
 }

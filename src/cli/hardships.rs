@@ -27,6 +27,10 @@ pub struct HardshipArguments {
     /// a tenth of the frame's height, elsewhere in every frame.
     #[arg(long, value_name = "N", default_value_t = 0)]
     moving: u32,
+    /// The carrier's shaft before the wall, dark, at the same place of every frame, P percent of it wide; the survey gets a mask
+    /// that says so [0 to 50].
+    #[arg(long, value_name = "P", default_value_t = 0.0)]
+    shaft_percent: f64,
     /// Bits of the frames' grey values. 16 bits hold grey level × 257, so they keep 1/257 of a grey level; --noise
     /// stays in grey levels of 8 bits.
     #[arg(long, value_enum, default_value_t)]
@@ -57,6 +61,7 @@ impl HardshipArguments {
             lamp_corner: self.lamp_corner,
             specular_percent: self.specular_percent,
             moving: self.moving,
+            shaft_percent: self.shaft_percent,
             bits: match self.bits {
                 BitsArgument::Eight => Bits::Eight,
                 BitsArgument::Sixteen => Bits::Sixteen,

@@ -9,16 +9,24 @@ use std::path::{Path, PathBuf};
 
 /// Looks into a folder for frames, calibration and poses, and writes a commented survey.toml for them.
 ///
-/// Frames are the largest group of pictures of one folder; a calibration that fits their size and poses that are as many are preferred.
+/// Frames are the largest group of pictures of one folder, or those of a video if there are none; a calibration that fits their size and poses that are as many are preferred.
 /// What was recognised is printed, and what is still missing.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Example:\n  tunnelstitch init my-survey --radius-m 1.5")]
+#[command(
+    after_help = "Examples:\n  tunnelstitch init my-survey --radius-m 1.5\n  tunnelstitch init my-survey --video my-survey/GX010001.MP4 --every 5"
+)]
 pub struct InitArguments {
     /// The folder.
     folder: PathBuf,
     /// Radius of the tunnel, metres; else a line to be filled in.
     #[arg(long, value_name = "M", value_parser = super::stitch::positive)]
     radius_m: Option<f64>,
+    /// The video that the frames are in. It is read by ffmpeg, picture by picture; nothing is unpacked.
+    #[arg(long, value_name = "FILE")]
+    video: Option<PathBuf>,
+    /// Every so many-th picture of the video is a frame.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    every: Option<u32>,
     /// Replace a survey.toml that is there.
     #[arg(long)]
     force: bool,
@@ -37,13 +45,29 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
             path.display()
         )));
     }
-    let found = Discovery::of(folder)
+    let mut found = Discovery::of(folder)
         .map_err(|error| Failure::input(format!("{}: {error}", folder.display())))?;
-    if found.pictures.is_empty() {
-        return Err(Failure::input(format!(
-            "{}: holds no pictures (JPEG, PNG, TIFF, WebP), not even three folders below",
-            folder.display()
-        )));
+    let video = match &arguments.video {
+        Some(video) => Some(from_folder(folder, video)),
+        None if found.pictures.is_empty() => found.videos.first().cloned(),
+        None => None,
+    };
+    match video {
+        Some(video) => {
+            found.choose_video(folder, &video, arguments.every.unwrap_or(1) as usize)?;
+        }
+        None if found.pictures.is_empty() => {
+            return Err(Failure::input(format!(
+                "{}: holds no pictures (JPEG, PNG, TIFF, WebP) and no video, not even three folders below",
+                folder.display()
+            )));
+        }
+        None if arguments.every.is_some() => {
+            return Err(Failure::usage(
+                "--every goes with a video; the folder holds pictures: say which video with --video",
+            ));
+        }
+        None => {}
     }
     for line in report(&found) {
         terminal.say(line);
@@ -57,18 +81,50 @@ pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure
     Ok(())
 }
 
+/// A path as survey.toml in `folder` has it.
+fn from_folder(folder: &Path, path: &Path) -> PathBuf {
+    let relative = folder.canonicalize().ok().and_then(|folder| {
+        let path = path.canonicalize().ok()?;
+        pathdiff::diff_paths(path, folder)
+    });
+    // Not there, which is said when it is opened.
+    relative.unwrap_or_else(|| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()))
+}
+
 /// What was recognised, a line each.
 fn report(found: &Discovery) -> Vec<String> {
     let mut lines = Vec::new();
+    if let Some(video) = &found.video {
+        let (width, height) = video.size;
+        lines.push(format!(
+            "  {:<16}{} ({} pictures, {width} × {height} px)",
+            "frames",
+            video.path.display(),
+            match video.every {
+                1 => video.count.to_string(),
+                every => format!("{} of every {every}", video.count),
+            },
+        ));
+    }
+    let chosen = found.video.as_ref().map(|video| &video.path);
+    for video in found.videos.iter().filter(|video| Some(*video) != chosen) {
+        lines.push(format!("  {:<16}{}", "other video", video.display()));
+    }
     for (k, group) in found.pictures.iter().enumerate() {
         let size = group
             .size
             .map_or("unreadable".to_owned(), |(w, h)| format!("{w} × {h} px"));
-        let which = if k == 0 { "frames" } else { "other pictures" };
+        let which = match k == 0 && found.video.is_none() {
+            true => "frames",
+            false => "other pictures",
+        };
         lines.push(format!(
             "  {which:<16}{} ({}, {size})",
             group.pattern, group.count
         ));
+    }
+    if let Some(mask) = &found.mask {
+        lines.push(format!("  {:<16}{}", "mask", mask.display()));
     }
     for (k, (path, camera)) in found.calibrations.iter().enumerate() {
         let which = if k == 0 { "calibration" } else { "another" };
@@ -115,6 +171,7 @@ fn text(found: &Discovery, radius_m: Option<f64>) -> String {
             "# Measure the tunnel's radius in metres and take away the # of the next line.\n# radius_m = 3.0"
         ),
     };
+    text += "# ignore = [{ theta_deg = [150, 210], chainage_m = [2.0, 5.5] }]    # water, plants: refine does not look there\n";
     text += "\n[camera]\n";
     let _ = match found.calibrations.first() {
         Some((path, _)) => writeln!(text, "file = {}", quoted(path)),
@@ -128,13 +185,25 @@ fn text(found: &Discovery, radius_m: Option<f64>) -> String {
         .pictures
         .first()
         .map_or("*.jpg", |group| &group.pattern);
-    let _ = writeln!(
-        text,
-        "\n[frames]\nimages = {}    # sorted by name",
-        quoted(pattern)
-    );
+    let _ = match &found.video {
+        Some(video) => writeln!(
+            text,
+            "\n[frames]\nvideo = {}\nevery = {}    # of its pictures; their times are the video's",
+            quoted(&video.path),
+            video.every
+        ),
+        None => writeln!(
+            text,
+            "\n[frames]\nimages = {}    # sorted by name",
+            quoted(pattern)
+        ),
+    };
+    text += &match &found.mask {
+        Some(mask) => format!("mask = {}    # black where no frame shows the wall\n", quoted(mask)),
+        None => "# mask = \"mask.png\"    # a picture of the frames' size, black where none of them shows the wall\n".to_owned(),
+    };
     text += "\n[poses]\n";
-    let count = found.pictures.first().map_or(0, |group| group.count);
+    let (count, _) = found.frames();
     match found.initial() {
         None => {
             text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC.\ninitial = \"baseline.tum\"\n";
@@ -147,7 +216,14 @@ fn text(found: &Discovery, radius_m: Option<f64>) -> String {
                 poses.entries.len()
             );
             if poses.entries.len() != count && poses.has_times() && !poses.has_names() {
-                text += "associate = \"time\"       # by the frames' names, or by [frames] times = FILE\n# interpolate = true\n";
+                text += match &found.video {
+                    Some(_) => {
+                        "associate = \"time\"       # by the video's times, or by [frames] times = FILE\ninterpolate = true\n"
+                    }
+                    None => {
+                        "associate = \"time\"       # by the frames' names, or by [frames] times = FILE\n# interpolate = true\n"
+                    }
+                };
             }
             if poses.format == PoseFormat::Euroc {
                 text += "# These are a body's poses: how the camera is mounted (its sensor.yaml, or a 4 × 4 matrix).\n\

@@ -162,9 +162,14 @@ pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failu
     )?;
     let layout = Layout::from(arguments.canvas.layout);
     let wall = point(arguments, &survey, &placements, &canvas)?;
-    let perimeter_m = surface.perimeter_m();
-    let theta_deg = wall.s_m.rem_euclid(perimeter_m) / perimeter_m * 360.0;
-    let found = sightings(surface, &survey.camera, &placements, wall);
+    let theta_deg = surface.angle_rad(wall.s_m).to_degrees();
+    let found = sightings(
+        surface,
+        &survey.camera,
+        survey.frames.mask().map(AsRef::as_ref),
+        &placements,
+        wall,
+    );
     let panorama_px = layout.to_picture(&canvas, canvas.pixel_of(wall));
     let located = Located {
         chainage_m: wall.h_m,
@@ -198,7 +203,7 @@ fn point(
     canvas: &Canvas,
 ) -> Result<WallPoint, Failure> {
     let on_wall = |[h_m, theta_deg]: [f64; 2]| WallPoint {
-        s_m: theta_deg.rem_euclid(360.0) / 360.0 * survey.surface.perimeter_m(),
+        s_m: survey.surface.s_at_m(theta_deg.to_radians()),
         h_m,
     };
     if let Some(wall) = arguments.wall {
@@ -231,6 +236,14 @@ fn point(
             pixel[1],
             camera.width - 1,
             camera.height - 1
+        )));
+    }
+    if let Some(mask) = survey.frames.mask()
+        && !mask.is_clear(pixel[0] as f32, pixel[1] as f32, 0.0)
+    {
+        return Err(Failure::input(format!(
+            "--frame {frame}: at {},{} the mask of the frames (frames.mask in survey.toml) hides the wall",
+            pixel[0], pixel[1]
         )));
     }
     let Some(ray) = camera.ray(pixel[0], pixel[1]) else {

@@ -8,6 +8,7 @@ mod configuration;
 mod converge;
 mod convert;
 mod demo;
+mod export;
 mod failure;
 mod frame_times;
 mod gyro;
@@ -28,6 +29,9 @@ mod simulate;
 mod stitch;
 mod suggestion;
 mod terminal;
+mod textured;
+mod tunnel;
+mod view;
 
 pub use failure::Failure;
 pub use terminal::Terminal;
@@ -77,6 +81,8 @@ enum Command {
     Compare(compare::CompareArguments),
     Convert(convert::ConvertArguments),
     Report(report::ReportArguments),
+    Export(export::ExportArguments),
+    View(view::ViewArguments),
     Converge(converge::ConvergeArguments),
     Project(project::ProjectArguments),
     Config(config::ConfigArguments),
@@ -126,6 +132,8 @@ pub fn run() -> Result<(), Failure> {
         Command::Compare(arguments) => compare::run(&arguments, &run, &terminal),
         Command::Convert(arguments) => convert::run(&arguments, &terminal),
         Command::Report(arguments) => report::run(&arguments, &terminal),
+        Command::Export(arguments) => export::run(&arguments, &terminal),
+        Command::View(arguments) => view::run(&arguments, &terminal),
         Command::Converge(arguments) => converge::run(&arguments, &terminal),
         Command::Project(arguments) => project::run(&arguments, &terminal),
         Command::Config(arguments) => config::run(&arguments, &terminal),

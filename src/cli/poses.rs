@@ -186,7 +186,7 @@ fn full(path: &Path) -> PathBuf {
 }
 
 /// Which poses.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct PosesArgument {
     /// Which poses: `initial` and `truth` are those of survey.toml, anything else is a file of any format. A file is taken to
     /// be in the tunnel's frame, as `refine` and `convert` write it, unless the flags below say otherwise.
@@ -202,6 +202,14 @@ pub struct PosesArgument {
 }
 
 impl PosesArgument {
+    /// The poses in a file, read as `refine` writes them.
+    pub fn of_file(file: &Path) -> Self {
+        Self {
+            name: file.to_string_lossy().into_owned(),
+            reading: ReadingArguments::default(),
+        }
+    }
+
     /// The file of poses, if it is one.
     pub fn file(&self) -> Option<&Path> {
         match self.name.as_str() {

@@ -53,10 +53,7 @@ pub fn run(arguments: &ProjectArguments, terminal: &Terminal) -> Result<(), Fail
         Some(path) => read_calibration(path, None)?,
         None => camera_of(arguments)?,
     };
-    let file = FrameFile {
-        index: 0,
-        path: arguments.image.clone(),
-    };
+    let file = FrameFile::picture(0, arguments.image.clone());
     let photo = Picture::from_decoded(load_colour(&file, camera.width, camera.height)?);
     let result = cylinder::project(&photo, &camera, arguments.interpolation.into());
     write_picture(&arguments.out, &result.image, format)?;

@@ -251,12 +251,19 @@ fn calibrated(
     for path in file.paths_mut() {
         *path = folder.join(&*path);
     }
-    file.tunnel.radius_m = calibration.radius_m;
+    if file.tunnel.is_straight_and_round() {
+        file.tunnel.radius_m = Some(calibration.radius_m);
+    }
     file.camera.file = CAMERA_FILE.into();
     file.camera.name = None;
-    let escaped = glob::Pattern::escape(&folder.to_string_lossy());
-    let images = Path::new(&escaped).join(&file.frames.images);
-    file.frames.images = images.to_string_lossy().into_owned();
+    if let Some(images) = &mut file.frames.images {
+        let escaped = glob::Pattern::escape(&folder.to_string_lossy());
+        let pattern = Path::new(&escaped).join(&*images);
+        *images = pattern.to_string_lossy().into_owned();
+    }
+    if let Some(video) = &mut file.frames.video {
+        *video = folder.join(&*video);
+    }
     file.calibrate = None;
     file.options.clear();
     Ok(format!(
@@ -364,7 +371,8 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
         if report.frames_on_prior == report.frames.len() {
             terminal.warn(
                 "  no frame is sure: too few overlapping frames, a wall without texture, poses in another convention \
-                 (--pose-convention, --camera-axes, --tunnel-frame), or a wrong radius_m, calibration or [prior]",
+                 (--pose-convention, --camera-axes, --tunnel-frame), a wrong radius_m, calibration or [prior], or a mask or \
+                 tunnel.ignore that leave nothing",
             );
         }
         for frame in &report.frames {

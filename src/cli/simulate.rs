@@ -2,6 +2,7 @@
 
 use super::hardships::HardshipArguments;
 use super::stitch::positive;
+use super::tunnel::TunnelArguments;
 use super::{Failure, Terminal, json};
 use crate::camera::{Camera, Lens, read_calibration};
 use crate::simulate::{self, Light, SimulateOptions, Wall};
@@ -22,6 +23,7 @@ use std::path::PathBuf;
     tunnelstitch simulate free --wall concrete --jitter independent --seed 7 --out survey\n  \
     tunnelstitch simulate off-centre --texture bricks.jpg --texture-width-m 2 --out survey\n  \
     tunnelstitch simulate free --lamp-corner 0.4 --gain-percent 20 --bias-grey 5 --specular-percent 3 --out damp\n  \
+    tunnelstitch simulate free --shape horseshoe --width-m 5 --height-m 4 --centreline bend.txt --out curved\n  \
     tunnelstitch simulate free --interval-s 0.333 --readout-ms 20 --out rolling\n  \
     tunnelstitch simulate free --turns 2 --moving 8 --bad-frames 5:black,18-20:missing --out bad"
 )]
@@ -64,9 +66,8 @@ pub struct SimulateArguments {
         allow_hyphen_values = true
     )]
     readout_ms: f64,
-    /// Radius of the tunnel, metres.
-    #[arg(long, value_name = "M", default_value_t = 3.0)]
-    radius_m: f64,
+    #[command(flatten)]
+    tunnel: TunnelArguments,
     /// Calibration file of the camera: any lens, of any of the kinds that `survey.toml` takes.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["size", "fov_deg", "k1", "k2"])]
     camera: Option<PathBuf>,
@@ -226,7 +227,7 @@ impl SimulateArguments {
             turn_deg: self.turn_deg,
             interval_s: self.interval_s,
             readout_ms: self.readout_ms,
-            radius_m: self.radius_m,
+            tunnel: self.tunnel.section(),
             camera,
             jitter: self.jitter_of(preset.jitter),
             wall,

@@ -156,7 +156,7 @@ impl From<InterpolationArgument> for Interpolation {
 }
 
 /// A size of memory in bytes, for clap.
-fn memory_size(text: &str) -> Result<u64, String> {
+pub fn memory_size(text: &str) -> Result<u64, String> {
     const FORM: &str = "must be a size as 512MiB or 2GiB";
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
     let unit = match text[digits.len()..].to_ascii_lowercase().as_str() {
@@ -270,7 +270,7 @@ pub fn run(arguments: &StitchArguments, run: &Run, terminal: &Terminal) -> Resul
                 "no frame covers a single pixel of the panorama; check the calibration (cx, cy) and --px-per-metre",
             ));
         }
-        let gaps = outputs.gaps();
+        let gaps = outputs.gaps(surface);
         terminal.start("writing", 1);
         let written = outputs.finish(&plan, &gaps, &survey.camera, covariances.as_deref());
         terminal.finish();

@@ -6,7 +6,7 @@ use super::{
     image_metrics, trajectory_error, unaligned_error, wall_error,
 };
 use crate::camera::Camera;
-use crate::frames::FrameFile;
+use crate::frames::FrameSet;
 use crate::progress::Progress;
 use crate::render::{
     Canvas, FrameStack, Panorama, Placement, RenderOptions, check_memory, level_for,
@@ -24,7 +24,7 @@ pub struct CompareInput<'a> {
     /// The camera.
     pub camera: &'a Camera,
     /// The frames on disk.
-    pub files: &'a [FrameFile],
+    pub files: &'a FrameSet,
     /// Poses before refinement, one per frame.
     pub initial: &'a [Pose],
     /// Poses after refinement, one per frame.

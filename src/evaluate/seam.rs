@@ -164,7 +164,9 @@ fn look(
             let pixel = camera
                 .project(&pose.to_camera(x_w))
                 .filter(|pixel| camera.sees(pixel, MARGIN_PX));
-            if let Some(pixel) = pixel {
+            if let Some(pixel) = pixel
+                && picture.shows(pixel.x as f32, pixel.y as f32, &bilinear)
+            {
                 seen.add(f64::from(picture.grey(&pixel, &bilinear)));
             }
         }

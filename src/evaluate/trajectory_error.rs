@@ -59,10 +59,7 @@ mod tests {
     #[test]
     fn known_errors_are_measured_and_the_gauge_is_not() {
         let truth = spiral(10, 0.1, 0.5);
-        let gauge = GaugeMotion {
-            turn_rad: 0.4,
-            shift_m: 2.0,
-        };
+        let gauge = GaugeMotion::about_y(0.4, 2.0);
         let both = Circle::new(3.0).unwrap().gauge();
         let mut estimated = gauge.apply_all(&truth);
         let error = trajectory_error(both, &estimated, &truth).unwrap();

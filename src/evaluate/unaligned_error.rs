@@ -85,10 +85,7 @@ mod tests {
     #[test]
     fn the_gauge_counts_for_the_absolute_errors_only() {
         let truth = spiral(5, 0.1, 0.5);
-        let motion = GaugeMotion {
-            turn_rad: 0.1,
-            shift_m: 2.0,
-        };
+        let motion = GaugeMotion::about_y(0.1, 2.0);
         let error = unaligned_error(&motion.apply_all(&truth), &truth).unwrap();
         assert!((error.ape_translation_m.rms - 2.0).abs() < 1e-12);
         assert!((error.ape_rotation_deg.rms - 0.1f64.to_degrees()).abs() < 1e-9);

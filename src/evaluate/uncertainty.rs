@@ -42,8 +42,7 @@ pub fn tied_errors(
             break;
         };
         let step = inverse * Vector2::new(turn.dot(&error), shift.dot(&error));
-        motion.turn_rad += step.x;
-        motion.shift_m += step.y;
+        motion = motion.plus(1.0, &gauge.motion(step.x, step.y));
     }
     let pairs = estimated.iter().zip(truth);
     Ok(pairs
@@ -81,10 +80,7 @@ mod tests {
     fn the_gauge_is_no_error_and_the_rest_is() {
         let circle = Circle::new(3.0).unwrap();
         let truth = spiral(6, 0.1, 0.5);
-        let motion = GaugeMotion {
-            turn_rad: 0.2,
-            shift_m: -1.0,
-        };
+        let motion = GaugeMotion::about_y(0.2, -1.0);
         let mut estimated = motion.apply_all(&truth);
         let xi = Vector6::new(1e-3, -2e-3, 5e-4, 1e-3, 2e-3, -1e-3);
         estimated[3] = estimated[3].retract(&xi);

@@ -3,9 +3,9 @@
 use super::error::check_pairs;
 use super::{EvaluateError, Spread, spread::root_mean_square};
 use crate::camera::Camera;
-use crate::surface::{Surface, WallPoint, shortest_arc};
+use crate::surface::{Surface, WallPoint, shortest_arc, wall_jacobian};
 use crate::trajectory::Pose;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -53,36 +53,33 @@ pub fn wall_error(
     check_pairs(estimated.len(), truth.len())?;
     let perimeter_m = surface.perimeter_m();
     let (mut delta_s, mut delta_h, mut pixel_m) = (Vec::new(), Vec::new(), Vec::new());
+    let mut ends = Vec::new();
     for (frame, (estimate, truth)) in estimated.iter().zip(truth).enumerate() {
         let offsets = frame_offsets(surface, camera, frame, estimate, truth)?;
         delta_s.extend(offsets.delta_s_m);
         delta_h.extend(offsets.delta_h_m);
-        pixel_m.push(offsets.pixel_m);
+        pixel_m.resize(delta_s.len(), offsets.pixel_m);
+        ends.push(delta_s.len());
     }
-    let gauge = surface.gauge();
-    let shift_s_m = match gauge.turn {
-        true => mean_arc(&delta_s, perimeter_m),
-        false => 0.0,
-    };
-    let shift_h_m = match gauge.shift {
-        true => delta_h.iter().sum::<f64>() / delta_h.len() as f64,
-        false => 0.0,
-    };
+    let mean = Vector2::new(
+        mean_arc(&delta_s, perimeter_m),
+        delta_h.iter().sum::<f64>() / delta_h.len() as f64,
+    );
+    let shift = gauge_shift(surface, &truth[0], &mean);
+    let (shift_s_m, shift_h_m) = (shift.x, shift.y);
     let distances_mm: Vec<f64> = delta_s
         .iter()
         .zip(&delta_h)
         .map(|(s, h)| 1e3 * shortest_arc(s - shift_s_m, perimeter_m).hypot(h - shift_h_m))
         .collect();
-    let per_frame = (GRID[0] * GRID[1]) as usize;
-    let distances_px: Vec<f64> = distances_mm
-        .iter()
-        .enumerate()
-        .map(|(k, mm)| 1e-3 * mm / pixel_m[k / per_frame])
+    let distances_px: Vec<f64> = (distances_mm.iter().zip(&pixel_m))
+        .map(|(mm, pixel_m)| 1e-3 * mm / pixel_m)
         .collect();
     let of_frames = |distances: &[f64]| -> Vec<f64> {
-        distances
-            .chunks_exact(per_frame)
-            .map(root_mean_square)
+        let starts = std::iter::once(&0).chain(&ends);
+        let frames = starts.zip(&ends);
+        frames
+            .map(|(start, end)| root_mean_square(&distances[*start..*end]))
             .collect()
     };
     let (frame_rms_mm, frame_rms_px) = (of_frames(&distances_mm), of_frames(&distances_px));
@@ -100,6 +97,29 @@ pub fn wall_error(
         frame_rms_mm,
         frame_rms_px,
     })
+}
+
+/// The part of a mean displacement `(Δs, Δh)` of the wall, metres, that the gauge may make up for.
+///
+/// On a straight tunnel a turn moves the wall along s and a shift along h. A turn about the axis of a bend, or along a helix, moves it in
+/// one direction, the same everywhere: as at the point that the camera at `pose` looks at.
+pub(super) fn gauge_shift(surface: &dyn Surface, pose: &Pose, mean: &Vector2<f64>) -> Vector2<f64> {
+    let gauge = surface.gauge();
+    match (gauge.turn, gauge.shift) {
+        (true, true) => *mean,
+        (false, true) => Vector2::new(0.0, mean.y),
+        (false, false) => Vector2::zeros(),
+        (true, false) => {
+            let along = surface
+                .hit(&pose.t_wc, &(pose.r_wc * Vector3::z()))
+                .map(|hit| {
+                    let wall = surface.frame(hit.wall);
+                    wall_jacobian(pose, &wall) * gauge.directions(pose)[0]
+                });
+            let along = along.ok().and_then(|along| along.try_normalize(0.0));
+            along.map_or_else(Vector2::zeros, |along| along * along.dot(mean))
+        }
+    }
 }
 
 /// How far one frame's pixels lie from where they belong on the wall, the gauge still in it.
@@ -196,10 +216,7 @@ mod tests {
     fn the_gauge_costs_nothing_even_across_the_wrap() {
         let (circle, camera, truth) = scene();
         for alpha_rad in [0.3, 3.1, -3.1] {
-            let gauge = GaugeMotion {
-                turn_rad: alpha_rad,
-                shift_m: -7.0,
-            };
+            let gauge = GaugeMotion::about_y(alpha_rad, -7.0);
             let error = wall_error(&circle, &camera, &gauge.apply_all(&truth), &truth).unwrap();
             assert!(error.mm.max < 1e-6, "{}", error.mm.max);
             assert!((error.shift_s_m - 3.0 * alpha_rad).abs() < 1e-9);

@@ -1,6 +1,6 @@
 //! Frames on demand, in bounded memory.
 
-use super::{FrameError, FrameFile, Pyramid, Shading, StoredFrame};
+use super::{FrameError, FrameFile, FrameSet, HalvedMask, Pyramid, Shading, StoredFrame};
 use crate::camera::Camera;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
@@ -30,7 +30,7 @@ pub struct FrameCache {
 
 #[derive(Debug)]
 enum Source {
-    Files(Vec<FrameFile>, Camera),
+    Files(FrameSet, Camera),
     Memory(Vec<Arc<Pyramid>>),
 }
 
@@ -50,20 +50,20 @@ struct Store {
 }
 
 impl FrameCache {
-    /// The frames `files` of `camera`, with `levels` pyramid levels each, in no more than `bytes` of memory (but
+    /// The `frames` of `camera`, with `levels` pyramid levels each, in no more than `bytes` of memory (but
     /// always room for one).
-    pub fn new(files: &[FrameFile], camera: &Camera, levels: usize, bytes: usize) -> Self {
+    pub fn new(frames: &FrameSet, camera: &Camera, levels: usize, bytes: usize) -> Self {
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let pyramids = |share: f64| (share * bytes as f64 / (PYRAMID_BYTES * pixels)) as usize;
-        let (room, stored) = match pyramids(1.0) >= files.len() {
-            true => (files.len(), 0),
+        let (room, stored) = match pyramids(1.0) >= frames.len() {
+            true => (frames.len(), 0),
             false => (
                 pyramids(PYRAMIDS),
                 ((1.0 - PYRAMIDS) * bytes as f64) as usize,
             ),
         };
         Self {
-            source: Source::Files(files.to_vec(), *camera),
+            source: Source::Files(frames.clone(), *camera),
             levels,
             shading: RwLock::default(),
             room: room.max(1),
@@ -91,8 +91,19 @@ impl FrameCache {
     /// Number of frames.
     pub fn frames(&self) -> usize {
         match &self.source {
-            Source::Files(files, _) => files.len(),
+            Source::Files(frames, _) => frames.len(),
             Source::Memory(pyramids) => pyramids.len(),
+        }
+    }
+
+    /// Which pixels show the wall in the pictures that `camera`, at any level, takes; all of them if there is no mask.
+    pub fn mask(&self, camera: &Camera) -> Option<HalvedMask> {
+        match &self.source {
+            Source::Files(frames, _) => {
+                let mask = Arc::clone(frames.mask()?);
+                Some(HalvedMask::for_camera(mask, camera))
+            }
+            Source::Memory(_) => None,
         }
     }
 
@@ -119,8 +130,8 @@ impl FrameCache {
     /// # Errors
     /// As [`StoredFrame::decode`].
     pub fn get(&self, frame: usize) -> Result<Arc<Pyramid>, FrameError> {
-        let (files, camera) = match &self.source {
-            Source::Files(files, camera) => (files, camera),
+        let (frames, camera) = match &self.source {
+            Source::Files(frames, camera) => (frames, camera),
             Source::Memory(pyramids) => return Ok(Arc::clone(&pyramids[frame])),
         };
         {
@@ -133,7 +144,10 @@ impl FrameCache {
             }
         }
         // Decoded without the lock; if two threads do the same frame at once, one result is dropped.
-        let mut image = self.stored(&files[frame], camera)?.grey();
+        let mut image = self.stored(&frames[frame], camera)?.grey();
+        if let Some(mask) = frames.mask() {
+            mask.blank(&mut image);
+        }
         if let Some(shading) = self.shading() {
             shading.divide(&mut image);
         }
@@ -176,18 +190,16 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 mod tests {
     use super::*;
 
-    fn files(folder: &std::path::Path) -> Vec<FrameFile> {
-        (0..5u8)
+    fn files(folder: &std::path::Path) -> FrameSet {
+        let files: Vec<FrameFile> = (0..5u8)
             .map(|index| {
                 let path = folder.join(format!("{index}.png"));
                 let picture = image::GrayImage::from_pixel(32, 24, image::Luma([10 + index]));
                 picture.save(&path).unwrap();
-                FrameFile {
-                    index: usize::from(index),
-                    path,
-                }
+                FrameFile::picture(usize::from(index), path)
             })
-            .collect()
+            .collect();
+        files.into()
     }
 
     #[test]
@@ -203,7 +215,7 @@ mod tests {
             assert_eq!(lock(&cache.shelf).kept.len(), 1);
         }
         // The first three are not read again.
-        for file in &files {
+        for file in files.iter() {
             std::fs::remove_file(&file.path).unwrap();
         }
         for frame in [0, 1, 2] {

@@ -1,7 +1,9 @@
 //! Finding and decoding frames.
 
+use super::Video;
 use image::{ColorType, DynamicImage, ImageDecoder};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Why a frame cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -33,6 +35,22 @@ pub enum FrameError {
         /// What the decoder said.
         what: String,
     },
+    /// A video cannot be read.
+    #[error("{}: {what}", path.display())]
+    Video {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and the remedy.
+        what: String,
+    },
+    /// A mask is unreadable or none.
+    #[error("{}: {what}", path.display())]
+    Mask {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it, and the remedy.
+        what: String,
+    },
     /// A frame is not as large as the calibration says.
     #[error(
         "frame {index} ({}): {width} × {height} px, but the calibration is for {expected_width} × {expected_height} px",
@@ -55,15 +73,69 @@ pub enum FrameError {
 }
 
 /// A frame on disk.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct FrameFile {
     /// Index of the frame in the survey.
     pub index: usize,
-    /// The picture.
+    /// The picture, or the video's path with the picture's number as if it were a file in it: `survey.mp4/000012`.
     pub path: PathBuf,
+    /// The video that it is in, and which picture of it.
+    pub(super) video: Option<(Arc<Video>, usize)>,
 }
 
 impl FrameFile {
+    /// A frame that is a file of its own.
+    pub fn picture(index: usize, path: PathBuf) -> Self {
+        Self {
+            index,
+            path,
+            video: None,
+        }
+    }
+
+    /// A picture of a video, numbered from 0.
+    pub fn in_video(index: usize, video: &Arc<Video>, picture: usize) -> Self {
+        Self {
+            index,
+            path: video.path().join(format!("{picture:06}")),
+            video: Some((Arc::clone(video), picture)),
+        }
+    }
+
+    /// The file that it is in.
+    pub fn file(&self) -> &Path {
+        match &self.video {
+            Some((video, _)) => video.path(),
+            None => &self.path,
+        }
+    }
+
+    /// True if it is in a video.
+    pub fn is_in_video(&self) -> bool {
+        self.video.is_some()
+    }
+
+    /// Width and height, pixels, by the file's header.
+    ///
+    /// # Errors
+    /// A missing or unknown file.
+    pub fn size(&self) -> Result<(u32, u32), FrameError> {
+        match &self.video {
+            Some((video, _)) => Ok(video.size()),
+            None => {
+                image::image_dimensions(&self.path).map_err(|error| self.fault(error.to_string()))
+            }
+        }
+    }
+
+    fn fault(&self, what: String) -> FrameError {
+        FrameError::Decode {
+            index: self.index,
+            path: self.path.clone(),
+            what,
+        }
+    }
+
     /// The picture's name without its folder.
     pub fn name(&self) -> String {
         let name = self.path.file_name().unwrap_or_default();
@@ -71,11 +143,15 @@ impl FrameFile {
     }
 }
 
-/// The files that match `pattern` (glob syntax, relative to `folder`), sorted by name.
+/// The files that match `pattern` (glob syntax, relative to `folder`), sorted by name, but for the mask.
 ///
 /// # Errors
 /// A malformed pattern, an unreadable folder, no match.
-pub fn list(folder: &Path, pattern: &str) -> Result<Vec<FrameFile>, FrameError> {
+pub fn list(
+    folder: &Path,
+    pattern: &str,
+    mask: Option<&Path>,
+) -> Result<Vec<FrameFile>, FrameError> {
     let fail = |what: String| FrameError::Pattern {
         pattern: pattern.to_owned(),
         what,
@@ -86,7 +162,7 @@ pub fn list(folder: &Path, pattern: &str) -> Result<Vec<FrameFile>, FrameError> 
     let mut paths = Vec::new();
     for path in found {
         let path = path.map_err(|error| fail(error.to_string()))?;
-        if !path.is_dir() {
+        if !path.is_dir() && Some(path.as_path()) != mask {
             paths.push(path);
         }
     }
@@ -99,7 +175,7 @@ pub fn list(folder: &Path, pattern: &str) -> Result<Vec<FrameFile>, FrameError> 
     Ok(paths
         .into_iter()
         .enumerate()
-        .map(|(index, path)| FrameFile { index, path })
+        .map(|(index, path)| FrameFile::picture(index, path))
         .collect())
 }
 
@@ -108,19 +184,11 @@ pub fn list(folder: &Path, pattern: &str) -> Result<Vec<FrameFile>, FrameError> 
 /// # Errors
 /// A missing, truncated or unknown file; a size other than `(width, height)`.
 pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicImage, FrameError> {
-    let fail = |what: String| FrameError::Decode {
-        index: file.index,
-        path: file.path.clone(),
-        what,
+    let picture = match &file.video {
+        Some((video, picture)) => video.decode(*picture),
+        None => decode(&file.path),
     };
-    let bytes = std::fs::read(&file.path).map_err(|error| fail(error.to_string()))?;
-    if bytes.starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(&bytes) {
-        return Err(fail("the JPEG file is truncated".to_owned()));
-    }
-    let reader = image::ImageReader::new(std::io::Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|error| fail(error.to_string()))?;
-    let picture = reader.decode().map_err(|error| fail(error.to_string()))?;
+    let picture = picture.map_err(|what| file.fault(what))?;
     if (picture.width(), picture.height()) != (width, height) {
         return Err(FrameError::Size {
             index: file.index,
@@ -134,16 +202,26 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
     Ok(picture)
 }
 
+fn decode(path: &Path) -> Result<DynamicImage, String> {
+    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
+    if bytes.starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(&bytes) {
+        return Err("the JPEG file is truncated".to_owned());
+    }
+    let reader = image::ImageReader::new(std::io::Cursor::new(bytes))
+        .with_guessed_format()
+        .map_err(|error| error.to_string())?;
+    reader.decode().map_err(|error| error.to_string())
+}
+
 /// What the pixels of a frame are, by its file's header.
 ///
 /// # Errors
 /// A missing or unknown file.
 pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
-    let fail = |what: String| FrameError::Decode {
-        index: file.index,
-        path: file.path.clone(),
-        what,
-    };
+    if let Some((video, _)) = &file.video {
+        return Ok(video.colour());
+    }
+    let fail = |what: String| file.fault(what);
     let reader = image::ImageReader::open(&file.path)
         .and_then(image::ImageReader::with_guessed_format)
         .map_err(|error| fail(error.to_string()))?;

@@ -83,7 +83,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("frame.png");
         write_picture(&path, picture, PictureFormat::Png).unwrap();
-        let file = FrameFile { index: 0, path };
+        let file = FrameFile::picture(0, path);
         let stored = StoredFrame::decode(&file, picture.width(), picture.height()).unwrap();
         stored.grey()
     }

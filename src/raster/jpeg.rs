@@ -50,16 +50,25 @@ pub(super) fn encode(
             pixel.copy_from_slice(last);
         }
     }
-    let mut stream = Vec::with_capacity(visible.len() / 4);
+    compress(&visible, size, channels, quality)
+}
+
+/// A picture of one channel or three, 8 bits, of at most 65535 columns and rows.
+pub(crate) fn compress(
+    pixels: &[u8],
+    [width, height]: [usize; 2],
+    channels: usize,
+    quality: u8,
+) -> io::Result<Vec<u8>> {
+    let mut stream = Vec::with_capacity(pixels.len() / 4);
     let mut encoder = Encoder::new(&mut stream, quality);
     encoder.set_sampling_factor(SamplingFactor::F_2_2);
     let colour = match channels {
         1 => ColorType::Luma,
         _ => ColorType::Rgb,
     };
-    // No tile is wider than EDGE.
     encoder
-        .encode(&visible, width as u16, height as u16, colour)
+        .encode(pixels, width as u16, height as u16, colour)
         .map_err(io::Error::other)?;
     Ok(stream)
 }

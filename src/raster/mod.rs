@@ -60,4 +60,6 @@ pub use cog::{CogState, CogWriter};
 pub use compression::Compression;
 pub use dzi::{DziFormat, DziState, DziWriter, files_folder};
 pub use error::RasterError;
+pub(crate) use jpeg::compress as compress_jpeg;
+pub(crate) use pyramid::{LevelTile, Pyramid};
 pub use spec::{EDGE, Georeference, Nodata, RasterSpec, RasterTile, Reduce, SampleType, TileOrder};

@@ -8,16 +8,16 @@ use std::collections::HashMap;
 
 /// A complete tile of some level.
 #[derive(Debug)]
-pub(super) struct LevelTile {
+pub(crate) struct LevelTile {
     /// 0 is full resolution; every level halves the one before.
-    pub(super) level: usize,
+    pub(crate) level: usize,
     /// The tile.
-    pub(super) tile: RasterTile,
+    pub(crate) tile: RasterTile,
 }
 
 /// The overviews of a picture that is arriving.
 #[derive(Debug)]
-pub(super) struct Pyramid {
+pub(crate) struct Pyramid {
     spec: RasterSpec,
     levels: usize,
     waiting: Waiting,
@@ -42,7 +42,7 @@ struct Pending {
 
 impl Pyramid {
     /// A pyramid of `levels` levels, full resolution included.
-    pub(super) fn new(spec: RasterSpec, levels: usize) -> Result<Self, RasterError> {
+    pub(crate) fn new(spec: RasterSpec, levels: usize) -> Result<Self, RasterError> {
         spec.check()?;
         Ok(Self {
             spec,
@@ -68,7 +68,7 @@ impl Pyramid {
     ///
     /// # Errors
     /// [`RasterError::Tile`]; the batch is lost then, and the picture will not be whole.
-    pub(super) fn add(&mut self, batch: Vec<RasterTile>) -> Result<Vec<LevelTile>, RasterError> {
+    pub(crate) fn add(&mut self, batch: Vec<RasterTile>) -> Result<Vec<LevelTile>, RasterError> {
         for tile in &batch {
             self.take(tile)?;
         }

@@ -145,17 +145,17 @@ impl RasterSpec {
     }
 
     /// Bytes of a pixel.
-    pub(super) fn pixel_bytes(&self) -> usize {
+    pub(crate) fn pixel_bytes(&self) -> usize {
         self.samples_per_pixel() * self.samples.bytes()
     }
 
     /// Columns and rows of pixels at `level`, where 0 is full resolution.
-    pub(super) fn size(&self, level: usize) -> [u32; 2] {
+    pub(crate) fn size(&self, level: usize) -> [u32; 2] {
         [self.width, self.height].map(|side| (0..level).fold(side, |side, _| side.div_ceil(2)))
     }
 
     /// Columns and rows of tiles at `level`.
-    pub(super) fn grid(&self, level: usize) -> [u32; 2] {
+    pub(crate) fn grid(&self, level: usize) -> [u32; 2] {
         self.size(level).map(|side| side.div_ceil(EDGE as u32))
     }
 
@@ -184,7 +184,7 @@ impl RasterSpec {
     }
 
     /// Levels until one has both sides within a tile.
-    pub(super) fn levels_to_one_tile(&self) -> usize {
+    pub(crate) fn levels_to_one_tile(&self) -> usize {
         self.levels_to(EDGE as u32)
     }
 

@@ -191,10 +191,10 @@ impl Template {
         let patch_columns = lattice.columns.div_ceil(PATCH);
         for row in 0..lattice.rows {
             for column in 0..lattice.columns {
-                let wall = WallPoint {
-                    s_m: lattice.s_m + column as f64 * lattice.spacing_m,
-                    h_m: lattice.h_m + row as f64 * lattice.spacing_m,
-                };
+                let wall = lattice.wall(row * lattice.columns + column);
+                if scene.ignored.hold(&wall) {
+                    continue;
+                }
                 let frame = scene.surface.frame(wall);
                 let point: [f32; 3] = (frame.x_w - origin).cast().into();
                 let (e_s, e_h): ([f32; 3], [f32; 3]) =

@@ -83,6 +83,7 @@ pub fn pose_bound(
     let shutter = Shutter::default();
     let scene = Scene {
         surface: survey.surface.as_ref(),
+        ignored: &survey.ignored,
         camera,
         shutter: &shutter,
         calibration: Calibration::none(&camera),

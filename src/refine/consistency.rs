@@ -190,7 +190,9 @@ fn compare(
     let gaze = own.at(scene, pose, &origin);
     let seen: Vec<([f32; 3], (f32, f32, f32))> = points
         .iter()
-        .filter_map(|x_w| {
+        .enumerate()
+        .filter(|(k, _)| !scene.ignored.hold(&lattice.wall(*k)))
+        .filter_map(|(_, x_w)| {
             let offset = x_w - origin;
             let point = [offset.x as f32, offset.y as f32, offset.z as f32];
             Some((point, gaze.contrast_and_detail(&point)?))

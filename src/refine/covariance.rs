@@ -23,8 +23,7 @@ use super::selected_inverse::SelectedInverse;
 use super::shared::{BorderBlock, SharedBlock};
 use crate::camera::Camera;
 use crate::surface::{GaugeMotion, Surface, lens_jacobian, wall_jacobian};
-use crate::trajectory::so3;
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector6};
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
 ///
@@ -89,10 +88,10 @@ impl Covariances {
         self
     }
 
-    /// The covariances after all poses have moved along the gauge: positions turn with it, `ρ → R_y ρ`; rotations are in
+    /// The covariances after all poses have moved along the gauge: positions turn with it, `ρ → R_n ρ`; rotations are in
     /// the cameras' own axes.
     pub(super) fn moved(mut self, motion: &GaugeMotion) -> Self {
-        let turn = so3::exp(&(Vector3::y() * motion.turn_rad));
+        let turn = motion.rotation();
         let mut t = Matrix6::identity();
         t.fixed_view_mut::<3, 3>(3, 3)
             .copy_from(turn.to_rotation_matrix().matrix());

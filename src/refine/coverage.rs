@@ -8,7 +8,7 @@ use super::estimate::FrameEstimate;
 use super::foreign::Marks;
 use super::grid::{BLOCK, WallGrid};
 use super::view::View;
-use super::visibility::{Placed, Visibility, rows_of};
+use super::visibility::{Hidden, Placed, Visibility, rows_of};
 use crate::camera::Camera;
 use crate::frames::{FrameCache, FrameError, Pyramid};
 use crate::surface::Surface;
@@ -63,6 +63,7 @@ pub struct Coverage<'a> {
     /// Of the level.
     camera: Camera,
     pictures: Pictures<'a>,
+    hidden: Hidden<'a>,
     /// Share of the information that the tiles compared hold.
     information: f64,
     /// Where the participants stood when the samples were chosen; None for those that are not compared.
@@ -90,6 +91,7 @@ impl<'a> Coverage<'a> {
         grid: WallGrid,
         camera: Camera,
         pictures: Pictures<'a>,
+        hidden: Hidden<'a>,
         information: f64,
         placed: Vec<Option<Placed>>,
     ) -> Result<Self, FrameError> {
@@ -99,6 +101,7 @@ impl<'a> Coverage<'a> {
             grid,
             camera,
             pictures,
+            hidden,
             information,
             placed,
             kept: Vec::new(),
@@ -174,6 +177,7 @@ impl<'a> Coverage<'a> {
             &self.grid,
             &self.camera,
             self.pictures.frames.shading().as_deref(),
+            &self.hidden,
             &placed,
             rows,
         );

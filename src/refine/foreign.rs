@@ -214,7 +214,7 @@ mod tests {
     use crate::camera::Sweep;
     use crate::frames::GreyImage;
     use crate::refine::estimate::FrameEstimate;
-    use crate::refine::visibility::Placed;
+    use crate::refine::visibility::{Hidden, Placed};
     use crate::surface::Footprint;
     use crate::test_wall::{TestWall, waves};
     use rand::SeedableRng;
@@ -261,7 +261,15 @@ mod tests {
         };
         let grid = WallGrid::new(&wall.circle, 1.0 / camera.fy, 1.0);
         let rows = -40..40;
-        let visibility = Visibility::find(&wall.circle, &grid, &camera, None, &placed, &rows);
+        let visibility = Visibility::find(
+            &wall.circle,
+            &grid,
+            &camera,
+            None,
+            &Hidden::NOTHING,
+            &placed,
+            &rows,
+        );
         let frames: Vec<usize> = (0..views.len()).collect();
         let mut misfits = Vec::new();
         let mut work = TileWork::default();

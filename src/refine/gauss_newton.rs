@@ -87,6 +87,20 @@ pub struct Solution<'a> {
     pub record: SolveRecord,
 }
 
+/// A solve between two steps.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SolveState {
+    unknowns: Unknowns,
+    lambda: f64,
+    cost_start: f64,
+    steps: Vec<StepRecord>,
+    /// Steps taken or given up.
+    iterations: u64,
+}
+
+/// What is called between two steps.
+pub type Between<'a> = dyn FnMut(SolveState) -> Result<(), ProblemError> + 'a;
+
 /// What is estimated: the active frames and the shared unknowns.
 type Unknowns = (Vec<FrameEstimate>, Kappa);
 
@@ -102,27 +116,18 @@ const TRIES: usize = 8;
 /// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples; such a
 /// step is never taken. Frames that a step would bring where they cannot be ([`Problem::admits`]) stay where they are.
 /// Only the last step, shorter than the tolerance, is taken on trust: cost and equations are those before it.
-struct DampedGaussNewton {
+struct DampedGaussNewton<'b> {
     stopping: Stopping,
     lambda: f64,
     current: Option<Linearisation>,
-    cost_start: f64,
+    /// None before the first linearisation.
+    cost_start: Option<f64>,
     steps: Vec<StepRecord>,
     stop: Option<StopReason>,
+    between: Option<&'b mut Between<'b>>,
 }
 
-impl DampedGaussNewton {
-    fn new(stopping: Stopping) -> Self {
-        Self {
-            stopping,
-            lambda: 0.0,
-            current: None,
-            cost_start: 0.0,
-            steps: Vec::new(),
-            stop: None,
-        }
-    }
-
+impl DampedGaussNewton<'_> {
     /// Why a step that moves the wall by `step_px` and lowers the quadratic model by `½ decrement` is the last one,
     /// if it is.
     fn reason_to_stop(&self, step_px: f64, decrement: f64, unknowns: usize) -> Option<StopReason> {
@@ -222,22 +227,9 @@ impl DampedGaussNewton {
     }
 }
 
-impl<'a> Solver<Problem<'a>, Iterate> for DampedGaussNewton {
+impl<'a> Solver<Problem<'a>, Iterate> for DampedGaussNewton<'_> {
     fn name(&self) -> &str {
         "damped Gauss–Newton"
-    }
-
-    fn init(
-        &mut self,
-        problem: &mut Counted<Problem<'a>>,
-        mut state: Iterate,
-    ) -> Result<(Iterate, Option<KV>), Error> {
-        let (estimates, kappa) = state.take_param().unwrap_or_default();
-        let first = problem.problem("linearise", |p| Ok(p.linearise_at(&estimates, &kappa)?))?;
-        self.cost_start = first.cost;
-        state = state.param((estimates, kappa)).cost(first.cost);
-        self.current = Some(first);
-        Ok((state, None))
     }
 
     fn next_iter(
@@ -245,15 +237,30 @@ impl<'a> Solver<Problem<'a>, Iterate> for DampedGaussNewton {
         problem: &mut Counted<Problem<'a>>,
         mut state: Iterate,
     ) -> Result<(Iterate, Option<KV>), Error> {
-        let (Some(unknowns), Some(current)) = (state.take_param(), self.current.take()) else {
-            return Err(Error::msg("the solver was not initialised"));
+        let unknowns = state.take_param().unwrap_or_default();
+        let current = match self.current.take() {
+            Some(current) => current,
+            None => problem.problem("linearise", |p| {
+                Ok(p.linearise_at(&unknowns.0, &unknowns.1)?)
+            })?,
         };
+        self.cost_start.get_or_insert(current.cost);
         let (unknowns, next) =
             problem.problem("step", |p| Ok(self.advance(p, &unknowns, current)?))?;
         state = state.param(unknowns).cost(next.cost);
         self.current = Some(next);
         if self.stop.is_some() {
             state = state.terminate_with(TerminationReason::SolverConverged);
+        } else if state.get_iter() + 1 < state.get_max_iters()
+            && let (Some(between), Some(unknowns)) = (&mut self.between, state.get_param())
+        {
+            between(SolveState {
+                unknowns: unknowns.clone(),
+                lambda: self.lambda,
+                cost_start: self.cost_start.unwrap_or_default(),
+                steps: self.steps.clone(),
+                iterations: state.get_iter() + 1,
+            })?;
         }
         Ok((state, None))
     }
@@ -287,14 +294,43 @@ pub fn solve<'a>(
     stopping: Stopping,
     announce: Option<(&str, &Arc<dyn Progress>)>,
 ) -> Result<Solution<'a>, ProblemError> {
+    go_on(problem, stopping, announce, None, None)
+}
+
+/// The same from where the solve of the same problem was, with a call between any two steps.
+///
+/// # Errors
+/// As [`solve`], and those of `between`.
+pub fn go_on<'a, 'b>(
+    problem: Problem<'a>,
+    stopping: Stopping,
+    announce: Option<(&str, &Arc<dyn Progress>)>,
+    begun: Option<SolveState>,
+    between: Option<&'b mut Between<'b>>,
+) -> Result<Solution<'a>, ProblemError> {
     let sigma = problem.sigma();
-    let start = (problem.start(), problem.kappa());
-    let solver = DampedGaussNewton::new(stopping);
-    let mut executor = Executor::new(problem, solver).configure(|state| {
-        state
-            .param(start.clone())
-            .max_iters(stopping.max_iterations)
+    let mut solver = DampedGaussNewton {
+        stopping,
+        lambda: 0.0,
+        current: None,
+        cost_start: None,
+        steps: Vec::new(),
+        stop: None,
+        between,
+    };
+    let (mut start, mut done) = ((problem.start(), problem.kappa()), 0);
+    if let Some(begun) = begun {
+        (start, done) = (begun.unknowns, begun.iterations);
+        (solver.lambda, solver.steps) = (begun.lambda, begun.steps);
+        solver.cost_start = Some(begun.cost_start);
+    }
+    let mut executor = Executor::new(problem, solver).configure(|mut state| {
+        state.iter = done;
+        state.param(start).max_iters(stopping.max_iterations)
     });
+    if let Some((_, progress)) = announce {
+        progress.advance(done as usize);
+    }
     if let Some((stage, progress)) = announce {
         executor = executor.add_observer(
             Reporter {
@@ -324,7 +360,7 @@ pub fn solve<'a>(
         iterations: solver.steps.len() as u64,
         last_step_px: solver.steps.last().map_or(0.0, |step| step.step_px),
         steps: solver.steps,
-        cost_start: solver.cost_start,
+        cost_start: solver.cost_start.unwrap_or_default(),
         cost_end: linearisation.cost,
         observations: linearisation.frames.iter().map(|f| f.samples).sum(),
         sigma,

@@ -1,6 +1,6 @@
 //! The lattice of wall samples, cut into square tiles.
 
-use crate::surface::{Surface, WallFrame, WallPoint};
+use crate::surface::{Footprint, Surface, WallFrame, WallPoint};
 use nalgebra::Vector3;
 
 /// Samples along the side of a tile.
@@ -112,6 +112,17 @@ impl WallGrid {
             std::array::from_fn(|i| centre.s_m + (i as f64 - reach) * self.spacing_s_m),
             std::array::from_fn(|j| centre.h_m + (j as f64 - reach) * self.spacing_h_m),
         )
+    }
+
+    /// The wall that a tile covers with its ring.
+    pub fn area(&self, tile: TileId) -> Footprint {
+        let (s, h) = self.samples(tile);
+        Footprint {
+            s_min_m: s[0],
+            s_max_m: s[SIDE - 1],
+            h_min_m: h[0],
+            h_max_m: h[SIDE - 1],
+        }
     }
 
     /// The four corners of a tile with its ring, in `points`.

@@ -83,7 +83,7 @@ pub fn settle_repeats(
     }
     let mut moved = false;
     for (k, motion) in frames.iter().zip(&choice.motion) {
-        if *motion != GaugeMotion::default() {
+        if !motion.is_none() {
             let pose = &mut tracked.estimates[*k].pose;
             *pose = motion.apply(pose);
             moved = true;
@@ -149,9 +149,10 @@ fn repeats_of(
     };
     let most = UNEXPLAINED * here.max(LEAST_UNEXPLAINED);
     let gauge = scene.surface.gauge();
-    let motion = |[s_m, h_m]: [f64; 2]| GaugeMotion {
-        turn_rad: if gauge.turn { s_m / radius_m } else { 0.0 },
-        shift_m: if gauge.shift { h_m } else { 0.0 },
+    let motion = |[s_m, h_m]: [f64; 2]| match gauge.shift {
+        true => gauge.motion(s_m / radius_m, h_m),
+        // Along the tunnel, not around it.
+        false => gauge.motion(h_m / arm_m(&gauge, &pose), 0.0),
     };
     let spacing = wall.lattice.spacing_m;
     let mut found = Vec::new();
@@ -181,19 +182,10 @@ fn repeats_of(
     Ok(found)
 }
 
-/// One motion after another; they commute.
-fn plus(a: &GaugeMotion, b: &GaugeMotion) -> GaugeMotion {
-    GaugeMotion {
-        turn_rad: a.turn_rad + b.turn_rad,
-        shift_m: a.shift_m + b.shift_m,
-    }
-}
-
-fn minus(a: &GaugeMotion, b: &GaugeMotion) -> GaugeMotion {
-    GaugeMotion {
-        turn_rad: a.turn_rad - b.turn_rad,
-        shift_m: a.shift_m - b.shift_m,
-    }
+/// Distance of a camera from the axis that the tunnel bends about, metres.
+fn arm_m(gauge: &Gauge, pose: &Pose) -> f64 {
+    let arm = pose.t_wc - gauge.axis.point;
+    arm.cross(&gauge.axis.direction).norm().max(1e-9)
 }
 
 /// The likeliest of some motions, and the second if it is less likely by no more than `clear`.
@@ -231,11 +223,11 @@ fn choose_steps(
         let expected = prior.predict(from, &before.apply(&poses[i - 1]), to);
         let steps = prior.steps_between(from, to);
         let cost = |own: &GaugeMotion| {
-            prior.deviation_cost(&expected, &plus(&before, own).apply(&poses[i])) / steps
+            prior.deviation_cost(&expected, &before.plus(1.0, own).apply(&poses[i])) / steps
         };
         let (best, second) = likeliest(&repeats[i], clear, cost);
-        motion[i] = plus(&before, &best);
-        step[i] = second.map(|second| minus(&second, &best));
+        motion[i] = before.plus(1.0, &best);
+        step[i] = second.map(|second| second.plus(-1.0, &best));
     }
     let cuts: Vec<usize> = (1..frames.len()).filter(|i| step[*i].is_some()).collect();
     let starts = std::iter::once(0).chain(cuts.iter().copied());
@@ -250,7 +242,7 @@ fn choose_steps(
             if i >= end {
                 step[end]
             } else if i < start {
-                step[start].map(|step| minus(&none, &step))
+                step[start].map(|step| none.plus(-1.0, &step))
             } else {
                 None
             }
@@ -290,7 +282,8 @@ fn choose_frames(
             let cost = |own: &GaugeMotion| prior.deviation_cost(&expected, &own.apply(&poses[i]));
             let (best, second) = likeliest(&repeats[i], clear, cost);
             next.motion.push(best);
-            next.rival.push(second.map(|second| minus(&second, &best)));
+            next.rival
+                .push(second.map(|second| second.plus(-1.0, &best)));
         }
         let same = next.motion == choice.motion;
         choice = next;
@@ -306,13 +299,13 @@ mod tests {
     use super::*;
     use crate::trajectory::{Jitter, spiral};
 
-    const TILE: GaugeMotion = GaugeMotion {
-        turn_rad: 0.0,
-        shift_m: 0.45,
-    };
+    /// A tile on.
+    fn tile() -> GaugeMotion {
+        GaugeMotion::about_y(0.0, 0.45)
+    }
 
     fn back(motion: &GaugeMotion) -> GaugeMotion {
-        minus(&GaugeMotion::default(), motion)
+        GaugeMotion::default().plus(-1.0, motion)
     }
 
     fn prior(model: JitterModel, shift_sigma_m: f64) -> Prior {
@@ -333,11 +326,8 @@ mod tests {
     /// Every frame fits a tile on and a tile back.
     fn choose(prior: &Prior, poses: &[Pose]) -> Choice {
         let frames: Vec<usize> = (0..poses.len()).collect();
-        let repeats = vec![vec![TILE, back(&TILE)]; poses.len()];
-        let gauge = Gauge {
-            turn: true,
-            shift: true,
-        };
+        let repeats = vec![vec![tile(), back(&tile())]; poses.len()];
+        let gauge = Gauge::round();
         match prior.jitter.model {
             JitterModel::RandomWalk => choose_steps(prior, &frames, poses, &repeats, CLEAR),
             JitterModel::Independent => {
@@ -352,7 +342,7 @@ mod tests {
         let mut poses = prior.initial.clone();
         poses[7..]
             .iter_mut()
-            .for_each(|pose| *pose = TILE.apply(pose));
+            .for_each(|pose| *pose = tile().apply(pose));
         let choice = choose(&prior, &poses);
         assert!(choice.rival.iter().all(Option::is_none));
         for (k, motion) in choice.motion.iter().enumerate() {
@@ -365,10 +355,10 @@ mod tests {
     fn a_single_wrong_frame_is_moved_back_by_a_tile() {
         let prior = prior(JitterModel::Independent, 0.03);
         let mut poses = prior.initial.clone();
-        poses[7] = TILE.apply(&poses[7]);
+        poses[7] = tile().apply(&poses[7]);
         let choice = choose(&prior, &poses);
         assert!(choice.rival.iter().all(Option::is_none));
-        assert_eq!(choice.motion[7], back(&TILE));
+        assert_eq!(choice.motion[7], back(&tile()));
         assert_eq!(choice.motion[6], GaugeMotion::default());
     }
 
@@ -376,10 +366,7 @@ mod tests {
     #[test]
     fn what_the_prior_cannot_tell_is_ambiguous() {
         let model = JitterModel::Independent;
-        let half = GaugeMotion {
-            turn_rad: 0.0,
-            shift_m: 0.2,
-        };
+        let half = GaugeMotion::about_y(0.0, 0.2);
         let walk = prior(JitterModel::RandomWalk, 0.1);
         let mut poses = walk.initial.clone();
         poses[8..]
@@ -389,7 +376,7 @@ mod tests {
         for (k, rival) in choice.rival.iter().enumerate() {
             assert_eq!(rival.is_some(), k >= 8, "{k}");
         }
-        assert_eq!(choice.rival[9], Some(back(&TILE)));
+        assert_eq!(choice.rival[9], Some(back(&tile())));
         let independent = prior(model, 0.1);
         let mut poses = independent.initial.clone();
         poses[8] = half.apply(&poses[8]);

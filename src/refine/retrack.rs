@@ -7,8 +7,7 @@ use super::calibration::Kappa;
 use super::doubt::Doubt;
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
-use super::problem::{Problem, Sampling, Scene};
-use super::run::RefineError;
+use super::problem::{Problem, ProblemError, Sampling, Scene};
 use super::track::{Tracked, Tracking};
 use crate::camera::Camera;
 use crate::progress::Progress;
@@ -56,8 +55,8 @@ impl Retracking {
         options: &RefineOptions,
         stopping: Stopping,
         progress: &dyn Progress,
-        mut between: impl FnMut(&Self) -> Result<(), RefineError>,
-    ) -> Result<Tracked, RefineError> {
+        mut between: impl FnMut(&Self) -> Result<(), ProblemError>,
+    ) -> Result<Tracked, ProblemError> {
         let mut scene = Scene {
             calibration: scene.calibration.of_camera(),
             ..*scene

@@ -9,7 +9,7 @@ use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::examine::examine;
 use super::flat_field::{correct, flatten};
-use super::gauss_newton::{Solution, StopReason, Stopping, solve};
+use super::gauss_newton::{Solution, StopReason, Stopping, go_on};
 use super::neighbourhood::Neighbourhood;
 use super::observed::{CalibrationReport, Refusal};
 use super::options::RefineOptions;
@@ -24,10 +24,10 @@ use super::rows::row_motion;
 use super::state::{Keeper, Phase, RunState, Solving};
 use super::track::{Tracked, retry};
 use super::verdict::unsupported;
-use crate::checkpoint::{Checkpoint, CheckpointError};
+use crate::checkpoint::Checkpoint;
 use crate::frames::FrameCache;
 use crate::progress::Progress;
-use crate::survey::Survey;
+use crate::survey::{CalibrationGroup, Survey};
 use crate::trajectory::{Pose, StampedPose, Trajectory};
 use std::sync::Arc;
 use std::time::Instant;
@@ -43,15 +43,20 @@ pub enum RefineError {
     SingleFrame,
     /// Nothing overlaps.
     #[error(
-        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, or take frames closer together"
+        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, whether the mask or tunnel.ignore leaves anything, or take frames closer together"
     )]
     NoOverlap,
+    /// Something that is known by its shape only for a straight round tunnel.
+    #[error(
+        "{unknown} can be estimated of a straight round tunnel only; leave it out of --calibrate and [calibrate] unknowns"
+    )]
+    OnlyRound {
+        /// What was to be estimated.
+        unknown: &'static str,
+    },
     /// The equations.
     #[error(transparent)]
     Problem(#[from] ProblemError),
-    /// What is done cannot be kept.
-    #[error(transparent)]
-    Checkpoint(#[from] CheckpointError),
 }
 
 /// Result of a refinement.
@@ -133,9 +138,10 @@ pub fn refine_keeping(
         bias_sigma: options.bias_sigma,
     };
     let shutter = survey.shutter();
-    let mut calibration = calibration_of(survey, options, &prior.initial);
+    let mut calibration = calibration_of(survey, options, &prior.initial)?;
     let mut scene = Scene {
         surface: survey.surface.as_ref(),
+        ignored: &survey.ignored,
         camera: survey.camera,
         shutter: &shutter,
         calibration,
@@ -161,7 +167,7 @@ pub fn refine_keeping(
             }
             clock.lap("decode");
             let tracking = Retracking::begin(examined.doubts);
-            (examined.noise, Phase::Tracking(tracking))
+            (examined.noise, Phase::Tracking(Box::new(tracking)))
         }
     };
     scene.noise = noise;
@@ -174,7 +180,7 @@ pub fn refine_keeping(
     };
 
     let mut solving = match phase {
-        Phase::Solving(solving) => solving,
+        Phase::Solving(solving) => *solving,
         Phase::Tracking(tracking) => {
             let rough = Prior {
                 jitter: calibration.widened(&prior.jitter, prior.arm_m()),
@@ -186,7 +192,7 @@ pub fn refine_keeping(
             };
             let stopping = close(options, options.handover_level(side));
             let between = |tracking: &Retracking| {
-                keeper.if_due(|| keep(Phase::Tracking(tracking.clone()), &clock))?;
+                keeper.if_due(|| keep(Phase::Tracking(Box::new(tracking.clone())), &clock))?;
                 Ok(())
             };
             let mut tracked = tracking.finish(
@@ -209,7 +215,7 @@ pub fn refine_keeping(
 
     let mut last = None;
     while let Some((sampling, stopping)) = solving.stages.front().copied() {
-        keeper.if_due(|| keep(Phase::Solving(solving.clone()), &clock))?;
+        keeper.if_due(|| keep(Phase::Solving(Box::new(solving.clone())), &clock))?;
         if solving.stages.len() == 1 && !solving.levels.is_empty() && solving.rivals.is_none() {
             solving.rivals = Some(repair(
                 &scene,
@@ -219,8 +225,10 @@ pub fn refine_keeping(
                 progress.as_ref(),
             )?);
             clock.lap("repair");
-            keeper.if_due(|| keep(Phase::Solving(solving.clone()), &clock))?;
+            keeper.if_due(|| keep(Phase::Solving(Box::new(solving.clone())), &clock))?;
         }
+        let before = solving.clone();
+        let begun = solving.solve.take();
         solving.stages.pop_front();
         let tracked = &mut solving.tracked;
         let Sampling {
@@ -247,7 +255,19 @@ pub fn refine_keeping(
             stage += &format!(", {:.0} % of the information", 100.0 * information);
         }
         progress.start("global", options.max_iterations as usize);
-        let solution = solve(problem, stopping, Some((&stage, progress)))?;
+        let mut between = |solve| {
+            keeper.if_due(|| {
+                let solve = Some(solve);
+                let solving = Solving {
+                    solve,
+                    ..before.clone()
+                };
+                keep(Phase::Solving(Box::new(solving)), &clock)
+            })?;
+            Ok(())
+        };
+        let announce = Some((stage.as_str(), progress));
+        let solution = go_on(problem, stopping, announce, begun, Some(&mut between))?;
         progress.finish();
         tracked.estimates.clone_from(&solution.estimates);
         let refused = match level {
@@ -364,7 +384,7 @@ pub fn refine_keeping(
                     &scene.kappa,
                     &certainty.shared.unwrap_or_default(),
                     &refusals,
-                    survey.file.tunnel.radius_m,
+                    survey.file.tunnel.nominal_m(),
                 )
             }),
             timings: clock.laps,
@@ -374,17 +394,32 @@ pub fn refine_keeping(
 }
 
 /// What is to be estimated of the survey's calibration.
-fn calibration_of(survey: &Survey, options: &RefineOptions, initial: &[Pose]) -> Calibration {
+///
+/// # Errors
+/// [`RefineError::OnlyRound`].
+fn calibration_of(
+    survey: &Survey,
+    options: &RefineOptions,
+    initial: &[Pose],
+) -> Result<Calibration, RefineError> {
     let section = survey.file.calibrate.clone().unwrap_or_default();
     let groups = options.calibrate.as_ref().unwrap_or(&section.unknowns);
     let calibration = match groups.is_empty() {
         true => Calibration::none(&survey.camera),
         false => Calibration::new(groups, &section, &survey.camera, initial),
     };
-    Calibration {
+    for (group, unknown) in [
+        (CalibrationGroup::Radius, "the radius"),
+        (CalibrationGroup::Axis, "the axis"),
+    ] {
+        if groups.contains(&group) && !survey.file.tunnel.is_straight_and_round() {
+            return Err(RefineError::OnlyRound { unknown });
+        }
+    }
+    Ok(Calibration {
         readout_s: survey.shutter().readout_s(),
         ..calibration
-    }
+    })
 }
 
 /// Goes on with the shared unknowns `kappa`, those refused at the values given.

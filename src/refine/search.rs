@@ -90,8 +90,8 @@ pub fn search(
     let spacing = wall.lattice.spacing_m;
     // How far a radian moves the middle of the view: of pitch along the tunnel, about the tunnel's axis around it.
     let a = wall_jacobian(predicted, &scene.surface.frame(hit.wall));
-    let axis = predicted.r_wc.inverse() * Vector3::y();
-    let Some(tilt) = tilt_axis(predicted) else {
+    let axis = axis_seen(scene, predicted);
+    let Some(tilt) = tilt_axis(&axis) else {
         return Vec::new();
     };
     let along = (a.fixed_columns::<3>(0) * tilt).norm();
@@ -181,10 +181,14 @@ pub fn search(
         .collect()
 }
 
+/// The direction of the tunnel where a camera stands, in the camera's frame.
+fn axis_seen(scene: &Scene, pose: &Pose) -> Vector3<f64> {
+    scene.surface.straightened(pose).r_wc.inverse() * Vector3::y()
+}
+
 /// The axis, in the camera's frame, about which a turn moves the middle of the view along the tunnel and nowhere else: its
 /// own x for a camera that is not rolled. None for one that looks along the tunnel's axis.
-fn tilt_axis(pose: &Pose) -> Option<Vector3<f64>> {
-    let axis = pose.r_wc.inverse() * Vector3::y();
+fn tilt_axis(axis: &Vector3<f64>) -> Option<Vector3<f64>> {
     axis.cross(&Vector3::z()).try_normalize(1e-6)
 }
 
@@ -233,8 +237,8 @@ fn shifted(scene: &Scene, pose: &Pose, shift_m: &Vector2<f64>) -> Option<Pose> {
         );
         let a = wall_jacobian(&pose, &scene.surface.frame(hit));
         let a: Matrix2x3<f64> = a.fixed_columns::<3>(0).into_owned();
-        let axis = pose.r_wc.inverse() * Vector3::y();
-        let tilt = tilt_axis(&pose)?;
+        let axis = axis_seen(scene, &pose);
+        let tilt = tilt_axis(&axis)?;
         let turn = Matrix2::from_columns(&[a * tilt, a * axis]);
         let step = turn.try_inverse()? * left;
         let step = step * (0.3 / step.norm()).min(1.0);

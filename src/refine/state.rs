@@ -1,9 +1,9 @@
 //! What a refinement knows between two of its steps: all that it needs to go on from there.
 
 use super::calibration::{Calibration, Kappa, SHARED};
-use super::gauss_newton::Stopping;
+use super::gauss_newton::{SolveState, Stopping};
 use super::observed::Refusal;
-use super::problem::Sampling;
+use super::problem::{ProblemError, Sampling};
 use super::repeats::Rival;
 use super::report::{LevelReport, StageTime};
 use super::retrack::Retracking;
@@ -32,9 +32,9 @@ pub struct RunState {
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Phase {
     /// Frames are being placed.
-    Tracking(Retracking),
+    Tracking(Box<Retracking>),
     /// All frames are placed.
-    Solving(Solving),
+    Solving(Box<Solving>),
 }
 
 /// Global solves, one after another.
@@ -50,6 +50,8 @@ pub struct Solving {
     pub free: [bool; SHARED],
     /// Solves that are left.
     pub stages: VecDeque<(Sampling, Stopping)>,
+    /// The first of them, if it has begun.
+    pub solve: Option<SolveState>,
     /// Whether all frames have been compared pair by pair.
     pub checked: bool,
     /// What the wall's repeats leave undecided, once that has been looked at.
@@ -74,6 +76,7 @@ impl Solving {
             kappa,
             free: calibration.free,
             stages: stages.collect(),
+            solve: None,
             checked: false,
             rivals: None,
             levels: Vec::new(),
@@ -92,10 +95,10 @@ impl Keeper<'_> {
     /// The state to go on from, if there is one.
     ///
     /// # Errors
-    /// [`CheckpointError::Damaged`].
-    pub fn state(&self) -> Result<Option<RunState>, CheckpointError> {
+    /// [`ProblemError::Checkpoint`] if it is damaged.
+    pub fn state(&self) -> Result<Option<RunState>, ProblemError> {
         match &self.0 {
-            Some(checkpoint) => checkpoint.state(NAME),
+            Some(checkpoint) => Ok(checkpoint.state(NAME)?),
             None => Ok(None),
         }
     }
@@ -103,12 +106,13 @@ impl Keeper<'_> {
     /// Keeps the state if it is time.
     ///
     /// # Errors
-    /// Whatever the system says.
-    pub fn if_due(&mut self, state: impl FnOnce() -> RunState) -> Result<(), CheckpointError> {
+    /// [`ProblemError::Checkpoint`] with whatever the system says.
+    pub fn if_due(&mut self, state: impl FnOnce() -> RunState) -> Result<(), ProblemError> {
         if let Some(checkpoint) = &mut self.0
             && checkpoint.is_due()
         {
-            checkpoint.keep(NAME, &state())?;
+            let kept = checkpoint.keep(NAME, &state());
+            kept.map_err(CheckpointError::from)?;
         }
         Ok(())
     }

@@ -6,6 +6,7 @@ use super::prior::Prior;
 use super::problem::Scene;
 use super::track::Tracked;
 use crate::frames::FrameCache;
+use crate::surface::Patches;
 use crate::test_wall::TestWall;
 use crate::trajectory::{Jitter, JitterModel, Pose, Shutter};
 use std::sync::LazyLock;
@@ -27,12 +28,14 @@ pub fn prior(initial: &[Pose]) -> Prior {
 }
 
 /// All rows at once.
+static NOWHERE: Patches = Patches::NONE;
 static GLOBAL: LazyLock<Shutter> = LazyLock::new(Shutter::default);
 
 /// The wall with frames without noise, nothing but poses and exposures unknown.
 pub fn scene<'a>(wall: &'a TestWall, frames: &'a FrameCache, prior: &'a Prior) -> Scene<'a> {
     Scene {
         surface: &wall.circle,
+        ignored: &NOWHERE,
         camera: wall.camera,
         shutter: &GLOBAL,
         calibration: Calibration::none(&wall.camera),

@@ -5,14 +5,14 @@ use super::grid::{BLOCK, SIDE, TileId, WallGrid};
 use super::tile::Seen;
 use super::view::View;
 use crate::camera::{Camera, Sweep};
-use crate::frames::Shading;
-use crate::surface::{Footprint, Surface};
+use crate::frames::{HalvedMask, Shading};
+use crate::surface::{Footprint, Patches, Surface};
 use crate::trajectory::Pose;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Pixels that a tile must stay away from the frame's border: room for the steps to come.
+/// Pixels that a tile must stay away from the frame's border and from what is masked: room for the steps to come.
 const MARGIN_PX: f64 = 1.0;
 
 /// Area of a tile between its outermost samples, in samples.
@@ -77,6 +77,24 @@ pub struct Placed {
     pub active: bool,
 }
 
+/// What of the wall and of the frames is not compared.
+#[derive(Clone, Debug)]
+pub struct Hidden<'a> {
+    /// Parts of the wall.
+    pub ignored: &'a Patches,
+    /// Which pixels show the wall, at the frames' level; all if there is none.
+    pub mask: Option<HalvedMask>,
+}
+
+#[cfg(test)]
+impl Hidden<'_> {
+    /// Nothing.
+    pub const NOTHING: Hidden<'static> = Hidden {
+        ignored: &Patches::NONE,
+        mask: None,
+    };
+}
+
 /// The observations of a set of frames: every tile that at least two frames see, one of them active.
 ///
 /// A frame either sees a whole tile (with the ring its gradients need) or does not count there at all: every sample of
@@ -99,6 +117,7 @@ impl Visibility {
         grid: &WallGrid,
         camera: &Camera,
         shading: Option<&Shading>,
+        hidden: &Hidden,
         placed: &[Placed],
         rows: &Range<i64>,
     ) -> Self {
@@ -107,7 +126,7 @@ impl Visibility {
             .iter()
             .map(|frame| Field::of(grid, &frame.footprint, rows))
             .collect();
-        let corners = cells.corners(surface, &fields);
+        let corners = cells.corners(surface, &fields, hidden.ignored);
         let seen: Vec<Vec<(usize, Observer)>> = placed
             .par_iter()
             .zip(&fields)
@@ -115,11 +134,13 @@ impl Visibility {
             .map(|(k, (frame, field))| {
                 let camera = &camera.sweeping(&frame.sweep);
                 let mut tiles = Vec::new();
+                let mask = hidden.mask.as_ref();
                 for tile in cells.of(field) {
-                    if let Some(observer) =
-                        observe(grid, camera, shading, &frame.pose, k, &corners[tile])
-                    {
-                        tiles.push((tile, observer));
+                    let Some(corners) = &corners[tile] else {
+                        continue;
+                    };
+                    if let Some(seen) = sight(grid, camera, mask, &frame.pose, corners) {
+                        tiles.push((tile, seen.observer(k, camera, shading)));
                     }
                 }
                 tiles
@@ -273,8 +294,14 @@ impl<'g> Cells<'g> {
         })
     }
 
-    /// The corners of all tiles that some frame may see, ring included, row by row; each is computed once for all frames.
-    fn corners(&self, surface: &dyn Surface, fields: &[Field]) -> Vec<[Vector3<f64>; 4]> {
+    /// The corners of all tiles that some frame may see, ring included, row by row; each is computed once for all frames. None for
+    /// tiles with wall that is ignored.
+    fn corners(
+        &self,
+        surface: &dyn Surface,
+        fields: &[Field],
+        ignored: &Patches,
+    ) -> Vec<Option<[Vector3<f64>; 4]>> {
         let mut wanted = vec![false; self.count()];
         for tile in fields.iter().flat_map(|field| self.of(field)) {
             wanted[tile] = true;
@@ -283,12 +310,13 @@ impl<'g> Cells<'g> {
             .par_iter()
             .enumerate()
             .map_init(Vec::new, |scratch, (k, wanted)| {
-                if *wanted {
-                    self.grid.corners(surface, self.id(k), scratch);
+                if !*wanted || ignored.meet(&self.grid.area(self.id(k))) {
+                    return None;
                 }
+                self.grid.corners(surface, self.id(k), scratch);
                 match scratch[..] {
-                    [a, b, c, d] if *wanted => [a, b, c, d],
-                    _ => [Vector3::zeros(); 4],
+                    [a, b, c, d] => Some([a, b, c, d]),
+                    _ => None,
                 }
             });
         corners.collect()
@@ -314,15 +342,22 @@ impl Field {
     }
 }
 
-/// Frame `frame` at `pose` as an observer of the tile with these corners, if it sees all of it.
-fn observe(
+/// A tile as a frame sees it.
+struct Sight {
+    /// Where its middle appears.
+    middle: Vector2<f64>,
+    /// See [`Observer::pixels`].
+    pixels: f64,
+}
+
+/// The tile with these corners as a frame at `pose` sees it, if it sees all of it.
+fn sight(
     grid: &WallGrid,
     camera: &Camera,
-    shading: Option<&Shading>,
+    mask: Option<&HalvedMask>,
     pose: &Pose,
-    frame: usize,
     corners: &[Vector3<f64>; 4],
-) -> Option<Observer> {
+) -> Option<Sight> {
     let pixel = |x_w: &Vector3<f64>| {
         camera
             .project(&pose.to_camera(x_w))
@@ -337,12 +372,28 @@ fn observe(
         return None;
     }
     let middle = 0.25 * (a + b + c + d);
-    let shade = shading.map_or(1.0, |shading| shading.at_level(&middle, camera));
-    Some(Observer {
-        frame: frame as u32,
-        pixels: pixels as f32,
-        shade: shade as f32,
-    })
+    if let Some(mask) = mask {
+        let off = [a, b, c, d].map(|corner| (corner - middle).amax());
+        let reach = off
+            .iter()
+            .fold(MARGIN_PX, |most, off| most.max(off + MARGIN_PX));
+        if !mask.is_clear(middle.x as f32, middle.y as f32, reach as f32) {
+            return None;
+        }
+    }
+    Some(Sight { middle, pixels })
+}
+
+impl Sight {
+    /// Frame `frame` as the observer of the tile.
+    fn observer(&self, frame: usize, camera: &Camera, shading: Option<&Shading>) -> Observer {
+        let shade = shading.map_or(1.0, |shading| shading.at_level(&self.middle, camera));
+        Observer {
+            frame: frame as u32,
+            pixels: self.pixels as f32,
+            shade: shade as f32,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -369,7 +420,15 @@ mod tests {
             })
             .collect();
         let everywhere = -1000..1000;
-        let found = Visibility::find(&circle, &grid, &camera, None, &placed, &everywhere);
+        let found = Visibility::find(
+            &circle,
+            &grid,
+            &camera,
+            None,
+            &Hidden::NOTHING,
+            &placed,
+            &everywhere,
+        );
         assert!(!found.tiles.is_empty());
         for tile in &found.tiles {
             let observers = found.observers(tile);
@@ -406,7 +465,17 @@ mod tests {
                 active: true,
             })
             .collect();
-        let find = |rows| Visibility::find(&circle, &grid, &camera, None, &placed, &rows);
+        let find = |rows| {
+            Visibility::find(
+                &circle,
+                &grid,
+                &camera,
+                None,
+                &Hidden::NOTHING,
+                &placed,
+                &rows,
+            )
+        };
         let (all, below, above) = (find(-100..100), find(-100..0), find(0..100));
         assert_eq!(all.observers, [below.observers, above.observers].concat());
     }

@@ -55,6 +55,15 @@ impl Lattice {
         }
     }
 
+    /// A point of the lattice, numbered row by row.
+    pub fn wall(&self, k: usize) -> WallPoint {
+        let (column, row) = (k % self.columns, k / self.columns);
+        WallPoint {
+            s_m: self.s_m + column as f64 * self.spacing_m,
+            h_m: self.h_m + row as f64 * self.spacing_m,
+        }
+    }
+
     /// World points of the lattice, row by row.
     pub fn points(&self, scene: &Scene) -> Vec<Vector3<f64>> {
         let axis = |from: f64, n: usize| -> Vec<f64> {
@@ -264,7 +273,7 @@ pub struct FusedWall {
     pub origin: Vector3<f64>,
     /// Points of the lattice relative to the origin.
     pub points: Vec<[f32; 3]>,
-    /// Local contrast there, the mean over the frames; NaN where none looks.
+    /// Local contrast there, the mean over the frames; NaN where none looks, or what is there is ignored.
     pub contrast: Vec<f32>,
     /// Variance of its noise.
     noise: Vec<f32>,
@@ -357,6 +366,9 @@ impl FusedWall {
             .enumerate()
             .map(|(k, point)| {
                 let (mut sum, mut seen) = ([0.0f32; 3], 0.0f32);
+                if scene.ignored.hold(&lattice.wall(k)) {
+                    return [f32::NAN; 3];
+                }
                 for (sight, gaze, inverse_gain, bias) in &gazes {
                     if !in_sight(sight, k) {
                         continue;

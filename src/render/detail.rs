@@ -20,7 +20,7 @@ pub struct Readings {
 }
 
 struct Reading {
-    /// Grey levels of 255 for each channel; NaN where clipped.
+    /// Grey levels of 255 for each channel; NaN where clipped or masked.
     channels: Vec<Vec<f32>>,
     /// 1-σ of their noise.
     noise: f32,
@@ -152,10 +152,12 @@ fn channels<T: Sample>(picture: &Picture, samples: &[T], response: Response) -> 
             own.take(width * picture.height())
                 .enumerate()
                 .map(|(k, sample)| {
-                    if *sample == black || *sample == white {
+                    let (u, v) = (k % width, k / width);
+                    let hidden = picture.mask().is_some_and(|mask| !mask.shows(u, v));
+                    if hidden || *sample == black || *sample == white {
                         return f32::NAN;
                     }
-                    let (u, v) = ((k % width) as f32, (k / width) as f32);
+                    let (u, v) = (u as f32, v as f32);
                     scale * response.wall(sample.value(), u, v)
                 })
                 .collect()

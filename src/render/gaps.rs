@@ -2,6 +2,7 @@
 
 use super::band::{Band, Target};
 use super::{Canvas, RenderError};
+use crate::surface::Surface;
 use serde::{Deserialize, Serialize};
 
 /// Edge of a cell, canvas pixels, unless the canvas is so large that there would be too many.
@@ -17,7 +18,7 @@ pub struct Gap {
     pub chainage_from_m: f64,
     /// To, metres.
     pub chainage_to_m: f64,
-    /// From, degrees of θ, below 360.
+    /// From, degrees of θ as seen from the axis, below 360.
     pub angle_from_deg: f64,
     /// To; beyond 360 across θ = 0, and 360 more than the beginning all around.
     pub angle_to_deg: f64,
@@ -79,19 +80,19 @@ impl Coverage {
     }
 
     /// The gaps, from the first chainage to the last.
-    pub fn gaps(&self) -> Vec<Gap> {
+    pub fn gaps(&self, surface: &dyn Surface) -> Vec<Gap> {
         let mut seen = vec![false; self.holes.len()];
         let mut gaps = Vec::new();
         for start in 0..self.holes.len() {
             if self.holes[start] > 0 && !seen[start] {
-                gaps.push(self.gap(start, &mut seen));
+                gaps.push(self.gap(surface, start, &mut seen));
             }
         }
         gaps
     }
 
     /// The cells with holes that hang together with `start`.
-    fn gap(&self, start: usize, seen: &mut [bool]) -> Gap {
+    fn gap(&self, surface: &dyn Surface, start: usize, seen: &mut [bool]) -> Gap {
         let around = self.columns as i64;
         // Columns are counted on across θ = 0.
         let mut open = vec![(start, (start % self.columns) as i64)];
@@ -123,7 +124,8 @@ impl Coverage {
         // The last cell may be narrower than the others.
         let degrees = |edge: i64| {
             let pixels = (edge.rem_euclid(around) * i64::from(self.cell)) as f64;
-            360.0 * (edge.div_euclid(around) as f64 + pixels / f64::from(self.canvas.columns))
+            let s_m = surface.perimeter_m() * pixels / f64::from(self.canvas.columns);
+            360.0 * edge.div_euclid(around) as f64 + surface.angle_rad(s_m).to_degrees()
         };
         let turns = 360.0 * left.div_euclid(around) as f64;
         let (from, to) = (degrees(left) - turns, degrees(right + 1) - turns);
@@ -178,6 +180,7 @@ pub fn gaps_csv(gaps: &[Gap]) -> String {
 mod tests {
     use super::*;
     use crate::render::{PixelFormat, Samples};
+    use crate::surface::Circle;
 
     const CANVAS: Canvas = Canvas {
         columns: 80,
@@ -212,7 +215,7 @@ mod tests {
             (16..24).contains(&row) && !(8..72).contains(&column) || row >= 60
         });
         assert!((coverage.share() - 1.0 + (8.0 * 16.0 + 4.0 * 80.0) / 5120.0).abs() < 1e-12);
-        let gaps = coverage.gaps();
+        let gaps = coverage.gaps(&Circle::new(1.0).unwrap());
         assert_eq!(gaps.len(), 2, "{gaps:?}");
         let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
         assert!(close(gaps[0].chainage_from_m, 6.6) && close(gaps[0].chainage_to_m, 7.4));
@@ -226,6 +229,12 @@ mod tests {
     #[test]
     fn without_holes_there_are_no_gaps() {
         let coverage = coverage(|_, _| false);
-        assert_eq!((coverage.share(), coverage.gaps().len()), (1.0, 0));
+        assert_eq!(
+            (
+                coverage.share(),
+                coverage.gaps(&Circle::new(1.0).unwrap()).len()
+            ),
+            (1.0, 0)
+        );
     }
 }

@@ -123,6 +123,11 @@ impl Kernel {
         self.taps
     }
 
+    /// How far from the point a pixel that counts may be along each axis, pixels.
+    pub fn reach_px(&self) -> f32 {
+        0.5 * self.taps as f32
+    }
+
     /// Pixels among them before the point's own.
     pub fn before(&self) -> usize {
         (self.taps - 1) / 2

@@ -2,6 +2,7 @@
 
 use super::Placement;
 use crate::camera::Camera;
+use crate::frames::Mask;
 use crate::surface::{Surface, WallFrame, WallPoint};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix2, Vector2};
@@ -43,10 +44,11 @@ pub(super) fn px_per_metre(camera: &Camera, pose: &Pose, point: &WallFrame) -> O
         .then(|| least_stretch(camera, pose, point))
 }
 
-/// The frames that show `wall`, the one with the highest resolution there first.
+/// The frames that show `wall`, the one with the highest resolution there first; what `mask` hides shows nothing.
 pub fn sightings(
     surface: &dyn Surface,
     camera: &Camera,
+    mask: Option<&Mask>,
     placements: &[Placement],
     wall: WallPoint,
 ) -> Vec<Sighting> {
@@ -57,7 +59,10 @@ pub fn sightings(
         let x_c = pose.to_camera(&point.x_w);
         let pixel = camera
             .project(&x_c)
-            .filter(|pixel| camera.sees(pixel, -ROUNDING_PX))?;
+            .filter(|pixel| camera.sees(pixel, -ROUNDING_PX))
+            .filter(|pixel| {
+                mask.is_none_or(|mask| mask.is_clear(pixel.x as f32, pixel.y as f32, 0.0))
+            })?;
         let normal = point.e_s.cross(&point.e_h);
         let ray = point.x_w - pose.t_wc;
         let cosine = ray.dot(&normal).abs() / (ray.norm() * normal.norm());
@@ -101,7 +106,7 @@ mod tests {
                 s_m: wall.perimeter_m() * f64::from(k) / 40.0,
                 h_m: 0.2 + 0.1 * (1.7 * f64::from(k)).sin(),
             };
-            let found = sightings(&wall.circle, &wall.camera, &placements, point);
+            let found = sightings(&wall.circle, &wall.camera, None, &placements, point);
             assert!(found.is_sorted_by(|a, b| a.px_per_metre >= b.px_per_metre));
             for sighting in &found {
                 seen += 1;

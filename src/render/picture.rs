@@ -3,6 +3,7 @@
 use super::integer::PADDING;
 use super::kernel::Kernel;
 use super::sample::{Sample, Samples};
+use crate::frames::HalvedMask;
 use image::{ColorType, DynamicImage};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -15,6 +16,8 @@ pub struct Picture {
     channels: usize,
     /// [`PADDING`] samples more than there are: pixels are read several at once.
     samples: Samples,
+    /// Which pixels show the wall; all if there is none.
+    mask: Option<HalvedMask>,
 }
 
 impl Picture {
@@ -39,7 +42,25 @@ impl Picture {
             height,
             channels,
             samples,
+            mask: None,
         }
+    }
+
+    /// The picture of which only what `mask` says shows the wall.
+    pub fn masked(self, mask: Option<HalvedMask>) -> Self {
+        Self { mask, ..self }
+    }
+
+    /// Which pixels show the wall; all if there is none.
+    pub(super) fn mask(&self) -> Option<&HalvedMask> {
+        self.mask.as_ref()
+    }
+
+    /// True if all pixels under a kernel at `(u, v)` show the wall.
+    #[inline]
+    pub fn shows(&self, u: f32, v: f32, kernel: &Kernel) -> bool {
+        let mask = self.mask.as_ref();
+        mask.is_none_or(|mask| mask.is_clear(u, v, kernel.reach_px()))
     }
 
     /// A decoded file in the format that [`PixelFormat::of`] says; transparency is ignored.
@@ -89,7 +110,8 @@ impl Picture {
         };
         let count = width * height * self.channels;
         let channels = self.channels * copies;
-        match self.samples {
+        let mask = self.mask.clone();
+        let widened = match self.samples {
             Samples::Eight(samples) if format.deep => {
                 let samples = samples[..count].iter();
                 let wide = samples.flat_map(|v| std::iter::repeat_n(257 * u16::from(*v), copies));
@@ -104,19 +126,20 @@ impl Picture {
                 Self::new(width, height, channels, wide.collect::<Vec<u16>>())
             }
             samples => Self { samples, ..self },
-        }
+        };
+        widened.masked(mask)
     }
 
     /// Half the size: the mean of 2 × 2 pixels; an odd last row or column is dropped (see
     /// [`crate::camera::Camera::at_level`]).
     pub fn halved(&self) -> Self {
         let size = (self.width / 2, self.height / 2);
-        match &self.samples {
-            Samples::Eight(samples) => Self::new(size.0, size.1, self.channels, self.mean(samples)),
-            Samples::Sixteen(samples) => {
-                Self::new(size.0, size.1, self.channels, self.mean(samples))
-            }
-        }
+        let samples = match &self.samples {
+            Samples::Eight(samples) => Samples::from(self.mean(samples)),
+            Samples::Sixteen(samples) => Samples::from(self.mean(samples)),
+        };
+        let half = Self::new(size.0, size.1, self.channels, samples);
+        half.masked(self.mask.as_ref().map(|mask| mask.halved(1)))
     }
 
     /// The means of `2^level × 2^level` pixels, 16 bits deep; odd rows and columns at the end are dropped.
@@ -126,7 +149,8 @@ impl Picture {
             Samples::Eight(samples) => self.sums(samples, level, 257.0),
             Samples::Sixteen(samples) => self.sums(samples, level, 1.0),
         };
-        Self::new(width, height, self.channels, data)
+        let small = Self::new(width, height, self.channels, data);
+        small.masked(self.mask.as_ref().map(|mask| mask.halved(level)))
     }
 
     fn sums<T: Sample>(&self, samples: &[T], level: usize, scale: f32) -> Vec<u16> {

@@ -4,8 +4,10 @@ use super::band::{Band, Target};
 use super::sample::{Sample, Samples};
 use super::{Canvas, Layout, RenderError};
 use crate::lettering::{self, LETTER};
+use crate::surface::Surface;
 use image::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 
 /// Longest side of the preview, pixels.
 const LONGEST: u32 = 4096;
@@ -63,7 +65,7 @@ impl Preview {
 
     /// The picture, at most 4096 px long, with chainage in metres along one side and clock positions along the other, twelve o'clock
     /// at θ = `twelve_at_deg`.
-    pub fn picture(&self, layout: Layout, twelve_at_deg: f64) -> RgbImage {
+    pub fn picture(&self, surface: &dyn Surface, layout: Layout, twelve_at_deg: f64) -> RgbImage {
         let size = [self.columns as u32, self.rows as u32];
         let [width, height] = match layout {
             Layout::ThetaRight => size,
@@ -96,7 +98,8 @@ impl Preview {
         }
         let around = f64::from(self.canvas.columns) / pixels;
         for hour in 0..12u32 {
-            let turn = (f64::from(hour) / 12.0 + twelve_at_deg / 360.0).rem_euclid(1.0);
+            let angle_rad = TAU * (f64::from(hour) / 12.0 + twelve_at_deg / 360.0);
+            let turn = surface.s_at_m(angle_rad) / surface.perimeter_m();
             let at = match layout {
                 Layout::ThetaRight => turn * around,
                 Layout::ChainageRight => (1.0 - turn) * around,
@@ -206,6 +209,7 @@ impl Preview {
 mod tests {
     use super::*;
     use crate::render::PixelFormat;
+    use crate::surface::Circle;
 
     #[test]
     fn a_long_panorama_becomes_short_and_keeps_its_places() {
@@ -232,7 +236,7 @@ mod tests {
             preview.put(&canvas, &band).unwrap();
         }
         for layout in [Layout::ThetaRight, Layout::ChainageRight] {
-            let picture = preview.picture(layout, 0.0);
+            let picture = preview.picture(&Circle::new(1000.0 / 100.0 / TAU).unwrap(), layout, 0.0);
             assert!(picture.width().max(picture.height()) <= LONGEST);
             let at = |share_around: f64, share_along: f64| {
                 let [x, y] = match layout {

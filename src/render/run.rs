@@ -45,7 +45,7 @@ impl Default for Run {
 }
 
 impl Run {
-    /// Which of the points the frame shows.
+    /// Which of the points the frame shows; after [`Run::sample`] and [`Run::copy`], without those whose kernel meets a masked pixel.
     #[inline(always)]
     pub fn seen(&self) -> &[bool; RUN] {
         &self.seen
@@ -127,8 +127,18 @@ impl Run {
         }
     }
 
+    /// Points whose kernel meets a masked pixel are not seen.
+    fn hide(&mut self, picture: &Picture, kernel: &Kernel, columns: Range<usize>) {
+        if picture.mask().is_some() {
+            for k in columns {
+                self.seen[k] = self.seen[k] && picture.shows(self.u[k], self.v[k], kernel);
+            }
+        }
+    }
+
     /// Looks up the values in some columns whose pixels were found before.
     pub fn sample(&mut self, picture: &Picture, kernel: &Kernel, columns: Range<usize>) {
+        self.hide(picture, kernel, columns.clone());
         match (picture.samples(), picture.format().channels) {
             (Samples::Eight(samples), 1) if kernel.taps() > 1 => {
                 self.integer_values::<1>(picture, samples, kernel, columns);
@@ -161,6 +171,7 @@ impl Run {
         columns: Range<usize>,
         pixels: &mut [u8],
     ) {
+        self.hide(picture, kernel, columns.clone());
         let all_inside = self.integer_sums::<C>(picture, samples, kernel, columns.clone());
         let sums = &self.sums[columns.clone()];
         integer::pixels::<C>(kernel, sums, pixels);

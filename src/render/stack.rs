@@ -2,7 +2,7 @@
 
 use super::{Picture, PixelFormat, RenderError};
 use crate::camera::Camera;
-use crate::frames::{FrameFile, colour_type, load_colour};
+use crate::frames::{FrameSet, HalvedMask, colour_type, load_colour};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 pub struct FrameStack {
     camera: Camera,
     format: PixelFormat,
-    files: Vec<FrameFile>,
+    files: FrameSet,
     /// Width and height of the files' pictures.
     full_size: [u32; 2],
     level: usize,
@@ -39,7 +39,7 @@ impl FrameStack {
     ///
     /// # Errors
     /// A frame that is missing or is no picture; the first in the order of the files.
-    pub fn open(files: &[FrameFile], camera: &Camera, level: usize) -> Result<Self, RenderError> {
+    pub fn open(files: &FrameSet, camera: &Camera, level: usize) -> Result<Self, RenderError> {
         let formats: Vec<Result<PixelFormat, RenderError>> = files
             .par_iter()
             .map(|file| Ok(PixelFormat::of(colour_type(file)?)))
@@ -54,7 +54,7 @@ impl FrameStack {
         Ok(Self {
             camera: camera.at_level(level),
             format,
-            files: files.to_vec(),
+            files: files.clone(),
             full_size: [camera.width, camera.height],
             level,
             pictures: vec![None; files.len()],
@@ -79,7 +79,7 @@ impl FrameStack {
         Self {
             camera,
             format,
-            files: Vec::new(),
+            files: FrameSet::default(),
             full_size: [camera.width, camera.height],
             level: 0,
             pictures: widened.collect(),
@@ -147,7 +147,10 @@ impl FrameStack {
         }
         let [width, height] = self.full_size;
         let decoded = load_colour(&self.files[frame], width, height)?;
-        let mut picture = Picture::from_decoded(decoded).widened(self.format);
+        let mask = self.files.mask().cloned().map(HalvedMask::of);
+        let mut picture = Picture::from_decoded(decoded)
+            .widened(self.format)
+            .masked(mask);
         for _ in 0..self.level {
             picture = picture.halved();
         }
@@ -222,6 +225,7 @@ impl FrameStack {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frames::FrameFile;
 
     #[test]
     fn frames_are_halved_only_for_coarse_canvases() {
@@ -259,11 +263,11 @@ mod tests {
                 let path = folder.path().join(format!("{index}.png"));
                 let grey = image::GrayImage::from_pixel(16, 16, image::Luma([index as u8]));
                 grey.save(&path).unwrap();
-                FrameFile { index, path }
+                FrameFile::picture(index, path)
             })
             .collect();
         let camera = Camera::from_vertical_fov(16, 16, 1.0);
-        let mut stack = FrameStack::open(&files, &camera, 0).unwrap();
+        let mut stack = FrameStack::open(&files.into(), &camera, 0).unwrap();
         let held = |stack: &FrameStack| -> Vec<usize> {
             (0..4).filter(|k| stack.picture(*k).is_some()).collect()
         };

@@ -7,7 +7,7 @@ use super::{
     native_px_per_metre, place,
 };
 use crate::camera::Camera;
-use crate::frames::FrameFile;
+use crate::frames::FrameSet;
 use crate::progress::Progress;
 use crate::surface::Surface;
 use crate::trajectory::{Pose, Shutter};
@@ -105,7 +105,7 @@ impl<'a> Stitch<'a> {
     pub fn new(
         surface: &'a dyn Surface,
         camera: &Camera,
-        files: &[FrameFile],
+        files: &FrameSet,
         poses: &[Pose],
         shutter: &Shutter,
         options: &StitchOptions,
@@ -209,7 +209,7 @@ impl<'a> Stitch<'a> {
 pub fn stitch(
     surface: &dyn Surface,
     camera: &Camera,
-    files: &[FrameFile],
+    files: &FrameSet,
     poses: &[Pose],
     shutter: &Shutter,
     options: &StitchOptions,

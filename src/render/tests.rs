@@ -365,7 +365,7 @@ fn what_is_finer_than_the_canvas_becomes_grey() {
 /// Frames on disk, drawn with room for all of them and for one band's only.
 #[test]
 fn little_memory_changes_nothing_but_the_time() {
-    use crate::frames::FrameFile;
+    use crate::frames::{FrameFile, FrameSet};
     let wall = TestWall::ring(test_wall::waves);
     let folder = tempfile::tempdir().unwrap();
     let stack = wall.stack();
@@ -379,9 +379,10 @@ fn little_memory_changes_nothing_but_the_time() {
             let picture = samples[..(width * height) as usize].to_vec();
             let picture = image::GrayImage::from_raw(width, height, picture).unwrap();
             picture.save(&path).unwrap();
-            FrameFile { index, path }
+            FrameFile::picture(index, path)
         })
         .collect();
+    let files = FrameSet::from(files);
     let placements = place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, 700.0).unwrap();
     let draw = |room| {

@@ -230,7 +230,7 @@ fn notes(survey: &Survey, refined: &RefinedFiles, comparison: &Comparison) -> Ve
         )),
         Some(refinement) => {
             if let Some(calibration) = &refinement.calibration
-                && (calibration.radius_m != survey.file.tunnel.radius_m
+                && (calibration.radius_m != survey.file.tunnel.nominal_m()
                     || calibration.camera != Value::Object(object(&survey.camera)))
             {
                 notes.push(

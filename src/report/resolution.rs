@@ -26,8 +26,8 @@ pub fn resolution(survey: &Survey, poses: &[Pose]) -> Result<Option<f64>, Report
         let pixels = Canvas::of_placements(surface, &placements, px_per_metre)
             .map_or(usize::MAX, |canvas| canvas.pixels());
         let level = level_for(camera, native, px_per_metre);
-        let one = survey.frames.get(..1).unwrap_or_default();
-        let bytes = FrameStack::open(one, camera, level)?.frame_bytes() * poses.len() as u64;
+        let one = survey.frames.first(1);
+        let bytes = FrameStack::open(&one, camera, level)?.frame_bytes() * poses.len() as u64;
         // Frames cannot be halved without end.
         let fits = bytes <= MOST_BYTES || px_per_metre < native / 64.0;
         if (pixels <= MOST_PIXELS && fits) || px_per_metre < 1e-6 * native {

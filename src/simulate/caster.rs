@@ -1,6 +1,7 @@
 //! The ray caster.
 
 use super::band::Band;
+use super::tunnel::{Place, Rays, Tunnel};
 use crate::camera::Camera;
 use crate::frames::GreyImage;
 use crate::trajectory::Pose;
@@ -12,16 +13,14 @@ const CELLS: usize = 2;
 
 /// Renders a frame: each pixel is the mean of `n × n` points spread evenly over its square.
 ///
-/// A ray `t + λ d` meets the wall where `|(t + λ d)_xz| = r`. With `d̂ = d_xz/|d_xz|`, the way along it is
-/// `−t·d̂ + √(r² − (t × d̂)²)`: from the foot of the perpendicular on the axis's side to the circle. The camera must
-/// stand inside. Rays are cast through the corners of half pixels; what lies between meets the wall between them, to within
+/// Rays are cast through the corners of half pixels; what lies between meets the wall between them, to within
 /// some 10⁻⁴ of a pixel (an eighth of the square of half a pixel times the map's curvature; more towards the axis's
 /// vanishing points).
 ///
 /// `pose`: where the camera is when a row is read.
 pub(super) fn cast(
     band: &Band,
-    radius_m: f64,
+    tunnel: &Tunnel,
     camera: &Camera,
     pose: impl Fn(f64) -> Pose,
     n: u32,
@@ -30,8 +29,8 @@ pub(super) fn cast(
     let points: Vec<Point> = (0..n).map(|k| Point::new(k, n)).collect();
     let line = |v: f64| {
         let pose = pose(v);
-        let t = pose.t_wc;
-        Caster { radius_m, t }.line(camera, &pose, v)
+        let rays = tunnel.rays(pose.t_wc);
+        cast_line(&rays, camera, &pose, v)
     };
     let share = 1.0 / (n * n) as f32;
     let mut data = vec![0.0f32; width * height];
@@ -118,49 +117,26 @@ impl Corner {
     }
 }
 
-/// Rays from one place.
-pub(super) struct Caster {
-    /// Radius of the tunnel, metres.
-    pub radius_m: f64,
-    /// Where the rays start, metres.
-    pub t: Vector3<f64>,
-}
-
-impl Caster {
-    /// The rays through the corners of the cells along a line of the picture at row `v`.
-    fn line(&self, camera: &Camera, pose: &Pose, v: f64) -> Vec<Corner> {
-        let corners = camera.width as usize * CELLS + 1;
-        let column = |k: usize| k as f64 / CELLS as f64 - 0.5;
-        let corner = |d: Vector3<f64>| {
-            let (theta, h_m) = self.hit(&d);
-            Corner { theta, h_m, d }
-        };
-        // Without distortion rays move evenly along a row.
-        if let (true, Some(first)) = (camera.lens.is_straight(), camera.ray(0.0, v)) {
-            let first = pose.r_wc * first;
-            let right = pose.r_wc * Vector3::x() / camera.fx;
-            let cast = |k: usize| corner(first + right * column(k));
-            return (0..corners).map(cast).collect();
-        }
-        let cast = |k: usize| {
-            let ray = camera.ray(column(k), v);
-            ray.map_or(Corner::DARK, |ray| corner(pose.r_wc * ray))
-        };
-        (0..corners).map(cast).collect()
+/// The rays through the corners of the cells along a line of the picture at row `v`.
+fn cast_line(rays: &Rays, camera: &Camera, pose: &Pose, v: f64) -> Vec<Corner> {
+    let corners = camera.width as usize * CELLS + 1;
+    let column = |k: usize| k as f64 / CELLS as f64 - 0.5;
+    let corner = |d: Vector3<f64>| {
+        let Place { theta, h_m } = rays.hit(&d);
+        Corner { theta, h_m, d }
+    };
+    // Without distortion rays move evenly along a row.
+    if let (true, Some(first)) = (camera.lens.is_straight(), camera.ray(0.0, v)) {
+        let first = pose.r_wc * first;
+        let right = pose.r_wc * Vector3::x() / camera.fx;
+        let cast = |k: usize| corner(first + right * column(k));
+        return (0..corners).map(cast).collect();
     }
-
-    /// Angle θ in `[0, 2π)` and chainage (metres) of the wall that a ray of direction `d` meets.
-    #[inline]
-    pub fn hit(&self, d: &Vector3<f64>) -> (f64, f64) {
-        let across = (d.x * d.x + d.z * d.z).sqrt();
-        let (dx, dz) = (d.x / across, d.z / across);
-        let foot = self.t.x * dx + self.t.z * dz;
-        let aside = self.t.x * dz - self.t.z * dx;
-        let way = (self.radius_m * self.radius_m - aside * aside).sqrt() - foot;
-        let theta = (self.t.x + way * dx).atan2(self.t.z + way * dz);
-        let theta = if theta < 0.0 { theta + TAU } else { theta };
-        (theta, self.t.y + way / across * d.y)
-    }
+    let cast = |k: usize| {
+        let ray = camera.ray(column(k), v);
+        ray.map_or(Corner::DARK, |ray| corner(pose.r_wc * ray))
+    };
+    (0..corners).map(cast).collect()
 }
 
 #[cfg(test)]
@@ -190,14 +166,12 @@ mod tests {
     /// The hit satisfies the wall's equation and lies ahead on the ray.
     #[test]
     fn a_hit_lies_on_the_wall_and_on_the_ray() {
-        let caster = Caster {
-            radius_m: 2.0,
-            t: Vector3::new(0.9, 7.0, -1.1),
-        };
+        let tunnel = Tunnel::Round(2.0);
+        let caster = tunnel.rays(Vector3::new(0.9, 7.0, -1.1));
         for k in 0..50 {
             let k = f64::from(k);
             let d = Vector3::new((1.7 * k).sin(), 0.8 * (0.9 * k).cos(), (2.3 * k).cos());
-            let (theta, h_m) = caster.hit(&d);
+            let Place { theta, h_m } = caster.hit(&d);
             let x_w = Vector3::new(2.0 * theta.sin(), h_m, 2.0 * theta.cos());
             let along = x_w - caster.t;
             assert!(along.cross(&d).norm() < 1e-5 * along.norm() * d.norm() + 1e-6);
@@ -212,23 +186,21 @@ mod tests {
             so3::exp(&Vector3::new(0.1, 0.05, -0.05)),
             Vector3::new(0.4, 0.3, -0.2),
         );
-        let caster = Caster {
-            radius_m: 2.0,
-            t: pose.t_wc,
-        };
+        let tunnel = Tunnel::Round(2.0);
+        let caster = tunnel.rays(pose.t_wc);
         let mut camera = Camera::from_vertical_fov(160, 120, 1.0);
         for k1 in [0.0, -0.08] {
             camera.lens = Lens::radial(k1, 0.0);
             let pixel_m = 2.0 / camera.fy;
             for v in [0.0, 59.0, 119.0] {
-                let lines = [v, v + 0.5].map(|v| caster.line(&camera, &pose, v));
+                let lines = [v, v + 0.5].map(|v| cast_line(&caster, &camera, &pose, v));
                 for k in 0..2 * camera.width as usize {
                     let left = lines[0][k].towards(&lines[1][k], 0.3);
                     let right = lines[0][k + 1].towards(&lines[1][k + 1], 0.3);
                     let between = left.towards(&right, 0.6);
                     let u = 0.5 * (k as f64 + 0.6) - 0.5;
                     let d = pose.r_wc * camera.ray(u, v + 0.15).unwrap();
-                    let (theta, h_m) = caster.hit(&d);
+                    let Place { theta, h_m } = caster.hit(&d);
                     let turned = (between.theta - theta + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
                     assert!(2.0 * turned.abs() < 1e-3 * pixel_m, "{u} {v}: {turned}");
                     assert!((between.h_m - h_m).abs() < 1e-3 * pixel_m, "{u} {v}");
@@ -253,7 +225,7 @@ mod tests {
     }
 
     fn shows_the_wall(band: &Band, radius_m: f64, camera: &Camera, pose: &Pose) {
-        let frame = cast(band, radius_m, camera, |_| *pose, 4);
+        let frame = cast(band, &Tunnel::Round(radius_m), camera, |_| *pose, 4);
         let mut compared = 0;
         for k in 0..160_000 {
             let (theta, h_m) = (

@@ -27,15 +27,13 @@ pub enum SimulateError {
     },
     /// A true pose left the tunnel.
     #[error(
-        "frame {frame}: the camera would stand {distance_m:.3} m off the axis of a tunnel of {radius_m} m radius; lower the translation sigmas or the number of frames, or take another seed"
+        "frame {frame}: the camera would stand {distance_m:.3} m off the axis, in the wall or beyond it; lower the translation sigmas or the number of frames, or take another seed"
     )]
     CameraOutside {
         /// Index of the frame.
         frame: usize,
         /// Distance from the axis, metres.
         distance_m: f64,
-        /// Radius of the tunnel, metres.
-        radius_m: f64,
     },
     /// A frame sees wall without end.
     #[error(

@@ -30,13 +30,16 @@ mod lamp;
 mod moving;
 mod noise;
 mod options;
+mod outline;
 mod path;
 mod picture;
 mod run;
 mod scene;
 mod sensor;
+mod shaft;
 mod spoil;
 mod target;
+mod tunnel;
 mod wall;
 
 pub use bad_frames::{BadFrames, BadFramesError, Fault};

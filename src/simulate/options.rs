@@ -2,7 +2,7 @@
 
 use super::{BadFrames, Bits, SimulateError};
 use crate::camera::Camera;
-use crate::survey::PriorSection;
+use crate::survey::{PriorSection, TunnelSection};
 use crate::trajectory::JitterModel;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -45,8 +45,8 @@ pub enum Light {
 pub struct SimulateOptions {
     /// Number of frames.
     pub frames: usize,
-    /// Radius of the tunnel, metres.
-    pub radius_m: f64,
+    /// The tunnel. Plan and jitter are laid out along it as if it were straight.
+    pub tunnel: TunnelSection,
     /// The camera.
     pub camera: Camera,
     /// Advance along the axis from frame to frame, metres.
@@ -86,6 +86,10 @@ pub struct SimulateOptions {
     /// Things in each frame that are not on the wall, at other places in every frame.
     #[serde(skip_serializing_if = "is_default")]
     pub moving: u32,
+    /// Width of the carrier's shaft, which hides the wall at the same place of every frame, percent of the frames' width; 0: none.
+    /// The survey has a mask then.
+    #[serde(skip_serializing_if = "is_default")]
+    pub shaft_percent: f64,
     /// Bits of a frame's grey values.
     #[serde(skip_serializing_if = "is_default")]
     pub bits: Bits,
@@ -114,7 +118,7 @@ impl SimulateOptions {
     pub fn centred() -> Self {
         Self {
             frames: 12,
-            radius_m: 3.0,
+            tunnel: TunnelSection::round(3.0),
             camera: Camera::from_vertical_fov(640, 480, 60f64.to_radians()),
             advance_m: 0.0,
             turn_deg: 30.0,
@@ -130,6 +134,7 @@ impl SimulateOptions {
             lamp_corner: None,
             specular_percent: 0.0,
             moving: 0,
+            shaft_percent: 0.0,
             bits: Bits::default(),
             bad_frames: BadFrames::default(),
             supersample: 8,
@@ -194,8 +199,8 @@ impl SimulateOptions {
             "the number of frames must lie between 1 and 1000000",
         )?;
         check(
-            (0.01..=1000.0).contains(&self.radius_m),
-            "the radius must lie between 0.01 and 1000 metres",
+            (0.01..=1000.0).contains(&self.tunnel.nominal_m()),
+            "the radius (half the width) must lie between 0.01 and 1000 metres",
         )?;
         let side = |pixels| (16..=16_384).contains(&pixels);
         check(
@@ -269,6 +274,10 @@ impl SimulateOptions {
             self.moving <= 10_000,
             "there may be no more than 10000 moving things in a frame",
         )?;
+        check(
+            (0.0..=50.0).contains(&self.shaft_percent),
+            "the shaft may be 0 to 50 percent of a frame wide",
+        )?;
         Ok(self.bad_frames.check(self.frames)?)
     }
 }
@@ -298,7 +307,7 @@ mod tests {
                 ..free()
             },
             SimulateOptions {
-                radius_m: f64::NAN,
+                tunnel: TunnelSection::round(f64::NAN),
                 ..free()
             },
             SimulateOptions {
@@ -352,6 +361,10 @@ mod tests {
             },
             SimulateOptions {
                 moving: 10_001,
+                ..free()
+            },
+            SimulateOptions {
+                shaft_percent: 51.0,
                 ..free()
             },
             SimulateOptions {

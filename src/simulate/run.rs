@@ -6,9 +6,10 @@ use crate::camera::format_calibration;
 use crate::frames::{PictureFormat, write_picture};
 use crate::progress::Progress;
 use crate::survey::{
-    CameraSection, FramesSection, PosesSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
+    CameraSection, FramesSection, PosesSection, SURVEY_FILE, SurveyFile, TunnelSection,
 };
 use crate::trajectory::{Pose, StampedPose, tum};
+use image::{GrayImage, Luma};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
@@ -23,7 +24,7 @@ pub struct Simulated {
 }
 
 /// Writes a survey folder: `survey.toml`, `camera.json`, `frames/000000.png` …, `baseline.tum` (the plan),
-/// `groundtruth.tum` and `simulation.json`.
+/// `groundtruth.tum` and `simulation.json`; with a shaft before the wall `mask.png`, too.
 ///
 /// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier simulated
 /// survey of that name is replaced. The same options give the same bytes, whatever the number of threads.
@@ -52,18 +53,27 @@ pub fn run(
         WriteError::new(&path, error.source)
     };
     write_texts(&scene, &simulated, folder.path()).map_err(final_name)?;
+    write_mask(&scene, &folder.path().join(MASK_FILE)).map_err(final_name)?;
     write_frames(&scene, &folder.path().join("frames"), progress).map_err(final_name)?;
     folder.finish()?;
     Ok(simulated)
 }
 
+/// What every frame hides of the wall, if anything does.
+const MASK_FILE: &str = "mask.png";
+
+/// The line along the middle of a tunnel that is not straight.
+const CENTRELINE_FILE: &str = "centreline.txt";
+
 /// The record of a simulation; no other survey has one.
 const RECORD_FILE: &str = "simulation.json";
 
 /// What a simulated survey consists of.
-const FILES: [&str; 6] = [
+const FILES: [&str; 8] = [
     SURVEY_FILE,
     RECORD_FILE,
+    MASK_FILE,
+    CENTRELINE_FILE,
     "camera.json",
     "baseline.tum",
     "groundtruth.tum",
@@ -110,8 +120,12 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
     let options = &simulated.options;
     let survey = SurveyFile {
         tunnel: TunnelSection {
-            shape: Shape::Circle,
-            radius_m: options.radius_m,
+            centreline: options
+                .tunnel
+                .centreline
+                .is_some()
+                .then(|| CENTRELINE_FILE.into()),
+            ..options.tunnel.clone()
         },
         camera: CameraSection {
             file: "camera.json".into(),
@@ -119,8 +133,12 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
             readout_ms: (options.readout_ms != 0.0).then_some(options.readout_ms),
         },
         frames: FramesSection {
-            images: "frames/*.png".to_owned(),
+            images: Some("frames/*.png".to_owned()),
+            video: None,
+            every: None,
+            angle_step_deg: None,
             times: None,
+            mask: scene.shaft().map(|_| MASK_FILE.into()),
         },
         poses: PosesSection {
             truth: Some("groundtruth.tum".into()),
@@ -145,11 +163,28 @@ fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<()
         let there: Vec<StampedPose> = scene.frames().map(stamped).collect();
         tum::format(&there)
     };
+    if let Some(centreline) = &options.tunnel.centreline {
+        let copy = path(CENTRELINE_FILE);
+        std::fs::copy(centreline, &copy).map_err(|source| WriteError::new(&copy, source))?;
+    }
     atomic::write_text(&survey_path, &survey)?;
     atomic::write_text(&record_path, &(record + "\n"))?;
     atomic::write_text(&path("camera.json"), &format_calibration(scene.camera()))?;
     atomic::write_text(&path("baseline.tum"), &trajectory(scene.plan()))?;
     atomic::write_text(&path("groundtruth.tum"), &trajectory(scene.truth()))
+}
+
+fn write_mask(scene: &Scene, path: &Path) -> Result<(), WriteError> {
+    let Some(shaft) = scene.shaft() else {
+        return Ok(());
+    };
+    let (width, height) = (scene.camera().width, scene.camera().height);
+    let wall = shaft.shows_wall();
+    let mask = GrayImage::from_fn(width, height, |u, v| {
+        let shown = wall[v as usize * width as usize + u as usize];
+        Luma([if shown { 255 } else { 0 }])
+    });
+    write_picture(path, &mask.into(), PictureFormat::Png)
 }
 
 /// Renders and writes all frames that are there, each named by its number in the plan, batch by batch, the frames of a batch in parallel.

@@ -1,14 +1,16 @@
 //! A simulated survey in memory.
 
 use super::band::Band;
-use super::caster::{Caster, cast};
+use super::caster::cast;
 use super::damp::Damp;
 use super::lamp::Lamp;
 use super::moving::hide_behind_things;
 use super::noise::Purpose;
 use super::path::Path;
 use super::sensor::deliver;
+use super::shaft::Shaft;
 use super::spoil::spoil;
+use super::tunnel::{Place, Tunnel};
 use super::wall::{Texture, texture};
 use super::{Exposure, SimulateError, SimulateOptions};
 use crate::camera::Camera;
@@ -41,6 +43,7 @@ pub struct Scene {
     path: Path,
     /// Least and greatest chainage that each frame sees, metres.
     reaches: Vec<[f64; 2]>,
+    tunnel: Tunnel,
     texture: Box<dyn Texture>,
     damp: Option<Damp>,
     /// Texels once around.
@@ -70,13 +73,17 @@ impl Scene {
             let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
             truth = Jitter::from(jitter).apply(&truth, &mut rng);
         }
-        let texel_m = texel_m(options, &camera, &truth);
+        // Both are laid out in a straight tunnel, and go with the real one.
+        let tunnel = Tunnel::new(options)?;
+        let [plan, truth] = [plan, truth]
+            .map(|poses| -> Vec<Pose> { poses.iter().map(|pose| tunnel.bent(pose)).collect() });
+        let texel_m = texel_m(&tunnel, &camera, &truth);
         let readout_share = 1e-3 * options.readout_ms / options.interval_s;
         let path = Path::new(truth, readout_share, camera.height);
         let reaches = (0..options.frames)
-            .map(|frame| reach(frame, &path, &camera, options.radius_m))
+            .map(|frame| reach(frame, &path, &camera, &tunnel))
             .collect::<Result<Vec<_>, _>>()?;
-        let perimeter_m = TAU * options.radius_m;
+        let perimeter_m = tunnel.perimeter_m();
         let widest = reaches
             .iter()
             .map(|h_m| h_m[1] - h_m[0])
@@ -99,6 +106,7 @@ impl Scene {
             damp: (options.specular_percent > 0.0)
                 .then(|| Damp::new(options.seed, options.specular_percent, perimeter_m)),
             columns: (perimeter_m / texel_m).ceil() as usize,
+            tunnel,
             options: options.clone(),
             camera,
             plan,
@@ -156,7 +164,7 @@ impl Scene {
     /// over its square, as many as over a frame's pixel, of the raster that frames are cast from.
     pub fn wall(&self, columns: usize, rows: usize, h_start_m: f64) -> GreyImage {
         let n = self.options.supersample as usize;
-        let pixel_m = TAU * self.options.radius_m / columns as f64;
+        let pixel_m = self.tunnel.perimeter_m() / columns as f64;
         let share = |k: usize| (k as f64 + 0.5) / n as f64;
         let mut data = vec![0.0; columns * rows];
         for (strip, pixels) in data.chunks_mut(columns * STRIP_ROWS).enumerate() {
@@ -222,7 +230,7 @@ impl Scene {
         let options = &self.options;
         let wall = cast(
             band,
-            options.radius_m,
+            &self.tunnel,
             &self.camera,
             |v| self.path.at_row(frame, v),
             options.supersample,
@@ -232,7 +240,18 @@ impl Scene {
             Some(corner) => Lamp::new(corner, seen.width(), seen.height()).shine(seen),
             None => seen,
         };
-        self.exposure(frame).expose(lit)
+        let before = match self.shaft() {
+            Some(shaft) => shaft.hide(lit),
+            None => lit,
+        };
+        self.exposure(frame).expose(before)
+    }
+
+    /// What hides the wall in every frame, if anything.
+    pub(super) fn shaft(&self) -> Option<Shaft> {
+        let percent = self.options.shaft_percent;
+        let (width, height) = (self.camera.width as usize, self.camera.height as usize);
+        (percent > 0.0).then(|| Shaft::new(percent, width, height))
     }
 
     /// The picture that a frame takes as the sensor delivers it, of a band that holds all it sees; its noise is a stream
@@ -250,7 +269,7 @@ impl Scene {
     }
 
     fn texel_m(&self) -> f64 {
-        TAU * self.options.radius_m / self.columns as f64
+        self.tunnel.perimeter_m() / self.columns as f64
     }
 }
 
@@ -270,22 +289,19 @@ fn reach(
     frame: usize,
     path: &Path,
     camera: &Camera,
-    radius_m: f64,
+    tunnel: &Tunnel,
 ) -> Result<[f64; 2], SimulateError> {
     let pose = &path.poses()[frame];
-    let distance_m = pose.t_wc.x.hypot(pose.t_wc.z);
-    if distance_m >= 0.99 * radius_m {
-        return Err(SimulateError::CameraOutside {
-            frame,
-            distance_m,
-            radius_m,
-        });
+    let (outward, distance_m) = tunnel.outward(&pose.t_wc);
+    if outward.is_nan() || outward >= 0.99 {
+        return Err(SimulateError::CameraOutside { frame, distance_m });
     }
-    let reach_m = REACH_RADII * radius_m;
+    let reach_m = REACH_RADII * tunnel.perimeter_m() / TAU;
     let too_far = SimulateError::LooksAlongTheAxis { frame, reach_m };
-    // The axis's vanishing points lie where its directions project to.
+    // The tunnel's vanishing points lie where its directions project to.
     let last = f64::from(camera.height - 1);
-    for axis in [Vector3::y(), -Vector3::y()] {
+    let along = tunnel.along(&pose.t_wc);
+    for axis in [along, -along] {
         for row in [0.0, 0.5 * last, last] {
             let r_wc = path.at_row(frame, row).r_wc;
             let x_c = r_wc.inverse_transform_vector(&axis);
@@ -301,14 +317,17 @@ fn reach(
     let border = camera.border(64, 0.5).into_iter();
     for (v, ray) in border.filter_map(|pixel| Some((pixel.y, camera.ray(pixel.x, pixel.y)?))) {
         let pose = path.at_row(frame, v);
-        let t = pose.t_wc;
-        let (_, h_m) = Caster { radius_m, t }.hit(&(pose.r_wc * ray));
+        let Place { h_m, .. } = tunnel.rays(pose.t_wc).hit(&(pose.r_wc * ray));
+        if h_m.is_nan() {
+            return Err(too_far);
+        }
         reach = [reach[0].min(h_m), reach[1].max(h_m)];
     }
     // The border is followed in steps; 1 % covers what bulges between them.
     let margin_m = 0.01 * (reach[1] - reach[0]);
     let reach = [reach[0] - margin_m, reach[1] + margin_m];
-    if reach.iter().all(|h_m| (h_m - pose.t_wc.y).abs() < reach_m) {
+    let camera_h_m = tunnel.chainage_m(&pose.t_wc);
+    if reach.iter().all(|h_m| (h_m - camera_h_m).abs() < reach_m) {
         Ok(reach)
     } else {
         Err(too_far)
@@ -317,13 +336,10 @@ fn reach(
 
 /// Size of a texel: a third of a pixel where a camera comes nearest to the wall, but of one at half the radius at
 /// the finest, metres.
-fn texel_m(options: &SimulateOptions, camera: &Camera, truth: &[Pose]) -> f64 {
-    let farthest = truth
-        .iter()
-        .map(|pose| pose.t_wc.x.hypot(pose.t_wc.z))
-        .fold(0.0, f64::max);
-    let nearest = (options.radius_m - farthest).max(0.5 * options.radius_m);
-    (nearest / camera.fy / TEXELS_PER_PIXEL).min(LARGEST_TEXEL_M)
+fn texel_m(tunnel: &Tunnel, camera: &Camera, truth: &[Pose]) -> f64 {
+    let outward = truth.iter().map(|pose| tunnel.outward(&pose.t_wc).0);
+    let nearest_m = tunnel.nearest_m() * (1.0 - outward.fold(0.0, f64::max)).max(0.5);
+    (nearest_m / camera.fy / TEXELS_PER_PIXEL).min(LARGEST_TEXEL_M)
 }
 
 #[cfg(test)]
@@ -434,7 +450,7 @@ mod tests {
         let scene = Scene::new(&options).unwrap();
         let frame = scene.render_exact(0);
         let columns = (TAU * scene.camera().fy).round() as usize;
-        let pixel_m = TAU * options.radius_m / columns as f64;
+        let pixel_m = TAU * options.tunnel.nominal_m() / columns as f64;
         // The first pixel's middle lies half a pixel off θ = 0.
         let wall = scene.wall(columns, 4, -2.0 * pixel_m);
         for (u, v) in [(0, 1), (2, 2), (3, 0)] {

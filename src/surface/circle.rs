@@ -16,13 +16,10 @@ impl Circle {
     /// A tunnel of the given radius (metres).
     ///
     /// # Errors
-    /// [`SurfaceError::Radius`] unless the radius is positive and finite.
+    /// [`SurfaceError::Size`] unless the radius is positive and finite.
     pub fn new(radius_m: f64) -> Result<Self, SurfaceError> {
-        if radius_m.is_finite() && radius_m > 0.0 {
-            Ok(Self { radius_m })
-        } else {
-            Err(SurfaceError::Radius { radius_m })
-        }
+        super::check_size("radius_m", radius_m)?;
+        Ok(Self { radius_m })
     }
 
     /// The radius, metres.
@@ -98,10 +95,7 @@ impl Surface for Circle {
     }
 
     fn gauge(&self) -> Gauge {
-        Gauge {
-            turn: true,
-            shift: true,
-        }
+        Gauge::round()
     }
 
     fn check_inside(&self, t: &Vector3<f64>) -> Result<(), SurfaceError> {
@@ -211,7 +205,7 @@ mod tests {
         for radius_m in [0.0, -3.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(
                 Circle::new(radius_m),
-                Err(SurfaceError::Radius { .. })
+                Err(SurfaceError::Size { .. })
             ));
         }
     }

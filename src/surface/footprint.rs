@@ -101,7 +101,8 @@ impl Footprint {
         pose: &Pose,
         reach_m: f64,
     ) -> Result<Self, SurfaceError> {
-        let near_m = pose.t_wc.y - reach_m..=pose.t_wc.y + reach_m;
+        let h_m = surface.chainage_m(&pose.t_wc);
+        let near_m = h_m - reach_m..=h_m + reach_m;
         let clamp = |h_m: f64| h_m.clamp(*near_m.start(), *near_m.end());
         match Self::trace(surface, camera, pose) {
             Ok(footprint) => Ok(Self {

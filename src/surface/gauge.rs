@@ -1,56 +1,127 @@
 //! What no picture of the wall can tell: the motions that map the tunnel onto itself.
 
 use crate::trajectory::{Pose, so3};
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
+
+/// A directed line in the world.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Axis {
+    /// A point on it, metres.
+    pub point: Vector3<f64>,
+    /// Its direction, a unit vector.
+    pub direction: Vector3<f64>,
+}
+
+impl Default for Axis {
+    /// The world's y axis: that of a straight tunnel.
+    fn default() -> Self {
+        Self {
+            point: Vector3::zeros(),
+            direction: Vector3::y(),
+        }
+    }
+}
+
+impl Axis {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
 
 /// The rigid motions that leave a tunnel's shape unchanged. Moving all poses by one of them changes no
 /// picture, so they are fixed by the prior and removed (and only they) before errors are computed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+///
+/// They turn about an axis and shift along it: a straight round tunnel allows both, a straight one of another section the
+/// shift, a bend of constant curvature the turn about the bend's own axis (which goes along the tunnel), a helix a turn with the shift
+/// of its pitch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gauge {
-    /// Turning about the axis.
+    /// The axis.
+    pub axis: Axis,
+    /// Turning about it; it shifts by `pitch_m` at the same time.
     pub turn: bool,
-    /// Shifting along the axis.
+    /// Shift that goes with a turn, metres a radian.
+    pub pitch_m: f64,
+    /// Shifting along it, by itself.
     pub shift: bool,
 }
 
 impl Gauge {
+    /// That of a straight round tunnel along the world's y axis.
+    pub fn round() -> Self {
+        Self {
+            turn: true,
+            shift: true,
+            ..Self::default()
+        }
+    }
+
+    /// That of any other straight tunnel along the world's y axis.
+    pub fn straight() -> Self {
+        Self {
+            shift: true,
+            ..Self::default()
+        }
+    }
+
     /// The steps `ξ` ([`Pose::retract`]) by which `pose` moves along each freedom, per radian and per metre:
-    /// `(Rᵀŷ, ŷ × t)` for the turn and `(0, ŷ)` for the shift.
+    /// `(Rᵀn, n × (t − p) + pitch n)` for the turn about the axis through p along n and `(0, n)` for the shift.
     pub fn directions(&self, pose: &Pose) -> Vec<Vector6<f64>> {
+        let Axis { point, direction } = self.axis;
         let mut directions = Vec::with_capacity(2);
         if self.turn {
-            let omega = pose.r_wc.inverse_transform_vector(&Vector3::y());
-            let rho = Vector3::y().cross(&pose.t_wc);
+            let omega = pose.r_wc.inverse_transform_vector(&direction);
+            let rho = direction.cross(&(pose.t_wc - point)) + direction * self.pitch_m;
             directions.push(Vector6::new(omega.x, omega.y, omega.z, rho.x, rho.y, rho.z));
         }
         if self.shift {
-            directions.push(Vector6::new(0.0, 0.0, 0.0, 0.0, 1.0, 0.0));
+            let n = direction;
+            directions.push(Vector6::new(0.0, 0.0, 0.0, n.x, n.y, n.z));
         }
         directions
     }
 
+    /// The motion by `turn_rad` and `shift_m`, as far as they are free.
+    pub fn motion(&self, turn_rad: f64, shift_m: f64) -> GaugeMotion {
+        let turn_rad = if self.turn { turn_rad } else { 0.0 };
+        let shift_m = if self.shift { shift_m } else { 0.0 };
+        GaugeMotion {
+            turn_rad,
+            shift_m: shift_m + self.pitch_m * turn_rad,
+            axis: self.axis,
+        }
+    }
+
     /// The motion that best carries `from` onto `to`, pose by pose, in closed form.
     ///
-    /// Turn: the α that minimises `Σ |R_to − R_y(α) R_from|²`. With `M = Σ R_to R_fromᵀ`,
-    /// `α = atan2(M_02 − M_20, M_00 + M_22)`. Shift: the mean difference of `t_y`. Freedoms that the shape
+    /// With the axis turned into y and its point into the origin. Turn: the α that minimises `Σ |R_to − R_y(α) R_from|²`. With
+    /// `M = Σ R_to R_fromᵀ`, `α = atan2(M_02 − M_20, M_00 + M_22)`. Shift: the mean difference of `t_y`. Freedoms that the shape
     /// does not have stay zero.
+    ///
+    /// Where only the turn is free, it goes along the tunnel, and positions tell it better than rotations do: α minimises
+    /// `Σ |t_to − R_y(α) t_from|²` across the axis instead.
     pub fn align(&self, from: &[Pose], to: &[Pose]) -> GaugeMotion {
+        let Axis { point, direction } = self.axis;
         let (mut sine, mut cosine, mut shift) = (0.0, 0.0, 0.0);
         for (from, to) in from.iter().zip(to) {
-            let m = (to.r_wc * from.r_wc.inverse()).to_rotation_matrix();
-            sine += m[(0, 2)] - m[(2, 0)];
-            cosine += m[(0, 0)] + m[(2, 2)];
-            shift += to.t_wc.y - from.t_wc.y;
-        }
-        GaugeMotion {
-            turn_rad: if self.turn { sine.atan2(cosine) } else { 0.0 },
-            shift_m: if self.shift {
-                shift / from.len().max(1) as f64
+            if self.shift {
+                // Of a turn that goes with a shift, the axis is the world's y.
+                let m = (to.r_wc * from.r_wc.inverse()).to_rotation_matrix();
+                sine += m[(0, 2)] - m[(2, 0)];
+                cosine += m[(0, 0)] + m[(2, 2)];
+                shift += (to.t_wc - from.t_wc).dot(&direction);
             } else {
-                0.0
-            },
+                let across = |t: &Vector3<f64>| {
+                    let arm = t - point;
+                    arm - direction * arm.dot(&direction)
+                };
+                let (from, to) = (across(&from.t_wc), across(&to.t_wc));
+                sine += from.cross(&to).dot(&direction);
+                cosine += from.dot(&to);
+            }
         }
+        self.motion(sine.atan2(cosine), shift / from.len().max(1) as f64)
     }
 }
 
@@ -61,15 +132,51 @@ pub struct GaugeMotion {
     pub turn_rad: f64,
     /// Shift along the axis, metres.
     pub shift_m: f64,
+    /// The axis.
+    #[serde(default, skip_serializing_if = "Axis::is_default")]
+    pub axis: Axis,
 }
 
 impl GaugeMotion {
-    /// The moved pose: `R ← R_y(α) R`, `t ← R_y(α) t + d ŷ`.
+    /// A motion about and along the world's y axis.
+    pub fn about_y(turn_rad: f64, shift_m: f64) -> Self {
+        Self {
+            turn_rad,
+            shift_m,
+            axis: Axis::default(),
+        }
+    }
+
+    /// Whether it moves nothing.
+    pub fn is_none(&self) -> bool {
+        self.turn_rad == 0.0 && self.shift_m == 0.0
+    }
+
+    /// This and then `times` another about the same axis; they commute.
+    pub fn plus(&self, times: f64, other: &Self) -> Self {
+        Self {
+            turn_rad: self.turn_rad + times * other.turn_rad,
+            shift_m: self.shift_m + times * other.shift_m,
+            axis: if self.is_none() {
+                other.axis
+            } else {
+                self.axis
+            },
+        }
+    }
+
+    /// The turn, as a rotation of the world.
+    pub fn rotation(&self) -> UnitQuaternion<f64> {
+        so3::exp(&(self.axis.direction * self.turn_rad))
+    }
+
+    /// The moved pose: `R ← R_n(α) R`, `t ← R_n(α) (t − p) + p + d n`.
     pub fn apply(&self, pose: &Pose) -> Pose {
-        let turn = so3::exp(&(Vector3::y() * self.turn_rad));
+        let Axis { point, direction } = self.axis;
+        let turn = self.rotation();
         Pose::new(
             turn * pose.r_wc,
-            turn * pose.t_wc + Vector3::y() * self.shift_m,
+            turn * (pose.t_wc - point) + point + direction * self.shift_m,
         )
     }
 
@@ -84,11 +191,6 @@ mod tests {
     use super::*;
     use crate::surface::{Circle, Surface, wall_jacobian};
     use proptest::prelude::*;
-
-    const BOTH: Gauge = Gauge {
-        turn: true,
-        shift: true,
-    };
 
     fn poses() -> Vec<Pose> {
         (0..9)
@@ -106,9 +208,9 @@ mod tests {
         #[test]
         fn aligning_undoes_any_gauge_motion(turn_rad in -3.0f64..3.0, shift_m in -50.0f64..50.0) {
             let truth = poses();
-            let motion = GaugeMotion { turn_rad, shift_m };
+            let motion = GaugeMotion::about_y(turn_rad, shift_m);
             let moved: Vec<_> = truth.iter().map(|pose| motion.apply(pose)).collect();
-            let back = BOTH.align(&moved, &truth);
+            let back = Gauge::round().align(&moved, &truth);
             for (moved, truth) in moved.iter().zip(&truth) {
                 prop_assert!(truth.local(&back.apply(moved)).norm() < 1e-9);
             }
@@ -118,12 +220,12 @@ mod tests {
     #[test]
     fn directions_are_the_derivatives_of_the_motion() {
         let pose = poses()[4];
-        let directions = BOTH.directions(&pose);
+        let directions = Gauge::round().directions(&pose);
         let step = 1e-6;
         for (k, direction) in directions.iter().enumerate() {
-            let motion = |amount: f64| GaugeMotion {
-                turn_rad: if k == 0 { amount } else { 0.0 },
-                shift_m: if k == 1 { amount } else { 0.0 },
+            let motion = |amount: f64| match k {
+                0 => GaugeMotion::about_y(amount, 0.0),
+                _ => GaugeMotion::about_y(0.0, amount),
             };
             let numeric = pose.local(&motion(step).apply(&pose)) / step;
             assert!((numeric - direction).norm() < 1e-5);

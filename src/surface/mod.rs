@@ -17,18 +17,28 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod centreline;
 mod circle;
 mod displacement;
 mod footprint;
 mod gauge;
+mod patches;
+mod prism;
+pub mod section;
+mod swept;
 
+pub use centreline::{CentrePoint, Centreline, Station};
 pub use circle::Circle;
 pub use displacement::{lens_jacobian, wall_jacobian};
 pub use footprint::{Footprint, shortest_arc};
-pub use gauge::{Gauge, GaugeMotion};
+pub use gauge::{Axis, Gauge, GaugeMotion};
+pub use patches::Patches;
+pub use prism::Prism;
+pub use swept::Swept;
 
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
+use std::f64::consts::TAU;
 
 /// A point of the unrolled wall, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +72,7 @@ pub struct WallFrame {
 }
 
 /// Why a ray or a camera does not go with the tunnel.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurfaceError {
     /// The camera's centre is not inside the tunnel.
@@ -89,12 +99,38 @@ pub enum SurfaceError {
     /// The ray or the camera's position is not a number.
     #[error("the camera's position or viewing direction is not finite")]
     NotFinite,
-    /// The shape's own size is impossible.
-    #[error("the tunnel's radius is {radius_m} m; it must be a positive number of metres")]
-    Radius {
-        /// The radius given, metres.
-        radius_m: f64,
+    /// A size of the section is impossible.
+    #[error("{name} is {size_m} m; it must be a positive number of metres")]
+    Size {
+        /// Its name in `survey.toml`.
+        name: &'static str,
+        /// The size given, metres.
+        size_m: f64,
     },
+    /// A horseshoe without walls.
+    #[error(
+        "a horseshoe {width_m} m wide and {height_m} m high has no floor; its height must be more than half its width"
+    )]
+    NoWalls {
+        /// Width, metres.
+        width_m: f64,
+        /// Height, metres.
+        height_m: f64,
+    },
+    /// A centreline that no tunnel follows.
+    #[error("the centreline: {what}")]
+    Centreline {
+        /// What is wrong with it.
+        what: String,
+    },
+}
+
+/// Refuses a size that is not positive and finite.
+fn check_size(name: &'static str, size_m: f64) -> Result<(), SurfaceError> {
+    match size_m.is_finite() && size_m > 0.0 {
+        true => Ok(()),
+        false => Err(SurfaceError::Size { name, size_m }),
+    }
 }
 
 /// Distance of the wall along a camera's optical axis, metres.
@@ -136,6 +172,26 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
 
     /// The motions that map the tunnel onto itself.
     fn gauge(&self) -> Gauge;
+
+    /// How far along the tunnel a point is, metres: the chainage of the section that holds it.
+    fn chainage_m(&self, t: &Vector3<f64>) -> f64 {
+        t.y
+    }
+
+    /// A pose as the section at its chainage sees it: what it would be if the tunnel were straight along y.
+    fn straightened(&self, pose: &Pose) -> Pose {
+        *pose
+    }
+
+    /// The angle of the wall at `s_m` as seen from the axis, from z towards x, in `[0, 2π)`, radians.
+    fn angle_rad(&self, s_m: f64) -> f64 {
+        TAU * (s_m / self.perimeter_m()).rem_euclid(1.0)
+    }
+
+    /// The place on the section's outline at an angle from z towards x, metres; see [`Surface::angle_rad`].
+    fn s_at_m(&self, angle_rad: f64) -> f64 {
+        self.perimeter_m() * (angle_rad / TAU).rem_euclid(1.0)
+    }
 
     /// Checks that a camera stands inside.
     ///

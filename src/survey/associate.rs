@@ -210,10 +210,7 @@ mod tests {
     use crate::trajectory::{PoseFormat, spiral};
 
     fn frames(paths: &[&str]) -> Vec<FrameFile> {
-        let frame = |(index, path): (usize, &&str)| FrameFile {
-            index,
-            path: path.into(),
-        };
+        let frame = |(index, path): (usize, &&str)| FrameFile::picture(index, path.into());
         paths.iter().enumerate().map(frame).collect()
     }
 

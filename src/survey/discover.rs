@@ -1,6 +1,7 @@
 //! What a folder holds that a survey can be made of.
 
 use crate::camera::{Camera, read_calibration};
+use crate::frames::{FrameError, Video};
 use crate::survey::SURVEY_FILE;
 use crate::trajectory::{PoseFile, read_poses};
 use std::collections::BTreeMap;
@@ -15,6 +16,9 @@ const POSES_BYTES: u64 = 256 << 20;
 /// Endings of pictures.
 const PICTURES: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
 
+/// Endings of videos.
+const VIDEOS: [&str; 7] = ["mp4", "mov", "m4v", "mkv", "avi", "webm", "mts"];
+
 /// Pictures of one folder and ending.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureGroup {
@@ -26,15 +30,35 @@ pub struct PictureGroup {
     pub size: Option<(u32, u32)>,
 }
 
+/// A video whose pictures are the frames.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct VideoChoice {
+    /// The file, relative to the folder that was looked into.
+    pub path: PathBuf,
+    /// Every so many-th of its pictures is a frame.
+    pub every: usize,
+    /// How many frames that makes.
+    pub count: usize,
+    /// Width and height, pixels.
+    pub size: (u32, u32),
+}
+
 /// What was found; all paths are relative to the folder.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Discovery {
+    /// A picture called mask.
+    pub mask: Option<PathBuf>,
+    /// Videos.
+    pub videos: Vec<PathBuf>,
+    /// The one that the frames are in, if one was chosen ([`Discovery::choose_video`]).
+    pub video: Option<VideoChoice>,
     /// Groups of pictures, the largest first.
     pub pictures: Vec<PictureGroup>,
-    /// Calibrations, those that fit the first group of pictures first.
+    /// Calibrations, those that fit the frames first: the video's, or the first group of pictures.
     pub calibrations: Vec<(PathBuf, Camera)>,
-    /// Files of poses; first those with as many poses as there are pictures, and of these what is not called true.
+    /// Files of poses; first those with as many poses as there are frames, and of these what is not called true.
     pub poses: Vec<(PathBuf, PoseFile)>,
 }
 
@@ -57,8 +81,19 @@ impl Discovery {
                 .into_owned();
             let lower = extension.to_lowercase();
             if PICTURES.contains(&lower.as_str()) {
+                if file
+                    .file_stem()
+                    .is_some_and(|stem| stem.eq_ignore_ascii_case("mask"))
+                {
+                    found.mask.get_or_insert_with(|| file.clone());
+                    continue;
+                }
                 let parent = file.parent().unwrap_or(Path::new("")).to_owned();
                 groups.entry((parent, extension)).or_default().push(file);
+                continue;
+            }
+            if VIDEOS.contains(&lower.as_str()) {
+                found.videos.push(file.clone());
                 continue;
             }
             let path = folder.join(file);
@@ -94,11 +129,40 @@ impl Discovery {
         Ok(found)
     }
 
+    /// Takes every `every`-th picture of a video, relative to the `folder` that was looked into, for the frames.
+    ///
+    /// # Errors
+    /// As [`Video::open`].
+    pub fn choose_video(
+        &mut self,
+        folder: &Path,
+        path: &Path,
+        every: usize,
+    ) -> Result<(), FrameError> {
+        let video = Video::open(&folder.join(path))?;
+        self.video = Some(VideoChoice {
+            path: path.to_owned(),
+            every,
+            count: video.pictures().div_ceil(every.max(1)),
+            size: video.size(),
+        });
+        self.sort();
+        Ok(())
+    }
+
+    /// Number of frames, and their size if it is known, pixels.
+    pub fn frames(&self) -> (usize, Option<(u32, u32)>) {
+        let pictures = self.pictures.first();
+        match &self.video {
+            Some(video) => (video.count, Some(video.size)),
+            None => pictures.map_or((0, None), |group| (group.count, group.size)),
+        }
+    }
+
     fn sort(&mut self) {
         self.pictures
             .sort_by_key(|group| std::cmp::Reverse(group.count));
-        let first = self.pictures.first().cloned();
-        let (count, size) = first.map_or((0, None), |group| (group.count, group.size));
+        let (count, size) = self.frames();
         self.calibrations
             .sort_by_key(|(_, camera)| Some((camera.width, camera.height)) != size);
         self.poses.sort_by_key(|(path, poses)| {
@@ -189,10 +253,15 @@ mod tests {
             "right.tum",
             "0 0 0 0 0 0 0 1\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n",
         );
+        image::GrayImage::new(64, 48)
+            .save(dir.path().join("images/Mask.png"))
+            .unwrap();
         write("notes.txt", "measured on a Monday\n");
         let found = Discovery::of(dir.path()).unwrap();
         assert_eq!(found.pictures.len(), 1);
         assert_eq!(found.pictures[0].pattern, "images/*.png");
+        assert_eq!(found.pictures[0].count, 3);
+        assert_eq!(found.mask.as_deref(), Some(Path::new("images/Mask.png")));
         assert_eq!(found.calibrations[0].0, Path::new("b.txt"));
         assert_eq!(found.initial().unwrap().0, Path::new("right.tum"));
         assert!(found.truth().is_none());

@@ -1,6 +1,6 @@
 //! `survey.toml` as written.
 
-use super::{CalibrateSection, PosesSection, SurveyError};
+use super::{CalibrateSection, PosesSection, SurveyError, TunnelSection};
 use crate::trajectory::{Jitter, JitterModel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -35,12 +35,14 @@ pub struct SurveyFile {
 }
 
 impl SurveyFile {
-    /// All files that it names, as written; the frames are a pattern and not among them.
+    /// All files that it names, as written, but for the frames: a pattern, or a video.
     pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let poses = &mut self.poses;
         [
+            self.tunnel.centreline.as_mut(),
             Some(&mut self.camera.file),
             self.frames.times.as_mut(),
+            self.frames.mask.as_mut(),
             Some(&mut poses.initial),
             poses.truth.as_mut(),
             poses.body_to_camera.as_mut(),
@@ -49,26 +51,6 @@ impl SurveyFile {
         .into_iter()
         .flatten()
     }
-}
-
-/// Shape of the tunnel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum Shape {
-    /// Straight, circular section.
-    Circle,
-}
-
-/// `[tunnel]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[non_exhaustive]
-pub struct TunnelSection {
-    /// Shape of the tunnel.
-    pub shape: Shape,
-    /// Radius, metres.
-    pub radius_m: f64,
 }
 
 /// `[camera]`.
@@ -92,11 +74,25 @@ pub struct CameraSection {
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct FramesSection {
-    /// Glob pattern of the frames.
-    pub images: String,
+    /// Glob pattern of the frames, if they are files of their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub images: Option<String>,
+    /// The video that they are in, if they are not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub video: Option<PathBuf>,
+    /// Of the video every so many-th picture is a frame, from the first on; without it every one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub every: Option<usize>,
+    /// Of these, only as many as it takes for the view to turn by so much from one to the next, degrees, by the initial poses, which
+    /// must be tied by time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle_step_deg: Option<f64>,
     /// The frames' times, where they are not in their names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
+    /// A picture of the frames' size, black where they never show the wall; see [`crate::frames::Mask`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mask: Option<PathBuf>,
 }
 
 /// `[prior]`: the noise model of the initial poses.
@@ -163,15 +159,22 @@ pub(super) fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::survey::{Associate, CalibrationGroup, Survey};
+    use crate::survey::{Associate, CalibrationGroup, IgnoreSection, Shape, Survey};
     use crate::trajectory::{CameraAxes, Direction, PoseFormat};
 
     #[test]
     fn the_file_round_trips() {
         let file = SurveyFile {
             tunnel: TunnelSection {
-                shape: Shape::Circle,
-                radius_m: 3.0,
+                shape: Shape::Box,
+                radius_m: None,
+                width_m: Some(4.0),
+                height_m: Some(3.0),
+                centreline: Some("curve.txt".into()),
+                ignore: vec![IgnoreSection {
+                    theta_deg: Some([150.0, 210.0]),
+                    chainage_m: None,
+                }],
             },
             camera: CameraSection {
                 file: "camera.json".into(),
@@ -179,8 +182,12 @@ mod tests {
                 readout_ms: Some(-20.0),
             },
             frames: FramesSection {
-                images: "frames/*.png".into(),
+                images: None,
+                video: Some("survey.mp4".into()),
+                every: Some(5),
+                angle_step_deg: Some(15.0),
                 times: Some("times.txt".into()),
+                mask: Some("mask.png".into()),
             },
             poses: PosesSection {
                 format: Some(PoseFormat::Csv),

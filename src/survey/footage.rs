@@ -1,9 +1,10 @@
 //! The frames of a survey that has no poses yet.
 
 use super::file::read_survey_file;
+use super::listing::Listing;
 use super::open::{folder_of, toml_path};
 use super::{SurveyError, times};
-use crate::frames::{self, FrameFile};
+use crate::frames::FrameFile;
 use std::path::Path;
 
 /// The frames of a survey, and when they were taken, before anything is known of their poses.
@@ -12,7 +13,7 @@ use std::path::Path;
 pub struct Footage {
     /// The frames, sorted by name.
     pub frames: Vec<FrameFile>,
-    /// Their times, seconds, where a file or all names tell them.
+    /// Their times, seconds, where a file, a video or all names tell them.
     pub times_s: Option<Vec<f64>>,
 }
 
@@ -26,12 +27,10 @@ impl Footage {
         let toml_path = toml_path(path);
         let file = read_survey_file(&toml_path)?;
         let folder = folder_of(&toml_path);
-        let frames = frames::list(&folder, &file.frames.images)?;
-        let own = file.frames.times.map(|times| folder.join(times));
-        let times_s = match frame_times.or(own.as_deref()) {
-            Some(path) => Some(times::read(path, &frames)?),
-            None => times::from_names(&frames).ok(),
-        };
+        let Listing {
+            frames, times_s, ..
+        } = Listing::new(&file.frames, &toml_path, &folder, frame_times)?;
+        let times_s = times_s.or_else(|| times::from_names(&frames).ok());
         Ok(Self { frames, times_s })
     }
 }

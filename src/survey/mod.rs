@@ -2,16 +2,24 @@
 //!
 //! ```toml
 //! [tunnel]
-//! shape = "circle"
+//! shape = "circle"            # with radius_m; or "ellipse", "box", "horseshoe" with width_m and height_m
 //! radius_m = 3.0
+//! centreline = "curve.txt"    # optional: of a tunnel that is not straight, `x y z [radius]` a line
+//! ignore = [                  # optional: parts of the wall by which refine does not compare frames
+//!     { theta_deg = [150, 210], chainage_m = [2.0, 5.5] },   # either may be left out: all around, all along
+//! ]
 //!
 //! [camera]
 //! file = "camera.json"
 //! readout_ms = 20.0           # optional: rolling shutter, from the first row to the last
 //!
 //! [frames]
-//! images = "frames/*.jpg"     # sorted by name
+//! images = "frames/*.jpg"     # sorted by name; or
+//! # video = "survey.mp4"      # pictures of a video, read by ffmpeg, with the times it says
+//! # every = 5                 # every fifth picture of it
+//! # angle_step_deg = 15.0     # of these, those between which the view turns by so much; needs `associate = "time"`
 //! times = "times.txt"         # optional: `time`, `time name` or `name time` a line; else from the names
+//! mask = "mask.png"           # optional: a picture of their size, black where they never show the wall
 //!
 //! [poses]
 //! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC, told by the content
@@ -63,21 +71,25 @@ mod discover;
 mod error;
 mod file;
 mod footage;
+mod ignore;
+mod listing;
 mod open;
 mod plausible;
 mod poses;
 mod reader;
+mod thinning;
 mod times;
+mod tunnel;
 
 pub use associate::{Associate, TIME_TOLERANCE_S};
 pub use calibrate::{CalibrateSection, CalibrationGroup};
-pub use discover::{Discovery, PictureGroup};
+pub use discover::{Discovery, PictureGroup, VideoChoice};
 pub use error::SurveyError;
-pub use file::{
-    CameraSection, FramesSection, PriorSection, SURVEY_FILE, Shape, SurveyFile, TunnelSection,
-};
+pub use file::{CameraSection, FramesSection, PriorSection, SURVEY_FILE, SurveyFile};
 pub use footage::Footage;
+pub use ignore::IgnoreSection;
 pub use open::Survey;
 pub(crate) use open::toml_path;
 pub use poses::PosesSection;
 pub use times::read_frame_times;
+pub use tunnel::{Shape, TunnelSection, read_centreline};

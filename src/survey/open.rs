@@ -2,12 +2,13 @@
 
 use super::associate::TIME_TOLERANCE_S;
 use super::file::read_survey_file;
+use super::listing::Listing;
 use super::reader::{PoseReader, Reading};
-use super::{CalibrateSection, PosesSection, SURVEY_FILE, Shape, SurveyError, SurveyFile};
-use super::{plausible, times};
+use super::{CalibrateSection, PosesSection, SURVEY_FILE, SurveyError, SurveyFile};
+use super::{ignore, plausible};
 use crate::camera::{Camera, read_calibration};
-use crate::frames::{self, FrameFile};
-use crate::surface::{Circle, Surface, SurfaceError};
+use crate::frames::{FrameSet, Mask};
+use crate::surface::{Patches, Surface};
 use crate::trajectory::{Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of};
 use std::path::{Path, PathBuf};
 
@@ -22,8 +23,10 @@ pub struct Survey {
     pub camera: Camera,
     /// The tunnel.
     pub surface: Box<dyn Surface>,
-    /// The frames, sorted by name.
-    pub frames: Vec<FrameFile>,
+    /// Parts of the wall by which frames are not compared.
+    pub ignored: Patches,
+    /// The frames, sorted by name, with what none of them shows.
+    pub frames: FrameSet,
     /// The initial poses, one per frame.
     pub initial: Trajectory,
     /// The true poses, one per frame, where known.
@@ -32,8 +35,8 @@ pub struct Survey {
     pub prior: Jitter,
     /// What is possible but suspicious, and what might be meant.
     pub warnings: Vec<String>,
-    /// The frames' times, seconds, where a file tells them.
-    times_s: Option<Vec<f64>>,
+    /// The frames' times, seconds, where a file or a video tells them.
+    pub(super) times_s: Option<Vec<f64>>,
     /// See [`Survey::own_files`].
     own_files: Vec<PathBuf>,
 }
@@ -74,8 +77,7 @@ impl Survey {
             path: toml_path.clone(),
             what,
         };
-        let surface =
-            surface_of(&file).map_err(|error| value(format!("tunnel.radius_m: {error}")))?;
+        let surface = file.tunnel.surface(&toml_path, &folder)?;
         let prior = &file.prior;
         if !(1e-6..=180.0).contains(&prior.rotation_sigma_deg) {
             return Err(value(format!(
@@ -86,10 +88,10 @@ impl Survey {
         if !prior
             .translation_sigma_m
             .iter()
-            .all(|s| (1e-9..=10.0 * file.tunnel.radius_m).contains(s))
+            .all(|s| (1e-9..=10.0 * file.tunnel.nominal_m()).contains(s))
         {
             return Err(value(format!(
-                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times the radius",
+                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times the radius (half the width)",
                 prior.translation_sigma_m
             )));
         }
@@ -104,15 +106,32 @@ impl Survey {
         }
         let camera =
             read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
-        let frames = frames::list(&folder, &file.frames.images)?;
-        let times_s = match &file.frames.times {
-            Some(times) => Some(times::read(&folder.join(times), &frames)?),
+        let Listing {
+            frames,
+            times_s,
+            video,
+        } = Listing::new(&file.frames, &toml_path, &folder, None)?;
+        if let Some(video) = &video
+            && video.rotation_deg() != 0
+            && file.camera.readout_ms.is_some()
+        {
+            return Err(value(format!(
+                "camera.readout_ms goes from row to row, but {} is to be shown turned by {}°, so that its rows are not what the sensor \
+                 reads at once; turn the pictures back with ffmpeg -noautorotate and calibrate for these, or leave readout_ms out",
+                video.path().display(),
+                video.rotation_deg()
+            )));
+        }
+        let mask = match &file.frames.mask {
+            Some(mask) => Some(Mask::read(&folder.join(mask), camera.width, camera.height)?),
             None => None,
         };
+        let ignored = ignore::patches(&file.tunnel.ignore, surface.as_ref()).map_err(value)?;
         let mut survey = Self {
             camera,
             surface,
-            frames,
+            ignored,
+            frames: FrameSet::new(frames, mask),
             initial: Vec::new(),
             truth: None,
             prior: file.prior.into(),
@@ -122,6 +141,9 @@ impl Survey {
             folder,
             file,
         };
+        if let Some(step_deg) = survey.file.frames.angle_step_deg {
+            survey.thin_by_angle(step_deg, &toml_path)?;
+        }
         let section = &survey.file.poses;
         let (initial, mut warnings) =
             survey.read_as(section, &survey.folder.join(&section.initial))?;
@@ -133,6 +155,11 @@ impl Survey {
             }
             None => None,
         };
+        warnings.extend(
+            video
+                .iter()
+                .filter_map(|video| video.warning().map(str::to_owned)),
+        );
         (survey.initial, survey.truth, survey.warnings) = (initial, truth, warnings);
         if let Some(fault) = survey.readout_fault() {
             return Err(value(fault));
@@ -150,7 +177,7 @@ impl Survey {
     }
 
     /// Reads a file of poses as a section says; its warnings beside it.
-    fn read_as(
+    pub(super) fn read_as(
         &self,
         section: &PosesSection,
         path: &Path,
@@ -186,8 +213,12 @@ impl Survey {
                 folder: self.folder.clone(),
                 file: self.file.clone(),
                 camera: self.camera,
-                surface: surface_of(&self.file)?,
-                frames: self.frames.iter().take(most_frames).cloned().collect(),
+                surface: self
+                    .file
+                    .tunnel
+                    .surface(Path::new(SURVEY_FILE), &self.folder)?,
+                ignored: self.ignored.clone(),
+                frames: self.frames.first(most_frames),
                 initial: stamped.take(most_frames).collect(),
                 truth: None,
                 prior: self.prior,
@@ -248,15 +279,5 @@ pub(crate) fn toml_path(path: &Path) -> PathBuf {
     match path.is_dir() {
         true => path.join(SURVEY_FILE),
         false => path.to_owned(),
-    }
-}
-
-/// The tunnel that a survey's file describes.
-///
-/// # Errors
-/// An impossible size.
-fn surface_of(file: &SurveyFile) -> Result<Box<dyn Surface>, SurfaceError> {
-    match file.tunnel.shape {
-        Shape::Circle => Ok(Box::new(Circle::new(file.tunnel.radius_m)?)),
     }
 }

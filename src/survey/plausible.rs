@@ -37,14 +37,18 @@ struct Stand {
 impl Stand {
     fn of(surface: &dyn Surface, camera: &Camera, poses: &[Pose]) -> Self {
         let outside = |pose: &&Pose| surface.check_inside(&pose.t_wc).is_err();
+        let straight: Vec<Pose> = poses
+            .iter()
+            .map(|pose| surface.straightened(pose))
+            .collect();
         Self {
             frames: poses.len(),
             outside: poses.iter().filter(outside).count(),
-            axial: poses
+            axial: straight
                 .iter()
                 .filter(|pose| looks_along_the_axis(camera, pose))
                 .count(),
-            course: Course::of(poses),
+            course: Course::of(&straight),
         }
     }
 

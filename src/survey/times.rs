@@ -125,9 +125,8 @@ mod tests {
     use super::*;
 
     fn frames(names: &[&str]) -> Vec<FrameFile> {
-        let frame = |(index, name): (usize, &&str)| FrameFile {
-            index,
-            path: Path::new("survey/frames").join(name),
+        let frame = |(index, name): (usize, &&str)| {
+            FrameFile::picture(index, Path::new("survey/frames").join(name))
         };
         names.iter().enumerate().map(frame).collect()
     }

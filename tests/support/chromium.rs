@@ -1,5 +1,8 @@
 //! Looking at pages with headless Chromium.
 
+// Every test binary uses its own part of this.
+#![allow(dead_code)]
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};

@@ -11,6 +11,7 @@ use crate::render::{
     Band, Canvas, Coverage, Gap, Layout, Map, Panorama, Plan, Preview, RasterState, RasterTarget,
     RenderError, Target, gaps_csv,
 };
+use crate::surface::Surface;
 use image::DynamicImage;
 use nalgebra::Matrix6;
 use serde::{Deserialize, Serialize};
@@ -130,8 +131,8 @@ impl Outputs {
     }
 
     /// What no frame sees.
-    pub fn gaps(&self) -> Vec<Gap> {
-        self.coverage.gaps()
+    pub fn gaps(&self, surface: &dyn Surface) -> Vec<Gap> {
+        self.coverage.gaps(surface)
     }
 
     /// Gives all files their names; the panorama last. `camera`: that of the frames as they are; `covariances`: those of their
@@ -185,7 +186,7 @@ impl Maps {
             // One from an earlier panorama would belong to other poses.
             atomic::remove_file(&self.folder.join(UNCERTAINTY))?;
         }
-        let preview = DynamicImage::from(self.preview.picture(layout, 0.0));
+        let preview = DynamicImage::from(self.preview.picture(surface, layout, 0.0));
         write_picture(&self.folder.join(PREVIEW), &preview, PictureFormat::Png)?;
         atomic::write_text(&self.folder.join(GAPS), &gaps_csv(gaps))?;
         Ok(())

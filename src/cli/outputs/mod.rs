@@ -91,7 +91,10 @@ impl OutputArguments {
     /// # Errors
     /// The two names.
     pub fn check_apart(&self, survey: &Survey) -> Result<(), Failure> {
-        let mut inputs: Vec<PathBuf> = survey.frames.iter().map(|f| f.path.clone()).collect();
+        let mut inputs: Vec<PathBuf> = {
+            let frames = survey.frames.iter();
+            frames.map(|frame| frame.file().to_owned()).collect()
+        };
         inputs.extend_from_slice(survey.own_files());
         inputs.extend(self.covariance.clone());
         let mut taken: Vec<PathBuf> = inputs.iter().map(|path| full(path)).collect();

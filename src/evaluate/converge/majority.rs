@@ -167,7 +167,7 @@ mod tests {
     }
 
     fn gauge(turn_rad: f64, shift_m: f64) -> GaugeMotion {
-        GaugeMotion { turn_rad, shift_m }
+        GaugeMotion::about_y(turn_rad, shift_m)
     }
 
     #[test]

@@ -19,7 +19,7 @@ use super::overlaps::footprint;
 use super::robust::NoiseModel;
 use super::shared::Border;
 use super::view::View;
-use super::visibility::Placed;
+use super::visibility::{Hidden, Placed};
 use crate::camera::{Camera, Sweep};
 use crate::frames::Pyramid;
 use crate::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
@@ -163,7 +163,19 @@ impl<'a> Problem<'a> {
             first: participants.start,
             level,
         };
-        let coverage = Coverage::new(scene.surface, grid, camera, pictures, information, placed)?;
+        let hidden = Hidden {
+            ignored: scene.ignored,
+            mask: scene.frames.mask(&camera),
+        };
+        let coverage = Coverage::new(
+            scene.surface,
+            grid,
+            camera,
+            pictures,
+            hidden,
+            information,
+            placed,
+        )?;
         let slot = |k: &usize| {
             let frame = participants.start + k;
             active.contains(&frame).then(|| frame - active.start)

@@ -1,12 +1,13 @@
 //! What a problem is made of.
 
 use crate::camera::{Camera, Sweep};
+use crate::checkpoint::CheckpointError;
 use crate::frames::{FrameCache, FrameError};
 use crate::refine::calibration::{Calibration, Kappa};
 use crate::refine::estimate::FrameEstimate;
 use crate::refine::factor::FactorError;
 use crate::refine::prior::{Prior, predict};
-use crate::surface::{Surface, SurfaceError};
+use crate::surface::{Patches, Surface, SurfaceError};
 use crate::trajectory::{Pose, Shutter};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -40,6 +41,8 @@ impl Sampling {
 pub struct Scene<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
+    /// Parts of the wall by which frames are not compared.
+    pub ignored: &'a Patches,
     /// The camera at full size, as far as it is known by now, at rest.
     pub camera: Camera,
     /// When the rows of the frames are read.
@@ -147,4 +150,7 @@ pub enum ProblemError {
     /// The iteration broke off for a reason of its own.
     #[error("the solver stopped: {0}")]
     Solver(String),
+    /// What is done cannot be kept, or not be continued.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
 }

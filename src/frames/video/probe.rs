@@ -1,0 +1,276 @@
+//! What `ffprobe` says of a video.
+
+use super::{Format, Video, missing};
+use image::ColorType;
+use serde::Deserialize;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::Mutex;
+
+/// When a picture is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Moment {
+    /// Its time in ticks of the stream.
+    pub ticks: i64,
+    /// Whether decoding may begin with it.
+    pub key: bool,
+}
+
+/// `ffprobe -of json`.
+#[derive(Deserialize)]
+struct Probed {
+    #[serde(default)]
+    packets: Vec<Packet>,
+    #[serde(default)]
+    streams: Vec<Stream>,
+}
+
+#[derive(Deserialize)]
+struct Packet {
+    pts: Option<i64>,
+    #[serde(default)]
+    flags: String,
+}
+
+#[derive(Deserialize)]
+struct Stream {
+    width: Option<u32>,
+    height: Option<u32>,
+    pix_fmt: Option<String>,
+    field_order: Option<String>,
+    time_base: Option<String>,
+    #[serde(default)]
+    side_data_list: Vec<SideData>,
+}
+
+#[derive(Deserialize)]
+struct SideData {
+    rotation: Option<f64>,
+}
+
+/// What `ffprobe` calls files that end too early.
+const CUT_OFF: [&str; 3] = ["prematurely", "partial file", "truncat"];
+
+/// Looks into the video at `path`.
+///
+/// # Errors
+/// See [`Video::open`].
+pub fn probe(path: &Path) -> Result<Video, String> {
+    let mut command = Command::new("ffprobe");
+    command.args([
+        "-v",
+        "error",
+        "-select_streams",
+        "v:0",
+        "-of",
+        "json",
+        "-show_entries",
+    ]);
+    command.arg(
+        "packet=pts,flags:stream=width,height,pix_fmt,field_order,time_base:stream_side_data=rotation",
+    );
+    let output = command
+        .arg(path)
+        .stdin(Stdio::null())
+        .output()
+        .map_err(|error| missing("ffprobe", &error))?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    // It begins with the file's own name at times, or with the address of a structure.
+    let complaint = said.lines().last().map(|line| {
+        let line = line.rsplit("] ").next().unwrap_or(line);
+        let name = format!("{}: ", path.display());
+        line.strip_prefix(&name).unwrap_or(line).trim().to_owned()
+    });
+    if !output.status.success() {
+        let why = complaint.unwrap_or_else(|| "ffprobe cannot read it".to_owned());
+        let remedy = match path.exists() {
+            true => {
+                "it is no video, or damaged, or was cut off before its end was written: copy it anew"
+            }
+            false => "frames.video is relative to survey.toml",
+        };
+        return Err(format!("{why}; {remedy}"));
+    }
+    if CUT_OFF.iter().any(|sign| said.contains(sign)) {
+        return Err(format!(
+            "the video is cut off ({}): copy it anew, or keep what there is with ffmpeg -i {} -c copy whole.mkv",
+            complaint.unwrap_or_default(),
+            path.display()
+        ));
+    }
+    let probed: Probed = serde_json::from_slice(&output.stdout)
+        .map_err(|error| format!("ffprobe says what cannot be understood: {error}"))?;
+    let video = of(path, probed)?;
+    Ok(Video {
+        warning: complaint.map(|said| format!("{}: ffprobe says: {said}", path.display())),
+        ..video
+    })
+}
+
+fn of(path: &Path, probed: Probed) -> Result<Video, String> {
+    let stream = probed.streams.first().ok_or("has no video stream")?;
+    let (Some(width), Some(height), Some(pixels), Some(time_base)) = (
+        stream.width,
+        stream.height,
+        &stream.pix_fmt,
+        &stream.time_base,
+    ) else {
+        return Err("has a video stream that ffmpeg cannot decode".to_owned());
+    };
+    if let Some(order @ ("tt" | "bb" | "tb" | "bt")) = stream.field_order.as_deref() {
+        return Err(format!(
+            "is interlaced (field order {order}): its odd and even rows are of different times; make it progressive with ffmpeg -i {} \
+             -vf bwdif -c:v libx264 -crf 12 progressive.mp4",
+            path.display()
+        ));
+    }
+    let rotation = stream.side_data_list.iter().find_map(|data| data.rotation);
+    let rotation = rotation.unwrap_or(0.0).rem_euclid(360.0);
+    let (width, height) = match rotation {
+        0.0 | 180.0 => (width, height),
+        90.0 | 270.0 => (height, width),
+        _ => {
+            return Err(format!(
+                "is to be shown turned by {rotation}°, which is no right angle"
+            ));
+        }
+    };
+    let mut moments = Vec::with_capacity(probed.packets.len());
+    for packet in &probed.packets {
+        // What is cut away at the beginning is in the file, but not shown.
+        if packet.flags.contains('D') {
+            continue;
+        }
+        moments.push(Moment {
+            ticks: packet.pts.ok_or_else(|| untimed(path))?,
+            key: packet.flags.starts_with('K'),
+        });
+    }
+    // Packets come in the order of decoding.
+    moments.sort_unstable_by_key(|moment| moment.ticks);
+    if moments
+        .windows(2)
+        .any(|pair| pair[0].ticks == pair[1].ticks)
+    {
+        return Err(untimed(path));
+    }
+    if moments.is_empty() {
+        return Err("holds no pictures; it was cut off or is still being written".to_owned());
+    }
+    Ok(Video {
+        path: path.to_owned(),
+        format: Format {
+            width,
+            height,
+            colour: colour(pixels),
+        },
+        moments,
+        tick_s: fraction(time_base).ok_or("has a clock without ticks")?,
+        rotation_deg: rotation as i32,
+        warning: None,
+        idle: Mutex::default(),
+    })
+}
+
+fn untimed(path: &Path) -> String {
+    format!(
+        "does not say when each picture is shown; give them times of their own with ffmpeg -i {} -c:v libx264 -crf 12 timed.mp4",
+        path.display()
+    )
+}
+
+/// Grey or colour, and how deep: names of more than 8 bits say in which order the bytes are.
+fn colour(pixels: &str) -> ColorType {
+    let grey = pixels.starts_with("gray") || pixels.starts_with("ya");
+    let deep = pixels.ends_with("le") || pixels.ends_with("be");
+    match (grey, deep) {
+        (true, false) => ColorType::L8,
+        (true, true) => ColorType::L16,
+        (false, false) => ColorType::Rgb8,
+        (false, true) => ColorType::Rgb16,
+    }
+}
+
+fn fraction(text: &str) -> Option<[i64; 2]> {
+    let (num, den) = text.split_once('/')?;
+    let (num, den) = (num.parse().ok()?, den.parse().ok()?);
+    (num > 0 && den > 0).then_some([num, den])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn probed(json: &str) -> Result<Video, String> {
+        of(Path::new("a.mp4"), serde_json::from_str(json).unwrap())
+    }
+
+    const STREAM: &str =
+        r#""width": 64, "height": 48, "pix_fmt": "yuv420p10le", "time_base": "1/600""#;
+
+    #[test]
+    fn pictures_are_in_the_order_of_their_times_without_those_cut_away() {
+        let json = format!(
+            r#"{{"packets": [{{"pts": -20, "flags": "KD"}}, {{"pts": 0, "flags": "K_"}}, {{"pts": 60, "flags": "__"}}, {{"pts": 20, "flags": "__"}}],
+                 "streams": [{{{STREAM}, "side_data_list": [{{}}, {{"rotation": -90}}]}}]}}"#
+        );
+        let video = probed(&json).unwrap();
+        let times: Vec<f64> = (0..video.pictures()).map(|k| video.time_s(k)).collect();
+        assert_eq!(times, [0.0, 20.0 / 600.0, 0.1]);
+        assert_eq!((video.size(), video.rotation_deg()), ((48, 64), 270));
+        assert_eq!(video.colour(), ColorType::Rgb16);
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_refused() {
+        let packets = r#""packets": [{"pts": 0, "flags": "K_"}]"#;
+        for (json, expected) in [
+            (r#"{"streams": []}"#.to_owned(), "no video stream"),
+            (
+                format!(r#"{{"streams": [{{{STREAM}}}]}}"#),
+                "holds no pictures",
+            ),
+            (
+                format!(r#"{{{packets}, "streams": [{{"width": 64}}]}}"#),
+                "cannot decode",
+            ),
+            (
+                format!(r#"{{{packets}, "streams": [{{{STREAM}, "field_order": "tt"}}]}}"#),
+                "interlaced",
+            ),
+            (
+                format!(
+                    r#"{{{packets}, "streams": [{{{STREAM}, "side_data_list": [{{"rotation": 30}}]}}]}}"#
+                ),
+                "no right angle",
+            ),
+            (
+                format!(r#"{{"packets": [{{"flags": "K_"}}], "streams": [{{{STREAM}}}]}}"#),
+                "when each picture is shown",
+            ),
+            (
+                format!(
+                    r#"{{"packets": [{{"pts": 1}}, {{"pts": 1}}], "streams": [{{{STREAM}}}]}}"#
+                ),
+                "when each picture is shown",
+            ),
+        ] {
+            let message = probed(&json).map(|_| ()).unwrap_err();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn pixels_are_grey_or_colour_and_deep_or_not() {
+        for (pixels, expected) in [
+            ("gray", ColorType::L8),
+            ("gray10le", ColorType::L16),
+            ("yuvj420p", ColorType::Rgb8),
+            ("nv12", ColorType::Rgb8),
+            ("p010le", ColorType::Rgb16),
+            ("gbrp12be", ColorType::Rgb16),
+        ] {
+            assert_eq!(colour(pixels), expected, "{pixels}");
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! From bands of the panorama to textured pieces of the wall, level by level.
+
+use super::glb::{Part, Place};
+use super::mesh::{Lines, Mesh, Patch};
+use super::strip::{BORDER, Block, Strip};
+use crate::raster::{
+    EDGE, LevelTile, Pyramid, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
+    compress_jpeg,
+};
+use crate::render::{Band, Canvas, PixelFormat, Samples};
+use crate::surface::Surface;
+use std::io;
+
+/// The wall is straight between the corners of its triangles within this many pixels of the texture.
+const TOLERANCE_PX: f64 = 0.125;
+
+/// Cuts bands into the blocks of all levels.
+pub(super) struct Cutter {
+    spec: RasterSpec,
+    pyramid: Pyramid,
+    strips: Vec<Strip>,
+}
+
+/// 8 bits a sample, alpha last: what the pictures are made from.
+fn spec(canvas: &Canvas, format: PixelFormat) -> RasterSpec {
+    RasterSpec {
+        width: canvas.columns,
+        height: canvas.rows,
+        samples: SampleType::U8,
+        channels: format.channels as u8,
+        alpha: true,
+        nodata: None,
+        reduce: Reduce::Mean,
+        georeference: None,
+    }
+}
+
+impl Cutter {
+    /// Cuts all levels of a canvas into blocks of a tile.
+    ///
+    /// # Errors
+    /// A canvas that is no raster.
+    pub(super) fn pyramid(canvas: &Canvas, format: PixelFormat) -> Result<Self, RasterError> {
+        let spec = spec(canvas, format);
+        Self::new(spec, spec.levels_to_one_tile(), 1)
+    }
+
+    /// Cuts a canvas itself into blocks of `tiles` × `tiles` tiles.
+    ///
+    /// # Errors
+    /// As [`Cutter::pyramid`].
+    pub(super) fn single(
+        canvas: &Canvas,
+        format: PixelFormat,
+        tiles: usize,
+    ) -> Result<Self, RasterError> {
+        Self::new(spec(canvas, format), 1, tiles)
+    }
+
+    fn new(spec: RasterSpec, levels: usize, tiles: usize) -> Result<Self, RasterError> {
+        let strip = |level| Strip::new(spec.size(level), spec.pixel_bytes(), tiles);
+        Ok(Self {
+            spec,
+            pyramid: Pyramid::new(spec, levels)?,
+            strips: (0..levels).map(strip).collect(),
+        })
+    }
+
+    /// Number of levels.
+    pub(super) fn levels(&self) -> usize {
+        self.strips.len()
+    }
+
+    /// Columns and rows of blocks of a tile at a level.
+    pub(super) fn grid(&self, level: usize) -> [u32; 2] {
+        self.spec.grid(level)
+    }
+
+    /// Channels of a picture without alpha.
+    pub(super) fn channels(&self) -> usize {
+        usize::from(self.spec.channels)
+    }
+
+    /// Memory that it holds at the most, bytes.
+    pub(super) fn most_bytes(&self) -> u64 {
+        let strips: u64 = self.strips.iter().map(Strip::most_bytes).sum();
+        strips + self.spec.pending_bytes(crate::raster::TileOrder::Rows)
+    }
+
+    /// Takes the next band; the blocks that are complete by that, with their level.
+    ///
+    /// # Errors
+    /// A band that came twice.
+    pub(super) fn add(&mut self, band: &Band) -> Result<Vec<(usize, Block)>, RasterError> {
+        let complete = self.pyramid.add(self.tiles(band))?;
+        let mut blocks = Vec::new();
+        for (level, strip) in self.strips.iter_mut().enumerate() {
+            let of_level = |tile: &&LevelTile| tile.level == level;
+            let tiles: Vec<&RasterTile> =
+                complete.iter().filter(of_level).map(|t| &t.tile).collect();
+            blocks.extend(strip.add(&tiles).into_iter().map(|block| (level, block)));
+        }
+        Ok(blocks)
+    }
+
+    /// The tiles of a band.
+    fn tiles(&self, band: &Band) -> Vec<RasterTile> {
+        let (width, bytes) = (self.spec.width as usize, self.spec.pixel_bytes());
+        let samples: std::borrow::Cow<[u8]> = match &band.samples {
+            Samples::Eight(samples) => samples.into(),
+            Samples::Sixteen(samples) => samples.iter().map(|v| (v >> 8) as u8).collect(),
+        };
+        let tile = |column: usize| {
+            let first = column * EDGE * bytes;
+            let count = EDGE.min(width - column * EDGE) * bytes;
+            let mut pixels = vec![0; EDGE * EDGE * bytes];
+            for (to, from) in pixels
+                .chunks_exact_mut(EDGE * bytes)
+                .zip(samples.chunks_exact(width * bytes))
+            {
+                to[..count].copy_from_slice(&from[first..][..count]);
+            }
+            RasterTile {
+                column: column as u32,
+                row: band.row / EDGE as u32,
+                pixels,
+            }
+        };
+        (0..width.div_ceil(EDGE)).map(tile).collect()
+    }
+}
+
+/// The piece of the wall that a block of a level shows.
+///
+/// # Errors
+/// A picture that cannot be encoded.
+pub(super) fn part(
+    surface: &dyn Surface,
+    canvas: &Canvas,
+    (level, block): &(usize, Block),
+    channels: usize,
+    quality: u8,
+) -> io::Result<Part> {
+    let px_m = 2f64.powi(*level as i32) / canvas.px_per_metre;
+    let start_m = [0.0, canvas.h_start_m];
+    let end_m = [surface.perimeter_m(), canvas.chainage_m()[1]];
+    // Pixels at the end of an overview stand for less than they would elsewhere.
+    let range = |k: usize| {
+        let [from, size] = [block.corner[k], block.size[k]].map(|px| px as f64 * px_m);
+        [start_m[k] + from, (start_m[k] + from + size).min(end_m[k])]
+    };
+    let patch = Patch {
+        s_m: range(0),
+        h_m: range(1),
+    };
+    let border_m = BORDER as f64 * px_m;
+    let lines = Lines::cut(surface, &patch, TOLERANCE_PX * px_m, px_m);
+    Ok(Part {
+        mesh: Mesh::new(surface, &lines),
+        jpeg: compress_jpeg(&block.pixels, block.texture_size(), channels, quality)?,
+        place: Place {
+            corner_m: [patch.s_m[0] - border_m, patch.h_m[0] - border_m],
+            extent_m: block.texture_size().map(|side| side as f64 * px_m),
+        },
+    })
+}

@@ -1,0 +1,165 @@
+/** The unrolled wall, chainage to the right and θ up, around where you are; and the whole length below it. */
+import type { Layer } from "./tunnel";
+import type { Wall, WallPlace } from "./wall";
+
+/** Least distance of two chainages in the map, pixels. */
+const TICK_PX = 60;
+
+export interface Pin {
+  place: WallPlace;
+  colour: string;
+}
+
+export class WallMap {
+  onJump: (place: WallPlace) => void = () => {};
+  private layer: Layer | null = null;
+  private pictures = new Map<number, HTMLImageElement>();
+  private eye: WallPlace = { s: 0, h: 0 };
+  private seen: WallPlace | null = null;
+  private pins: Pin[] = [];
+
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly whole: HTMLCanvasElement,
+    private readonly wall: Wall,
+  ) {
+    canvas.addEventListener("click", (event) => this.onJump(this.placeAt(event.offsetX, event.offsetY)));
+    whole.addEventListener("click", (event) => {
+      const [from, to] = wall.chainage;
+      this.onJump({ s: this.seen?.s ?? 0, h: from + ((to - from) * event.offsetX) / whole.clientWidth });
+    });
+    new ResizeObserver(() => this.draw()).observe(canvas);
+  }
+
+  show(layer: Layer): void {
+    this.layer = layer;
+    this.pictures.clear();
+    this.draw();
+  }
+
+  /** You are in the section `h`, and look at `seen`. */
+  move(h: number, seen: WallPlace | null, pins: Pin[]): void {
+    this.eye = { s: 0, h };
+    [this.seen, this.pins] = [seen, pins];
+    this.draw();
+  }
+
+  /** Pixels of the screen per metre. */
+  private get scale(): number {
+    return this.canvas.clientHeight / this.wall.perimeter;
+  }
+
+  /** Chainage at the left edge: you are in the middle, except at the ends. */
+  private get left(): number {
+    const [from, to] = this.wall.chainage;
+    const span = this.canvas.clientWidth / this.scale;
+    if (span >= to - from) return from - (span - (to - from)) / 2;
+    return Math.min(Math.max(this.eye.h - span / 2, from), to - span);
+  }
+
+  private placeAt(x: number, y: number): WallPlace {
+    const [from, to] = this.wall.chainage;
+    const h = Math.min(Math.max(this.left + x / this.scale, from), to);
+    return { s: (1 - y / this.canvas.clientHeight) * this.wall.perimeter, h };
+  }
+
+  private draw(): void {
+    const [context, width, height] = fit(this.canvas);
+    if (!context) return;
+    const [left, scale] = [this.left, this.scale];
+    if (this.layer) this.drawPictures(context, this.layer, left, scale, height);
+    const at = ({ s, h }: WallPlace): [number, number] => [(h - left) * scale, (1 - this.wall.around(s) / this.wall.perimeter) * height];
+    this.drawScale(context, left, scale, width, height);
+    context.fillStyle = "#ffb02e";
+    const [x] = at(this.eye);
+    context.fillRect(x - 1, 0, 2, height);
+    for (const pin of this.pins) dot(context, at(pin.place), 4, pin.colour);
+    if (this.seen) dot(context, at(this.seen), 5, "#ffb02e");
+    this.drawWhole(width / scale, left);
+  }
+
+  private drawPictures(context: CanvasRenderingContext2D, layer: Layer, left: number, scale: number, height: number): void {
+    const { map, chainage_m } = layer;
+    const span = map.rows_px / map.px_per_metre;
+    const count = Math.ceil(map.size_px[1] / map.rows_px);
+    const first = Math.max(Math.floor((left - chainage_m[0]) / span), 0);
+    const last = Math.min(Math.floor((left + this.canvas.clientWidth / scale - chainage_m[0]) / span), count - 1);
+    for (let row = first; row <= last; row++) {
+      const picture = this.picture(map.folder, row);
+      if (!picture.complete || picture.naturalWidth === 0) continue;
+      const rows = picture.naturalHeight - 2 * map.border_px;
+      const columns = picture.naturalWidth - 2 * map.border_px;
+      context.save();
+      // Turned counter-clockwise: a column goes up, a row to the right.
+      const start = (chainage_m[0] + row * span - left) * scale;
+      const [along, across] = [scale / map.px_per_metre, height / map.size_px[0]];
+      context.transform(0, -across, along, 0, start, height);
+      context.drawImage(picture, map.border_px, map.border_px, columns, rows, 0, 0, columns, rows);
+      context.restore();
+    }
+  }
+
+  /** Chainages along the lower edge. */
+  private drawScale(context: CanvasRenderingContext2D, left: number, scale: number, width: number, height: number): void {
+    const [from, to] = this.wall.chainage;
+    const metres = [1, 2, 5, 10, 20, 50, 100].find((step) => step * scale >= TICK_PX) ?? 200;
+    context.font = "11px system-ui, sans-serif";
+    context.textBaseline = "bottom";
+    for (let h = Math.ceil(Math.max(left, from) / metres) * metres; h <= Math.min(to, left + width / scale); h += metres) {
+      const x = (h - left) * scale;
+      context.fillStyle = "#fffa";
+      context.fillRect(x, height - 6, 1, 6);
+      context.strokeStyle = "#000";
+      context.lineWidth = 3;
+      context.strokeText(`${h} m`, x + 3, height);
+      context.fillText(`${h} m`, x + 3, height);
+    }
+  }
+
+  private picture(folder: string, row: number): HTMLImageElement {
+    const known = this.pictures.get(row);
+    if (known) return known;
+    const picture = new Image();
+    picture.addEventListener("load", () => this.draw());
+    picture.src = `${folder}/${row}.jpg`;
+    this.pictures.set(row, picture);
+    return picture;
+  }
+
+  private drawWhole(span: number, left: number): void {
+    const [context, width, height] = fit(this.whole);
+    if (!context) return;
+    const [from, to] = this.wall.chainage;
+    const at = (h: number) => ((h - from) / (to - from)) * width;
+    context.fillStyle = "#333a42";
+    context.fillRect(0, 0, width, height);
+    context.fillStyle = "#6b7683";
+    const begin = Math.max(at(left), 0);
+    context.fillRect(begin, 0, Math.max(Math.min(at(left + span), width) - begin, 2), height);
+    context.fillStyle = "#ffb02e";
+    context.fillRect(at(this.eye.h) - 1, 0, 3, height);
+    for (const pin of this.pins) {
+      context.fillStyle = pin.colour;
+      context.fillRect(at(pin.place.h) - 1, 0, 2, height);
+    }
+  }
+}
+
+function dot(context: CanvasRenderingContext2D, [x, y]: [number, number], radius: number, colour: string): void {
+  context.beginPath();
+  context.arc(x, y, radius, 0, 2 * Math.PI);
+  context.strokeStyle = colour;
+  context.lineWidth = 2;
+  context.stroke();
+}
+
+/** The canvas as large as it is shown, cleared; in units of the page's pixels. */
+function fit(canvas: HTMLCanvasElement): [CanvasRenderingContext2D | null, number, number] {
+  const [width, height, ratio] = [canvas.clientWidth, canvas.clientHeight, window.devicePixelRatio];
+  const [columns, rows] = [Math.round(width * ratio), Math.round(height * ratio)];
+  if (canvas.width !== columns || canvas.height !== rows) [canvas.width, canvas.height] = [columns, rows];
+  const context = canvas.getContext("2d");
+  context?.setTransform(ratio, 0, 0, ratio, 0, 0);
+  context?.clearRect(0, 0, width, height);
+  return [context, width, height];
+}

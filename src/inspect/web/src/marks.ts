@@ -1,0 +1,137 @@
+/** Marks: GeoJSON features on the unrolled wall. A server keeps them; without one, this browser does. */
+import { clockOf } from "./clock";
+import type { Tunnel } from "./tunnel";
+import type { Wall, WallPlace } from "./wall";
+
+export interface Mark {
+  type: "Feature";
+  id: string;
+  geometry: { type: "Point"; coordinates: [number, number] } | { type: "LineString"; coordinates: [[number, number], [number, number]] };
+  properties: {
+    class: string;
+    severity: number;
+    note: string;
+    chainage_m: number;
+    clock: string;
+    theta_deg: number;
+    x_m: number;
+    y_m: number;
+    z_m: number;
+    end_chainage_m?: number;
+    end_clock?: string;
+    length_m?: number;
+    width_mm?: number;
+    layer: string;
+    created: string;
+  };
+}
+
+/** What was measured, if anything. */
+export type Measure = { kind: "point" } | { kind: "length"; length_m: number } | { kind: "width"; width_mm: number };
+
+/** What the inspector says. */
+export interface Remark {
+  class: string;
+  severity: number;
+  note: string;
+}
+
+/** The places that a mark lies at, one or two. */
+export function placesOf(mark: Mark): WallPlace[] {
+  const { geometry } = mark;
+  const all = geometry.type === "Point" ? [geometry.coordinates] : geometry.coordinates;
+  return all.map(([s, h]) => ({ s, h }));
+}
+
+export function newMark(tunnel: Tunnel, wall: Wall, layer: string, places: WallPlace[], measure: Measure, remark: Remark): Mark {
+  const [first, second] = places;
+  const x = wall.point(first);
+  const clock = (place: WallPlace) => clockOf(wall.thetaDeg(place.s), tunnel.twelve_at_deg);
+  const end = second && wall.nearest(first, second);
+  return {
+    type: "Feature",
+    id: crypto.randomUUID(),
+    geometry: end
+      ? { type: "LineString", coordinates: [[first.s, first.h], [end.s, end.h]] }
+      : { type: "Point", coordinates: [first.s, first.h] },
+    properties: {
+      ...remark,
+      chainage_m: first.h,
+      clock: clock(first),
+      theta_deg: wall.thetaDeg(first.s),
+      x_m: x.x,
+      y_m: x.y,
+      z_m: x.z,
+      ...(end && { end_chainage_m: end.h, end_clock: clock(end) }),
+      ...(measure.kind === "length" && { length_m: measure.length_m }),
+      ...(measure.kind === "width" && { width_mm: measure.width_mm }),
+      layer,
+      created: new Date().toISOString(),
+    },
+  };
+}
+
+/** Where marks are kept. */
+export interface Store {
+  all(): Promise<Mark[]>;
+  put(mark: Mark): Promise<void>;
+  remove(id: string): Promise<void>;
+}
+
+interface Collection {
+  type: "FeatureCollection";
+  features: Mark[];
+}
+
+export class ServerStore implements Store {
+  async all(): Promise<Mark[]> {
+    const answer = await fetch("api/marks");
+    if (!answer.ok) throw new Error(await answer.text());
+    return ((await answer.json()) as Collection).features;
+  }
+
+  put(mark: Mark): Promise<void> {
+    return this.change("PUT", mark.id, JSON.stringify(mark));
+  }
+
+  remove(id: string): Promise<void> {
+    return this.change("DELETE", id, undefined);
+  }
+
+  private async change(method: string, id: string, body: string | undefined): Promise<void> {
+    const answer = await fetch(`api/marks/${id}`, { method, body, headers: { "Content-Type": "application/json" } });
+    if (!answer.ok) throw new Error(await answer.text());
+  }
+}
+
+/** In this browser, by the page's address. */
+export class LocalStore implements Store {
+  private readonly key = `marks ${location.pathname}`;
+
+  async all(): Promise<Mark[]> {
+    return JSON.parse(localStorage.getItem(this.key) ?? "[]") as Mark[];
+  }
+
+  async put(mark: Mark): Promise<void> {
+    const others = (await this.all()).filter((other) => other.id !== mark.id);
+    localStorage.setItem(this.key, JSON.stringify([...others, mark]));
+  }
+
+  async remove(id: string): Promise<void> {
+    localStorage.setItem(this.key, JSON.stringify((await this.all()).filter((mark) => mark.id !== id)));
+  }
+}
+
+/** The file that the server would have written. */
+export function geojson(marks: Mark[]): string {
+  const collection: Collection = { type: "FeatureCollection", features: marks };
+  return JSON.stringify(collection, null, 2) + "\n";
+}
+
+export function download(name: string, text: string): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type: "application/geo+json" }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}

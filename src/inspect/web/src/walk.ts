@@ -1,0 +1,197 @@
+/** Walking through the tunnel: keys, mouse, wheel, touch, and the ride along the axis. Never through the wall. */
+import { Matrix4, PerspectiveCamera, Vector3 } from "three";
+import type { Station, Wall, WallPlace } from "./wall";
+
+/** Nearest that the eye comes to the wall, as a share of the radius. */
+const MARGIN = 0.04;
+const TURN_RAD_PER_PX = 0.003;
+const TURN_RAD_PER_S = 1.2;
+const FASTER = 4;
+/** A press that moves less is a click, pixels. */
+const CLICK_PX = 4;
+
+const MOVES: Record<string, [number, number, number]> = {
+  KeyW: [0, 0, 1], KeyS: [0, 0, -1], KeyA: [-1, 0, 0], KeyD: [1, 0, 0], KeyE: [0, 1, 0], KeyQ: [0, -1, 0],
+};
+const TURNS: Record<string, [number, number]> = {
+  ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
+};
+
+export class Walk {
+  /** Metres a second. */
+  speed: number;
+  riding = false;
+  /** Called with where a click was, in pixels of the view. */
+  onClick: (x: number, y: number) => void = () => {};
+  /** Where the eye is. */
+  private readonly eye: Vector3;
+  /** Angles of the view from the axis: to the right and up, radians. */
+  private yaw = 0;
+  private pitch = 0;
+  private readonly pressed = new Set<string>();
+  private readonly touches = new Map<number, [number, number]>();
+  private moved = 0;
+  private changed = true;
+
+  constructor(
+    private readonly wall: Wall,
+    private readonly camera: PerspectiveCamera,
+    private readonly view: HTMLElement,
+  ) {
+    this.speed = wall.radius * 0.6;
+    camera.near = wall.radius * MARGIN * 0.2;
+    camera.far = (wall.chainage[1] - wall.chainage[0]) * 2 + wall.radius * 20;
+    // A few steps in, so that there is wall around.
+    const [from, to] = wall.chainage;
+    this.eye = wall.station(from + Math.min(wall.radius, 0.2 * (to - from))).centre;
+    this.listen();
+  }
+
+  get station(): Station {
+    return this.wall.stationOf(this.eye);
+  }
+
+  /** Distance from the wall in the eye's section, straight away from the axis. */
+  get clearance(): number {
+    const station = this.station;
+    const offset = this.eye.clone().sub(station.centre);
+    return this.wall.towards(station, offset).distance - offset.length();
+  }
+
+  /** Goes to the axis and looks at a place of the wall. */
+  lookAt(place: WallPlace): void {
+    const station = this.wall.station(Math.min(Math.max(place.h, this.wall.chainage[0]), this.wall.chainage[1]));
+    this.eye.copy(station.centre);
+    this.turnTo(station, this.wall.point(place).sub(this.eye));
+  }
+
+  /** Looks along the axis. */
+  lookAlong(): void {
+    [this.yaw, this.pitch, this.changed] = [0, 0, true];
+  }
+
+  /** Moves for some seconds; whether anything changed. */
+  update(seconds: number): boolean {
+    const station = this.station;
+    const [look, right, up] = this.axes(station);
+    const step = new Vector3();
+    const turn = [0, 0];
+    for (const key of this.pressed) {
+      const move = MOVES[key];
+      if (move) step.addScaledVector(right, move[0]).addScaledVector(up, move[1]).addScaledVector(look, move[2]);
+      const angles = TURNS[key];
+      if (angles) [turn[0], turn[1]] = [turn[0] + angles[0], turn[1] + angles[1]];
+    }
+    const fast = this.pressed.has("ShiftLeft") || this.pressed.has("ShiftRight") ? FASTER : 1;
+    if (step.lengthSq() > 0) this.go(step.setLength(this.speed * fast * seconds));
+    if (turn[0] || turn[1]) this.turn(turn[0] * TURN_RAD_PER_S * seconds, turn[1] * TURN_RAD_PER_S * seconds);
+    if (this.riding) this.rideOn(station, this.speed * fast * seconds);
+    const changed = this.changed;
+    if (changed) this.place();
+    this.changed = false;
+    return changed;
+  }
+
+  private go(step: Vector3): void {
+    const next = this.eye.clone().add(step);
+    this.eye.copy(this.wall.inside(next, this.wall.radius * MARGIN));
+    this.changed = true;
+  }
+
+  private rideOn(station: Station, metres: number): void {
+    const backwards = Math.abs(this.yaw) > Math.PI / 2;
+    const end = this.wall.chainage[backwards ? 0 : 1];
+    const left = Math.abs(end - station.h);
+    if (left < 1e-6) this.riding = false;
+    const along = Math.min(metres, left) * (backwards ? -1 : 1);
+    const next = this.wall.station(station.h + along);
+    const offset = this.eye.clone().sub(station.centre);
+    // The same place in the next section.
+    this.eye.copy(next.centre);
+    for (const axis of ["up", "right"] as const) this.eye.addScaledVector(next[axis], offset.dot(station[axis]));
+    this.go(new Vector3());
+  }
+
+  private turn(yaw: number, pitch: number): void {
+    this.yaw = Math.atan2(Math.sin(this.yaw + yaw), Math.cos(this.yaw + yaw));
+    this.pitch = Math.min(Math.max(this.pitch + pitch, -Math.PI / 2), Math.PI / 2);
+    this.changed = true;
+  }
+
+  private turnTo(station: Station, direction: Vector3): void {
+    const [x, y, z] = [direction.dot(station.right), direction.dot(station.up), direction.dot(station.along)];
+    this.pitch = Math.atan2(y, Math.hypot(x, z));
+    // Straight up or down: as the wall beside it is looked at.
+    this.yaw = Math.hypot(x, z) > 1e-6 * Math.abs(y) ? Math.atan2(x, z) : Math.PI / 2;
+    this.changed = true;
+  }
+
+  /** Directions of the view: where it looks, to its right, and up. */
+  private axes(station: Station): [Vector3, Vector3, Vector3] {
+    const [sin, cos] = [Math.sin(this.yaw), Math.cos(this.yaw)];
+    const level = station.along.clone().multiplyScalar(cos).addScaledVector(station.right, sin);
+    const look = level.clone().multiplyScalar(Math.cos(this.pitch)).addScaledVector(station.up, Math.sin(this.pitch));
+    const right = station.right.clone().multiplyScalar(cos).addScaledVector(station.along, -sin);
+    return [look, right, right.clone().cross(look)];
+  }
+
+  private place(): void {
+    const [look, right, up] = this.axes(this.station);
+    this.camera.position.copy(this.eye);
+    this.camera.quaternion.setFromRotationMatrix(new Matrix4().makeBasis(right, up, look.negate()));
+    this.camera.updateMatrixWorld();
+  }
+
+  private listen(): void {
+    const view = this.view;
+    const typing = (event: Event) => event.target instanceof HTMLElement && event.target.closest("input, textarea, select, dialog");
+    window.addEventListener("keydown", (event) => {
+      if (typing(event) || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (MOVES[event.code] || TURNS[event.code] || event.code.startsWith("Shift")) this.pressed.add(event.code);
+      if (TURNS[event.code]) event.preventDefault();
+    });
+    window.addEventListener("keyup", (event) => this.pressed.delete(event.code));
+    window.addEventListener("blur", () => this.pressed.clear());
+    view.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      const [least, most] = [this.wall.radius * 0.02, this.wall.radius * 20];
+      this.speed = Math.min(Math.max(this.speed * Math.pow(1.2, -Math.sign(event.deltaY)), least), most);
+    }, { passive: false });
+    view.addEventListener("pointerdown", (event) => {
+      view.focus();
+      if (document.pointerLockElement !== view) view.setPointerCapture(event.pointerId);
+      this.touches.set(event.pointerId, [event.clientX, event.clientY]);
+      this.moved = this.touches.size > 1 ? Infinity : 0;
+    });
+    view.addEventListener("pointermove", (event) => this.drag(event));
+    const end = (event: PointerEvent) => {
+      const pressed = this.touches.delete(event.pointerId);
+      if (!pressed || event.type === "pointercancel" || this.moved > CLICK_PX) return;
+      const locked = document.pointerLockElement === view;
+      this.onClick(locked ? view.clientWidth / 2 : event.clientX, locked ? view.clientHeight / 2 : event.clientY);
+    };
+    view.addEventListener("pointerup", end);
+    view.addEventListener("pointercancel", end);
+  }
+
+  private drag(event: PointerEvent): void {
+    if (document.pointerLockElement === this.view) {
+      this.turn(event.movementX * TURN_RAD_PER_PX, -event.movementY * TURN_RAD_PER_PX);
+      return;
+    }
+    const before = this.touches.get(event.pointerId);
+    if (!before) return;
+    const [dx, dy] = [event.clientX - before[0], event.clientY - before[1]];
+    if (Math.hypot(dx, dy) + this.moved <= CLICK_PX) return;
+    this.touches.set(event.pointerId, [event.clientX, event.clientY]);
+    this.moved += Math.hypot(dx, dy);
+    if (this.touches.size > 1) {
+      const [look, right] = this.axes(this.station);
+      const metres = this.wall.radius * 0.01;
+      this.go(look.multiplyScalar(-dy * metres).addScaledVector(right, dx * metres));
+    } else {
+      // The wall follows the hand.
+      this.turn(-dx * TURN_RAD_PER_PX, dy * TURN_RAD_PER_PX);
+    }
+  }
+}

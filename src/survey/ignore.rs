@@ -1,0 +1,101 @@
+//! `[tunnel] ignore`: parts of the wall by which frames are not compared.
+
+use crate::surface::{Patches, Surface};
+use serde::{Deserialize, Serialize};
+
+/// A part of the wall; what is left out goes all the way.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+#[non_exhaustive]
+pub struct IgnoreSection {
+    /// Angles θ from and to, degrees, in the direction in which θ grows; may go through 0, as `[330, 30]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub theta_deg: Option<[f64; 2]>,
+    /// Chainages from and to, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chainage_m: Option<[f64; 2]>,
+}
+
+/// Angles beyond are a mistake, degrees.
+const MOST_DEG: f64 = 720.0;
+
+impl IgnoreSection {
+    /// What is wrong with it, if anything.
+    fn fault(&self) -> Option<String> {
+        match self {
+            Self {
+                theta_deg: None,
+                chainage_m: None,
+            } => Some(
+                "says neither theta_deg nor chainage_m, which would be all of the wall".to_owned(),
+            ),
+            Self {
+                theta_deg: Some([from, to]),
+                ..
+            } if !(from.abs() <= MOST_DEG && to.abs() <= MOST_DEG) || from == to => Some(format!(
+                "theta_deg is [{from}, {to}]; it must be two different angles in degrees, from and to in the direction in which θ grows"
+            )),
+            Self {
+                chainage_m: Some([from, to]),
+                ..
+            } if !(from.is_finite() && to.is_finite() && from < to) => Some(format!(
+                "chainage_m is [{from}, {to}]; it must be two numbers of metres, the lesser first"
+            )),
+            _ => None,
+        }
+    }
+}
+
+/// The parts of the wall of `surface`.
+///
+/// # Errors
+/// What is wrong with the first that is no part of the wall.
+pub(super) fn patches(
+    sections: &[IgnoreSection],
+    surface: &dyn Surface,
+) -> Result<Patches, String> {
+    let mut patches = Patches::default();
+    for (k, section) in sections.iter().enumerate() {
+        if let Some(fault) = section.fault() {
+            return Err(format!("tunnel.ignore, item {}: {fault}", k + 1));
+        }
+        let theta_rad = section.theta_deg.map(|theta| theta.map(f64::to_radians));
+        patches.add(surface, theta_rad, section.chainage_m);
+    }
+    Ok(patches)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::Circle;
+
+    #[test]
+    fn impossible_parts_are_named() {
+        let circle = Circle::new(3.0).unwrap();
+        let good = "[{ theta_deg = [330, 30] }, { theta_deg = [-30, 30], chainage_m = [2, 5.5] }]";
+        for (text, expected) in [
+            (good, None),
+            ("[{}]", Some("item 1: says neither")),
+            ("[{ theta_deg = [20, 20] }]", Some("two different angles")),
+            ("[{ theta_deg = [nan, 20] }]", Some("two different angles")),
+            (
+                "[{ chainage_m = [1, 2] }, { chainage_m = [5, 2] }]",
+                Some("item 2: chainage_m is [5, 2]"),
+            ),
+            ("[{ chainage_m = [0, inf] }]", Some("the lesser first")),
+        ] {
+            let table: toml::Table = format!("ignore = {text}").parse().unwrap();
+            let sections: Vec<IgnoreSection> = table["ignore"].clone().try_into().unwrap();
+            let fault = patches(&sections, &circle).err();
+            match expected {
+                None => assert_eq!(fault, None),
+                Some(expected) => assert!(
+                    fault.as_deref().unwrap_or("").contains(expected),
+                    "{fault:?}"
+                ),
+            }
+        }
+        assert!(toml::from_str::<IgnoreSection>("theta = [1, 2]").is_err());
+    }
+}

@@ -1,0 +1,305 @@
+//! What never shows the wall, and wall that is not to be compared: through the program.
+
+mod support;
+
+use image::GrayImage;
+use nalgebra::Vector2;
+use serde_json::Value;
+use std::path::Path;
+use support::{edit, fail, succeed, text};
+use tunnelstitch::evaluate::wall_error;
+use tunnelstitch::survey::Survey;
+use tunnelstitch::trajectory::{Pose, poses_of};
+
+/// Percent of a frame's width that the shaft takes.
+const SHAFT: &str = "12";
+
+/// A brick tunnel in small frames, by default two turns of it.
+fn simulated(folder: &Path, name: &str, more: &[&str]) -> std::path::PathBuf {
+    let out = folder.join(name);
+    let mut arguments = vec![
+        "simulate",
+        "free",
+        "--supersample",
+        "3",
+        "--size",
+        "320x240",
+        "--quiet",
+        "--out",
+        text(&out),
+    ];
+    if !more.contains(&"--frames") {
+        arguments.extend(["--turns", "2"]);
+    }
+    arguments.extend(more);
+    succeed(&arguments);
+    out
+}
+
+fn without_its_mask(survey: &Path) {
+    edit(&survey.join("survey.toml"), "mask = \"mask.png\"\n", "");
+}
+
+/// Refines a survey; `refine.json`, and how far off the poses still are on the wall, pixels.
+fn refined(survey: &Path) -> (Value, f64) {
+    let out = survey.join("refined");
+    let json = succeed(&[
+        "refine",
+        text(survey),
+        "--out",
+        text(&out),
+        "--json",
+        "--quiet",
+    ]);
+    let survey = Survey::open(survey).unwrap();
+    let poses: Vec<Pose> = poses_of(&survey.read_poses(&out.join("poses.tum")).unwrap());
+    let truth = poses_of(survey.truth.as_deref().unwrap());
+    let error = wall_error(survey.surface.as_ref(), &survey.camera, &poses, &truth).unwrap();
+    (serde_json::from_str(&json).unwrap(), error.px.rms)
+}
+
+/// The frames' mean 1-σ on the wall, pixels, and how many are not sure.
+fn certainty(report: &Value) -> (f64, u64) {
+    let frames = report["frames"].as_array().unwrap();
+    let sigma = |frame: &Value| frame["sigma"]["wall_px"].as_f64().unwrap();
+    let mean = frames.iter().map(sigma).sum::<f64>() / frames.len() as f64;
+    (mean, report["frames_on_prior"].as_u64().unwrap())
+}
+
+#[test]
+fn behind_its_mask_a_shaft_costs_no_more_than_the_wall_it_hides() {
+    let dir = tempfile::tempdir().unwrap();
+    let clean = simulated(dir.path(), "clean", &[]);
+    let masked = simulated(dir.path(), "masked", &["--shaft-percent", SHAFT]);
+    let bare = simulated(dir.path(), "bare", &["--shaft-percent", SHAFT]);
+    without_its_mask(&bare);
+    let share = Survey::open(&masked)
+        .unwrap()
+        .frames
+        .mask()
+        .unwrap()
+        .share();
+    assert!((share - 0.09).abs() < 0.005, "{share}");
+    let [(clean, clean_px), (masked, masked_px), (bare, _)] =
+        [&clean, &masked, &bare].map(|survey| refined(survey));
+    let (clean_sigma, none) = certainty(&clean);
+    let (masked_sigma, unsure) = certainty(&masked);
+    println!(
+        "wall error {clean_px:.4} px, with shaft and mask {masked_px:.4} px; 1-σ {clean_sigma:.4}, {masked_sigma:.4} px"
+    );
+    assert_eq!((none, unsure), (0, 0));
+    // As 1/√n; tiles at the shaft's edge are lost, too.
+    let most = (1.0 - 1.5 * share).powf(-0.5);
+    assert!(
+        masked_sigma < most * clean_sigma,
+        "{masked_sigma} {clean_sigma}"
+    );
+    for (error, sigma) in [(clean_px, clean_sigma), (masked_px, masked_sigma)] {
+        assert!(error < 1.5 * sigma, "{error} {sigma}");
+    }
+    // Nobody has told it of the shaft.
+    let (_, unsure) = certainty(&bare);
+    assert!(unsure > 0, "{unsure}");
+}
+
+/// The panorama of true poses.
+fn panorama(survey: &Path, more: &[&str]) -> image::GrayAlphaImage {
+    let out = survey.join("panorama.png");
+    let mut arguments = vec![
+        "stitch",
+        text(survey),
+        "--poses",
+        "truth",
+        "--px-per-metre",
+        "60",
+        "--quiet",
+        "--out",
+        text(&out),
+    ];
+    arguments.extend(more);
+    succeed(&arguments);
+    image::open(&out).unwrap().to_luma_alpha8()
+}
+
+/// Root mean square difference where both show the wall, grey levels, and the share of pixels with more than 25.
+fn difference(a: &image::GrayAlphaImage, b: &image::GrayAlphaImage) -> (f64, f64) {
+    let both = a
+        .pixels()
+        .zip(b.pixels())
+        .filter(|(a, b)| a.0[1] > 0 && b.0[1] > 0);
+    let differences: Vec<f64> = both
+        .map(|(a, b)| f64::from(a.0[0].abs_diff(b.0[0])))
+        .collect();
+    let n = differences.len() as f64;
+    let squares: f64 = differences.iter().map(|d| d * d).sum();
+    let large = differences.iter().filter(|d| **d > 25.0).count() as f64;
+    ((squares / n).sqrt(), large / n)
+}
+
+#[test]
+fn panoramas_show_the_wall_and_nothing_of_the_shaft() {
+    let dir = tempfile::tempdir().unwrap();
+    let more = ["--light", "even", "--frames", "12"];
+    let clean = simulated(dir.path(), "clean", &more);
+    let shaft = simulated(
+        dir.path(),
+        "shaft",
+        &[&more[..], &["--shaft-percent", SHAFT]].concat(),
+    );
+    let bare = dir.path().join("bare");
+    simulated(
+        dir.path(),
+        "bare",
+        &[&more[..], &["--shaft-percent", SHAFT]].concat(),
+    );
+    without_its_mask(&bare);
+    for how in [
+        &["--mode", "best-view"][..],
+        &["--mode", "average"],
+        &["--mode", "median"],
+        &["--no-blend", "--interpolation", "lanczos3"],
+        &["--super-resolve", "2"],
+    ] {
+        let [clean, shaft, bare] = [&clean, &shaft, &bare].map(|survey| panorama(survey, how));
+        let (rms, large) = difference(&clean, &shaft);
+        // Other frames, other noise: 2 grey levels each.
+        assert!(rms < 4.0 && large < 1e-3, "{how:?}: {rms} {large}");
+        let (_, large) = difference(&clean, &bare);
+        assert!(
+            large > 1e-2,
+            "{how:?}: the shaft shows without its mask, {large}"
+        );
+        // Where no other frame sees the wall there is a hole.
+        let holes =
+            |picture: &image::GrayAlphaImage| picture.pixels().filter(|p| p.0[1] == 0).count();
+        assert!(holes(&shaft) > holes(&clean));
+    }
+}
+
+#[test]
+fn a_masked_pixel_shows_no_point() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = simulated(dir.path(), "survey", &["--shaft-percent", SHAFT]);
+    let hidden = |pixel: &Value, mask: &GrayImage| {
+        let at = |k: usize| pixel[k].as_f64().unwrap().round() as u32;
+        mask.get_pixel(at(0), at(1)).0[0] == 0
+    };
+    let mask = image::open(survey.join("mask.png")).unwrap().to_luma8();
+    let frames = |theta_deg: u32| {
+        let wall = format!("0.6,{theta_deg}");
+        let json = succeed(&[
+            "locate",
+            text(&survey),
+            "--poses",
+            "truth",
+            "--wall",
+            &wall,
+            "--json",
+        ]);
+        let found: Value = serde_json::from_str(&json).unwrap();
+        found["frames"].as_array().unwrap().clone()
+    };
+    let angles: Vec<u32> = (0..24).map(|k| 15 * k).collect();
+    let with: Vec<Vec<Value>> = angles.iter().map(|angle| frames(*angle)).collect();
+    without_its_mask(&survey);
+    let mut left_out = 0;
+    for (angle, with) in angles.iter().zip(with) {
+        let (gone, kept): (Vec<Value>, Vec<Value>) = frames(*angle)
+            .into_iter()
+            .partition(|frame| hidden(&frame["pixel"], &mask));
+        assert_eq!(kept, with);
+        left_out += gone.len();
+    }
+    assert!(left_out > 3, "{left_out}");
+    // Asked for the shaft itself.
+    edit(
+        &survey.join("survey.toml"),
+        "[poses]",
+        "mask = \"mask.png\"\n[poses]",
+    );
+    let message = fail(&["locate", text(&survey), "--frame", "3,130,200"], 3);
+    assert!(message.contains("frames.mask"), "{message}");
+}
+
+#[test]
+fn a_mask_is_recognised_reported_recorded_and_kept() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = simulated(
+        dir.path(),
+        "survey",
+        &["--shaft-percent", SHAFT, "--jitter", "random-walk"],
+    );
+    let toml = survey.join("survey.toml");
+    std::fs::remove_file(&toml).unwrap();
+    let said = succeed(&["init", text(&survey), "--radius-m", "3"]);
+    assert!(said.contains("mask.png"), "{said}");
+    assert!(
+        std::fs::read_to_string(&toml)
+            .unwrap()
+            .contains("mask = \"mask.png\"")
+    );
+    edit(
+        &toml,
+        "# ignore = [{ theta_deg = [150, 210], chainage_m = [2.0, 5.5] }]",
+        "ignore = [{ theta_deg = [330, 30] }]",
+    );
+    let said = succeed(&["check", text(&survey)]);
+    let masks = "9.0 % of every picture hidden, 16.7 % of the wall in 1 part ignored";
+    assert!(said.contains(masks), "{said}");
+    let config = succeed(&["config", text(&survey)]);
+    for kept in ["mask = \"mask.png\"", "theta_deg = [330.0, 30.0]"] {
+        assert!(config.replace("\n    ", " ").contains(kept), "{config}");
+    }
+    // The calibrated survey has both, and its record the mask.
+    let out = dir.path().join("refined");
+    succeed(&[
+        "refine",
+        text(&survey),
+        "--out",
+        text(&out),
+        "--calibrate",
+        "focal",
+        "--quiet",
+    ]);
+    let run = std::fs::read_to_string(out.join("run.toml")).unwrap();
+    assert!(run.contains("mask.png"), "{run}");
+    let calibrated = Survey::open(&out).unwrap();
+    assert!(calibrated.frames.mask().is_some());
+    assert_eq!(calibrated.ignored, Survey::open(&survey).unwrap().ignored);
+}
+
+/// Water along the invert: every frame shows it elsewhere.
+#[test]
+fn wall_that_moves_is_ignored_if_it_is_said_to() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = simulated(dir.path(), "survey", &["--light", "even"]);
+    let survey = Survey::open(&path).unwrap();
+    let truth = poses_of(survey.truth.as_deref().unwrap());
+    for (frame, pose) in survey.frames.iter().zip(&truth) {
+        let mut picture = image::open(&frame.path).unwrap().to_luma8();
+        for (u, v, pixel) in picture.enumerate_pixels_mut() {
+            let ray = pose.r_wc * survey.camera.ray(f64::from(u), f64::from(v)).unwrap();
+            let wall = survey.surface.hit(&pose.t_wc, &ray).unwrap().wall;
+            let theta_deg = (wall.s_m / 3.0).to_degrees();
+            if (145.0..215.0).contains(&theta_deg) && (0.4..1.4).contains(&wall.h_m) {
+                // Waves that run along with the camera, half as fast again, a tenth of a metre long.
+                let at = Vector2::new(wall.s_m, wall.h_m - 1.5 * pose.t_wc.y);
+                let wave = (63.0 * at.y + 9.0 * at.x).sin() + (41.0 * at.x - 17.0 * at.y).sin();
+                pixel.0[0] = (110.0 + 40.0 * wave) as u8;
+            }
+        }
+        picture.save(&frame.path).unwrap();
+    }
+    let (_, unsure) = certainty(&refined(&path).0);
+    assert!(unsure > 0);
+    edit(
+        &path.join("survey.toml"),
+        "radius_m = 3.0\n",
+        "radius_m = 3.0\nignore = [{ theta_deg = [130, 230], chainage_m = [0.3, 1.5] }]\n",
+    );
+    let (report, error_px) = refined(&path);
+    let (sigma_px, unsure) = certainty(&report);
+    println!("wall error {error_px:.4} px, 1-σ {sigma_px:.4} px");
+    assert_eq!(unsure, 0);
+    assert!(error_px < 1.5 * sigma_px, "{error_px} {sigma_px}");
+}

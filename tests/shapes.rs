@@ -1,0 +1,131 @@
+//! Tunnels that are not round or not straight, from the simulator, which has equations of its own, to the panorama.
+
+mod support;
+
+use std::path::Path;
+use support::{fail, succeed, text};
+
+/// Simulates a survey, refines it and compares: the wall error, pixels RMS, and that of the initial poses.
+fn refined(folder: &Path, arguments: &[&str]) -> [f64; 2] {
+    let path = |name: &str| folder.join(name);
+    let (survey, refined, out) = (path("survey"), path("refined"), path("compared"));
+    let simulate = [
+        "simulate",
+        "free",
+        "--size",
+        "320x240",
+        "--out",
+        text(&survey),
+    ];
+    succeed(&[&simulate[..], arguments].concat());
+    succeed(&["refine", text(&survey), "--out", text(&refined)]);
+    let poses = refined.join("poses.tum");
+    succeed(&[
+        "compare",
+        text(&survey),
+        "--refined",
+        text(&poses),
+        "--out",
+        text(&out),
+    ]);
+    let json = std::fs::read_to_string(out.join("compare.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    ["refined", "baseline"].map(|which| json[which]["wall"]["px"]["rms"].as_f64().unwrap())
+}
+
+#[test]
+fn boxes_horseshoes_and_ellipses_are_refined_as_circles_are() {
+    for shape in [
+        ["--shape", "box", "--width-m", "4", "--height-m", "3"],
+        ["--shape", "horseshoe", "--width-m", "5", "--height-m", "4"],
+        ["--shape", "ellipse", "--width-m", "5", "--height-m", "3.5"],
+    ] {
+        let dir = tempfile::tempdir().unwrap();
+        let arguments = [&shape[..], &["--frames", "24"]].concat();
+        let [refined, initial] = refined(dir.path(), &arguments);
+        assert!(initial > 10.0, "{shape:?}: {initial} px before");
+        assert!(refined <= 0.1, "{shape:?}: {refined} px");
+    }
+}
+
+/// A bend of radius 2 m, 5 cm of arc from point to point.
+fn bend() -> String {
+    let point = |k: i32| {
+        let (sin, cos) = (f64::from(k) * 0.05 / 2.0).sin_cos();
+        format!("{} {} 0\n", 2.0 - 2.0 * cos, 2.0 * sin)
+    };
+    (-6..66).map(point).collect()
+}
+
+/// How far a tunnel is turned about its own line shows in the bend alone, and a short one tells little of it: the poses are as exact as
+/// they are said to be.
+#[test]
+fn a_tight_bend_is_refined_as_exactly_as_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let line = dir.path().join("bend.txt");
+    std::fs::write(&line, bend()).unwrap();
+    let [refined, initial] = refined(
+        dir.path(),
+        &[
+            "--radius-m",
+            "0.6",
+            "--centreline",
+            text(&line),
+            "--frames",
+            "36",
+            "--advance-m",
+            "0.05",
+            "--translation-sigma-m",
+            "0.004,0.004,0.006",
+        ],
+    );
+    let json = std::fs::read_to_string(dir.path().join("refined/refine.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let frames = json["frames"].as_array().unwrap();
+    let sigmas = frames
+        .iter()
+        .map(|frame| frame["sigma"]["wall_px"].as_f64().unwrap());
+    let sigma = sigmas.sum::<f64>() / frames.len() as f64;
+    assert!(
+        initial > 10.0 && sigma < 0.25,
+        "{initial} px before, 1-σ {sigma} px"
+    );
+    assert!(refined < 3.0 * sigma, "{refined} px, 1-σ {sigma} px");
+}
+
+#[test]
+fn shapes_and_lines_that_cannot_be_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("survey");
+    let simulate = |arguments: &[&str]| {
+        let all = ["simulate", "free", "--frames", "2", "--out", text(&out)];
+        fail(&[&all[..], arguments].concat(), 2)
+    };
+    let line = dir.path().join("line.txt");
+    let with_line = |content: &str| {
+        std::fs::write(&line, content).unwrap();
+        simulate(&["--centreline", text(&line)])
+    };
+    for (message, words) in [
+        (
+            simulate(&["--shape", "box", "--width-m", "4"]),
+            vec!["height_m", "missing"],
+        ),
+        (simulate(&["--width-m", "4"]), vec!["width_m", "not a size"]),
+        (
+            simulate(&["--shape", "horseshoe", "--width-m", "4", "--height-m", "2"]),
+            vec!["height", "more than half"],
+        ),
+        (with_line("0 0 0\n0 x 0\n"), vec!["line.txt:2", "x y z"]),
+        (with_line("0 0 0\n"), vec!["two or more"]),
+        (with_line("0 0 0\n0 0 0\n0 1 0\n"), vec!["points 1 and 2"]),
+        (
+            with_line("0 0 0\n0 4 0\n2 5 0\n4 4 0\n4 0 0\n"),
+            vec!["tighter than the tunnel"],
+        ),
+    ] {
+        for word in words {
+            assert!(message.contains(word), "{message}");
+        }
+    }
+}

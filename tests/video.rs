@@ -1,0 +1,394 @@
+//! Frames out of a video, through the program. Needs `ffmpeg` and `ffprobe`.
+
+mod support;
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use support::{blender_survey, edit, fail, succeed, text};
+use tunnelstitch::evaluate::wall_error;
+use tunnelstitch::frames::Video;
+use tunnelstitch::survey::Survey;
+use tunnelstitch::trajectory::poses_of;
+
+/// Runs ffmpeg; what it writes to standard output.
+fn ffmpeg(arguments: &[&str]) -> Vec<u8> {
+    let output = Command::new("ffmpeg")
+        .args(["-v", "error", "-nostdin", "-y"])
+        .args(arguments)
+        .output()
+        .expect("ffmpeg is not installed: apt install ffmpeg (.ci/run does)");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {said}");
+    output.stdout
+}
+
+/// A video of numbered pictures, one a second.
+fn video_of(pattern: &Path, video: &Path, codec: &[&str]) {
+    let mut arguments = vec!["-framerate", "1", "-i", text(pattern)];
+    arguments.extend(codec);
+    arguments.push(text(video));
+    ffmpeg(&arguments);
+}
+
+const LOSSLESS: [&str; 4] = ["-c:v", "ffv1", "-pix_fmt", "gray"];
+/// Pictures that hang together over a dozen others, forwards and backwards, and across the key pictures.
+const ENTANGLED: [&str; 12] = [
+    "-c:v",
+    "libx264",
+    "-crf",
+    "0",
+    "-pix_fmt",
+    "gray",
+    "-bf",
+    "3",
+    "-g",
+    "12",
+    "-x264-params",
+    "open-gop=1:scenecut=0",
+];
+
+/// Two turns of a brick tunnel in small frames.
+fn simulated(folder: &Path) -> PathBuf {
+    let out = folder.join("survey");
+    succeed(&[
+        "simulate",
+        "free",
+        "--turns",
+        "2",
+        "--size",
+        "320x240",
+        "--supersample",
+        "3",
+        "--quiet",
+        "--out",
+        text(&out),
+    ]);
+    out
+}
+
+/// Makes a video of a survey's frames and has the survey read it; the frames go.
+fn into_video(survey: &Path, name: &str, codec: &[&str]) {
+    let frames = survey.join("frames");
+    video_of(&frames.join("%06d.png"), &survey.join(name), codec);
+    let video = format!("video = \"{name}\"");
+    edit(
+        &survey.join("survey.toml"),
+        "images = \"frames/*.png\"",
+        &video,
+    );
+}
+
+/// In whatever order they are asked for, by however many at once, pictures are those that come in sequence.
+#[test]
+fn every_picture_is_the_one_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    let frame = |k: usize| dir.path().join(format!("{k:06}.png"));
+    for k in 0..48 {
+        let from = blender_survey().join(format!("frames/{k:06}.jpg"));
+        image::open(from)
+            .unwrap()
+            .to_luma8()
+            .save(frame(k))
+            .unwrap();
+    }
+    let pattern = dir.path().join("%06d.png");
+    for (name, codec) in [
+        ("a.mkv", &LOSSLESS[..]),
+        ("b.mp4", &ENTANGLED),
+        ("c.avi", &["-c:v", "mjpeg", "-q:v", "2"]),
+    ] {
+        let path = dir.path().join(name);
+        video_of(&pattern, &path, codec);
+        let video = Video::open(&path).unwrap();
+        assert_eq!((video.pictures(), video.size()), (48, (480, 360)));
+        let grey = ["-f", "rawvideo", "-pix_fmt", "gray", "-"];
+        let colour = [
+            "-sws_flags",
+            "bitexact+accurate_rnd+full_chroma_int",
+            "-f",
+            "rawvideo",
+            "-pix_fmt",
+            "rgb24",
+            "-",
+        ];
+        let is_grey = video.colour() == image::ColorType::L8;
+        let raw: &[&str] = if is_grey { &grey } else { &colour };
+        let all = ffmpeg(&[&["-i", text(&path)], raw].concat());
+        let sequence: Vec<&[u8]> = all.chunks_exact(all.len() / 48).collect();
+        let same = |k: usize| video.decode(k).unwrap().as_bytes() == sequence[k];
+        for k in (0..300)
+            .map(|k| (k * k + 7 * k) % 48)
+            .take(30)
+            .chain(0..48)
+            .chain([47, 0, 46])
+        {
+            assert!(same(k), "{name}: picture {k}");
+            assert_eq!(video.time_s(k), k as f64);
+        }
+        std::thread::scope(|scope| {
+            for thread in 0..4 {
+                let same = &same;
+                scope.spawn(move || {
+                    for k in (0..12).map(|k| (13 * thread + 5 * k) % 48) {
+                        assert!(same(k), "{name}: picture {k}");
+                    }
+                });
+            }
+        });
+        if codec == LOSSLESS {
+            for k in [0, 17, 47] {
+                assert_eq!(video.decode(k).unwrap(), image::open(frame(k)).unwrap());
+            }
+        }
+    }
+}
+
+/// The refined poses, and how far off they still are on the wall, pixels.
+fn refined(survey: &Path) -> (String, f64) {
+    let out = survey.join("refined");
+    succeed(&["refine", text(survey), "--out", text(&out), "--quiet"]);
+    let poses = out.join("poses.tum");
+    let survey = Survey::open(survey).unwrap();
+    let found = poses_of(&survey.read_poses(&poses).unwrap());
+    let truth = poses_of(survey.truth.as_deref().unwrap());
+    let error = wall_error(survey.surface.as_ref(), &survey.camera, &found, &truth).unwrap();
+    (std::fs::read_to_string(poses).unwrap(), error.px.rms)
+}
+
+#[test]
+fn a_video_refines_as_its_pictures_do() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = simulated(dir.path());
+    let toml = survey.join("survey.toml");
+    let pictures = std::fs::read_to_string(&toml).unwrap();
+    let (expected, error_px) = refined(&survey);
+    into_video(&survey, "lossless.mkv", &LOSSLESS);
+    assert_eq!(refined(&survey).0, expected);
+    // Tied by the video's times as well.
+    edit(&toml, "[poses]", "[poses]\nassociate = \"time\"");
+    assert_eq!(refined(&survey).0, expected);
+    let run = std::fs::read_to_string(survey.join("refined/run.toml")).unwrap();
+    let hash = blake3::hash(&std::fs::read(survey.join("lossless.mkv")).unwrap());
+    assert!(
+        run.contains("lossless.mkv") && run.contains(hash.to_hex().as_str()),
+        "{run}"
+    );
+    // A quarter of the bits of the wall's own noise.
+    std::fs::write(&toml, &pictures).unwrap();
+    into_video(
+        &survey,
+        "lossy.mp4",
+        &["-c:v", "libx264", "-crf", "16", "-pix_fmt", "yuv420p"],
+    );
+    let (_, lossy_px) = refined(&survey);
+    println!("wall error: pictures {error_px:.4} px, video at crf 16 {lossy_px:.4} px");
+    assert!(lossy_px < 2.0 * error_px, "{lossy_px} {error_px}");
+}
+
+#[test]
+fn every_command_takes_a_video() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = simulated(dir.path());
+    into_video(
+        &survey,
+        "survey.mp4",
+        &["-c:v", "libx264", "-crf", "8", "-pix_fmt", "yuv420p"],
+    );
+    std::fs::remove_dir_all(survey.join("frames")).unwrap();
+    std::fs::remove_file(survey.join("survey.toml")).unwrap();
+    let folder = text(&survey);
+    let said = succeed(&["init", folder, "--radius-m", "3"]);
+    assert!(
+        said.contains("survey.mp4 (24 pictures, 320 × 240 px)") && said.contains("next: "),
+        "{said}"
+    );
+    let out = |name: &str| survey.join(name).to_str().unwrap().to_owned();
+    let (refined, poses) = (out("refined"), out("refined/poses.tum"));
+    for arguments in [
+        &["check", folder][..],
+        &["config", folder],
+        &["refine", folder, "--out", &refined],
+        &[
+            "stitch",
+            folder,
+            "--poses",
+            &poses,
+            "--out",
+            &out("after.png"),
+        ],
+        &[
+            "compare",
+            folder,
+            "--refined",
+            &poses,
+            "--out",
+            &out("compared"),
+        ],
+        &[
+            "report",
+            folder,
+            "--refined",
+            &refined,
+            "--out",
+            &out("report"),
+        ],
+        &["locate", folder, "--frame", "000003,100,100"],
+        &[
+            "convert",
+            folder,
+            "--to",
+            "nerfstudio",
+            "--out",
+            &out("transforms.json"),
+        ],
+        &[
+            "refine",
+            folder,
+            "--out",
+            &out("calibrated"),
+            "--calibrate",
+            "focal",
+        ],
+        &[
+            "stitch",
+            &out("calibrated"),
+            "--poses",
+            &out("calibrated/poses.tum"),
+            "--out",
+            &out("again.png"),
+        ],
+    ] {
+        succeed(arguments);
+    }
+    // Every other picture, by its time.
+    let said = succeed(&[
+        "init",
+        folder,
+        "--radius-m",
+        "3",
+        "--video",
+        &out("survey.mp4"),
+        "--every",
+        "2",
+        "--force",
+    ]);
+    assert!(said.contains("12 of every 2"), "{said}");
+    let check: Value = serde_json::from_str(&succeed(&["check", folder, "--json"])).unwrap();
+    assert_eq!(check["frames"], 12);
+    let step_deg = |check: &Value| check["poses"]["step_deg"].as_f64().unwrap();
+    assert!((step_deg(&check) - 60.0).abs() < 0.01, "{check}");
+    // The same by the angle.
+    edit(
+        &survey.join("survey.toml"),
+        "every = 2",
+        "angle_step_deg = 50.0 #",
+    );
+    let again: Value = serde_json::from_str(&succeed(&["check", folder, "--json"])).unwrap();
+    assert_eq!(
+        (&again["frames"], step_deg(&again)),
+        (&check["frames"], step_deg(&check))
+    );
+}
+
+#[test]
+fn pictures_are_turned_as_players_show_them() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let (upright, turned, shown) = (path("a.mp4"), path("b.mp4"), path("shown.png"));
+    video_of(
+        &blender_survey().join("frames/%06d.jpg"),
+        &upright,
+        &ENTANGLED,
+    );
+    // Older and newer versions say it differently.
+    let copy = ["-i", text(&upright), "-c", "copy"];
+    let old = ["-metadata:s:v:0", "rotate=90", text(&turned)];
+    ffmpeg(&[&copy[..], &old].concat());
+    if Video::open(&turned).unwrap().rotation_deg() == 0 {
+        let new = [&["-display_rotation", "90"], &copy[..], &[text(&turned)]];
+        ffmpeg(&new.concat());
+    }
+    let video = Video::open(&turned).unwrap();
+    assert_eq!(video.size(), (360, 480));
+    assert!([90, 270].contains(&video.rotation_deg()));
+    let first = [
+        "-i",
+        text(&turned),
+        "-frames:v",
+        "1",
+        "-pix_fmt",
+        "gray",
+        text(&shown),
+    ];
+    ffmpeg(&first);
+    let shown = image::open(shown).unwrap().to_luma8();
+    assert_eq!(video.decode(0).unwrap().to_luma8(), shown);
+}
+
+#[test]
+fn what_is_wrong_with_a_video_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = simulated(dir.path());
+    let toml = survey.join("survey.toml");
+    into_video(&survey, "a.mkv", &LOSSLESS);
+    let sound = std::fs::read(survey.join("a.mkv")).unwrap();
+    let sound_toml = std::fs::read_to_string(&toml).unwrap();
+    ffmpeg(&[
+        "-f",
+        "lavfi",
+        "-i",
+        "sine=duration=1",
+        text(&survey.join("sound.mkv")),
+    ]);
+    let refine = |expected: &[&str]| {
+        let message = fail(
+            &["refine", text(&survey), "--out", text(&survey.join("out"))],
+            3,
+        );
+        for part in expected {
+            assert!(message.contains(part), "no {part:?} in {message}");
+        }
+        std::fs::write(survey.join("a.mkv"), &sound).unwrap();
+        std::fs::write(&toml, &sound_toml).unwrap();
+    };
+    std::fs::write(survey.join("a.mkv"), &sound[..sound.len() / 2]).unwrap();
+    refine(&["a.mkv", "cut off", "copy it anew"]);
+    std::fs::write(survey.join("a.mkv"), "no video").unwrap();
+    refine(&["a.mkv", "no video"]);
+    let frames = survey.join("frames/%06d.png");
+    let entangled = survey.join("b.mp4");
+    video_of(&frames, &entangled, &ENTANGLED);
+    let mut damaged = std::fs::read(&entangled).unwrap();
+    let length = damaged.len();
+    damaged[length / 2..][..length / 5].fill(0);
+    std::fs::write(&entangled, &damaged).unwrap();
+    edit(&toml, "a.mkv", "b.mp4");
+    refine(&["b.mp4/0000", "the video is damaged"]);
+    std::fs::write(&entangled, &damaged[..length / 2]).unwrap();
+    edit(&toml, "a.mkv", "b.mp4");
+    refine(&["b.mp4", "cut off before its end", "copy it anew"]);
+    edit(&toml, "a.mkv", "sound.mkv");
+    refine(&["sound.mkv", "no video stream"]);
+    edit(&toml, "a.mkv", "gone.mkv");
+    refine(&["gone.mkv", "relative to survey.toml"]);
+    edit(&toml, "\"a.mkv\"", "\"a.mkv\"\nevery = 2");
+    refine(&["baseline.tum", "24 poses for 12 frames", "--associate time"]);
+    edit(&toml, "\"a.mkv\"", "\"a.mkv\"\nevery = 0");
+    refine(&["survey.toml", "every is 0"]);
+    edit(&toml, "\"a.mkv\"", "\"a.mkv\"\nimages = \"*.jpg\"");
+    refine(&["survey.toml", "both images and video"]);
+    edit(&toml, "video = \"a.mkv\"", "");
+    refine(&["survey.toml", "neither images", "nor video"]);
+    let without = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+        .args(["check", text(&survey)])
+        .env("PATH", dir.path())
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&without.stderr);
+    assert_eq!(without.status.code(), Some(3), "{message}");
+    assert!(
+        message.contains("ffprobe") && message.contains("install ffmpeg"),
+        "{message}"
+    );
+}

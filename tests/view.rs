@@ -1,0 +1,516 @@
+//! The viewer: its server from outside, and its page in a browser.
+
+#[path = "support/chromium.rs"]
+mod chromium;
+#[path = "support/npm.rs"]
+mod npm;
+mod support;
+
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use support::{blender_survey, fail, succeed, text};
+use tunnelstitch::inspect::Viewer;
+
+/// A server, ended with this.
+struct Running {
+    child: Child,
+    port: u16,
+}
+
+impl Running {
+    /// Starts `view` at a free port and waits until it listens.
+    fn start(arguments: &[&str]) -> Self {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))
+            .arg("view")
+            .args(arguments)
+            .args(["--port", "0"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let out = BufReader::new(child.stdout.take().expect("its output"));
+        let address = out
+            .lines()
+            .map_while(Result::ok)
+            .find_map(|line| line.strip_prefix("http://127.0.0.1:").map(str::to_owned))
+            .expect("an address");
+        let port = address.split('/').next().unwrap().parse().expect("a port");
+        Self { child, port }
+    }
+
+    fn address(&self) -> String {
+        format!("http://127.0.0.1:{}/", self.port)
+    }
+
+    /// Sends a request letter by letter as it is given; status and body of the answer.
+    fn send(&self, request: &str) -> (u16, String) {
+        let mut stream = TcpStream::connect(("127.0.0.1", self.port)).expect("a connection");
+        stream.write_all(request.as_bytes()).expect("a request");
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).expect("an answer");
+        let answer = String::from_utf8_lossy(&answer).into_owned();
+        let status = answer
+            .split(' ')
+            .nth(1)
+            .and_then(|s| s.parse().ok())
+            .unwrap_or(0);
+        let body = answer
+            .split_once("\r\n\r\n")
+            .map_or(String::new(), |(_, body)| body.to_owned());
+        (status, body)
+    }
+
+    /// The same with the host that is right.
+    fn ask(&self, line: &str, headers: &str, body: &str) -> (u16, String) {
+        let length = body.len();
+        self.send(&format!(
+            "{line} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\nContent-Length: {length}\r\n{headers}\r\n{body}",
+            self.port
+        ))
+    }
+}
+
+impl Drop for Running {
+    /// Without a warning, as in a crash.
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Whether the page was built in; where the environment says CI, it must be.
+fn has_viewer() -> bool {
+    let bundled = Viewer::bundled();
+    assert!(
+        bundled.is_ok() || std::env::var_os("CI").is_none(),
+        "{bundled:?}"
+    );
+    bundled.is_ok()
+}
+
+const JSON: &str = "Content-Type: application/json\r\n";
+
+fn mark(id: &str) -> String {
+    format!(
+        r#"{{"type":"Feature","id":"{id}","geometry":{{"type":"Point","coordinates":[1.5,2.0]}},"properties":{{"class":"BAB","severity":3,
+        "note":"","chainage_m":2.0,"clock":"4:30","theta_deg":135.0,"x_m":1.0,"y_m":2.0,"z_m":0.0,"layer":"truth","created":""}}}}"#
+    )
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn without_the_page_it_says_what_to_install() {
+    if Viewer::bundled().is_err() {
+        let message = fail(&["view", text(&blender_survey())], 2);
+        assert!(message.contains("npm"), "{message}");
+    }
+}
+
+#[test]
+fn the_server_answers_its_own_page_and_writes_nothing_but_marks() {
+    if !has_viewer() {
+        return;
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let site = dir.path().join("site");
+    std::fs::write(dir.path().join("secret.json"), "secret").unwrap();
+    let survey = blender_survey();
+    succeed(&[
+        "export",
+        text(&survey),
+        "--poses",
+        "truth",
+        "--layers",
+        "truth",
+        "--px-per-metre",
+        "20",
+        "--web",
+        text(&site),
+    ]);
+    let before = names(&site);
+    let server = Running::start(&[text(&site)]);
+    let port = server.port;
+
+    // Only this machine: no other address of it listens.
+    assert!(TcpStream::connect(("127.0.0.2", port)).is_err());
+
+    for (path, start) in [
+        ("/", "<!doctype html>"),
+        ("/tunnel.json", "{"),
+        ("/truth/tileset.json", "{"),
+        ("/server.json", "{"),
+    ] {
+        let (status, body) = server.ask(&format!("GET {path}"), "", "");
+        assert!(
+            status == 200 && body.starts_with(start),
+            "{path}: {status} {body:.60}"
+        );
+    }
+
+    // Another name for this machine, as a page elsewhere could have made for it, or none.
+    for host in [
+        "Host: evil.example\r\n".to_owned(),
+        format!("Host: evil.example:{port}\r\n"),
+        "Host: 127.0.0.1\r\n".to_owned(),
+        String::new(),
+        format!("Host: 127.0.0.1:{port}\r\nHost: evil.example\r\n"),
+    ] {
+        for path in ["/", "/tunnel.json", "/api/marks"] {
+            let (status, body) = server.send(&format!(
+                "GET {path} HTTP/1.1\r\n{host}Connection: close\r\n\r\n"
+            ));
+            assert!(
+                matches!(status, 400 | 421) && !body.contains("Feature"),
+                "{host} {path}: {status} {body}"
+            );
+        }
+    }
+
+    // Ways out of the folder.
+    for path in [
+        "/../secret.json",
+        "/truth/../../secret.json",
+        "/%2e%2e/secret.json",
+        "/..%2fsecret.json",
+        "/..\\secret.json",
+        "//secret.json",
+        "/./../secret.json",
+        "/api/frames/0",
+        "/api/frames/../../secret.json",
+        "/api/../../secret.json",
+        "/marks.geojson/../../secret.json",
+        "/truth",
+        "/.npmrc",
+    ] {
+        let (status, body) = server.ask(&format!("GET {path}"), "", "");
+        assert!(
+            matches!(status, 400 | 404) && !body.contains("secret\""),
+            "{path}: {status} {body}"
+        );
+    }
+    let absolute = dir.path().join("secret.json");
+    let (status, _) = server.ask(&format!("GET {}", absolute.display()), "", "");
+    assert_eq!(status, 404);
+
+    // Changes by other pages, and of anything but marks.
+    let put = "PUT /api/marks/a";
+    let own = format!("Origin: http://127.0.0.1:{port}\r\n{JSON}");
+    for (line, headers, body, expected) in [
+        (
+            put,
+            "Content-Type: text/plain\r\n".to_owned(),
+            mark("a"),
+            415,
+        ),
+        (
+            put,
+            format!("Origin: http://evil.example\r\n{JSON}"),
+            mark("a"),
+            403,
+        ),
+        (put, format!("Origin: null\r\n{JSON}"), mark("a"), 403),
+        ("POST /api/marks/a", own.clone(), mark("a"), 405),
+        ("PUT /tunnel.json", own.clone(), "{}".to_owned(), 405),
+        ("DELETE /tunnel.json", own.clone(), String::new(), 405),
+        (put, own.clone(), mark("b"), 400),
+        (put, own.clone(), "{".to_owned(), 400),
+        ("PUT /api/marks/..", own.clone(), mark(".."), 400),
+        (put, own.clone(), mark("a").replace(":3,", ":9,"), 400),
+        (put, own.clone(), " ".repeat(2 << 20), 413),
+    ] {
+        let (status, said) = server.ask(line, &headers, &body);
+        assert_eq!(status, expected, "{line} {headers}: {said}");
+    }
+    assert_eq!(names(&site), before);
+
+    let (status, said) = server.ask(put, &own, &mark("a"));
+    assert_eq!(status, 200, "{said}");
+    let (_, said) = server.ask("GET /api/marks", "", "");
+    assert!(said.contains("\"BAB\""), "{said}");
+    let mut with_marks = before.clone();
+    with_marks.extend(["marks.csv".to_owned(), "marks.geojson".to_owned()]);
+    with_marks.sort();
+    assert_eq!(names(&site), with_marks);
+    assert_eq!(names(dir.path()), ["secret.json", "site"]);
+
+    // A file of marks that somebody has spoilt is not overwritten.
+    drop(server);
+    std::fs::write(site.join("marks.geojson"), "[]").unwrap();
+    let message = fail(&["view", text(&site), "--port", "0"], 3);
+    assert!(
+        message.contains("marks.geojson") && message.contains("move it away"),
+        "{message}"
+    );
+}
+
+/// A wall once around with bright dots 1000 px of 6283 apart, along the axis and around: a metre, where the perimeter is 6.283 m.
+fn target(path: &Path) -> f64 {
+    let (width, height) = (6283u32, 2400u32);
+    let mut picture = image::GrayImage::from_fn(width, height, |x, y| {
+        // Some texture, dark.
+        image::Luma([60 + (((x / 90) * 7 + (y / 60) * 13) % 31) as u8])
+    });
+    let quarter = width / 4;
+    for [cx, cy] in [
+        [quarter, 700],
+        [quarter, 1700],
+        [3 * quarter, 700],
+        [3 * quarter + 1000, 700],
+    ] {
+        for y in cy - 22..cy + 22 {
+            for x in cx - 22..cx + 22 {
+                // Pixels' centres are half a pixel from their corners.
+                let (dx, dy) = (
+                    f64::from(x) + 0.5 - f64::from(cx),
+                    f64::from(y) + 0.5 - f64::from(cy),
+                );
+                if dx.hypot(dy) < 20.0 {
+                    picture.put_pixel(x, y, image::Luma([250]));
+                }
+            }
+        }
+    }
+    picture.save(path).unwrap();
+    std::f64::consts::TAU / f64::from(width) * 1000.0
+}
+
+fn run(browser: &Path, modules: &Path, scenario: &str, place: &str, picture: &Path) -> Value {
+    let said = npm::node(
+        "viewer.mjs",
+        &[text(modules), text(browser), scenario, place, text(picture)],
+    );
+    let seen: Value = serde_json::from_str(&said).unwrap_or_else(|_| panic!("{said}"));
+    assert!(seen.get("failed").is_none(), "{seen:#}");
+    assert_eq!(seen["problems"].as_array().unwrap().len(), 0, "{seen:#}");
+    seen
+}
+
+#[test]
+fn an_inspector_walks_measures_marks_and_comes_back() {
+    if !has_viewer() {
+        return;
+    }
+    let (Some(browser), Some(modules)) = (chromium::find(), npm::find()) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let [paper, survey, site, picture] =
+        ["paper.png", "survey", "site", "target.png"].map(|name| dir.path().join(name));
+    let metre_m = target(&paper);
+    succeed(&[
+        "simulate",
+        "free",
+        "--frames",
+        "48",
+        "--advance-m",
+        "0.05",
+        "--size",
+        "320x240",
+        "--supersample",
+        "2",
+        "--radius-m",
+        "1",
+        "--noise",
+        "0",
+        "--light",
+        "even",
+        "--texture",
+        text(&paper),
+        "--texture-width-m",
+        "6.2832",
+        "--out",
+        text(&survey),
+    ]);
+    let poses = survey.join("groundtruth.tum");
+    let given = [text(&survey), "--poses", text(&poses)];
+    let server = Running::start(&given);
+    let seen = run(&browser, &modules, "inspect", &server.address(), &picture);
+    let number = |state: &str, name: &str| seen[state][name].as_f64().unwrap_or(f64::NAN);
+
+    // Forwards along the axis.
+    assert!(
+        number("ahead", "h") > number("start", "h") + 0.1,
+        "{seen:#}"
+    );
+    assert!(number("wall", "h") == 1.2 && (number("wall", "fromWall") - 1.0).abs() < 0.02);
+    assert_eq!(seen["wall"]["hash"], "#h=1.20&clock=3:00");
+    // To the wall, and not through it.
+    assert!(
+        (0.0..0.1).contains(&number("against", "fromWall")),
+        "{seen:#}"
+    );
+    // A quarter of the whole length.
+    let manifest: Value = serde_json::from_str(&server.ask("GET /tunnel.json", "", "").1).unwrap();
+    let [from, to] = [0, 1].map(|k| manifest["chainage_m"][k].as_f64().unwrap());
+    let quarter = from + 0.25 * (to - from);
+    assert!(
+        (number("jumped", "h") - quarter).abs() < 0.03,
+        "{quarter}: {seen:#}"
+    );
+    assert!(number("ridden", "h") > quarter + 0.1);
+
+    // The metre, from dots found in the picture.
+    assert_eq!(seen["dots"].as_array().unwrap().len(), 2, "{seen:#}");
+    let length = seen["length"]
+        .as_str()
+        .unwrap()
+        .strip_suffix(" m")
+        .unwrap()
+        .parse::<f64>()
+        .unwrap();
+    assert!((length - metre_m).abs() < 0.005, "{length}");
+    // The frame shows the dot where the page says.
+    assert!(seen["middle"].as_f64().unwrap() > 180.0, "{seen:#}");
+
+    assert_eq!(seen["marks"].as_array().unwrap().len(), 2);
+    assert_eq!(seen["kept"], seen["marks"]);
+    let table = std::fs::read_to_string(survey.join("marks.csv")).unwrap();
+    assert!(
+        table.contains("BAB crack")
+            && table.contains("\"wet, \"\"open\"\"\"")
+            && table.contains(",3:00,"),
+        "{table}"
+    );
+
+    for state in ["start", "wall", "against", "jumped", "baseline", "reloaded"] {
+        let (triangles, mib) = (number(state, "triangles"), number(state, "textureMiB"));
+        println!("{state}: {triangles} triangles, {mib} MiB of textures");
+        assert!(
+            (2.0..20_000.0).contains(&triangles) && mib > 0.0 && mib < 64.0,
+            "{seen:#}"
+        );
+    }
+
+    // The server is gone without a word; another finds the marks.
+    drop(server);
+    let server = Running::start(&[&given[..], &["--layers", "refined"]].concat());
+    let again = run(&browser, &modules, "again", &server.address(), &picture);
+    assert_eq!(again["kept"], seen["marks"]);
+    let marks: Value =
+        serde_json::from_str(&std::fs::read_to_string(survey.join("marks.geojson")).unwrap())
+            .unwrap();
+    assert_eq!(marks["features"].as_array().unwrap().len(), 1);
+    drop(server);
+
+    succeed(&[
+        "export",
+        given[0],
+        given[1],
+        given[2],
+        "--layers",
+        "refined",
+        "--web",
+        text(&site),
+    ]);
+    let alone = run(&browser, &modules, "static", text(&site), &picture);
+    assert_eq!(alone["frames"], false);
+    assert_eq!(alone["kept"].as_array().unwrap().len(), 1, "{alone:#}");
+}
+
+/// A box that bends: points found by the page lie where the tiles are, and the eye stays inside.
+#[test]
+fn a_bend_is_walked_through() {
+    if !has_viewer() {
+        return;
+    }
+    let (Some(browser), Some(modules)) = (chromium::find(), npm::find()) else {
+        return;
+    };
+    let dir = tempfile::tempdir().unwrap();
+    let [line, survey, site, picture] =
+        ["bend.txt", "survey", "site", "bend.png"].map(|name| dir.path().join(name));
+    let points: Vec<String> = (0..=20)
+        .map(|k| {
+            let (sin, cos) = (0.05 * f64::from(k)).sin_cos();
+            format!("{} {} 0", 20.0 - 20.0 * cos, 20.0 * sin)
+        })
+        .collect();
+    std::fs::write(&line, points.join("\n")).unwrap();
+    succeed(&[
+        "simulate",
+        "free",
+        "--frames",
+        "36",
+        "--advance-m",
+        "0.25",
+        "--size",
+        "160x120",
+        "--supersample",
+        "2",
+        "--shape",
+        "box",
+        "--width-m",
+        "4",
+        "--height-m",
+        "3",
+        "--centreline",
+        text(&line),
+        "--out",
+        text(&survey),
+    ]);
+    succeed(&[
+        "export",
+        text(&survey),
+        "--poses",
+        "truth",
+        "--layers",
+        "truth",
+        "--web",
+        text(&site),
+    ]);
+    let seen = run(&browser, &modules, "bend", text(&site), &picture);
+    let number = |state: &str, name: &str| seen[state][name].as_f64().unwrap_or(f64::NAN);
+    assert!((number("start", "seen") - 6.0).abs() < 0.01, "{seen:#}");
+    assert_eq!(seen["start"]["clock"], "3:00");
+    assert!(
+        (0.0..0.15).contains(&number("against", "fromWall")),
+        "{seen:#}"
+    );
+    assert!((number("against", "seen") - 6.0).abs() < 0.1);
+    assert!(number("ridden", "h") > 1.1, "{seen:#}");
+}
+
+/// Jumps over a kilometre and a ride along it: what the page holds stays bounded.
+#[test]
+#[ignore = "a kilometre takes some minutes"]
+fn a_kilometre_streams() {
+    let (browser, modules) = (
+        chromium::find().expect("Chromium"),
+        npm::find().expect("npm"),
+    );
+    let dir = tempfile::tempdir().unwrap();
+    let [survey, site, picture] = ["survey", "site", "last.png"].map(|name| dir.path().join(name));
+    let frames = "--frames 4000 --advance-m 0.25 --size 160x120 --supersample 2 --seed 1";
+    let mut simulate = vec!["simulate", "free", "--out", text(&survey)];
+    simulate.extend(frames.split(' '));
+    succeed(&simulate);
+    let export = "--poses truth --layers truth --px-per-metre 100 --web";
+    let mut arguments = vec!["export", text(&survey)];
+    arguments.extend(export.split(' '));
+    arguments.push(text(&site));
+    succeed(&arguments);
+    let seen = run(&browser, &modules, "kilometre", text(&site), &picture);
+    let places = seen["places"].as_array().unwrap();
+    let most = |name: &str| {
+        places
+            .iter()
+            .filter_map(|p| p[name].as_f64())
+            .fold(0.0, f64::max)
+    };
+    let (triangles, mib) = (most("triangles"), most("textureMiB"));
+    println!(
+        "{} views: at most {triangles} triangles, {mib} MiB of textures",
+        places.len()
+    );
+    assert!(triangles < 100_000.0 && (1.0..512.0).contains(&mib));
+}
