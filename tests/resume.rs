@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use support::{succeed, text};
 
 /// Times that each command is killed.
-const KILLS: usize = 10;
+const KILLS: usize = 7;
 
 /// A simulated survey.
 fn survey(folder: &Path, frames: usize) -> PathBuf {
