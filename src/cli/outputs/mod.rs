@@ -4,8 +4,7 @@ mod files;
 
 pub use files::{Keeping, Outputs};
 
-use super::Failure;
-use super::record::RUN_FILE;
+use super::{Failure, record};
 use super::stitch::picture_output;
 use crate::atomic;
 use crate::checkpoint::Checkpoint;
@@ -114,12 +113,9 @@ impl OutputArguments {
         Ok(())
     }
 
-    /// The record of how the panorama was made: its name with `.run.toml` added.
+    /// The record of how the panorama was made.
     pub fn run_file(&self) -> PathBuf {
-        let mut name = self.out.clone().into_os_string();
-        name.push(".");
-        name.push(RUN_FILE);
-        name.into()
+        record::beside(&self.out)
     }
 
     /// Everything that is written.
