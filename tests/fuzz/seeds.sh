@@ -28,8 +28,42 @@ small=$work/small
 program simulate free --frames 4 --size 32x24 --supersample 1 --out "$small"
 seed survey small <"$small/survey.toml"
 program config "$small" --json
-program init "$work/small" --radius-m 3 --force || true
+program init "$work/small" --radius-m 3 --force
 seed survey init <"$small/survey.toml"
+seed survey everything <<'END'
+[tunnel]
+shape = "ellipse"
+width_m = 6.0
+height_m = 6.5
+centreline = "curve.txt"
+ignore = [{ theta_deg = [150, 210], chainage_m = [2.0, 5.5] }, { theta_deg = [330, 30] }]
+[camera]
+file = "camera.json"
+readout_ms = 20.0
+[frames]
+images = "frames/*.png"
+times = "times.txt"
+mask = "mask.png"
+[poses]
+initial = "baseline.tum"
+truth = "groundtruth.tum"
+convention = "c2w"
+camera_axes = "opencv"
+body_to_camera = "body.yaml"
+tunnel_frame = "axis.json"
+associate = "time"
+time_tolerance_s = 0.01
+interpolate = true
+[prior]
+model = "independent"
+rotation_sigma_deg = 2.0
+translation_sigma_m = [0.02, 0.02, 0.03]
+[calibrate]
+unknowns = ["focal", "centre", "distortion"]
+focal_sigma_percent = 2.0
+[options.stitch]
+mode = "average"
+END
 seed poses small 0 <"$small/baseline.tum"
 for format in kitti csv nerfstudio; do
     program convert "$small" --to $format --out "$work/poses.$format"
@@ -43,11 +77,13 @@ program refine "$small" --out "$work/refined" --calibrate focal
 seed refinement refined <"$work/refined/refine.json"
 { cat "$work/refined/refine.json"; printf '\0'; cat "$work/refined/covariance.csv"; } | seed refinement both
 head -4 "$work/refined/covariance.csv" | seed covariances frames
-program converge --rotation-deg 2 --jitter independent --seeds 1 --frames 2 --size 16x12 --noise 0 --out "$work/sweep" || true
-seed sweep runs <"$work/sweep/runs.jsonl"
-for mask in $blender/frames/000000.jpg "$small/frames/000000.png"; do
-    seed pictures "$(basename $mask)" <"$mask"
+program converge --rotation-deg 2 --jitter independent --seeds 1 --frames 2 --size 32x24 --noise 0 --out "$work/sweep"
+sed 's/"noise_grey":0.0/"noise_grey":-1.0/' "$work/sweep/runs.jsonl" | seed sweep runs
+for ending in png jpg tif; do
+    program stitch "$small" --px-per-metre 5 --out "$work/wall.$ending"
+    seed pictures $ending <"$work/wall.$ending"
 done
+seed pictures frame <$blender/frames/000000.jpg
 
 seed poses euroc 0 <<'END'
 #timestamp [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z
@@ -101,7 +137,7 @@ seed plan times <<<$'time_s;chainage_m;angle_deg\n0;0;0\n2;1;90'
 {
     printf 'GYROFLOW IMU LOG\nversion,1.3\norientation,YxZ\ntscale,0.001\ngscale,0.01\nascale,0.001\n'
     printf 'frame_readout_time,20\nframe_readout_direction,0\nt,gx,gy,gz,ax,ay,az\n'
-    for ((k = 0; k < 60; k++)); do printf '%d,%d,%d,0,0,1000,0\n' $((k * 10)) $((k % 3)) $((k > 20 ? 50 : 0)); done
+    for ((k = 0; k < 600; k++)); do printf '%d,%d,%d,0,0,999,%d\n' $k $((k % 3)) $((k > 200 ? k / 9 : 0)) $((k % 2)); done
 } >"$work/gyro"
 for choice in 0 1 7 20 37; do
     seed gyro "log-$choice" "$(printf '%o' $choice)" <"$work/gyro"

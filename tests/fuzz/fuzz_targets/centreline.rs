@@ -2,9 +2,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use tunnelstitch::survey::Shape;
 use tunnelstitch::survey::Survey;
 use tunnelstitch_fuzz::{file, small_survey};
-use tunnelstitch::survey::Shape;
 
 const SHAPES: [Shape; 4] = [Shape::Circle, Shape::Ellipse, Shape::Box, Shape::Horseshoe];
 

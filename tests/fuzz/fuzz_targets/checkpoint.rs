@@ -8,7 +8,12 @@ use tunnelstitch::frames::Shading;
 use tunnelstitch::refine::{FrameReport, LevelReport};
 
 /// Of what states are made.
-type State = (Option<Shading>, Vec<LevelReport>, Vec<FrameReport>, Vec<f64>);
+type State = (
+    Option<Shading>,
+    Vec<LevelReport>,
+    Vec<FrameReport>,
+    Vec<f64>,
+);
 
 fuzz_target!(|data: &[u8]| {
     let Some((first, content)) = data.split_first() else {

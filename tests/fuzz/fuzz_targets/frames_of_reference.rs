@@ -7,7 +7,10 @@ use tunnelstitch_fuzz::file;
 
 fuzz_target!(|data: &[u8]| {
     let (_folder, path) = file("frame.yaml", data);
-    for pose in [read_camera_in_body(&path), read_tunnel_frame(&path)].into_iter().flatten() {
+    for pose in [read_camera_in_body(&path), read_tunnel_frame(&path)]
+        .into_iter()
+        .flatten()
+    {
         assert!(pose.t_wc.iter().all(|v| v.is_finite()));
     }
 });

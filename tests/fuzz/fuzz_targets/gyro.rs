@@ -17,7 +17,9 @@ fuzz_target!(|data: &[u8]| {
     let Ok(log) = GyroLog::read(&path) else {
         return;
     };
-    let to_camera = log.orientation.map_or_else(Matrix3::identity, |word| word.to_camera());
+    let to_camera = log
+        .orientation
+        .map_or_else(Matrix3::identity, |word| word.to_camera());
     let start_s = log.samples[0].time_s;
     let times_s = [0.1, 0.2, 0.3, 0.4, 0.5].map(|after_s| start_s + after_s);
     let stations = [0.0, 0.0, 0.1, 0.4, 0.9].map(|angle_rad| Station {

@@ -10,6 +10,10 @@ fuzz_target!(|data: &[u8]| {
     if let Ok(table) = PlanTable::read(&path)
         && let Ok(stations) = table.stations(&[0.0, 0.5, 1.0])
     {
-        assert!(stations.iter().all(|station| station.chainage_m.is_finite() && station.angle_rad.is_finite()));
+        assert!(
+            stations
+                .iter()
+                .all(|station| station.chainage_m.is_finite() && station.angle_rad.is_finite())
+        );
     }
 });

@@ -33,12 +33,20 @@ fn compared() -> &'static Compared {
             render: RenderOptions::default(),
         };
         let (comparison, drawings) = compare(&input, &Silent).unwrap();
-        Compared { survey, comparison, drawings }
+        Compared {
+            survey,
+            comparison,
+            drawings,
+        }
     })
 }
 
 fuzz_target!(|data: &[u8]| {
-    let Compared { survey, comparison, drawings } = compared();
+    let Compared {
+        survey,
+        comparison,
+        drawings,
+    } = compared();
     let folder = tempfile::tempdir().unwrap();
     let put = |name: &str, bytes: &[u8]| std::fs::write(folder.path().join(name), bytes).unwrap();
     let mut parts = data.splitn(2, |byte| *byte == 0);
@@ -46,11 +54,21 @@ fuzz_target!(|data: &[u8]| {
     if let Some(covariances) = parts.next() {
         put("covariance.csv", covariances);
     }
-    std::fs::copy(small_survey().join("baseline.tum"), folder.path().join("poses.tum")).unwrap();
+    std::fs::copy(
+        small_survey().join("baseline.tum"),
+        folder.path().join("poses.tum"),
+    )
+    .unwrap();
     let Ok(refined) = RefinedFiles::read(survey, folder.path()) else {
         return;
     };
-    let sources = Sources { survey, refined, comparison, drawings, command: Vec::new() };
+    let sources = Sources {
+        survey,
+        refined,
+        comparison,
+        drawings,
+        command: Vec::new(),
+    };
     if let Ok((report, pictures)) = gather(sources) {
         let _ = page(&report, &pictures);
     }

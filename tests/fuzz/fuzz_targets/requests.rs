@@ -16,13 +16,23 @@ fn port() -> &'static str {
     PORT.get_or_init(|| {
         let survey = Survey::open(small_survey()).unwrap();
         let surface = survey.surface.as_ref();
-        let placed = place(surface, &survey.camera, &survey.initial_poses(), &survey.shutter()).unwrap();
+        let placed = place(
+            surface,
+            &survey.camera,
+            &survey.initial_poses(),
+            &survey.shutter(),
+        )
+        .unwrap();
         let folder = tempfile::tempdir().unwrap().keep();
         std::fs::write(folder.join("tile.webp"), "tile").unwrap();
         let served = Served {
             marks: Marks::open(&folder).unwrap(),
             folder,
-            viewer: Viewer { page: b"page", style: b"style", script: b"script" },
+            viewer: Viewer {
+                page: b"page",
+                style: b"style",
+                script: b"script",
+            },
             originals: Some(Originals {
                 surface: survey.surface,
                 camera: survey.camera,

@@ -14,8 +14,8 @@ fuzz_target!(|data: &[u8]| {
         jitters: vec![JitterModel::Independent],
         seeds: 1,
         frames: 2,
-        width: 16,
-        height: 12,
+        width: 32,
+        height: 24,
         noise_grey: -1.0,
         ..ConvergeOptions::default()
     };

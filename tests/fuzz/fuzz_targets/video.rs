@@ -15,7 +15,12 @@ fuzz_target!(|data: &[u8]| {
         let (_folder, path) = file("video.mp4", bytes);
         Video::open(&path)
     };
-    STOOD_IN.call_once(|| assert!(open(SOUND).is_ok(), "put tests/fuzz/stand_in first into PATH"));
+    STOOD_IN.call_once(|| {
+        assert!(
+            open(SOUND).is_ok(),
+            "put tests/fuzz/stand_in first into PATH"
+        )
+    });
     if let Ok(video) = open(data) {
         assert!((0..video.pictures()).all(|picture| video.time_s(picture).is_finite()));
     }

@@ -2,10 +2,10 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tunnelstitch::simulate::{BadFrames, SimulateOptions, run};
-use tunnelstitch::progress::Silent;
-use tunnelstitch::trajectory::gyro::Orientation;
 use std::path::Path;
+use tunnelstitch::progress::Silent;
+use tunnelstitch::simulate::{BadFrames, SimulateOptions, run};
+use tunnelstitch::trajectory::gyro::Orientation;
 
 fuzz_target!(|text: &str| {
     if let Ok(orientation) = Orientation::parse(text) {

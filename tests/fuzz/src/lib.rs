@@ -18,7 +18,18 @@ pub fn file(name: &str, content: &[u8]) -> (TempDir, PathBuf) {
 /// Frames of the small survey.
 pub const FRAMES: usize = 4;
 
-/// The folder of a survey of [`FRAMES`] frames of 32 × 24 pixels, simulated once.
+/// Files of the small survey that its survey.toml may name, besides those that the simulator writes.
+const OTHERS: [(&str, &str); 4] = [
+    ("times.txt", "0\n1\n2\n3\n"),
+    ("curve.txt", "0 -50 0\n0 0 0 3.1\n1 50 0\n"),
+    ("axis.json", r#"{"point_m": [0, 0, 0], "axis": [0, 1, 0]}"#),
+    (
+        "body.yaml",
+        "T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}\n",
+    ),
+];
+
+/// The folder of a survey of [`FRAMES`] frames of 32 × 24 pixels with a mask, simulated once.
 pub fn small_survey() -> &'static Path {
     static SURVEY: OnceLock<TempDir> = OnceLock::new();
     let folder = SURVEY.get_or_init(|| {
@@ -27,9 +38,13 @@ pub fn small_survey() -> &'static Path {
             frames: FRAMES,
             camera: Camera::from_vertical_fov(32, 24, 1.0),
             supersample: 1,
+            shaft_percent: 12.0,
             ..SimulateOptions::free()
         };
         simulate::run(&options, folder.path(), true, &Silent).unwrap();
+        for (name, content) in OTHERS {
+            std::fs::write(folder.path().join(name), content).unwrap();
+        }
         folder
     });
     folder.path()
