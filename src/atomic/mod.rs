@@ -48,7 +48,9 @@ pub fn write(
     let temporary = temporary::file_in(beside(path)).map_err(fail)?;
     let mut writer = std::io::BufWriter::new(temporary.file);
     fill(&mut writer).map_err(fail)?;
-    let file = writer.into_inner().map_err(|error| fail(error.into_error()))?;
+    let file = writer
+        .into_inner()
+        .map_err(|error| fail(error.into_error()))?;
     // What is in a folder that is not finished goes to the disk with the folder.
     let is_final = !temporary::is_unfinished(path);
     if is_final {

@@ -44,48 +44,52 @@ fn shared(a: &Footprint, b: &Footprint, perimeter_m: f64) -> [f64; 2] {
     [s.max(0.0), h.max(0.0)]
 }
 
-/// The wall that a frame shows, as far as frames are compared by it: pixels, spread evenly, that the lens shows and neither the mask
-/// nor [`Survey::ignored`] leaves out, where they meet it.
-struct Seen<'a> {
+/// Pixels of a frame, spread evenly, by which it is compared with others.
+struct Asked<'a> {
     survey: &'a Survey,
-    /// World coordinates, metres, each frame's.
-    points: Vec<Vec<Vector3<f64>>>,
     poses: &'a [Pose],
+    pixels: Vec<[f64; 2]>,
 }
 
-impl<'a> Seen<'a> {
+impl<'a> Asked<'a> {
     fn of(survey: &'a Survey, poses: &'a [Pose]) -> Self {
         let camera = &survey.camera;
         let [columns, rows] = PIXELS;
-        let middle = |k: usize, of: usize, px: u32| (k as f64 + 0.5) / of as f64 * f64::from(px) - 0.5;
-        let pixels: Vec<[f64; 2]> = (0..columns * rows)
-            .map(|k| [middle(k % columns, columns, camera.width), middle(k / columns, rows, camera.height)])
-            .filter(|pixel| shows(survey, &Vector2::from(*pixel)))
-            .collect();
-        let points = |pose: &Pose| -> Vec<Vector3<f64>> {
-            let hits = pixels.iter().filter_map(|[u, v]| {
-                let ray = pose.r_wc * camera.ray(*u, *v)?;
-                let hit = survey.surface.hit(&pose.t_wc, &ray).ok()?;
-                (!survey.ignored.hold(&hit.wall)).then_some(hit.x_w)
-            });
-            hits.collect()
+        let middle =
+            |k: usize, of: usize, px: u32| (k as f64 + 0.5) / of as f64 * f64::from(px) - 0.5;
+        let pixel = |k: usize| {
+            let u = middle(k % columns, columns, camera.width);
+            [u, middle(k / columns, rows, camera.height)]
         };
+        let pixels = (0..columns * rows).map(pixel);
         Self {
             survey,
-            points: poses.par_iter().map(points).collect(),
             poses,
+            pixels: pixels
+                .filter(|pixel| shows(survey, &Vector2::from(*pixel)))
+                .collect(),
         }
     }
 
-    /// Share of frame `a` that is seen by `b`, too.
-    fn share(&self, a: usize, b: usize) -> f64 {
+    /// Where they meet wall that is not ignored, world coordinates, metres.
+    fn points(&self, frame: usize) -> Vec<Vector3<f64>> {
+        let (survey, pose) = (self.survey, &self.poses[frame]);
+        let hits = self.pixels.iter().filter_map(|[u, v]| {
+            let ray = pose.r_wc * survey.camera.ray(*u, *v)?;
+            let hit = survey.surface.hit(&pose.t_wc, &ray).ok()?;
+            (!survey.ignored.hold(&hit.wall)).then_some(hit.x_w)
+        });
+        hits.collect()
+    }
+
+    /// Share of a frame that these points are, which it shows, and which another shows, too.
+    fn share(&self, points: &[Vector3<f64>], other: usize) -> f64 {
         let sees = |x_w: &&Vector3<f64>| {
-            let x_c = self.poses[b].to_camera(x_w);
+            let x_c = self.poses[other].to_camera(x_w);
             let pixel = self.survey.camera.project(&x_c);
             pixel.is_some_and(|pixel| shows(self.survey, &pixel))
         };
-        let shared = self.points[a].iter().filter(sees).count();
-        shared as f64 / (PIXELS[0] * PIXELS[1]) as f64
+        points.iter().filter(sees).count() as f64 / (PIXELS[0] * PIXELS[1]) as f64
     }
 }
 
@@ -105,19 +109,25 @@ impl OverlapCheck {
             .iter()
             .map(|pose| Footprint::trace(surface, &survey.camera, pose).ok())
             .collect();
-        let seen = Seen::of(survey, poses);
+        let asked = Asked::of(survey, poses);
         let sides = |a: usize, b: usize| {
             let (a, b) = (footprints[a].as_ref()?, footprints[b].as_ref()?);
             Some(shared(a, b, perimeter_m))
         };
         let meet = |a: usize, b: usize| sides(a, b).is_some_and(|[s, h]| s > 0.0 && h > 0.0);
-        let shares: Vec<f64> = (1..poses.len()).map(|k| seen.share(k - 1, k)).collect();
+        let shares: Vec<f64> = (1..poses.len())
+            .into_par_iter()
+            .map(|k| asked.share(&asked.points(k - 1), k))
+            .collect();
         let least = shares.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
         let step = poses.len().div_ceil(ASKED).max(1);
         let others = |k: usize| {
             let others = (0..poses.len()).filter(|other| other.abs_diff(k) > SAME_TURN);
-            let met = others.filter(|other| meet(k, *other));
-            met.map(|other| seen.share(k, other)).fold(0.0, f64::max)
+            let points = asked.points(k);
+            let shares = others
+                .filter(|other| meet(k, *other))
+                .map(|other| asked.share(&points, other));
+            shares.fold(0.0, f64::max)
         };
         let widths = (1..poses.len()).filter_map(|k| sides(k - 1, k));
         Self {

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 
 /// Commands whose options a survey may hold: those that take one.
 pub const CONFIGURABLE: [&str; 11] = [
-    "check", "plan", "gyro", "refine", "stitch", "locate", "compare", "convert", "report", "export",
-    "view",
+    "check", "plan", "gyro", "refine", "stitch", "locate", "compare", "convert", "report",
+    "export", "view",
 ];
 
 /// The arguments as parsed, and every option in effect with where it comes from.
@@ -204,8 +204,7 @@ fn of_survey(command: &Command, matches: &ArgMatches) -> Result<Option<Held>, Fa
         ) {
             continue;
         }
-        let word =
-            word(value).map_err(|what| fail(format!("[options.{name}]: {key}: {what}")))?;
+        let word = word(value).map_err(|what| fail(format!("[options.{name}]: {key}: {what}")))?;
         let default = arg.get_default_values().join(OsStr::new(","));
         match word {
             Word::Switch(false) => continue,

@@ -42,11 +42,7 @@ pub struct DemoArguments {
 ///
 /// # Errors
 /// An output that cannot be written.
-pub fn run(
-    arguments: &DemoArguments,
-    run: &Run,
-    terminal: &Arc<Terminal>,
-) -> Result<(), Failure> {
+pub fn run(arguments: &DemoArguments, run: &Run, terminal: &Arc<Terminal>) -> Result<(), Failure> {
     let since = Instant::now();
     let say = |text: String| {
         if !arguments.json {
@@ -78,7 +74,14 @@ pub fn run(
     ));
     let refine_options = RefineOptions::default();
     let survey = Survey::open(&survey_folder)?;
-    let (refined, _) = refine_into(&survey, &refine_options, &refined_folder, run, None, terminal)?;
+    let (refined, _) = refine_into(
+        &survey,
+        &refine_options,
+        &refined_folder,
+        run,
+        None,
+        terminal,
+    )?;
     if !arguments.json {
         summarise(&refined, terminal);
     }

@@ -192,7 +192,11 @@ pub fn run(arguments: &GyroArguments, run: &Run, terminal: &Terminal) -> Result<
     parent_folder(&arguments.out)?;
     atomic::write_text(&arguments.out, &tum::format(&baseline.trajectory))?;
     let inputs = arguments.times.files(arguments.survey.as_deref());
-    let others = arguments.way.file().into_iter().chain(&sensor.body_to_camera);
+    let others = arguments
+        .way
+        .file()
+        .into_iter()
+        .chain(&sensor.body_to_camera);
     let inputs = inputs.iter().chain(others).chain([&arguments.log]);
     let inputs = record::files(inputs.map(AsRef::as_ref))?;
     run.write(&record::beside(&arguments.out), &inputs)?;

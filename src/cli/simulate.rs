@@ -293,7 +293,11 @@ pub fn run(arguments: &SimulateArguments, run: &Run, terminal: &Terminal) -> Res
     }
     let options = arguments.options()?;
     let simulated = simulate::run(&options, &arguments.out, arguments.force, terminal)?;
-    let inputs = [&arguments.camera, &arguments.texture, &options.tunnel.centreline];
+    let inputs = [
+        &arguments.camera,
+        &arguments.texture,
+        &options.tunnel.centreline,
+    ];
     let inputs = record::files(inputs.into_iter().flatten().map(AsRef::as_ref))?;
     run.write(&arguments.out.join(RUN_FILE), &inputs)?;
     if arguments.json {

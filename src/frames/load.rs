@@ -122,9 +122,11 @@ impl FrameFile {
     pub fn size(&self) -> Result<(u32, u32), FrameError> {
         match &self.video {
             Some((video, _)) => Ok(video.size()),
-            None => {
-                image::image_dimensions(&self.path).map_err(|error| self.fault(error.to_string()))
-            }
+            None => image::ImageReader::open(&self.path)
+                .and_then(image::ImageReader::with_guessed_format)
+                .map_err(image::ImageError::from)
+                .and_then(image::ImageReader::into_dimensions)
+                .map_err(|error| self.fault(error.to_string())),
         }
     }
 

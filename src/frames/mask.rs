@@ -37,7 +37,8 @@ impl Mask {
             path: path.to_owned(),
             what,
         };
-        let undecodable = |error: image::ImageError| fail(format!("{error}; save it as a PNG file"));
+        let undecodable =
+            |error: image::ImageError| fail(format!("{error}; save it as a PNG file"));
         let decoder = image::ImageReader::open(path)
             .and_then(image::ImageReader::with_guessed_format)
             .map_err(|error| {

@@ -86,10 +86,7 @@ impl DziWriter {
     /// Whatever the system says.
     pub fn state(&self) -> Result<DziState<'_>, WriteError> {
         let fail = |source| WriteError::new(self.folder.path(), source);
-        let mut unsynced = self
-            .unsynced
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut unsynced = self.unsynced.lock().unwrap_or_else(PoisonError::into_inner);
         atomic::sync_files(&unsynced).map_err(fail)?;
         unsynced.clear();
         Ok(DziState {

@@ -4,8 +4,8 @@ mod files;
 
 pub use files::{Keeping, Outputs};
 
-use super::{Failure, record};
 use super::stitch::picture_output;
+use super::{Failure, record};
 use crate::atomic;
 use crate::checkpoint::Checkpoint;
 use crate::frames::{JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat};
