@@ -15,13 +15,13 @@ import time
 import cv2
 import numpy as np
 
-WIDTH, HEIGHT, ROUNDS, RUNS = 1920, 1080, 15, 3
+WIDTH, HEIGHT, FOV_DEG, ROUNDS, RUNS = 1920, 1080, 30, 15, 3
 THREADS = int(sys.argv[1]) if len(sys.argv) > 1 else 1
 
 
 def maps():
     """Pixels of the frame for each pixel of the unrolled wall that it sees, at its own resolution."""
-    f = 0.5 * HEIGHT / np.tan(np.radians(30))
+    f = 0.5 * HEIGHT / np.tan(np.radians(FOV_DEG / 2))
     cx, cy = 0.5 * (WIDTH - 1), 0.5 * (HEIGHT - 1)
     half = np.arctan(cx / f)
     theta = np.arange(-half, half, 1 / f)

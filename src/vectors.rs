@@ -36,6 +36,15 @@ pub fn avx2(work: impl FnMut(pulp::x86::V3)) -> bool {
     true
 }
 
+/// Asks for a sample that will be needed soon.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+pub fn prefetch(simd: pulp::x86::V3, samples: &[u8], at: usize) {
+    use std::arch::x86_64::_MM_HINT_T0;
+    let pointer = samples.as_ptr().wrapping_add(at);
+    simd.sse._mm_prefetch::<_MM_HINT_T0>(pointer.cast());
+}
+
 #[cfg(target_arch = "x86_64")]
 struct Avx2<F>(pulp::x86::V3, F);
 

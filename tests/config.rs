@@ -137,6 +137,149 @@ fn a_panorama_can_be_made_again_from_its_record() {
     );
 }
 
+/// What a command cannot do without may be in the survey, and what all commands have, too.
+#[test]
+fn every_command_takes_options_from_its_survey() {
+    let survey =
+        survey("\n[options.convert]\nto = \"kitti\"\nquiet = true\n[options.check]\njson = true\n");
+    let out = survey.path().join("poses.txt");
+    let convert = ["convert", text(survey.path()), "--out", text(&out)];
+    assert_eq!(succeed(&convert), "");
+    let poses = std::fs::read_to_string(&out).unwrap();
+    assert_eq!(poses.lines().next().unwrap().split(' ').count(), 12);
+    assert!(succeed(&["check", text(survey.path())]).starts_with('{'));
+    let shown = succeed(&["config", text(survey.path()), "convert"]);
+    assert!(shown.contains("to = \"kitti\"    # survey.toml"), "{shown}");
+    assert!(shown.contains("quiet = true    # survey.toml"), "{shown}");
+    // All of it may be put into the survey: nothing that is so in any case keeps another option out.
+    let all = succeed(&["config", text(survey.path())]);
+    std::fs::write(survey.path().join("survey.toml"), all).unwrap();
+    let table = survey.path().join("plan.csv");
+    std::fs::write(&table, "frame,chainage_m,angle_deg\n0,0,0\n2,1,60\n").unwrap();
+    let plan = [
+        "plan",
+        text(survey.path()),
+        "--table",
+        text(&table),
+        "--out",
+        text(&out),
+    ];
+    succeed(&plan);
+    // What is missing still is.
+    let message = fail(&["stitch", text(survey.path())], 2);
+    assert!(message.contains("--out"), "{message}");
+}
+
+#[test]
+fn every_result_has_a_record() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = |name: &str| dir.path().join(name);
+    let simulate = "simulate free --frames 3 --size 64x48 --supersample 1 --seed 7 --out D/survey";
+    for (arguments, record, input) in [
+        (simulate, "survey/run.toml", None),
+        // Again, over it.
+        (&format!("{simulate} --force"), "survey/run.toml", None),
+        (
+            "converge --rotation-deg 1 --jitter independent --seeds 1 --frames 2 --size 32x24 --out D/sweep",
+            "sweep/run.toml",
+            None,
+        ),
+        (
+            "plan D/survey --advance-m 0.1 --turn-deg 30 --out D/plan.tum",
+            "plan.tum.run.toml",
+            Some("survey.toml"),
+        ),
+        (
+            "convert D/survey --to tum --out D/out.tum",
+            "out.tum.run.toml",
+            Some("baseline.tum"),
+        ),
+        (
+            "convert D/survey --to colmap --out D/model",
+            "model/run.toml",
+            Some("baseline.tum"),
+        ),
+        // Again, over it.
+        (
+            "convert D/survey --to colmap --out D/model",
+            "model/run.toml",
+            Some("baseline.tum"),
+        ),
+        (
+            "project D/survey/frames/000000.png --out D/photo.png",
+            "photo.png.run.toml",
+            Some("000000.png"),
+        ),
+        (
+            "export D/survey --glb D/wall.glb",
+            "wall.glb.run.toml",
+            Some("camera.json"),
+        ),
+        (
+            "export D/survey --3dtiles D/tiles",
+            "tiles/run.toml",
+            Some("camera.json"),
+        ),
+        (
+            "compare D/survey --refined D/out.tum --out D/compared",
+            "compared/run.toml",
+            Some("out.tum"),
+        ),
+        (
+            "report D/survey --refined D/out.tum --out D/report",
+            "report/run.toml",
+            Some("out.tum"),
+        ),
+    ] {
+        let words: Vec<String> = arguments
+            .split(' ')
+            .map(|word| word.replacen("D/", &format!("{}/", text(dir.path())), 1))
+            .collect();
+        succeed(&words.iter().map(String::as_str).collect::<Vec<_>>());
+        let record = toml_of(&path(record));
+        assert!(
+            record["program"]
+                .as_str()
+                .unwrap()
+                .starts_with("tunnelstitch ")
+        );
+        assert_eq!(record["arguments"][1].as_str(), Some(words[0].as_str()));
+        assert!(record["options"][&words[0]].get("out").is_some() || words[0] == "export");
+        let inputs = record["inputs"].as_array().unwrap();
+        let names = |name: &str| {
+            inputs
+                .iter()
+                .any(|i| i["path"].as_str().unwrap().ends_with(name))
+        };
+        assert!(input.is_none_or(names), "{arguments}: {record}");
+    }
+    let simulated = toml_of(&path("survey/run.toml"));
+    assert_eq!(
+        simulated["options"]["simulate"]["seed"].as_integer(),
+        Some(7)
+    );
+}
+
+#[test]
+fn the_report_reads_poses_as_it_is_told() {
+    let survey = survey("");
+    let (poses, out) = (
+        survey.path().join("groundtruth.tum"),
+        survey.path().join("report"),
+    );
+    let report = [
+        "report",
+        text(survey.path()),
+        "--refined",
+        text(&poses),
+        "--out",
+        text(&out),
+    ];
+    let message = fail(&[&report[..], &["--pose-format", "kitti"]].concat(), 3);
+    assert!(message.contains("baseline.tum"), "{message}");
+    assert!(!out.exists());
+}
+
 #[test]
 fn wrong_options_in_a_survey_are_named_with_the_file() {
     for (options, expected) in [

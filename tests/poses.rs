@@ -493,7 +493,8 @@ fn convert_replaces_nothing_it_should_not() {
     for _ in 0..2 {
         convert(dir, "initial", "colmap", &model, &[]);
     }
-    assert_eq!(support::entries(&model), 3);
+    // The model's three, and the record.
+    assert_eq!(support::entries(&model), 4);
     std::fs::write(dir.join("axis"), "1 0 0 0\n0 2 0 0\n0 0 1 0\n0 0 0 1\n").unwrap();
     let (axis, out) = (dir.join("axis"), dir.join("o.tum"));
     let arguments = [

@@ -25,7 +25,7 @@ fn simulate_with(out: &Path, more: &[&str]) -> String {
     succeed(&arguments)
 }
 
-/// All files of a folder and of its folders with their contents, by name.
+/// All files of a folder and of its folders with their contents, by name; but for the record, which names the folder.
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -34,7 +34,7 @@ fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 folders.push(path);
-            } else {
+            } else if !path.ends_with("run.toml") {
                 let name = path.strip_prefix(folder).unwrap().display().to_string();
                 found.push((name, std::fs::read(path).unwrap()));
             }

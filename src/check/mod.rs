@@ -255,4 +255,38 @@ mod tests {
         let said = dark.warnings.join("\n");
         assert!(said.contains("dark"), "{said}");
     }
+
+    /// A shaft in the picture takes its share of every overlap, and so does wall that is ignored.
+    #[test]
+    fn what_is_left_out_is_no_overlap() {
+        let dir = tempfile::tempdir().unwrap();
+        simulate::run(&small(), dir.path(), true, &Silent).unwrap();
+        let overlap = |ignore: &str| {
+            let opened = Survey::open_with(dir.path(), |file| {
+                let table: toml::Table = format!("ignore = {ignore}").parse().unwrap();
+                file.tunnel.ignore = table["ignore"].clone().try_into().unwrap();
+            });
+            let survey = opened.unwrap();
+            OverlapCheck::of(&survey, &survey.initial_poses())
+        };
+        let whole = overlap("[]");
+        let half = overlap("[{ theta_deg = [0, 180] }]");
+        // Of some neighbours nothing is left.
+        assert_eq!(half.least_neighbours, 0.0);
+        assert!(
+            half.neighbours < whole.neighbours && half.turns < whole.turns,
+            "{half:?} {whole:?}"
+        );
+        let none = overlap("[{ theta_deg = [0, 360] }]");
+        assert_eq!((none.neighbours, none.turns), (0.0, 0.0));
+        let shaft = looked_over(SimulateOptions {
+            shaft_percent: 40.0,
+            ..small()
+        });
+        assert!(
+            shaft.overlap.neighbours < 0.8 * whole.neighbours,
+            "{:?}",
+            shaft.overlap
+        );
+    }
 }

@@ -94,6 +94,11 @@ impl WayArguments {
         Ok(plan.stations(&frames.times_s))
     }
 
+    /// The file that tells it, if there is one.
+    pub fn file(&self) -> Option<&PathBuf> {
+        self.table.as_ref()
+    }
+
     /// Whether anything tells the way.
     pub fn is_given(&self) -> bool {
         self.table.is_some() || self.advance_m.is_some() || self.advance_m_per_s.is_some()

@@ -6,11 +6,14 @@ use crate::survey::{Survey, toml_path};
 use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{ArgMatches, Command, CommandFactory, FromArgMatches};
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
-/// Commands whose options a survey may hold.
-pub const CONFIGURABLE: [&str; 4] = ["refine", "stitch", "locate", "compare"];
+/// Commands whose options a survey may hold: those that take one.
+pub const CONFIGURABLE: [&str; 11] = [
+    "check", "plan", "gyro", "refine", "stitch", "locate", "compare", "convert", "report",
+    "export", "view",
+];
 
 /// The arguments as parsed, and every option in effect with where it comes from.
 pub struct Configuration {
@@ -95,12 +98,17 @@ fn variable(command: Option<&str>, long: &str) -> String {
 /// Wrong options in `survey.toml`. Wrong arguments, and what only asks for help, end the program as clap does.
 pub fn parse(arguments: Vec<OsString>) -> Result<Configuration, Failure> {
     let command = command();
-    let plain = command
-        .clone()
-        .try_get_matches_from(&arguments)
-        .unwrap_or_else(|error| error.exit());
-    let (matches, from_survey) = match of_survey(&command, &plain)? {
-        None => (plain, Vec::new()),
+    let given = command.clone().try_get_matches_from(&arguments);
+    let held = match &given {
+        Ok(matches) => of_survey(&command, matches)?,
+        // What is missing may be in the survey.
+        Err(error) if error.kind() == ErrorKind::MissingRequiredArgument => {
+            of_survey(&command, &without_required(&command, &arguments)?)?
+        }
+        Err(_) => None,
+    };
+    let (matches, from_survey) = match held {
+        None => (given.unwrap_or_else(|error| error.exit()), Vec::new()),
         Some(held) => {
             let mut all = arguments;
             // Before what a lone `--` marks as no options.
@@ -109,6 +117,9 @@ pub fn parse(arguments: Vec<OsString>) -> Result<Configuration, Failure> {
             all.splice(end..end, held.arguments);
             let matches = command.clone().try_get_matches_from(&all);
             let matches = matches.map_err(|error| {
+                if error.kind() == ErrorKind::MissingRequiredArgument {
+                    error.exit();
+                }
                 let text = error.to_string();
                 let what = text.strip_prefix("error: ").unwrap_or(&text);
                 Failure::input(format!(
@@ -178,13 +189,12 @@ fn of_survey(command: &Command, matches: &ArgMatches) -> Result<Option<Held>, Fa
     };
     for (key, value) in table {
         let long = key.replace('_', "-");
-        let arg = sub
-            .get_arguments()
-            .find(|arg| arg.get_long() == Some(&long));
-        let Some(arg) = arg else {
+        let arg = options(command, sub).find(|(_, other)| *other == long);
+        let Some((arg, _)) = arg else {
+            let names = options(command, sub).map(|(_, long)| long.replace('-', "_"));
             return Err(fail(format!(
                 "[options.{name}]: unknown option `{key}`; there are {}",
-                names(sub).join(", ")
+                names.collect::<Vec<_>>().join(", ")
             )));
         };
         let given = own.value_source(arg.get_id().as_str());
@@ -194,38 +204,55 @@ fn of_survey(command: &Command, matches: &ArgMatches) -> Result<Option<Held>, Fa
         ) {
             continue;
         }
+        let word = word(value).map_err(|what| fail(format!("[options.{name}]: {key}: {what}")))?;
+        let default = arg.get_default_values().join(OsStr::new(","));
+        match word {
+            Word::Switch(false) => continue,
+            Word::Switch(true) => held.arguments.push(format!("--{long}").into()),
+            // What is so in any case keeps no other option out.
+            Word::Value(text) if default == *text => continue,
+            Word::Value(text) => held.arguments.push(format!("--{long}={text}").into()),
+        }
         held.names.push(key.replace('-', "_"));
-        let words =
-            words(&long, value).map_err(|what| fail(format!("[options.{name}]: {key}: {what}")))?;
-        held.arguments.extend(words.map(OsString::from));
     }
     Ok((!held.names.is_empty()).then_some(held))
 }
 
-/// The options of a command, with underscores.
-fn names(command: &Command) -> Vec<String> {
-    let longs = command.get_arguments().filter_map(clap::Arg::get_long);
-    let longs = longs.filter(|long| !matches!(*long, "help" | "version"));
-    longs.map(|long| long.replace('-', "_")).collect()
+/// The options of a command, those that all commands have included, with their long flags.
+fn options<'a>(
+    command: &'a Command,
+    sub: &'a Command,
+) -> impl Iterator<Item = (&'a clap::Arg, &'a str)> {
+    let arguments = sub.get_arguments().chain(command.get_arguments());
+    arguments.filter_map(|arg| {
+        let long = arg.get_long()?;
+        (!matches!(long, "help" | "version")).then_some((arg, long))
+    })
 }
 
-/// The argument that says the same as `long = value`, if it says anything.
-fn words(long: &str, value: &toml::Value) -> Result<Option<String>, String> {
-    let word = |value: &toml::Value| match value {
+/// What a value in `survey.toml` says on the command line.
+enum Word {
+    /// A flag without a value, given or not.
+    Switch(bool),
+    /// The value of one that has one.
+    Value(String),
+}
+
+fn word(value: &toml::Value) -> Result<Word, String> {
+    let text = |value: &toml::Value| match value {
         toml::Value::String(text) => Ok(text.clone()),
         toml::Value::Integer(number) => Ok(number.to_string()),
         toml::Value::Float(number) => Ok(number.to_string()),
         _ => Err("must be a text, a number, true or false, or a list of these".to_owned()),
     };
-    match value {
-        toml::Value::Boolean(true) => Ok(Some(format!("--{long}"))),
-        toml::Value::Boolean(false) => Ok(None),
+    Ok(match value {
+        toml::Value::Boolean(set) => Word::Switch(*set),
         toml::Value::Array(list) => {
-            let list: Vec<String> = list.iter().map(word).collect::<Result<_, _>>()?;
-            Ok(Some(format!("--{long}={}", list.join(","))))
+            let list: Vec<String> = list.iter().map(text).collect::<Result<_, _>>()?;
+            Word::Value(list.join(","))
         }
-        value => Ok(Some(format!("--{long}={}", word(value)?))),
-    }
+        value => Word::Value(text(value)?),
+    })
 }
 
 /// Every option of command `name` with its value and where that comes from.
@@ -238,11 +265,7 @@ fn effective(
     let Some(sub) = command.find_subcommand(name) else {
         return Vec::new();
     };
-    let arguments = sub.get_arguments().filter_map(|arg| {
-        let long = arg.get_long()?;
-        (!matches!(long, "help" | "version")).then_some((arg, long))
-    });
-    arguments
+    options(command, sub)
         .map(|(arg, long)| {
             let id = arg.get_id().as_str();
             let option = long.replace('-', "_");
@@ -255,7 +278,10 @@ fn effective(
             let source = match matches.value_source(id) {
                 Some(ValueSource::CommandLine) if from_survey.contains(&option) => Source::Survey,
                 Some(ValueSource::CommandLine) => Source::Flag,
-                Some(ValueSource::EnvVariable) => Source::Variable(variable(Some(name), long)),
+                Some(ValueSource::EnvVariable) => {
+                    let command = (!arg.is_global_set()).then_some(name);
+                    Source::Variable(variable(command, long))
+                }
                 _ => Source::Default,
             };
             EffectiveOption {
@@ -334,6 +360,16 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         command().debug_assert();
+    }
+
+    #[test]
+    fn every_command_that_takes_a_survey_can_be_configured() {
+        let command = command();
+        let takes_one = |sub: &&Command| sub.get_arguments().any(|arg| arg.get_id() == "survey");
+        let names = command.get_subcommands().filter(takes_one);
+        let names: Vec<&str> = names.map(Command::get_name).collect();
+        let others: Vec<&str> = names.into_iter().filter(|name| *name != "config").collect();
+        assert_eq!(others, CONFIGURABLE);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! `tunnelstitch converge`: how much noise the refinement can take.
 
+use super::record::{RUN_FILE, Run};
 use super::simulate::{JitterArgument, WallArgument, size};
 use super::{Failure, Terminal, json};
 use crate::evaluate::converge::{self, ConvergeOptions, SweepWall, TranslationScale};
@@ -132,9 +133,10 @@ impl ConvergeArguments {
 ///
 /// # Errors
 /// Impossible options, a log of another sweep, or an output that cannot be written.
-pub fn run(arguments: &ConvergeArguments, terminal: &Terminal) -> Result<(), Failure> {
+pub fn run(arguments: &ConvergeArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     if arguments.efficiency {
         let table = converge::efficiency(&arguments.options(), &arguments.out, terminal)?;
+        run.write(&arguments.out.join(RUN_FILE), &[])?;
         if arguments.json {
             return json::print(&table);
         }
@@ -153,6 +155,7 @@ pub fn run(arguments: &ConvergeArguments, terminal: &Terminal) -> Result<(), Fai
         arguments.force,
         terminal,
     )?;
+    run.write(&arguments.out.join(RUN_FILE), &[])?;
     if arguments.json {
         return json::print_text(&swept.json);
     }

@@ -1,6 +1,7 @@
 //! `tunnelstitch convert`: poses in another format.
 
 use super::poses::PosesArgument;
+use super::record::{self, RUN_FILE, Run};
 use super::{Failure, Terminal};
 use crate::atomic::{self, StagedFolder, WriteError};
 use crate::camera::ColmapCamera;
@@ -51,10 +52,12 @@ enum ToArgument {
 ///
 /// # Errors
 /// [`Failure`] for everything wrong with the survey, the poses or the output.
-pub fn run(arguments: &ConvertArguments, terminal: &Terminal) -> Result<(), Failure> {
+pub fn run(arguments: &ConvertArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
     let out = &arguments.out;
     check_apart(&survey, out)?;
+    let others: Vec<&Path> = arguments.poses.file().into_iter().collect();
+    let inputs = record::inputs(&survey, &others)?;
     let has_names = !matches!(arguments.to, ToArgument::Tum | ToArgument::Kitti);
     if let Some(frame) = survey
         .frames
@@ -83,6 +86,7 @@ pub fn run(arguments: &ConvertArguments, terminal: &Terminal) -> Result<(), Fail
         }
         ToArgument::Colmap => {
             write_colmap(out, &camera, &of_survey(), &trajectory)?;
+            run.write(&out.join(RUN_FILE), &inputs)?;
             terminal.say(format!(
                 "wrote {} poses to {}",
                 trajectory.len(),
@@ -93,6 +97,7 @@ pub fn run(arguments: &ConvertArguments, terminal: &Terminal) -> Result<(), Fail
     };
     super::stitch::parent_folder(out)?;
     atomic::write_text(out, &text)?;
+    run.write(&record::beside(out), &inputs)?;
     terminal.say(format!(
         "wrote {} poses to {}",
         trajectory.len(),
@@ -118,7 +123,8 @@ fn write_colmap(
     if out.exists() {
         let entries = std::fs::read_dir(out).map_err(|error| WriteError::new(out, error))?;
         let is_ours = |entry: std::io::Result<std::fs::DirEntry>| {
-            entry.is_ok_and(|entry| MODEL.iter().any(|name| entry.file_name() == *name))
+            let mut ours = MODEL.iter().chain([&RUN_FILE]);
+            entry.is_ok_and(|entry| ours.any(|name| entry.file_name() == *name))
         };
         if !entries.into_iter().all(is_ours) {
             return Err(Failure::usage(format!(

@@ -1,9 +1,10 @@
 //! `tunnelstitch demo`: the whole job on a simulated survey.
 
 use super::compare::{compare_poses, write_comparison};
+use super::record::{RUN_FILE, Run};
 use super::refine::{refine_into, summarise};
 use super::report::report_into;
-use super::{Failure, Terminal, command_line, json};
+use super::{Failure, Terminal, json};
 use crate::atomic;
 use crate::refine::RefineOptions;
 use crate::render::{Interpolation, Layout};
@@ -41,7 +42,7 @@ pub struct DemoArguments {
 ///
 /// # Errors
 /// An output that cannot be written.
-pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Failure> {
+pub fn run(arguments: &DemoArguments, run: &Run, terminal: &Arc<Terminal>) -> Result<(), Failure> {
     let since = Instant::now();
     let say = |text: String| {
         if !arguments.json {
@@ -73,7 +74,14 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
     ));
     let refine_options = RefineOptions::default();
     let survey = Survey::open(&survey_folder)?;
-    let (refined, _) = refine_into(&survey, &refine_options, &refined_folder, None, terminal)?;
+    let (refined, _) = refine_into(
+        &survey,
+        &refine_options,
+        &refined_folder,
+        run,
+        None,
+        terminal,
+    )?;
     if !arguments.json {
         summarise(&refined, terminal);
     }
@@ -97,7 +105,7 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
         refined,
         comparison: &comparison,
         drawings: &drawings,
-        command: command_line(),
+        command: run.arguments.clone(),
     };
     report_into(sources, &report_folder, terminal)?;
     let json = write_comparison(
@@ -109,6 +117,7 @@ pub fn run(arguments: &DemoArguments, terminal: &Arc<Terminal>) -> Result<(), Fa
         &compare_folder,
         terminal,
     )?;
+    run.write(&arguments.out.join(RUN_FILE), &[])?;
     if arguments.json {
         return json::print_text(&json);
     }

@@ -1,13 +1,15 @@
 //! `tunnelstitch export`: the wall for programs that show it in three dimensions.
 
 use super::poses::PosesArgument;
+use super::record::{self, RUN_FILE, Run};
 use super::stitch::parent_folder;
 use super::textured::{LayerName, LayersArguments, TextureArguments};
 use super::{Failure, Terminal, json};
 use crate::atomic::{StagedFolder, WriteError};
 use crate::inspect::{GlbTarget, MANIFEST, MARKS_CSV, MARKS_GEOJSON, TILESET, TilesFolder, Viewer};
 use crate::render::{Canvas, Target};
-use crate::trajectory::poses_of;
+use crate::survey::Survey;
+use crate::trajectory::{Pose, Trajectory, poses_of};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -70,16 +72,25 @@ struct Report<'a> {
 ///
 /// # Errors
 /// [`Failure`] for everything wrong with the survey, the poses or the output.
-pub fn run(arguments: &ExportArguments, terminal: &Terminal) -> Result<(), Failure> {
+pub fn run(arguments: &ExportArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     check(arguments)?;
+    let (survey, given) = arguments.poses.open(&arguments.survey, terminal)?;
+    let others: Vec<&Path> = arguments.poses.file().into_iter().collect();
+    let inputs = record::inputs(&survey, &others)?;
     let canvas = match arguments.glb.is_some() || arguments.tiles.is_some() {
-        true => Some(files(arguments, terminal)?),
+        true => Some(files(arguments, &survey, &poses_of(&given), terminal)?),
         false => None,
     };
     let layers = match &arguments.web {
-        Some(folder) => web(arguments, folder, terminal)?,
+        Some(folder) => web(arguments, folder, (survey, given), terminal)?,
         None => Vec::new(),
     };
+    if let Some(glb) = &arguments.glb {
+        run.write(&record::beside(glb), &inputs)?;
+    }
+    for folder in arguments.tiles.iter().chain(&arguments.web) {
+        run.write(&folder.join(RUN_FILE), &inputs)?;
+    }
     if arguments.json {
         return json::print(&Report {
             glb: arguments.glb.as_deref(),
@@ -148,11 +159,15 @@ fn check_replaceable(folder: &Path, file: &str) -> Result<(), Failure> {
 }
 
 /// Writes `--glb` and `--3dtiles` from one panorama.
-fn files(arguments: &ExportArguments, terminal: &Terminal) -> Result<Canvas, Failure> {
-    let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
+fn files(
+    arguments: &ExportArguments,
+    survey: &Survey,
+    poses: &[Pose],
+    terminal: &Terminal,
+) -> Result<Canvas, Failure> {
     let surface = survey.surface.as_ref();
     let textures = &arguments.textures;
-    let mut stitch = textures.stitch(&survey, &poses_of(&trajectory), &survey.shutter())?;
+    let mut stitch = textures.stitch(survey, poses, &survey.shutter())?;
     let (canvas, format, quality) = (*stitch.canvas(), stitch.frames().format(), textures.quality);
     let mut single = match &arguments.glb {
         Some(path) => Some(GlbTarget::new(surface, &canvas, format, path, quality)?),
@@ -190,10 +205,11 @@ fn files(arguments: &ExportArguments, terminal: &Terminal) -> Result<Canvas, Fai
 fn web(
     arguments: &ExportArguments,
     folder: &Path,
+    opened: (Survey, Trajectory),
     terminal: &Terminal,
 ) -> Result<Vec<LayerName>, Failure> {
     let layers = &arguments.layers;
-    let (survey, all) = layers.open(&arguments.survey, &arguments.poses, terminal)?;
+    let (survey, all) = layers.of(&arguments.survey, &arguments.poses, opened)?;
     let staged = StagedFolder::begin(folder)?;
     layers.draw(
         (&survey, &all),

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::stitch::positive;
-use crate::survey::{Footage, read_frame_times};
+use crate::survey::{Footage, read_frame_times, toml_path};
 use std::path::{Path, PathBuf};
 
 /// When the frames were taken [default: as the survey tells].
@@ -76,6 +76,14 @@ impl FrameTimesArguments {
             )));
         }
         Ok(FrameTimes { times_s, is_clock })
+    }
+}
+
+impl FrameTimesArguments {
+    /// The files that tell the times.
+    pub fn files(&self, survey: Option<&Path>) -> Vec<PathBuf> {
+        let survey = survey.map(toml_path);
+        survey.into_iter().chain(self.frame_times.clone()).collect()
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::carrier::{MountingArguments, WayArguments, numbers};
 use super::frame_times::FrameTimesArguments;
+use super::record::{self, Run};
 use super::stitch::{parent_folder, positive};
 use super::suggestion::{Suggestion, SuggestionArguments};
 use super::{Failure, Terminal};
@@ -145,7 +146,7 @@ impl SensorArguments {
 ///
 /// # Errors
 /// [`Failure`] for everything wrong with the log, the frames, the plan or the output.
-pub fn run(arguments: &GyroArguments, terminal: &Terminal) -> Result<(), Failure> {
+pub fn run(arguments: &GyroArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     let times = arguments.times.find(arguments.survey.as_deref())?;
     let sensor = &arguments.sensor;
     let stations = arguments.way.stations(Rate::PerFrame(0.0), &times)?;
@@ -190,6 +191,15 @@ pub fn run(arguments: &GyroArguments, terminal: &Terminal) -> Result<(), Failure
     }
     parent_folder(&arguments.out)?;
     atomic::write_text(&arguments.out, &tum::format(&baseline.trajectory))?;
+    let inputs = arguments.times.files(arguments.survey.as_deref());
+    let others = arguments
+        .way
+        .file()
+        .into_iter()
+        .chain(&sensor.body_to_camera);
+    let inputs = inputs.iter().chain(others).chain([&arguments.log]);
+    let inputs = record::files(inputs.map(AsRef::as_ref))?;
+    run.write(&record::beside(&arguments.out), &inputs)?;
     describe(arguments, &log, &baseline, terminal);
     let prior = PriorSection {
         model: JitterModel::RandomWalk,

@@ -2,6 +2,7 @@
 
 use super::carrier::{MountingArguments, WayArguments, numbers};
 use super::frame_times::FrameTimesArguments;
+use super::record::{self, Run};
 use super::stitch::{parent_folder, positive};
 use super::suggestion::{Suggestion, SuggestionArguments};
 use super::{Failure, Terminal};
@@ -60,7 +61,7 @@ pub struct PlanArguments {
 ///
 /// # Errors
 /// [`Failure`] for everything wrong with the plan, the frames or the output.
-pub fn run(arguments: &PlanArguments, terminal: &Terminal) -> Result<(), Failure> {
+pub fn run(arguments: &PlanArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     let frames = arguments.times.find(arguments.survey.as_deref())?;
     let turn_rad = match arguments.turn_deg_per_s {
         Some(rate) => {
@@ -86,6 +87,9 @@ pub fn run(arguments: &PlanArguments, terminal: &Terminal) -> Result<(), Failure
         .collect();
     parent_folder(&arguments.out)?;
     atomic::write_text(&arguments.out, &tum::format(&trajectory))?;
+    let inputs = arguments.times.files(arguments.survey.as_deref());
+    let inputs = record::files(inputs.iter().chain(arguments.way.file()).map(AsRef::as_ref))?;
+    run.write(&record::beside(&arguments.out), &inputs)?;
     if let (Some(first), Some(last)) = (stations.first(), stations.last()) {
         terminal.say(format!(
             "wrote {} poses to {}: chainage {:.3} to {:.3} m, angle {:.2} to {:.2}°",

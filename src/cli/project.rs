@@ -1,5 +1,6 @@
 //! `tunnelstitch project`: the cylindrical projection of one photo.
 
+use super::record::{self, Run};
 use super::stitch::{InterpolationArgument, picture_output, positive};
 use super::{Failure, Terminal};
 use crate::camera::{Camera, read_calibration};
@@ -47,7 +48,7 @@ fn field_of_view(text: &str) -> Result<f64, String> {
 /// # Errors
 /// [`Failure`] for an unreadable photo or calibration, a photo of another size than the calibration's, and
 /// an output that cannot be written.
-pub fn run(arguments: &ProjectArguments, terminal: &Terminal) -> Result<(), Failure> {
+pub fn run(arguments: &ProjectArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     let format = picture_output(&arguments.out)?;
     let camera = match &arguments.camera {
         Some(path) => read_calibration(path, None)?,
@@ -57,6 +58,9 @@ pub fn run(arguments: &ProjectArguments, terminal: &Terminal) -> Result<(), Fail
     let photo = Picture::from_decoded(load_colour(&file, camera.width, camera.height)?);
     let result = cylinder::project(&photo, &camera, arguments.interpolation.into());
     write_picture(&arguments.out, &result.image, format)?;
+    let inputs = [&arguments.image].into_iter().chain(&arguments.camera);
+    let inputs = record::files(inputs.map(AsRef::as_ref))?;
+    run.write(&record::beside(&arguments.out), &inputs)?;
     terminal.say(format!(
         "{}: {} × {} px, first pixel at û = {}, v̂ = {}",
         arguments.out.display(),

@@ -2,12 +2,12 @@
 
 use super::Failure;
 use super::configuration::{EffectiveOption, Source};
-use crate::provenance::{self, Input};
+use crate::provenance::{self, HashError, Input};
 use crate::survey::Survey;
 use crate::{PROGRAM, atomic};
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The run of a command.
 pub struct Run {
@@ -54,21 +54,36 @@ impl Run {
     }
 }
 
+/// The name of the record of a result that is one file: its own with `.run.toml` added.
+pub fn beside(result: &Path) -> PathBuf {
+    let mut name = result.as_os_str().to_owned();
+    name.push(".");
+    name.push(RUN_FILE);
+    name.into()
+}
+
 /// Hashes of everything that `survey` is made of, and of `others`.
 ///
 /// # Errors
 /// An input that cannot be read.
 pub fn inputs(survey: &Survey, others: &[&Path]) -> Result<Vec<Input>, Failure> {
-    let own = survey
-        .own_files()
-        .iter()
-        .map(|file| provenance::input(file));
-    let others = others.iter().map(|file| provenance::input(file));
-    let inputs: Result<Vec<Input>, _> = own
-        .chain(others)
-        .chain([provenance::frames(&survey.frames)])
-        .collect();
-    inputs.map_err(|error| Failure::input(error.to_string()))
+    let own = survey.own_files().iter().map(PathBuf::as_path);
+    let mut inputs = files(own.chain(others.iter().copied()))?;
+    inputs.push(provenance::frames(&survey.frames).map_err(unreadable)?);
+    Ok(inputs)
+}
+
+/// Hashes of files.
+///
+/// # Errors
+/// One that cannot be read.
+pub fn files<'a>(files: impl IntoIterator<Item = &'a Path>) -> Result<Vec<Input>, Failure> {
+    let inputs = files.into_iter().map(provenance::input);
+    inputs.collect::<Result<_, _>>().map_err(unreadable)
+}
+
+fn unreadable(error: HashError) -> Failure {
+    Failure::input(error.to_string())
 }
 
 /// Options as `survey.toml` takes them; those without a value are left out.

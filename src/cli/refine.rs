@@ -3,7 +3,7 @@
 use super::poses::ReadingArguments;
 use super::record::{self, RUN_FILE, Run};
 use super::resume::{self, ResumeArguments};
-use super::{Failure, Terminal, command_line, json};
+use super::{Failure, Terminal, json};
 use crate::PROGRAM;
 use crate::atomic;
 use crate::camera::format_calibration;
@@ -90,7 +90,7 @@ struct ReportFile<'a> {
     /// Name and version of the program.
     program: &'static str,
     /// The command line.
-    command: Vec<String>,
+    command: &'a [String],
     /// The survey as given, and what its survey.toml says.
     survey: &'a Path,
     survey_file: &'a SurveyFile,
@@ -135,6 +135,7 @@ pub fn run(
             &survey,
             &options,
             &arguments.out,
+            run,
             Some(checkpoint),
             terminal,
         )?;
@@ -183,6 +184,7 @@ pub fn refine_into(
     survey: &Survey,
     options: &RefineOptions,
     out: &Path,
+    run: &Run,
     checkpoint: Option<&mut Checkpoint>,
     terminal: &Arc<Terminal>,
 ) -> Result<(Refined, String), Failure> {
@@ -199,7 +201,7 @@ pub fn refine_into(
     let refined = refine_keeping(survey, options, checkpoint, &progress)?;
     let json = json::text(&ReportFile {
         program: PROGRAM,
-        command: command_line(),
+        command: &run.arguments,
         survey: &survey.folder,
         survey_file: &survey.file,
         options,

@@ -1,13 +1,14 @@
 //! `tunnelstitch report`: one page about a refined survey.
 
 use super::compare::compare_poses;
+use super::poses::ReadingArguments;
+use super::record::{self, RUN_FILE, Run};
 use super::stitch::positive;
-use super::{Failure, Terminal, command_line, json};
+use super::{Failure, Terminal, json};
 use crate::atomic::{self, StagedFolder};
 use crate::progress::Progress;
 use crate::render::Interpolation;
 use crate::report::{self, PICTURES, RefinedFiles, Report, Sources};
-use crate::survey::Survey;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -21,7 +22,7 @@ pub struct ReportArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
     /// What refine has written: its folder, or the poses (TUM) in it. Other poses will do; then the page says nothing of how
-    /// they were found.
+    /// they were found. The flags for reading poses are about those of the survey.
     #[arg(long, value_name = "DIR|FILE")]
     refined: PathBuf,
     /// Folder for the report; made if missing.
@@ -34,34 +35,40 @@ pub struct ReportArguments {
     /// Print report.json on standard output instead of where it is.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    reading: ReadingArguments,
 }
 
 /// Runs the command.
 ///
 /// # Errors
 /// [`Failure`] for everything wrong with the survey, the poses, what refine has written, or the output.
-pub fn run(arguments: &ReportArguments, terminal: &Terminal) -> Result<(), Failure> {
-    let survey = Survey::open(&arguments.survey)?;
+pub fn run(arguments: &ReportArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
+    let survey = arguments.reading.open(&arguments.survey, terminal)?;
     let refined = RefinedFiles::read(&survey, &arguments.refined)?;
     let px_per_metre = match arguments.px_per_metre {
         Some(px_per_metre) => Some(px_per_metre),
         None => report::resolution(&survey, &refined.poses)?,
     };
-    let (comparison, drawings) = compare_poses(
+    let (comparison, drawings) = &compare_poses(
         &survey,
         &refined.poses,
         px_per_metre,
         Interpolation::default(),
         terminal,
     )?;
+    let files = refined.files();
+    let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
+    let inputs = record::inputs(&survey, &files)?;
     let sources = Sources {
         survey: &survey,
         refined,
-        comparison: &comparison,
-        drawings: &drawings,
-        command: command_line(),
+        comparison,
+        drawings,
+        command: run.arguments.clone(),
     };
     let (report, json) = report_into(sources, &arguments.out, terminal)?;
+    run.write(&arguments.out.join(RUN_FILE), &inputs)?;
     if arguments.json {
         return json::print_text(&json);
     }

@@ -1,6 +1,7 @@
 //! `tunnelstitch simulate`: a survey of a tunnel that never was.
 
 use super::hardships::HardshipArguments;
+use super::record::{self, RUN_FILE, Run};
 use super::stitch::positive;
 use super::tunnel::TunnelArguments;
 use super::{Failure, Terminal, json};
@@ -284,7 +285,7 @@ impl SimulateArguments {
 ///
 /// # Errors
 /// Impossible options, or an output that cannot be written.
-pub fn run(arguments: &SimulateArguments, terminal: &Terminal) -> Result<(), Failure> {
+pub fn run(arguments: &SimulateArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     if arguments.turns.is_some() && arguments.turn_deg == 0.0 {
         return Err(Failure::usage(
             "--turns needs a --turn-deg other than 0; or give a number of --frames",
@@ -292,6 +293,13 @@ pub fn run(arguments: &SimulateArguments, terminal: &Terminal) -> Result<(), Fai
     }
     let options = arguments.options()?;
     let simulated = simulate::run(&options, &arguments.out, arguments.force, terminal)?;
+    let inputs = [
+        &arguments.camera,
+        &arguments.texture,
+        &options.tunnel.centreline,
+    ];
+    let inputs = record::files(inputs.into_iter().flatten().map(AsRef::as_ref))?;
+    run.write(&arguments.out.join(RUN_FILE), &inputs)?;
     if arguments.json {
         return json::print(&simulated);
     }

@@ -10,7 +10,7 @@ use crate::inspect::{
 };
 use crate::render::{RenderOptions, Stitch, StitchOptions};
 use crate::survey::Survey;
-use crate::trajectory::{Pose, Shutter, poses_of};
+use crate::trajectory::{Pose, Shutter, Trajectory, poses_of};
 use clap::ValueEnum;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -121,17 +121,16 @@ pub struct Poses {
 }
 
 impl LayersArguments {
-    /// Opens a survey with all layers that are wanted, in the order given; by default the refined ones first.
+    /// All layers that are wanted of the survey at `path`, in the order given; by default the refined ones first. It has been opened with `poses`.
     ///
     /// # Errors
-    /// Everything that can be wrong with the survey and the poses; a layer that is not there.
-    pub fn open(
+    /// A layer that is not there.
+    pub fn of(
         &self,
         path: &Path,
         poses: &PosesArgument,
-        terminal: &Terminal,
+        (mut survey, given): (Survey, Trajectory),
     ) -> Result<(Survey, Vec<Poses>), Failure> {
-        let (mut survey, given) = poses.open(path, terminal)?;
         let mut all = Vec::new();
         if poses.file().is_some() {
             all.push(Poses {

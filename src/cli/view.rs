@@ -59,7 +59,8 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
         Some(refined) if arguments.poses.file().is_none() => refined,
         _ => (arguments.survey.clone(), arguments.poses.clone()),
     };
-    let (survey, layers) = arguments.layers.open(&survey, &poses, terminal)?;
+    let opened = poses.open(&survey, terminal)?;
+    let (survey, layers) = arguments.layers.of(&survey, &poses, opened)?;
     let marks = Marks::open(&survey.folder)?;
     let scratch = ScratchFolder::inside(&std::env::temp_dir())?;
     arguments.layers.draw(

@@ -122,9 +122,11 @@ impl FrameFile {
     pub fn size(&self) -> Result<(u32, u32), FrameError> {
         match &self.video {
             Some((video, _)) => Ok(video.size()),
-            None => {
-                image::image_dimensions(&self.path).map_err(|error| self.fault(error.to_string()))
-            }
+            None => image::ImageReader::open(&self.path)
+                .and_then(image::ImageReader::with_guessed_format)
+                .map_err(image::ImageError::from)
+                .and_then(image::ImageReader::into_dimensions)
+                .map_err(|error| self.fault(error.to_string())),
         }
     }
 
@@ -184,33 +186,34 @@ pub fn list(
 /// # Errors
 /// A missing, truncated or unknown file; a size other than `(width, height)`.
 pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicImage, FrameError> {
-    let picture = match &file.video {
-        Some((video, picture)) => video.decode(*picture),
-        None => decode(&file.path),
-    };
-    let picture = picture.map_err(|what| file.fault(what))?;
-    if (picture.width(), picture.height()) != (width, height) {
-        return Err(FrameError::Size {
+    let check = |found: (u32, u32)| match found == (width, height) {
+        true => Ok(()),
+        false => Err(FrameError::Size {
             index: file.index,
             path: file.path.clone(),
-            width: picture.width(),
-            height: picture.height(),
+            width: found.0,
+            height: found.1,
             expected_width: width,
             expected_height: height,
-        });
+        }),
+    };
+    let fail = |what: String| file.fault(what);
+    if let Some((video, picture)) = &file.video {
+        check(video.size())?;
+        return video.decode(*picture).map_err(fail);
     }
-    Ok(picture)
-}
-
-fn decode(path: &Path) -> Result<DynamicImage, String> {
-    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
+    let bytes = std::fs::read(&file.path).map_err(|error| fail(error.to_string()))?;
     if bytes.starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(&bytes) {
-        return Err("the JPEG file is truncated".to_owned());
+        return Err(fail("the JPEG file is truncated".to_owned()));
     }
-    let reader = image::ImageReader::new(std::io::Cursor::new(bytes))
+    let decoder = image::ImageReader::new(std::io::Cursor::new(bytes))
         .with_guessed_format()
-        .map_err(|error| error.to_string())?;
-    reader.decode().map_err(|error| error.to_string())
+        .map_err(|error| fail(error.to_string()))?
+        .into_decoder()
+        .map_err(|error| fail(error.to_string()))?;
+    // Before there is room made for as many pixels as a header may claim.
+    check(decoder.dimensions())?;
+    DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))
 }
 
 /// What the pixels of a frame are, by its file's header.
@@ -236,4 +239,26 @@ pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
 fn jpeg_is_complete(bytes: &[u8]) -> bool {
     let end = bytes.len().saturating_sub(4096);
     bytes[end..].windows(2).any(|pair| pair == [0xff, 0xd9])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::Mask;
+
+    /// The beginning of a PNG file that says to be one of 60000 × 60000 pixels.
+    const BOAST: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\xea`\0\0\xea`\x08\0\0\0\0\xa5\xb9*\x9e\0\0\0\x09IDATx\x9cc\0\0\0\x01\0\x01^\xff}\xf9";
+
+    #[test]
+    fn no_room_is_made_for_what_only_a_header_claims() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("boast.png");
+        std::fs::write(&path, BOAST).unwrap();
+        let frame = FrameFile::picture(0, path.clone());
+        assert_eq!(frame.size().unwrap(), (60000, 60000));
+        let refused = load_colour(&frame, 32, 24).unwrap_err();
+        assert!(matches!(refused, FrameError::Size { .. }), "{refused}");
+        let refused = Mask::read(&path, 32, 24).unwrap_err().to_string();
+        assert!(refused.contains("60000 × 60000 px"), "{refused}");
+    }
 }

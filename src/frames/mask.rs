@@ -2,7 +2,7 @@
 
 use super::{FrameError, GreyImage};
 use crate::camera::Camera;
-use image::GenericImageView;
+use image::{DynamicImage, ImageDecoder};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -37,23 +37,26 @@ impl Mask {
             path: path.to_owned(),
             what,
         };
-        let picture = image::ImageReader::open(path)
+        let undecodable =
+            |error: image::ImageError| fail(format!("{error}; save it as a PNG file"));
+        let decoder = image::ImageReader::open(path)
             .and_then(image::ImageReader::with_guessed_format)
             .map_err(|error| {
                 fail(format!(
                     "{error}; draw a mask, or take frames.mask out of survey.toml"
                 ))
-            })?;
-        let picture = picture
-            .decode()
-            .map_err(|error| fail(format!("{error}; save it as a PNG file")))?;
-        if picture.dimensions() != (width, height) {
+            })?
+            .into_decoder()
+            .map_err(undecodable)?;
+        // Before there is room made for as many pixels as a header may claim.
+        let found = decoder.dimensions();
+        if found != (width, height) {
             return Err(fail(format!(
                 "{} × {} px, but the frames have {width} × {height} px; a mask is a picture of the frames' size",
-                picture.width(),
-                picture.height()
+                found.0, found.1
             )));
         }
+        let picture = DynamicImage::from_decoder(decoder).map_err(undecodable)?;
         if picture.to_rgba8().pixels().any(|pixel| pixel.0[3] != 255) {
             return Err(fail(
                 "has transparent pixels; save it without transparency, black where no wall is to be seen and white elsewhere"

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 /// The format of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +36,8 @@ pub struct DziWriter {
     folder: StagedFolder,
     /// Tiles written.
     written: u64,
+    /// Those of them that may not be on the disk yet.
+    unsynced: Mutex<Vec<PathBuf>>,
 }
 
 /// How far a [`DziWriter`] has come whose tiles wait in a folder that stays.
@@ -77,12 +80,19 @@ impl DziWriter {
         Ok(writer)
     }
 
-    /// How far it has come.
-    pub fn state(&self) -> DziState<'_> {
-        DziState {
+    /// How far it has come; all of that is on the disk.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn state(&self) -> Result<DziState<'_>, WriteError> {
+        let fail = |source| WriteError::new(self.folder.path(), source);
+        let mut unsynced = self.unsynced.lock().unwrap_or_else(PoisonError::into_inner);
+        atomic::sync_files(&unsynced).map_err(fail)?;
+        unsynced.clear();
+        Ok(DziState {
             waiting: Cow::Borrowed(self.pyramid.waiting()),
             written: self.written,
-        }
+        })
     }
 
     fn with(
@@ -123,6 +133,7 @@ impl DziWriter {
             levels,
             folder,
             written: 0,
+            unsynced: Mutex::default(),
         })
     }
 
@@ -133,8 +144,15 @@ impl DziWriter {
     /// system says.
     pub fn add(&mut self, batch: Vec<RasterTile>) -> Result<(), RasterError> {
         let complete = self.pyramid.add(batch)?;
-        complete.par_iter().try_for_each(|tile| self.write(tile))?;
-        self.written += complete.len() as u64;
+        let written: Vec<PathBuf> = complete
+            .par_iter()
+            .map(|tile| self.write(tile))
+            .collect::<Result<_, _>>()?;
+        self.written += written.len() as u64;
+        let unsynced = self.unsynced.get_mut();
+        unsynced
+            .unwrap_or_else(PoisonError::into_inner)
+            .extend(written);
         Ok(())
     }
 
@@ -159,8 +177,8 @@ impl DziWriter {
         Ok(())
     }
 
-    /// Writes a tile, as much of it as is within the picture.
-    fn write(&self, LevelTile { level, tile }: &LevelTile) -> Result<(), WriteError> {
+    /// Writes a tile, as much of it as is within the picture; its name.
+    fn write(&self, LevelTile { level, tile }: &LevelTile) -> Result<PathBuf, WriteError> {
         let RasterTile {
             column,
             row,
@@ -179,7 +197,8 @@ impl DziWriter {
         };
         encoded
             .and_then(|bytes| std::fs::write(&path, bytes))
-            .map_err(|source| WriteError::new(&path, source))
+            .map_err(|source| WriteError::new(&path, source))?;
+        Ok(path)
     }
 }
 

@@ -18,7 +18,7 @@ use std::f64::consts::SQRT_2;
 /// Pixels of the canvas along each side of a patch.
 pub const PATCH: usize = 32;
 /// From pixels to the patch's coordinates.
-const SCALE: f32 = 2.0 / PATCH as f32;
+pub const SCALE: f32 = 2.0 / PATCH as f32;
 /// Error of a polynomial at the most, pixels of the frame.
 const MOST_OFF_PX: f32 = 1e-3;
 /// Points of a patch along each side, the last of which are the next one's first; those at 0 are checked, the others fitted.
@@ -72,7 +72,7 @@ impl Lattice {
 }
 
 /// Powers of x with u's coefficients, then with v's: side by side, they are one vector.
-type Lanes = [f32; 8];
+pub type Lanes = [f32; 8];
 
 #[derive(Clone, Copy, Debug)]
 enum Patch {
@@ -146,30 +146,40 @@ impl Chart {
         }
     }
 
-    /// How far u and v move from one canvas pixel to the next, along its row and along its column; None where pixels are to be projected
-    /// one by one.
-    pub fn steps(&self, row: usize, column: usize) -> Option<[[f32; 2]; 2]> {
-        let patch = &self.patches[row / PATCH * self.across + column / PATCH];
-        let Patch::Smooth(c) = patch else {
+    /// Where the pixels of a smooth patch lie, to be sure: between these, along u and along v.
+    pub fn range(&self, patch: usize) -> Option<[[f32; 2]; 2]> {
+        let Patch::Smooth(c) = &self.patches[patch] else {
             return None;
         };
-        let x = (column % PATCH) as f32 * SCALE - 1.0;
-        let y = (row % PATCH) as f32 * SCALE - 1.0;
-        // By powers of x, and their slopes along y.
-        let (mut at, mut down) = (c[3], [0.0; 8]);
-        for c in [&c[2], &c[1], &c[0]] {
-            for k in 0..8 {
-                down[k] = down[k] * y + at[k];
-                at[k] = at[k] * y + c[k];
-            }
+        // All powers of x and y are at most 1.
+        Some([0, 4].map(|first| {
+            let all = || c.iter().flat_map(|c| &c[first..first + 4]);
+            let middle = c[0][first];
+            let around = all().map(|c| c.abs()).sum::<f32>() - middle.abs();
+            [middle - around, middle + around]
+        }))
+    }
+
+    /// The patch of a pixel of the tile.
+    #[inline(always)]
+    pub fn patch(&self, row: usize, column: usize) -> usize {
+        row / PATCH * self.across + column / PATCH
+    }
+
+    /// Number of patches.
+    pub fn len(&self) -> usize {
+        self.patches.len()
+    }
+
+    /// How far u and v move from one canvas pixel to the next in the middle of a smooth patch, along its row and along its column.
+    pub fn steps(&self, patch: usize) -> Option<[[f32; 2]; 2]> {
+        match &self.patches[patch] {
+            Patch::Smooth(c) => Some([
+                [SCALE * c[0][1], SCALE * c[0][5]],
+                [SCALE * c[1][0], SCALE * c[1][4]],
+            ]),
+            _ => None,
         }
-        let mut steps = [[0.0; 2]; 2];
-        for (k, first) in [0, 4].into_iter().enumerate() {
-            let (p, q) = (&at[first..first + 4], &down[first..first + 4]);
-            steps[0][k] = SCALE * ((3.0 * p[3] * x + 2.0 * p[2]) * x + p[1]);
-            steps[1][k] = SCALE * (((q[3] * x + q[2]) * x + q[1]) * x + q[0]);
-        }
-        Some(steps)
     }
 
     /// True if no pixel of the tile lies in the frame.
@@ -186,6 +196,22 @@ impl Chart {
             .any(|patch| matches!(patch, Patch::Rough))
     }
 
+    /// Where the pixels of a row of a smooth patch appear, by powers of x; `row`: of the tile.
+    #[inline(always)]
+    pub fn line(&self, row: usize, patch: usize) -> Option<Lanes> {
+        let Patch::Smooth(c) = &self.patches[patch] else {
+            return None;
+        };
+        let y = (row % PATCH) as f32 * SCALE - 1.0;
+        let mut at = c[3];
+        for c in [&c[2], &c[1], &c[0]] {
+            for k in 0..at.len() {
+                at[k] = at[k] * y + c[k];
+            }
+        }
+        Some(at)
+    }
+
     /// Finds where the pixels of the tile's `row` appear, those of the patch that covers `columns` (of u and v) from `patch`
     /// times [`PATCH`] on. False if they are to be projected one by one.
     #[inline(always)]
@@ -196,29 +222,18 @@ impl Chart {
         u: &mut [f32; PATCH],
         v: &mut [f32; PATCH],
     ) -> bool {
-        match &self.patches[row / PATCH * self.across + patch] {
-            Patch::Smooth(c) => {
-                let y = (row % PATCH) as f32 * SCALE - 1.0;
-                let mut at = c[3];
-                for c in [&c[2], &c[1], &c[0]] {
-                    for k in 0..at.len() {
-                        at[k] = at[k] * y + c[k];
-                    }
-                }
-                for k in 0..PATCH {
-                    let x = k as f32 * SCALE - 1.0;
-                    u[k] = ((at[3] * x + at[2]) * x + at[1]) * x + at[0];
-                    v[k] = ((at[7] * x + at[6]) * x + at[5]) * x + at[4];
-                }
-                true
+        let patch = row / PATCH * self.across + patch;
+        if let Some(at) = self.line(row, patch) {
+            for k in 0..PATCH {
+                let x = k as f32 * SCALE - 1.0;
+                u[k] = ((at[3] * x + at[2]) * x + at[1]) * x + at[0];
+                v[k] = ((at[7] * x + at[6]) * x + at[5]) * x + at[4];
             }
-            Patch::Outside => {
-                u.fill(-OUTSIDE_PX);
-                v.fill(-OUTSIDE_PX);
-                true
-            }
-            Patch::Rough => false,
+            return true;
         }
+        u.fill(-OUTSIDE_PX);
+        v.fill(-OUTSIDE_PX);
+        matches!(self.patches[patch], Patch::Outside)
     }
 }
 

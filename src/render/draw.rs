@@ -395,17 +395,15 @@ impl<const C: usize> Brush<'_, C> {
             covered = share.to;
             let columns = share.from..share.to;
             let own = &mut pixels[columns.start * step..columns.end * step];
+            let there = &mut sources[columns.clone()];
             view.copy::<C>(self.run, points, place, columns.clone(), own);
-            let seen = &self.run.seen()[columns.clone()];
-            let frame = share.frame as u32;
-            wide(
-                #[inline(always)]
-                || {
-                    for (source, seen) in sources[columns.clone()].iter_mut().zip(seen) {
-                        *source = if *seen { frame } else { NO_FRAME };
-                    }
-                },
-            );
+            there.fill(share.frame as u32);
+            let seen = &self.run.seen()[columns];
+            if seen.contains(&false) {
+                for (source, _) in there.iter_mut().zip(seen).filter(|(_, seen)| !**seen) {
+                    *source = NO_FRAME;
+                }
+            }
         }
         pixels[covered * step..].fill(0);
         sources[covered..].fill(NO_FRAME);

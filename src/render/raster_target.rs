@@ -110,7 +110,7 @@ impl RasterTarget {
     pub fn state(&self) -> Result<RasterState<'_>, WriteError> {
         Ok(match &self.writer {
             Writer::Cog(writer) => RasterState::Cog(writer.state()?),
-            Writer::Dzi(writer) => RasterState::Dzi(writer.state()),
+            Writer::Dzi(writer) => RasterState::Dzi(writer.state()?),
         })
     }
 

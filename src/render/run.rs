@@ -1,7 +1,7 @@
 //! What a frame shows of a run of points: geometry and sampling in one pass.
 
 use super::chart::{Chart, PATCH};
-use super::integer::{self, Places, Source};
+use super::integer::{self, Places, Source, Span};
 use super::kernel::Kernel;
 use super::picture::Picture;
 use super::sample::{Sample, Samples, WHOLE};
@@ -68,6 +68,11 @@ impl Run {
     #[expect(clippy::type_complexity, reason = "parts of the run, side by side")]
     pub fn parts(&mut self) -> (&[f32; RUN], &[f32; RUN], &[bool; RUN], &mut [[f32; 4]; RUN]) {
         (&self.u, &self.v, &self.seen, &mut self.values)
+    }
+
+    /// Notes that all points of some columns are seen.
+    pub fn show(&mut self, columns: Range<usize>) {
+        self.seen[columns].fill(true);
     }
 
     /// Finds the pixels of `count` points from index `start`, one by one.
@@ -161,6 +166,23 @@ impl Run {
         }
     }
 
+    /// Looks up the values in some columns of the patch that begins with column `first`, all of it inside the picture. False without doing it
+    /// where the processor lacks the vectors for it.
+    pub fn sample_span(
+        &mut self,
+        picture: &Picture,
+        span: &Span,
+        first: usize,
+        columns: Range<usize>,
+    ) -> bool {
+        let own = columns.start - first..columns.end - first;
+        let values = &mut self.values[first..first + PATCH];
+        match picture.format().channels {
+            1 => integer::span_values::<1>(span, own, values),
+            _ => integer::span_values::<3>(span, own, values),
+        }
+    }
+
     /// Puts the values in some columns whose pixels were found before straight into `pixels`, alpha last; nothing where
     /// the frame does not show the wall.
     pub fn copy<const C: usize>(
@@ -235,10 +257,6 @@ impl Run {
             samples,
             stride: picture.width() * C,
         };
-        if columns.len() >= PATCH {
-            let ahead = (kernel.taps() + 1) * source.stride;
-            touch(samples, &self.first[columns.clone()], ahead);
-        }
         let places = Places {
             first: &self.first[columns.clone()],
             phases: [
@@ -365,20 +383,6 @@ impl Run {
             };
         }
     }
-}
-
-/// Reads what is `ahead` of the samples, so that it is in the cache when the next row needs it.
-fn touch(samples: &[u8], first: &[u32], ahead: usize) {
-    /// Pixels of a cache line, about.
-    const LINE: usize = 16;
-    let mut sum = 0;
-    for first in first.chunks(LINE) {
-        sum ^= samples
-            .get(first[0] as usize + ahead)
-            .copied()
-            .unwrap_or_default();
-    }
-    std::hint::black_box(sum);
 }
 
 /// The patches that some columns lie in.

@@ -111,20 +111,17 @@ impl Seams {
 
     /// The frames that a tile may be drawn from, in their order.
     pub(super) fn frames_of(&self, canvas: &Canvas, tile: &Tile) -> Vec<usize> {
-        let ends = |between: &[Between]| {
-            let mut nodes: Vec<usize> = between.iter().flat_map(|b| [b.before, b.after]).collect();
-            nodes.sort_unstable();
-            nodes.dedup();
-            nodes
-        };
-        let rows: Vec<Between> = (tile.row..tile.row + tile.rows)
-            .map(|row| self.row_of(canvas, row))
-            .collect();
-        let columns = ends(&self.columns_of(canvas, tile));
+        // Nodes follow each other; around the tunnel the first comes after the last.
+        let first = self.row_of(canvas, tile.row).before;
+        let last = self.row_of(canvas, tile.row + tile.rows - 1).after;
+        let columns = self.columns_of(canvas, tile);
+        let mut across: Vec<usize> = columns.iter().map(|between| between.before).collect();
+        across.extend(columns.last().map(|between| between.after));
+        across.dedup();
         let mut frames = Vec::new();
         let mut open = false;
-        for row in ends(&rows) {
-            for column in &columns {
+        for row in first..=last {
+            for column in &across {
                 match self.frame(row, *column) {
                     NO_FRAME => open = true,
                     frame => {

@@ -1,7 +1,8 @@
 //! A frame as a tile of the canvas looks at it.
 
-use super::chart::{Chart, Lattice, Projected};
+use super::chart::{Chart, Lattice, PATCH, Projected};
 use super::exposure::Response;
+use super::integer::{self, Source, Span};
 use super::kernel::{Interpolation, Kernel};
 use super::run::Run;
 use super::sample::Samples;
@@ -28,11 +29,52 @@ impl Kernels {
         Self((0..=steps).map(kernel).collect())
     }
 
+    /// The kernel for canvas pixels that are these steps apart in a frame, u and v of each: as wide as that axis asks along which
+    /// there are more frame pixels.
+    fn for_steps(&self, [s, h]: [[f32; 2]; 2]) -> &Kernel {
+        let square = |k: usize| s[k] * s[k] + h[k] * h[k];
+        self.stretched(square(0).max(square(1)).sqrt())
+    }
+
     /// The widest kernel that is no wider than `stretch`.
     fn stretched(&self, stretch: f32) -> &Kernel {
         // The cast saturates, so that anything odd gets an end of the list.
         let step = ((f64::from(stretch) - 1.0) / STRETCH_STEP) as usize;
         &self.0[step.min(self.0.len() - 1)]
+    }
+}
+
+/// A patch of the chart in a frame.
+#[derive(Clone, Copy)]
+struct PatchView<'a> {
+    /// As wide as the frame is finer than the canvas in the middle of the patch; None where it is rough or not in the frame.
+    kernel: Option<&'a Kernel>,
+    /// True if the kernel lies within the picture all over the patch, and nothing is masked.
+    inside: bool,
+}
+
+/// What rounding may change of a coordinate, pixels.
+const ROUNDING_PX: f32 = 0.01;
+
+impl<'a> PatchView<'a> {
+    fn new(chart: &Chart, patch: usize, picture: &Picture, kernels: &'a Kernels) -> Self {
+        let (Some(steps), Some(range)) = (chart.steps(patch), chart.range(patch)) else {
+            return Self {
+                kernel: None,
+                inside: false,
+            };
+        };
+        let kernel = kernels.for_steps(steps);
+        let first = kernel.before() as f32 + ROUNDING_PX;
+        let size = [picture.width(), picture.height()];
+        let within = range.into_iter().zip(size).all(|([least, most], size)| {
+            let end = (size + kernel.before() + 1) as f32 - kernel.taps() as f32;
+            least >= first && most <= end - ROUNDING_PX
+        });
+        Self {
+            kernel: Some(kernel),
+            inside: within && picture.mask().is_none() && kernel.taps() > 1,
+        }
     }
 }
 
@@ -44,6 +86,8 @@ pub struct View<'a> {
     chart: Chart,
     picture: &'a Picture,
     kernels: &'a Kernels,
+    /// Of each patch.
+    patches: Vec<PatchView<'a>>,
     response: Response<'a>,
     /// `2/width`, `2/height` of the picture, and the last pixel centres.
     feather: [f32; 4],
@@ -63,9 +107,11 @@ impl<'a> View<'a> {
         let origin = &lattice.points().origin;
         let look = Look::new(&placement.camera(camera), &placement.pose, origin);
         let chart = Chart::new(&look, lattice, projected);
+        let patches = (0..chart.len()).map(|k| PatchView::new(&chart, k, picture, kernels));
         Self {
             frame,
             look,
+            patches: patches.collect(),
             chart,
             kernels,
             picture,
@@ -108,7 +154,7 @@ impl<'a> View<'a> {
         run.locate(&self.chart, &self.look, points, place, columns);
     }
 
-    /// The second half, for columns that were located: one kernel for all of them.
+    /// The second half, for columns that were located.
     pub fn values(
         &self,
         run: &mut Run,
@@ -116,10 +162,15 @@ impl<'a> View<'a> {
         place: (usize, usize),
         columns: Range<usize>,
     ) {
-        if let Some(kernel) = self.kernel(run, points, place, columns.clone()) {
-            run.sample(self.picture, kernel, columns.clone());
-            self.response.undo(run, columns);
+        for piece in pieces(columns.clone()) {
+            let done = self.span(place.0, &piece).is_some_and(|(span, first)| {
+                run.sample_span(self.picture, &span, first, piece.clone())
+            });
+            if !done && let Some(kernel) = self.kernel(run, points, place, piece.clone()) {
+                run.sample(self.picture, kernel, piece);
+            }
         }
+        self.response.undo(run, columns);
     }
 
     /// Whether [`View::copy`] can do it: 8 bits, more than the nearest pixel, no exposure to be undone.
@@ -137,18 +188,52 @@ impl<'a> View<'a> {
         columns: Range<usize>,
         pixels: &mut [u8],
     ) {
-        run.locate(&self.chart, &self.look, points, place, columns.clone());
-        let kernel = self.kernel(run, points, place, columns.clone());
-        match (kernel, self.picture.samples()) {
-            (Some(kernel), Samples::Eight(samples)) => {
-                run.copy::<C>(self.picture, samples, kernel, columns, pixels);
+        for piece in pieces(columns.clone()) {
+            let first = (piece.start - columns.start) * (C + 1);
+            let own = &mut pixels[first..first + piece.len() * (C + 1)];
+            let done = self.span(place.0, &piece).is_some_and(|(span, first)| {
+                run.show(piece.clone());
+                integer::span::<C>(&span, piece.start - first..piece.end - first, own)
+            });
+            if done {
+                continue;
             }
-            _ => pixels.fill(0),
+            self.locate(run, points, place, piece.clone());
+            let kernel = self.kernel(run, points, place, piece.clone());
+            match (kernel, self.picture.samples()) {
+                (Some(kernel), Samples::Eight(samples)) => {
+                    run.copy::<C>(self.picture, samples, kernel, piece, own);
+                }
+                _ => own.fill(0),
+            }
         }
     }
 
-    /// The kernel for points that were found before: as wide as the frame is finer than the canvas where it shows one of them, next to
-    /// the middle. None if it shows none.
+    // Handed back through memory it would be waited for until all that was drawn before is stored.
+    /// What is to be sampled for columns of one patch, and the patch's first column, if all of it lies inside an 8-bit frame.
+    #[inline(always)]
+    fn span(&self, row: usize, columns: &Range<usize>) -> Option<(Span<'_>, usize)> {
+        let patch = self.chart.patch(row, columns.start);
+        let PatchView {
+            kernel: Some(kernel),
+            inside: true,
+        } = self.patches[patch]
+        else {
+            return None;
+        };
+        let Samples::Eight(samples) = self.picture.samples() else {
+            return None;
+        };
+        let stride = self.picture.width() * self.picture.format().channels;
+        let span = Span {
+            source: Source { samples, stride },
+            kernel,
+            line: self.chart.line(row, patch)?,
+        };
+        Some((span, columns.start - columns.start % PATCH))
+    }
+
+    /// The kernel for points of a patch that were found before; None if the frame shows none of them.
     fn kernel(
         &self,
         run: &Run,
@@ -156,19 +241,21 @@ impl<'a> View<'a> {
         (row, width): (usize, usize),
         columns: Range<usize>,
     ) -> Option<&'a Kernel> {
+        let patch = self.chart.patch(row, columns.start);
+        if let Some(kernel) = self.patches[patch].kernel {
+            return Some(kernel);
+        }
+        // Next to the middle.
         let seen = run.seen();
         let half = columns.start + columns.len() / 2;
         let column = (half..columns.end)
             .find(|k| seen[*k])
             .or_else(|| (columns.start..half).rev().find(|k| seen[*k]))?;
-        let steps = self.chart.steps(row, column);
-        let [s, h] = steps.unwrap_or_else(|| self.exact_steps(points, (row, width), column));
-        // Frame pixels to a step of one canvas pixel, along that axis of the frame along which there are more.
-        let square = |k: usize| s[k] * s[k] + h[k] * h[k];
-        Some(self.kernels.stretched(square(0).max(square(1)).sqrt()))
+        let steps = self.exact_steps(points, (row, width), column);
+        Some(self.kernels.for_steps(steps))
     }
 
-    /// [`Chart::steps`] from one point to the next, or from the one before where a row or column ends.
+    /// How far u and v move from one point to the next, or from the one before where a row or column ends.
     fn exact_steps(
         &self,
         points: &Points,
@@ -194,4 +281,15 @@ impl<'a> View<'a> {
         let [across, down, right, bottom] = self.feather;
         (u + 0.5).min(right - u) * across * ((v + 0.5).min(bottom - v) * down)
     }
+}
+
+/// Columns of a row, patch by patch.
+fn pieces(columns: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let mut from = columns.start;
+    std::iter::from_fn(move || {
+        let to = columns.end.min((from / PATCH + 1) * PATCH);
+        let piece = from..to;
+        from = to;
+        (!piece.is_empty()).then_some(piece)
+    })
 }

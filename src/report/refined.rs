@@ -70,6 +70,10 @@ pub struct CalibratedUnknown {
     pub reason: Option<String>,
 }
 
+/// Names of what lies beside refined poses.
+const REFINEMENT: &str = "refine.json";
+const COVARIANCES: &str = "covariance.csv";
+
 /// Refined poses, and what lies beside them.
 #[derive(Debug)]
 pub struct RefinedFiles {
@@ -106,14 +110,25 @@ impl RefinedFiles {
             (own && path.is_file()).then_some(path)
         };
         let count = survey.frames.len();
-        let refinement = beside("refine.json").map(|path| read_refinement(&path, count));
-        let covariances = beside("covariance.csv").map(|path| read_covariances(&path, count));
+        let refinement = beside(REFINEMENT).map(|path| read_refinement(&path, count));
+        let covariances = beside(COVARIANCES).map(|path| read_covariances(&path, count));
         Ok(Self {
             refinement: refinement.transpose()?,
             covariances: covariances.transpose()?,
             path: poses_path,
             poses,
         })
+    }
+
+    /// The files that were read.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let beside = |name: &str, read: bool| read.then(|| self.path.with_file_name(name));
+        let others = [
+            beside(REFINEMENT, self.refinement.is_some()),
+            beside(COVARIANCES, self.covariances.is_some()),
+        ];
+        let poses = std::iter::once(self.path.clone());
+        poses.chain(others.into_iter().flatten()).collect()
     }
 }
 

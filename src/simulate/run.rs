@@ -69,9 +69,11 @@ const CENTRELINE_FILE: &str = "centreline.txt";
 const RECORD_FILE: &str = "simulation.json";
 
 /// What a simulated survey consists of.
-const FILES: [&str; 8] = [
+const FILES: [&str; 9] = [
     SURVEY_FILE,
     RECORD_FILE,
+    // What the program adds.
+    "run.toml",
     MASK_FILE,
     CENTRELINE_FILE,
     "camera.json",

@@ -4,9 +4,8 @@ mod files;
 
 pub use files::{Keeping, Outputs};
 
-use super::Failure;
-use super::record::RUN_FILE;
 use super::stitch::picture_output;
+use super::{Failure, record};
 use crate::atomic;
 use crate::checkpoint::Checkpoint;
 use crate::frames::{JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat};
@@ -114,12 +113,9 @@ impl OutputArguments {
         Ok(())
     }
 
-    /// The record of how the panorama was made: its name with `.run.toml` added.
+    /// The record of how the panorama was made.
     pub fn run_file(&self) -> PathBuf {
-        let mut name = self.out.clone().into_os_string();
-        name.push(".");
-        name.push(RUN_FILE);
-        name.into()
+        record::beside(&self.out)
     }
 
     /// Everything that is written.

@@ -15,6 +15,9 @@ pub struct ClockMatch {
 /// Rates that agree less than this are not of the same motion.
 const LEAST_CORRELATION: f64 = 0.7;
 
+/// More offsets than this are not tried.
+const MOST_OFFSETS: f64 = 1e7;
+
 impl ClockMatch {
     /// Finds the offset, within `range_s`, that makes the rate about `axis` (in the camera's axes) agree best with a plan's:
     /// that of the greatest correlation of the mean rates between frames, with a parabola through its neighbours.
@@ -59,7 +62,14 @@ impl ClockMatch {
             correlation(&planned, &measured)
         };
         let [step_s, _] = rates.steps_s();
-        let count = ((range_s[1] - range_s[0]) / step_s).ceil().max(0.0) as usize;
+        let count = ((range_s[1] - range_s[0]) / step_s).ceil().max(0.0);
+        if !count.is_finite() || count > MOST_OFFSETS {
+            return Err(format!(
+                "the range of {:.3} s holds {count:.0} of the log's steps of {step_s:.1e} s; see to the log's tscale, or narrow the range",
+                range_s[1] - range_s[0]
+            ));
+        }
+        let count = count as usize;
         let offset = |k: usize| range_s[0] + k as f64 * step_s;
         let values: Vec<Option<f64>> = (0..=count).map(|k| at(offset(k))).collect();
         let value = |k: usize| values.get(k).copied().flatten();
@@ -170,6 +180,18 @@ mod tests {
             .map(|t| axis * rate(t) + Vector3::new(0.01, 0.02, 0.0));
         let rates = rates.collect();
         Rates::new(times, rates)
+    }
+
+    /// As of a log whose tscale is wrong.
+    #[test]
+    fn a_range_of_countless_steps_is_refused() {
+        let axis = Vector3::z();
+        let times: Vec<f64> = (0..100).map(|k| f64::from(k) * 1e-12).collect();
+        let rates = Rates::new(times, vec![axis; 100]);
+        let at = [0.0, 0.1, 0.2, 0.3, 0.4];
+        let angles = at.map(|t| t * t);
+        let refused = ClockMatch::find(&rates, &axis, &at, &angles, [-1.0, 1.0]).unwrap_err();
+        assert!(refused.contains("tscale"), "{refused}");
     }
 
     #[test]

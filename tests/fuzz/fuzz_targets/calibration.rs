@@ -2,6 +2,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use tunnelstitch::camera::{ColmapCamera, format_calibration, read_calibration};
+use tunnelstitch_fuzz::file;
 
 const ENDINGS: [&str; 4] = ["json", "toml", "yaml", "txt"];
 
@@ -10,15 +12,13 @@ fuzz_target!(|data: &[u8]| {
         return;
     };
     let ending = ENDINGS[usize::from(*first) % ENDINGS.len()];
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(format!("camera.{ending}"));
-    std::fs::write(&path, content).unwrap();
-    if let Ok(camera) = tunnelstitch::camera::read_calibration(&path, None) {
+    let (_folder, path) = file(&format!("camera.{ending}"), content);
+    let _ = read_calibration(&path, Some("cam0"));
+    if let Ok(camera) = read_calibration(&path, None) {
         // What is read is a camera that can be used and written.
         let _ = camera.border(4, 0.5);
-        let text = tunnelstitch::camera::format_calibration(&camera);
-        let own = folder.path().join("own.json");
-        std::fs::write(&own, text).unwrap();
-        assert_eq!(tunnelstitch::camera::read_calibration(&own, None).unwrap(), camera);
+        let _ = ColmapCamera::of(&camera).cameras_txt();
+        let (_folder, own) = file("own.json", format_calibration(&camera).as_bytes());
+        assert_eq!(read_calibration(&own, None).unwrap(), camera);
     }
 });

@@ -3,11 +3,14 @@
 
 use libfuzzer_sys::fuzz_target;
 use tunnelstitch::trajectory::{read_camera_in_body, read_tunnel_frame};
+use tunnelstitch_fuzz::file;
 
 fuzz_target!(|data: &[u8]| {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("frame.yaml");
-    std::fs::write(&path, data).unwrap();
-    let _ = read_camera_in_body(&path);
-    let _ = read_tunnel_frame(&path);
+    let (_folder, path) = file("frame.yaml", data);
+    for pose in [read_camera_in_body(&path), read_tunnel_frame(&path)]
+        .into_iter()
+        .flatten()
+    {
+        assert!(pose.t_wc.iter().all(|v| v.is_finite()));
+    }
 });

@@ -1,14 +1,45 @@
-//! Files of poses of every format.
+//! Files of poses; the first byte chooses the format, told by the content or said, and what ties them to frames.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
+use std::path::PathBuf;
+use tunnelstitch::survey::{Associate, Survey};
+use tunnelstitch::trajectory::{Pose, PoseFormat, read_poses};
+use tunnelstitch_fuzz::{file, small_survey};
+
+const FORMATS: [Option<PoseFormat>; 7] = [
+    None,
+    Some(PoseFormat::Tum),
+    Some(PoseFormat::Kitti),
+    Some(PoseFormat::Csv),
+    Some(PoseFormat::Colmap),
+    Some(PoseFormat::Nerfstudio),
+    Some(PoseFormat::Euroc),
+];
+const TIES: [Option<Associate>; 4] = [
+    None,
+    Some(Associate::Order),
+    Some(Associate::Name),
+    Some(Associate::Time),
+];
 
 fuzz_target!(|data: &[u8]| {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("poses.txt");
-    std::fs::write(&path, data).unwrap();
-    if let Ok(file) = tunnelstitch::trajectory::read_poses(&path, None) {
-        let finite = |pose: &tunnelstitch::trajectory::Pose| pose.t_wc.iter().all(|v| v.is_finite());
-        assert!(file.entries.iter().all(|entry| finite(&entry.pose)));
-    }
+    let Some((first, content)) = data.split_first() else {
+        return;
+    };
+    let choice = usize::from(*first);
+    let format = FORMATS[choice % FORMATS.len()];
+    let (_folder, path) = file("poses.txt", content);
+    let Ok(read) = read_poses(&path, format) else {
+        return;
+    };
+    let finite = |pose: &Pose| pose.t_wc.iter().all(|v| v.is_finite());
+    assert!(read.entries.iter().all(|entry| finite(&entry.pose)));
+    let _ = Survey::open_with(small_survey(), |survey| {
+        survey.frames.times = (choice % 3 == 0).then(|| PathBuf::from("times.txt"));
+        survey.poses.initial = path.clone();
+        survey.poses.format = format;
+        survey.poses.associate = TIES[choice / FORMATS.len() % TIES.len()];
+        survey.poses.interpolate = Some(choice % 2 == 0);
+    });
 });

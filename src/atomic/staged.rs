@@ -1,0 +1,171 @@
+//! Folders that appear as a whole, and folders for a while.
+
+use super::temporary::{self, ASIDE, TemporaryFolder};
+use super::{WriteError, beside, create_folder, durable};
+use std::path::{Path, PathBuf};
+
+/// A folder that is being filled under another name beside its final one.
+pub struct StagedFolder {
+    folder: PathBuf,
+    /// Unless it stays whatever happens.
+    temporary: Option<TemporaryFolder>,
+    target: PathBuf,
+}
+
+impl StagedFolder {
+    /// Begins the folder that will be `target`; the folders above it are made if missing.
+    ///
+    /// # Errors
+    /// Whatever the system says; a target without a name of its own (`.`, `..`, `/`), or one that holds the folder the
+    /// program works in.
+    pub fn begin(target: &Path) -> Result<Self, WriteError> {
+        check_replaceable(target)?;
+        let parent = beside(target);
+        create_folder(parent)?;
+        let temporary =
+            temporary::folder_in(parent).map_err(|source| WriteError::new(target, source))?;
+        Ok(Self {
+            folder: temporary.folder.path().to_owned(),
+            temporary: Some(temporary),
+            target: target.to_owned(),
+        })
+    }
+
+    /// The folder that will be `target`, with what is in `folder` on the same disk already, which stays whatever happens.
+    ///
+    /// # Errors
+    /// As [`StagedFolder::begin`].
+    pub fn kept(target: &Path, folder: &Path) -> Result<Self, WriteError> {
+        check_replaceable(target)?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            temporary: None,
+            target: target.to_owned(),
+        })
+    }
+
+    /// Where to write for now.
+    pub fn path(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Gives the folder its final name; a folder of that name is replaced.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn finish(self) -> Result<(), WriteError> {
+        let fail = |source| WriteError::new(&self.target, source);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            // A temporary folder is private; the finished one is as its parent.
+            let mode = std::fs::metadata(beside(&self.target))
+                .map_err(fail)?
+                .permissions()
+                .mode();
+            let mode = std::fs::Permissions::from_mode(mode & 0o777);
+            std::fs::set_permissions(&self.folder, mode).map_err(fail)?;
+        }
+        durable::sync_tree(&self.folder).map_err(fail)?;
+        // The old folder steps aside first and goes only when the new one is in place.
+        let mut old = None;
+        if self.target.exists() {
+            let aside = temporary::folder_in(beside(&self.target)).map_err(fail)?;
+            std::fs::rename(&self.target, aside.folder.path().join(ASIDE)).map_err(fail)?;
+            old = Some(aside);
+        }
+        if let Err(error) = std::fs::rename(&self.folder, &self.target) {
+            if let Some(aside) = &old {
+                std::fs::rename(aside.folder.path().join(ASIDE), &self.target).map_err(fail)?;
+            }
+            return Err(fail(error));
+        }
+        if let Some(TemporaryFolder { folder, .. }) = self.temporary {
+            // It is no longer temporary.
+            let _ = folder.keep();
+        }
+        durable::sync_folder(beside(&self.target));
+        if let Some(aside) = old {
+            let aside = aside.folder.path();
+            // From now on it may be tidied away.
+            std::fs::rename(aside.join(ASIDE), aside.join("replaced")).map_err(fail)?;
+        }
+        Ok(())
+    }
+}
+
+/// Refuses a folder that cannot be replaced as a whole.
+fn check_replaceable(target: &Path) -> Result<(), WriteError> {
+    let refuse = |what: &str| Err(WriteError::new(target, std::io::Error::other(what)));
+    let named = target
+        .components()
+        .next_back()
+        .is_some_and(|last| matches!(last, std::path::Component::Normal(_)));
+    if !named {
+        return refuse("it has no name of its own; name a folder that may be replaced as a whole");
+    }
+    if target.symlink_metadata().is_ok_and(|meta| !meta.is_dir()) {
+        return refuse("it exists and is no folder");
+    }
+    let here = std::env::current_dir().and_then(|here| here.canonicalize());
+    if let (Ok(here), Ok(target)) = (here, target.canonicalize())
+        && here.starts_with(target)
+    {
+        return refuse("the program works in it, so it cannot be replaced");
+    }
+    Ok(())
+}
+
+/// A folder for what is needed for a while; it goes with all that is in it when this is dropped or the program is
+/// interrupted.
+pub struct ScratchFolder(TemporaryFolder);
+
+impl ScratchFolder {
+    /// Makes one inside `parent`.
+    ///
+    /// # Errors
+    /// Whatever the system says.
+    pub fn inside(parent: &Path) -> Result<Self, WriteError> {
+        let folder = temporary::folder_in(parent);
+        folder
+            .map(Self)
+            .map_err(|source| WriteError::new(parent, source))
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        self.0.folder.path()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::atomic::write_text;
+
+    #[test]
+    fn a_staged_folder_appears_whole_or_not_at_all() {
+        let dir = tempfile::tempdir().unwrap();
+        let target = dir.path().join("deep/folder");
+        let abandoned = StagedFolder::begin(&target).unwrap();
+        write_text(&abandoned.path().join("a.txt"), "half").unwrap();
+        drop(abandoned);
+        assert!(!target.exists());
+        for text in ["first", "second"] {
+            let staged = StagedFolder::begin(&target).unwrap();
+            write_text(&staged.path().join("a.txt"), text).unwrap();
+            staged.finish().unwrap();
+            assert_eq!(std::fs::read_to_string(target.join("a.txt")).unwrap(), text);
+        }
+        for nameless in [".", "..", "/", "deep/.."] {
+            assert!(
+                StagedFolder::begin(Path::new(nameless)).is_err(),
+                "{nameless}"
+            );
+        }
+        let above = std::env::current_dir().unwrap();
+        assert!(StagedFolder::begin(&above).is_err());
+        let litter = std::fs::read_dir(dir.path().join("deep")).unwrap().count();
+        assert_eq!(litter, 1);
+    }
+}

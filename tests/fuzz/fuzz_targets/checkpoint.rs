@@ -1,0 +1,40 @@
+//! What an interrupted run has kept: with the hash that belongs to it, so that what the bytes mean is read; and if the first byte
+//! is odd, as it is.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tunnelstitch::checkpoint::{Checkpoint, Origin};
+use tunnelstitch::frames::Shading;
+use tunnelstitch::refine::{FrameReport, LevelReport};
+
+/// Of what states are made.
+type State = (
+    Option<Shading>,
+    Vec<LevelReport>,
+    Vec<FrameReport>,
+    Vec<f64>,
+);
+
+fuzz_target!(|data: &[u8]| {
+    let Some((first, content)) = data.split_first() else {
+        return;
+    };
+    let mut bytes = content.to_owned();
+    if first % 2 == 0 {
+        bytes.extend_from_slice(blake3::hash(content).as_bytes());
+    }
+    let origin = Origin {
+        program: String::new(),
+        options: String::new(),
+        survey: String::new(),
+        inputs: Vec::new(),
+    };
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["origin", "a.state"] {
+        std::fs::write(folder.path().join(name), &bytes).unwrap();
+    }
+    let _ = Checkpoint::open(folder.path(), &origin, false);
+    let checkpoint = Checkpoint::open(folder.path(), &origin, true).unwrap();
+    std::fs::write(folder.path().join("a.state"), &bytes).unwrap();
+    let _ = checkpoint.state::<State>("a");
+});

@@ -1,0 +1,23 @@
+//! runs.jsonl, the runs that a sweep has done. The one run that it asks for is refused by the simulator at once.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use tunnelstitch::evaluate::converge::{ConvergeOptions, run};
+use tunnelstitch::progress::Silent;
+use tunnelstitch::trajectory::JitterModel;
+use tunnelstitch_fuzz::file;
+
+fuzz_target!(|data: &[u8]| {
+    let (folder, _path) = file("runs.jsonl", data);
+    let options = ConvergeOptions {
+        rotations_deg: vec![2.0],
+        jitters: vec![JitterModel::Independent],
+        seeds: 1,
+        frames: 2,
+        width: 32,
+        height: 24,
+        noise_grey: -1.0,
+        ..ConvergeOptions::default()
+    };
+    let _ = run(&options, folder.path(), false, &Silent);
+});

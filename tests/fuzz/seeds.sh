@@ -1,0 +1,165 @@
+#!/usr/bin/env bash
+# Sound files for the fuzzer to begin with, most of them written by the program itself: tests/fuzz/corpus/TARGET/.
+# A zero byte before a file is the choice that some targets take from the first.
+set -euo pipefail
+cd "$(dirname "$0")/../.."
+corpus=$PWD/tests/fuzz/corpus
+work=$(mktemp -d)
+trap 'rm -r "$work"' EXIT
+cargo build --release --quiet
+program() { "${CARGO_TARGET_DIR:-target}/release/tunnelstitch" "$@" --quiet >"$work/said"; }
+# seed TARGET NAME [CHOICE]: standard input becomes a seed.
+seed() {
+    mkdir -p "$corpus/$1"
+    { [ $# -lt 3 ] || printf "\\$3"; cat; } >"$corpus/$1/$2"
+}
+
+blender=fixtures/blender_free48
+for choice in 0 1 2 3; do
+    seed calibration "own-$choice" "$choice" <$blender/camera.json
+    printf '0 0 0\n0 5 0 3\n1 10 0\n3 15 0 # bend\n' | seed centreline "points-$choice" "$choice"
+done
+seed discovery camera 0 <$blender/camera.json
+seed discovery poses 3 <$blender/baseline.tum
+seed poses tum 0 <$blender/baseline.tum
+
+# The survey that the targets simulate, and what the program makes of it.
+small=$work/small
+program simulate free --frames 4 --size 32x24 --supersample 1 --out "$small"
+seed survey small <"$small/survey.toml"
+program config "$small" --json
+program init "$work/small" --radius-m 3 --force
+seed survey init <"$small/survey.toml"
+seed survey everything <<'END'
+[tunnel]
+shape = "ellipse"
+width_m = 6.0
+height_m = 6.5
+centreline = "curve.txt"
+ignore = [{ theta_deg = [150, 210], chainage_m = [2.0, 5.5] }, { theta_deg = [330, 30] }]
+[camera]
+file = "camera.json"
+readout_ms = 20.0
+[frames]
+images = "frames/*.png"
+times = "times.txt"
+mask = "mask.png"
+[poses]
+initial = "baseline.tum"
+truth = "groundtruth.tum"
+convention = "c2w"
+camera_axes = "opencv"
+body_to_camera = "body.yaml"
+tunnel_frame = "axis.json"
+associate = "time"
+time_tolerance_s = 0.01
+interpolate = true
+[prior]
+model = "independent"
+rotation_sigma_deg = 2.0
+translation_sigma_m = [0.02, 0.02, 0.03]
+[calibrate]
+unknowns = ["focal", "centre", "distortion"]
+focal_sigma_percent = 2.0
+[options.stitch]
+mode = "average"
+END
+seed poses small 0 <"$small/baseline.tum"
+for format in kitti csv nerfstudio; do
+    program convert "$small" --to $format --out "$work/poses.$format"
+    seed poses $format 0 <"$work/poses.$format"
+done
+program convert "$small" --to colmap --out "$work/colmap"
+seed poses colmap 0 <"$work/colmap/images.txt"
+seed calibration colmap 3 <"$work/colmap/cameras.txt"
+seed calibration nerfstudio 0 <"$work/poses.nerfstudio"
+program refine "$small" --out "$work/refined" --calibrate focal
+seed refinement refined <"$work/refined/refine.json"
+{ cat "$work/refined/refine.json"; printf '\0'; cat "$work/refined/covariance.csv"; } | seed refinement both
+head -4 "$work/refined/covariance.csv" | seed covariances frames
+program converge --rotation-deg 2 --jitter independent --seeds 1 --frames 2 --size 32x24 --noise 0 --out "$work/sweep"
+sed 's/"noise_grey":0.0/"noise_grey":-1.0/' "$work/sweep/runs.jsonl" | seed sweep runs
+for ending in png jpg tif; do
+    program stitch "$small" --px-per-metre 5 --out "$work/wall.$ending"
+    seed pictures $ending <"$work/wall.$ending"
+done
+seed pictures frame <$blender/frames/000000.jpg
+
+seed poses euroc 0 <<'END'
+#timestamp [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z
+1000000000,0,0,0,1,0,0,0
+1100000000,0,0,0,1,0,0,0
+END
+seed calibration opencv 2 <<'END'
+%YAML:1.0
+---
+image_width: 640
+image_height: 480
+camera_matrix: !!opencv-matrix
+   rows: 3
+   cols: 3
+   dt: d
+   data: [415., 0., 318., 0., 417., 241., 0., 0., 1.]
+distortion_coefficients: !!opencv-matrix
+   rows: 1
+   cols: 5
+   dt: d
+   data: [-0.3, 0.1, 0.001, -0.002, -0.02]
+END
+kalibr='cam0:
+  camera_model: pinhole
+  distortion_coeffs: [-0.3, 0.1, 0.001, -0.002]
+  distortion_model: equidistant
+  intrinsics: [415, 417, 318, 241]
+  resolution: [640, 480]
+  T_cam_imu:
+  - [1, 0, 0, 0]
+  - [0, 1, 0, 0]
+  - [0, 0, 1, 0]
+  - [0, 0, 0, 1]'
+seed calibration kalibr 2 <<<"$kalibr"
+seed frames_of_reference kalibr <<<"$kalibr"
+seed calibration ros 2 <<'END'
+image_width: 640
+image_height: 480
+camera_name: narrow
+camera_matrix: {rows: 3, cols: 3, data: [415, 0, 318, 0, 417, 241, 0, 0, 1]}
+distortion_model: plumb_bob
+distortion_coefficients: {rows: 1, cols: 5, data: [-0.3, 0.1, 0.001, -0.002, 0]}
+END
+seed frames_of_reference axis <<<'{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}'
+seed frames_of_reference matrix <<<'1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1'
+seed frames_of_reference euroc <<<'T_BS: {rows: 4, cols: 4, data: [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}'
+seed frame_times times <<<$'0\n1\n2\n3'
+seed frame_times names <<<$'0.5 000000.png\n1 000001.png\n2 000002.png\n3000000000000000 000003.png'
+seed plan frames <<<$'frame,chainage_m,angle_deg,x_m,z_m\n0,0,350,0,0\n4,1,370,0.1,0'
+seed plan times <<<$'time_s;chainage_m;angle_deg\n0;0;0\n2;1;90'
+{
+    printf 'GYROFLOW IMU LOG\nversion,1.3\norientation,YxZ\ntscale,0.001\ngscale,0.01\nascale,0.001\n'
+    printf 'frame_readout_time,20\nframe_readout_direction,0\nt,gx,gy,gz,ax,ay,az\n'
+    for ((k = 0; k < 600; k++)); do printf '%d,%d,%d,0,0,999,%d\n' $k $((k % 3)) $((k > 200 ? k / 9 : 0)) $((k % 2)); done
+} >"$work/gyro"
+for choice in 0 1 7 20 37; do
+    seed gyro "log-$choice" "$(printf '%o' $choice)" <"$work/gyro"
+done
+mark='{"type": "Feature", "id": "a-1", "geometry": {"type": "Point", "coordinates": [1.5, 2.5]}, "properties": {"class": "BAB",
+ "severity": 3, "note": "", "chainage_m": 2.5, "clock": "3:00", "theta_deg": 90, "x_m": 3, "y_m": 2.5, "z_m": 0, "end_chainage_m": 3,
+ "end_clock": "4:00", "length_m": 0.5, "width_mm": 1.5, "layer": "refined", "created": "2020-01-01T00:00:00Z"}}'
+seed marks one <<<"{\"type\": \"FeatureCollection\", \"features\": [$mark]}"
+seed marks none <<<'{"type": "FeatureCollection", "features": []}'
+request() { printf '%s HTTP/1.1\r\nHost: 127.0.0.1:PORT\r\nContent-Type: application/json\r\n%s\r\n' "$1" "${2:-}"; }
+request 'GET /' | seed requests page
+request 'GET /tile.webp' | seed requests tile
+request 'HEAD /api/marks' | seed requests marks
+request 'GET /api/frames/1' | seed requests frame
+request 'GET /api/sightings?layer=initial&s=1.5&h=0.1' | seed requests sightings
+{ request 'PUT /api/marks/a-1' "Content-Length: ${#mark}"$'\r\n'; printf %s "$mark"; } | seed requests put
+request 'DELETE /api/marks/a-1' | seed requests delete
+seed video probed <<'END'
+{"packets": [{"pts": 0, "flags": "K_"}, {"pts": 60, "flags": "__"}, {"pts": 20, "flags": "_D"}], "streams": [{"width": 64,
+ "height": 48, "pix_fmt": "yuv420p", "time_base": "1/600", "field_order": "progressive", "side_data_list": [{"rotation": -90}]}]}
+END
+printf '5:black,18-20:missing,2:repeated' | seed words bad-frames
+printf 'YxZ' | seed words orientation
+printf '\202\200\201\200\377' | seed checkpoint cbor 0
+echo "seeds for: $(ls "$corpus" | tr '\n' ' ')"
