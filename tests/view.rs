@@ -504,7 +504,7 @@ fn a_bend_is_walked_through() {
         (0.0..0.15).contains(&number("against", "fromWall")),
         "{seen:#}"
     );
-    assert!((number("against", "seen") - 6.0).abs() < 0.1);
+    assert!((number("against", "seen") - 6.0).abs() < 0.1, "{seen:#}");
     assert!(number("ridden", "h") > 1.1, "{seen:#}");
 }
 

@@ -22,6 +22,8 @@ export interface Station {
 
 /** Pieces of a line whose length is measured. */
 const PIECES = 256;
+/** Steps to the section that holds a point, at the most. */
+const ROUNDS = 20;
 
 export class Wall {
   readonly perimeter: number;
@@ -89,7 +91,14 @@ export class Wall {
       const distance = from.clone().addScaledVector(axis, within).distanceToSquared(x);
       if (distance < best) [best, h] = [distance, this.h[row] + within * (this.h[row + 1] - this.h[row])];
     }
-    return this.station(h);
+    // The section that holds it: between the lines, directions change from end to end.
+    let station = this.station(h);
+    for (let round = 0; round < ROUNDS; round++) {
+      const ahead = x.clone().sub(station.centre).dot(station.along);
+      if (Math.abs(ahead) < this.radius * 1e-6) break;
+      station = this.station(station.h + ahead);
+    }
+    return station;
   }
 
   /** The wall that lies from the centre of a section in a direction: its place and its distance. */
