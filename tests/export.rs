@@ -71,6 +71,15 @@ fn numbers(value: &Value) -> Vec<f64> {
         .collect()
 }
 
+/// The names in an object, sorted. The schema of 3D Tiles knows no others than those that are asked for here.
+fn names(value: &Value) -> Vec<&str> {
+    let mut names: Vec<&str> = (value.as_object().unwrap().keys())
+        .map(String::as_str)
+        .collect();
+    names.sort_unstable();
+    names
+}
+
 /// World coordinates of all vertices of a GLB, metres.
 fn vertices(path: &Path) -> Vec<[f64; 3]> {
     let (json, binary) = open_glb(path);
@@ -180,14 +189,35 @@ fn the_tree_holds_together() {
     let read = |name: &str| -> Value {
         let file: Value =
             serde_json::from_slice(&std::fs::read(folder.join(name)).unwrap()).unwrap();
+        assert_eq!(names(&file), ["asset", "geometricError", "root"]);
+        assert_eq!(names(&file["asset"]), ["extras", "version"]);
         assert_eq!(file["asset"]["version"], "1.1");
+        // No less than the error of its root, which is drawn instead of nothing.
+        assert!(file["geometricError"].as_f64() >= file["root"]["geometricError"].as_f64());
         file
     };
     let root = read("tileset.json");
     let error = root["geometricError"].as_f64().unwrap();
     let mut open = vec![(root["root"].clone(), error, None::<Vec<f64>>)];
     while let Some((tile, error_above, box_above)) = open.pop() {
+        let mut keys = names(&tile);
+        keys.retain(|name| *name != "children");
+        assert_eq!(
+            keys,
+            ["boundingVolume", "content", "geometricError", "refine"]
+        );
+        assert_eq!(names(&tile["boundingVolume"]), ["box"]);
+        assert_eq!(names(&tile["content"]), ["uri"]);
         let bounds = numbers(&tile["boundingVolume"]["box"]);
+        assert_eq!(bounds.len(), 12);
+        // Half axes are those of the world, and none is flat.
+        for (k, value) in bounds[3..].iter().enumerate() {
+            assert!(if k % 4 == 0 {
+                *value > 0.0
+            } else {
+                *value == 0.0
+            });
+        }
         let range = |b: &[f64], k: usize| (b[k] - b[3 + 4 * k], b[k] + b[3 + 4 * k]);
         if let Some(above) = &box_above {
             for k in 0..3 {
@@ -213,7 +243,7 @@ fn the_tree_holds_together() {
         }
         match tile["children"].as_array() {
             Some(children) => {
-                assert!(error > 0.0);
+                assert!(error > 0.0 && (1..=4).contains(&children.len()));
                 open.extend(
                     children
                         .iter()

@@ -74,7 +74,7 @@ impl TextureArguments {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Layers of the page")]
 pub struct LayersArguments {
-    /// Poses to switch between, with commas [default: all there are; `refined` are those of a file of --poses].
+    /// Poses to switch between, with commas, the first of them shown first [default: all there are; `refined` are those of a file of --poses].
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     layers: Option<Vec<LayerName>>,
     /// The angle θ of twelve o'clock, degrees.
@@ -121,7 +121,7 @@ pub struct Poses {
 }
 
 impl LayersArguments {
-    /// All layers that are wanted of the survey at `path`, the refined ones first. It has been opened with `poses`.
+    /// All layers that are wanted of the survey at `path`, in the order given; by default the refined ones first. It has been opened with `poses`.
     ///
     /// # Errors
     /// A layer that is not there.
@@ -165,7 +165,9 @@ impl LayersArguments {
                 name.text()
             )));
         }
-        all.retain(|layer| wanted.contains(&layer.name));
+        let place = |layer: &Poses| wanted.iter().position(|name| *name == layer.name);
+        all.retain(|layer| place(layer).is_some());
+        all.sort_by_key(place);
         Ok((survey, all))
     }
 

@@ -3,7 +3,7 @@
 use super::error::check_pairs;
 use super::{EvaluateError, Spread, spread::root_mean_square};
 use crate::camera::Camera;
-use crate::surface::{Surface, WallPoint, shortest_arc, wall_jacobian};
+use crate::surface::{Surface, WallPoint, free_part, shortest_arc};
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -65,7 +65,7 @@ pub fn wall_error(
         mean_arc(&delta_s, perimeter_m),
         delta_h.iter().sum::<f64>() / delta_h.len() as f64,
     );
-    let shift = gauge_shift(surface, &truth[0], &mean);
+    let (shift, _) = free_part(surface, &truth[0], &mean);
     let (shift_s_m, shift_h_m) = (shift.x, shift.y);
     let distances_mm: Vec<f64> = delta_s
         .iter()
@@ -97,29 +97,6 @@ pub fn wall_error(
         frame_rms_mm,
         frame_rms_px,
     })
-}
-
-/// The part of a mean displacement `(Δs, Δh)` of the wall, metres, that the gauge may make up for.
-///
-/// On a straight tunnel a turn moves the wall along s and a shift along h. A turn about the axis of a bend, or along a helix, moves it in
-/// one direction, the same everywhere: as at the point that the camera at `pose` looks at.
-pub(super) fn gauge_shift(surface: &dyn Surface, pose: &Pose, mean: &Vector2<f64>) -> Vector2<f64> {
-    let gauge = surface.gauge();
-    match (gauge.turn, gauge.shift) {
-        (true, true) => *mean,
-        (false, true) => Vector2::new(0.0, mean.y),
-        (false, false) => Vector2::zeros(),
-        (true, false) => {
-            let along = surface
-                .hit(&pose.t_wc, &(pose.r_wc * Vector3::z()))
-                .map(|hit| {
-                    let wall = surface.frame(hit.wall);
-                    wall_jacobian(pose, &wall) * gauge.directions(pose)[0]
-                });
-            let along = along.ok().and_then(|along| along.try_normalize(0.0));
-            along.map_or_else(Vector2::zeros, |along| along * along.dot(mean))
-        }
-    }
 }
 
 /// How far one frame's pixels lie from where they belong on the wall, the gauge still in it.

@@ -18,8 +18,9 @@ use super::problem::{ProblemError, Scene};
 use super::search::matches;
 use super::track::{FARTHEST, Tracked, footprints};
 use super::wall::{FusedWall, Portrait};
-use crate::surface::{Footprint, Gauge, GaugeMotion};
+use crate::surface::{Footprint, Gauge, GaugeMotion, free_part};
 use crate::trajectory::{JitterModel, Pose};
+use nalgebra::Vector2;
 use rayon::prelude::*;
 
 /// Difference of log-posteriors from which on one place is believed: odds of 1000 to 1.
@@ -148,27 +149,26 @@ fn repeats_of(
         return Ok(Vec::new());
     };
     let most = UNEXPLAINED * here.max(LEAST_UNEXPLAINED);
-    let gauge = scene.surface.gauge();
-    let motion = |[s_m, h_m]: [f64; 2]| match gauge.shift {
-        true => gauge.motion(s_m / radius_m, h_m),
-        // Along the tunnel, not around it.
-        false => gauge.motion(h_m / arm_m(&gauge, &pose), 0.0),
-    };
+    let motion = |shift_m: [f64; 2]| free_part(scene.surface, &pose, &shift_m.into());
+    let moved = |shift_m: [f64; 2]| motion(shift_m).1.apply(&pose);
     let spacing = wall.lattice.spacing_m;
     let mut found = Vec::new();
     let least = LEFT_BY_STEPS * (1.0 - most).max(0.0);
     for shift_m in matches(&wall, &portrait, &pose, reach_m, least) {
-        if shift_m[0].hypot(shift_m[1]) < APART * spacing {
+        // Where the shape forbids a motion, no repeat leads there.
+        let (made_m, _) = motion(shift_m);
+        let missed_m = (made_m - Vector2::from(shift_m)).norm();
+        if shift_m[0].hypot(shift_m[1]) < APART * spacing || missed_m > APART * spacing {
             continue;
         }
         // To a fraction of a sample: the best of ever closer neighbours.
-        let mut best = (left(&motion(shift_m).apply(&pose)), shift_m);
+        let mut best = (left(&moved(shift_m)), shift_m);
         let mut step = 0.5 * spacing;
         for _ in 0..4 {
             let [s_m, h_m] = best.1;
             for (ds, dh) in [(-1.0, 0.0), (1.0, 0.0), (0.0, -1.0), (0.0, 1.0)] {
                 let shift_m = [s_m + ds * step, h_m + dh * step];
-                let there = left(&motion(shift_m).apply(&pose));
+                let there = left(&moved(shift_m));
                 if there.is_some_and(|there| best.0.is_none_or(|best| there < best)) {
                     best = (there, shift_m);
                 }
@@ -176,16 +176,10 @@ fn repeats_of(
             step *= 0.5;
         }
         if best.0.is_some_and(|there| there < most) {
-            found.push(motion(best.1));
+            found.push(motion(best.1).1);
         }
     }
     Ok(found)
-}
-
-/// Distance of a camera from the axis that the tunnel bends about, metres.
-fn arm_m(gauge: &Gauge, pose: &Pose) -> f64 {
-    let arm = pose.t_wc - gauge.axis.point;
-    arm.cross(&gauge.axis.direction).norm().max(1e-9)
 }
 
 /// The likeliest of some motions, and the second if it is less likely by no more than `clear`.

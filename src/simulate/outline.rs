@@ -60,9 +60,14 @@ impl Outline {
         self.half[0].min(self.half[1]).min(self.floor_m)
     }
 
-    /// The farthest distance of the wall from the axis at the most, metres.
+    /// The farthest distance of the wall from the axis, metres.
     pub fn farthest_m(&self) -> f64 {
-        self.half[0].hypot(self.half[1].max(self.floor_m))
+        let [a, b] = self.half;
+        match self.shape {
+            Shape::Circle | Shape::Ellipse => a.max(b),
+            Shape::Box => a.hypot(b),
+            Shape::Horseshoe => a.hypot(self.floor_m),
+        }
     }
 
     /// G at a point across the tunnel, metres: below 1 inside.

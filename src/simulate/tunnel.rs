@@ -36,7 +36,7 @@ pub(super) struct Place {
 /// Rounds of false position at the most.
 const ROUNDS: usize = 60;
 /// A place is on the wall if it is so close to it, shares of the distance from the axis.
-const CLOSE: f64 = 1e-13;
+const CLOSE: f64 = 1e-11;
 /// Steps of a ray at the most.
 const STEPS: usize = 2000;
 
@@ -60,7 +60,7 @@ impl Tunnel {
             Some(path) => {
                 let points = read_centreline(path).map_err(|error| fail(error.to_string()))?;
                 let line = Centreline::through(&points, nominal_m, outline.farthest_m());
-                Some(line.map_err(|error| fail(error.to_string()))?)
+                Some(line.map_err(|error| fail(format!("{}: {error}", path.display())))?)
             }
             None => None,
         };
@@ -148,6 +148,7 @@ impl Tunnel {
         Rays {
             tunnel: self,
             h_m: self.chainage_m(&t),
+            along: self.along(&t),
             t,
         }
     }
@@ -159,6 +160,8 @@ pub(super) struct Rays<'a> {
     /// Where they start, metres.
     pub t: Vector3<f64>,
     h_m: f64,
+    /// The direction of the tunnel there.
+    along: Vector3<f64>,
 }
 
 impl Rays<'_> {
@@ -189,44 +192,74 @@ impl Rays<'_> {
 
     fn search(&self, outline: &Outline, line: Option<&Centreline>, d: &Vector3<f64>) -> Place {
         let d = d.normalize();
-        let local = |way: f64, h_m: f64| Tunnel::local(line, &(self.t + d * way), h_m);
+        let on_ray = |way_m: f64, near_h_m: f64| {
+            let point = Tunnel::local(line, &(self.t + d * way_m), near_h_m);
+            let beyond = outline.g(point.x, point.z) - 1.0;
+            OnRay {
+                way_m,
+                point,
+                beyond,
+            }
+        };
         let step_m = outline.nearest_m() / 3.0;
-        let (mut inside, mut h_m) = (0.0, self.h_m);
-        let mut last = f64::NAN;
+        let mut inside = on_ray(0.0, self.h_m);
+        // Chainage grows from step to step about as it did before.
+        let mut growth_m = step_m * self.along.dot(&d);
         for _ in 0..STEPS {
-            let beyond = inside + step_m;
-            let there = local(beyond, h_m);
-            if outline.g(there.x, there.z) < 1.0 {
-                (inside, h_m) = (beyond, there.y);
-                continue;
+            let next = on_ray(inside.way_m + step_m, inside.point.y + growth_m);
+            if next.beyond >= 0.0 {
+                let wall = closed_in(inside, next, on_ray);
+                return Place {
+                    theta: outline.place(wall.x, wall.z),
+                    h_m: wall.y,
+                };
             }
-            let before = local(inside, h_m);
-            let mut low = (inside, outline.g(before.x, before.z) - 1.0);
-            let mut high = (beyond, outline.g(there.x, there.z) - 1.0);
-            let mut wall = there;
-            // The rule of false position as the Illinois algorithm has it: an end that stays counts half.
-            for _ in 0..ROUNDS {
-                let way = (low.0 * high.1 - high.0 * low.1) / (high.1 - low.1);
-                wall = local(way, wall.y);
-                let g = outline.g(wall.x, wall.z) - 1.0;
-                if g.abs() < CLOSE {
-                    break;
-                }
-                if (g < 0.0) == (last < 0.0) {
-                    let other = if g < 0.0 { &mut high } else { &mut low };
-                    other.1 *= 0.5;
-                }
-                last = g;
-                *(if g < 0.0 { &mut low } else { &mut high }) = (way, g);
-            }
-            return Place {
-                theta: outline.place(wall.x, wall.z),
-                h_m: wall.y,
-            };
+            growth_m = next.point.y - inside.point.y;
+            inside = next;
         }
         Place {
             theta: f64::NAN,
             h_m: f64::NAN,
         }
     }
+}
+
+/// A point of a ray.
+#[derive(Clone, Copy)]
+struct OnRay {
+    /// Its distance from where the ray starts, metres.
+    way_m: f64,
+    /// As the section at its chainage sees it.
+    point: Vector3<f64>,
+    /// How far it lies beyond the wall, as a share of the distance from the axis; less than 0 inside.
+    beyond: f64,
+}
+
+/// Where a ray meets the wall between a point inside and one beyond: the rule of false position as the Illinois algorithm has it, by which an
+/// end that stays counts half.
+fn closed_in(
+    mut inside: OnRay,
+    mut outside: OnRay,
+    on_ray: impl Fn(f64, f64) -> OnRay,
+) -> Vector3<f64> {
+    let mut wall = outside;
+    let mut last = None;
+    for _ in 0..ROUNDS {
+        let share = inside.beyond / (inside.beyond - outside.beyond);
+        wall = on_ray(
+            inside.way_m + share * (outside.way_m - inside.way_m),
+            inside.point.y + share * (outside.point.y - inside.point.y),
+        );
+        if wall.beyond.abs() < CLOSE {
+            break;
+        }
+        let is_inside = wall.beyond < 0.0;
+        if last == Some(is_inside) {
+            let other = if is_inside { &mut outside } else { &mut inside };
+            other.beyond *= 0.5;
+        }
+        last = Some(is_inside);
+        *(if is_inside { &mut inside } else { &mut outside }) = wall;
+    }
+    wall.point
 }

@@ -2,8 +2,8 @@
 //!
 //! Points given by the user are joined by a cubic spline of their chord lengths (C², with the ends bent as the circles through the first and
 //! last three points). It is walked in even steps of its own length: the nodes. Each has a frame `Q = (E_x, T, E_z)` that turns along as little as
-//! possible (the rotation-minimising frame: from node to node, T is carried over by the smallest rotation). Between nodes the position
-//! is a cubic Hermite polynomial of position and tangent, and the frame `Q_k Exp(τ ω_k)` with `ω_k = Log(Q_kᵀ Q_{k+1})`, so that
+//! possible (the rotation-minimising frame: from node to node, T is carried over by the smallest rotation). Between nodes position
+//! and size of the section are cubic Hermite polynomials, and the frame `Q_k Exp(τ ω_k)` with `ω_k = Log(Q_kᵀ Q_{k+1})`, so that
 //! derivatives are exact. Beyond both ends the tunnel goes on straight.
 //!
 //! Source: W. Wang, B. Jüttler, D. Zheng, Y. Liu, "Computation of rotation minimizing frames", ACM TOG 27(1), 2008.
@@ -11,6 +11,9 @@
 use super::SurfaceError;
 use crate::trajectory::so3;
 use nalgebra::{UnitQuaternion, Vector3};
+use std::ops::{Add, Mul, Sub};
+
+mod room;
 
 /// A point that the centreline passes through.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,12 +46,16 @@ struct Node {
     point: Vector3<f64>,
     frame: UnitQuaternion<f64>,
     scale: f64,
+    /// How the scale grows, a metre.
+    growth: f64,
 }
 
 /// Nodes whose surrounding sphere is kept, to find the nearest.
-const RUN: usize = 32;
+const RUN: usize = 64;
 /// Steps between nodes over the section's size.
-const STEP: f64 = 0.05;
+const STEP: f64 = 0.02;
+/// A step of Newton's method after which no other is taken, over the length between nodes.
+const SETTLED: f64 = 1e-7;
 /// Nodes at the most.
 const MOST_NODES: usize = 4_000_000;
 /// Pieces of the spline's parameter between two given points, to measure its length.
@@ -69,7 +76,8 @@ impl Centreline {
     /// The line through points, for a section that reaches `farthest_m` from it, of a nominal radius.
     ///
     /// # Errors
-    /// [`SurfaceError::Centreline`]: fewer than two points, two at one place, a radius that is not positive, a bend tighter than the section.
+    /// [`SurfaceError::Centreline`]: fewer than two points, two at one place, a radius that is not positive, a bend tighter
+    /// than the section, a tunnel that runs into itself.
     pub fn through(
         points: &[CentrePoint],
         nominal_m: f64,
@@ -77,16 +85,23 @@ impl Centreline {
     ) -> Result<Self, SurfaceError> {
         let fail = |what: String| SurfaceError::Centreline { what };
         if points.len() < 2 {
-            return Err(fail(format!(
-                "{} point, and a line needs two or more",
-                points.len()
-            )));
+            return Err(fail(match points.len() {
+                0 => "no points; a line needs two or more".to_owned(),
+                _ => "one point only; a line needs two or more".to_owned(),
+            }));
         }
         for (k, pair) in points.windows(2).enumerate() {
             let apart_m = (pair[1].point - pair[0].point).norm();
-            if !apart_m.is_finite() || apart_m < 1e-6 * farthest_m {
+            if !apart_m.is_finite() {
                 return Err(fail(format!(
-                    "points {} and {} are {apart_m:.2e} m apart; each must be somewhere else",
+                    "points {} and {} must be finite numbers of metres",
+                    k + 1,
+                    k + 2
+                )));
+            }
+            if apart_m < 1e-6 * farthest_m {
+                return Err(fail(format!(
+                    "points {} and {} lie at one place; leave one of them out",
                     k + 1,
                     k + 2
                 )));
@@ -107,6 +122,7 @@ impl Centreline {
         let scales: Vec<f64> = (0..points.len()).map(scale).collect();
         let line = Self::walked(&spline, &scales, STEP * farthest_m)?;
         line.check_bends(farthest_m)?;
+        line.check_apart(farthest_m)?;
         Ok(line)
     }
 
@@ -121,11 +137,19 @@ impl Centreline {
             });
         }
         let step_m = length_m / steps;
+        let rises = rises(scales, &spline.chords);
         let mut frame: Option<UnitQuaternion<f64>> = None;
         let nodes: Vec<Node> = (0..=steps as usize)
             .map(|k| {
                 let (place, share) = spline.at_length(&lengths, k as f64 * step_m);
-                let tangent = spline.velocity(place, share).normalize();
+                let velocity = spline.velocity(place, share);
+                let tangent = velocity.normalize();
+                let chord_m = spline.chords[place];
+                let (scale, rise) = hermite(
+                    [scales[place], scales[place + 1]],
+                    [rises[place], rises[place + 1]].map(|rise| rise * chord_m),
+                    share,
+                );
                 let before = frame.unwrap_or_default();
                 let carried = before * Vector3::y();
                 // Exactly against the axis any turn by 180° will do.
@@ -138,7 +162,8 @@ impl Centreline {
                 Node {
                     point: spline.point(place, share),
                     frame: now,
-                    scale: scales[place] + (scales[place + 1] - scales[place]) * smooth(share),
+                    scale,
+                    growth: rise / chord_m / velocity.norm(),
                 }
             })
             .collect();
@@ -160,23 +185,6 @@ impl Centreline {
             turns,
             spheres,
         })
-    }
-
-    /// Refuses bends in which the section would meet itself.
-    fn check_bends(&self, farthest_m: f64) -> Result<(), SurfaceError> {
-        for (k, turn) in self.turns.iter().enumerate() {
-            let bend_m = self.step_m / turn.norm().max(1e-12);
-            let size_m = farthest_m * self.nodes[k].scale.max(self.nodes[k + 1].scale);
-            if bend_m <= size_m {
-                return Err(SurfaceError::Centreline {
-                    what: format!(
-                        "at chainage {:.2} m it bends with a radius of {bend_m:.2} m, tighter than the tunnel, which reaches {size_m:.2} m from it",
-                        k as f64 * self.step_m
-                    ),
-                });
-            }
-        }
-        Ok(())
     }
 
     /// Its length, metres.
@@ -211,13 +219,18 @@ impl Centreline {
             [a.frame * Vector3::y(), b.frame * Vector3::y()].map(|t| t * self.step_m),
             share,
         );
+        let (scale, growth) = hermite(
+            [a.scale, b.scale],
+            [a.growth, b.growth].map(|growth| growth * self.step_m),
+            share,
+        );
         Station {
             point,
             velocity: velocity / self.step_m,
             frame: a.frame * so3::exp(&(self.turns[k] * share)),
             turn: self.turns[k] / self.step_m,
-            scale: a.scale + (b.scale - a.scale) * share,
-            growth: (b.scale - a.scale) / self.step_m,
+            scale,
+            growth: growth / self.step_m,
         }
     }
 
@@ -258,7 +271,8 @@ impl Centreline {
                 4.0 * self.step_m
             };
             h_m += step.clamp(-most, most);
-            if step.abs() < 1e-13 * (1.0 + h_m.abs()) {
+            // What is left is of the step's square.
+            if step.abs() < SETTLED * self.step_m {
                 break;
             }
         }
@@ -266,15 +280,34 @@ impl Centreline {
     }
 }
 
-/// From 0 to 1 without a jump in the slope.
-fn smooth(share: f64) -> f64 {
-    share * share * (3.0 - 2.0 * share)
+/// Slopes of the section's scale at the given points over the chords, so that the cubics between them are smooth and monotone: none overshoots
+/// the radii given. There is none at the ends, beyond which the scale stays.
+///
+/// Of neighbouring slopes of one sign it is the weighted harmonic mean, else 0.
+///
+/// Source: F. N. Fritsch, J. Butland, "A method for constructing local monotone piecewise cubic interpolants", SIAM J. Sci. Stat.
+/// Comput. 5(2), 1984.
+fn rises(scales: &[f64], chords: &[f64]) -> Vec<f64> {
+    let slope = |k: usize| (scales[k + 1] - scales[k]) / chords[k];
+    let mut rises = vec![0.0; scales.len()];
+    for k in 1..chords.len() {
+        let (before, after) = (slope(k - 1), slope(k));
+        if before * after > 0.0 {
+            let (a, b) = (chords[k - 1], chords[k]);
+            let (a, b) = (a + 2.0 * b, 2.0 * a + b);
+            rises[k] = (a + b) / (a / before + b / after);
+        }
+    }
+    rises
 }
 
-/// Position and derivative of the cubic with the given ends and end slopes.
-fn hermite(p: [Vector3<f64>; 2], m: [Vector3<f64>; 2], t: f64) -> (Vector3<f64>, Vector3<f64>) {
+/// Value and derivative of the cubic with the given ends and end slopes.
+fn hermite<T>(p: [T; 2], m: [T; 2], t: f64) -> (T, T)
+where
+    T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
+{
     let (t2, t3) = (t * t, t * t * t);
-    let rise = smooth(t);
+    let rise = t2 * (3.0 - 2.0 * t);
     let point = p[0] + (p[1] - p[0]) * rise + m[0] * (t3 - 2.0 * t2 + t) + m[1] * (t3 - t2);
     let slope = (p[1] - p[0]) * (6.0 * t - 6.0 * t2)
         + m[0] * (3.0 * t2 - 4.0 * t + 1.0)

@@ -1,7 +1,8 @@
 //! What no picture of the wall can tell: the motions that map the tunnel onto itself.
 
+use super::{Surface, wall_jacobian};
 use crate::trajectory::{Pose, so3};
-use nalgebra::{UnitQuaternion, Vector3, Vector6};
+use nalgebra::{UnitQuaternion, Vector2, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// A directed line in the world.
@@ -33,8 +34,8 @@ impl Axis {
 /// picture, so they are fixed by the prior and removed (and only they) before errors are computed.
 ///
 /// They turn about an axis and shift along it: a straight round tunnel allows both, a straight one of another section the
-/// shift, a bend of constant curvature the turn about the bend's own axis (which goes along the tunnel), a helix a turn with the shift
-/// of its pitch.
+/// shift, a straight round one whose radius changes the turn, a bend of constant curvature the turn about the bend's own axis (which
+/// goes along the tunnel), a helix a turn with the shift of its pitch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gauge {
     /// The axis.
@@ -95,34 +96,73 @@ impl Gauge {
 
     /// The motion that best carries `from` onto `to`, pose by pose, in closed form.
     ///
-    /// With the axis turned into y and its point into the origin. Turn: the α that minimises `Σ |R_to − R_y(α) R_from|²`. With
-    /// `M = Σ R_to R_fromᵀ`, `α = atan2(M_02 − M_20, M_00 + M_22)`. Shift: the mean difference of `t_y`. Freedoms that the shape
-    /// does not have stay zero.
+    /// Turn: the α that minimises `Σ |R_to − R_n(α) R_from|²`. With `M = Σ R_to R_fromᵀ` and the axis n,
+    /// `α = atan2(nᵀ(M − Mᵀ)ᵛ, tr M − nᵀ M n)`. Shift: the mean difference of `nᵀt`. Freedoms that the shape does not have stay zero.
     ///
-    /// Where only the turn is free, it goes along the tunnel, and positions tell it better than rotations do: α minimises
-    /// `Σ |t_to − R_y(α) t_from|²` across the axis instead.
+    /// Where only the turn is free, it may go along the tunnel, and then positions tell it better than rotations do: the sum has
+    /// `Σ |t_to − R_n(α) t_from|²` across the axis, too, a radian counting as much as a metre.
     pub fn align(&self, from: &[Pose], to: &[Pose]) -> GaugeMotion {
-        let Axis { point, direction } = self.axis;
+        let Axis {
+            point,
+            direction: n,
+        } = self.axis;
         let (mut sine, mut cosine, mut shift) = (0.0, 0.0, 0.0);
         for (from, to) in from.iter().zip(to) {
-            if self.shift {
-                // Of a turn that goes with a shift, the axis is the world's y.
-                let m = (to.r_wc * from.r_wc.inverse()).to_rotation_matrix();
-                sine += m[(0, 2)] - m[(2, 0)];
-                cosine += m[(0, 0)] + m[(2, 2)];
-                shift += (to.t_wc - from.t_wc).dot(&direction);
-            } else {
+            let m = (to.r_wc * from.r_wc.inverse()).to_rotation_matrix();
+            let m = m.matrix();
+            let odd = Vector3::new(
+                m[(2, 1)] - m[(1, 2)],
+                m[(0, 2)] - m[(2, 0)],
+                m[(1, 0)] - m[(0, 1)],
+            );
+            sine += n.dot(&odd);
+            cosine += m.trace() - n.dot(&(m * n));
+            shift += (to.t_wc - from.t_wc).dot(&n);
+            if !self.shift {
                 let across = |t: &Vector3<f64>| {
                     let arm = t - point;
-                    arm - direction * arm.dot(&direction)
+                    arm - n * arm.dot(&n)
                 };
                 let (from, to) = (across(&from.t_wc), across(&to.t_wc));
-                sine += from.cross(&to).dot(&direction);
-                cosine += from.dot(&to);
+                // |R_to − R_from|² is twice the square of a small angle between them.
+                sine += 2.0 * from.cross(&to).dot(&n);
+                cosine += 2.0 * from.dot(&to);
             }
         }
         self.motion(sine.atan2(cosine), shift / from.len().max(1) as f64)
     }
+}
+
+/// The part of a displacement `(Δs, Δh)` of the wall, metres, that the gauge can make, and the motion that makes it.
+///
+/// On a straight tunnel a turn moves the wall along s and a shift along h. A turn that is free by itself moves it in one direction, the same
+/// everywhere: as at the point that the camera at `pose` looks at.
+pub fn free_part(
+    surface: &dyn Surface,
+    pose: &Pose,
+    moved: &Vector2<f64>,
+) -> (Vector2<f64>, GaugeMotion) {
+    let gauge = surface.gauge();
+    if gauge.turn && !gauge.shift {
+        let hit = surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z())).ok();
+        let per_radian = hit.map(|hit| {
+            let wall = surface.frame(hit.wall);
+            wall_jacobian(pose, &wall) * gauge.directions(pose)[0]
+        });
+        let per_radian = per_radian.unwrap_or_default();
+        let square = per_radian.norm_squared();
+        let turn_rad = match square > 0.0 {
+            true => per_radian.dot(moved) / square,
+            false => 0.0,
+        };
+        return (per_radian * turn_rad, gauge.motion(turn_rad, 0.0));
+    }
+    let radius_m = surface.perimeter_m() / std::f64::consts::TAU;
+    let motion = gauge.motion(moved.x / radius_m, moved.y);
+    (
+        Vector2::new(motion.turn_rad * radius_m, motion.shift_m),
+        motion,
+    )
 }
 
 /// A motion along the gauge: a turn about the axis, then a shift along it.

@@ -31,7 +31,7 @@ pub use centreline::{CentrePoint, Centreline, Station};
 pub use circle::Circle;
 pub use displacement::{lens_jacobian, wall_jacobian};
 pub use footprint::{Footprint, shortest_arc};
-pub use gauge::{Axis, Gauge, GaugeMotion};
+pub use gauge::{Axis, Gauge, GaugeMotion, free_part};
 pub use patches::Patches;
 pub use prism::Prism;
 pub use swept::Swept;

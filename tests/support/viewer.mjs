@@ -3,7 +3,7 @@
 //     node viewer.mjs NODE_MODULES CHROMIUM SCENARIO ADDRESS|FOLDER SCREENSHOT
 //
 // Scenarios: inspect (a page with a server), again (after a restart), bend, kilometre and static (folders, served
-// as they are).
+// as they are; static by touch).
 
 import { createServer } from "node:http";
 import { createRequire } from "node:module";
@@ -35,7 +35,9 @@ const browser = await chromium.launch({
   executablePath,
   args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--disable-quic"],
 });
-const page = await browser.newPage({ viewport: { width: 1300, height: 760 }, deviceScaleFactor: 1 });
+// A folder is looked at on a tablet, which has no mouse and no keys.
+const hasTouch = scenario === "static";
+const page = await browser.newPage({ viewport: { width: 1300, height: 760 }, deviceScaleFactor: 1, hasTouch, isMobile: hasTouch });
 const problems = [];
 page.on("console", (message) => message.type() === "error" && problems.push(message.text()));
 page.on("pageerror", (error) => problems.push(String(error)));
@@ -122,6 +124,17 @@ async function dots() {
   }, picture);
 }
 
+/** Fingers touch, move from places to places, and leave when `then` is over. */
+async function fingers(places, then = async () => {}) {
+  const session = await page.context().newCDPSession(page);
+  const send = (type, points) =>
+    session.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y], id) => ({ x, y, id })) });
+  await send("touchStart", places[0]);
+  for (const points of places.slice(1)) await send("touchMove", points);
+  await then();
+  await send("touchEnd", []);
+}
+
 async function save(code) {
   await page.fill("#panel input[name=class]", code);
   await page.fill("#panel textarea", 'wet, "open"');
@@ -205,12 +218,31 @@ const scenarios = {
     await page.goto(address + "#h=1.2&clock=3:00");
     seen.start = await told();
     seen.frames = await page.isVisible("[data-tool=frames]");
-    await page.keyboard.press("2");
-    await page.mouse.click(500, 330);
-    await save("BAB");
+    await fingers([[[700, 400]], [[600, 400]], [[500, 400]]]);
+    seen.turned = await told();
+    await go("#h=1.2&clock=3:00");
+    await fingers([[[600, 400], [640, 400]], [[560, 400], [680, 400]], [[520, 400], [720, 400]]]);
+    seen.pinched = await told();
+    const pad = await (await page.$("[data-key=KeyW]")).boundingBox();
+    await fingers([[[pad.x + 20, pad.y + 20]]], () => until(stopped));
+    seen.against = await told();
+
+    await go("#h=1.2&clock=3:00");
+    await page.tap("[data-tool=length]");
+    for (const x of [500, 560]) await page.touchscreen.tap(x, 330);
+    seen.length = await page.textContent("#measured");
+    await save('BAB, "long"');
+    await page.tap("[data-tool=mark]");
+    await page.touchscreen.tap(500, 330);
+    await save("BBF");
     await page.reload();
     await told();
     seen.kept = await marks();
+    const saved = async (name) => {
+      const [download] = await Promise.all([page.waitForEvent("download"), page.tap(`#marks button:text-is("${name}")`)]);
+      return readFile(await download.path(), "utf8");
+    };
+    [seen.geojson, seen.csv] = [await saved("GeoJSON"), await saved("CSV")];
   },
 };
 

@@ -1,6 +1,6 @@
 use super::*;
 use crate::surface::section::{Ellipse, Pieces, Round};
-use crate::surface::{CentrePoint, Circle, wall_jacobian};
+use crate::surface::{CentrePoint, Circle, free_part, wall_jacobian};
 use crate::trajectory::{Pose, so3};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -173,6 +173,53 @@ fn a_helix_is_a_screw_and_other_lines_are_nothing() {
     }
 }
 
+/// Radii given close to each other make no steps, and the wall is as smooth as they are.
+#[test]
+fn radii_between_points_are_on_the_way_from_one_to_the_next() {
+    let radius_m = |y: f64| 3.0 + 0.5 * (0.4 * y).sin();
+    let points: Vec<[f64; 4]> = (0..=40)
+        .map(|k| 0.5 * f64::from(k))
+        .map(|y| [0.0, y, 0.0, radius_m(y)])
+        .collect();
+    let tunnel = tunnel(Box::new(Round { radius_m: 3.0 }), 3.0, &points);
+    for k in 100..1900 {
+        let y = 0.01 * f64::from(k);
+        let at = tunnel.line().at(y);
+        assert!((3.0 * at.scale - radius_m(y)).abs() < 5e-3, "{y}: {at:?}");
+        assert!(
+            (3.0 * at.growth - 0.2 * (0.4 * y).cos()).abs() < 3e-2,
+            "{y}: {at:?}"
+        );
+    }
+}
+
+/// A straight tunnel whose radius changes may be turned, but not shifted: rotations tell the turn of cameras on the axis.
+#[test]
+fn a_funnel_turns_about_its_axis() {
+    let funnel = tunnel(
+        Box::new(Round { radius_m: 3.0 }),
+        3.0,
+        &[[0.0, 0.0, 0.0, 3.0], [0.0, 10.0, 0.0, 2.0]],
+    );
+    let gauge = funnel.gauge();
+    assert!(gauge.turn && !gauge.shift, "{gauge:?}");
+    let truth = [0.3, 1.4, 2.5].map(|k: f64| {
+        let turn = so3::exp(&Vector3::new(0.1 * k, k, -0.1));
+        Pose::new(turn, Vector3::new(0.02 * k, k, -0.01))
+    });
+    let turned = gauge.motion(0.7, 0.0).apply_all(&truth);
+    let back = gauge.align(&turned, &truth);
+    for (pose, truth) in back.apply_all(&turned).iter().zip(&truth) {
+        assert!(truth.local(pose).norm() < 1e-6);
+    }
+    // Around, as it may be turned; not along.
+    let (made_m, _) = free_part(&funnel, &truth[1], &nalgebra::Vector2::new(0.2, 0.1));
+    assert!(
+        (made_m.x - 0.2).abs() < 1e-6 && made_m.y.abs() < 1e-6,
+        "{made_m}"
+    );
+}
+
 #[test]
 fn impossible_lines_are_refused_with_the_reason() {
     let line = |points: &[[f64; 3]], radius_m: Option<f64>| {
@@ -189,7 +236,7 @@ fn impossible_lines_are_refused_with_the_reason() {
         let error = result.unwrap_err().to_string();
         assert!(error.contains(what), "{error}");
     };
-    told(line(&[], None), "0 point");
+    told(line(&[], None), "no points");
     told(line(&[[0.0; 3]], None), "two or more");
     told(
         line(&[[0.0; 3], [0.0; 3], [0.0, 5.0, 0.0]], None),
@@ -209,4 +256,14 @@ fn impossible_lines_are_refused_with_the_reason() {
     ];
     told(line(&hairpin, None), "tighter than the tunnel");
     told(line(&[[0.0; 3], [0.0, 1e9, 0.0]], None), "too long");
+    // Turns of 12 m radius; the tunnel is 6 m wide.
+    let turns = |rise_m: f64, count: i32| -> Vec<[f64; 3]> {
+        let angles = (0..20 * count).map(|k| f64::from(k) * TAU / 20.0);
+        let point = |a: f64| [12.0 * a.cos(), 12.0 * a.sin(), rise_m * a / TAU];
+        angles.map(point).collect()
+    };
+    told(line(&turns(5.9, 3), None), "runs into itself");
+    told(line(&turns(-2.0, 2), None), "runs into itself");
+    line(&turns(6.2, 40), None).unwrap();
+    line(&turns(4.2, 3), Some(2.0)).unwrap();
 }

@@ -5,7 +5,8 @@ import { clockOf, placeOf, thetaOf } from "./clock";
 import { byId, make, press } from "./element";
 import { Layers } from "./layers";
 import { WallMap } from "./map";
-import { LocalStore, type Mark, type Measure, ServerStore, type Store, download, geojson, newMark, placesOf } from "./marks";
+import { LocalStore, type Mark, type Measure, ServerStore, type Store, csv, download, geojson, newMark, placesOf } from "./marks";
+import { wirePad } from "./pad";
 import { Overlay, type Shape } from "./overlay";
 import { Panel, valueOf } from "./panel";
 import { type Abilities, type Tunnel, type WallPoints, read } from "./tunnel";
@@ -82,6 +83,7 @@ class Page {
       if (button.dataset.tool === "frames") button.hidden = !this.abilities.frames;
     }
     byId("ride").addEventListener("click", () => this.ride());
+    wirePad(byId("pad"), this.walk);
     byId("lock").addEventListener("click", () => this.lock());
     byId("cameras").addEventListener("click", () => this.toggleCameras());
     byId("help").addEventListener("click", () => byId<HTMLDialogElement>("keys").showModal());
@@ -110,11 +112,14 @@ class Page {
       this.renderer.render(this.scene, this.camera);
       this.drawShapes();
     }
-    document.body.dataset.loading = this.layers.complete ? "0" : "1";
-    if (now - this.lastSlow > SLOWLY_MS) {
+    const loading = this.layers.complete ? "0" : "1";
+    // At once when all is there; else now and then.
+    const arrived = loading === "0" && document.body.dataset.loading === "1";
+    if (arrived || now - this.lastSlow > SLOWLY_MS) {
       this.lastSlow = now;
       this.tell();
     }
+    document.body.dataset.loading = loading;
   }
 
   /** Where you are, what you see, and what it takes. */
@@ -283,11 +288,15 @@ class Page {
     root.replaceChildren();
     this.dirty = true;
     if (rows.length === 0) return;
-    const row = make("div", { className: "row" }, make("strong", {}, `${rows.length} marks`));
+    const row = make("div", { className: "row" }, make("strong", {}, rows.length === 1 ? "1 mark" : `${rows.length} marks`));
     if (!this.abilities.marks) {
-      const save = make("button", { type: "button" }, "GeoJSON");
-      save.addEventListener("click", () => download("marks.geojson", geojson(this.marks)));
-      row.append(save);
+      const save = (name: string, file: string, type: string, text: (marks: Mark[]) => string) => {
+        const button = make("button", { type: "button", title: `Save as ${file}` }, name);
+        button.addEventListener("click", () => download(file, type, text(this.marks)));
+        row.append(button);
+      };
+      save("GeoJSON", "marks.geojson", "application/geo+json", geojson);
+      save("CSV", "marks.csv", "text/csv", csv);
     }
     root.append(row, make("ul", {}, ...rows));
   }

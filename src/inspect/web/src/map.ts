@@ -4,6 +4,10 @@ import type { Wall, WallPlace } from "./wall";
 
 /** Least distance of two chainages in the map, pixels. */
 const TICK_PX = 60;
+/** Clock positions nearer to an edge are not written, pixels. */
+const CLOCK_PX = 10;
+/** They need so much room, pixels. */
+const CLOCK_ROOM_PX = 40;
 
 export interface Pin {
   place: WallPlace;
@@ -70,6 +74,7 @@ export class WallMap {
     if (this.layer) this.drawPictures(context, this.layer, left, scale, height);
     const at = ({ s, h }: WallPlace): [number, number] => [(h - left) * scale, (1 - this.wall.around(s) / this.wall.perimeter) * height];
     this.drawScale(context, left, scale, width, height);
+    this.drawClock(context, at({ s: 0, h: this.wall.chainage[0] })[0], height);
     context.fillStyle = "#ffb02e";
     const [x] = at(this.eye);
     context.fillRect(x - 1, 0, 2, height);
@@ -114,6 +119,25 @@ export class WallMap {
       context.strokeText(`${h} m`, x + 3, height);
       context.fillText(`${h} m`, x + 3, height);
     }
+  }
+
+  /** Clock positions beside the wall, or on it where that fills the map. */
+  private drawClock(context: CanvasRenderingContext2D, left: number, height: number): void {
+    const beside = left > CLOCK_ROOM_PX;
+    const x = beside ? left - 4 : Math.max(left, 0) + 4;
+    context.textBaseline = "middle";
+    context.textAlign = beside ? "end" : "start";
+    context.strokeStyle = "#000";
+    context.fillStyle = "#fffa";
+    context.lineWidth = 3;
+    for (const hour of [12, 3, 6, 9]) {
+      const y = (1 - this.wall.sAtHour(hour) / this.wall.perimeter) * height;
+      // Not on the seam, which is at both edges.
+      if (y < CLOCK_PX || y > height - CLOCK_PX) continue;
+      context.strokeText(`${hour}:00`, x, y);
+      context.fillText(`${hour}:00`, x, y);
+    }
+    context.textAlign = "start";
   }
 
   private picture(folder: string, row: number): HTMLImageElement {

@@ -50,7 +50,7 @@ export function newMark(tunnel: Tunnel, wall: Wall, layer: string, places: WallP
   const end = second && wall.nearest(first, second);
   return {
     type: "Feature",
-    id: crypto.randomUUID(),
+    id: newId(),
     geometry: end
       ? { type: "LineString", coordinates: [[first.s, first.h], [end.s, end.h]] }
       : { type: "Point", coordinates: [first.s, first.h] },
@@ -69,6 +69,11 @@ export function newMark(tunnel: Tunnel, wall: Wall, layer: string, places: WallP
       created: new Date().toISOString(),
     },
   };
+}
+
+/** A name that no other mark has. (`randomUUID` is not there for pages of a web server without TLS.) */
+function newId(): string {
+  return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
 /** Where marks are kept. */
@@ -128,9 +133,36 @@ export function geojson(marks: Mark[]): string {
   return JSON.stringify(collection, null, 2) + "\n";
 }
 
-export function download(name: string, text: string): void {
+/** The table that the server would have written: by chainage, as RFC 4180 quotes. */
+export function csv(marks: Mark[]): string {
+  const number = (value: number | undefined, digits: number) => value?.toFixed(digits) ?? "";
+  const columns: [string, (id: string, p: Mark["properties"]) => string][] = [
+    ["id", (id) => id],
+    ["class", (_, p) => p.class],
+    ["severity", (_, p) => String(p.severity)],
+    ["chainage_m", (_, p) => number(p.chainage_m, 4)],
+    ["clock", (_, p) => p.clock],
+    ["theta_deg", (_, p) => number(p.theta_deg, 3)],
+    ["end_chainage_m", (_, p) => number(p.end_chainage_m, 4)],
+    ["end_clock", (_, p) => p.end_clock ?? ""],
+    ["length_m", (_, p) => number(p.length_m, 4)],
+    ["width_mm", (_, p) => number(p.width_mm, 2)],
+    ["x_m", (_, p) => number(p.x_m, 4)],
+    ["y_m", (_, p) => number(p.y_m, 4)],
+    ["z_m", (_, p) => number(p.z_m, 4)],
+    ["note", (_, p) => p.note],
+    ["layer", (_, p) => p.layer],
+    ["created", (_, p) => p.created],
+  ];
+  const quoted = (text: string) => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+  const sorted = [...marks].sort((a, b) => a.properties.chainage_m - b.properties.chainage_m);
+  const rows = sorted.map((mark) => columns.map(([, value]) => quoted(value(mark.id, mark.properties))));
+  return [columns.map(([name]) => name), ...rows].map((row) => row.join(",") + "\n").join("");
+}
+
+export function download(name: string, type: string, text: string): void {
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([text], { type: "application/geo+json" }));
+  link.href = URL.createObjectURL(new Blob([text], { type }));
   link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);

@@ -7,8 +7,14 @@ const MARGIN = 0.04;
 const TURN_RAD_PER_PX = 0.003;
 const TURN_RAD_PER_S = 1.2;
 const FASTER = 4;
-/** A press that moves less is a click, pixels. */
-const CLICK_PX = 4;
+/** A press that moves less is a click, pixels: of a mouse, of a finger. */
+const CLICK_PX = { mouse: 4, touch: 12 };
+/** Two fingers twice as far apart: this far ahead, radii. */
+const PINCH = 0.7;
+/** Two fingers moved aside by a pixel: this far aside, radii. */
+const ASIDE = 0.004;
+/** What is looked at first lies this far ahead at the most, radii. */
+const AHEAD = 6;
 
 const MOVES: Record<string, [number, number, number]> = {
   KeyW: [0, 0, 1], KeyS: [0, 0, -1], KeyA: [-1, 0, 0], KeyD: [1, 0, 0], KeyE: [0, 1, 0], KeyQ: [0, -1, 0],
@@ -29,7 +35,9 @@ export class Walk {
   private yaw = 0;
   private pitch = 0;
   private readonly pressed = new Set<string>();
+  /** Where fingers, or the mouse, press. */
   private readonly touches = new Map<number, [number, number]>();
+  /** How far they have moved, pixels. */
   private moved = 0;
   private changed = true;
 
@@ -43,7 +51,12 @@ export class Walk {
     camera.far = (wall.chainage[1] - wall.chainage[0]) * 2 + wall.radius * 20;
     // A few steps in, so that there is wall around.
     const [from, to] = wall.chainage;
-    this.eye = wall.station(from + Math.min(wall.radius, 0.2 * (to - from))).centre;
+    const start = from + Math.min(wall.radius, 0.2 * (to - from));
+    this.eye = wall.station(start).centre;
+    // Along the tunnel if it is long; not out of its end.
+    const ahead = Math.min(AHEAD * wall.radius, 0.3 * (to - start));
+    const there = wall.station(start + ahead);
+    this.lookFrom(wall.station(start), wall.towards(there, there.right).place);
     this.listen();
   }
 
@@ -61,8 +74,18 @@ export class Walk {
   /** Goes to the axis and looks at a place of the wall. */
   lookAt(place: WallPlace): void {
     const station = this.wall.station(Math.min(Math.max(place.h, this.wall.chainage[0]), this.wall.chainage[1]));
+    this.lookFrom(station, place);
+  }
+
+  private lookFrom(station: Station, place: WallPlace): void {
     this.eye.copy(station.centre);
     this.turnTo(station, this.wall.point(place).sub(this.eye));
+  }
+
+  /** Holds a key down, or lets it go. */
+  hold(key: string, down: boolean): void {
+    if (down) this.pressed.add(key);
+    else this.pressed.delete(key);
   }
 
   /** Looks along the axis. */
@@ -166,7 +189,7 @@ export class Walk {
     view.addEventListener("pointermove", (event) => this.drag(event));
     const end = (event: PointerEvent) => {
       const pressed = this.touches.delete(event.pointerId);
-      if (!pressed || event.type === "pointercancel" || this.moved > CLICK_PX) return;
+      if (!pressed || event.type === "pointercancel" || this.moved > clickPx(event)) return;
       const locked = document.pointerLockElement === view;
       this.onClick(locked ? view.clientWidth / 2 : event.clientX, locked ? view.clientHeight / 2 : event.clientY);
     };
@@ -182,16 +205,23 @@ export class Walk {
     const before = this.touches.get(event.pointerId);
     if (!before) return;
     const [dx, dy] = [event.clientX - before[0], event.clientY - before[1]];
-    if (Math.hypot(dx, dy) + this.moved <= CLICK_PX) return;
+    if (Math.hypot(dx, dy) + this.moved <= clickPx(event)) return;
     this.touches.set(event.pointerId, [event.clientX, event.clientY]);
     this.moved += Math.hypot(dx, dy);
-    if (this.touches.size > 1) {
-      const [look, right] = this.axes(this.station);
-      const metres = this.wall.radius * 0.01;
-      this.go(look.multiplyScalar(-dy * metres).addScaledVector(right, dx * metres));
+    const other = [...this.touches].find(([id]) => id !== event.pointerId)?.[1];
+    if (other) {
+      const [look, right, up] = this.axes(this.station);
+      const apart = (x: number, y: number) => Math.max(Math.hypot(x - other[0], y - other[1]), 1);
+      const ahead = PINCH * Math.log2(apart(event.clientX, event.clientY) / apart(...before));
+      const step = look.multiplyScalar(ahead).addScaledVector(right, -ASIDE * dx).addScaledVector(up, ASIDE * dy);
+      this.go(step.multiplyScalar(this.wall.radius));
     } else {
       // The wall follows the hand.
       this.turn(-dx * TURN_RAD_PER_PX, dy * TURN_RAD_PER_PX);
     }
   }
+}
+
+function clickPx(event: PointerEvent): number {
+  return event.pointerType === "mouse" ? CLICK_PX.mouse : CLICK_PX.touch;
 }

@@ -34,6 +34,7 @@ export class Wall {
   private readonly centres: Vector3[] = [];
   private readonly angles: number[];
   private readonly twelve: number;
+  private readonly twelveAtDeg: number;
 
   constructor(tunnel: Tunnel, points: WallPoints) {
     this.perimeter = tunnel.perimeter_m;
@@ -42,7 +43,8 @@ export class Wall {
     this.h = points.h_m;
     this.points = points.points_m;
     this.angles = tunnel.theta_deg;
-    this.twelve = this.sAt(tunnel.twelve_at_deg);
+    this.twelveAtDeg = tunnel.twelve_at_deg;
+    this.twelve = this.sAtHour(12);
     for (let row = 0; row < this.h.length; row++) {
       const centre = new Vector3();
       for (let column = 1; column < this.s.length; column++) {
@@ -175,6 +177,11 @@ export class Wall {
     const [from, to] = [this.angles[after - 1], this.angles[after]];
     const share = to > from ? (theta - from) / (to - from) : 0;
     return ((after - 1 + Math.min(share, 1)) / steps) * this.perimeter;
+  }
+
+  /** The arc length at a full hour of the clock. */
+  sAtHour(hour: number): number {
+    return this.sAt(this.twelveAtDeg + 30 * hour);
   }
 
   private corner(column: number, row: number): Vector3 {
