@@ -193,7 +193,7 @@ impl<'a> View<'a> {
             let own = &mut pixels[first..first + piece.len() * (C + 1)];
             let done = self.span(place.0, &piece).is_some_and(|(span, first)| {
                 run.show(piece.clone());
-                integer::span::<C>(&span, piece.start - first..piece.end - first, own)
+                integer::span_bytes::<C>(&span, piece.start - first..piece.end - first, own)
             });
             if done {
                 continue;

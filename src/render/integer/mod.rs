@@ -88,7 +88,7 @@ pub struct Span<'a> {
 
 /// The bytes of some `columns` of a span, alpha last and full, straight from where they appear. False without doing it where the
 /// processor lacks the vectors for it.
-pub fn span<const C: usize>(span: &Span, columns: Range<usize>, pixels: &mut [u8]) -> bool {
+pub fn span_bytes<const C: usize>(span: &Span, columns: Range<usize>, pixels: &mut [u8]) -> bool {
     #[cfg(target_arch = "x86_64")]
     if vectors::avx2(
         #[inline(always)]
@@ -265,7 +265,7 @@ mod tests {
         for columns in [0..PATCH, 0..3, 5..14, 27..PATCH] {
             let expected = &slow_bytes[columns.start * (C + 1)..columns.end * (C + 1)];
             let mut bytes = vec![7; expected.len()];
-            if !span::<C>(&all, columns.clone(), &mut bytes) {
+            if !span_bytes::<C>(&all, columns.clone(), &mut bytes) {
                 return;
             }
             assert_eq!(bytes, expected, "{interpolation:?} {stretch} {columns:?}");

@@ -15,7 +15,7 @@ use std::ops::Range;
 /// Pixels at a time.
 const EIGHT: usize = 8;
 
-/// See [`super::span`].
+/// See [`super::span_bytes`].
 #[inline(always)]
 pub fn copy<const C: usize>(simd: V3, span: &Span, columns: Range<usize>, pixels: &mut [u8]) {
     let mut from = columns.start;
