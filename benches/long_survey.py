@@ -60,7 +60,7 @@ initial = "plan.tum"
 
 def main():
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "long-survey")
-    subprocess.run(["cargo", "build", "--quiet", "--release"], check=True, cwd=PROGRAM.parent)
+    subprocess.run(["cargo", "build", "--quiet", "--release"], check=True, cwd=Path(__file__).parent.parent)
     if not (folder / "survey.toml").exists():
         folder.mkdir(parents=True, exist_ok=True)
         survey(folder)

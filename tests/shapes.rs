@@ -71,38 +71,26 @@ fn circling(pitch_m: f64) -> String {
 /// they are said to be.
 #[test]
 fn a_tight_bend_is_refined_as_exactly_as_is_said() {
-    let dir = tempfile::tempdir().unwrap();
-    let line = dir.path().join("bend.txt");
-    std::fs::write(&line, bend()).unwrap();
-    let [refined, initial] = refined(
-        dir.path(),
-        &[
-            "--radius-m",
-            "0.6",
-            "--centreline",
-            text(&line),
-            "--frames",
-            "36",
-            "--advance-m",
-            "0.05",
-            "--translation-sigma-m",
-            "0.004,0.004,0.006",
-        ],
-    );
-    exact_as_said(dir.path(), refined, initial);
+    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&bend(), "36");
 }
 
 /// Nothing of a line that bends to and fro, in a tunnel that widens and narrows, may be moved without a picture that tells.
 #[test]
 fn a_winding_tunnel_of_changing_radius_is_refined_as_exactly_as_is_said() {
-    let dir = tempfile::tempdir().unwrap();
-    let line = dir.path().join("winding.txt");
     let point = |k: i32| {
         let y = 0.05 * f64::from(k);
         let x = 0.12 * (1.0 - (2.6 * y).cos());
         format!("{x} {y} 0 {}\n", 0.6 + 0.06 * (3.1 * y).sin())
     };
-    std::fs::write(&line, (-6..50).map(point).collect::<String>()).unwrap();
+    let winding: String = (-6..50).map(point).collect();
+    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&winding, "24");
+}
+
+/// A tunnel of 0.6 m radius along a line.
+fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str, frames: &str) {
+    let dir = tempfile::tempdir().unwrap();
+    let line = dir.path().join("line.txt");
+    std::fs::write(&line, points).unwrap();
     let [refined, initial] = refined(
         dir.path(),
         &[
@@ -111,7 +99,7 @@ fn a_winding_tunnel_of_changing_radius_is_refined_as_exactly_as_is_said() {
             "--centreline",
             text(&line),
             "--frames",
-            "24",
+            frames,
             "--advance-m",
             "0.05",
             "--translation-sigma-m",

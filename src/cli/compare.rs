@@ -88,7 +88,7 @@ pub fn run(arguments: &CompareArguments, run: &Run, terminal: &Terminal) -> Resu
         &arguments.out,
         terminal,
     )?;
-    let inputs = record::inputs(&survey, &[&arguments.refined])?;
+    let inputs = record::inputs(&survey, [arguments.refined.as_path()])?;
     run.write(&arguments.out.join(RUN_FILE), &inputs)?;
     if arguments.json {
         json::print_text(&json)?;

@@ -56,8 +56,7 @@ pub fn run(arguments: &ConvertArguments, run: &Run, terminal: &Terminal) -> Resu
     let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
     let out = &arguments.out;
     check_apart(&survey, out)?;
-    let others: Vec<&Path> = arguments.poses.file().into_iter().collect();
-    let inputs = record::inputs(&survey, &others)?;
+    let inputs = record::inputs(&survey, arguments.poses.file())?;
     let has_names = !matches!(arguments.to, ToArgument::Tum | ToArgument::Kitti);
     if let Some(frame) = survey
         .frames

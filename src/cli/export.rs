@@ -75,8 +75,7 @@ struct Report<'a> {
 pub fn run(arguments: &ExportArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     check(arguments)?;
     let (survey, given) = arguments.poses.open(&arguments.survey, terminal)?;
-    let others: Vec<&Path> = arguments.poses.file().into_iter().collect();
-    let inputs = record::inputs(&survey, &others)?;
+    let inputs = record::inputs(&survey, arguments.poses.file())?;
     let canvas = match arguments.glb.is_some() || arguments.tiles.is_some() {
         true => Some(files(arguments, &survey, &poses_of(&given), terminal)?),
         false => None,

@@ -77,9 +77,7 @@ impl FrameTimesArguments {
         }
         Ok(FrameTimes { times_s, is_clock })
     }
-}
 
-impl FrameTimesArguments {
     /// The files that tell the times.
     pub fn files(&self, survey: Option<&Path>) -> Vec<PathBuf> {
         let survey = survey.map(toml_path);

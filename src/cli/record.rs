@@ -66,9 +66,12 @@ pub fn beside(result: &Path) -> PathBuf {
 ///
 /// # Errors
 /// An input that cannot be read.
-pub fn inputs(survey: &Survey, others: &[&Path]) -> Result<Vec<Input>, Failure> {
-    let own = survey.own_files().iter().map(PathBuf::as_path);
-    let mut inputs = files(own.chain(others.iter().copied()))?;
+pub fn inputs<'a>(
+    survey: &'a Survey,
+    others: impl IntoIterator<Item = &'a Path>,
+) -> Result<Vec<Input>, Failure> {
+    let own = survey.own_files();
+    let mut inputs = files(own.iter().map(PathBuf::as_path).chain(others))?;
     inputs.push(provenance::frames(&survey.frames).map_err(unreadable)?);
     Ok(inputs)
 }

@@ -121,7 +121,7 @@ pub fn run(
         }
     };
     let survey = arguments.reading.open(&arguments.survey, terminal)?;
-    let inputs = record::inputs(&survey, &[])?;
+    let inputs = record::inputs(&survey, None)?;
     let origin = resume::origin(&survey, &options, inputs.clone())?;
     let say = |text: &str| {
         if !arguments.json {

@@ -58,8 +58,7 @@ pub fn run(arguments: &ReportArguments, run: &Run, terminal: &Terminal) -> Resul
         terminal,
     )?;
     let files = refined.files();
-    let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-    let inputs = record::inputs(&survey, &files)?;
+    let inputs = record::inputs(&survey, files.iter().map(PathBuf::as_path))?;
     let sources = Sources {
         survey: &survey,
         refined,

@@ -240,8 +240,7 @@ pub fn run(arguments: &StitchArguments, run: &Run, terminal: &Terminal) -> Resul
         budget.most(frames_bytes) >> 20,
         frames_bytes.min(budget.room) >> 20
     ));
-    let others: Vec<&Path> = arguments.poses.file().into_iter().collect();
-    let inputs = record::inputs(&survey, &others)?;
+    let inputs = record::inputs(&survey, arguments.poses.file())?;
     let origin = resume::origin(&survey, &arguments.result(&options), inputs.clone())?;
     let out = &arguments.output.out;
     let resume = &arguments.resume;

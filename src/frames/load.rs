@@ -1,7 +1,8 @@
 //! Finding and decoding frames.
 
 use super::Video;
-use image::{ColorType, DynamicImage, ImageDecoder};
+use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageReader, ImageResult};
+use std::io::{BufRead, Cursor, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -122,12 +123,16 @@ impl FrameFile {
     pub fn size(&self) -> Result<(u32, u32), FrameError> {
         match &self.video {
             Some((video, _)) => Ok(video.size()),
-            None => image::ImageReader::open(&self.path)
-                .and_then(image::ImageReader::with_guessed_format)
-                .map_err(image::ImageError::from)
-                .and_then(image::ImageReader::into_dimensions)
-                .map_err(|error| self.fault(error.to_string())),
+            None => Ok(self.header()?.dimensions()),
         }
+    }
+
+    /// The decoder of a picture of its own, its header read.
+    fn header(&self) -> Result<impl ImageDecoder, FrameError> {
+        ImageReader::open(&self.path)
+            .map_err(ImageError::from)
+            .and_then(decoder)
+            .map_err(|error| self.fault(error.to_string()))
     }
 
     fn fault(&self, what: String) -> FrameError {
@@ -206,11 +211,8 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
     if bytes.starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(&bytes) {
         return Err(fail("the JPEG file is truncated".to_owned()));
     }
-    let decoder = image::ImageReader::new(std::io::Cursor::new(bytes))
-        .with_guessed_format()
-        .map_err(|error| fail(error.to_string()))?
-        .into_decoder()
-        .map_err(|error| fail(error.to_string()))?;
+    let decoder =
+        decoder(ImageReader::new(Cursor::new(bytes))).map_err(|error| fail(error.to_string()))?;
     // Before there is room made for as many pixels as a header may claim.
     check(decoder.dimensions())?;
     DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))
@@ -224,14 +226,12 @@ pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
     if let Some((video, _)) = &file.video {
         return Ok(video.colour());
     }
-    let fail = |what: String| file.fault(what);
-    let reader = image::ImageReader::open(&file.path)
-        .and_then(image::ImageReader::with_guessed_format)
-        .map_err(|error| fail(error.to_string()))?;
-    let decoder = reader
-        .into_decoder()
-        .map_err(|error| fail(error.to_string()))?;
-    Ok(decoder.color_type())
+    Ok(file.header()?.color_type())
+}
+
+/// The decoder that the content of a file asks for, its header read.
+fn decoder<R: BufRead + Seek + 'static>(reader: ImageReader<R>) -> ImageResult<impl ImageDecoder> {
+    reader.with_guessed_format()?.into_decoder()
 }
 
 /// True if a JPEG file holds its end-of-image marker (the decoder fills what is missing with grey and

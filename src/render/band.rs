@@ -65,28 +65,20 @@ impl Band {
         let columns = canvas.columns as usize;
         let step = self.format.channels + 1;
         let sources = cut(&mut self.sources, columns, 1, tiles);
-        match &mut self.samples {
+        let pixels: Vec<Rows> = match &mut self.samples {
             Samples::Eight(samples) => {
                 let pixels = cut(samples, columns, step, tiles).into_iter();
-                let places = pixels.zip(sources);
-                places
-                    .map(|(pixels, sources)| Place {
-                        pixels: Rows::Eight(pixels),
-                        sources,
-                    })
-                    .collect()
+                pixels.map(Rows::Eight).collect()
             }
             Samples::Sixteen(samples) => {
                 let pixels = cut(samples, columns, step, tiles).into_iter();
-                let places = pixels.zip(sources);
-                places
-                    .map(|(pixels, sources)| Place {
-                        pixels: Rows::Sixteen(pixels),
-                        sources,
-                    })
-                    .collect()
+                pixels.map(Rows::Sixteen).collect()
             }
-        }
+        };
+        let places = pixels.into_iter().zip(sources);
+        places
+            .map(|(pixels, sources)| Place { pixels, sources })
+            .collect()
     }
 
     /// One channel of a region, grey levels of 255; NaN in holes. Rows beyond the band's are those next to them.

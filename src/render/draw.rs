@@ -145,6 +145,7 @@ impl Scene<'_> {
         match self.composition {
             Composition::Seams(seams) => {
                 let places = seams.columns_of(self.canvas, tile);
+                let copies = seams.are_hard() && views.iter().all(View::copies);
                 let mut above = None;
                 for (row, (pixels, sources)) in rows {
                     let between = seams.row_of(self.canvas, tile.row + row as u32);
@@ -154,7 +155,7 @@ impl Scene<'_> {
                         above = Some(between.before());
                     }
                     match T::bytes(pixels) {
-                        Some(pixels) if seams.are_hard() && views.iter().all(View::copies) => {
+                        Some(pixels) if copies => {
                             brush.copy(row, shares, pixels, sources);
                         }
                         _ => {

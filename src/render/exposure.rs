@@ -172,7 +172,7 @@ impl Response<'_> {
         let (u, v, seen, values) = run.parts();
         let Some(table) = self.shading else {
             for value in values[columns].as_flattened_mut() {
-                *value = (*value - self.bias) * self.gain;
+                *value = self.undone(*value, self.gain);
             }
             return;
         };
@@ -191,7 +191,7 @@ impl Response<'_> {
                         for (k, value) in values[start..end].iter_mut().enumerate() {
                             let factor = first + k as f32 * slope;
                             for value in value {
-                                *value = (*value - self.bias) * factor;
+                                *value = self.undone(*value, factor);
                             }
                         }
                     } else {
@@ -199,7 +199,7 @@ impl Response<'_> {
                         for (value, (u, v)) in values[start..end].iter_mut().zip(places) {
                             let factor = self.gain * table.at(*u, *v);
                             for value in value {
-                                *value = (*value - self.bias) * factor;
+                                *value = self.undone(*value, factor);
                             }
                         }
                     }
@@ -211,7 +211,12 @@ impl Response<'_> {
     /// The value of the evenly lit wall for one of the frame at a pixel.
     pub fn wall(&self, value: f32, u: f32, v: f32) -> f32 {
         let light = self.shading.map_or(1.0, |table| table.at(u, v));
-        (value - self.bias) * (self.gain * light)
+        self.undone(value, self.gain * light)
+    }
+
+    #[inline(always)]
+    fn undone(&self, value: f32, factor: f32) -> f32 {
+        (value - self.bias) * factor
     }
 }
 

@@ -225,7 +225,7 @@ impl Run {
             &mut self.values[columns.clone()],
         );
         let missing = integer::missing(kernel);
-        let scale = 1.0 / (1u32 << integer::bits(kernel)) as f32;
+        let scale = integer::scale(kernel);
         wide(
             #[inline(always)]
             || {

@@ -82,6 +82,15 @@ fn four_greys(
     ssse3._mm_hadd_epi32(ssse3._mm_hadd_epi32(a, b), ssse3._mm_hadd_epi32(c, d))
 }
 
+/// The weights along u and v of pixel `k`.
+#[inline(always)]
+fn weights(kernel: &Kernel, [s, t]: [Eight<i32>; 2], k: usize) -> (&[i16], &[i16]) {
+    (
+        kernel.integers(s[k] as usize),
+        kernel.integers(t[k] as usize),
+    )
+}
+
 /// Four numbers whose sum is that of grey pixel `k`.
 #[inline(always)]
 fn one_grey(
@@ -89,13 +98,10 @@ fn one_grey(
     source: Source,
     kernel: &Kernel,
     first: &Eight<u32>,
-    [s, t]: [Eight<i32>; 2],
+    phases: [Eight<i32>; 2],
     k: usize,
 ) -> __m128i {
-    let weights = (
-        kernel.integers(s[k] as usize),
-        kernel.integers(t[k] as usize),
-    );
+    let weights = weights(kernel, phases, k);
     let at = first[k] as usize;
     match kernel.taps() {
         4 => grey(simd, source, weights, at),
@@ -146,18 +152,28 @@ fn one_colour(
     source: Source,
     kernel: &Kernel,
     first: &Eight<u32>,
-    [s, t]: [Eight<i32>; 2],
+    phases: [Eight<i32>; 2],
     k: usize,
 ) -> __m128i {
-    let weights = (
-        kernel.integers(s[k] as usize),
-        kernel.integers(t[k] as usize),
-    );
+    let weights = weights(kernel, phases, k);
     let at = first[k] as usize;
     match kernel.taps() {
         4 => colour(simd, source, weights, at, 1),
         taps => colour(simd, source, weights, at, taps / 4),
     }
+}
+
+/// Sums with `more` and without their last `bits`, as bytes: the lower halves of all vectors first.
+#[inline(always)]
+pub fn packed(simd: V3, [a, b, c, d]: [__m256i; 4], more: __m256i, bits: u32) -> __m256i {
+    let avx2 = simd.avx2;
+    let count: __m128i = cast([bits, 0, 0, 0]);
+    let a = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(a, more), count);
+    let b = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(b, more), count);
+    let c = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(c, more), count);
+    let d = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(d, more), count);
+    let (ab, cd) = (avx2._mm256_packs_epi32(a, b), avx2._mm256_packs_epi32(c, d));
+    avx2._mm256_packus_epi16(ab, cd)
 }
 
 #[inline(always)]
@@ -172,19 +188,12 @@ pub fn pixels<const C: usize>(
     let (eights, rest) = sums.as_chunks::<8>();
     let (there, there_rest) = pixels.split_at_mut(8 * (C + 1) * eights.len());
     let more_twice: __m256i = cast([*more; 2]);
-    let count: __m128i = cast([bits, 0, 0, 0]);
     // Packing leaves pixels 0, 2, 4, 6 in the lower half and 1, 3, 5, 7 in the upper one.
     let order: __m256i = cast([0, 4, 1, 5, 2, 6, 3, 7]);
     let first_two: __m256i =
         cast([[0i8, 1, 4, 5, 8, 9, 12, 13, NO, NO, NO, NO, NO, NO, NO, NO]; 2]);
     for (eight, there) in eights.iter().zip(there.chunks_exact_mut(8 * (C + 1))) {
-        let [a, b, c, d]: [__m256i; 4] = cast(*eight);
-        let a = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(a, more_twice), count);
-        let b = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(b, more_twice), count);
-        let c = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(c, more_twice), count);
-        let d = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(d, more_twice), count);
-        let (ab, cd) = (avx2._mm256_packs_epi32(a, b), avx2._mm256_packs_epi32(c, d));
-        let all = avx2._mm256_packus_epi16(ab, cd);
+        let all = packed(simd, cast(*eight), more_twice, bits);
         let all = avx2._mm256_permutevar8x32_epi32(all, order);
         if C == 3 {
             let all: [u8; 32] = cast(all);

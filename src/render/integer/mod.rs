@@ -63,8 +63,7 @@ pub fn sums<const C: usize>(
 /// The nearest 8-bit samples of sums, alpha last and full.
 pub fn pixels<const C: usize>(kernel: &Kernel, sums: &[[i32; 4]], pixels: &mut [u8]) {
     let bits = bits(kernel);
-    let half = missing(kernel) + (1 << (bits - 1));
-    let mut more = [half; 4];
+    let mut more = [rounding(kernel); 4];
     more[C] = 255 << bits;
     #[cfg(target_arch = "x86_64")]
     if vectors::avx2(
@@ -116,11 +115,21 @@ pub fn span_values<const C: usize>(
 }
 
 /// Bits of a sum below its whole part.
-pub fn bits(kernel: &Kernel) -> u32 {
+fn bits(kernel: &Kernel) -> u32 {
     match kernel.taps() {
         2 => 14,
         _ => 20,
     }
+}
+
+/// A sum in units of a whole one.
+pub fn scale(kernel: &Kernel) -> f32 {
+    1.0 / (1u32 << bits(kernel)) as f32
+}
+
+/// What is added to a sum that is then cut to the nearest whole one.
+fn rounding(kernel: &Kernel) -> i32 {
+    missing(kernel) + (1 << (bits(kernel) - 1))
 }
 
 /// What is missing of a sum: what cutting has taken away in the mean.

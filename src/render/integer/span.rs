@@ -5,7 +5,7 @@
 use super::super::chart::{PATCH, SCALE};
 use super::avx2;
 use super::avx2::Eight;
-use super::{Kernel, Span, bits, missing};
+use super::{Kernel, Span, bits, missing, rounding, scale};
 use crate::vectors;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
@@ -48,7 +48,7 @@ pub fn values<const C: usize>(
 ) {
     let avx = simd.avx;
     let missing = avx._mm256_set1_epi32(missing(span.kernel));
-    let scale = avx._mm256_set1_ps(1.0 / (1u32 << bits(span.kernel)) as f32);
+    let scale = avx._mm256_set1_ps(scale(span.kernel));
     for first in (columns.start / EIGHT * EIGHT..columns.end).step_by(EIGHT) {
         let places = places::<C>(simd, span, first);
         let own = &mut values[first..first + EIGHT];
@@ -145,28 +145,17 @@ fn whole(simd: V3, value: __m256, phases: f32) -> (__m256i, __m256i) {
 /// The pixels whose sums are those of k and k + 4 in the halves of the k-th vector, alpha last and full.
 #[inline(always)]
 fn colour_bytes(simd: V3, kernel: &Kernel, sums: [__m256i; 4]) -> [u8; 32] {
-    let avx2 = simd.avx2;
-    let bits = bits(kernel);
-    let half = missing(kernel) + (1 << (bits - 1));
-    let more: __m256i = cast([[half, half, half, 255 << bits]; 2]);
-    let count: __m128i = cast([bits, 0, 0, 0]);
-    let [a, b, c, d] = sums;
-    let a = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(a, more), count);
-    let b = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(b, more), count);
-    let c = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(c, more), count);
-    let d = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(d, more), count);
-    let (ab, cd) = (avx2._mm256_packs_epi32(a, b), avx2._mm256_packs_epi32(c, d));
-    cast(avx2._mm256_packus_epi16(ab, cd))
+    let (bits, half) = (bits(kernel), rounding(kernel));
+    let more = cast([[half, half, half, 255 << bits]; 2]);
+    cast(avx2::packed(simd, sums, more, bits))
 }
 
 /// The same of grey pixels.
 #[inline(always)]
 fn grey_bytes(simd: V3, kernel: &Kernel, sums: __m256i) -> [u8; 32] {
     let (avx, avx2) = (simd.avx, simd.avx2);
-    let bits = bits(kernel);
-    let half = missing(kernel) + (1 << (bits - 1));
-    let count: __m128i = cast([bits, 0, 0, 0]);
-    let value = avx2._mm256_add_epi32(sums, avx._mm256_set1_epi32(half));
+    let count: __m128i = cast([bits(kernel), 0, 0, 0]);
+    let value = avx2._mm256_add_epi32(sums, avx._mm256_set1_epi32(rounding(kernel)));
     let value = avx2._mm256_sra_epi32(value, count);
     let value = avx2._mm256_max_epi32(value, avx._mm256_setzero_si256());
     let value = avx2._mm256_min_epi32(value, avx._mm256_set1_epi32(255));
