@@ -18,7 +18,8 @@ pub struct Band {
     pub format: PixelFormat,
     /// The pixels, row-major over all columns, alpha last: full where some frame sees the wall, 0 in holes.
     pub samples: Samples,
-    /// The frame that each pixel shows most of; [`NO_FRAME`] in holes and where frames are mixed everywhere.
+    /// The frame that each pixel shows most of; [`NO_FRAME`] in holes and where frames are mixed everywhere. Empty unless some target
+    /// asks for it ([`Target::wants_sources`]).
     pub sources: Vec<u32>,
 }
 
@@ -29,11 +30,16 @@ pub trait Target {
     /// # Errors
     /// What the system says.
     fn put(&mut self, canvas: &Canvas, band: &Band) -> Result<(), RenderError>;
+
+    /// Whether it needs [`Band::sources`].
+    fn wants_sources(&self) -> bool {
+        false
+    }
 }
 
 impl Band {
-    /// A band without rows.
-    pub(super) fn empty(canvas: &Canvas, format: PixelFormat) -> Self {
+    /// A band without rows, with sources or without.
+    pub(super) fn empty(canvas: &Canvas, format: PixelFormat, sources: bool) -> Self {
         let most = canvas.columns as usize * BAND_ROWS.min(canvas.rows) as usize;
         let count = most * (format.channels + 1);
         Self {
@@ -44,7 +50,7 @@ impl Band {
                 true => Samples::Sixteen(Vec::with_capacity(count)),
                 false => Samples::Eight(Vec::with_capacity(count)),
             },
-            sources: Vec::with_capacity(most),
+            sources: Vec::with_capacity(if sources { most } else { 0 }),
         }
     }
 
@@ -57,7 +63,9 @@ impl Band {
             Samples::Eight(samples) => samples.resize(count, 0),
             Samples::Sixteen(samples) => samples.resize(count, 0),
         }
-        self.sources.resize(pixels, NO_FRAME);
+        if self.sources.capacity() > 0 {
+            self.sources.resize(pixels, NO_FRAME);
+        }
     }
 
     /// The places of all its tiles, `tiles` row by row of tiles.
@@ -164,7 +172,8 @@ fn alpha<T: Sample>(samples: &[T], step: usize) -> Vec<bool> {
 pub struct Place<'a> {
     /// Its pixels, alpha last: full where some frame sees the wall, 0 in holes.
     pub(super) pixels: Rows<'a>,
-    /// The frame that each pixel shows most of, [`NO_FRAME`] in holes and where frames are mixed all over; row by row.
+    /// The frame that each pixel shows most of, [`NO_FRAME`] in holes and where frames are mixed all over; row by row, or no rows
+    /// if nobody asks.
     pub(super) sources: Vec<&'a mut [u32]>,
 }
 

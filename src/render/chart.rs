@@ -14,6 +14,7 @@ use super::{Canvas, Tile};
 use crate::surface::Surface;
 use nalgebra::Vector3;
 use std::f64::consts::SQRT_2;
+use std::ops::Range;
 
 /// Pixels of the canvas along each side of a patch.
 pub const PATCH: usize = 32;
@@ -146,18 +147,29 @@ impl Chart {
         }
     }
 
-    /// Where the pixels of a smooth patch lie, to be sure: between these, along u and along v.
-    pub fn range(&self, patch: usize) -> Option<[[f32; 2]; 2]> {
-        let Patch::Smooth(c) = &self.patches[patch] else {
-            return None;
+    /// Where these rows and columns of a smooth patch lie, to be sure: between these, along u and along v.
+    ///
+    /// Around the middle `(x, y)` of `2a × 2b`: `|Δu| ≤ a max|∂u/∂x| + b max|∂u/∂y|`, and as all powers of x and y are at most 1,
+    /// `|∂u/∂x| ≤ Σ k |c_kl|`, `|∂u/∂y| ≤ Σ l |c_kl|`.
+    pub fn range(lines: &[Lanes; 4], rows: Range<usize>, columns: Range<usize>) -> [[f32; 2]; 2] {
+        let along = |range: Range<usize>| {
+            let (first, last) = (range.start as f32, range.end as f32 - 1.0);
+            (
+                0.5 * (first + last) * SCALE - 1.0,
+                0.5 * (last - first) * SCALE,
+            )
         };
-        // All powers of x and y are at most 1.
-        Some([0, 4].map(|first| {
-            let all = || c.iter().flat_map(|c| &c[first..first + 4]);
-            let middle = c[0][first];
-            let around = all().map(|c| c.abs()).sum::<f32>() - middle.abs();
-            [middle - around, middle + around]
-        }))
+        let ((x, a), (y, b)) = (along(columns), along(rows));
+        let middle = Self::pixel(lines, x, y);
+        [0, 1].map(|axis| {
+            let mut around = 0.0;
+            for (l, c) in lines.iter().enumerate() {
+                for (k, c) in c[4 * axis..4 * axis + 4].iter().enumerate() {
+                    around += (k as f32 * a + l as f32 * b) * c.abs();
+                }
+            }
+            [middle[axis] - around, middle[axis] + around]
+        })
     }
 
     /// The patch of a pixel of the tile.
@@ -196,20 +208,38 @@ impl Chart {
             .any(|patch| matches!(patch, Patch::Rough))
     }
 
+    /// Where the pixels of a smooth patch appear, by powers of y.
+    pub fn lines(&self, patch: usize) -> Option<&[Lanes; 4]> {
+        match &self.patches[patch] {
+            Patch::Smooth(c) => Some(c),
+            _ => None,
+        }
+    }
+
+    /// Where a point of a smooth patch appears.
+    pub fn pixel(lines: &[Lanes; 4], x: f32, y: f32) -> [f32; 2] {
+        let c = Self::at(lines, y);
+        [0, 4].map(|k| ((c[k + 3] * x + c[k + 2]) * x + c[k + 1]) * x + c[k])
+    }
+
     /// Where the pixels of a row of a smooth patch appear, by powers of x; `row`: of the tile.
     #[inline(always)]
-    pub fn line(&self, row: usize, patch: usize) -> Option<Lanes> {
+    fn line(&self, row: usize, patch: usize) -> Option<Lanes> {
         let Patch::Smooth(c) = &self.patches[patch] else {
             return None;
         };
-        let y = (row % PATCH) as f32 * SCALE - 1.0;
+        Some(Self::at(c, (row % PATCH) as f32 * SCALE - 1.0))
+    }
+
+    #[inline(always)]
+    fn at(c: &[Lanes; 4], y: f32) -> Lanes {
         let mut at = c[3];
         for c in [&c[2], &c[1], &c[0]] {
             for k in 0..at.len() {
                 at[k] = at[k] * y + c[k];
             }
         }
-        Some(at)
+        at
     }
 
     /// Finds where the pixels of the tile's `row` appear, those of the patch that covers `columns` (of u and v) from `patch`

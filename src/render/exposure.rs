@@ -15,7 +15,9 @@
 //! Source: D. J. Fixsen, S. H. Moseley and R. G. Arendt, "Calibrating array detectors", Astrophysical Journal Supplement
 //! 128, 2000; for panoramas D. B. Goldman, "Vignette and exposure calibration and compensation", PAMI 32(12), 2010.
 
+use super::chart::SCALE;
 use super::glimpses::{Glimpse, glimpses};
+use super::light::Light;
 use super::run::Run;
 use super::sample::Sample;
 use super::thumbnails::Thumbnails;
@@ -164,7 +166,50 @@ impl Response<'_> {
         self.shading.is_none() && self.gain == 1.0 && self.bias == 0.0
     }
 
-    /// Undoes it in some of the values of a run.
+    /// The bias, which is taken away before values are multiplied by the light.
+    pub fn bias(&self) -> f32 {
+        self.bias
+    }
+
+    /// What values are multiplied by over a patch, by where its ends and middles appear in the frame; None if there is nothing to undo.
+    pub fn light(&self, pixels: impl FnOnce() -> [[[f32; 2]; 3]; 3]) -> Option<Light> {
+        if self.is_none() {
+            return None;
+        }
+        let Some(table) = self.shading else {
+            return Some(Light::even(self.gain));
+        };
+        let at = |[u, v]: [f32; 2]| self.gain * table.at(u, v);
+        Some(Light::through(pixels().map(|row| row.map(at))))
+    }
+
+    /// Undoes it in the values of some columns of a run that lie in one row of a patch; `first`: the column where the patch begins.
+    pub fn undo_by(
+        &self,
+        light: &Light,
+        row: usize,
+        run: &mut Run,
+        first: usize,
+        columns: Range<usize>,
+    ) {
+        let [a, b, c] = light.row(row);
+        let bias = self.bias;
+        let values = &mut run.values_mut()[columns.clone()];
+        wide(
+            #[inline(always)]
+            || {
+                for (column, value) in columns.clone().zip(values.iter_mut()) {
+                    let x = (column - first) as f32 * SCALE - 1.0;
+                    let factor = (c * x + b) * x + a;
+                    for value in value {
+                        *value = (*value - bias) * factor;
+                    }
+                }
+            },
+        );
+    }
+
+    /// Undoes it in some of the values of a run by where its points appear.
     pub fn undo(&self, run: &mut Run, columns: Range<usize>) {
         if self.is_none() {
             return;

@@ -196,7 +196,7 @@ mod tests {
         };
         let mut coverage = Coverage::new(&CANVAS);
         for row in [0, 32] {
-            let mut band = Band::empty(&CANVAS, format);
+            let mut band = Band::empty(&CANVAS, format, false);
             band.begin(&CANVAS, row, 32);
             let samples = (0..32 * 80).flat_map(|at| {
                 let hole = hole(row as usize + at / 80, at % 80);

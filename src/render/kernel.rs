@@ -158,6 +158,12 @@ impl Kernel {
         }
     }
 
+    /// The weights of all phases, one after the other, in units of 2⁻¹⁴.
+    #[inline(always)]
+    pub fn all_integers(&self) -> &[i16] {
+        &self.integers
+    }
+
     /// The weights of a phase in units of 2⁻¹⁴; their sum is one exactly.
     #[inline(always)]
     pub fn integers(&self, phase: usize) -> &[i16] {

@@ -37,6 +37,7 @@
 //! ```
 
 mod band;
+mod best_view;
 mod budget;
 mod canvas;
 mod chart;
@@ -51,6 +52,7 @@ mod integer;
 mod kernel;
 mod labels;
 mod levelling;
+mod light;
 mod locate;
 mod maps;
 mod memory;
@@ -60,6 +62,7 @@ mod placement;
 mod plan;
 mod preview;
 mod raster_target;
+mod row;
 mod run;
 mod sample;
 mod seams;

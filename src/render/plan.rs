@@ -216,7 +216,8 @@ impl<'a> Plan<'a> {
             .collect();
         progress.start("panorama", starts.len());
         progress.advance(first.min(starts.len()));
-        let mut band = Band::empty(&self.canvas, frames.format());
+        let sources = targets.iter().any(|target| target.wants_sources());
+        let mut band = Band::empty(&self.canvas, frames.format(), sources);
         let mut readings = Readings::default();
         for (k, row) in starts.iter().enumerate().skip(first) {
             let later: Vec<usize> = needs[k + 1..]

@@ -226,7 +226,7 @@ mod tests {
         };
         // Bright at 90 m less 3, from 270° on.
         for row in (0..9000).step_by(500) {
-            let mut band = Band::empty(&canvas, format);
+            let mut band = Band::empty(&canvas, format, false);
             band.begin(&canvas, row, 500);
             let samples = (0..500 * 1000).flat_map(|k| {
                 let bright = row == 8500 && k % 1000 >= 750;

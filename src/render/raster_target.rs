@@ -200,6 +200,10 @@ impl RasterTarget {
 }
 
 impl Target for RasterTarget {
+    fn wants_sources(&self) -> bool {
+        matches!(self.layer, RasterLayer::Frames)
+    }
+
     fn put(&mut self, canvas: &Canvas, band: &Band) -> Result<(), RenderError> {
         let pixels = self.bytes(band);
         let places = (canvas.columns as usize).div_ceil(EDGE);

@@ -1,7 +1,7 @@
 //! What a frame shows of a run of points: geometry and sampling in one pass.
 
 use super::chart::{Chart, PATCH};
-use super::integer::{self, Places, Source, Span};
+use super::integer::{self, Patch, Places, Source};
 use super::kernel::Kernel;
 use super::picture::Picture;
 use super::sample::{Sample, Samples, WHOLE};
@@ -63,16 +63,16 @@ impl Run {
         &self.values
     }
 
+    /// The values, to be changed.
+    pub fn values_mut(&mut self) -> &mut [[f32; 4]; RUN] {
+        &mut self.values
+    }
+
     /// The pixel coordinates, which of them are seen, and the values to be changed.
     #[inline(always)]
     #[expect(clippy::type_complexity, reason = "parts of the run, side by side")]
     pub fn parts(&mut self) -> (&[f32; RUN], &[f32; RUN], &[bool; RUN], &mut [[f32; 4]; RUN]) {
         (&self.u, &self.v, &self.seen, &mut self.values)
-    }
-
-    /// Notes that all points of some columns are seen.
-    pub fn show(&mut self, columns: Range<usize>) {
-        self.seen[columns].fill(true);
     }
 
     /// Finds the pixels of `count` points from index `start`, one by one.
@@ -166,21 +166,26 @@ impl Run {
         }
     }
 
-    /// Looks up the values in some columns of the patch that begins with column `first`, all of it inside the picture. False without doing it
+    /// Looks up the values in some columns of a row of the patch that begins with column `first`, all of it inside the picture. False without doing it
     /// where the processor lacks the vectors for it.
-    pub fn sample_span(
+    pub fn sample_row(
         &mut self,
         picture: &Picture,
-        span: &Span,
+        patch: &Patch,
+        row: usize,
         first: usize,
         columns: Range<usize>,
     ) -> bool {
         let own = columns.start - first..columns.end - first;
         let values = &mut self.values[first..first + PATCH];
-        match picture.format().channels {
-            1 => integer::span_values::<1>(span, own, values),
-            _ => integer::span_values::<3>(span, own, values),
+        let done = match picture.format().channels {
+            1 => integer::values::<1>(patch, row, own, values),
+            _ => integer::values::<3>(patch, row, own, values),
+        };
+        if done {
+            self.seen[columns].fill(true);
         }
+        done
     }
 
     /// Puts the values in some columns whose pixels were found before straight into `pixels`, alpha last; nothing where
@@ -224,8 +229,8 @@ impl Run {
             &self.sums[columns.clone()],
             &mut self.values[columns.clone()],
         );
-        let missing = integer::missing(kernel);
-        let scale = integer::scale(kernel);
+        let missing = integer::missing(kernel.taps());
+        let scale = integer::scale(kernel.taps());
         wide(
             #[inline(always)]
             || {

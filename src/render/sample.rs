@@ -14,8 +14,8 @@ pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + '
     /// The nearest sample; numbers beyond the scale become its end (a cubic overshoots at edges).
     fn nearest(value: f32) -> Self;
 
-    /// The samples as bytes, if that is what they are.
-    fn bytes(samples: &mut [Self]) -> Option<&mut [u8]>;
+    /// Rows of samples as rows of bytes, if that is what they are.
+    fn bytes<'a, 'b>(rows: &'a mut [&'b mut [Self]]) -> Option<&'a mut [&'b mut [u8]]>;
 }
 
 /// 2²³: added to a number from 0 to 2²³, it leaves the nearest whole number (of two equally near the even one) in the last bits of the
@@ -37,15 +37,15 @@ macro_rules! sample {
                 (value.clamp(0.0, Self::WHITE) + WHOLE).to_bits() as Self
             }
 
-            fn bytes(samples: &mut [Self]) -> Option<&mut [u8]> {
-                let bytes: fn(&mut [Self]) -> Option<&mut [u8]> = $bytes;
-                bytes(samples)
+            fn bytes<'a, 'b>(rows: &'a mut [&'b mut [Self]]) -> Option<&'a mut [&'b mut [u8]]> {
+                let bytes: for<'c, 'd> fn(&'c mut [&'d mut [Self]]) -> Option<&'c mut [&'d mut [u8]]> = $bytes;
+                bytes(rows)
             }
         })*
     };
 }
 
-sample!(u8, |samples| Some(samples); u16, |_| None);
+sample!(u8, |rows| Some(rows); u16, |_| None);
 
 /// Samples of one kind, row-major, channels interleaved.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -4,6 +4,7 @@
 //! ([`super::labels`]); between nodes the frames pass into each other with the bilinear weights of their nodes. What they still differ by in light
 //! over longer distances is levelled out by a correction given at the nodes ([`super::levelling`]).
 
+use super::chart::PATCH;
 use super::draw::NO_FRAME;
 use super::labels;
 use super::levelling::{self, COARSEST};
@@ -11,6 +12,7 @@ use super::thumbnails::Thumbnails;
 use super::{Canvas, Exposure, Placement, Tile};
 use crate::surface::Surface;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Distance of the grid's nodes, canvas pixels, unless there would be too many.
 const STEP_PX: f64 = 8.0;
@@ -45,20 +47,34 @@ pub struct Seams {
     channels: usize,
 }
 
-/// A place between two nodes along one axis.
+/// Where the columns of a tile lie between the nodes.
+pub struct Across {
+    cells: Vec<Cell>,
+    /// How far each column lies from the node before to the one after, 0 to 1.
+    t: Vec<f32>,
+}
+
+impl Across {
+    /// Number of columns.
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+}
+
+/// Columns of a tile between the same two nodes.
+struct Cell {
+    columns: Range<usize>,
+    before: usize,
+    after: usize,
+}
+
+/// A row between two rows of nodes.
 #[derive(Clone, Copy, Debug)]
 pub struct Between {
     before: usize,
     after: usize,
     /// How far from the one to the other, 0 to 1.
     t: f32,
-}
-
-impl Between {
-    /// The node before.
-    pub fn before(&self) -> usize {
-        self.before
-    }
 }
 
 impl Seams {
@@ -114,10 +130,9 @@ impl Seams {
         // Nodes follow each other; around the tunnel the first comes after the last.
         let first = self.row_of(canvas, tile.row).before;
         let last = self.row_of(canvas, tile.row + tile.rows - 1).after;
-        let columns = self.columns_of(canvas, tile);
-        let mut across: Vec<usize> = columns.iter().map(|between| between.before).collect();
-        across.extend(columns.last().map(|between| between.after));
-        across.dedup();
+        let cells = self.across(canvas, tile).cells;
+        let across = cells.iter().map(|cell| cell.before);
+        let across: Vec<usize> = across.chain(cells.last().map(|cell| cell.after)).collect();
         let mut frames = Vec::new();
         let mut open = false;
         for row in first..=last {
@@ -142,21 +157,29 @@ impl Seams {
     }
 
     /// Where the columns of a tile lie between the nodes.
-    pub(super) fn columns_of(&self, canvas: &Canvas, tile: &Tile) -> Vec<Between> {
-        let count = self.grid.columns as usize;
+    pub(super) fn across(&self, canvas: &Canvas, tile: &Tile) -> Across {
+        let count = i64::from(self.grid.columns);
         let scale = f64::from(self.grid.columns) / f64::from(canvas.columns);
-        let between = |column: u32| {
-            let at = (f64::from(column) + 0.5) * scale - 0.5;
+        let mut cells: Vec<Cell> = Vec::new();
+        let mut t = Vec::with_capacity(tile.columns as usize);
+        let mut cell = i64::MIN;
+        for column in 0..tile.columns as usize {
+            let at = (f64::from(tile.column + column as u32) + 0.5) * scale - 0.5;
             let before = at.floor();
-            Between {
-                before: (before as i64).rem_euclid(count as i64) as usize,
-                after: (before as i64 + 1).rem_euclid(count as i64) as usize,
-                t: (at - before) as f32,
+            t.push((at - before) as f32);
+            if before as i64 != cell {
+                cell = before as i64;
+                cells.push(Cell {
+                    columns: column..column,
+                    before: cell.rem_euclid(count) as usize,
+                    after: (cell + 1).rem_euclid(count) as usize,
+                });
             }
-        };
-        (tile.column..tile.column + tile.columns)
-            .map(between)
-            .collect()
+            if let Some(cell) = cells.last_mut() {
+                cell.columns.end = column + 1;
+            }
+        }
+        Across { cells, t }
     }
 
     /// Where a row of the canvas lies between the nodes.
@@ -172,17 +195,48 @@ impl Seams {
         }
     }
 
-    /// What the columns of a row are made of.
+    /// The rows of a tile, cut where they pass a row of nodes and where one row of patches ends and the next begins.
+    pub(super) fn strips(
+        &self,
+        canvas: &Canvas,
+        tile: &Tile,
+    ) -> impl Iterator<Item = Range<usize>> {
+        let rows = tile.rows as usize;
+        let key = move |row: usize| {
+            let between = self.row_of(canvas, tile.row + row as u32);
+            (between.before, row / PATCH)
+        };
+        let mut from = 0;
+        std::iter::from_fn(move || {
+            let own = (from < rows).then(|| key(from))?;
+            let to = (from + 1..rows)
+                .find(|row| key(*row) != own)
+                .unwrap_or(rows);
+            let strip = from..to;
+            from = to;
+            Some(strip)
+        })
+    }
+
+    /// What some columns of a row are made of. Between the same nodes nothing changes from row to row where no frames meet.
     ///
     /// Without blending each pixel is one frame's, the one with the largest weight.
-    pub(super) fn shares(&self, columns: &[Between], row: &Between, shares: &mut Shares) {
+    pub(super) fn shares(
+        &self,
+        across: &Across,
+        columns: Range<usize>,
+        row: &Between,
+        shares: &mut Shares,
+    ) {
         shares.clear();
-        let mut from = 0;
-        while from < columns.len() {
-            let cell = &columns[from];
-            let mut to = from + 1;
-            while to < columns.len() && columns[to].before == cell.before {
-                to += 1;
+        let outside = |cell: &&Cell| cell.columns.end <= columns.start;
+        for cell in across.cells.iter().skip_while(outside) {
+            let (from, to) = (
+                cell.columns.start.max(columns.start),
+                cell.columns.end.min(columns.end),
+            );
+            if from >= to {
+                break;
             }
             let corners = [
                 self.frame(row.before, cell.before),
@@ -191,28 +245,26 @@ impl Seams {
                 self.frame(row.after, cell.after),
             ];
             if corners.iter().any(|frame| *frame != corners[0]) {
-                shares.mixed = true;
-                self.mixed(&corners, &columns[from..to], row, from, shares);
+                self.mixed(&corners, &across.t[from..to], row, from, shares);
             } else if corners[0] != NO_FRAME {
                 shares.whole(corners[0] as usize, from, to);
             }
-            from = to;
         }
     }
 
-    /// A cell with different frames at its corners.
+    /// A cell with different frames at its corners: its columns from `from` on, at `along`.
     fn mixed(
         &self,
         corners: &[u32; 4],
-        columns: &[Between],
+        along: &[f32],
         row: &Between,
         from: usize,
         shares: &mut Shares,
     ) {
         let mut frames = *corners;
         frames.sort_unstable();
-        let weight = |between: &Between, frame: u32| {
-            let (s, t) = (between.t, row.t);
+        let weight = |s: f32, frame: u32| {
+            let t = row.t;
             let weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t];
             let own = corners
                 .iter()
@@ -221,11 +273,11 @@ impl Seams {
             own.map(|(_, w)| w).sum::<f32>()
         };
         if self.are_hard() {
-            for (column, between) in columns.iter().enumerate() {
+            for (column, s) in along.iter().enumerate() {
                 let mut best = (NO_FRAME, f32::NEG_INFINITY);
                 // Of equals the earlier frame.
                 for frame in frames.iter().filter(|frame| **frame != NO_FRAME) {
-                    let own = weight(between, *frame);
+                    let own = weight(*s, *frame);
                     if own > best.1 {
                         best = (*frame, own);
                     }
@@ -240,27 +292,27 @@ impl Seams {
                 continue;
             }
             let start = shares.weights.len();
-            let own = columns.iter().map(|between| weight(between, *frame));
-            shares.weights.extend(own);
+            shares
+                .weights
+                .extend(along.iter().map(|s| weight(*s, *frame)));
             shares.list.push(Share {
                 frame: *frame as usize,
                 from,
-                to: from + columns.len(),
+                to: from + along.len(),
                 weights: Some(start),
             });
         }
     }
 
-    /// What is added to the values along a row, at each of its columns.
-    pub(super) fn corrections(
+    /// What is added to the values along a row, at each of its columns: nothing in lanes beyond the channels.
+    pub(super) fn corrections<const L: usize>(
         &self,
-        columns: &[Between],
+        across: &Across,
         row: &Between,
-        found: &mut Vec<[f32; 4]>,
+        found: &mut [[f32; L]],
     ) {
-        found.clear();
         if self.are_hard() {
-            found.resize(columns.len(), [0.0; 4]);
+            found.fill([0.0; L]);
             return;
         }
         let node = |row: usize, column: usize| {
@@ -268,23 +320,21 @@ impl Seams {
             &self.corrections[first..][..self.channels]
         };
         let between = |column: usize| {
-            let mut value = [0.0; 4];
+            let mut value = [0.0; L];
             let ends = node(row.before, column).iter().zip(node(row.after, column));
             for (value, (upper, lower)) in value.iter_mut().zip(ends) {
                 *value = upper + row.t * (lower - upper);
             }
             value
         };
-        let mut cell = usize::MAX;
-        let (mut left, mut right) = ([0.0; 4], [0.0; 4]);
-        for column in columns {
-            if column.before != cell {
-                cell = column.before;
-                (left, right) = (between(column.before), between(column.after));
+        for cell in &across.cells {
+            let (left, right) = (between(cell.before), between(cell.after));
+            let columns = cell.columns.clone();
+            for (t, found) in across.t[columns.clone()].iter().zip(&mut found[columns]) {
+                for c in 0..L {
+                    found[c] = left[c] + t * (right[c] - left[c]);
+                }
             }
-            found.push(std::array::from_fn(|c| {
-                left[c] + column.t * (right[c] - left[c])
-            }));
         }
     }
 }
@@ -294,8 +344,6 @@ impl Seams {
 pub struct Shares {
     list: Vec<Share>,
     weights: Vec<f32>,
-    /// True if different frames meet in some cell.
-    mixed: bool,
 }
 
 /// A frame's part in the columns `from..to`.
@@ -315,12 +363,6 @@ impl Shares {
     fn clear(&mut self) {
         self.list.clear();
         self.weights.clear();
-        self.mixed = false;
-    }
-
-    /// True if all columns of every cell are one frame's.
-    pub fn are_whole(&self) -> bool {
-        !self.mixed
     }
 
     /// Columns that are one frame's.

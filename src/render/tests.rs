@@ -186,6 +186,10 @@ fn what_one_frame_alone_shows_is_left_out_where_others_see_the_wall() {
 fn raw_pixels_are_those_of_the_frames() {
     struct Check<'a>(&'a TestWall, &'a FrameStack, usize);
     impl Target for Check<'_> {
+        fn wants_sources(&self) -> bool {
+            true
+        }
+
         fn put(&mut self, canvas: &Canvas, band: &Band) -> Result<(), RenderError> {
             let Samples::Eight(samples) = &band.samples else {
                 panic!("8 bits");

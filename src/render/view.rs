@@ -2,8 +2,9 @@
 
 use super::chart::{Chart, Lattice, PATCH, Projected};
 use super::exposure::Response;
-use super::integer::{self, Source, Span};
+use super::integer::{self, Block, Finish, Patch, Source};
 use super::kernel::{Interpolation, Kernel};
+use super::light::Light;
 use super::run::Run;
 use super::sample::Samples;
 use super::warp::{Look, Points};
@@ -49,31 +50,50 @@ impl Kernels {
 struct PatchView<'a> {
     /// As wide as the frame is finer than the canvas in the middle of the patch; None where it is rough or not in the frame.
     kernel: Option<&'a Kernel>,
-    /// True if the kernel lies within the picture all over the patch, and nothing is masked.
+    /// Between which u and between which v all of the kernel lies within the picture; None if it is looked up otherwise, or masked.
+    within: Option<[[f32; 2]; 2]>,
+    /// True if that is so all over the patch.
     inside: bool,
+    /// What undoes the light of a smooth patch, if there is any.
+    light: Option<Light>,
 }
 
 /// What rounding may change of a coordinate, pixels.
 const ROUNDING_PX: f32 = 0.01;
 
 impl<'a> PatchView<'a> {
-    fn new(chart: &Chart, patch: usize, picture: &Picture, kernels: &'a Kernels) -> Self {
-        let (Some(steps), Some(range)) = (chart.steps(patch), chart.range(patch)) else {
+    fn new(
+        chart: &Chart,
+        patch: usize,
+        picture: &Picture,
+        kernels: &'a Kernels,
+        response: &Response,
+    ) -> Self {
+        let (Some(lines), Some(steps)) = (chart.lines(patch), chart.steps(patch)) else {
             return Self {
                 kernel: None,
+                within: None,
                 inside: false,
+                light: None,
             };
         };
         let kernel = kernels.for_steps(steps);
+        let range = Chart::range(lines, 0..PATCH, 0..PATCH);
         let first = kernel.before() as f32 + ROUNDING_PX;
         let size = [picture.width(), picture.height()];
-        let within = range.into_iter().zip(size).all(|([least, most], size)| {
+        let within = size.map(|size| {
             let end = (size + kernel.before() + 1) as f32 - kernel.taps() as f32;
-            least >= first && most <= end - ROUNDING_PX
+            [first, end - ROUNDING_PX]
         });
+        let within = (picture.mask().is_none() && kernel.taps() > 1).then_some(within);
         Self {
             kernel: Some(kernel),
-            inside: within && picture.mask().is_none() && kernel.taps() > 1,
+            within,
+            inside: within.is_some_and(|within| lies(range, within)),
+            light: response.light(|| {
+                let nodes = [-1.0, 0.0, 1.0];
+                nodes.map(|y| nodes.map(|x| Chart::pixel(lines, x, y)))
+            }),
         }
     }
 }
@@ -107,7 +127,8 @@ impl<'a> View<'a> {
         let origin = &lattice.points().origin;
         let look = Look::new(&placement.camera(camera), &placement.pose, origin);
         let chart = Chart::new(&look, lattice, projected);
-        let patches = (0..chart.len()).map(|k| PatchView::new(&chart, k, picture, kernels));
+        let patches =
+            (0..chart.len()).map(|k| PatchView::new(&chart, k, picture, kernels, &response));
         Self {
             frame,
             look,
@@ -139,22 +160,15 @@ impl<'a> View<'a> {
         place: (usize, usize),
         columns: Range<usize>,
     ) {
-        self.locate(run, points, place, columns.clone());
-        self.values(run, points, place, columns);
+        run.locate(&self.chart, &self.look, points, place, columns.clone());
+        for piece in pieces(columns) {
+            if !self.sample_row(run, place.0, piece.clone()) {
+                self.sample_located(run, points, place, piece);
+            }
+        }
     }
 
-    /// The first half of [`View::look_at`]: where they appear.
-    pub fn locate(
-        &self,
-        run: &mut Run,
-        points: &Points,
-        place: (usize, usize),
-        columns: Range<usize>,
-    ) {
-        run.locate(&self.chart, &self.look, points, place, columns);
-    }
-
-    /// The second half, for columns that were located.
+    /// The same without where the columns appear.
     pub fn values(
         &self,
         run: &mut Run,
@@ -162,15 +176,51 @@ impl<'a> View<'a> {
         place: (usize, usize),
         columns: Range<usize>,
     ) {
-        for piece in pieces(columns.clone()) {
-            let done = self.span(place.0, &piece).is_some_and(|(span, first)| {
-                run.sample_span(self.picture, &span, first, piece.clone())
-            });
-            if !done && let Some(kernel) = self.kernel(run, points, place, piece.clone()) {
-                run.sample(self.picture, kernel, piece);
+        for piece in pieces(columns) {
+            if !self.sample_row(run, place.0, piece.clone()) {
+                run.locate(&self.chart, &self.look, points, place, piece.clone());
+                self.sample_located(run, points, place, piece);
             }
         }
-        self.response.undo(run, columns);
+    }
+
+    /// The values in columns of one patch, if all of it lies inside an 8-bit frame.
+    fn sample_row(&self, run: &mut Run, row: usize, columns: Range<usize>) -> bool {
+        let at = self.chart.patch(row, columns.start);
+        let first = columns.start - columns.start % PATCH;
+        let own = columns.start - first..columns.end - first;
+        let rows = row % PATCH..row % PATCH + 1;
+        let done = self.patch(at, rows, own).is_some_and(|patch| {
+            run.sample_row(self.picture, &patch, row % PATCH, first, columns.clone())
+        });
+        if done && let Some(light) = &self.patches[at].light {
+            let row = row % PATCH;
+            self.response.undo_by(light, row, run, first, columns);
+        }
+        done
+    }
+
+    /// The values in columns of one patch that were located.
+    fn sample_located(
+        &self,
+        run: &mut Run,
+        points: &Points,
+        place: (usize, usize),
+        columns: Range<usize>,
+    ) {
+        let Some(kernel) = self.kernel(run, points, place, columns.clone()) else {
+            return;
+        };
+        run.sample(self.picture, kernel, columns.clone());
+        let row = place.0;
+        match &self.patches[self.chart.patch(row, columns.start)].light {
+            Some(light) => {
+                let first = columns.start - columns.start % PATCH;
+                let row = row % PATCH;
+                self.response.undo_by(light, row, run, first, columns);
+            }
+            None => self.response.undo(run, columns),
+        }
     }
 
     /// Whether [`View::copy`] can do it: 8 bits, more than the nearest pixel, no exposure to be undone.
@@ -179,7 +229,7 @@ impl<'a> View<'a> {
         eight && self.kernels.stretched(1.0).taps() > 1 && self.response.is_none()
     }
 
-    /// As [`View::look_at`], with the values straight into `pixels`, alpha last.
+    /// As [`View::values`], with the values straight into `pixels`, alpha last.
     pub fn copy<const C: usize>(
         &self,
         run: &mut Run,
@@ -191,14 +241,7 @@ impl<'a> View<'a> {
         for piece in pieces(columns.clone()) {
             let first = (piece.start - columns.start) * (C + 1);
             let own = &mut pixels[first..first + piece.len() * (C + 1)];
-            let done = self.span(place.0, &piece).is_some_and(|(span, first)| {
-                run.show(piece.clone());
-                integer::span_bytes::<C>(&span, piece.start - first..piece.end - first, own)
-            });
-            if done {
-                continue;
-            }
-            self.locate(run, points, place, piece.clone());
+            run.locate(&self.chart, &self.look, points, place, piece.clone());
             let kernel = self.kernel(run, points, place, piece.clone());
             match (kernel, self.picture.samples()) {
                 (Some(kernel), Samples::Eight(samples)) => {
@@ -209,28 +252,67 @@ impl<'a> View<'a> {
         }
     }
 
-    // Handed back through memory it would be waited for until all that was drawn before is stored.
-    /// What is to be sampled for columns of one patch, and the patch's first column, if all of it lies inside an 8-bit frame.
-    #[inline(always)]
-    fn span(&self, row: usize, columns: &Range<usize>) -> Option<(Span<'_>, usize)> {
-        let patch = self.chart.patch(row, columns.start);
+    /// Draws some rows and columns of a tile, all in one patch that lies inside an 8-bit frame, into the tile's rows of pixels, alpha
+    /// last: the bytes of [`View::copy`], or with `corrections` (of each of these rows, [`super::run::RUN`] columns each) those nearest to [`View::values`] with them
+    /// added. False without doing it where they do not, or the processor lacks the vectors for it.
+    pub fn block<const C: usize, const L: usize>(
+        &self,
+        rows: Range<usize>,
+        columns: Range<usize>,
+        corrections: Option<&[[f32; L]]>,
+        pixels: &mut [&mut [u8]],
+    ) -> bool {
+        let at = self.chart.patch(rows.start, columns.start);
+        let first = columns.start - columns.start % PATCH;
+        let columns = columns.start - first..columns.end - first;
+        let row = rows.start % PATCH;
+        let Some(patch) = self.patch(at, row..row + rows.len(), columns.clone()) else {
+            return false;
+        };
+        let block = Block {
+            patch,
+            row,
+            columns,
+            first,
+        };
+        let pixels = &mut pixels[rows];
+        match corrections {
+            None => integer::block::<C>(&block, pixels),
+            Some(corrections) => {
+                let finish = Finish {
+                    bias: self.response.bias(),
+                    light: self.patches[at].light,
+                    corrections,
+                };
+                integer::lit_block::<C, L>(&block, &finish, pixels)
+            }
+        }
+    }
+
+    /// What is to be sampled in a patch, if these rows and columns of it lie inside an 8-bit frame.
+    fn patch(&self, patch: usize, rows: Range<usize>, columns: Range<usize>) -> Option<Patch<'_>> {
         let PatchView {
             kernel: Some(kernel),
-            inside: true,
-        } = self.patches[patch]
+            within: Some(within),
+            inside,
+            ..
+        } = &self.patches[patch]
         else {
             return None;
         };
+        let lines = self.chart.lines(patch)?;
+        if !inside && !lies(Chart::range(lines, rows, integer::reach(&columns)), *within) {
+            return None;
+        }
         let Samples::Eight(samples) = self.picture.samples() else {
             return None;
         };
         let stride = self.picture.width() * self.picture.format().channels;
-        let span = Span {
+        Some(Patch {
             source: Source { samples, stride },
             kernel,
-            line: self.chart.line(row, patch)?,
-        };
-        Some((span, columns.start - columns.start % PATCH))
+            lines,
+        })
     }
 
     /// The kernel for points of a patch that were found before; None if the frame shows none of them.
@@ -283,8 +365,15 @@ impl<'a> View<'a> {
     }
 }
 
+/// Whether what lies between these, along u and along v, lies within.
+fn lies(range: [[f32; 2]; 2], within: [[f32; 2]; 2]) -> bool {
+    let both = range.into_iter().zip(within);
+    both.into_iter()
+        .all(|([least, most], [first, last])| least >= first && most <= last)
+}
+
 /// Columns of a row, patch by patch.
-fn pieces(columns: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+pub fn pieces(columns: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     let mut from = columns.start;
     std::iter::from_fn(move || {
         let to = columns.end.min((from / PATCH + 1) * PATCH);

@@ -70,6 +70,10 @@ pub struct Keeping<'a> {
 }
 
 impl Target for Keeping<'_> {
+    fn wants_sources(&self) -> bool {
+        self.outputs.maps.is_some()
+    }
+
     fn put(&mut self, canvas: &Canvas, band: &Band) -> Result<(), RenderError> {
         for target in self.outputs.targets() {
             target.put(canvas, band)?;

@@ -10,7 +10,7 @@ const NO: i8 = -1;
 
 /// Eight at a time, the rest plainly.
 #[inline(always)]
-pub fn sums<const C: usize>(
+pub fn sums<const C: usize, const TAPS: usize>(
     simd: V3,
     source: Source,
     kernel: &Kernel,
@@ -24,12 +24,12 @@ pub fn sums<const C: usize>(
     let done = 8 * chunks.len();
     for (((sums, first), s), t) in chunks.iter_mut().zip(first).zip(s).zip(t) {
         if C == 1 {
-            let all: [i32; 8] = cast(greys(simd, source, kernel, first, [*s, *t]));
+            let all: [i32; 8] = cast(greys::<TAPS>(simd, source, kernel, first, [*s, *t]));
             for (sum, value) in sums.iter_mut().zip(all) {
                 *sum = [value, 0, 0, 0];
             }
         } else {
-            let [a, b, c, d] = colours(simd, source, kernel, first, [*s, *t]);
+            let [a, b, c, d] = colours::<TAPS>(simd, source, kernel, first, [*s, *t]);
             [sums[0], sums[4]] = cast(a);
             [sums[1], sums[5]] = cast(b);
             [sums[2], sums[6]] = cast(c);
@@ -48,25 +48,28 @@ pub type Eight<T> = [T; 8];
 
 /// The sums of eight grey pixels.
 #[inline(always)]
-pub fn greys(
+pub fn greys<const TAPS: usize>(
     simd: V3,
     source: Source,
     kernel: &Kernel,
     first: &Eight<u32>,
     phases: [Eight<i32>; 2],
 ) -> __m256i {
-    if kernel.taps() == 2 {
+    if TAPS == 2 {
         let [s, t] = phases;
         return bilinear_grey(simd, source, first, cast(s), cast(t));
     }
-    let lower = four_greys(simd, source, kernel, first, phases, 0);
-    let upper = four_greys(simd, source, kernel, first, phases, 4);
+    if TAPS == 4 {
+        return bicubic_grey(simd, source, kernel, first, phases);
+    }
+    let lower = four_greys::<TAPS>(simd, source, kernel, first, phases, 0);
+    let upper = four_greys::<TAPS>(simd, source, kernel, first, phases, 4);
     simd.avx._mm256_set_m128i(upper, lower)
 }
 
 /// The sums of grey pixels `k` to `k + 3`.
 #[inline(always)]
-fn four_greys(
+fn four_greys<const TAPS: usize>(
     simd: V3,
     source: Source,
     kernel: &Kernel,
@@ -74,26 +77,47 @@ fn four_greys(
     phases: [Eight<i32>; 2],
     k: usize,
 ) -> __m128i {
-    let a = one_grey(simd, source, kernel, first, phases, k);
-    let b = one_grey(simd, source, kernel, first, phases, k + 1);
-    let c = one_grey(simd, source, kernel, first, phases, k + 2);
-    let d = one_grey(simd, source, kernel, first, phases, k + 3);
+    let a = one_grey::<TAPS>(simd, source, kernel, first, phases, k);
+    let b = one_grey::<TAPS>(simd, source, kernel, first, phases, k + 1);
+    let c = one_grey::<TAPS>(simd, source, kernel, first, phases, k + 2);
+    let d = one_grey::<TAPS>(simd, source, kernel, first, phases, k + 3);
     let ssse3 = simd.ssse3;
     ssse3._mm_hadd_epi32(ssse3._mm_hadd_epi32(a, b), ssse3._mm_hadd_epi32(c, d))
 }
 
+/// The kernel's taps, known beforehand or not (0).
+#[inline(always)]
+pub fn taps<const TAPS: usize>(kernel: &Kernel) -> usize {
+    match TAPS {
+        0 => kernel.taps(),
+        taps => taps,
+    }
+}
+
+/// [`Kernel::integer_phases`] of a kernel with so many taps.
+#[inline(always)]
+pub fn phases<const TAPS: usize>() -> f32 {
+    match TAPS {
+        2 => 128.0,
+        _ => Kernel::PHASES,
+    }
+}
+
 /// The weights along u and v of pixel `k`.
 #[inline(always)]
-fn weights(kernel: &Kernel, [s, t]: [Eight<i32>; 2], k: usize) -> (&[i16], &[i16]) {
-    (
-        kernel.integers(s[k] as usize),
-        kernel.integers(t[k] as usize),
-    )
+fn weights<'a, const TAPS: usize>(
+    kernel: &'a Kernel,
+    [s, t]: [Eight<i32>; 2],
+    k: usize,
+) -> (&'a [i16], &'a [i16]) {
+    let taps = taps::<TAPS>(kernel);
+    let of = |phase: i32| &kernel.all_integers()[phase as usize * taps..][..taps];
+    (of(s[k]), of(t[k]))
 }
 
 /// Four numbers whose sum is that of grey pixel `k`.
 #[inline(always)]
-fn one_grey(
+fn one_grey<const TAPS: usize>(
     simd: V3,
     source: Source,
     kernel: &Kernel,
@@ -101,10 +125,9 @@ fn one_grey(
     phases: [Eight<i32>; 2],
     k: usize,
 ) -> __m128i {
-    let weights = weights(kernel, phases, k);
+    let weights = weights::<TAPS>(kernel, phases, k);
     let at = first[k] as usize;
-    match kernel.taps() {
-        4 => grey(simd, source, weights, at),
+    match taps::<TAPS>(kernel) {
         8 => wide_grey(simd, source, weights, at, 1),
         taps => wide_grey(simd, source, weights, at, taps.div_ceil(8)),
     }
@@ -112,27 +135,27 @@ fn one_grey(
 
 /// The sums of eight pixels in colour: of the k-th and the k + 4th in the halves of the k-th vector.
 #[inline(always)]
-pub fn colours(
+pub fn colours<const TAPS: usize>(
     simd: V3,
     source: Source,
     kernel: &Kernel,
     first: &Eight<u32>,
     phases: [Eight<i32>; 2],
 ) -> [__m256i; 4] {
-    if kernel.taps() == 2 {
+    if TAPS == 2 {
         let [s, t] = phases;
         return bilinear_colour(simd, source, first, cast(s), cast(t));
     }
-    let a = both_colours(simd, source, kernel, first, phases, 0);
-    let b = both_colours(simd, source, kernel, first, phases, 1);
-    let c = both_colours(simd, source, kernel, first, phases, 2);
-    let d = both_colours(simd, source, kernel, first, phases, 3);
+    let a = both_colours::<TAPS>(simd, source, kernel, first, phases, 0);
+    let b = both_colours::<TAPS>(simd, source, kernel, first, phases, 1);
+    let c = both_colours::<TAPS>(simd, source, kernel, first, phases, 2);
+    let d = both_colours::<TAPS>(simd, source, kernel, first, phases, 3);
     [a, b, c, d]
 }
 
 /// The sums of pixels `k` and `k + 4`.
 #[inline(always)]
-fn both_colours(
+fn both_colours<const TAPS: usize>(
     simd: V3,
     source: Source,
     kernel: &Kernel,
@@ -140,14 +163,14 @@ fn both_colours(
     phases: [Eight<i32>; 2],
     k: usize,
 ) -> __m256i {
-    let lower = one_colour(simd, source, kernel, first, phases, k);
-    let upper = one_colour(simd, source, kernel, first, phases, k + 4);
+    let lower = one_colour::<TAPS>(simd, source, kernel, first, phases, k);
+    let upper = one_colour::<TAPS>(simd, source, kernel, first, phases, k + 4);
     simd.avx._mm256_set_m128i(upper, lower)
 }
 
 /// The sums of pixel `k`.
 #[inline(always)]
-fn one_colour(
+fn one_colour<const TAPS: usize>(
     simd: V3,
     source: Source,
     kernel: &Kernel,
@@ -155,9 +178,9 @@ fn one_colour(
     phases: [Eight<i32>; 2],
     k: usize,
 ) -> __m128i {
-    let weights = weights(kernel, phases, k);
+    let weights = weights::<TAPS>(kernel, phases, k);
     let at = first[k] as usize;
-    match kernel.taps() {
+    match taps::<TAPS>(kernel) {
         4 => colour(simd, source, weights, at, 1),
         taps => colour(simd, source, weights, at, taps / 4),
     }
@@ -239,34 +262,31 @@ fn two_rows(source: Source<'_>) -> [&[u8]; 2] {
     [&source.samples[..count], &lower[..count]]
 }
 
-/// Eight bytes of both.
+/// Sixteen bytes from `a` on in the lower half, from `b` on in the upper one.
 #[inline(always)]
-fn eight_of_both(simd: V3, [upper, lower]: [&[u8]; 2], at: u32) -> __m128i {
-    let upper = i64::from_le_bytes(read(upper, at as usize));
-    let lower = i64::from_le_bytes(read(lower, at as usize));
-    simd.sse2._mm_set_epi64x(lower, upper)
+fn sixteen_of_both(simd: V3, row: &[u8], a: u32, b: u32) -> __m256i {
+    let (a, b): ([u8; 16], [u8; 16]) = (read(row, a as usize), read(row, b as usize));
+    simd.avx._mm256_set_m128i(cast(b), cast(a))
 }
 
-/// The two pixels of a row side by side, channel by channel: (r, r′, g, g′, b, b′).
-const UPPER: [i8; 16] = [0, NO, 3, NO, 1, NO, 4, NO, 2, NO, 5, NO, NO, NO, NO, NO];
-/// The same of the next row.
-const LOWER: [i8; 16] = [8, NO, 11, NO, 9, NO, 12, NO, 10, NO, 13, NO, NO, NO, NO, NO];
+/// Two pixels side by side, channel by channel: (r, r′, g, g′, b, b′).
+const SIDE_BY_SIDE: [i8; 16] = [0, NO, 3, NO, 1, NO, 4, NO, 2, NO, 5, NO, NO, NO, NO, NO];
 
 /// The sums of the two pixels at `a` and `b`, with their rows' weights.
 #[inline(always)]
 fn two_colours(
     simd: V3,
-    rows: [&[u8]; 2],
+    [upper_row, lower_row]: [&[u8]; 2],
     a: u32,
     b: u32,
     upper: __m256i,
     lower: __m256i,
 ) -> __m256i {
     let avx2 = simd.avx2;
-    let (a, b) = (eight_of_both(simd, rows, a), eight_of_both(simd, rows, b));
-    let pixels = simd.avx._mm256_set_m128i(b, a);
-    let above = avx2._mm256_shuffle_epi8(pixels, cast([UPPER; 2]));
-    let below = avx2._mm256_shuffle_epi8(pixels, cast([LOWER; 2]));
+    let above = sixteen_of_both(simd, upper_row, a, b);
+    let below = sixteen_of_both(simd, lower_row, a, b);
+    let above = avx2._mm256_shuffle_epi8(above, cast([SIDE_BY_SIDE; 2]));
+    let below = avx2._mm256_shuffle_epi8(below, cast([SIDE_BY_SIDE; 2]));
     avx2._mm256_add_epi32(
         avx2._mm256_madd_epi16(above, upper),
         avx2._mm256_madd_epi16(below, lower),
@@ -367,7 +387,7 @@ fn four(simd: V3, weights: &[i16], at: usize) -> __m256i {
 
 /// Pixels 0 and 1 side by side in the lower half, 2 and 3 in the upper one.
 const TWO_BY_TWO: [[i8; 16]; 2] = [
-    UPPER,
+    SIDE_BY_SIDE,
     [6, NO, 9, NO, 7, NO, 10, NO, 8, NO, 11, NO, NO, NO, NO, NO],
 ];
 /// The first two of four weights in the lower half, the last two in the upper one.
@@ -406,11 +426,7 @@ fn colour(
         let upper = colour_row(simd, source.samples, at, w_x, blocks);
         let lower = colour_row(simd, source.samples, at + source.stride, w_x, blocks);
         at += 2 * source.stride;
-        // Cut, and two rows in the halves of each number.
-        let two = avx2._mm256_blend_epi16::<0b1010_1010>(
-            avx2._mm256_srai_epi32::<8>(upper),
-            avx2._mm256_slli_epi32::<8>(lower),
-        );
+        let two = cut_pair(simd, upper, lower);
         let w = avx._mm256_set1_epi32(cast(*w_y));
         total = avx2._mm256_add_epi32(total, avx2._mm256_madd_epi16(two, w));
     }
@@ -425,26 +441,82 @@ fn sum_of_halves(simd: V3, all: __m256i) -> __m128i {
     simd.sse2._mm_add_epi32(lower, upper)
 }
 
-/// Each of four weights twice, in the lower halves of the numbers.
-const TWICE: [i8; 32] = [
-    0, 1, NO, NO, 0, 1, NO, NO, 2, 3, NO, NO, 2, 3, NO, NO, //
-    4, 5, NO, NO, 4, 5, NO, NO, 6, 7, NO, NO, 6, 7, NO, NO,
-];
-
-/// Four numbers whose sum is that of a pixel under four taps.
+/// Four rows of samples, as many of each.
 #[inline(always)]
-fn grey(simd: V3, source: Source, (w_x, w_y): (&[i16], &[i16]), at: usize) -> __m128i {
-    let (avx2, stride) = (simd.avx2, source.stride);
+fn four_rows(source: Source<'_>) -> [&[u8]; 4] {
+    let Source { samples, stride } = source;
+    let count = samples.len().saturating_sub(3 * stride);
+    [
+        &samples[..count],
+        &samples[stride..][..count],
+        &samples[2 * stride..][..count],
+        &samples[3 * stride..][..count],
+    ]
+}
+
+/// The samples under four taps of a row for pixels `k` to `k + 3`, times their weights: a and b of each.
+#[inline(always)]
+fn four_across(simd: V3, row: &[u8], first: &Eight<u32>, k: usize, w_x: __m256i) -> __m256i {
     let pixels = simd.sse2._mm_set_epi32(
-        i32::from_le_bytes(read(source.samples, at + 3 * stride)),
-        i32::from_le_bytes(read(source.samples, at + 2 * stride)),
-        i32::from_le_bytes(read(source.samples, at + stride)),
-        i32::from_le_bytes(read(source.samples, at)),
+        i32::from_le_bytes(read(row, first[k + 3] as usize)),
+        i32::from_le_bytes(read(row, first[k + 2] as usize)),
+        i32::from_le_bytes(read(row, first[k + 1] as usize)),
+        i32::from_le_bytes(read(row, first[k] as usize)),
     );
-    let pixels = avx2._mm256_cvtepu8_epi16(pixels);
-    let cut = avx2._mm256_srai_epi32::<8>(avx2._mm256_madd_epi16(pixels, four(simd, w_x, 0)));
-    let w = avx2._mm256_shuffle_epi8(four(simd, w_y, 0), cast(TWICE));
-    sum_of_halves(simd, avx2._mm256_madd_epi16(cut, w))
+    let avx2 = simd.avx2;
+    avx2._mm256_madd_epi16(avx2._mm256_cvtepu8_epi16(pixels), w_x)
+}
+
+/// Twice four numbers, two of which add up to the sum of each of pixels `k` to `k + 3` under four taps.
+#[inline(always)]
+fn four_by_four(
+    simd: V3,
+    rows: [&[u8]; 4],
+    kernel: &Kernel,
+    first: &Eight<u32>,
+    [s, t]: [Eight<i32>; 2],
+    k: usize,
+) -> __m256i {
+    let (avx, avx2) = (simd.avx, simd.avx2);
+    let w = kernel.all_integers();
+    let of = |phase: i32| four_of(w, 4 * phase as usize);
+    let w_x = avx._mm256_set_epi64x(of(s[k + 3]), of(s[k + 2]), of(s[k + 1]), of(s[k]));
+    let w_y = avx._mm256_set_epi64x(of(t[k + 3]), of(t[k + 2]), of(t[k + 1]), of(t[k]));
+    let a = four_across(simd, rows[0], first, k, w_x);
+    let b = four_across(simd, rows[1], first, k, w_x);
+    let c = four_across(simd, rows[2], first, k, w_x);
+    let d = four_across(simd, rows[3], first, k, w_x);
+    avx2._mm256_add_epi32(
+        avx2._mm256_madd_epi16(cut_pair(simd, a, b), avx2._mm256_shuffle_epi32::<0xa0>(w_y)),
+        avx2._mm256_madd_epi16(cut_pair(simd, c, d), avx2._mm256_shuffle_epi32::<0xf5>(w_y)),
+    )
+}
+
+/// Two rows, cut, in the halves of each number.
+#[inline(always)]
+fn cut_pair(simd: V3, upper: __m256i, lower: __m256i) -> __m256i {
+    let avx2 = simd.avx2;
+    avx2._mm256_blend_epi16::<0b1010_1010>(
+        avx2._mm256_srai_epi32::<8>(upper),
+        avx2._mm256_slli_epi32::<8>(lower),
+    )
+}
+
+/// The sums of eight grey pixels under four taps.
+#[inline(always)]
+fn bicubic_grey(
+    simd: V3,
+    source: Source,
+    kernel: &Kernel,
+    first: &Eight<u32>,
+    phases: [Eight<i32>; 2],
+) -> __m256i {
+    let rows = four_rows(source);
+    let lower = four_by_four(simd, rows, kernel, first, phases, 0);
+    let upper = four_by_four(simd, rows, kernel, first, phases, 4);
+    // Pixels 0, 1, 4, 5 and 2, 3, 6, 7.
+    let both = simd.avx2._mm256_hadd_epi32(lower, upper);
+    simd.avx2._mm256_permute4x64_epi64::<0b11_01_10_00>(both)
 }
 
 /// Two weights: the first twice in the lower half, the second in the upper one.

@@ -12,15 +12,36 @@
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
-mod plain;
 #[cfg(target_arch = "x86_64")]
-mod span;
+mod block;
+mod plain;
 
-use super::chart::Lanes;
+use super::chart::{Lanes, PATCH};
 use super::kernel::Kernel;
+use super::light::Light;
 #[cfg(target_arch = "x86_64")]
 use crate::vectors;
 use std::ops::Range;
+
+/// Does the work with code made for the kernel's taps; 0 stands for any other number of them.
+#[cfg(target_arch = "x86_64")]
+macro_rules! by_taps {
+    ($kernel:expr, |$simd:ident, $taps:ident| $work:expr) => {
+        match $kernel.taps() {
+            2 => by_taps!(2, $simd, $taps, $work),
+            4 => by_taps!(4, $simd, $taps, $work),
+            8 => by_taps!(8, $simd, $taps, $work),
+            _ => by_taps!(0, $simd, $taps, $work),
+        }
+    };
+    ($number:literal, $simd:ident, $taps:ident, $work:expr) => {{
+        const $taps: usize = $number;
+        vectors::avx2(
+            #[inline(always)]
+            |$simd| $work,
+        )
+    }};
+}
 
 /// What the kernel needs to know of a picture.
 #[derive(Clone, Copy)]
@@ -51,10 +72,9 @@ pub fn sums<const C: usize>(
     sums: &mut [[i32; 4]],
 ) {
     #[cfg(target_arch = "x86_64")]
-    if vectors::avx2(
-        #[inline(always)]
-        |simd| avx2::sums::<C>(simd, source, kernel, places, sums),
-    ) {
+    if by_taps!(kernel, |simd, TAPS| avx2::sums::<C, TAPS>(
+        simd, source, kernel, places, sums
+    )) {
         return;
     }
     plain::sums::<C>(source, kernel, places, sums);
@@ -62,8 +82,8 @@ pub fn sums<const C: usize>(
 
 /// The nearest 8-bit samples of sums, alpha last and full.
 pub fn pixels<const C: usize>(kernel: &Kernel, sums: &[[i32; 4]], pixels: &mut [u8]) {
-    let bits = bits(kernel);
-    let mut more = [rounding(kernel); 4];
+    let bits = bits(kernel.taps());
+    let mut more = [rounding(kernel.taps()); 4];
     more[C] = 255 << bits;
     #[cfg(target_arch = "x86_64")]
     if vectors::avx2(
@@ -75,66 +95,114 @@ pub fn pixels<const C: usize>(kernel: &Kernel, sums: &[[i32; 4]], pixels: &mut [
     plain::pixels::<C>(sums, &more, bits, pixels);
 }
 
-/// A row of a patch of the chart that lies inside a frame, kernels and all.
-pub struct Span<'a> {
+/// A patch of the chart that lies inside a frame, kernels and all.
+#[derive(Clone, Copy)]
+pub struct Patch<'a> {
     /// The frame.
     pub source: Source<'a>,
     /// The kernel, of two taps at least.
     pub kernel: &'a Kernel,
-    /// Where its pixels appear.
-    pub line: Lanes,
+    /// Where its pixels appear, by powers of y.
+    pub lines: &'a [Lanes; 4],
 }
 
-/// The bytes of some `columns` of a span, alpha last and full, straight from where they appear. False without doing it where the
-/// processor lacks the vectors for it.
-pub fn span_bytes<const C: usize>(span: &Span, columns: Range<usize>, pixels: &mut [u8]) -> bool {
+/// Pixels at a time.
+const EIGHT: usize = 8;
+
+/// The columns of a patch that are looked at for the sake of these: whole eights.
+pub fn reach(columns: &Range<usize>) -> Range<usize> {
+    let start = columns.start.min(PATCH - EIGHT);
+    start..columns.end.max(start + EIGHT)
+}
+
+/// Some columns of a patch, from one of its rows on.
+pub struct Block<'a> {
+    /// The patch.
+    pub patch: Patch<'a>,
+    /// Its first row that is meant.
+    pub row: usize,
+    /// The columns, of the patch.
+    pub columns: Range<usize>,
+    /// Column of the tile where the patch begins.
+    pub first: usize,
+}
+
+/// What becomes of a frame's values: `(value − bias) light + correction`.
+pub struct Finish<'a, const L: usize> {
+    /// What is taken away.
+    pub bias: f32,
+    /// What is multiplied by; None for 1.
+    pub light: Option<Light>,
+    /// What is added, in all columns of each of the rows, [`super::run::RUN`] a row.
+    pub corrections: &'a [[f32; L]],
+}
+
+/// Draws a block into rows of a tile, alpha last and full: the bytes nearest to the sums. False without doing it where the processor
+/// lacks the vectors for it.
+pub fn block<const C: usize>(block: &Block, pixels: &mut [&mut [u8]]) -> bool {
     #[cfg(target_arch = "x86_64")]
-    if vectors::avx2(
-        #[inline(always)]
-        |simd| span::copy::<C>(simd, span, columns.clone(), pixels),
-    ) {
-        return true;
-    }
+    return by_taps!(block.patch.kernel, |simd, TAPS| block::plain::<C, TAPS>(
+        simd, block, pixels
+    ));
+    #[cfg(not(target_arch = "x86_64"))]
     false
 }
 
-/// The same with the values as numbers, in the lanes of [`sums`]; `values`: of all the patch, those around `columns` are anything.
-pub fn span_values<const C: usize>(
-    span: &Span,
+/// The same with light undone and corrections added.
+pub fn lit_block<const C: usize, const L: usize>(
+    block: &Block,
+    finish: &Finish<L>,
+    pixels: &mut [&mut [u8]],
+) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    return by_taps!(block.patch.kernel, |simd, TAPS| block::lit::<C, L, TAPS>(
+        simd, block, finish, pixels
+    ));
+    #[cfg(not(target_arch = "x86_64"))]
+    false
+}
+
+/// The values in some columns of a row of a patch, in the lanes of [`sums`]; `values`: of all the patch, those around `columns` are
+/// anything.
+pub fn values<const C: usize>(
+    patch: &Patch,
+    row: usize,
     columns: Range<usize>,
     values: &mut [[f32; 4]],
 ) -> bool {
     #[cfg(target_arch = "x86_64")]
-    if vectors::avx2(
-        #[inline(always)]
-        |simd| span::values::<C>(simd, span, columns.clone(), values),
-    ) {
-        return true;
-    }
+    return by_taps!(patch.kernel, |simd, TAPS| block::values::<C, TAPS>(
+        simd,
+        patch,
+        row,
+        columns.clone(),
+        values
+    ));
+    #[cfg(not(target_arch = "x86_64"))]
     false
 }
 
 /// Bits of a sum below its whole part.
-fn bits(kernel: &Kernel) -> u32 {
-    match kernel.taps() {
+const fn bits(taps: usize) -> u32 {
+    match taps {
         2 => 14,
         _ => 20,
     }
 }
 
-/// A sum in units of a whole one.
-pub fn scale(kernel: &Kernel) -> f32 {
-    1.0 / (1u32 << bits(kernel)) as f32
+/// A sum under so many taps in units of a whole one.
+pub const fn scale(taps: usize) -> f32 {
+    1.0 / (1u32 << bits(taps)) as f32
 }
 
 /// What is added to a sum that is then cut to the nearest whole one.
-fn rounding(kernel: &Kernel) -> i32 {
-    missing(kernel) + (1 << (bits(kernel) - 1))
+const fn rounding(taps: usize) -> i32 {
+    missing(taps) + (1 << (bits(taps) - 1))
 }
 
 /// What is missing of a sum: what cutting has taken away in the mean.
-pub fn missing(kernel: &Kernel) -> i32 {
-    match kernel.taps() {
+pub const fn missing(taps: usize) -> i32 {
+    match taps {
         2 => 0,
         _ => 1 << 14,
     }
@@ -143,7 +211,9 @@ pub fn missing(kernel: &Kernel) -> i32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::chart::{PATCH, SCALE};
+    use crate::render::chart::{Chart, SCALE};
+    use crate::render::run::RUN;
+    use crate::render::sample::Sample;
     use crate::render::{Interpolation, Picture, Samples};
 
     const KERNELS: [(Interpolation, f64); 6] = [
@@ -204,7 +274,10 @@ mod tests {
         sums::<C>(source, &kernel, places, &mut fast);
         plain::sums::<C>(source, &kernel, places, &mut slow);
         assert_eq!(fast, slow, "{interpolation:?} {stretch}");
-        let (bits_of, half) = (bits(&kernel), missing(&kernel) + (1 << (bits(&kernel) - 1)));
+        let (bits_of, half) = (
+            bits(kernel.taps()),
+            missing(kernel.taps()) + (1 << (bits(kernel.taps()) - 1)),
+        );
         let mut more = [half; 4];
         more[C] = 255 << bits_of;
         let mut bytes = [vec![1; (C + 1) * fast.len()], vec![2; (C + 1) * fast.len()]];
@@ -212,13 +285,13 @@ mod tests {
         plain::pixels::<C>(&fast, &more, bits_of, &mut bytes[1]);
         assert_eq!(bytes[0], bytes[1]);
         // Against single precision at the same phases, and where phases are 1/1024 px off at the most.
-        let scale = f64::from(1u32 << bits(&kernel)).recip();
+        let scale = f64::from(1u32 << bits(kernel.taps())).recip();
         let (mut worst, mut squares) = (0.0f64, 0.0);
         for ((u, v), sum) in coordinates().zip(&fast) {
             let near = |t: f32| t.floor() + Kernel::phase_of(t.fract(), phases) as f32 / phases;
             let exact = picture.at(near(u), near(v), &kernel);
             for (sum, exact) in sum[..C].iter().zip(exact) {
-                let error = f64::from(sum + missing(&kernel)) * scale - f64::from(exact);
+                let error = f64::from(sum + missing(kernel.taps())) * scale - f64::from(exact);
                 worst = worst.max(error.abs());
                 squares += error * error;
             }
@@ -238,8 +311,8 @@ mod tests {
         }
     }
 
-    /// A curved line through the picture, patch's columns along it: as the same pixels one by one.
-    fn check_span<const C: usize>(interpolation: Interpolation, stretch: f64) {
+    /// Blocks of a curved patch of the picture: as the same pixels one by one.
+    fn check_blocks<const C: usize, const L: usize>(interpolation: Interpolation, stretch: f64) {
         let kernel = Kernel::new(interpolation, stretch);
         let picture = picture::<C>();
         let Samples::Eight(samples) = picture.samples() else {
@@ -247,19 +320,94 @@ mod tests {
         };
         let stride = SIZE * C;
         let source = Source { samples, stride };
-        let line = [31.3, 14.7, -1.9, 0.7, 30.1, -11.2, 2.3, 1.1];
-        let all = Span {
+        let lines = [
+            [31.3, 12.7, -1.9, 0.7, 30.1, -3.2, 1.3, 0.4],
+            [1.1, 0.2, -0.3, 0.1, 11.4, 0.3, 0.1, -0.1],
+            [0.4, 0.0, 0.1, 0.0, -0.3, 0.2, 0.0, 0.0],
+            [0.1; 8],
+        ];
+        let patch = Patch {
             source,
             kernel: &kernel,
-            line,
+            lines: &lines,
         };
+        let light = Light::through([[1.1, 1.0, 0.9], [1.3, 1.2, 1.1], [1.0, 0.7, 0.8]]);
+        let bias = 3.25;
+        let corrections: Vec<[f32; L]> = (0..RUN * 8)
+            .map(|k| std::array::from_fn(|c| (k % 37) as f32 * 0.3 - 5.0 + c as f32))
+            .collect();
+        // The patch begins at the tile's column 64.
+        let (tile_first, step) = (64, C + 1);
+        for (row, columns) in [
+            (0, 0..PATCH),
+            (7, 0..3),
+            (13, 5..14),
+            (24, 27..PATCH),
+            (9, 3..30),
+        ] {
+            let block_of = Block {
+                patch,
+                row,
+                columns: columns.clone(),
+                first: tile_first,
+            };
+            let mut drawn = vec![vec![7; RUN * step]; 8];
+            let mut rows: Vec<&mut [u8]> = drawn.iter_mut().map(|row| &mut row[..]).collect();
+            if !block::<C>(&block_of, &mut rows) {
+                return;
+            }
+            let mut lit = vec![vec![7; RUN * step]; 8];
+            let mut rows: Vec<&mut [u8]> = lit.iter_mut().map(|row| &mut row[..]).collect();
+            let finish = Finish {
+                bias,
+                light: Some(light),
+                corrections: &corrections,
+            };
+            assert!(lit_block::<C, L>(&block_of, &finish, &mut rows));
+            for n in 0..8 {
+                let slow = slow_sums::<C>(&patch, row + n);
+                let mut bytes = vec![0; PATCH * step];
+                pixels::<C>(&kernel, &slow, &mut bytes);
+                let mut expected = vec![7; RUN * step];
+                let own = columns.start * step..columns.end * step;
+                expected[tile_first * step..][own.clone()].copy_from_slice(&bytes[own]);
+                assert_eq!(
+                    drawn[n], expected,
+                    "{interpolation:?} {stretch} {columns:?}"
+                );
+                let mut values = vec![[0.0; 4]; PATCH];
+                assert!(super::values::<C>(
+                    &patch,
+                    row + n,
+                    columns.clone(),
+                    &mut values
+                ));
+                let [a, b, c] = light.row(row + n);
+                for k in columns.clone() {
+                    for channel in 0..C {
+                        let value = (slow[k][channel] + missing(kernel.taps())) as f32
+                            * scale(kernel.taps());
+                        assert_eq!(values[k][channel], value, "{interpolation:?} {stretch}");
+                        let x = k as f32 * SCALE - 1.0;
+                        let even = (value - bias) * ((c * x + b) * x + a);
+                        let even = even + corrections[n * RUN + tile_first + k][channel];
+                        let there = &lit[n][(tile_first + k) * step..][..step];
+                        assert_eq!(there[channel], u8::nearest(even));
+                        assert_eq!(there[C], 255);
+                    }
+                }
+            }
+        }
+    }
+
+    fn slow_sums<const C: usize>(patch: &Patch, row: usize) -> Vec<[i32; 4]> {
+        let (kernel, stride) = (patch.kernel, patch.source.stride);
         let (mut first, mut across, mut down) = (Vec::new(), Vec::new(), Vec::new());
-        let cubic = |c: &[f32], x: f32| ((c[3] * x + c[2]) * x + c[1]) * x + c[0];
         for k in 0..PATCH {
-            let x = k as f32 * SCALE - 1.0;
-            let (u, v) = (cubic(&line[..4], x), cubic(&line[4..], x));
+            let at = |k: usize| k as f32 * SCALE - 1.0;
+            let [u, v] = Chart::pixel(patch.lines, at(k), at(row));
             let corner = |t: f32| t as usize - kernel.before();
-            first.push(((corner(v) * SIZE + corner(u)) * C) as u32);
+            first.push((corner(v) * stride + corner(u) * C) as u32);
             across.push(Kernel::phase_of(u.fract(), kernel.integer_phases()));
             down.push(Kernel::phase_of(v.fract(), kernel.integer_phases()));
         }
@@ -268,33 +416,15 @@ mod tests {
             phases: [&across, &down],
         };
         let mut slow = vec![[0; 4]; PATCH];
-        plain::sums::<C>(source, &kernel, places, &mut slow);
-        let mut slow_bytes = vec![0; PATCH * (C + 1)];
-        pixels::<C>(&kernel, &slow, &mut slow_bytes);
-        for columns in [0..PATCH, 0..3, 5..14, 27..PATCH] {
-            let expected = &slow_bytes[columns.start * (C + 1)..columns.end * (C + 1)];
-            let mut bytes = vec![7; expected.len()];
-            if !span_bytes::<C>(&all, columns.clone(), &mut bytes) {
-                return;
-            }
-            assert_eq!(bytes, expected, "{interpolation:?} {stretch} {columns:?}");
-            let mut values = vec![[0.0; 4]; PATCH];
-            assert!(span_values::<C>(&all, columns.clone(), &mut values));
-            let scale = 1.0 / (1u32 << bits(&kernel)) as f32;
-            for k in columns {
-                for c in 0..C {
-                    let value = (slow[k][c] + missing(&kernel)) as f32 * scale;
-                    assert_eq!(values[k][c], value, "{interpolation:?} {stretch}");
-                }
-            }
-        }
+        plain::sums::<C>(patch.source, kernel, places, &mut slow);
+        slow
     }
 
     #[test]
-    fn spans_are_their_pixels_one_by_one() {
+    fn blocks_are_their_pixels_one_by_one() {
         for (interpolation, stretch) in KERNELS {
-            check_span::<1>(interpolation, stretch);
-            check_span::<3>(interpolation, stretch);
+            check_blocks::<1, 1>(interpolation, stretch);
+            check_blocks::<3, 4>(interpolation, stretch);
         }
     }
 }

@@ -1,0 +1,346 @@
+//! Rows of a patch of the chart, from where they appear in a frame to the bytes of the panorama, without a stop between.
+//!
+//! The numbers are those of [`super::super::run::Run`], to the bit.
+
+use super::super::chart::{Lanes, SCALE};
+use super::super::light::Light;
+use super::super::run::RUN;
+use super::avx2;
+use super::avx2::Eight;
+use super::{Block, EIGHT, Finish, Patch, bits, missing, reach, rounding, scale};
+use crate::vectors;
+use pulp::bytemuck::cast;
+use pulp::x86::V3;
+use std::arch::x86_64::{__m128i, __m256, __m256i};
+use std::ops::Range;
+
+/// See [`super::block`].
+#[inline(always)]
+pub fn plain<const C: usize, const TAPS: usize>(simd: V3, block: &Block, pixels: &mut [&mut [u8]]) {
+    let patch = &block.patch;
+    for (n, pixels) in pixels.iter_mut().enumerate() {
+        let line = line(simd, patch.lines, block.row + n);
+        for (first, own) in eights(&block.columns) {
+            let places = places::<C, TAPS>(simd, patch, &line, x_of(simd, first));
+            let eight = match C {
+                3 => colour_bytes::<TAPS>(simd, colours::<TAPS>(simd, patch, &places)),
+                _ => grey_bytes::<TAPS>(simd, greys::<TAPS>(simd, patch, &places)),
+            };
+            put::<C>(eight, first, own, block.first, pixels);
+        }
+    }
+}
+
+/// See [`super::lit_block`].
+#[inline(always)]
+pub fn lit<const C: usize, const L: usize, const TAPS: usize>(
+    simd: V3,
+    block: &Block,
+    finish: &Finish<L>,
+    pixels: &mut [&mut [u8]],
+) {
+    let (avx, patch) = (simd.avx, &block.patch);
+    let missing = avx._mm256_set1_epi32(missing(TAPS));
+    let scale = avx._mm256_set1_ps(scale(TAPS));
+    let bias = avx._mm256_set1_ps(finish.bias);
+    let light = finish.light.unwrap_or(Light::even(1.0));
+    let rows = pixels.iter_mut().zip(finish.corrections.chunks_exact(RUN));
+    for (n, (pixels, corrections)) in rows.enumerate() {
+        let line = line(simd, patch.lines, block.row + n);
+        let [a, b, c] = light.row(block.row + n);
+        for (first, own) in eights(&block.columns) {
+            let x = x_of(simd, first);
+            let places = places::<C, TAPS>(simd, patch, &line, x);
+            let corrections = &corrections[block.first + first..][..EIGHT];
+            let light = polynomial(simd, x, &[a, b, c]);
+            let undone = Undone {
+                missing,
+                scale,
+                bias,
+                light,
+            };
+            let eight = match C {
+                3 => lit_colours(
+                    simd,
+                    colours::<TAPS>(simd, patch, &places),
+                    &undone,
+                    corrections,
+                ),
+                _ => lit_greys(
+                    simd,
+                    greys::<TAPS>(simd, patch, &places),
+                    &undone,
+                    corrections,
+                ),
+            };
+            put::<C>(eight, first, own, block.first, pixels);
+        }
+    }
+}
+
+/// See [`super::values`].
+#[inline(always)]
+pub fn values<const C: usize, const TAPS: usize>(
+    simd: V3,
+    patch: &Patch,
+    row: usize,
+    columns: Range<usize>,
+    values: &mut [[f32; 4]],
+) {
+    let avx = simd.avx;
+    let missing = avx._mm256_set1_epi32(missing(TAPS));
+    let scale = avx._mm256_set1_ps(scale(TAPS));
+    let line = line(simd, patch.lines, row);
+    for (first, _) in eights(&columns) {
+        let places = places::<C, TAPS>(simd, patch, &line, x_of(simd, first));
+        let own = &mut values[first..first + EIGHT];
+        if C == 3 {
+            let [a, b, c, d] = colours::<TAPS>(simd, patch, &places);
+            [own[0], own[4]] = cast(numbers(simd, a, missing, scale));
+            [own[1], own[5]] = cast(numbers(simd, b, missing, scale));
+            [own[2], own[6]] = cast(numbers(simd, c, missing, scale));
+            [own[3], own[7]] = cast(numbers(simd, d, missing, scale));
+        } else {
+            let sums = greys::<TAPS>(simd, patch, &places);
+            let all: [f32; EIGHT] = cast(numbers(simd, sums, missing, scale));
+            for (own, value) in own.iter_mut().zip(all) {
+                *own = [value, 0.0, 0.0, 0.0];
+            }
+        }
+    }
+}
+
+/// Columns of a patch, eight at a time: the first of each eight, and those of them that are meant. Where eight do not fit any more,
+/// some are done again.
+#[inline(always)]
+fn eights(columns: &Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
+    let Range { start, end } = *columns;
+    let last = reach(columns).end - EIGHT;
+    (start..end).step_by(EIGHT).map(
+        #[inline(always)]
+        move |from| {
+            let first = from.min(last);
+            (first, first.max(start)..(first + EIGHT).min(end))
+        },
+    )
+}
+
+/// Puts the columns `own` of eight pixels from `first` on into a row of the tile, where the patch begins at column `patch`.
+#[inline(always)]
+fn put<const C: usize>(
+    eight: __m256i,
+    first: usize,
+    own: Range<usize>,
+    patch: usize,
+    pixels: &mut [u8],
+) {
+    let pixel = C + 1;
+    let eight: [u8; 32] = cast(eight);
+    let there = &mut pixels[(patch + own.start) * pixel..(patch + own.end) * pixel];
+    if there.len() == EIGHT * pixel {
+        there.copy_from_slice(&eight[..EIGHT * pixel]);
+    } else {
+        let skip = own.start - first;
+        let eight = &eight[skip * pixel..];
+        for (there, own) in there.iter_mut().zip(eight) {
+            *there = *own;
+        }
+    }
+}
+
+/// Where the pixels of a row of a patch appear, by powers of x.
+#[inline(always)]
+fn line(simd: V3, lines: &[Lanes; 4], row: usize) -> Lanes {
+    let avx = simd.avx;
+    let y = avx._mm256_set1_ps(row as f32 * SCALE - 1.0);
+    let mut at: __m256 = cast(lines[3]);
+    for c in [lines[2], lines[1], lines[0]] {
+        at = avx._mm256_add_ps(avx._mm256_mul_ps(at, y), cast(c));
+    }
+    cast(at)
+}
+
+/// The patch's coordinates of eight columns.
+#[inline(always)]
+fn x_of(simd: V3, first: usize) -> __m256 {
+    let avx = simd.avx;
+    let steps: __m256 = cast([0.0f32, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    let column = avx._mm256_add_ps(steps, avx._mm256_set1_ps(first as f32));
+    avx._mm256_sub_ps(
+        avx._mm256_mul_ps(column, avx._mm256_set1_ps(SCALE)),
+        avx._mm256_set1_ps(1.0),
+    )
+}
+
+/// How sums become what the evenly lit wall would show: `((sum + missing) scale − bias) light`, light of eight pixels.
+struct Undone {
+    missing: __m256i,
+    scale: __m256,
+    bias: __m256,
+    light: __m256,
+}
+
+impl Undone {
+    /// With corrections, as whole numbers.
+    #[inline(always)]
+    fn of(&self, simd: V3, sums: __m256i, light: __m256, corrections: __m256) -> __m256i {
+        let avx = simd.avx;
+        let value = numbers(simd, sums, self.missing, self.scale);
+        let value = avx._mm256_mul_ps(avx._mm256_sub_ps(value, self.bias), light);
+        avx._mm256_cvtps_epi32(avx._mm256_add_ps(value, corrections))
+    }
+
+    /// Of the pixels k and k + 4 in colour.
+    #[inline(always)]
+    fn both<const L: usize>(
+        &self,
+        simd: V3,
+        sums: __m256i,
+        corrections: &[[f32; L]],
+        k: usize,
+    ) -> __m256i {
+        let avx2 = simd.avx2;
+        let (k_32, both) = (k as i32, k + 4);
+        let lanes: __m256i = cast([[k_32; 4], [k_32 + 4; 4]]);
+        let light = avx2._mm256_permutevar8x32_ps(self.light, lanes);
+        let of = |k: usize| [0, 1, 2, 3].map(|c| corrections[k][c % L]);
+        let corrections: __m256 = cast([of(k), of(both)]);
+        self.of(simd, sums, light, corrections)
+    }
+}
+
+/// The pixels whose sums are those of k and k + 4 in the halves of the k-th vector, alpha last and full.
+#[inline(always)]
+fn lit_colours<const L: usize>(
+    simd: V3,
+    [a, b, c, d]: [__m256i; 4],
+    undone: &Undone,
+    corrections: &[[f32; L]],
+) -> __m256i {
+    let avx2 = simd.avx2;
+    let a = undone.both(simd, a, corrections, 0);
+    let b = undone.both(simd, b, corrections, 1);
+    let c = undone.both(simd, c, corrections, 2);
+    let d = undone.both(simd, d, corrections, 3);
+    let (ab, cd) = (avx2._mm256_packs_epi32(a, b), avx2._mm256_packs_epi32(c, d));
+    let all = avx2._mm256_packus_epi16(ab, cd);
+    let alpha = simd.avx._mm256_set1_epi32(0xff00_0000_u32.cast_signed());
+    avx2._mm256_or_si256(all, alpha)
+}
+
+/// The same of grey pixels.
+#[inline(always)]
+fn lit_greys<const L: usize>(
+    simd: V3,
+    sums: __m256i,
+    undone: &Undone,
+    corrections: &[[f32; L]],
+) -> __m256i {
+    let mut own = [0.0; EIGHT];
+    for (own, correction) in own.iter_mut().zip(corrections) {
+        *own = correction[0];
+    }
+    grey_pixels(simd, undone.of(simd, sums, undone.light, cast(own)))
+}
+
+/// What sums are as numbers.
+#[inline(always)]
+fn numbers(simd: V3, sums: __m256i, missing: __m256i, scale: __m256) -> __m256 {
+    let whole = simd.avx2._mm256_add_epi32(sums, missing);
+    simd.avx
+        ._mm256_mul_ps(simd.avx._mm256_cvtepi32_ps(whole), scale)
+}
+
+#[inline(always)]
+fn colours<const TAPS: usize>(simd: V3, patch: &Patch, (first, phases): &Eights) -> [__m256i; 4] {
+    avx2::colours::<TAPS>(simd, patch.source, patch.kernel, first, *phases)
+}
+
+#[inline(always)]
+fn greys<const TAPS: usize>(simd: V3, patch: &Patch, (first, phases): &Eights) -> __m256i {
+    avx2::greys::<TAPS>(simd, patch.source, patch.kernel, first, *phases)
+}
+
+/// Where eight kernels begin, and their phases along u and v.
+type Eights = (Eight<u32>, [Eight<i32>; 2]);
+
+/// Of the pixels at `x`.
+#[inline(always)]
+fn places<const C: usize, const TAPS: usize>(
+    simd: V3,
+    patch: &Patch,
+    line: &Lanes,
+    x: __m256,
+) -> Eights {
+    let Patch { source, kernel, .. } = patch;
+    let (avx, avx2) = (simd.avx, simd.avx2);
+    let taps = avx2::taps::<TAPS>(kernel);
+    let phases = avx2::phases::<TAPS>();
+    let (left, s) = whole(simd, polynomial(simd, x, &line[..4]), phases);
+    let (top, t) = whole(simd, polynomial(simd, x, &line[4..]), phases);
+    let before = avx._mm256_set1_epi32((taps as i32 - 1) / 2);
+    let left = avx2._mm256_sub_epi32(left, before);
+    let top = avx2._mm256_sub_epi32(top, before);
+    let row = avx2._mm256_mullo_epi32(top, avx._mm256_set1_epi32(source.stride as i32));
+    let at = match C {
+        1 => left,
+        _ => avx2._mm256_add_epi32(left, avx2._mm256_add_epi32(left, left)),
+    };
+    let at: Eight<u32> = cast(avx2._mm256_add_epi32(row, at));
+    // What the next rows need.
+    let below = at[0] as usize + (taps + 1) * source.stride;
+    vectors::prefetch(simd, source.samples, below);
+    (at, [cast(s), cast(t)])
+}
+
+#[inline(always)]
+fn polynomial(simd: V3, x: __m256, c: &[f32]) -> __m256 {
+    let avx = simd.avx;
+    let (last, rest) = c.split_last().unwrap_or((&0.0, &[]));
+    let mut value = avx._mm256_set1_ps(*last);
+    for c in rest.iter().rev() {
+        value = avx._mm256_add_ps(avx._mm256_mul_ps(value, x), avx._mm256_set1_ps(*c));
+    }
+    value
+}
+
+/// Numbers from 0 on cut to the whole numbers below them, and the phases of what was cut off.
+#[inline(always)]
+fn whole(simd: V3, value: __m256, phases: f32) -> (__m256i, __m256i) {
+    let avx = simd.avx;
+    let below = avx._mm256_cvttps_epi32(value);
+    let rest = avx._mm256_sub_ps(value, avx._mm256_cvtepi32_ps(below));
+    let phase = avx._mm256_mul_ps(rest, avx._mm256_set1_ps(phases));
+    (below, avx._mm256_cvtps_epi32(phase))
+}
+
+/// The pixels whose sums are those of k and k + 4 in the halves of the k-th vector, alpha last and full.
+#[inline(always)]
+fn colour_bytes<const TAPS: usize>(simd: V3, sums: [__m256i; 4]) -> __m256i {
+    let (bits, half) = (bits(TAPS), rounding(TAPS));
+    let more = cast([[half, half, half, 255 << bits]; 2]);
+    avx2::packed(simd, sums, more, bits)
+}
+
+/// The same of grey pixels.
+#[inline(always)]
+fn grey_bytes<const TAPS: usize>(simd: V3, sums: __m256i) -> __m256i {
+    let (avx, avx2) = (simd.avx, simd.avx2);
+    let count: __m128i = cast([bits(TAPS), 0, 0, 0]);
+    let value = avx2._mm256_add_epi32(sums, avx._mm256_set1_epi32(rounding(TAPS)));
+    grey_pixels(simd, avx2._mm256_sra_epi32(value, count))
+}
+
+/// Eight grey pixels of these values, alpha last and full.
+#[inline(always)]
+fn grey_pixels(simd: V3, value: __m256i) -> __m256i {
+    let (avx, avx2) = (simd.avx, simd.avx2);
+    let value = avx2._mm256_max_epi32(value, avx._mm256_setzero_si256());
+    let value = avx2._mm256_min_epi32(value, avx._mm256_set1_epi32(255));
+    let pixel = avx2._mm256_or_si256(value, avx._mm256_set1_epi32(255 << 8));
+    // The lower 16 bits of each number.
+    let lower = avx._mm256_castsi256_si128(pixel);
+    let upper = avx2._mm256_extracti128_si256::<1>(pixel);
+    let packed = simd.sse4_1._mm_packus_epi32(lower, upper);
+    avx._mm256_castsi128_si256(packed)
+}
