@@ -130,41 +130,36 @@ fn choices(
         })
         .collect();
     // Node by node, in the order of the frames.
-    let mut seen: Vec<Vec<(usize, Sight)>> = vec![Vec::new(); walls.len()];
-    for (frame, sights) in tile.frames.iter().zip(&sights) {
-        for (seen, sight) in seen.iter_mut().zip(sights) {
-            if sight.fineness > 0.0 {
-                seen.push((*frame, *sight));
-            }
-        }
-    }
+    let seen = |node: usize| {
+        let own = tile.frames.iter().zip(&sights);
+        own.map(move |(frame, sights)| (*frame, sights[node]))
+            .filter(|(_, sight)| sight.fineness > 0.0)
+    };
     let mut greys = Vec::new();
-    let middles: Vec<f32> = seen
-        .iter()
-        .map(|seen| {
+    let middles: Vec<f32> = (0..walls.len())
+        .map(|node| {
             greys.clear();
-            greys.extend(seen.iter().map(|(_, sight)| sight.grey));
+            greys.extend(seen(node).map(|(_, sight)| sight.grey));
             median(&mut greys)
         })
         .collect();
-    let around = surroundings(&middles, tile.columns as usize);
     let mut found: Vec<Choice> = Vec::new();
-    seen.iter()
-        .enumerate()
-        .map(|(node, seen)| {
-            let finest = seen
-                .iter()
-                .map(|(_, sight)| sight.fineness)
-                .fold(0.0, f32::max);
+    (0..walls.len())
+        .map(|node| {
+            let (mut finest, mut count) = (0.0f32, 0);
+            for (_, sight) in seen(node) {
+                finest = finest.max(sight.fineness);
+                count += 1;
+            }
             // Of two that differ, neither is nearer to their median: what is around decides.
-            let usual = match seen.len() {
-                2 => around[node],
+            let usual = match count {
+                2 => surroundings(&middles, tile.columns as usize, node),
                 _ => middles[node],
             };
-            let least = seen.iter().map(|(_, sight)| (sight.grey - usual).abs());
+            let least = seen(node).map(|(_, sight)| (sight.grey - usual).abs());
             let least = least.fold(f32::INFINITY, f32::min);
             found.clear();
-            found.extend(seen.iter().map(|(frame, sight)| {
+            found.extend(seen(node).map(|(frame, sight)| {
                 let mut cost = RESOLUTION * (finest / sight.fineness).log2();
                 cost += EDGE * (1.0 - sight.inset / EDGE_SHARE).max(0.0);
                 let off = ((sight.grey - usual).abs() - least) / SIGMA - 2.0;
@@ -173,7 +168,7 @@ fn choices(
                     cost += CLIPPED;
                 }
                 Choice {
-                    frame: *frame as u32,
+                    frame: frame as u32,
                     cost,
                     grey: sight.grey,
                 }
@@ -185,25 +180,20 @@ fn choices(
         .collect()
 }
 
-/// Means of the values (those there are) in squares of [`AROUND`] nodes to each side.
-fn surroundings(values: &[f32], columns: usize) -> Vec<f32> {
+/// Mean of the values (those there are) in a square of [`AROUND`] nodes to each side of a node.
+fn surroundings(values: &[f32], columns: usize, node: usize) -> f32 {
     let rows = values.len() / columns.max(1);
     let near = |at: usize, size: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(size);
-    (0..values.len())
-        .map(|node| {
-            let (mut sum, mut count) = (0.0, 0.0);
-            for row in near(node / columns, rows) {
-                for column in near(node % columns, columns) {
-                    let value = values[row * columns + column];
-                    if !value.is_nan() {
-                        sum += value;
-                        count += 1.0;
-                    }
-                }
+    let (mut sum, mut count) = (0.0, 0.0);
+    for row in near(node / columns, rows) {
+        for value in &values[row * columns..][near(node % columns, columns)] {
+            if !value.is_nan() {
+                sum += value;
+                count += 1.0;
             }
-            sum / count
-        })
-        .collect()
+        }
+    }
+    sum / count
 }
 
 /// What a frame shows of a node.
@@ -317,36 +307,30 @@ impl Lattice {
         for (n, node) in line.iter().enumerate() {
             let before = n.checked_sub(1).map(|n| line[n]);
             let after = line.get(n + 1).copied();
-            let mut next = [0.0; CHOICES];
+            let own = &self.choices[*node];
+            let mut next = self.held(*node, before, after, above);
             let mut from = [0u8; CHOICES];
-            for (k, next) in next.iter_mut().enumerate() {
-                let choice = &self.choices[*node][k];
-                if choice.frame == NO_FRAME && k > 0 {
-                    *next = f32::INFINITY;
-                    continue;
-                }
-                *next = choice.cost + self.held(*node, choice, before, after, above);
-                if let Some(before) = before {
-                    let reached = |j: usize| {
-                        costs[j]
-                            + seam(
-                                &self.choices[before],
-                                &self.choices[before][j],
-                                &self.choices[*node],
-                                choice,
-                            )
-                    };
+            for (next, choice) in next.iter_mut().zip(own) {
+                *next += choice.cost;
+            }
+            if let Some(before) = before {
+                let seams = seams(&self.choices[before], own);
+                for (k, next) in next.iter_mut().enumerate() {
                     let mut best = (f32::INFINITY, 0);
                     for (j, cost) in costs.iter().enumerate() {
-                        if cost.is_finite() {
-                            let cost = reached(j);
-                            if cost < best.0 {
-                                best = (cost, j as u8);
-                            }
+                        let cost = cost + seams[j][k];
+                        if cost < best.0 {
+                            best = (cost, j as u8);
                         }
                     }
                     *next += best.0;
                     from[k] = best.1;
+                }
+            }
+            // What is no choice is not taken, unless there is none.
+            for (next, choice) in next.iter_mut().zip(own).skip(1) {
+                if choice.frame == NO_FRAME {
+                    *next = f32::INFINITY;
                 }
             }
             costs = next;
@@ -368,51 +352,77 @@ impl Lattice {
         chosen
     }
 
-    /// Seams between a node and those neighbours that are held.
+    /// Seams between each choice of a node and those neighbours that are held.
     fn held(
         &self,
         node: usize,
-        choice: &Choice,
         before: Option<usize>,
         after: Option<usize>,
         above: Option<&[u32]>,
-    ) -> f32 {
+    ) -> [f32; CHOICES] {
         let columns = self.columns;
         let (row, column) = (node / columns, node % columns);
         let start = row * columns;
+        let right = if column + 1 < columns {
+            node + 1
+        } else {
+            start
+        };
+        let left = if column > 0 {
+            node - 1
+        } else {
+            start + columns - 1
+        };
         let neighbours = [
-            Some(start + (column + 1) % columns),
-            Some(start + (column + columns - 1) % columns),
-            row.checked_sub(1).map(|row| row * columns + column),
+            Some(right),
+            Some(left),
+            node.checked_sub(columns),
             Some(node + columns).filter(|below| *below < self.choices.len()),
         ];
-        let mut cost = 0.0;
+        let mut costs = [0.0; CHOICES];
         for other in neighbours.into_iter().flatten() {
             if Some(other) != before && Some(other) != after && other != node {
-                let held = &self.choices[other][usize::from(self.chosen[other])];
-                cost += seam(&self.choices[other], held, &self.choices[node], choice);
+                let seams = seams(&self.choices[node], &self.choices[other]);
+                let chosen = usize::from(self.chosen[other]);
+                for (cost, seams) in costs.iter_mut().zip(&seams) {
+                    *cost += seams[chosen];
+                }
             }
         }
-        if let (0, Some(above)) = (row, above)
-            && above[column] != choice.frame
-        {
-            cost += SEAM;
+        if let (0, Some(above)) = (row, above) {
+            for (cost, choice) in costs.iter_mut().zip(&self.choices[node]) {
+                if above[column] != choice.frame {
+                    *cost += SEAM;
+                }
+            }
         }
-        cost
+        costs
     }
 }
 
-/// V of two neighbours with their choices.
-fn seam(first: &Choices, a: &Choice, second: &Choices, b: &Choice) -> f32 {
-    if a.frame == b.frame || a.frame == NO_FRAME || b.frame == NO_FRAME {
-        return 0.0;
+/// V of two neighbours for each choice of the first and each of the second.
+#[inline]
+fn seams(first: &Choices, second: &Choices) -> [[f32; CHOICES]; CHOICES] {
+    // What each frame of the second shows at the first, and the other way round; NaN where that is not known.
+    let (mut at_first, mut at_second) = ([f32::NAN; CHOICES], [f32::NAN; CHOICES]);
+    for (a, there) in first.iter().zip(&mut at_second) {
+        for (b, here) in second.iter().zip(&mut at_first) {
+            if a.frame == b.frame {
+                (*here, *there) = (a.grey, b.grey);
+            }
+        }
     }
-    // What frame b shows at the first node against a there, and the other way round.
-    let difference = |choices: &Choices, here: &Choice, other: u32| {
-        let found = choices.iter().find(|choice| choice.frame == other);
-        found.map_or(MOST_DIFFERENT, |choice| {
-            (DIFFERENCE * (choice.grey - here.grey).abs() / SIGMA).min(MOST_DIFFERENT)
-        })
+    let difference = |shown: f32, grey: f32| {
+        // The least of NaN and a number is the number.
+        (DIFFERENCE / SIGMA * (shown - grey).abs()).min(MOST_DIFFERENT)
     };
-    SEAM + difference(first, a, b.frame) + difference(second, b, a.frame)
+    let mut seams = [[0.0; CHOICES]; CHOICES];
+    for (k, a) in first.iter().enumerate() {
+        for (j, b) in second.iter().enumerate() {
+            let same = a.frame == b.frame || a.frame == NO_FRAME || b.frame == NO_FRAME;
+            let cost = SEAM + difference(at_first[j], a.grey) + difference(at_second[k], b.grey);
+            seams[k][j] = if same { 0.0 } else { cost };
+        }
+    }
+    seams
 }

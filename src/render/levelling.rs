@@ -264,9 +264,11 @@ fn shown(
             let start = row * window.columns + column;
             view.look_at(&mut run, start, length);
             response.undo(&mut run, 0..length);
-            for k in 0..length {
-                let (value, seen) = (run.values()[k], run.seen()[k]);
-                values.extend((0..channels).map(|c| if seen { value[c] } else { f32::NAN }));
+            for (value, seen) in run.values()[..length].iter().zip(run.seen()) {
+                match seen {
+                    true => values.extend_from_slice(&value[..channels]),
+                    false => values.extend_from_slice(&[f32::NAN; 4][..channels]),
+                }
             }
         }
     }
@@ -276,6 +278,19 @@ fn shown(
         channels,
         values,
     }
+}
+
+/// Fills in what a row of so many nodes has before the first and after the last: around the tunnel, or the same again.
+fn pad(row: &mut [f32], columns: usize, channels: usize, around: bool) {
+    let (first, last) = match around {
+        true => (columns, 1),
+        false => (1, columns),
+    };
+    row.copy_within(first * channels..(first + 1) * channels, 0);
+    row.copy_within(
+        last * channels..(last + 1) * channels,
+        (columns + 1) * channels,
+    );
 }
 
 impl Layer {
@@ -290,63 +305,54 @@ impl Layer {
 
     /// Each node times its weight, and the weight as one channel more.
     fn weighted(&self, weights: &Self) -> Self {
+        let mut all = Self::zeros(self.columns, self.rows, self.channels + 1);
         let nodes = self.values.chunks_exact(self.channels).zip(&weights.values);
-        Self {
-            channels: self.channels + 1,
-            values: nodes
-                .flat_map(|(node, w)| node.iter().map(move |v| v * w).chain([*w]))
-                .collect(),
-            ..*self
+        for (own, (node, w)) in all.values.chunks_exact_mut(self.channels + 1).zip(nodes) {
+            for (own, value) in own.iter_mut().zip(node) {
+                *own = value * w;
+            }
+            own[self.channels] = *w;
         }
+        all
     }
 
     /// Each node by its last channel, which is its weight.
     fn normalised(&self) -> Self {
         let channels = self.channels - 1;
+        let mut all = Self::zeros(self.columns, self.rows, channels);
         let nodes = self.values.chunks_exact(self.channels);
-        Self {
-            channels,
-            values: nodes
-                .flat_map(|node| {
-                    let w = node[channels];
-                    let scale = if w > LEAST_WEIGHT { 1.0 / w } else { 0.0 };
-                    node[..channels].iter().map(move |v| v * scale)
-                })
-                .collect(),
-            ..*self
+        for (own, node) in all.values.chunks_exact_mut(channels).zip(nodes) {
+            let w = node[channels];
+            let scale = if w > LEAST_WEIGHT { 1.0 / w } else { 0.0 };
+            for (own, value) in own.iter_mut().zip(node) {
+                *own = value * scale;
+            }
         }
+        all
     }
 
     /// Half as many nodes each way, at the middles of 2 × 2: weights (1, 3, 3, 1)/8 along each axis; `around`: the last
     /// column is followed by the first, else the border is repeated.
     fn reduced(&self, around: bool) -> Self {
+        const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
         let (columns, rows, c) = (self.columns / 2, self.rows / 2, self.channels);
-        let weights = [0.125, 0.375, 0.375, 0.125];
-        let near = |at: usize, k: usize, size: usize| (2 * at + k).saturating_sub(1).min(size - 1);
-        let mut across = Self::zeros(columns, self.rows, c);
-        for row in 0..self.rows {
-            for column in 0..columns {
-                for (k, w) in weights.iter().enumerate() {
-                    let near = match around {
-                        true => (2 * column + k + self.columns - 1) % self.columns,
-                        false => near(column, k, self.columns),
-                    };
-                    let from = (row * self.columns + near) * c;
-                    for channel in 0..c {
-                        across.values[(row * columns + column) * c + channel] +=
-                            w * self.values[from + channel];
-                    }
-                }
-            }
-        }
         let mut half = Self::zeros(columns, rows, c);
+        // A row with the columns beyond either end of it.
+        let mut row_of = vec![0.0; (self.columns + 2) * c];
         for row in 0..rows {
-            for (k, w) in weights.iter().enumerate() {
-                let from = near(row, k, self.rows) * columns * c;
-                let source = &across.values[from..][..columns * c];
-                let target = &mut half.values[row * columns * c..][..columns * c];
-                for (target, source) in target.iter_mut().zip(source) {
-                    *target += w * source;
+            let near = |k: usize| (2 * row + k).saturating_sub(1).min(self.rows - 1);
+            let [p, q, r, s] = [0, 1, 2, 3].map(|k| self.row(near(k)));
+            let inner = &mut row_of[c..(self.columns + 1) * c];
+            for (n, value) in inner.iter_mut().enumerate() {
+                *value = WEIGHTS[0] * (p[n] + s[n]) + WEIGHTS[1] * (q[n] + r[n]);
+            }
+            pad(&mut row_of, self.columns, c, around);
+            let target = &mut half.values[row * columns * c..][..columns * c];
+            for (column, node) in target.chunks_exact_mut(c).enumerate() {
+                let own = &row_of[2 * column * c..][..4 * c];
+                for (channel, value) in node.iter_mut().enumerate() {
+                    let at = |k: usize| own[k * c + channel];
+                    *value = WEIGHTS[0] * (at(0) + at(3)) + WEIGHTS[1] * (at(1) + at(2));
                 }
             }
         }
@@ -355,33 +361,39 @@ impl Layer {
 
     /// Twice as many nodes each way, bilinear; `around`: the last column is followed by the first, else the border is repeated.
     fn expanded(&self, around: bool) -> Self {
+        /// Of the node's own parent, and of the other one next to it.
+        const WEIGHTS: [f32; 2] = [0.75, 0.25];
         let (columns, rows, c) = (2 * self.columns, 2 * self.rows, self.channels);
         let mut double = Self::zeros(columns, rows, c);
-        // The node's own parent, and the other one next to it.
-        let parents = |at: usize, size: usize, around: bool| {
-            let own = at / 2;
-            let other = match (at % 2, around) {
-                (0, true) => (own + size - 1) % size,
-                (0, false) => own.saturating_sub(1),
-                (_, true) => (own + 1) % size,
-                (_, false) => (own + 1).min(size - 1),
-            };
-            [(own, 0.75f32), (other, 0.25)]
-        };
+        let mut row_of = vec![0.0; (self.columns + 2) * c];
         for row in 0..rows {
-            for column in 0..columns {
-                let at = (row * columns + column) * c;
-                for (i, w_i) in parents(row, self.rows, false) {
-                    for (j, w_j) in parents(column, self.columns, around) {
-                        let from = (i * self.columns + j) * c;
-                        for channel in 0..c {
-                            double.values[at + channel] += w_i * w_j * self.values[from + channel];
-                        }
-                    }
+            let own = row / 2;
+            let other = match row % 2 {
+                0 => own.saturating_sub(1),
+                _ => (own + 1).min(self.rows - 1),
+            };
+            let inner = &mut row_of[c..(self.columns + 1) * c];
+            let both = self.row(own).iter().zip(self.row(other));
+            for (value, (own, other)) in inner.iter_mut().zip(both) {
+                *value = WEIGHTS[0] * own + WEIGHTS[1] * other;
+            }
+            pad(&mut row_of, self.columns, c, around);
+            let target = &mut double.values[row * columns * c..][..columns * c];
+            for (column, two) in target.chunks_exact_mut(2 * c).enumerate() {
+                let near = &row_of[column * c..][..3 * c];
+                for channel in 0..c {
+                    let at = |k: usize| near[k * c + channel];
+                    two[channel] = WEIGHTS[0] * at(1) + WEIGHTS[1] * at(0);
+                    two[c + channel] = WEIGHTS[0] * at(1) + WEIGHTS[1] * at(2);
                 }
             }
         }
         double
+    }
+
+    fn row(&self, row: usize) -> &[f32] {
+        let length = self.columns * self.channels;
+        &self.values[row * length..][..length]
     }
 
     /// Adds the layer of a window, `band` halvings from the grid's.
