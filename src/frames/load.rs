@@ -2,7 +2,9 @@
 
 use super::Video;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageReader, ImageResult};
-use std::io::{BufRead, Cursor, Seek};
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{BufRead, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -207,8 +209,8 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
         check(video.size())?;
         return video.decode(*picture).map_err(fail);
     }
-    let bytes = std::fs::read(&file.path).map_err(|error| fail(error.to_string()))?;
-    if bytes.starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(&bytes) {
+    let bytes = Content::of(&file.path).map_err(|error| fail(error.to_string()))?;
+    if bytes.as_ref().starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(bytes.as_ref()) {
         return Err(fail("the JPEG file is truncated".to_owned()));
     }
     let decoder =
@@ -216,6 +218,35 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
     // Before there is room made for as many pixels as a header may claim.
     check(decoder.dimensions())?;
     DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))
+}
+
+/// What is in a file. Its memory serves for the thread's next file: memory that the system clears anew for each costs as much as reading.
+struct Content(Vec<u8>);
+
+thread_local! {
+    static ROOM: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+}
+
+impl Content {
+    fn of(path: &Path) -> std::io::Result<Self> {
+        let mut content = Self(ROOM.take());
+        content.0.clear();
+        File::open(path)?.read_to_end(&mut content.0)?;
+        Ok(content)
+    }
+}
+
+impl AsRef<[u8]> for Content {
+    fn as_ref(&self) -> &[u8] {
+        &self.0
+    }
+}
+
+impl Drop for Content {
+    fn drop(&mut self) {
+        // A thread that ends has no room to give back to.
+        let _ = ROOM.try_with(|room| room.replace(std::mem::take(&mut self.0)));
+    }
 }
 
 /// What the pixels of a frame are, by its file's header.

@@ -3,14 +3,17 @@
 //! A tile is drawn in strips between two rows of the seams' nodes. What one frame shows alone there is drawn a block at a time, patch
 //! by patch of the frame's chart; where frames meet, at their edges and round holes, row by row.
 
+use super::chart::PATCH;
 use super::draw::NO_FRAME;
+use super::integer::{self, LitBlock, PARTS, Part};
 use super::row::Row;
 use super::run::{RUN, Run};
 use super::sample::Sample;
-use super::seams::{Across, Between, Seams, Shares};
+use super::seams::{Across, Between, Seams, Share, Shares};
 use super::view::{View, pieces};
 use super::warp::Points;
 use super::{Canvas, Tile};
+use arrayvec::ArrayVec;
 use std::ops::Range;
 
 /// What drawing needs for a while.
@@ -19,6 +22,8 @@ pub struct Scratch {
     shares: Shares,
     /// Of each row of a strip, [`RUN`] columns each.
     corrections: Vec<f32>,
+    /// How far each row of a strip lies between the nodes.
+    down: Vec<f32>,
 }
 
 /// A tile about to be drawn from views, in the order of their frames, along seams; `C`: channels, `L`: lanes of a correction.
@@ -67,6 +72,7 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
             let Scratch {
                 shares,
                 corrections,
+                ..
             } = &mut *scratch;
             let mut corrections = corrections.as_chunks::<L>().0.chunks_exact(RUN);
             for row in strip {
@@ -114,7 +120,7 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         }
     }
 
-    /// Draws what one frame shows alone in whole patches of its chart; which columns these are.
+    /// Draws what lies inside all frames that show it; which columns these are.
     fn blocks<T: Sample>(
         &self,
         strip: &Range<usize>,
@@ -129,27 +135,79 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         let Scratch {
             shares,
             corrections,
+            down,
         } = scratch;
-        let corrections = (!self.copies).then_some(corrections.as_chunks::<L>().0);
+        let corrections = corrections.as_chunks::<L>().0;
+        down.clear();
+        down.extend(strip.clone().map(|row| self.between(row).t()));
         let first = self.between(strip.start);
-        self.seams
-            .shares(&self.across, 0..self.across.len(), &first, shares);
-        for (share, _) in shares.iter().filter(|(_, weights)| weights.is_none()) {
-            let Some(view) = self.view(share.frame) else {
+        let all = 0..self.across.len();
+        self.seams.shares(&self.across, all, &first, shares);
+        for cell in shares.by_cells() {
+            // Who shows most is found pixel by pixel.
+            if cell.len() > 1 && !sources.is_empty() {
                 continue;
-            };
-            for piece in pieces(share.from..share.to) {
-                if view.block::<C, L>(strip.clone(), piece.clone(), corrections, pixels) {
-                    for row in strip.clone() {
-                        if let Some(sources) = sources.get_mut(row) {
-                            sources[piece.clone()].fill(share.frame as u32);
-                        }
+            }
+            for piece in pieces(cell[0].from..cell[0].to) {
+                let done = match self.copies {
+                    true => {
+                        let view = self.view(cell[0].frame);
+                        view.is_some_and(|view| {
+                            view.block::<C>(strip.clone(), piece.clone(), pixels)
+                        })
                     }
-                    drawn.add(piece);
+                    false => self.lit_block(strip, &piece, cell, down, corrections, pixels),
+                };
+                if !done {
+                    continue;
                 }
+                for row in strip.clone() {
+                    if let Some(sources) = sources.get_mut(row) {
+                        sources[piece.clone()].fill(cell[0].frame as u32);
+                    }
+                }
+                drawn.add(piece);
             }
         }
         drawn
+    }
+
+    /// Draws what frames share in a cell, and where one is alone; false without doing it if one does not show all of it.
+    fn lit_block(
+        &self,
+        strip: &Range<usize>,
+        columns: &Range<usize>,
+        shares: &[Share],
+        down: &[f32],
+        corrections: &[[f32; L]],
+        pixels: &mut [&mut [u8]],
+    ) -> bool {
+        let part = |share: &Share| self.view(share.frame)?.part(strip, columns, share.corners);
+        let mut parts = ArrayVec::<Part, PARTS>::new();
+        let mut weights = [0.0; 4];
+        for share in shares {
+            let Some(part) = part(share) else {
+                return false;
+            };
+            for (weight, corner) in weights.iter_mut().zip(part.corners) {
+                *weight += corner;
+            }
+            parts.push(part);
+        }
+        if weights != [1.0; 4] {
+            return false;
+        }
+        let first = columns.start - columns.start % PATCH;
+        let block = LitBlock {
+            parts: &parts,
+            row: strip.start % PATCH,
+            columns: columns.start - first..columns.end - first,
+            first,
+            across: self.across.between(),
+            down,
+            corrections,
+        };
+        integer::lit_block::<C, L>(&block, &mut pixels[strip.clone()])
     }
 
     /// What some columns of a row are, mixed of the frames that share them.
@@ -264,17 +322,20 @@ mod tests {
 
     #[test]
     fn open_columns_are_those_not_added() {
-        let open = |added: &[Range<usize>], count: usize| {
+        let open = |added: &[(usize, usize)], count: usize| {
             let mut columns = Columns::default();
-            for range in added {
-                columns.add(range.clone());
+            for (from, to) in added {
+                columns.add(*from..*to);
             }
-            columns.open(count).collect::<Vec<_>>()
+            let open = columns.open(count);
+            open.map(|range| (range.start, range.end))
+                .collect::<Vec<_>>()
         };
-        assert_eq!(open(&[], 128), [0..128]);
-        assert_eq!(open(&[0..128], 128), []);
-        assert_eq!(open(&[3..7, 9..64], 100), [0..3, 7..9, 64..100]);
-        assert_eq!(open(&[0..5, 5..6, 100..128], 128), [6..100]);
-        assert_eq!(open(&[0..5], 5), []);
+        assert_eq!(open(&[], 128), [(0, 128)]);
+        assert_eq!(open(&[(0, 128)], 128), []);
+        let some = [(3, 7), (9, 64)];
+        assert_eq!(open(&some, 100), [(0, 3), (7, 9), (64, 100)]);
+        assert_eq!(open(&[(0, 5), (5, 6), (100, 128)], 128), [(6, 100)]);
+        assert_eq!(open(&[(0, 5)], 5), []);
     }
 }

@@ -4,8 +4,8 @@
 //!
 //! `E = Σ_p D_p(l_p) + Σ_{p,q neighbours} V_pq(l_p, l_q)`
 //!
-//! is small. D prefers frames that show the wall finely and squarely, away from their edges, and that show what the others
-//! show, too; V is zero between nodes of the same frame, else a seam's length and what the two frames differ by on both sides of it.
+//! is small. D prefers frames that show the wall squarely and as finely as the canvas does (finer is of no use), near their middles, and
+//! that show what the others show, too; V is zero between nodes of the same frame, else a seam's length and what the two frames differ by on both sides of it.
 //!
 //! Rows and columns of nodes are solved one at a time with their neighbours held, by dynamic programming (Viterbi). A
 //! row is cut open at θ = 0, where its ends are held to what they were. Every other row at once, which does not depend on the
@@ -30,6 +30,8 @@ const CHOICES: usize = 3;
 const SIGMA: f32 = 2.0;
 /// Cost of half the resolution.
 const RESOLUTION: f32 = 2.0;
+/// Cost at a frame's border over its middle, where lenses are sharpest and the wall is looked at most squarely: what decides among equals.
+const OFF_CENTRE: f32 = 0.5;
 /// Cost at a frame's very edge, ...
 const EDGE: f32 = 2.0;
 /// ... which begins at this share of half its width or height from it.
@@ -70,21 +72,40 @@ const NONE: Choice = Choice {
 /// The choices of a node, the best first; [`NONE`] where there are no more.
 type Choices = [Choice; CHOICES];
 
+/// What nodes are looked at with.
+struct Eyes<'a> {
+    surface: &'a dyn Surface,
+    thumbnails: &'a Thumbnails,
+    exposure: &'a Exposure,
+    placements: &'a [Placement],
+    /// Fineness of the canvas, in units of [`Sight::fineness`].
+    finest: f64,
+}
+
 /// The frame of each node of `grid`, row-major; [`NO_FRAME`] where no thumbnail shows the wall.
 pub fn best(
     surface: &dyn Surface,
     thumbnails: &Thumbnails,
     exposure: &Exposure,
     placements: &[Placement],
+    canvas: &Canvas,
     grid: &Canvas,
 ) -> Vec<u32> {
     let columns = grid.columns as usize;
+    let focal = thumbnails.camera().fx * f64::from(thumbnails.scale());
+    let eyes = Eyes {
+        surface,
+        thumbnails,
+        exposure,
+        placements,
+        finest: canvas.px_per_metre / focal,
+    };
     let mut labels: Vec<u32> = Vec::with_capacity(grid.pixels());
     // Band by band, each held to the one before.
     for band in tiles(surface, grid, placements, TILE) {
         let parts: Vec<Vec<Choices>> = band
             .par_iter()
-            .map(|tile| choices(surface, thumbnails, exposure, placements, grid, tile))
+            .map(|tile| choices(&eyes, grid, tile))
             .collect();
         let rows = band.first().map_or(0, |tile| tile.rows as usize);
         let mut choices = Vec::with_capacity(rows * columns);
@@ -109,25 +130,14 @@ pub fn best(
 }
 
 /// The best choices of a tile's nodes.
-fn choices(
-    surface: &dyn Surface,
-    thumbnails: &Thumbnails,
-    exposure: &Exposure,
-    placements: &[Placement],
-    grid: &Canvas,
-    tile: &Tile,
-) -> Vec<Choices> {
-    let walls: Vec<WallFrame> = tile.walls(grid).map(|wall| surface.frame(wall)).collect();
+fn choices(eyes: &Eyes, grid: &Canvas, tile: &Tile) -> Vec<Choices> {
+    let frame_of = |wall| eyes.surface.frame(wall);
+    let walls: Vec<WallFrame> = tile.walls(grid).map(frame_of).collect();
     let points: Vec<_> = walls.iter().map(|wall| wall.x_w).collect();
     let points = Points::new(&points);
-    let sights: Vec<Vec<Sight>> = tile
-        .frames
-        .iter()
-        .map(|frame| {
-            sights(
-                thumbnails, exposure, placements, *frame, tile, &points, &walls,
-            )
-        })
+    let frames = tile.frames.iter();
+    let sights: Vec<Vec<Sight>> = frames
+        .map(|frame| eyes.sights(*frame, tile, &points, &walls))
         .collect();
     // Node by node, in the order of the frames.
     let seen = |node: usize| {
@@ -161,6 +171,7 @@ fn choices(
             found.clear();
             found.extend(seen(node).map(|(frame, sight)| {
                 let mut cost = RESOLUTION * (finest / sight.fineness).log2();
+                cost += OFF_CENTRE * (1.0 - sight.inset);
                 cost += EDGE * (1.0 - sight.inset / EDGE_SHARE).max(0.0);
                 let off = ((sight.grey - usual).abs() - least) / SIGMA - 2.0;
                 cost += (OUTLIER * off.max(0.0)).min(MOST_OUTLYING);
@@ -199,7 +210,8 @@ fn surroundings(values: &[f32], columns: usize, node: usize) -> f32 {
 /// What a frame shows of a node.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sight {
-    /// Pixels per length of wall along the direction in which they are fewest, in units of the focal length; 0: does not show it.
+    /// Pixels per length of wall along the direction in which they are fewest, in units of the focal length, at most the canvas'; 0: does
+    /// not show it.
     fineness: f32,
     /// Distance from the nearest edge, of half the width or height.
     inset: f32,
@@ -209,54 +221,57 @@ struct Sight {
     raw: f32,
 }
 
-fn sights(
-    thumbnails: &Thumbnails,
-    exposure: &Exposure,
-    placements: &[Placement],
-    frame: usize,
-    tile: &Tile,
-    points: &Points,
-    walls: &[WallFrame],
-) -> Vec<Sight> {
-    let camera = thumbnails.camera();
-    let pose = &placements[frame].pose;
-    let view = thumbnails.view(frame, &placements[frame], points);
-    let response = exposure.of(frame);
-    let format = thumbnails.format();
-    let forwards = pose.r_wc * nalgebra::Vector3::z();
-    let columns = tile.columns as usize;
-    let mut run = Run::default();
-    let mut raw = [[0.0; 4]; RUN];
-    let mut found = vec![Sight::default(); walls.len()];
-    for row in 0..tile.rows as usize {
-        let start = row * columns;
-        view.look_at(&mut run, start, columns);
-        raw[..columns].copy_from_slice(&run.values()[..columns]);
-        response.undo(&mut run, 0..columns);
-        let (u, v) = run.pixels();
-        for k in 0..columns {
-            if !run.seen()[k] {
-                continue;
+impl Eyes<'_> {
+    /// What a frame shows of a tile's nodes.
+    fn sights(
+        &self,
+        frame: usize,
+        tile: &Tile,
+        points: &Points,
+        walls: &[WallFrame],
+    ) -> Vec<Sight> {
+        let (thumbnails, placements) = (self.thumbnails, self.placements);
+        let camera = thumbnails.camera();
+        let pose = &placements[frame].pose;
+        let view = thumbnails.view(frame, &placements[frame], points);
+        let response = self.exposure.of(frame);
+        let format = thumbnails.format();
+        let forwards = pose.r_wc * nalgebra::Vector3::z();
+        let columns = tile.columns as usize;
+        let mut run = Run::default();
+        let mut raw = [[0.0; 4]; RUN];
+        let mut found = vec![Sight::default(); walls.len()];
+        for row in 0..tile.rows as usize {
+            let start = row * columns;
+            view.look_at(&mut run, start, columns);
+            raw[..columns].copy_from_slice(&run.values()[..columns]);
+            response.undo(&mut run, 0..columns);
+            let (u, v) = run.pixels();
+            for k in 0..columns {
+                if !run.seen()[k] {
+                    continue;
+                }
+                // On a plane at distance d from the camera, at the point x: f cos α/|x| with cos α = d/|x| across, f/z along:
+                // the least is d f/(z |x|) up to the angle between the view and the optical axis.
+                let wall = &walls[start + k];
+                let ray = wall.x_w - pose.t_wc;
+                let normal = wall.e_s.cross(&wall.e_h);
+                let fineness = ray.dot(&normal).abs() / (ray.dot(&forwards) * ray.norm());
+                let fineness = fineness.min(self.finest);
+                let inset = |at: f32, last: u32| {
+                    let last = (last - 1) as f32;
+                    at.min(last - at) * 2.0 / last
+                };
+                found[start + k] = Sight {
+                    fineness: fineness as f32,
+                    inset: inset(u[k], camera.width).min(inset(v[k], camera.height)),
+                    grey: format.grey(run.values()[k]),
+                    raw: format.grey(raw[k]),
+                };
             }
-            // On a plane at distance d from the camera, at the point x: f cos α/|x| with cos α = d/|x| across, f/z along:
-            // the least is d f/(z |x|) up to the angle between the view and the optical axis.
-            let wall = &walls[start + k];
-            let ray = wall.x_w - pose.t_wc;
-            let normal = wall.e_s.cross(&wall.e_h);
-            let fineness = ray.dot(&normal).abs() / (ray.dot(&forwards) * ray.norm());
-            let inset = |at: f32, last: u32| {
-                let last = (last - 1) as f32;
-                at.min(last - at) * 2.0 / last
-            };
-            found[start + k] = Sight {
-                fineness: fineness as f32,
-                inset: inset(u[k], camera.width).min(inset(v[k], camera.height)),
-                grey: format.grey(run.values()[k]),
-                raw: format.grey(raw[k]),
-            };
         }
+        found
     }
-    found
 }
 
 /// Nodes of a band and what they chose.

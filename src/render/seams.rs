@@ -8,6 +8,7 @@ use super::chart::PATCH;
 use super::draw::NO_FRAME;
 use super::labels;
 use super::levelling::{self, COARSEST};
+use super::run::RUN;
 use super::thumbnails::Thumbnails;
 use super::{Canvas, Exposure, Placement, Tile};
 use crate::surface::Surface;
@@ -50,14 +51,20 @@ pub struct Seams {
 /// Where the columns of a tile lie between the nodes.
 pub struct Across {
     cells: Vec<Cell>,
-    /// How far each column lies from the node before to the one after, 0 to 1.
-    t: Vec<f32>,
+    /// How far each column lies from the node before to the one after, 0 to 1; 0 beyond the last.
+    t: [f32; RUN],
+    columns: usize,
 }
 
 impl Across {
     /// Number of columns.
     pub fn len(&self) -> usize {
-        self.t.len()
+        self.columns
+    }
+
+    /// How far each column lies from the node before to the one after, 0 to 1; anything beyond the last.
+    pub fn between(&self) -> &[f32; RUN] {
+        &self.t
     }
 }
 
@@ -77,6 +84,13 @@ pub struct Between {
     t: f32,
 }
 
+impl Between {
+    /// How far from the one row to the other, 0 to 1.
+    pub fn t(&self) -> f32 {
+        self.t
+    }
+}
+
 impl Seams {
     /// Finds the best frame for each node of the grid over `canvas`, by thumbnails whose exposure is undone; with `blend`, also the
     /// correction. `white`: full scale of the frames.
@@ -89,7 +103,7 @@ impl Seams {
         blend: Option<f32>,
     ) -> Self {
         let grid = grid(canvas);
-        let labels = labels::best(surface, thumbnails, exposure, placements, &grid);
+        let labels = labels::best(surface, thumbnails, exposure, placements, canvas, &grid);
         let channels = thumbnails.channels();
         let corrections = match blend {
             Some(white) => levelling::corrections(
@@ -161,12 +175,12 @@ impl Seams {
         let count = i64::from(self.grid.columns);
         let scale = f64::from(self.grid.columns) / f64::from(canvas.columns);
         let mut cells: Vec<Cell> = Vec::new();
-        let mut t = Vec::with_capacity(tile.columns as usize);
+        let mut t = [0.0; RUN];
         let mut cell = i64::MIN;
-        for column in 0..tile.columns as usize {
+        for (column, t) in t.iter_mut().enumerate().take(tile.columns as usize) {
             let at = (f64::from(tile.column + column as u32) + 0.5) * scale - 0.5;
             let before = at.floor();
-            t.push((at - before) as f32);
+            *t = (at - before) as f32;
             if before as i64 != cell {
                 cell = before as i64;
                 cells.push(Cell {
@@ -179,7 +193,11 @@ impl Seams {
                 cell.columns.end = column + 1;
             }
         }
-        Across { cells, t }
+        Across {
+            cells,
+            t,
+            columns: tile.columns as usize,
+        }
     }
 
     /// Where a row of the canvas lies between the nodes.
@@ -299,6 +317,7 @@ impl Seams {
                 frame: *frame as usize,
                 from,
                 to: from + along.len(),
+                corners: corners.map(|corner| f32::from(corner == *frame)),
                 weights: Some(start),
             });
         }
@@ -355,6 +374,8 @@ pub struct Share {
     pub from: usize,
     /// The column after the last.
     pub to: usize,
+    /// 1 at those corners of its cell that are its own, else 0: the upper two, then the lower two.
+    pub corners: [f32; 4],
     /// Where its weights begin; none where it is alone.
     weights: Option<usize>,
 }
@@ -375,9 +396,16 @@ impl Shares {
                 frame,
                 from,
                 to,
+                corners: [1.0; 4],
                 weights: None,
             }),
         }
+    }
+
+    /// All of them, those of one cell together.
+    pub fn by_cells(&self) -> impl Iterator<Item = &[Share]> {
+        let same = |a: &Share, b: &Share| a.weights.is_some() && a.from == b.from;
+        self.list.chunk_by(same)
     }
 
     /// All of them, each with its weights or none if it is alone.

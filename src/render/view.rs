@@ -2,7 +2,7 @@
 
 use super::chart::{Chart, Lattice, PATCH, Projected};
 use super::exposure::Response;
-use super::integer::{self, Block, Finish, Patch, Source};
+use super::integer::{self, Block, Part, Patch, Source};
 use super::kernel::{Interpolation, Kernel};
 use super::light::Light;
 use super::run::Run;
@@ -186,15 +186,12 @@ impl<'a> View<'a> {
 
     /// The values in columns of one patch, if all of it lies inside an 8-bit frame.
     fn sample_row(&self, run: &mut Run, row: usize, columns: Range<usize>) -> bool {
-        let at = self.chart.patch(row, columns.start);
-        let first = columns.start - columns.start % PATCH;
-        let own = columns.start - first..columns.end - first;
-        let rows = row % PATCH..row % PATCH + 1;
-        let done = self.patch(at, rows, own).is_some_and(|patch| {
-            run.sample_row(self.picture, &patch, row % PATCH, first, columns.clone())
-        });
+        let Some((at, patch)) = self.patch(&(row..row + 1), &columns) else {
+            return false;
+        };
+        let (row, first) = (row % PATCH, columns.start - columns.start % PATCH);
+        let done = run.sample_row(self.picture, &patch, row, first, columns.clone());
         if done && let Some(light) = &self.patches[at].light {
-            let row = row % PATCH;
             self.response.undo_by(light, row, run, first, columns);
         }
         done
@@ -252,67 +249,76 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Draws some rows and columns of a tile, all in one patch that lies inside an 8-bit frame, into the tile's rows of pixels, alpha
-    /// last: the bytes of [`View::copy`], or with `corrections` (of each of these rows, [`super::run::RUN`] columns each) those nearest to [`View::values`] with them
-    /// added. False without doing it where they do not, or the processor lacks the vectors for it.
-    pub fn block<const C: usize, const L: usize>(
+    /// Draws some rows and columns of a tile, all in one patch, into the tile's rows of pixels: the bytes of [`View::copy`]. False without
+    /// doing it where they do not lie inside an 8-bit frame, or the processor lacks the vectors for it.
+    pub fn block<const C: usize>(
         &self,
         rows: Range<usize>,
         columns: Range<usize>,
-        corrections: Option<&[[f32; L]]>,
         pixels: &mut [&mut [u8]],
     ) -> bool {
-        let at = self.chart.patch(rows.start, columns.start);
-        let first = columns.start - columns.start % PATCH;
-        let columns = columns.start - first..columns.end - first;
-        let row = rows.start % PATCH;
-        let Some(patch) = self.patch(at, row..row + rows.len(), columns.clone()) else {
+        let Some((_, patch)) = self.patch(&rows, &columns) else {
             return false;
         };
+        let first = columns.start - columns.start % PATCH;
         let block = Block {
             patch,
-            row,
-            columns,
+            row: rows.start % PATCH,
+            columns: columns.start - first..columns.end - first,
             first,
         };
-        let pixels = &mut pixels[rows];
-        match corrections {
-            None => integer::block::<C>(&block, pixels),
-            Some(corrections) => {
-                let finish = Finish {
-                    bias: self.response.bias(),
-                    light: self.patches[at].light,
-                    corrections,
-                };
-                integer::lit_block::<C, L>(&block, &finish, pixels)
-            }
-        }
+        integer::block::<C>(&block, &mut pixels[rows])
     }
 
-    /// What is to be sampled in a patch, if these rows and columns of it lie inside an 8-bit frame.
-    fn patch(&self, patch: usize, rows: Range<usize>, columns: Range<usize>) -> Option<Patch<'_>> {
+    /// What the frame has in some rows and columns of a tile, all in one patch, if they lie inside an 8-bit frame.
+    pub fn part(
+        &self,
+        rows: &Range<usize>,
+        columns: &Range<usize>,
+        corners: [f32; 4],
+    ) -> Option<Part<'_>> {
+        let (at, patch) = self.patch(rows, columns)?;
+        Some(Part {
+            patch,
+            bias: self.response.bias(),
+            light: self.patches[at].light,
+            corners,
+        })
+    }
+
+    /// The patch that these rows and columns of a tile lie in, and what is to be sampled there, if they lie inside an 8-bit frame.
+    fn patch(&self, rows: &Range<usize>, columns: &Range<usize>) -> Option<(usize, Patch<'_>)> {
+        let at = self.chart.patch(rows.start, columns.start);
         let PatchView {
             kernel: Some(kernel),
             within: Some(within),
             inside,
             ..
-        } = &self.patches[patch]
+        } = &self.patches[at]
         else {
             return None;
         };
-        let lines = self.chart.lines(patch)?;
-        if !inside && !lies(Chart::range(lines, rows, integer::reach(&columns)), *within) {
-            return None;
+        let lines = self.chart.lines(at)?;
+        if !inside {
+            let own = |all: &Range<usize>| {
+                let first = all.start - all.start % PATCH;
+                all.start - first..all.end - first
+            };
+            let range = Chart::range(lines, own(rows), integer::reach(&own(columns)));
+            if !lies(range, *within) {
+                return None;
+            }
         }
         let Samples::Eight(samples) = self.picture.samples() else {
             return None;
         };
         let stride = self.picture.width() * self.picture.format().channels;
-        Some(Patch {
+        let patch = Patch {
             source: Source { samples, stride },
             kernel,
             lines,
-        })
+        };
+        Some((at, patch))
     }
 
     /// The kernel for points of a patch that were found before; None if the frame shows none of them.

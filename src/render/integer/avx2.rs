@@ -105,11 +105,11 @@ pub fn phases<const TAPS: usize>() -> f32 {
 
 /// The weights along u and v of pixel `k`.
 #[inline(always)]
-fn weights<'a, const TAPS: usize>(
-    kernel: &'a Kernel,
+fn weights<const TAPS: usize>(
+    kernel: &Kernel,
     [s, t]: [Eight<i32>; 2],
     k: usize,
-) -> (&'a [i16], &'a [i16]) {
+) -> (&[i16], &[i16]) {
     let taps = taps::<TAPS>(kernel);
     let of = |phase: i32| &kernel.all_integers()[phase as usize * taps..][..taps];
     (of(s[k]), of(t[k]))
@@ -478,8 +478,8 @@ fn four_by_four(
     k: usize,
 ) -> __m256i {
     let (avx, avx2) = (simd.avx, simd.avx2);
-    let w = kernel.all_integers();
-    let of = |phase: i32| four_of(w, 4 * phase as usize);
+    let w = kernel.all_integers().as_chunks::<4>().0;
+    let of = |phase: i32| -> i64 { cast(w[phase as usize]) };
     let w_x = avx._mm256_set_epi64x(of(s[k + 3]), of(s[k + 2]), of(s[k + 1]), of(s[k]));
     let w_y = avx._mm256_set_epi64x(of(t[k + 3]), of(t[k + 2]), of(t[k + 1]), of(t[k]));
     let a = four_across(simd, rows[0], first, k, w_x);

@@ -7,8 +7,9 @@ use super::super::light::Light;
 use super::super::run::RUN;
 use super::avx2;
 use super::avx2::Eight;
-use super::{Block, EIGHT, Finish, Patch, bits, missing, reach, rounding, scale};
+use super::{Block, EIGHT, LitBlock, PARTS, Part, Patch, bits, missing, reach, rounding, scale};
 use crate::vectors;
+use arrayvec::ArrayVec;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::{__m128i, __m256, __m256i};
@@ -35,47 +36,184 @@ pub fn plain<const C: usize, const TAPS: usize>(simd: V3, block: &Block, pixels:
 #[inline(always)]
 pub fn lit<const C: usize, const L: usize, const TAPS: usize>(
     simd: V3,
-    block: &Block,
-    finish: &Finish<L>,
+    block: &LitBlock<L>,
     pixels: &mut [&mut [u8]],
 ) {
-    let (avx, patch) = (simd.avx, &block.patch);
-    let missing = avx._mm256_set1_epi32(missing(TAPS));
-    let scale = avx._mm256_set1_ps(scale(TAPS));
-    let bias = avx._mm256_set1_ps(finish.bias);
-    let light = finish.light.unwrap_or(Light::even(1.0));
-    let rows = pixels.iter_mut().zip(finish.corrections.chunks_exact(RUN));
-    for (n, (pixels, corrections)) in rows.enumerate() {
-        let line = line(simd, patch.lines, block.row + n);
-        let [a, b, c] = light.row(block.row + n);
+    let avx = simd.avx;
+    let rows = pixels.iter_mut().zip(block.corrections.chunks_exact(RUN));
+    // Where pixels of a row appear in each part, by powers of x, and its light.
+    let mut parts: ArrayVec<(&Part, Lanes, [f32; 3]), PARTS> = ArrayVec::new();
+    for (n, ((pixels, corrections), t)) in rows.zip(block.down).enumerate() {
+        let row = block.row + n;
+        parts.clear();
+        for part in block.parts {
+            let light = part.light.unwrap_or(Light::even(1.0));
+            parts.push((part, line(simd, part.patch.lines, row), light.row(row)));
+        }
         for (first, own) in eights(&block.columns) {
-            let x = x_of(simd, first);
-            let places = places::<C, TAPS>(simd, patch, &line, x);
-            let corrections = &corrections[block.first + first..][..EIGHT];
-            let light = polynomial(simd, x, &[a, b, c]);
-            let undone = Undone {
-                missing,
-                scale,
-                bias,
-                light,
-            };
+            let (x, at) = (x_of(simd, first), block.first + first);
+            let corrections = &corrections[at..][..EIGHT];
+            let mut s = [0.0; EIGHT];
+            s.copy_from_slice(&block.across[at..][..EIGHT]);
+            let mut mix = Mix::<C>::nothing(simd);
+            for (part, line, light) in &parts {
+                let weights = match parts.len() {
+                    1 => avx._mm256_set1_ps(1.0),
+                    _ => bilinear(simd, cast(s), *t, part.corners),
+                };
+                mix.add::<TAPS>(simd, part, (line, light), x, weights);
+            }
             let eight = match C {
-                3 => lit_colours(
-                    simd,
-                    colours::<TAPS>(simd, patch, &places),
-                    &undone,
-                    corrections,
-                ),
-                _ => lit_greys(
-                    simd,
-                    greys::<TAPS>(simd, patch, &places),
-                    &undone,
-                    corrections,
-                ),
+                3 => mix.colours(simd, corrections),
+                _ => mix.greys(simd, corrections),
             };
             put::<C>(eight, first, own, block.first, pixels);
         }
     }
+}
+
+/// Between corners before and after along `s`, the upper two and then the lower two along `t`: what is given at them, bilinear.
+#[inline(always)]
+fn bilinear(simd: V3, s: __m256, t: f32, corners: [f32; 4]) -> __m256 {
+    let avx = simd.avx;
+    let one = avx._mm256_set1_ps(1.0);
+    let (up, down) = (avx._mm256_set1_ps(1.0 - t), avx._mm256_set1_ps(t));
+    let rest = avx._mm256_sub_ps(one, s);
+    let (a, b) = (avx._mm256_mul_ps(rest, up), avx._mm256_mul_ps(s, up));
+    let (c, d) = (avx._mm256_mul_ps(rest, down), avx._mm256_mul_ps(s, down));
+    let of = |w: __m256, corner: f32| avx._mm256_mul_ps(w, avx._mm256_set1_ps(corner));
+    let sum = avx._mm256_add_ps(of(a, corners[0]), of(b, corners[1]));
+    let sum = avx._mm256_add_ps(sum, of(c, corners[2]));
+    avx._mm256_add_ps(sum, of(d, corners[3]))
+}
+
+/// Weighted sums of eight pixels: of the k-th and the k + 4th in the halves of the k-th vector in colour, in the first one if they
+/// are grey.
+struct Mix<const C: usize> {
+    sums: [__m256; 4],
+    weights: __m256,
+}
+
+impl<const C: usize> Mix<C> {
+    #[inline(always)]
+    fn nothing(simd: V3) -> Self {
+        let zero = simd.avx._mm256_setzero_ps();
+        Self {
+            sums: [zero; 4],
+            weights: zero,
+        }
+    }
+
+    /// Adds what a frame shows at `x` in a row of its patch (its line and light), light undone: `((sum + missing) scale − bias) light`.
+    #[inline(always)]
+    fn add<const TAPS: usize>(
+        &mut self,
+        simd: V3,
+        part: &Part,
+        (line, light): (&Lanes, &[f32; 3]),
+        x: __m256,
+        weights: __m256,
+    ) {
+        let avx = simd.avx;
+        let places = places::<C, TAPS>(simd, &part.patch, line, x);
+        let light = polynomial(simd, x, light);
+        let bias = avx._mm256_set1_ps(part.bias);
+        self.weights = avx._mm256_add_ps(self.weights, weights);
+        if C == 3 {
+            let [a, b, c, d] = colours::<TAPS>(simd, &part.patch, &places);
+            self.sums[0] = both::<TAPS>(simd, self.sums[0], a, bias, light, weights, 0);
+            self.sums[1] = both::<TAPS>(simd, self.sums[1], b, bias, light, weights, 1);
+            self.sums[2] = both::<TAPS>(simd, self.sums[2], c, bias, light, weights, 2);
+            self.sums[3] = both::<TAPS>(simd, self.sums[3], d, bias, light, weights, 3);
+        } else {
+            let sums = greys::<TAPS>(simd, &part.patch, &places);
+            let value = undone::<TAPS>(simd, sums, bias, light);
+            self.sums[0] = avx._mm256_add_ps(self.sums[0], avx._mm256_mul_ps(weights, value));
+        }
+    }
+
+    /// Means with corrections added, as pixels, alpha last and full.
+    #[inline(always)]
+    fn colours<const L: usize>(&self, simd: V3, corrections: &[[f32; L]]) -> __m256i {
+        let (avx, avx2) = (simd.avx, simd.avx2);
+        let inverse = avx._mm256_div_ps(avx._mm256_set1_ps(1.0), self.weights);
+        let a = colour_mean(simd, self.sums[0], inverse, corrections, 0);
+        let b = colour_mean(simd, self.sums[1], inverse, corrections, 1);
+        let c = colour_mean(simd, self.sums[2], inverse, corrections, 2);
+        let d = colour_mean(simd, self.sums[3], inverse, corrections, 3);
+        let (ab, cd) = (avx2._mm256_packs_epi32(a, b), avx2._mm256_packs_epi32(c, d));
+        let all = avx2._mm256_packus_epi16(ab, cd);
+        let alpha = avx._mm256_set1_epi32(0xff00_0000_u32.cast_signed());
+        avx2._mm256_or_si256(all, alpha)
+    }
+
+    /// The same in grey.
+    #[inline(always)]
+    fn greys<const L: usize>(&self, simd: V3, corrections: &[[f32; L]]) -> __m256i {
+        let avx = simd.avx;
+        let inverse = avx._mm256_div_ps(avx._mm256_set1_ps(1.0), self.weights);
+        let mut own = [0.0; EIGHT];
+        for (own, correction) in own.iter_mut().zip(corrections) {
+            *own = correction[0];
+        }
+        let mean = avx._mm256_mul_ps(self.sums[0], inverse);
+        grey_pixels(
+            simd,
+            avx._mm256_cvtps_epi32(avx._mm256_add_ps(mean, cast(own))),
+        )
+    }
+}
+
+/// Sums as numbers, light undone.
+#[inline(always)]
+fn undone<const TAPS: usize>(simd: V3, sums: __m256i, bias: __m256, light: __m256) -> __m256 {
+    let avx = simd.avx;
+    let missing = avx._mm256_set1_epi32(missing(TAPS));
+    let value = numbers(simd, sums, missing, avx._mm256_set1_ps(scale(TAPS)));
+    avx._mm256_mul_ps(avx._mm256_sub_ps(value, bias), light)
+}
+
+/// What is one number for each of eight pixels, four times for the pixels k and k + 4.
+#[inline(always)]
+fn four_times(simd: V3, eight: __m256, k: i32) -> __m256 {
+    let lanes: __m256i = cast([[k; 4], [k + 4; 4]]);
+    simd.avx2._mm256_permutevar8x32_ps(eight, lanes)
+}
+
+/// Adds the pixels k and k + 4 in colour to what there is.
+#[inline(always)]
+fn both<const TAPS: usize>(
+    simd: V3,
+    so_far: __m256,
+    sums: __m256i,
+    bias: __m256,
+    light: __m256,
+    weights: __m256,
+    k: i32,
+) -> __m256 {
+    let value = undone::<TAPS>(simd, sums, bias, four_times(simd, light, k));
+    let weighted = simd.avx._mm256_mul_ps(four_times(simd, weights, k), value);
+    simd.avx._mm256_add_ps(so_far, weighted)
+}
+
+/// The means of pixels k and k + 4 in colour with corrections added, as whole numbers.
+#[inline(always)]
+fn colour_mean<const L: usize>(
+    simd: V3,
+    sums: __m256,
+    inverse: __m256,
+    corrections: &[[f32; L]],
+    k: usize,
+) -> __m256i {
+    let avx = simd.avx;
+    let mean = avx._mm256_mul_ps(sums, four_times(simd, inverse, k as i32));
+    let mut own = [[0.0; 4]; 2];
+    for (own, correction) in own.iter_mut().zip([&corrections[k], &corrections[k + 4]]) {
+        for (own, correction) in own.iter_mut().zip(correction) {
+            *own = *correction;
+        }
+    }
+    avx._mm256_cvtps_epi32(avx._mm256_add_ps(mean, cast(own)))
 }
 
 /// See [`super::values`].
@@ -170,77 +308,6 @@ fn x_of(simd: V3, first: usize) -> __m256 {
         avx._mm256_mul_ps(column, avx._mm256_set1_ps(SCALE)),
         avx._mm256_set1_ps(1.0),
     )
-}
-
-/// How sums become what the evenly lit wall would show: `((sum + missing) scale − bias) light`, light of eight pixels.
-struct Undone {
-    missing: __m256i,
-    scale: __m256,
-    bias: __m256,
-    light: __m256,
-}
-
-impl Undone {
-    /// With corrections, as whole numbers.
-    #[inline(always)]
-    fn of(&self, simd: V3, sums: __m256i, light: __m256, corrections: __m256) -> __m256i {
-        let avx = simd.avx;
-        let value = numbers(simd, sums, self.missing, self.scale);
-        let value = avx._mm256_mul_ps(avx._mm256_sub_ps(value, self.bias), light);
-        avx._mm256_cvtps_epi32(avx._mm256_add_ps(value, corrections))
-    }
-
-    /// Of the pixels k and k + 4 in colour.
-    #[inline(always)]
-    fn both<const L: usize>(
-        &self,
-        simd: V3,
-        sums: __m256i,
-        corrections: &[[f32; L]],
-        k: usize,
-    ) -> __m256i {
-        let avx2 = simd.avx2;
-        let (k_32, both) = (k as i32, k + 4);
-        let lanes: __m256i = cast([[k_32; 4], [k_32 + 4; 4]]);
-        let light = avx2._mm256_permutevar8x32_ps(self.light, lanes);
-        let of = |k: usize| [0, 1, 2, 3].map(|c| corrections[k][c % L]);
-        let corrections: __m256 = cast([of(k), of(both)]);
-        self.of(simd, sums, light, corrections)
-    }
-}
-
-/// The pixels whose sums are those of k and k + 4 in the halves of the k-th vector, alpha last and full.
-#[inline(always)]
-fn lit_colours<const L: usize>(
-    simd: V3,
-    [a, b, c, d]: [__m256i; 4],
-    undone: &Undone,
-    corrections: &[[f32; L]],
-) -> __m256i {
-    let avx2 = simd.avx2;
-    let a = undone.both(simd, a, corrections, 0);
-    let b = undone.both(simd, b, corrections, 1);
-    let c = undone.both(simd, c, corrections, 2);
-    let d = undone.both(simd, d, corrections, 3);
-    let (ab, cd) = (avx2._mm256_packs_epi32(a, b), avx2._mm256_packs_epi32(c, d));
-    let all = avx2._mm256_packus_epi16(ab, cd);
-    let alpha = simd.avx._mm256_set1_epi32(0xff00_0000_u32.cast_signed());
-    avx2._mm256_or_si256(all, alpha)
-}
-
-/// The same of grey pixels.
-#[inline(always)]
-fn lit_greys<const L: usize>(
-    simd: V3,
-    sums: __m256i,
-    undone: &Undone,
-    corrections: &[[f32; L]],
-) -> __m256i {
-    let mut own = [0.0; EIGHT];
-    for (own, correction) in own.iter_mut().zip(corrections) {
-        *own = correction[0];
-    }
-    grey_pixels(simd, undone.of(simd, sums, undone.light, cast(own)))
 }
 
 /// What sums are as numbers.

@@ -127,12 +127,35 @@ pub struct Block<'a> {
     pub first: usize,
 }
 
-/// What becomes of a frame's values: `(value − bias) light + correction`.
-pub struct Finish<'a, const L: usize> {
+/// The most parts of a block: one for each corner of a cell.
+pub const PARTS: usize = 4;
+
+/// What a frame has in a block: `(value − bias) light`, with some weight.
+pub struct Part<'a> {
+    /// The frame's patch.
+    pub patch: Patch<'a>,
     /// What is taken away.
     pub bias: f32,
     /// What is multiplied by; None for 1.
     pub light: Option<Light>,
+    /// Weights at the corners of a cell between four nodes, bilinear in between: the upper two, then the lower two.
+    pub corners: [f32; 4],
+}
+
+/// Some rows and columns of a patch, the mean of parts with corrections added.
+pub struct LitBlock<'a, const L: usize> {
+    /// The parts, [`PARTS`] at the most, in the order of their frames; their kernels have equally many taps. One alone weighs 1 everywhere.
+    pub parts: &'a [Part<'a>],
+    /// The first row, of the patch.
+    pub row: usize,
+    /// The columns, of the patch.
+    pub columns: Range<usize>,
+    /// Column of the tile where the patch begins.
+    pub first: usize,
+    /// How far each of the tile's columns lies between the nodes, [`super::run::RUN`] of them.
+    pub across: &'a [f32],
+    /// How far each of the rows lies between the nodes.
+    pub down: &'a [f32],
     /// What is added, in all columns of each of the rows, [`super::run::RUN`] a row.
     pub corrections: &'a [[f32; L]],
 }
@@ -148,15 +171,23 @@ pub fn block<const C: usize>(block: &Block, pixels: &mut [&mut [u8]]) -> bool {
     false
 }
 
-/// The same with light undone and corrections added.
+/// Draws a block with light undone and corrections added. False without doing it where the processor lacks the vectors for it, or
+/// kernels have different taps.
 pub fn lit_block<const C: usize, const L: usize>(
-    block: &Block,
-    finish: &Finish<L>,
+    block: &LitBlock<L>,
     pixels: &mut [&mut [u8]],
 ) -> bool {
+    let Some((one, others)) = block.parts.split_first() else {
+        return false;
+    };
+    let taps = one.patch.kernel.taps();
+    let odd = |part: &Part| part.patch.kernel.taps() != taps;
+    if others.iter().any(odd) || others.len() >= PARTS {
+        return false;
+    }
     #[cfg(target_arch = "x86_64")]
-    return by_taps!(block.patch.kernel, |simd, TAPS| block::lit::<C, L, TAPS>(
-        simd, block, finish, pixels
+    return by_taps!(one.patch.kernel, |simd, TAPS| block::lit::<C, L, TAPS>(
+        simd, block, pixels
     ));
     #[cfg(not(target_arch = "x86_64"))]
     false
@@ -331,6 +362,14 @@ mod tests {
             kernel: &kernel,
             lines: &lines,
         };
+        let mut shifted = lines;
+        (shifted[0][0], shifted[0][4]) = (33.7, 28.9);
+        let other = Patch {
+            lines: &shifted,
+            ..patch
+        };
+        let across: Vec<f32> = (0..RUN).map(|k| (k % 8) as f32 / 8.0 + 0.01).collect();
+        let down: Vec<f32> = (0..8).map(|k| k as f32 / 8.0 + 0.03).collect();
         let light = Light::through([[1.1, 1.0, 0.9], [1.3, 1.2, 1.1], [1.0, 0.7, 0.8]]);
         let bias = 3.25;
         let corrections: Vec<[f32; L]> = (0..RUN * 8)
@@ -358,14 +397,32 @@ mod tests {
             }
             let mut lit = vec![vec![7; RUN * step]; 8];
             let mut rows: Vec<&mut [u8]> = lit.iter_mut().map(|row| &mut row[..]).collect();
-            let finish = Finish {
+            let part = |patch, corners| Part {
+                patch,
                 bias,
                 light: Some(light),
+                corners,
+            };
+            let parts = [
+                part(patch, [1.0, 0.0, 0.0, 1.0]),
+                part(other, [0.0, 1.0, 1.0, 0.0]),
+            ];
+            let lit_of = |parts| LitBlock::<L> {
+                parts,
+                row,
+                columns: columns.clone(),
+                first: tile_first,
+                across: &across,
+                down: &down,
                 corrections: &corrections,
             };
-            assert!(lit_block::<C, L>(&block_of, &finish, &mut rows));
+            assert!(lit_block::<C, L>(&lit_of(&parts[..1]), &mut rows));
+            let mut mixed = vec![vec![7; RUN * step]; 8];
+            let mut rows: Vec<&mut [u8]> = mixed.iter_mut().map(|row| &mut row[..]).collect();
+            assert!(lit_block::<C, L>(&lit_of(&parts), &mut rows));
             for n in 0..8 {
                 let slow = slow_sums::<C>(&patch, row + n);
+                let slow_other = slow_sums::<C>(&other, row + n);
                 let mut bytes = vec![0; PATCH * step];
                 pixels::<C>(&kernel, &slow, &mut bytes);
                 let mut expected = vec![7; RUN * step];
@@ -389,8 +446,18 @@ mod tests {
                             * scale(kernel.taps());
                         assert_eq!(values[k][channel], value, "{interpolation:?} {stretch}");
                         let x = k as f32 * SCALE - 1.0;
-                        let even = (value - bias) * ((c * x + b) * x + a);
-                        let even = even + corrections[n * RUN + tile_first + k][channel];
+                        let undone = |value: f32| (value - bias) * ((c * x + b) * x + a);
+                        let more = corrections[n * RUN + tile_first + k][channel];
+                        let even = undone(value) + more;
+                        // Crosswise: the second is half of all in the middle, nothing at two corners.
+                        let (s, t) = (across[tile_first + k], down[n]);
+                        let w = [(1.0 - s) * (1.0 - t) + s * t, s * (1.0 - t) + (1.0 - s) * t];
+                        let second = (slow_other[k][channel] + missing(kernel.taps())) as f32
+                            * scale(kernel.taps());
+                        let both = w[0] * undone(value) + w[1] * undone(second);
+                        let both = both * (1.0 / (w[0] + w[1])) + more;
+                        let there = &mixed[n][(tile_first + k) * step..][..step];
+                        assert_eq!(there[channel], u8::nearest(both));
                         let there = &lit[n][(tile_first + k) * step..][..step];
                         assert_eq!(there[channel], u8::nearest(even));
                         assert_eq!(there[C], 255);
