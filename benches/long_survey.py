@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """A panorama of 200 m at 400 px/m: how fast it is drawn, and in how much memory.
 
-    python3 benches/long_survey.py [FOLDER] [options of stitch]
+    python3 benches/long_survey.py [--tiff] [FOLDER] [options of stitch]
 
-Makes a survey of 2,000 grey JPEG frames of 1920 x 1080 px (36 simulated ones, again and again, on the plan's poses; the
+Makes a survey of 2,000 grey JPEG frames (with --tiff uncompressed TIFF frames, of which decoding is next to nothing) of 1920 x 1080 px (36 simulated ones, again and again, on the plan's poses; the
 camera shows the wall at 400 px/m), unless FOLDER has it already, and stitches it with `--compression jpeg`. Prints Mpx of
 panorama per second by the clock, processor time, and the most memory resident. Needs pillow (PyPI), a Rust toolchain
 and Linux.
@@ -28,7 +28,7 @@ def run(*arguments):
                           check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
-def survey(folder):
+def survey(folder, suffix):
     """Simulates the different frames and links to them."""
     few = folder / "few"
     fov_deg = 2 * math.degrees(math.atan(0.5 * SIZE[1] / (PX_PER_METRE * RADIUS_M)))
@@ -36,11 +36,11 @@ def survey(folder):
         "--rotation-sigma-deg", 0, "--translation-sigma-m", "0,0,0", "--out", few)
     frames = sorted((few / "frames").iterdir())
     for k, frame in enumerate(frames):
-        frames[k] = frame.with_suffix(".jpg")
+        frames[k] = frame.with_suffix(suffix)
         Image.open(frame).convert("L").save(frames[k], quality=90)
     (folder / "frames").mkdir()
     for k in range(FRAMES):
-        os.link(frames[k % len(frames)], folder / "frames" / f"{k:06}.jpg")
+        os.link(frames[k % len(frames)], folder / "frames" / f"{k:06}{suffix}")
     (folder / "camera.json").write_bytes((few / "camera.json").read_bytes())
     with open(folder / "plan.tum", "w") as poses:
         for k in range(FRAMES):
@@ -52,22 +52,26 @@ radius_m = {RADIUS_M}
 [camera]
 file = "camera.json"
 [frames]
-images = "frames/*.jpg"
+images = "frames/*{suffix}"
 [poses]
 initial = "plan.tum"
 """)
 
 
 def main():
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "long-survey")
+    options = sys.argv[1:]
+    suffix = ".jpg"
+    if options[:1] == ["--tiff"]:
+        suffix, options = ".tif", options[1:]
+    folder = Path(options[0] if options else "long-survey" + suffix[1:])
     subprocess.run(["cargo", "build", "--quiet", "--release"], check=True, cwd=Path(__file__).parent.parent)
     if not (folder / "survey.toml").exists():
         folder.mkdir(parents=True, exist_ok=True)
-        survey(folder)
+        survey(folder, suffix)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     since = time.perf_counter()
     report = json.loads(run("stitch", folder, "--poses", "initial", "--px-per-metre", PX_PER_METRE, "--compression",
-                            "jpeg", "--out", folder / "panorama.tif", "--json", *sys.argv[2:]))
+                            "jpeg", "--out", folder / "panorama.tif", "--json", *options[1:]))
     elapsed = time.perf_counter() - since
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     pixels = report["width"] * report["height"]

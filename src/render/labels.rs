@@ -4,8 +4,8 @@
 //!
 //! `E = Σ_p D_p(l_p) + Σ_{p,q neighbours} V_pq(l_p, l_q)`
 //!
-//! is small. D prefers frames that show the wall squarely and as finely as the canvas does (finer is of no use), near their middles, and
-//! that show what the others show, too; V is zero between nodes of the same frame, else a seam's length and what the two frames differ by on both sides of it.
+//! is small. D prefers frames that show the wall finely and squarely, away from their edges, and that show what the others
+//! show, too; V is zero between nodes of the same frame, else a seam's length and what the two frames differ by on both sides of it.
 //!
 //! Rows and columns of nodes are solved one at a time with their neighbours held, by dynamic programming (Viterbi). A
 //! row is cut open at θ = 0, where its ends are held to what they were. Every other row at once, which does not depend on the
@@ -30,8 +30,6 @@ const CHOICES: usize = 3;
 const SIGMA: f32 = 2.0;
 /// Cost of half the resolution.
 const RESOLUTION: f32 = 2.0;
-/// Cost at a frame's border over its middle, where lenses are sharpest and the wall is looked at most squarely: what decides among equals.
-const OFF_CENTRE: f32 = 0.5;
 /// Cost at a frame's very edge, ...
 const EDGE: f32 = 2.0;
 /// ... which begins at this share of half its width or height from it.
@@ -78,8 +76,6 @@ struct Eyes<'a> {
     thumbnails: &'a Thumbnails,
     exposure: &'a Exposure,
     placements: &'a [Placement],
-    /// Fineness of the canvas, in units of [`Sight::fineness`].
-    finest: f64,
 }
 
 /// The frame of each node of `grid`, row-major; [`NO_FRAME`] where no thumbnail shows the wall.
@@ -88,17 +84,14 @@ pub fn best(
     thumbnails: &Thumbnails,
     exposure: &Exposure,
     placements: &[Placement],
-    canvas: &Canvas,
     grid: &Canvas,
 ) -> Vec<u32> {
     let columns = grid.columns as usize;
-    let focal = thumbnails.camera().fx * f64::from(thumbnails.scale());
     let eyes = Eyes {
         surface,
         thumbnails,
         exposure,
         placements,
-        finest: canvas.px_per_metre / focal,
     };
     let mut labels: Vec<u32> = Vec::with_capacity(grid.pixels());
     // Band by band, each held to the one before.
@@ -171,7 +164,6 @@ fn choices(eyes: &Eyes, grid: &Canvas, tile: &Tile) -> Vec<Choices> {
             found.clear();
             found.extend(seen(node).map(|(frame, sight)| {
                 let mut cost = RESOLUTION * (finest / sight.fineness).log2();
-                cost += OFF_CENTRE * (1.0 - sight.inset);
                 cost += EDGE * (1.0 - sight.inset / EDGE_SHARE).max(0.0);
                 let off = ((sight.grey - usual).abs() - least) / SIGMA - 2.0;
                 cost += (OUTLIER * off.max(0.0)).min(MOST_OUTLYING);
@@ -210,8 +202,7 @@ fn surroundings(values: &[f32], columns: usize, node: usize) -> f32 {
 /// What a frame shows of a node.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sight {
-    /// Pixels per length of wall along the direction in which they are fewest, in units of the focal length, at most the canvas'; 0: does
-    /// not show it.
+    /// Pixels per length of wall along the direction in which they are fewest, in units of the focal length; 0: does not show it.
     fineness: f32,
     /// Distance from the nearest edge, of half the width or height.
     inset: f32,
@@ -257,7 +248,6 @@ impl Eyes<'_> {
                 let ray = wall.x_w - pose.t_wc;
                 let normal = wall.e_s.cross(&wall.e_h);
                 let fineness = ray.dot(&normal).abs() / (ray.dot(&forwards) * ray.norm());
-                let fineness = fineness.min(self.finest);
                 let inset = |at: f32, last: u32| {
                     let last = (last - 1) as f32;
                     at.min(last - at) * 2.0 / last

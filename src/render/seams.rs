@@ -103,7 +103,7 @@ impl Seams {
         blend: Option<f32>,
     ) -> Self {
         let grid = grid(canvas);
-        let labels = labels::best(surface, thumbnails, exposure, placements, canvas, &grid);
+        let labels = labels::best(surface, thumbnails, exposure, placements, &grid);
         let channels = thumbnails.channels();
         let corrections = match blend {
             Some(white) => levelling::corrections(
