@@ -78,15 +78,15 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
             for row in strip {
                 let corrections = corrections.next().unwrap_or(&[[0.0; L]; RUN]);
                 for open in drawn.open(self.across.len()) {
-                    let pixels = &mut pixels[row][open.start * (C + 1)..open.end * (C + 1)];
                     self.seams
                         .shares(&self.across, open.clone(), &self.between(row), shares);
-                    match T::bytes(&mut [&mut *pixels]) {
+                    match T::bytes(&mut pixels[row..row + 1]) {
                         Some([pixels]) if self.copies => {
                             self.copy(row, open.clone(), shares, run, sums, pixels);
                         }
                         _ => {
                             self.mix(row, open.clone(), shares, run, sums);
+                            let pixels = &mut pixels[row][open.start * (C + 1)..open.end * (C + 1)];
                             sums.put::<T, C, L>(open.clone(), corrections, pixels);
                         }
                     }
@@ -153,6 +153,7 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
                     true => {
                         let view = self.view(cell[0].frame);
                         view.is_some_and(|view| {
+                            let pixels = &mut pixels[strip.clone()];
                             view.block::<C>(strip.clone(), piece.clone(), pixels)
                         })
                     }
@@ -239,7 +240,7 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         }
     }
 
-    /// The same where every pixel is one frame's as it is.
+    /// The same where every pixel is one frame's as it is; `pixels`: of all the row.
     fn copy(
         &self,
         row: usize,
@@ -249,29 +250,33 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         sums: &mut Row,
         pixels: &mut [u8],
     ) {
-        let sources = &mut sums.sources_mut()[columns.clone()];
+        let sources = sums.sources_mut();
         let (place, step) = ((row, self.across.len()), C + 1);
-        pixels.fill(0);
-        sources.fill(NO_FRAME);
+        pixels[columns.start * step..columns.end * step].fill(0);
+        sources[columns.clone()].fill(NO_FRAME);
         for (share, _) in shares.iter() {
             let Some(view) = self.view(share.frame) else {
                 continue;
             };
-            let (from, to) = (share.from - columns.start, share.to - columns.start);
-            let own = &mut pixels[from * step..to * step];
-            view.copy::<C>(run, self.points, place, share.from..share.to, own);
-            let seen = &run.seen()[share.from..share.to];
-            for (source, _) in sources[from..to]
-                .iter_mut()
-                .zip(seen)
-                .filter(|(_, seen)| **seen)
-            {
-                *source = share.frame as u32;
+            for piece in pieces(share.from..share.to) {
+                let sources = &mut sources[piece.clone()];
+                if view.block::<C>(row..row + 1, piece.clone(), &mut [&mut *pixels]) {
+                    sources.fill(share.frame as u32);
+                    continue;
+                }
+                let own = &mut pixels[piece.start * step..piece.end * step];
+                view.copy::<C>(run, self.points, place, piece.clone(), own);
+                let seen = sources.iter_mut().zip(&run.seen()[piece]);
+                for (source, _) in seen.filter(|(_, seen)| **seen) {
+                    *source = share.frame as u32;
+                }
             }
         }
+        let sources = &mut sources[columns.clone()];
         if !sources.contains(&NO_FRAME) {
             return;
         }
+        let pixels = &mut pixels[columns.start * step..columns.end * step];
         let mut other = [0; 4 * RUN];
         for view in self.views {
             let own = &mut other[..columns.len() * step];

@@ -249,7 +249,7 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Draws some rows and columns of a tile, all in one patch, into the tile's rows of pixels: the bytes of [`View::copy`]. False without
+    /// Draws some rows and columns of a tile, all in one patch, into these rows' pixels: the bytes of [`View::copy`]. False without
     /// doing it where they do not lie inside an 8-bit frame, or the processor lacks the vectors for it.
     pub fn block<const C: usize>(
         &self,
@@ -267,7 +267,7 @@ impl<'a> View<'a> {
             columns: columns.start - first..columns.end - first,
             first,
         };
-        integer::block::<C>(&block, &mut pixels[rows])
+        integer::block::<C>(&block, pixels)
     }
 
     /// What the frame has in some rows and columns of a tile, all in one patch, if they lie inside an 8-bit frame.

@@ -15,7 +15,7 @@ use pulp::x86::V3;
 use std::arch::x86_64::{__m128i, __m256, __m256i};
 use std::ops::Range;
 
-/// See [`super::block`].
+/// See [`fn@super::block`].
 #[inline(always)]
 pub fn plain<const C: usize, const TAPS: usize>(simd: V3, block: &Block, pixels: &mut [&mut [u8]]) {
     let patch = &block.patch;
