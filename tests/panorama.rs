@@ -4,7 +4,7 @@ mod support;
 
 use image::{DynamicImage, GenericImageView};
 use std::path::{Path, PathBuf};
-use support::{fail, first_frames, succeed, text};
+use support::{blender_survey, fail, first_frames, succeed, text};
 
 /// Resolution of the small panoramas here, pixels per metre.
 const PX_PER_METRE: &str = "30";
@@ -293,6 +293,28 @@ fn light_and_exposure_are_undone() {
         let psnr_db = 10.0 * (255.0 * 255.0 * pairs().count() as f64 / squares).log10();
         assert!(psnr_db > 34.0, "{wall}: {psnr_db} dB");
     }
+}
+
+/// Over more than one band, with tiles that no frame meets: who draws maps keeps account of frames, who does not must leave the same
+/// holes.
+#[test]
+fn the_panorama_is_the_same_with_maps_and_without() {
+    let dir = tempfile::tempdir().unwrap();
+    let pictures = [true, false].map(|with_maps| {
+        let out = dir.path().join(format!("{with_maps}.png"));
+        let maps = dir.path().join("maps");
+        let survey = blender_survey();
+        let mut arguments = vec!["stitch", text(&survey), "--poses", "truth", "--quiet"];
+        arguments.extend(["--out", text(&out)]);
+        if with_maps {
+            arguments.extend(["--maps", text(&maps)]);
+        }
+        succeed(&arguments);
+        image::open(&out).unwrap().to_rgba8()
+    });
+    let holes = |picture: &image::RgbaImage| picture.pixels().filter(|p| p[3] == 0).count();
+    assert!(pictures[0].height() > 512 && holes(&pictures[0]) > 0);
+    assert!(pictures[0] == pictures[1]);
 }
 
 #[test]

@@ -125,8 +125,10 @@ impl Scene<'_> {
         });
         let views: Vec<View> = views.filter(View::shows).collect();
         if views.is_empty() {
-            for (pixels, sources) in pixels.into_iter().zip(sources) {
+            for pixels in pixels {
                 pixels.fill(T::default());
+            }
+            for sources in sources {
                 sources.fill(NO_FRAME);
             }
             return;
