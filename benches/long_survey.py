@@ -3,8 +3,8 @@
 
     python3 benches/long_survey.py [--tiff] [FOLDER] [options of stitch]
 
-Makes a survey of 2,000 grey JPEG frames (with --tiff uncompressed TIFF frames, of which decoding is next to nothing) of 1920 x 1080 px (36 simulated ones, again and again, on the plan's poses; the
-camera shows the wall at 400 px/m), unless FOLDER has it already, and stitches it with `--compression jpeg`. Prints Mpx of
+Makes a survey of 2,000 grey JPEG frames of 1920 x 1080 px (with --tiff uncompressed TIFF frames, of which decoding is
+next to nothing; 36 simulated ones, again and again, on the plan's poses; the camera shows the wall at 400 px/m), unless FOLDER has it already, and stitches it with `--compression jpeg`. Prints Mpx of
 panorama per second by the clock, processor time, and the most memory resident. Needs pillow (PyPI), a Rust toolchain
 and Linux.
 """

@@ -1,9 +1,9 @@
 //! One frame at each place of a tile, and how one passes into the next.
 //!
-//! A tile is drawn in strips between two rows of the seams' nodes. What one frame shows alone there is drawn a block at a time, patch
-//! by patch of the frame's chart; where frames meet, at their edges and round holes, row by row.
+//! A tile is drawn in strips between two rows of the seams' nodes. What lies inside all frames that share it is drawn a block at a time,
+//! patch by patch of the frames' charts; at the frames' borders and round holes, row by row.
 
-use super::chart::PATCH;
+use super::chart::{PATCH, of_patch};
 use super::draw::NO_FRAME;
 use super::integer::{self, LitBlock, PARTS, Part};
 use super::row::Row;
@@ -198,11 +198,11 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         if weights != [1.0; 4] {
             return false;
         }
-        let first = columns.start - columns.start % PATCH;
+        let (first, columns) = of_patch(columns);
         let block = LitBlock {
             parts: &parts,
             row: strip.start % PATCH,
-            columns: columns.start - first..columns.end - first,
+            columns,
             first,
             across: self.across.between(),
             down,

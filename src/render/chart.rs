@@ -85,6 +85,12 @@ enum Patch {
     Rough,
 }
 
+/// Where the patch of some rows or columns of a tile, all in one patch, begins, and which of its own they are.
+pub fn of_patch(all: &Range<usize>) -> (usize, Range<usize>) {
+    let first = all.start - all.start % PATCH;
+    (first, all.start - first..all.end - first)
+}
+
 /// Where the pixels of a tile appear in a frame.
 #[derive(Debug)]
 pub struct Chart {

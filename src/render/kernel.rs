@@ -130,7 +130,13 @@ impl Kernel {
 
     /// Pixels among them before the point's own.
     pub fn before(&self) -> usize {
-        (self.taps - 1) / 2
+        Self::before_of(self.taps)
+    }
+
+    /// The same of any kernel with so many taps.
+    #[inline(always)]
+    pub const fn before_of(taps: usize) -> usize {
+        (taps - 1) / 2
     }
 
     /// What is added to a coordinate before it is cut to its own pixel: ½ for the nearest one, else 0.
@@ -152,7 +158,13 @@ impl Kernel {
 
     /// The phases that a pixel is divided into for whole-numbered weights: 128 for two taps, which need no table.
     pub fn integer_phases(&self) -> f32 {
-        match self.taps {
+        Self::integer_phases_of(self.taps)
+    }
+
+    /// The same of any kernel with so many taps.
+    #[inline(always)]
+    pub const fn integer_phases_of(taps: usize) -> f32 {
+        match taps {
             2 => 128.0,
             _ => Self::PHASES,
         }

@@ -166,7 +166,7 @@ impl Run {
         }
     }
 
-    /// Looks up the values in some columns of a row of the patch that begins with column `first`, all of it inside the picture. False without doing it
+    /// Looks up the values in some columns (`own`) of a row of the patch that begins with the tile's column `first`, all of them inside the picture. False without doing it
     /// where the processor lacks the vectors for it.
     pub fn sample_row(
         &mut self,
@@ -174,16 +174,15 @@ impl Run {
         patch: &Patch,
         row: usize,
         first: usize,
-        columns: Range<usize>,
+        own: Range<usize>,
     ) -> bool {
-        let own = columns.start - first..columns.end - first;
         let values = &mut self.values[first..first + PATCH];
         let done = match picture.format().channels {
-            1 => integer::values::<1>(patch, row, own, values),
-            _ => integer::values::<3>(patch, row, own, values),
+            1 => integer::values::<1>(patch, row, own.clone(), values),
+            _ => integer::values::<3>(patch, row, own.clone(), values),
         };
         if done {
-            self.seen[columns].fill(true);
+            self.seen[first..][own].fill(true);
         }
         done
     }

@@ -1,6 +1,6 @@
 //! A frame as a tile of the canvas looks at it.
 
-use super::chart::{Chart, Lattice, PATCH, Projected};
+use super::chart::{Chart, Lattice, PATCH, Projected, of_patch};
 use super::exposure::Response;
 use super::integer::{self, Block, Part, Patch, Source};
 use super::kernel::{Interpolation, Kernel};
@@ -189,8 +189,8 @@ impl<'a> View<'a> {
         let Some((at, patch)) = self.patch(&(row..row + 1), &columns) else {
             return false;
         };
-        let (row, first) = (row % PATCH, columns.start - columns.start % PATCH);
-        let done = run.sample_row(self.picture, &patch, row, first, columns.clone());
+        let (row, (first, own)) = (row % PATCH, of_patch(&columns));
+        let done = run.sample_row(self.picture, &patch, row, first, own);
         if done && let Some(light) = &self.patches[at].light {
             self.response.undo_by(light, row, run, first, columns);
         }
@@ -212,9 +212,9 @@ impl<'a> View<'a> {
         let row = place.0;
         match &self.patches[self.chart.patch(row, columns.start)].light {
             Some(light) => {
-                let first = columns.start - columns.start % PATCH;
-                let row = row % PATCH;
-                self.response.undo_by(light, row, run, first, columns);
+                let (first, _) = of_patch(&columns);
+                self.response
+                    .undo_by(light, row % PATCH, run, first, columns);
             }
             None => self.response.undo(run, columns),
         }
@@ -260,11 +260,11 @@ impl<'a> View<'a> {
         let Some((_, patch)) = self.patch(&rows, &columns) else {
             return false;
         };
-        let first = columns.start - columns.start % PATCH;
+        let (first, columns) = of_patch(&columns);
         let block = Block {
             patch,
             row: rows.start % PATCH,
-            columns: columns.start - first..columns.end - first,
+            columns,
             first,
         };
         integer::block::<C>(&block, pixels)
@@ -300,11 +300,8 @@ impl<'a> View<'a> {
         };
         let lines = self.chart.lines(at)?;
         if !inside {
-            let own = |all: &Range<usize>| {
-                let first = all.start - all.start % PATCH;
-                all.start - first..all.end - first
-            };
-            let range = Chart::range(lines, own(rows), integer::reach(&own(columns)));
+            let ((_, rows), (_, columns)) = (of_patch(rows), of_patch(columns));
+            let range = Chart::range(lines, rows, integer::reach(&columns));
             if !lies(range, *within) {
                 return None;
             }

@@ -94,15 +94,6 @@ pub fn taps<const TAPS: usize>(kernel: &Kernel) -> usize {
     }
 }
 
-/// [`Kernel::integer_phases`] of a kernel with so many taps.
-#[inline(always)]
-pub fn phases<const TAPS: usize>() -> f32 {
-    match TAPS {
-        2 => 128.0,
-        _ => Kernel::PHASES,
-    }
-}
-
 /// The weights along u and v of pixel `k`.
 #[inline(always)]
 fn weights<const TAPS: usize>(
@@ -127,10 +118,7 @@ fn one_grey<const TAPS: usize>(
 ) -> __m128i {
     let weights = weights::<TAPS>(kernel, phases, k);
     let at = first[k] as usize;
-    match taps::<TAPS>(kernel) {
-        8 => wide_grey(simd, source, weights, at, 1),
-        taps => wide_grey(simd, source, weights, at, taps.div_ceil(8)),
-    }
+    wide_grey(simd, source, weights, at, taps::<TAPS>(kernel).div_ceil(8))
 }
 
 /// The sums of eight pixels in colour: of the k-th and the k + 4th in the halves of the k-th vector.
@@ -180,10 +168,7 @@ fn one_colour<const TAPS: usize>(
 ) -> __m128i {
     let weights = weights::<TAPS>(kernel, phases, k);
     let at = first[k] as usize;
-    match taps::<TAPS>(kernel) {
-        4 => colour(simd, source, weights, at, 1),
-        taps => colour(simd, source, weights, at, taps / 4),
-    }
+    colour(simd, source, weights, at, taps::<TAPS>(kernel) / 4)
 }
 
 /// Sums with `more` and without their last `bits`, as bytes: the lower halves of all vectors first.
@@ -195,6 +180,13 @@ pub fn packed(simd: V3, [a, b, c, d]: [__m256i; 4], more: __m256i, bits: u32) ->
     let b = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(b, more), count);
     let c = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(c, more), count);
     let d = avx2._mm256_sra_epi32(avx2._mm256_add_epi32(d, more), count);
+    bytes(simd, [a, b, c, d])
+}
+
+/// Whole numbers as bytes, those beyond the scale its ends: the lower halves of all vectors first.
+#[inline(always)]
+pub fn bytes(simd: V3, [a, b, c, d]: [__m256i; 4]) -> __m256i {
+    let avx2 = simd.avx2;
     let (ab, cd) = (avx2._mm256_packs_epi32(a, b), avx2._mm256_packs_epi32(c, d));
     avx2._mm256_packus_epi16(ab, cd)
 }
@@ -262,9 +254,9 @@ fn two_rows(source: Source<'_>) -> [&[u8]; 2] {
     [&source.samples[..count], &lower[..count]]
 }
 
-/// Sixteen bytes from `a` on in the lower half, from `b` on in the upper one.
+/// Sixteen bytes of a row from `a` on in the lower half, from `b` on in the upper one.
 #[inline(always)]
-fn sixteen_of_both(simd: V3, row: &[u8], a: u32, b: u32) -> __m256i {
+fn two_sixteens(simd: V3, row: &[u8], a: u32, b: u32) -> __m256i {
     let (a, b): ([u8; 16], [u8; 16]) = (read(row, a as usize), read(row, b as usize));
     simd.avx._mm256_set_m128i(cast(b), cast(a))
 }
@@ -283,8 +275,8 @@ fn two_colours(
     lower: __m256i,
 ) -> __m256i {
     let avx2 = simd.avx2;
-    let above = sixteen_of_both(simd, upper_row, a, b);
-    let below = sixteen_of_both(simd, lower_row, a, b);
+    let above = two_sixteens(simd, upper_row, a, b);
+    let below = two_sixteens(simd, lower_row, a, b);
     let above = avx2._mm256_shuffle_epi8(above, cast([SIDE_BY_SIDE; 2]));
     let below = avx2._mm256_shuffle_epi8(below, cast([SIDE_BY_SIDE; 2]));
     avx2._mm256_add_epi32(

@@ -7,7 +7,9 @@ use super::super::light::Light;
 use super::super::run::RUN;
 use super::avx2;
 use super::avx2::Eight;
-use super::{Block, EIGHT, LitBlock, PARTS, Part, Patch, bits, missing, reach, rounding, scale};
+use super::{
+    Block, EIGHT, Kernel, LitBlock, PARTS, Part, Patch, bits, missing, reach, rounding, scale,
+};
 use crate::vectors;
 use arrayvec::ArrayVec;
 use pulp::bytemuck::cast;
@@ -135,16 +137,15 @@ impl<const C: usize> Mix<C> {
     /// Means with corrections added, as pixels, alpha last and full.
     #[inline(always)]
     fn colours<const L: usize>(&self, simd: V3, corrections: &[[f32; L]]) -> __m256i {
-        let (avx, avx2) = (simd.avx, simd.avx2);
+        let avx = simd.avx;
         let inverse = avx._mm256_div_ps(avx._mm256_set1_ps(1.0), self.weights);
         let a = colour_mean(simd, self.sums[0], inverse, corrections, 0);
         let b = colour_mean(simd, self.sums[1], inverse, corrections, 1);
         let c = colour_mean(simd, self.sums[2], inverse, corrections, 2);
         let d = colour_mean(simd, self.sums[3], inverse, corrections, 3);
-        let (ab, cd) = (avx2._mm256_packs_epi32(a, b), avx2._mm256_packs_epi32(c, d));
-        let all = avx2._mm256_packus_epi16(ab, cd);
+        let all = avx2::bytes(simd, [a, b, c, d]);
         let alpha = avx._mm256_set1_epi32(0xff00_0000_u32.cast_signed());
-        avx2._mm256_or_si256(all, alpha)
+        simd.avx2._mm256_or_si256(all, alpha)
     }
 
     /// The same in grey.
@@ -342,10 +343,10 @@ fn places<const C: usize, const TAPS: usize>(
     let Patch { source, kernel, .. } = patch;
     let (avx, avx2) = (simd.avx, simd.avx2);
     let taps = avx2::taps::<TAPS>(kernel);
-    let phases = avx2::phases::<TAPS>();
+    let phases = Kernel::integer_phases_of(taps);
     let (left, s) = whole(simd, polynomial(simd, x, &line[..4]), phases);
     let (top, t) = whole(simd, polynomial(simd, x, &line[4..]), phases);
-    let before = avx._mm256_set1_epi32((taps as i32 - 1) / 2);
+    let before = avx._mm256_set1_epi32(Kernel::before_of(taps) as i32);
     let left = avx2._mm256_sub_epi32(left, before);
     let top = avx2._mm256_sub_epi32(top, before);
     let row = avx2._mm256_mullo_epi32(top, avx._mm256_set1_epi32(source.stride as i32));
