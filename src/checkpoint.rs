@@ -40,7 +40,7 @@ use crate::provenance::Input;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, BufWriter, ErrorKind, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -50,6 +50,8 @@ const ORIGIN: &str = "origin";
 const STATE: &str = "state";
 /// Name of the file that the run holds locked.
 const LOCK: &str = "lock";
+/// Bytes that are hashed at once.
+const HASHED: usize = 1 << 17;
 /// Time between two states, at the least ...
 const INTERVAL: Duration = Duration::from_millis(250);
 /// ... and in multiples of the time that keeping the last one took.
@@ -269,12 +271,15 @@ impl Checkpoint {
 
     fn write<S: Serialize>(&self, file: &str, state: &S) -> Result<(), WriteError> {
         atomic::write(&self.folder.join(file), |writer| {
-            let mut hashing = Hashing {
+            let hashing = Hashing {
                 writer,
                 hasher: blake3::Hasher::new(),
             };
+            // A number at a time is a slow way to hash.
+            let mut hashing = BufWriter::with_capacity(HASHED, hashing);
             ciborium::into_writer(state, &mut hashing).map_err(io::Error::other)?;
-            let Hashing { writer, hasher } = hashing;
+            let Hashing { writer, hasher } =
+                hashing.into_inner().map_err(IntoInnerError::into_error)?;
             writer.write_all(hasher.finalize().as_bytes())
         })
     }

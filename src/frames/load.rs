@@ -1,7 +1,10 @@
 //! Finding and decoding frames.
 
 use super::Video;
-use image::{ColorType, DynamicImage, ImageDecoder, ImageError, ImageReader, ImageResult};
+use image::{
+    ColorType, DynamicImage, GrayImage, ImageDecoder, ImageError, ImageReader, ImageResult,
+    RgbImage,
+};
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::{BufRead, Cursor, Read, Seek};
@@ -213,11 +216,43 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
     if bytes.as_ref().starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(bytes.as_ref()) {
         return Err(fail("the JPEG file is truncated".to_owned()));
     }
+    if let Some(picture) = plain_tiff(bytes.as_ref(), width, height) {
+        return Ok(picture);
+    }
     let decoder =
         decoder(ImageReader::new(Cursor::new(bytes))).map_err(|error| fail(error.to_string()))?;
     // Before there is room made for as many pixels as a header may claim.
     check(decoder.dimensions())?;
     DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))
+}
+
+/// A TIFF file of this size in grey or colour of 8 bits; None if it is anything else, or damaged. The general decoder makes two pictures of
+/// it on the way: slow, where there is nothing to decode.
+fn plain_tiff(bytes: &[u8], width: u32, height: u32) -> Option<DynamicImage> {
+    let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).ok()?;
+    if decoder.dimensions().ok()? != (width, height) {
+        return None;
+    }
+    let (colour, layout) = (
+        decoder.colortype().ok()?,
+        decoder.image_buffer_layout().ok()?,
+    );
+    let channels = match colour {
+        tiff::ColorType::Gray(8) => 1,
+        tiff::ColorType::RGB(8) => 3,
+        _ => return None,
+    };
+    let size = width as usize * height as usize * channels;
+    let unsigned = layout.sample_format == tiff::tags::SampleFormat::Uint;
+    if !unsigned || layout.planes != 1 || layout.complete_len != size {
+        return None;
+    }
+    let mut samples = vec![0; size];
+    decoder.read_image_bytes(&mut samples).ok()?;
+    match channels {
+        1 => GrayImage::from_raw(width, height, samples).map(Into::into),
+        _ => RgbImage::from_raw(width, height, samples).map(Into::into),
+    }
 }
 
 /// What is in a file. Its memory serves for the thread's next file: memory that the system clears anew for each costs as much as reading.

@@ -1,6 +1,6 @@
 //! Tiles without loss: a predictor, then deflate.
 
-use super::reduce::Sample;
+use super::reduce::{Sample, is_full};
 use super::{EDGE, RasterSpec, SampleType};
 
 /// Effort of [`miniz_oxide`], of 10.
@@ -43,14 +43,20 @@ pub(super) fn deflate_mask(spec: &RasterSpec, pixels: &[u8]) -> Vec<u8> {
 
 /// The bits of [`deflate_mask`] for pixels of `N` samples.
 fn mask<const N: usize>(pixels: &[u8]) -> Vec<u8> {
-    let eights = pixels.chunks_exact(8 * N);
-    eights
-        .map(|eight| {
-            eight
-                .chunks_exact(N)
-                .fold(0, |bits, pixel| bits << 1 | u8::from(pixel[N - 1] > 0))
-        })
-        .collect()
+    let (pixels, _) = pixels.as_chunks::<N>();
+    let mut bits = Vec::with_capacity(pixels.len() / 8);
+    for row in pixels.chunks_exact(EDGE) {
+        // Most rows are.
+        if is_full(row) {
+            bits.resize(bits.len() + EDGE / 8, u8::MAX);
+            continue;
+        }
+        bits.extend(row.as_chunks::<8>().0.iter().map(|eight| {
+            let set = eight.iter().map(|pixel| u8::from(pixel[N - 1] > 0));
+            set.fold(0, |bits, set| bits << 1 | set)
+        }));
+    }
+    bits
 }
 
 fn u8_difference(sample: u8, before: u8) -> [u8; 1] {

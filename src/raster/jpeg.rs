@@ -1,7 +1,8 @@
 //! Tiles with loss.
 
 use super::{EDGE, RasterError, RasterSpec, SampleType};
-use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
+use crate::vectors::wide;
+use jpeg_encoder::{ColorType, Encoder, EncodingError, ImageBuffer, JpegColorType, SamplingFactor};
 use std::io;
 
 /// Columns and rows of pixels that share their colour, but not their brightness.
@@ -34,23 +35,75 @@ pub(super) fn encode(
     quality: u8,
 ) -> io::Result<Vec<u8>> {
     let [width, height] = size;
-    let channels = usize::from(spec.channels);
     let bytes = spec.pixel_bytes();
-    let mut visible = vec![0; width * height * channels];
-    for (y, out) in visible.chunks_exact_mut(width * channels).enumerate() {
-        let row = &pixels[y.min(extent[1] - 1) * EDGE * bytes..][..extent[0] * bytes];
-        let (within, beyond) = out.split_at_mut(extent[0].min(width) * channels);
-        match (channels, spec.alpha) {
-            (_, false) => within.copy_from_slice(&row[..within.len()]),
-            (1, true) => channels_of::<2, 1>(row, within),
-            (_, true) => channels_of::<4, 3>(row, within),
-        }
-        let last = &row[row.len() - bytes..][..channels];
-        for pixel in beyond.chunks_exact_mut(channels) {
-            pixel.copy_from_slice(last);
-        }
+    let rows = Rows {
+        pixels,
+        bytes,
+        extent,
+        size,
+    };
+    if spec.channels == 1 {
+        return packed(width * height, quality, |encoder| {
+            encoder.encode_image(rows)
+        });
     }
-    compress(&visible, size, channels, quality)
+    let mut visible = Vec::with_capacity(3 * width * height);
+    for y in 0..height {
+        let pixels = rows.row(y).chunks_exact(bytes);
+        let last = pixels.clone().next_back();
+        let all = pixels.chain(std::iter::repeat_with(|| last).flatten());
+        visible.extend(all.take(width).flat_map(|pixel| &pixel[..3]));
+    }
+    compress(&visible, size, 3, quality)
+}
+
+/// What of a tile is drawn.
+struct Rows<'a> {
+    pixels: &'a [u8],
+    /// Of a pixel.
+    bytes: usize,
+    /// Columns and rows that are there.
+    extent: [usize; 2],
+    /// Columns and rows to be drawn.
+    size: [usize; 2],
+}
+
+impl Rows<'_> {
+    /// The pixels of a row that are there.
+    fn row(&self, y: usize) -> &[u8] {
+        let start = y.min(self.extent[1] - 1) * EDGE * self.bytes;
+        &self.pixels[start..][..self.extent[0].min(self.size[0]) * self.bytes]
+    }
+}
+
+/// As grey: the first byte of every pixel.
+impl ImageBuffer for Rows<'_> {
+    fn get_jpeg_color_type(&self) -> JpegColorType {
+        JpegColorType::Luma
+    }
+
+    fn width(&self) -> u16 {
+        self.size[0] as u16
+    }
+
+    fn height(&self) -> u16 {
+        self.size[1] as u16
+    }
+
+    fn fill_buffers(&self, y: u16, buffers: &mut [Vec<u8>; 4]) {
+        let row = self.row(usize::from(y));
+        let all = &mut buffers[0];
+        let end = all.len() + self.size[0];
+        match self.bytes {
+            1 => all.extend_from_slice(row),
+            _ => wide(
+                #[inline(always)]
+                || all.extend(row.as_chunks::<2>().0.iter().map(|pixel| pixel[0])),
+            ),
+        }
+        let last = all.last().copied().unwrap_or_default();
+        all.resize(end, last);
+    }
 }
 
 /// A picture of one channel or three, 8 bits, of at most 65535 columns and rows.
@@ -60,22 +113,24 @@ pub(crate) fn compress(
     channels: usize,
     quality: u8,
 ) -> io::Result<Vec<u8>> {
-    let mut stream = Vec::with_capacity(pixels.len() / 4);
-    let mut encoder = Encoder::new(&mut stream, quality);
-    encoder.set_sampling_factor(SamplingFactor::F_2_2);
     let colour = match channels {
         1 => ColorType::Luma,
         _ => ColorType::Rgb,
     };
-    encoder
-        .encode(pixels, width as u16, height as u16, colour)
-        .map_err(io::Error::other)?;
-    Ok(stream)
+    packed(pixels.len(), quality, |encoder| {
+        encoder.encode(pixels, width as u16, height as u16, colour)
+    })
 }
 
-/// The first `C` of the `B` samples of every pixel.
-fn channels_of<const B: usize, const C: usize>(row: &[u8], out: &mut [u8]) {
-    for (pixel, out) in row.chunks_exact(B).zip(out.chunks_exact_mut(C)) {
-        out.copy_from_slice(&pixel[..C]);
-    }
+/// What an encoder makes of `bytes` bytes.
+fn packed(
+    bytes: usize,
+    quality: u8,
+    encode: impl FnOnce(Encoder<&mut Vec<u8>>) -> Result<(), EncodingError>,
+) -> io::Result<Vec<u8>> {
+    let mut stream = Vec::with_capacity(bytes / 4);
+    let mut encoder = Encoder::new(&mut stream, quality);
+    encoder.set_sampling_factor(SamplingFactor::F_2_2);
+    encode(encoder).map_err(io::Error::other)?;
+    Ok(stream)
 }

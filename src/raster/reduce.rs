@@ -1,6 +1,7 @@
 //! Overviews: 2 × 2 pixels become one.
 
 use super::{EDGE, RasterSpec, Reduce, SampleType};
+use crate::vectors::wide;
 
 /// Columns and rows of a reduced tile.
 pub(super) const HALF: usize = EDGE / 2;
@@ -134,6 +135,16 @@ fn of_pixel<S: Sample, const N: usize>(
         .enumerate()
     {
         let (upper, lower) = rows.split_at(EDGE * bytes);
+        let all = width == EDGE && 2 * y + 1 < height;
+        if all
+            && spec.alpha
+            && spec.reduce == Reduce::Mean
+            && S::BYTES == 1
+            && is_full::<N>(rows.as_chunks().0)
+        {
+            means::<N>(upper, lower, out);
+            continue;
+        }
         let pairs = upper
             .chunks_exact(2 * bytes)
             .zip(lower.chunks_exact(2 * bytes));
@@ -175,6 +186,39 @@ fn of_pixel<S: Sample, const N: usize>(
         }
     }
     reduced
+}
+
+/// Whether pixels of `N` bytes are all there, by their alpha.
+pub(super) fn is_full<const N: usize>(pixels: &[[u8; N]]) -> bool {
+    let mut least = u8::MAX;
+    wide(
+        #[inline(always)]
+        || {
+            for pixel in pixels {
+                least = least.min(pixel[N - 1]);
+            }
+        },
+    );
+    least > 0
+}
+
+/// Two rows of pixels of `N` bytes, all of them there, reduced.
+fn means<const N: usize>(upper: &[u8], lower: &[u8], out: &mut [u8]) {
+    let (upper, _) = upper.as_chunks::<N>().0.as_chunks::<2>();
+    let (lower, _) = lower.as_chunks::<N>().0.as_chunks::<2>();
+    let (out, _) = out.as_chunks_mut::<N>();
+    wide(
+        #[inline(always)]
+        || {
+            for (([a, b], [c, d]), out) in upper.iter().zip(lower).zip(out.iter_mut()) {
+                for k in 0..N - 1 {
+                    let sum = u16::from(a[k]) + u16::from(b[k]) + u16::from(c[k]) + u16::from(d[k]);
+                    out[k] = ((sum + 2) / 4) as u8;
+                }
+                out[N - 1] = u8::OPAQUE;
+            }
+        },
+    );
 }
 
 /// What the values that are `there` become; nothing if none is.

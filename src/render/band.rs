@@ -5,6 +5,7 @@ use super::plan::BAND_ROWS;
 use super::sample::{Sample, Samples};
 use super::super_resolve::Region;
 use super::{Canvas, PixelFormat, RenderError, Tile};
+use crate::vectors::wide;
 
 /// A stretch of the canvas, all around and some rows along.
 #[derive(Clone, Debug)]
@@ -138,10 +139,11 @@ impl Band {
 
     /// Whether each pixel is covered.
     pub fn covered(&self) -> Vec<bool> {
-        let step = self.format.channels + 1;
-        match &self.samples {
-            Samples::Eight(samples) => alpha(samples, step),
-            Samples::Sixteen(samples) => alpha(samples, step),
+        match (&self.samples, self.format.channels) {
+            (Samples::Eight(samples), 1) => alpha::<_, 2>(samples),
+            (Samples::Eight(samples), _) => alpha::<_, 4>(samples),
+            (Samples::Sixteen(samples), 1) => alpha::<_, 2>(samples),
+            (Samples::Sixteen(samples), _) => alpha::<_, 4>(samples),
         }
     }
 }
@@ -161,11 +163,16 @@ fn put<T: Sample>(pixel: &mut [T], channel: usize, grey: f32) {
     }
 }
 
-fn alpha<T: Sample>(samples: &[T], step: usize) -> Vec<bool> {
-    let pixels = samples.chunks_exact(step);
-    pixels
-        .map(|pixel| pixel[step - 1] != T::default())
-        .collect()
+/// Which pixels of `N` samples have an alpha.
+fn alpha<T: Sample, const N: usize>(samples: &[T]) -> Vec<bool> {
+    let pixels = samples.as_chunks::<N>().0;
+    wide(
+        #[inline(always)]
+        || {
+            let alpha = pixels.iter().map(|pixel| pixel[N - 1] != T::default());
+            alpha.collect()
+        },
+    )
 }
 
 /// Where a tile is drawn.

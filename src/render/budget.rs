@@ -82,6 +82,12 @@ impl Budget {
         let fixed = thumbnails + grid + band + output + decoding + readings;
         let needed = fixed + frames_least;
         memory::check(canvas, frames, needed, Some(limit))?;
+        // With the frames of one band none is decoded twice while bands are drawn; with more, some are not even once more than for
+        // their thumbnails.
+        let room = match frames.is_packed() {
+            true => limit - fixed,
+            false => frames_least,
+        };
         Ok(Self {
             thumbnails,
             grid,
@@ -91,7 +97,7 @@ impl Budget {
             decoding,
             readings,
             frames_least,
-            room: limit - fixed,
+            room,
         })
     }
 

@@ -28,10 +28,9 @@ use crate::vectors::wide;
 use faer::Side;
 use faer::prelude::Solve;
 use faer::sparse::{SparseColMat, Triplet};
-use nalgebra::{DMatrix, DVector, Vector2};
+use nalgebra::{DVector, Vector2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// Unknowns of a frame: α, β.
@@ -376,13 +375,17 @@ fn rows_of(point: &[Glimpse], size: (usize, usize), x: &DVector<f64>) -> Vec<Row
     rows
 }
 
+/// What two frames have in common in the normal equations.
+type Block = [[f64; OWN]; OWN];
+
 /// The normal equations, S eliminated.
 struct Normal {
-    /// Blocks of frames i ≤ j.
-    pairs: BTreeMap<(usize, usize), [[f64; OWN]; OWN]>,
-    /// Rows of frames, columns of the shading.
-    border: DMatrix<f64>,
-    corner: DMatrix<f64>,
+    /// Of each frame i, its blocks with frames j ≥ i, in their order.
+    pairs: Vec<Vec<(usize, Block)>>,
+    /// Of each unknown of a frame, what it has in common with the shading's.
+    border: Vec<[f64; SHADING_TERMS]>,
+    /// Of the shading's unknowns, the lower triangle.
+    corner: [[f64; SHADING_TERMS]; SHADING_TERMS],
     right: DVector<f64>,
     /// Sizes of the residuals.
     sizes: Vec<f64>,
@@ -391,9 +394,9 @@ struct Normal {
 impl Normal {
     fn new(frames: usize) -> Self {
         Self {
-            pairs: BTreeMap::new(),
-            border: DMatrix::zeros(OWN * frames, SHADING_TERMS),
-            corner: DMatrix::zeros(SHADING_TERMS, SHADING_TERMS),
+            pairs: vec![Vec::new(); frames],
+            border: vec![[0.0; SHADING_TERMS]; OWN * frames],
+            corner: [[0.0; SHADING_TERMS]; SHADING_TERMS],
             right: DVector::zeros(OWN * frames + SHADING_TERMS),
             sizes: Vec::new(),
         }
@@ -404,7 +407,7 @@ impl Normal {
     /// With `r_i` the rows, `y_i` the logarithms and w the weights: `N = Σ w r rᵀ − (Σ w r)(Σ w r)ᵀ/Σ w`, likewise the
     /// right side.
     fn add(&mut self, point: &[Row], x: &DVector<f64>, variance: f64) {
-        let shading = self.border.nrows();
+        let shading = self.border.len();
         let left: Vec<f64> = point
             .iter()
             .map(|row| {
@@ -439,21 +442,21 @@ impl Normal {
             let terms: [f64; SHADING_TERMS] = std::array::from_fn(|k| one.terms[k] - mean[k]);
             for (k, term) in terms.iter().enumerate() {
                 self.right[shading + k] += w * term * log;
-                for (l, other) in terms.iter().enumerate().take(k + 1) {
-                    self.corner[(k, l)] += w * term * other;
+                for (entry, other) in self.corner[k].iter_mut().zip(&terms[..=k]) {
+                    *entry += w * term * other;
                 }
             }
             for (r, value) in one.own.iter().enumerate() {
                 let row = OWN * one.frame + r;
                 self.right[row] += w * value * log;
-                for (k, term) in terms.iter().enumerate() {
-                    self.border[(row, k)] += w * value * term;
+                for (entry, term) in self.border[row].iter_mut().zip(&terms) {
+                    *entry += w * value * term;
                 }
             }
             for (b, (other, w_other)) in point.iter().zip(&weights).enumerate().skip(a) {
                 let share = if a == b { *w } else { 0.0 } - w * w_other / total;
                 // Frames come in their order.
-                let block = self.pairs.entry((one.frame, other.frame)).or_default();
+                let block = self.block(one.frame, other.frame);
                 for (r, row) in block.iter_mut().enumerate() {
                     for (c, entry) in row.iter_mut().enumerate() {
                         *entry += share * one.own[r] * other.own[c];
@@ -463,17 +466,34 @@ impl Normal {
         }
     }
 
+    /// The block of two frames, i ≤ j.
+    fn block(&mut self, i: usize, j: usize) -> &mut Block {
+        let others = &mut self.pairs[i];
+        let at = others.binary_search_by_key(&j, |(j, _)| *j);
+        let at = at.unwrap_or_else(|at| {
+            others.insert(at, (j, Block::default()));
+            at
+        });
+        &mut others[at].1
+    }
+
     fn merge(&mut self, other: Self) {
-        for (pair, block) in other.pairs {
-            let sum = self.pairs.entry(pair).or_default();
-            for (row, more) in sum.iter_mut().zip(block) {
-                for (entry, more) in row.iter_mut().zip(more) {
+        for (i, others) in other.pairs.into_iter().enumerate() {
+            for (j, block) in others {
+                let sum = self.block(i, j).as_flattened_mut();
+                for (entry, more) in sum.iter_mut().zip(block.as_flattened()) {
                     *entry += more;
                 }
             }
         }
-        self.border += other.border;
-        self.corner += other.corner;
+        let border = self.border.as_flattened_mut().iter_mut();
+        let corner = self.corner.as_flattened_mut().iter_mut();
+        for (entry, more) in border.zip(other.border.as_flattened()) {
+            *entry += more;
+        }
+        for (entry, more) in corner.zip(other.corner.as_flattened()) {
+            *entry += more;
+        }
         self.right += other.right;
         self.sizes.extend(other.sizes);
     }
@@ -487,7 +507,7 @@ impl Normal {
 
     /// Solves with the priors; `None` if the matrix is not positive definite.
     fn solve(&self, variance: f64) -> Option<DVector<f64>> {
-        let frames = self.border.nrows();
+        let frames = self.border.len();
         let n = self.right.len();
         let prior = |k: usize| {
             let sigma = match (k < frames, k % OWN) {
@@ -500,11 +520,12 @@ impl Normal {
         // The lower triangle.
         let mut entries: Vec<Triplet<usize, usize, f64>> =
             (0..n).map(|k| Triplet::new(k, k, prior(k))).collect();
-        for (&(i, j), block) in &self.pairs {
+        let pairs = self.pairs.iter().enumerate();
+        for (i, (j, block)) in pairs.flat_map(|(i, own)| own.iter().map(move |pair| (i, pair))) {
             for (r, row) in block.iter().enumerate() {
                 for (c, value) in row.iter().enumerate() {
                     let (row, column) = (OWN * i + r, OWN * j + c);
-                    if i < j {
+                    if i < *j {
                         entries.push(Triplet::new(column, row, *value));
                     } else if row >= column {
                         entries.push(Triplet::new(row, column, *value));
@@ -514,10 +535,10 @@ impl Normal {
         }
         for k in 0..SHADING_TERMS {
             for row in 0..frames {
-                entries.push(Triplet::new(frames + k, row, self.border[(row, k)]));
+                entries.push(Triplet::new(frames + k, row, self.border[row][k]));
             }
             for l in 0..=k {
-                entries.push(Triplet::new(frames + k, frames + l, self.corner[(k, l)]));
+                entries.push(Triplet::new(frames + k, frames + l, self.corner[k][l]));
             }
         }
         let matrix = SparseColMat::try_new_from_triplets(n, n, &entries).ok()?;

@@ -146,12 +146,11 @@ impl Target for Coverage {
         let width = canvas.columns as usize;
         for (row, pixels) in covered.chunks_exact(width).enumerate() {
             let row = (band.row as usize + row) / self.cell as usize * self.columns;
-            for (column, covered) in pixels.iter().enumerate() {
-                if *covered {
-                    self.covered += 1;
-                } else {
-                    self.holes[row + column / self.cell as usize] += 1;
-                }
+            let cells = self.holes[row..].iter_mut();
+            for (holes, pixels) in cells.zip(pixels.chunks(self.cell as usize)) {
+                let covered: u32 = pixels.iter().map(|covered| u32::from(*covered)).sum();
+                *holes += pixels.len() as u32 - covered;
+                self.covered += u64::from(covered);
             }
         }
         Ok(())

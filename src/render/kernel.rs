@@ -70,7 +70,7 @@ pub struct Kernel {
     taps: usize,
     /// `PHASES + 1` rows of `taps` weights; each row's sum is 1.
     weights: Vec<f32>,
-    /// The same in units of 2⁻¹⁴.
+    /// The same in units of 2⁻¹⁴, rows filled up to [`Kernel::row_of`] with nothing, for the sake of vectors.
     integers: Vec<i16>,
 }
 
@@ -81,25 +81,20 @@ impl Kernel {
     /// The kernel of an interpolation, `stretch` (at least 1) times as wide as for a picture that is looked at pixel by
     /// pixel.
     ///
-    /// Taps are 1, 2 or a multiple of 4, for the sake of vectors; those that are not needed weigh nothing. Weights are `k((x − t)/stretch)` normalised to a sum of 1, x the pixels and t the point. The nearest pixel is
+    /// Taps are 1 or an even number. Weights are `k((x − t)/stretch)` normalised to a sum of 1, x the pixels and t the point. The nearest pixel is
     /// never stretched: it is for pictures that must stay what they are.
     pub fn new(interpolation: Interpolation, stretch: f64) -> Self {
         if interpolation == Interpolation::Nearest {
             return Self {
                 taps: 1,
                 weights: vec![1.0; PHASES + 1],
-                integers: vec![ONE as i16; PHASES + 1],
+                integers: [ONE as i16, 0, 0, 0].repeat(PHASES + 1),
             };
         }
         let half = (interpolation.reach() * stretch.max(1.0) - 1e-9).ceil() as usize;
-        let half = if half > 1 {
-            half.next_multiple_of(2)
-        } else {
-            half
-        };
         let taps = 2 * half;
         let mut weights = Vec::with_capacity((PHASES + 1) * taps);
-        let mut integers = Vec::with_capacity((PHASES + 1) * taps);
+        let mut integers = Vec::with_capacity((PHASES + 1) * Self::row_of(taps));
         for phase in 0..=PHASES {
             let t = (half - 1) as f64 + phase as f64 / PHASES as f64;
             let row = (0..taps).map(|x| interpolation.weight((x as f64 - t) / stretch.max(1.0)));
@@ -107,6 +102,7 @@ impl Kernel {
             let sum: f64 = row.iter().sum();
             weights.extend(row.iter().map(|w| (w / sum) as f32));
             integers.extend(whole_weights(&row, sum));
+            integers.resize((phase + 1) * Self::row_of(taps), 0);
         }
         Self {
             taps,
@@ -170,7 +166,13 @@ impl Kernel {
         }
     }
 
-    /// The weights of all phases, one after the other, in units of 2⁻¹⁴.
+    /// Numbers of a row of [`Kernel::all_integers`] for so many taps: a multiple of 4.
+    #[inline(always)]
+    pub const fn row_of(taps: usize) -> usize {
+        taps.next_multiple_of(4)
+    }
+
+    /// The weights of all phases, one row of them after the other, in units of 2⁻¹⁴.
     #[inline(always)]
     pub fn all_integers(&self) -> &[i16] {
         &self.integers
@@ -179,7 +181,7 @@ impl Kernel {
     /// The weights of a phase in units of 2⁻¹⁴; their sum is one exactly.
     #[inline(always)]
     pub fn integers(&self, phase: usize) -> &[i16] {
-        &self.integers[phase * self.taps..][..self.taps]
+        &self.integers[phase * Self::row_of(self.taps)..][..self.taps]
     }
 
     /// The weights of a phase.
@@ -228,7 +230,7 @@ mod tests {
         }
         assert_eq!(
             ALL.map(|interpolation| Kernel::new(interpolation, 1.0).taps()),
-            [1, 2, 4, 8]
+            [1, 2, 4, 6]
         );
     }
 

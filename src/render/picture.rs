@@ -4,6 +4,7 @@ use super::integer::PADDING;
 use super::kernel::Kernel;
 use super::sample::{Sample, Samples};
 use crate::frames::HalvedMask;
+use crate::vectors::wide;
 use image::{ColorType, DynamicImage};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -164,9 +165,14 @@ impl Picture {
             // Down the columns first, side by side.
             for row in 0..edge {
                 let row = &samples[(y * edge + row) * self.width * c..][..width * edge * c];
-                for (sum, sample) in sums.iter_mut().zip(row) {
-                    *sum += sample.value();
-                }
+                wide(
+                    #[inline(always)]
+                    || {
+                        for (sum, sample) in sums.iter_mut().zip(row) {
+                            *sum += sample.value();
+                        }
+                    },
+                );
             }
             for block in sums.chunks_exact(edge * c) {
                 for channel in 0..c {

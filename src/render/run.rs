@@ -289,7 +289,9 @@ impl Run {
                     1 => self.gather::<T, C, 1>(samples, stride, kernel, columns),
                     2 => self.gather::<T, C, 2>(samples, stride, kernel, columns),
                     4 => self.gather::<T, C, 4>(samples, stride, kernel, columns),
+                    6 => self.gather::<T, C, 6>(samples, stride, kernel, columns),
                     8 => self.gather::<T, C, 8>(samples, stride, kernel, columns),
+                    10 => self.gather::<T, C, 10>(samples, stride, kernel, columns),
                     12 => self.gather::<T, C, 12>(samples, stride, kernel, columns),
                     _ => self.inside[columns].fill(false),
                 }

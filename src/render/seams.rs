@@ -18,7 +18,7 @@ use std::ops::Range;
 /// Distance of the grid's nodes, canvas pixels, unless there would be too many.
 const STEP_PX: f64 = 8.0;
 /// The most nodes of a grid; beyond, they are farther apart.
-const NODES: usize = 12 << 20;
+const NODES: usize = 4 << 20;
 
 /// Distance of the nodes on a canvas, pixels: by the canvas alone, so that the panorama does not depend on the memory.
 pub(super) fn step_px(canvas: &Canvas) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::{Picture, PixelFormat, RenderError};
 use crate::camera::Camera;
-use crate::frames::{FrameSet, HalvedMask, colour_type, load_colour};
+use crate::frames::{FrameFile, FrameSet, HalvedMask, colour_type, load_colour};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -18,8 +18,12 @@ pub struct FrameStack {
     /// Width and height of the files' pictures.
     full_size: [u32; 2],
     level: usize,
+    packed: bool,
     pictures: Vec<Option<Picture>>,
 }
+
+/// Files of no more than this share of their pictures' bytes are packed.
+const PACKED: f64 = 0.9;
 
 /// How many times frames of resolution `native` may be halved before they are coarser than a canvas of
 /// `px_per_metre`: a canvas much coarser than the frames would otherwise pick single pixels out of them.
@@ -51,14 +55,27 @@ impl FrameStack {
         for found in formats {
             format = format.and(found?);
         }
-        Ok(Self {
+        let mut stack = Self {
             camera: camera.at_level(level),
             format,
             files: files.clone(),
             full_size: [camera.width, camera.height],
             level,
+            packed: false,
             pictures: vec![None; files.len()],
-        })
+        };
+        stack.packed = stack.has_packed_files();
+        Ok(stack)
+    }
+
+    fn has_packed_files(&self) -> bool {
+        let bytes = |file: &FrameFile| match file.is_in_video() {
+            true => 0,
+            false => std::fs::metadata(&file.path).map_or(0, |file| file.len()),
+        };
+        let files: u64 = self.files.iter().map(bytes).sum();
+        let pictures = self.full_frame_bytes() * self.len() as u64;
+        files as f64 <= PACKED * pictures as f64
     }
 
     /// Frames that are in memory already, with the camera that took them.
@@ -82,6 +99,7 @@ impl FrameStack {
             files: FrameSet::default(),
             full_size: [camera.width, camera.height],
             level: 0,
+            packed: false,
             pictures: widened.collect(),
         }
     }
@@ -204,6 +222,12 @@ impl FrameStack {
         self.pictures.is_empty()
     }
 
+    /// Whether files are smaller than their pictures, so that decoding a frame takes more than reading it: worth the memory that it takes to
+    /// do it once only.
+    pub fn is_packed(&self) -> bool {
+        self.packed
+    }
+
     /// What the pixels are.
     pub fn format(&self) -> PixelFormat {
         self.format
@@ -225,7 +249,6 @@ impl FrameStack {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::FrameFile;
 
     #[test]
     fn frames_are_halved_only_for_coarse_canvases() {

@@ -94,7 +94,7 @@ pub fn taps<const TAPS: usize>(kernel: &Kernel) -> usize {
     }
 }
 
-/// The weights along u and v of pixel `k`.
+/// The weights along u and v of pixel `k`, those along u filled up with nothing.
 #[inline(always)]
 fn weights<const TAPS: usize>(
     kernel: &Kernel,
@@ -102,8 +102,9 @@ fn weights<const TAPS: usize>(
     k: usize,
 ) -> (&[i16], &[i16]) {
     let taps = taps::<TAPS>(kernel);
-    let of = |phase: i32| &kernel.all_integers()[phase as usize * taps..][..taps];
-    (of(s[k]), of(t[k]))
+    let row = Kernel::row_of(taps);
+    let of = |phase: i32| &kernel.all_integers()[phase as usize * row..][..row];
+    (of(s[k]), &of(t[k])[..taps])
 }
 
 /// Four numbers whose sum is that of grey pixel `k`.
@@ -168,7 +169,7 @@ fn one_colour<const TAPS: usize>(
 ) -> __m128i {
     let weights = weights::<TAPS>(kernel, phases, k);
     let at = first[k] as usize;
-    colour(simd, source, weights, at, taps::<TAPS>(kernel) / 4)
+    colour(simd, source, weights, at, taps::<TAPS>(kernel).div_ceil(4))
 }
 
 /// Sums with `more` and without their last `bits`, as bytes: the lower halves of all vectors first.
@@ -486,7 +487,7 @@ fn four_by_four(
 
 /// Two rows, cut, in the halves of each number.
 #[inline(always)]
-fn cut_pair(simd: V3, upper: __m256i, lower: __m256i) -> __m256i {
+pub fn cut_pair(simd: V3, upper: __m256i, lower: __m256i) -> __m256i {
     let avx2 = simd.avx2;
     avx2._mm256_blend_epi16::<0b1010_1010>(
         avx2._mm256_srai_epi32::<8>(upper),

@@ -7,6 +7,7 @@ use super::super::light::Light;
 use super::super::run::RUN;
 use super::avx2;
 use super::avx2::Eight;
+use super::window;
 use super::{
     Block, EIGHT, Kernel, LitBlock, PARTS, Part, Patch, bits, missing, reach, rounding, scale,
 };
@@ -29,7 +30,7 @@ pub fn plain<const C: usize, const TAPS: usize>(simd: V3, block: &Block, pixels:
                 3 => colour_bytes::<TAPS>(simd, colours::<TAPS>(simd, patch, &places)),
                 _ => grey_bytes::<TAPS>(simd, greys::<TAPS>(simd, patch, &places)),
             };
-            put::<C>(eight, first, own, block.first, pixels);
+            put::<C>(simd, eight, first, own, block.first, pixels);
         }
     }
 }
@@ -41,35 +42,66 @@ pub fn lit<const C: usize, const L: usize, const TAPS: usize>(
     block: &LitBlock<L>,
     pixels: &mut [&mut [u8]],
 ) {
+    match block.parts {
+        [part] => alone::<C, L, TAPS>(simd, block, part, pixels),
+        _ => mixed::<C, L, TAPS>(simd, block, pixels),
+    }
+}
+
+/// A block with one part.
+#[inline(always)]
+fn alone<const C: usize, const L: usize, const TAPS: usize>(
+    simd: V3,
+    block: &LitBlock<L>,
+    part: &Part,
+    pixels: &mut [&mut [u8]],
+) {
+    let rows = pixels.iter_mut().zip(block.corrections.chunks_exact(RUN));
+    for (n, (pixels, corrections)) in rows.enumerate() {
+        let row = Row::of(simd, part, block.row + n);
+        for (first, own) in eights(&block.columns) {
+            let x = x_of(simd, first);
+            let corrections = &corrections[block.first + first..][..EIGHT];
+            let values = row.values::<C, TAPS>(simd, x);
+            let eight = corrected::<C, L>(simd, values, corrections);
+            put::<C>(simd, eight, first, own, block.first, pixels);
+        }
+    }
+}
+
+/// A block with several parts.
+#[inline(always)]
+fn mixed<const C: usize, const L: usize, const TAPS: usize>(
+    simd: V3,
+    block: &LitBlock<L>,
+    pixels: &mut [&mut [u8]],
+) {
     let avx = simd.avx;
     let rows = pixels.iter_mut().zip(block.corrections.chunks_exact(RUN));
-    // Where pixels of a row appear in each part, by powers of x, and its light.
-    let mut parts: ArrayVec<(&Part, Lanes, [f32; 3]), PARTS> = ArrayVec::new();
+    let mut parts: ArrayVec<Row, PARTS> = ArrayVec::new();
     for (n, ((pixels, corrections), t)) in rows.zip(block.down).enumerate() {
-        let row = block.row + n;
         parts.clear();
         for part in block.parts {
-            let light = part.light.unwrap_or(Light::even(1.0));
-            parts.push((part, line(simd, part.patch.lines, row), light.row(row)));
+            parts.push(Row::of(simd, part, block.row + n));
         }
         for (first, own) in eights(&block.columns) {
             let (x, at) = (x_of(simd, first), block.first + first);
             let corrections = &corrections[at..][..EIGHT];
             let mut s = [0.0; EIGHT];
             s.copy_from_slice(&block.across[at..][..EIGHT]);
-            let mut mix = Mix::<C>::nothing(simd);
-            for (part, line, light) in &parts {
-                let weights = match parts.len() {
-                    1 => avx._mm256_set1_ps(1.0),
-                    _ => bilinear(simd, cast(s), *t, part.corners),
-                };
-                mix.add::<TAPS>(simd, part, (line, light), x, weights);
+            let mut sums = [avx._mm256_setzero_ps(); 4];
+            let mut all = avx._mm256_setzero_ps();
+            for row in &parts {
+                let weights = bilinear(simd, cast(s), *t, row.part.corners);
+                let values = row.values::<C, TAPS>(simd, x);
+                all = avx._mm256_add_ps(all, weights);
+                add::<C>(simd, &mut sums, values, weights);
             }
-            let eight = match C {
-                3 => mix.colours(simd, corrections),
-                _ => mix.greys(simd, corrections),
-            };
-            put::<C>(eight, first, own, block.first, pixels);
+            let inverse = avx._mm256_div_ps(avx._mm256_set1_ps(1.0), all);
+            let mut means = [avx._mm256_setzero_ps(); 4];
+            add::<C>(simd, &mut means, sums, inverse);
+            let eight = corrected::<C, L>(simd, means, corrections);
+            put::<C>(simd, eight, first, own, block.first, pixels);
         }
     }
 }
@@ -89,80 +121,86 @@ fn bilinear(simd: V3, s: __m256, t: f32, corners: [f32; 4]) -> __m256 {
     avx._mm256_add_ps(sum, of(d, corners[3]))
 }
 
-/// Weighted sums of eight pixels: of the k-th and the k + 4th in the halves of the k-th vector in colour, in the first one if they
-/// are grey.
-struct Mix<const C: usize> {
-    sums: [__m256; 4],
-    weights: __m256,
+/// A row of a part.
+struct Row<'a> {
+    part: &'a Part<'a>,
+    /// Where its pixels appear, by powers of x.
+    line: Lanes,
+    light: [f32; 3],
 }
 
-impl<const C: usize> Mix<C> {
+impl<'a> Row<'a> {
     #[inline(always)]
-    fn nothing(simd: V3) -> Self {
-        let zero = simd.avx._mm256_setzero_ps();
+    fn of(simd: V3, part: &'a Part<'a>, row: usize) -> Self {
         Self {
-            sums: [zero; 4],
-            weights: zero,
+            part,
+            line: line(simd, part.patch.lines, row),
+            light: part.light.unwrap_or(Light::even(1.0)).row(row),
         }
     }
 
-    /// Adds what a frame shows at `x` in a row of its patch (its line and light), light undone: `((sum + missing) scale − bias) light`.
+    /// What the frame shows at `x`, light undone: `((sum + missing) scale − bias) light`. Of the pixels k and k + 4 in the halves of the k-th
+    /// vector in colour, of all in the first one if they are grey.
     #[inline(always)]
-    fn add<const TAPS: usize>(
-        &mut self,
-        simd: V3,
-        part: &Part,
-        (line, light): (&Lanes, &[f32; 3]),
-        x: __m256,
-        weights: __m256,
-    ) {
-        let avx = simd.avx;
-        let places = places::<C, TAPS>(simd, &part.patch, line, x);
-        let light = polynomial(simd, x, light);
-        let bias = avx._mm256_set1_ps(part.bias);
-        self.weights = avx._mm256_add_ps(self.weights, weights);
+    fn values<const C: usize, const TAPS: usize>(&self, simd: V3, x: __m256) -> [__m256; 4] {
+        let patch = &self.part.patch;
+        let places = places::<C, TAPS>(simd, patch, &self.line, x);
+        let light = polynomial(simd, x, &self.light);
+        let bias = simd.avx._mm256_set1_ps(self.part.bias);
         if C == 3 {
-            let [a, b, c, d] = colours::<TAPS>(simd, &part.patch, &places);
-            self.sums[0] = both::<TAPS>(simd, self.sums[0], a, bias, light, weights, 0);
-            self.sums[1] = both::<TAPS>(simd, self.sums[1], b, bias, light, weights, 1);
-            self.sums[2] = both::<TAPS>(simd, self.sums[2], c, bias, light, weights, 2);
-            self.sums[3] = both::<TAPS>(simd, self.sums[3], d, bias, light, weights, 3);
+            let [a, b, c, d] = colours::<TAPS>(simd, patch, &places);
+            [
+                undone::<TAPS>(simd, a, bias, four_times(simd, light, 0)),
+                undone::<TAPS>(simd, b, bias, four_times(simd, light, 1)),
+                undone::<TAPS>(simd, c, bias, four_times(simd, light, 2)),
+                undone::<TAPS>(simd, d, bias, four_times(simd, light, 3)),
+            ]
         } else {
-            let sums = greys::<TAPS>(simd, &part.patch, &places);
-            let value = undone::<TAPS>(simd, sums, bias, light);
-            self.sums[0] = avx._mm256_add_ps(self.sums[0], avx._mm256_mul_ps(weights, value));
+            let sums = greys::<TAPS>(simd, patch, &places);
+            let nothing = simd.avx._mm256_setzero_ps();
+            let values = undone::<TAPS>(simd, sums, bias, light);
+            [values, nothing, nothing, nothing]
         }
     }
+}
 
-    /// Means with corrections added, as pixels, alpha last and full.
-    #[inline(always)]
-    fn colours<const L: usize>(&self, simd: V3, corrections: &[[f32; L]]) -> __m256i {
-        let avx = simd.avx;
-        let inverse = avx._mm256_div_ps(avx._mm256_set1_ps(1.0), self.weights);
-        let a = colour_mean(simd, self.sums[0], inverse, corrections, 0);
-        let b = colour_mean(simd, self.sums[1], inverse, corrections, 1);
-        let c = colour_mean(simd, self.sums[2], inverse, corrections, 2);
-        let d = colour_mean(simd, self.sums[3], inverse, corrections, 3);
+/// Adds values times what is one number for each of eight pixels to sums of them.
+#[inline(always)]
+fn add<const C: usize>(simd: V3, sums: &mut [__m256; 4], values: [__m256; 4], factors: __m256) {
+    let avx = simd.avx;
+    if C == 3 {
+        for k in 0..4 {
+            let own = avx._mm256_mul_ps(four_times(simd, factors, k as i32), values[k]);
+            sums[k] = avx._mm256_add_ps(sums[k], own);
+        }
+    } else {
+        sums[0] = avx._mm256_add_ps(sums[0], avx._mm256_mul_ps(factors, values[0]));
+    }
+}
+
+/// Values with corrections added, as pixels, alpha last and full.
+#[inline(always)]
+fn corrected<const C: usize, const L: usize>(
+    simd: V3,
+    values: [__m256; 4],
+    corrections: &[[f32; L]],
+) -> __m256i {
+    let avx = simd.avx;
+    if C == 3 {
+        let a = corrected_colour(simd, values[0], corrections, 0);
+        let b = corrected_colour(simd, values[1], corrections, 1);
+        let c = corrected_colour(simd, values[2], corrections, 2);
+        let d = corrected_colour(simd, values[3], corrections, 3);
         let all = avx2::bytes(simd, [a, b, c, d]);
         let alpha = avx._mm256_set1_epi32(0xff00_0000_u32.cast_signed());
-        simd.avx2._mm256_or_si256(all, alpha)
+        return simd.avx2._mm256_or_si256(all, alpha);
     }
-
-    /// The same in grey.
-    #[inline(always)]
-    fn greys<const L: usize>(&self, simd: V3, corrections: &[[f32; L]]) -> __m256i {
-        let avx = simd.avx;
-        let inverse = avx._mm256_div_ps(avx._mm256_set1_ps(1.0), self.weights);
-        let mut own = [0.0; EIGHT];
-        for (own, correction) in own.iter_mut().zip(corrections) {
-            *own = correction[0];
-        }
-        let mean = avx._mm256_mul_ps(self.sums[0], inverse);
-        grey_pixels(
-            simd,
-            avx._mm256_cvtps_epi32(avx._mm256_add_ps(mean, cast(own))),
-        )
+    let mut own = [0.0; EIGHT];
+    for (own, correction) in own.iter_mut().zip(corrections) {
+        *own = correction[0];
     }
+    let value = avx._mm256_add_ps(values[0], cast(own));
+    grey_pixels(simd, avx._mm256_cvtps_epi32(value))
 }
 
 /// Sums as numbers, light undone.
@@ -181,40 +219,22 @@ fn four_times(simd: V3, eight: __m256, k: i32) -> __m256 {
     simd.avx2._mm256_permutevar8x32_ps(eight, lanes)
 }
 
-/// Adds the pixels k and k + 4 in colour to what there is.
+/// Values of the pixels k and k + 4 in colour with corrections added, as whole numbers.
 #[inline(always)]
-fn both<const TAPS: usize>(
+fn corrected_colour<const L: usize>(
     simd: V3,
-    so_far: __m256,
-    sums: __m256i,
-    bias: __m256,
-    light: __m256,
-    weights: __m256,
-    k: i32,
-) -> __m256 {
-    let value = undone::<TAPS>(simd, sums, bias, four_times(simd, light, k));
-    let weighted = simd.avx._mm256_mul_ps(four_times(simd, weights, k), value);
-    simd.avx._mm256_add_ps(so_far, weighted)
-}
-
-/// The means of pixels k and k + 4 in colour with corrections added, as whole numbers.
-#[inline(always)]
-fn colour_mean<const L: usize>(
-    simd: V3,
-    sums: __m256,
-    inverse: __m256,
+    values: __m256,
     corrections: &[[f32; L]],
     k: usize,
 ) -> __m256i {
     let avx = simd.avx;
-    let mean = avx._mm256_mul_ps(sums, four_times(simd, inverse, k as i32));
     let mut own = [[0.0; 4]; 2];
     for (own, correction) in own.iter_mut().zip([&corrections[k], &corrections[k + 4]]) {
         for (own, correction) in own.iter_mut().zip(correction) {
             *own = *correction;
         }
     }
-    avx._mm256_cvtps_epi32(avx._mm256_add_ps(mean, cast(own)))
+    avx._mm256_cvtps_epi32(avx._mm256_add_ps(values, cast(own)))
 }
 
 /// See [`super::values`].
@@ -267,6 +287,7 @@ fn eights(columns: &Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)>
 /// Puts the columns `own` of eight pixels from `first` on into a row of the tile, where the patch begins at column `patch`.
 #[inline(always)]
 fn put<const C: usize>(
+    simd: V3,
     eight: __m256i,
     first: usize,
     own: Range<usize>,
@@ -274,16 +295,19 @@ fn put<const C: usize>(
     pixels: &mut [u8],
 ) {
     let pixel = C + 1;
-    let eight: [u8; 32] = cast(eight);
     let there = &mut pixels[(patch + own.start) * pixel..(patch + own.end) * pixel];
-    if there.len() == EIGHT * pixel {
-        there.copy_from_slice(&eight[..EIGHT * pixel]);
-    } else {
-        let skip = own.start - first;
-        let eight = &eight[skip * pixel..];
+    if there.len() < EIGHT * pixel {
+        let eight: [u8; 32] = cast(eight);
+        let eight = &eight[(own.start - first) * pixel..];
         for (there, own) in there.iter_mut().zip(eight) {
             *there = *own;
         }
+    } else if C == 1 {
+        let eight: [u8; 16] = cast(simd.avx._mm256_castsi256_si128(eight));
+        there.copy_from_slice(&eight);
+    } else {
+        let eight: [u8; 32] = cast(eight);
+        there.copy_from_slice(&eight);
     }
 }
 
@@ -320,17 +344,44 @@ fn numbers(simd: V3, sums: __m256i, missing: __m256i, scale: __m256) -> __m256 {
 }
 
 #[inline(always)]
-fn colours<const TAPS: usize>(simd: V3, patch: &Patch, (first, phases): &Eights) -> [__m256i; 4] {
-    avx2::colours::<TAPS>(simd, patch.source, patch.kernel, first, *phases)
+fn colours<const TAPS: usize>(simd: V3, patch: &Patch, eight: &Eights) -> [__m256i; 4] {
+    let first = eight.first::<3>(simd, patch.source.stride);
+    avx2::colours::<TAPS>(simd, patch.source, patch.kernel, &first, eight.phases)
 }
 
 #[inline(always)]
-fn greys<const TAPS: usize>(simd: V3, patch: &Patch, (first, phases): &Eights) -> __m256i {
-    avx2::greys::<TAPS>(simd, patch.source, patch.kernel, first, *phases)
+fn greys<const TAPS: usize>(simd: V3, patch: &Patch, eight: &Eights) -> __m256i {
+    let Patch { source, kernel, .. } = *patch;
+    let near = window::greys::<TAPS>(simd, source, kernel, eight.corner, eight.phases);
+    if let Some(sums) = near {
+        return sums;
+    }
+    let first = eight.first::<1>(simd, source.stride);
+    avx2::greys::<TAPS>(simd, source, kernel, &first, eight.phases)
 }
 
-/// Where eight kernels begin, and their phases along u and v.
-type Eights = (Eight<u32>, [Eight<i32>; 2]);
+/// Where eight kernels lie.
+struct Eights {
+    /// Columns and rows in which they begin.
+    corner: [__m256i; 2],
+    /// Their phases along u and v.
+    phases: [Eight<i32>; 2],
+}
+
+impl Eights {
+    /// The samples with which they begin.
+    #[inline(always)]
+    fn first<const C: usize>(&self, simd: V3, stride: usize) -> Eight<u32> {
+        let (avx, avx2) = (simd.avx, simd.avx2);
+        let [left, top] = self.corner;
+        let row = avx2._mm256_mullo_epi32(top, avx._mm256_set1_epi32(stride as i32));
+        let at = match C {
+            1 => left,
+            _ => avx2._mm256_add_epi32(left, avx2._mm256_add_epi32(left, left)),
+        };
+        cast(avx2._mm256_add_epi32(row, at))
+    }
+}
 
 /// Of the pixels at `x`.
 #[inline(always)]
@@ -349,16 +400,14 @@ fn places<const C: usize, const TAPS: usize>(
     let before = avx._mm256_set1_epi32(Kernel::before_of(taps) as i32);
     let left = avx2._mm256_sub_epi32(left, before);
     let top = avx2._mm256_sub_epi32(top, before);
-    let row = avx2._mm256_mullo_epi32(top, avx._mm256_set1_epi32(source.stride as i32));
-    let at = match C {
-        1 => left,
-        _ => avx2._mm256_add_epi32(left, avx2._mm256_add_epi32(left, left)),
-    };
-    let at: Eight<u32> = cast(avx2._mm256_add_epi32(row, at));
     // What the next rows need.
-    let below = at[0] as usize + (taps + 1) * source.stride;
+    let (column, row): (Eight<u32>, Eight<u32>) = (cast(left), cast(top));
+    let below = (row[0] as usize + taps + 1) * source.stride + column[0] as usize * C;
     vectors::prefetch(simd, source.samples, below);
-    (at, [cast(s), cast(t)])
+    Eights {
+        corner: [left, top],
+        phases: [cast(s), cast(t)],
+    }
 }
 
 #[inline(always)]

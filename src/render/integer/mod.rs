@@ -15,6 +15,8 @@ mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod block;
 mod plain;
+#[cfg(target_arch = "x86_64")]
+mod window;
 
 use super::chart::{Lanes, PATCH};
 use super::kernel::Kernel;
@@ -30,6 +32,7 @@ macro_rules! by_taps {
         match $kernel.taps() {
             2 => by_taps!(2, $simd, $taps, $work),
             4 => by_taps!(4, $simd, $taps, $work),
+            6 => by_taps!(6, $simd, $taps, $work),
             8 => by_taps!(8, $simd, $taps, $work),
             _ => by_taps!(0, $simd, $taps, $work),
         }
@@ -247,11 +250,12 @@ mod tests {
     use crate::render::sample::Sample;
     use crate::render::{Interpolation, Picture, Samples};
 
-    const KERNELS: [(Interpolation, f64); 6] = [
+    const KERNELS: [(Interpolation, f64); 7] = [
         (Interpolation::Bilinear, 1.0),
         (Interpolation::Bicubic, 1.0),
         (Interpolation::Lanczos3, 1.0),
         (Interpolation::Bilinear, 1.75),
+        (Interpolation::Bicubic, 1.5),
         (Interpolation::Bicubic, 2.5),
         (Interpolation::Lanczos3, 4.0),
     ];
