@@ -1,7 +1,8 @@
 //! One frame at each place of a tile, and how one passes into the next.
 //!
 //! A tile is drawn in strips between two rows of the seams' nodes. What lies inside all frames that share it is drawn a block at a time,
-//! patch by patch of the frames' charts; at the frames' borders and round holes, row by row.
+//! patch by patch of the frames' charts; at the frames' borders and round holes, row by row. (A patch at once where one frame is alone
+//! would be slower: so many rows are far apart in the frame and in the panorama.)
 
 use super::chart::{PATCH, of_patch};
 use super::draw::NO_FRAME;
@@ -20,7 +21,7 @@ use std::ops::Range;
 #[derive(Default)]
 pub struct Scratch {
     shares: Shares,
-    /// Of each row of a strip, [`RUN`] columns each.
+    /// Of each row of a row of patches, [`RUN`] columns each.
     corrections: Vec<f32>,
     /// How far each row of a strip lies between the nodes.
     down: Vec<f32>,
@@ -66,18 +67,30 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         sums: &mut Row,
         scratch: &mut Scratch,
     ) {
+        let all = self.across.len();
+        // Of each patch of a row of them, the frame that it shows alone.
+        let mut alone = ArrayVec::<Option<usize>, { RUN / PATCH }>::new();
         for strip in self.seams.strips(self.canvas, self.tile) {
-            self.correct(&strip, &mut scratch.corrections);
-            let drawn = self.blocks(&strip, pixels, sources, scratch);
+            if strip.start.is_multiple_of(PATCH) {
+                let end = (strip.start + PATCH).min(self.tile.rows as usize);
+                let rows = strip.start..end;
+                self.correct(&rows, &mut scratch.corrections);
+                let ends = [&self.between(rows.start), &self.between(rows.end - 1)];
+                let only = |columns| self.seams.only(&self.across, &columns, ends);
+                alone = pieces(0..all).map(only).collect();
+            }
             let Scratch {
                 shares,
                 corrections,
-                ..
+                down,
             } = &mut *scratch;
-            let mut corrections = corrections.as_chunks::<L>().0.chunks_exact(RUN);
+            let corrections = corrections.as_chunks::<L>().0;
+            let corrections = corrections.get(strip.start % PATCH * RUN..).unwrap_or(&[]);
+            let drawn = self.blocks(&strip, pixels, sources, (shares, down), corrections, &alone);
+            let mut corrections = corrections.chunks_exact(RUN);
             for row in strip {
                 let corrections = corrections.next().unwrap_or(&[[0.0; L]; RUN]);
-                for open in drawn.open(self.across.len()) {
+                for open in drawn.open(all) {
                     self.seams
                         .shares(&self.across, open.clone(), &self.between(row), shares);
                     match T::bytes(&mut pixels[row..row + 1]) {
@@ -107,70 +120,83 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         Some(&self.views[at.ok()?])
     }
 
-    fn correct(&self, strip: &Range<usize>, corrections: &mut Vec<f32>) {
+    fn correct(&self, rows: &Range<usize>, corrections: &mut Vec<f32>) {
+        corrections.clear();
         if self.copies {
             return;
         }
-        corrections.resize(strip.len() * RUN * L, 0.0);
-        let rows = corrections.as_chunks_mut::<L>().0.chunks_exact_mut(RUN);
-        for (row, found) in strip.clone().zip(rows) {
+        corrections.resize(rows.len() * RUN * L, 0.0);
+        let corrections = corrections.as_chunks_mut::<L>().0.chunks_exact_mut(RUN);
+        for (row, found) in rows.clone().zip(corrections) {
             let found = &mut found[..self.across.len()];
             self.seams
                 .corrections(&self.across, &self.between(row), found);
         }
     }
 
-    /// Draws what lies inside all frames that show it; which columns these are.
+    /// Draws what lies inside all frames that show it; which columns these are. `alone`: the frames of those patches that show only one.
     fn blocks<T: Sample>(
         &self,
         strip: &Range<usize>,
         pixels: &mut [&mut [T]],
         sources: &mut [&mut [u32]],
-        scratch: &mut Scratch,
+        (shares, down): (&mut Shares, &mut Vec<f32>),
+        corrections: &[[f32; L]],
+        alone: &[Option<usize>],
     ) -> Columns {
         let mut drawn = Columns::default();
         let Some(pixels) = T::bytes(pixels) else {
             return drawn;
         };
-        let Scratch {
-            shares,
-            corrections,
-            down,
-        } = scratch;
-        let corrections = corrections.as_chunks::<L>().0;
         down.clear();
         down.extend(strip.clone().map(|row| self.between(row).t()));
-        let first = self.between(strip.start);
-        let all = 0..self.across.len();
-        self.seams.shares(&self.across, all, &first, shares);
-        for cell in shares.by_cells() {
-            // Who shows most is found pixel by pixel.
-            if cell.len() > 1 && !sources.is_empty() {
+        for (columns, frame) in pieces(0..self.across.len()).zip(alone) {
+            let Some(frame) = *frame else {
                 continue;
+            };
+            let share = [Share::alone(frame, columns.clone())];
+            if self.block(strip, &columns, &share, down, corrections, pixels) {
+                name(frame, strip, &columns, sources);
+                drawn.add(columns);
             }
-            for piece in pieces(cell[0].from..cell[0].to) {
-                let done = match self.copies {
-                    true => {
-                        let view = self.view(cell[0].frame);
-                        view.is_some_and(|view| {
-                            let pixels = &mut pixels[strip.clone()];
-                            view.block::<C>(strip.clone(), piece.clone(), pixels)
-                        })
-                    }
-                    false => self.lit_block(strip, &piece, cell, down, corrections, pixels),
-                };
-                if !done {
+        }
+        let first = self.between(strip.start);
+        for open in drawn.open(self.across.len()) {
+            self.seams.shares(&self.across, open, &first, shares);
+            for cell in shares.by_cells() {
+                // Who shows most is found pixel by pixel.
+                if cell.len() > 1 && !sources.is_empty() {
                     continue;
                 }
-                for row in strip.clone() {
-                    if let Some(sources) = sources.get_mut(row) {
-                        sources[piece.clone()].fill(cell[0].frame as u32);
+                for piece in pieces(cell[0].from..cell[0].to) {
+                    if self.block(strip, &piece, cell, down, corrections, pixels) {
+                        name(cell[0].frame, strip, &piece, sources);
+                        drawn.add(piece);
                     }
                 }
-                drawn.add(piece);
             }
         }
         drawn
+    }
+
+    /// Draws some rows and columns of a patch; false without doing it if a frame does not show all of it.
+    fn block(
+        &self,
+        rows: &Range<usize>,
+        columns: &Range<usize>,
+        shares: &[Share],
+        down: &[f32],
+        corrections: &[[f32; L]],
+        pixels: &mut [&mut [u8]],
+    ) -> bool {
+        if !self.copies {
+            return self.lit_block(rows, columns, shares, down, corrections, pixels);
+        }
+        let view = self.view(shares[0].frame);
+        view.is_some_and(|view| {
+            let pixels = &mut pixels[rows.clone()];
+            view.block::<C>(rows.clone(), columns.clone(), pixels)
+        })
     }
 
     /// Draws what frames share in a cell, and where one is alone; false without doing it if one does not show all of it.
@@ -289,6 +315,15 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
                     *source = view.frame as u32;
                 }
             }
+        }
+    }
+}
+
+/// Notes the frame that some rows and columns show.
+fn name(frame: usize, rows: &Range<usize>, columns: &Range<usize>, sources: &mut [&mut [u32]]) {
+    for row in rows.clone() {
+        if let Some(sources) = sources.get_mut(row) {
+            sources[columns.clone()].fill(frame as u32);
         }
     }
 }

@@ -236,6 +236,31 @@ impl Seams {
         })
     }
 
+    /// The frame that some columns from a row to another are of; None if there are several, or none.
+    pub(super) fn only(
+        &self,
+        across: &Across,
+        columns: &Range<usize>,
+        [first, last]: [&Between; 2],
+    ) -> Option<usize> {
+        let cells = across.cells.iter();
+        let cells = cells.skip_while(|cell| cell.columns.end <= columns.start);
+        let cells = cells.take_while(|cell| cell.columns.start < columns.end);
+        let mut only = None;
+        for cell in cells {
+            for row in first.before..=last.after {
+                for column in [cell.before, cell.after] {
+                    let frame = self.frame(row, column);
+                    if frame == NO_FRAME || only.is_some_and(|only| only != frame) {
+                        return None;
+                    }
+                    only = Some(frame);
+                }
+            }
+        }
+        Some(only? as usize)
+    }
+
     /// What some columns of a row are made of. Between the same nodes nothing changes from row to row where no frames meet.
     ///
     /// Without blending each pixel is one frame's, the one with the largest weight.
@@ -380,6 +405,19 @@ pub struct Share {
     weights: Option<usize>,
 }
 
+impl Share {
+    /// That of a frame that is alone in its columns.
+    pub fn alone(frame: usize, columns: Range<usize>) -> Self {
+        Self {
+            frame,
+            from: columns.start,
+            to: columns.end,
+            corners: [1.0; 4],
+            weights: None,
+        }
+    }
+}
+
 impl Shares {
     fn clear(&mut self) {
         self.list.clear();
@@ -392,13 +430,7 @@ impl Shares {
             Some(last) if last.weights.is_none() && last.frame == frame && last.to == from => {
                 last.to = to;
             }
-            _ => self.list.push(Share {
-                frame,
-                from,
-                to,
-                corners: [1.0; 4],
-                weights: None,
-            }),
+            _ => self.list.push(Share::alone(frame, from..to)),
         }
     }
 

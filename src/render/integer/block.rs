@@ -2,7 +2,7 @@
 //!
 //! The numbers are those of [`super::super::run::Run`], to the bit.
 
-use super::super::chart::{Lanes, SCALE};
+use super::super::chart::{Lanes, PATCH, SCALE};
 use super::super::light::Light;
 use super::super::run::RUN;
 use super::avx2;
@@ -18,19 +18,33 @@ use pulp::x86::V3;
 use std::arch::x86_64::{__m128i, __m256, __m256i};
 use std::ops::Range;
 
+/// Eights of columns of a patch.
+const EIGHTS: usize = PATCH / EIGHT;
+
+/// Eight columns of a patch.
+struct Columns {
+    /// The first of them.
+    first: usize,
+    /// Those that are meant.
+    own: Range<usize>,
+    /// The patch's coordinates.
+    x: [f32; EIGHT],
+}
+
 /// See [`fn@super::block`].
 #[inline(always)]
 pub fn plain<const C: usize, const TAPS: usize>(simd: V3, block: &Block, pixels: &mut [&mut [u8]]) {
     let patch = &block.patch;
+    let columns = eights(simd, &block.columns);
+    let mut places = [NOWHERE; EIGHTS];
     for (n, pixels) in pixels.iter_mut().enumerate() {
-        let line = line(simd, patch.lines, block.row + n);
-        for (first, own) in eights(&block.columns) {
-            let places = places::<C, TAPS>(simd, patch, &line, x_of(simd, first));
+        place::<C, TAPS>(simd, patch, block.row + n, &columns, &mut places);
+        for (columns, places) in columns.iter().zip(&places) {
             let eight = match C {
-                3 => colour_bytes::<TAPS>(simd, colours::<TAPS>(simd, patch, &places)),
-                _ => grey_bytes::<TAPS>(simd, greys::<TAPS>(simd, patch, &places)),
+                3 => colour_bytes::<TAPS>(simd, colours::<TAPS>(simd, patch, places)),
+                _ => grey_bytes::<TAPS>(simd, greys::<TAPS>(simd, patch, places)),
             };
-            put::<C>(simd, eight, first, own, block.first, pixels);
+            put::<C>(simd, eight, columns, block.first, pixels);
         }
     }
 }
@@ -56,15 +70,15 @@ fn alone<const C: usize, const L: usize, const TAPS: usize>(
     part: &Part,
     pixels: &mut [&mut [u8]],
 ) {
+    let columns = eights(simd, &block.columns);
     let rows = pixels.iter_mut().zip(block.corrections.chunks_exact(RUN));
     for (n, (pixels, corrections)) in rows.enumerate() {
-        let row = Row::of(simd, part, block.row + n);
-        for (first, own) in eights(&block.columns) {
-            let x = x_of(simd, first);
-            let corrections = &corrections[block.first + first..][..EIGHT];
-            let values = row.values::<C, TAPS>(simd, x);
+        let row = Row::of::<C, TAPS>(simd, part, block.row + n, &columns);
+        for (k, columns) in columns.iter().enumerate() {
+            let corrections = &corrections[block.first + columns.first..][..EIGHT];
+            let values = row.values::<C, TAPS>(simd, k, cast(columns.x));
             let eight = corrected::<C, L>(simd, values, corrections);
-            put::<C>(simd, eight, first, own, block.first, pixels);
+            put::<C>(simd, eight, columns, block.first, pixels);
         }
     }
 }
@@ -77,15 +91,16 @@ fn mixed<const C: usize, const L: usize, const TAPS: usize>(
     pixels: &mut [&mut [u8]],
 ) {
     let avx = simd.avx;
+    let columns = eights(simd, &block.columns);
     let rows = pixels.iter_mut().zip(block.corrections.chunks_exact(RUN));
     let mut parts: ArrayVec<Row, PARTS> = ArrayVec::new();
     for (n, ((pixels, corrections), t)) in rows.zip(block.down).enumerate() {
         parts.clear();
         for part in block.parts {
-            parts.push(Row::of(simd, part, block.row + n));
+            parts.push(Row::of::<C, TAPS>(simd, part, block.row + n, &columns));
         }
-        for (first, own) in eights(&block.columns) {
-            let (x, at) = (x_of(simd, first), block.first + first);
+        for (k, columns) in columns.iter().enumerate() {
+            let at = block.first + columns.first;
             let corrections = &corrections[at..][..EIGHT];
             let mut s = [0.0; EIGHT];
             s.copy_from_slice(&block.across[at..][..EIGHT]);
@@ -93,7 +108,7 @@ fn mixed<const C: usize, const L: usize, const TAPS: usize>(
             let mut all = avx._mm256_setzero_ps();
             for row in &parts {
                 let weights = bilinear(simd, cast(s), *t, row.part.corners);
-                let values = row.values::<C, TAPS>(simd, x);
+                let values = row.values::<C, TAPS>(simd, k, cast(columns.x));
                 all = avx._mm256_add_ps(all, weights);
                 add::<C>(simd, &mut sums, values, weights);
             }
@@ -101,7 +116,7 @@ fn mixed<const C: usize, const L: usize, const TAPS: usize>(
             let mut means = [avx._mm256_setzero_ps(); 4];
             add::<C>(simd, &mut means, sums, inverse);
             let eight = corrected::<C, L>(simd, means, corrections);
-            put::<C>(simd, eight, first, own, block.first, pixels);
+            put::<C>(simd, eight, columns, block.first, pixels);
         }
     }
 }
@@ -124,31 +139,41 @@ fn bilinear(simd: V3, s: __m256, t: f32, corners: [f32; 4]) -> __m256 {
 /// A row of a part.
 struct Row<'a> {
     part: &'a Part<'a>,
-    /// Where its pixels appear, by powers of x.
-    line: Lanes,
+    places: [Eights; EIGHTS],
     light: [f32; 3],
 }
 
 impl<'a> Row<'a> {
     #[inline(always)]
-    fn of(simd: V3, part: &'a Part<'a>, row: usize) -> Self {
+    fn of<const C: usize, const TAPS: usize>(
+        simd: V3,
+        part: &'a Part<'a>,
+        row: usize,
+        columns: &[Columns],
+    ) -> Self {
+        let mut places = [NOWHERE; EIGHTS];
+        place::<C, TAPS>(simd, &part.patch, row, columns, &mut places);
         Self {
             part,
-            line: line(simd, part.patch.lines, row),
+            places,
             light: part.light.unwrap_or(Light::even(1.0)).row(row),
         }
     }
 
-    /// What the frame shows at `x`, light undone: `((sum + missing) scale − bias) light`. Of the pixels k and k + 4 in the halves of the k-th
-    /// vector in colour, of all in the first one if they are grey.
+    /// What the frame shows in the k-th eight columns, at `x`, light undone: `((sum + missing) scale − bias) light`. Of the pixels k and k + 4
+    /// in the halves of the k-th vector in colour, of all in the first one if they are grey.
     #[inline(always)]
-    fn values<const C: usize, const TAPS: usize>(&self, simd: V3, x: __m256) -> [__m256; 4] {
-        let patch = &self.part.patch;
-        let places = places::<C, TAPS>(simd, patch, &self.line, x);
+    fn values<const C: usize, const TAPS: usize>(
+        &self,
+        simd: V3,
+        k: usize,
+        x: __m256,
+    ) -> [__m256; 4] {
+        let (patch, places) = (&self.part.patch, &self.places[k]);
         let light = polynomial(simd, x, &self.light);
         let bias = simd.avx._mm256_set1_ps(self.part.bias);
         if C == 3 {
-            let [a, b, c, d] = colours::<TAPS>(simd, patch, &places);
+            let [a, b, c, d] = colours::<TAPS>(simd, patch, places);
             [
                 undone::<TAPS>(simd, a, bias, four_times(simd, light, 0)),
                 undone::<TAPS>(simd, b, bias, four_times(simd, light, 1)),
@@ -156,7 +181,7 @@ impl<'a> Row<'a> {
                 undone::<TAPS>(simd, d, bias, four_times(simd, light, 3)),
             ]
         } else {
-            let sums = greys::<TAPS>(simd, patch, &places);
+            let sums = greys::<TAPS>(simd, patch, places);
             let nothing = simd.avx._mm256_setzero_ps();
             let values = undone::<TAPS>(simd, sums, bias, light);
             [values, nothing, nothing, nothing]
@@ -249,18 +274,19 @@ pub fn values<const C: usize, const TAPS: usize>(
     let avx = simd.avx;
     let missing = avx._mm256_set1_epi32(missing(TAPS));
     let scale = avx._mm256_set1_ps(scale(TAPS));
-    let line = line(simd, patch.lines, row);
-    for (first, _) in eights(&columns) {
-        let places = places::<C, TAPS>(simd, patch, &line, x_of(simd, first));
-        let own = &mut values[first..first + EIGHT];
+    let columns = eights(simd, &columns);
+    let mut places = [NOWHERE; EIGHTS];
+    place::<C, TAPS>(simd, patch, row, &columns, &mut places);
+    for (columns, places) in columns.iter().zip(&places) {
+        let own = &mut values[columns.first..columns.first + EIGHT];
         if C == 3 {
-            let [a, b, c, d] = colours::<TAPS>(simd, patch, &places);
+            let [a, b, c, d] = colours::<TAPS>(simd, patch, places);
             [own[0], own[4]] = cast(numbers(simd, a, missing, scale));
             [own[1], own[5]] = cast(numbers(simd, b, missing, scale));
             [own[2], own[6]] = cast(numbers(simd, c, missing, scale));
             [own[3], own[7]] = cast(numbers(simd, d, missing, scale));
         } else {
-            let sums = greys::<TAPS>(simd, patch, &places);
+            let sums = greys::<TAPS>(simd, patch, places);
             let all: [f32; EIGHT] = cast(numbers(simd, sums, missing, scale));
             for (own, value) in own.iter_mut().zip(all) {
                 *own = [value, 0.0, 0.0, 0.0];
@@ -269,28 +295,29 @@ pub fn values<const C: usize, const TAPS: usize>(
     }
 }
 
-/// Columns of a patch, eight at a time: the first of each eight, and those of them that are meant. Where eight do not fit any more,
-/// some are done again.
+/// Columns of a patch, eight at a time. Where eight do not fit any more, some are done again.
 #[inline(always)]
-fn eights(columns: &Range<usize>) -> impl Iterator<Item = (usize, Range<usize>)> {
+fn eights(simd: V3, columns: &Range<usize>) -> ArrayVec<Columns, EIGHTS> {
     let Range { start, end } = *columns;
     let last = reach(columns).end - EIGHT;
-    (start..end).step_by(EIGHT).map(
-        #[inline(always)]
-        move |from| {
-            let first = from.min(last);
-            (first, first.max(start)..(first + EIGHT).min(end))
-        },
-    )
+    let mut all = ArrayVec::new();
+    for from in (start..end).step_by(EIGHT) {
+        let first = from.min(last);
+        all.push(Columns {
+            first,
+            own: first.max(start)..(first + EIGHT).min(end),
+            x: cast(x_of(simd, first)),
+        });
+    }
+    all
 }
 
-/// Puts the columns `own` of eight pixels from `first` on into a row of the tile, where the patch begins at column `patch`.
+/// Puts those of eight pixels that are meant into a row of the tile, where the patch begins at column `patch`.
 #[inline(always)]
 fn put<const C: usize>(
     simd: V3,
     eight: __m256i,
-    first: usize,
-    own: Range<usize>,
+    Columns { first, own, .. }: &Columns,
     patch: usize,
     pixels: &mut [u8],
 ) {
@@ -352,7 +379,7 @@ fn colours<const TAPS: usize>(simd: V3, patch: &Patch, eight: &Eights) -> [__m25
 #[inline(always)]
 fn greys<const TAPS: usize>(simd: V3, patch: &Patch, eight: &Eights) -> __m256i {
     let Patch { source, kernel, .. } = *patch;
-    let near = window::greys::<TAPS>(simd, source, kernel, eight.corner, eight.phases);
+    let near = window::greys::<TAPS>(simd, source, kernel, cast(eight.corner), eight.phases);
     if let Some(sums) = near {
         return sums;
     }
@@ -361,19 +388,25 @@ fn greys<const TAPS: usize>(simd: V3, patch: &Patch, eight: &Eights) -> __m256i 
 }
 
 /// Where eight kernels lie.
+#[derive(Clone, Copy)]
 struct Eights {
     /// Columns and rows in which they begin.
-    corner: [__m256i; 2],
+    corner: [Eight<i32>; 2],
     /// Their phases along u and v.
     phases: [Eight<i32>; 2],
 }
+
+const NOWHERE: Eights = Eights {
+    corner: [[0; EIGHT]; 2],
+    phases: [[0; EIGHT]; 2],
+};
 
 impl Eights {
     /// The samples with which they begin.
     #[inline(always)]
     fn first<const C: usize>(&self, simd: V3, stride: usize) -> Eight<u32> {
         let (avx, avx2) = (simd.avx, simd.avx2);
-        let [left, top] = self.corner;
+        let [left, top]: [__m256i; 2] = cast(self.corner);
         let row = avx2._mm256_mullo_epi32(top, avx._mm256_set1_epi32(stride as i32));
         let at = match C {
             1 => left,
@@ -383,30 +416,35 @@ impl Eights {
     }
 }
 
-/// Of the pixels at `x`.
+/// Where the kernels of a row lie: of all its columns before the first is looked up, or each would wait for its own.
 #[inline(always)]
-fn places<const C: usize, const TAPS: usize>(
+fn place<const C: usize, const TAPS: usize>(
     simd: V3,
     patch: &Patch,
-    line: &Lanes,
-    x: __m256,
-) -> Eights {
-    let Patch { source, kernel, .. } = patch;
+    row: usize,
+    columns: &[Columns],
+    places: &mut [Eights; EIGHTS],
+) {
     let (avx, avx2) = (simd.avx, simd.avx2);
-    let taps = avx2::taps::<TAPS>(kernel);
+    let taps = avx2::taps::<TAPS>(patch.kernel);
     let phases = Kernel::integer_phases_of(taps);
-    let (left, s) = whole(simd, polynomial(simd, x, &line[..4]), phases);
-    let (top, t) = whole(simd, polynomial(simd, x, &line[4..]), phases);
     let before = avx._mm256_set1_epi32(Kernel::before_of(taps) as i32);
-    let left = avx2._mm256_sub_epi32(left, before);
-    let top = avx2._mm256_sub_epi32(top, before);
-    // What the next rows need.
-    let (column, row): (Eight<u32>, Eight<u32>) = (cast(left), cast(top));
-    let below = (row[0] as usize + taps + 1) * source.stride + column[0] as usize * C;
-    vectors::prefetch(simd, source.samples, below);
-    Eights {
-        corner: [left, top],
-        phases: [cast(s), cast(t)],
+    let line = line(simd, patch.lines, row);
+    for (columns, place) in columns.iter().zip(places) {
+        let x: __m256 = cast(columns.x);
+        let (left, s) = whole(simd, polynomial(simd, x, &line[..4]), phases);
+        let (top, t) = whole(simd, polynomial(simd, x, &line[4..]), phases);
+        *place = Eights {
+            corner: [
+                cast(avx2._mm256_sub_epi32(left, before)),
+                cast(avx2._mm256_sub_epi32(top, before)),
+            ],
+            phases: [cast(s), cast(t)],
+        };
+        // What the next rows need.
+        let [column, row] = place.corner.map(|corner| corner[0] as usize);
+        let below = (row + taps + 1) * patch.source.stride + column * C;
+        vectors::prefetch(simd, patch.source.samples, below);
     }
 }
 
