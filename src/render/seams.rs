@@ -1,6 +1,6 @@
 //! Which frame shows which part of the panorama, and how one passes into the next.
 //!
-//! A grid of nodes, some eight pixels apart, lies over the canvas. Each node is given to one frame
+//! A grid of nodes, some eight pixels apart (sixteen and more where there would be too many), lies over the canvas. Each node is given to one frame
 //! ([`super::labels`]); between nodes the frames pass into each other with the bilinear weights of their nodes. What they still differ by in light
 //! over longer distances is levelled out by a correction given at the nodes ([`super::levelling`]).
 
