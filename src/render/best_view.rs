@@ -4,14 +4,14 @@
 //! patch by patch of the frames' charts; at the frames' borders and round holes, row by row. (A patch at once where one frame is alone
 //! would be slower: so many rows are far apart in the frame and in the panorama.)
 
-use super::chart::{PATCH, of_patch};
+use super::chart::{EIGHT, PATCH, of_patch};
 use super::draw::NO_FRAME;
 use super::integer::{self, LitBlock, PARTS, Part};
 use super::row::Row;
 use super::run::{RUN, Run};
 use super::sample::Sample;
 use super::seams::{Across, Between, Seams, Share, Shares};
-use super::view::{View, pieces};
+use super::view::{View, cut, pieces};
 use super::warp::Points;
 use super::{Canvas, Tile};
 use arrayvec::ArrayVec;
@@ -168,10 +168,20 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
                 if cell.len() > 1 && !sources.is_empty() {
                     continue;
                 }
+                let mut draw = |columns: Range<usize>| {
+                    let done = self.block(strip, &columns, cell, down, corrections, pixels);
+                    if done {
+                        name(cell[0].frame, strip, &columns, sources);
+                        drawn.add(columns);
+                    }
+                    done
+                };
                 for piece in pieces(cell[0].from..cell[0].to) {
-                    if self.block(strip, &piece, cell, down, corrections, pixels) {
-                        name(cell[0].frame, strip, &piece, sources);
-                        drawn.add(piece);
+                    // Next to a frame's border, as much of it as lies inside.
+                    if !draw(piece.clone()) && piece.len() > EIGHT {
+                        for eight in cut::<EIGHT>(piece) {
+                            draw(eight);
+                        }
                     }
                 }
             }

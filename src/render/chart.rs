@@ -18,6 +18,8 @@ use std::ops::Range;
 
 /// Pixels of the canvas along each side of a patch.
 pub const PATCH: usize = 32;
+/// Pixels of a row that are looked at together.
+pub const EIGHT: usize = 8;
 /// From pixels to the patch's coordinates.
 pub const SCALE: f32 = 2.0 / PATCH as f32;
 /// Error of a polynomial at the most, pixels of the frame.
@@ -248,20 +250,21 @@ impl Chart {
         at
     }
 
-    /// Finds where the pixels of the tile's `row` appear, those of the patch that covers `columns` (of u and v) from `patch`
-    /// times [`PATCH`] on. False if they are to be projected one by one.
+    /// Finds where the pixels of the tile's `row` appear, eight of them (of u and v) from column 8 times `eight` on. False if they are to
+    /// be projected one by one.
     #[inline(always)]
-    pub fn row(
+    pub fn eight(
         &self,
         row: usize,
-        patch: usize,
-        u: &mut [f32; PATCH],
-        v: &mut [f32; PATCH],
+        eight: usize,
+        u: &mut [f32; EIGHT],
+        v: &mut [f32; EIGHT],
     ) -> bool {
-        let patch = row / PATCH * self.across + patch;
+        let patch = self.patch(row, eight * EIGHT);
         if let Some(at) = self.line(row, patch) {
-            for k in 0..PATCH {
-                let x = k as f32 * SCALE - 1.0;
+            let first = eight * EIGHT % PATCH;
+            for k in 0..EIGHT {
+                let x = (first + k) as f32 * SCALE - 1.0;
                 u[k] = ((at[3] * x + at[2]) * x + at[1]) * x + at[0];
                 v[k] = ((at[7] * x + at[6]) * x + at[5]) * x + at[4];
             }

@@ -1,6 +1,6 @@
 //! What a frame shows of a run of points: geometry and sampling in one pass.
 
-use super::chart::{Chart, PATCH};
+use super::chart::{Chart, EIGHT, PATCH};
 use super::integer::{self, Patch, Places, Source};
 use super::kernel::Kernel;
 use super::picture::Picture;
@@ -101,31 +101,31 @@ impl Run {
         (row, width): (usize, usize),
         columns: Range<usize>,
     ) {
-        let patches = patches(&columns);
+        let eights = eights(&columns);
         let limit = look.limit();
-        let mut rough = [false; RUN / PATCH];
+        let mut rough = [false; RUN / EIGHT];
         let (u, v) = (
-            self.u.as_chunks_mut::<PATCH>().0,
-            self.v.as_chunks_mut::<PATCH>().0,
+            self.u.as_chunks_mut::<EIGHT>().0,
+            self.v.as_chunks_mut::<EIGHT>().0,
         );
-        let seen = self.seen.as_chunks_mut::<PATCH>().0;
+        let seen = self.seen.as_chunks_mut::<EIGHT>().0;
         wide(
             #[inline(always)]
             || {
-                for patch in patches.clone() {
-                    let (u, v) = (&mut u[patch], &mut v[patch]);
-                    rough[patch] = !chart.row(row, patch, u, v);
-                    for (k, seen) in seen[patch].iter_mut().enumerate() {
+                for eight in eights.clone() {
+                    let (u, v) = (&mut u[eight], &mut v[eight]);
+                    rough[eight] = !chart.eight(row, eight, u, v);
+                    for (k, seen) in seen[eight].iter_mut().enumerate() {
                         *seen = within(u[k], v[k], limit);
                     }
                 }
             },
         );
-        for patch in patches.filter(|patch| rough[*patch]) {
-            let count = PATCH.min(width - patch * PATCH);
-            let (u, v) = (&mut u[patch][..count], &mut v[patch][..count]);
-            let seen = &mut seen[patch][..count];
-            look.project_all(points, row * width + patch * PATCH, (u, v, seen));
+        for eight in eights.filter(|eight| rough[*eight]) {
+            let count = EIGHT.min(width - eight * EIGHT);
+            let (u, v) = (&mut u[eight][..count], &mut v[eight][..count]);
+            let seen = &mut seen[eight][..count];
+            look.project_all(points, row * width + eight * EIGHT, (u, v, seen));
             for (k, seen) in seen.iter_mut().enumerate() {
                 *seen &= within(u[k], v[k], limit);
             }
@@ -326,21 +326,21 @@ impl Run {
         let (right, bottom) = (width - taps, height - taps);
         let channels = picture.format().channels as i32;
         let rounding = kernel.rounding();
-        let (u, v) = (self.u.as_chunks::<PATCH>().0, self.v.as_chunks::<PATCH>().0);
-        let seen = self.seen.as_chunks::<PATCH>().0;
-        let first = self.first.as_chunks_mut::<PATCH>().0;
-        let inside = self.inside.as_chunks_mut::<PATCH>().0;
+        let (u, v) = (self.u.as_chunks::<EIGHT>().0, self.v.as_chunks::<EIGHT>().0);
+        let seen = self.seen.as_chunks::<EIGHT>().0;
+        let first = self.first.as_chunks_mut::<EIGHT>().0;
+        let inside = self.inside.as_chunks_mut::<EIGHT>().0;
         let [across, down] = &mut self.phases;
-        let across = across.as_chunks_mut::<PATCH>().0;
-        let down = down.as_chunks_mut::<PATCH>().0;
+        let across = across.as_chunks_mut::<EIGHT>().0;
+        let down = down.as_chunks_mut::<EIGHT>().0;
         wide(
             #[inline(always)]
             || {
-                for patch in patches(&columns) {
-                    let (u, v, seen) = (&u[patch], &v[patch], &seen[patch]);
-                    let (across, down) = (&mut across[patch], &mut down[patch]);
-                    let (first, inside) = (&mut first[patch], &mut inside[patch]);
-                    for k in 0..PATCH {
+                for eight in eights(&columns) {
+                    let (u, v, seen) = (&u[eight], &v[eight], &seen[eight]);
+                    let (across, down) = (&mut across[eight], &mut down[eight]);
+                    let (first, inside) = (&mut first[eight], &mut inside[eight]);
+                    for k in 0..EIGHT {
                         let (x, s) = whole(u[k] + rounding);
                         let (y, t) = whole(v[k] + rounding);
                         across[k] = Kernel::phase_of(s, phases);
@@ -391,9 +391,9 @@ impl Run {
     }
 }
 
-/// The patches that some columns lie in.
-fn patches(columns: &Range<usize>) -> Range<usize> {
-    columns.start / PATCH..columns.end.div_ceil(PATCH)
+/// The eights that some columns lie in.
+fn eights(columns: &Range<usize>) -> Range<usize> {
+    columns.start / EIGHT..columns.end.div_ceil(EIGHT)
 }
 
 /// True within the outermost pixel centres.

@@ -377,9 +377,14 @@ fn lies(range: [[f32; 2]; 2], within: [[f32; 2]; 2]) -> bool {
 
 /// Columns of a row, patch by patch.
 pub fn pieces(columns: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    cut::<PATCH>(columns)
+}
+
+/// Columns of a row, cut at multiples of `N`.
+pub fn cut<const N: usize>(columns: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     let mut from = columns.start;
     std::iter::from_fn(move || {
-        let to = columns.end.min((from / PATCH + 1) * PATCH);
+        let to = columns.end.min((from / N + 1) * N);
         let piece = from..to;
         from = to;
         (!piece.is_empty()).then_some(piece)

@@ -18,7 +18,7 @@ mod plain;
 #[cfg(target_arch = "x86_64")]
 mod window;
 
-use super::chart::{Lanes, PATCH};
+use super::chart::{EIGHT, Lanes, PATCH};
 use super::kernel::Kernel;
 use super::light::Light;
 #[cfg(target_arch = "x86_64")]
@@ -108,9 +108,6 @@ pub struct Patch<'a> {
     /// Where its pixels appear, by powers of y.
     pub lines: &'a [Lanes; 4],
 }
-
-/// Pixels at a time.
-const EIGHT: usize = 8;
 
 /// The columns of a patch that are looked at for the sake of these: whole eights.
 pub fn reach(columns: &Range<usize>) -> Range<usize> {
