@@ -327,4 +327,33 @@ mod tests {
         let refused = Mask::read(&path, 32, 24).unwrap_err().to_string();
         assert!(refused.contains("60000 × 60000 px"), "{refused}");
     }
+
+    /// Plain TIFF files, and those that are not, or not whole: the same as by the general decoder.
+    #[test]
+    fn tiff_files_are_the_pictures_they_are() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frame.tif");
+        let value = |x: u32, y: u32, c: u32| (37 * x + 11 * y + 101 * c) as u8;
+        let grey = GrayImage::from_fn(32, 24, |x, y| image::Luma([value(x, y, 0)]));
+        let colour =
+            RgbImage::from_fn(32, 24, |x, y| image::Rgb([0, 1, 2].map(|c| value(x, y, c))));
+        let deep = DynamicImage::from(grey.clone()).to_luma16();
+        let pictures = [
+            (grey.into(), true),
+            (colour.into(), true),
+            (deep.into(), false),
+        ];
+        for (picture, plain) in pictures {
+            let picture: DynamicImage = picture;
+            picture.save(&path).unwrap();
+            let bytes = std::fs::read(&path).unwrap();
+            assert_eq!(plain_tiff(&bytes, 32, 24).is_some(), plain);
+            assert!(plain_tiff(&bytes, 24, 32).is_none());
+            let frame = FrameFile::picture(0, path.clone());
+            assert_eq!(load_colour(&frame, 32, 24).unwrap(), picture);
+            std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+            let refused = load_colour(&frame, 32, 24).unwrap_err();
+            assert!(matches!(refused, FrameError::Decode { .. }), "{refused}");
+        }
+    }
 }

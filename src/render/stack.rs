@@ -307,4 +307,17 @@ mod tests {
         assert_eq!(held(&stack), [0, 1, 3]);
         assert_eq!(stack.decode(2).ok(), before);
     }
+
+    #[test]
+    fn files_as_large_as_their_pictures_are_not_packed() {
+        let folder = tempfile::tempdir().unwrap();
+        let camera = Camera::from_vertical_fov(64, 64, 1.0);
+        for (name, packed) in [("frame.png", true), ("frame.tif", false)] {
+            let path = folder.path().join(name);
+            image::GrayImage::new(64, 64).save(&path).unwrap();
+            let files = vec![FrameFile::picture(0, path)].into();
+            let stack = FrameStack::open(&files, &camera, 0).unwrap();
+            assert_eq!(stack.is_packed(), packed, "{name}");
+        }
+    }
 }
