@@ -49,10 +49,7 @@ pub(super) fn encode(
     }
     let mut visible = Vec::with_capacity(3 * width * height);
     for y in 0..height {
-        let pixels = rows.row(y).chunks_exact(bytes);
-        let last = pixels.clone().next_back();
-        let all = pixels.chain(std::iter::repeat_with(|| last).flatten());
-        visible.extend(all.take(width).flat_map(|pixel| &pixel[..3]));
+        rows.push::<3>(y, &mut visible);
     }
     compress(&visible, size, 3, quality)
 }
@@ -69,11 +66,36 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// The pixels of a row that are there.
-    fn row(&self, y: usize) -> &[u8] {
+    /// Adds the first `C` bytes of every pixel of a row; those of the last one again for the pixels that are not there.
+    fn push<const C: usize>(&self, y: usize, out: &mut Vec<u8>) {
         let start = y.min(self.extent[1] - 1) * EDGE * self.bytes;
-        &self.pixels[start..][..self.extent[0].min(self.size[0]) * self.bytes]
+        let there = self.extent[0].min(self.size[0]);
+        let row = &self.pixels[start..][..there * self.bytes];
+        let from = out.len();
+        out.resize(from + there * C, 0);
+        let own = &mut out[from..];
+        match self.bytes {
+            2 => first_of::<2, C>(row, own),
+            4 => first_of::<4, C>(row, own),
+            _ => own.copy_from_slice(row),
+        }
+        for _ in there..self.size[0] {
+            out.extend_from_within(out.len() - C..);
+        }
     }
+}
+
+/// The first `C` of the `B` bytes of every pixel.
+fn first_of<const B: usize, const C: usize>(row: &[u8], out: &mut [u8]) {
+    wide(
+        #[inline(always)]
+        || {
+            let out = out.as_chunks_mut::<C>().0;
+            for (pixel, out) in row.as_chunks::<B>().0.iter().zip(out) {
+                out.copy_from_slice(&pixel[..C]);
+            }
+        },
+    );
 }
 
 /// As grey: the first byte of every pixel.
@@ -91,18 +113,7 @@ impl ImageBuffer for Rows<'_> {
     }
 
     fn fill_buffers(&self, y: u16, buffers: &mut [Vec<u8>; 4]) {
-        let row = self.row(usize::from(y));
-        let all = &mut buffers[0];
-        let end = all.len() + self.size[0];
-        match self.bytes {
-            1 => all.extend_from_slice(row),
-            _ => wide(
-                #[inline(always)]
-                || all.extend(row.as_chunks::<2>().0.iter().map(|pixel| pixel[0])),
-            ),
-        }
-        let last = all.last().copied().unwrap_or_default();
-        all.resize(end, last);
+        self.push::<1>(usize::from(y), &mut buffers[0]);
     }
 }
 

@@ -150,19 +150,12 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         };
         down.clear();
         down.extend(strip.clone().map(|row| self.between(row).t()));
-        for (columns, frame) in pieces(0..self.across.len()).zip(alone) {
-            let Some(frame) = *frame else {
-                continue;
-            };
-            let share = [Share::alone(frame, columns.clone())];
-            if self.block(strip, &columns, &share, down, corrections, pixels) {
-                name(frame, strip, &columns, sources);
-                drawn.add(columns);
-            }
-        }
         let first = self.between(strip.start);
-        for open in drawn.open(self.across.len()) {
-            self.seams.shares(&self.across, open, &first, shares);
+        for (columns, alone) in pieces(0..self.across.len()).zip(alone) {
+            shares.only(*alone, columns.clone());
+            if alone.is_none() {
+                self.seams.shares(&self.across, columns, &first, shares);
+            }
             for cell in shares.by_cells() {
                 // Who shows most is found pixel by pixel.
                 if cell.len() > 1 && !sources.is_empty() {
@@ -176,12 +169,11 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
                     }
                     done
                 };
-                for piece in pieces(cell[0].from..cell[0].to) {
-                    // Next to a frame's border, as much of it as lies inside.
-                    if !draw(piece.clone()) && piece.len() > EIGHT {
-                        for eight in cut::<EIGHT>(piece) {
-                            draw(eight);
-                        }
+                let all = cell[0].from..cell[0].to;
+                // Next to a frame's border, as much of it as lies inside.
+                if !draw(all.clone()) && all.len() > EIGHT {
+                    for eight in cut::<EIGHT>(all) {
+                        draw(eight);
                     }
                 }
             }
@@ -189,7 +181,7 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         drawn
     }
 
-    /// Draws some rows and columns of a patch; false without doing it if a frame does not show all of it.
+    /// Draws what frames share in some rows and columns of a patch, or one has alone; false without doing it if one does not show all of it.
     fn block(
         &self,
         rows: &Range<usize>,
@@ -199,27 +191,12 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         corrections: &[[f32; L]],
         pixels: &mut [&mut [u8]],
     ) -> bool {
-        if !self.copies {
-            return self.lit_block(rows, columns, shares, down, corrections, pixels);
+        let pixels = &mut pixels[rows.clone()];
+        if self.copies {
+            let view = self.view(shares[0].frame);
+            return view.is_some_and(|view| view.block::<C>(rows.clone(), columns.clone(), pixels));
         }
-        let view = self.view(shares[0].frame);
-        view.is_some_and(|view| {
-            let pixels = &mut pixels[rows.clone()];
-            view.block::<C>(rows.clone(), columns.clone(), pixels)
-        })
-    }
-
-    /// Draws what frames share in a cell, and where one is alone; false without doing it if one does not show all of it.
-    fn lit_block(
-        &self,
-        strip: &Range<usize>,
-        columns: &Range<usize>,
-        shares: &[Share],
-        down: &[f32],
-        corrections: &[[f32; L]],
-        pixels: &mut [&mut [u8]],
-    ) -> bool {
-        let part = |share: &Share| self.view(share.frame)?.part(strip, columns, share.corners);
+        let part = |share: &Share| self.view(share.frame)?.part(rows, columns, share.corners);
         let mut parts = ArrayVec::<Part, PARTS>::new();
         let mut weights = [0.0; 4];
         for share in shares {
@@ -237,14 +214,14 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         let (first, columns) = of_patch(columns);
         let block = LitBlock {
             parts: &parts,
-            row: strip.start % PATCH,
+            row: rows.start % PATCH,
             columns,
             first,
             across: self.across.between(),
             down,
             corrections,
         };
-        integer::lit_block::<C, L>(&block, &mut pixels[strip.clone()])
+        integer::lit_block::<C, L>(&block, pixels)
     }
 
     /// What some columns of a row are, mixed of the frames that share them.

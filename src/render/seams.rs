@@ -405,23 +405,18 @@ pub struct Share {
     weights: Option<usize>,
 }
 
-impl Share {
-    /// That of a frame that is alone in its columns.
-    pub fn alone(frame: usize, columns: Range<usize>) -> Self {
-        Self {
-            frame,
-            from: columns.start,
-            to: columns.end,
-            corners: [1.0; 4],
-            weights: None,
-        }
-    }
-}
-
 impl Shares {
     fn clear(&mut self) {
         self.list.clear();
         self.weights.clear();
+    }
+
+    /// Makes them the one of a frame that is alone in its columns, if there is one; else none.
+    pub fn only(&mut self, frame: Option<usize>, columns: Range<usize>) {
+        self.clear();
+        if let Some(frame) = frame {
+            self.whole(frame, columns.start, columns.end);
+        }
     }
 
     /// Columns that are one frame's.
@@ -430,7 +425,13 @@ impl Shares {
             Some(last) if last.weights.is_none() && last.frame == frame && last.to == from => {
                 last.to = to;
             }
-            _ => self.list.push(Share::alone(frame, from..to)),
+            _ => self.list.push(Share {
+                frame,
+                from,
+                to,
+                corners: [1.0; 4],
+                weights: None,
+            }),
         }
     }
 
