@@ -17,19 +17,19 @@ const OVERSAMPLING: f64 = 4.0;
 ///
 /// Source: ISO 12233:2017, annex D (edge-based spatial frequency response).
 pub fn mtf50(samples: impl IntoIterator<Item = (f64, f64)>, pixel_m: f64) -> Option<f64> {
-    let lsf = line_spread(&edge_spread(samples, pixel_m / OVERSAMPLING)?);
+    let mut lsf = line_spread(&edge_spread(samples, pixel_m / OVERSAMPLING)?);
     let n = lsf.len();
-    let plan = RealFftPlanner::<f64>::new().plan_fft_forward(n);
+    let plan = RealFftPlanner::<f32>::new().plan_fft_forward(n);
     let mut spectrum = plan.make_output_vec();
-    plan.process(&mut lsf.clone(), &mut spectrum).ok()?;
-    let still = spectrum.first()?.norm();
+    plan.process(&mut lsf, &mut spectrum).ok()?;
+    let still = f64::from(spectrum.first()?.norm());
     let per_bin = OVERSAMPLING / (n as f64 * pixel_m);
     let mut last = 1.0;
     for (k, value) in spectrum.iter().enumerate().skip(1) {
         // A central difference over two bins, and a bin's mean: sinc(2f) and sinc(f), f in cycles a bin.
         let f = k as f64 / n as f64;
         let taken = sinc(2.0 * f) * sinc(f);
-        let mtf = value.norm() / (still * taken);
+        let mtf = f64::from(value.norm()) / (still * taken);
         if f > 0.4 || !mtf.is_finite() {
             return None;
         }
@@ -64,11 +64,12 @@ fn edge_spread(samples: impl IntoIterator<Item = (f64, f64)>, bin_m: f64) -> Opt
 }
 
 /// Central differences under a Hann window.
-fn line_spread(esf: &[f64]) -> Vec<f64> {
+fn line_spread(esf: &[f64]) -> Vec<f32> {
     let n = esf.len().saturating_sub(2);
     let differences = esf.windows(3).map(|bins| bins[2] - bins[0]);
     let hann = |k: usize| 0.5 - 0.5 * (2.0 * PI * (k as f64 + 0.5) / n as f64).cos();
-    differences.enumerate().map(|(k, d)| d * hann(k)).collect()
+    let windowed = differences.enumerate().map(|(k, d)| (d * hann(k)) as f32);
+    windowed.collect()
 }
 
 fn sinc(x: f64) -> f64 {

@@ -7,6 +7,9 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
+/// Points that are looked up at a time.
+pub(super) const RUN: usize = 64;
+
 /// Rows of texels between two chainages, once around: lit grey levels.
 ///
 /// Texel `(k, n)` is centred at `s = (k + ½) texel`, `h = (n + ½) texel` for n from `first_row`, so texels of
@@ -83,17 +86,34 @@ impl Band {
             });
     }
 
-    /// Brightness that the camera's lamp adds where a ray of direction `d` meets the wall at angle θ (in `[0, 2π)`) and
-    /// chainage h (metres, within the band), grey levels. Of the nearest texel: texels are finer than pixels.
-    #[inline]
-    pub fn glint(&self, theta: f64, h_m: f64, d: &Vector3<f64>) -> f32 {
+    /// Adds the brightness that the camera's lamp adds where rays meet the wall at angles θ (in `[0, 2π)`) and chainages h (metres,
+    /// within the band), [`RUN`] at the most, to grey levels; `d`: the rays' directions. Of the nearest texel: texels are finer
+    /// than pixels.
+    #[inline(always)]
+    pub fn add_glints(
+        &self,
+        theta: &[f64],
+        h_m: &[f64],
+        d: impl Fn(usize) -> Vector3<f64>,
+        values: &mut [f32],
+    ) {
         if self.water.is_empty() {
-            return 0.0;
+            return;
         }
-        let column = (theta * (self.columns as f64 / TAU)) as usize;
-        let row = ((h_m / self.texel_m).floor() as i64 - self.first_row) as usize;
-        let k = row.min(self.rows - 1) * self.columns + column.min(self.columns - 1);
-        self.water[k].glint(theta, d)
+        let scale = self.columns as f64 / TAU;
+        let (last, last_row) = (self.columns as i32 - 1, self.rows as i32 - 1);
+        let (first_row, texel_m) = (self.first_row as f64, self.texel_m);
+        let mut at = [[0i32; 2]; RUN];
+        for (at, (theta, h_m)) in at.iter_mut().zip(theta.iter().zip(h_m)) {
+            let row = ((h_m / texel_m).floor() - first_row) as i32;
+            *at = [((theta * scale) as i32).min(last), row.clamp(0, last_row)];
+        }
+        for (k, (theta, [column, row])) in theta.iter().zip(at).enumerate() {
+            let water = self.water[row as usize * self.columns + column as usize];
+            if water.wet > 0 && !theta.is_nan() {
+                values[k] += water.glint(*theta, &d(k));
+            }
+        }
     }
 
     /// Rows that a band between two chainages has.
@@ -101,23 +121,44 @@ impl Band {
         ((h_m[1] / texel_m).floor() - (h_m[0] / texel_m).floor()) as usize + 3
     }
 
-    /// The grey level at angle θ (any turn) and chainage h (metres, within the band), bilinear.
-    #[inline]
-    pub fn at(&self, theta: f64, h_m: f64) -> f32 {
-        let x = theta * (self.columns as f64 / TAU) - 0.5;
-        let x = if x < 0.0 { x + self.columns as f64 } else { x };
-        let y = h_m / self.texel_m - 0.5 - self.first_row as f64;
-        let (column, row) = (
-            (x as usize).min(self.columns - 1),
-            (y as usize).min(self.rows - 2),
-        );
-        let (fx, fy) = ((x - column as f64) as f32, (y - row as f64) as f32);
-        let start = row * (self.columns + 1) + column;
-        let below = start + self.columns + 1;
-        let (a, b) = (self.texels[start], self.texels[start + 1]);
-        let (c, d) = (self.texels[below], self.texels[below + 1]);
-        let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
-        upper + (lower - upper) * fy
+    /// The grey levels at angles θ (in `[0, 2π)`) and chainages h (metres, within the band), [`RUN`] at the most, bilinear;
+    /// 0 where they are NaN.
+    #[inline(always)]
+    pub fn look(&self, theta: &[f64], h_m: &[f64], values: &mut [f32]) {
+        let columns = self.columns as f64;
+        let (last, last_row) = (self.columns as i32 - 1, self.rows as i32 - 2);
+        let (first_row, texel_m) = (self.first_row as f64, self.texel_m);
+        let mut at = [[0i32; RUN]; 2];
+        let mut share = [[0.0f32; RUN]; 2];
+        let mut corners = [[0.0f32; RUN]; 4];
+        let [column, row] = &mut at;
+        let [fx, fy] = &mut share;
+        for (k, (theta, h_m)) in theta.iter().zip(h_m).enumerate().take(RUN) {
+            let x = theta * (columns / TAU) - 0.5;
+            let x = if x < 0.0 { x + columns } else { x };
+            let y = h_m / texel_m - 0.5 - first_row;
+            column[k] = (x as i32).min(last);
+            row[k] = (y as i32).min(last_row);
+            fx[k] = (x - f64::from(column[k])) as f32;
+            fy[k] = (y - f64::from(row[k])) as f32;
+        }
+        for (k, (column, row)) in column.iter().zip(row).enumerate().take(theta.len()) {
+            let start = *row as usize * (self.columns + 1) + *column as usize;
+            let below = start + self.columns + 1;
+            let (upper, lower) = (
+                &self.texels[start..start + 2],
+                &self.texels[below..below + 2],
+            );
+            (corners[0][k], corners[1][k]) = (upper[0], upper[1]);
+            (corners[2][k], corners[3][k]) = (lower[0], lower[1]);
+        }
+        let [a, b, c, d] = &corners;
+        for (k, value) in values.iter_mut().enumerate().take(RUN) {
+            let upper = a[k] + (b[k] - a[k]) * fx[k];
+            let lower = c[k] + (d[k] - c[k]) * fx[k];
+            let own = upper + (lower - upper) * fy[k];
+            *value = if own.is_nan() { 0.0 } else { own };
+        }
     }
 }
 
@@ -157,7 +198,10 @@ mod tests {
         for theta in [0.0, 0.001, 1.0, 3.1, TAU - 0.001] {
             for h_m in [-1.0, 0.0, 0.777, 2.0] {
                 let expected = 100.0 + 40.0 * theta.cos() + 7.0 * h_m;
-                assert!((f64::from(band.at(theta, h_m)) - expected).abs() < 1e-3);
+                let mut seen = [0.0; 2];
+                band.look(&[theta, f64::NAN], &[h_m, f64::NAN], &mut seen);
+                assert!((f64::from(seen[0]) - expected).abs() < 1e-3);
+                assert_eq!(seen[1], 0.0);
             }
         }
     }

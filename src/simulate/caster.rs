@@ -1,12 +1,14 @@
 //! The ray caster.
 
-use super::band::Band;
+use super::band::{Band, RUN};
 use super::tunnel::{Place, Rays, Tunnel};
 use crate::camera::Camera;
 use crate::frames::GreyImage;
 use crate::trajectory::Pose;
+use crate::vectors::wide;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Cells of a pixel along each axis, at whose corners rays are cast.
 const CELLS: usize = 2;
@@ -35,30 +37,78 @@ pub(super) fn cast(
     let share = 1.0 / (n * n) as f32;
     let mut data = vec![0.0f32; width * height];
     let mut lines = vec![line(-0.5)];
+    let mut between = Angles::default();
     for (v, row) in data.chunks_exact_mut(width).enumerate() {
         // The last line of a row of pixels is the first of the next.
         lines.drain(..lines.len() - 1);
         lines.extend((1..=CELLS).map(|k| line(v as f64 - 0.5 + k as f64 / CELLS as f64)));
-        for (u, pixel) in row.iter_mut().enumerate() {
-            for down in &points {
-                let (upper, lower) = (&lines[down.cell], &lines[down.cell + 1]);
-                let edges: [Corner; CELLS + 1] = std::array::from_fn(|k| {
-                    upper[u * CELLS + k].towards(&lower[u * CELLS + k], down.share)
-                });
-                for across in &points {
-                    let (left, right) = (&edges[across.cell], &edges[across.cell + 1]);
-                    let Corner { theta, h_m, d } = left.towards(right, across.share);
-                    if theta.is_nan() {
-                        continue;
+        // All of some pixels' points lie close together on the wall.
+        for (n, pixels) in row.chunks_mut(RUN).enumerate() {
+            let first = n * RUN;
+            wide(
+                #[inline(always)]
+                || {
+                    for down in &points {
+                        let ends = [&lines[down.cell], &lines[down.cell + 1]];
+                        between.set(ends, down.share, first..first + pixels.len());
+                        for across in &points {
+                            let points = [down, across];
+                            add_points(band, ends, &between, points, first, pixels);
+                        }
                     }
-                    let theta = if theta < TAU { theta } else { theta - TAU };
-                    *pixel += band.at(theta, h_m) + band.glint(theta, h_m, &d);
-                }
-            }
+                },
+            );
         }
         row.iter_mut().for_each(|pixel| *pixel *= share);
     }
     GreyImage::new(width, height, data)
+}
+
+/// Adds what is seen at one point of each of some pixels of a row, from column `first` on; `between`: theirs.
+#[inline(always)]
+fn add_points(
+    band: &Band,
+    [upper, lower]: [&Line; 2],
+    between: &Angles,
+    [down, across]: [&Point; 2],
+    first: usize,
+    pixels: &mut [f32],
+) {
+    let (left, right) = (across.cell, across.cell + 1);
+    let count = pixels.len();
+    let (mut theta, mut h_m, mut values) = ([0.0; RUN], [0.0; RUN], [0.0; RUN]);
+    let [a, b] = [left, right].map(|k| &between.thetas(k)[..count]);
+    let [p, q] = [left, right].map(|k| &between.chainages(k)[..count]);
+    for k in 0..count {
+        let angle = turned(a[k], b[k], across.share);
+        theta[k] = if angle >= TAU { angle - TAU } else { angle };
+        h_m[k] = p[k] + (q[k] - p[k]) * across.share;
+    }
+    let (theta, h_m) = (&theta[..count], &h_m[..count]);
+    band.look(theta, h_m, &mut values);
+    let d = |k: usize| {
+        let edge = |corner: usize| {
+            let (from, to) = (
+                upper.direction(first + k, corner),
+                lower.direction(first + k, corner),
+            );
+            from + (to - from) * down.share
+        };
+        edge(left) + (edge(right) - edge(left)) * across.share
+    };
+    band.add_glints(theta, h_m, d, &mut values);
+    for (pixel, value) in pixels.iter_mut().zip(&values) {
+        *pixel += value;
+    }
+}
+
+/// What lies between two angles at some share of the shorter way around, −2π to 4π.
+#[inline(always)]
+fn turned(from: f64, to: f64, share: f64) -> f64 {
+    let turn = to - from;
+    let more = if turn > 0.5 * TAU { TAU } else { 0.0 };
+    let less = if turn < -0.5 * TAU { TAU } else { 0.0 };
+    from + more + (turn - more + less) * share
 }
 
 /// Where a point lies in a pixel, along one axis.
@@ -80,63 +130,92 @@ impl Point {
     }
 }
 
-/// A ray that has been cast.
-#[derive(Clone, Copy)]
-struct Corner {
-    /// Angle, radians, and chainage, metres, where it meets the wall.
-    theta: f64,
-    h_m: f64,
-    /// Its direction.
-    d: Vector3<f64>,
+/// Where rays through the corners of cells meet the wall: for each of a pixel's [`CELLS`] first corners along a row a list, in which entry u is
+/// that of pixel u. The first list is longer by one: the last corner of a pixel is the first one of the next.
+#[derive(Default)]
+struct Angles {
+    /// Angles, radians; NaN where the lens shows nothing, and so is all that lies next to it.
+    theta: [Vec<f64>; CELLS],
+    /// Chainages, metres.
+    h_m: [Vec<f64>; CELLS],
 }
 
-impl Corner {
-    /// Where the lens shows nothing; so is all that lies next to it.
-    const DARK: Self = Self {
-        theta: f64::NAN,
-        h_m: f64::NAN,
-        d: Vector3::new(f64::NAN, f64::NAN, f64::NAN),
-    };
+impl Angles {
+    /// Those of all pixels' corner `k`, up to [`CELLS`].
+    fn thetas(&self, k: usize) -> &[f64] {
+        &self.theta[k % CELLS][k / CELLS..]
+    }
 
-    /// What lies between two, the shorter way around.
-    #[inline]
-    fn towards(&self, other: &Self, share: f64) -> Self {
-        let turn = other.theta - self.theta;
-        let (from, turn) = if turn > 0.5 * TAU {
-            (self.theta + TAU, turn - TAU)
-        } else if turn < -0.5 * TAU {
-            (self.theta, turn + TAU)
-        } else {
-            (self.theta, turn)
-        };
-        Self {
-            theta: from + turn * share,
-            h_m: self.h_m + (other.h_m - self.h_m) * share,
-            d: self.d + (other.d - self.d) * share,
+    fn chainages(&self, k: usize) -> &[f64] {
+        &self.h_m[k % CELLS][k / CELLS..]
+    }
+
+    /// Makes them what lies between those of two lines, of some pixels only.
+    #[inline(always)]
+    fn set(&mut self, [upper, lower]: [&Line; 2], share: f64, pixels: Range<usize>) {
+        for k in 0..CELLS {
+            let own = pixels.start..(pixels.end + 1).min(upper.at.theta[k].len());
+            let (theta, h_m) = (&mut self.theta[k], &mut self.h_m[k]);
+            theta.resize(own.len(), 0.0);
+            h_m.resize(own.len(), 0.0);
+            let (a, b) = (&upper.at.theta[k], &lower.at.theta[k]);
+            let ends = a[own.clone()].iter().zip(&b[own.clone()]);
+            for (theta, (a, b)) in theta.iter_mut().zip(ends) {
+                *theta = turned(*a, *b, share);
+            }
+            let (p, q) = (&upper.at.h_m[k], &lower.at.h_m[k]);
+            let ends = p[own.clone()].iter().zip(&q[own]);
+            for (h_m, (p, q)) in h_m.iter_mut().zip(ends) {
+                *h_m = p + (q - p) * share;
+            }
         }
     }
 }
 
-/// The rays through the corners of the cells along a line of the picture at row `v`.
-fn cast_line(rays: &Rays, camera: &Camera, pose: &Pose, v: f64) -> Vec<Corner> {
+/// Rays that have been cast through the corners of cells along a line of the picture.
+#[derive(Default)]
+struct Line {
+    at: Angles,
+    /// Their directions.
+    d: [Vec<Vector3<f64>>; CELLS],
+}
+
+impl Line {
+    /// The direction through corner `k` of pixel u, up to [`CELLS`].
+    fn direction(&self, u: usize, k: usize) -> Vector3<f64> {
+        self.d[k % CELLS][u + k / CELLS]
+    }
+
+    fn push(&mut self, corner: usize, Place { theta, h_m }: Place, d: Vector3<f64>) {
+        self.at.theta[corner % CELLS].push(theta);
+        self.at.h_m[corner % CELLS].push(h_m);
+        self.d[corner % CELLS].push(d);
+    }
+}
+
+/// The rays along a line of the picture at row `v`.
+fn cast_line(rays: &Rays, camera: &Camera, pose: &Pose, v: f64) -> Line {
     let corners = camera.width as usize * CELLS + 1;
     let column = |k: usize| k as f64 / CELLS as f64 - 0.5;
-    let corner = |d: Vector3<f64>| {
-        let Place { theta, h_m } = rays.hit(&d);
-        Corner { theta, h_m, d }
-    };
+    let mut line = Line::default();
     // Without distortion rays move evenly along a row.
     if let (true, Some(first)) = (camera.lens.is_straight(), camera.ray(0.0, v)) {
         let first = pose.r_wc * first;
         let right = pose.r_wc * Vector3::x() / camera.fx;
-        let cast = |k: usize| corner(first + right * column(k));
-        return (0..corners).map(cast).collect();
+        for k in 0..corners {
+            let d = first + right * column(k);
+            line.push(k, rays.hit(&d), d);
+        }
+        return line;
     }
-    let cast = |k: usize| {
-        let ray = camera.ray(column(k), v);
-        ray.map_or(Corner::DARK, |ray| corner(pose.r_wc * ray))
-    };
-    (0..corners).map(cast).collect()
+    for k in 0..corners {
+        let (place, d) = match camera.ray(column(k), v) {
+            Some(ray) => (rays.hit(&(pose.r_wc * ray)), pose.r_wc * ray),
+            None => (Place::NOWHERE, Vector3::repeat(f64::NAN)),
+        };
+        line.push(k, place, d);
+    }
+    line
 }
 
 #[cfg(test)]
@@ -194,16 +273,20 @@ mod tests {
             let pixel_m = 2.0 / camera.fy;
             for v in [0.0, 59.0, 119.0] {
                 let lines = [v, v + 0.5].map(|v| cast_line(&caster, &camera, &pose, v));
-                for k in 0..2 * camera.width as usize {
-                    let left = lines[0][k].towards(&lines[1][k], 0.3);
-                    let right = lines[0][k + 1].towards(&lines[1][k + 1], 0.3);
-                    let between = left.towards(&right, 0.6);
+                let mut between = Angles::default();
+                between.set([&lines[0], &lines[1]], 0.3, 0..camera.width as usize);
+                for k in 0..CELLS * camera.width as usize {
+                    let (pixel, cell) = (k / CELLS, k % CELLS);
+                    let [left, right] = [cell, cell + 1].map(|k| between.thetas(k)[pixel]);
+                    let [before, after] = [cell, cell + 1].map(|k| between.chainages(k)[pixel]);
                     let u = 0.5 * (k as f64 + 0.6) - 0.5;
                     let d = pose.r_wc * camera.ray(u, v + 0.15).unwrap();
                     let Place { theta, h_m } = caster.hit(&d);
-                    let turned = (between.theta - theta + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
-                    assert!(2.0 * turned.abs() < 1e-3 * pixel_m, "{u} {v}: {turned}");
-                    assert!((between.h_m - h_m).abs() < 1e-3 * pixel_m, "{u} {v}");
+                    let off = turned(left, right, 0.6) - theta;
+                    let off = (off + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
+                    assert!(2.0 * off.abs() < 1e-3 * pixel_m, "{u} {v}: {off}");
+                    let h_off = before + 0.6 * (after - before) - h_m;
+                    assert!(h_off.abs() < 1e-3 * pixel_m, "{u} {v}");
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! A simulated survey in memory.
 
-use super::band::Band;
+use super::band::{Band, RUN};
 use super::caster::cast;
 use super::damp::Damp;
 use super::lamp::Lamp;
@@ -172,16 +172,20 @@ impl Scene {
             let band = self.band([from_m, from_m + STRIP_ROWS as f64 * pixel_m]);
             let lines = pixels.par_chunks_mut(columns).enumerate();
             lines.for_each(|(row, line)| {
-                for (column, pixel) in line.iter_mut().enumerate() {
-                    for down in 0..n {
-                        let h_m = from_m + (row as f64 + share(down)) * pixel_m;
-                        for across in 0..n {
-                            let theta = (column as f64 + share(across)) * TAU / columns as f64;
-                            *pixel += band.at(theta, h_m);
+                for (down, across) in (0..n * n).map(|k| (k / n, k % n)) {
+                    let h_m = [from_m + (row as f64 + share(down)) * pixel_m; RUN];
+                    for (part, pixels) in line.chunks_mut(RUN).enumerate() {
+                        let column = |k: usize| (part * RUN + k) as f64 + share(across);
+                        let theta: [f64; RUN] =
+                            std::array::from_fn(|k| column(k) * TAU / columns as f64);
+                        let (mut values, count) = ([0.0; RUN], pixels.len());
+                        band.look(&theta[..count], &h_m[..count], &mut values);
+                        for (pixel, value) in pixels.iter_mut().zip(&values) {
+                            *pixel += value;
                         }
                     }
-                    *pixel /= (n * n) as f32;
                 }
+                line.iter_mut().for_each(|pixel| *pixel /= (n * n) as f32);
             });
         }
         GreyImage::new(columns, rows, data)

@@ -33,6 +33,14 @@ pub(super) struct Place {
     pub h_m: f64,
 }
 
+impl Place {
+    /// Where a ray goes that the lens does not show.
+    pub const NOWHERE: Self = Self {
+        theta: f64::NAN,
+        h_m: f64::NAN,
+    };
+}
+
 /// Rounds of false position at the most.
 const ROUNDS: usize = 60;
 /// A place is on the wall if it is so close to it, shares of the distance from the axis.
@@ -217,10 +225,7 @@ impl Rays<'_> {
             growth_m = next.point.y - inside.point.y;
             inside = next;
         }
-        Place {
-            theta: f64::NAN,
-            h_m: f64::NAN,
-        }
+        Place::NOWHERE
     }
 }
 

@@ -1,9 +1,7 @@
 //! Tunnels that are not round or not straight, from the simulator, which has equations of its own, to the panorama.
 
-mod support;
-
+use crate::support::{fail, succeed, text};
 use std::path::Path;
-use support::{fail, succeed, text};
 
 /// Simulates a survey, refines it and compares: the wall error, pixels RMS, and that of the initial poses.
 fn refined(folder: &Path, arguments: &[&str]) -> [f64; 2] {

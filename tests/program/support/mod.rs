@@ -1,7 +1,7 @@
 //! What the integration tests share: the fixture, copies of its first frames, and running the program.
 
-// Every test binary uses its own part of this.
-#![allow(dead_code)]
+pub mod chromium;
+pub mod npm;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

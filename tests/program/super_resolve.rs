@@ -262,7 +262,7 @@ fn slanted_edges_are_sharper() {
     );
 }
 
-/// `cargo test --release --test super_resolve -- --ignored --nocapture`: the figures of full-size surveys.
+/// `cargo test --release --test program super_resolve:: -- --ignored --nocapture`: the figures of full-size surveys.
 #[test]
 #[ignore = "minutes; prints a table"]
 fn figures() {

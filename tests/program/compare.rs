@@ -1,8 +1,6 @@
 //! Refine and compare on frames that a renderer independent of this program made.
 
-mod support;
-
-use support::{blender_survey, fail, first_frames, succeed, text};
+use crate::support::{self, blender_survey, fail, first_frames, succeed, text};
 
 fn number(value: &serde_json::Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)

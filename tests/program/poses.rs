@@ -1,9 +1,7 @@
 //! Poses in other formats and conventions, through the program.
 
-mod support;
-
+use crate::support::{self, edit, fail, first_frames, succeed, text};
 use std::path::{Path, PathBuf};
-use support::{edit, fail, first_frames, succeed, text};
 use tunnelstitch::trajectory::{
     CameraAxes, Pose, StampedPose, Trajectory, TunnelAxis, poses_of, se3, so3, tum,
 };

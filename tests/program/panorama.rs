@@ -1,10 +1,8 @@
 //! Panoramas through the program: what they look like, and that they depend on nothing but the input.
 
-mod support;
-
+use crate::support::{self, blender_survey, fail, first_frames, succeed, text};
 use image::{DynamicImage, GenericImageView};
 use std::path::{Path, PathBuf};
-use support::{blender_survey, fail, first_frames, succeed, text};
 
 /// Resolution of the small panoramas here, pixels per metre.
 const PX_PER_METRE: &str = "30";

@@ -19,7 +19,7 @@ fn lens(model: &str) -> Lens {
 /// Projections agree to 1e-9 px, and the rays of those pixels lead back to the points.
 #[test]
 fn projections_agree_with_opencv() {
-    let text = include_str!("../fixtures/opencv/projections.csv");
+    let text = include_str!("../../fixtures/opencv/projections.csv");
     let mut compared = 0;
     for line in text.lines().skip(2) {
         let (model, numbers) = line.split_once(',').unwrap();

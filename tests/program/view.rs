@@ -1,17 +1,11 @@
 //! The viewer: its server from outside, and its page in a browser.
 
-#[path = "support/chromium.rs"]
-mod chromium;
-#[path = "support/npm.rs"]
-mod npm;
-mod support;
-
+use crate::support::{blender_survey, chromium, fail, npm, succeed, text};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
-use support::{blender_survey, fail, succeed, text};
 use tunnelstitch::inspect::{Marks, Viewer};
 
 /// A server, ended with this.

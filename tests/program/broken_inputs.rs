@@ -1,10 +1,8 @@
 //! A table of broken inputs: each ends with exit code 3 (2 for wrong usage), a message that names the file, line or frame, no panic, and
 //! no output.
 
-mod support;
-
+use crate::support::{self, first_frames, text, tunnelstitch};
 use std::path::Path;
-use support::{first_frames, text, tunnelstitch};
 
 /// What is done to a survey of three frames.
 enum Damage {

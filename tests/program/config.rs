@@ -1,10 +1,8 @@
 //! Where options come from, and the record beside every result.
 
-mod support;
-
+use crate::support::{fail, first_frames, succeed, text};
 use std::path::Path;
 use std::process::{Command, Output};
-use support::{fail, first_frames, succeed, text};
 
 /// A survey that holds options for `stitch`.
 fn survey(options: &str) -> tempfile::TempDir {

@@ -19,10 +19,10 @@ pub fn find() -> Option<PathBuf> {
     None
 }
 
-/// Runs a script of `tests/support` with Node.js and returns what it printed.
+/// Runs a script of `tests/program/support` with Node.js and returns what it printed.
 pub fn node(script: &str, arguments: &[&str]) -> String {
     let script = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/support")
+        .join("tests/program/support")
         .join(script);
     let output = Command::new("node")
         .arg(script)

@@ -1,15 +1,14 @@
 //! The report of a survey with a black frame: its numbers, its page, and how that looks in a browser.
 
-#[path = "support/chromium.rs"]
-mod chromium;
-mod support;
-
-use chromium::Look;
+use crate::support::{
+    self,
+    chromium::{self, Look},
+    fail, succeed, text,
+};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use support::{fail, succeed, text};
 use tunnelstitch::report::{PICTURES, Pictures, Report, page};
 
 /// A survey's results.

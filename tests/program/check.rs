@@ -1,8 +1,6 @@
 //! `init` and `check` through the program.
 
-mod support;
-
-use support::{edit, fail, first_frames, succeed, text, tunnelstitch};
+use crate::support::{edit, fail, first_frames, succeed, text, tunnelstitch};
 
 #[test]
 fn a_folder_becomes_a_survey_and_is_sound() {

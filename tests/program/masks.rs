@@ -1,12 +1,10 @@
 //! What never shows the wall, and wall that is not to be compared: through the program.
 
-mod support;
-
+use crate::support::{edit, fail, succeed, text};
 use image::GrayImage;
 use nalgebra::Vector2;
 use serde_json::Value;
 use std::path::Path;
-use support::{edit, fail, succeed, text};
 use tunnelstitch::evaluate::wall_error;
 use tunnelstitch::survey::Survey;
 use tunnelstitch::trajectory::{Pose, poses_of};

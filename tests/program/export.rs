@@ -1,14 +1,10 @@
 //! The wall in three dimensions: validated by the programs of others, and read back.
 
-#[path = "support/npm.rs"]
-mod npm;
-mod support;
-
+use crate::support::{self, blender_survey, fail, npm, succeed, text};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
-use support::{blender_survey, fail, succeed, text};
 
 struct Work {
     _dir: tempfile::TempDir,

@@ -1,9 +1,7 @@
 //! Refinement of the Blender-rendered fixture through the program, judged against the true poses.
 
-mod support;
-
+use crate::support::{self, blender_survey, first_frames, succeed, text, tunnelstitch};
 use std::path::Path;
-use support::{blender_survey, first_frames, succeed, text, tunnelstitch};
 
 /// Refines the fixture into `out`.
 fn refine(out: &Path, threads: &str) {
@@ -99,10 +97,10 @@ fn a_flat_wall_is_never_called_photometric() {
 /// Low contrast under much noise: a hard case, but no error.
 #[test]
 fn faint_walls_and_odd_frames_are_refined_without_an_error() {
-    let faint = ["--frames", "24", "--size", "160x120", "--wall", "concrete"];
+    let faint = ["--frames", "16", "--size", "160x120", "--wall", "concrete"];
     refine_simulated(&[&faint[..], &["--noise", "6"]].concat());
     refine_simulated(&["--frames", "6", "--size", "16x120", "--turn-deg", "1"]);
-    refine_simulated(&["--frames", "4", "--size", "400x16", "--fov-deg", "4"]);
+    refine_simulated(&["--frames", "3", "--size", "400x16", "--fov-deg", "4"]);
 }
 
 /// World-to-camera poses are a mistake anybody makes once: it must be said.

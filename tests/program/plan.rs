@@ -1,9 +1,7 @@
 //! Initial poses from a plan, through the program.
 
-mod support;
-
+use crate::support::{edit, fail, first_frames, succeed, text};
 use std::path::Path;
-use support::{edit, fail, first_frames, succeed, text};
 use tunnelstitch::survey::Survey;
 use tunnelstitch::trajectory::{StampedPose, tum};
 

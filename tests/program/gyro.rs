@@ -1,13 +1,11 @@
 //! Initial poses from a gyro's log, through the program: a simulated survey, a log made from its true rotations, refinement.
 
-mod support;
-
+use crate::support::{fail, succeed, text, tunnelstitch};
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;
 use std::path::Path;
-use support::{fail, succeed, text, tunnelstitch};
 use tunnelstitch::evaluate::wall_error;
 use tunnelstitch::survey::Survey;
 use tunnelstitch::trajectory::{Pose, poses_of, tum};

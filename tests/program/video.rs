@@ -1,11 +1,9 @@
 //! Frames out of a video, through the program. Needs `ffmpeg` and `ffprobe`.
 
-mod support;
-
+use crate::support::{blender_survey, edit, fail, succeed, text};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use support::{blender_survey, edit, fail, succeed, text};
 use tunnelstitch::evaluate::wall_error;
 use tunnelstitch::frames::Video;
 use tunnelstitch::survey::Survey;

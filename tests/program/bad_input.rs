@@ -1,9 +1,7 @@
 //! Bad input ends with a clear message, exit code 3 and no output; never with a panic.
 
-mod support;
-
+use crate::support::{edit, fail, first_frames, text};
 use std::path::Path;
-use support::{edit, fail, first_frames, text};
 
 /// Damages a copy of the first three frames and returns what `refine` says of it.
 fn refine_after(damage: impl FnOnce(&Path)) -> String {

@@ -1,8 +1,6 @@
 //! Every lens through the program: simulated, refined, stitched, and judged against the true poses.
 
-mod support;
-
-use support::{fail, succeed, text};
+use crate::support::{fail, succeed, text};
 
 const PICTURE: &str = r#""width":320,"height":240,"cx":161.5,"cy":118.2"#;
 

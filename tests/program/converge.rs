@@ -1,8 +1,6 @@
 //! Convergence tests through the program, as small as they get.
 
-mod support;
-
-use support::{succeed, text};
+use crate::support::{succeed, text};
 
 #[test]
 fn a_sweep_is_written_resumed_and_drawn() {

@@ -1,11 +1,9 @@
 //! From the panorama to the frames and back, through the program.
 
-mod support;
-
+use crate::support::{fail, first_frames, succeed, text};
 use image::GenericImageView;
 use serde_json::Value;
 use std::path::Path;
-use support::{fail, first_frames, succeed, text};
 
 fn locate(survey: &Path, point: &[&str]) -> Value {
     let mut arguments = vec!["locate", text(survey), "--poses", "truth", "--json"];

@@ -1,13 +1,11 @@
 //! Runs that are killed and go on.
 
-mod support;
-
+use crate::support::{succeed, text};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
-use support::{succeed, text};
 
 /// Times that each command is killed at the least.
 const KILLS: usize = 7;

@@ -1,10 +1,8 @@
 //! Self-calibration through the program: wrong calibrations are found, or refused with the reason.
 
-mod support;
-
+use crate::support::{blender_survey, edit, fail, first_frames, succeed, text};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
-use support::{blender_survey, edit, fail, first_frames, succeed, text};
 use tunnelstitch::trajectory::{Pose, tum};
 
 /// A simulated survey in `dir`.

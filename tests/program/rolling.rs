@@ -1,10 +1,8 @@
 //! Rolling shutter through the program: rows read over 20 ms while the camera turns at 90 degrees a second.
 
-mod support;
-
+use crate::support::{edit, fail, succeed, text, tunnelstitch};
 use serde_json::Value;
 use std::path::Path;
-use support::{edit, fail, succeed, text, tunnelstitch};
 
 const READOUT: &str = "readout_ms = 20.0\n";
 

@@ -1,9 +1,7 @@
 //! Simulated surveys and the demo, through the program.
 
-mod support;
-
+use crate::support::{self, fail, succeed, text};
 use std::path::Path;
-use support::{fail, succeed, text};
 use tunnelstitch::frames::StoredFrame;
 use tunnelstitch::survey::Survey;
 

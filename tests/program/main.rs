@@ -1,0 +1,29 @@
+//! The program as its users meet it: run from outside, on files, and judged by what it prints and writes.
+
+mod bad_input;
+mod broken_inputs;
+mod calibrate;
+mod check;
+mod compare;
+mod config;
+mod converge;
+mod export;
+mod gyro;
+mod lenses;
+mod locate;
+mod masks;
+mod mutations;
+mod opencv;
+mod panorama;
+mod plan;
+mod poses;
+mod refine;
+mod report;
+mod resume;
+mod rolling;
+mod shapes;
+mod simulate;
+mod super_resolve;
+mod support;
+mod video;
+mod view;
