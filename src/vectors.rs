@@ -45,6 +45,26 @@ pub fn prefetch(simd: pulp::x86::V3, samples: &[u8], at: usize) {
     simd.sse._mm_prefetch::<_MM_HINT_T0>(pointer.cast());
 }
 
+/// Asks for rows that will be written soon.
+pub fn prefetch_rows(rows: &[&mut [u8]]) {
+    /// Bytes that come at once.
+    #[cfg(target_arch = "x86_64")]
+    const LINE: usize = 64;
+    #[cfg(target_arch = "x86_64")]
+    avx2(
+        #[inline(always)]
+        |simd| {
+            for row in rows {
+                for at in (0..row.len()).step_by(LINE) {
+                    prefetch(simd, row, at);
+                }
+            }
+        },
+    );
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = rows;
+}
+
 #[cfg(target_arch = "x86_64")]
 struct Avx2<F>(pulp::x86::V3, F);
 

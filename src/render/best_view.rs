@@ -14,6 +14,7 @@ use super::seams::{Across, Between, Seams, Share, Shares};
 use super::view::{View, cut, pieces};
 use super::warp::Points;
 use super::{Canvas, Tile};
+use crate::vectors::prefetch_rows;
 use arrayvec::ArrayVec;
 use std::ops::Range;
 
@@ -71,6 +72,10 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         // Of each patch of a row of them, the frame that it shows alone.
         let mut alone = ArrayVec::<Option<usize>, { RUN / PATCH }>::new();
         for strip in self.seams.strips(self.canvas, self.tile) {
+            let next = strip.end..(strip.end + strip.len()).min(pixels.len());
+            if let Some(next) = T::bytes(&mut pixels[next]) {
+                prefetch_rows(next);
+            }
             if strip.start.is_multiple_of(PATCH) {
                 let end = (strip.start + PATCH).min(self.tile.rows as usize);
                 let rows = strip.start..end;
@@ -285,10 +290,15 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
                 }
             }
         }
-        let sources = &mut sources[columns.clone()];
-        if !sources.contains(&NO_FRAME) {
+        // At the edge of what is seen: frames that no node of the grid shows.
+        let open = |source: &u32| *source == NO_FRAME;
+        let own = &sources[columns.clone()];
+        let (Some(first), Some(last)) = (own.iter().position(open), own.iter().rposition(open))
+        else {
             return;
-        }
+        };
+        let columns = columns.start + first..columns.start + last + 1;
+        let sources = &mut sources[columns.clone()];
         let pixels = &mut pixels[columns.start * step..columns.end * step];
         let mut other = [0; 4 * RUN];
         for view in self.views {

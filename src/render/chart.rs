@@ -209,6 +209,11 @@ impl Chart {
             .all(|patch| matches!(patch, Patch::Outside))
     }
 
+    /// True if no pixel of the patch that a pixel of the tile lies in lies in the frame.
+    pub fn is_outside_at(&self, row: usize, column: usize) -> bool {
+        matches!(self.patches[self.patch(row, column)], Patch::Outside)
+    }
+
     /// True if some pixels must be projected one by one.
     pub fn is_rough(&self) -> bool {
         self.patches

@@ -132,6 +132,11 @@ impl Run {
         }
     }
 
+    /// Makes some columns ones that the frame does not show.
+    pub fn see_nothing(&mut self, columns: Range<usize>) {
+        self.seen[columns].fill(false);
+    }
+
     /// Points whose kernel meets a masked pixel are not seen.
     fn hide(&mut self, picture: &Picture, kernel: &Kernel, columns: Range<usize>) {
         if picture.mask().is_some() {

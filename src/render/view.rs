@@ -177,7 +177,9 @@ impl<'a> View<'a> {
         columns: Range<usize>,
     ) {
         for piece in pieces(columns) {
-            if !self.sample_row(run, place.0, piece.clone()) {
+            if self.chart.is_outside_at(place.0, piece.start) {
+                run.see_nothing(piece);
+            } else if !self.sample_row(run, place.0, piece.clone()) {
                 run.locate(&self.chart, &self.look, points, place, piece.clone());
                 self.sample_located(run, points, place, piece);
             }
@@ -238,6 +240,11 @@ impl<'a> View<'a> {
         for piece in pieces(columns.clone()) {
             let first = (piece.start - columns.start) * (C + 1);
             let own = &mut pixels[first..first + piece.len() * (C + 1)];
+            if self.chart.is_outside_at(place.0, piece.start) {
+                run.see_nothing(piece);
+                own.fill(0);
+                continue;
+            }
             run.locate(&self.chart, &self.look, points, place, piece.clone());
             let kernel = self.kernel(run, points, place, piece.clone());
             match (kernel, self.picture.samples()) {

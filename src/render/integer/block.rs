@@ -430,7 +430,7 @@ fn place<const C: usize, const TAPS: usize>(
     let phases = Kernel::integer_phases_of(taps);
     let before = avx._mm256_set1_epi32(Kernel::before_of(taps) as i32);
     let line = line(simd, patch.lines, row);
-    for (columns, place) in columns.iter().zip(places) {
+    for (k, (columns, place)) in columns.iter().zip(places).enumerate() {
         let x: __m256 = cast(columns.x);
         let (left, s) = whole(simd, polynomial(simd, x, &line[..4]), phases);
         let (top, t) = whole(simd, polynomial(simd, x, &line[4..]), phases);
@@ -441,10 +441,12 @@ fn place<const C: usize, const TAPS: usize>(
             ],
             phases: [cast(s), cast(t)],
         };
-        // What the next rows need.
-        let [column, row] = place.corner.map(|corner| corner[0] as usize);
-        let below = (row + taps + 1) * patch.source.stride + column * C;
-        vectors::prefetch(simd, patch.source.samples, below);
+        // What the next rows need: sixteen pixels in colour take less than a line of the cache, or little more.
+        if k % 2 == 0 {
+            let [column, row] = place.corner.map(|corner| corner[0] as usize);
+            let below = (row + taps + 1) * patch.source.stride + column * C;
+            vectors::prefetch(simd, patch.source.samples, below);
+        }
     }
 }
 
