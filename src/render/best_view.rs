@@ -290,15 +290,11 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
                 }
             }
         }
-        // At the edge of what is seen: frames that no node of the grid shows.
-        let open = |source: &u32| *source == NO_FRAME;
-        let own = &sources[columns.clone()];
-        let (Some(first), Some(last)) = (own.iter().position(open), own.iter().rposition(open))
-        else {
+        // As in `mix`.
+        if !sums.has_holes(columns.clone()) {
             return;
-        };
-        let columns = columns.start + first..columns.start + last + 1;
-        let sources = &mut sources[columns.clone()];
+        }
+        let sources = &mut sums.sources_mut()[columns.clone()];
         let pixels = &mut pixels[columns.start * step..columns.end * step];
         let mut other = [0; 4 * RUN];
         for view in self.views {

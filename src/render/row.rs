@@ -45,9 +45,9 @@ impl Row {
         &mut self.sources
     }
 
-    /// Whether nothing was added yet to one of some columns.
+    /// Whether one of some columns shows no frame yet.
     pub fn has_holes(&self, columns: Range<usize>) -> bool {
-        self.weights[columns].contains(&0.0)
+        self.sources[columns].contains(&NO_FRAME)
     }
 
     /// Adds to a column.

@@ -177,12 +177,19 @@ impl<'a> View<'a> {
         columns: Range<usize>,
     ) {
         for piece in pieces(columns) {
-            if self.chart.is_outside_at(place.0, piece.start) {
-                run.see_nothing(piece);
-            } else if !self.sample_row(run, place.0, piece.clone()) {
-                run.locate(&self.chart, &self.look, points, place, piece.clone());
+            if !self.sample_row(run, place.0, piece.clone()) {
+                self.locate(run, points, place, piece.clone());
                 self.sample_located(run, points, place, piece);
             }
+        }
+    }
+
+    /// Finds where columns of one patch appear; of a patch outside the frame only that it shows none of them.
+    fn locate(&self, run: &mut Run, points: &Points, place: (usize, usize), columns: Range<usize>) {
+        if self.chart.is_outside_at(place.0, columns.start) {
+            run.see_nothing(columns);
+        } else {
+            run.locate(&self.chart, &self.look, points, place, columns);
         }
     }
 
@@ -240,12 +247,7 @@ impl<'a> View<'a> {
         for piece in pieces(columns.clone()) {
             let first = (piece.start - columns.start) * (C + 1);
             let own = &mut pixels[first..first + piece.len() * (C + 1)];
-            if self.chart.is_outside_at(place.0, piece.start) {
-                run.see_nothing(piece);
-                own.fill(0);
-                continue;
-            }
-            run.locate(&self.chart, &self.look, points, place, piece.clone());
+            self.locate(run, points, place, piece.clone());
             let kernel = self.kernel(run, points, place, piece.clone());
             match (kernel, self.picture.samples()) {
                 (Some(kernel), Samples::Eight(samples)) => {

@@ -37,7 +37,7 @@ pub(super) fn cast(
     let share = 1.0 / (n * n) as f32;
     let mut data = vec![0.0f32; width * height];
     let mut lines = vec![line(-0.5)];
-    let mut between = Angles::default();
+    let mut between = Places::default();
     for (v, row) in data.chunks_exact_mut(width).enumerate() {
         // The last line of a row of pixels is the first of the next.
         lines.drain(..lines.len() - 1);
@@ -69,7 +69,7 @@ pub(super) fn cast(
 fn add_points(
     band: &Band,
     [upper, lower]: [&Line; 2],
-    between: &Angles,
+    between: &Places,
     [down, across]: [&Point; 2],
     first: usize,
     pixels: &mut [f32],
@@ -102,7 +102,7 @@ fn add_points(
     }
 }
 
-/// What lies between two angles at some share of the shorter way around, −2π to 4π.
+/// What lies between two angles at some share of the shorter way around; it may come out beyond 2π.
 #[inline(always)]
 fn turned(from: f64, to: f64, share: f64) -> f64 {
     let turn = to - from;
@@ -133,19 +133,20 @@ impl Point {
 /// Where rays through the corners of cells meet the wall: for each of a pixel's [`CELLS`] first corners along a row a list, in which entry u is
 /// that of pixel u. The first list is longer by one: the last corner of a pixel is the first one of the next.
 #[derive(Default)]
-struct Angles {
-    /// Angles, radians; NaN where the lens shows nothing, and so is all that lies next to it.
+struct Places {
+    /// Places, radians; NaN where the lens shows nothing, and so is all that lies next to it.
     theta: [Vec<f64>; CELLS],
     /// Chainages, metres.
     h_m: [Vec<f64>; CELLS],
 }
 
-impl Angles {
+impl Places {
     /// Those of all pixels' corner `k`, up to [`CELLS`].
     fn thetas(&self, k: usize) -> &[f64] {
         &self.theta[k % CELLS][k / CELLS..]
     }
 
+    /// The same of chainages.
     fn chainages(&self, k: usize) -> &[f64] {
         &self.h_m[k % CELLS][k / CELLS..]
     }
@@ -175,7 +176,7 @@ impl Angles {
 /// Rays that have been cast through the corners of cells along a line of the picture.
 #[derive(Default)]
 struct Line {
-    at: Angles,
+    at: Places,
     /// Their directions.
     d: [Vec<Vector3<f64>>; CELLS],
 }
@@ -209,11 +210,10 @@ fn cast_line(rays: &Rays, camera: &Camera, pose: &Pose, v: f64) -> Line {
         return line;
     }
     for k in 0..corners {
-        let (place, d) = match camera.ray(column(k), v) {
-            Some(ray) => (rays.hit(&(pose.r_wc * ray)), pose.r_wc * ray),
-            None => (Place::NOWHERE, Vector3::repeat(f64::NAN)),
-        };
-        line.push(k, place, d);
+        match camera.ray(column(k), v).map(|ray| pose.r_wc * ray) {
+            Some(d) => line.push(k, rays.hit(&d), d),
+            None => line.push(k, Place::NOWHERE, Vector3::repeat(f64::NAN)),
+        }
     }
     line
 }
@@ -273,7 +273,7 @@ mod tests {
             let pixel_m = 2.0 / camera.fy;
             for v in [0.0, 59.0, 119.0] {
                 let lines = [v, v + 0.5].map(|v| cast_line(&caster, &camera, &pose, v));
-                let mut between = Angles::default();
+                let mut between = Places::default();
                 between.set([&lines[0], &lines[1]], 0.3, 0..camera.width as usize);
                 for k in 0..CELLS * camera.width as usize {
                     let (pixel, cell) = (k / CELLS, k % CELLS);

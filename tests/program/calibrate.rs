@@ -1,21 +1,14 @@
 //! Self-calibration through the program: wrong calibrations are found, or refused with the reason.
 
-use crate::support::{blender_survey, edit, fail, first_frames, succeed, text};
+use crate::support::{blender_survey, edit, fail, first_frames, json, simulate, succeed, text};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
 use tunnelstitch::trajectory::{Pose, tum};
 
-/// A simulated survey in `dir`.
-fn simulate(dir: &Path, options: &[&str]) {
-    let start = ["simulate", "free", "--quiet", "--out", text(dir)];
-    succeed(&[&start, options].concat());
-}
-
 /// Changes a number of camera.json.
 fn change_camera(survey: &Path, change: impl Fn(&mut serde_json::Map<String, serde_json::Value>)) {
     let path = survey.join("camera.json");
-    let mut camera: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+    let mut camera: serde_json::Value = json(&path);
     change(camera.as_object_mut().unwrap());
     std::fs::write(&path, camera.to_string()).unwrap();
 }
@@ -33,8 +26,7 @@ fn scale_focal(survey: &Path, factor: f64) {
 fn calibrate(survey: &Path, out: &Path, unknowns: &str) -> impl Fn(&str) -> serde_json::Value {
     let arguments = ["refine", text(survey), "--out", text(out), "--quiet"];
     succeed(&[&arguments[..], &["--fast", "--calibrate", unknowns]].concat());
-    let report: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    let report = json(&out.join("refine.json"));
     move |name| {
         let unknowns = report["calibration"]["unknowns"].as_array().unwrap();
         let found = unknowns.iter().find(|unknown| unknown["name"] == name);

@@ -1,6 +1,6 @@
 //! Refine and compare on frames that a renderer independent of this program made.
 
-use crate::support::{self, blender_survey, fail, first_frames, succeed, text};
+use crate::support::{self, blender_survey, fail, first_frames, json, succeed, text};
 
 fn number(value: &serde_json::Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
@@ -26,9 +26,7 @@ fn the_fixture_is_repaired_to_the_accuracy_promised() {
     for row in ["rotation RMSE", "wall error RMS", "PSNR", "seam residual"] {
         assert!(table.contains(row), "{table}");
     }
-    let report: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(compared.join("compare.json")).unwrap())
-            .unwrap();
+    let report = json(&compared.join("compare.json"));
     let (baseline, refined) = (&report["baseline"], &report["refined"]);
     // 571 mm off before, by a separate evaluation in another language; the gauge is chosen a little
     // differently there.

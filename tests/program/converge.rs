@@ -1,6 +1,6 @@
 //! Convergence tests through the program, as small as they get.
 
-use crate::support::{succeed, text};
+use crate::support::{json, succeed, text};
 
 #[test]
 fn a_sweep_is_written_resumed_and_drawn() {
@@ -20,8 +20,7 @@ fn a_sweep_is_written_resumed_and_drawn() {
     let more = sweep("3");
     assert!(more.starts_with(&first) && more.lines().count() == 3);
 
-    let result: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("converge.json")).unwrap()).unwrap();
+    let result = json(&out.join("converge.json"));
     assert_eq!(result["cells"][0]["runs"], 3);
     assert_eq!(result["cells"][0]["false_successes"], 0);
     let map = image::open(out.join("converge.png")).unwrap();
@@ -36,9 +35,7 @@ fn the_efficiency_is_measured_against_the_bound() {
     let mut arguments = vec!["converge", "--out", text(&out)];
     arguments.extend(options.split(' '));
     succeed(&arguments);
-    let table: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("efficiency.json")).unwrap())
-            .unwrap();
+    let table = json(&out.join("efficiency.json"));
     let number = |name: &str| table[0][name].as_f64().unwrap();
     // One survey scatters; far below the bound or far above would be a mistake in one of the two.
     assert!((0.4..3.0).contains(&number("ratio")), "{table}");

@@ -1,6 +1,6 @@
 //! The wall in three dimensions: validated by the programs of others, and read back.
 
-use crate::support::{self, blender_survey, fail, npm, succeed, text};
+use crate::support::{self, blender_survey, fail, json, npm, succeed, text};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -183,8 +183,7 @@ fn the_tree_holds_together() {
     let mut leaves = Vec::new();
     let mut seen = BTreeSet::new();
     let read = |name: &str| -> Value {
-        let file: Value =
-            serde_json::from_slice(&std::fs::read(folder.join(name)).unwrap()).unwrap();
+        let file = json(&folder.join(name));
         assert_eq!(names(&file), ["asset", "geometricError", "root"]);
         assert_eq!(names(&file["asset"]), ["extras", "version"]);
         assert_eq!(file["asset"]["version"], "1.1");

@@ -1,6 +1,6 @@
 //! Initial poses from a gyro's log, through the program: a simulated survey, a log made from its true rotations, refinement.
 
-use crate::support::{fail, succeed, text, tunnelstitch};
+use crate::support::{fail, simulate, succeed, text, tunnelstitch};
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -63,20 +63,9 @@ fn gcsv(truth: &[Pose], title: &str) -> String {
     text
 }
 
-fn simulate(survey: &Path) -> Vec<Pose> {
-    succeed(&[
-        "simulate",
-        "free",
-        "--frames",
-        "24",
-        "--size",
-        "320x240",
-        "--seed",
-        "3",
-        "--out",
-        text(survey),
-        "--quiet",
-    ]);
+fn simulated(survey: &Path) -> Vec<Pose> {
+    let options = ["--frames", "24", "--size", "320x240", "--seed", "3"];
+    simulate(survey, &options);
     poses_of(&tum::read(&survey.join("groundtruth.tum")).unwrap())
 }
 
@@ -86,7 +75,7 @@ fn simulate(survey: &Path) -> Vec<Pose> {
 fn a_gyros_log_makes_poses_that_refine() {
     let dir = tempfile::tempdir().unwrap();
     let survey = dir.path().join("survey");
-    let truth = simulate(&survey);
+    let truth = simulated(&survey);
     let log = dir.path().join("video.gcsv");
     std::fs::write(&log, gcsv(&truth, "GYROFLOW IMU LOG")).unwrap();
     let baseline = survey.join("gyro.tum");

@@ -1,6 +1,6 @@
 //! Every lens through the program: simulated, refined, stitched, and judged against the true poses.
 
-use crate::support::{fail, succeed, text};
+use crate::support::{fail, simulate, succeed, text};
 
 const PICTURE: &str = r#""width":320,"height":240,"cx":161.5,"cy":118.2"#;
 
@@ -9,23 +9,13 @@ fn repaired(camera: &str, file: &str) -> serde_json::Value {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     let (survey, out) = (path("survey"), path("refined"));
-    std::fs::write(path(file), camera).unwrap();
-    succeed(&[
-        "simulate",
-        "free",
-        "--frames",
-        "24",
-        "--supersample",
-        "4",
-        "--camera",
-        text(&path(file)),
-        "--out",
-        text(&survey),
-        "--quiet",
-    ]);
+    let file = path(file);
+    std::fs::write(&file, camera).unwrap();
+    let size = ["--frames", "24", "--supersample", "4"];
+    simulate(&survey, &[&size[..], &["--camera", text(&file)]].concat());
     // What was given is what the survey has.
     let own = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
-    let given = tunnelstitch::camera::read_calibration(&path(file), None).unwrap();
+    let given = tunnelstitch::camera::read_calibration(&file, None).unwrap();
     assert_eq!(own, given);
     succeed(&["refine", text(&survey), "--out", text(&out), "--quiet"]);
     let poses = out.join("poses.tum");

@@ -1,6 +1,6 @@
 //! What never shows the wall, and wall that is not to be compared: through the program.
 
-use crate::support::{edit, fail, succeed, text};
+use crate::support::{edit, fail, simulate, succeed, text};
 use image::GrayImage;
 use nalgebra::Vector2;
 use serde_json::Value;
@@ -15,22 +15,12 @@ const SHAFT: &str = "12";
 /// A brick tunnel in small frames, by default two turns of it.
 fn simulated(folder: &Path, name: &str, more: &[&str]) -> std::path::PathBuf {
     let out = folder.join(name);
-    let mut arguments = vec![
-        "simulate",
-        "free",
-        "--supersample",
-        "3",
-        "--size",
-        "320x240",
-        "--quiet",
-        "--out",
-        text(&out),
-    ];
+    let mut options = vec!["--supersample", "3", "--size", "320x240"];
     if !more.contains(&"--frames") {
-        arguments.extend(["--turns", "2"]);
+        options.extend(["--turns", "2"]);
     }
-    arguments.extend(more);
-    succeed(&arguments);
+    options.extend(more);
+    simulate(&out, &options);
     out
 }
 

@@ -240,17 +240,8 @@ fn covered(picture: &DynamicImage) -> (Vec<f64>, Vec<bool>) {
 }
 
 fn simulate(folder: &Path, more: &[&str]) {
-    let mut arguments = vec![
-        "simulate",
-        "free",
-        "--out",
-        text(folder),
-        "--size",
-        "320x240",
-    ];
-    arguments.extend(["--frames", "24", "--supersample", "4"]);
-    arguments.extend(more);
-    succeed(&arguments);
+    let size = ["--size", "320x240", "--frames", "24", "--supersample", "4"];
+    support::simulate(folder, &[&size, more].concat());
 }
 
 /// Gain ±30 % and a headlight undone, against the same wall evenly lit and without noise.

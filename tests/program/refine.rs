@@ -1,6 +1,8 @@
 //! Refinement of the Blender-rendered fixture through the program, judged against the true poses.
 
-use crate::support::{self, blender_survey, first_frames, succeed, text, tunnelstitch};
+use crate::support::{
+    self, blender_survey, first_frames, json, simulate, succeed, text, tunnelstitch,
+};
 use std::path::Path;
 
 /// Refines the fixture into `out`.
@@ -34,8 +36,7 @@ fn the_fixture_is_repaired_and_any_number_of_threads_gives_the_same_bytes() {
         assert!(line.split(' ').all(|word| word.parse::<f64>().is_ok()));
     }
 
-    let report: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(one.join("refine.json")).unwrap()).unwrap();
+    let report = json(&one.join("refine.json"));
     assert_eq!(report["frames"].as_array().unwrap().len(), 48);
     assert_eq!(report["frames_on_prior"], 0);
     for level in report["levels"].as_array().unwrap() {
@@ -58,14 +59,11 @@ fn the_fixture_is_repaired_and_any_number_of_threads_gives_the_same_bytes() {
 fn refine_simulated(options: &[&str]) -> (serde_json::Value, String) {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    let mut arguments = vec!["simulate", "free", "--out", text(&survey)];
-    arguments.extend(options);
-    succeed(&arguments);
+    simulate(&survey, options);
     let output = tunnelstitch(&["refine", text(&survey), "--out", text(&out)]);
     let warned = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{options:?}: {warned}");
-    let report = std::fs::read_to_string(out.join("refine.json")).unwrap();
-    (serde_json::from_str(&report).unwrap(), warned)
+    (json(&out.join("refine.json")), warned)
 }
 
 /// A wall without texture tells nothing, and the report must say so.
@@ -132,8 +130,7 @@ fn poses_in_the_wrong_direction_are_warned_of() {
 /// Root mean square wall error of a refined survey's believed frames, pixels, with the gauge fixed by them.
 fn believed_wall_px(survey: &Path, out: &Path) -> f64 {
     let survey = tunnelstitch::survey::Survey::open(survey).unwrap();
-    let report: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    let report = json(&out.join("refine.json"));
     let believed = |k: usize| report["frames"][k]["flag"] == "photometric";
     let poses = |trajectory: &tunnelstitch::trajectory::Trajectory| -> Vec<_> {
         let all = tunnelstitch::trajectory::poses_of(trajectory);
@@ -154,9 +151,7 @@ fn believed_wall_px(survey: &Path, out: &Path) -> f64 {
 fn repaired(options: &[&str]) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    let mut arguments = vec!["simulate", "free", "--out", text(&survey), "--quiet"];
-    arguments.extend(options);
-    succeed(&arguments);
+    simulate(&survey, options);
     succeed(&["refine", text(&survey), "--out", text(&out), "--quiet"]);
     dir
 }
@@ -179,8 +174,7 @@ fn hard_light_does_no_harm_on_a_faint_wall() {
     let out = dir.path().join("out");
     let px = believed_wall_px(&dir.path().join("survey"), &out);
     assert!(px < 0.15, "{px}");
-    let report: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    let report = json(&out.join("refine.json"));
     assert_eq!(report["frames_on_prior"], 0);
 }
 
@@ -191,8 +185,7 @@ fn bad_frames_are_flagged_and_the_rest_stays_exact() {
     let options = ["--frames", "30", "--size", "480x360", "--seed", "6"];
     let dir = repaired(&[&options[..], &["--bad-frames", bad]].concat());
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    let report: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    let report = json(&out.join("refine.json"));
     let flagged: Vec<u64> = report["frames"]
         .as_array()
         .unwrap()
@@ -221,21 +214,14 @@ fn a_wrong_prior_costs_one_frame() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     let options = ["--frames", "24", "--size", "480x360", "--seed", "8"];
-    succeed(
-        &[
-            &["simulate", "free", "--out", text(&survey), "--quiet"],
-            &options[..],
-        ]
-        .concat(),
-    );
+    simulate(&survey, &options);
     let path = survey.join("baseline.tum");
     let mut baseline = tunnelstitch::trajectory::tum::read(&path).unwrap();
     let turn = nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::y() * 0.35);
     baseline[10].pose.r_wc *= turn;
     std::fs::write(&path, tunnelstitch::trajectory::tum::format(&baseline)).unwrap();
     succeed(&["refine", text(&survey), "--out", text(&out), "--quiet"]);
-    let report: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    let report = json(&out.join("refine.json"));
     for frame in report["frames"].as_array().unwrap() {
         let expected = if frame["index"] == 10 {
             "prior"
@@ -258,8 +244,7 @@ fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     let px = believed_wall_px(&survey, &out);
     assert!(px < 0.3, "{px}");
-    let report: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(out.join("refine.json")).unwrap()).unwrap();
+    let report = json(&out.join("refine.json"));
     let frames = report["frames"].as_array().unwrap();
     let ambiguous = frames.iter().filter(|frame| frame["flag"] == "ambiguous");
     assert!(ambiguous.clone().count() > 0);

@@ -3,7 +3,7 @@
 use crate::support::{
     self,
     chromium::{self, Look},
-    fail, succeed, text,
+    fail, json, succeed, text,
 };
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -72,10 +72,6 @@ fn work() -> &'static Work {
             report,
         }
     })
-}
-
-fn json(path: &Path) -> Value {
-    serde_json::from_str(&std::fs::read_to_string(path).expect("a JSON file")).expect("JSON")
 }
 
 fn html() -> String {

@@ -1,6 +1,6 @@
 //! Rolling shutter through the program: rows read over 20 ms while the camera turns at 90 degrees a second.
 
-use crate::support::{edit, fail, succeed, text, tunnelstitch};
+use crate::support::{self, edit, fail, json, succeed, text, tunnelstitch};
 use serde_json::Value;
 use std::path::Path;
 
@@ -8,12 +8,9 @@ const READOUT: &str = "readout_ms = 20.0\n";
 
 fn simulate(out: &Path, more: &[&str]) {
     let size = ["--turns", "2", "--size", "320x240", "--noise", "1"];
-    let mut arguments = vec!["simulate", "free", "--out", text(out)];
-    arguments.extend(size);
     // A turn of 12 frames in 4 s.
-    arguments.extend(["--interval-s", "0.33333333"]);
-    arguments.extend(more);
-    succeed(&arguments);
+    let speed = ["--interval-s", "0.33333333"];
+    support::simulate(out, &[&size[..], &speed, more].concat());
 }
 
 /// Refines a survey; returns what was found of the rows, and what was warned of.
@@ -21,8 +18,7 @@ fn refine(survey: &Path, out: &Path) -> (Value, String) {
     let output = tunnelstitch(&["refine", text(survey), "--out", text(out)]);
     let warned = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{warned}");
-    let report = std::fs::read_to_string(out.join("refine.json")).unwrap();
-    let report: Value = serde_json::from_str(&report).unwrap();
+    let report = json(&out.join("refine.json"));
     (report["rows"].clone(), warned)
 }
 

@@ -1,21 +1,13 @@
 //! Tunnels that are not round or not straight, from the simulator, which has equations of its own, to the panorama.
 
-use crate::support::{fail, succeed, text};
+use crate::support::{fail, json, simulate, succeed, text};
 use std::path::Path;
 
 /// Simulates a survey, refines it and compares: the wall error, pixels RMS, and that of the initial poses.
 fn refined(folder: &Path, arguments: &[&str]) -> [f64; 2] {
     let path = |name: &str| folder.join(name);
     let (survey, refined, out) = (path("survey"), path("refined"), path("compared"));
-    let simulate = [
-        "simulate",
-        "free",
-        "--size",
-        "320x240",
-        "--out",
-        text(&survey),
-    ];
-    succeed(&[&simulate[..], arguments].concat());
+    simulate(&survey, &[&["--size", "320x240"], arguments].concat());
     succeed(&["refine", text(&survey), "--out", text(&refined)]);
     let poses = refined.join("poses.tum");
     succeed(&[
@@ -26,8 +18,7 @@ fn refined(folder: &Path, arguments: &[&str]) -> [f64; 2] {
         "--out",
         text(&out),
     ]);
-    let json = std::fs::read_to_string(out.join("compare.json")).unwrap();
-    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let json = json(&out.join("compare.json"));
     ["refined", "baseline"].map(|which| json[which]["wall"]["px"]["rms"].as_f64().unwrap())
 }
 
@@ -109,8 +100,7 @@ fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str, frames: &str) 
 
 /// The wall error, pixels, is no more than three of its own 1-σ as `refine` tells it, and that is little.
 fn exact_as_said(folder: &Path, refined: f64, initial: f64) {
-    let json = std::fs::read_to_string(folder.join("refined/refine.json")).unwrap();
-    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let json = json(&folder.join("refined/refine.json"));
     let frames = json["frames"].as_array().unwrap();
     let sigmas = frames
         .iter()

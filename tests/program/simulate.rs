@@ -1,6 +1,6 @@
 //! Simulated surveys and the demo, through the program.
 
-use crate::support::{self, fail, succeed, text};
+use crate::support::{self, fail, json, succeed, text};
 use std::path::Path;
 use tunnelstitch::frames::StoredFrame;
 use tunnelstitch::survey::Survey;
@@ -357,8 +357,7 @@ fn the_demo_does_the_whole_job_and_can_be_repeated() {
     ] {
         assert!(out.join(name).is_file(), "{name}");
     }
-    let report = std::fs::read_to_string(out.join("compare/compare.json")).unwrap();
-    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let report = json(&out.join("compare/compare.json"));
     let wall_px = |which: &str| report[which]["wall"]["px"]["rms"].as_f64().unwrap();
     assert!(wall_px("baseline") > 10.0, "{}", wall_px("baseline"));
     assert!(wall_px("refined") < 0.1, "{}", wall_px("refined"));

@@ -1,6 +1,6 @@
 //! Frames out of a video, through the program. Needs `ffmpeg` and `ffprobe`.
 
-use crate::support::{blender_survey, edit, fail, succeed, text};
+use crate::support::{blender_survey, edit, fail, simulate, succeed, text};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -49,19 +49,8 @@ const ENTANGLED: [&str; 12] = [
 /// Two turns of a brick tunnel in small frames.
 fn simulated(folder: &Path) -> PathBuf {
     let out = folder.join("survey");
-    succeed(&[
-        "simulate",
-        "free",
-        "--turns",
-        "2",
-        "--size",
-        "320x240",
-        "--supersample",
-        "3",
-        "--quiet",
-        "--out",
-        text(&out),
-    ]);
+    let options = ["--turns", "2", "--size", "320x240", "--supersample", "3"];
+    simulate(&out, &options);
     out
 }
 

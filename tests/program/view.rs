@@ -1,6 +1,6 @@
 //! The viewer: its server from outside, and its page in a browser.
 
-use crate::support::{blender_survey, chromium, fail, npm, succeed, text};
+use crate::support::{blender_survey, chromium, fail, json, npm, succeed, text};
 use serde_json::Value;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -390,9 +390,7 @@ fn an_inspector_walks_measures_marks_and_comes_back() {
     let server = Running::start(&[&given[..], &["--layers", "refined"]].concat());
     let again = run(&browser, &modules, "again", &server.address(), &picture);
     assert_eq!(again["kept"], seen["marks"]);
-    let marks: Value =
-        serde_json::from_str(&std::fs::read_to_string(survey.join("marks.geojson")).unwrap())
-            .unwrap();
+    let marks = json(&survey.join("marks.geojson"));
     assert_eq!(marks["features"].as_array().unwrap().len(), 1);
     drop(server);
 

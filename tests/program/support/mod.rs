@@ -66,6 +66,17 @@ pub fn fail(arguments: &[&str], code: i32) -> String {
     message
 }
 
+/// Simulates a survey into `out`; `options`: what differs from the defaults.
+pub fn simulate(out: &Path, options: &[&str]) -> String {
+    let start = ["simulate", "free", "--quiet", "--out", text(out)];
+    succeed(&[&start, options].concat())
+}
+
+/// What a JSON file holds.
+pub fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_str(&std::fs::read_to_string(path).expect("a JSON file")).expect("JSON")
+}
+
 /// A path as an argument.
 pub fn text(path: &Path) -> &str {
     path.to_str().expect("a path in UTF-8")
