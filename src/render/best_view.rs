@@ -10,7 +10,7 @@ use super::integer::{self, LitBlock, PARTS, Part};
 use super::row::Row;
 use super::run::{RUN, Run};
 use super::sample::Sample;
-use super::seams::{Across, Between, Seams, Share, Shares};
+use super::seams::{Across, Between, Seams, Share, Shares, strips};
 use super::view::{View, cut, pieces};
 use super::warp::Points;
 use super::{Canvas, Tile};
@@ -31,12 +31,12 @@ pub struct Scratch {
 /// A tile about to be drawn from views, in the order of their frames, along seams; `C`: channels, `L`: lanes of a correction.
 pub struct BestView<'a, const C: usize, const L: usize> {
     seams: &'a Seams,
-    canvas: &'a Canvas,
-    tile: &'a Tile,
     views: &'a [View<'a>],
     /// The tile's points, if some view is rough.
     points: &'a Points,
     across: Across,
+    /// Of each row.
+    down: Vec<Between>,
     /// Whether every pixel is one frame's as it is.
     copies: bool,
 }
@@ -44,17 +44,16 @@ pub struct BestView<'a, const C: usize, const L: usize> {
 impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
     pub fn new(
         seams: &'a Seams,
-        (canvas, tile): (&'a Canvas, &'a Tile),
+        (canvas, tile): (&Canvas, &Tile),
         views: &'a [View<'a>],
         points: &'a Points,
     ) -> Self {
         Self {
             seams,
-            canvas,
-            tile,
             views,
             points,
             across: seams.across(canvas, tile),
+            down: seams.down(canvas, tile),
             copies: seams.are_hard() && views.iter().all(View::copies),
         }
     }
@@ -71,16 +70,16 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         let all = self.across.len();
         // Of each patch of a row of them, the frame that it shows alone.
         let mut alone = ArrayVec::<Option<usize>, { RUN / PATCH }>::new();
-        for strip in self.seams.strips(self.canvas, self.tile) {
+        for strip in strips(&self.down) {
             let next = strip.end..(strip.end + strip.len()).min(pixels.len());
             if let Some(next) = T::bytes(&mut pixels[next]) {
                 prefetch_rows(next);
             }
             if strip.start.is_multiple_of(PATCH) {
-                let end = (strip.start + PATCH).min(self.tile.rows as usize);
+                let end = (strip.start + PATCH).min(self.down.len());
                 let rows = strip.start..end;
                 self.correct(&rows, &mut scratch.corrections);
-                let ends = [&self.between(rows.start), &self.between(rows.end - 1)];
+                let ends = [&self.down[rows.start], &self.down[rows.end - 1]];
                 let only = |columns| self.seams.only(&self.across, &columns, ends);
                 alone = pieces(0..all).map(only).collect();
             }
@@ -92,12 +91,13 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
             let corrections = corrections.as_chunks::<L>().0;
             let corrections = corrections.get(strip.start % PATCH * RUN..).unwrap_or(&[]);
             let drawn = self.blocks(&strip, pixels, sources, (shares, down), corrections, &alone);
+            let drawn = self.holes(&strip, pixels, sources, drawn);
             let mut corrections = corrections.chunks_exact(RUN);
             for row in strip {
                 let corrections = corrections.next().unwrap_or(&[[0.0; L]; RUN]);
                 for open in drawn.open(all) {
                     self.seams
-                        .shares(&self.across, open.clone(), &self.between(row), shares);
+                        .shares(&self.across, open.clone(), &self.down[row], shares);
                     match T::bytes(&mut pixels[row..row + 1]) {
                         Some([pixels]) if self.copies => {
                             self.copy(row, open.clone(), shares, run, sums, pixels);
@@ -116,13 +116,16 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         }
     }
 
-    fn between(&self, row: usize) -> Between {
-        self.seams.row_of(self.canvas, self.tile.row + row as u32)
-    }
-
     fn view(&self, frame: usize) -> Option<&View<'a>> {
         let at = self.views.binary_search_by_key(&frame, |view| view.frame);
         Some(&self.views[at.ok()?])
+    }
+
+    /// The views but the one that some columns are given to alone, if one is.
+    fn others(&self, shares: &Shares, columns: &Range<usize>) -> impl Iterator<Item = &View<'a>> {
+        let alone = shares.alone(columns);
+        let views = self.views.iter();
+        views.filter(move |view| Some(view.frame) != alone)
     }
 
     fn correct(&self, rows: &Range<usize>, corrections: &mut Vec<f32>) {
@@ -132,10 +135,9 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         }
         corrections.resize(rows.len() * RUN * L, 0.0);
         let corrections = corrections.as_chunks_mut::<L>().0.chunks_exact_mut(RUN);
-        for (row, found) in rows.clone().zip(corrections) {
+        for (row, found) in self.down[rows.clone()].iter().zip(corrections) {
             let found = &mut found[..self.across.len()];
-            self.seams
-                .corrections(&self.across, &self.between(row), found);
+            self.seams.corrections(&self.across, row, found);
         }
     }
 
@@ -154,12 +156,12 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
             return drawn;
         };
         down.clear();
-        down.extend(strip.clone().map(|row| self.between(row).t()));
-        let first = self.between(strip.start);
+        down.extend(self.down[strip.clone()].iter().map(Between::t));
+        let first = &self.down[strip.start];
         for (columns, alone) in pieces(0..self.across.len()).zip(alone) {
             shares.only(*alone, columns.clone());
             if alone.is_none() {
-                self.seams.shares(&self.across, columns, &first, shares);
+                self.seams.shares(&self.across, columns, first, shares);
             }
             for cell in shares.by_cells() {
                 // Who shows most is found pixel by pixel.
@@ -169,7 +171,7 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
                 let mut draw = |columns: Range<usize>| {
                     let done = self.block(strip, &columns, cell, down, corrections, pixels);
                     if done {
-                        name(cell[0].frame, strip, &columns, sources);
+                        name(cell[0].frame as u32, strip, &columns, sources);
                         drawn.add(columns);
                     }
                     done
@@ -184,6 +186,36 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
             }
         }
         drawn
+    }
+
+    /// Clears what no frame shows, as far as that is plain for eight columns at once; the columns that are done, those in `drawn` among them.
+    fn holes<T: Sample>(
+        &self,
+        strip: &Range<usize>,
+        pixels: &mut [&mut [T]],
+        sources: &mut [&mut [u32]],
+        drawn: Columns,
+    ) -> Columns {
+        let mut done = drawn;
+        let mut clear = |columns: &Range<usize>| {
+            let hole = self.views.iter().all(|view| view.misses(strip, columns));
+            if hole {
+                for pixels in &mut pixels[strip.clone()] {
+                    pixels[columns.start * (C + 1)..columns.end * (C + 1)].fill(T::default());
+                }
+                name(NO_FRAME, strip, columns, sources);
+                done.add(columns.clone());
+            }
+            hole
+        };
+        for piece in drawn.open(self.across.len()).flat_map(pieces) {
+            if !clear(&piece) && piece.len() > EIGHT {
+                for eight in cut::<EIGHT>(piece) {
+                    clear(&eight);
+                }
+            }
+        }
+        done
     }
 
     /// Draws what frames share in some rows and columns of a patch, or one has alone; false without doing it if one does not show all of it.
@@ -251,7 +283,7 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         }
         // At the edge of what is seen: frames that no node of the grid shows.
         if sums.has_holes(columns.clone()) {
-            for view in self.views {
+            for view in self.others(shares, &columns) {
                 view.values(run, self.points, place, columns.clone());
                 sums.fill(run, view.frame, columns.clone());
             }
@@ -297,7 +329,7 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         let sources = &mut sums.sources_mut()[columns.clone()];
         let pixels = &mut pixels[columns.start * step..columns.end * step];
         let mut other = [0; 4 * RUN];
-        for view in self.views {
+        for view in self.others(shares, &columns) {
             let own = &mut other[..columns.len() * step];
             view.copy::<C>(run, self.points, place, columns.clone(), own);
             let there = pixels.chunks_exact_mut(step).zip(sources.iter_mut());
@@ -313,10 +345,10 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
 }
 
 /// Notes the frame that some rows and columns show.
-fn name(frame: usize, rows: &Range<usize>, columns: &Range<usize>, sources: &mut [&mut [u32]]) {
+fn name(frame: u32, rows: &Range<usize>, columns: &Range<usize>, sources: &mut [&mut [u32]]) {
     for row in rows.clone() {
         if let Some(sources) = sources.get_mut(row) {
-            sources[columns.clone()].fill(frame as u32);
+            sources[columns.clone()].fill(frame);
         }
     }
 }

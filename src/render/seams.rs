@@ -91,6 +91,21 @@ impl Between {
     }
 }
 
+/// The rows of a tile, cut where they pass a row of nodes and where one row of patches ends and the next begins.
+pub fn strips(down: &[Between]) -> impl Iterator<Item = Range<usize>> {
+    let key = |row: usize| (down[row].before, row / PATCH);
+    let mut from = 0;
+    std::iter::from_fn(move || {
+        let own = (from < down.len()).then(|| key(from))?;
+        let to = (from + 1..down.len())
+            .find(|row| key(*row) != own)
+            .unwrap_or(down.len());
+        let strip = from..to;
+        from = to;
+        Some(strip)
+    })
+}
+
 impl Seams {
     /// Finds the best frame for each node of the grid over `canvas`, by thumbnails whose exposure is undone; with `blend`, also the
     /// correction. `white`: full scale of the frames.
@@ -141,23 +156,24 @@ impl Seams {
 
     /// The frames that a tile may be drawn from, in their order.
     pub(super) fn frames_of(&self, canvas: &Canvas, tile: &Tile) -> Vec<usize> {
-        // Nodes follow each other; around the tunnel the first comes after the last.
         let first = self.row_of(canvas, tile.row).before;
         let last = self.row_of(canvas, tile.row + tile.rows - 1).after;
-        let cells = self.across(canvas, tile).cells;
-        let across = cells.iter().map(|cell| cell.before);
-        let across: Vec<usize> = across.chain(cells.last().map(|cell| cell.after)).collect();
+        // Nodes follow each other; around the tunnel the first comes after the last.
+        let count = self.grid.columns as usize;
+        let node = |column: u32| self.column_of(canvas, column).0;
+        let across = (node(tile.column)..=node(tile.column + tile.columns - 1) + 1)
+            .map(|node| node.rem_euclid(count as i64) as usize);
+        let across: Vec<usize> = across.take(count).collect();
         let mut frames = Vec::new();
+        let mut previous = NO_FRAME;
         let mut open = false;
-        for row in first..=last {
+        for row in self.labels[first * count..(last + 1) * count].chunks_exact(count) {
             for column in &across {
-                match self.frame(row, *column) {
-                    NO_FRAME => open = true,
-                    frame => {
-                        if frames.last() != Some(&(frame as usize)) {
-                            frames.push(frame as usize);
-                        }
-                    }
+                let frame = row[*column];
+                open |= frame == NO_FRAME;
+                if frame != previous && frame != NO_FRAME {
+                    frames.push(frame as usize);
+                    previous = frame;
                 }
             }
         }
@@ -170,19 +186,25 @@ impl Seams {
         frames
     }
 
+    /// The node before a column of the canvas, from −1 on, and how far from it to the next one the column lies.
+    fn column_of(&self, canvas: &Canvas, column: u32) -> (i64, f32) {
+        let scale = f64::from(self.grid.columns) / f64::from(canvas.columns);
+        let at = (f64::from(column) + 0.5) * scale - 0.5;
+        let before = at.floor();
+        (before as i64, (at - before) as f32)
+    }
+
     /// Where the columns of a tile lie between the nodes.
     pub(super) fn across(&self, canvas: &Canvas, tile: &Tile) -> Across {
         let count = i64::from(self.grid.columns);
-        let scale = f64::from(self.grid.columns) / f64::from(canvas.columns);
         let mut cells: Vec<Cell> = Vec::new();
         let mut t = [0.0; RUN];
         let mut cell = i64::MIN;
         for (column, t) in t.iter_mut().enumerate().take(tile.columns as usize) {
-            let at = (f64::from(tile.column + column as u32) + 0.5) * scale - 0.5;
-            let before = at.floor();
-            *t = (at - before) as f32;
-            if before as i64 != cell {
-                cell = before as i64;
+            let before;
+            (before, *t) = self.column_of(canvas, tile.column + column as u32);
+            if before != cell {
+                cell = before;
                 cells.push(Cell {
                     columns: column..column,
                     before: cell.rem_euclid(count) as usize,
@@ -213,27 +235,10 @@ impl Seams {
         }
     }
 
-    /// The rows of a tile, cut where they pass a row of nodes and where one row of patches ends and the next begins.
-    pub(super) fn strips(
-        &self,
-        canvas: &Canvas,
-        tile: &Tile,
-    ) -> impl Iterator<Item = Range<usize>> {
-        let rows = tile.rows as usize;
-        let key = move |row: usize| {
-            let between = self.row_of(canvas, tile.row + row as u32);
-            (between.before, row / PATCH)
-        };
-        let mut from = 0;
-        std::iter::from_fn(move || {
-            let own = (from < rows).then(|| key(from))?;
-            let to = (from + 1..rows)
-                .find(|row| key(*row) != own)
-                .unwrap_or(rows);
-            let strip = from..to;
-            from = to;
-            Some(strip)
-        })
+    /// Where the rows of a tile lie between the rows of nodes.
+    pub(super) fn down(&self, canvas: &Canvas, tile: &Tile) -> Vec<Between> {
+        let rows = tile.row..tile.row + tile.rows;
+        rows.map(|row| self.row_of(canvas, row)).collect()
     }
 
     /// The frame that some columns from a row to another are of; None if there are several, or none.
@@ -433,6 +438,14 @@ impl Shares {
                 weights: None,
             }),
         }
+    }
+
+    /// The frame that some columns are given to alone, if there is one.
+    pub fn alone(&self, columns: &Range<usize>) -> Option<usize> {
+        let all = |share: &&Share| {
+            share.weights.is_none() && share.from <= columns.start && share.to >= columns.end
+        };
+        Some(self.list.iter().find(all)?.frame)
     }
 
     /// All of them, those of one cell together.

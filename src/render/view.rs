@@ -151,6 +151,16 @@ impl<'a> View<'a> {
         self.chart.is_rough()
     }
 
+    /// True if it is plain that the frame shows nothing of some rows and columns of a tile, all in one patch.
+    pub fn misses(&self, rows: &Range<usize>, columns: &Range<usize>) -> bool {
+        let Some(lines) = self.chart.lines(self.chart.patch(rows.start, columns.start)) else {
+            return self.chart.is_outside_at(rows.start, columns.start);
+        };
+        let range = Chart::range(lines, of_patch(rows).1, of_patch(columns).1);
+        let mut axes = range.into_iter().zip(self.look.limit());
+        axes.any(|([least, most], limit)| most < -ROUNDING_PX || least > limit + ROUNDING_PX)
+    }
+
     /// Looks at some columns of a row of a tile `width` columns wide: where they appear, and the values there with the frame's exposure
     /// undone. `points`: all of the tile's, if the view is rough.
     pub fn look_at(
@@ -177,20 +187,27 @@ impl<'a> View<'a> {
         columns: Range<usize>,
     ) {
         for piece in pieces(columns) {
-            if !self.sample_row(run, place.0, piece.clone()) {
-                self.locate(run, points, place, piece.clone());
+            let done = self.sample_row(run, place.0, piece.clone());
+            if !done && self.locate(run, points, place, piece.clone()) {
                 self.sample_located(run, points, place, piece);
             }
         }
     }
 
-    /// Finds where columns of one patch appear; of a patch outside the frame only that it shows none of them.
-    fn locate(&self, run: &mut Run, points: &Points, place: (usize, usize), columns: Range<usize>) {
-        if self.chart.is_outside_at(place.0, columns.start) {
-            run.see_nothing(columns);
-        } else {
-            run.locate(&self.chart, &self.look, points, place, columns);
+    /// Finds where columns of one patch appear; false if it is plain that the frame shows none of them.
+    fn locate(
+        &self,
+        run: &mut Run,
+        points: &Points,
+        place: (usize, usize),
+        columns: Range<usize>,
+    ) -> bool {
+        let misses = self.misses(&(place.0..place.0 + 1), &columns);
+        match misses {
+            true => run.see_nothing(columns),
+            false => run.locate(&self.chart, &self.look, points, place, columns),
         }
+        !misses
     }
 
     /// The values in columns of one patch, if all of it lies inside an 8-bit frame.
@@ -247,8 +264,10 @@ impl<'a> View<'a> {
         for piece in pieces(columns.clone()) {
             let first = (piece.start - columns.start) * (C + 1);
             let own = &mut pixels[first..first + piece.len() * (C + 1)];
-            self.locate(run, points, place, piece.clone());
-            let kernel = self.kernel(run, points, place, piece.clone());
+            let kernel = match self.locate(run, points, place, piece.clone()) {
+                true => self.kernel(run, points, place, piece.clone()),
+                false => None,
+            };
             match (kernel, self.picture.samples()) {
                 (Some(kernel), Samples::Eight(samples)) => {
                     run.copy::<C>(self.picture, samples, kernel, piece, own);
