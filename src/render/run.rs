@@ -112,12 +112,16 @@ impl Run {
         wide(
             #[inline(always)]
             || {
+                let limit = limit;
                 for eight in eights.clone() {
-                    let (u, v) = (&mut u[eight], &mut v[eight]);
-                    rough[eight] = !chart.eight(row, eight, u, v);
-                    for (k, seen) in seen[eight].iter_mut().enumerate() {
-                        *seen = within(u[k], v[k], limit);
-                    }
+                    // On the stack, where nothing else may change it: else the loops are not made vectors of.
+                    let (mut own_u, mut own_v) = ([0.0; EIGHT], [0.0; EIGHT]);
+                    rough[eight] = !chart.eight(row, eight, &mut own_u, &mut own_v);
+                    seen[eight] = std::array::from_fn(
+                        #[inline(always)]
+                        |k| within(own_u[k], own_v[k], limit),
+                    );
+                    (u[eight], v[eight]) = (own_u, own_v);
                 }
             },
         );
@@ -341,26 +345,32 @@ impl Run {
         wide(
             #[inline(always)]
             || {
+                let (width, right, bottom) = (width, right, bottom);
+                let (before, channels) = (before, channels);
+                let (rounding, phases) = (rounding, phases);
                 for eight in eights(&columns) {
-                    let (u, v, seen) = (&u[eight], &v[eight], &seen[eight]);
-                    let (across, down) = (&mut across[eight], &mut down[eight]);
-                    let (first, inside) = (&mut first[eight], &mut inside[eight]);
+                    // As in [`Run::locate`].
+                    let (u, v, seen) = (u[eight], v[eight], seen[eight]);
+                    let (mut own_across, mut own_down) = ([0; EIGHT], [0; EIGHT]);
+                    let (mut own_first, mut own_inside) = ([0; EIGHT], [false; EIGHT]);
                     for k in 0..EIGHT {
                         let (x, s) = whole(u[k] + rounding);
                         let (y, t) = whole(v[k] + rounding);
-                        across[k] = Kernel::phase_of(s, phases);
-                        down[k] = Kernel::phase_of(t, phases);
+                        own_across[k] = Kernel::phase_of(s, phases);
+                        own_down[k] = Kernel::phase_of(t, phases);
                         let (left, top) = (x - before, y - before);
                         let within =
                             seen[k] & (left >= 0) & (top >= 0) & (left <= right) & (top <= bottom);
-                        inside[k] = within;
+                        own_inside[k] = within;
                         let at = top.wrapping_mul(width).wrapping_add(left);
-                        first[k] = if within {
+                        own_first[k] = if within {
                             at.wrapping_mul(channels) as u32
                         } else {
                             0
                         };
                     }
+                    (across[eight], down[eight]) = (own_across, own_down);
+                    (first[eight], inside[eight]) = (own_first, own_inside);
                 }
             },
         );

@@ -153,7 +153,10 @@ impl<'a> View<'a> {
 
     /// True if it is plain that the frame shows nothing of some rows and columns of a tile, all in one patch.
     pub fn misses(&self, rows: &Range<usize>, columns: &Range<usize>) -> bool {
-        let Some(lines) = self.chart.lines(self.chart.patch(rows.start, columns.start)) else {
+        let Some(lines) = self
+            .chart
+            .lines(self.chart.patch(rows.start, columns.start))
+        else {
             return self.chart.is_outside_at(rows.start, columns.start);
         };
         let range = Chart::range(lines, of_patch(rows).1, of_patch(columns).1);

@@ -322,14 +322,17 @@ fn put<const C: usize>(
     pixels: &mut [u8],
 ) {
     let pixel = C + 1;
-    let there = &mut pixels[(patch + own.start) * pixel..(patch + own.end) * pixel];
-    if there.len() < EIGHT * pixel {
+    if own.len() < EIGHT {
+        let there = &mut pixels[(patch + own.start) * pixel..(patch + own.end) * pixel];
         let eight: [u8; 32] = cast(eight);
         let eight = &eight[(own.start - first) * pixel..];
         for (there, own) in there.iter_mut().zip(eight) {
             *there = *own;
         }
-    } else if C == 1 {
+        return;
+    }
+    let there = &mut pixels[(patch + first) * pixel..][..EIGHT * pixel];
+    if C == 1 {
         let eight: [u8; 16] = cast(simd.avx._mm256_castsi256_si128(eight));
         there.copy_from_slice(&eight);
     } else {
@@ -372,8 +375,7 @@ fn numbers(simd: V3, sums: __m256i, missing: __m256i, scale: __m256) -> __m256 {
 
 #[inline(always)]
 fn colours<const TAPS: usize>(simd: V3, patch: &Patch, eight: &Eights) -> [__m256i; 4] {
-    let first = eight.first::<3>(simd, patch.source.stride);
-    avx2::colours::<TAPS>(simd, patch.source, patch.kernel, &first, eight.phases)
+    avx2::colours::<TAPS>(simd, patch.source, patch.kernel, &eight.first, eight.phases)
 }
 
 #[inline(always)]
@@ -383,38 +385,26 @@ fn greys<const TAPS: usize>(simd: V3, patch: &Patch, eight: &Eights) -> __m256i 
     if let Some(sums) = near {
         return sums;
     }
-    let first = eight.first::<1>(simd, source.stride);
-    avx2::greys::<TAPS>(simd, source, kernel, &first, eight.phases)
+    avx2::greys::<TAPS>(simd, source, kernel, &eight.first, eight.phases)
 }
 
-/// Where eight kernels lie.
+/// Where eight kernels lie: aligned, as what crosses lines of the cache must reach it before it can be read again.
 #[derive(Clone, Copy)]
+#[repr(align(64))]
 struct Eights {
     /// Columns and rows in which they begin.
     corner: [Eight<i32>; 2],
+    /// The samples with which they begin.
+    first: Eight<u32>,
     /// Their phases along u and v.
     phases: [Eight<i32>; 2],
 }
 
 const NOWHERE: Eights = Eights {
     corner: [[0; EIGHT]; 2],
+    first: [0; EIGHT],
     phases: [[0; EIGHT]; 2],
 };
-
-impl Eights {
-    /// The samples with which they begin.
-    #[inline(always)]
-    fn first<const C: usize>(&self, simd: V3, stride: usize) -> Eight<u32> {
-        let (avx, avx2) = (simd.avx, simd.avx2);
-        let [left, top]: [__m256i; 2] = cast(self.corner);
-        let row = avx2._mm256_mullo_epi32(top, avx._mm256_set1_epi32(stride as i32));
-        let at = match C {
-            1 => left,
-            _ => avx2._mm256_add_epi32(left, avx2._mm256_add_epi32(left, left)),
-        };
-        cast(avx2._mm256_add_epi32(row, at))
-    }
-}
 
 /// Where the kernels of a row lie: of all its columns before the first is looked up, or each would wait for its own.
 #[inline(always)]
@@ -429,22 +419,27 @@ fn place<const C: usize, const TAPS: usize>(
     let taps = avx2::taps::<TAPS>(patch.kernel);
     let phases = Kernel::integer_phases_of(taps);
     let before = avx._mm256_set1_epi32(Kernel::before_of(taps) as i32);
+    let stride = avx._mm256_set1_epi32(patch.source.stride as i32);
     let line = line(simd, patch.lines, row);
     for (k, (columns, place)) in columns.iter().zip(places).enumerate() {
         let x: __m256 = cast(columns.x);
         let (left, s) = whole(simd, polynomial(simd, x, &line[..4]), phases);
         let (top, t) = whole(simd, polynomial(simd, x, &line[4..]), phases);
+        let left = avx2._mm256_sub_epi32(left, before);
+        let top = avx2._mm256_sub_epi32(top, before);
+        let sample = match C {
+            1 => left,
+            _ => avx2._mm256_add_epi32(left, avx2._mm256_add_epi32(left, left)),
+        };
+        let first = avx2._mm256_add_epi32(avx2._mm256_mullo_epi32(top, stride), sample);
         *place = Eights {
-            corner: [
-                cast(avx2._mm256_sub_epi32(left, before)),
-                cast(avx2._mm256_sub_epi32(top, before)),
-            ],
+            corner: [cast(left), cast(top)],
+            first: cast(first),
             phases: [cast(s), cast(t)],
         };
         // What the next rows need: sixteen pixels in colour take less than a line of the cache, or little more.
         if k % 2 == 0 {
-            let [column, row] = place.corner.map(|corner| corner[0] as usize);
-            let below = (row + taps + 1) * patch.source.stride + column * C;
+            let below = place.first[0] as usize + (taps + 1) * patch.source.stride;
             vectors::prefetch(simd, patch.source.samples, below);
         }
     }
