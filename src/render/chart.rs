@@ -148,9 +148,14 @@ impl Chart {
     fn fit(u: &[[f32; 5]; 5], v: &[[f32; 5]; 5]) -> Patch {
         let (u, v) = (coefficients(u), coefficients(v));
         match (u, v) {
-            (Some(u), Some(v)) => Patch::Smooth(std::array::from_fn(|l| {
-                std::array::from_fn(|k| if k < 4 { u[l][k] } else { v[l][k - 4] })
-            })),
+            (Some(u), Some(v)) => {
+                let mut lines = [[0.0; 8]; 4];
+                for (line, (u, v)) in lines.iter_mut().zip(u.iter().zip(&v)) {
+                    line[..4].copy_from_slice(u);
+                    line[4..].copy_from_slice(v);
+                }
+                Patch::Smooth(lines)
+            }
             _ => Patch::Rough,
         }
     }
@@ -169,15 +174,18 @@ impl Chart {
         };
         let ((x, a), (y, b)) = (along(columns), along(rows));
         let middle = Self::pixel(lines, x, y);
-        [0, 1].map(|axis| {
-            let mut around = 0.0;
-            for (l, c) in lines.iter().enumerate() {
-                for (k, c) in c[4 * axis..4 * axis + 4].iter().enumerate() {
-                    around += (k as f32 * a + l as f32 * b) * c.abs();
-                }
+        let mut around = [0.0; 8];
+        for (l, c) in lines.iter().enumerate() {
+            for k in 0..around.len() {
+                around[k] += ((k % 4) as f32 * a + l as f32 * b) * c[k].abs();
             }
-            [middle[axis] - around, middle[axis] + around]
-        })
+        }
+        let [u0, u1, u2, u3, v0, v1, v2, v3] = around;
+        let (u, v) = ((u0 + u1) + (u2 + u3), (v0 + v1) + (v2 + v3));
+        [
+            [middle[0] - u, middle[0] + u],
+            [middle[1] - v, middle[1] + v],
+        ]
     }
 
     /// The patch of a pixel of the tile.
@@ -230,9 +238,13 @@ impl Chart {
     }
 
     /// Where a point of a smooth patch appears.
+    #[inline]
     pub fn pixel(lines: &[Lanes; 4], x: f32, y: f32) -> [f32; 2] {
         let c = Self::at(lines, y);
-        [0, 4].map(|k| ((c[k + 3] * x + c[k + 2]) * x + c[k + 1]) * x + c[k])
+        [
+            ((c[3] * x + c[2]) * x + c[1]) * x + c[0],
+            ((c[7] * x + c[6]) * x + c[5]) * x + c[4],
+        ]
     }
 
     /// Where the pixels of a row of a smooth patch appear, by powers of x; `row`: of the tile.
@@ -305,11 +317,15 @@ fn cubic([p, q, r, s]: [f32; 4]) -> [f32; 4] {
 fn coefficients(at: &[[f32; 5]; 5]) -> Option<[[f32; 4]; 4]> {
     // Small numbers round less.
     let middle = at[2][2];
-    let fitted = [0, 1, 3, 4];
-    let along_x = fitted.map(|row| cubic(fitted.map(|column| at[row][column] - middle)));
+    let mut along_x = [[0.0; 4]; 4];
+    for (along_x, row) in along_x.iter_mut().zip([0, 1, 3, 4]) {
+        let [p, q, _, r, s] = at[row];
+        *along_x = cubic([p - middle, q - middle, r - middle, s - middle]);
+    }
     let mut c = [[0.0; 4]; 4];
     for k in 0..4 {
-        let along_y = cubic(along_x.map(|row| row[k]));
+        let [p, q, r, s] = along_x;
+        let along_y = cubic([p[k], q[k], r[k], s[k]]);
         for l in 0..4 {
             c[l][k] = along_y[l];
         }

@@ -112,9 +112,9 @@ impl Run {
         wide(
             #[inline(always)]
             || {
+                // Copies, here and in [`Run::address`], that nothing else may change: else loops are not made vectors of.
                 let limit = limit;
                 for eight in eights.clone() {
-                    // On the stack, where nothing else may change it: else the loops are not made vectors of.
                     let (mut own_u, mut own_v) = ([0.0; EIGHT], [0.0; EIGHT]);
                     rough[eight] = !chart.eight(row, eight, &mut own_u, &mut own_v);
                     seen[eight] = std::array::from_fn(
@@ -346,10 +346,8 @@ impl Run {
             #[inline(always)]
             || {
                 let (width, right, bottom) = (width, right, bottom);
-                let (before, channels) = (before, channels);
-                let (rounding, phases) = (rounding, phases);
+                let (before, channels, rounding, phases) = (before, channels, rounding, phases);
                 for eight in eights(&columns) {
-                    // As in [`Run::locate`].
                     let (u, v, seen) = (u[eight], v[eight], seen[eight]);
                     let (mut own_across, mut own_down) = ([0; EIGHT], [0; EIGHT]);
                     let (mut own_first, mut own_inside) = ([0; EIGHT], [false; EIGHT]);
