@@ -102,7 +102,6 @@ impl Run {
         columns: Range<usize>,
     ) {
         let eights = eights(&columns);
-        let limit = look.limit();
         let mut rough = [false; RUN / EIGHT];
         let (u, v) = (
             self.u.as_chunks_mut::<EIGHT>().0,
@@ -112,8 +111,8 @@ impl Run {
         wide(
             #[inline(always)]
             || {
-                // Copies, here and in [`Run::address`], that nothing else may change: else loops are not made vectors of.
-                let limit = limit;
+                // The closure's own, here and in [`Run::address`]: of what it borrows, loops are not made vectors.
+                let limit = look.limit();
                 for eight in eights.clone() {
                     let (mut own_u, mut own_v) = ([0.0; EIGHT], [0.0; EIGHT]);
                     rough[eight] = !chart.eight(row, eight, &mut own_u, &mut own_v);
@@ -131,7 +130,7 @@ impl Run {
             let seen = &mut seen[eight][..count];
             look.project_all(points, row * width + eight * EIGHT, (u, v, seen));
             for (k, seen) in seen.iter_mut().enumerate() {
-                *seen &= within(u[k], v[k], limit);
+                *seen &= within(u[k], v[k], look.limit());
             }
         }
     }
