@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """The warp against OpenCV's, in one run and with one thread each.
 
-Needs opencv-python-headless and numpy (PyPI) and a Rust toolchain. Runs `cargo bench --bench warp -- --json` and, before
-and after it, OpenCV's `remap` (four RGB8 frames of 1920 x 1080 in turn, ready-made float maps of the same cylinder) and its
-cylindrical `PyRotationWarper`, three times; prints Mpx per second of processor time and the ratios, medians of the three.
+Needs opencv-python-headless and numpy (PyPI) and a Rust toolchain. Runs `cargo bench --bench warp -- --ask` and OpenCV in
+turn, a round of one and then a round of the other, so that what else the machine does meets both: OpenCV's `remap` (RGB8
+frames of 1920 x 1080, ready-made float maps of the same cylinder) and its cylindrical `PyRotationWarper`. Prints Mpx per
+second of processor time and the ratio of neighbouring rounds: the median, and the quartiles.
 """
-import json
 import os
 import statistics
 import subprocess
@@ -15,7 +15,7 @@ import time
 import cv2
 import numpy as np
 
-WIDTH, HEIGHT, FOV_DEG, ROUNDS, RUNS = 1920, 1080, 30, 15, 3
+WIDTH, HEIGHT, FOV_DEG, ROUNDS = 1920, 1080, 30, 25
 THREADS = int(sys.argv[1]) if len(sys.argv) > 1 else 1
 
 
@@ -33,60 +33,54 @@ def maps():
 
 
 def speed(pixels, photos, work):
-    times = []
-    for _ in range(ROUNDS):
-        since = time.process_time()
-        for photo in photos:
-            work(photo)
-        times.append(time.process_time() - since)
-    return len(photos) * pixels / statistics.median(times) / 1e6
+    """Mpx per second of processor time in one round."""
+    since = time.process_time()
+    for photo in photos:
+        work(photo)
+    return len(photos) * pixels / (time.process_time() - since) / 1e6
 
 
 def opencv():
+    """What is compared: the name of ours, that of OpenCV's, and a round of it."""
     u, v, f, (cx, cy) = maps()
-    photos = np.random.default_rng(1).integers(0, 256, (4, HEIGHT, WIDTH, 3), dtype=np.uint8)
+    photos = np.random.default_rng(1).integers(0, 256, (8, HEIGHT, WIDTH, 3), dtype=np.uint8)
     out = np.empty(u.shape + (3,), np.uint8)
-    found = {}
-    for name, flag in [("bilinear", cv2.INTER_LINEAR), ("bicubic", cv2.INTER_CUBIC), ("lanczos4", cv2.INTER_LANCZOS4)]:
-        found[f"remap {name}"] = speed(u.size, photos, lambda photo: cv2.remap(photo, u, v, flag, dst=out))
+    remap = lambda flag: lambda: speed(u.size, photos, lambda photo: cv2.remap(photo, u, v, flag, dst=out))
     warper = cv2.PyRotationWarper("cylindrical", f)
     k = np.array([[f, 0, cx], [0, f, cy], [0, 0, 1]], np.float32)
-    r = np.eye(3, dtype=np.float32)
-    _, warped = warper.warp(photos[0], k, r, cv2.INTER_LINEAR, cv2.BORDER_CONSTANT)
-    pixels = warped.shape[0] * warped.shape[1]
-    found["PyRotationWarper bilinear"] = speed(
-        pixels, photos, lambda photo: warper.warp(photo, k, r, cv2.INTER_LINEAR, cv2.BORDER_CONSTANT))
-    return found
+    warp = lambda photo: warper.warp(photo, k, np.eye(3, dtype=np.float32), cv2.INTER_LINEAR, cv2.BORDER_CONSTANT)
+    pixels = np.prod(warp(photos[0])[1].shape[:2])
+    return [
+        ("bilinear", "remap bilinear", remap(cv2.INTER_LINEAR)),
+        ("bilinear", "PyRotationWarper bilinear", lambda: speed(pixels, photos, warp)),
+        ("bicubic", "remap bicubic", remap(cv2.INTER_CUBIC)),
+        ("lanczos3", "remap lanczos4", remap(cv2.INTER_LANCZOS4)),
+    ]
 
 
-def ours():
-    environment = dict(os.environ, RAYON_NUM_THREADS=str(THREADS))
-    text = subprocess.run(["cargo", "bench", "--quiet", "--bench", "warp", "--", "--json"],
-                          env=environment, check=True, capture_output=True, text=True).stdout
-    return {row["what"]: row["mpx_per_s"] for row in map(json.loads, filter(None, text.splitlines()))}
+def quartiles(values, digits):
+    low, median, high = statistics.quantiles(values, n=4)
+    return f"{median:8.{digits}f}  ({low:.{digits}f} to {high:.{digits}f})"
 
 
 def main():
     cv2.setNumThreads(THREADS)
-    # In turn, so that what else the machine does meets both.
-    theirs, own = [opencv()], []
-    for _ in range(RUNS):
-        own.append(ours())
-        theirs.append(opencv())
-    median = lambda runs: {name: statistics.median(run[name] for run in runs) for name in runs[0]}
-    theirs, own = median(theirs), median(own)
-    print(f"{THREADS} thread(s), Mpx/s of processor time")
-    for name, value in {**theirs, **{f"tunnelstitch {k}": v for k, v in own.items()}}.items():
-        print(f"  {name:28} {value:10.1f}")
-    print("ratios")
-    for name, mine, other in [
-        ("bilinear / remap", "bilinear", "remap bilinear"),
-        ("bilinear / PyRotationWarper", "bilinear", "PyRotationWarper bilinear"),
-        ("bicubic / remap", "bicubic", "remap bicubic"),
-        ("lanczos3 / remap (lanczos4)", "lanczos3", "remap lanczos4"),
-    ]:
-        print(f"  {name:28} {own[mine] / theirs[other]:10.2f}")
-    print(f"  {'bilinear / copy':28} {own['bilinear'] / own['copy']:10.4f}")
+    bench = subprocess.Popen(
+        ["cargo", "bench", "--quiet", "--bench", "warp", "--", "--ask"], text=True, bufsize=1,
+        env=dict(os.environ, RAYON_NUM_THREADS=str(THREADS)), stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+
+    def ours(what):
+        print(what, file=bench.stdin)
+        return float(bench.stdout.readline())
+
+    print(f"{THREADS} thread(s), {ROUNDS} rounds in turn, Mpx/s of processor time: median (quartiles)")
+    for name, other, theirs in opencv() + [("bilinear", "a copy", lambda: ours("copy"))]:
+        rounds = [(ours(name), theirs()) for _ in range(ROUNDS + 1)][1:]
+        print(f"  {name:9} {quartiles([own for own, _ in rounds], 1)}")
+        print(f"    {other:26} {quartiles([other for _, other in rounds], 1)}")
+        print(f"    ratio                      {quartiles([own / other for own, other in rounds], 3)}", flush=True)
+    bench.stdin.close()
+    sys.exit(bench.wait())
 
 
 if __name__ == "__main__":
