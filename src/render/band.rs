@@ -25,7 +25,7 @@ pub struct Band {
 }
 
 /// Takes bands, from the first row of the canvas to the last.
-pub trait Target {
+pub trait Target: Send {
     /// Takes the next band.
     ///
     /// # Errors

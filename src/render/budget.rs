@@ -31,7 +31,7 @@ pub struct Budget {
     pub room: u64,
 }
 
-/// Copies of a band: drawn tiles, the band, the tiles that are written, and what becomes of them.
+/// Copies of a band: the one that is drawn, the one before it, the tiles of this that are written, and what becomes of them.
 const COPIES: u64 = 5;
 /// Copies of a frame while it is decoded: the file, the decoder's picture, and what it is turned into.
 const DECODING: u64 = 4;

@@ -76,14 +76,25 @@ pub fn corrections(
             .par_iter()
             .map(|(frame, window)| sight(*frame, window))
             .collect();
-        for ((frame, window), layer) in run.iter().zip(&layers) {
-            window.each(grid, |node, at| {
-                if labels[node] == *frame as u32 {
-                    composite[node * channels..][..channels]
-                        .copy_from_slice(&layer.values[at * channels..][..channels]);
+        let columns = grid.columns as usize;
+        let rows = composite.par_chunks_exact_mut(columns * channels);
+        let labels = labels.par_chunks_exact(columns);
+        rows.zip(labels)
+            .enumerate()
+            .for_each(|(row, (own, labels))| {
+                for ((frame, window), layer) in run.iter().zip(&layers) {
+                    let Some(values) = window.row(0, row, layer) else {
+                        continue;
+                    };
+                    for (column, value) in
+                        window.around(0, columns).zip(values.chunks_exact(channels))
+                    {
+                        if labels[column] == *frame as u32 {
+                            own[column * channels..][..channels].copy_from_slice(value);
+                        }
+                    }
                 }
             });
-        }
     }
     let mut bands: Vec<Layer> = (0..BANDS)
         .map(|band| {
@@ -125,10 +136,24 @@ pub fn corrections(
                 weighted_bands(different, mask, window.columns == grid.columns as usize)
             })
             .collect();
-        for ((_, window), part) in run.iter().zip(&parts) {
-            for (band, (sum, layer)) in bands.iter_mut().zip(part).enumerate() {
-                sum.add(layer, window, band);
-            }
+        for (band, sum) in bands.iter_mut().enumerate() {
+            let (columns, channels) = (sum.columns, sum.channels);
+            let rows = sum.values.par_chunks_exact_mut(columns * channels);
+            rows.enumerate().for_each(|(row, own)| {
+                for ((_, window), part) in run.iter().zip(&parts) {
+                    let values = window.row(band, row, &part[band]).unwrap_or_default();
+                    for (column, value) in window
+                        .around(band, columns)
+                        .zip(values.chunks_exact(channels))
+                    {
+                        for (own, value) in
+                            own[column * channels..][..channels].iter_mut().zip(value)
+                        {
+                            *own += value;
+                        }
+                    }
+                }
+            });
         }
     }
     let bands = bands.iter().map(Layer::normalised);
@@ -214,20 +239,30 @@ fn windows(grid: &Canvas, labels: &[u32], frames: usize) -> Vec<(usize, Window)>
 impl Window {
     /// Calls `visit(node of the grid, place in the window)` for all nodes of the window that the grid has.
     fn each(&self, grid: &Canvas, mut visit: impl FnMut(usize, usize)) {
-        let columns = i64::from(grid.columns);
+        let columns = grid.columns as usize;
         for row in 0..self.rows {
             let of_grid = self.row + row as i64;
             if !(0..i64::from(grid.rows)).contains(&of_grid) {
                 continue;
             }
-            for column in 0..self.columns {
-                let around = (self.column + column as i64).rem_euclid(columns);
-                visit(
-                    (of_grid * columns + around) as usize,
-                    row * self.columns + column,
-                );
+            for (k, column) in self.around(0, columns).enumerate() {
+                visit(of_grid as usize * columns + column, row * self.columns + k);
             }
         }
+    }
+
+    /// The columns of the window among the `columns` of a grid that is `band` halvings coarser.
+    fn around(&self, band: usize, columns: usize) -> impl Iterator<Item = usize> {
+        let first = (self.column >> band).rem_euclid(columns as i64) as usize;
+        (first..columns)
+            .chain(0..columns)
+            .take(self.columns >> band)
+    }
+
+    /// A row of such a grid in the window's layer, if it has it.
+    fn row<'a>(&self, band: usize, row: usize, layer: &'a Layer) -> Option<&'a [f32]> {
+        let row = usize::try_from(row as i64 - (self.row >> band)).ok()?;
+        (row < layer.rows).then(|| layer.row(row))
     }
 }
 
@@ -394,25 +429,5 @@ impl Layer {
     fn row(&self, row: usize) -> &[f32] {
         let length = self.columns * self.channels;
         &self.values[row * length..][..length]
-    }
-
-    /// Adds the layer of a window, `band` halvings from the grid's.
-    fn add(&mut self, layer: &Self, window: &Window, band: usize) {
-        let c = self.channels;
-        let (first, top) = (window.column >> band, window.row >> band);
-        for row in 0..layer.rows {
-            let to = top + row as i64;
-            if !(0..self.rows as i64).contains(&to) {
-                continue;
-            }
-            for column in 0..layer.columns {
-                let around = (first + column as i64).rem_euclid(self.columns as i64);
-                let node = (to * self.columns as i64 + around) as usize * c;
-                let from = (row * layer.columns + column) * c;
-                for channel in 0..c {
-                    self.values[node + channel] += layer.values[from + channel];
-                }
-            }
-        }
     }
 }

@@ -217,7 +217,18 @@ impl<'a> Plan<'a> {
         progress.start("panorama", starts.len());
         progress.advance(first.min(starts.len()));
         let sources = targets.iter().any(|target| target.wants_sources());
-        let mut band = Band::empty(&self.canvas, frames.format(), sources);
+        let empty = || Band::empty(&self.canvas, frames.format(), sources);
+        // While a band is drawn the one before is written.
+        let (mut band, mut before) = (empty(), empty());
+        let mut put = |band: &Band| {
+            if band.rows > 0 {
+                for target in &mut *targets {
+                    target.put(&self.canvas, band)?;
+                }
+                progress.advance(1);
+            }
+            Ok::<_, RenderError>(())
+        };
         let mut readings = Readings::default();
         for (k, row) in starts.iter().enumerate().skip(first) {
             let later: Vec<usize> = needs[k + 1..]
@@ -228,17 +239,19 @@ impl<'a> Plan<'a> {
                 .collect();
             frames.hold(&needs[k], &later, room)?;
             let tiles = self.tiles(*row);
-            self.fill(&mut band, frames, *row, &tiles);
-            if self.super_resolve {
-                readings.keep(frames, &self.settled.exposure, &needs[k]);
-                let (surface, placements) = (self.surface, self.placements);
-                readings.resolve(surface, frames, placements, &self.canvas, &tiles, &mut band);
-            }
-            for target in &mut *targets {
-                target.put(&self.canvas, &band)?;
-            }
-            progress.advance(1);
+            let draw = || {
+                self.fill(&mut band, frames, *row, &tiles);
+                if self.super_resolve {
+                    readings.keep(frames, &self.settled.exposure, &needs[k]);
+                    let (surface, placements) = (self.surface, self.placements);
+                    readings.resolve(surface, frames, placements, &self.canvas, &tiles, &mut band);
+                }
+            };
+            let ((), written) = rayon::join(draw, || put(&before));
+            written?;
+            std::mem::swap(&mut band, &mut before);
         }
+        put(&before)?;
         progress.finish();
         Ok(())
     }
