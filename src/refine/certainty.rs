@@ -42,6 +42,7 @@ impl Certainty {
             &solution.linearisation.normal,
             &solution.linearisation.scatter,
             &prior,
+            solution.record.curvature(),
         );
         // Poses without a covariance are still poses; they are reported as uncertain.
         let mut covariances =

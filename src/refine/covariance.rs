@@ -1,18 +1,29 @@
 //! How sure the estimate is.
 //!
-//! Were all residuals independent noise of the assumed size, the covariance would be `Z = H⁻¹`. They are not quite: where
-//! the wall is steep, aliasing and interpolation add errors that depend on how pixels happen to fall. How much the
-//! estimate moves for it is told by the scatter of the gradients of the parts of the cost, `V = Σ_b g_b g_bᵀ` over blocks
-//! b of the wall (32 × 32 pixels: errors of neighbouring samples hang together, those of blocks hardly), plus the
-//! prior's own information P. If the model were true, `V + P = H`. So
+//! The estimate is where the score g, the gradient of the cost, is zero. Errors of the pixels that add ε to it there move the estimate by
+//! `−D⁻¹ ε`, D the derivative of the score; so its covariance is `D⁻¹ Q D⁻¹` with Q the variance of ε.
 //!
-//! `Σ = c H⁻¹`,   `c = tr(H⁻¹ (V + P)) / unknowns`,
+//! **D is not the normal matrix H.** Gauss–Newton weighs a residual by `ω = ψ(e)/e`, but as it grows its weight fades: a score
+//! `Σ ψ(e) ∂e` has the derivative `Σ ψ'(e) ∂e ∂eᵀ`, and ψ' is less than ω (0.89 of it in the mean, for Gaussian residuals). Where
+//! slopes are not quite those of the wall, as on one that is faint or very sharp, that makes a difference, too. What D is the
+//! solver sees from step to step: `D = κ H`, with κ the [`SolveRecord::curvature`], 0.8–0.9 on faint walls, about 1 on sharp bricks.
 //!
-//! with c about 1 on noisy walls of low contrast, and about 3 on sharp bricks. Only blocks of `H⁻¹` where H itself has
+//! **Q** is told by the scatter of the gradients of the parts of the cost, `V = Σ_b g_b g_bᵀ` over blocks
+//! b of the wall (32 × 32 pixels: errors of neighbouring samples hang together, those of blocks hardly), whatever the residuals are like, plus
+//! the prior's own information P. Were the residuals independent noise of the assumed size, `V + P` would be D. They are not quite:
+//! where the wall is steep, aliasing and interpolation add errors that depend on how pixels happen to fall. With one factor for
+//! all unknowns,
+//!
+//! `Σ = c H⁻¹`,   `c = tr(H⁻¹ (V + P)) / (κ² unknowns)`,
+//!
+//! c about 1 on noisy walls of low contrast, and about 3 on sharp bricks. Only blocks of `H⁻¹` where H itself has
 //! blocks are needed ([`super::selected_inverse`]).
 //!
-//! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`H⁻¹ V H⁻¹`);
-//! R. W. M. Wedderburn, "Quasi-likelihood functions", Biometrika 61(3), 1974 (one factor for all).
+//! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`D⁻¹ Q D⁻¹`);
+//! F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw, W. A. Stahel, "Robust Statistics: The Approach Based on Influence
+//! Functions", 1986, 6.3 (ψ' in D); R. W. M. Wedderburn, "Quasi-likelihood functions", Biometrika 61(3), 1974 (one factor for all).
+//!
+//! [`SolveRecord::curvature`]: super::SolveRecord::curvature
 
 use super::calibration::LENS;
 use super::estimate::{FrameEstimate, UNKNOWNS};
@@ -135,7 +146,7 @@ impl Covariances {
     }
 }
 
-/// The covariances at a solution: `normal` with the gauge tied, `scatter` V of the pixels, `prior` P, all on `pattern`.
+/// The covariances at a solution: `normal` with the gauge tied, `scatter` V of the pixels, `prior` P, all on `pattern`; `curvature`: κ.
 ///
 /// # Errors
 /// [`FactorError`] if the normal matrix is singular.
@@ -144,6 +155,7 @@ pub fn covariances(
     normal: &NormalEquations,
     scatter: &[Block],
     prior: &[Block],
+    curvature: f64,
 ) -> Result<Covariances, FactorError> {
     let inverse = SelectedInverse::new(pattern, normal)?;
     let count = pattern.frames();
@@ -158,7 +170,7 @@ pub fn covariances(
             }
         }
     }
-    let variance_factor = trace / (UNKNOWNS * count) as f64;
+    let variance_factor = trace / (curvature.powi(2) * (UNKNOWNS * count) as f64);
     let pose = |block: Block| variance_factor * block.fixed_view::<6, 6>(0, 0).into_owned();
     let unknown = Matrix6::from_element(f64::NAN);
     Ok(Covariances {
@@ -236,9 +248,10 @@ mod tests {
         assert_eq!(lines[0][4], "wx_wy");
     }
 
-    /// If the scatter is what the model says, so is the covariance; twice the scatter, twice the covariance.
+    /// If the scatter is what the model says, so is the covariance; twice the scatter, twice the covariance; half the curvature,
+    /// twice the error.
     #[test]
-    fn the_factor_follows_the_scatter() {
+    fn the_factor_follows_scatter_and_curvature() {
         let pattern = Pattern::new(3, [(0, 1), (1, 2)]);
         let mut normal = NormalEquations::zeros(&pattern);
         for k in 0..3 {
@@ -248,10 +261,13 @@ mod tests {
             normal.add_block(&pattern, k, k + 1, &(Block::identity() * -1.0));
         }
         let none = vec![Block::zeros(); pattern.blocks()];
-        let one = covariances(&pattern, &normal, &normal.blocks, &none).unwrap();
+        let one = covariances(&pattern, &normal, &normal.blocks, &none, 1.0).unwrap();
         assert!((one.variance_factor - 1.0).abs() < 1e-12);
-        let two = covariances(&pattern, &normal, &normal.blocks, &normal.blocks).unwrap();
+        let both = (&normal.blocks, &normal.blocks);
+        let two = covariances(&pattern, &normal, both.0, both.1, 1.0).unwrap();
         assert!((two.frames[1] - one.frames[1] * 2.0).norm() < 1e-12);
+        let bent = covariances(&pattern, &normal, &normal.blocks, &none, 0.5).unwrap();
+        assert!((bent.frames[1] - one.frames[1] * 4.0).norm() < 1e-12);
         assert!((one.frames[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
         assert!((one.next[0][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
     }

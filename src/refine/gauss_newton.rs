@@ -10,6 +10,7 @@ use argmin::core::{
     Error, Executor, IterState, KV, Problem as Counted, Solver, State, TerminationReason,
 };
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 /// When to stop.
@@ -49,6 +50,9 @@ pub struct StepRecord {
     pub step_px: f64,
     /// λ with which it was taken; 0 is plain Gauss–Newton.
     pub damping: f64,
+    /// How much the gradient changed along the step, over what the normal equations foretell: `δᵀ(g' − g)/δᵀHδ`. None where it was not
+    /// looked at.
+    pub curvature: Option<f64>,
 }
 
 /// The course of one solve.
@@ -71,6 +75,29 @@ pub struct SolveRecord {
     pub sigma: f64,
     /// Why it stopped.
     pub stop: StopReason,
+}
+
+/// What the curvature is for Gaussian residuals and slopes without error: the mean of `ψ'` over that of `ω` with [`super::robust::Loss`].
+const USUAL_CURVATURE: f64 = 0.89;
+/// The curvatures that are believed; others are those of a solve that was still far from its end.
+const CURVATURES: RangeInclusive<f64> = 0.6..=1.2;
+
+impl SolveRecord {
+    /// How much the derivative of the gradient is of the normal matrix: the mean over all steps that tell, by the squares of their
+    /// lengths ([`super::covariance`]).
+    pub fn curvature(&self) -> f64 {
+        let steps = self.steps.iter().filter_map(|step| {
+            let curvature = step.curvature.filter(|of| CURVATURES.contains(of))?;
+            Some((step.step_px.powi(2), curvature))
+        });
+        let (weights, sum) = steps.fold((0.0, 0.0), |(weights, sum), (weight, curvature)| {
+            (weights + weight, sum + weight * curvature)
+        });
+        match weights > 0.0 {
+            true => sum / weights,
+            false => USUAL_CURVATURE,
+        }
+    }
 }
 
 /// Where a solve ended.
@@ -173,21 +200,22 @@ impl DampedGaussNewton<'_> {
                 },
             };
             // One frame that fits nowhere must not hold back the others.
+            let mut whole = self.lambda == 0.0;
             for (estimate, step) in estimates.iter().zip(&mut step) {
                 if !problem.admits(&estimate.retract(step)) {
                     *step = FrameStep::zeros();
+                    whole = false;
                 }
             }
             let moved = problem.wall_step_px(estimates, &step, &shared);
             let step_px = moved.into_iter().fold(0.0, f64::max);
-            let mut decrement: f64 = step
-                .iter()
-                .zip(gradient)
-                .map(|(step, gradient)| -step.dot(gradient))
-                .sum();
-            if let Some(border) = &current.border {
-                decrement -= shared.dot(&border.gradient);
-            }
+            let along = |at: &Linearisation| {
+                let poses = step.iter().zip(&at.normal.gradient);
+                let poses: f64 = poses.map(|(step, gradient)| step.dot(gradient)).sum();
+                let border = at.border.as_ref();
+                poses + border.map_or(0.0, |border| shared.dot(&border.gradient))
+            };
+            let decrement = -along(&current);
             let stop = self.reason_to_stop(step_px, decrement, UNKNOWNS * step.len());
             let candidate: Vec<_> = estimates
                 .iter()
@@ -199,6 +227,7 @@ impl DampedGaussNewton<'_> {
                 cost: None,
                 step_px,
                 damping: self.lambda,
+                curvature: None,
             };
             if stop.is_some() {
                 self.steps.push(record);
@@ -208,6 +237,8 @@ impl DampedGaussNewton<'_> {
             let next = problem.linearise_at(&candidate.0, &candidate.1)?;
             if next.cost < current.cost {
                 record.cost = Some(next.cost);
+                // Of a whole undamped step δᵀHδ is the decrement.
+                record.curvature = whole.then(|| 1.0 + along(&next) / decrement);
                 self.steps.push(record);
                 self.lambda = if self.lambda > DAMPING.0 {
                     self.lambda / DAMPING.1
@@ -373,4 +404,51 @@ pub fn go_on<'a, 'b>(
         linearisation,
         record,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn record(steps: &[(f64, Option<f64>)]) -> SolveRecord {
+        let steps = steps.iter().map(|(step_px, curvature)| StepRecord {
+            cost: None,
+            step_px: *step_px,
+            damping: 0.0,
+            curvature: *curvature,
+        });
+        SolveRecord {
+            iterations: 0,
+            steps: steps.collect(),
+            cost_start: 0.0,
+            cost_end: 0.0,
+            observations: 0,
+            last_step_px: 0.0,
+            sigma: 1.0,
+            stop: StopReason::StepBelowTolerance,
+        }
+    }
+
+    #[test]
+    fn long_steps_tell_the_curvature_and_strange_ones_do_not() {
+        let told = record(&[(0.2, Some(0.9)), (0.1, Some(0.8)), (0.05, None)]);
+        assert!((told.curvature() - (4.0 * 0.9 + 0.8) / 5.0).abs() < 1e-12);
+        let strange = record(&[(3.0, Some(-0.4)), (1.0, Some(f64::NAN)), (0.1, None)]);
+        assert_eq!(strange.curvature(), USUAL_CURVATURE);
+    }
+
+    /// Means over a Gaussian of unit variance.
+    #[test]
+    fn the_usual_curvature_is_that_of_gaussian_residuals() {
+        use crate::refine::robust::Loss;
+        let (mut weight, mut slope) = (0.0, 0.0);
+        for k in -800..=800 {
+            let e = 0.01 * f64::from(k);
+            let density = (-0.5 * e * e).exp();
+            let omega = |e: f64| f64::from(Loss::weight((e * e) as f32, 1.0));
+            weight += density * omega(e);
+            slope += density * ((e + 0.01) * omega(e + 0.01) - (e - 0.01) * omega(e - 0.01)) / 0.02;
+        }
+        assert!((slope / weight - USUAL_CURVATURE).abs() < 0.01);
+    }
 }

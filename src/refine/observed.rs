@@ -34,7 +34,7 @@ pub struct Posterior {
     pub w: Vec<BorderBlock>,
     /// S.
     schur: SharedBlock,
-    /// `E Q Eᵀ`.
+    /// `E Q Eᵀ`, over the square of the score's curvature ([`super::covariance`]).
     scatter: SharedBlock,
 }
 
@@ -52,8 +52,9 @@ impl Posterior {
         let factor = problem.symbolic().factorise(pattern, &at.normal, 0.0)?;
         let Eliminated { w, schur } = border.eliminate(&factor, 0.0);
         let (prior, prior_border) = problem.prior_information(&solution.estimates, &solution.kappa);
-        let scatter = reduce(pattern, &at.scatter, border_scatter, &w)
-            + reduce(pattern, &prior, &prior_border, &w);
+        let scatter = (reduce(pattern, &at.scatter, border_scatter, &w)
+            + reduce(pattern, &prior, &prior_border, &w))
+            / solution.record.curvature().powi(2);
         Ok(Some(Self { w, schur, scatter }))
     }
 

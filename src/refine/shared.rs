@@ -8,7 +8,7 @@
 //!
 //! `S δκ = −(g_κ − Wᵀ g_p)`,  `S = H_κκ − H_κp W`,  `W = H_pp⁻¹ H_pκ`,   and then `δp = −H_pp⁻¹ g_p − W δκ`.
 //!
-//! With Q the scatter of the whole gradient (`V + P` of [`super::covariance`]), `Σ_κ = S⁻¹ (E Q Eᵀ) S⁻¹` with `E = (−Wᵀ, I)` is
+//! With Q the scatter of the whole gradient over the square of its curvature (both of [`super::covariance`]), `Σ_κ = S⁻¹ (E Q Eᵀ) S⁻¹` with `E = (−Wᵀ, I)` is
 //! the covariance of κ with the poses unknown, and `Z + W Σ_κ Wᵀ` that of the poses with κ unknown.
 //!
 //! What a tile adds ([`super::lens`]): if κ changes, the pixel of frame i that looks at x shows the wall at `x − C_i δκ` instead, with
