@@ -5,8 +5,8 @@
 //!
 //! **D is not the normal matrix H.** Gauss–Newton weighs a residual by `ω = ψ(e)/e`, but as it grows its weight fades: a score
 //! `Σ ψ(e) ∂e` has the derivative `Σ ψ'(e) ∂e ∂eᵀ`, and ψ' is less than ω (0.89 of it in the mean, for Gaussian residuals). Where
-//! slopes are not quite those of the wall, as on one that is faint or very sharp, that makes a difference, too. What D is the
-//! solver sees from step to step: `D = κ H`, with κ the [`SolveRecord::curvature`], 0.8–0.9 on faint walls, about 1 on sharp bricks.
+//! slopes are not quite those of the wall, as on one that is faint or very sharp, that makes a difference, too. What D is for poses
+//! the solver sees from step to step: `D = κ H`, with κ the [`SolveRecord::curvature`], about 0.9 on faint walls and 1.03 on sharp bricks.
 //!
 //! **Q** is told by the scatter of the gradients of the parts of the cost, `V = Σ_b g_b g_bᵀ` over blocks
 //! b of the wall (32 × 32 pixels: errors of neighbouring samples hang together, those of blocks hardly), whatever the residuals are like, plus

@@ -50,8 +50,8 @@ pub struct StepRecord {
     pub step_px: f64,
     /// λ with which it was taken; 0 is plain Gauss–Newton.
     pub damping: f64,
-    /// How much the gradient changed along the step, over what the normal equations foretell: `δᵀ(g' − g)/δᵀHδ`. None where it was not
-    /// looked at.
+    /// How much the gradient changed along the step, over what the normal equations foretell: `δᵀ(g' − g)/δᵀHδ`, of the poses' part of
+    /// the step δ. None where it was not looked at.
     pub curvature: Option<f64>,
 }
 
@@ -98,6 +98,16 @@ impl SolveRecord {
             false => USUAL_CURVATURE,
         }
     }
+}
+
+/// The derivative of the cost along the poses' part of a step.
+fn pose_slope(step: &[FrameStep], at: &Linearisation) -> f64 {
+    let frames = step.iter().zip(&at.normal.gradient);
+    let poses = frames.map(|(step, gradient)| {
+        let (step, gradient) = (step.fixed_rows::<6>(0), gradient.fixed_rows::<6>(0));
+        step.dot(&gradient)
+    });
+    poses.sum()
 }
 
 /// Where a solve ended.
@@ -209,13 +219,14 @@ impl DampedGaussNewton<'_> {
             }
             let moved = problem.wall_step_px(estimates, &step, &shared);
             let step_px = moved.into_iter().fold(0.0, f64::max);
-            let along = |at: &Linearisation| {
-                let poses = step.iter().zip(&at.normal.gradient);
-                let poses: f64 = poses.map(|(step, gradient)| step.dot(gradient)).sum();
-                let border = at.border.as_ref();
-                poses + border.map_or(0.0, |border| shared.dot(&border.gradient))
-            };
-            let decrement = -along(&current);
+            let mut decrement: f64 = step
+                .iter()
+                .zip(gradient)
+                .map(|(step, gradient)| -step.dot(gradient))
+                .sum();
+            if let Some(border) = &current.border {
+                decrement -= shared.dot(&border.gradient);
+            }
             let stop = self.reason_to_stop(step_px, decrement, UNKNOWNS * step.len());
             let candidate: Vec<_> = estimates
                 .iter()
@@ -237,8 +248,9 @@ impl DampedGaussNewton<'_> {
             let next = problem.linearise_at(&candidate.0, &candidate.1)?;
             if next.cost < current.cost {
                 record.cost = Some(next.cost);
-                // Of a whole undamped step δᵀHδ is the decrement.
-                record.curvature = whole.then(|| 1.0 + along(&next) / decrement);
+                // A whole undamped step is δ = −H⁻¹ g.
+                let of_poses = |at| pose_slope(&step, at);
+                record.curvature = whole.then(|| 1.0 - of_poses(&next) / of_poses(&current));
                 self.steps.push(record);
                 self.lambda = if self.lambda > DAMPING.0 {
                     self.lambda / DAMPING.1
