@@ -53,26 +53,31 @@ pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
 /// Gaussian's σ).
 fn without_extremes(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
     let mut values = image.data().to_vec();
-    let windows = Windows::new(&values, image.width(), reach);
+    let (means, sigma) = detail(image, reach);
+    for (value, mean) in values.iter_mut().zip(&means) {
+        // NaN stays NaN.
+        *value = value.clamp(mean - most * sigma, mean + most * sigma);
+    }
+    values
+}
+
+/// The means over windows of `2 reach + 1` pixels, and the median size of what pixels differ from them (as a Gaussian's σ; 0 of a
+/// picture without a value).
+fn detail(image: &GreyImage, reach: usize) -> (Vec<f32>, f32) {
+    let windows = Windows::new(image.data(), image.width(), reach);
     let means: Vec<f32> = windows.moments().map(|m| m.mean).collect();
-    let mut sizes: Vec<f32> = values
-        .iter()
-        .zip(&means)
+    let pixels = image.data().iter().zip(&means);
+    let mut sizes: Vec<f32> = pixels
         .map(|(value, mean)| (value - mean).abs())
         .filter(|size| !size.is_nan())
         .step_by(3)
         .collect();
     if sizes.is_empty() {
-        return values;
+        return (means, 0.0);
     }
     let middle = sizes.len() / 2;
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f32::total_cmp);
-    let most = most * MAD_TO_SIGMA as f32 * *median;
-    for (value, mean) in values.iter_mut().zip(&means) {
-        // NaN stays NaN.
-        *value = value.clamp(mean - most, mean + most);
-    }
-    values
+    (means, MAD_TO_SIGMA as f32 * *median)
 }
 
 /// A picture without its extremes: what stands out of its surroundings by more than a few times what is usual in the
@@ -85,6 +90,22 @@ pub fn subdued(image: &GreyImage) -> GreyImage {
 
 /// Detail that [`subdued`] leaves, in σ of the usual.
 const MOST_EXTREME: f32 = 3.0;
+
+/// A picture of the usual alone: what stands out of its surroundings, as wet patches and glints do, has no value.
+pub fn usual(image: &GreyImage) -> GreyImage {
+    let (means, sigma) = detail(image, wide_window(image));
+    let pixels = image.data().iter().zip(&means);
+    let values = pixels.map(
+        |(value, mean)| match (value - mean).abs() > MOST_USUAL * sigma {
+            true => f32::NAN,
+            false => *value,
+        },
+    );
+    GreyImage::new(image.width(), image.height(), values.collect())
+}
+
+/// Detail that is usual, in its σ: less than [`subdued`] cuts to.
+const MOST_USUAL: f32 = 2.5;
 
 /// Mean and variance of the values in a window.
 struct Moments {
@@ -180,6 +201,19 @@ mod tests {
             (ab, aa, bb) = (ab + a * b, aa + a * a, bb + b * b);
         }
         assert!(ab / (aa * bb).sqrt() > 0.98);
+    }
+
+    #[test]
+    fn a_wet_patch_is_not_usual_and_the_wall_around_it_is() {
+        let wet = |x: usize, y: usize| (10..16).contains(&x) && (20..27).contains(&y);
+        let value = |k: usize| match (k % 60, k / 60) {
+            (x, y) if wet(x, y) => 60.0,
+            (x, y) => 100.0 + 2.0 * texture(x, y),
+        };
+        let left = usual(&GreyImage::new(60, 40, (0..2400).map(value).collect()));
+        for (k, value) in left.data().iter().enumerate() {
+            assert_eq!(value.is_nan(), wet(k % 60, k / 60), "{k}");
+        }
     }
 
     #[test]

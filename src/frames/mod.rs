@@ -16,7 +16,7 @@ mod write;
 
 pub(crate) use agreement::Agreement;
 pub use cache::FrameCache;
-pub use contrast::{LocalContrast, local_contrast};
+pub use contrast::{LocalContrast, local_contrast, usual};
 pub use grey::GreyImage;
 pub use load::{FrameError, FrameFile, colour_type, list, load_colour};
 pub use mask::{HalvedMask, Mask};

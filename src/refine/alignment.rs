@@ -88,7 +88,7 @@ pub fn alignments(
     let camera = scene.camera.at_level(level);
     let overlaps = Overlaps::of(scene, &camera, tracked, frames)?;
     let mut found = Vec::new();
-    for Batch { partners, needed } in overlaps.batches() {
+    for Batch { partners, needed } in overlaps.batches(|_, _| true) {
         let pictures: BTreeMap<usize, Arc<Pyramid>> = needed
             .into_par_iter()
             .map(|k| Ok((k, scene.frames.get(k)?)))

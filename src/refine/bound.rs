@@ -20,7 +20,13 @@
 //! but is of no use to an estimator that does not know it beforehand. So on faint walls the bound is not to be reached, the
 //! less the more noise there is.
 //!
-//! Source: W. R. Hahn and S. A. Tretter, "Optimum processing for delay-vector estimation in passive signal arrays", IEEE
+//! Nor is it on sharp walls, the less the *less* noise there is: detail finer than pixels shows as something coarser (aliasing), and how
+//! much of it there is must be told from the same pixels, which takes as many frames as there are frequencies that look alike.
+//! `benches/reach.py` has the information of both together, `F_ij = tr(C⁻¹ ∂_i C C⁻¹ ∂_j C)` with C the covariance of what N frames
+//! show at one frequency: where five frames see a point, no estimator that knows no more of the wall than its spectrum comes closer than 1.32,
+//! 1.20 and 1.14 × the bound on brick with noise of 1, 2 and 4 grey levels, and 1.10, 1.23 and 1.52 × on concrete.
+//!
+//! Source: W. J. Bangs, "Array processing with generalized beamformers", thesis, Yale, 1971; W. R. Hahn and S. A. Tretter, "Optimum processing for delay-vector estimation in passive signal arrays", IEEE
 //! Transactions on Information Theory 19(5), 1973; C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection,
 //! Estimation, and Modulation Theory", 1968.
 

@@ -13,7 +13,7 @@ use super::track::Tracked;
 use super::wall::{Lattice, Likeness, Portrait, pixel_m};
 use crate::surface::Footprint;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 /// Least samples that two frames share, as a share of the lattice over one.
@@ -49,7 +49,9 @@ pub struct Pair {
 /// finest detail.
 ///
 /// Either alone can be misled: the first by glints and things before the wall, the second by the edges of a pattern
-/// that repeats. Two frames contradict if neither sees the same wall in them.
+/// that repeats. Where neither sees the same wall in two frames, they are looked at once more without what stands out of it: water
+/// is dark in one and glints in the other, and on a faint wall a few such patches in a strip are all that is compared. Two frames
+/// contradict if the wall between does, too.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -59,19 +61,18 @@ pub fn compare_pairs(
     tracked: &Tracked,
     frames: &Range<usize>,
 ) -> Result<Vec<Pair>, ProblemError> {
-    let coarse = compare_at(scene, Comparison { level, ..COARSE }, tracked, frames)?;
+    let any = |_, _| true;
+    let coarse = Comparison { level, ..COARSE };
     let fine = Comparison {
         level: FINE.level.min(level),
         ..FINE
     };
-    let fine: BTreeMap<(usize, usize), Compared> = compare_at(scene, fine, tracked, frames)?
-        .into_iter()
-        .map(|compared| ((compared.a, compared.b), compared))
-        .collect();
-    Ok(coarse
+    let of_coarse = compare_at(scene, coarse, tracked, frames, &any)?;
+    let of_fine = by_pair(compare_at(scene, fine, tracked, frames, &any)?);
+    let mut pairs: Vec<Pair> = of_coarse
         .into_iter()
         .filter_map(|coarse| {
-            let fine = fine.get(&(coarse.a, coarse.b));
+            let fine = of_fine.get(&(coarse.a, coarse.b));
             let fine_quality = fine.and_then(|fine| fine.quality);
             let wrong = match (coarse.quality, fine_quality) {
                 (None, None) => return None,
@@ -87,7 +88,30 @@ pub fn compare_pairs(
                 sharpness: fine_quality.and(fine.map(|fine| fine.sharpness)),
             })
         })
-        .collect())
+        .collect();
+    let wrong = pairs.iter().filter(|pair| pair.wrong);
+    let wrong: BTreeSet<(usize, usize)> = wrong.map(|pair| (pair.a, pair.b)).collect();
+    if wrong.is_empty() {
+        return Ok(pairs);
+    }
+    let usual = Comparison {
+        all: false,
+        ..coarse
+    };
+    let again = |a, b| wrong.contains(&(a, b));
+    let of_usual = by_pair(compare_at(scene, usual, tracked, frames, &again)?);
+    for pair in pairs.iter_mut().filter(|pair| pair.wrong) {
+        let usual = of_usual.get(&(pair.a, pair.b));
+        pair.wrong = usual
+            .and_then(|usual| usual.quality)
+            .is_none_or(|quality| quality < LEAST_QUALITY);
+    }
+    Ok(pairs)
+}
+
+fn by_pair(compared: Vec<Compared>) -> BTreeMap<(usize, usize), Compared> {
+    let compared = compared.into_iter();
+    compared.map(|one| ((one.a, one.b), one)).collect()
 }
 
 /// How frames are compared.
@@ -99,17 +123,21 @@ struct Comparison {
     stride: usize,
     /// Half width of the window of local contrast, pixels.
     window: usize,
+    /// All that they show, or the usual alone.
+    all: bool,
 }
 
 const COARSE: Comparison = Comparison {
     level: 2,
     stride: 4,
     window: 6,
+    all: true,
 };
 const FINE: Comparison = Comparison {
     level: 1,
     stride: 5,
     window: 3,
+    all: true,
 };
 
 /// Two frames compared in one way.
@@ -121,22 +149,25 @@ struct Compared {
     sharpness: f64,
 }
 
+/// Compares the pairs that are `wanted`.
 fn compare_at(
     scene: &Scene,
     comparison: Comparison,
     tracked: &Tracked,
     frames: &Range<usize>,
+    wanted: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Vec<Compared>, ProblemError> {
     let Comparison {
         level,
         stride,
         window,
+        all,
     } = comparison;
     let camera = scene.camera.at_level(level);
     let overlaps = Overlaps::of(scene, &camera, tracked, frames)?;
     let mut pairs = Vec::new();
     let mut portraits: BTreeMap<usize, Portrait> = BTreeMap::new();
-    for Batch { partners, needed } in overlaps.batches() {
+    for Batch { partners, needed } in overlaps.batches(wanted) {
         // What the batch before has left is not made again.
         portraits.retain(|k, _| needed.binary_search(k).is_ok());
         let made: Vec<(usize, Portrait)> = needed
@@ -144,7 +175,7 @@ fn compare_at(
             .filter(|k| !portraits.contains_key(k))
             .map(|k| {
                 let sweep = tracked.sweep(scene, k);
-                Ok((k, Portrait::fine(scene, level, k, &sweep, window)?))
+                Ok((k, Portrait::fine(scene, level, k, &sweep, window, all)?))
             })
             .collect::<Result<_, ProblemError>>()?;
         portraits.extend(made);

@@ -73,12 +73,16 @@ impl Overlaps {
         })
     }
 
-    /// The frames of the run, a few at a time.
-    pub fn batches(&self) -> impl Iterator<Item = Batch> {
-        self.run.clone().step_by(BATCH).map(|start| {
+    /// The frames of the run, a few at a time, with those partners that are `wanted`.
+    pub fn batches(&self, wanted: impl Fn(usize, usize) -> bool) -> impl Iterator<Item = Batch> {
+        self.run.clone().step_by(BATCH).map(move |start| {
             let frames = start..(start + BATCH).min(self.run.end);
             let partners: Vec<(usize, Vec<usize>)> = frames
-                .map(|a| (a, self.after(a)))
+                .map(|a| {
+                    let mut others = self.after(a);
+                    others.retain(|b| wanted(a, *b));
+                    (a, others)
+                })
                 .filter(|(_, others)| !others.is_empty())
                 .collect();
             let all = partners

@@ -148,7 +148,10 @@ fn repeats_of(
     let Some(here) = left(&pose) else {
         return Ok(Vec::new());
     };
-    let most = UNEXPLAINED * here.max(LEAST_UNEXPLAINED);
+    // By odds: (1 − u)/u no less than half of what it is here. Where little is explained here, a place that explains nothing is no
+    // rival, though it leaves less than twice as much.
+    let here = here.max(LEAST_UNEXPLAINED);
+    let most = UNEXPLAINED * here / (1.0 + (UNEXPLAINED - 1.0) * here);
     let motion = |shift_m: [f64; 2]| free_part(scene.surface, &pose, &shift_m.into());
     let moved = |shift_m: [f64; 2]| motion(shift_m).1.apply(&pose);
     let spacing = wall.lattice.spacing_m;

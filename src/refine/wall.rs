@@ -5,7 +5,7 @@ use super::problem::{ProblemError, Scene};
 use super::sampler::{Sampler, Spot};
 use super::visibility::reach_m;
 use crate::camera::{Camera, Sweep};
-use crate::frames::{GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level};
+use crate::frames::{GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level, usual};
 use crate::surface::{Footprint, WallPoint, viewing_distance};
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
@@ -112,6 +112,7 @@ impl Portrait {
     }
 
     /// Frame `frame`, its camera moving by `sweep`, with its contrast over no more than `window` pixels to each side: fine detail only.
+    /// `all`: of all that it shows, or of the usual alone ([`usual`]).
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
@@ -121,11 +122,17 @@ impl Portrait {
         frame: usize,
         sweep: &Sweep,
         window: usize,
+        all: bool,
     ) -> Result<Self, ProblemError> {
         let picture = scene.frames.get(frame)?;
+        let image = picture.level(level);
+        let local = match all {
+            true => local_contrast(image, window),
+            false => local_contrast(&usual(image), window),
+        };
         Ok(Self {
             camera: scene.camera.at_level(level).sweeping(sweep),
-            local: Arc::new(local_contrast(picture.level(level), window)),
+            local: Arc::new(local),
             level,
             picture,
         })
