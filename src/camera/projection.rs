@@ -248,6 +248,25 @@ impl Camera {
             .collect()
     }
 
+    /// Focal length, pixels: the geometric mean of both.
+    pub fn focal_px(&self) -> f64 {
+        (self.fx * self.fy).sqrt()
+    }
+
+    /// Rays through 9 × 7 pixels spread evenly over the picture, its border included, as far as the lens shows them: all of what a
+    /// frame shows.
+    pub fn rays_across(&self) -> Vec<Vector3<f64>> {
+        const COLUMNS: u32 = 9;
+        const ROWS: u32 = 7;
+        let place = |k, count, pixels| f64::from((pixels - 1) * k) / f64::from(count - 1);
+        let pixels = (0..ROWS).flat_map(|j| (0..COLUMNS).map(move |i| (i, j)));
+        let rays = pixels.filter_map(|(i, j)| {
+            let u = place(i, COLUMNS, self.width);
+            self.ray(u, place(j, ROWS, self.height))
+        });
+        rays.collect()
+    }
+
     /// The border of the picture as pixels, clockwise from the first, `per_edge` steps an edge, along the
     /// outermost pixel centres widened by `outset` pixels (½ reaches the pixels' outer edges). Where the lens's picture ends
     /// before, the border is there.
@@ -470,5 +489,17 @@ mod tests {
         let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
         let top = camera.ray(camera.cx, -0.5).unwrap();
         assert!((top.y.abs().atan() - 30f64.to_radians()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn rays_go_across_all_of_the_picture() {
+        let camera = Camera::from_vertical_fov(160, 120, 1.0);
+        let rays = camera.rays_across();
+        assert_eq!(rays.len(), 63);
+        let corners = [(0, (0.0, 0.0)), (8, (159.0, 0.0)), (62, (159.0, 119.0))];
+        for (k, (u, v)) in corners {
+            let pixel = camera.project(&rays[k]).unwrap();
+            assert!((pixel - Vector2::new(u, v)).norm() < 1e-9);
+        }
     }
 }

@@ -129,7 +129,7 @@ fn jitter(
     survey: &Survey,
     overlap: &OverlapCheck,
 ) -> JitterCheck {
-    let focal_px = (survey.camera.fx * survey.camera.fy).sqrt();
+    let focal_px = survey.camera.focal_px();
     let [x, y, z] = prior.translation_sigma_m;
     let shift_px = px_per_metre * y.max(x).max(z);
     let one = (focal_px * prior.rotation_sigma_rad).hypot(shift_px);

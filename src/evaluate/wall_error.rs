@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 
 /// Distances on the unrolled wall between where the estimated and the true pose put a pixel.
 ///
-/// Over a grid of 9 × 7 pixels a frame, its border included. The mean `Δs` and the mean `Δh` over all pixels
+/// Over 9 × 7 pixels a frame ([`Camera::rays_across`]). The mean `Δs` and the mean `Δh` over all pixels
 /// of all frames are removed as far as the tunnel's [gauge](crate::surface::Gauge) leaves them free: no
 /// picture fixes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,9 +36,6 @@ pub struct WallError {
     /// Its root mean square, pixels.
     pub worst_frame_rms_px: f64,
 }
-
-/// Grid of pixels along u and v.
-const GRID: [u32; 2] = [9, 7];
 
 /// Compares where estimated and true poses put the pixels on the wall.
 ///
@@ -130,25 +127,17 @@ pub(super) fn frame_offsets(
             })
     };
     let (mut delta_s_m, mut delta_h_m) = (Vec::new(), Vec::new());
-    for j in 0..GRID[1] {
-        for i in 0..GRID[0] {
-            let u = f64::from((camera.width - 1) * i) / f64::from(GRID[0] - 1);
-            let v = f64::from((camera.height - 1) * j) / f64::from(GRID[1] - 1);
-            // What the lens does not show has no place on the wall.
-            let Some(ray) = camera.ray(u, v) else {
-                continue;
-            };
-            let here: WallPoint = hit(estimate, "estimated", &ray)?.wall;
-            let there: WallPoint = hit(truth, "true", &ray)?.wall;
-            delta_s_m.push(here.s_m - there.s_m);
-            delta_h_m.push(here.h_m - there.h_m);
-        }
+    // What the lens does not show has no place on the wall.
+    for ray in camera.rays_across() {
+        let here: WallPoint = hit(estimate, "estimated", &ray)?.wall;
+        let there: WallPoint = hit(truth, "true", &ray)?.wall;
+        delta_s_m.push(here.s_m - there.s_m);
+        delta_h_m.push(here.h_m - there.h_m);
     }
-    let focal_px = (camera.fx * camera.fy).sqrt();
     Ok(FrameOffsets {
         delta_s_m,
         delta_h_m,
-        pixel_m: hit(truth, "true", &Vector3::z())?.range / focal_px,
+        pixel_m: hit(truth, "true", &Vector3::z())?.range / camera.focal_px(),
     })
 }
 

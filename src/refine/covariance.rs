@@ -33,7 +33,7 @@ use super::report::nan_if_null;
 use super::selected_inverse::SelectedInverse;
 use super::shared::{BorderBlock, SharedBlock};
 use crate::camera::Camera;
-use crate::surface::{GaugeMotion, Surface, lens_jacobian, wall_jacobian};
+use crate::surface::{GaugeMotion, Surface, lens_jacobian, viewing_distance, wall_jacobian};
 use nalgebra::{Matrix6, Vector6};
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
@@ -48,10 +48,10 @@ pub struct FrameSigma {
     /// Translation, root mean square over the three axes, metres.
     #[serde(deserialize_with = "nan_if_null")]
     pub translation_m: f64,
-    /// Position on the wall of what the frame shows: root mean square over middle and corners, metres.
+    /// Position on the wall of what the frame shows: root mean square over the picture ([`Camera::rays_across`]), metres.
     #[serde(deserialize_with = "nan_if_null")]
     pub wall_m: f64,
-    /// The same in pixels of the frame.
+    /// The same in pixels of the frame at its middle, as [`crate::evaluate::WallError`] counts them.
     #[serde(deserialize_with = "nan_if_null")]
     pub wall_px: f64,
 }
@@ -201,10 +201,8 @@ pub fn frame_sigma(
             .map(|k| covariance[(first + k, first + k)])
             .sum::<f64>()
     };
-    let mut wall = 0.0;
-    let mut wall_px = 0.0;
-    let mut points = 0.0;
-    for ray_c in camera.probes() {
+    let (mut wall, mut points) = (0.0, 0.0);
+    for ray_c in camera.rays_across() {
         let ray = pose.r_wc * ray_c;
         if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
             let a = wall_jacobian(pose, &surface.frame(hit.wall));
@@ -217,21 +215,23 @@ pub fn frame_sigma(
                 variance += own.trace() - 2.0 * crossed.trace();
             }
             wall += variance;
-            wall_px += variance * (camera.fy / hit.range).powi(2);
             points += 1.0;
         }
     }
+    let wall_m = f64::sqrt(wall / points);
+    let distance_m = viewing_distance(surface, pose).unwrap_or(f64::NAN);
     FrameSigma {
         rotation_deg: (trace(0) / 3.0).sqrt().to_degrees(),
         translation_m: (trace(3) / 3.0).sqrt(),
-        wall_m: (wall / points).sqrt(),
-        wall_px: (wall_px / points).sqrt(),
+        wall_m,
+        wall_px: wall_m * camera.focal_px() / distance_m,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::trajectory::{Pose, so3};
 
     #[test]
     fn the_table_has_a_line_per_frame_and_pair_and_38_numbers_each() {
@@ -270,5 +270,24 @@ mod tests {
         assert!((bent.frames[1] - one.frames[1] * 4.0).norm() < 1e-12);
         assert!((one.frames[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
         assert!((one.next[0][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
+    }
+
+    /// A camera that may be off by a millimetre along the tunnel shows all of the wall a millimetre off; how many pixels that is goes
+    /// by the middle, even where the corners are far away.
+    #[test]
+    fn pixels_on_the_wall_are_those_of_the_middle() {
+        let circle = crate::surface::Circle::new(3.0).unwrap();
+        let camera = Camera::from_vertical_fov(160, 120, 40f64.to_radians());
+        let mut covariance = Matrix6::zeros();
+        covariance[(4, 4)] = 1e-6;
+        for (tilt_deg, distance_m) in [(0.0, 3.0), (45.0f64, 3.0 * 2f64.sqrt())] {
+            let tilt = nalgebra::Vector3::x() * tilt_deg.to_radians();
+            let pose = Pose::new(so3::exp(&tilt), nalgebra::Vector3::zeros());
+            let estimate = FrameEstimate::at(pose);
+            let sigma = frame_sigma(&circle, &camera, &estimate, &covariance, None);
+            assert!((sigma.wall_m - 1e-3).abs() < 1e-9, "{sigma:?}");
+            let expected = 1e-3 * camera.fy / distance_m;
+            assert!((sigma.wall_px - expected).abs() < 1e-6, "{sigma:?}");
+        }
     }
 }

@@ -11,7 +11,7 @@ use super::doubt::Doubt;
 use super::neighbourhood::{Neighbourhood, changes};
 use super::options::RefineOptions;
 use super::problem::{ProblemError, Scene};
-use super::repeats::{Rival, settle_repeats};
+use super::repeats::{Rival, settle_all_repeats, settle_repeats};
 use super::run::disagreements;
 use super::track::{Tracked, retry};
 use super::verdict::unsupported;
@@ -67,9 +67,9 @@ pub fn repair(
             false => 0,
         };
         if !changed && placed == 0 {
-            let (moved, undecided) = settle_repeats(scene, options, tracked)?;
-            if !moved || round + 1 == ROUNDS {
-                rivals = Some(undecided);
+            let settled = settle_repeats(scene, options, tracked)?;
+            if settled.moved.is_empty() || round + 1 == ROUNDS {
+                rivals = Some(settled.unsure());
                 break;
             }
         }
@@ -111,7 +111,7 @@ pub fn repair(
     }
     match rivals {
         Some(rivals) => Ok(rivals),
-        None => Ok(settle_repeats(scene, options, tracked)?.1),
+        None => settle_all_repeats(scene, options, tracked),
     }
 }
 

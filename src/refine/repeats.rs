@@ -8,6 +8,9 @@
 //! With errors that add up, what can be wrong by a tile is a step, and with it all frames after it; with independent
 //! errors a frame by itself. Where less than half of the frames would be clear, none is: what they are clear against has
 //! been settled by the others.
+//!
+//! A frame may fit where it is and, for all that is seen there, nowhere else, because those that it is compared with are wrong by a
+//! tile as well. If the prior would clearly have it a period of the wall away, as others have shown it, it is ambiguous, too.
 
 use super::options::RefineOptions;
 use super::place::{
@@ -22,6 +25,7 @@ use crate::surface::{Footprint, Gauge, GaugeMotion, free_part};
 use crate::trajectory::{JitterModel, Pose};
 use nalgebra::Vector2;
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Difference of log-posteriors from which on one place is believed: odds of 1000 to 1.
 const CLEAR: f64 = 6.9;
@@ -31,6 +35,10 @@ const LEFT_BY_STEPS: f64 = 0.5;
 const APART: f64 = 3.0;
 /// Sweeps over all frames until no choice changes, at the most.
 const SWEEPS: usize = 20;
+/// Motions whose difference is a smaller share of them are the same.
+const SAME: f64 = 0.1;
+/// Times that all frames are compared with the wall elsewhere, at the most.
+const ROUNDS: usize = 8;
 
 /// A frame, and where it might be as well.
 pub type Rival = (usize, GaugeMotion);
@@ -44,8 +52,48 @@ struct Choice {
     rival: Vec<Option<GaugeMotion>>,
 }
 
-/// Moves the frames that fit elsewhere as well to where the prior has them; returns whether any has moved, and those for
-/// which it does not decide.
+/// What has become of frames that fit elsewhere as well.
+#[derive(Debug, Default)]
+pub struct Settled {
+    /// Those that have moved, and how they would go back. They have been compared where they were; where they are now, the others
+    /// may tell otherwise.
+    pub moved: Vec<Rival>,
+    /// Those for which the prior does not decide.
+    pub undecided: Vec<Rival>,
+}
+
+impl Settled {
+    /// All that nothing decides, if this is where it ends.
+    pub fn unsure(self) -> Vec<Rival> {
+        let Self { moved, undecided } = self;
+        let mut unsure: BTreeMap<usize, GaugeMotion> = moved.into_iter().collect();
+        unsure.extend(undecided);
+        unsure.into_iter().collect()
+    }
+}
+
+/// Moves the frames that fit elsewhere as well to where the prior has them, until none moves any more.
+///
+/// Returns those of which it is not known where they belong.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn settle_all_repeats(
+    scene: &Scene,
+    options: &RefineOptions,
+    tracked: &mut Tracked,
+) -> Result<Vec<Rival>, ProblemError> {
+    let mut settled = settle_repeats(scene, options, tracked)?;
+    for _ in 1..ROUNDS {
+        if settled.moved.is_empty() {
+            break;
+        }
+        settled = settle_repeats(scene, options, tracked)?;
+    }
+    Ok(settled.unsure())
+}
+
+/// Moves the frames that fit elsewhere as well to where the prior has them.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -53,7 +101,7 @@ pub fn settle_repeats(
     scene: &Scene,
     options: &RefineOptions,
     tracked: &mut Tracked,
-) -> Result<(bool, Vec<Rival>), ProblemError> {
+) -> Result<Settled, ProblemError> {
     let all = 0..tracked.estimates.len();
     let believed = tracked.believed(&all);
     let frames: Vec<usize> = all.filter(|k| believed[*k]).collect();
@@ -63,14 +111,21 @@ pub fn settle_repeats(
         .map(|k| repeats_of(scene, options, *k, tracked, &footprints))
         .collect::<Result<Vec<_>, _>>()?;
     if repeats.iter().all(Vec::is_empty) {
-        return Ok((false, Vec::new()));
+        return Ok(Settled::default());
     }
     let poses: Vec<Pose> = frames.iter().map(|k| tracked.estimates[*k].pose).collect();
-    let choose = |clear: f64| match scene.prior.jitter.model {
-        JitterModel::RandomWalk => choose_steps(scene.prior, &frames, &poses, &repeats, clear),
-        JitterModel::Independent => {
-            let gauge = scene.surface.gauge();
-            choose_frames(scene.prior, &gauge, &frames, &poses, &repeats, clear)
+    let radius_m = scene.surface.perimeter_m() / std::f64::consts::TAU;
+    let choose = |clear: f64| {
+        let periods = periods(&repeats, radius_m);
+        let prior = scene.prior;
+        match prior.jitter.model {
+            JitterModel::RandomWalk => {
+                choose_steps(prior, &frames, &poses, &repeats, &periods, clear)
+            }
+            JitterModel::Independent => {
+                let gauge = scene.surface.gauge();
+                choose_frames(prior, &gauge, &frames, &poses, &repeats, &periods, clear)
+            }
         }
     };
     let mut choice = choose(CLEAR);
@@ -82,19 +137,19 @@ pub fn settle_repeats(
             *rival = rival.or(repeats.first().copied());
         }
     }
-    let mut moved = false;
+    let mut moved = Vec::new();
     for (k, motion) in frames.iter().zip(&choice.motion) {
         if !motion.is_none() {
             let pose = &mut tracked.estimates[*k].pose;
             *pose = motion.apply(pose);
-            moved = true;
+            moved.push((*k, GaugeMotion::default().plus(-1.0, motion)));
         }
     }
     let rivals = frames.iter().zip(choice.rival);
-    Ok((
+    Ok(Settled {
         moved,
-        rivals.filter_map(|(k, rival)| Some((*k, rival?))).collect(),
-    ))
+        undecided: rivals.filter_map(|(k, rival)| Some((*k, rival?))).collect(),
+    })
 }
 
 /// The gauge motions after which frame `frame` matches what the others show as well as it does now.
@@ -185,9 +240,24 @@ fn repeats_of(
     Ok(found)
 }
 
-/// The likeliest of some motions, and the second if it is less likely by no more than `clear`.
+/// The motions by which the wall repeats: those of all frames, without those nearly the same.
+fn periods(repeats: &[Vec<GaugeMotion>], radius_m: f64) -> Vec<GaugeMotion> {
+    let length = |motion: &GaugeMotion| (radius_m * motion.turn_rad).hypot(motion.shift_m);
+    let mut found: Vec<GaugeMotion> = Vec::new();
+    for motion in repeats.iter().flatten() {
+        let same = |other: &GaugeMotion| length(&motion.plus(-1.0, other)) < SAME * length(other);
+        if !found.iter().any(same) {
+            found.push(*motion);
+        }
+    }
+    found
+}
+
+/// The likeliest of some motions, and the second if it is less likely by no more than `clear`; or one of the wall's `periods`, if
+/// it is likelier by more than that.
 fn likeliest(
     motions: &[GaugeMotion],
+    periods: &[GaugeMotion],
     clear: f64,
     cost: impl Fn(&GaugeMotion) -> f64,
 ) -> (GaugeMotion, Option<GaugeMotion>) {
@@ -197,10 +267,15 @@ fn likeliest(
         .map(|motion| (cost(motion), *motion))
         .collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let second = ranked
-        .get(1)
-        .filter(|second| second.0 - ranked[0].0 < clear);
-    (ranked[0].1, second.map(|(_, motion)| *motion))
+    let (best_cost, best) = ranked[0];
+    let second = ranked.get(1).filter(|second| second.0 - best_cost < clear);
+    let elsewhere = || {
+        let costs = periods.iter().map(|period| (cost(period), *period));
+        let likelier = costs.min_by(|a, b| a.0.total_cmp(&b.0));
+        likelier.filter(|(cost, _)| best_cost - cost > clear)
+    };
+    let rival = second.copied().or_else(elsewhere);
+    (best, rival.map(|(_, motion)| motion))
 }
 
 /// Errors that add up: step by step. Of the runs of frames between undecided steps, the longest is believed.
@@ -209,6 +284,7 @@ fn choose_steps(
     frames: &[usize],
     poses: &[Pose],
     repeats: &[Vec<GaugeMotion>],
+    periods: &[GaugeMotion],
     clear: f64,
 ) -> Choice {
     let mut motion = vec![GaugeMotion::default(); frames.len()];
@@ -222,7 +298,7 @@ fn choose_steps(
         let cost = |own: &GaugeMotion| {
             prior.deviation_cost(&expected, &before.plus(1.0, own).apply(&poses[i])) / steps
         };
-        let (best, second) = likeliest(&repeats[i], clear, cost);
+        let (best, second) = likeliest(&repeats[i], periods, clear, cost);
         motion[i] = before.plus(1.0, &best);
         step[i] = second.map(|second| second.plus(-1.0, &best));
     }
@@ -255,6 +331,7 @@ fn choose_frames(
     frames: &[usize],
     poses: &[Pose],
     repeats: &[Vec<GaugeMotion>],
+    periods: &[GaugeMotion],
     clear: f64,
 ) -> Choice {
     let initial: Vec<Pose> = frames.iter().map(|k| prior.initial[*k]).collect();
@@ -277,7 +354,7 @@ fn choose_frames(
         for i in 0..frames.len() {
             let expected = settled.apply(&initial[i]);
             let cost = |own: &GaugeMotion| prior.deviation_cost(&expected, &own.apply(&poses[i]));
-            let (best, second) = likeliest(&repeats[i], clear, cost);
+            let (best, second) = likeliest(&repeats[i], periods, clear, cost);
             next.motion.push(best);
             next.rival
                 .push(second.map(|second| second.plus(-1.0, &best)));
@@ -322,14 +399,53 @@ mod tests {
 
     /// Every frame fits a tile on and a tile back.
     fn choose(prior: &Prior, poses: &[Pose]) -> Choice {
+        choose_of(
+            prior,
+            poses,
+            &vec![vec![tile(), back(&tile())]; poses.len()],
+        )
+    }
+
+    fn choose_of(prior: &Prior, poses: &[Pose], repeats: &[Vec<GaugeMotion>]) -> Choice {
         let frames: Vec<usize> = (0..poses.len()).collect();
-        let repeats = vec![vec![tile(), back(&tile())]; poses.len()];
-        let gauge = Gauge::round();
+        let periods = periods(repeats, 3.0);
+        let (clear, gauge) = (CLEAR, Gauge::round());
         match prior.jitter.model {
-            JitterModel::RandomWalk => choose_steps(prior, &frames, poses, &repeats, CLEAR),
-            JitterModel::Independent => {
-                choose_frames(prior, &gauge, &frames, poses, &repeats, CLEAR)
+            JitterModel::RandomWalk => {
+                choose_steps(prior, &frames, poses, repeats, &periods, clear)
             }
+            JitterModel::Independent => {
+                choose_frames(prior, &gauge, &frames, poses, repeats, &periods, clear)
+            }
+        }
+    }
+
+    #[test]
+    fn periods_are_counted_once() {
+        let near = GaugeMotion::about_y(0.001, 0.46);
+        let turn = GaugeMotion::about_y(0.6, 0.0);
+        let found = periods(
+            &[vec![tile(), turn], vec![], vec![near, back(&tile())]],
+            3.0,
+        );
+        assert_eq!(found, [tile(), turn, back(&tile())]);
+    }
+
+    /// Those that a frame was compared with are a tile off, too, so it fits nowhere else; others have shown that the wall repeats.
+    #[test]
+    fn what_the_prior_would_have_a_period_away_is_ambiguous() {
+        for model in [JitterModel::RandomWalk, JitterModel::Independent] {
+            let prior = prior(model, 0.03);
+            let mut poses = prior.initial.clone();
+            poses[8] = tile().apply(&poses[8]);
+            let mut repeats = vec![Vec::new(); poses.len()];
+            let choice = choose_of(&prior, &poses, &repeats);
+            assert!(choice.rival.iter().all(Option::is_none));
+            repeats[2] = vec![tile(), back(&tile())];
+            let choice = choose_of(&prior, &poses, &repeats);
+            assert_eq!(choice.rival[8], Some(back(&tile())), "{model:?}");
+            assert_eq!(choice.rival[4], None);
+            assert!(choice.motion.iter().all(GaugeMotion::is_none));
         }
     }
 
@@ -357,6 +473,19 @@ mod tests {
         assert!(choice.rival.iter().all(Option::is_none));
         assert_eq!(choice.motion[7], back(&tile()));
         assert_eq!(choice.motion[6], GaugeMotion::default());
+    }
+
+    /// Of frames that have moved last, nobody has asked the others since.
+    #[test]
+    fn what_has_moved_last_is_unsure() {
+        let settled = Settled {
+            moved: vec![(3, tile()), (7, tile())],
+            undecided: vec![(7, back(&tile())), (9, tile())],
+        };
+        assert_eq!(
+            settled.unsure(),
+            [(3, tile()), (7, back(&tile())), (9, tile())]
+        );
     }
 
     /// Half a tile off with σ of a quarter: the prior cannot tell.

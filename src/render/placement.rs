@@ -58,7 +58,7 @@ pub fn native_px_per_metre<'a>(
     camera: &Camera,
     poses: impl IntoIterator<Item = &'a Pose>,
 ) -> Result<f64, RenderError> {
-    let focal_px = (camera.fx * camera.fy).sqrt();
+    let focal_px = camera.focal_px();
     let mut resolutions = Vec::new();
     for (frame, pose) in poses.into_iter().enumerate() {
         let distance_m = viewing_distance(surface, pose)
