@@ -18,10 +18,10 @@ use std::ops::Range;
 
 /// Least samples that two frames share, as a share of the lattice over one.
 const LEAST_OVERLAP: f64 = 0.03;
-/// Correlation, noise aside, that a right pair reaches, ...
+/// Correlation, noise aside, that a right pair reaches.
 const LEAST_QUALITY: f64 = 0.6;
-/// ... or this in its finest detail.
-const LEAST_FINE_QUALITY: f64 = 0.85;
+/// One above this is not asked for that of most samples.
+const SURE_QUALITY: f64 = 0.85;
 /// Share of its weight that may contradict before a frame is doubted.
 const MOST_CONTRADICTION: f64 = 0.15;
 /// A blurred frame has less than this share of the others' fine contrast (variance).
@@ -45,13 +45,13 @@ pub struct Pair {
     pub sharpness: Option<f64>,
 }
 
-/// Compares those of a run of frames that are believed and overlap: at pyramid level `level`, in windows that hold a brick or two, and in
-/// finest detail.
+/// Compares those of a run of frames that are believed and overlap: at pyramid level `level`, in windows that hold a brick or two, and
+/// in finest detail.
 ///
-/// Either alone can be misled: the first by glints and things before the wall, the second by the edges of a pattern
-/// that repeats. Where neither sees the same wall in two frames, they are looked at once more without what stands out of it: water
-/// is dark in one and glints in the other, and on a faint wall a few such patches in a strip are all that is compared. Two frames
-/// contradict if the wall between does, too.
+/// The first tells whether they show the same wall; finest detail only where the first is drowned by noise, for of a pattern it is
+/// edges alone, and they coincide wherever the pattern does, whatever is between them. Where two frames do not show the same wall,
+/// they are looked at once more without what stands out of it: water is dark in one and glints in the other, and on a faint wall
+/// a few such patches in a strip are all that is compared. Two frames contradict if the wall between does, too.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -74,17 +74,13 @@ pub fn compare_pairs(
         .filter_map(|coarse| {
             let fine = of_fine.get(&(coarse.a, coarse.b));
             let fine_quality = fine.and_then(|fine| fine.quality);
-            let wrong = match (coarse.quality, fine_quality) {
-                (None, None) => return None,
-                (Some(c), None) | (None, Some(c)) => c < LEAST_QUALITY,
-                (Some(c), Some(f)) => c < LEAST_QUALITY && f < LEAST_FINE_QUALITY,
-            };
+            let quality = coarse.quality.or(fine_quality)?;
             Some(Pair {
                 a: coarse.a,
                 b: coarse.b,
                 samples: coarse.samples,
-                wrong,
-                quality: coarse.quality.or(fine_quality).unwrap_or(0.0),
+                wrong: quality < LEAST_QUALITY,
+                quality,
                 sharpness: fine_quality.and(fine.map(|fine| fine.sharpness)),
             })
         })
@@ -263,7 +259,7 @@ fn compare(
 /// outweigh a faint wall.
 fn quality(likeness: &Likeness, shared: &[(f32, f32)]) -> Option<f64> {
     let of_all = likeness.match_quality()?;
-    if of_all > LEAST_FINE_QUALITY {
+    if of_all > SURE_QUALITY {
         return Some(of_all);
     }
     let of_most = robust_correlation(shared) / likeness.texture();
@@ -341,6 +337,82 @@ pub fn blurred(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::frames::{FrameCache, GreyImage, Pyramid};
+    use crate::refine::test_scene::{prior, scene, tracked};
+    use crate::surface::{GaugeMotion, WallPoint};
+    use crate::test_wall::{TestWall, waves};
+    use crate::trajectory::Pose;
+
+    /// Bricks around.
+    const BRICKS: f64 = 60.0;
+
+    /// Bricks of tones of their own, 10 × 6 cm, between light joints of 1 cm.
+    fn bricks(wall: WallPoint, perimeter_m: f64) -> f64 {
+        let (x, y) = (BRICKS * wall.s_m / perimeter_m, wall.h_m / 0.06);
+        let of_brick = |x: f64, joint: f64| x.rem_euclid(1.0) > joint;
+        if !of_brick(x, 0.1) || !of_brick(y, 0.17) {
+            return 160.0;
+        }
+        let brick = 12.9898 * x.floor().rem_euclid(BRICKS) + 78.233 * y.floor();
+        90.0 + 80.0 * (43758.5453 * brick.sin()).rem_euclid(1.0)
+    }
+
+    /// Pairs of these frames.
+    fn compared(wall: &TestWall, pictures: Vec<GreyImage>, poses: &[Pose]) -> Vec<Pair> {
+        let pyramids = pictures.into_iter().map(|frame| Pyramid::new(frame, 1));
+        let frames = FrameCache::of_pyramids(pyramids.collect());
+        let prior = prior(poses);
+        let scene = scene(wall, &frames, &prior);
+        let tracked = tracked(poses);
+        compare_pairs(&scene, 0, &tracked, &(0..poses.len())).unwrap()
+    }
+
+    #[test]
+    fn true_poses_show_the_same_wall() {
+        let wall = TestWall::ring(bricks);
+        let pairs = compared(&wall, wall.frames(), &wall.poses);
+        assert!(pairs.len() >= 14);
+        for pair in pairs {
+            assert!(!pair.wrong && pair.quality > 0.8, "{pair:?}");
+        }
+    }
+
+    /// All joints lie on joints.
+    #[test]
+    fn a_frame_a_brick_off_does_not_show_the_same_wall() {
+        let wall = TestWall::ring(bricks);
+        let mut poses = wall.poses.clone();
+        let brick = GaugeMotion::about_y(std::f64::consts::TAU / BRICKS, 0.0);
+        poses[5] = brick.apply(&poses[5]);
+        let pairs = compared(&wall, wall.frames(), &poses);
+        assert!(pairs.iter().filter(|p| p.a == 5 || p.b == 5).count() >= 2);
+        for pair in pairs {
+            assert_eq!(pair.wrong, pair.a == 5 || pair.b == 5, "{pair:?}");
+        }
+    }
+
+    /// Dark in some frames and bright in others, with the wall between as it is.
+    #[test]
+    fn what_stands_out_of_the_wall_does_not_contradict() {
+        let faint =
+            |wall: WallPoint, perimeter_m: f64| 128.0 + 0.1 * (waves(wall, perimeter_m) - 128.0);
+        let wall = TestWall::ring(faint);
+        let mut pictures = wall.frames();
+        for (k, picture) in pictures.iter_mut().enumerate() {
+            let (w, glint) = (picture.width(), if k % 2 == 0 { 240.0 } else { 20.0 });
+            for (n, value) in picture.data_mut().iter_mut().enumerate() {
+                if (n % w + 7 * k) % 40 < 6 && (n / w) % 30 < 6 {
+                    *value = glint;
+                }
+            }
+        }
+        let pairs = compared(&wall, pictures, &wall.poses);
+        assert!(pairs.iter().any(|pair| pair.quality < LEAST_QUALITY));
+        // Of a strip hardly wider than what stands out nothing is left to look at.
+        for pair in pairs.iter().filter(|pair| pair.samples > 80.0) {
+            assert!(!pair.wrong, "{pair:?}");
+        }
+    }
 
     fn pair(a: usize, b: usize, quality: f64) -> Pair {
         Pair {
