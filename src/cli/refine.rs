@@ -10,8 +10,8 @@ use crate::camera::format_calibration;
 use crate::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::{
-    CalibrationReport, FrameFlag, RefineOptions, RefineReport, Refined, RowMotion, other_readings,
-    refine_keeping,
+    CalibrationReport, FrameFlag, FrameReport, RefineOptions, RefineReport, Refined, RowMotion,
+    other_readings, refine_keeping,
 };
 use crate::survey::{CalibrationGroup, SURVEY_FILE, Survey, SurveyFile};
 use crate::trajectory::tum;
@@ -338,7 +338,7 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
             solve.sigma
         ));
     }
-    let mean = |value: &dyn Fn(&crate::refine::FrameReport) -> f64| {
+    let mean = |value: &dyn Fn(&FrameReport) -> f64| {
         report.frames.iter().map(value).sum::<f64>() / report.frames.len() as f64
     };
     terminal.say(format!(
@@ -377,13 +377,40 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
                  tunnel.ignore that leave nothing",
             );
         }
-        for frame in &report.frames {
-            if let (FrameFlag::Prior, Some(reason)) = (frame.flag, &frame.reason) {
-                terminal.warn(format!(
-                    "  frame {} ({}): {reason}",
-                    frame.index, frame.file
-                ));
-            }
+        let doubted: Vec<_> = report
+            .frames
+            .iter()
+            .filter(|frame| frame.flag == FrameFlag::Prior && frame.reason.is_some())
+            .collect();
+        let runs: Vec<_> = doubted
+            .chunk_by(|a, b| b.index == a.index + 1 && a.reason == b.reason)
+            .collect();
+        for run in runs.iter().take(MOST_DOUBTS) {
+            terminal.warn(format!("  {}", doubt_of(run)));
         }
+        let left: usize = runs.iter().skip(MOST_DOUBTS).map(|run| run.len()).sum();
+        if left > 0 {
+            terminal.warn(format!(
+                "  … and {left} more, each with its reason in refine.json"
+            ));
+        }
+    }
+}
+
+/// Lines about frames in doubt, at the most.
+const MOST_DOUBTS: usize = 24;
+
+/// Which frames are doubted, all for the same reason, and why.
+fn doubt_of(run: &[&FrameReport]) -> String {
+    let (Some(first), Some(last)) = (run.first(), run.last()) else {
+        return String::new();
+    };
+    let reason = first.reason.as_deref().unwrap_or_default();
+    match run.len() {
+        1 => format!("frame {} ({}): {reason}", first.index, first.file),
+        _ => format!(
+            "frames {} to {} ({} to {}), each: {reason}",
+            first.index, last.index, first.file, last.file
+        ),
     }
 }

@@ -134,6 +134,7 @@ pub fn pose_bound(
         frames: (0..count).map(|k| pose(k, k)).collect(),
         next: (1..count).map(|k| pose(k - 1, k)).collect(),
         variance_factor: 1.0,
+        frame_factors: vec![1.0; count],
     })
 }
 

@@ -16,7 +16,8 @@
 //!
 //! `Σ = c H⁻¹`,   `c = tr(H⁻¹ (V + P)) / (κ² unknowns)`,
 //!
-//! c about 1 on noisy walls of low contrast, and about 3 on sharp bricks. Only blocks of `H⁻¹` where H itself has
+//! c about 1 on noisy walls of low contrast, and about 3 on sharp bricks. It is the mean of what the frames contribute, the rows of the
+//! trace: where one contributes a hundred, its residuals are no noise, but what the model cannot follow. Only blocks of `H⁻¹` where H itself has
 //! blocks are needed ([`super::selected_inverse`]).
 //!
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`D⁻¹ Q D⁻¹`);
@@ -63,8 +64,10 @@ pub struct Covariances {
     pub frames: Vec<Matrix6<f64>>,
     /// Of every frame (rows) with the next (columns); not a number where the two have nothing in common.
     pub next: Vec<Matrix6<f64>>,
-    /// The factor c.
+    /// The factor c: the mean of the frames'.
     pub variance_factor: f64,
+    /// What each frame contributes to it.
+    pub frame_factors: Vec<f64>,
 }
 
 impl Covariances {
@@ -75,6 +78,7 @@ impl Covariances {
             frames: vec![unknown; frames],
             next: vec![unknown; frames.saturating_sub(1)],
             variance_factor: f64::NAN,
+            frame_factors: vec![f64::NAN; frames],
         }
     }
 
@@ -159,18 +163,23 @@ pub fn covariances(
 ) -> Result<Covariances, FactorError> {
     let inverse = SelectedInverse::new(pattern, normal)?;
     let count = pattern.frames();
-    let mut trace = 0.0;
+    let mut frame_factors = vec![0.0; count];
     for column in 0..count {
         for &row in pattern.rows(column) {
             if let (Some(place), Some(z)) = (pattern.place(row, column), inverse.block(row, column))
             {
+                let part = z.component_mul(&(scatter[place] + prior[place])).sum();
+                frame_factors[row] += part;
                 // Off the diagonal each block stands for its transpose, too.
-                let twice = if row == column { 1.0 } else { 2.0 };
-                trace += twice * z.component_mul(&(scatter[place] + prior[place])).sum();
+                if row != column {
+                    frame_factors[column] += part;
+                }
             }
         }
     }
-    let variance_factor = trace / (curvature.powi(2) * (UNKNOWNS * count) as f64);
+    let usual = curvature.powi(2) * UNKNOWNS as f64;
+    frame_factors.iter_mut().for_each(|factor| *factor /= usual);
+    let variance_factor = frame_factors.iter().sum::<f64>() / count as f64;
     let pose = |block: Block| variance_factor * block.fixed_view::<6, 6>(0, 0).into_owned();
     let unknown = Matrix6::from_element(f64::NAN);
     Ok(Covariances {
@@ -181,6 +190,7 @@ pub fn covariances(
             .map(|k| inverse.block(k - 1, k).map_or(unknown, pose))
             .collect(),
         variance_factor,
+        frame_factors,
     })
 }
 
@@ -266,6 +276,16 @@ mod tests {
         let both = (&normal.blocks, &normal.blocks);
         let two = covariances(&pattern, &normal, both.0, both.1, 1.0).unwrap();
         assert!((two.frames[1] - one.frames[1] * 2.0).norm() < 1e-12);
+        let mut strained = normal.blocks.clone();
+        strained[pattern.place(2, 2).unwrap()] *= 10.0;
+        let strained = covariances(&pattern, &normal, &strained, &none, 1.0).unwrap();
+        // 1 and nine times the share of (Z H)₂₂ on the diagonal, Z₂₂ = 15/56.
+        let expected = [1.0, 1.0, 1.0 + 9.0 * 4.0 * 15.0 / 56.0];
+        for (factor, expected) in strained.frame_factors.iter().zip(expected) {
+            assert!((factor - expected).abs() < 1e-12);
+        }
+        let mean = strained.frame_factors.iter().sum::<f64>() / 3.0;
+        assert!((strained.variance_factor - mean).abs() < 1e-12);
         let bent = covariances(&pattern, &normal, &normal.blocks, &none, 0.5).unwrap();
         assert!((bent.frames[1] - one.frames[1] * 4.0).norm() < 1e-12);
         assert!((one.frames[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);

@@ -80,6 +80,7 @@ mod tests {
             frames: (0..3).map(|k| Matrix6::from_fn(element(k))).collect(),
             next: vec![Matrix6::from_element(f64::NAN); 2],
             variance_factor: 1.0,
+            frame_factors: vec![1.0; 3],
         };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("covariance.csv");

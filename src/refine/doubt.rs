@@ -60,6 +60,11 @@ pub enum Doubt {
         /// Share of its pixels that others show, 0 to 1.
         share: f64,
     },
+    /// Its residuals are far more than noise, and hang together.
+    Strained {
+        /// What the variance of its gradient exceeds, times that of noise.
+        times: f64,
+    },
     /// Too little texture to fix its place.
     Uncertain {
         /// 1-σ on the wall, pixels.
@@ -140,6 +145,11 @@ impl fmt::Display for Doubt {
                 f,
                 "only {:.1} % of its pixels overlap other frames",
                 100.0 * share
+            ),
+            Self::Strained { times } => write!(
+                f,
+                "it fits the others only under strain (errors that hang together, over {times:.0} times the variance of noise): a wall \
+                 that repeats and is closed a period off, or a wrong camera, radius or shape"
             ),
             Self::Uncertain { wall_px } => write!(
                 f,

@@ -203,10 +203,7 @@ fn repeats_of(
     let Some(here) = left(&pose) else {
         return Ok(Vec::new());
     };
-    // By odds: (1 − u)/u no less than half of what it is here. Where little is explained here, a place that explains nothing is no
-    // rival, though it leaves less than twice as much.
-    let here = here.max(LEAST_UNEXPLAINED);
-    let most = UNEXPLAINED * here / (1.0 + (UNEXPLAINED - 1.0) * here);
+    let most = most_unexplained(here);
     let motion = |shift_m: [f64; 2]| free_part(scene.surface, &pose, &shift_m.into());
     let moved = |shift_m: [f64; 2]| motion(shift_m).1.apply(&pose);
     let spacing = wall.lattice.spacing_m;
@@ -238,6 +235,15 @@ fn repeats_of(
         }
     }
     Ok(found)
+}
+
+/// What a place may leave unexplained, as a share of the contrast, to fit as well as one that leaves `here`.
+///
+/// By odds: (1 − u)/u no less than half of what it is here. Where little is explained here, a place that explains nothing is no
+/// rival, though it leaves less than twice as much.
+fn most_unexplained(here: f64) -> f64 {
+    let here = here.max(LEAST_UNEXPLAINED);
+    UNEXPLAINED * here / (1.0 + (UNEXPLAINED - 1.0) * here)
 }
 
 /// The motions by which the wall repeats: those of all frames, without those nearly the same.
@@ -418,6 +424,18 @@ mod tests {
                 choose_frames(prior, &gauge, &frames, poses, repeats, &periods, clear)
             }
         }
+    }
+
+    #[test]
+    fn what_fits_as_well_has_half_the_odds() {
+        let odds = |unexplained: f64| (1.0 - unexplained) / unexplained;
+        for here in [0.05, 0.3, 0.9, 0.99] {
+            let ratio = odds(most_unexplained(here)) / odds(here);
+            assert!((ratio - 1.0 / UNEXPLAINED).abs() < 1e-9, "{here}: {ratio}");
+        }
+        // Of a perfect match, places that differ by noise alone are no worse.
+        assert_eq!(most_unexplained(0.0), most_unexplained(LEAST_UNEXPLAINED));
+        assert!(most_unexplained(0.99) < 1.0);
     }
 
     #[test]

@@ -252,3 +252,19 @@ fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
         assert!(frame["other_pose"]["translation_m"].is_array(), "{frame}");
     }
 }
+
+/// The errors add up to a tile after one turn, so the second closes upon the wrong one; bent all around, every pair of frames fits.
+#[test]
+fn a_turn_closed_a_tile_off_is_not_believed() {
+    let options = "--wall tiled-brick --frames 60 --seed 2 --jitter random-walk \
+                   --rotation-sigma-deg 2 --translation-sigma-m 0.02,0.02,0.03";
+    let dir = repaired(&options.split_whitespace().collect::<Vec<_>>());
+    let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
+    let report = json(&out.join("refine.json"));
+    let frames = report["frames"].as_array().unwrap();
+    let believed = frames.iter().filter(|f| f["flag"] == "photometric");
+    if believed.count() > 0 {
+        let px = believed_wall_px(&survey, &out);
+        assert!(px < 0.3, "{px}");
+    }
+}
