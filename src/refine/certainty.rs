@@ -16,6 +16,9 @@ const MOST_MISFITS: f64 = 0.1;
 /// loosely can tilt and shift together, the camera with them, for less than aliasing does; that is more than the
 /// covariance knows of.
 const MOST_LOOSE_PX: f64 = 0.2;
+/// Largest contribution of a frame to the variance factor that can be borne. Aliasing on sharp bricks makes it 2 to 10, glints and
+/// moving things up to some 70; a focal length 2 % off 100 to 200, a turn that is closed a tile off and bent all around 300 and more.
+const MOST_STRAIN: f64 = 150.0;
 
 /// The covariance of a solution.
 pub struct Certainty {
@@ -69,8 +72,14 @@ impl Certainty {
         )
     }
 
-    /// The shared unknowns that the data do not observe: all, where too many frames do not fit the others, or where all
-    /// are tied too loosely. `scene`: with the solution's own κ.
+    /// Frames whose residuals are no noise: those with more than can be borne of the variance factor; where it is half of those
+    /// believed, what strains them strains all.
+    pub fn strained(&self, doubts: &[Option<Doubt>]) -> Vec<Option<Doubt>> {
+        strained(&self.covariances.frame_factors, doubts)
+    }
+
+    /// The shared unknowns that the data do not observe: all, where too many frames do not fit the others, or only under strain, or
+    /// where all are tied too loosely. `scene`: with the solution's own κ.
     pub fn refused(
         &self,
         scene: &Scene,
@@ -90,8 +99,17 @@ impl Certainty {
             );
             return refuse_all(calibration, &reason);
         }
-        let believed = (0..count).filter(|k| doubts[*k].is_none());
-        let sigmas = believed.map(|k| self.of_frame(scene, k, &estimates[k]).wall_px);
+        let strained = self.strained(doubts);
+        let sure = (0..count).filter(|k| doubts[*k].is_none() && strained[*k].is_none());
+        let sure: Vec<usize> = sure.collect();
+        if sure.is_empty() && strained.iter().any(Option::is_some) {
+            let reason = "the frames fit each other only under strain: a wall that repeats and is closed a period off, a wrong shape, \
+                          or what is not estimated";
+            return refuse_all(calibration, reason);
+        }
+        let sigmas = sure
+            .into_iter()
+            .map(|k| self.of_frame(scene, k, &estimates[k]).wall_px);
         let mut sigmas: Vec<f64> = sigmas.collect();
         sigmas.sort_unstable_by(f64::total_cmp);
         let usual = sigmas.get(sigmas.len() / 2).copied().unwrap_or(f64::NAN);
@@ -104,6 +122,18 @@ impl Certainty {
         }
         posterior.refuse(calibration)
     }
+}
+
+/// See [`Certainty::strained`]. `factors`: each frame's share of the variance factor.
+fn strained(factors: &[f64], doubts: &[Option<Doubt>]) -> Vec<Option<Doubt>> {
+    let believed = || (0..doubts.len()).filter(|k| doubts[*k].is_none());
+    let beyond = |k: &usize| factors[*k] > MOST_STRAIN;
+    let all = 2 * believed().filter(beyond).count() >= believed().count();
+    let doubt = |k: usize| {
+        let strained = doubts[k].is_none() && (all || beyond(&k));
+        strained.then_some(Doubt::Strained { times: MOST_STRAIN })
+    };
+    (0..doubts.len()).map(doubt).collect()
 }
 
 /// Refuses every free unknown.
@@ -122,6 +152,19 @@ mod tests {
     use super::*;
     use crate::camera::Camera;
     use crate::refine::calibration::Kappa;
+
+    #[test]
+    fn what_strains_half_of_the_frames_strains_all() {
+        let mut doubts = vec![None; 4];
+        doubts[0] = Some(Doubt::Featureless);
+        let of = |factors: [f64; 4]| -> Vec<bool> {
+            let found = strained(&factors, &doubts);
+            found.iter().map(Option::is_some).collect()
+        };
+        assert_eq!(of([1.0, 2.0, 70.0, 3.0]), [false; 4]);
+        assert_eq!(of([1.0, 2.0, 700.0, 3.0]), [false, false, true, false]);
+        assert_eq!(of([1.0, 200.0, 700.0, 3.0]), [false, true, true, true]);
+    }
 
     #[test]
     fn all_that_was_asked_for_is_refused() {

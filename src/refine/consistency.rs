@@ -407,9 +407,10 @@ mod tests {
             }
         }
         let pairs = compared(&wall, pictures, &wall.poses);
-        assert!(pairs.iter().any(|pair| pair.quality < LEAST_QUALITY));
         // Of a strip hardly wider than what stands out nothing is left to look at.
-        for pair in pairs.iter().filter(|pair| pair.samples > 80.0) {
+        let wide = || pairs.iter().filter(|pair| pair.samples > 80.0);
+        assert!(wide().any(|pair| pair.quality < LEAST_QUALITY));
+        for pair in wide() {
             assert!(!pair.wrong, "{pair:?}");
         }
     }

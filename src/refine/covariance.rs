@@ -10,7 +10,7 @@
 //!
 //! **Q** is told by the scatter of the gradients of the parts of the cost, `V = Σ_b g_b g_bᵀ` over blocks
 //! b of the wall (32 × 32 pixels: errors of neighbouring samples hang together, those of blocks hardly), whatever the residuals are like, plus
-//! the prior's own information P. Were the residuals independent noise of the assumed size, `V + P` would be D. They are not quite:
+//! the prior's own information P. Were the residuals independent Gaussian noise of the assumed size, c would be 0.97. They are not quite:
 //! where the wall is steep, aliasing and interpolation add errors that depend on how pixels happen to fall. With one factor for
 //! all unknowns,
 //!

@@ -52,6 +52,17 @@ struct Choice {
     rival: Vec<Option<GaugeMotion>>,
 }
 
+impl Choice {
+    /// Where most frames are undecided, so is every other that fits elsewhere, too: the one that the others were compared with, and
+    /// those that a `first` choice, by clear odds, found in doubt.
+    fn leave_none_clear(&mut self, first: &Self, repeats: &[Vec<GaugeMotion>]) {
+        let before = first.rival.iter().zip(repeats);
+        for (rival, (before, repeats)) in self.rival.iter_mut().zip(before) {
+            *rival = rival.or(*before).or(repeats.first().copied());
+        }
+    }
+}
+
 /// What has become of frames that fit elsewhere as well.
 #[derive(Debug, Default)]
 pub struct Settled {
@@ -131,11 +142,8 @@ pub fn settle_repeats(
     let mut choice = choose(CLEAR);
     let undecided = choice.rival.iter().flatten().count();
     if 2 * undecided > frames.len() {
-        choice = choose(f64::INFINITY);
-        // Nor is the one that the others were compared with.
-        for (rival, repeats) in choice.rival.iter_mut().zip(&repeats) {
-            *rival = rival.or(repeats.first().copied());
-        }
+        let first = std::mem::replace(&mut choice, choose(f64::INFINITY));
+        choice.leave_none_clear(&first, &repeats);
     }
     let mut moved = Vec::new();
     for (k, motion) in frames.iter().zip(&choice.motion) {
@@ -246,14 +254,17 @@ fn most_unexplained(here: f64) -> f64 {
     UNEXPLAINED * here / (1.0 + (UNEXPLAINED - 1.0) * here)
 }
 
-/// The motions by which the wall repeats: those of all frames, without those nearly the same.
+/// The motions by which the wall repeats: those of all frames and their opposites, without those nearly the same.
 fn periods(repeats: &[Vec<GaugeMotion>], radius_m: f64) -> Vec<GaugeMotion> {
     let length = |motion: &GaugeMotion| (radius_m * motion.turn_rad).hypot(motion.shift_m);
     let mut found: Vec<GaugeMotion> = Vec::new();
-    for motion in repeats.iter().flatten() {
-        let same = |other: &GaugeMotion| length(&motion.plus(-1.0, other)) < SAME * length(other);
-        if !found.iter().any(same) {
-            found.push(*motion);
+    for there in repeats.iter().flatten() {
+        for motion in [*there, GaugeMotion::default().plus(-1.0, there)] {
+            let same =
+                |other: &GaugeMotion| length(&motion.plus(-1.0, other)) < SAME * length(other);
+            if !found.iter().any(same) {
+                found.push(motion);
+            }
         }
     }
     found
@@ -446,7 +457,7 @@ mod tests {
             &[vec![tile(), turn], vec![], vec![near, back(&tile())]],
             3.0,
         );
-        assert_eq!(found, [tile(), turn, back(&tile())]);
+        assert_eq!(found, [tile(), back(&tile()), turn, back(&turn)]);
     }
 
     /// Those that a frame was compared with are a tile off, too, so it fits nowhere else; others have shown that the wall repeats.
@@ -459,12 +470,26 @@ mod tests {
             let mut repeats = vec![Vec::new(); poses.len()];
             let choice = choose_of(&prior, &poses, &repeats);
             assert!(choice.rival.iter().all(Option::is_none));
-            repeats[2] = vec![tile(), back(&tile())];
+            repeats[2] = vec![tile()];
             let choice = choose_of(&prior, &poses, &repeats);
             assert_eq!(choice.rival[8], Some(back(&tile())), "{model:?}");
             assert_eq!(choice.rival[4], None);
             assert!(choice.motion.iter().all(GaugeMotion::is_none));
         }
+    }
+
+    /// What is in doubt by clear odds is so, too, where no odds are clear enough.
+    #[test]
+    fn no_frame_is_clear_because_others_are_not() {
+        let (none, other) = (GaugeMotion::default(), back(&tile()));
+        let choice = |rival: [Option<GaugeMotion>; 4]| Choice {
+            motion: vec![none; 4],
+            rival: rival.to_vec(),
+        };
+        let first = choice([Some(tile()), Some(other), None, None]);
+        let mut last = choice([Some(tile()), None, None, None]);
+        last.leave_none_clear(&first, &[vec![], vec![], vec![other], vec![]]);
+        assert_eq!(last.rival, [Some(tile()), Some(other), Some(other), None]);
     }
 
     #[test]

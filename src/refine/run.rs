@@ -80,9 +80,6 @@ const LEAST_PIXEL_SHARE: f64 = 0.02;
 const LARGEST_STEP: (f64, f64) = (0.25, 2.0);
 /// Largest 1-σ on the wall of a pose that counts as photometric, pixels: twice that is half a pixel.
 const LARGEST_SIGMA_PX: f64 = 0.25;
-/// Largest contribution of a photometric frame to the variance factor. Aliasing on sharp bricks makes it 2 to 10, glints and moving
-/// things up to some 70; a focal length 2 % off 100 to 200, a turn that is closed a tile off and bent all around 300 and more.
-const MOST_STRAIN: f64 = 150.0;
 /// Share of a frame's weight that the robust loss may reject. Things before the wall, glints and oblique views cost a
 /// right frame some; whether its pose is right is asked of its alignment with others.
 const MOST_REJECTED: f64 = 0.3;
@@ -342,11 +339,12 @@ pub fn refine_keeping(
     }
     // No step without a covariance, whose lack is told already.
     let steps_px = steps_left(&solution).unwrap_or_else(|_| vec![0.0; count]);
+    let strained = certainty.strained(&tracked.doubts);
     let mut reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = certainty.of_frame(&scene, k, &estimates[k]);
             let doubt = tracked.doubts[k].clone();
-            let doubt = doubt.or_else(|| strain(certainty.covariances.frame_factors[k]));
+            let doubt = doubt.or_else(|| strained[k].clone());
             frame_report(survey, k, &solution, doubt, steps_px[k], sigma)
         })
         .collect();
@@ -534,13 +532,6 @@ fn rejected(share: &FrameShare) -> f64 {
 fn disagreement(share: &FrameShare) -> Option<Doubt> {
     let share = rejected(share);
     (share > MOST_REJECTED).then_some(Doubt::Disagrees { share })
-}
-
-/// Doubts a frame whose residuals are no noise ([`Covariances::frame_factors`]).
-///
-/// [`Covariances::frame_factors`]: super::Covariances::frame_factors
-fn strain(factor: f64) -> Option<Doubt> {
-    (factor > MOST_STRAIN).then_some(Doubt::Strained { times: MOST_STRAIN })
 }
 
 fn frame_report(

@@ -2,7 +2,9 @@
 //!
 //! Registering each frame only against those already placed gains error exponentially. Solving the last
 //! frames that can overlap again together, every few frames, with the oldest third held, keeps it bounded. When a
-//! turn closes, the window is solved from the coarsest level.
+//! turn closes, frames may have drifted apart by many pixels, or by next to nothing: the window is solved both from the coarsest
+//! level, which reaches far and on a wall that repeats may end at another place that fits, and from the finest, which stays where
+//! it is; what fits better in the end is kept.
 //!
 //! A frame that cannot be placed stays where the prior expects it, and no other is compared with it.
 
@@ -171,14 +173,19 @@ impl Tracking {
             && options.windows
             && (closes || !settled || k % options.window_stride == 0 || k + 1 == count)
         {
-            let coarsest = match closes || !settled {
-                true => coarsest,
-                false => finest,
-            };
             let held = if first == 0 { 0 } else { (k + 1 - first) / 3 };
-            for level in (finest..=coarsest).rev() {
-                let scene = scene.at(tracked.kappa);
-                solve_window(&scene, level, first..k + 1, held, tracked)?;
+            let window = first..k + 1;
+            let from_coarsest = (closes || !settled).then(|| tracked.clone());
+            let near = solve_window(scene, finest, window.clone(), held, tracked)?;
+            if let Some(mut far) = from_coarsest {
+                let mut cost = f64::INFINITY;
+                for level in (finest..=coarsest).rev() {
+                    let scene = scene.at(far.kappa);
+                    cost = solve_window(&scene, level, window.clone(), held, &mut far)?;
+                }
+                if cost < near {
+                    *tracked = far;
+                }
             }
         }
         if k > 0 && options.windows && k % LONG_STRIDE == 0 {
@@ -193,22 +200,25 @@ impl Tracking {
 }
 
 /// Solves the frames of a window together, the oldest `held` of them held; where none is, with the camera's unknowns.
+///
+/// Returns the cost of an observation at the end; infinity where nothing is seen twice.
 fn solve_window(
     scene: &Scene,
     level: usize,
     window: Range<usize>,
     held: usize,
     tracked: &mut Tracked,
-) -> Result<(), ProblemError> {
+) -> Result<f64, ProblemError> {
     let active = window.start + held..window.end;
     let members = tracked.members_of(window, active.clone());
     let problem = Problem::new(scene, Sampling::of(level), members)?.calibrating();
-    if problem.tiles() > 0 {
-        let solution = solve(problem, WINDOW_STOPPING, None)?;
-        tracked.kappa = solution.kappa;
-        tracked.estimates[active].copy_from_slice(&solution.estimates);
+    if problem.tiles() == 0 {
+        return Ok(f64::INFINITY);
     }
-    Ok(())
+    let solution = solve(problem, WINDOW_STOPPING, None)?;
+    tracked.kappa = solution.kappa;
+    tracked.estimates[active].copy_from_slice(&solution.estimates);
+    Ok(solution.record.cost_end / solution.record.observations as f64)
 }
 
 /// What each frame sees of the wall at its present pose.
