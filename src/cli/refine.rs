@@ -377,40 +377,40 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
                  tunnel.ignore that leave nothing",
             );
         }
-        let doubted: Vec<_> = report
-            .frames
-            .iter()
-            .filter(|frame| frame.flag == FrameFlag::Prior && frame.reason.is_some())
-            .collect();
-        let runs: Vec<_> = doubted
-            .chunk_by(|a, b| b.index == a.index + 1 && a.reason == b.reason)
-            .collect();
-        for run in runs.iter().take(MOST_DOUBTS) {
-            terminal.warn(format!("  {}", doubt_of(run)));
-        }
-        let left: usize = runs.iter().skip(MOST_DOUBTS).map(|run| run.len()).sum();
-        if left > 0 {
-            terminal.warn(format!(
-                "  … and {left} more, each with its reason in refine.json"
-            ));
-        }
+        warn_of_doubts(report, terminal);
     }
 }
 
 /// Lines about frames in doubt, at the most.
 const MOST_DOUBTS: usize = 24;
 
-/// Which frames are doubted, all for the same reason, and why.
-fn doubt_of(run: &[&FrameReport]) -> String {
-    let (Some(first), Some(last)) = (run.first(), run.last()) else {
-        return String::new();
-    };
-    let reason = first.reason.as_deref().unwrap_or_default();
-    match run.len() {
-        1 => format!("frame {} ({}): {reason}", first.index, first.file),
-        _ => format!(
-            "frames {} to {} ({} to {}), each: {reason}",
-            first.index, last.index, first.file, last.file
-        ),
+/// Says which frames are doubted and why, those in a row with the same reason together.
+fn warn_of_doubts(report: &RefineReport, terminal: &Terminal) {
+    let frames = report.frames.iter();
+    let doubted: Vec<(&FrameReport, &str)> = frames
+        .filter(|frame| frame.flag == FrameFlag::Prior)
+        .filter_map(|frame| Some((frame, frame.reason.as_deref()?)))
+        .collect();
+    let mut runs = doubted.chunk_by(|(a, why), (b, too)| b.index == a.index + 1 && why == too);
+    for run in runs.by_ref().take(MOST_DOUBTS) {
+        match run {
+            [] => {}
+            [(frame, reason)] => {
+                terminal.warn(format!(
+                    "  frame {} ({}): {reason}",
+                    frame.index, frame.file
+                ));
+            }
+            [(first, reason), .., (last, _)] => terminal.warn(format!(
+                "  frames {} to {} ({} to {}), each: {reason}",
+                first.index, last.index, first.file, last.file
+            )),
+        }
+    }
+    let left: usize = runs.map(<[_]>::len).sum();
+    if left > 0 {
+        terminal.warn(format!(
+            "  … and {left} more, each with its reason in refine.json"
+        ));
     }
 }

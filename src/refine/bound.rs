@@ -133,7 +133,6 @@ pub fn pose_bound(
     Ok(Covariances {
         frames: (0..count).map(|k| pose(k, k)).collect(),
         next: (1..count).map(|k| pose(k - 1, k)).collect(),
-        variance_factor: 1.0,
         frame_factors: vec![1.0; count],
     })
 }

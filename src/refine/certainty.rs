@@ -72,10 +72,15 @@ impl Certainty {
         )
     }
 
-    /// Frames whose residuals are no noise: those with more than can be borne of the variance factor; where it is half of those
-    /// believed, what strains them strains all.
-    pub fn strained(&self, doubts: &[Option<Doubt>]) -> Vec<Option<Doubt>> {
-        strained(&self.covariances.frame_factors, doubts)
+    /// The doubts with those about frames whose residuals are no noise.
+    pub fn with_strain(&self, mut doubts: Vec<Option<Doubt>>) -> Vec<Option<Doubt>> {
+        let strained = strained(&self.covariances.frame_factors, &doubts);
+        for (doubt, strained) in doubts.iter_mut().zip(strained) {
+            if strained {
+                *doubt = Some(Doubt::Strained { times: MOST_STRAIN });
+            }
+        }
+        doubts
     }
 
     /// The shared unknowns that the data do not observe: all, where too many frames do not fit the others, or only under strain, or
@@ -99,10 +104,10 @@ impl Certainty {
             );
             return refuse_all(calibration, &reason);
         }
-        let strained = self.strained(doubts);
-        let sure = (0..count).filter(|k| doubts[*k].is_none() && strained[*k].is_none());
+        let strained = strained(&self.covariances.frame_factors, doubts);
+        let sure = (0..count).filter(|k| doubts[*k].is_none() && !strained[*k]);
         let sure: Vec<usize> = sure.collect();
-        if sure.is_empty() && strained.iter().any(Option::is_some) {
+        if sure.is_empty() && strained.contains(&true) {
             let reason = "the frames fit each other only under strain: a wall that repeats and is closed a period off, a wrong shape, \
                           or what is not estimated";
             return refuse_all(calibration, reason);
@@ -124,16 +129,15 @@ impl Certainty {
     }
 }
 
-/// See [`Certainty::strained`]. `factors`: each frame's share of the variance factor.
-fn strained(factors: &[f64], doubts: &[Option<Doubt>]) -> Vec<Option<Doubt>> {
+/// Which of the frames believed so far have residuals that are no noise: those with more than can be borne of the variance factor;
+/// where they are half, what strains them strains all. `factors`: each frame's share of the variance factor.
+fn strained(factors: &[f64], doubts: &[Option<Doubt>]) -> Vec<bool> {
     let believed = || (0..doubts.len()).filter(|k| doubts[*k].is_none());
     let beyond = |k: &usize| factors[*k] > MOST_STRAIN;
     let all = 2 * believed().filter(beyond).count() >= believed().count();
-    let doubt = |k: usize| {
-        let strained = doubts[k].is_none() && (all || beyond(&k));
-        strained.then_some(Doubt::Strained { times: MOST_STRAIN })
-    };
-    (0..doubts.len()).map(doubt).collect()
+    (0..doubts.len())
+        .map(|k| doubts[k].is_none() && (all || beyond(&k)))
+        .collect()
 }
 
 /// Refuses every free unknown.
@@ -157,10 +161,7 @@ mod tests {
     fn what_strains_half_of_the_frames_strains_all() {
         let mut doubts = vec![None; 4];
         doubts[0] = Some(Doubt::Featureless);
-        let of = |factors: [f64; 4]| -> Vec<bool> {
-            let found = strained(&factors, &doubts);
-            found.iter().map(Option::is_some).collect()
-        };
+        let of = |factors: [f64; 4]| strained(&factors, &doubts);
         assert_eq!(of([1.0, 2.0, 70.0, 3.0]), [false; 4]);
         assert_eq!(of([1.0, 2.0, 700.0, 3.0]), [false, false, true, false]);
         assert_eq!(of([1.0, 200.0, 700.0, 3.0]), [false, true, true, true]);

@@ -64,20 +64,22 @@ pub struct Covariances {
     pub frames: Vec<Matrix6<f64>>,
     /// Of every frame (rows) with the next (columns); not a number where the two have nothing in common.
     pub next: Vec<Matrix6<f64>>,
-    /// The factor c: the mean of the frames'.
-    pub variance_factor: f64,
-    /// What each frame contributes to it.
+    /// What each frame contributes to the factor c.
     pub frame_factors: Vec<f64>,
 }
 
 impl Covariances {
+    /// The factor c.
+    pub fn variance_factor(&self) -> f64 {
+        mean(&self.frame_factors)
+    }
+
     /// Of `frames` frames of which nothing is known.
     pub(super) fn unknown(frames: usize) -> Self {
         let unknown = Matrix6::from_element(f64::NAN);
         Self {
             frames: vec![unknown; frames],
             next: vec![unknown; frames.saturating_sub(1)],
-            variance_factor: f64::NAN,
             frame_factors: vec![f64::NAN; frames],
         }
     }
@@ -179,7 +181,7 @@ pub fn covariances(
     }
     let usual = curvature.powi(2) * UNKNOWNS as f64;
     frame_factors.iter_mut().for_each(|factor| *factor /= usual);
-    let variance_factor = frame_factors.iter().sum::<f64>() / count as f64;
+    let variance_factor = mean(&frame_factors);
     let pose = |block: Block| variance_factor * block.fixed_view::<6, 6>(0, 0).into_owned();
     let unknown = Matrix6::from_element(f64::NAN);
     Ok(Covariances {
@@ -189,9 +191,12 @@ pub fn covariances(
         next: (1..count)
             .map(|k| inverse.block(k - 1, k).map_or(unknown, pose))
             .collect(),
-        variance_factor,
         frame_factors,
     })
+}
+
+fn mean(factors: &[f64]) -> f64 {
+    factors.iter().sum::<f64>() / factors.len() as f64
 }
 
 /// Reads a pose covariance as σ of rotation, translation and wall position.
@@ -272,7 +277,7 @@ mod tests {
         }
         let none = vec![Block::zeros(); pattern.blocks()];
         let one = covariances(&pattern, &normal, &normal.blocks, &none, 1.0).unwrap();
-        assert!((one.variance_factor - 1.0).abs() < 1e-12);
+        assert!((one.variance_factor() - 1.0).abs() < 1e-12);
         let both = (&normal.blocks, &normal.blocks);
         let two = covariances(&pattern, &normal, both.0, both.1, 1.0).unwrap();
         assert!((two.frames[1] - one.frames[1] * 2.0).norm() < 1e-12);
@@ -284,8 +289,8 @@ mod tests {
         for (factor, expected) in strained.frame_factors.iter().zip(expected) {
             assert!((factor - expected).abs() < 1e-12);
         }
-        let mean = strained.frame_factors.iter().sum::<f64>() / 3.0;
-        assert!((strained.variance_factor - mean).abs() < 1e-12);
+        let mean = expected.iter().sum::<f64>() / 3.0;
+        assert!((strained.variance_factor() - mean).abs() < 1e-12);
         let bent = covariances(&pattern, &normal, &normal.blocks, &none, 0.5).unwrap();
         assert!((bent.frames[1] - one.frames[1] * 4.0).norm() < 1e-12);
         assert!((one.frames[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);

@@ -79,7 +79,6 @@ mod tests {
         let covariances = Covariances {
             frames: (0..3).map(|k| Matrix6::from_fn(element(k))).collect(),
             next: vec![Matrix6::from_element(f64::NAN); 2],
-            variance_factor: 1.0,
             frame_factors: vec![1.0; 3],
         };
         let folder = tempfile::tempdir().unwrap();

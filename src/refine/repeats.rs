@@ -126,18 +126,18 @@ pub fn settle_repeats(
     }
     let poses: Vec<Pose> = frames.iter().map(|k| tracked.estimates[*k].pose).collect();
     let radius_m = scene.surface.perimeter_m() / std::f64::consts::TAU;
+    let periods = periods(&repeats, radius_m);
+    let gauge = scene.surface.gauge();
     let choose = |clear: f64| {
-        let periods = periods(&repeats, radius_m);
-        let prior = scene.prior;
-        match prior.jitter.model {
-            JitterModel::RandomWalk => {
-                choose_steps(prior, &frames, &poses, &repeats, &periods, clear)
-            }
-            JitterModel::Independent => {
-                let gauge = scene.surface.gauge();
-                choose_frames(prior, &gauge, &frames, &poses, &repeats, &periods, clear)
-            }
-        }
+        choose(
+            scene.prior,
+            &gauge,
+            &frames,
+            &poses,
+            &repeats,
+            &periods,
+            clear,
+        )
     };
     let mut choice = choose(CLEAR);
     let undecided = choice.rival.iter().flatten().count();
@@ -150,7 +150,7 @@ pub fn settle_repeats(
         if !motion.is_none() {
             let pose = &mut tracked.estimates[*k].pose;
             *pose = motion.apply(pose);
-            moved.push((*k, GaugeMotion::default().plus(-1.0, motion)));
+            moved.push((*k, motion.reversed()));
         }
     }
     let rivals = frames.iter().zip(choice.rival);
@@ -259,7 +259,7 @@ fn periods(repeats: &[Vec<GaugeMotion>], radius_m: f64) -> Vec<GaugeMotion> {
     let length = |motion: &GaugeMotion| (radius_m * motion.turn_rad).hypot(motion.shift_m);
     let mut found: Vec<GaugeMotion> = Vec::new();
     for there in repeats.iter().flatten() {
-        for motion in [*there, GaugeMotion::default().plus(-1.0, there)] {
+        for motion in [*there, there.reversed()] {
             let same =
                 |other: &GaugeMotion| length(&motion.plus(-1.0, other)) < SAME * length(other);
             if !found.iter().any(same) {
@@ -295,6 +295,24 @@ fn likeliest(
     (best, rival.map(|(_, motion)| motion))
 }
 
+/// What the prior makes of the repeats, where odds are clear from `clear` on.
+fn choose(
+    prior: &Prior,
+    gauge: &Gauge,
+    frames: &[usize],
+    poses: &[Pose],
+    repeats: &[Vec<GaugeMotion>],
+    periods: &[GaugeMotion],
+    clear: f64,
+) -> Choice {
+    match prior.jitter.model {
+        JitterModel::RandomWalk => choose_steps(prior, frames, poses, repeats, periods, clear),
+        JitterModel::Independent => {
+            choose_frames(prior, gauge, frames, poses, repeats, periods, clear)
+        }
+    }
+}
+
 /// Errors that add up: step by step. Of the runs of frames between undecided steps, the longest is believed.
 fn choose_steps(
     prior: &Prior,
@@ -326,13 +344,12 @@ fn choose_steps(
         .zip(ends)
         .max_by_key(|(start, end)| (end - start, std::cmp::Reverse(*start)));
     let (start, end) = longest.unwrap_or((0, frames.len()));
-    let none = GaugeMotion::default();
     let rival = (0..frames.len())
         .map(|i| {
             if i >= end {
                 step[end]
             } else if i < start {
-                step[start].map(|step| none.plus(-1.0, &step))
+                step[start].map(|step| step.reversed())
             } else {
                 None
             }
@@ -396,7 +413,7 @@ mod tests {
     }
 
     fn back(motion: &GaugeMotion) -> GaugeMotion {
-        GaugeMotion::default().plus(-1.0, motion)
+        motion.reversed()
     }
 
     fn prior(model: JitterModel, shift_sigma_m: f64) -> Prior {
@@ -415,7 +432,7 @@ mod tests {
     }
 
     /// Every frame fits a tile on and a tile back.
-    fn choose(prior: &Prior, poses: &[Pose]) -> Choice {
+    fn choose_of_all(prior: &Prior, poses: &[Pose]) -> Choice {
         choose_of(
             prior,
             poses,
@@ -426,15 +443,8 @@ mod tests {
     fn choose_of(prior: &Prior, poses: &[Pose], repeats: &[Vec<GaugeMotion>]) -> Choice {
         let frames: Vec<usize> = (0..poses.len()).collect();
         let periods = periods(repeats, 3.0);
-        let (clear, gauge) = (CLEAR, Gauge::round());
-        match prior.jitter.model {
-            JitterModel::RandomWalk => {
-                choose_steps(prior, &frames, poses, repeats, &periods, clear)
-            }
-            JitterModel::Independent => {
-                choose_frames(prior, &gauge, &frames, poses, repeats, &periods, clear)
-            }
-        }
+        let gauge = Gauge::round();
+        choose(prior, &gauge, &frames, poses, repeats, &periods, CLEAR)
     }
 
     #[test]
@@ -499,7 +509,7 @@ mod tests {
         poses[7..]
             .iter_mut()
             .for_each(|pose| *pose = tile().apply(pose));
-        let choice = choose(&prior, &poses);
+        let choice = choose_of_all(&prior, &poses);
         assert!(choice.rival.iter().all(Option::is_none));
         for (k, motion) in choice.motion.iter().enumerate() {
             let expected = if k < 7 { 0.0 } else { -0.45 };
@@ -512,7 +522,7 @@ mod tests {
         let prior = prior(JitterModel::Independent, 0.03);
         let mut poses = prior.initial.clone();
         poses[7] = tile().apply(&poses[7]);
-        let choice = choose(&prior, &poses);
+        let choice = choose_of_all(&prior, &poses);
         assert!(choice.rival.iter().all(Option::is_none));
         assert_eq!(choice.motion[7], back(&tile()));
         assert_eq!(choice.motion[6], GaugeMotion::default());
@@ -541,7 +551,7 @@ mod tests {
         poses[8..]
             .iter_mut()
             .for_each(|pose| *pose = half.apply(pose));
-        let choice = choose(&walk, &poses);
+        let choice = choose_of_all(&walk, &poses);
         for (k, rival) in choice.rival.iter().enumerate() {
             assert_eq!(rival.is_some(), k >= 8, "{k}");
         }
@@ -549,7 +559,7 @@ mod tests {
         let independent = prior(model, 0.1);
         let mut poses = independent.initial.clone();
         poses[8] = half.apply(&poses[8]);
-        let choice = choose(&independent, &poses);
+        let choice = choose_of_all(&independent, &poses);
         for (k, rival) in choice.rival.iter().enumerate() {
             assert_eq!(rival.is_some(), k == 8, "{k}");
         }

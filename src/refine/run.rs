@@ -339,13 +339,11 @@ pub fn refine_keeping(
     }
     // No step without a covariance, whose lack is told already.
     let steps_px = steps_left(&solution).unwrap_or_else(|_| vec![0.0; count]);
-    let strained = certainty.strained(&tracked.doubts);
+    let doubts = certainty.with_strain(tracked.doubts);
     let mut reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = certainty.of_frame(&scene, k, &estimates[k]);
-            let doubt = tracked.doubts[k].clone();
-            let doubt = doubt.or_else(|| strained[k].clone());
-            frame_report(survey, k, &solution, doubt, steps_px[k], sigma)
+            frame_report(survey, k, &solution, doubts[k].as_ref(), steps_px[k], sigma)
         })
         .collect();
     leave_none_alone(&mut reports);
@@ -373,7 +371,7 @@ pub fn refine_keeping(
             frames: reports,
             frames_on_prior: on_prior,
             rows,
-            variance_factor: certainty.covariances.variance_factor,
+            variance_factor: certainty.covariances.variance_factor(),
             calibration: (calibration.any() || !refusals.is_empty()).then(|| {
                 CalibrationReport::new(
                     &calibration,
@@ -538,7 +536,7 @@ fn frame_report(
     survey: &Survey,
     k: usize,
     solution: &Solution,
-    doubt: Option<Doubt>,
+    doubt: Option<&Doubt>,
     step_px: f64,
     sigma: super::covariance::FrameSigma,
 ) -> FrameReport {
@@ -563,7 +561,7 @@ fn frame_report(
     } else {
         None
     };
-    let doubt = doubt.or(late);
+    let doubt = doubt.cloned().or(late);
     FrameReport {
         index: k,
         file: survey.frames[k].name(),

@@ -175,16 +175,19 @@ impl Tracking {
         {
             let held = if first == 0 { 0 } else { (k + 1 - first) / 3 };
             let window = first..k + 1;
-            let from_coarsest = (closes || !settled).then(|| tracked.clone());
-            let near = solve_window(scene, finest, window.clone(), held, tracked)?;
-            if let Some(mut far) = from_coarsest {
-                let mut cost = f64::INFINITY;
+            let start = WindowState::of(tracked, &window);
+            let near_cost = solve_window(scene, finest, window.clone(), held, tracked)?;
+            if closes || !settled {
+                let near = WindowState::of(tracked, &window);
+                start.restore(tracked, &window);
+                let mut far_cost = f64::INFINITY;
                 for level in (finest..=coarsest).rev() {
-                    let scene = scene.at(far.kappa);
-                    cost = solve_window(&scene, level, window.clone(), held, &mut far)?;
+                    let scene = scene.at(tracked.kappa);
+                    far_cost = solve_window(&scene, level, window.clone(), held, tracked)?;
                 }
-                if cost < near {
-                    *tracked = far;
+                let far_is_better = far_cost < near_cost;
+                if !far_is_better {
+                    near.restore(tracked, &window);
                 }
             }
         }
@@ -196,6 +199,26 @@ impl Tracking {
         }
         self.footprints[k] = footprint(scene, &scene.camera, k, &tracked.estimates[k].pose)?;
         Ok(())
+    }
+}
+
+/// What solving a window changes.
+struct WindowState {
+    estimates: Vec<FrameEstimate>,
+    kappa: Kappa,
+}
+
+impl WindowState {
+    fn of(tracked: &Tracked, window: &Range<usize>) -> Self {
+        Self {
+            estimates: tracked.estimates[window.clone()].to_vec(),
+            kappa: tracked.kappa,
+        }
+    }
+
+    fn restore(&self, tracked: &mut Tracked, window: &Range<usize>) {
+        tracked.estimates[window.clone()].copy_from_slice(&self.estimates);
+        tracked.kappa = self.kappa;
     }
 }
 

@@ -192,6 +192,11 @@ impl GaugeMotion {
         self.turn_rad == 0.0 && self.shift_m == 0.0
     }
 
+    /// The motion that undoes it.
+    pub fn reversed(&self) -> Self {
+        Self::default().plus(-1.0, self)
+    }
+
     /// This and then `times` another about the same axis; they commute.
     pub fn plus(&self, times: f64, other: &Self) -> Self {
         Self {
