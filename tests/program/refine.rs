@@ -273,7 +273,7 @@ fn a_turn_closes_on_the_right_tile() {
 fn a_wrong_camera_strains_the_frames() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    simulate(&survey, &["--frames", "24", "--seed", "1"]);
+    simulate(&survey, &["--frames", "12", "--seed", "1"]);
     let camera = survey.join("camera.json");
     let mut given = json(&camera);
     for focal in ["fx", "fy"] {
