@@ -388,7 +388,7 @@ const MOST_DOUBTS: usize = 24;
 fn warn_of_doubts(report: &RefineReport, terminal: &Terminal) {
     let frames = report.frames.iter();
     let doubted: Vec<(&FrameReport, &str)> = frames
-        .filter(|frame| frame.flag == FrameFlag::Prior)
+        .filter(|frame| frame.flag != FrameFlag::Photometric)
         .filter_map(|frame| Some((frame, frame.reason.as_deref()?)))
         .collect();
     let mut runs = doubted.chunk_by(|(a, why), (b, too)| b.index == a.index + 1 && why == too);

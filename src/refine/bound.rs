@@ -133,7 +133,7 @@ pub fn pose_bound(
     Ok(Covariances {
         frames: (0..count).map(|k| pose(k, k)).collect(),
         next: (1..count).map(|k| pose(k - 1, k)).collect(),
-        frame_factors: vec![1.0; count],
+        variance_factor: 1.0,
     })
 }
 

@@ -1,13 +1,15 @@
 //! How sure a solution is, and what of the shared unknowns it does not tell.
 
 use super::calibration::{Calibration, SHARED};
-use super::covariance::{Covariances, FrameSigma, covariances, frame_sigma};
+use super::covariance::{Covariances, FrameSigma, covariances, frame_sigma, pull, strain_px};
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::gauss_newton::Solution;
+use super::grid::BLOCK;
 use super::observed::{Posterior, Refusal};
 use super::problem::{ProblemError, Scene};
 use super::shared::SharedBlock;
+use super::tile::SAMPLES;
 
 /// Share of frames that may fit nowhere before nothing is believed about what all frames share: the others may fit each
 /// other in wrong places.
@@ -16,9 +18,13 @@ const MOST_MISFITS: f64 = 0.1;
 /// loosely can tilt and shift together, the camera with them, for less than aliasing does; that is more than the
 /// covariance knows of.
 const MOST_LOOSE_PX: f64 = 0.2;
-/// Largest contribution of a frame to the variance factor that can be borne. Aliasing on sharp bricks makes it 2 to 10, glints and
-/// moving things up to some 70; a focal length 2 % off 100 to 200, a turn that is closed a tile off and bent all around 300 and more.
-const MOST_STRAIN: f64 = 150.0;
+/// Largest strain of a frame that can be borne, pixels ([`super::covariance`]): of a frame by itself, and of the median frame. Sharp
+/// bricks strain frames by 0.01 to 0.03, whatever the noise, glints on a faint wall the median frame by 0.04 and single ones by 0.2; a
+/// focal length 1 % off the median frame by 0.15, and a turn that is closed a period off and bent all around more.
+const MOST_STRAIN_PX: f64 = 0.25;
+const MOST_USUAL_STRAIN_PX: f64 = 0.08;
+/// Wall samples of a patch: of the blocks over which the scatter is told.
+const PATCH: i64 = BLOCK * BLOCK * SAMPLES as i64;
 
 /// The covariance of a solution.
 pub struct Certainty {
@@ -26,15 +32,21 @@ pub struct Certainty {
     pub covariances: Covariances,
     /// `Σ_κ`, where it was estimated.
     pub shared: Option<SharedBlock>,
+    /// Each frame's strain, pixels.
+    pub strain_px: Vec<f64>,
     posterior: Option<Posterior>,
 }
 
 impl Certainty {
-    /// At a solution, for the free unknowns of `calibration`.
+    /// At a solution, for the free unknowns of `calibration`; `scene`: with the solution's own κ.
     ///
     /// # Errors
     /// [`ProblemError::Factor`] if shared unknowns were estimated and the poses' normal matrix is singular.
-    pub fn at(solution: &Solution, calibration: &Calibration) -> Result<Self, ProblemError> {
+    pub fn at(
+        scene: &Scene,
+        solution: &Solution,
+        calibration: &Calibration,
+    ) -> Result<Self, ProblemError> {
         let problem = &solution.problem;
         let posterior = Posterior::at(solution).map_err(|source| problem.factor_error(source))?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
@@ -56,6 +68,7 @@ impl Certainty {
         Ok(Self {
             covariances,
             shared,
+            strain_px: strains(scene, solution),
             posterior,
         })
     }
@@ -74,10 +87,12 @@ impl Certainty {
 
     /// The doubts with those about frames whose residuals are no noise.
     pub fn with_strain(&self, mut doubts: Vec<Option<Doubt>>) -> Vec<Option<Doubt>> {
-        let strained = strained(&self.covariances.frame_factors, &doubts);
-        for (doubt, strained) in doubts.iter_mut().zip(strained) {
+        let strained = strained(&self.strain_px, &doubts);
+        for ((doubt, strained), strain_px) in doubts.iter_mut().zip(strained).zip(&self.strain_px) {
             if strained {
-                *doubt = Some(Doubt::Strained { times: MOST_STRAIN });
+                *doubt = Some(Doubt::Strained {
+                    strain_px: *strain_px,
+                });
             }
         }
         doubts
@@ -104,7 +119,7 @@ impl Certainty {
             );
             return refuse_all(calibration, &reason);
         }
-        let strained = strained(&self.covariances.frame_factors, doubts);
+        let strained = strained(&self.strain_px, doubts);
         let sure = (0..count).filter(|k| doubts[*k].is_none() && !strained[*k]);
         let sure: Vec<usize> = sure.collect();
         if sure.is_empty() && strained.contains(&true) {
@@ -129,14 +144,41 @@ impl Certainty {
     }
 }
 
-/// Which of the frames believed so far have residuals that are no noise: those with more than can be borne of the variance factor;
-/// where they are half, what strains them strains all. `factors`: each frame's share of the variance factor.
-fn strained(factors: &[f64], doubts: &[Option<Doubt>]) -> Vec<bool> {
-    let believed = || (0..doubts.len()).filter(|k| doubts[*k].is_none());
-    let beyond = |k: &usize| factors[*k] > MOST_STRAIN;
-    let all = 2 * believed().filter(beyond).count() >= believed().count();
+/// See [`Certainty::strain_px`]; 0 for frames that show nothing.
+fn strains(scene: &Scene, solution: &Solution) -> Vec<f64> {
+    let at = &solution.linearisation;
+    let pattern = solution.problem.pattern();
+    let share = solution.problem.share_of_wall();
+    let of = |k: usize| {
+        let place = pattern.place(k, k)?;
+        let (q, covariance) = pull(&at.normal.blocks[place], &at.scatter[place])?;
+        let sigma = frame_sigma(
+            scene.surface,
+            &scene.camera,
+            &solution.estimates[k],
+            &covariance,
+            None,
+        );
+        let patches = at.frames[k].samples as f64 / (PATCH as f64 * share);
+        Some(strain_px(q, patches, sigma.wall_px))
+    };
+    (0..solution.estimates.len())
+        .map(|k| of(k).unwrap_or(0.0))
+        .collect()
+}
+
+/// Which of the frames believed so far are under more strain than can be borne; where their median is, all are.
+fn strained(strain_px: &[f64], doubts: &[Option<Doubt>]) -> Vec<bool> {
+    let believed = (0..doubts.len()).filter(|k| doubts[*k].is_none());
+    let mut ordered: Vec<f64> = believed.map(|k| strain_px[k]).collect();
+    ordered.sort_unstable_by(f64::total_cmp);
+    let usual = ordered.get(ordered.len() / 2).copied().unwrap_or(0.0);
+    let most = match usual > MOST_USUAL_STRAIN_PX {
+        true => 0.0,
+        false => MOST_STRAIN_PX,
+    };
     (0..doubts.len())
-        .map(|k| doubts[k].is_none() && (all || beyond(&k)))
+        .map(|k| doubts[k].is_none() && strain_px[k] >= most)
         .collect()
 }
 
@@ -158,13 +200,16 @@ mod tests {
     use crate::refine::calibration::Kappa;
 
     #[test]
-    fn what_strains_half_of_the_frames_strains_all() {
+    fn what_strains_the_median_frame_strains_all() {
         let mut doubts = vec![None; 4];
         doubts[0] = Some(Doubt::Featureless);
-        let of = |factors: [f64; 4]| strained(&factors, &doubts);
-        assert_eq!(of([1.0, 2.0, 70.0, 3.0]), [false; 4]);
-        assert_eq!(of([1.0, 2.0, 700.0, 3.0]), [false, false, true, false]);
-        assert_eq!(of([1.0, 200.0, 700.0, 3.0]), [false, true, true, true]);
+        let of = |strain: [f64; 4]| strained(&strain, &doubts);
+        let (none, usual, much) = (0.01, 0.1, 0.5);
+        assert_eq!(of([much, none, none, none]), [false; 4]);
+        assert_eq!(of([none, none, much, usual]), [false, true, true, true]);
+        assert_eq!(of([none, none, much, none]), [false, false, true, false]);
+        assert_eq!(of([usual, none, usual, none]), [false; 4]);
+        assert_eq!(strained(&[], &[]), [false; 0]);
     }
 
     #[test]

@@ -20,6 +20,8 @@ use std::ops::Range;
 const LEAST_OVERLAP: f64 = 0.03;
 /// Correlation, noise aside, that a right pair reaches.
 const LEAST_QUALITY: f64 = 0.6;
+/// Share of what two frames share that must be left without what stands out of it, for the rest to speak for them.
+const LEAST_LEFT: f64 = 0.5;
 /// One above this is not asked for that of most samples.
 const SURE_QUALITY: f64 = 0.85;
 /// Share of its weight that may contradict before a frame is doubted.
@@ -51,7 +53,8 @@ pub struct Pair {
 /// The first tells whether they show the same wall; finest detail only where the first is drowned by noise, for of a pattern it is
 /// edges alone, and they coincide wherever the pattern does, whatever is between them. Where two frames do not show the same wall,
 /// they are looked at once more without what stands out of it: water is dark in one and glints in the other, and on a faint wall
-/// a few such patches in a strip are all that is compared. Two frames contradict if the wall between does, too.
+/// a few such patches in a strip are all that is compared. Two frames contradict if the wall between does, too; where little of it
+/// is left they neither agree nor contradict.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -96,12 +99,18 @@ pub fn compare_pairs(
     };
     let again = |a, b| wrong.contains(&(a, b));
     let of_usual = by_pair(compare_at(scene, usual, tracked, frames, &again)?);
-    for pair in pairs.iter_mut().filter(|pair| pair.wrong) {
+    // Where too little is left to see, the pair says nothing.
+    pairs.retain_mut(|pair| {
+        if !pair.wrong {
+            return true;
+        }
         let usual = of_usual.get(&(pair.a, pair.b));
-        pair.wrong = usual
-            .and_then(|usual| usual.quality)
-            .is_none_or(|quality| quality < LEAST_QUALITY);
-    }
+        let Some((usual, quality)) = usual.and_then(|usual| Some((usual, usual.quality?))) else {
+            return false;
+        };
+        pair.wrong = quality < LEAST_QUALITY;
+        pair.wrong || usual.samples >= LEAST_LEFT * pair.samples
+    });
     Ok(pairs)
 }
 

@@ -16,9 +16,16 @@
 //!
 //! `Σ = c H⁻¹`,   `c = tr(H⁻¹ (V + P)) / (κ² unknowns)`,
 //!
-//! c about 1 on noisy walls of low contrast, and about 3 on sharp bricks. It is the mean of what the frames contribute, the rows of the
-//! trace: where one contributes a hundred, its residuals are no noise, but what the model cannot follow. Only blocks of `H⁻¹` where H itself has
-//! blocks are needed ([`super::selected_inverse`]).
+//! c about 1 on noisy walls of low contrast, and about 3 on sharp bricks. Only blocks of `H⁻¹` where H itself has blocks are needed
+//! ([`super::selected_inverse`]).
+//!
+//! **Strain.** Where the model is wrong (a camera's focal length, a turn closed a period off and bent), patches of the wall pull a frame hither
+//! and thither, and it rests between. Were it noise, the scatter of what the patches pull would be `V_k ≈ H_k`, the frame's own blocks
+//! on the diagonal, all other frames held. With `q = tr(H_k⁻¹ V_k)/unknowns` a patch lies `√q` times as far off as by noise. By noise, N patches
+//! of information I px⁻² each, which together fix six unknowns, leave the mean point of the picture the variance `σ² = 6/(N I)`, and
+//! a patch by itself, in both directions, is uncertain by `2/I = N σ²/3`. So what patches are off by, beyond noise, is
+//!
+//! `strain² = (q − 1) N σ²/3`   px².
 //!
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`D⁻¹ Q D⁻¹`);
 //! F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw, W. A. Stahel, "Robust Statistics: The Approach Based on Influence
@@ -64,23 +71,18 @@ pub struct Covariances {
     pub frames: Vec<Matrix6<f64>>,
     /// Of every frame (rows) with the next (columns); not a number where the two have nothing in common.
     pub next: Vec<Matrix6<f64>>,
-    /// What each frame contributes to the factor c.
-    pub frame_factors: Vec<f64>,
+    /// The factor c.
+    pub variance_factor: f64,
 }
 
 impl Covariances {
-    /// The factor c.
-    pub fn variance_factor(&self) -> f64 {
-        mean(&self.frame_factors)
-    }
-
     /// Of `frames` frames of which nothing is known.
     pub(super) fn unknown(frames: usize) -> Self {
         let unknown = Matrix6::from_element(f64::NAN);
         Self {
             frames: vec![unknown; frames],
             next: vec![unknown; frames.saturating_sub(1)],
-            frame_factors: vec![f64::NAN; frames],
+            variance_factor: f64::NAN,
         }
     }
 
@@ -165,23 +167,18 @@ pub fn covariances(
 ) -> Result<Covariances, FactorError> {
     let inverse = SelectedInverse::new(pattern, normal)?;
     let count = pattern.frames();
-    let mut frame_factors = vec![0.0; count];
+    let mut trace = 0.0;
     for column in 0..count {
         for &row in pattern.rows(column) {
             if let (Some(place), Some(z)) = (pattern.place(row, column), inverse.block(row, column))
             {
-                let part = z.component_mul(&(scatter[place] + prior[place])).sum();
-                frame_factors[row] += part;
                 // Off the diagonal each block stands for its transpose, too.
-                if row != column {
-                    frame_factors[column] += part;
-                }
+                let times = if row == column { 1.0 } else { 2.0 };
+                trace += times * z.component_mul(&(scatter[place] + prior[place])).sum();
             }
         }
     }
-    let usual = curvature.powi(2) * UNKNOWNS as f64;
-    frame_factors.iter_mut().for_each(|factor| *factor /= usual);
-    let variance_factor = mean(&frame_factors);
+    let variance_factor = trace / (curvature.powi(2) * (count * UNKNOWNS) as f64);
     let pose = |block: Block| variance_factor * block.fixed_view::<6, 6>(0, 0).into_owned();
     let unknown = Matrix6::from_element(f64::NAN);
     Ok(Covariances {
@@ -191,12 +188,24 @@ pub fn covariances(
         next: (1..count)
             .map(|k| inverse.block(k - 1, k).map_or(unknown, pose))
             .collect(),
-        frame_factors,
+        variance_factor,
     })
 }
 
-fn mean(factors: &[f64]) -> f64 {
-    factors.iter().sum::<f64>() / factors.len() as f64
+/// How far patches of the wall pull a frame apart: q and, by noise alone, the covariance of its pose with all other frames held.
+///
+/// `information`: the frame's own block of the normal matrix; `scatter`: that of V. None if the frame is not fixed by the others.
+pub fn pull(information: &Block, scatter: &Block) -> Option<(f64, Matrix6<f64>)> {
+    let inverse = information.cholesky()?.inverse();
+    let q = inverse.component_mul(scatter).sum() / UNKNOWNS as f64;
+    Some((q, inverse.fixed_view::<6, 6>(0, 0).into_owned()))
+}
+
+/// What patches of a frame are off by beyond noise, pixels, root mean square: see the [module](self).
+///
+/// `patches`: N; `sigma_px`: σ of the mean point of the picture by noise, all other frames held.
+pub fn strain_px(q: f64, patches: f64, sigma_px: f64) -> f64 {
+    ((q - 1.0).max(0.0) * patches / 3.0).sqrt() * sigma_px
 }
 
 /// Reads a pose covariance as σ of rotation, translation and wall position.
@@ -277,24 +286,32 @@ mod tests {
         }
         let none = vec![Block::zeros(); pattern.blocks()];
         let one = covariances(&pattern, &normal, &normal.blocks, &none, 1.0).unwrap();
-        assert!((one.variance_factor() - 1.0).abs() < 1e-12);
+        assert!((one.variance_factor - 1.0).abs() < 1e-12);
         let both = (&normal.blocks, &normal.blocks);
         let two = covariances(&pattern, &normal, both.0, both.1, 1.0).unwrap();
         assert!((two.frames[1] - one.frames[1] * 2.0).norm() < 1e-12);
-        let mut strained = normal.blocks.clone();
-        strained[pattern.place(2, 2).unwrap()] *= 10.0;
-        let strained = covariances(&pattern, &normal, &strained, &none, 1.0).unwrap();
-        // 1 and nine times the share of (Z H)₂₂ on the diagonal, Z₂₂ = 15/56.
-        let expected = [1.0, 1.0, 1.0 + 9.0 * 4.0 * 15.0 / 56.0];
-        for (factor, expected) in strained.frame_factors.iter().zip(expected) {
-            assert!((factor - expected).abs() < 1e-12);
-        }
-        let mean = expected.iter().sum::<f64>() / 3.0;
-        assert!((strained.variance_factor() - mean).abs() < 1e-12);
         let bent = covariances(&pattern, &normal, &normal.blocks, &none, 0.5).unwrap();
         assert!((bent.frames[1] - one.frames[1] * 4.0).norm() < 1e-12);
         assert!((one.frames[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
         assert!((one.next[0][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
+    }
+
+    /// Patches that all pull at random, each by its own noise, are no strain; those that pull by half a pixel more are half a pixel.
+    #[test]
+    fn strain_is_what_patches_are_off_by_beyond_noise() {
+        // N patches, each with information I px⁻² about both directions of a picture that can move in six ways.
+        let (patches, information) = (300.0, 40.0);
+        let sigma_px = f64::sqrt(6.0 / (patches * information));
+        assert_eq!(strain_px(1.0, patches, sigma_px), 0.0);
+        let off_px = 0.5;
+        // Pull I · off in each of the two directions, so its square over that by noise, I.
+        let q = 1.0 + 0.5 * information * off_px * off_px;
+        assert!((strain_px(q, patches, sigma_px) - off_px).abs() < 1e-12);
+        let scatter = Block::identity() * 12.0;
+        let (q, pose) = pull(&(Block::identity() * 4.0), &scatter).unwrap();
+        assert!((q - 3.0).abs() < 1e-12);
+        assert!((pose - Matrix6::identity() * 0.25).norm() < 1e-12);
+        assert!(pull(&Block::zeros(), &scatter).is_none());
     }
 
     /// A camera that may be off by a millimetre along the tunnel shows all of the wall a millimetre off; how many pixels that is goes

@@ -79,7 +79,7 @@ mod tests {
         let covariances = Covariances {
             frames: (0..3).map(|k| Matrix6::from_fn(element(k))).collect(),
             next: vec![Matrix6::from_element(f64::NAN); 2],
-            frame_factors: vec![1.0; 3],
+            variance_factor: 1.0,
         };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("covariance.csv");

@@ -60,10 +60,10 @@ pub enum Doubt {
         /// Share of its pixels that others show, 0 to 1.
         share: f64,
     },
-    /// Its residuals are far more than noise, and hang together.
+    /// Its patches do not all fit the others at once.
     Strained {
-        /// What the variance of its gradient exceeds, times that of noise.
-        times: f64,
+        /// What they are off by, beyond noise, pixels.
+        strain_px: f64,
     },
     /// Too little texture to fix its place.
     Uncertain {
@@ -146,10 +146,10 @@ impl fmt::Display for Doubt {
                 "only {:.1} % of its pixels overlap other frames",
                 100.0 * share
             ),
-            Self::Strained { times } => write!(
+            Self::Strained { strain_px } => write!(
                 f,
-                "it fits the others only under strain (errors that hang together, over {times:.0} times the variance of noise): a wall \
-                 that repeats and is closed a period off, or a wrong camera, radius or shape"
+                "it fits the others only under strain (patches of it are off by {strain_px:.2} px, or those of most frames are): a wrong \
+                 camera, radius or shape, or a wall that repeats and is closed a period off"
             ),
             Self::Uncertain { wall_px } => write!(
                 f,

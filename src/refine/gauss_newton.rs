@@ -110,6 +110,16 @@ fn pose_slope(step: &[FrameStep], at: &Linearisation) -> f64 {
     poses.sum()
 }
 
+/// The derivative of the cost along a whole step: `δᵀ g`.
+fn slope(step: &[FrameStep], shared: &Kappa, at: &Linearisation) -> f64 {
+    let frames = step.iter().zip(&at.normal.gradient);
+    let own: f64 = frames.map(|(step, gradient)| step.dot(gradient)).sum();
+    own + at
+        .border
+        .as_ref()
+        .map_or(0.0, |border| shared.dot(&border.gradient))
+}
+
 /// Where a solve ended.
 pub struct Solution<'a> {
     /// The problem that was solved.
@@ -143,6 +153,11 @@ type Unknowns = (Vec<FrameEstimate>, Kappa);
 
 type Iterate = IterState<Unknowns, (), (), (), (), f64>;
 
+/// Of the slope along a step, `δᵀ g`, this much must be gone after one that does not lower the cost.
+const LEAST_SLOPE_GONE: f64 = 0.5;
+/// Share of the cost by which it may rise along a good step. On sharp bricks it rises and falls by up to 0.9 % while the whole survey moves
+/// along its gauge, which changes nothing.
+const ROUGHNESS: f64 = 0.01;
 /// First damping tried after a rejected step, and the factor between tries.
 const DAMPING: (f64, f64) = (1e-4, 10.0);
 /// Tries before a step is given up.
@@ -150,9 +165,17 @@ const TRIES: usize = 8;
 
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
 ///
-/// λ starts at 0 and rises only when a step fails to lower the robust cost on the same wall samples; such a
-/// step is never taken. Frames that a step would bring where they cannot be ([`Problem::admits`]) stay where they are.
-/// Only the last step, shorter than the tolerance, is taken on trust: cost and equations are those before it.
+/// λ starts at 0 and rises when a step is none for the better; such a step is never taken. It is for the better if it lowers the
+/// robust cost on the same wall samples; or if it leaves less than half of the slope along it ([`LEAST_SLOPE_GONE`]) and the cost
+/// as it was but for its [`ROUGHNESS`]. What is sought is where the gradient is zero, and that is not quite the derivative of the
+/// cost: it takes the slopes of the fused texture ([`super::tile`]), so it is smooth, whereas the cost of sharp edges
+/// depends on where between pixels samples happen to fall. Along weak directions, in which all frames move together by half a pixel
+/// and hardly against each other, that outweighs what there is to gain, and a solve that asked for a lower cost would be stuck.
+///
+/// Frames that a step would bring where they cannot be ([`Problem::admits`]) stay where they are.
+/// Only the last step, undamped and shorter than the tolerance, is taken on trust: cost and equations are those before it.
+///
+/// Source: P. Wolfe, "Convergence conditions for ascent methods", SIAM Review 11(2), 1969 (the slope along a step).
 struct DampedGaussNewton<'b> {
     stopping: Stopping,
     lambda: f64,
@@ -184,6 +207,7 @@ impl DampedGaussNewton<'_> {
         (estimates, kappa): &Unknowns,
         current: Linearisation,
     ) -> Result<(Unknowns, Linearisation), ProblemError> {
+        let mut undamped_failed = false;
         for _ in 0..TRIES {
             let factor =
                 problem
@@ -219,15 +243,16 @@ impl DampedGaussNewton<'_> {
             }
             let moved = problem.wall_step_px(estimates, &step, &shared);
             let step_px = moved.into_iter().fold(0.0, f64::max);
-            let mut decrement: f64 = step
-                .iter()
-                .zip(gradient)
-                .map(|(step, gradient)| -step.dot(gradient))
-                .sum();
-            if let Some(border) = &current.border {
-                decrement -= shared.dot(&border.gradient);
-            }
+            let decrement = -slope(&step, &shared, &current);
             let stop = self.reason_to_stop(step_px, decrement, UNKNOWNS * step.len());
+            if stop.is_some() && self.lambda > 0.0 {
+                // It is the damping that makes the step short.
+                if undamped_failed {
+                    break;
+                }
+                self.lambda = 0.0;
+                continue;
+            }
             let candidate: Vec<_> = estimates
                 .iter()
                 .zip(&step)
@@ -246,7 +271,10 @@ impl DampedGaussNewton<'_> {
                 return Ok((candidate, current));
             }
             let next = problem.linearise_at(&candidate.0, &candidate.1)?;
-            if next.cost < current.cost {
+            let left = slope(&step, &shared, &next).abs();
+            let settles = left < (1.0 - LEAST_SLOPE_GONE) * decrement
+                && next.cost < (1.0 + ROUGHNESS) * current.cost;
+            if next.cost < current.cost || settles {
                 record.cost = Some(next.cost);
                 // A whole undamped step is δ = −H⁻¹ g.
                 let of_poses = |at| pose_slope(&step, at);
@@ -259,6 +287,7 @@ impl DampedGaussNewton<'_> {
                 };
                 return Ok((candidate, next));
             }
+            undamped_failed |= self.lambda == 0.0;
             self.raise_damping();
         }
         self.stop = Some(StopReason::NoFurtherDescent);

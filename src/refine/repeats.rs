@@ -53,12 +53,18 @@ struct Choice {
 }
 
 impl Choice {
-    /// Where most frames are undecided, so is every other that fits elsewhere, too: the one that the others were compared with, and
-    /// those that a `first` choice, by clear odds, found in doubt.
-    fn leave_none_clear(&mut self, first: &Self, repeats: &[Vec<GaugeMotion>]) {
+    /// Where most frames are undecided, so is every other, too: those that a `first` choice, by clear odds, found in doubt, those
+    /// that fit elsewhere, and those that fit nowhere else, perhaps because what they are compared with is a period off as well.
+    fn leave_none_clear(
+        &mut self,
+        first: &Self,
+        repeats: &[Vec<GaugeMotion>],
+        periods: &[GaugeMotion],
+    ) {
         let before = first.rival.iter().zip(repeats);
         for (rival, (before, repeats)) in self.rival.iter_mut().zip(before) {
-            *rival = rival.or(*before).or(repeats.first().copied());
+            let elsewhere = repeats.first().or(periods.first());
+            *rival = rival.or(*before).or(elsewhere.copied());
         }
     }
 }
@@ -143,7 +149,7 @@ pub fn settle_repeats(
     let undecided = choice.rival.iter().flatten().count();
     if 2 * undecided > frames.len() {
         let first = std::mem::replace(&mut choice, choose(f64::INFINITY));
-        choice.leave_none_clear(&first, &repeats);
+        choice.leave_none_clear(&first, &repeats, &periods);
     }
     let mut moved = Vec::new();
     for (k, motion) in frames.iter().zip(&choice.motion) {
@@ -204,11 +210,10 @@ fn repeats_of(
     let sweep = surroundings.sweep(scene, frame);
     let portrait = Portrait::new(scene, level, frame, &sweep)?;
     let wall = FusedWall::new(scene, &portraits, &camera, (frame, &pose), margin)?;
-    let left = |pose: &Pose| {
-        let likeness = wall.likeness(scene, &portrait, pose);
-        unexplained(&likeness, &portrait)
-    };
-    let Some(here) = left(&pose) else {
+    let likeness = |pose: &Pose| wall.likeness(scene, &portrait, pose);
+    let left = |pose: &Pose| unexplained(&likeness(pose), &portrait);
+    let at_home = likeness(&pose);
+    let Some(here) = unexplained(&at_home, &portrait) else {
         return Ok(Vec::new());
     };
     let most = most_unexplained(here);
@@ -216,7 +221,8 @@ fn repeats_of(
     let moved = |shift_m: [f64; 2]| motion(shift_m).1.apply(&pose);
     let spacing = wall.lattice.spacing_m;
     let mut found = Vec::new();
-    let least = LEFT_BY_STEPS * (1.0 - most).max(0.0);
+    // Of the correlation as it is, noise and all.
+    let least = LEFT_BY_STEPS * (1.0 - most).max(0.0) * at_home.texture().powi(2);
     for shift_m in matches(&wall, &portrait, &pose, reach_m, least) {
         // Where the shape forbids a motion, no repeat leads there.
         let (made_m, _) = motion(shift_m);
@@ -498,8 +504,10 @@ mod tests {
         };
         let first = choice([Some(tile()), Some(other), None, None]);
         let mut last = choice([Some(tile()), None, None, None]);
-        last.leave_none_clear(&first, &[vec![], vec![], vec![other], vec![]]);
-        assert_eq!(last.rival, [Some(tile()), Some(other), Some(other), None]);
+        let repeats = [vec![], vec![], vec![other], vec![]];
+        last.leave_none_clear(&first, &repeats, &[tile()]);
+        let expected = [Some(tile()), Some(other), Some(other), Some(tile())];
+        assert_eq!(last.rival, expected);
     }
 
     #[test]

@@ -71,6 +71,10 @@ pub struct FrameReport {
     pub bias: f64,
     /// 1-σ relative to the first frame.
     pub sigma: FrameSigma,
+    /// What patches of it are off by against the others, beyond noise: root mean square, pixels. Much of it speaks of a wrong camera,
+    /// radius or shape.
+    #[serde(default)]
+    pub strain_px: f64,
 }
 
 /// One global solve of the report.

@@ -271,7 +271,7 @@ pub fn refine_keeping(
         progress.finish();
         tracked.estimates.clone_from(&solution.estimates);
         let refused = match level {
-            0 => Certainty::at(&solution, &calibration)?.refused(
+            0 => Certainty::at(&scene, &solution, &calibration)?.refused(
                 &scene.at(solution.kappa),
                 &calibration,
                 &solution.estimates,
@@ -328,7 +328,7 @@ pub fn refine_keeping(
         tracked.doubts[frame].get_or_insert(doubt);
     }
     let rows = row_motion(&scene, options, &tracked)?;
-    let certainty = Certainty::at(&solution, &calibration)?;
+    let certainty = Certainty::at(&scene, &solution, &calibration)?;
     let estimates = &tracked.estimates;
     let metric = calibration.metric(&scene.kappa);
     let motion = prior.settle_gauge(&scene.surface.gauge(), estimates, &metric);
@@ -343,7 +343,9 @@ pub fn refine_keeping(
     let mut reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = certainty.of_frame(&scene, k, &estimates[k]);
-            frame_report(survey, k, &solution, doubts[k].as_ref(), steps_px[k], sigma)
+            let strain_px = certainty.strain_px[k];
+            let doubt = doubts[k].as_ref();
+            frame_report(survey, k, &solution, doubt, steps_px[k], (sigma, strain_px))
         })
         .collect();
     leave_none_alone(&mut reports);
@@ -371,7 +373,7 @@ pub fn refine_keeping(
             frames: reports,
             frames_on_prior: on_prior,
             rows,
-            variance_factor: certainty.covariances.variance_factor(),
+            variance_factor: certainty.covariances.variance_factor,
             calibration: (calibration.any() || !refusals.is_empty()).then(|| {
                 CalibrationReport::new(
                     &calibration,
@@ -538,7 +540,7 @@ fn frame_report(
     solution: &Solution,
     doubt: Option<&Doubt>,
     step_px: f64,
-    sigma: super::covariance::FrameSigma,
+    (sigma, strain_px): (super::covariance::FrameSigma, f64),
 ) -> FrameReport {
     let share: &FrameShare = &solution.linearisation.frames[k];
     let estimate: &FrameEstimate = &solution.estimates[k];
@@ -581,6 +583,7 @@ fn frame_report(
         gain: estimate.log_gain.exp(),
         bias: estimate.bias,
         sigma,
+        strain_px,
     }
 }
 

@@ -224,7 +224,7 @@ impl WindowState {
 
 /// Solves the frames of a window together, the oldest `held` of them held; where none is, with the camera's unknowns.
 ///
-/// Returns the cost of an observation at the end; infinity where nothing is seen twice.
+/// Returns the cost of an observation at the end, grey levels²; infinity where nothing is seen twice.
 fn solve_window(
     scene: &Scene,
     level: usize,
@@ -241,7 +241,9 @@ fn solve_window(
     let solution = solve(problem, WINDOW_STOPPING, None)?;
     tracked.kappa = solution.kappa;
     tracked.estimates[active].copy_from_slice(&solution.estimates);
-    Ok(solution.record.cost_end / solution.record.observations as f64)
+    let record = solution.record;
+    // Each problem takes σ from what it starts with; in units of it costs could not be compared.
+    Ok(record.cost_end * record.sigma.powi(2) / record.observations as f64)
 }
 
 /// What each frame sees of the wall at its present pose.

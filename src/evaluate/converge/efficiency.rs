@@ -205,7 +205,7 @@ fn one(options: &SimulateOptions, out: &Path) -> Result<Run, ConvergeError> {
         bound: pose_bound(&survey, &doubled, noise, false)?,
         bayesian: pose_bound(&survey, &doubled, noise, true)?,
         normalised: normalised.into_iter().flatten().collect(),
-        variance_factor: refined.covariances.variance_factor(),
+        variance_factor: refined.covariances.variance_factor,
         truth,
         errors,
         survey,
