@@ -1,7 +1,7 @@
 //! How sure a solution is, and what of the shared unknowns it does not tell.
 
 use super::calibration::{Calibration, SHARED};
-use super::covariance::{Covariances, FrameSigma, covariances, frame_sigma, pull, strain_px};
+use super::covariance::{Covariances, FrameSigma, Strain, covariances, frame_sigma};
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::gauss_newton::Solution;
@@ -18,10 +18,14 @@ const MOST_MISFITS: f64 = 0.1;
 /// loosely can tilt and shift together, the camera with them, for less than aliasing does; that is more than the
 /// covariance knows of.
 const MOST_LOOSE_PX: f64 = 0.2;
-/// Largest strain of a frame that can be borne, pixels ([`super::covariance`]): of a frame by itself, and of the median frame. Sharp
-/// bricks strain frames by 0.01 to 0.03, whatever the noise, glints on a faint wall the median frame by 0.04 and single ones by 0.2; a
-/// focal length 1 % off the median frame by 0.15, and a turn that is closed a period off and bent all around more.
-const MOST_STRAIN_PX: f64 = 0.25;
+/// Largest strain that can be borne of a frame by itself, if it is that many times what noise does ([`Strain`]): glints on a faint
+/// wall make it 0.6 px and two times, a turn that is closed a period off and bent ten and more.
+const MOST_STRAIN: Strain = Strain {
+    times: 5.0,
+    px: 0.25,
+};
+/// Largest strain of the median frame, pixels. Sharp bricks make it 0.01 to 0.03, whatever the noise; a focal length 0.3 % off 0.06, one
+/// 1 % off 0.15.
 const MOST_USUAL_STRAIN_PX: f64 = 0.08;
 /// Wall samples of a patch: of the blocks over which the scatter is told.
 const PATCH: i64 = BLOCK * BLOCK * SAMPLES as i64;
@@ -32,8 +36,8 @@ pub struct Certainty {
     pub covariances: Covariances,
     /// `Σ_κ`, where it was estimated.
     pub shared: Option<SharedBlock>,
-    /// Each frame's strain, pixels.
-    pub strain_px: Vec<f64>,
+    /// Each frame's strain; none of those that show nothing.
+    pub strains: Vec<Strain>,
     posterior: Option<Posterior>,
 }
 
@@ -68,7 +72,7 @@ impl Certainty {
         Ok(Self {
             covariances,
             shared,
-            strain_px: strains(scene, solution),
+            strains: strains(scene, solution),
             posterior,
         })
     }
@@ -87,11 +91,11 @@ impl Certainty {
 
     /// The doubts with those about frames whose residuals are no noise.
     pub fn with_strain(&self, mut doubts: Vec<Option<Doubt>>) -> Vec<Option<Doubt>> {
-        let strained = strained(&self.strain_px, &doubts);
-        for ((doubt, strained), strain_px) in doubts.iter_mut().zip(strained).zip(&self.strain_px) {
+        let strained = strained(&self.strains, &doubts);
+        for ((doubt, strained), strain) in doubts.iter_mut().zip(strained).zip(&self.strains) {
             if strained {
                 *doubt = Some(Doubt::Strained {
-                    strain_px: *strain_px,
+                    strain_px: strain.px,
                 });
             }
         }
@@ -119,7 +123,7 @@ impl Certainty {
             );
             return refuse_all(calibration, &reason);
         }
-        let strained = strained(&self.strain_px, doubts);
+        let strained = strained(&self.strains, doubts);
         let sure = (0..count).filter(|k| doubts[*k].is_none() && !strained[*k]);
         let sure: Vec<usize> = sure.collect();
         if sure.is_empty() && strained.contains(&true) {
@@ -144,41 +148,31 @@ impl Certainty {
     }
 }
 
-/// See [`Certainty::strain_px`]; 0 for frames that show nothing.
-fn strains(scene: &Scene, solution: &Solution) -> Vec<f64> {
+/// See [`Certainty::strains`].
+fn strains(scene: &Scene, solution: &Solution) -> Vec<Strain> {
     let at = &solution.linearisation;
     let pattern = solution.problem.pattern();
-    let share = solution.problem.share_of_wall();
-    let of = |k: usize| {
+    let patch = PATCH as f64 * solution.problem.share_of_wall();
+    let of = |(k, estimate): (usize, &FrameEstimate)| {
         let place = pattern.place(k, k)?;
-        let (q, covariance) = pull(&at.normal.blocks[place], &at.scatter[place])?;
-        let sigma = frame_sigma(
-            scene.surface,
-            &scene.camera,
-            &solution.estimates[k],
-            &covariance,
-            None,
-        );
-        let patches = at.frames[k].samples as f64 / (PATCH as f64 * share);
-        Some(strain_px(q, patches, sigma.wall_px))
+        let blocks = (&at.normal.blocks[place], &at.scatter[place]);
+        let patches = at.frames[k].samples as f64 / patch;
+        Strain::of_frame(scene.surface, &scene.camera, estimate, blocks, patches)
     };
-    (0..solution.estimates.len())
-        .map(|k| of(k).unwrap_or(0.0))
-        .collect()
+    let frames = solution.estimates.iter().enumerate();
+    frames.map(|frame| of(frame).unwrap_or_default()).collect()
 }
 
 /// Which of the frames believed so far are under more strain than can be borne; where their median is, all are.
-fn strained(strain_px: &[f64], doubts: &[Option<Doubt>]) -> Vec<bool> {
+fn strained(strains: &[Strain], doubts: &[Option<Doubt>]) -> Vec<bool> {
     let believed = (0..doubts.len()).filter(|k| doubts[*k].is_none());
-    let mut ordered: Vec<f64> = believed.map(|k| strain_px[k]).collect();
+    let mut ordered: Vec<f64> = believed.map(|k| strains[k].px).collect();
     ordered.sort_unstable_by(f64::total_cmp);
     let usual = ordered.get(ordered.len() / 2).copied().unwrap_or(0.0);
-    let most = match usual > MOST_USUAL_STRAIN_PX {
-        true => 0.0,
-        false => MOST_STRAIN_PX,
-    };
+    let all = usual > MOST_USUAL_STRAIN_PX;
+    let beyond = |strain: &Strain| strain.px > MOST_STRAIN.px && strain.times > MOST_STRAIN.times;
     (0..doubts.len())
-        .map(|k| doubts[k].is_none() && strain_px[k] >= most)
+        .map(|k| doubts[k].is_none() && (all || beyond(&strains[k])))
         .collect()
 }
 
@@ -203,12 +197,15 @@ mod tests {
     fn what_strains_the_median_frame_strains_all() {
         let mut doubts = vec![None; 4];
         doubts[0] = Some(Doubt::Featureless);
-        let of = |strain: [f64; 4]| strained(&strain, &doubts);
-        let (none, usual, much) = (0.01, 0.1, 0.5);
+        let strain = |times, px| Strain { times, px };
+        let of = |strains: [Strain; 4]| strained(&strains, &doubts);
+        let (none, usual, much) = (strain(1.5, 0.01), strain(10.0, 0.1), strain(20.0, 0.5));
+        let (faint, clean) = (strain(1.5, 0.6), strain(20.0, 0.02));
         assert_eq!(of([much, none, none, none]), [false; 4]);
         assert_eq!(of([none, none, much, usual]), [false, true, true, true]);
         assert_eq!(of([none, none, much, none]), [false, false, true, false]);
         assert_eq!(of([usual, none, usual, none]), [false; 4]);
+        assert_eq!(of([none, clean, faint, clean]), [false; 4]);
         assert_eq!(strained(&[], &[]), [false; 0]);
     }
 

@@ -343,7 +343,7 @@ pub fn refine_keeping(
     let mut reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = certainty.of_frame(&scene, k, &estimates[k]);
-            let strain_px = certainty.strain_px[k];
+            let strain_px = certainty.strains[k].px;
             let doubt = doubts[k].as_ref();
             frame_report(survey, k, &solution, doubt, steps_px[k], (sigma, strain_px))
         })
