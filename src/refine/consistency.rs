@@ -53,7 +53,7 @@ pub struct Pair {
 /// The first tells whether they show the same wall; finest detail only where the first is drowned by noise, for of a pattern it is
 /// edges alone, and they coincide wherever the pattern does, whatever is between them. Where two frames do not show the same wall,
 /// they are looked at once more without what stands out of it: water is dark in one and glints in the other, and on a faint wall
-/// a few such patches in a strip are all that is compared. Two frames contradict if the wall between does, too; where little of it
+/// a few such patches in a strip are all that is compared. Two frames contradict unless the wall between agrees; where little of it
 /// is left they neither agree nor contradict.
 ///
 /// # Errors
@@ -99,17 +99,14 @@ pub fn compare_pairs(
     };
     let again = |a, b| wrong.contains(&(a, b));
     let of_usual = by_pair(compare_at(scene, usual, tracked, frames, &again)?);
-    // Where too little is left to see, the pair says nothing.
+    // Where little is left, and that agrees, the pair says nothing.
     pairs.retain_mut(|pair| {
-        if !pair.wrong {
-            return true;
-        }
-        let usual = of_usual.get(&(pair.a, pair.b));
-        let Some((usual, quality)) = usual.and_then(|usual| Some((usual, usual.quality?))) else {
-            return false;
-        };
-        pair.wrong = quality < LEAST_QUALITY;
-        pair.wrong || usual.samples >= LEAST_LEFT * pair.samples
+        let usual = of_usual.get(&(pair.a, pair.b)).filter(|_| pair.wrong);
+        let agrees = |usual: &&Compared| usual.quality.is_some_and(|q| q >= LEAST_QUALITY);
+        usual.filter(agrees).is_none_or(|usual| {
+            pair.wrong = false;
+            usual.samples >= LEAST_LEFT * pair.samples
+        })
     });
     Ok(pairs)
 }

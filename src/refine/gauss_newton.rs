@@ -166,8 +166,8 @@ const TRIES: usize = 8;
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
 ///
 /// λ starts at 0 and rises when a step is none for the better; such a step is never taken. It is for the better if it lowers the
-/// robust cost on the same wall samples; or if it leaves less than half of the slope along it ([`LEAST_SLOPE_GONE`]) and the cost
-/// as it was but for its [`ROUGHNESS`]. What is sought is where the gradient is zero, and that is not quite the derivative of the
+/// robust cost on the same wall samples; or, within a pixel, if it leaves less than half of the slope along it ([`LEAST_SLOPE_GONE`])
+/// and the cost as it was but for its [`ROUGHNESS`]. What is sought is where the gradient is zero, and that is not quite the derivative of the
 /// cost: it takes the slopes of the fused texture ([`super::tile`]), so it is smooth, whereas the cost of sharp edges
 /// depends on where between pixels samples happen to fall. Along weak directions, in which all frames move together by half a pixel
 /// and hardly against each other, that outweighs what there is to gain, and a solve that asked for a lower cost would be stuck.
@@ -272,7 +272,8 @@ impl DampedGaussNewton<'_> {
             }
             let next = problem.linearise_at(&candidate.0, &candidate.1)?;
             let left = slope(&step, &shared, &next).abs();
-            let settles = left < (1.0 - LEAST_SLOPE_GONE) * decrement
+            let settles = step_px < problem.pixel_px()
+                && left < (1.0 - LEAST_SLOPE_GONE) * decrement
                 && next.cost < (1.0 + ROUGHNESS) * current.cost;
             if next.cost < current.cost || settles {
                 record.cost = Some(next.cost);

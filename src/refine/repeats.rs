@@ -244,8 +244,9 @@ fn repeats_of(
             }
             step *= 0.5;
         }
-        if best.0.is_some_and(|there| there < most) {
-            found.push(motion(best.1).1);
+        let (made_m, motion) = motion(best.1);
+        if best.0.is_some_and(|there| there < most) && made_m.norm() >= APART * spacing {
+            found.push(motion);
         }
     }
     Ok(found)

@@ -504,6 +504,11 @@ impl<'a> Problem<'a> {
             .then(|| frame - self.active.start)
     }
 
+    /// A pixel of the pictures compared, in pixels of full size.
+    pub fn pixel_px(&self) -> f64 {
+        2f64.powi(self.sampling.level as i32)
+    }
+
     /// How far a step, with `shared` that of the shared unknowns, moves the wall under each active frame, in pixels of full
     /// size: the largest over the frame's middle and corners.
     pub fn wall_step_px(
@@ -512,12 +517,11 @@ impl<'a> Problem<'a> {
         step: &[FrameStep],
         shared: &Kappa,
     ) -> Vec<f64> {
-        let full = 0.5f64.powi(self.sampling.level as i32);
         let lens = shared.fixed_rows::<LENS>(0).into_owned();
         active
             .iter()
             .zip(step)
-            .map(|(estimate, step)| self.frame_step_px(estimate, step, &lens) / full)
+            .map(|(estimate, step)| self.frame_step_px(estimate, step, &lens) * self.pixel_px())
             .collect()
     }
 
