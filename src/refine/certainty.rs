@@ -18,10 +18,10 @@ const MOST_MISFITS: f64 = 0.1;
 /// loosely can tilt and shift together, the camera with them, for less than aliasing does; that is more than the
 /// covariance knows of.
 const MOST_LOOSE_PX: f64 = 0.2;
-/// Largest strain that can be borne of a frame by itself, if it is that many times what noise does ([`Strain`]): glints on a faint
-/// wall make it 0.6 px and two times, a turn that is closed a period off and bent ten and more.
+/// Largest strain that can be borne of a frame by itself, if it is that many times what noise does ([`Strain`]): a glint on a faint
+/// wall makes it a pixel and five to ten times, in one patch of a frame that is right.
 const MOST_STRAIN: Strain = Strain {
-    times: 5.0,
+    times: 12.0,
     px: 0.25,
 };
 /// Largest strain of the median frame, pixels. Sharp bricks make it 0.01 to 0.03, whatever the noise; a focal length 0.3 % off 0.06, one
@@ -200,7 +200,7 @@ mod tests {
         let strain = |times, px| Strain { times, px };
         let of = |strains: [Strain; 4]| strained(&strains, &doubts);
         let (none, usual, much) = (strain(1.5, 0.01), strain(10.0, 0.1), strain(20.0, 0.5));
-        let (faint, clean) = (strain(1.5, 0.6), strain(20.0, 0.02));
+        let (faint, clean) = (strain(8.0, 1.0), strain(20.0, 0.02));
         assert_eq!(of([much, none, none, none]), [false; 4]);
         assert_eq!(of([none, none, much, usual]), [false, true, true, true]);
         assert_eq!(of([none, none, much, none]), [false, false, true, false]);
