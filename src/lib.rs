@@ -97,6 +97,7 @@ pub mod evaluate;
 pub mod frames;
 pub mod inspect;
 mod lettering;
+mod median;
 pub mod progress;
 pub mod provenance;
 pub mod raster;

@@ -51,7 +51,6 @@ pub use image_metrics::{ImageMetrics, image_metrics};
 pub use mtf::mtf50;
 pub use seam::{SeamMap, SeamResidual, seam_residual};
 pub use spread::Spread;
-pub(crate) use spread::upper_median;
 pub use table::Row;
 pub use trajectory_error::{TrajectoryError, trajectory_error};
 pub use unaligned_error::{UnalignedError, unaligned_error};

@@ -44,13 +44,6 @@ impl Spread {
     }
 }
 
-/// The middle one of those numbers that are finite (the upper one of the middle two), if there are any.
-pub(crate) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
-    values.retain(|value| value.is_finite());
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
-}
-
 /// `√(Σ e² / n)`; zero for an empty list.
 pub(super) fn root_mean_square(errors: &[f64]) -> f64 {
     let squares: f64 = errors.iter().map(|e| e * e).sum();

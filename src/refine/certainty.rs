@@ -1,15 +1,14 @@
 //! How sure a solution is, and what of the shared unknowns it does not tell.
 
 use super::calibration::{Calibration, SHARED};
-use super::covariance::{Covariances, FrameSigma, Strain, covariances, frame_sigma};
+use super::covariance::{Covariances, FrameSigma, covariances, frame_sigma};
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::gauss_newton::Solution;
-use super::grid::BLOCK;
 use super::observed::{Posterior, Refusal};
 use super::problem::{ProblemError, Scene};
 use super::shared::SharedBlock;
-use super::tile::SAMPLES;
+use super::strain::{Strain, strained, strains};
 
 /// Share of frames that may fit nowhere before nothing is believed about what all frames share: the others may fit each
 /// other in wrong places.
@@ -18,18 +17,6 @@ const MOST_MISFITS: f64 = 0.1;
 /// loosely can tilt and shift together, the camera with them, for less than aliasing does; that is more than the
 /// covariance knows of.
 const MOST_LOOSE_PX: f64 = 0.2;
-/// Largest strain that can be borne of a frame by itself, if it is that many times what noise does ([`Strain`]): a glint on a faint
-/// wall makes it a pixel and five to ten times, in one patch of a frame that is right.
-const MOST_STRAIN: Strain = Strain {
-    times: 12.0,
-    px: 0.25,
-};
-/// Largest strain of the median frame, pixels. Sharp bricks make it 0.01 to 0.03, whatever the noise; a focal length 0.3 % off 0.06, one
-/// 1 % off 0.15.
-const MOST_USUAL_STRAIN_PX: f64 = 0.08;
-/// Wall samples of a patch: of the blocks over which the scatter is told.
-const PATCH: i64 = BLOCK * BLOCK * SAMPLES as i64;
-
 /// The covariance of a solution.
 pub struct Certainty {
     /// Of the poses.
@@ -148,34 +135,6 @@ impl Certainty {
     }
 }
 
-/// See [`Certainty::strains`].
-fn strains(scene: &Scene, solution: &Solution) -> Vec<Strain> {
-    let at = &solution.linearisation;
-    let pattern = solution.problem.pattern();
-    let patch = PATCH as f64 * solution.problem.share_of_wall();
-    let of = |(k, estimate): (usize, &FrameEstimate)| {
-        let place = pattern.place(k, k)?;
-        let blocks = (&at.normal.blocks[place], &at.scatter[place]);
-        let patches = at.frames[k].samples as f64 / patch;
-        Strain::of_frame(scene.surface, &scene.camera, estimate, blocks, patches)
-    };
-    let frames = solution.estimates.iter().enumerate();
-    frames.map(|frame| of(frame).unwrap_or_default()).collect()
-}
-
-/// Which of the frames believed so far are under more strain than can be borne; where their median is, all are.
-fn strained(strains: &[Strain], doubts: &[Option<Doubt>]) -> Vec<bool> {
-    let believed = (0..doubts.len()).filter(|k| doubts[*k].is_none());
-    let mut ordered: Vec<f64> = believed.map(|k| strains[k].px).collect();
-    ordered.sort_unstable_by(f64::total_cmp);
-    let usual = ordered.get(ordered.len() / 2).copied().unwrap_or(0.0);
-    let all = usual > MOST_USUAL_STRAIN_PX;
-    let beyond = |strain: &Strain| strain.px > MOST_STRAIN.px && strain.times > MOST_STRAIN.times;
-    (0..doubts.len())
-        .map(|k| doubts[k].is_none() && (all || beyond(&strains[k])))
-        .collect()
-}
-
 /// Refuses every free unknown.
 fn refuse_all(calibration: &Calibration, reason: &str) -> Vec<Refusal> {
     let free = (0..SHARED).filter(|k| calibration.free[*k]);
@@ -192,22 +151,6 @@ mod tests {
     use super::*;
     use crate::camera::Camera;
     use crate::refine::calibration::Kappa;
-
-    #[test]
-    fn what_strains_the_median_frame_strains_all() {
-        let mut doubts = vec![None; 4];
-        doubts[0] = Some(Doubt::Featureless);
-        let strain = |times, px| Strain { times, px };
-        let of = |strains: [Strain; 4]| strained(&strains, &doubts);
-        let (none, usual, much) = (strain(1.5, 0.01), strain(10.0, 0.1), strain(20.0, 0.5));
-        let (faint, clean) = (strain(8.0, 1.0), strain(20.0, 0.02));
-        assert_eq!(of([much, none, none, none]), [false; 4]);
-        assert_eq!(of([none, none, much, usual]), [false, true, true, true]);
-        assert_eq!(of([none, none, much, none]), [false, false, true, false]);
-        assert_eq!(of([usual, none, usual, none]), [false; 4]);
-        assert_eq!(of([none, clean, faint, clean]), [false; 4]);
-        assert_eq!(strained(&[], &[]), [false; 0]);
-    }
 
     #[test]
     fn all_that_was_asked_for_is_refused() {

@@ -100,13 +100,12 @@ pub fn compare_pairs(
     let again = |a, b| wrong.contains(&(a, b));
     let of_usual = by_pair(compare_at(scene, usual, tracked, frames, &again)?);
     // Where little is left, and that agrees, the pair says nothing.
-    pairs.retain_mut(|pair| {
-        let usual = of_usual.get(&(pair.a, pair.b)).filter(|_| pair.wrong);
-        let agrees = |usual: &&Compared| usual.quality.is_some_and(|q| q >= LEAST_QUALITY);
-        usual.filter(agrees).is_none_or(|usual| {
+    pairs.retain_mut(|pair| match of_usual.get(&(pair.a, pair.b)) {
+        Some(usual) if usual.quality.is_some_and(|q| q >= LEAST_QUALITY) => {
             pair.wrong = false;
             usual.samples >= LEAST_LEFT * pair.samples
-        })
+        }
+        _ => true,
     });
     Ok(pairs)
 }

@@ -19,14 +19,6 @@
 //! c about 1 on noisy walls of low contrast, and about 3 on sharp bricks. Only blocks of `H⁻¹` where H itself has blocks are needed
 //! ([`super::selected_inverse`]).
 //!
-//! **Strain.** Where the model is wrong (a camera's focal length, a turn closed a period off and bent), patches of the wall pull a frame hither
-//! and thither, and it rests between. Were it noise, the scatter of what the patches pull would be `V_k ≈ H_k`, the frame's own blocks
-//! on the diagonal, all other frames held. With `q = tr(H_k⁻¹ V_k)/6` over the pose ([`pull`]) a patch lies `√q` times as far off as by noise. By noise, N patches
-//! of information I px⁻² each, which together fix six unknowns, leave the mean point of the picture the variance `σ² = 6/(N I)`, and
-//! a patch by itself, in both directions, is uncertain by `2/I = N σ²/3`. So what patches are off by, beyond noise, is
-//!
-//! `strain² = (q − 1) N σ²/3`   px².
-//!
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`D⁻¹ Q D⁻¹`);
 //! F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw, W. A. Stahel, "Robust Statistics: The Approach Based on Influence
 //! Functions", 1986, 6.3 (ψ' in D); R. W. M. Wedderburn, "Quasi-likelihood functions", Biometrika 61(3), 1974 (one factor for all).
@@ -192,52 +184,6 @@ pub fn covariances(
     })
 }
 
-/// How far patches of the wall pull a frame's pose apart: see the [module](self).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Strain {
-    /// What patches are off by, in terms of what they are by noise: √q.
-    pub times: f64,
-    /// What they are off by beyond noise, pixels, root mean square.
-    pub px: f64,
-}
-
-impl Strain {
-    /// From q, the number N of patches, and σ of the mean point of the picture by noise, all other frames held.
-    fn new(q: f64, patches: f64, sigma_px: f64) -> Self {
-        Self {
-            times: q.sqrt(),
-            px: ((q - 1.0).max(0.0) * patches / 3.0).sqrt() * sigma_px,
-        }
-    }
-
-    /// Of a frame with its own block of the normal matrix, `information`, and of V, `scatter`, over a number of `patches`. None if the
-    /// frame is not fixed by the others.
-    pub fn of_frame(
-        surface: &dyn Surface,
-        camera: &Camera,
-        estimate: &FrameEstimate,
-        (information, scatter): (&Block, &Block),
-        patches: f64,
-    ) -> Option<Self> {
-        let (q, covariance) = pull(information, scatter)?;
-        let sigma = frame_sigma(surface, camera, estimate, &covariance, None);
-        (q.is_finite() && sigma.wall_px.is_finite()).then(|| Self::new(q, patches, sigma.wall_px))
-    }
-}
-
-/// q and, by noise alone, the covariance of the pose with all other frames held.
-///
-/// The exposure goes along: with `E = (I, −H_pe H_ee⁻¹)`, pulls on the pose p that the exposure e does not make up for have the scatter
-/// `E V Eᵀ`; and `E` is `Z_pp⁻¹ (Z_pp Z_pe)` with `Z = H_k⁻¹`.
-fn pull(information: &Block, scatter: &Block) -> Option<(f64, Matrix6<f64>)> {
-    let inverse = information.cholesky()?.inverse();
-    let rows = inverse.fixed_rows::<6>(0);
-    let pose = rows.fixed_columns::<6>(0).into_owned();
-    let moved = rows * scatter * rows.transpose();
-    let q = pose.cholesky()?.solve(&moved).trace() / 6.0;
-    Some((q, pose))
-}
-
 /// Reads a pose covariance as σ of rotation, translation and wall position.
 ///
 /// `shared`: W of the frame and `Σ_κ`, where they were estimated. As `ξ` moves by `−W κ` with κ, their covariance is `−W Σ_κ`,
@@ -324,33 +270,6 @@ mod tests {
         assert!((bent.frames[1] - one.frames[1] * 4.0).norm() < 1e-12);
         assert!((one.frames[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
         assert!((one.next[0][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
-    }
-
-    /// Patches that all pull at random, each by its own noise, are no strain; those that pull by half a pixel more are half a pixel.
-    #[test]
-    fn strain_is_what_patches_are_off_by_beyond_noise() {
-        // N patches, each with information I px⁻² about both directions of a picture that can move in six ways.
-        let (patches, information) = (300.0, 40.0);
-        let sigma_px = f64::sqrt(6.0 / (patches * information));
-        assert_eq!(Strain::new(1.0, patches, sigma_px).px, 0.0);
-        let off_px = 0.5;
-        // Pull I · off in each of the two directions, so its square over that by noise, I.
-        let q = 1.0 + 0.5 * information * off_px * off_px;
-        assert!((Strain::new(q, patches, sigma_px).px - off_px).abs() < 1e-12);
-        let scatter = Block::identity() * 12.0;
-        let (q, pose) = pull(&(Block::identity() * 4.0), &scatter).unwrap();
-        assert!((q - 3.0).abs() < 1e-12);
-        assert!((pose - Matrix6::identity() * 0.25).norm() < 1e-12);
-        assert!(pull(&Block::zeros(), &scatter).is_none());
-        // What the exposure makes up for is no pull on the pose.
-        let (mut information, mut scatter) = (Block::identity(), Block::identity());
-        for (row, column) in [(0, 7), (7, 0)] {
-            information[(row, column)] = 0.5;
-            scatter[(row, column)] = 0.5;
-        }
-        let along = Block::from_fn(|r, c| information[(r, 7)] * information[(7, c)]);
-        let (q, _) = pull(&information, &(scatter + along * 100.0)).unwrap();
-        assert!((q - 1.0).abs() < 1e-12, "{q}");
     }
 
     /// A camera that may be off by a millimetre along the tunnel shows all of the wall a millimetre off; how many pixels that is goes

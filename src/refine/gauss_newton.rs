@@ -100,24 +100,19 @@ impl SolveRecord {
     }
 }
 
-/// The derivative of the cost along the poses' part of a step.
-fn pose_slope(step: &[FrameStep], at: &Linearisation) -> f64 {
+/// The derivative of the cost along the first `unknowns` of each frame's step: `δᵀ g`.
+fn frames_slope(step: &[FrameStep], at: &Linearisation, unknowns: usize) -> f64 {
     let frames = step.iter().zip(&at.normal.gradient);
-    let poses = frames.map(|(step, gradient)| {
-        let (step, gradient) = (step.fixed_rows::<6>(0), gradient.fixed_rows::<6>(0));
-        step.dot(&gradient)
-    });
-    poses.sum()
+    let slopes =
+        frames.map(|(step, gradient)| step.rows(0, unknowns).dot(&gradient.rows(0, unknowns)));
+    slopes.sum()
 }
 
-/// The derivative of the cost along a whole step: `δᵀ g`.
+/// The derivative of the cost along a whole step, that of the shared unknowns included.
 fn slope(step: &[FrameStep], shared: &Kappa, at: &Linearisation) -> f64 {
-    let frames = step.iter().zip(&at.normal.gradient);
-    let own: f64 = frames.map(|(step, gradient)| step.dot(gradient)).sum();
-    own + at
-        .border
-        .as_ref()
-        .map_or(0.0, |border| shared.dot(&border.gradient))
+    let border = at.border.as_ref();
+    let of_shared = border.map_or(0.0, |border| shared.dot(&border.gradient));
+    frames_slope(step, at, UNKNOWNS) + of_shared
 }
 
 /// Where a solve ended.
@@ -278,7 +273,7 @@ impl DampedGaussNewton<'_> {
             if next.cost < current.cost || settles {
                 record.cost = Some(next.cost);
                 // A whole undamped step is δ = −H⁻¹ g.
-                let of_poses = |at| pose_slope(&step, at);
+                let of_poses = |at| frames_slope(&step, at, 6);
                 record.curvature = whole.then(|| 1.0 - of_poses(&next) / of_poses(&current));
                 self.steps.push(record);
                 self.lambda = if self.lambda > DAMPING.0 {

@@ -80,6 +80,7 @@ mod selected_inverse;
 mod shared;
 mod spectrum;
 mod state;
+mod strain;
 #[cfg(test)]
 mod test_scene;
 mod tile;

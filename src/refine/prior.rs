@@ -4,6 +4,7 @@ use super::calibration::{LENS, METRIC, Metric};
 use super::estimate::{FrameEstimate, FrameStep};
 use super::normal::{Block, NormalEquations, Pattern};
 use super::shared::Border;
+use crate::median::upper_median;
 use crate::surface::{Gauge, GaugeMotion};
 use crate::trajectory::{Jitter, JitterModel, Pose, so3};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
@@ -37,9 +38,8 @@ pub struct Prior {
 
 /// The median step between times, seconds.
 pub fn usual_step_s(times_s: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = times_s.windows(2).map(|t| t[1] - t[0]).collect();
-    steps.sort_unstable_by(f64::total_cmp);
-    steps.get(steps.len() / 2).copied().unwrap_or(1.0)
+    let steps = times_s.windows(2).map(|t| t[1] - t[0]);
+    upper_median(steps.collect()).unwrap_or(1.0)
 }
 
 /// The pose after `pose` if the step from `from` to `to` is right.

@@ -52,6 +52,20 @@ struct Choice {
     rival: Vec<Option<GaugeMotion>>,
 }
 
+/// What a choice between repeats rests on; the slices are frame by frame.
+struct Evidence<'a> {
+    prior: &'a Prior,
+    gauge: Gauge,
+    /// Which of the prior's frames.
+    frames: &'a [usize],
+    /// Where they are.
+    poses: &'a [Pose],
+    /// How each may be moved and fits as well.
+    repeats: &'a [Vec<GaugeMotion>],
+    /// The motions by which the wall repeats.
+    periods: &'a [GaugeMotion],
+}
+
 impl Choice {
     /// Where most frames are undecided, so is every other, too: those that a `first` choice, by clear odds, found in doubt, those
     /// that fit elsewhere, and those that fit nowhere else, perhaps because what they are compared with is a period off as well.
@@ -132,24 +146,19 @@ pub fn settle_repeats(
     }
     let poses: Vec<Pose> = frames.iter().map(|k| tracked.estimates[*k].pose).collect();
     let radius_m = scene.surface.perimeter_m() / std::f64::consts::TAU;
-    let periods = periods(&repeats, radius_m);
-    let gauge = scene.surface.gauge();
-    let choose = |clear: f64| {
-        choose(
-            scene.prior,
-            &gauge,
-            &frames,
-            &poses,
-            &repeats,
-            &periods,
-            clear,
-        )
+    let evidence = Evidence {
+        prior: scene.prior,
+        gauge: scene.surface.gauge(),
+        frames: &frames,
+        poses: &poses,
+        repeats: &repeats,
+        periods: &periods(&repeats, radius_m),
     };
-    let mut choice = choose(CLEAR);
+    let mut choice = evidence.choose(CLEAR);
     let undecided = choice.rival.iter().flatten().count();
     if 2 * undecided > frames.len() {
-        let first = std::mem::replace(&mut choice, choose(f64::INFINITY));
-        choice.leave_none_clear(&first, &repeats, &periods);
+        let first = std::mem::replace(&mut choice, evidence.choose(f64::INFINITY));
+        choice.leave_none_clear(&first, &repeats, evidence.periods);
     }
     let mut moved = Vec::new();
     for (k, motion) in frames.iter().zip(&choice.motion) {
@@ -302,111 +311,96 @@ fn likeliest(
     (best, rival.map(|(_, motion)| motion))
 }
 
-/// What the prior makes of the repeats, where odds are clear from `clear` on.
-fn choose(
-    prior: &Prior,
-    gauge: &Gauge,
-    frames: &[usize],
-    poses: &[Pose],
-    repeats: &[Vec<GaugeMotion>],
-    periods: &[GaugeMotion],
-    clear: f64,
-) -> Choice {
-    match prior.jitter.model {
-        JitterModel::RandomWalk => choose_steps(prior, frames, poses, repeats, periods, clear),
-        JitterModel::Independent => {
-            choose_frames(prior, gauge, frames, poses, repeats, periods, clear)
+impl Evidence<'_> {
+    /// What the prior makes of the repeats, where odds are clear from `clear` on.
+    fn choose(&self, clear: f64) -> Choice {
+        match self.prior.jitter.model {
+            JitterModel::RandomWalk => self.by_steps(clear),
+            JitterModel::Independent => self.by_frames(clear),
         }
     }
-}
 
-/// Errors that add up: step by step. Of the runs of frames between undecided steps, the longest is believed.
-fn choose_steps(
-    prior: &Prior,
-    frames: &[usize],
-    poses: &[Pose],
-    repeats: &[Vec<GaugeMotion>],
-    periods: &[GaugeMotion],
-    clear: f64,
-) -> Choice {
-    let mut motion = vec![GaugeMotion::default(); frames.len()];
-    // How all frames from here on might be moved as well.
-    let mut step = vec![None; frames.len()];
-    for i in 1..frames.len() {
-        let before = motion[i - 1];
-        let (from, to) = (frames[i - 1], frames[i]);
-        let expected = prior.predict(from, &before.apply(&poses[i - 1]), to);
-        let steps = prior.steps_between(from, to);
-        let cost = |own: &GaugeMotion| {
-            prior.deviation_cost(&expected, &before.plus(1.0, own).apply(&poses[i])) / steps
-        };
-        let (best, second) = likeliest(&repeats[i], periods, clear, cost);
-        motion[i] = before.plus(1.0, &best);
-        step[i] = second.map(|second| second.plus(-1.0, &best));
-    }
-    let cuts: Vec<usize> = (1..frames.len()).filter(|i| step[*i].is_some()).collect();
-    let starts = std::iter::once(0).chain(cuts.iter().copied());
-    let ends = cuts.iter().copied().chain([frames.len()]);
-    let longest = starts
-        .zip(ends)
-        .max_by_key(|(start, end)| (end - start, std::cmp::Reverse(*start)));
-    let (start, end) = longest.unwrap_or((0, frames.len()));
-    let rival = (0..frames.len())
-        .map(|i| {
-            if i >= end {
-                step[end]
-            } else if i < start {
-                step[start].map(|step| step.reversed())
-            } else {
-                None
-            }
-        })
-        .collect();
-    Choice { motion, rival }
-}
-
-/// Independent errors: frame by frame, against the gauge that all have taken on, until nothing changes.
-fn choose_frames(
-    prior: &Prior,
-    gauge: &Gauge,
-    frames: &[usize],
-    poses: &[Pose],
-    repeats: &[Vec<GaugeMotion>],
-    periods: &[GaugeMotion],
-    clear: f64,
-) -> Choice {
-    let initial: Vec<Pose> = frames.iter().map(|k| prior.initial[*k]).collect();
-    let mut choice = Choice {
-        motion: vec![GaugeMotion::default(); frames.len()],
-        rival: vec![None; frames.len()],
-    };
-    for _ in 0..SWEEPS {
-        let moved: Vec<Pose> = choice
-            .motion
-            .iter()
-            .zip(poses)
-            .map(|(m, p)| m.apply(p))
+    /// Errors that add up: step by step. Of the runs of frames between undecided steps, the longest is believed.
+    fn by_steps(&self, clear: f64) -> Choice {
+        let count = self.frames.len();
+        let mut motion = vec![GaugeMotion::default(); count];
+        // How all frames from here on might be moved as well.
+        let mut step = vec![None; count];
+        for i in 1..count {
+            let before = motion[i - 1];
+            let (from, to) = (self.frames[i - 1], self.frames[i]);
+            let expected = self
+                .prior
+                .predict(from, &before.apply(&self.poses[i - 1]), to);
+            let steps = self.prior.steps_between(from, to);
+            let cost = |own: &GaugeMotion| {
+                self.prior
+                    .deviation_cost(&expected, &before.plus(1.0, own).apply(&self.poses[i]))
+                    / steps
+            };
+            let (best, second) = likeliest(&self.repeats[i], self.periods, clear, cost);
+            motion[i] = before.plus(1.0, &best);
+            step[i] = second.map(|second| second.plus(-1.0, &best));
+        }
+        let cuts: Vec<usize> = (1..count).filter(|i| step[*i].is_some()).collect();
+        let starts = std::iter::once(0).chain(cuts.iter().copied());
+        let ends = cuts.iter().copied().chain([count]);
+        let longest = starts
+            .zip(ends)
+            .max_by_key(|(start, end)| (end - start, std::cmp::Reverse(*start)));
+        let (start, end) = longest.unwrap_or((0, count));
+        let rival = (0..count)
+            .map(|i| {
+                if i >= end {
+                    step[end]
+                } else if i < start {
+                    step[start].map(|step| step.reversed())
+                } else {
+                    None
+                }
+            })
             .collect();
-        let settled = gauge.align(&initial, &moved);
-        let mut next = Choice {
-            motion: Vec::new(),
-            rival: Vec::new(),
-        };
-        for i in 0..frames.len() {
-            let expected = settled.apply(&initial[i]);
-            let cost = |own: &GaugeMotion| prior.deviation_cost(&expected, &own.apply(&poses[i]));
-            let (best, second) = likeliest(&repeats[i], periods, clear, cost);
-            next.motion.push(best);
-            next.rival
-                .push(second.map(|second| second.plus(-1.0, &best)));
-        }
-        let same = next.motion == choice.motion;
-        choice = next;
-        if same {
-            break;
-        }
+        Choice { motion, rival }
     }
-    choice
+
+    /// Independent errors: frame by frame, against the gauge that all have taken on, until nothing changes.
+    fn by_frames(&self, clear: f64) -> Choice {
+        let initial: Vec<Pose> = self.frames.iter().map(|k| self.prior.initial[*k]).collect();
+        let mut choice = Choice {
+            motion: vec![GaugeMotion::default(); self.frames.len()],
+            rival: vec![None; self.frames.len()],
+        };
+        for _ in 0..SWEEPS {
+            let moved: Vec<Pose> = choice
+                .motion
+                .iter()
+                .zip(self.poses)
+                .map(|(m, p)| m.apply(p))
+                .collect();
+            let settled = self.gauge.align(&initial, &moved);
+            let mut next = Choice {
+                motion: Vec::new(),
+                rival: Vec::new(),
+            };
+            for (i, initial) in initial.iter().enumerate() {
+                let expected = settled.apply(initial);
+                let cost = |own: &GaugeMotion| {
+                    self.prior
+                        .deviation_cost(&expected, &own.apply(&self.poses[i]))
+                };
+                let (best, second) = likeliest(&self.repeats[i], self.periods, clear, cost);
+                next.motion.push(best);
+                next.rival
+                    .push(second.map(|second| second.plus(-1.0, &best)));
+            }
+            let same = next.motion == choice.motion;
+            choice = next;
+            if same {
+                break;
+            }
+        }
+        choice
+    }
 }
 
 #[cfg(test)]
@@ -417,10 +411,6 @@ mod tests {
     /// A tile on.
     fn tile() -> GaugeMotion {
         GaugeMotion::about_y(0.0, 0.45)
-    }
-
-    fn back(motion: &GaugeMotion) -> GaugeMotion {
-        motion.reversed()
     }
 
     fn prior(model: JitterModel, shift_sigma_m: f64) -> Prior {
@@ -443,15 +433,21 @@ mod tests {
         choose_of(
             prior,
             poses,
-            &vec![vec![tile(), back(&tile())]; poses.len()],
+            &vec![vec![tile(), tile().reversed()]; poses.len()],
         )
     }
 
     fn choose_of(prior: &Prior, poses: &[Pose], repeats: &[Vec<GaugeMotion>]) -> Choice {
         let frames: Vec<usize> = (0..poses.len()).collect();
-        let periods = periods(repeats, 3.0);
-        let gauge = Gauge::round();
-        choose(prior, &gauge, &frames, poses, repeats, &periods, CLEAR)
+        let evidence = Evidence {
+            prior,
+            gauge: Gauge::round(),
+            frames: &frames,
+            poses,
+            repeats,
+            periods: &periods(repeats, 3.0),
+        };
+        evidence.choose(CLEAR)
     }
 
     #[test]
@@ -471,10 +467,10 @@ mod tests {
         let near = GaugeMotion::about_y(0.001, 0.46);
         let turn = GaugeMotion::about_y(0.6, 0.0);
         let found = periods(
-            &[vec![tile(), turn], vec![], vec![near, back(&tile())]],
+            &[vec![tile(), turn], vec![], vec![near, tile().reversed()]],
             3.0,
         );
-        assert_eq!(found, [tile(), back(&tile()), turn, back(&turn)]);
+        assert_eq!(found, [tile(), tile().reversed(), turn, turn.reversed()]);
     }
 
     /// Those that a frame was compared with are a tile off, too, so it fits nowhere else; others have shown that the wall repeats.
@@ -489,7 +485,7 @@ mod tests {
             assert!(choice.rival.iter().all(Option::is_none));
             repeats[2] = vec![tile()];
             let choice = choose_of(&prior, &poses, &repeats);
-            assert_eq!(choice.rival[8], Some(back(&tile())), "{model:?}");
+            assert_eq!(choice.rival[8], Some(tile().reversed()), "{model:?}");
             assert_eq!(choice.rival[4], None);
             assert!(choice.motion.iter().all(GaugeMotion::is_none));
         }
@@ -498,7 +494,7 @@ mod tests {
     /// What is in doubt by clear odds is so, too, where no odds are clear enough.
     #[test]
     fn no_frame_is_clear_because_others_are_not() {
-        let (none, other) = (GaugeMotion::default(), back(&tile()));
+        let (none, other) = (GaugeMotion::default(), tile().reversed());
         let choice = |rival: [Option<GaugeMotion>; 4]| Choice {
             motion: vec![none; 4],
             rival: rival.to_vec(),
@@ -533,7 +529,7 @@ mod tests {
         poses[7] = tile().apply(&poses[7]);
         let choice = choose_of_all(&prior, &poses);
         assert!(choice.rival.iter().all(Option::is_none));
-        assert_eq!(choice.motion[7], back(&tile()));
+        assert_eq!(choice.motion[7], tile().reversed());
         assert_eq!(choice.motion[6], GaugeMotion::default());
     }
 
@@ -542,11 +538,11 @@ mod tests {
     fn what_has_moved_last_is_unsure() {
         let settled = Settled {
             moved: vec![(3, tile()), (7, tile())],
-            undecided: vec![(7, back(&tile())), (9, tile())],
+            undecided: vec![(7, tile().reversed()), (9, tile())],
         };
         assert_eq!(
             settled.unsure(),
-            [(3, tile()), (7, back(&tile())), (9, tile())]
+            [(3, tile()), (7, tile().reversed()), (9, tile())]
         );
     }
 
@@ -564,7 +560,7 @@ mod tests {
         for (k, rival) in choice.rival.iter().enumerate() {
             assert_eq!(rival.is_some(), k >= 8, "{k}");
         }
-        assert_eq!(choice.rival[9], Some(back(&tile())));
+        assert_eq!(choice.rival[9], Some(tile().reversed()));
         let independent = prior(model, 0.1);
         let mut poses = independent.initial.clone();
         poses[8] = half.apply(&poses[8]);

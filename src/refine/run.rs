@@ -4,7 +4,7 @@ use super::alignment::alignments;
 use super::calibration::{Calibration, Kappa};
 use super::certainty::Certainty;
 use super::consistency::{blurred, compare_pairs, contradictions};
-use super::covariance::Covariances;
+use super::covariance::{Covariances, FrameSigma};
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
 use super::examine::examine;
@@ -270,14 +270,12 @@ pub fn refine_keeping(
         let solution = go_on(problem, stopping, announce, begun, Some(&mut between))?;
         progress.finish();
         tracked.estimates.clone_from(&solution.estimates);
-        let refused = match level {
-            0 => Certainty::at(&scene, &solution, &calibration)?.refused(
-                &scene.at(solution.kappa),
-                &calibration,
-                &solution.estimates,
-                &tracked.doubts,
-            ),
-            _ => Vec::new(),
+        let refused = if level == 0 && calibration.any() {
+            let solved = scene.at(solution.kappa);
+            let certainty = Certainty::at(&solved, &solution, &calibration)?;
+            certainty.refused(&solved, &calibration, &solution.estimates, &tracked.doubts)
+        } else {
+            Vec::new()
         };
         adopt(&mut scene, &mut calibration, solution.kappa, &refused);
         (solving.kappa, solving.free) = (scene.kappa, calibration.free);
@@ -343,9 +341,9 @@ pub fn refine_keeping(
     let mut reports: Vec<FrameReport> = (0..count)
         .map(|k| {
             let sigma = certainty.of_frame(&scene, k, &estimates[k]);
-            let strain_px = certainty.strains[k].px;
-            let doubt = doubts[k].as_ref();
-            frame_report(survey, k, &solution, doubt, steps_px[k], (sigma, strain_px))
+            let late = || late_doubt(survey, k, &solution, steps_px[k], &sigma);
+            let doubt = doubts[k].clone().or_else(late);
+            frame_report(survey, k, &solution, doubt, sigma, certainty.strains[k].px)
         })
         .collect();
     leave_none_alone(&mut reports);
@@ -534,21 +532,19 @@ fn disagreement(share: &FrameShare) -> Option<Doubt> {
     (share > MOST_REJECTED).then_some(Doubt::Disagrees { share })
 }
 
-fn frame_report(
+/// What speaks against a frame of which nothing else does.
+fn late_doubt(
     survey: &Survey,
     k: usize,
     solution: &Solution,
-    doubt: Option<&Doubt>,
     step_px: f64,
-    (sigma, strain_px): (super::covariance::FrameSigma, f64),
-) -> FrameReport {
+    sigma: &FrameSigma,
+) -> Option<Doubt> {
     let share: &FrameShare = &solution.linearisation.frames[k];
-    let estimate: &FrameEstimate = &solution.estimates[k];
     let all = f64::from(survey.camera.width)
         * f64::from(survey.camera.height)
         * solution.problem.share_of_wall();
-    let inlier_share = share.inliers / share.pixels.max(1e-9);
-    let late = if share.pixels < LEAST_PIXEL_SHARE * all {
+    if share.pixels < LEAST_PIXEL_SHARE * all {
         Some(Doubt::NoOverlap {
             share: share.pixels / all,
         })
@@ -562,8 +558,19 @@ fn frame_report(
         Some(Doubt::Unsettled { step_px })
     } else {
         None
-    };
-    let doubt = doubt.cloned().or(late);
+    }
+}
+
+fn frame_report(
+    survey: &Survey,
+    k: usize,
+    solution: &Solution,
+    doubt: Option<Doubt>,
+    sigma: FrameSigma,
+    strain_px: f64,
+) -> FrameReport {
+    let share: &FrameShare = &solution.linearisation.frames[k];
+    let estimate: &FrameEstimate = &solution.estimates[k];
     FrameReport {
         index: k,
         file: survey.frames[k].name(),
@@ -579,7 +586,7 @@ fn frame_report(
         reason: doubt.map(|doubt| doubt.to_string()),
         points: share.samples,
         residual: (share.square / share.inliers.max(1e-9)).sqrt(),
-        inlier_share,
+        inlier_share: share.inliers / share.pixels.max(1e-9),
         gain: estimate.log_gain.exp(),
         bias: estimate.bias,
         sigma,

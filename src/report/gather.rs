@@ -5,7 +5,8 @@ use super::model::{Abscissa, FrameRow, Report, SCHEMA_VERSION, SurveyFacts, Verd
 use super::pictures::{Pictures, panoramas, thumbnails};
 use super::refined::{RefinedFiles, Refinement};
 use crate::PROGRAM;
-use crate::evaluate::{Comparison, Drawings, SeamMap, WallError, upper_median};
+use crate::evaluate::{Comparison, Drawings, SeamMap, WallError};
+use crate::median::upper_median;
 use crate::refine::FrameFlag;
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};

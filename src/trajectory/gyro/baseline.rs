@@ -5,6 +5,7 @@ use super::{
     ClockMatch, GyroLog, Rates, Rest, RotationNoise, Turning, angle_from_gravity_rad,
     axis_in_camera,
 };
+use crate::median::upper_median;
 use crate::trajectory::{Mounting, Pose, PoseError, StampedPose, Station, Trajectory};
 use nalgebra::{Matrix3, Vector3};
 
@@ -249,9 +250,8 @@ fn mean_acceleration(log: &GyroLog, span_s: [f64; 2]) -> Result<Vector3<f64>, St
 /// What is said of the median step, by time and by angle.
 fn step_sigma_rad(noise: &RotationNoise, trajectory: &[StampedPose]) -> f64 {
     let median = |of: fn(&StampedPose, &StampedPose) -> f64| {
-        let mut values: Vec<f64> = trajectory.windows(2).map(|p| of(&p[0], &p[1])).collect();
-        values.sort_unstable_by(f64::total_cmp);
-        values.get(values.len() / 2).copied().unwrap_or(0.0)
+        let values = trajectory.windows(2).map(|p| of(&p[0], &p[1]));
+        upper_median(values.collect()).unwrap_or(0.0)
     };
     noise.sigma_rad(
         median(|a, b| b.time_s - a.time_s),
