@@ -108,9 +108,8 @@ pub fn pose_bound(
         compared: Cow::Owned(vec![true; count]),
     };
     let sampling = Sampling {
-        level: 0,
         density: DENSITY,
-        information: 1.0,
+        ..Sampling::of(0)
     };
     // A quarter of the doubled pixels are pixels.
     let problem = Problem::new(&scene, sampling, members)?.exact(2.0 * noise_grey);

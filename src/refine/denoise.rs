@@ -14,13 +14,14 @@
 //! mean of `φ̂φ̂ᵀ` is that of `φ̂φᵀ` with the true slopes φ, the derivative of the score; so M needs no correction for
 //! the noise in it.
 //!
-//! v is the variance of a sample of S, and `ν_k = Σ_ij p_k(i) p_k(j) β(|i − j| d)/β(0)`: bilinear samples d pixels apart
-//! correlate so, with β the cubic B-spline (the autocorrelation of the triangular kernel).
+//! v is the variance of a sample of S, and `ν_k = Σ_ij p_k(i) p_k(j) β(|i − j| d)/β(0)`: samples interpolated d pixels apart
+//! correlate so, with β the autocorrelation of the interpolation's kernel ([`Interpolation::autocorrelation`]).
 //!
 //! Source: N. Wiener, "Extrapolation, Interpolation, and Smoothing of Stationary Time Series", 1949; J. P. Gram, "Ueber die
 //! Entwickelung reeller Functionen in Reihen mittelst der Methode der kleinsten Quadrate", 1883 (the polynomials).
 
 use super::grid::{Plane, SIDE, ZERO};
+use super::interpolation::Interpolation;
 
 type Square<T> = [[T; SIDE]; SIDE];
 
@@ -71,11 +72,11 @@ impl TextureSpectrum {
         self
     }
 
-    /// The filter for samples with noise of variance `floor` (grey levels²), `spacing_px` pixels apart.
-    pub fn denoiser(&self, floor: f64, spacing_px: f64) -> Denoiser {
-        let correlation = |i: usize, j: usize| {
-            cubic_b_spline(i.abs_diff(j) as f64 * spacing_px) / cubic_b_spline(0.0)
-        };
+    /// The filter for samples with noise of variance `floor` (grey levels²), interpolated `spacing_px` pixels apart.
+    pub fn denoiser(&self, floor: f64, interpolation: Interpolation, spacing_px: f64) -> Denoiser {
+        let covariances: [f64; SIDE] =
+            std::array::from_fn(|k| interpolation.autocorrelation(k as f64 * spacing_px));
+        let correlation = |i: usize, j: usize| covariances[i.abs_diff(j)] / covariances[0];
         let nu: [f64; SIDE] = std::array::from_fn(|k| {
             let p = &self.basis[k];
             let pairs = (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| (i, j)));
@@ -165,15 +166,6 @@ fn polynomials() -> Square<f64> {
     basis
 }
 
-/// The cubic B-spline β(x), `x ≥ 0`.
-fn cubic_b_spline(x: f64) -> f64 {
-    if x < 1.0 {
-        2.0 / 3.0 - x * x * (1.0 - 0.5 * x)
-    } else {
-        (2.0 - x).max(0.0).powi(3) / 6.0
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,7 +212,7 @@ mod tests {
             })
             .collect();
         // Far apart: no correlation.
-        let denoiser = spectrum.denoiser(4.0, 2.0);
+        let denoiser = spectrum.denoiser(4.0, Interpolation::Bilinear, 2.0);
         let (mut before, mut after, mut square, mut product) = (0.0, 0.0, 0.0, 0.0);
         for (slope, tile) in &tiles {
             let clean = denoiser.apply(tile);
@@ -247,7 +239,9 @@ mod tests {
         }
         let mut spectrum = TextureSpectrum::default();
         spectrum.add(&tile, 1.0);
-        let same = spectrum.denoiser(0.0, 0.5).apply(&tile);
+        let same = spectrum
+            .denoiser(0.0, Interpolation::Bilinear, 0.5)
+            .apply(&tile);
         assert!(tile.iter().zip(&same).all(|(a, b)| (a - b).abs() < 1e-3));
     }
 }

@@ -57,6 +57,7 @@ mod flat_field;
 mod foreign;
 mod gauss_newton;
 mod grid;
+mod interpolation;
 mod lens;
 mod neighbourhood;
 mod normal;

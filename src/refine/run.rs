@@ -10,6 +10,7 @@ use super::estimate::FrameEstimate;
 use super::examine::examine;
 use super::flat_field::{correct, flatten};
 use super::gauss_newton::{Solution, StopReason, Stopping, go_on};
+use super::interpolation::Interpolation;
 use super::neighbourhood::Neighbourhood;
 use super::observed::{CalibrationReport, Refusal};
 use super::options::RefineOptions;
@@ -235,6 +236,7 @@ pub fn refine_keeping(
             level,
             density,
             information,
+            ..
         } = sampling;
         let mut problem = Problem::new(&scene, sampling, tracked.members())?.calibrating();
         // Before the frames are aligned at full size, residuals are mostly misalignment.
@@ -439,9 +441,10 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
         step_sigma: options.step_tolerance_sigma,
     };
     let finest = Sampling {
-        level: 0,
         density: options.final_density,
-        information: 1.0,
+        interpolation: Interpolation::Bicubic,
+        by_variance: true,
+        ..Sampling::of(0)
     };
     let first = options.handover_level(side);
     let sampling = move |level| Sampling {

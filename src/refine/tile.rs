@@ -5,7 +5,9 @@
 //!
 //! - residual in the frame's own grey levels `e_i = I_i − b_i − a_i S = a_i r_i` with `r_i = z_i − S`: noise is
 //!   equal there, whatever the gain (in the wall's units a large gain would hide any residual);
-//! - weight `w_i = q_i a_i² ω(e_i)` of `r_i²`, with q the pixels per sample and ω the robust weight;
+//! - weight `w_i = q_i a_i² ω(e_i) τ` of `r_i²`, with q the pixels per sample, ω the robust weight, and, in the last solve, `τ = σ²/v` by
+//!   the variance v of residuals where the texture is as steep as here ([`super::robust::NoiseModel`]), else 1: it is aliasing that
+//!   makes residuals at edges large, and without τ the sharpest edges would decide all;
 //! - texture `S(x) = Σ w_i z_i / Σ w_i`, the robust weighted mean: for given poses and exposures this is the
 //!   minimiser, so S is eliminated exactly (variable projection);
 //! - derivative. If frame i moves by ξ, the pixel that looks at x shows the wall at `x − A_i ξ` instead,
@@ -72,7 +74,7 @@ pub struct ObserverMoments {
     pub gradient: Vector4<f64>,
     /// Mean weight `w̄`.
     pub weight: f64,
-    /// `Σ_x q ρ(e)`.
+    /// `Σ_x q τ ρ(e)`.
     pub cost: f64,
     /// `Σ_x q ω(e) e²`, grey levels².
     pub square: f64,
@@ -277,7 +279,7 @@ impl TileWork {
 
     /// Fills [`TileWork::observers`] and [`TileWork::features`] for a tile's observers.
     ///
-    /// `spacing_m`: distance between samples along s and h; `fused`: the derivative takes the gradient of S, and not each
+    /// `spacing_m`: distance between samples along s and h; `by_variance`: whether samples weigh by `σ²/v`; `fused`: the derivative takes the gradient of S, and not each
     /// frame's own; `denoiser`: what takes the noise from S for its slopes.
     #[inline(always)]
     pub fn moments<'a>(
@@ -286,6 +288,7 @@ impl TileWork {
         observers: impl Iterator<Item = Seen<'a>>,
         spacing_m: (f64, f64),
         noise: &NoiseModel,
+        by_variance: bool,
         fused: bool,
         denoiser: Option<&Denoiser>,
     ) {
@@ -303,21 +306,25 @@ impl TileWork {
             (phi[0], phi[1]) = (clean[0], clean[1]);
         }
         let mut variance = NO_ROWS;
+        let mut trust = [1.0; NO_ROWS.len()];
         for k in 0..NO_ROWS.len() {
             variance[k] = 1.0 / precision[k + SIDE];
+            if by_variance {
+                trust[k] = noise.floor * precision[k + SIDE];
+            }
         }
-        let shares = self.shares();
+        let shares = self.shares(&trust);
         self.features = feature_moments(&phi, &shares);
         self.observers.clear();
         self.own_features.clear();
         for frame in &self.samples {
             let moments = if fused {
-                observer_moments(frame, &phi, &precision, &variance)
+                observer_moments(frame, &phi, &precision, [&variance, &trust])
             } else {
                 let [own_s, own_h, _] = features(&frame.values, slopes, &covered);
                 let own = [own_s, own_h, phi[2]];
                 self.own_features.push(feature_moments(&own, &shares));
-                observer_moments(frame, &own, &precision, &variance)
+                observer_moments(frame, &own, &precision, [&variance, &trust])
             };
             self.observers.push(moments);
         }
@@ -329,14 +336,14 @@ impl TileWork {
     /// Where all frames but one are rejected (a glint in it), the texture is that frame's own and says nothing, however
     /// steep it is.
     #[inline(always)]
-    fn shares(&self) -> Rows {
+    fn shares(&self, trust: &Rows) -> Rows {
         let (mut total, mut square) = (NO_ROWS, NO_ROWS);
         let (mut mean_sum, mut mean_square) = (0.0f32, 0.0f32);
         for frame in &self.samples {
             let q = frame.pixels * frame.gain * frame.gain;
             let mut own = NO_ROWS;
             for k in 0..NO_ROWS.len() {
-                let w = q * OWN[k] * frame.weights[k + SIDE];
+                let w = q * OWN[k] * trust[k] * frame.weights[k + SIDE];
                 own[k] = w;
                 total[k] += w;
                 square[k] += w * w;
@@ -554,24 +561,28 @@ fn observer_moments(
     frame: &Samples,
     phi: &[Rows; 3],
     precision: &Plane,
-    variance: &Rows,
+    [variance, trust]: [&Rows; 2],
 ) -> ObserverMoments {
-    let (mut e, mut w, mut we) = (NO_ROWS, NO_ROWS, NO_ROWS);
+    let (mut e, mut omega, mut w, mut we) = (NO_ROWS, NO_ROWS, NO_ROWS, NO_ROWS);
     let (mut loss, mut known) = (NO_ROWS, NO_ROWS);
     for k in 0..NO_ROWS.len() {
         let c = k + SIDE;
         e[k] = frame.gain * (frame.values[c] - phi[2][k]);
-        w[k] = OWN[k] * frame.weights[c];
+        omega[k] = OWN[k] * frame.weights[c];
+        w[k] = trust[k] * omega[k];
         we[k] = w[k] * e[k];
         known[k] = OWN[k] * frame.known[c];
         // A sample without a value costs what plain noise would: losing one is no gain.
         let noise = 0.5 * variance[k];
         let cost = variance[k] * Loss::share(e[k] * e[k], precision[c]);
-        loss[k] = OWN[k] * noise + known[k] * (cost - noise);
+        loss[k] = trust[k] * (OWN[k] * noise + known[k] * (cost - noise));
     }
     let (q, a) = (f64::from(frame.pixels), f64::from(frame.gain));
-    let inliers = f64::from(sum(&w));
-    // w r = q a² ω r = q a (ω e).
+    let mut square = NO_ROWS;
+    for k in 0..NO_ROWS.len() {
+        square[k] = omega[k] * e[k];
+    }
+    // w r = q a² ω τ r = q a (ω τ e).
     ObserverMoments {
         gradient: Vector4::new(
             f64::from(dot(&we, &phi[0])),
@@ -579,11 +590,11 @@ fn observer_moments(
             f64::from(dot(&we, &phi[2])),
             f64::from(sum(&we)),
         ) * (q * a),
-        weight: q * a * a * inliers / SAMPLES as f64,
+        weight: q * a * a * f64::from(sum(&w)) / SAMPLES as f64,
         cost: q * f64::from(sum(&loss)),
-        square: q * f64::from(dot(&we, &e)),
+        square: q * f64::from(dot(&square, &e)),
         pixels: q * f64::from(sum(&known)),
-        inliers: q * inliers,
+        inliers: q * f64::from(sum(&omega)),
     }
 }
 
@@ -623,6 +634,7 @@ mod tests {
     use crate::frames::GreyImage;
     use crate::refine::estimate::FrameEstimate;
     use crate::refine::grid::{TileId, WallGrid};
+    use crate::refine::interpolation::Interpolation;
     use crate::surface::Circle;
     use crate::trajectory::{Pose, so3};
     use nalgebra::Vector3;
@@ -680,11 +692,15 @@ mod tests {
             for points in &tiles {
                 work.count_residuals(points, seen(), &mut histogram, &mut spectrum);
             }
-            let denoiser = spectrum.denoiser(f64::from(model.floor), 1.0 / density);
+            let denoiser = spectrum.denoiser(
+                f64::from(model.floor),
+                Interpolation::Bilinear,
+                1.0 / density,
+            );
             let mut slopes = |denoiser: Option<&Denoiser>| {
                 let mut sum = 0.0;
                 for points in &tiles {
-                    work.moments(points, seen(), spacing, &model, true, denoiser);
+                    work.moments(points, seen(), spacing, &model, false, true, denoiser);
                     sum += work.features[(0, 0)] + work.features[(1, 1)];
                 }
                 sum

@@ -2,6 +2,7 @@
 
 use super::estimate::FrameEstimate;
 use super::grid::{Plane, TilePoints, ZERO};
+use super::interpolation::{Interpolation, cubic_weights};
 use crate::camera::{Bend, Camera, SingleLens, Sweep};
 use crate::frames::GreyImage;
 use crate::surface::{lens_jacobian, wall_jacobian};
@@ -22,6 +23,7 @@ pub struct View<'a> {
     r_cw: Matrix3<f32>,
     gain: f32,
     bias: f32,
+    interpolation: Interpolation,
 }
 
 impl<'a> View<'a> {
@@ -36,6 +38,15 @@ impl<'a> View<'a> {
             r_cw: r_wc.matrix().transpose().cast(),
             gain: estimate.log_gain.exp() as f32,
             bias: estimate.bias as f32,
+            interpolation: Interpolation::Bilinear,
+        }
+    }
+
+    /// The same, interpolated so.
+    pub fn interpolated(self, interpolation: Interpolation) -> Self {
+        Self {
+            interpolation,
+            ..self
         }
     }
 
@@ -74,8 +85,8 @@ impl<'a> View<'a> {
         seen
     }
 
-    /// The wall's values `(I/V − b/V)/a` as this frame shows them, bilinearly interpolated, into `values`; the frame
-    /// holds `I/V`, and `shade` is V around the tile. NaN where a pixel next to the sample has no value.
+    /// The wall's values `(I/V − b/V)/a` as this frame shows them, into `values`; the frame
+    /// holds `I/V`, and `shade` is V around the tile. NaN where a pixel that the interpolation takes has no value.
     /// Samples that a step has moved out of the picture repeat its border.
     #[inline(always)]
     pub fn sample(&self, points: &TilePoints, shade: f32, values: &mut Plane) {
@@ -95,7 +106,13 @@ impl<'a> View<'a> {
         let r = &self.r_cw;
         let [fx, fy, cx, cy] = self.intrinsics;
         let (width, height) = (self.image.width(), self.image.height());
-        let (last_u, last_v) = ((width - 2) as f32, (height - 2) as f32);
+        // The cubic takes a pixel more on either side.
+        let more = match self.interpolation {
+            Interpolation::Bicubic if width.min(height) >= 4 => 1,
+            _ => 0,
+        };
+        let first = more as f32;
+        let (last_u, last_v) = ((width - 2 - more) as f32, (height - 2 - more) as f32);
         let mut index = [0u32; ZERO.len()];
         let (mut fu, mut fv) = (ZERO, ZERO);
         for k in 0..ZERO.len() {
@@ -106,21 +123,37 @@ impl<'a> View<'a> {
             let (p, q, _) = lens.bend(x, y, z);
             let (u, v) = (fx * p + cx, fy * q + cy);
             // `max` first: a NaN (a sample behind the camera) becomes the first pixel.
-            let x0 = (u - 0.5).max(0.0).min(last_u) + INTEGER;
-            let y0 = (v - 0.5).max(0.0).min(last_v) + INTEGER;
+            let x0 = (u - 0.5).max(first).min(last_u) + INTEGER;
+            let y0 = (v - 0.5).max(first).min(last_v) + INTEGER;
             fu[k] = (u - (x0 - INTEGER)).clamp(0.0, 1.0);
             fv[k] = (v - (y0 - INTEGER)).clamp(0.0, 1.0);
             index[k] = (y0.to_bits() - INTEGER.to_bits()) * width as u32
                 + (x0.to_bits() - INTEGER.to_bits());
         }
         let data = self.image.data();
+        let (inverse_gain, bias) = (1.0 / self.gain, self.bias / shade);
+        if more == 1 {
+            for k in 0..ZERO.len() {
+                let (across, down) = (cubic_weights(fu[k]), cubic_weights(fv[k]));
+                let start = index[k] as usize - width - 1;
+                let mut columns = [0.0f32; 4];
+                for (row, weight) in down.into_iter().enumerate() {
+                    let at = start + row * width;
+                    for (sum, pixel) in columns.iter_mut().zip(&data[at..at + 4]) {
+                        *sum += weight * pixel;
+                    }
+                }
+                let [a, b, c, d] = [0, 1, 2, 3].map(|i| across[i] * columns[i]);
+                values[k] = ((a + b) + (c + d) - bias) * inverse_gain;
+            }
+            return;
+        }
         let (mut upper, mut lower) = ([[0.0f32; 2]; ZERO.len()], [[0.0f32; 2]; ZERO.len()]);
         for k in 0..ZERO.len() {
             let top = index[k] as usize;
             upper[k].copy_from_slice(&data[top..top + 2]);
             lower[k].copy_from_slice(&data[top + width..top + width + 2]);
         }
-        let (inverse_gain, bias) = (1.0 / self.gain, self.bias / shade);
         for k in 0..ZERO.len() {
             let a = upper[k][0] + fu[k] * (upper[k][1] - upper[k][0]);
             let b = lower[k][0] + fu[k] * (lower[k][1] - lower[k][0]);
@@ -192,7 +225,7 @@ mod tests {
         }
     }
 
-    /// A frame whose grey value is a linear function of the pixel: bilinear sampling must return it exactly.
+    /// A frame whose grey value is a linear function of the pixel: either interpolation must return it exactly.
     #[test]
     fn samples_are_where_the_camera_projects_them() {
         let straight = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
@@ -209,6 +242,12 @@ mod tests {
     }
 
     fn sampled_where_projected(camera: Camera) {
+        for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
+            interpolated_where_projected(camera, interpolation);
+        }
+    }
+
+    fn interpolated_where_projected(camera: Camera, interpolation: Interpolation) {
         let circle = Circle::new(3.0).unwrap();
         let data = (0..160 * 120)
             .map(|k| 0.5 * (k % 160) as f32 + 1.5 * (k / 160) as f32)
@@ -220,7 +259,7 @@ mod tests {
         ));
         estimate.log_gain = 0.2;
         estimate.bias = 3.0;
-        let view = View::new(&image, camera, &estimate);
+        let view = View::new(&image, camera, &estimate).interpolated(interpolation);
         let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
         let hit = circle
             .hit(&estimate.pose.t_wc, &(estimate.pose.r_wc * Vector3::z()))

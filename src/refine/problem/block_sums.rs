@@ -49,6 +49,7 @@ impl Problem<'_> {
                         seen,
                         spacing,
                         &self.noise,
+                        self.sampling.by_variance,
                         self.scene.fused_gradient,
                         self.denoiser.as_ref(),
                     );

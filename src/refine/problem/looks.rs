@@ -5,6 +5,7 @@ use crate::frames::noise_at_level;
 use crate::refine::denoise::TextureSpectrum;
 use crate::refine::foreign::Foreign;
 use crate::refine::grid::TilePoints;
+use crate::refine::interpolation::Interpolation;
 use crate::refine::robust::NoiseHistogram;
 use crate::refine::tile::{Misfit, Seen, TileWork};
 use crate::refine::view::View;
@@ -17,9 +18,6 @@ use std::borrow::Cow;
 const SCALE_TILES: usize = 600;
 /// Factor by which the variance of residuals may be short of the sensor's.
 const MOST_UNDERESTIMATE: f64 = 1.25;
-/// Noise of a pixel over that of a bilinear sample between pixels: each axis averages `f² + (1−f)²` of the
-/// variance, 2/3 over all phases f, so 4/9 for both.
-const PIXEL_OVER_SAMPLE: f64 = 1.5;
 
 impl Problem<'_> {
     /// Reads the noise from the residuals around the plain mean in every few tiles, and what is typical of the texture.
@@ -44,7 +42,14 @@ impl Problem<'_> {
         self.noise = histogram.fit();
         // Residuals are a little too small, for S has fitted itself to them; single pictures know the noise better, but
         // take fine texture for noise.
-        let single = self.scene.noise.powi(2) * noise_at_level(self.sampling.level);
+        let interpolation = self.sampling.interpolation;
+        let axis = interpolation.autocorrelation(0.0);
+        let single = self.scene.noise.powi(2)
+            * match interpolation {
+                Interpolation::Bilinear => noise_at_level(self.sampling.level),
+                // At full size only.
+                Interpolation::Bicubic => axis * axis,
+            };
         let fitted = f64::from(self.noise.floor);
         if single > fitted && single < MOST_UNDERESTIMATE * fitted {
             self.noise.floor = single as f32;
@@ -52,9 +57,10 @@ impl Problem<'_> {
         // Before the frames are aligned at full size, residuals are mostly misalignment.
         if self.sampling.level == 0 && self.active.len() > 1 {
             let floor = f64::from(self.noise.floor);
-            self.denoiser = Some(spectrum.denoiser(floor, 1.0 / self.grid.density));
+            self.denoiser = Some(spectrum.denoiser(floor, interpolation, 1.0 / self.grid.density));
         }
-        self.sigma = PIXEL_OVER_SAMPLE * f64::from(self.noise.floor).sqrt();
+        // A sample's variance is that of a pixel times the square of an axis's share.
+        self.sigma = f64::from(self.noise.floor).sqrt() / axis;
         Ok(())
     }
 

@@ -119,6 +119,7 @@ impl<'a> Problem<'a> {
             level,
             density,
             information,
+            ..
         } = sampling;
         let Members {
             participants,
@@ -307,6 +308,7 @@ impl<'a> Problem<'a> {
                     camera.sweeping(&self.rates[*k].times(readout_s)),
                     &estimates[*k],
                 )
+                .interpolated(self.sampling.interpolation)
             })
             .collect()
     }
@@ -581,6 +583,7 @@ mod tests {
     use crate::frames::FrameCache;
     use crate::refine::calibration::{Calibration, SHARED};
     use crate::refine::estimate::UNKNOWNS;
+    use crate::refine::interpolation::Interpolation;
     use crate::refine::prior::Prior;
     use crate::refine::test_scene::{prior, scene};
     use crate::test_wall::{TestWall, waves};
@@ -640,17 +643,26 @@ mod tests {
             self.problem_with(1.0)
         }
 
+        fn sampling(&self) -> Sampling {
+            Sampling {
+                density: 2.0,
+                ..Sampling::of(0)
+            }
+        }
+
         fn problem_with(&self, information: f64) -> Problem<'_> {
+            self.problem_of(Sampling {
+                information,
+                ..self.sampling()
+            })
+        }
+
+        fn problem_of(&self, sampling: Sampling) -> Problem<'_> {
             let scene = Scene {
                 calibration: self.calibration,
                 ..scene(&self.wall, &self.frames, &self.prior)
             };
             let all = 0..self.estimates.len();
-            let sampling = Sampling {
-                level: 0,
-                density: 2.0,
-                information,
-            };
             let members = Members {
                 participants: all.clone(),
                 active: all,
@@ -669,7 +681,18 @@ mod tests {
     #[test]
     fn the_gradient_is_the_derivative_of_the_cost() {
         let ring = Ring::new(1e-4);
-        let problem = ring.problem();
+        check_gradient(&ring, &ring.problem());
+        check_gradient(
+            &ring,
+            &ring.problem_of(Sampling {
+                interpolation: Interpolation::Bicubic,
+                by_variance: true,
+                ..ring.sampling()
+            }),
+        );
+    }
+
+    fn check_gradient(ring: &Ring, problem: &Problem) {
         let gradient = problem.linearise(&ring.estimates).unwrap().normal.gradient;
         let steps = [2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 1e-3, 0.1];
         for unknown in 0..UNKNOWNS {

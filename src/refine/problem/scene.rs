@@ -6,6 +6,7 @@ use crate::frames::{FrameCache, FrameError};
 use crate::refine::calibration::{Calibration, Kappa};
 use crate::refine::estimate::FrameEstimate;
 use crate::refine::factor::FactorError;
+use crate::refine::interpolation::Interpolation;
 use crate::refine::prior::{Prior, predict};
 use crate::surface::{Patches, Surface, SurfaceError};
 use crate::trajectory::{Pose, Shutter};
@@ -23,6 +24,11 @@ pub struct Sampling {
     /// Share of the information that is used: the tiles that tell most are chosen until they hold it
     /// ([`crate::refine::choice`]).
     pub information: f64,
+    /// Between pixels.
+    pub interpolation: Interpolation,
+    /// Whether samples weigh by their variance, steep ones less ([`crate::refine::robust::NoiseModel`]): only once the frames are aligned;
+    /// before that, residuals at steep places are what aligns them.
+    pub by_variance: bool,
 }
 
 impl Sampling {
@@ -32,6 +38,8 @@ impl Sampling {
             level,
             density: 1.0,
             information: 1.0,
+            interpolation: Interpolation::Bilinear,
+            by_variance: false,
         }
     }
 }

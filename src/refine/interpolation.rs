@@ -1,0 +1,105 @@
+//! What a frame shows between its pixels.
+//!
+//! Along each axis a sample at the fraction f from one pixel to the next is `Σ_i K(i − f) I_i`. Sharp edges are where it matters: what a
+//! sample shows of one depends on f, and that passes for a displacement of some hundredths of a pixel.
+//!
+//! Source: R. G. Keys, "Cubic convolution interpolation for digital image processing", IEEE Transactions on Acoustics, Speech, and
+//! Signal Processing 29(6), 1981.
+
+use serde::{Deserialize, Serialize};
+
+/// The kernel K.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Interpolation {
+    /// A triangle: two pixels along each axis.
+    #[default]
+    Bilinear,
+    /// Keys's cubic with a = −½: four pixels, exact for quadratics.
+    Bicubic,
+}
+
+/// Steps of an integral over a pixel.
+const STEPS: usize = 256;
+
+impl Interpolation {
+    /// `K(x)`.
+    fn kernel(self, x: f64) -> f64 {
+        let x = x.abs();
+        match self {
+            Self::Bilinear => (1.0 - x).max(0.0),
+            Self::Bicubic if x < 1.0 => 1.0 + x * x * (1.5 * x - 2.5),
+            Self::Bicubic if x < 2.0 => 2.0 - x * (4.0 - x * (2.5 - 0.5 * x)),
+            Self::Bicubic => 0.0,
+        }
+    }
+
+    /// Pixels from the middle of the kernel to its end.
+    fn reach(self) -> usize {
+        match self {
+            Self::Bilinear => 1,
+            Self::Bicubic => 2,
+        }
+    }
+
+    /// Covariance, along one axis, of samples `apart_px` pixels apart in a picture of white noise of variance 1, on average over all
+    /// fractions: `∫ K(x) K(x + d) dx`. So the variance of a sample is the square of this at 0; bilinear: 4/9.
+    pub fn autocorrelation(self, apart_px: f64) -> f64 {
+        let reach = self.reach() as f64;
+        let steps = 2 * self.reach() * STEPS;
+        let at = |k: usize| (k as f64 + 0.5) / STEPS as f64 - reach;
+        let products = (0..steps).map(|k| self.kernel(at(k)) * self.kernel(at(k) + apart_px));
+        products.sum::<f64>() / STEPS as f64
+    }
+}
+
+/// Weights of the pixels at −1, 0, 1 and 2 at the fraction `f` from 0 to 1: `K(i − f)` of [`Interpolation::Bicubic`].
+#[inline(always)]
+pub fn cubic_weights(f: f32) -> [f32; 4] {
+    let g = 1.0 - f;
+    [
+        -0.5 * f * g * g,
+        1.0 + f * f * (1.5 * f - 2.5),
+        1.0 + g * g * (1.5 * g - 2.5),
+        -0.5 * g * f * f,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weights_are_the_kernels() {
+        for k in 0..=10 {
+            let f = k as f32 / 10.0;
+            for (i, weight) in cubic_weights(f).into_iter().enumerate() {
+                let expected = Interpolation::Bicubic.kernel(i as f64 - 1.0 - f64::from(f));
+                assert!((f64::from(weight) - expected).abs() < 1e-6, "{f} {i}");
+            }
+        }
+    }
+
+    /// A triangle's autocorrelation is the cubic B-spline; and a cubic leaves more of the noise.
+    #[test]
+    fn noise_correlates_as_the_kernel_with_itself() {
+        let bilinear = |d: f64| Interpolation::Bilinear.autocorrelation(d);
+        let expected = [
+            (0.0, 2.0 / 3.0),
+            (0.5, 23.0 / 48.0),
+            (1.0, 1.0 / 6.0),
+            (2.0, 0.0),
+        ];
+        for (apart, value) in expected {
+            assert!((bilinear(apart) - value).abs() < 1e-5, "{apart}");
+        }
+        // Σ_i K(i − f)² over many fractions.
+        let squares = (0..1000).map(|k| {
+            let weights = cubic_weights((k as f32 + 0.5) / 1000.0);
+            f64::from(weights.iter().map(|w| w * w).sum::<f32>())
+        });
+        let variance = Interpolation::Bicubic.autocorrelation(0.0);
+        assert!((variance - squares.sum::<f64>() / 1000.0).abs() < 1e-5);
+        assert!(variance > bilinear(0.0));
+        assert_eq!(Interpolation::Bicubic.autocorrelation(4.0), 0.0);
+    }
+}
