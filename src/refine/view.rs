@@ -133,18 +133,28 @@ impl<'a> View<'a> {
         let data = self.image.data();
         let (inverse_gain, bias) = (1.0 / self.gain, self.bias / shade);
         if more == 1 {
+            let (mut across, mut down) = ([ZERO; 4], [ZERO; 4]);
             for k in 0..ZERO.len() {
-                let (across, down) = (cubic_weights(fu[k]), cubic_weights(fv[k]));
+                let (u, v) = (cubic_weights(fu[k]), cubic_weights(fv[k]));
+                (across[0][k], across[1][k], across[2][k], across[3][k]) = (u[0], u[1], u[2], u[3]);
+                (down[0][k], down[1][k], down[2][k], down[3][k]) = (v[0], v[1], v[2], v[3]);
+            }
+            let mut columns = [[0.0f32; 4]; ZERO.len()];
+            for k in 0..ZERO.len() {
                 let start = index[k] as usize - width - 1;
-                let mut columns = [0.0f32; 4];
-                for (row, weight) in down.into_iter().enumerate() {
+                for (row, weights) in down.iter().enumerate() {
                     let at = start + row * width;
-                    for (sum, pixel) in columns.iter_mut().zip(&data[at..at + 4]) {
-                        *sum += weight * pixel;
+                    let pixels: &[f32] = &data[at..at + 4];
+                    for i in 0..4 {
+                        columns[k][i] += weights[k] * pixels[i];
                     }
                 }
-                let [a, b, c, d] = [0, 1, 2, 3].map(|i| across[i] * columns[i]);
-                values[k] = ((a + b) + (c + d) - bias) * inverse_gain;
+            }
+            for k in 0..ZERO.len() {
+                let [a, b, c, d] = columns[k];
+                let left = across[0][k] * a + across[1][k] * b;
+                let right = across[2][k] * c + across[3][k] * d;
+                values[k] = (left + right - bias) * inverse_gain;
             }
             return;
         }
