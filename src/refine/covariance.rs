@@ -6,17 +6,17 @@
 //! **D is not the normal matrix H.** Gauss–Newton weighs a residual by `ω = ψ(e)/e`, but as it grows its weight fades: a score
 //! `Σ ψ(e) ∂e` has the derivative `Σ ψ'(e) ∂e ∂eᵀ`, and ψ' is less than ω (0.89 of it in the mean, for Gaussian residuals). Where
 //! slopes are not quite those of the wall, as on one that is faint or very sharp, that makes a difference, too. What D is for poses
-//! the solver sees from step to step: `D = κ H`, with κ the [`SolveRecord::curvature`], about 0.9 on faint walls and 1.03 on sharp bricks.
+//! the solver sees from step to step: `D = κ H`, with κ the [`SolveRecord::curvature`], about 0.9.
 //!
 //! **Q** is told by the scatter of the gradients of the parts of the cost, `V = Σ_b g_b g_bᵀ` over blocks
 //! b of the wall (32 × 32 pixels: errors of neighbouring samples hang together, those of blocks hardly), whatever the residuals are like, plus
 //! the prior's own information P. Were the residuals independent Gaussian noise of the assumed size, c would be 0.97. They are not quite:
-//! where the wall is steep, aliasing and interpolation add errors that depend on how pixels happen to fall. With one factor for
-//! all unknowns,
+//! where the wall is steep, aliasing and interpolation add errors that depend on how pixels happen to fall, and hang together more or
+//! less than noise does. With one factor for all unknowns,
 //!
 //! `Σ = c H⁻¹`,   `c = tr(H⁻¹ (V + P)) / (κ² unknowns)`,
 //!
-//! c about 1 on noisy walls of low contrast, and about 3 on sharp bricks. Only blocks of `H⁻¹` where H itself has blocks are needed
+//! c about 0.7 on sharp bricks and 0.8 on noisy walls of low contrast. Only blocks of `H⁻¹` where H itself has blocks are needed
 //! ([`super::selected_inverse`]).
 //!
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`D⁻¹ Q D⁻¹`);

@@ -26,9 +26,9 @@ const MOST_STRAIN: Strain = Strain {
     times: 12.0,
     px: 0.25,
 };
-/// Largest strain of the median frame, pixels. Sharp bricks make it 0.01 to 0.03, whatever the noise; a focal length 0.3 % off 0.06, one
-/// 1 % off 0.15.
-const MOST_USUAL_STRAIN_PX: f64 = 0.08;
+/// Largest strain of the median frame, pixels. Right surveys have none, whatever wall, light and noise; a focal length 0.3 % off makes it
+/// 0.05, one 1 % off 0.13.
+const MOST_USUAL_STRAIN_PX: f64 = 0.04;
 /// Wall samples of a patch: of the blocks over which the scatter is told.
 const PATCH: i64 = BLOCK * BLOCK * SAMPLES as i64;
 
