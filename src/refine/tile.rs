@@ -93,6 +93,19 @@ pub struct Misfit {
     pub steepness: f32,
 }
 
+/// How residuals are weighed and slopes are taken.
+#[derive(Clone, Copy)]
+pub struct Weighing<'a> {
+    /// The residuals' variance.
+    pub noise: &'a NoiseModel,
+    /// Whether samples weigh by `τ = σ²/v`, else all alike.
+    pub by_variance: bool,
+    /// Whether the derivative takes the gradient of S, and not each frame's own.
+    pub fused: bool,
+    /// What takes the noise from S for its slopes.
+    pub denoiser: Option<&'a Denoiser>,
+}
+
 /// A frame that sees a tile.
 pub struct Seen<'a> {
     /// The frame.
@@ -279,19 +292,21 @@ impl TileWork {
 
     /// Fills [`TileWork::observers`] and [`TileWork::features`] for a tile's observers.
     ///
-    /// `spacing_m`: distance between samples along s and h; `by_variance`: whether samples weigh by `σ²/v`; `fused`: the derivative takes the gradient of S, and not each
-    /// frame's own; `denoiser`: what takes the noise from S for its slopes.
+    /// `spacing_m`: distance between samples along s and h.
     #[inline(always)]
     pub fn moments<'a>(
         &mut self,
         points: &TilePoints,
         observers: impl Iterator<Item = Seen<'a>>,
         spacing_m: (f64, f64),
-        noise: &NoiseModel,
-        by_variance: bool,
-        fused: bool,
-        denoiser: Option<&Denoiser>,
+        weighing: &Weighing,
     ) {
+        let Weighing {
+            noise,
+            by_variance,
+            fused,
+            denoiser,
+        } = *weighing;
         self.sample(points, observers);
         let precision = self.precision(noise);
         let mut texture = self.mean();
@@ -700,7 +715,13 @@ mod tests {
             let mut slopes = |denoiser: Option<&Denoiser>| {
                 let mut sum = 0.0;
                 for points in &tiles {
-                    work.moments(points, seen(), spacing, &model, false, true, denoiser);
+                    let weighing = Weighing {
+                        noise: &model,
+                        by_variance: false,
+                        fused: true,
+                        denoiser,
+                    };
+                    work.moments(points, seen(), spacing, &weighing);
                     sum += work.features[(0, 0)] + work.features[(1, 1)];
                 }
                 sum

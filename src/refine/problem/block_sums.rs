@@ -6,7 +6,7 @@ use crate::refine::estimate::{FrameStep, UNKNOWNS};
 use crate::refine::grid::TilePoints;
 use crate::refine::lens::LensSums;
 use crate::refine::normal::{Block, NormalEquations, Pattern};
-use crate::refine::tile::{ObserverMoments, SAMPLES, TileWork};
+use crate::refine::tile::{ObserverMoments, SAMPLES, TileWork, Weighing};
 use crate::refine::view::View;
 use crate::refine::visibility::Visibility;
 use crate::vectors::wide;
@@ -36,6 +36,12 @@ impl Problem<'_> {
         let mut work = TileWork::default();
         let mut scratch = Vec::new();
         let spacing = (self.grid.spacing_s_m, self.grid.spacing_h_m);
+        let weighing = Weighing {
+            noise: &self.noise,
+            by_variance: self.sampling.by_variance,
+            fused: self.scene.fused_gradient,
+            denoiser: self.denoiser.as_ref(),
+        };
         let mut summed: Vec<TileSums> = Vec::with_capacity(tiles.len());
         for tile in tiles {
             let points = TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
@@ -44,15 +50,7 @@ impl Problem<'_> {
                 #[inline(always)]
                 || {
                     let seen = observers.iter().map(|o| o.seen(views));
-                    work.moments(
-                        &points,
-                        seen,
-                        spacing,
-                        &self.noise,
-                        self.sampling.by_variance,
-                        self.scene.fused_gradient,
-                        self.denoiser.as_ref(),
-                    );
+                    work.moments(&points, seen, spacing, &weighing);
                 },
             );
             let mut columns = Vec::with_capacity(observers.len());
