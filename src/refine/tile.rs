@@ -7,7 +7,8 @@
 //!   equal there, whatever the gain (in the wall's units a large gain would hide any residual);
 //! - weight `w_i = q_i a_i² ω(e_i) τ` of `r_i²`, with q the pixels per sample, ω the robust weight, and, in the last solve, `τ = σ²/v` by
 //!   the variance v of residuals where the texture is as steep as here ([`super::robust::NoiseModel`]), else 1: it is aliasing that
-//!   makes residuals at edges large, and without τ the sharpest edges would decide all;
+//!   makes residuals at edges large, and without τ the sharpest edges would decide all; like the v in ω, τ is taken to stay as it is
+//!   while the poses move;
 //! - texture `S(x) = Σ w_i z_i / Σ w_i`, the robust weighted mean: for given poses and exposures this is the
 //!   minimiser, so S is eliminated exactly (variable projection);
 //! - derivative. If frame i moves by ξ, the pixel that looks at x shows the wall at `x − A_i ξ` instead,
