@@ -17,6 +17,7 @@ const MOST_MISFITS: f64 = 0.1;
 /// loosely can tilt and shift together, the camera with them, for less than aliasing does; that is more than the
 /// covariance knows of.
 const MOST_LOOSE_PX: f64 = 0.2;
+
 /// The covariance of a solution.
 pub struct Certainty {
     /// Of the poses.

@@ -6,13 +6,13 @@
 //! Source: R. G. Keys, "Cubic convolution interpolation for digital image processing", IEEE Transactions on Acoustics, Speech, and
 //! Signal Processing 29(6), 1981.
 
+use crate::render;
 use serde::{Deserialize, Serialize};
 
 /// The kernel K.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Interpolation {
     /// A triangle: two pixels along each axis.
-    #[default]
     Bilinear,
     /// Keys's cubic with a = −½: four pixels, exact for quadratics.
     Bicubic,
@@ -22,32 +22,21 @@ pub enum Interpolation {
 const STEPS: usize = 256;
 
 impl Interpolation {
-    /// `K(x)`.
-    fn kernel(self, x: f64) -> f64 {
-        let x = x.abs();
+    /// The one that panoramas are drawn with, which has `K(x)` and how far it reaches.
+    fn kernel(self) -> render::Interpolation {
         match self {
-            Self::Bilinear => (1.0 - x).max(0.0),
-            Self::Bicubic if x < 1.0 => 1.0 + x * x * (1.5 * x - 2.5),
-            Self::Bicubic if x < 2.0 => 2.0 - x * (4.0 - x * (2.5 - 0.5 * x)),
-            Self::Bicubic => 0.0,
-        }
-    }
-
-    /// Pixels from the middle of the kernel to its end.
-    fn reach(self) -> usize {
-        match self {
-            Self::Bilinear => 1,
-            Self::Bicubic => 2,
+            Self::Bilinear => render::Interpolation::Bilinear,
+            Self::Bicubic => render::Interpolation::Bicubic,
         }
     }
 
     /// Covariance, along one axis, of samples `apart_px` pixels apart in a picture of white noise of variance 1, on average over all
     /// fractions: `∫ K(x) K(x + d) dx`. So the variance of a sample is the square of this at 0; bilinear: 4/9.
     pub fn autocorrelation(self, apart_px: f64) -> f64 {
-        let reach = self.reach() as f64;
-        let steps = 2 * self.reach() * STEPS;
-        let at = |k: usize| (k as f64 + 0.5) / STEPS as f64 - reach;
-        let products = (0..steps).map(|k| self.kernel(at(k)) * self.kernel(at(k) + apart_px));
+        let kernel = self.kernel();
+        let steps = (2.0 * kernel.reach()) as usize * STEPS;
+        let at = |k: usize| (k as f64 + 0.5) / STEPS as f64 - kernel.reach();
+        let products = (0..steps).map(|k| kernel.weight(at(k)) * kernel.weight(at(k) + apart_px));
         products.sum::<f64>() / STEPS as f64
     }
 }
@@ -73,7 +62,7 @@ mod tests {
         for k in 0..=10 {
             let f = k as f32 / 10.0;
             for (i, weight) in cubic_weights(f).into_iter().enumerate() {
-                let expected = Interpolation::Bicubic.kernel(i as f64 - 1.0 - f64::from(f));
+                let expected = render::Interpolation::Bicubic.weight(i as f64 - 1.0 - f64::from(f));
                 assert!((f64::from(weight) - expected).abs() < 1e-6, "{f} {i}");
             }
         }

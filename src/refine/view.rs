@@ -13,6 +13,9 @@ use nalgebra::{Matrix2x6, Matrix3, Vector3};
 /// saturates, this is done on whole vectors.
 const INTEGER: f32 = 8_388_608.0;
 
+/// For every sample of a tile, where in a picture's data the pixel to its upper left is.
+type Indices = [u32; ZERO.len()];
+
 /// A frame at one pyramid level with its current estimate, ready to be sampled.
 pub struct View<'a> {
     image: &'a GreyImage,
@@ -113,7 +116,7 @@ impl<'a> View<'a> {
         };
         let first = more as f32;
         let (last_u, last_v) = ((width - 2 - more) as f32, (height - 2 - more) as f32);
-        let mut index = [0u32; ZERO.len()];
+        let mut index: Indices = [0; ZERO.len()];
         let (mut fu, mut fv) = (ZERO, ZERO);
         for k in 0..ZERO.len() {
             let (dx, dy, dz) = (points.dx[k], points.dy[k], points.dz[k]);
@@ -130,34 +133,20 @@ impl<'a> View<'a> {
             index[k] = (y0.to_bits() - INTEGER.to_bits()) * width as u32
                 + (x0.to_bits() - INTEGER.to_bits());
         }
-        let data = self.image.data();
-        let (inverse_gain, bias) = (1.0 / self.gain, self.bias / shade);
-        if more == 1 {
-            let (mut across, mut down) = ([ZERO; 4], [ZERO; 4]);
-            for k in 0..ZERO.len() {
-                let (u, v) = (cubic_weights(fu[k]), cubic_weights(fv[k]));
-                (across[0][k], across[1][k], across[2][k], across[3][k]) = (u[0], u[1], u[2], u[3]);
-                (down[0][k], down[1][k], down[2][k], down[3][k]) = (v[0], v[1], v[2], v[3]);
-            }
-            let mut columns = [[0.0f32; 4]; ZERO.len()];
-            for k in 0..ZERO.len() {
-                let start = index[k] as usize - width - 1;
-                for (row, weights) in down.iter().enumerate() {
-                    let at = start + row * width;
-                    let pixels: &[f32] = &data[at..at + 4];
-                    for i in 0..4 {
-                        columns[k][i] += weights[k] * pixels[i];
-                    }
-                }
-            }
-            for k in 0..ZERO.len() {
-                let [a, b, c, d] = columns[k];
-                let left = across[0][k] * a + across[1][k] * b;
-                let right = across[2][k] * c + across[3][k] * d;
-                values[k] = (left + right - bias) * inverse_gain;
-            }
-            return;
+        match more {
+            0 => self.bilinear(&index, [&fu, &fv], values),
+            _ => self.bicubic(&index, [&fu, &fv], values),
         }
+        let (inverse_gain, bias) = (1.0 / self.gain, self.bias / shade);
+        for value in values.iter_mut() {
+            *value = (*value - bias) * inverse_gain;
+        }
+    }
+
+    /// What the picture shows at the fractions `fu`, `fv` from the pixels at `index` to the next.
+    #[inline(always)]
+    fn bilinear(&self, index: &Indices, [fu, fv]: [&Plane; 2], values: &mut Plane) {
+        let (data, width) = (self.image.data(), self.image.width());
         let (mut upper, mut lower) = ([[0.0f32; 2]; ZERO.len()], [[0.0f32; 2]; ZERO.len()]);
         for k in 0..ZERO.len() {
             let top = index[k] as usize;
@@ -167,7 +156,36 @@ impl<'a> View<'a> {
         for k in 0..ZERO.len() {
             let a = upper[k][0] + fu[k] * (upper[k][1] - upper[k][0]);
             let b = lower[k][0] + fu[k] * (lower[k][1] - lower[k][0]);
-            values[k] = (a + fv[k] * (b - a) - bias) * inverse_gain;
+            values[k] = a + fv[k] * (b - a);
+        }
+    }
+
+    /// The same by cubics: of four rows first, then of what they make of four columns.
+    #[inline(always)]
+    fn bicubic(&self, index: &Indices, [fu, fv]: [&Plane; 2], values: &mut Plane) {
+        let (data, width) = (self.image.data(), self.image.width());
+        let (mut across, mut down) = ([ZERO; 4], [ZERO; 4]);
+        for k in 0..ZERO.len() {
+            let (u, v) = (cubic_weights(fu[k]), cubic_weights(fv[k]));
+            for i in 0..4 {
+                (across[i][k], down[i][k]) = (u[i], v[i]);
+            }
+        }
+        let mut columns = [[0.0f32; 4]; ZERO.len()];
+        for k in 0..ZERO.len() {
+            let start = index[k] as usize - width - 1;
+            for (row, weights) in down.iter().enumerate() {
+                let at = start + row * width;
+                let pixels: &[f32] = &data[at..at + 4];
+                for i in 0..4 {
+                    columns[k][i] += weights[k] * pixels[i];
+                }
+            }
+        }
+        for k in 0..ZERO.len() {
+            let [a, b, c, d] = columns[k];
+            let left = across[0][k] * a + across[1][k] * b;
+            values[k] = left + (across[2][k] * c + across[3][k] * d);
         }
     }
 }

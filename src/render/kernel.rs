@@ -23,7 +23,7 @@ pub enum Interpolation {
 
 impl Interpolation {
     /// How far the kernel reaches to either side, pixels.
-    fn reach(self) -> f64 {
+    pub(crate) fn reach(self) -> f64 {
         match self {
             Self::Nearest => 0.5,
             Self::Bilinear => 1.0,
@@ -33,7 +33,7 @@ impl Interpolation {
     }
 
     /// The weight of a pixel at distance `x`, pixels.
-    fn weight(self, x: f64) -> f64 {
+    pub(crate) fn weight(self, x: f64) -> f64 {
         let x = x.abs();
         if x >= self.reach() {
             return 0.0;
