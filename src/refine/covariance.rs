@@ -9,15 +9,22 @@
 //! the solver sees from step to step: `D = κ H`, with κ the [`SolveRecord::curvature`], about 0.9.
 //!
 //! **Q** is told by the scatter of the gradients of the parts of the cost, `V = Σ_b g_b g_bᵀ` over blocks
-//! b of the wall (32 × 32 pixels: errors of neighbouring samples hang together, those of blocks hardly), whatever the residuals are like, plus
+//! b of the wall (32 × 32 pixels: errors of neighbouring samples hang together, those of blocks hardly), whatever the residuals are like, over κ², plus
 //! the prior's own information P. Were the residuals independent Gaussian noise of the assumed size, c would be 0.97. They are not quite:
 //! where the wall is steep, aliasing and interpolation add errors that depend on how pixels happen to fall, and hang together more or
-//! less than noise does. With one factor for all unknowns,
+//! less than noise does. With one factor for all poses, and J the normal matrix of the poses with the exposures eliminated,
 //!
-//! `Σ = c H⁻¹`,   `c = tr(H⁻¹ (V + P)) / (κ² unknowns)`,
+//! `Σ = c J⁻¹`,   `c = tr(J⁻¹ E Q Eᵀ) / freedoms`,   `Q = V/κ² + P`,   `J = H_pp − H_pe H_ee⁻¹ H_ep`,   `E = (I, −H_pe H_ee⁻¹)`,
 //!
-//! c about 0.7 on sharp bricks and 0.8 on noisy walls of low contrast. Only blocks of `H⁻¹` where H itself has blocks are needed
-//! ([`super::selected_inverse`]).
+//! the freedoms being six of each frame less those of the gauge. The exposures are left out since they err in a way of their own: where
+//! a wall is sharp, a frame that sees it from aslant is blurred, which passes for a lower gain, block after block, and says nothing of
+//! its pose. As `H⁻¹ = Eᵀ J⁻¹ E + diag(0, H_ee⁻¹)`,
+//!
+//! `tr(J⁻¹ E Q Eᵀ) = tr(H⁻¹ Q) − tr(H_ee⁻¹ Q_ee)`,
+//!
+//! for which only those blocks of `H⁻¹` and `H_ee⁻¹` are needed where H itself has blocks ([`super::selected_inverse`]). And `J⁻¹` is the
+//! poses' part of `H⁻¹`. c is about 0.35 on sharp bricks, where samples are told to weigh less than their residuals in sum show, and 0.7
+//! on noisy walls of low contrast.
 //!
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`D⁻¹ Q D⁻¹`);
 //! F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw, W. A. Stahel, "Robust Statistics: The Approach Based on Influence
@@ -26,7 +33,7 @@
 //! [`SolveRecord::curvature`]: super::SolveRecord::curvature
 
 use super::calibration::LENS;
-use super::estimate::{FrameEstimate, UNKNOWNS};
+use super::estimate::{FrameEstimate, FrameStep, UNKNOWNS};
 use super::factor::FactorError;
 use super::normal::{Block, NormalEquations, Pattern};
 use super::report::nan_if_null;
@@ -35,6 +42,10 @@ use super::shared::{BorderBlock, SharedBlock};
 use crate::camera::Camera;
 use crate::surface::{GaugeMotion, Surface, lens_jacobian, viewing_distance, wall_jacobian};
 use nalgebra::{Matrix6, Vector6};
+
+/// Unknowns of a frame's pose, and of its exposure.
+const POSE: usize = 6;
+const EXPOSURE: usize = UNKNOWNS - POSE;
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
 ///
@@ -146,31 +157,38 @@ impl Covariances {
     }
 }
 
-/// The covariances at a solution: `normal` with the gauge tied, `scatter` V of the pixels, `prior` P, all on `pattern`; `curvature`: κ.
+/// The covariances at a solution: `normal` with the `gauge`'s freedoms tied, `scatter` V of the pixels, `prior` P, all on `pattern`;
+/// `curvature`: κ.
 ///
 /// # Errors
 /// [`FactorError`] if the normal matrix is singular.
 pub fn covariances(
     pattern: &Pattern,
-    normal: &NormalEquations,
+    (normal, gauge): (&NormalEquations, usize),
     scatter: &[Block],
     prior: &[Block],
     curvature: f64,
 ) -> Result<Covariances, FactorError> {
     let inverse = SelectedInverse::new(pattern, normal)?;
+    let of_exposures = SelectedInverse::new(pattern, &exposures_alone(pattern, normal))?;
     let count = pattern.frames();
     let mut trace = 0.0;
     for column in 0..count {
         for &row in pattern.rows(column) {
-            if let (Some(place), Some(z)) = (pattern.place(row, column), inverse.block(row, column))
-            {
+            let blocks = inverse
+                .block(row, column)
+                .zip(of_exposures.block(row, column));
+            if let (Some(place), Some((all, exposures))) = (pattern.place(row, column), blocks) {
+                let q = scatter[place] / curvature.powi(2) + prior[place];
                 // Off the diagonal each block stands for its transpose, too.
                 let times = if row == column { 1.0 } else { 2.0 };
-                trace += times * z.component_mul(&(scatter[place] + prior[place])).sum();
+                trace += times * all.component_mul(&q).sum();
+                trace -= times * exposures.component_mul(&exposures_part(&q)).sum();
             }
         }
     }
-    let variance_factor = trace / (curvature.powi(2) * (count * UNKNOWNS) as f64);
+    let freedoms = count * POSE - gauge;
+    let variance_factor = trace / freedoms as f64;
     let pose = |block: Block| variance_factor * block.fixed_view::<6, 6>(0, 0).into_owned();
     let unknown = Matrix6::from_element(f64::NAN);
     Ok(Covariances {
@@ -182,6 +200,27 @@ pub fn covariances(
             .collect(),
         variance_factor,
     })
+}
+
+/// The part of a block that is the exposures' own.
+fn exposures_part(block: &Block) -> Block {
+    let mut part = Block::zeros();
+    part.fixed_view_mut::<EXPOSURE, EXPOSURE>(POSE, POSE)
+        .copy_from(&block.fixed_view::<EXPOSURE, EXPOSURE>(POSE, POSE));
+    part
+}
+
+/// `diag(I, H_ee)`: the normal matrix if the poses were known.
+fn exposures_alone(pattern: &Pattern, normal: &NormalEquations) -> NormalEquations {
+    let mut alone = NormalEquations::zeros(pattern);
+    for (alone, block) in alone.blocks.iter_mut().zip(&normal.blocks) {
+        *alone = exposures_part(block);
+    }
+    let poses = Block::from_diagonal(&FrameStep::from_fn(|k, _| if k < POSE { 1.0 } else { 0.0 }));
+    for k in 0..pattern.frames() {
+        alone.add_block(pattern, k, k, &poses);
+    }
+    alone
 }
 
 /// Reads a pose covariance as σ of rotation, translation and wall position.
@@ -232,6 +271,7 @@ pub fn frame_sigma(
 mod tests {
     use super::*;
     use crate::trajectory::{Pose, so3};
+    use nalgebra::DMatrix;
 
     #[test]
     fn the_table_has_a_line_per_frame_and_pair_and_38_numbers_each() {
@@ -249,7 +289,7 @@ mod tests {
     }
 
     /// If the scatter is what the model says, so is the covariance; twice the scatter, twice the covariance; half the curvature,
-    /// twice the error.
+    /// twice the error by pixels; and what the exposures scatter more is not the poses'.
     #[test]
     fn the_factor_follows_scatter_and_curvature() {
         let pattern = Pattern::new(3, [(0, 1), (1, 2)]);
@@ -261,15 +301,58 @@ mod tests {
             normal.add_block(&pattern, k, k + 1, &(Block::identity() * -1.0));
         }
         let none = vec![Block::zeros(); pattern.blocks()];
-        let one = covariances(&pattern, &normal, &normal.blocks, &none, 1.0).unwrap();
+        let at = |scatter: &[Block], prior: &[Block], curvature: f64| {
+            covariances(&pattern, (&normal, 0), scatter, prior, curvature).unwrap()
+        };
+        let one = at(&normal.blocks, &none, 1.0);
         assert!((one.variance_factor - 1.0).abs() < 1e-12);
-        let both = (&normal.blocks, &normal.blocks);
-        let two = covariances(&pattern, &normal, both.0, both.1, 1.0).unwrap();
+        let two = at(&normal.blocks, &normal.blocks, 1.0);
         assert!((two.frames[1] - one.frames[1] * 2.0).norm() < 1e-12);
-        let bent = covariances(&pattern, &normal, &normal.blocks, &none, 0.5).unwrap();
-        assert!((bent.frames[1] - one.frames[1] * 4.0).norm() < 1e-12);
+        let bent = at(&normal.blocks, &normal.blocks, 0.5);
+        assert!((bent.frames[1] - one.frames[1] * 5.0).norm() < 1e-12);
         assert!((one.frames[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
         assert!((one.next[0][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
+        let mut exposed = normal.blocks.clone();
+        exposed
+            .iter_mut()
+            .for_each(|block| *block += exposures_part(block) * 9.0);
+        let same = at(&exposed, &none, 1.0);
+        assert!((same.variance_factor - 1.0).abs() < 1e-12);
+        // With the gauge tied, two of 18 freedoms are no freedoms.
+        let tied = covariances(&pattern, (&normal, 2), &normal.blocks, &none, 1.0).unwrap();
+        assert!((tied.variance_factor - 18.0 / 16.0).abs() < 1e-12);
+    }
+
+    /// Against the sandwich itself, where poses and exposures hang together.
+    #[test]
+    fn the_factor_is_that_of_the_poses_with_the_exposures_eliminated() {
+        let pattern = Pattern::new(2, [(0, 1)]);
+        let matrix = |salt: f64| {
+            let n = 2 * UNKNOWNS;
+            let number = |r: usize, c: usize| (12.9898 * (r + n * c) as f64 + salt).sin();
+            let root = DMatrix::from_fn(n, n, number);
+            &root * root.transpose() + DMatrix::identity(n, n)
+        };
+        let blocks = |dense: &DMatrix<f64>| {
+            let block = |row: usize, column: usize| {
+                let view =
+                    dense.fixed_view::<UNKNOWNS, UNKNOWNS>(row * UNKNOWNS, column * UNKNOWNS);
+                view.into_owned()
+            };
+            vec![block(0, 0), block(0, 1), block(1, 1)]
+        };
+        let (h, q) = (matrix(0.1), matrix(0.7));
+        let mut normal = NormalEquations::zeros(&pattern);
+        normal.blocks = blocks(&h);
+        let none = vec![Block::zeros(); pattern.blocks()];
+        let found = covariances(&pattern, (&normal, 0), &blocks(&q), &none, 1.0).unwrap();
+        let poses: Vec<usize> = (0..2 * UNKNOWNS).filter(|k| k % UNKNOWNS < POSE).collect();
+        let inverse = h.try_inverse().unwrap();
+        let sandwich = &inverse * q * &inverse;
+        let part = |m: &DMatrix<f64>| m.select_rows(&poses).select_columns(&poses);
+        let relative = part(&inverse).try_inverse().unwrap() * part(&sandwich);
+        let expected = relative.trace() / poses.len() as f64;
+        assert!((found.variance_factor / expected - 1.0).abs() < 1e-9);
     }
 
     /// A camera that may be off by a millimetre along the tunnel shows all of the wall a millimetre off; how many pixels that is goes

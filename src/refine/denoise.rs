@@ -6,7 +6,7 @@
 //!
 //! A tile of S (10 × 10 samples with its ring) is written in polynomials `p_k(s) p_l(h)`, orthonormal on the samples, so
 //! that a ramp is one of them and does not bend at the tile's border. A coefficient `c_kl` has the noise variance
-//! `n_kl = v ν_k ν_l` and, over many tiles of the wall, the mean square `m_kl`. The share
+//! `n_kl` and, over many tiles of the wall, the mean square `m_kl`. The share
 //!
 //! `W_kl = max(0, 1 − n_kl/m_kl)`
 //!
@@ -14,8 +14,13 @@
 //! mean of `φ̂φ̂ᵀ` is that of `φ̂φᵀ` with the true slopes φ, the derivative of the score; so M needs no correction for
 //! the noise in it.
 //!
-//! v is the variance of a sample of S, and `ν_k = Σ_ij p_k(i) p_k(j) β(|i − j| d)/β(0)`: samples interpolated d pixels apart
-//! correlate so, with β the autocorrelation of the interpolation's kernel ([`Interpolation::autocorrelation`]).
+//! `S = Σ q_i a_i² z_i / Σ q_i a_i²`, and the noise of z_i has the variance `σ²/a_i²` and, along each axis, the autocorrelation
+//! `β(d)/β(0)` of the interpolation's kernel ([`Interpolation::autocorrelation`]), d pixels apart. With `d_i = √q_i` pixels from sample to
+//! sample of frame i, on average over the tiles,
+//!
+//! `n_kl = σ² ⟨Σ_i u_i ν_k(d_i) ν_l(d_i)⟩`,  `u_i = (q_i a_i)² / (Σ_j q_j a_j²)²`,  `ν_k(d) = Σ_ij p_k(i) p_k(j) β(|i − j| d)/β(0)`.
+//!
+//! From aslant a frame has fewer pixels to a sample, whose noise hangs together the more, and more of it is in the slopes.
 //!
 //! Source: N. Wiener, "Extrapolation, Interpolation, and Smoothing of Stationary Time Series", 1949; J. P. Gram, "Ueber die
 //! Entwickelung reeller Functionen in Reihen mittelst der Methode der kleinsten Quadrate", 1883 (the polynomials).
@@ -30,23 +35,27 @@ type Square<T> = [[T; SIDE]; SIDE];
 pub struct TextureSpectrum {
     basis: Square<f64>,
     squares: Square<f64>,
-    /// Sum of the variance of S over that of a sample.
-    variance: f64,
+    /// `Σ u` by the spacing d, in steps of [`SPACING_PX`].
+    shares: [f64; SPACINGS],
 }
+
+/// Width of a bin of spacings, pixels, and their number: the last has all that is beyond.
+const SPACING_PX: f64 = 1.0 / 32.0;
+const SPACINGS: usize = 64;
 
 impl Default for TextureSpectrum {
     fn default() -> Self {
         Self {
             basis: polynomials(),
             squares: [[0.0; SIDE]; SIDE],
-            variance: 0.0,
+            shares: [0.0; SPACINGS],
         }
     }
 }
 
 impl TextureSpectrum {
-    /// Counts a tile of S; `variance`: that of a sample of S over that of a frame's.
-    pub fn add(&mut self, texture: &Plane, variance: f64) {
+    /// Counts a tile of S, of frames with `(d_i, u_i)`.
+    pub fn add(&mut self, texture: &Plane, frames: impl Iterator<Item = (f64, f64)>) {
         let mut along_s = [[0.0; SIDE]; SIDE];
         for (row, samples) in along_s.iter_mut().zip(texture.chunks_exact(SIDE)) {
             for (sum, p) in row.iter_mut().zip(&self.basis) {
@@ -59,40 +68,53 @@ impl TextureSpectrum {
                 *square += c * c;
             }
         }
-        self.variance += variance;
+        for (spacing_px, share) in frames {
+            let bin = (spacing_px / SPACING_PX) as usize;
+            self.shares[bin.min(SPACINGS - 1)] += share;
+        }
     }
 
     /// Adds the counts of another.
     pub fn merge(mut self, other: &Self) -> Self {
-        let others = other.squares.iter().flatten();
-        for (a, b) in self.squares.iter_mut().flatten().zip(others) {
-            *a += b;
-        }
-        self.variance += other.variance;
+        let others = other.squares.iter().flatten().chain(&other.shares);
+        let own = self.squares.iter_mut().flatten().chain(&mut self.shares);
+        own.zip(others).for_each(|(a, b)| *a += b);
         self
     }
 
-    /// The filter for samples with noise of variance `floor` (grey levels²), interpolated `spacing_px` pixels apart.
-    pub fn denoiser(&self, floor: f64, interpolation: Interpolation, spacing_px: f64) -> Denoiser {
-        let covariances: [f64; SIDE] =
-            std::array::from_fn(|k| interpolation.autocorrelation(k as f64 * spacing_px));
-        let correlation = |i: usize, j: usize| covariances[i.abs_diff(j)] / covariances[0];
-        let nu: [f64; SIDE] = std::array::from_fn(|k| {
-            let p = &self.basis[k];
-            let pairs = (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| (i, j)));
-            pairs.map(|(i, j)| p[i] * p[j] * correlation(i, j)).sum()
-        });
-        let v = floor * self.variance;
+    /// The filter for samples with noise of variance `floor`, σ² (grey levels²).
+    pub fn denoiser(&self, floor: f64, interpolation: Interpolation) -> Denoiser {
+        let mut noise = [[0.0; SIDE]; SIDE];
+        for (bin, share) in self.shares.iter().enumerate().filter(|(_, u)| **u > 0.0) {
+            let nu = self.noise((bin as f64 + 0.5) * SPACING_PX, interpolation);
+            for (row, nu_l) in noise.iter_mut().zip(&nu) {
+                for (noise, nu_k) in row.iter_mut().zip(&nu) {
+                    *noise += floor * share * nu_l * nu_k;
+                }
+            }
+        }
+        // The mean has no slope.
+        noise[0][0] = 0.0;
         let share = |l: usize, k: usize| {
-            // The mean has no slope.
-            let noise = if k + l == 0 { 0.0 } else { v * nu[k] * nu[l] };
-            (1.0 - noise / self.squares[l][k].max(f64::MIN_POSITIVE)).max(0.0) as f32
+            (1.0 - noise[l][k] / self.squares[l][k].max(f64::MIN_POSITIVE)).max(0.0) as f32
         };
         Denoiser {
             basis: self.basis.map(|p| p.map(|v| v as f32)),
             transposed: std::array::from_fn(|i| std::array::from_fn(|k| self.basis[k][i] as f32)),
             shares: std::array::from_fn(|l| std::array::from_fn(|k| share(l, k))),
         }
+    }
+
+    /// `ν_k` of samples `spacing_px` apart.
+    fn noise(&self, spacing_px: f64, interpolation: Interpolation) -> [f64; SIDE] {
+        let covariances: [f64; SIDE] =
+            std::array::from_fn(|k| interpolation.autocorrelation(k as f64 * spacing_px));
+        let correlation = |i: usize, j: usize| covariances[i.abs_diff(j)] / covariances[0];
+        std::array::from_fn(|k| {
+            let p = &self.basis[k];
+            let pairs = (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| (i, j)));
+            pairs.map(|(i, j)| p[i] * p[j] * correlation(i, j)).sum()
+        })
     }
 }
 
@@ -207,12 +229,12 @@ mod tests {
                 for (k, value) in tile[..SIDE * SIDE].iter_mut().enumerate() {
                     *value = slope * (k % SIDE) as f32 + noise.sample(&mut rng);
                 }
-                spectrum.add(&tile, 1.0);
+                // Far apart: no correlation.
+                spectrum.add(&tile, [(2.0, 1.0)].into_iter());
                 (slope, tile)
             })
             .collect();
-        // Far apart: no correlation.
-        let denoiser = spectrum.denoiser(4.0, Interpolation::Bilinear, 2.0);
+        let denoiser = spectrum.denoiser(4.0, Interpolation::Bilinear);
         let (mut before, mut after, mut square, mut product) = (0.0, 0.0, 0.0, 0.0);
         for (slope, tile) in &tiles {
             let clean = denoiser.apply(tile);
@@ -238,10 +260,9 @@ mod tests {
             *value = (7.3 * k as f32).sin() * 50.0;
         }
         let mut spectrum = TextureSpectrum::default();
-        spectrum.add(&tile, 1.0);
-        let same = spectrum
-            .denoiser(0.0, Interpolation::Bilinear, 0.5)
-            .apply(&tile);
+        spectrum.add(&tile, [(0.5, 1.0)].into_iter());
+        let denoiser = spectrum.denoiser(0.0, Interpolation::Bilinear);
+        let same = denoiser.apply(&tile);
         assert!(tile.iter().zip(&same).all(|(a, b)| (a - b).abs() < 1e-3));
     }
 }

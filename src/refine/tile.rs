@@ -250,15 +250,14 @@ impl TileWork {
         )
     }
 
-    /// Variance of a sample of S over that of a frame's: `Σ q²a² / (Σ q a²)²`.
-    fn variance(&self) -> f64 {
-        let (mut square, mut sum) = (0.0, 0.0);
-        for frame in &self.samples {
-            let (q, a) = (f64::from(frame.pixels), f64::from(frame.gain));
-            square += (q * a).powi(2);
-            sum += q * a * a;
-        }
-        square / (sum * sum)
+    /// Of each observer, for the noise of S ([`super::denoise`]): `√q`, the pixels from sample to sample, and `(q a)² / (Σ q a²)²`.
+    fn noise_shares(&self) -> impl Iterator<Item = (f64, f64)> {
+        let weight = |frame: &Samples| f64::from(frame.pixels * frame.gain * frame.gain);
+        let sum: f64 = self.samples.iter().map(weight).sum();
+        self.samples.iter().map(move |frame| {
+            let own = f64::from(frame.pixels * frame.gain) / sum;
+            (f64::from(frame.pixels).sqrt(), own * own)
+        })
     }
 
     /// One step of iteratively reweighted least squares: sets every weight by the residual from `reference`
@@ -475,7 +474,7 @@ impl TileWork {
         let scale = (n / (n - 1.0)).sqrt();
         let mean = self.mean();
         if !self.gaps {
-            spectrum.add(&mean, self.variance());
+            spectrum.add(&mean, self.noise_shares());
         }
         let gains: f32 = self.samples.iter().map(|frame| frame.gain.powi(2)).sum();
         let square_gain = gains / self.samples.len().max(1) as f32;
@@ -708,11 +707,7 @@ mod tests {
             for points in &tiles {
                 work.count_residuals(points, seen(), &mut histogram, &mut spectrum);
             }
-            let denoiser = spectrum.denoiser(
-                f64::from(model.floor),
-                Interpolation::Bilinear,
-                1.0 / density,
-            );
+            let denoiser = spectrum.denoiser(f64::from(model.floor), Interpolation::Bilinear);
             let mut slopes = |denoiser: Option<&Denoiser>| {
                 let mut sum = 0.0;
                 for points in &tiles {

@@ -57,7 +57,7 @@ impl Problem<'_> {
         // Before the frames are aligned at full size, residuals are mostly misalignment.
         if self.sampling.level == 0 && self.active.len() > 1 {
             let floor = f64::from(self.noise.floor);
-            self.denoiser = Some(spectrum.denoiser(floor, interpolation, 1.0 / self.grid.density));
+            self.denoiser = Some(spectrum.denoiser(floor, interpolation));
         }
         // A sample's variance is that of a pixel times the square of an axis's share.
         self.sigma = f64::from(self.noise.floor).sqrt() / axis;
