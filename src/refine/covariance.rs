@@ -23,8 +23,8 @@
 //! `tr(J⁻¹ E Q Eᵀ) = tr(H⁻¹ Q) − tr(H_ee⁻¹ Q_ee)`,
 //!
 //! for which only those blocks of `H⁻¹` and `H_ee⁻¹` are needed where H itself has blocks ([`super::selected_inverse`]). And `J⁻¹` is the
-//! poses' part of `H⁻¹`. c is about 0.35 on sharp bricks, where samples are told to weigh less than their residuals in sum show, and 0.7
-//! on noisy walls of low contrast.
+//! poses' part of `H⁻¹`. c is about 0.35 on sharp bricks, where aliasing, which every sample's weight counts as if it were by itself, cancels
+//! over a block, and 0.7 on noisy walls of low contrast.
 //!
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`D⁻¹ Q D⁻¹`);
 //! F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw, W. A. Stahel, "Robust Statistics: The Approach Based on Influence

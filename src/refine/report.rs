@@ -112,8 +112,8 @@ pub struct RefineReport {
     pub frames: Vec<FrameReport>,
     /// Frames whose pose rests on the prior.
     pub frames_on_prior: usize,
-    /// Factor by which the covariance exceeds the inverse of the normal matrix: what aliasing and the robust loss add
-    /// ([`super::covariance`]).
+    /// The covariance over the inverse of the normal matrix, c of [`super::covariance`]: above 1 where residuals err together, below
+    /// where they cancel.
     pub variance_factor: f64,
     /// The readout time that the frames want, as far as they can tell.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -26,7 +26,7 @@ pub struct Refinement {
     pub frames: Vec<FrameReport>,
     /// Frames whose pose rests on the prior.
     pub frames_on_prior: usize,
-    /// Factor by which the covariance exceeds that of independent noise; null where there is none.
+    /// The covariance over that of independent noise; null where there is none.
     pub variance_factor: Option<f64>,
     /// Self-calibration, if it was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]

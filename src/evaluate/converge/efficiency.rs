@@ -57,7 +57,7 @@ pub struct Efficiency {
     pub normalised_error: f64,
     /// Share of frames whose 95 % ellipsoid holds the truth.
     pub inside_95: f64,
-    /// Mean factor by which the covariance was enlarged for aliasing.
+    /// Mean of the covariances over those of independent noise ([`crate::refine::RefineReport::variance_factor`]).
     pub variance_factor: f64,
 }
 
