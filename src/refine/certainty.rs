@@ -46,7 +46,8 @@ impl Certainty {
         let (prior, _) = problem.prior_information(&solution.estimates, &solution.kappa);
         let found = covariances(
             problem.pattern(),
-            (&solution.linearisation.normal, problem.tied_freedoms()),
+            &solution.linearisation.normal,
+            problem.tied_freedoms(),
             &solution.linearisation.scatter,
             &prior,
             solution.record.curvature(),

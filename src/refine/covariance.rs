@@ -157,14 +157,15 @@ impl Covariances {
     }
 }
 
-/// The covariances at a solution: `normal` with the `gauge`'s freedoms tied, `scatter` V of the pixels, `prior` P, all on `pattern`;
-/// `curvature`: κ.
+/// The covariances at a solution: `normal` with `tied` freedoms of the gauge tied, `scatter` V of the pixels, `prior` P, all on
+/// `pattern`; `curvature`: κ.
 ///
 /// # Errors
 /// [`FactorError`] if the normal matrix is singular.
 pub fn covariances(
     pattern: &Pattern,
-    (normal, gauge): (&NormalEquations, usize),
+    normal: &NormalEquations,
+    tied: usize,
     scatter: &[Block],
     prior: &[Block],
     curvature: f64,
@@ -172,24 +173,14 @@ pub fn covariances(
     let inverse = SelectedInverse::new(pattern, normal)?;
     let of_exposures = SelectedInverse::new(pattern, &exposures_alone(pattern, normal))?;
     let count = pattern.frames();
-    let mut trace = 0.0;
-    for column in 0..count {
-        for &row in pattern.rows(column) {
-            let blocks = inverse
-                .block(row, column)
-                .zip(of_exposures.block(row, column));
-            if let (Some(place), Some((all, exposures))) = (pattern.place(row, column), blocks) {
-                let q = scatter[place] / curvature.powi(2) + prior[place];
-                // Off the diagonal each block stands for its transpose, too.
-                let times = if row == column { 1.0 } else { 2.0 };
-                trace += times * all.component_mul(&q).sum();
-                trace -= times * exposures.component_mul(&exposures_part(&q)).sum();
-            }
-        }
-    }
-    let freedoms = count * POSE - gauge;
+    let q = scatter.iter().zip(prior);
+    let q: Vec<Block> = q.map(|(v, p)| v / curvature.powi(2) + p).collect();
+    let q_ee: Vec<Block> = q.iter().map(exposures_part).collect();
+    let trace =
+        trace_of_product(pattern, &inverse, &q) - trace_of_product(pattern, &of_exposures, &q_ee);
+    let freedoms = count * POSE - tied;
     let variance_factor = trace / freedoms as f64;
-    let pose = |block: Block| variance_factor * block.fixed_view::<6, 6>(0, 0).into_owned();
+    let pose = |block: Block| variance_factor * block.fixed_view::<POSE, POSE>(0, 0).into_owned();
     let unknown = Matrix6::from_element(f64::NAN);
     Ok(Covariances {
         frames: (0..count)
@@ -200,6 +191,22 @@ pub fn covariances(
             .collect(),
         variance_factor,
     })
+}
+
+/// `tr(H⁻¹ Q)` of a symmetric matrix Q with the upper `blocks` on `pattern`.
+fn trace_of_product(pattern: &Pattern, inverse: &SelectedInverse, blocks: &[Block]) -> f64 {
+    let mut trace = 0.0;
+    for column in 0..pattern.frames() {
+        for &row in pattern.rows(column) {
+            let z = inverse.block(row, column);
+            if let Some((place, z)) = pattern.place(row, column).zip(z) {
+                // Off the diagonal each block stands for its transpose, too.
+                let times = if row == column { 1.0 } else { 2.0 };
+                trace += times * z.component_mul(&blocks[place]).sum();
+            }
+        }
+    }
+    trace
 }
 
 /// The part of a block that is the exposures' own.
@@ -302,7 +309,7 @@ mod tests {
         }
         let none = vec![Block::zeros(); pattern.blocks()];
         let at = |scatter: &[Block], prior: &[Block], curvature: f64| {
-            covariances(&pattern, (&normal, 0), scatter, prior, curvature).unwrap()
+            covariances(&pattern, &normal, 0, scatter, prior, curvature).unwrap()
         };
         let one = at(&normal.blocks, &none, 1.0);
         assert!((one.variance_factor - 1.0).abs() < 1e-12);
@@ -319,7 +326,7 @@ mod tests {
         let same = at(&exposed, &none, 1.0);
         assert!((same.variance_factor - 1.0).abs() < 1e-12);
         // With the gauge tied, two of 18 freedoms are no freedoms.
-        let tied = covariances(&pattern, (&normal, 2), &normal.blocks, &none, 1.0).unwrap();
+        let tied = covariances(&pattern, &normal, 2, &normal.blocks, &none, 1.0).unwrap();
         assert!((tied.variance_factor - 18.0 / 16.0).abs() < 1e-12);
     }
 
@@ -345,7 +352,7 @@ mod tests {
         let mut normal = NormalEquations::zeros(&pattern);
         normal.blocks = blocks(&h);
         let none = vec![Block::zeros(); pattern.blocks()];
-        let found = covariances(&pattern, (&normal, 0), &blocks(&q), &none, 1.0).unwrap();
+        let found = covariances(&pattern, &normal, 0, &blocks(&q), &none, 1.0).unwrap();
         let poses: Vec<usize> = (0..2 * UNKNOWNS).filter(|k| k % UNKNOWNS < POSE).collect();
         let inverse = h.try_inverse().unwrap();
         let sandwich = &inverse * q * &inverse;

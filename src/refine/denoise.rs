@@ -36,7 +36,7 @@ pub struct TextureSpectrum {
     basis: Square<f64>,
     squares: Square<f64>,
     /// `Σ u` by the spacing d, in steps of [`SPACING_PX`].
-    shares: [f64; SPACINGS],
+    noise_shares: [f64; SPACINGS],
 }
 
 /// Width of a bin of spacings, pixels, and their number: the last has all that is beyond.
@@ -48,7 +48,7 @@ impl Default for TextureSpectrum {
         Self {
             basis: polynomials(),
             squares: [[0.0; SIDE]; SIDE],
-            shares: [0.0; SPACINGS],
+            noise_shares: [0.0; SPACINGS],
         }
     }
 }
@@ -70,14 +70,18 @@ impl TextureSpectrum {
         }
         for (spacing_px, share) in frames {
             let bin = (spacing_px / SPACING_PX) as usize;
-            self.shares[bin.min(SPACINGS - 1)] += share;
+            self.noise_shares[bin.min(SPACINGS - 1)] += share;
         }
     }
 
     /// Adds the counts of another.
     pub fn merge(mut self, other: &Self) -> Self {
-        let others = other.squares.iter().flatten().chain(&other.shares);
-        let own = self.squares.iter_mut().flatten().chain(&mut self.shares);
+        let others = other.squares.iter().flatten().chain(&other.noise_shares);
+        let own = self
+            .squares
+            .iter_mut()
+            .flatten()
+            .chain(&mut self.noise_shares);
         own.zip(others).for_each(|(a, b)| *a += b);
         self
     }
@@ -85,11 +89,12 @@ impl TextureSpectrum {
     /// The filter for samples with noise of variance `floor`, σ² (grey levels²).
     pub fn denoiser(&self, floor: f64, interpolation: Interpolation) -> Denoiser {
         let mut noise = [[0.0; SIDE]; SIDE];
-        for (bin, share) in self.shares.iter().enumerate().filter(|(_, u)| **u > 0.0) {
-            let nu = self.noise((bin as f64 + 0.5) * SPACING_PX, interpolation);
+        let shares = self.noise_shares.iter().enumerate();
+        for (bin, u) in shares.filter(|(_, u)| **u > 0.0) {
+            let nu = self.nu((bin as f64 + 0.5) * SPACING_PX, interpolation);
             for (row, nu_l) in noise.iter_mut().zip(&nu) {
                 for (noise, nu_k) in row.iter_mut().zip(&nu) {
-                    *noise += floor * share * nu_l * nu_k;
+                    *noise += floor * u * nu_l * nu_k;
                 }
             }
         }
@@ -106,7 +111,7 @@ impl TextureSpectrum {
     }
 
     /// `ν_k` of samples `spacing_px` apart.
-    fn noise(&self, spacing_px: f64, interpolation: Interpolation) -> [f64; SIDE] {
+    fn nu(&self, spacing_px: f64, interpolation: Interpolation) -> [f64; SIDE] {
         let covariances: [f64; SIDE] =
             std::array::from_fn(|k| interpolation.autocorrelation(k as f64 * spacing_px));
         let correlation = |i: usize, j: usize| covariances[i.abs_diff(j)] / covariances[0];

@@ -66,6 +66,11 @@ impl Gauge {
         }
     }
 
+    /// How many freedoms there are.
+    pub fn freedoms(&self) -> usize {
+        usize::from(self.turn) + usize::from(self.shift)
+    }
+
     /// The steps `ξ` ([`Pose::retract`]) by which `pose` moves along each freedom, per radian and per metre:
     /// `(Rᵀn, n × (t − p) + pitch n)` for the turn about the axis through p along n and `(0, n)` for the shift.
     pub fn directions(&self, pose: &Pose) -> Vec<Vector6<f64>> {

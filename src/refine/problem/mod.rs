@@ -501,10 +501,10 @@ impl<'a> Problem<'a> {
 
     /// How many freedoms of the poses the tie of the gauge takes.
     pub fn tied_freedoms(&self) -> usize {
-        let free = self.held_frames() == 0;
-        let ties = |estimate: &FrameEstimate| self.scene.surface.gauge().directions(&estimate.pose);
-        let first = self.held.first().filter(|_| free);
-        first.map_or(0, |estimate| ties(estimate).len())
+        match self.held_frames() {
+            0 => self.scene.surface.gauge().freedoms(),
+            _ => 0,
+        }
     }
 
     fn slot(&self, participant: usize) -> Option<usize> {
