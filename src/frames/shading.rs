@@ -107,6 +107,17 @@ impl Shading {
         range
     }
 
+    /// By what share two shadings of the same pictures differ, at the most, once their exposures are made equal: half of
+    /// the spread of `ln V/V'`.
+    pub fn differs(&self, other: &Self) -> f64 {
+        let ratio = Self {
+            size: self.size,
+            coefficients: std::array::from_fn(|k| self.coefficients[k] - other.coefficients[k]),
+        };
+        let [least, greatest] = ratio.range();
+        0.5 * (greatest / least).ln()
+    }
+
     /// Divides a full-size picture by V.
     pub fn divide(&self, image: &mut GreyImage) {
         let (width, height) = self.size;
@@ -189,6 +200,18 @@ mod tests {
     fn lamp(x: f64, y: f64) -> f64 {
         let (dx, dy) = (x / 63.0 - 0.6, (y / 63.0) - 0.3);
         1.0 - 0.9 * (dx * dx + dy * dy)
+    }
+
+    #[test]
+    fn shadings_differ_by_a_share_and_not_by_their_sign() {
+        let none = Shading::none((64, 48));
+        let mut delta = [0.0; TERMS];
+        // P_1(x), from −1 to 1.
+        delta[0] = 0.03;
+        let sloped = none.changed(&delta);
+        assert!((sloped.differs(&none) - 0.03).abs() < 1e-12);
+        assert_eq!(sloped.differs(&none), none.differs(&sloped));
+        assert_eq!(sloped.differs(&sloped), 0.0);
     }
 
     #[test]

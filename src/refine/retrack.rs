@@ -1,10 +1,15 @@
-//! Tracking with a camera that is only roughly known.
+//! Tracking in a light and with a camera that are only roughly known.
 //!
-//! Frames placed with a wrong camera fit badly where they overlap, and some end up in the wrong place. But what they tell of
+//! The mean of all frames shows the camera's light up to what is left of the wall in it, which on a faint wall is as much as there is
+//! to see. So a few frames are tracked first; where they overlap they tell the light ([`super::flat_field`]), and they are
+//! tracked again in that, until the light stays as it is. Then the others follow.
+//!
+//! Likewise, frames placed with a wrong camera fit badly where they overlap, and some end up in the wrong place. But what they tell of
 //! the camera is much better than what was given, so they are tracked again with that, until the camera stays as it is.
 
 use super::calibration::Kappa;
 use super::doubt::Doubt;
+use super::flat_field::{MOST_FRAMES, flatten};
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
 use super::problem::{Problem, ProblemError, Sampling, Scene};
@@ -17,12 +22,18 @@ use serde::{Deserialize, Serialize};
 const ROUNDS: usize = 5;
 /// A camera that has moved a pixel by less than this, pixels of full size, is the one the frames were placed with.
 const SAME_CAMERA_PX: f64 = 2.0;
+/// Times that a few frames are tracked for the light, at the most.
+const LIGHT_ROUNDS: usize = 3;
+/// A light that has changed nowhere by more than this share is the one the frames were placed in.
+const SAME_LIGHT: f64 = 0.01;
 /// Points on each edge of the picture at which cameras are compared.
 const STEPS_PER_EDGE: usize = 4;
 
 /// Frames being placed, in one round after another.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Retracking {
+    /// Whether the light is as well known as it gets.
+    lit: bool,
     /// The round, from 0.
     round: usize,
     /// The shared unknowns that it began with.
@@ -37,11 +48,41 @@ impl Retracking {
     pub fn begin(doubts: Vec<Option<Doubt>>) -> Self {
         let kappa = Kappa::zeros();
         Self {
+            lit: false,
             round: 0,
             kappa,
             tracking: Tracking::begin(doubts.clone(), kappa),
             useless: doubts,
         }
+    }
+
+    /// Places the first frames and corrects the shading, if there is one, by what they tell where they overlap.
+    fn find_light(
+        &mut self,
+        scene: &Scene,
+        options: &RefineOptions,
+        progress: &dyn Progress,
+    ) -> Result<(), ProblemError> {
+        let frames = self.useless.len().min(MOST_FRAMES);
+        for _ in 0..LIGHT_ROUNDS {
+            let Some(before) = scene.frames.shading() else {
+                break;
+            };
+            self.tracking = Tracking::begin(self.useless.clone(), self.kappa);
+            progress.start("light", frames);
+            while self.tracking.placed() < frames {
+                self.tracking.place_next(scene, options)?;
+                progress.advance(1);
+            }
+            progress.finish();
+            let mut tracked = self.tracking.so_far();
+            flatten(&scene.at(tracked.kappa), options, &mut tracked)?;
+            let after = scene.frames.shading();
+            if after.is_none_or(|after| after.differs(&before) < SAME_LIGHT) {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// Places all frames that are left, with the camera's unknowns if they are to be estimated. `between` is called after
@@ -62,6 +103,9 @@ impl Retracking {
             ..*scene
         }
         .at(self.kappa);
+        if !std::mem::replace(&mut self.lit, true) {
+            self.find_light(&scene, options, progress)?;
+        }
         loop {
             progress.start("tracking", self.useless.len());
             progress.advance(self.tracking.placed());

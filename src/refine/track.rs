@@ -119,6 +119,13 @@ impl Tracking {
         self.placed() == self.tracked.doubts.len()
     }
 
+    /// The frames placed so far, as if there were no others.
+    pub fn so_far(&self) -> Tracked {
+        let mut tracked = self.tracked.clone();
+        tracked.doubts.truncate(tracked.estimates.len());
+        tracked
+    }
+
     /// All frames.
     pub fn finish(self) -> Tracked {
         self.tracked
