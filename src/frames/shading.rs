@@ -110,10 +110,7 @@ impl Shading {
     /// By what share two shadings of the same pictures differ, at the most, once their exposures are made equal: half of
     /// the spread of `ln V/V'`.
     pub fn differs(&self, other: &Self) -> f64 {
-        let ratio = Self {
-            size: self.size,
-            coefficients: std::array::from_fn(|k| self.coefficients[k] - other.coefficients[k]),
-        };
+        let ratio = self.changed(&other.coefficients.map(|c| -c));
         let [least, greatest] = ratio.range();
         0.5 * (greatest / least).ln()
     }

@@ -32,8 +32,6 @@ const STEPS_PER_EDGE: usize = 4;
 /// Frames being placed, in one round after another.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Retracking {
-    /// Whether the light is as well known as it gets.
-    lit: bool,
     /// The round, from 0.
     round: usize,
     /// The shared unknowns that it began with.
@@ -48,7 +46,6 @@ impl Retracking {
     pub fn begin(doubts: Vec<Option<Doubt>>) -> Self {
         let kappa = Kappa::zeros();
         Self {
-            lit: false,
             round: 0,
             kappa,
             tracking: Tracking::begin(doubts.clone(), kappa),
@@ -103,7 +100,7 @@ impl Retracking {
             ..*scene
         }
         .at(self.kappa);
-        if !std::mem::replace(&mut self.lit, true) {
+        if self.round == 0 && self.tracking.placed() == 0 {
             self.find_light(&scene, options, progress)?;
         }
         loop {
