@@ -18,7 +18,8 @@
 //!
 //! [`camera`], [`trajectory`] and [`surface`] are the geometry; [`frames`] loads the pictures; [`refine`],
 //! [`render`] and [`simulate`] know nothing of each other and share the geometry only (the simulator not even
-//! the ray–wall intersection, so that it can judge the others); [`raster`] writes pictures larger than the memory;
+//! the ray–wall intersection, so that it can judge the others); [`super_resolve`] solves for the wall finer than any frame, for
+//! panoramas and poses alike; [`raster`] writes pictures larger than the memory;
 //! [`evaluate`] measures; [`report`] makes a page of it all; [`inspect`] puts the panorama on the wall in three dimensions;
 //! [`cli`] prints.
 //!
@@ -105,6 +106,7 @@ pub mod refine;
 pub mod render;
 pub mod report;
 pub mod simulate;
+pub mod super_resolve;
 pub mod surface;
 pub mod survey;
 #[cfg(test)]

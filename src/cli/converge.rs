@@ -35,6 +35,9 @@ pub struct ConvergeArguments {
     /// nothing else is asked for; writes efficiency.json and efficiency.txt.
     #[arg(long)]
     efficiency: bool,
+    /// With --efficiency: refine as `refine --joint` does.
+    #[arg(long, requires = "efficiency")]
+    joint: bool,
     /// Folder for the results; made if missing. An unfinished sweep in it is continued.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
@@ -135,7 +138,12 @@ impl ConvergeArguments {
 /// Impossible options, a log of another sweep, or an output that cannot be written.
 pub fn run(arguments: &ConvergeArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     if arguments.efficiency {
-        let table = converge::efficiency(&arguments.options(), &arguments.out, terminal)?;
+        let table = converge::efficiency(
+            &arguments.options(),
+            arguments.joint,
+            &arguments.out,
+            terminal,
+        )?;
         run.write(&arguments.out.join(RUN_FILE), &[])?;
         if arguments.json {
             return json::print(&table);

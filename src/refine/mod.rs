@@ -58,6 +58,7 @@ mod foreign;
 mod gauss_newton;
 mod grid;
 mod interpolation;
+mod joint;
 mod lens;
 mod neighbourhood;
 mod normal;

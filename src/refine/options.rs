@@ -32,6 +32,9 @@ pub struct RefineOptions {
     pub windows: bool,
     /// Linearise with the gradient of the texture fused from all frames; otherwise each frame with its own picture's.
     pub fused_gradient: bool,
+    /// Solve for the wall at the density of the last solve, jointly with the poses, instead of taking what the frames show between
+    /// their pixels for it: on sharp walls errors a third smaller, in many times the time.
+    pub joint: bool,
     /// Memory for decoded frames, bytes. Frames that do not fit are decoded anew when needed.
     pub cache_bytes: usize,
     /// Steps of a global solve per level, at the most.
@@ -57,6 +60,7 @@ impl Default for RefineOptions {
             search: true,
             windows: true,
             fused_gradient: true,
+            joint: false,
             cache_bytes: 2 << 30,
             max_iterations: 20,
             step_tolerance_px: 0.0005,

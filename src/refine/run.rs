@@ -444,6 +444,7 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
         density: options.final_density,
         interpolation: Interpolation::Bicubic,
         by_variance: true,
+        joint: options.joint,
         ..Sampling::of(0)
     };
     let first = options.handover_level(side);

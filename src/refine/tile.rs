@@ -85,6 +85,17 @@ pub struct ObserverMoments {
     pub inliers: f64,
 }
 
+/// Moments of a tile.
+#[derive(Clone, Debug, Default)]
+pub struct TileMoments {
+    /// Of each observer, in the order given.
+    pub observers: Vec<ObserverMoments>,
+    /// `Σ_x p φ φᵀ`.
+    pub features: Matrix4<f64>,
+    /// M of each observer's own gradient, if that is asked for.
+    pub own_features: Vec<Matrix4<f64>>,
+}
+
 /// How a frame fits the others over a tile.
 #[derive(Clone, Copy, Debug)]
 pub struct Misfit {
@@ -137,12 +148,8 @@ pub struct TileWork {
     samples: Vec<Samples>,
     /// True if some frame lacks some value.
     gaps: bool,
-    /// Moments of each observer, in the order given.
-    pub observers: Vec<ObserverMoments>,
-    /// `Σ_x p φ φᵀ`.
-    pub features: Matrix4<f64>,
-    /// M of each observer's own gradient, if that is asked for.
-    pub own_features: Vec<Matrix4<f64>>,
+    /// What the work came to.
+    pub found: TileMoments,
     /// How each observer fits the others, if that is asked for.
     pub misfits: Vec<Misfit>,
     /// Values in ascending order, sample by sample.
@@ -290,7 +297,7 @@ impl TileWork {
         texture
     }
 
-    /// Fills [`TileWork::observers`] and [`TileWork::features`] for a tile's observers.
+    /// Fills [`TileWork::found`] for a tile's observers.
     ///
     /// `spacing_m`: distance between samples along s and h.
     #[inline(always)]
@@ -329,19 +336,19 @@ impl TileWork {
             }
         }
         let shares = self.shares(&trust);
-        self.features = feature_moments(&phi, &shares);
-        self.observers.clear();
-        self.own_features.clear();
+        self.found.features = feature_moments(&phi, &shares);
+        self.found.observers.clear();
+        self.found.own_features.clear();
         for frame in &self.samples {
             let moments = if fused {
                 observer_moments(frame, &phi, &precision, [&variance, &trust])
             } else {
                 let [own_s, own_h, _] = features(&frame.values, slopes, &covered);
                 let own = [own_s, own_h, phi[2]];
-                self.own_features.push(feature_moments(&own, &shares));
+                self.found.own_features.push(feature_moments(&own, &shares));
                 observer_moments(frame, &own, &precision, [&variance, &trust])
             };
-            self.observers.push(moments);
+            self.found.observers.push(moments);
         }
     }
 
@@ -718,7 +725,7 @@ mod tests {
                         denoiser,
                     };
                     work.moments(points, seen(), spacing, &weighing);
-                    sum += work.features[(0, 0)] + work.features[(1, 1)];
+                    sum += work.found.features[(0, 0)] + work.found.features[(1, 1)];
                 }
                 sum
             };

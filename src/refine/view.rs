@@ -5,6 +5,7 @@ use super::grid::{Plane, TilePoints, ZERO};
 use super::interpolation::{Interpolation, cubic_weights};
 use crate::camera::{Bend, Camera, SingleLens, Sweep};
 use crate::frames::GreyImage;
+use crate::super_resolve::{self, Reading};
 use crate::surface::{lens_jacobian, wall_jacobian};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix2x6, Matrix3, Vector3};
@@ -19,6 +20,7 @@ type Indices = [u32; ZERO.len()];
 /// A frame at one pyramid level with its current estimate, ready to be sampled.
 pub struct View<'a> {
     image: &'a GreyImage,
+    camera: Camera,
     /// `fx, fy, cx, cy`.
     intrinsics: [f32; 4],
     lens: SingleLens,
@@ -35,6 +37,7 @@ impl<'a> View<'a> {
         let r_wc = estimate.pose.r_wc.to_rotation_matrix();
         Self {
             image,
+            camera,
             intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy].map(|v| v as f32),
             lens: SingleLens::new(&camera),
             pose: estimate.pose,
@@ -50,6 +53,28 @@ impl<'a> View<'a> {
         Self {
             interpolation,
             ..self
+        }
+    }
+
+    /// The frame as its footprints are sought.
+    pub fn placed(&self) -> super_resolve::View<'_> {
+        super_resolve::View {
+            camera: self.camera,
+            pose: &self.pose,
+        }
+    }
+
+    /// What a pixel (by its number, row-major) says of the wall where the shading is `shade`, with noise of `sigma` grey
+    /// levels; nothing where it has no value.
+    #[inline(always)]
+    pub fn reading(&self, pixel: u32, shade: f32, sigma: f32) -> Reading {
+        let value = (self.image.data()[pixel as usize] - self.bias / shade) / self.gain;
+        match value.is_finite() {
+            true => Reading {
+                value,
+                inverse_sigma: self.gain * shade / sigma,
+            },
+            false => Reading::default(),
         }
     }
 

@@ -10,6 +10,7 @@ use crate::surface::{Footprint, Patches, Surface};
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::ops::Range;
 
 /// Pixels that a tile must stay away from the frame's border and from what is masked: room for the steps to come.
@@ -108,6 +109,8 @@ pub struct Visibility {
     pub observers: Vec<Observer>,
     /// Runs of tiles of one block: the units of parallel work.
     pub blocks: Vec<Range<usize>>,
+    /// What [`Visibility::without`] has taken out: tiles and frames.
+    left_out: HashSet<(TileId, u32)>,
 }
 
 impl Visibility {
@@ -209,6 +212,9 @@ impl Visibility {
     pub fn without(&self, marks: &Marks) -> Self {
         let mut visibility = Self::default();
         for tile in &self.tiles {
+            let marked = tile.observers.clone().filter(|k| marks.has(*k));
+            let frames = marked.map(|k| (tile.id, self.observers[k].frame));
+            visibility.left_out.extend(frames);
             let left = tile.observers.clone().filter(|k| !marks.has(*k));
             if left.clone().nth(1).is_some() {
                 visibility.push(tile.id, left.map(|k| self.observers[k]));
@@ -226,6 +232,22 @@ impl Visibility {
         frames.sort_unstable();
         frames.dedup();
         frames
+    }
+
+    /// The tile of that name with its place in [`Visibility::tiles`], if it is among these.
+    pub fn tile(&self, id: TileId) -> Option<(usize, &Tile)> {
+        let of = |block: &Range<usize>| self.tiles[block.start].id.block();
+        let block = self.blocks.partition_point(|block| of(block) < id.block());
+        let block = self.blocks.get(block)?.clone();
+        let tiles = &self.tiles[block.clone()];
+        let place = (id.row, id.column);
+        let found = tiles.binary_search_by_key(&place, |tile| (tile.id.row, tile.id.column));
+        found.ok().map(|k| (block.start + k, &tiles[k]))
+    }
+
+    /// True if a frame sees a tile but does not show the wall there.
+    pub fn leaves_out(&self, tile: TileId, frame: usize) -> bool {
+        self.left_out.contains(&(tile, frame as u32))
     }
 
     /// The frames that see `tile`.

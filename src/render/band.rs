@@ -3,8 +3,8 @@
 use super::draw::NO_FRAME;
 use super::plan::BAND_ROWS;
 use super::sample::{Sample, Samples};
-use super::super_resolve::Region;
 use super::{Canvas, PixelFormat, RenderError, Tile};
+use crate::super_resolve::Region;
 use crate::vectors::wide;
 
 /// A stretch of the canvas, all around and some rows along.

@@ -1,6 +1,7 @@
 //! The grid of the panorama on the unrolled wall.
 
 use super::{Placement, RenderError};
+use crate::super_resolve::Lattice;
 use crate::surface::{Footprint, Surface, WallPoint};
 use image::DynamicImage;
 use serde::{Deserialize, Serialize};
@@ -146,6 +147,15 @@ impl Canvas {
     ) -> Result<Self, RenderError> {
         let footprints = placements.iter().map(|placement| &placement.footprint);
         Self::covering(surface, footprints, px_per_metre)
+    }
+
+    /// The pixels as a lattice that goes on beyond the first row and the last.
+    pub fn lattice(&self) -> Lattice {
+        Lattice {
+            columns: i64::from(self.columns),
+            spacing_m: [1.0 / self.px_per_metre; 2],
+            h_start_m: self.h_start_m,
+        }
     }
 
     /// The wall point at the centre of a pixel.

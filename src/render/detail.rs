@@ -1,11 +1,11 @@
-//! The panorama finer than any frame: bands drawn as ever and then solved anew from all frames ([`super::super_resolve`]).
+//! The panorama finer than any frame: bands drawn as ever and then solved anew from all frames ([`crate::super_resolve`]).
 
 use super::band::Band;
 use super::exposure::{Exposure, Response};
 use super::sample::{Sample, Samples};
-use super::super_resolve::{Channel, Footprints, MARGIN, Region, View};
 use super::{Canvas, FrameStack, Picture, Placement, Tile};
 use crate::frames::{GreyImage, noise_sigma};
+use crate::super_resolve::{Footprints, MARGIN, Reading, Region, View};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -13,13 +13,16 @@ use std::collections::BTreeMap;
 /// Variance of rounding to whole numbers.
 const ROUNDING: f64 = 1.0 / 12.0;
 
+/// Noise is at least this, grey levels: rounding to 8 bits gives 0.29.
+const LEAST_NOISE: f32 = 0.2;
+
 /// What frames read of the evenly lit wall, as long as it is needed.
 #[derive(Default)]
 pub struct Readings {
-    frames: BTreeMap<usize, Reading>,
+    frames: BTreeMap<usize, Frame>,
 }
 
-struct Reading {
+struct Frame {
     /// Grey levels of 255 for each channel; NaN where clipped or masked.
     channels: Vec<Vec<f32>>,
     /// 1-σ of their noise.
@@ -39,14 +42,9 @@ impl Readings {
             .copied()
             .filter(|frame| !self.frames.contains_key(frame))
             .collect();
-        let read: Vec<Option<(usize, Reading)>> = missing
+        let read: Vec<Option<(usize, Frame)>> = missing
             .into_par_iter()
-            .map(|frame| {
-                Some((
-                    frame,
-                    Reading::of(stack.picture(frame)?, exposure.of(frame)),
-                ))
-            })
+            .map(|frame| Some((frame, Frame::of(stack.picture(frame)?, exposure.of(frame)))))
             .collect();
         self.frames.extend(read.into_iter().flatten());
     }
@@ -90,7 +88,7 @@ impl Readings {
             columns: tile.columns as usize + 2 * across,
             rows: tile.rows as usize + 2 * MARGIN,
         };
-        let seen: Vec<(&usize, &Reading)> = tile
+        let seen: Vec<(&usize, &Frame)> = tile
             .frames
             .iter()
             .filter_map(|frame| Some((frame, self.frames.get(frame)?)))
@@ -102,18 +100,16 @@ impl Readings {
                 pose: &placements[**frame].pose,
             })
             .collect();
-        let footprints = Footprints::new(surface, canvas, region, &views);
+        let footprints = Footprints::new(surface, &canvas.lattice(), region, &views);
         (0..band.format.channels)
             .map(|c| {
-                let channels: Vec<Channel> = seen
+                let readings: Vec<Vec<Reading>> = seen
                     .iter()
-                    .map(|(_, reading)| Channel {
-                        values: &reading.channels[c],
-                        noise: reading.noise,
-                    })
+                    .enumerate()
+                    .map(|(view, (_, frame))| frame.readings(footprints.pixels(view), c))
                     .collect();
                 let start = band.region(canvas, &region, c);
-                let solved = footprints.super_resolve(&channels, &start);
+                let solved = footprints.super_resolve(&readings, &start).values;
                 let rows = solved.chunks_exact(region.columns).skip(MARGIN);
                 rows.take(tile.rows as usize)
                     .flat_map(|row| &row[across..across + tile.columns as usize])
@@ -124,7 +120,7 @@ impl Readings {
     }
 }
 
-impl Reading {
+impl Frame {
     fn of(picture: &Picture, response: Response) -> Self {
         let channels = match picture.samples() {
             Samples::Eight(samples) => channels(picture, samples, response),
@@ -139,6 +135,20 @@ impl Reading {
             noise: (noise * noise + ROUNDING).sqrt() as f32,
             channels,
         }
+    }
+
+    /// What some pixels read in a channel.
+    fn readings(&self, pixels: &[u32], channel: usize) -> Vec<Reading> {
+        let values = &self.channels[channel];
+        let inverse_sigma = 1.0 / self.noise.max(LEAST_NOISE);
+        let reading = |pixel: &u32| match values[*pixel as usize] {
+            value if value.is_finite() => Reading {
+                value,
+                inverse_sigma,
+            },
+            _ => Reading::default(),
+        };
+        pixels.iter().map(reading).collect()
     }
 }
 

@@ -68,7 +68,6 @@ mod sample;
 mod seams;
 mod stack;
 mod stitch;
-pub mod super_resolve;
 mod thumbnails;
 mod tiles;
 mod view;

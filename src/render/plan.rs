@@ -26,7 +26,7 @@ pub struct RenderOptions {
     pub mode: Mode,
     /// Whether exposure is undone and light levelled out over seams; else frames keep the values they have.
     pub blend: bool,
-    /// Whether the wall is solved from all frames, finer than any of them ([`super::super_resolve`]); exposure must be undone for it.
+    /// Whether the wall is solved from all frames, finer than any of them ([`crate::super_resolve`]); exposure must be undone for it.
     pub super_resolve: bool,
 }
 

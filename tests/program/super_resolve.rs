@@ -5,9 +5,9 @@ use std::time::Instant;
 use tunnelstitch::camera::Camera;
 use tunnelstitch::evaluate::mtf50;
 use tunnelstitch::frames::GreyImage;
-use tunnelstitch::render::super_resolve::{Channel, Footprints, MARGIN, Region, View};
 use tunnelstitch::render::{Canvas, Interpolation, Kernel, Picture, native_px_per_metre, place};
 use tunnelstitch::simulate::{Light, Scene, SimulateOptions, SlantedEdge, Wall};
+use tunnelstitch::super_resolve::{Footprints, MARGIN, Reading, Region, View};
 use tunnelstitch::surface::{Circle, Surface, WallPoint};
 use tunnelstitch::survey::TunnelSection;
 use tunnelstitch::trajectory::Shutter;
@@ -120,17 +120,22 @@ impl Simulated {
                 pose,
             })
             .collect();
-        let channels: Vec<Channel> = self
-            .values
-            .iter()
-            .map(|values| Channel {
-                values,
-                noise: self.noise,
+        let read = |value: f32| match value.is_finite() {
+            true => Reading {
+                value,
+                inverse_sigma: 1.0 / self.noise,
+            },
+            false => Reading::default(),
+        };
+        let clock = Instant::now();
+        let footprints = Footprints::new(&self.circle, &self.canvas.lattice(), region, &views);
+        let readings: Vec<Vec<Reading>> = (self.values.iter().enumerate())
+            .map(|(view, values)| {
+                let pixels = footprints.pixels(view).iter();
+                pixels.map(|pixel| read(values[*pixel as usize])).collect()
             })
             .collect();
-        let clock = Instant::now();
-        let footprints = Footprints::new(&self.circle, &self.canvas, region, &views);
-        let solved = footprints.super_resolve(&channels, &start);
+        let solved = footprints.super_resolve(&readings, &start).values;
         let seconds = clock.elapsed().as_secs_f64();
         let mut drawn = Vec::new();
         for (k, found) in bicubic.into_iter().enumerate() {

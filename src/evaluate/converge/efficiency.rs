@@ -100,7 +100,7 @@ impl Squares {
     }
 }
 
-/// Runs `options.seeds` surveys of each cell and writes efficiency.json and efficiency.txt into `out`.
+/// Runs `options.seeds` surveys of each cell, refined with the wall solved for jointly or not, and writes efficiency.json and efficiency.txt into `out`.
 ///
 /// A sensor rounds to whole grey levels; the bounds are for its noise and the rounding's variance, 1/12, together.
 ///
@@ -108,6 +108,7 @@ impl Squares {
 /// [`ConvergeError`].
 pub fn efficiency(
     options: &ConvergeOptions,
+    joint: bool,
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Vec<Efficiency>, ConvergeError> {
@@ -127,7 +128,7 @@ pub fn efficiency(
                 progress.advance(1);
                 continue;
             };
-            let run = one(&survey, out)?;
+            let run = one(&survey, joint, out)?;
             surveys += 1;
             factors += run.variance_factor;
             normalised.extend(run.normalised);
@@ -185,13 +186,17 @@ struct Run {
 }
 
 /// Refines one survey and computes its bounds.
-fn one(options: &SimulateOptions, out: &Path) -> Result<Run, ConvergeError> {
+fn one(options: &SimulateOptions, joint: bool, out: &Path) -> Result<Run, ConvergeError> {
     let scratch = ScratchFolder::inside(out)?;
     let folder = scratch.path().join("survey");
     simulate::run(options, &folder, false, &Silent)?;
     let survey = Survey::open(&folder)?;
     let silent: Arc<dyn Progress> = Arc::new(Silent);
-    let refined = refine(&survey, &RefineOptions::default(), &silent)?;
+    let refining = RefineOptions {
+        joint,
+        ..RefineOptions::default()
+    };
+    let refined = refine(&survey, &refining, &silent)?;
     let doubled = doubled_frames(options, &scratch.path().join("doubled"))?;
     let noise = (options.noise_grey.powi(2) + ROUNDING).sqrt();
     let truth = poses_of(survey.truth.as_deref().unwrap_or_default());

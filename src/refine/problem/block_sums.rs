@@ -6,9 +6,9 @@ use crate::refine::estimate::{FrameStep, UNKNOWNS};
 use crate::refine::grid::TilePoints;
 use crate::refine::lens::LensSums;
 use crate::refine::normal::{Block, NormalEquations, Pattern};
-use crate::refine::tile::{ObserverMoments, SAMPLES, TileWork, Weighing};
+use crate::refine::tile::{ObserverMoments, SAMPLES, TileMoments, TileWork, Weighing};
 use crate::refine::view::View;
-use crate::refine::visibility::Visibility;
+use crate::refine::visibility::{Tile, Visibility};
 use crate::vectors::wide;
 use nalgebra::{Matrix2x6, Matrix4, SMatrix};
 use std::ops::Range;
@@ -43,32 +43,24 @@ impl Problem<'_> {
             denoiser: self.denoiser.as_ref(),
         };
         let mut summed: Vec<TileSums> = Vec::with_capacity(tiles.len());
-        for tile in tiles {
-            let points = TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
+        let mut add = |tile: &Tile, points: &TilePoints, found: &TileMoments| {
             let observers = visibility.observers(tile);
-            wide(
-                #[inline(always)]
-                || {
-                    let seen = observers.iter().map(|o| o.seen(views));
-                    work.moments(&points, seen, spacing, &weighing);
-                },
-            );
             let mut columns = Vec::with_capacity(observers.len());
-            for (k, (observer, moments)) in observers.iter().zip(&work.observers).enumerate() {
+            for (k, (observer, moments)) in observers.iter().zip(&found.observers).enumerate() {
                 sums.cost += moments.cost;
                 let view = &views[observer.frame as usize];
                 if let Some(slot) = stretch_slots[observer.frame as usize] {
-                    let a = view.wall_jacobian(&points);
+                    let a = view.wall_jacobian(points);
                     let mut c = Matrix2x6::zeros();
                     if self.calibrates {
                         let frame = self.coverage.frames(stretch)[observer.frame as usize];
-                        let seen = view.shared_jacobian(&points, &a, lens, &self.rates[frame]);
+                        let seen = view.shared_jacobian(points, &a, lens, &self.rates[frame]);
                         c.copy_from(&seen);
                     }
                     columns.push(Column {
                         place: sums.place(slot),
                         moments: *moments,
-                        own_features: work.own_features.get(k).copied(),
+                        own_features: found.own_features.get(k).copied(),
                         a,
                         c,
                         inverse_gain: 1.0 / f64::from(view.gain() * observer.shade),
@@ -77,9 +69,30 @@ impl Problem<'_> {
             }
             summed.push(TileSums {
                 columns,
-                features: work.features,
-                total: total_weight(&work),
+                features: found.features,
+                total: found.observers.iter().map(|observer| observer.weight).sum(),
             });
+        };
+        let points_of = |tile: &Tile, scratch: &mut Vec<_>| {
+            TilePoints::new(&self.grid, self.scene.surface, tile.id, scratch)
+        };
+        if let Some(roughness) = self.roughness {
+            let found = self.joint(visibility, block, views).moments(roughness);
+            for (tile, found) in tiles.iter().zip(&found) {
+                add(tile, &points_of(tile, &mut scratch), found);
+            }
+        } else {
+            for tile in tiles {
+                let points = points_of(tile, &mut scratch);
+                wide(
+                    #[inline(always)]
+                    || {
+                        let seen = visibility.observers(tile).iter().map(|o| o.seen(views));
+                        work.moments(&points, seen, spacing, &weighing);
+                    },
+                );
+                add(tile, &points, &work.found);
+            }
         }
         wide(
             #[inline(always)]
@@ -94,11 +107,6 @@ impl Problem<'_> {
         );
         sums
     }
-}
-
-/// Weight of all observers of a tile, per sample.
-fn total_weight(work: &TileWork) -> f64 {
-    work.observers.iter().map(|observer| observer.weight).sum()
 }
 
 /// What a tile adds to the normal equations.

@@ -4,18 +4,23 @@ use super::{Members, Problem, ProblemError, Sampling};
 use crate::frames::noise_at_level;
 use crate::refine::denoise::TextureSpectrum;
 use crate::refine::foreign::Foreign;
-use crate::refine::grid::TilePoints;
+use crate::refine::grid::{BLOCK, TilePoints};
 use crate::refine::interpolation::Interpolation;
+use crate::refine::joint::JointBlock;
 use crate::refine::robust::NoiseHistogram;
 use crate::refine::tile::{Misfit, Seen, TileWork};
 use crate::refine::view::View;
 use crate::refine::visibility::{Observer, Tile, Visibility};
+use crate::super_resolve::{Evidence, KINDS};
 use crate::vectors::wide;
 use rayon::prelude::*;
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// Tiles looked at to estimate the noise.
 const SCALE_TILES: usize = 600;
+/// Blocks of tiles that are solved for to learn how rough the wall is.
+const ROUGHNESS_BLOCKS: usize = 48;
 /// Factor by which the variance of residuals may be short of the sensor's.
 const MOST_UNDERESTIMATE: f64 = 1.25;
 
@@ -64,6 +69,42 @@ impl Problem<'_> {
         Ok(())
     }
 
+    /// Learns how rough the wall is, from blocks spread over all of it.
+    pub(super) fn learn_roughness(&self) -> Result<[f64; KINDS], ProblemError> {
+        let blocks = self.coverage.tiles / (BLOCK * BLOCK) as usize;
+        let stride = (blocks / ROUGHNESS_BLOCKS).max(1);
+        let mut evidence = Evidence::default();
+        for stretch in 0..self.coverage.len() {
+            let visibility = self.coverage.visibility(stretch)?;
+            let pictures = self.pictures.of(self.coverage.frames(stretch))?;
+            let views = self.held_views(stretch, &pictures);
+            let blocks: Vec<&Range<usize>> = visibility.blocks.iter().step_by(stride).collect();
+            let found: Vec<Evidence> = blocks
+                .into_par_iter()
+                .map(|block| self.joint(&visibility, block, &views).evidence())
+                .collect();
+            evidence = found.iter().fold(evidence, Evidence::merge);
+        }
+        Ok(evidence.strengths())
+    }
+
+    /// A block of the wall, to be solved for jointly with the poses.
+    pub(super) fn joint<'v>(
+        &self,
+        visibility: &'v Visibility,
+        block: &Range<usize>,
+        views: &'v [View<'v>],
+    ) -> JointBlock<'v> {
+        JointBlock::new(
+            &self.scene,
+            &self.grid,
+            visibility,
+            block,
+            views,
+            self.sigma,
+        )
+    }
+
     /// Leaves out what is in a frame but not on the wall, as its own tiles show it or, if a `density` is given, those of
     /// another lattice over all of the wall.
     ///
@@ -76,6 +117,7 @@ impl Problem<'_> {
                 let sampling = Sampling {
                     density,
                     information: 1.0,
+                    joint: false,
                     ..self.sampling
                 };
                 let members = Members {

@@ -22,6 +22,7 @@ use super::view::View;
 use super::visibility::{Hidden, Placed};
 use crate::camera::{Camera, Sweep};
 use crate::frames::Pyramid;
+use crate::super_resolve::KINDS;
 use crate::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
 use nalgebra::Vector5;
 use rayon::prelude::*;
@@ -101,6 +102,8 @@ pub struct Problem<'a> {
     noise: NoiseModel,
     /// Takes the noise from the fused texture for its slopes.
     denoiser: Option<Denoiser>,
+    /// How rough the wall is, if it is solved for jointly with the poses.
+    roughness: Option<[f64; KINDS]>,
     /// True if the shared unknowns are estimated.
     calibrates: bool,
 }
@@ -210,9 +213,13 @@ impl<'a> Problem<'a> {
                 steepness: 0.0,
             },
             denoiser: None,
+            roughness: None,
             calibrates: false,
         };
         problem.estimate_noise()?;
+        if sampling.joint {
+            problem.roughness = Some(problem.learn_roughness()?);
+        }
         Ok(problem)
     }
 

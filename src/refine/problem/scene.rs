@@ -29,6 +29,8 @@ pub struct Sampling {
     /// Whether samples weigh by their variance, steep ones less ([`crate::refine::robust::NoiseModel`]): only once the frames are aligned;
     /// before that, residuals at steep places are what aligns them.
     pub by_variance: bool,
+    /// Whether the wall is solved for at the density of the samples, jointly with the poses ([`crate::refine::joint`]): at full size only.
+    pub joint: bool,
 }
 
 impl Sampling {
@@ -40,6 +42,7 @@ impl Sampling {
             information: 1.0,
             interpolation: Interpolation::Bilinear,
             by_variance: false,
+            joint: false,
         }
     }
 }

@@ -1,8 +1,8 @@
 //! The wall finer than any frame.
 //!
 //! ```text
-//! poses ─ Footprints::new ──> stencils ─┬─ Footprints::super_resolve ──> fine pixels, for each channel
-//! grey values, a panorama to start from ┘
+//! poses ─ Footprints::new ──> stencils ─┬─ Footprints::super_resolve ──> fine pixels, and how rough the wall is
+//! readings, values to start from ───────┴─ WallSolve ──> fine pixels, roughness and losses given
 //! ```
 //!
 //! A pixel is the mean of the wall over its square, and every frame's squares lie elsewhere: where several frames show
@@ -13,12 +13,15 @@
 //! Σ_p ρ((y_p − Σ_k w_pk x_k)/σ_p) + Σ_i a_i Σ_n ρ_i((D_i x)_n)
 //! ```
 //!
-//! with the footprints w ([`Footprints`]), differences `D_i` of neighbouring fine pixels and Huber's losses ρ: squares, but
+//! with the footprints w ([`Footprints`]), differences `D_i` of neighbouring fine pixels and robust losses ρ: squares, but
 //! linear for what stands out, so that what moves or glints pulls no harder than a few σ, and edges of the wall stay
-//! edges. How rough the wall is, `a`, is learned from the region itself.
+//! edges. How rough the wall is, `a`, is learned from the region itself, or given.
 //!
 //! A region is a tile with a margin: pixels near its border lack the views that would reach beyond it, so the margin is cut
 //! off. Two native pixels and what the differences reach, [`MARGIN`] fine pixels, are enough.
+//!
+//! Panoramas are drawn so ([`crate::render::RenderOptions::super_resolve`]), and poses estimated jointly with the wall
+//! ([`crate::refine::RefineOptions::joint`]).
 //!
 //! Sources: R. C. Hardie, K. J. Barnard, E. E. Armstrong, "Joint MAP registration and high-resolution image estimation
 //! using a sequence of undersampled images", IEEE Transactions on Image Processing 6(12), 1997; S. Farsiu, M. D. Robinson,
@@ -27,12 +30,16 @@
 mod conjugate_gradients;
 mod footprints;
 mod huber;
+mod learn;
 mod observations;
 mod region;
 mod roughness;
 mod solve;
+mod stencils;
 
 pub use footprints::{Footprints, View};
-pub use observations::Channel;
-pub use region::Region;
-pub use solve::MARGIN;
+pub use learn::{Evidence, Resolved};
+pub use observations::Reading;
+pub use region::{Lattice, Region};
+pub use roughness::KINDS;
+pub use solve::{MARGIN, WallSolve};

@@ -55,11 +55,6 @@ impl Roughness {
         }
     }
 
-    /// Number of fine pixels.
-    pub fn pixels(&self) -> usize {
-        self.columns * self.rows
-    }
-
     /// Sets `out` to `D_i x`, at the first of each difference's pixels.
     fn differences(&self, kind: usize, x: &[f32], out: &mut [f32]) {
         let taps = DIFFERENCES[kind];

@@ -1,0 +1,115 @@
+//! What the frames read of a region.
+
+use super::footprints::{Footprints, SEEN};
+use crate::vectors::wide;
+
+/// What a pixel says of the wall.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reading {
+    /// Grey levels of the wall, exposure and shading undone; 0 where the pixel says nothing.
+    pub value: f32,
+    /// `1/σ` of its noise; 0 where the pixel says nothing.
+    pub inverse_sigma: f32,
+}
+
+/// Pixels with their values and weights.
+pub(super) struct Observations<'a> {
+    pub footprints: &'a Footprints,
+    readings: &'a [Vec<Reading>],
+    /// Precisions with robust weight, view by view.
+    omega: Vec<Vec<f32>>,
+}
+
+impl<'a> Observations<'a> {
+    pub fn new(footprints: &'a Footprints, readings: &'a [Vec<Reading>]) -> Self {
+        let precisions = readings.iter().map(|readings| {
+            let squares = readings.iter().map(|r| r.inverse_sigma * r.inverse_sigma);
+            squares.collect()
+        });
+        Self {
+            footprints,
+            readings,
+            omega: precisions.collect(),
+        }
+    }
+
+    /// Number of pixels with a value.
+    pub fn count(&self) -> usize {
+        let all = self.readings.iter().flatten();
+        all.filter(|reading| reading.inverse_sigma > 0.0).count()
+    }
+
+    /// True for every fine pixel that pixels with a value show.
+    pub fn seen(&self) -> Vec<bool> {
+        let mut weight = vec![0.0; self.footprints.region.pixels()];
+        for (stencils, readings) in self.footprints.views.iter().zip(self.readings) {
+            let ones = readings.iter().map(|r| f32::from(r.inverse_sigma > 0.0));
+            stencils.spread(&ones.collect::<Vec<f32>>(), &mut weight);
+        }
+        weight.into_iter().map(|weight| weight > SEEN).collect()
+    }
+
+    /// `Wᵀ Ω y`.
+    pub fn right(&self) -> Vec<f32> {
+        let mut right = vec![0.0; self.footprints.region.pixels()];
+        let views = self.footprints.views.iter().zip(self.readings);
+        for ((stencils, readings), omega) in views.zip(&self.omega) {
+            let weighted = omega.iter().zip(readings).map(|(omega, r)| omega * r.value);
+            stencils.spread(&weighted.collect::<Vec<f32>>(), &mut right);
+        }
+        right
+    }
+
+    /// Adds `Wᵀ Ω W x` to y.
+    pub fn add_to(&self, x: &[f32], y: &mut [f32]) {
+        for (stencils, omega) in self.footprints.views.iter().zip(&self.omega) {
+            wide(
+                #[inline(always)]
+                || stencils.add_normal(omega, x, y),
+            );
+        }
+    }
+
+    /// Adds the diagonal of `Wᵀ Ω W` to y.
+    pub fn add_diagonal(&self, y: &mut [f32]) {
+        for (stencils, omega) in self.footprints.views.iter().zip(&self.omega) {
+            stencils.add_diagonal(omega, y);
+        }
+    }
+
+    /// Weighs each pixel by what is left of it: `Ω = weight((y − W x)/σ)/σ²`.
+    pub fn weigh(&mut self, residuals: &[Vec<f32>], weight: impl Fn(f32) -> f32) {
+        let views = self.omega.iter_mut().zip(self.readings);
+        for ((omega, readings), residuals) in views.zip(residuals) {
+            for ((omega, reading), residual) in omega.iter_mut().zip(readings).zip(residuals) {
+                *omega = weight(*residual) * reading.inverse_sigma * reading.inverse_sigma;
+            }
+        }
+    }
+
+    /// `(y − W x)/σ` view by view; 0 for pixels without a value.
+    pub fn residuals(&self, x: &[f32]) -> Vec<Vec<f32>> {
+        let views = self.footprints.views.iter().zip(self.readings);
+        views
+            .map(|(stencils, readings)| {
+                let mut read = Vec::new();
+                stencils.read(x, &mut read);
+                let pixels = read.iter().zip(readings);
+                pixels
+                    .map(|(read, reading)| (reading.value - read) * reading.inverse_sigma)
+                    .collect()
+            })
+            .collect()
+    }
+
+    /// The residuals of pixels with a value.
+    pub fn known<'r>(&'r self, residuals: &'r [Vec<f32>]) -> impl Iterator<Item = f32> + 'r {
+        let all = self
+            .readings
+            .iter()
+            .flatten()
+            .zip(residuals.iter().flatten());
+        all.filter(|(reading, _)| reading.inverse_sigma > 0.0)
+            .map(|(_, residual)| *residual)
+    }
+}

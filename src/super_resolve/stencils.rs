@@ -1,0 +1,247 @@
+//! What pixels read of fine pixels, as sparse rows of a matrix.
+
+use super::Region;
+use crate::vectors::wide;
+
+/// Fine pixels along the side of a stencil, at the most: a pixel that looks so obliquely that its footprint is wider
+/// tells little of the wall's detail, and is left out.
+pub(super) const REACH: usize = 12;
+/// Parts of a pixel along each side.
+const PARTS: usize = 4;
+
+/// A pixel's middle with the two sides of its parallelogram, fine pixels.
+pub(super) struct Spot {
+    pub pixel: usize,
+    pub middle: [f32; 2],
+    pub sides: [[f32; 2]; 2],
+}
+
+impl Spot {
+    /// Half the width of the parallelogram along an axis.
+    pub fn reach(&self, axis: usize) -> f32 {
+        0.5 * (self.sides[0][axis].abs() + self.sides[1][axis].abs())
+    }
+
+    /// The first fine pixel along an axis.
+    fn first(&self, axis: usize) -> f32 {
+        (self.middle[axis] - self.reach(axis)).floor()
+    }
+
+    /// The number of fine pixels along an axis.
+    fn span(&self, axis: usize) -> usize {
+        let end = (self.middle[axis] + self.reach(axis)).floor() + 1.0;
+        (end - self.first(axis)) as usize
+    }
+}
+
+/// The stencils of one view's pixels: pixel p reads `Σ_k w_pk x_k` with `w_pk` the share of its square, projected onto
+/// the wall, that lies in fine pixel k.
+///
+/// The square is a parallelogram on the wall (the map from pixels to the wall is linear within a pixel). It is taken in
+/// [`PARTS`]² parts, and each part as the upright rectangle of its width and height around its middle: exact for an
+/// upright camera, and of the right area, middle and about the right width for a turned one.
+pub(super) struct Stencils {
+    /// Fine pixels from one row of the region to the next.
+    stride: usize,
+    /// Fine pixels along a stencil's rows: 4, 6, 8 or 12.
+    width: usize,
+    /// Rows of a stencil.
+    height: usize,
+    /// First fine pixel of each stencil.
+    first: Vec<u32>,
+    /// `w`, stencil by stencil, row by row.
+    weights: Vec<f32>,
+    /// The pixels' numbers in their frame, row-major.
+    pub pixels: Vec<u32>,
+    /// Where their middles lie in the region, fine pixels from its first corner.
+    pub places: Vec<[f32; 2]>,
+}
+
+impl Stencils {
+    /// Of pixels at `spots` that lie in the region entirely.
+    pub fn new(region: &Region, mut spots: Vec<Spot>) -> Self {
+        let most = |axis| spots.iter().map(|spot| spot.span(axis)).max();
+        let width = match most(0).unwrap_or(1) {
+            0..=4 => 4,
+            5..=6 => 6,
+            7..=8 => 8,
+            _ => REACH,
+        };
+        let height = most(1).unwrap_or(1);
+        if region.columns < width || region.rows < height {
+            spots.clear();
+        }
+        // Stencils are wider than some footprints, and begin earlier where they would end beyond the region.
+        let corner = |spot: &Spot| {
+            let column = (spot.first(0) as usize).min(region.columns.saturating_sub(width));
+            let row = (spot.first(1) as usize).min(region.rows.saturating_sub(height));
+            [column, row]
+        };
+        let mut weights = vec![0.0; spots.len() * width * height];
+        wide(
+            #[inline(always)]
+            || {
+                let stencils = weights.chunks_exact_mut(width * height);
+                for (spot, stencil) in spots.iter().zip(stencils) {
+                    match width {
+                        4 => fill::<4>(spot, corner(spot), stencil),
+                        6 => fill::<6>(spot, corner(spot), stencil),
+                        8 => fill::<8>(spot, corner(spot), stencil),
+                        _ => fill::<REACH>(spot, corner(spot), stencil),
+                    }
+                }
+            },
+        );
+        let first = spots.iter().map(|spot| {
+            let [column, row] = corner(spot);
+            (row * region.columns + column) as u32
+        });
+        Self {
+            stride: region.columns,
+            width,
+            height,
+            first: first.collect(),
+            weights,
+            pixels: spots.iter().map(|spot| spot.pixel as u32).collect(),
+            places: spots.iter().map(|spot| spot.middle).collect(),
+        }
+    }
+
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        self.first.len()
+    }
+
+    /// `Σ_k w_pk x_k` for every pixel p.
+    #[inline(always)]
+    pub fn read(&self, x: &[f32], out: &mut Vec<f32>) {
+        match self.width {
+            4 => self.read_as::<4>(x, out),
+            6 => self.read_as::<6>(x, out),
+            8 => self.read_as::<8>(x, out),
+            _ => self.read_as::<REACH>(x, out),
+        }
+    }
+
+    #[inline(always)]
+    fn read_as<const W: usize>(&self, x: &[f32], out: &mut Vec<f32>) {
+        out.clear();
+        let stencils = self.weights.chunks_exact(W * self.height);
+        let all = self.first.iter().zip(stencils);
+        out.extend(all.map(|(first, stencil)| self.dot::<W>(stencil, x, *first as usize)));
+    }
+
+    /// Adds `Σ_p w_pk v_p` to every fine pixel k.
+    #[inline(always)]
+    pub fn spread(&self, values: &[f32], y: &mut [f32]) {
+        match self.width {
+            4 => self.spread_as::<4>(values, y),
+            6 => self.spread_as::<6>(values, y),
+            8 => self.spread_as::<8>(values, y),
+            _ => self.spread_as::<REACH>(values, y),
+        }
+    }
+
+    #[inline(always)]
+    fn spread_as<const W: usize>(&self, values: &[f32], y: &mut [f32]) {
+        let stencils = self.weights.chunks_exact(W * self.height);
+        for ((first, stencil), value) in self.first.iter().zip(stencils).zip(values) {
+            self.add::<W>(stencil, *value, y, *first as usize);
+        }
+    }
+
+    /// Adds `Σ_p w_pk ω_p Σ_l w_pl x_l` to every fine pixel k: the view's part of the normal matrix times x.
+    #[inline(always)]
+    pub fn add_normal(&self, omega: &[f32], x: &[f32], y: &mut [f32]) {
+        match self.width {
+            4 => self.add_normal_as::<4>(omega, x, y),
+            6 => self.add_normal_as::<6>(omega, x, y),
+            8 => self.add_normal_as::<8>(omega, x, y),
+            _ => self.add_normal_as::<REACH>(omega, x, y),
+        }
+    }
+
+    #[inline(always)]
+    fn add_normal_as<const W: usize>(&self, omega: &[f32], x: &[f32], y: &mut [f32]) {
+        let stencils = self.weights.chunks_exact(W * self.height);
+        for ((first, stencil), omega) in self.first.iter().zip(stencils).zip(omega) {
+            let first = *first as usize;
+            let read = self.dot::<W>(stencil, x, first);
+            self.add::<W>(stencil, omega * read, y, first);
+        }
+    }
+
+    /// Adds the diagonal of the view's part of the normal matrix, `Σ_p w_pk² ω_p`.
+    pub fn add_diagonal(&self, omega: &[f32], y: &mut [f32]) {
+        let stencils = self.weights.chunks_exact(self.width * self.height);
+        for ((first, stencil), omega) in self.first.iter().zip(stencils).zip(omega) {
+            for (j, row) in stencil.chunks_exact(self.width).enumerate() {
+                let start = *first as usize + j * self.stride;
+                for (y, w) in y[start..start + self.width].iter_mut().zip(row) {
+                    *y += w * w * omega;
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn dot<const W: usize>(&self, stencil: &[f32], x: &[f32], first: usize) -> f32 {
+        let mut sums = [0.0f32; W];
+        for (j, row) in stencil.chunks_exact(W).enumerate() {
+            let start = first + j * self.stride;
+            for (sum, (w, x)) in sums.iter_mut().zip(row.iter().zip(&x[start..start + W])) {
+                *sum += w * x;
+            }
+        }
+        sums.iter().sum()
+    }
+
+    #[inline(always)]
+    fn add<const W: usize>(&self, stencil: &[f32], value: f32, y: &mut [f32], first: usize) {
+        for (j, row) in stencil.chunks_exact(W).enumerate() {
+            let start = first + j * self.stride;
+            for (y, w) in y[start..start + W].iter_mut().zip(row) {
+                *y += w * value;
+            }
+        }
+    }
+}
+
+/// Fills a pixel's stencil (all zeros before), W fine pixels wide, whose first one is `corner`.
+#[inline(always)]
+fn fill<const W: usize>(spot: &Spot, corner: [usize; 2], stencil: &mut [f32]) {
+    let at = |k: usize| (k as f32 + 0.5) / PARTS as f32 - 0.5;
+    let reach = [0, 1].map(|axis| (spot.reach(axis) / PARTS as f32).max(LEAST_REACH));
+    // A part's share of the pixel, over its width and height.
+    let density = 1.0 / ((PARTS * PARTS) as f32 * 4.0 * reach[0] * reach[1]);
+    for part_v in (0..PARTS).map(at) {
+        for part_u in (0..PARTS).map(at) {
+            let middle = |axis: usize| {
+                spot.middle[axis] - corner[axis] as f32
+                    + part_u * spot.sides[0][axis]
+                    + part_v * spot.sides[1][axis]
+            };
+            let (across, down) = (middle(0), middle(1));
+            let mut widths = [0.0; W];
+            for (i, width) in widths.iter_mut().enumerate() {
+                *width = density * overlap(i, across - reach[0], across + reach[0]);
+            }
+            for (j, row) in stencil.chunks_exact_mut(W).enumerate() {
+                let height = overlap(j, down - reach[1], down + reach[1]);
+                for (w, width) in row.iter_mut().zip(&widths) {
+                    *w += height * width;
+                }
+            }
+        }
+    }
+}
+
+/// Half the width of a part, at the least, fine pixels: none is a line.
+const LEAST_REACH: f32 = 1e-4;
+
+/// How much of an interval lies in a unit cell.
+#[inline(always)]
+fn overlap(cell: usize, from: f32, to: f32) -> f32 {
+    let cell = cell as f32;
+    (to.min(cell + 1.0) - from.max(cell)).max(0.0)
+}
