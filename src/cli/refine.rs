@@ -115,14 +115,14 @@ pub fn run(
 ) -> Result<(), Failure> {
     let options = RefineOptions {
         max_iterations: arguments.max_iterations,
-        joint: arguments.joint,
         calibrate: arguments
             .calibrate
             .as_ref()
             .map(|list| list.iter().flat_map(|group| group.groups()).collect()),
-        ..match arguments.fast {
-            true => RefineOptions::fast(),
-            false => RefineOptions::default(),
+        ..match (arguments.fast, arguments.joint) {
+            (true, _) => RefineOptions::fast(),
+            (_, true) => RefineOptions::joint(),
+            _ => RefineOptions::default(),
         }
     };
     let survey = arguments.reading.open(&arguments.survey, terminal)?;

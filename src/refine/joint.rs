@@ -70,12 +70,11 @@ pub struct JointBlock<'a> {
 
 /// Who sees what of the tiles of a region.
 struct Sights {
-    /// The tile at the region's first corner.
-    first: TileId,
-    /// Fine pixels from its own corner to the region's.
+    /// Which tiles.
+    columns: Range<i64>,
+    rows: Range<i64>,
+    /// Fine pixels from the first tile's corner to the region's.
     offset: [f32; 2],
-    /// Columns of tiles.
-    columns: usize,
     /// Row by row, column by column, frame by frame.
     all: Vec<Sight>,
     frames: usize,
@@ -92,9 +91,9 @@ struct Sight {
 }
 
 impl Sights {
-    /// Besides the tiles in which a frame is compared, it is taken for the wall in those next to them, which it sees but partly:
-    /// without them the wall would be less well known along the borders of every frame, and the frame drawn to where
-    /// it is known.
+    /// Besides the tiles in which a frame is compared, it is taken for the wall in those next to them, which it sees but partly, and
+    /// next to tiles in which it does not show the wall it is not compared: otherwise frames would be drawn to where the
+    /// wall is known better, away from the borders of what they show of it.
     fn new(
         ignored: &Patches,
         grid: &WallGrid,
@@ -103,34 +102,56 @@ impl Sights {
         frames: &[usize],
         region: &Region,
     ) -> Self {
+        let mut sights = Self::compared(grid, visibility, block, frames, region);
+        let compared = sights.all.clone();
+        for tile in sights.tiles() {
+            let id = around(grid, tile);
+            if visibility.tile(id).is_none() && ignored.meet(&grid.area(id)) {
+                continue;
+            }
+            for (n, frame) in frames.iter().enumerate() {
+                if !visibility.leaves_out(id, *frame) {
+                    let shades = sights.next_to(tile).map(|k| compared[k + n].shade);
+                    let shade = shades.fold(0.0, f32::max);
+                    let sight = sights.at(tile, n);
+                    if sight.shade == 0.0 {
+                        sight.shade = shade;
+                    }
+                }
+            }
+        }
+        for tile in sights.tiles() {
+            for n in 0..frames.len() {
+                if sights.next_to(tile).any(|k| sights.all[k + n].shade == 0.0) {
+                    sights.at(tile, n).place = None;
+                }
+            }
+        }
+        sights
+    }
+
+    /// Only the tiles in which frames are compared.
+    fn compared(
+        grid: &WallGrid,
+        visibility: &Visibility,
+        block: &Range<usize>,
+        frames: &[usize],
+        region: &Region,
+    ) -> Self {
         let side = TILE as i64;
-        let first = TileId {
-            column: region.column.div_euclid(side),
-            row: region.row.div_euclid(side),
-        };
         let end = |first: i64, pixels: usize| (first + pixels as i64 - 1).div_euclid(side) + 1;
-        let columns = first.column..end(region.column, region.columns);
-        let rows = first.row..end(region.row, region.rows);
+        let columns = region.column.div_euclid(side)..end(region.column, region.columns);
+        let rows = region.row.div_euclid(side)..end(region.row, region.rows);
+        let tiles = ((columns.end - columns.start) * (rows.end - rows.start)) as usize;
         let mut sights = Self {
-            first,
+            columns,
+            rows,
             offset: [region.column, region.row].map(|pixel| pixel.rem_euclid(side) as f32),
-            columns: columns.clone().count(),
-            all: vec![
-                Sight::default();
-                columns.clone().count() * rows.clone().count() * frames.len()
-            ],
+            all: vec![Sight::default(); tiles * frames.len()],
             frames: frames.len(),
         };
-        let tiles = || {
-            rows.clone()
-                .flat_map(|row| columns.clone().map(move |column| TileId { column, row }))
-        };
-        let around = |tile: TileId| TileId {
-            column: tile.column.rem_euclid(grid.columns),
-            ..tile
-        };
-        for tile in tiles() {
-            let Some((index, seen)) = visibility.tile(around(tile)) else {
+        for tile in sights.tiles() {
+            let Some((index, seen)) = visibility.tile(around(grid, tile)) else {
                 continue;
             };
             let own = block.contains(&index);
@@ -143,47 +164,56 @@ impl Sights {
                 }
             }
         }
-        let compared = sights.all.clone();
-        for tile in tiles() {
-            let id = around(tile);
-            if visibility.tile(id).is_none() && ignored.meet(&grid.area(id)) {
-                continue;
-            }
-            for (n, frame) in frames.iter().enumerate() {
-                if sights.at(tile, n).shade > 0.0 || visibility.leaves_out(id, *frame) {
-                    continue;
-                }
-                let next = rows
-                    .clone()
-                    .filter(|row| row.abs_diff(tile.row) <= 1)
-                    .flat_map(|row| {
-                        let near = columns
-                            .clone()
-                            .filter(|column| column.abs_diff(tile.column) <= 1);
-                        near.map(move |column| TileId { column, row })
-                    });
-                let shades = next.map(|next| compared[sights.index(next, n)].shade);
-                sights.at(tile, n).shade = shades.fold(0.0, f32::max);
-            }
-        }
         sights
     }
 
-    fn index(&self, tile: TileId, frame: usize) -> usize {
-        let (column, row) = (tile.column - self.first.column, tile.row - self.first.row);
-        (row as usize * self.columns + column as usize) * self.frames + frame
+    /// The region's tiles; columns may go on around the section.
+    fn tiles(&self) -> impl Iterator<Item = TileId> + use<> {
+        let columns = self.columns.clone();
+        self.rows.clone().flat_map(move |row| {
+            let columns = columns.clone();
+            columns.map(move |column| TileId { column, row })
+        })
+    }
+
+    /// Where the tiles around a tile, as far as they are in the region, and itself begin.
+    fn next_to(&self, tile: TileId) -> impl Iterator<Item = usize> + '_ {
+        let near = |range: &Range<i64>, of: i64| range.start.max(of - 1)..range.end.min(of + 2);
+        let columns = near(&self.columns, tile.column);
+        near(&self.rows, tile.row).flat_map(move |row| {
+            let columns = columns.clone();
+            columns.map(move |column| self.start(TileId { column, row }))
+        })
+    }
+
+    /// Where the frames of a tile begin.
+    fn start(&self, tile: TileId) -> usize {
+        let columns = (self.columns.end - self.columns.start) as usize;
+        let (column, row) = (tile.column - self.columns.start, tile.row - self.rows.start);
+        (row as usize * columns + column as usize) * self.frames
     }
 
     fn at(&mut self, tile: TileId, frame: usize) -> &mut Sight {
-        let index = self.index(tile, frame);
-        &mut self.all[index]
+        let start = self.start(tile);
+        &mut self.all[start + frame]
     }
 
     /// How a frame sees the tile around a place in the region.
     fn of(&self, [x, y]: [f32; 2], frame: usize) -> Sight {
-        let column = ((x + self.offset[0]) / TILE as f32) as usize;
-        let row = ((y + self.offset[1]) / TILE as f32) as usize;
-        self.all[(row * self.columns + column) * self.frames + frame]
+        let tile = |at: f32, offset: f32| ((at + offset) / TILE as f32) as i64;
+        let id = TileId {
+            column: self.columns.start + tile(x, self.offset[0]),
+            row: self.rows.start + tile(y, self.offset[1]),
+        };
+        self.all[self.start(id) + frame]
+    }
+}
+
+/// The tile of the grid that a region's tile is.
+fn around(grid: &WallGrid, tile: TileId) -> TileId {
+    TileId {
+        column: tile.column.rem_euclid(grid.columns),
+        ..tile
     }
 }
 

@@ -210,30 +210,36 @@ impl Stencils {
 /// Fills a pixel's stencil (all zeros before), W fine pixels wide, whose first one is `corner`.
 #[inline(always)]
 fn fill<const W: usize>(spot: &Spot, corner: [usize; 2], stencil: &mut [f32]) {
-    let at = |k: usize| (k as f32 + 0.5) / PARTS as f32 - 0.5;
-    let reach = [0, 1].map(|axis| (spot.reach(axis) / PARTS as f32).max(LEAST_REACH));
+    let reach_s = (spot.reach(0) / PARTS as f32).max(LEAST_REACH);
+    let reach_h = (spot.reach(1) / PARTS as f32).max(LEAST_REACH);
+    let middle_s = spot.middle[0] - corner[0] as f32;
+    let middle_h = spot.middle[1] - corner[1] as f32;
+    let [[us, uh], [vs, vh]] = spot.sides;
     // A part's share of the pixel, over its width and height.
-    let density = 1.0 / ((PARTS * PARTS) as f32 * 4.0 * reach[0] * reach[1]);
-    for part_v in (0..PARTS).map(at) {
-        for part_u in (0..PARTS).map(at) {
-            let middle = |axis: usize| {
-                spot.middle[axis] - corner[axis] as f32
-                    + part_u * spot.sides[0][axis]
-                    + part_v * spot.sides[1][axis]
-            };
-            let (across, down) = (middle(0), middle(1));
+    let density = 1.0 / ((PARTS * PARTS) as f32 * 4.0 * reach_s * reach_h);
+    for j in 0..PARTS {
+        for i in 0..PARTS {
+            let (part_u, part_v) = (middle_of(i), middle_of(j));
+            let across = middle_s + part_u * us + part_v * vs;
+            let down = middle_h + part_u * uh + part_v * vh;
             let mut widths = [0.0; W];
-            for (i, width) in widths.iter_mut().enumerate() {
-                *width = density * overlap(i, across - reach[0], across + reach[0]);
+            for (k, width) in widths.iter_mut().enumerate() {
+                *width = density * overlap(k, across - reach_s, across + reach_s);
             }
-            for (j, row) in stencil.chunks_exact_mut(W).enumerate() {
-                let height = overlap(j, down - reach[1], down + reach[1]);
+            for (k, row) in stencil.chunks_exact_mut(W).enumerate() {
+                let height = overlap(k, down - reach_h, down + reach_h);
                 for (w, width) in row.iter_mut().zip(&widths) {
                     *w += height * width;
                 }
             }
         }
     }
+}
+
+/// The middle of a part along a side of its pixel, −½ to ½.
+#[inline(always)]
+fn middle_of(part: usize) -> f32 {
+    (part as f32 + 0.5) / PARTS as f32 - 0.5
 }
 
 /// Half the width of a part, at the least, fine pixels: none is a line.
