@@ -72,13 +72,15 @@ pub struct Marks {
 }
 
 impl Marks {
-    fn none(observers: usize) -> Self {
+    /// None of so many observers.
+    pub(super) fn none(observers: usize) -> Self {
         Self {
             bits: vec![0; observers.div_ceil(64)],
         }
     }
 
-    fn set(&mut self, observer: usize) {
+    /// Marks an observer.
+    pub(super) fn set(&mut self, observer: usize) {
         self.bits[observer / 64] |= 1 << (observer % 64);
     }
 

@@ -49,6 +49,19 @@ impl TileId {
     }
 }
 
+/// Two numbers from 0 to 1 for a column and row, of a sequence that fills the square evenly: `frac(row φ⁻¹ + column φ⁻²)` and its
+/// mirror with φ³ = φ + 1.
+///
+/// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
+pub fn fractions(column: i64, row: i64) -> [f64; 2] {
+    const PHI: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
+    let fraction = |a: f64, b: f64| {
+        let sum = row as f64 * a + column as f64 * b;
+        sum - sum.floor()
+    };
+    [fraction(PHI[0], PHI[1]), fraction(PHI[1], PHI[0])]
+}
+
 impl WallGrid {
     /// A lattice with about `density` samples to a pixel's width of `pixel_m` on the wall.
     pub fn new(surface: &dyn Surface, pixel_m: f64, density: f64) -> Self {
@@ -86,21 +99,14 @@ impl WallGrid {
     ///
     /// Walls repeat in step with a regular lattice: courses of bricks run along its rows, so that every joint would
     /// be sampled at the same fraction everywhere, and what falls between the samples would not average out.
-    /// The fractions follow a sequence that fills the square evenly, `frac(row φ⁻¹ + column φ⁻²)` and its mirror with
-    /// φ³ = φ + 1.
-    ///
-    /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018 (the sequence).
+    /// The fractions are [`fractions`].
     pub fn centre(&self, tile: TileId) -> WallPoint {
-        const PHI: [f64; 2] = [0.754_877_666_246_693, 0.569_840_290_998_053];
         let (width, height) = self.tile_size_m();
         let (column, row) = (tile.column as f64, tile.row as f64);
-        let fraction = |a: f64, b: f64| {
-            let sum = row * a + column * b;
-            sum - sum.floor() - 0.5
-        };
+        let [along_s, along_h] = fractions(tile.column, tile.row);
         WallPoint {
-            s_m: (column + 0.5) * width + fraction(PHI[0], PHI[1]) * self.spacing_s_m,
-            h_m: (row + 0.5) * height + fraction(PHI[1], PHI[0]) * self.spacing_h_m,
+            s_m: (column + 0.5) * width + (along_s - 0.5) * self.spacing_s_m,
+            h_m: (row + 0.5) * height + (along_h - 0.5) * self.spacing_h_m,
         }
     }
 

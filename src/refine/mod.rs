@@ -25,7 +25,7 @@
 //! At full size what is in a frame but not on the wall is left out of a solve beforehand: [`foreign`]. Every solve is the
 //! same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`], [`coverage`] and [`choice`] choose the
 //! samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, with the slopes of S as
-//! [`denoise`] finds them, [`problem`] reduces to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
+//! [`denoise`] finds them ([`joint`] does the same with the wall solved for finer than pixels, if asked for), [`problem`] reduces to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
 //!
 //! # Speed
 //!

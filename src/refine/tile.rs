@@ -32,6 +32,8 @@
 //! Frames that do not show the wall in a tile take no part in it ([`super::foreign`]).
 //! Where a frame has no value (clipped pixels) its weight is zero, and its cost that of plain noise.
 //!
+//! What edges that are sharp against a pixel need beyond this is in [`super::joint`].
+//!
 //! Rows of the bracket sum to zero, so what moves all frames of a tile alike costs nothing: the gauge
 //! directions are exact null vectors of the data term.
 

@@ -472,6 +472,43 @@ mod tests {
         assert_eq!(tiles, found.tiles.len());
     }
 
+    /// Every tile is found by its name, and who was left out of it is known.
+    #[test]
+    fn tiles_are_found_by_name_and_what_is_left_out_is_known() {
+        let circle = Circle::new(3.0).unwrap();
+        let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
+        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
+        let placed: Vec<Placed> = spiral(6, 0.1, 30f64.to_radians())
+            .into_iter()
+            .map(|pose| Placed {
+                sweep: Sweep::default(),
+                pose,
+                footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),
+                active: true,
+            })
+            .collect();
+        let hidden = Hidden::NOTHING;
+        let rows = -1000..1000;
+        let all = Visibility::find(&circle, &grid, &camera, None, &hidden, &placed, &rows);
+        for (k, tile) in all.tiles.iter().enumerate() {
+            assert_eq!(all.tile(tile.id).map(|(found, _)| found), Some(k));
+        }
+        let nowhere = TileId {
+            column: 0,
+            row: 900,
+        };
+        assert!(all.tile(nowhere).is_none());
+        let (tile, first) = (&all.tiles[17], all.tiles[17].observers.start);
+        let mut marks = Marks::none(all.observers.len());
+        marks.set(first);
+        let without = all.without(&marks);
+        let frames = all.observers(tile).iter().map(|o| o.frame as usize);
+        for (n, frame) in frames.enumerate() {
+            assert_eq!(without.leaves_out(tile.id, frame), n == 0);
+            assert!(!without.leaves_out(all.tiles[18].id, frame));
+        }
+    }
+
     /// Looked at in pieces, the wall has the same tiles.
     #[test]
     fn pieces_make_up_the_whole() {

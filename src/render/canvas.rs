@@ -154,7 +154,7 @@ impl Canvas {
         Lattice {
             columns: i64::from(self.columns),
             spacing_m: [1.0 / self.px_per_metre; 2],
-            h_start_m: self.h_start_m,
+            start_m: [0.0, self.h_start_m],
         }
     }
 

@@ -191,13 +191,13 @@ mod tests {
         let lattice = Lattice {
             columns: 1738,
             spacing_m: [wall.perimeter_m() / 1738.0, 0.009],
-            h_start_m: -0.7,
+            start_m: [0.0, -0.7],
         };
         let pose = wall.poses[frame];
         let ray = pose.r_wc * Vector3::z();
         let middle = wall.circle.hit(&pose.t_wc, &ray).unwrap().wall;
         let column = middle.s_m / lattice.spacing_m[0];
-        let row = (middle.h_m - lattice.h_start_m) / lattice.spacing_m[1];
+        let row = (middle.h_m - lattice.start_m[1]) / lattice.spacing_m[1];
         let region = Region {
             column: if across { -30 } else { column as i64 - 30 },
             row: row as i64 - 20,

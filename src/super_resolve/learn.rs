@@ -166,3 +166,19 @@ fn signs(seen: &[bool]) -> Vec<f32> {
         .map(|(k, seen)| if *seen { sign(k) } else { 0.0 })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regions_together_are_as_rough_as_all_their_differences() {
+        let of = |freedoms: f64, energy: f64| Evidence {
+            freedoms: [freedoms; KINDS],
+            energies: [energy; KINDS],
+        };
+        let both = of(10.0, 2.0).merge(&of(2.0, 4.0));
+        assert_eq!(both.strengths(), [2.0; KINDS]);
+        assert_eq!(Evidence::default().strengths(), [0.0; KINDS]);
+    }
+}

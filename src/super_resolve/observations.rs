@@ -60,6 +60,17 @@ impl<'a> Observations<'a> {
         right
     }
 
+    /// `Wᵀ Ω v` for values v of one view's pixels.
+    pub fn right_of(&self, view: usize, values: &[f32]) -> Vec<f32> {
+        let mut right = vec![0.0; self.footprints.region.pixels()];
+        let weighted = self.omega[view]
+            .iter()
+            .zip(values)
+            .map(|(omega, v)| omega * v);
+        self.footprints.views[view].spread(&weighted.collect::<Vec<f32>>(), &mut right);
+        right
+    }
+
     /// Adds `Wᵀ Ω W x` to y.
     pub fn add_to(&self, x: &[f32], y: &mut [f32]) {
         for (stencils, omega) in self.footprints.views.iter().zip(&self.omega) {

@@ -2,7 +2,7 @@
 
 use crate::surface::{WallPoint, shortest_arc};
 
-/// A raster of fine pixels on the unrolled wall: column `j` and row `i` (from 0) have their centre at `s = (j + ½) Δs`,
+/// A raster of fine pixels on the unrolled wall: column `j` and row `i` (from 0) have their centre at `s = s_start + (j + ½) Δs`,
 /// `h = h_start + (i + ½) Δh`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
@@ -10,8 +10,8 @@ pub struct Lattice {
     pub columns: i64,
     /// Distance of neighbours along s and h, metres.
     pub spacing_m: [f64; 2],
-    /// Chainage of the upper edge of row 0, metres.
-    pub h_start_m: f64,
+    /// s and h of the first edges of column 0 and row 0, metres.
+    pub start_m: [f64; 2],
 }
 
 /// A rectangle of a lattice's pixels: a tile with its margin.
@@ -37,8 +37,8 @@ impl Region {
     pub(super) fn wall(&self, lattice: &Lattice, [across, down]: [f64; 2]) -> WallPoint {
         let [ds, dh] = lattice.spacing_m;
         WallPoint {
-            s_m: (self.column as f64 + across * self.columns as f64) * ds,
-            h_m: lattice.h_start_m + (self.row as f64 + down * self.rows as f64) * dh,
+            s_m: lattice.start_m[0] + (self.column as f64 + across * self.columns as f64) * ds,
+            h_m: lattice.start_m[1] + (self.row as f64 + down * self.rows as f64) * dh,
         }
     }
 

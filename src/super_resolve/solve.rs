@@ -73,6 +73,15 @@ impl<'a> WallSolve<'a> {
         conjugate_gradients(times, &diagonal, right, steps, x);
     }
 
+    /// How what a view's pixels read of x changes if they show `more` than they do, grey levels of the wall: `W A⁻¹ Wᵀ Ω more`, A the
+    /// matrix of the normal equations.
+    pub fn follow(&self, view: usize, more: &[f32], steps: usize) -> Vec<f32> {
+        let right = self.observations.right_of(view, more);
+        let mut change = vec![0.0; right.len()];
+        self.solve(&right, steps, &mut change);
+        self.observations.footprints.read(view, &change)
+    }
+
     /// Weighs each pixel by its residual `(y − W x)/σ`.
     pub fn weigh_pixels(&mut self, weight: impl Fn(f32) -> f32) {
         let residuals = self.observations.residuals(&self.x);

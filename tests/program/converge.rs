@@ -38,6 +38,9 @@ fn the_efficiency_is_measured_against_the_bound() {
     let table = json(&out.join("efficiency.json"));
     let number = |name: &str| table[0][name].as_f64().unwrap();
     // One survey scatters; far below the bound or far above would be a mistake in one of the two.
-    assert!((0.4..3.0).contains(&number("ratio")), "{table}");
+    for kind in ["rotation", "translation", "wall", "pose"] {
+        let ratio = table[0]["ratio"][kind].as_f64().unwrap();
+        assert!((0.4..3.0).contains(&ratio), "{kind}: {table}");
+    }
     assert!((1.0..20.0).contains(&number("normalised_error")), "{table}");
 }

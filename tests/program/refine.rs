@@ -290,3 +290,26 @@ fn a_wrong_camera_strains_the_frames() {
         assert!(frame["strain_px"].as_f64().unwrap() > 0.04, "{frame}");
     }
 }
+
+/// Sharp bricks: with the wall solved for, at least a quarter of the error goes, and the uncertainty stated goes with it.
+#[test]
+fn solving_for_the_wall_makes_bricks_more_exact() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("survey");
+    simulate(
+        &survey,
+        &["--frames", "16", "--size", "320x240", "--noise", "2"],
+    );
+    let refined = |name: &str, options: &[&str]| {
+        let out = dir.path().join(name);
+        let mut arguments = vec!["refine", text(&survey), "--out", text(&out), "--quiet"];
+        arguments.extend(options);
+        succeed(&arguments);
+        let report = json(&out.join("refine.json"));
+        let sigma = report["frames"][8]["sigma"]["wall_px"].as_f64().unwrap();
+        (believed_wall_px(&survey, &out), sigma)
+    };
+    let (plain, joint) = (refined("plain", &[]), refined("joint", &["--joint"]));
+    assert!(joint.0 < 0.75 * plain.0, "{} after {}", joint.0, plain.0);
+    assert!((0.3..3.0).contains(&(joint.0 / joint.1)), "{joint:?}");
+}

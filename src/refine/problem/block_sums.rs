@@ -76,8 +76,8 @@ impl Problem<'_> {
         let points_of = |tile: &Tile, scratch: &mut Vec<_>| {
             TilePoints::new(&self.grid, self.scene.surface, tile.id, scratch)
         };
-        if let Some(roughness) = self.roughness {
-            let found = self.joint(visibility, block, views).moments(roughness);
+        if let Some(wall) = &self.wall {
+            let found = self.joint(visibility, block, views).moments(wall);
             for (tile, found) in tiles.iter().zip(&found) {
                 add(tile, &points_of(tile, &mut scratch), found);
             }

@@ -6,12 +6,12 @@ use crate::refine::denoise::TextureSpectrum;
 use crate::refine::foreign::Foreign;
 use crate::refine::grid::{BLOCK, TilePoints};
 use crate::refine::interpolation::Interpolation;
-use crate::refine::joint::JointBlock;
+use crate::refine::joint::{JointBlock, Probe, WallModel};
 use crate::refine::robust::NoiseHistogram;
 use crate::refine::tile::{Misfit, Seen, TileWork};
 use crate::refine::view::View;
 use crate::refine::visibility::{Observer, Tile, Visibility};
-use crate::super_resolve::{Evidence, KINDS};
+use crate::super_resolve::Evidence;
 use crate::vectors::wide;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -19,8 +19,8 @@ use std::ops::Range;
 
 /// Tiles looked at to estimate the noise.
 const SCALE_TILES: usize = 600;
-/// Blocks of tiles that are solved for to learn how rough the wall is.
-const ROUGHNESS_BLOCKS: usize = 48;
+/// Blocks of tiles that are solved for to learn what the wall is like.
+const LEARNED_BLOCKS: usize = 48;
 /// Factor by which the variance of residuals may be short of the sensor's.
 const MOST_UNDERESTIMATE: f64 = 1.25;
 
@@ -69,23 +69,41 @@ impl Problem<'_> {
         Ok(())
     }
 
-    /// Learns how rough the wall is, from blocks spread over all of it.
-    pub(super) fn learn_roughness(&self) -> Result<[f64; KINDS], ProblemError> {
+    /// Learns how rough the wall is, and how stiffly it holds frames, from blocks spread over all of it.
+    pub(super) fn learn_wall(&self) -> Result<WallModel, ProblemError> {
+        let found = self.at_blocks(|block| block.evidence())?;
+        let strengths = found
+            .iter()
+            .fold(Evidence::default(), Evidence::merge)
+            .strengths();
+        let found = self.at_blocks(|block| block.stiffness(strengths))?;
+        let stiffness = found
+            .iter()
+            .fold(Probe::default(), Probe::merge)
+            .stiffness();
+        Ok(WallModel {
+            strengths,
+            stiffness,
+        })
+    }
+
+    /// Works on about [`LEARNED_BLOCKS`] blocks spread over all of the wall.
+    fn at_blocks<T: Send>(
+        &self,
+        work: impl Fn(JointBlock) -> T + Sync,
+    ) -> Result<Vec<T>, ProblemError> {
         let blocks = self.coverage.tiles / (BLOCK * BLOCK) as usize;
-        let stride = (blocks / ROUGHNESS_BLOCKS).max(1);
-        let mut evidence = Evidence::default();
+        let stride = (blocks / LEARNED_BLOCKS).max(1);
+        let mut found = Vec::new();
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch)?;
             let pictures = self.pictures.of(self.coverage.frames(stretch))?;
             let views = self.held_views(stretch, &pictures);
             let blocks: Vec<&Range<usize>> = visibility.blocks.iter().step_by(stride).collect();
-            let found: Vec<Evidence> = blocks
-                .into_par_iter()
-                .map(|block| self.joint(&visibility, block, &views).evidence())
-                .collect();
-            evidence = found.iter().fold(evidence, Evidence::merge);
+            let work = |block| work(self.joint(&visibility, block, &views));
+            found.extend(blocks.into_par_iter().map(work).collect::<Vec<T>>());
         }
-        Ok(evidence.strengths())
+        Ok(found)
     }
 
     /// A block of the wall, to be solved for jointly with the poses.

@@ -14,6 +14,7 @@ use super::denoise::Denoiser;
 use super::estimate::{FrameEstimate, FrameStep};
 use super::factor::{FactorError, Symbolic};
 use super::grid::WallGrid;
+use super::joint::WallModel;
 use super::normal::{Block, NormalEquations, Pattern};
 use super::overlaps::footprint;
 use super::robust::NoiseModel;
@@ -22,7 +23,6 @@ use super::view::View;
 use super::visibility::{Hidden, Placed};
 use crate::camera::{Camera, Sweep};
 use crate::frames::Pyramid;
-use crate::super_resolve::KINDS;
 use crate::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
 use nalgebra::Vector5;
 use rayon::prelude::*;
@@ -102,8 +102,8 @@ pub struct Problem<'a> {
     noise: NoiseModel,
     /// Takes the noise from the fused texture for its slopes.
     denoiser: Option<Denoiser>,
-    /// How rough the wall is, if it is solved for jointly with the poses.
-    roughness: Option<[f64; KINDS]>,
+    /// What is known of the wall, if it is solved for jointly with the poses.
+    wall: Option<WallModel>,
     /// True if the shared unknowns are estimated.
     calibrates: bool,
 }
@@ -213,12 +213,12 @@ impl<'a> Problem<'a> {
                 steepness: 0.0,
             },
             denoiser: None,
-            roughness: None,
+            wall: None,
             calibrates: false,
         };
         problem.estimate_noise()?;
         if sampling.joint {
-            problem.roughness = Some(problem.learn_roughness()?);
+            problem.wall = Some(problem.learn_wall()?);
         }
         Ok(problem)
     }
@@ -665,6 +665,16 @@ mod tests {
             }
         }
 
+        /// That of a solve for wall and poses together.
+        fn joint(&self) -> Sampling {
+            Sampling {
+                interpolation: Interpolation::Bicubic,
+                by_variance: true,
+                joint: true,
+                ..self.sampling()
+            }
+        }
+
         fn problem_with(&self, information: f64) -> Problem<'_> {
             self.problem_of(Sampling {
                 information,
@@ -705,6 +715,46 @@ mod tests {
                 ..ring.sampling()
             }),
         );
+    }
+
+    /// With the wall solved for, the gradient is not quite the derivative of what pixels cost (x is held by its roughness, too), but
+    /// it must change as the normal equations say, along every unknown.
+    #[test]
+    fn the_joint_gradient_changes_as_the_normal_equations_say() {
+        let ring = Ring::new(1e-4);
+        let problem = ring.problem_of(ring.joint());
+        let normal = problem.linearise(&ring.estimates).unwrap().normal;
+        let steps = [2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 1e-3, 0.1];
+        for (unknown, step) in steps.into_iter().enumerate() {
+            let direction: Vec<f64> = (0..ring.estimates.len())
+                .map(|k| step * number(k, 20.0 + unknown as f64))
+                .collect();
+            let slope = |amount: f64| {
+                let moved: Vec<_> = (ring.estimates.iter().zip(&direction))
+                    .map(|(estimate, d)| {
+                        let mut step = FrameStep::zeros();
+                        step[unknown] = amount * d;
+                        estimate.retract(&step)
+                    })
+                    .collect();
+                let gradient = problem.linearise(&moved).unwrap().normal.gradient;
+                let along = gradient.iter().zip(&direction);
+                along.map(|(g, d)| g[unknown] * d).sum::<f64>()
+            };
+            let change = 0.5 * (slope(1.0) - slope(-1.0));
+            let mut foretold = 0.0;
+            for i in 0..direction.len() {
+                for j in i..direction.len() {
+                    if let Some(place) = problem.pattern().place(i, j) {
+                        let term = normal.blocks[place][(unknown, unknown)];
+                        let twice = if i == j { 1.0 } else { 2.0 };
+                        foretold += twice * term * direction[i] * direction[j];
+                    }
+                }
+            }
+            let ratio = change / foretold;
+            assert!((0.9..1.1).contains(&ratio), "unknown {unknown}: {ratio}");
+        }
     }
 
     fn check_gradient(ring: &Ring, problem: &Problem) {
@@ -797,7 +847,11 @@ mod tests {
     #[test]
     fn gauss_newton_steps_lower_the_cost_to_the_truth() {
         let ring = Ring::new(2e-3);
-        let problem = ring.problem();
+        steps_lead_to_the_truth(&ring, &ring.problem());
+        steps_lead_to_the_truth(&ring, &ring.problem_of(ring.joint()));
+    }
+
+    fn steps_lead_to_the_truth(ring: &Ring, problem: &Problem) {
         let mut estimates = ring.estimates.clone();
         let start = problem.linearise(&estimates).unwrap().cost;
         for _ in 0..6 {
