@@ -2,13 +2,16 @@
 
 use super::calibration::{Calibration, Kappa};
 use super::estimate::FrameEstimate;
+use super::grid::WallGrid;
 use super::prior::Prior;
 use super::problem::Scene;
 use super::track::Tracked;
+use super::visibility::Placed;
+use crate::camera::{Camera, Sweep};
 use crate::frames::FrameCache;
-use crate::surface::Patches;
+use crate::surface::{Circle, Footprint, Patches};
 use crate::test_wall::TestWall;
-use crate::trajectory::{Jitter, JitterModel, Pose, Shutter};
+use crate::trajectory::{Jitter, JitterModel, Pose, Shutter, spiral};
 use std::sync::LazyLock;
 
 /// A frame a second, each off by 0.05 rad and 5 cm by itself.
@@ -54,4 +57,21 @@ pub fn tracked(poses: &[Pose]) -> Tracked {
         doubts: vec![None; poses.len()],
         kappa: Kappa::zeros(),
     }
+}
+
+/// A tunnel of 3 m radius, a camera, the lattice of its pixels there, and a spiral of so many frames, all to be estimated.
+pub fn placed_spiral(frames: usize) -> (Circle, Camera, WallGrid, Vec<Placed>) {
+    let circle = Circle::new(3.0).unwrap();
+    let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
+    let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
+    let placed = spiral(frames, 0.1, 30f64.to_radians())
+        .into_iter()
+        .map(|pose| Placed {
+            sweep: Sweep::default(),
+            pose,
+            footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),
+            active: true,
+        });
+    let placed = placed.collect();
+    (circle, camera, grid, placed)
 }

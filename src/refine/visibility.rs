@@ -421,26 +421,15 @@ impl Sight {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Circle;
-    use crate::trajectory::spiral;
+    use crate::refine::test_scene::placed_spiral;
 
     #[test]
     fn every_tile_is_seen_by_an_active_frame_and_another() {
-        let circle = Circle::new(3.0).unwrap();
-        let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
-        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
-        let poses = spiral(24, 0.1, 30f64.to_radians());
+        let (circle, camera, grid, mut placed) = placed_spiral(24);
         let active = 20..24;
-        let placed: Vec<Placed> = poses
-            .iter()
-            .enumerate()
-            .map(|(k, pose)| Placed {
-                sweep: Sweep::default(),
-                pose: *pose,
-                footprint: Footprint::trace(&circle, &camera, pose).unwrap(),
-                active: active.contains(&k),
-            })
-            .collect();
+        for (k, frame) in placed.iter_mut().enumerate() {
+            frame.active = active.contains(&k);
+        }
         let everywhere = -1000..1000;
         let found = Visibility::find(
             &circle,
@@ -475,18 +464,7 @@ mod tests {
     /// Every tile is found by its name, and who was left out of it is known.
     #[test]
     fn tiles_are_found_by_name_and_what_is_left_out_is_known() {
-        let circle = Circle::new(3.0).unwrap();
-        let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
-        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
-        let placed: Vec<Placed> = spiral(6, 0.1, 30f64.to_radians())
-            .into_iter()
-            .map(|pose| Placed {
-                sweep: Sweep::default(),
-                pose,
-                footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),
-                active: true,
-            })
-            .collect();
+        let (circle, camera, grid, placed) = placed_spiral(6);
         let hidden = Hidden::NOTHING;
         let rows = -1000..1000;
         let all = Visibility::find(&circle, &grid, &camera, None, &hidden, &placed, &rows);
@@ -512,18 +490,7 @@ mod tests {
     /// Looked at in pieces, the wall has the same tiles.
     #[test]
     fn pieces_make_up_the_whole() {
-        let circle = Circle::new(3.0).unwrap();
-        let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
-        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
-        let placed: Vec<Placed> = spiral(12, 0.1, 30f64.to_radians())
-            .into_iter()
-            .map(|pose| Placed {
-                sweep: Sweep::default(),
-                pose,
-                footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),
-                active: true,
-            })
-            .collect();
+        let (circle, camera, grid, placed) = placed_spiral(12);
         let find = |rows| {
             Visibility::find(
                 &circle,

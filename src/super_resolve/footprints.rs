@@ -9,7 +9,7 @@ use crate::trajectory::Pose;
 /// Points along each side of a region that are projected to find its place in a frame.
 const OUTLINE: usize = 9;
 /// Weight of pixels above which a fine pixel counts as seen: a pixel of two by two gives 0.25.
-pub(super) const SEEN: f32 = 0.05;
+const SEEN: f32 = 0.05;
 
 /// A frame with its place.
 #[derive(Clone, Copy, Debug)]
@@ -70,29 +70,32 @@ impl Footprints {
         read
     }
 
+    /// `Wᵀ v` with the value v of each reading.
+    fn spread(&self, readings: &[Vec<Reading>], value: impl Fn(&Reading) -> f32) -> Vec<f32> {
+        let mut sum = vec![0.0; self.region.pixels()];
+        for (stencils, readings) in self.views.iter().zip(readings) {
+            let values: Vec<f32> = readings.iter().map(&value).collect();
+            stencils.spread(&values, &mut sum);
+        }
+        sum
+    }
+
+    /// True for every fine pixel that pixels with a value show.
+    pub(super) fn seen(&self, readings: &[Vec<Reading>]) -> Vec<bool> {
+        let total = self.spread(readings, |r| f32::from(r.inverse_sigma > 0.0));
+        total.into_iter().map(|total| total > SEEN).collect()
+    }
+
     /// The mean of what all pixels read, each weighing by its precision and its share of a fine pixel; NaN where none does.
     ///
     /// `readings`: of each view's pixels, as [`Footprints::super_resolve`] takes them.
     pub fn mean(&self, readings: &[Vec<Reading>]) -> Vec<f32> {
-        let mut sum = vec![0.0; self.region.pixels()];
-        let mut weight = vec![0.0; self.region.pixels()];
-        let mut total = vec![0.0; self.region.pixels()];
-        for (stencils, readings) in self.views.iter().zip(readings) {
-            let precision = |reading: &Reading| reading.inverse_sigma * reading.inverse_sigma;
-            let each = |of: &dyn Fn(&Reading) -> f32| readings.iter().map(of).collect::<Vec<f32>>();
-            stencils.spread(&each(&|r| precision(r) * r.value), &mut sum);
-            stencils.spread(&each(&precision), &mut weight);
-            stencils.spread(&each(&|r| f32::from(r.inverse_sigma > 0.0)), &mut total);
-        }
-        let found = sum.iter().zip(&weight).zip(&total);
+        let precision = |reading: &Reading| reading.inverse_sigma * reading.inverse_sigma;
+        let sum = self.spread(readings, |reading| precision(reading) * reading.value);
+        let weight = self.spread(readings, precision);
+        let found = sum.iter().zip(&weight).zip(self.seen(readings));
         found
-            .map(|((sum, weight), total)| {
-                if *total > SEEN {
-                    sum / weight
-                } else {
-                    f32::NAN
-                }
-            })
+            .map(|((sum, weight), seen)| if seen { sum / weight } else { f32::NAN })
             .collect()
     }
 }

@@ -5,7 +5,7 @@ use crate::frames::MAD_TO_SIGMA;
 /// Weight of a residual r: 1 up to the limit, `limit/|r|` beyond, where the loss is linear.
 ///
 /// Source: P. J. Huber, "Robust estimation of a location parameter", Annals of Mathematical Statistics 35(1), 1964.
-pub(super) fn weight(residual: f32, limit: f32) -> f32 {
+pub fn weight(residual: f32, limit: f32) -> f32 {
     if residual.abs() <= limit {
         1.0
     } else {

@@ -38,6 +38,7 @@ mod solve;
 mod stencils;
 
 pub use footprints::{Footprints, View};
+pub use huber::weight as huber_weight;
 pub use learn::{Evidence, Resolved};
 pub use observations::Reading;
 pub use region::{Lattice, Region};

@@ -1,6 +1,6 @@
 //! What the frames read of a region.
 
-use super::footprints::{Footprints, SEEN};
+use super::footprints::Footprints;
 use crate::vectors::wide;
 
 /// What a pixel says of the wall.
@@ -39,36 +39,20 @@ impl<'a> Observations<'a> {
         all.filter(|reading| reading.inverse_sigma > 0.0).count()
     }
 
-    /// True for every fine pixel that pixels with a value show.
-    pub fn seen(&self) -> Vec<bool> {
-        let mut weight = vec![0.0; self.footprints.region.pixels()];
-        for (stencils, readings) in self.footprints.views.iter().zip(self.readings) {
-            let ones = readings.iter().map(|r| f32::from(r.inverse_sigma > 0.0));
-            stencils.spread(&ones.collect::<Vec<f32>>(), &mut weight);
-        }
-        weight.into_iter().map(|weight| weight > SEEN).collect()
-    }
-
     /// `Wᵀ Ω y`.
     pub fn right(&self) -> Vec<f32> {
         let mut right = vec![0.0; self.footprints.region.pixels()];
-        let views = self.footprints.views.iter().zip(self.readings);
-        for ((stencils, readings), omega) in views.zip(&self.omega) {
-            let weighted = omega.iter().zip(readings).map(|(omega, r)| omega * r.value);
-            stencils.spread(&weighted.collect::<Vec<f32>>(), &mut right);
+        for (view, readings) in self.readings.iter().enumerate() {
+            self.add_right(view, readings.iter().map(|r| r.value), &mut right);
         }
         right
     }
 
-    /// `Wᵀ Ω v` for values v of one view's pixels.
-    pub fn right_of(&self, view: usize, values: &[f32]) -> Vec<f32> {
-        let mut right = vec![0.0; self.footprints.region.pixels()];
-        let weighted = self.omega[view]
-            .iter()
-            .zip(values)
-            .map(|(omega, v)| omega * v);
-        self.footprints.views[view].spread(&weighted.collect::<Vec<f32>>(), &mut right);
-        right
+    /// Adds `Wᵀ Ω v` for values v of one view's pixels.
+    pub fn add_right(&self, view: usize, values: impl Iterator<Item = f32>, right: &mut [f32]) {
+        let weighted = self.omega[view].iter().zip(values);
+        let weighted: Vec<f32> = weighted.map(|(omega, v)| omega * v).collect();
+        self.footprints.views[view].spread(&weighted, right);
     }
 
     /// Adds `Wᵀ Ω W x` to y.

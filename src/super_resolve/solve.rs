@@ -40,7 +40,7 @@ impl<'a> WallSolve<'a> {
             "a reading of every pixel"
         );
         let observations = Observations::new(footprints, readings);
-        let seen = observations.seen();
+        let seen = footprints.seen(readings);
         let mut rough = Roughness::new(region.columns, region.rows, &seen);
         rough.strengths = strengths;
         Self {
@@ -76,7 +76,9 @@ impl<'a> WallSolve<'a> {
     /// How what a view's pixels read of x changes if they show `more` than they do, grey levels of the wall: `W A⁻¹ Wᵀ Ω more`, A the
     /// matrix of the normal equations.
     pub fn follow(&self, view: usize, more: &[f32], steps: usize) -> Vec<f32> {
-        let right = self.observations.right_of(view, more);
+        let mut right = vec![0.0; self.x.len()];
+        let more = more.iter().copied();
+        self.observations.add_right(view, more, &mut right);
         let mut change = vec![0.0; right.len()];
         self.solve(&right, steps, &mut change);
         self.observations.footprints.read(view, &change)
@@ -96,11 +98,6 @@ impl<'a> WallSolve<'a> {
     /// The fine pixels, row-major; what no pixel shows is nothing but smooth.
     pub fn x(&self) -> &[f32] {
         &self.x
-    }
-
-    /// True for every fine pixel that pixels with a value show.
-    pub fn seen(&self) -> &[bool] {
-        &self.seen
     }
 }
 

@@ -47,7 +47,7 @@ use super::tile::{ObserverMoments, SAMPLES, TileMoments};
 use super::view::View;
 use super::visibility::{Tile, Visibility};
 use crate::super_resolve::{
-    Evidence, Footprints, KINDS, Lattice, MARGIN, Reading, Region, WallSolve,
+    Evidence, Footprints, KINDS, Lattice, MARGIN, Reading, Region, WallSolve, huber_weight,
 };
 use nalgebra::Vector4;
 use std::ops::Range;
@@ -58,7 +58,7 @@ const STEPS: usize = 10;
 /// The losses of pixels in the rounds after the first, as weights of residuals in σ: Huber's, which finds most of the wall whatever
 /// glints on it, and then Tukey's, by which poses are estimated ([`super::robust`]), which forgets the glint.
 const LOSSES: [fn(f32) -> f32; 2] = [
-    |residual| (2.0 / residual.abs()).min(1.0),
+    |residual| huber_weight(residual, 2.0),
     |residual| Loss::weight(residual * residual, 1.0),
 ];
 
@@ -173,28 +173,24 @@ impl<'a> JointBlock<'a> {
         let pixels = self.pixels(solve.x());
         let moments = self.moments_of(&pixels);
         let mut probe = Probe::default();
-        for (view, pixels) in pixels.iter().enumerate() {
-            let count = self.readings[view].len();
-            for axis in 0..2 {
-                let mut moved = vec![0.0; count];
+        for axis in 0..2 {
+            let nothing = |tile: &TileMoments| vec![0.0; tile.observers.len()];
+            let mut held: Vec<Vec<f64>> = moments.iter().map(nothing).collect();
+            for (view, pixels) in pixels.iter().enumerate() {
+                let mut moved = vec![0.0; self.readings[view].len()];
                 for pixel in pixels {
                     moved[pixel.number] = pixel.features[axis];
                 }
                 let follows = solve.follow(view, &moved, PROBE_STEPS);
-                let mut held = vec![0.0; moments.len()];
                 for pixel in pixels {
                     let slope = f64::from(pixel.features[axis]);
                     let left = slope - f64::from(follows[pixel.number]);
-                    held[pixel.tile] += pixel.weight(self.sigma) * slope * left;
+                    held[pixel.tile][pixel.observer] += pixel.weight() * slope * left;
                 }
-                for (k, tile) in moments.iter().enumerate() {
-                    let place = self.visibility.observers(&self.tiles[k]).iter();
-                    let observer = place
-                        .clone()
-                        .position(|o| o.frame as usize == self.frames[view]);
-                    if let Some(observer) = observer {
-                        probe.add(tile, observer, axis, held[k]);
-                    }
+            }
+            for (tile, held) in moments.iter().zip(&held) {
+                for (observer, held) in held.iter().enumerate() {
+                    probe.add(tile, observer, axis, *held);
                 }
             }
         }
@@ -203,22 +199,25 @@ impl<'a> JointBlock<'a> {
 
     /// The pixels that are compared, view by view.
     fn pixels(&self, x: &[f32]) -> Vec<Vec<Pixel>> {
-        let features = self.features(x);
+        let slopes = self.slopes(x);
+        let precision = self.sigma.powi(-2);
         let views = self.frames.iter().enumerate();
         let pixels = views.map(|(n, frame)| {
-            let [s, h, value] = [0, 1, 2].map(|k| self.footprints.read(n, &features[k]));
+            let [s, h, value] = [&slopes[0], &slopes[1], x].map(|of| self.footprints.read(n, of));
             let gain = self.views[*frame].gain();
             let places = self.footprints.places(n).iter().zip(&self.readings[n]);
             let pixels = places.enumerate().filter_map(|(p, (place, reading))| {
                 let sight = self.sights.of(*place, n);
                 let (tile, observer) = sight.place.filter(|_| reading.inverse_sigma > 0.0)?;
                 let gain = gain * sight.shade;
+                let residual = gain * (reading.value - value[p]);
                 Some(Pixel {
                     number: p,
                     tile: tile as usize,
                     observer: observer as usize,
                     gain: f64::from(gain),
-                    residual: gain * (reading.value - value[p]),
+                    residual,
+                    omega: f64::from(Loss::weight(residual * residual, precision)),
                     features: [s[p], h[p], value[p]],
                 })
             });
@@ -241,8 +240,8 @@ impl<'a> JointBlock<'a> {
         moments
     }
 
-    /// `∂x/∂s`, `∂x/∂h` and x; no slopes at the region's border.
-    fn features<'x>(&self, x: &'x [f32]) -> [std::borrow::Cow<'x, [f32]>; 3] {
+    /// `∂x/∂s` and `∂x/∂h`; none at the region's border.
+    fn slopes(&self, x: &[f32]) -> [Vec<f32>; 2] {
         let (columns, rows) = (self.region.columns, self.region.rows);
         let slope = |step: usize, spacing_m: f64| {
             let scale = (0.5 / spacing_m) as f32;
@@ -252,12 +251,11 @@ impl<'a> JointBlock<'a> {
                     slopes[k] = scale * (x[k + step] - x[k - step]);
                 }
             }
-            slopes.into()
+            slopes
         };
         [
             slope(1, self.spacing_m[0]),
             slope(columns, self.spacing_m[1]),
-            x.into(),
         ]
     }
 }
@@ -292,35 +290,31 @@ struct Pixel {
     gain: f64,
     /// `e_p`, grey levels.
     residual: f32,
+    /// ω.
+    omega: f64,
     /// `φ_p` without its 1.
     features: [f32; 3],
 }
 
 impl Pixel {
-    /// ω.
-    fn omega(&self, sigma: f32) -> f64 {
-        f64::from(Loss::weight(self.residual * self.residual, sigma.powi(-2)))
-    }
-
     /// `a_i² ω`.
-    fn weight(&self, sigma: f32) -> f64 {
-        self.gain * self.gain * self.omega(sigma)
+    fn weight(&self) -> f64 {
+        self.gain * self.gain * self.omega
     }
 
     /// Adds its part to its frame's moments and, weighted, to the tile's features.
     fn add_to(&self, sigma: f32, tile: &mut TileMoments) {
         let (square, precision) = (self.residual * self.residual, sigma.powi(-2));
-        let omega = self.omega(sigma);
         let [s, h, value] = self.features.map(f64::from);
         let phi = Vector4::new(s, h, value, 1.0);
-        let weight = self.weight(sigma);
+        let weight = self.weight();
         let moments = &mut tile.observers[self.observer];
-        moments.gradient += phi * (self.gain * omega * f64::from(self.residual));
+        moments.gradient += phi * (self.gain * self.omega * f64::from(self.residual));
         moments.weight += weight / SAMPLES as f64;
         moments.cost += f64::from(Loss::share(square, precision) / precision);
-        moments.square += omega * f64::from(square);
+        moments.square += self.omega * f64::from(square);
         moments.pixels += 1.0;
-        moments.inliers += omega;
+        moments.inliers += self.omega;
         tile.features += phi * phi.transpose() * weight;
     }
 }

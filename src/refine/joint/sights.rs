@@ -168,27 +168,14 @@ fn around(grid: &WallGrid, tile: TileId) -> TileId {
 mod tests {
     use super::super::region_of;
     use super::*;
-    use crate::camera::{Camera, Sweep};
     use crate::refine::foreign::Marks;
-    use crate::refine::visibility::{Hidden, Placed};
-    use crate::surface::{Circle, Footprint};
-    use crate::trajectory::spiral;
+    use crate::refine::test_scene::placed_spiral;
+    use crate::refine::visibility::Hidden;
 
     /// Where a frame shows a tile partly it helps; next to where it shows something else it is not compared.
     #[test]
     fn frames_are_taken_for_the_wall_up_to_their_borders_but_for_what_is_left_out() {
-        let circle = Circle::new(3.0).unwrap();
-        let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
-        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
-        let placed: Vec<Placed> = spiral(6, 0.1, 30f64.to_radians())
-            .into_iter()
-            .map(|pose| Placed {
-                sweep: Sweep::default(),
-                pose,
-                footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),
-                active: true,
-            })
-            .collect();
+        let (circle, camera, grid, placed) = placed_spiral(6);
         let hidden = Hidden::NOTHING;
         let rows = -1000..1000;
         let all = Visibility::find(&circle, &grid, &camera, None, &hidden, &placed, &rows);
