@@ -37,8 +37,9 @@ pub struct RefineArguments {
     /// End the last solve with the first step shorter than 0.1 px or twice the uncertainty, most often its first: less time.
     #[arg(long)]
     fast: bool,
-    /// Solve for the wall at a third of a pixel, jointly with the poses, in the last solve: on walls with sharp edges, as bricks, a third
-    /// to a half of the error goes, in ten times the time; smooth walls gain nothing.
+    /// Solve once more, for the wall at a third of a pixel jointly with the poses: on walls with sharp edges, as bricks, a third
+    /// to a half of the error goes, in ten times the time. Walls that are smooth over a pixel have nothing to gain, and are refined as
+    /// without it.
     #[arg(long, conflicts_with = "fast")]
     joint: bool,
     /// Estimate what all frames share, too: focal, centre, distortion, radius, axis, or all, with commas between. How far
@@ -119,10 +120,10 @@ pub fn run(
             .calibrate
             .as_ref()
             .map(|list| list.iter().flat_map(|group| group.groups()).collect()),
-        ..match (arguments.fast, arguments.joint) {
-            (true, _) => RefineOptions::fast(),
-            (_, true) => RefineOptions::joint(),
-            _ => RefineOptions::default(),
+        joint: arguments.joint,
+        ..match arguments.fast {
+            true => RefineOptions::fast(),
+            false => RefineOptions::default(),
         }
     };
     let survey = arguments.reading.open(&arguments.survey, terminal)?;
@@ -163,6 +164,10 @@ pub fn run(
         json::print_text(&json)?;
     } else {
         summarise(&refined, terminal);
+        let solved_for = refined.report.levels.iter().any(|level| level.joint);
+        if arguments.joint && !solved_for {
+            terminal.say("  refined as without --joint: the wall is so smooth that there is nothing between the pixels to be solved for");
+        }
         terminal.say(format!(
             "wrote {} and {}",
             arguments.out.join("poses.tum").display(),

@@ -32,8 +32,9 @@ pub struct RefineOptions {
     pub windows: bool,
     /// Linearise with the gradient of the texture fused from all frames; otherwise each frame with its own picture's.
     pub fused_gradient: bool,
-    /// Solve for the wall at the density of the last solve, jointly with the poses, instead of taking what the frames show between
-    /// their pixels for it: on walls with sharp edges errors a third to a half smaller, in ten times the time ([`RefineOptions::joint()`]).
+    /// Solve once more, for the wall at a third of a pixel jointly with the poses, instead of taking what the frames show between
+    /// their pixels for it: on walls with sharp edges errors a third to a half smaller, in ten times the time. Where the wall is so smooth
+    /// that there is nothing between the pixels, that is found out and the solve left out.
     pub joint: bool,
     /// Memory for decoded frames, bytes. Frames that do not fit are decoded anew when needed.
     pub cache_bytes: usize,
@@ -78,18 +79,6 @@ impl RefineOptions {
             foreign_density: Some(1.0),
             step_tolerance_px: 0.1,
             step_tolerance_sigma: 2.0,
-            ..Self::default()
-        }
-    }
-
-    /// For exactness, at several times the time: the wall is solved for at a third of a pixel, jointly with the poses ([`RefineOptions::joint`](Self#structfield.joint)). Its
-    /// steps take long, and the last one taken leaves a tenth of the uncertainty at the most.
-    pub fn joint() -> Self {
-        Self {
-            joint: true,
-            final_density: 3.0,
-            foreign_density: Some(2.0),
-            step_tolerance_sigma: 0.3,
             ..Self::default()
         }
     }

@@ -87,6 +87,9 @@ pub struct LevelReport {
     pub samples_per_pixel: f64,
     /// Share of the wall that was looked at, the most informative.
     pub share_of_wall: f64,
+    /// True if the wall was solved for jointly with the poses.
+    #[serde(default)]
+    pub joint: bool,
     /// Its course.
     #[serde(flatten)]
     pub solve: SolveRecord,

@@ -11,6 +11,7 @@ use super::examine::examine;
 use super::flat_field::{correct, flatten};
 use super::gauss_newton::{Solution, StopReason, Stopping, go_on};
 use super::interpolation::Interpolation;
+use super::joint;
 use super::neighbourhood::Neighbourhood;
 use super::observed::{CalibrationReport, Refusal};
 use super::options::RefineOptions;
@@ -30,6 +31,7 @@ use crate::frames::FrameCache;
 use crate::progress::Progress;
 use crate::survey::{CalibrationGroup, Survey};
 use crate::trajectory::{Pose, StampedPose, Trajectory};
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -216,8 +218,12 @@ pub fn refine_keeping(
 
     let mut last = None;
     while let Some((sampling, stopping)) = solving.stages.front().copied() {
-        keeper.if_due(|| keep(Phase::Solving(Box::new(solving.clone())), &clock))?;
-        if solving.stages.len() == 1 && !solving.levels.is_empty() && solving.rivals.is_none() {
+        // Not between a solve and the one with the wall: that may turn out to be for nothing, and then the solution before it is wanted.
+        if !sampling.joint {
+            keeper.if_due(|| keep(Phase::Solving(Box::new(solving.clone())), &clock))?;
+        }
+        // Once the frames are aligned, before the first of the solves at the end.
+        if sampling.by_variance && !solving.levels.is_empty() && solving.rivals.is_none() {
             solving.rivals = Some(repair(
                 &scene,
                 options,
@@ -239,10 +245,17 @@ pub fn refine_keeping(
             ..
         } = sampling;
         let mut problem = Problem::new(&scene, sampling, tracked.members())?.calibrating();
+        if sampling.joint && !problem.is_joint() {
+            clock.lap("look at the wall");
+            continue;
+        }
         // Before the frames are aligned at full size, residuals are mostly misalignment.
         if level == 0 {
-            let last = solving.stages.is_empty();
-            problem = problem.without_foreign(options.foreign_density.filter(|_| last))?;
+            let density = match sampling.joint {
+                true => Some(joint::FOREIGN_DENSITY),
+                false => options.foreign_density.filter(|_| sampling.by_variance),
+            };
+            problem = problem.without_foreign(density)?;
         }
         // Where no frame can be believed, the prior is all there is to report.
         if problem.tiles() == 0 && tracked.doubts.iter().all(Option::is_none) {
@@ -281,8 +294,8 @@ pub fn refine_keeping(
         };
         adopt(&mut scene, &mut calibration, solution.kappa, &refused);
         (solving.kappa, solving.free) = (scene.kappa, calibration.free);
-        if !refused.is_empty() && solving.stages.is_empty() {
-            solving.stages.push_back((sampling, stopping));
+        if !refused.is_empty() && !more_for_certain(&solving.stages) {
+            solving.stages.push_front((sampling, stopping));
         }
         solving.refusals.extend(refused);
         solving.solved.clone_from(tracked);
@@ -293,10 +306,11 @@ pub fn refine_keeping(
             level,
             samples_per_pixel: density,
             share_of_wall: solution.problem.share_of_wall(),
+            joint: solution.problem.is_joint(),
             solve: solution.record.clone(),
         });
-        last = Some(solution);
-        if !solving.stages.is_empty() && frames.shading().is_some() {
+        last = Some((solution, stopping));
+        if more_for_certain(&solving.stages) && frames.shading().is_some() {
             correct(&scene, options, tracked)?;
         }
         clock.lap(&format!("global {stage}"));
@@ -312,7 +326,7 @@ pub fn refine_keeping(
         rivals,
         ..
     } = solving;
-    let solution = last.ok_or(RefineError::NoOverlap)?;
+    let (solution, stopping) = last.ok_or(RefineError::NoOverlap)?;
     progress.start("covariance", 1);
     let finest = options.handover_level(side);
     let late = unsupported(&alignments(&scene, finest, &tracked, &(0..count))?, count);
@@ -368,7 +382,7 @@ pub fn refine_keeping(
     Ok(Refined {
         trajectory,
         report: RefineReport {
-            stopped_because: explain(&solution, options),
+            stopped_because: explain(&solution, &stopping),
             levels,
             frames: reports,
             frames_on_prior: on_prior,
@@ -428,7 +442,7 @@ fn adopt(scene: &mut Scene, calibration: &mut Calibration, mut kappa: Kappa, ref
     *scene = scene.at(kappa);
 }
 
-/// The global solves: coarse to fine, and the finest once more with a denser look at the wall.
+/// The global solves: coarse to fine, the finest once more with a denser look at the wall, and, if asked for, jointly with the wall.
 /// Those between only bring the estimate close for the next, and a share of the information is enough for that.
 ///
 /// One sample per pixel is too sparse to end with: the products of residual and gradient vary faster than either,
@@ -444,8 +458,16 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
         density: options.final_density,
         interpolation: Interpolation::Bicubic,
         by_variance: true,
-        joint: options.joint,
         ..Sampling::of(0)
+    };
+    let with_wall = Sampling {
+        density: joint::DENSITY,
+        joint: true,
+        ..finest
+    };
+    let with_wall_stopping = Stopping {
+        step_sigma: joint::STEP_SIGMA,
+        ..last
     };
     let first = options.handover_level(side);
     let sampling = move |level| Sampling {
@@ -460,6 +482,12 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
         .rev()
         .map(move |level| (sampling(level), close(options, level)))
         .chain([(finest, last)])
+        .chain(options.joint.then_some((with_wall, with_wall_stopping)))
+}
+
+/// Whether solves are to come; one jointly with the wall may turn out to be for nothing.
+fn more_for_certain(stages: &VecDeque<(Sampling, Stopping)>) -> bool {
+    stages.front().is_some_and(|(next, _)| !next.joint)
 }
 
 /// When a solve has come close enough for the next.
@@ -608,22 +636,22 @@ fn leave_none_alone(reports: &mut [FrameReport]) {
     }
 }
 
-fn explain(solution: &Solution, options: &RefineOptions) -> String {
+fn explain(solution: &Solution, stopping: &Stopping) -> String {
     match solution.record.stop {
         StopReason::StepBelowTolerance => format!(
             "the last step moved no wall point by more than {} px",
-            options.step_tolerance_px
+            stopping.step_px
         ),
         StopReason::StepBelowUncertainty => format!(
             "the last step was shorter than {} of the estimate's uncertainty",
-            options.step_tolerance_sigma
+            stopping.step_sigma
         ),
         StopReason::NoFurtherDescent => {
             "no step, however damped, lowers the robust cost any more".to_owned()
         }
         StopReason::MaxIterations => format!(
             "the {} steps allowed were used up; the last moved the wall by {:.4} px",
-            options.max_iterations, solution.record.last_step_px
+            stopping.max_iterations, solution.record.last_step_px
         ),
     }
 }

@@ -21,7 +21,7 @@
 //! off. Two native pixels and what the differences reach, [`MARGIN`] fine pixels, are enough.
 //!
 //! Panoramas are drawn so ([`crate::render::RenderOptions::super_resolve`]), and poses estimated jointly with the wall
-//! ([`crate::refine::RefineOptions::joint`]).
+//! ([`crate::refine::RefineOptions`]).
 //!
 //! Sources: R. C. Hardie, K. J. Barnard, E. E. Armstrong, "Joint MAP registration and high-resolution image estimation
 //! using a sequence of undersampled images", IEEE Transactions on Image Processing 6(12), 1997; S. Farsiu, M. D. Robinson,
@@ -42,5 +42,5 @@ pub use huber::weight as huber_weight;
 pub use learn::{Evidence, Resolved};
 pub use observations::Reading;
 pub use region::{Lattice, Region};
-pub use roughness::KINDS;
+pub use roughness::{KINDS, aliased_variance};
 pub use solve::{MARGIN, WallSolve};

@@ -153,13 +153,8 @@ impl Roughness {
     /// The mean over all frequencies of each kind's share of `1/P(f)`.
     pub fn shares(&self) -> [f64; KINDS] {
         let mut shares = [0.0; KINDS];
-        let at = |k: usize| ((k as f64 + 0.5) / FREQUENCIES as f64) * PI;
-        for (k, l) in (0..FREQUENCIES).flat_map(|k| (0..FREQUENCIES).map(move |l| (k, l))) {
-            // |1 − exp(iω)|² along s and h.
-            let [s, h] = [at(k), at(l)].map(|omega| 2.0 - 2.0 * omega.cos());
-            let responses = [s, h, s * s, h * h, s * h];
-            let parts: [f64; KINDS] =
-                std::array::from_fn(|kind| self.strengths[kind] * responses[kind]);
+        for omega in frequencies() {
+            let parts = parts(&self.strengths, omega);
             let all: f64 = parts.iter().sum();
             for (share, part) in shares.iter_mut().zip(parts) {
                 *share += part / all.max(f64::MIN_POSITIVE) / (FREQUENCIES * FREQUENCIES) as f64;
@@ -167,6 +162,34 @@ impl Roughness {
         }
         shares
     }
+}
+
+/// Variance, grey levels², of what a pixel as wide as `width` fine pixels reads of the frequencies above its own Nyquist frequency along
+/// either axis, on a wall of the given strengths: `E_f[P(f) B(f)²]` over them, with `B(ω) = sin(ω width/2)/(width sin(ω/2))` along each
+/// axis. It passes for something coarser, another thing in each frame (aliasing).
+pub fn aliased_variance(strengths: &[f64; KINDS], width: f64) -> f64 {
+    let box_mean = |omega: f64| (0.5 * width * omega).sin() / (width * (0.5 * omega).sin());
+    let finer = frequencies().filter(|omega| omega.iter().any(|omega| omega * width > PI));
+    let variances = finer.map(|omega| {
+        let all: f64 = parts(strengths, omega).iter().sum();
+        let seen = box_mean(omega[0]) * box_mean(omega[1]);
+        seen * seen / all.max(f64::MIN_POSITIVE)
+    });
+    variances.sum::<f64>() / (FREQUENCIES * FREQUENCIES) as f64
+}
+
+/// Angular frequencies spread evenly over a quarter of the spectrum: along s and h, radians per fine pixel.
+fn frequencies() -> impl Iterator<Item = [f64; 2]> {
+    let at = |k: usize| ((k as f64 + 0.5) / FREQUENCIES as f64) * PI;
+    (0..FREQUENCIES * FREQUENCIES).map(move |k| [at(k / FREQUENCIES), at(k % FREQUENCIES)])
+}
+
+/// The parts `a_i |D_i(f)|²` of `1/P(f)`.
+fn parts(strengths: &[f64; KINDS], omega: [f64; 2]) -> [f64; KINDS] {
+    // |1 − exp(iω)|² along s and h.
+    let [s, h] = omega.map(|omega| 2.0 - 2.0 * omega.cos());
+    let responses = [s, h, s * s, h * h, s * h];
+    std::array::from_fn(|kind| strengths[kind] * responses[kind])
 }
 
 /// Columns and rows from a difference's first pixel to its last.
@@ -240,5 +263,19 @@ mod tests {
     fn shares_add_up() {
         let rough = roughness();
         assert!((rough.shares().iter().sum::<f64>() - 1.0).abs() < 1e-9);
+    }
+
+    /// A wall whose second differences alone are known along each axis, `1/P = a (s² + h² + 2 s h) = a (s + h)²`, has nearly all of its
+    /// power in what pixels can tell; one of nothing but mixed differences along the axes.
+    #[test]
+    fn a_smooth_wall_hardly_aliases() {
+        let smooth = aliased_variance(&[0.0, 0.0, 1.0, 1.0, 2.0], 3.0);
+        let stronger = aliased_variance(&[0.0, 0.0, 4.0, 4.0, 8.0], 3.0);
+        let edges = aliased_variance(&[0.01, 0.01, 0.0, 0.0, 0.2], 3.0);
+        assert!((smooth - 4.0 * stronger).abs() < 1e-12);
+        assert!(smooth > 0.0 && smooth < 0.03, "{smooth}");
+        assert!(edges > 20.0 * smooth, "{edges}");
+        // A pixel no wider than a fine one has nothing above its Nyquist frequency.
+        assert_eq!(aliased_variance(&[1.0; KINDS], 1.0), 0.0);
     }
 }

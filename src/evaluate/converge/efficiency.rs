@@ -247,9 +247,9 @@ fn one(options: &SimulateOptions, joint: bool, out: &Path) -> Result<Run, Conver
     simulate::run(options, &folder, false, &Silent)?;
     let survey = Survey::open(&folder)?;
     let silent: Arc<dyn Progress> = Arc::new(Silent);
-    let refining = match joint {
-        true => RefineOptions::joint(),
-        false => RefineOptions::default(),
+    let refining = RefineOptions {
+        joint,
+        ..RefineOptions::default()
     };
     let refined = refine(&survey, &refining, &silent)?;
     let doubled = doubled_frames(options, &scratch.path().join("doubled"))?;

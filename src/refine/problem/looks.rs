@@ -11,7 +11,7 @@ use crate::refine::robust::NoiseHistogram;
 use crate::refine::tile::{Misfit, Seen, TileWork};
 use crate::refine::view::View;
 use crate::refine::visibility::{Observer, Tile, Visibility};
-use crate::super_resolve::Evidence;
+use crate::super_resolve::{Evidence, aliased_variance};
 use crate::vectors::wide;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -21,6 +21,9 @@ use std::ops::Range;
 const SCALE_TILES: usize = 600;
 /// Blocks of tiles that are solved for to learn what the wall is like.
 const LEARNED_BLOCKS: usize = 48;
+/// What detail finer than pixels adds to the variance of what they read, over the variance of their noise, at the least, for the wall to be
+/// solved for: on brick 1.4, 0.4 and 0.1 with noise of 1, 2 and 4 grey levels, on concrete 0.005 at the most.
+const LEAST_ALIASED: f64 = 0.02;
 /// Factor by which the variance of residuals may be short of the sensor's.
 const MOST_UNDERESTIMATE: f64 = 1.25;
 
@@ -69,22 +72,27 @@ impl Problem<'_> {
         Ok(())
     }
 
-    /// Learns how rough the wall is, and how stiffly it holds frames, from blocks spread over all of it.
-    pub(super) fn learn_wall(&self) -> Result<WallModel, ProblemError> {
+    /// Learns how rough the wall is, and how stiffly it holds frames, from blocks spread over all of it; `None` if it is so smooth that there
+    /// is nothing between the pixels to be solved for.
+    pub(super) fn learn_wall(&self) -> Result<Option<WallModel>, ProblemError> {
         let found = self.at_blocks(|block| block.evidence())?;
         let strengths = found
             .iter()
             .fold(Evidence::default(), Evidence::merge)
             .strengths();
+        let aliased = aliased_variance(&strengths, self.grid.density);
+        if aliased < LEAST_ALIASED * self.sigma.powi(2) {
+            return Ok(None);
+        }
         let found = self.at_blocks(|block| block.stiffness(strengths))?;
         let stiffness = found
             .iter()
             .fold(Probe::default(), Probe::merge)
             .stiffness();
-        Ok(WallModel {
+        Ok(Some(WallModel {
             strengths,
             stiffness,
-        })
+        }))
     }
 
     /// Works on about [`LEARNED_BLOCKS`] blocks spread over all of the wall.

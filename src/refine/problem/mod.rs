@@ -218,7 +218,7 @@ impl<'a> Problem<'a> {
         };
         problem.estimate_noise()?;
         if sampling.joint {
-            problem.wall = Some(problem.learn_wall()?);
+            problem.wall = problem.learn_wall()?;
         }
         Ok(problem)
     }
@@ -269,6 +269,11 @@ impl<'a> Problem<'a> {
     /// Number of tiles that are compared.
     pub fn tiles(&self) -> usize {
         self.coverage.tiles
+    }
+
+    /// True if the wall is solved for jointly with the poses: if it was asked for, and there is something between the pixels to be solved for.
+    pub fn is_joint(&self) -> bool {
+        self.wall.is_some()
     }
 
     /// Share of the wall that is compared.

@@ -41,6 +41,9 @@ fn name(level: &LevelReport) -> String {
             significant(100.0 * level.share_of_wall, 2)
         );
     }
+    if level.joint {
+        name += ", jointly with the wall";
+    }
     name
 }
 
