@@ -313,3 +313,23 @@ fn solving_for_the_wall_makes_bricks_more_exact() {
     assert!(joint.0 < 0.75 * plain.0, "{} after {}", joint.0, plain.0);
     assert!((0.3..3.0).contains(&(joint.0 / joint.1)), "{joint:?}");
 }
+
+/// Concrete is smooth over a pixel: there is nothing to be solved for, and nothing is changed.
+#[test]
+fn a_smooth_wall_is_refined_as_without_solving_for_it() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = dir.path().join("survey");
+    let concrete = ["--wall", "concrete", "--frames", "12", "--size", "320x240"];
+    simulate(&survey, &concrete);
+    let refined = |name: &str, options: &[&str]| {
+        let out = dir.path().join(name);
+        let arguments = ["refine", text(&survey), "--out", text(&out)];
+        (succeed(&[&arguments[..], options].concat()), out)
+    };
+    let ((_, plain), (said, joint)) = (refined("plain", &[]), refined("joint", &["--joint"]));
+    assert!(said.contains("as without --joint"), "{said}");
+    for file in ["poses.tum", "covariance.csv"] {
+        let [plain, joint] = [&plain, &joint].map(|out| std::fs::read(out.join(file)).unwrap());
+        assert!(plain == joint, "{file} is different");
+    }
+}

@@ -113,30 +113,28 @@ fn result(path: &Path) -> Vec<u8> {
     }
 }
 
+/// Refines a survey in one go and with kills, and compares the results.
+fn refine_with_kills(survey: &Path, folder: &Path, options: &[&str]) {
+    let (whole, broken) = (folder.join("whole"), folder.join("broken"));
+    let refine = |out| [&["refine", text(survey), "--out", text(out)], options].concat();
+    let since = Instant::now();
+    succeed(&refine(&whole));
+    killed(&refine(&broken), since.elapsed(), 1);
+    assert_same(&whole, &broken, result);
+}
+
 #[test]
 fn refine_ends_with_the_same_bytes_however_often_it_is_killed() {
     let dir = tempfile::tempdir().unwrap();
     let survey = survey(dir.path(), 18);
-    let refine = |out: &Path| -> Vec<String> {
-        let arguments = [
-            "refine",
-            text(&survey),
-            "--calibrate",
-            "focal",
-            "--out",
-            text(out),
-        ];
-        arguments.map(str::to_owned).to_vec()
-    };
-    let (whole, broken) = (dir.path().join("whole"), dir.path().join("broken"));
-    let since = Instant::now();
-    let arguments = refine(&whole);
-    succeed(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
-    let takes = since.elapsed();
-    let arguments = refine(&broken);
-    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    killed(&arguments, takes, 1);
-    assert_same(&whole, &broken, result);
+    refine_with_kills(&survey, dir.path(), &["--calibrate", "focal"]);
+}
+
+#[test]
+fn so_does_refine_jointly_with_the_wall() {
+    let dir = tempfile::tempdir().unwrap();
+    let survey = survey(dir.path(), 8);
+    refine_with_kills(&survey, dir.path(), &["--joint"]);
 }
 
 #[test]
