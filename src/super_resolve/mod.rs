@@ -13,12 +13,12 @@
 //! Σ_p ρ((y_p − Σ_k w_pk x_k)/σ_p) + Σ_i a_i Σ_n ρ_i((D_i x)_n)
 //! ```
 //!
-//! with the footprints w ([`Footprints`]), differences `D_i` of neighbouring fine pixels and robust losses ρ: squares, but
+//! with the footprints w ([`Footprints`]), differences `D_i` of fine pixels and robust losses ρ: squares, but
 //! linear for what stands out, so that what moves or glints pulls no harder than a few σ, and edges of the wall stay
 //! edges. How rough the wall is, `a`, is learned from the region itself, or given.
 //!
 //! A region is a tile with a margin: pixels near its border lack the views that would reach beyond it, so the margin is cut
-//! off. Two native pixels and what the differences reach, [`MARGIN`] fine pixels, are enough.
+//! off. Two native pixels and what most differences reach, [`MARGIN`] fine pixels, are enough.
 //!
 //! Panoramas are drawn so ([`crate::render::RenderOptions::super_resolve`]), and poses estimated jointly with the wall
 //! ([`crate::refine::RefineOptions`]).

@@ -4,13 +4,29 @@ use super::huber;
 use crate::vectors::wide;
 use std::f64::consts::PI;
 
-/// Differences of neighbouring fine pixels: `∂s`, `∂h`, `∂ss`, `∂hh`, `∂sh`, each as (column, row, factor).
-const DIFFERENCES: [&[(usize, usize, f32)]; 5] = [
+/// Fine pixels over which an edge is expected to go on as it is, along the axes.
+const STRAIGHT: usize = 6;
+
+/// Differences of fine pixels: `∂s`, `∂h`, `∂ss`, `∂hh`, `∂sh`, each as (column, row, factor), and what changes of `∂h` along s and of `∂s`
+/// along h over [`STRAIGHT`] fine pixels.
+const DIFFERENCES: [&[(usize, usize, f32)]; 7] = [
     &[(0, 0, -1.0), (1, 0, 1.0)],
     &[(0, 0, -1.0), (0, 1, 1.0)],
     &[(0, 0, 1.0), (1, 0, -2.0), (2, 0, 1.0)],
     &[(0, 0, 1.0), (0, 1, -2.0), (0, 2, 1.0)],
     &[(0, 0, 1.0), (1, 0, -1.0), (0, 1, -1.0), (1, 1, 1.0)],
+    &[
+        (0, 0, 1.0),
+        (STRAIGHT, 0, -1.0),
+        (0, 1, -1.0),
+        (STRAIGHT, 1, 1.0),
+    ],
+    &[
+        (0, 0, 1.0),
+        (1, 0, -1.0),
+        (0, STRAIGHT, -1.0),
+        (1, STRAIGHT, 1.0),
+    ],
 ];
 /// Number of kinds of differences.
 pub const KINDS: usize = DIFFERENCES.len();
@@ -22,7 +38,9 @@ const FREQUENCIES: usize = 24;
 /// The roughness of a raster, `Σ_i a_i Σ_n w_in (D_i x)_n²`: the negative logarithm (times two) of a Gaussian prior.
 ///
 /// Its spectrum is `1/P(f) = Σ_i a_i |D_i(f)|²`: between first differences, the `1/f²` of natural scenes, second ones,
-/// the `1/f⁴` of smooth ones, and mixed ones, of walls whose edges run along and across the tunnel.
+/// the `1/f⁴` of smooth ones, and mixed ones, of walls whose edges run along and across the tunnel. Where grain lies over them, what
+/// neighbours have in common says little of an edge, and it takes what is farther along it, too: errors of an edge that hang together along
+/// a course of bricks bend trajectories.
 pub struct Roughness {
     columns: usize,
     rows: usize,
@@ -186,9 +204,10 @@ fn frequencies() -> impl Iterator<Item = [f64; 2]> {
 
 /// The parts `a_i |D_i(f)|²` of `1/P(f)`.
 fn parts(strengths: &[f64; KINDS], omega: [f64; 2]) -> [f64; KINDS] {
-    // |1 − exp(iω)|² along s and h.
-    let [s, h] = omega.map(|omega| 2.0 - 2.0 * omega.cos());
-    let responses = [s, h, s * s, h * h, s * h];
+    // |1 − exp(iωd)|² along s and h, of neighbours and of fine pixels farther apart.
+    let squares = |apart: usize| omega.map(|omega| 2.0 - 2.0 * (apart as f64 * omega).cos());
+    let ([s, h], [far_s, far_h]) = (squares(1), squares(STRAIGHT));
+    let responses = [s, h, s * s, h * h, s * h, far_s * h, s * far_h];
     std::array::from_fn(|kind| strengths[kind] * responses[kind])
 }
 
@@ -205,7 +224,7 @@ mod tests {
     fn roughness() -> Roughness {
         let seen: Vec<bool> = (0..63).map(|k| k != 40).collect();
         let mut rough = Roughness::new(9, 7, &seen);
-        rough.strengths = [1.0, 2.0, 0.5, 3.0, 0.25];
+        rough.strengths = [1.0, 2.0, 0.5, 3.0, 0.25, 0.75, 1.5];
         rough
     }
 
@@ -269,9 +288,14 @@ mod tests {
     /// power in what pixels can tell; one of nothing but mixed differences along the axes.
     #[test]
     fn a_smooth_wall_hardly_aliases() {
-        let smooth = aliased_variance(&[0.0, 0.0, 1.0, 1.0, 2.0], 3.0);
-        let stronger = aliased_variance(&[0.0, 0.0, 4.0, 4.0, 8.0], 3.0);
-        let edges = aliased_variance(&[0.01, 0.01, 0.0, 0.0, 0.2], 3.0);
+        let of = |near: [f64; 5]| {
+            let mut strengths = [0.0; KINDS];
+            strengths[..5].copy_from_slice(&near);
+            aliased_variance(&strengths, 3.0)
+        };
+        let smooth = of([0.0, 0.0, 1.0, 1.0, 2.0]);
+        let stronger = of([0.0, 0.0, 4.0, 4.0, 8.0]);
+        let edges = of([0.01, 0.01, 0.0, 0.0, 0.2]);
         assert!((smooth - 4.0 * stronger).abs() < 1e-12);
         assert!(smooth > 0.0 && smooth < 0.03, "{smooth}");
         assert!(edges > 20.0 * smooth, "{edges}");

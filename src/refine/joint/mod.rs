@@ -29,6 +29,10 @@
 //! step with a lattice, as courses of bricks do, and errors that are the same all along a course bend a trajectory; so the lattice of every
 //! block is off by fractions of its own, as the samples of tiles are ([`WallGrid::centre`]).
 //!
+//! **Smooth walls** have nothing between the pixels to be solved for, and interpolation with the mean of all frames does better, as it supposes
+//! nothing of the wall. How much of what pixels read is finer than they are, follows from how rough the wall is
+//! ([`crate::super_resolve::aliased_variance`]); where that is little against the noise, the solve before stands.
+//!
 //! Block by block of the wall, with a margin, and nothing is kept of x: memory does not grow with the tunnel's length.
 //!
 //! Source: R. C. Hardie, K. J. Barnard, E. E. Armstrong, "Joint MAP registration and high-resolution image estimation
