@@ -38,7 +38,7 @@ pub struct RefineArguments {
     #[arg(long)]
     fast: bool,
     /// Solve once more, for the wall at a third of a pixel jointly with the poses: on walls with sharp edges, as bricks, a third
-    /// to a half of the error goes, in ten times the time. Walls that are smooth over a pixel have nothing to gain, and are refined as
+    /// to a half of the error goes, in five to ten times the time. Walls that are smooth over a pixel have nothing to gain, and are refined as
     /// without it.
     #[arg(long, conflicts_with = "fast")]
     joint: bool,

@@ -18,7 +18,7 @@ pub struct RefineOptions {
     pub tracking_levels: usize,
     /// Frames placed between two solves of the sliding window.
     pub window_stride: usize,
-    /// Wall samples per pixel along each axis in the last solve.
+    /// Wall samples per pixel along each axis in the last solve (but for a joint one).
     pub final_density: f64,
     /// Wall samples per pixel along each axis where, before the last solve, the frames are searched for what is not wall; if
     /// None, the samples of that solve.
@@ -33,7 +33,7 @@ pub struct RefineOptions {
     /// Linearise with the gradient of the texture fused from all frames; otherwise each frame with its own picture's.
     pub fused_gradient: bool,
     /// Solve once more, for the wall at a third of a pixel jointly with the poses, instead of taking what the frames show between
-    /// their pixels for it: on walls with sharp edges errors a third to a half smaller, in ten times the time. Where the wall is so smooth
+    /// their pixels for it: on walls with sharp edges errors a third to a half smaller, in five to ten times the time. Where the wall is so smooth
     /// that there is nothing between the pixels, that is found out and the solve left out.
     pub joint: bool,
     /// Memory for decoded frames, bytes. Frames that do not fit are decoded anew when needed.

@@ -223,7 +223,8 @@ pub fn refine_keeping(
             keeper.if_due(|| keep(Phase::Solving(Box::new(solving.clone())), &clock))?;
         }
         // Once the frames are aligned, before the first of the solves at the end.
-        if sampling.by_variance && !solving.levels.is_empty() && solving.rivals.is_none() {
+        let at_the_end = sampling.by_variance && !sampling.joint;
+        if at_the_end && !solving.levels.is_empty() && solving.rivals.is_none() {
             solving.rivals = Some(repair(
                 &scene,
                 options,
@@ -296,6 +297,10 @@ pub fn refine_keeping(
         (solving.kappa, solving.free) = (scene.kappa, calibration.free);
         if !refused.is_empty() && !more_for_certain(&solving.stages) {
             solving.stages.push_front((sampling, stopping));
+            // Without the unknown the wall may look smooth, and then a solution without it is wanted.
+            if sampling.joint {
+                solving.stages.push_front(finest(options));
+            }
         }
         solving.refusals.extend(refused);
         solving.solved.clone_from(tracked);
@@ -449,17 +454,7 @@ fn adopt(scene: &mut Scene, calibration: &mut Calibration, mut kappa: Kappa, ref
 /// and where the wall repeats in step with the samples (courses of bricks run along them) what falls between
 /// them does not average out. On brick this alone is 0.05 px of wall error over two turns.
 fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling, Stopping)> + '_ {
-    let last = Stopping {
-        max_iterations: options.max_iterations,
-        step_px: options.step_tolerance_px,
-        step_sigma: options.step_tolerance_sigma,
-    };
-    let finest = Sampling {
-        density: options.final_density,
-        interpolation: Interpolation::Bicubic,
-        by_variance: true,
-        ..Sampling::of(0)
-    };
+    let (finest, last) = finest(options);
     let with_wall = Sampling {
         density: joint::DENSITY,
         joint: true,
@@ -483,6 +478,22 @@ fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling,
         .map(move |level| (sampling(level), close(options, level)))
         .chain([(finest, last)])
         .chain(options.joint.then_some((with_wall, with_wall_stopping)))
+}
+
+/// The solve at full size with a denser look.
+fn finest(options: &RefineOptions) -> (Sampling, Stopping) {
+    let sampling = Sampling {
+        density: options.final_density,
+        interpolation: Interpolation::Bicubic,
+        by_variance: true,
+        ..Sampling::of(0)
+    };
+    let stopping = Stopping {
+        max_iterations: options.max_iterations,
+        step_px: options.step_tolerance_px,
+        step_sigma: options.step_tolerance_sigma,
+    };
+    (sampling, stopping)
 }
 
 /// Whether solves are to come; one jointly with the wall may turn out to be for nothing.

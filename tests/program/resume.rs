@@ -135,6 +135,8 @@ fn so_does_refine_jointly_with_the_wall() {
     let dir = tempfile::tempdir().unwrap();
     let survey = survey(dir.path(), 8);
     refine_with_kills(&survey, dir.path(), &["--joint"]);
+    let report = std::fs::read_to_string(dir.path().join("broken/refine.json")).unwrap();
+    assert!(report.contains("\"joint\": true"), "{report}");
 }
 
 #[test]
