@@ -57,9 +57,9 @@ impl Roughness {
     pub fn new(columns: usize, rows: usize, seen: &[bool]) -> Self {
         let weights = DIFFERENCES.map(|taps| {
             let mut weights = vec![0.0; columns * rows];
-            let [reach_s, reach_h] = reach(taps);
-            for row in 0..rows.saturating_sub(reach_h) {
-                for column in 0..columns.saturating_sub(reach_s) {
+            let [starts_s, starts_h] = starts(columns, rows, taps);
+            for row in 0..starts_h {
+                for column in 0..starts_s {
                     let at = row * columns + column;
                     let all = taps.iter().all(|(s, h, _)| seen[at + h * columns + s]);
                     weights[at] = if all { 1.0 } else { 0.0 };
@@ -84,16 +84,12 @@ impl Roughness {
     /// Sets `out` to `D_i x`, at the first of each difference's pixels.
     fn differences(&self, kind: usize, x: &[f32], out: &mut [f32]) {
         let taps = DIFFERENCES[kind];
-        let [reach_s, reach_h] = reach(taps);
+        let [columns, rows] = starts(self.columns, self.rows, taps);
         out.fill(0.0);
-        let columns = self.columns.saturating_sub(reach_s);
-        if columns == 0 {
-            return;
-        }
         wide(
             #[inline(always)]
             || {
-                for row in 0..self.rows.saturating_sub(reach_h) {
+                for row in 0..rows {
                     let start = row * self.columns;
                     for (s, h, factor) in taps {
                         let from = start + h * self.columns + s;
@@ -142,18 +138,14 @@ impl Roughness {
             self.differences(kind, x, scratch);
             let strength = self.strengths[kind] as f32;
             let weights = &self.weights[kind];
-            let [reach_s, reach_h] = reach(taps);
-            let columns = self.columns.saturating_sub(reach_s);
-            if columns == 0 {
-                continue;
-            }
+            let [columns, rows] = starts(self.columns, self.rows, taps);
             wide(
                 #[inline(always)]
                 || {
                     for (d, w) in scratch.iter_mut().zip(weights) {
                         *d *= strength * w;
                     }
-                    for row in 0..self.rows.saturating_sub(reach_h) {
+                    for row in 0..rows {
                         let start = row * self.columns;
                         for (s, h, factor) in *taps {
                             let to = start + h * self.columns + s;
@@ -226,10 +218,15 @@ fn parts(strengths: &[f64; KINDS], omega: [f64; 2]) -> [f64; KINDS] {
     std::array::from_fn(|kind| strengths[kind] * responses[kind])
 }
 
-/// Columns and rows from a difference's first pixel to its last.
-fn reach(taps: &[(usize, usize, f32)]) -> [usize; 2] {
-    taps.iter()
-        .fold([0, 0], |[s, h], tap| [s.max(tap.0), h.max(tap.1)])
+/// Number of columns and of rows, the first ones of a raster, in which differences begin; none if they do not fit into it.
+fn starts(columns: usize, rows: usize, taps: &[(usize, usize, f32)]) -> [usize; 2] {
+    let reach = |along: fn(&(usize, usize, f32)) -> usize| taps.iter().map(along).max();
+    let columns = columns.saturating_sub(reach(|tap| tap.0).unwrap_or(0));
+    let rows = rows.saturating_sub(reach(|tap| tap.1).unwrap_or(0));
+    if columns == 0 || rows == 0 {
+        return [0, 0];
+    }
+    [columns, rows]
 }
 
 #[cfg(test)]
