@@ -224,15 +224,16 @@ impl Camera {
         }
     }
 
-    /// The same camera with twice as many pixels along each axis: the inverse of a halving.
-    pub fn doubled(&self) -> Self {
+    /// The same camera with `times` as many pixels along each axis.
+    pub fn finer(&self, times: u32) -> Self {
+        let scale = f64::from(times);
         Self {
-            width: 2 * self.width,
-            height: 2 * self.height,
-            fx: 2.0 * self.fx,
-            fy: 2.0 * self.fy,
-            cx: 2.0 * self.cx + 0.5,
-            cy: 2.0 * self.cy + 0.5,
+            width: times * self.width,
+            height: times * self.height,
+            fx: scale * self.fx,
+            fy: scale * self.fy,
+            cx: scale * self.cx + 0.5 * (scale - 1.0),
+            cy: scale * self.cy + 0.5 * (scale - 1.0),
             lens: self.lens,
             sweep: self.sweep,
         }

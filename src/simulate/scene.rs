@@ -150,6 +150,19 @@ impl Scene {
         self.exact(&self.band(self.reaches[frame]), frame)
     }
 
+    /// All frames that are there as [`Self::render_exact`] has them, but with `times` as many pixels along each axis, cast from the
+    /// same raster.
+    pub fn render_finer(&self, times: u32) -> Vec<GreyImage> {
+        let camera = self.camera.finer(times);
+        let points = self.options.supersample.div_ceil(times);
+        let frames_of = |batch: Batch| {
+            let band = self.band(batch.h_m);
+            let finer = |(_, shown): &(usize, usize)| self.exact_by(&band, *shown, &camera, points);
+            batch.frames.par_iter().map(finer).collect::<Vec<_>>()
+        };
+        self.batches().into_iter().flat_map(frames_of).collect()
+    }
+
     /// A frame as the sensor delivers it, good or bad; `None` if it is missing.
     ///
     /// # Panics
@@ -231,14 +244,15 @@ impl Scene {
 
     /// [`Self::render_exact`], of a band that holds all the frame sees.
     fn exact(&self, band: &Band, frame: usize) -> GreyImage {
+        self.exact_by(band, frame, &self.camera, self.options.supersample)
+    }
+
+    /// The same through `camera`, this one or a finer one, as the mean of `points × points` points a pixel.
+    fn exact_by(&self, band: &Band, frame: usize, camera: &Camera, points: u32) -> GreyImage {
         let options = &self.options;
-        let wall = cast(
-            band,
-            &self.tunnel,
-            &self.camera,
-            |v| self.path.at_row(frame, v),
-            options.supersample,
-        );
+        let finer = f64::from(camera.height) / f64::from(self.camera.height);
+        let pose = |v: f64| self.path.at_row(frame, (v + 0.5) / finer - 0.5);
+        let wall = cast(band, &self.tunnel, camera, pose, points);
         let seen = hide_behind_things(options.seed, frame, options.moving, wall);
         let lit = match options.lamp_corner {
             Some(corner) => Lamp::new(corner, seen.width(), seen.height()).shine(seen),

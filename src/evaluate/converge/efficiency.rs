@@ -5,15 +5,17 @@ use super::{Cell, ConvergeError, ConvergeOptions};
 use crate::atomic::{self, ScratchFolder};
 use crate::camera::Camera;
 use crate::evaluate::{normalised_errors, tied_errors};
-use crate::frames::{GreyImage, load_colour};
 use crate::progress::{Progress, Silent};
-use crate::refine::{Covariances, RefineOptions, pose_bound, refine};
-use crate::simulate::{self, SimulateOptions};
+use crate::refine::{
+    Covariances, FINER, PoseBounds, RefineOptions, UnknownTexture, pose_bounds, refine,
+};
+use crate::simulate::{self, Scene, SimulateOptions};
 use crate::surface::{Surface, wall_jacobian};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
 use nalgebra::{Matrix6, Vector6};
 use serde::Serialize;
+use std::f64::consts::TAU;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
@@ -84,12 +86,16 @@ pub struct Efficiency {
     pub surveys: usize,
     /// Errors made.
     pub error: PoseRms,
-    /// Cramér–Rao bound without the prior.
+    /// Cramér–Rao bound without the prior, with the slopes of the texture known.
     pub bound: PoseRms,
+    /// The same with the texture unknown but for its spectrum.
+    pub unknown_texture_bound: PoseRms,
     /// Bayesian bound, with it.
     pub bayesian_bound: PoseRms,
     /// Error over bound.
     pub ratio: Ratio,
+    /// Error over bound with the texture unknown.
+    pub unknown_texture_ratio: Ratio,
     /// Error over Bayesian bound.
     pub bayesian_ratio: Ratio,
     /// Mean normalised error squared of a frame; 6 if the stated covariances are true.
@@ -158,9 +164,9 @@ pub fn efficiency(
     let mut table = Vec::new();
     for cell in &cells {
         let (mut error, mut bound) = (Squares::default(), Squares::default());
-        let mut bayesian = Squares::default();
+        let (mut unknown, mut bayesian) = (Squares::default(), Squares::default());
         let (mut normalised, mut factors) = (Vec::new(), 0.0);
-        let (mut by_bound, mut by_bayesian) = (Vec::new(), Vec::new());
+        let (mut by_bound, mut by_unknown, mut by_bayesian) = (Vec::new(), Vec::new(), Vec::new());
         let mut surveys = 0;
         for seed in 1..=options.seeds {
             progress.detail(&format!("{cell}, seed {seed}"));
@@ -172,8 +178,9 @@ pub fn efficiency(
             surveys += 1;
             factors += run.stated.variance_factor;
             normalised.extend(run.by(&run.stated));
-            by_bound.extend(run.by(&run.bound));
-            by_bayesian.extend(run.by(&run.bayesian));
+            by_bound.extend(run.by(&run.bounds.known));
+            by_unknown.extend(run.by(&run.bounds.unknown));
+            by_bayesian.extend(run.by(&run.bounds.bayesian));
             for k in 1..run.truth.len() {
                 let add = |squares: &mut Squares, square: &Matrix6<f64>| {
                     squares.add(
@@ -184,8 +191,9 @@ pub fn efficiency(
                     );
                 };
                 add(&mut error, &(run.errors[k] * run.errors[k].transpose()));
-                add(&mut bound, &run.bound.frames[k]);
-                add(&mut bayesian, &run.bayesian.frames[k]);
+                add(&mut bound, &run.bounds.known.frames[k]);
+                add(&mut unknown, &run.bounds.unknown.frames[k]);
+                add(&mut bayesian, &run.bounds.bayesian.frames[k]);
             }
             progress.advance(1);
         }
@@ -197,8 +205,10 @@ pub fn efficiency(
             surveys,
             error: error.rms(),
             bound: bound.rms(),
+            unknown_texture_bound: unknown.rms(),
             bayesian_bound: bayesian.rms(),
             ratio: Ratio::new(&error.rms(), &bound.rms(), &by_bound),
+            unknown_texture_ratio: Ratio::new(&error.rms(), &unknown.rms(), &by_unknown),
             bayesian_ratio: Ratio::new(&error.rms(), &bayesian.rms(), &by_bayesian),
             normalised_error: normalised.iter().sum::<f64>() / frames,
             inside_95: inside as f64 / frames,
@@ -227,8 +237,7 @@ struct Run {
     survey: Survey,
     truth: Vec<Pose>,
     errors: Vec<Vector6<f64>>,
-    bound: Covariances,
-    bayesian: Covariances,
+    bounds: PoseBounds,
     stated: Covariances,
 }
 
@@ -252,8 +261,10 @@ fn one(options: &SimulateOptions, joint: bool, out: &Path) -> Result<Run, Conver
         ..RefineOptions::default()
     };
     let refined = refine(&survey, &refining, &silent)?;
-    let doubled = doubled_frames(options, &scratch.path().join("doubled"))?;
+    let scene = Scene::new(options)?;
+    let fine = scene.render_finer(FINER);
     let noise = (options.noise_grey.powi(2) + ROUNDING).sqrt();
+    let texture = texture_of(&scene, noise);
     let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
     let errors = tied_errors(
         survey.surface.as_ref(),
@@ -261,8 +272,7 @@ fn one(options: &SimulateOptions, joint: bool, out: &Path) -> Result<Run, Conver
         &truth,
     )?;
     Ok(Run {
-        bound: pose_bound(&survey, &doubled, noise, false)?,
-        bayesian: pose_bound(&survey, &doubled, noise, true)?,
+        bounds: pose_bounds(&survey, &fine, noise, &texture)?,
         stated: refined.covariances,
         truth,
         errors,
@@ -270,33 +280,13 @@ fn one(options: &SimulateOptions, joint: bool, out: &Path) -> Result<Run, Conver
     })
 }
 
-/// The frames of a survey without noise and with twice as many pixels along each axis.
-fn doubled_frames(
-    options: &SimulateOptions,
-    folder: &Path,
-) -> Result<Vec<GreyImage>, ConvergeError> {
-    let doubled = SimulateOptions {
-        camera: options.camera.doubled(),
-        noise_grey: 0.0,
-        bits: simulate::Bits::Sixteen,
-        ..options.clone()
-    };
-    simulate::run(&doubled, folder, false, &Silent)?;
-    let survey = Survey::open(folder)?;
-    survey
-        .frames
-        .iter()
-        .map(|file| {
-            let picture = load_colour(file, doubled.camera.width, doubled.camera.height)
-                .map_err(crate::survey::SurveyError::from)?;
-            let data = picture.to_luma32f().into_raw();
-            Ok(GreyImage::new(
-                doubled.camera.width as usize,
-                doubled.camera.height as usize,
-                data.into_iter().map(|v| 255.0 * v).collect(),
-            ))
-        })
-        .collect()
+/// What can be known of the texture of a survey's wall, seen from the middle of the tunnel.
+fn texture_of(scene: &Scene, noise_grey: f64) -> UnknownTexture {
+    let columns = (TAU * scene.camera().fy * f64::from(FINER)).round() as usize;
+    let finer = FINER as usize;
+    let side = UnknownTexture::least_side(finer);
+    let wall = scene.wall(columns.max(side), 2 * side, 0.0);
+    UnknownTexture::of_wall(&wall, finer, noise_grey)
 }
 
 impl fmt::Display for Efficiency {
@@ -314,6 +304,7 @@ impl fmt::Display for Efficiency {
         let rows = [
             ("error", &self.error),
             ("Cramér–Rao bound", &self.bound),
+            ("…, texture unknown", &self.unknown_texture_bound),
             ("Bayesian bound", &self.bayesian_bound),
         ];
         for (name, rms) in rows {
@@ -324,6 +315,8 @@ impl fmt::Display for Efficiency {
             )?;
         }
         writeln!(f, "{:22} {}", "error / bound", self.ratio)?;
+        let unknown = self.unknown_texture_ratio;
+        writeln!(f, "{:22} {unknown}", "…, texture unknown")?;
         writeln!(f, "{:22} {}", "error / Bayesian bound", self.bayesian_ratio)?;
         write!(
             f,

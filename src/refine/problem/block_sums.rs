@@ -67,9 +67,13 @@ impl Problem<'_> {
                     });
                 }
             }
+            let mut features = found.features;
+            if let Some(texture) = &self.unknown_texture {
+                texture.weaken(&mut features, observers.len());
+            }
             summed.push(TileSums {
                 columns,
-                features: found.features,
+                features,
                 total: found.observers.iter().map(|observer| observer.weight).sum(),
             });
         };

@@ -19,6 +19,7 @@ use super::normal::{Block, NormalEquations, Pattern};
 use super::overlaps::footprint;
 use super::robust::NoiseModel;
 use super::shared::Border;
+use super::unknown_texture::UnknownTexture;
 use super::view::View;
 use super::visibility::{Hidden, Placed};
 use crate::camera::{Camera, Sweep};
@@ -104,6 +105,8 @@ pub struct Problem<'a> {
     denoiser: Option<Denoiser>,
     /// What is known of the wall, if it is solved for jointly with the poses.
     wall: Option<WallModel>,
+    /// What lessens the information of slopes, if they are not to count as known.
+    unknown_texture: Option<UnknownTexture>,
     /// True if the shared unknowns are estimated.
     calibrates: bool,
 }
@@ -214,6 +217,7 @@ impl<'a> Problem<'a> {
             },
             denoiser: None,
             wall: None,
+            unknown_texture: None,
             calibrates: false,
         };
         problem.estimate_noise()?;
@@ -233,6 +237,14 @@ impl<'a> Problem<'a> {
                 steepness: 0.0,
             },
             denoiser: None,
+            ..self
+        }
+    }
+
+    /// The same with the information that is left where the texture is known by its spectrum only.
+    pub fn of_unknown_texture(self, texture: &UnknownTexture) -> Self {
+        Self {
+            unknown_texture: Some(texture.clone()),
             ..self
         }
     }
