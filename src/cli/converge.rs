@@ -31,7 +31,8 @@ use std::path::PathBuf;
     tunnelstitch converge --efficiency --wall brick,concrete --frames 60 --seeds 10 --out limit\n      \
     how close the poses come to the Cramér–Rao bound, and whether their stated uncertainty is true")]
 pub struct ConvergeArguments {
-    /// Compare the errors with the Cramér–Rao bound and with the stated covariances instead, at 2° of random walk if
+    /// Compare the errors with the Cramér–Rao bound (with the wall's texture known, and unknown but for its spectrum, which no
+    /// estimator can do better than that knows no more) and with the stated covariances instead, at 2° of random walk if
     /// nothing else is asked for; writes efficiency.json and efficiency.txt.
     #[arg(long)]
     efficiency: bool,

@@ -339,13 +339,14 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
     for level in &report.levels {
         let solve = &level.solve;
         terminal.say(format!(
-            "  {:>5}  {:>5}  {:>12.4e} → {:>11.4e}  {:>12}  {:>12.2}",
+            "  {:>5}  {:>5}  {:>12.4e} → {:>11.4e}  {:>12}  {:>12.2}{}",
             level.level,
             solve.iterations,
             solve.cost_start,
             solve.cost_end,
             solve.observations,
-            solve.sigma
+            solve.sigma,
+            if level.joint { "  with the wall" } else { "" }
         ));
     }
     let mean = |value: &dyn Fn(&FrameReport) -> f64| {

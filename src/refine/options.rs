@@ -21,7 +21,7 @@ pub struct RefineOptions {
     /// Wall samples per pixel along each axis in the last solve (but for a joint one).
     pub final_density: f64,
     /// Wall samples per pixel along each axis where, before the last solve, the frames are searched for what is not wall; if
-    /// None, the samples of that solve.
+    /// None, the samples of that solve. (Before a joint one two a pixel, whatever this says.)
     pub foreign_density: Option<f64>,
     /// Share of the information that the global solves before it use, below the level where tracking ends: they look at
     /// the parts of the wall that tell most.
@@ -42,7 +42,7 @@ pub struct RefineOptions {
     pub max_iterations: u64,
     /// The last global solve ends when no wall point moves by more than this in a step, pixels, ...
     pub step_tolerance_px: f64,
-    /// ... or when a step is shorter than this share of the estimate's own uncertainty.
+    /// ... or when a step is shorter than this share of the estimate's own uncertainty. (A joint one ends sooner: at three tenths of it.)
     pub step_tolerance_sigma: f64,
 }
 

@@ -209,26 +209,26 @@ fn informations(alike: &[Wave], places: &[[f64; 2]], noise_grey: f64) -> [[f64; 
     for i in 0..n {
         covariance[(i, i)] += noise;
     }
-    let mut of_frames = [[0.0; 2]; 2];
     // Hermitian and at least σ² I.
     let Some(factor) = covariance.cholesky() else {
-        return of_frames;
+        return [[0.0; 2]; 2];
     };
     let inverse = factor.inverse();
-    for axis in 0..2 {
+    let of_axis = |axis: usize| {
         let slope = |wave: &Wave| TAU * wave.frequency[axis];
         let changes = weighed(&|wave| Complex::new(0.0, -slope(wave) * wave.power));
-        for i in 0..n {
-            // The row of a_i^* is the column of b.
+        let of_place = |i: usize| {
             let mut b = changes.column(i).into_owned();
             b[i] = Complex::ZERO;
             let gb = &inverse * &b;
-            of_frames[0][axis] += 2.0 * (inverse[(i, i)].re * b.dotc(&gb).re + (gb[i] * gb[i]).re);
-        }
+            2.0 * (inverse[(i, i)].re * b.dotc(&gb).re + (gb[i] * gb[i]).re)
+        };
         let steepness = alike.iter().map(|wave| slope(wave).powi(2) * wave.power);
-        of_frames[1][axis] = 2.0 * (n as f64 - 1.0) * steepness.sum::<f64>() / noise;
-    }
-    of_frames
+        let known = 2.0 * (n as f64 - 1.0) * steepness.sum::<f64>() / noise;
+        ((0..n).map(of_place).sum(), known)
+    };
+    let [s, h]: [(f64, f64); 2] = [0, 1].map(of_axis);
+    [[s.0, h.0], [s.1, h.1]]
 }
 
 /// `k` of a transform of `side` values as a frequency of either sign.
