@@ -105,6 +105,7 @@ pub mod raster;
 pub mod refine;
 pub mod render;
 pub mod report;
+mod signal;
 pub mod simulate;
 pub mod super_resolve;
 pub mod surface;

@@ -1,7 +1,7 @@
 //! How fine the detail is that a picture shows, from a slanted edge.
 
+use crate::signal::{hann, sinc};
 use realfft::RealFftPlanner;
-use std::f64::consts::PI;
 
 /// Bins of the edge's profile over the width of one of the picture's pixels.
 const OVERSAMPLING: f64 = 4.0;
@@ -67,22 +67,16 @@ fn edge_spread(samples: impl IntoIterator<Item = (f64, f64)>, bin_m: f64) -> Opt
 fn line_spread(esf: &[f64]) -> Vec<f32> {
     let n = esf.len().saturating_sub(2);
     let differences = esf.windows(3).map(|bins| bins[2] - bins[0]);
-    let hann = |k: usize| 0.5 - 0.5 * (2.0 * PI * (k as f64 + 0.5) / n as f64).cos();
-    let windowed = differences.enumerate().map(|(k, d)| (d * hann(k)) as f32);
+    let windowed = differences
+        .enumerate()
+        .map(|(k, d)| (d * hann(k, n)) as f32);
     windowed.collect()
-}
-
-fn sinc(x: f64) -> f64 {
-    if x.abs() < 1e-9 {
-        1.0
-    } else {
-        (PI * x).sin() / (PI * x)
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     const PIXEL_M: f64 = 0.004;
 

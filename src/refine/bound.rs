@@ -180,12 +180,9 @@ fn finer_camera(camera: &Camera) -> Camera {
     Camera {
         width: FINER * (camera.width - 1) + 1,
         height: FINER * (camera.height - 1) + 1,
-        fx: scale * camera.fx,
-        fy: scale * camera.fy,
         cx: scale * camera.cx,
         cy: scale * camera.cy,
-        lens: camera.lens,
-        sweep: camera.sweep,
+        ..camera.finer(FINER)
     }
 }
 

@@ -28,11 +28,12 @@
 
 use super::spectrum::Transform;
 use crate::frames::GreyImage;
+use crate::signal::{hann, sinc};
 use nalgebra::{Complex, DMatrix, DVector, Matrix4};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// Side of the patches whose spectra are averaged, pixels of a frame.
 const PATCH_PX: usize = 64;
@@ -53,20 +54,17 @@ impl UnknownTexture {
     /// For the wall shown by `wall` (columns along s, rows along h, at least [`UnknownTexture::least_side`] of each), `finer` times as
     /// fine as pixels of a frame, with noise of `noise_grey` grey levels (1-σ) in these.
     pub fn of_wall(wall: &GreyImage, finer: usize, noise_grey: f64) -> Self {
-        Self::new(&WallSpectrum::of(wall, finer), noise_grey)
-    }
-
-    /// Rows and columns that a wall `finer` times as fine as pixels must have.
-    pub fn least_side(finer: usize) -> usize {
-        PATCH_PX * finer
-    }
-
-    fn new(spectrum: &WallSpectrum, noise_grey: f64) -> Self {
+        let spectrum = WallSpectrum::of(wall, finer);
         let shares = (2..=MOST_FRAMES).into_par_iter();
         let shares = shares.map(|frames| spectrum.shares(frames, noise_grey));
         Self {
             roots: shares.map(|share| share.map(f64::sqrt)).collect(),
         }
+    }
+
+    /// Rows and columns that a wall `finer` times as fine as pixels must have.
+    pub fn least_side(finer: usize) -> usize {
+        PATCH_PX * finer
     }
 
     /// Takes from `M = Σ p φ φᵀ` of a tile that `frames` frames see what needs a known texture.
@@ -94,7 +92,7 @@ impl WallSpectrum {
     fn of(wall: &GreyImage, finer: usize) -> Self {
         let side = UnknownTexture::least_side(finer);
         let transform = Transform::at_least(side, side);
-        let hann = |k: usize| (PI * (k as f64 + 0.5) / side as f64).sin().powi(2);
+        let hann = |k: usize| hann(k, side);
         let energy: f64 = (0..side).map(|k| hann(k).powi(2)).sum();
         let starts = |length: usize| (0..=length - side).step_by(side / 2);
         let places: Vec<(usize, usize)> = starts(wall.height())
@@ -236,14 +234,6 @@ fn signed(k: usize, side: usize) -> i64 {
     match k < side / 2 {
         true => k as i64,
         false => k as i64 - side as i64,
-    }
-}
-
-/// `sin πx / πx`.
-fn sinc(x: f64) -> f64 {
-    match x == 0.0 {
-        true => 1.0,
-        false => (PI * x).sin() / (PI * x),
     }
 }
 

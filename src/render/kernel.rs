@@ -1,8 +1,8 @@
 //! Interpolation: the weights of the pixels around a point.
 
 use super::sample::WHOLE;
+use crate::signal::sinc;
 use serde::Serialize;
-use std::f64::consts::PI;
 
 /// How values between pixel centres are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
@@ -46,15 +46,6 @@ impl Interpolation {
             Self::Bicubic => 2.0 + x * (x * (2.5 - 0.5 * x) - 4.0),
             Self::Lanczos3 => sinc(x) * sinc(x / 3.0),
         }
-    }
-}
-
-/// `sin πx / πx`.
-fn sinc(x: f64) -> f64 {
-    if x == 0.0 {
-        1.0
-    } else {
-        (PI * x).sin() / (PI * x)
     }
 }
 
@@ -204,6 +195,7 @@ fn whole_weights(row: &[f64], sum: f64) -> Vec<i16> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     const ALL: [Interpolation; 4] = [
         Interpolation::Nearest,

@@ -153,11 +153,9 @@ impl Scene {
     /// All frames that are there as [`Self::render_exact`] has them, but with `times` as many pixels along each axis, cast from the
     /// same raster.
     pub fn render_finer(&self, times: u32) -> Vec<GreyImage> {
-        let camera = self.camera.finer(times);
-        let points = self.options.supersample.div_ceil(times);
         let frames_of = |batch: Batch| {
             let band = self.band(batch.h_m);
-            let finer = |(_, shown): &(usize, usize)| self.exact_by(&band, *shown, &camera, points);
+            let finer = |(_, shown): &(usize, usize)| self.finer(&band, *shown, times);
             batch.frames.par_iter().map(finer).collect::<Vec<_>>()
         };
         self.batches().into_iter().flat_map(frames_of).collect()
@@ -244,15 +242,18 @@ impl Scene {
 
     /// [`Self::render_exact`], of a band that holds all the frame sees.
     fn exact(&self, band: &Band, frame: usize) -> GreyImage {
-        self.exact_by(band, frame, &self.camera, self.options.supersample)
+        self.finer(band, frame, 1)
     }
 
-    /// The same through `camera`, this one or a finer one, as the mean of `points × points` points a pixel.
-    fn exact_by(&self, band: &Band, frame: usize, camera: &Camera, points: u32) -> GreyImage {
+    /// The same with `times` as many pixels along each axis, and so many fewer points to each.
+    fn finer(&self, band: &Band, frame: usize, times: u32) -> GreyImage {
         let options = &self.options;
-        let finer = f64::from(camera.height) / f64::from(self.camera.height);
-        let pose = |v: f64| self.path.at_row(frame, (v + 0.5) / finer - 0.5);
-        let wall = cast(band, &self.tunnel, camera, pose, points);
+        let pose = |v: f64| self.path.at_row(frame, (v + 0.5) / f64::from(times) - 0.5);
+        let (camera, points) = (
+            self.camera.finer(times),
+            options.supersample.div_ceil(times),
+        );
+        let wall = cast(band, &self.tunnel, &camera, pose, points);
         let seen = hide_behind_things(options.seed, frame, options.moving, wall);
         let lit = match options.lamp_corner {
             Some(corner) => Lamp::new(corner, seen.width(), seen.height()).shine(seen),
@@ -409,6 +410,27 @@ mod tests {
         for frame in [0, 7] {
             assert_eq!(scene.exact(&band, frame), scene.render_exact(frame));
         }
+    }
+
+    /// A pixel is the mean of the fine ones in its square.
+    #[test]
+    fn finer_frames_are_of_the_same_points() {
+        let scene = Scene::new(&small()).unwrap();
+        let fine = &scene.render_finer(4)[5];
+        let frame = scene.render_exact(5);
+        assert_eq!(
+            (fine.width(), fine.height()),
+            (4 * frame.width(), 4 * frame.height())
+        );
+        let mean = |u: usize, v: usize| {
+            let square = (0..16).map(|k| fine.at(4 * u + k % 4, 4 * v + k / 4));
+            square.sum::<f32>() / 16.0
+        };
+        let (width, height) = (frame.width(), frame.height());
+        let pixels = (0..width * height).map(|k| (k % width, k / width));
+        let squares = pixels.map(|(u, v)| (mean(u, v) - frame.at(u, v)).powi(2));
+        let rms = (squares.sum::<f32>() / (width * height) as f32).sqrt();
+        assert!(rms < 0.05, "{rms}");
     }
 
     #[test]
