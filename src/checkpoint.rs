@@ -164,8 +164,7 @@ impl Checkpoint {
             due: None,
             _lock: lock(folder)?,
         };
-        let kept = checkpoint.kept_files()?;
-        checkpoint.begun = !fresh && kept.iter().any(|path| is_state(path));
+        checkpoint.begun = !fresh && checkpoint.kept_files()?.iter().any(|path| is_state(path));
         if checkpoint.begun {
             let what = match checkpoint.read::<Origin>(ORIGIN)? {
                 Some(kept) => kept.difference(origin),
@@ -176,20 +175,27 @@ impl Checkpoint {
                 return Err(CheckpointError::Other { folder, what });
             }
         } else {
-            kept.iter().try_for_each(|path| atomic::remove_file(path))?;
+            checkpoint.clear()?;
             checkpoint.write(ORIGIN, origin)?;
         }
         Ok(checkpoint)
     }
 
-    /// The files of the checkpoint, but the lock.
+    /// The files of the checkpoint, but the lock; the states first.
     fn kept_files(&self) -> Result<Vec<PathBuf>, WriteError> {
         let entries = std::fs::read_dir(&self.folder)
             .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
         let mut paths: Vec<PathBuf> =
             entries.map_err(|source| WriteError::new(&self.folder, source))?;
         paths.retain(|path| path.file_name() != Some(LOCK.as_ref()));
+        paths.sort_by_key(|path| !is_state(path));
         Ok(paths)
+    }
+
+    /// Removes what is kept. A run killed meanwhile leaves no state without what says which run it is of.
+    fn clear(&self) -> Result<(), WriteError> {
+        let kept = self.kept_files()?;
+        kept.iter().try_for_each(|path| atomic::remove_file(path))
     }
 
     /// The file `name` of the checkpoint, for what is added to as the run goes.
@@ -289,6 +295,7 @@ impl Checkpoint {
     /// # Errors
     /// Whatever the system says.
     pub fn finish(self) -> Result<(), WriteError> {
+        self.clear()?;
         let folders = self.others.iter().chain([&self.folder]);
         for folder in folders.filter(|folder| folder.is_dir()) {
             std::fs::remove_dir_all(folder).map_err(|source| WriteError::new(folder, source))?;
@@ -385,6 +392,24 @@ mod tests {
         assert!(beside.is_dir());
         checkpoint.finish().unwrap();
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_run_killed_while_it_clears_up_can_be_begun_anew() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut checkpoint = Checkpoint::open(dir.path(), &origin(), false).unwrap();
+        for state in ["a", "b", "z"] {
+            checkpoint.keep(state, &1).unwrap();
+        }
+        std::fs::write(checkpoint.file("log"), "").unwrap();
+        let files = checkpoint.kept_files().unwrap();
+        drop(checkpoint);
+        let left = files.iter().position(|path| {
+            std::fs::remove_file(path).unwrap();
+            let again = Checkpoint::open(dir.path(), &origin(), false).unwrap();
+            !again.is_begun()
+        });
+        assert_eq!(left, Some(2));
     }
 
     #[test]

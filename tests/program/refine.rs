@@ -169,7 +169,7 @@ fn uneven_light_glints_and_moving_things_do_no_harm() {
 /// The same light on concrete, whose contrast is 3 to 4 grey levels: what the light leaves is steeper than the wall.
 #[test]
 fn hard_light_does_no_harm_on_a_faint_wall() {
-    let light = "--frames 48 --wall concrete --gain-percent 30 --lamp-corner 0.4 --specular-percent 3 --seed 2";
+    let light = "--frames 24 --wall concrete --gain-percent 30 --lamp-corner 0.4 --specular-percent 3 --seed 2";
     let dir = repaired(&light.split_whitespace().collect::<Vec<_>>());
     let out = dir.path().join("out");
     let px = believed_wall_px(&dir.path().join("survey"), &out);
@@ -256,7 +256,7 @@ fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
 /// Where a turn closes on little overlap, the wall's coarse levels would bend it to the next tile, and every pair of frames would fit.
 #[test]
 fn a_turn_closes_on_the_right_tile() {
-    let options = "--wall tiled-brick --frames 60 --seed 2 --jitter random-walk \
+    let options = "--wall tiled-brick --frames 60 --size 480x360 --seed 2 --jitter random-walk \
                    --rotation-sigma-deg 2 --translation-sigma-m 0.02,0.02,0.03";
     let dir = repaired(&options.split_whitespace().collect::<Vec<_>>());
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));

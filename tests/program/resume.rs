@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Times that each command is killed at the least.
-const KILLS: usize = 7;
+const KILLS: usize = 4;
 
 /// A simulated survey.
 fn survey(folder: &Path, frames: usize) -> PathBuf {

@@ -60,7 +60,7 @@ fn circling(pitch_m: f64) -> String {
 /// they are said to be.
 #[test]
 fn a_tight_bend_is_refined_as_exactly_as_is_said() {
-    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&bend(), "36");
+    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&bend(), "24");
 }
 
 /// Nothing of a line that bends to and fro, in a tunnel that widens and narrows, may be moved without a picture that tells.
