@@ -65,12 +65,18 @@ pub const STEP_SIGMA: f64 = 0.3;
 /// Steps of conjugate gradients between two rounds of reweighting.
 const STEPS: usize = 10;
 
-/// The losses of pixels in the rounds after the first, as weights of residuals in σ: Huber's, which finds most of the wall whatever
+/// Rounds of reweighting; edges take some to become as sharp as they are. On bricks with noise of 2 grey levels, two rounds make the
+/// poses' squared error 14 % larger, and seven 4 % smaller.
+const ROUNDS: usize = 4;
+
+/// The loss of pixels in a round, as the weight of a residual in σ: Huber's in the first, which finds most of the wall whatever
 /// glints on it, and then Tukey's, by which poses are estimated ([`super::robust`]), which forgets the glint.
-const LOSSES: [fn(f32) -> f32; 2] = [
-    |residual| huber_weight(residual, 2.0),
-    |residual| Loss::weight(residual * residual, 1.0),
-];
+fn pixel_weight(round: usize, residual: f32) -> f32 {
+    match round {
+        0 => huber_weight(residual, 2.0),
+        _ => Loss::weight(residual * residual, 1.0),
+    }
+}
 
 /// Steps of conjugate gradients to find how the wall follows a frame.
 const PROBE_STEPS: usize = 20;
@@ -159,9 +165,9 @@ impl<'a> JointBlock<'a> {
         let start = self.footprints.mean(&self.readings);
         let mut solve = WallSolve::new(&self.footprints, &self.readings, &start, strengths);
         solve.improve(STEPS);
-        for loss in LOSSES {
+        for round in 0..ROUNDS {
             solve.weigh_edges();
-            solve.weigh_pixels(loss);
+            solve.weigh_pixels(|residual| pixel_weight(round, residual));
             solve.improve(STEPS);
         }
         solve
