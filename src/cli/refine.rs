@@ -37,8 +37,8 @@ pub struct RefineArguments {
     /// End the last solve with the first step shorter than 0.1 px or twice the uncertainty, most often its first: less time.
     #[arg(long)]
     fast: bool,
-    /// Solve once more, for the wall at a third of a pixel jointly with the poses: on walls with sharp edges, as bricks, a third
-    /// to a half of the error goes, in five to ten times the time. Walls that are smooth over a pixel have nothing to gain, and are refined as
+    /// Solve once more, for the wall at a third of a pixel jointly with the poses: on walls with sharp edges, as bricks, about
+    /// a third of the error goes, in ten to twenty times the time. Walls that are smooth over a pixel have nothing to gain, and are refined as
     /// without it.
     #[arg(long, conflicts_with = "fast")]
     joint: bool,

@@ -33,7 +33,7 @@ pub struct RefineOptions {
     /// Linearise with the gradient of the texture fused from all frames; otherwise each frame with its own picture's.
     pub fused_gradient: bool,
     /// Solve once more, for the wall at a third of a pixel jointly with the poses, instead of taking what the frames show between
-    /// their pixels for it: on walls with sharp edges errors a third to a half smaller, in five to ten times the time. Where the wall is so smooth
+    /// their pixels for it: on walls with sharp edges errors about a third smaller, in ten to twenty times the time. Where the wall is so smooth
     /// that there is nothing between the pixels, that is found out and the solve left out.
     pub joint: bool,
     /// Memory for decoded frames, bytes. Frames that do not fit are decoded anew when needed.
