@@ -1,8 +1,8 @@
 //! Bundles the viewer's page (`src/inspect/web`) where npm is there.
 //!
-//! Everything happens in `OUT_DIR`: the sources are copied there, npm installs what the lock file names (its cache included), and
-//! esbuild writes `viewer.js`. Without npm or a network the file is empty; the program is whole but for `view` and
-//! `export --web`, which then say what to install.
+//! Everything happens in `OUT_DIR`: the sources are copied there, npm installs what the lock file
+//! names (its cache included), and esbuild writes `viewer.js`. Without npm or a network the file is
+//! empty; the program is whole but for `view` and `export --web`, which then say what to install.
 
 use std::path::Path;
 use std::process::Command;

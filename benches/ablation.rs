@@ -1,8 +1,10 @@
-//! `cargo bench --bench ablation [-- FRAMES]`: what each idea of the estimator buys, by leaving out one at a time.
+//! `cargo bench --bench ablation [-- FRAMES]`: what each idea of the estimator buys, by leaving out
+//! one at a time.
 //!
-//! The surveys are that of `tunnelstitch demo` (120 frames of 640 × 480 px, or FRAMES of them) with seeds 1 to 3. The table
-//! gives time and accuracy, the wall error of the refined poses: the root mean square over the surveys, and the worst
-//! frame of all. Frames left to their prior count as they are.
+//! The surveys are that of `tunnelstitch demo` (120 frames of 640 × 480 px, or FRAMES of them) with
+//! seeds 1 to 3. The table gives time and accuracy, the wall error of the refined poses: the root
+//! mean square over the surveys, and the worst frame of all. Frames left to their prior count as
+//! they are.
 
 use std::sync::Arc;
 use std::time::Instant;

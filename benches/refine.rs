@@ -1,8 +1,8 @@
 //! `cargo bench --bench refine`: the estimator stage by stage, on a simulated survey.
 //!
-//! The survey is that of `tunnelstitch demo`: 120 frames of 640 × 480 px. Each round decodes and refines it
-//! anew, in the default mode and with `--fast`; the tables give the median and the range over the rounds, and frames per
-//! second end to end.
+//! The survey is that of `tunnelstitch demo`: 120 frames of 640 × 480 px. Each round decodes and
+//! refines it anew, in the default mode and with `--fast`; the tables give the median and the range
+//! over the rounds, and frames per second end to end.
 
 use std::sync::Arc;
 use tunnelstitch::progress::{Progress, Silent};

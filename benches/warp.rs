@@ -1,10 +1,13 @@
-//! `cargo bench --bench warp [-- bilinear] [bicubic] [lanczos3] [copy]`: how fast a frame is laid on the wall.
+//! `cargo bench --bench warp [-- bilinear] [bicubic] [lanczos3] [copy]`: how fast a frame is laid
+//! on the wall.
 //!
-//! RGB frames of 1920 × 1080 px that just meet around a tunnel are drawn at their own resolution with every interpolation, each
-//! pixel from one frame, and pictures of a frame's size are copied. Nowhere are the frames so much finer than the panorama that
-//! kernels are stretched: `remap` of OpenCV does not stretch them either. Millions of pixels (those that some frame shows) a second of
-//! processor time, median and range over rounds. `-- --ask` measures one round for each of these names that comes on the standard
-//! input and answers with a line: so `benches/opencv_warp.py` runs this and OpenCV in turn.
+//! RGB frames of 1920 × 1080 px that just meet around a tunnel are drawn at their own resolution
+//! with every interpolation, each pixel from one frame, and pictures of a frame's size are copied.
+//! Nowhere are the frames so much finer than the panorama that kernels are stretched: `remap` of
+//! OpenCV does not stretch them either. Millions of pixels (those that some frame shows) a second
+//! of processor time, median and range over rounds. `-- --ask` measures one round for each of these
+//! names that comes on the standard input and answers with a line: so `benches/opencv_warp.py` runs
+//! this and OpenCV in turn.
 
 use cpu_time::ProcessTime;
 use std::error::Error;

@@ -1,11 +1,14 @@
-//! Where a long run keeps what it has done, so that it can go on after it was interrupted, killed or out of disk.
+//! Where a long run keeps what it has done, so that it can go on after it was interrupted, killed
+//! or out of disk.
 //!
-//! A checkpoint is a folder `NAME.unfinished` beside the result, or in it, with files that are each replaced as a whole: `origin`,
-//! what run it is of, and states. Beside them lies whatever the run adds to as it goes, of which a state says how much counts. It
-//! belongs to one run, of the same version of the program with the same options and inputs ([`Origin`]), and is
-//! refused to any other. It goes when the run ends.
+//! A checkpoint is a folder `NAME.unfinished` beside the result, or in it, with files that are each
+//! replaced as a whole: `origin`, what run it is of, and states. Beside them lies whatever the run
+//! adds to as it goes, of which a state says how much counts. It belongs to one run, of the same
+//! version of the program with the same options and inputs ([`Origin`]), and is refused to any
+//! other. It goes when the run ends.
 //!
-//! A state is CBOR (RFC 8949), in which every number comes back with all its bits, and then the BLAKE3 hash of that.
+//! A state is CBOR (RFC 8949), in which every number comes back with all its bits, and then the
+//! BLAKE3 hash of that.
 //!
 //! # Example
 //!
@@ -149,7 +152,8 @@ pub struct Checkpoint {
 }
 
 impl Checkpoint {
-    /// The checkpoint in `folder`, made if missing; what is kept there is dropped if the run is to begin anew (`fresh`).
+    /// The checkpoint in `folder`, made if missing; what is kept there is dropped if the run is to
+    /// begin anew (`fresh`).
     ///
     /// # Errors
     /// Another run's checkpoint, a damaged one, one in use; whatever the system says.
@@ -192,7 +196,8 @@ impl Checkpoint {
         Ok(paths)
     }
 
-    /// Removes what is kept. A run killed meanwhile leaves no state without what says which run it is of.
+    /// Removes what is kept. A run killed meanwhile leaves no state without what says which run it
+    /// is of.
     fn clear(&self) -> Result<(), WriteError> {
         let kept = self.kept_files()?;
         kept.iter().try_for_each(|path| atomic::remove_file(path))
@@ -203,8 +208,8 @@ impl Checkpoint {
         self.folder.join(name)
     }
 
-    /// A folder beside `target`, for what must lie on the same disk. It goes with the checkpoint; if it has gone without it,
-    /// the run begins anew. To be asked for before any state.
+    /// A folder beside `target`, for what must lie on the same disk. It goes with the checkpoint;
+    /// if it has gone without it, the run begins anew. To be asked for before any state.
     ///
     /// # Errors
     /// Whatever the system says.
@@ -237,7 +242,8 @@ impl Checkpoint {
         self.read(&format!("{name}.{STATE}"))
     }
 
-    /// Keeps the state `name` in place of the one before. How long that takes, since it was found due, spaces the next.
+    /// Keeps the state `name` in place of the one before. How long that takes, since it was found
+    /// due, spaces the next.
     ///
     /// # Errors
     /// Whatever the system says.
@@ -326,7 +332,8 @@ impl<W: Write> Write for Hashing<'_, W> {
     }
 }
 
-/// The folder in which an interrupted run that makes `result` is kept: its name with `.unfinished` added.
+/// The folder in which an interrupted run that makes `result` is kept: its name with `.unfinished`
+/// added.
 pub fn folder_of(result: &Path) -> PathBuf {
     let mut name = result.as_os_str().to_owned();
     name.push(".unfinished");

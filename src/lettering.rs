@@ -11,8 +11,8 @@ pub fn width(text: &str, scale: u32) -> u32 {
     text.chars().count() as u32 * LETTER * scale
 }
 
-/// Draws a text with its upper left corner at (x, y), pixels; what lies outside the picture is cut off, and a letter
-/// that the font lacks becomes a question mark.
+/// Draws a text with its upper left corner at (x, y), pixels; what lies outside the picture is cut
+/// off, and a letter that the font lacks becomes a question mark.
 pub fn draw(image: &mut RgbImage, [x, y]: [u32; 2], text: &str, scale: u32, colour: Rgb<u8>) {
     for (k, letter) in text.chars().enumerate() {
         let rows = glyph(letter);

@@ -1,9 +1,9 @@
 //! Photometric trajectory repair and metric panoramas for tunnels, sewers and pipes.
 //!
-//! A camera revolves while its carrier moves through a tunnel of known shape. The wall has no features to
-//! match, and the poses are wrong by degrees and centimetres a frame. This crate makes them right by the
-//! photometric consistency of overlapping strips of the wall, says how sure it is, and unrolls the wall into
-//! one panorama in metres.
+//! A camera revolves while its carrier moves through a tunnel of known shape. The wall has no
+//! features to match, and the poses are wrong by degrees and centimetres a frame. This crate makes
+//! them right by the photometric consistency of overlapping strips of the wall, says how sure it
+//! is, and unrolls the wall into one panorama in metres.
 //!
 //! # The flow of data
 //!
@@ -16,12 +16,12 @@
 //!                                                   └─> report ──> report.html, report.json
 //! ```
 //!
-//! [`camera`], [`trajectory`] and [`surface`] are the geometry; [`frames`] loads the pictures; [`refine`],
-//! [`render`] and [`simulate`] know nothing of each other and share the geometry only (the simulator not even
-//! the ray–wall intersection, so that it can judge the others); [`super_resolve`] solves for the wall finer than any frame, for
-//! panoramas and poses alike; [`raster`] writes pictures larger than the memory;
-//! [`evaluate`] measures; [`report`] makes a page of it all; [`inspect`] puts the panorama on the wall in three dimensions;
-//! [`cli`] prints.
+//! [`camera`], [`trajectory`] and [`surface`] are the geometry; [`frames`] loads the pictures;
+//! [`refine`], [`render`] and [`simulate`] know nothing of each other and share the geometry only
+//! (the simulator not even the ray–wall intersection, so that it can judge the others);
+//! [`super_resolve`] solves for the wall finer than any frame, for panoramas and poses alike;
+//! [`raster`] writes pictures larger than the memory; [`evaluate`] measures; [`report`] makes a
+//! page of it all; [`inspect`] puts the panorama on the wall in three dimensions; [`cli`] prints.
 //!
 //! # An example
 //!
@@ -77,8 +77,8 @@
 //!
 //! Names end in their unit: `_m`, `_rad`, `_deg`, `_px`, `_s`.
 //!
-//! Source: R. S. Pahwa, W. K. Leong, S. Foong, K. Leman, M. N. Do, "Feature-less Stitching of Cylindrical
-//! Tunnel", arXiv 1806.10278.
+//! Source: R. S. Pahwa, W. K. Leong, S. Foong, K. Leman, M. N. Do, "Feature-less Stitching of
+//! Cylindrical Tunnel", arXiv 1806.10278.
 
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]

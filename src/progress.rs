@@ -1,6 +1,7 @@
 //! News of long work, for whoever wants to show it.
 
-/// Receives the progress of long work. The library calls it from any thread; the program draws bars.
+/// Receives the progress of long work. The library calls it from any thread; the program draws
+/// bars.
 pub trait Progress: Send + Sync {
     /// A stage of `total` equal parts begins; it replaces the one before.
     fn start(&self, stage: &str, total: usize);

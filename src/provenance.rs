@@ -38,7 +38,8 @@ fn hash_file(path: &Path) -> Result<blake3::Hash, HashError> {
     Ok(hasher.finalize())
 }
 
-/// One hash over the names (without folders) and hashes of files, in order; several are read at once.
+/// One hash over the names (without folders) and hashes of files, in order; several are read at
+/// once.
 fn hash_files(paths: &[&Path]) -> Result<blake3::Hash, HashError> {
     let hashes: Vec<blake3::Hash> = paths
         .par_iter()
@@ -63,17 +64,16 @@ pub fn input(path: &Path) -> Result<Input, HashError> {
         path: path.to_owned(),
         source,
     };
-    let (files, hash) = match path.is_dir() {
-        false => (None, hash_file(path)?),
-        true => {
-            let entries = std::fs::read_dir(path).map_err(fail)?;
-            let inner: Result<Vec<PathBuf>, _> = entries.map(|entry| Ok(entry?.path())).collect();
-            let mut inner = inner.map_err(fail)?;
-            inner.retain(|path| path.is_file());
-            inner.sort();
-            let inner: Vec<&Path> = inner.iter().map(PathBuf::as_path).collect();
-            (Some(inner.len()), hash_files(&inner)?)
-        }
+    let (files, hash) = if !path.is_dir() {
+        (None, hash_file(path)?)
+    } else {
+        let entries = std::fs::read_dir(path).map_err(fail)?;
+        let inner: Result<Vec<PathBuf>, _> = entries.map(|entry| Ok(entry?.path())).collect();
+        let mut inner = inner.map_err(fail)?;
+        inner.retain(|path| path.is_file());
+        inner.sort();
+        let inner: Vec<&Path> = inner.iter().map(PathBuf::as_path).collect();
+        (Some(inner.len()), hash_files(&inner)?)
     };
     Ok(Input {
         path: path.to_owned(),

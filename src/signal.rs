@@ -4,9 +4,10 @@ use std::f64::consts::PI;
 
 /// `sin πx / πx`: what averaging over a width of 1 leaves of the frequency x.
 pub(crate) fn sinc(x: f64) -> f64 {
-    match x == 0.0 {
-        true => 1.0,
-        false => (PI * x).sin() / (PI * x),
+    if x == 0.0 {
+        1.0
+    } else {
+        (PI * x).sin() / (PI * x)
     }
 }
 

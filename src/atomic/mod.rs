@@ -1,9 +1,11 @@
-//! Files and folders that are complete or absent: written under a temporary name beside the target, put on the disk, then
-//! renamed. So neither a killed program nor a power failure leaves half of one.
+//! Files and folders that are complete or absent: written under a temporary name beside the target,
+//! put on the disk, then renamed. So neither a killed program nor a power failure leaves half of
+//! one.
 //!
-//! What is unfinished is removed when writing fails, and by [`remove_unfinished`] when the program is interrupted. What a killed
-//! program has left in a folder is removed by the next that writes into it: a temporary name is locked for as long as its writer
-//! lives, and one that is not locked is nobody's.
+//! What is unfinished is removed when writing fails, and by [`remove_unfinished`] when the program
+//! is interrupted. What a killed program has left in a folder is removed by the next that writes
+//! into it: a temporary name is locked for as long as its writer lives, and one that is not locked
+//! is nobody's.
 
 mod durable;
 mod staged;

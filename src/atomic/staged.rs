@@ -16,8 +16,8 @@ impl StagedFolder {
     /// Begins the folder that will be `target`; the folders above it are made if missing.
     ///
     /// # Errors
-    /// Whatever the system says; a target without a name of its own (`.`, `..`, `/`), or one that holds the folder the
-    /// program works in.
+    /// Whatever the system says; a target without a name of its own (`.`, `..`, `/`), or one that
+    /// holds the folder the program works in.
     pub fn begin(target: &Path) -> Result<Self, WriteError> {
         check_replaceable(target)?;
         let parent = beside(target);
@@ -31,7 +31,8 @@ impl StagedFolder {
         })
     }
 
-    /// The folder that will be `target`, with what is in `folder` on the same disk already, which stays whatever happens.
+    /// The folder that will be `target`, with what is in `folder` on the same disk already, which
+    /// stays whatever happens.
     ///
     /// # Errors
     /// As [`StagedFolder::begin`].
@@ -116,8 +117,8 @@ fn check_replaceable(target: &Path) -> Result<(), WriteError> {
     Ok(())
 }
 
-/// A folder for what is needed for a while; it goes with all that is in it when this is dropped or the program is
-/// interrupted.
+/// A folder for what is needed for a while; it goes with all that is in it when this is dropped or
+/// the program is interrupted.
 pub struct ScratchFolder(TemporaryFolder);
 
 impl ScratchFolder {

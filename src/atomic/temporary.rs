@@ -1,4 +1,5 @@
-//! Temporary names: listed and locked while they are in use, and tidied away when a killed program has left them.
+//! Temporary names: listed and locked while they are in use, and tidied away when a killed program
+//! has left them.
 
 use std::collections::BTreeSet;
 use std::fs::{File, TryLockError};
@@ -11,8 +12,8 @@ use tempfile::{TempDir, TempPath};
 /// Beginning of temporary names.
 const PREFIX: &str = ".tunnelstitch-";
 
-/// Name, in a temporary folder, of a result that steps aside for its successor. Such a folder is never tidied away: it may hold the
-/// only copy.
+/// Name, in a temporary folder, of a result that steps aside for its successor. Such a folder is
+/// never tidied away: it may hold the only copy.
 pub(super) const ASIDE: &str = "old";
 
 /// Temporary names in use.
@@ -42,8 +43,9 @@ impl Drop for Listed {
     }
 }
 
-/// Removes every file and folder that is being written. For a program about to be ended from outside: the
-/// writers are not told and must not go on, so the list stays locked until the process ends.
+/// Removes every file and folder that is being written. For a program about to be ended from
+/// outside: the writers are not told and must not go on, so the list stays locked until the process
+/// ends.
 pub fn remove_unfinished() {
     let list = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
     for path in list.iter() {
@@ -130,7 +132,8 @@ pub(super) fn folder_in(parent: &Path) -> io::Result<TemporaryFolder> {
     }
 }
 
-/// Locks a temporary name that was just made; false if somebody has taken it for left behind in the meantime.
+/// Locks a temporary name that was just made; false if somebody has taken it for left behind in the
+/// meantime.
 fn hold(file: &File, path: &Path) -> bool {
     match file.try_lock() {
         Ok(()) => path.exists(),

@@ -4,8 +4,8 @@ use super::rising::{end_of_rise, invert};
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// Coefficients of a Brown–Conrady lens, in OpenCV's convention and names. The plain polynomial (4 or 5 coefficients) has
-/// `k4 = k5 = k6 = 0`.
+/// Coefficients of a Brown–Conrady lens, in OpenCV's convention and names. The plain polynomial (4
+/// or 5 coefficients) has `k4 = k5 = k6 = 0`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BrownCoefficients {
     /// k1 to k6: radial, k4 to k6 in the denominator.
@@ -14,16 +14,18 @@ pub struct BrownCoefficients {
     pub p: [f64; 2],
 }
 
-/// Radial and tangential distortion: the point `p = (x, y) = (x_c/z_c, y_c/z_c)` before the camera appears at
+/// Radial and tangential distortion: the point `p = (x, y) = (x_c/z_c, y_c/z_c)` before the camera
+/// appears at
 ///
 /// `p_d = f p + (2 p1 x y + p2 (q + 2x²), p1 (q + 2y²) + 2 p2 x y)`,
 /// `f = (1 + k1 q + k2 q² + k3 q³)/(1 + k4 q + k5 q² + k6 q³)`, `q = |p|²`.
 ///
-/// Points are seen only up to the radius [`BrownConrady::limit`], within which the picture does not fold back on itself
-/// (`det ∂p_d/∂p > 0` all around).
+/// Points are seen only up to the radius [`BrownConrady::limit`], within which the picture does not
+/// fold back on itself (`det ∂p_d/∂p > 0` all around).
 ///
-/// Source: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37(8), 1971; the rational form: D. Claus
-/// and A. W. Fitzgibbon, "A rational function lens distortion model for general cameras", CVPR 2005.
+/// Source: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37(8), 1971;
+/// the rational form: D. Claus and A. W. Fitzgibbon, "A rational function lens distortion model for
+/// general cameras", CVPR 2005.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrownConrady {
     coefficients: BrownCoefficients,
@@ -160,8 +162,9 @@ impl BrownConrady {
 
     /// The point that appears at `p_d`; None if none within the limit does.
     ///
-    /// The radial part has one unknown ([`invert`]). Tangential distortion is removed from there by Newton's method with steps
-    /// halved until they bring the picture nearer and stay within the limit.
+    /// The radial part has one unknown ([`invert`]). Tangential distortion is removed from there by
+    /// Newton's method with steps halved until they bring the picture nearer and stay within the
+    /// limit.
     pub fn undistort(&self, p_d: &Vector2<f64>) -> Option<Vector2<f64>> {
         let target = p_d.norm();
         if self.is_straight() || target == 0.0 {

@@ -3,7 +3,8 @@
 use super::{BrownCoefficients, Camera, Lens};
 use serde_json::{Map, Value, json};
 
-/// A camera model of COLMAP with its parameters; pixels count from the corner of the first, whose centre is (½, ½).
+/// A camera model of COLMAP with its parameters; pixels count from the corner of the first, whose
+/// centre is (½, ½).
 ///
 /// Source: COLMAP's documentation, "Camera Models"; nerfstudio has the names of COLMAP's models.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,8 +20,8 @@ pub struct ColmapCamera {
 }
 
 impl ColmapCamera {
-    /// `PINHOLE` for a lens without distortion, `OPENCV` for k1, k2, p1, p2, `FULL_OPENCV` for more, `OPENCV_FISHEYE` for a fisheye. How
-    /// far off its axis the lens is used is not said.
+    /// `PINHOLE` for a lens without distortion, `OPENCV` for k1, k2, p1, p2, `FULL_OPENCV` for
+    /// more, `OPENCV_FISHEYE` for a fisheye. How far off its axis the lens is used is not said.
     pub fn of(camera: &Camera) -> Self {
         let mut parameters = vec![
             ("fx", camera.fx),
@@ -76,8 +77,8 @@ impl ColmapCamera {
         )
     }
 
-    /// The keys of the camera in nerfstudio's `transforms.json`, whose `OPENCV` has k3, too; None for a rational lens (k4 to k6), which
-    /// it has not.
+    /// The keys of the camera in nerfstudio's `transforms.json`, whose `OPENCV` has k3, too; None
+    /// for a rational lens (k4 to k6), which it has not.
     pub fn nerfstudio(&self) -> Option<Map<String, Value>> {
         let rational =
             |(name, value): &(&str, f64)| matches!(*name, "k4" | "k5" | "k6") && *value != 0.0;

@@ -4,14 +4,16 @@ use super::rising::{end_of_rise, invert};
 use nalgebra::{Matrix2, Matrix2x3, RowVector3, Vector2, Vector3};
 use std::f64::consts::PI;
 
-/// A point at the angle θ off the axis appears at the distance `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` from the
-/// middle of the picture, in its own direction: `p_d = θ_d (x, y)/√(x² + y²)`.
+/// A point at the angle θ off the axis appears at the distance
+/// `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` from the middle of the picture, in its own
+/// direction: `p_d = θ_d (x, y)/√(x² + y²)`.
 ///
-/// The same as OpenCV's `fisheye` and the "equidistant" of ROS and Kalibr. Points may lie beside and behind the camera; they
-/// are seen up to the angle [`KannalaBrandt::limit_rad`], within which θ_d rises.
+/// The same as OpenCV's `fisheye` and the "equidistant" of ROS and Kalibr. Points may lie beside
+/// and behind the camera; they are seen up to the angle [`KannalaBrandt::limit_rad`], within which
+/// θ_d rises.
 ///
-/// Source: J. Kannala and S. S. Brandt, "A generic camera model and calibration method for conventional, wide-angle, and
-/// fish-eye lenses", PAMI 28(8), 2006.
+/// Source: J. Kannala and S. S. Brandt, "A generic camera model and calibration method for
+/// conventional, wide-angle, and fish-eye lenses", PAMI 28(8), 2006.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KannalaBrandt {
     k: [f64; 4],
@@ -79,8 +81,8 @@ impl KannalaBrandt {
         Some(x_c.xy() * (self.radius(theta).0 / rho))
     }
 
-    /// `∂p_d/∂x_c = θ_d′ e ∂θ/∂x_c + (θ_d/ρ) (I − e eᵀ) ∂(x, y)/∂x_c` with `e = (x, y)/ρ`, `ρ = √(x² + y²)`,
-    /// `∂θ/∂x_c = (z eᵀ, −ρ)/(ρ² + z²)`.
+    /// `∂p_d/∂x_c = θ_d′ e ∂θ/∂x_c + (θ_d/ρ) (I − e eᵀ) ∂(x, y)/∂x_c` with `e = (x, y)/ρ`,
+    /// `ρ = √(x² + y²)`, `∂θ/∂x_c = (z eᵀ, −ρ)/(ρ² + z²)`.
     pub fn jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
         let rho = x_c.xy().norm();
         if rho <= NEAR_AXIS * x_c.z {

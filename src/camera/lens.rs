@@ -3,7 +3,8 @@
 use super::{BrownConrady, KannalaBrandt};
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
-/// A lens model. What it gives, `p_d`, becomes a pixel by `u = fx p_d.x + cx`, `v = fy p_d.y + cy` ([`super::Camera`]).
+/// A lens model. What it gives, `p_d`, becomes a pixel by `u = fx p_d.x + cx`, `v = fy p_d.y + cy`
+/// ([`super::Camera`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Lens {
@@ -47,8 +48,8 @@ impl Lens {
         }
     }
 
-    /// A vector along the ray that appears at `p_d`, its z 1 for Brown–Conrady and its length 1 for Kannala–Brandt; None
-    /// beyond what the lens shows.
+    /// A vector along the ray that appears at `p_d`, its z 1 for Brown–Conrady and its length 1 for
+    /// Kannala–Brandt; None beyond what the lens shows.
     pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
         match self {
             Self::BrownConrady(lens) => lens.undistort(p_d).map(|p| p.push(1.0)),

@@ -1,5 +1,5 @@
-//! Camera models: pixel → ray and point → pixel, with analytic Jacobians, and the calibration files they
-//! come from.
+//! Camera models: pixel → ray and point → pixel, with analytic Jacobians, and the calibration files
+//! they come from.
 //!
 //! Pixel convention: the centre of the first pixel is (0, 0). Files that count from the corner
 //! (`pixel_centre = "half"`, COLMAP, nerfstudio) are converted when read.

@@ -5,11 +5,11 @@ use super::{Lens, Sweep};
 use nalgebra::{Matrix2, Matrix2x3, Matrix2x5, Vector2, Vector3};
 use serde::{Serialize, Serializer};
 
-/// A camera: `u = fx p_d.x + cx`, `v = fy p_d.y + cy`, pixels counted from the centre of the first, with p_d where the lens
-/// shows a point ([`Lens`]).
+/// A camera: `u = fx p_d.x + cx`, `v = fy p_d.y + cy`, pixels counted from the centre of the first,
+/// with p_d where the lens shows a point ([`Lens`]).
 ///
-/// With a [`Sweep`], the camera's coordinates are those of the middle row, the point is that of the row it appears in, and rays
-/// start at the row's own centre ([`Camera::origin`]).
+/// With a [`Sweep`], the camera's coordinates are those of the middle row, the point is that of the
+/// row it appears in, and rays start at the row's own centre ([`Camera::origin`]).
 ///
 /// Serialises as its calibration file ([`super::format_calibration`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,8 +47,8 @@ const MOST_SHARES: usize = 30;
 const EXACT_SHARE: f64 = 1e-13;
 
 impl Camera {
-    /// A pinhole with square pixels and its principal point in the middle, from its vertical field of view
-    /// (radians): `f = (height / 2) / tan(fov / 2)`.
+    /// A pinhole with square pixels and its principal point in the middle, from its vertical field
+    /// of view (radians): `f = (height / 2) / tan(fov / 2)`.
     pub fn from_vertical_fov(width: u32, height: u32, fov_rad: f64) -> Self {
         let f = 0.5 * f64::from(height) / (0.5 * fov_rad).tan();
         Self {
@@ -77,39 +77,45 @@ impl Camera {
         ((v - 0.5 * (height - 1.0)) / height).clamp(-LARGEST_SHARE, LARGEST_SHARE)
     }
 
-    /// A vector along the ray of a pixel, in camera coordinates (z = 1, of unit length for a fisheye); None where the lens
-    /// shows nothing.
+    /// A vector along the ray of a pixel, in camera coordinates (z = 1, of unit length for a
+    /// fisheye); None where the lens shows nothing.
     pub fn ray(&self, u: f64, v: f64) -> Option<Vector3<f64>> {
         let ray = self.lens.ray(&Vector2::new(
             (u - self.cx) / self.fx,
             (v - self.cy) / self.fy,
         ))?;
-        match self.sweep.is_none() {
-            true => Some(ray),
-            false => Some(self.sweep.turn(self.share(v)) * ray),
+        if self.sweep.is_none() {
+            Some(ray)
+        } else {
+            Some(self.sweep.turn(self.share(v)) * ray)
         }
     }
 
     /// Where the rays of row `v` start, in camera coordinates, metres: 0 without a sweep.
     pub fn origin(&self, v: f64) -> Vector3<f64> {
-        match self.sweep.is_none() {
-            true => Vector3::zeros(),
-            false => self.sweep.nu_m * self.share(v),
+        if self.sweep.is_none() {
+            Vector3::zeros()
+        } else {
+            self.sweep.nu_m * self.share(v)
         }
     }
 
-    /// The pixel of a point in camera coordinates, within the picture or not; None where the lens shows nothing.
+    /// The pixel of a point in camera coordinates, within the picture or not; None where the lens
+    /// shows nothing.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
-        match self.sweep.is_none() {
-            true => self.project_at(x_c),
-            false => self.project_at(&self.sweep.at(x_c, self.share_of(x_c)?)),
+        if self.sweep.is_none() {
+            self.project_at(x_c)
+        } else {
+            self.project_at(&self.sweep.at(x_c, self.share_of(x_c)?))
         }
     }
 
-    /// The share of the picture's time at which a point appears: the solution of `τ = share(v(x_c(τ)))`.
+    /// The share of the picture's time at which a point appears: the solution of
+    /// `τ = share(v(x_c(τ)))`.
     ///
-    /// Fixed-point iteration from the middle row; a camera that moves a point by n pixels during the picture errs by n/H of the
-    /// error before in each step. None where the lens shows nothing on the way.
+    /// Fixed-point iteration from the middle row; a camera that moves a point by n pixels during
+    /// the picture errs by n/H of the error before in each step. None where the lens shows nothing
+    /// on the way.
     fn share_of(&self, x_c: &Vector3<f64>) -> Option<f64> {
         let mut share = 0.0;
         for _ in 0..MOST_SHARES {
@@ -134,8 +140,9 @@ impl Camera {
 
     /// `∂(u, v)/∂x_c`, pixels per metre, for a point that the lens shows.
     ///
-    /// With a sweep, a change of the row changes the row's pose: with J the Jacobian in the row's coordinates, `g = J ∂x_c(τ)/∂τ/H`
-    /// and `e = (0, 1)`, `∂(u, v)/∂x_c = (I − g eᵀ)⁻¹ J Exp(−ω τ)`.
+    /// With a sweep, a change of the row changes the row's pose: with J the Jacobian in the row's
+    /// coordinates, `g = J ∂x_c(τ)/∂τ/H` and `e = (0, 1)`,
+    /// `∂(u, v)/∂x_c = (I − g eᵀ)⁻¹ J Exp(−ω τ)`.
     pub fn project_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
         if self.sweep.is_none() {
             return self.jacobian_at(x_c);
@@ -158,7 +165,8 @@ impl Camera {
         Matrix2::new(1.0, g.x * inverse, 0.0, inverse)
     }
 
-    /// `∂(u, v)/∂(ln f, cx, cy, k1, k2)` of a point that the lens shows, with fx and fy growing alike.
+    /// `∂(u, v)/∂(ln f, cx, cy, k1, k2)` of a point that the lens shows, with fx and fy growing
+    /// alike.
     pub fn intrinsics_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x5<f64> {
         if self.sweep.is_none() {
             return self.intrinsics_jacobian_at(x_c);
@@ -239,8 +247,8 @@ impl Camera {
         }
     }
 
-    /// Rays through the four corners, as far as the lens shows them, and along the optical axis: where these meet the wall tells how far
-    /// a frame moves.
+    /// Rays through the four corners, as far as the lens shows them, and along the optical axis:
+    /// where these meet the wall tells how far a frame moves.
     pub fn probes(&self) -> Vec<Vector3<f64>> {
         let corners = self.border(1, 0.0).into_iter();
         corners
@@ -254,8 +262,8 @@ impl Camera {
         (self.fx * self.fy).sqrt()
     }
 
-    /// Rays through 9 × 7 pixels spread evenly over the picture, its border included, as far as the lens shows them: all of what a
-    /// frame shows.
+    /// Rays through 9 × 7 pixels spread evenly over the picture, its border included, as far as the
+    /// lens shows them: all of what a frame shows.
     pub fn rays_across(&self) -> Vec<Vector3<f64>> {
         const COLUMNS: u32 = 9;
         const ROWS: u32 = 7;
@@ -268,9 +276,9 @@ impl Camera {
         rays.collect()
     }
 
-    /// The border of the picture as pixels, clockwise from the first, `per_edge` steps an edge, along the
-    /// outermost pixel centres widened by `outset` pixels (½ reaches the pixels' outer edges). Where the lens's picture ends
-    /// before, the border is there.
+    /// The border of the picture as pixels, clockwise from the first, `per_edge` steps an edge,
+    /// along the outermost pixel centres widened by `outset` pixels (½ reaches the pixels' outer
+    /// edges). Where the lens's picture ends before, the border is there.
     pub fn border(&self, per_edge: usize, outset: f64) -> Vec<Vector2<f64>> {
         let (left, top) = (-outset, -outset);
         let right = f64::from(self.width - 1) + outset;

@@ -9,7 +9,8 @@ const GROWTH: f64 = 1.01;
 
 /// The first place up to `end` where `slope` is no longer positive; infinity if there is none.
 ///
-/// Looked for from 0.001 on in steps of one percent, then halved to rounding: a dip narrower than a percent is not seen.
+/// Looked for from 0.001 on in steps of one percent, then halved to rounding: a dip narrower than a
+/// percent is not seen.
 pub fn end_of_rise(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
     let rises = |at: f64| slope(at) > 0.0;
     let (mut low, mut high) = (0.0, FIRST);
@@ -34,8 +35,8 @@ pub fn end_of_rise(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
     f64::INFINITY
 }
 
-/// The `x` from 0 to `end` with `f(x) = target ≥ 0`, where `f` gives value and slope and rises; None if it does not get that
-/// far.
+/// The `x` from 0 to `end` with `f(x) = target ≥ 0`, where `f` gives value and slope and rises;
+/// None if it does not get that far.
 ///
 /// Newton's method, kept between bounds that close in on the root.
 pub fn invert(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> Option<f64> {

@@ -1,7 +1,7 @@
 //! Lenses in single precision, for loops over many points.
 //!
-//! A loop is written once over [`Bend`] and entered with the lens at hand, not the enum of all, so that the compiler makes vectors
-//! of it.
+//! A loop is written once over [`Bend`] and entered with the lens at hand, not the enum of all, so
+//! that the compiler makes vectors of it.
 
 use super::sweep::LARGEST_SHARE;
 use super::{Camera, Lens};
@@ -9,8 +9,8 @@ use std::f64::consts::PI;
 
 /// A lens in a loop.
 pub trait Bend: Copy {
-    /// Where a point (camera coordinates) appears at focal length 1, and whether the lens shows it. Beyond its limit the
-    /// answer is finite but means nothing.
+    /// Where a point (camera coordinates) appears at focal length 1, and whether the lens shows it.
+    /// Beyond its limit the answer is finite but means nothing.
     fn bend(self, x: f32, y: f32, z: f32) -> (f32, f32, bool);
 }
 
@@ -81,9 +81,9 @@ impl Bend for SingleLens {
 /// A lens of a camera that moves while the rows are read ([`super::Sweep`]).
 ///
 /// The motion is expanded to the second order in the share τ of the picture's time,
-/// `x_c(τ) ≈ x − τ a + τ²/2 ω × (a + ν)` with `a = ω × x + ν`, which is off by `f |ω τ|³/6`: 0.0003 px at 90 °/s over 20 ms
-/// with a focal length of 415 px. The row is found by two steps of `τ ← share(v(x_c(τ)))` and one of Aitken's, which leaves
-/// the square of what a third step would.
+/// `x_c(τ) ≈ x − τ a + τ²/2 ω × (a + ν)` with `a = ω × x + ν`, which is off by `f |ω τ|³/6`: 0.0003
+/// px at 90 °/s over 20 ms with a focal length of 415 px. The row is found by two steps of
+/// `τ ← share(v(x_c(τ)))` and one of Aitken's, which leaves the square of what a third step would.
 #[derive(Clone, Copy, Debug)]
 pub struct Rolling<L> {
     lens: L,
@@ -189,13 +189,15 @@ const DEGREE: usize = 17;
 /// Nearer to 180° off the axis, `θ_d/sin θ` grows beyond what a polynomial follows.
 const WIDEST_RAD: f64 = 0.75 * PI;
 
-/// A fisheye: `p_d = G(cos θ) (x, y)/|x_c|` with `G = θ_d/sin θ`, which is smooth in `cos θ` as far as 180°.
+/// A fisheye: `p_d = G(cos θ) (x, y)/|x_c|` with `G = θ_d/sin θ`, which is smooth in `cos θ` as far
+/// as 180°.
 ///
-/// G is interpolated at Chebyshev's nodes over the angles that the lens shows, to about the rounding of single precision as far as
-/// 120° off the axis; beyond 135° nothing is shown.
+/// G is interpolated at Chebyshev's nodes over the angles that the lens shows, to about the
+/// rounding of single precision as far as 120° off the axis; beyond 135° nothing is shown.
 #[derive(Clone, Copy, Debug)]
 pub struct Fisheye {
-    /// Coefficients of G in `t = cos θ · scale + offset`, which runs from −1 to 1; the lowest first.
+    /// Coefficients of G in `t = cos θ · scale + offset`, which runs from −1 to 1; the lowest
+    /// first.
     g: [f32; DEGREE + 1],
     scale: f32,
     offset: f32,
@@ -239,7 +241,8 @@ impl Bend for Fisheye {
     }
 }
 
-/// Coefficients (the lowest first) of the polynomial that has the values of `f` at Chebyshev's nodes in [−1, 1].
+/// Coefficients (the lowest first) of the polynomial that has the values of `f` at Chebyshev's
+/// nodes in [−1, 1].
 fn interpolate(f: impl Fn(f64) -> f64) -> [f64; DEGREE + 1] {
     let count = DEGREE + 1;
     let angle = |j: usize| PI * (j as f64 + 0.5) / count as f64;
@@ -292,7 +295,8 @@ mod tests {
         assert!(seen > 100);
     }
 
-    /// Directions up to `limit` radians off the axis (and a little beyond), at distances of 0.5 to 5 m.
+    /// Directions up to `limit` radians off the axis (and a little beyond), at distances of 0.5 to
+    /// 5 m.
     fn directions(limit: f64) -> impl Iterator<Item = Vector3<f64>> {
         (0..1000).map(move |k| {
             let theta = limit * 1.05 * f64::from(k) / 1000.0;
@@ -318,7 +322,8 @@ mod tests {
         let narrow = KannalaBrandt::new(real).limited_to(1.2);
         compare(&Lens::KannalaBrandt(narrow), 1e-6, directions(1.2));
     }
-    /// The expansion against the exact row's pose: a wall at 1 to 5 m, 90 °/s over 20 ms about any axis, 640 × 480 px.
+    /// The expansion against the exact row's pose: a wall at 1 to 5 m, 90 °/s over 20 ms about any
+    /// axis, 640 × 480 px.
     #[test]
     fn a_moving_camera_projects_to_a_thousandth_of_a_pixel() {
         let fisheye = KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]);

@@ -1,17 +1,19 @@
-//! Rolling shutter: the camera moves while the rows of a picture are read, so every row has a pose of its own.
+//! Rolling shutter: the camera moves while the rows of a picture are read, so every row has a pose
+//! of its own.
 
 use nalgebra::{Rotation3, Vector3};
 
-/// How a camera moves while as many rows are read as its picture has, in its own coordinates at the time of the middle row:
-/// steadily, by the rotation ω (radians) and the shift ν (metres).
+/// How a camera moves while as many rows are read as its picture has, in its own coordinates at the
+/// time of the middle row: steadily, by the rotation ω (radians) and the shift ν (metres).
 ///
-/// Row v of a picture of H rows is read at the share `τ = (v − (H − 1)/2)/H` of that time, from −½ to ½. The camera has then
-/// turned by `Exp(ω τ)` and moved by `ν τ`: a point x_c of the middle row's coordinates lies at
+/// Row v of a picture of H rows is read at the share `τ = (v − (H − 1)/2)/H` of that time, from −½
+/// to ½. The camera has then turned by `Exp(ω τ)` and moved by `ν τ`: a point x_c of the middle
+/// row's coordinates lies at
 ///
 /// `x_c(τ) = Exp(−ω τ) (x_c − ν τ)`
 ///
-/// in the row's own. Shares are those of any halved picture, too ([`super::Camera::at_level`]); where an odd number of rows was
-/// halved, to within half a row.
+/// in the row's own. Shares are those of any halved picture, too ([`super::Camera::at_level`]);
+/// where an odd number of rows was halved, to within half a row.
 ///
 /// Source: M. Meingast, C. Geyer, S. Sastry, "Geometric models of rolling-shutter cameras", OMNIVIS 2005.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -22,7 +24,8 @@ pub struct Sweep {
     pub nu_m: Vector3<f64>,
 }
 
-/// The largest share: rows farther than half a picture's height beyond its border are taken as if they were read there.
+/// The largest share: rows farther than half a picture's height beyond its border are taken as if
+/// they were read there.
 pub(super) const LARGEST_SHARE: f64 = 1.0;
 
 impl Sweep {
@@ -49,7 +52,8 @@ impl Sweep {
         self.turn(-share) * (x_c - self.nu_m * share)
     }
 
-    /// `∂x_c(τ)/∂τ = −ω × x_c(τ) − Exp(−ω τ) ν` of a point that lies at `at` in the row's coordinates.
+    /// `∂x_c(τ)/∂τ = −ω × x_c(τ) − Exp(−ω τ) ν` of a point that lies at `at` in the row's
+    /// coordinates.
     pub(super) fn rate(&self, at: &Vector3<f64>, share: f64) -> Vector3<f64> {
         -self.omega_rad.cross(at) - self.turn(-share) * self.nu_m
     }

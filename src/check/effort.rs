@@ -4,8 +4,8 @@ use crate::refine::RefineOptions;
 use crate::survey::Survey;
 use serde::Serialize;
 
-/// Processor time of a frame that does not depend on its size, seconds, and of a pixel: from surveys of 320 × 240 to 640 × 480 px on
-/// one core of a cloud machine. A guess for any other.
+/// Processor time of a frame that does not depend on its size, seconds, and of a pixel: from
+/// surveys of 320 × 240 to 640 × 480 px on one core of a cloud machine. A guess for any other.
 const FRAME_S: f64 = 0.035;
 const PIXEL_S: f64 = 0.14e-6;
 /// Bytes of a frame's pyramid per pixel, and of the equations per frame.

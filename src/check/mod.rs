@@ -1,6 +1,8 @@
-//! What a survey is like, before hours are spent on it: frames, overlap, jitter, texture, effort, and what to do about them.
+//! What a survey is like, before hours are spent on it: frames, overlap, jitter, texture, effort,
+//! and what to do about them.
 //!
-//! A dozen frames are decoded, the others only measured by their headers; everything else is geometry.
+//! A dozen frames are decoded, the others only measured by their headers; everything else is
+//! geometry.
 
 mod advice;
 mod effort;
@@ -82,7 +84,8 @@ pub struct PosesCheck {
 pub struct JitterCheck {
     /// 1-σ of the displacement from one frame to the next that the poses do not tell, pixels.
     pub sigma_px: f64,
-    /// The same as a share of what neighbours share along the way they are displaced: up to a quarter has been seen to work.
+    /// The same as a share of what neighbours share along the way they are displaced: up to a
+    /// quarter has been seen to work.
     pub share_of_overlap: f64,
 }
 
@@ -93,7 +96,8 @@ pub struct JitterCheck {
 pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     let poses = survey.initial_poses();
     let surface = survey.surface.as_ref();
-    // The poses have been checked when the survey was opened: a failure is a camera that looks along the axis.
+    // The poses have been checked when the survey was opened: a failure is a camera that looks
+    // along the axis.
     let px_per_metre = native_px_per_metre(surface, &survey.camera, &poses)
         .map_err(|_| SurfaceError::LooksAlongTheAxis)?;
     let overlap = OverlapCheck::of(survey, &poses);
@@ -121,8 +125,8 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     Ok(check)
 }
 
-/// 1-σ of the displacement between neighbours: turns about the picture's two axes and shifts, `f σ_R ⊕ σ_t px/m`, twice the
-/// variance where each pose is off on its own.
+/// 1-σ of the displacement between neighbours: turns about the picture's two axes and shifts,
+/// `f σ_R ⊕ σ_t px/m`, twice the variance where each pose is off on its own.
 fn jitter(
     prior: &Jitter,
     px_per_metre: f64,

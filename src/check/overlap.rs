@@ -15,7 +15,8 @@ const PIXELS: [usize; 2] = [20, 15];
 /// Frames nearer than this in the sequence are neighbours, not another turn.
 const SAME_TURN: usize = 3;
 
-/// What frames share and are compared by; medians over the frames. What the mask hides or the survey ignores is shared with none.
+/// What frames share and are compared by; medians over the frames. What the mask hides or the
+/// survey ignores is shared with none.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[non_exhaustive]
 pub struct OverlapCheck {
@@ -27,7 +28,8 @@ pub struct OverlapCheck {
     pub least_after: usize,
     /// Share of a frame that the best frame of another turn shows, too; 0 if no turn is closed.
     pub turns: f64,
-    /// The shorter side of the box on the unrolled wall that neighbours share, masked or not, metres.
+    /// The shorter side of the box on the unrolled wall that neighbours share, masked or not,
+    /// metres.
     pub neighbours_width_m: f64,
     /// Frames that look along the tunnel's axis and could not be asked.
     pub along_the_axis: usize,

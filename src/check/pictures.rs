@@ -8,8 +8,9 @@ use serde::Serialize;
 
 /// Frames that are decoded.
 const DECODED: usize = 12;
-/// Variance of the difference of neighbours in a half-size picture over that of a pixel's noise: halving filters with
-/// `[1 3 3 1]/8` along each axis, so that along one axis the variance is `20/64`, and `6/64` of it is shared by neighbours.
+/// Variance of the difference of neighbours in a half-size picture over that of a pixel's noise:
+/// halving filters with `[1 3 3 1]/8` along each axis, so that along one axis the variance is
+/// `20/64`, and `6/64` of it is shared by neighbours.
 const HALVED_NOISE: f64 = 2.0 * (20.0 - 6.0) * 20.0 / (64.0 * 64.0);
 /// Faults that are listed.
 const LISTED: usize = 5;
@@ -26,10 +27,11 @@ pub struct PictureCheck {
     pub clipped: f64,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise_grey: f64,
-    /// Texture: RMS slope at half size without the noise's part, grey levels per pixel of full size.
+    /// Texture: RMS slope at half size without the noise's part, grey levels per pixel of full
+    /// size.
     pub slope_grey_per_px: f64,
-    /// 1-σ to which all pixels of one frame can place it on a wall that is known: `σ/(slope √n)`, pixels. What can be reached
-    /// is a few times that.
+    /// 1-σ to which all pixels of one frame can place it on a wall that is known: `σ/(slope √n)`,
+    /// pixels. What can be reached is a few times that.
     pub sigma_px: f64,
 }
 

@@ -15,8 +15,9 @@ pub struct WayArguments {
     /// Advance along the axis each second, metres.
     #[arg(long, value_name = "M")]
     advance_m_per_s: Option<f64>,
-    /// The plan as a table instead: CSV with columns frame (from 0) or time_s, chainage_m, angle_deg, and x_m and z_m if the
-    /// carrier is off the axis. Between rows all changes evenly; angles count as they are given, beyond 360 too.
+    /// The plan as a table instead: CSV with columns frame (from 0) or time_s, chainage_m,
+    /// angle_deg, and x_m and z_m if the carrier is off the axis. Between rows all changes evenly;
+    /// angles count as they are given, beyond 360 too.
     #[arg(
         long,
         value_name = "CSV",
@@ -41,8 +42,8 @@ pub struct MountingArguments {
     /// How far the camera looks ahead, towards larger chainage, degrees; 0 is straight at the wall.
     #[arg(long, value_name = "DEG", default_value_t = 0.0)]
     tilt_deg: f64,
-    /// How far the camera is turned clockwise about its line of sight, degrees: at 0 the picture's right is towards larger θ
-    /// and its lower edge ahead, at 90 its right is ahead.
+    /// How far the camera is turned clockwise about its line of sight, degrees: at 0 the picture's
+    /// right is towards larger θ and its lower edge ahead, at 90 its right is ahead.
     #[arg(long, value_name = "DEG", default_value_t = 0.0)]
     roll_deg: f64,
     /// How far the lens is from the axis of the turn, towards where the camera points, metres.
@@ -63,10 +64,12 @@ pub fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 }
 
 impl WayArguments {
-    /// Where the carrier stands at the frames, if it turns by `turn_rad` where no table says otherwise.
+    /// Where the carrier stands at the frames, if it turns by `turn_rad` where no table says
+    /// otherwise.
     ///
     /// # Errors
-    /// A malformed table or one that does not cover the frames; something that goes by the second where no clock is known.
+    /// A malformed table or one that does not cover the frames; something that goes by the second
+    /// where no clock is known.
     pub fn stations(&self, turn_rad: Rate, frames: &FrameTimes) -> Result<Vec<Station>, Failure> {
         if let Some(path) = &self.table {
             let table = PlanTable::read(path)?;

@@ -7,7 +7,8 @@ use std::path::PathBuf;
 
 /// Looks a survey over in seconds: frames, overlap, jitter, texture, and what refining will take.
 ///
-/// Exits with code 3 if anything would make refine or stitch fail. Warnings say what asks for attention, and what to do.
+/// Exits with code 3 if anything would make refine or stitch fail. Warnings say what asks for
+/// attention, and what to do.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  tunnelstitch check my-survey")]
 pub struct CheckArguments {
@@ -35,9 +36,10 @@ pub fn run(arguments: &CheckArguments, terminal: &Terminal) -> Result<(), Failur
             terminal.warn(warning);
         }
     }
-    match check.faults.is_empty() {
-        true => Ok(()),
-        false => Err(Failure::input(check.faults.join("\nerror: "))),
+    if check.faults.is_empty() {
+        Ok(())
+    } else {
+        Err(Failure::input(check.faults.join("\nerror: ")))
     }
 }
 

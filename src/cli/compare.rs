@@ -18,8 +18,8 @@ use std::path::{Path, PathBuf};
 
 /// Compares the survey's initial poses with refined ones, and both with the true ones where known.
 ///
-/// Writes baseline.png, refined.png, truth.png (all of the same stretch of wall), before-after.png (a small
-/// extract of the first above the second) and compare.json.
+/// Writes baseline.png, refined.png, truth.png (all of the same stretch of wall), before-after.png
+/// (a small extract of the first above the second) and compare.json.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  tunnelstitch compare my-survey --refined refined/poses.tum --out compared"
@@ -27,8 +27,9 @@ use std::path::{Path, PathBuf};
 pub struct CompareArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
-    /// The refined poses, in the tunnel's frame as `refine` and `convert` write them, in any format. The flags for reading
-    /// poses are about those of the survey; `convert` first what has another convention.
+    /// The refined poses, in the tunnel's frame as `refine` and `convert` write them, in any
+    /// format. The flags for reading poses are about those of the survey; `convert` first what has
+    /// another convention.
     #[arg(long, value_name = "FILE")]
     refined: PathBuf,
     /// Folder for the results; made if need be.
@@ -39,8 +40,8 @@ pub struct CompareArguments {
     /// Print compare.json on standard output instead of the table.
     #[arg(long)]
     json: bool,
-    /// Exit with code 4 if the refined poses put pixels farther than this from their true place on the wall
-    /// (root mean square, pixels). Needs true poses.
+    /// Exit with code 4 if the refined poses put pixels farther than this from their true place on
+    /// the wall (root mean square, pixels). Needs true poses.
     #[arg(long, value_name = "X", value_parser = positive)]
     max_wall_px: Option<f64>,
     #[command(flatten)]
@@ -61,8 +62,8 @@ struct Report<'a> {
 /// Runs the command.
 ///
 /// # Errors
-/// [`Failure`] for everything wrong with the survey, the poses or the output, and for a quality gate that is
-/// not met (after everything was written).
+/// [`Failure`] for everything wrong with the survey, the poses or the output, and for a quality
+/// gate that is not met (after everything was written).
 pub fn run(arguments: &CompareArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     let survey = arguments.reading.open(&arguments.survey, terminal)?;
     if arguments.max_wall_px.is_some() && survey.truth.is_none() {
@@ -99,7 +100,8 @@ pub fn run(arguments: &CompareArguments, run: &Run, terminal: &Terminal) -> Resu
     gate(&comparison, arguments.max_wall_px)
 }
 
-/// Compares a survey's initial with refined poses, and both with the true ones where they are known.
+/// Compares a survey's initial with refined poses, and both with the true ones where they are
+/// known.
 ///
 /// # Errors
 /// Poses that cannot be laid on the wall, unreadable frames, too little memory.

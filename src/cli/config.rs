@@ -10,8 +10,9 @@ use std::path::PathBuf;
 
 /// Shows every option in effect for a survey, and where it comes from.
 ///
-/// Flags come before variables (TUNNELSTITCH_STITCH_MODE=average), these before [options.stitch] in survey.toml, and that before
-/// the defaults. What is printed may be put into survey.toml as it is; every result has the like beside it in run.toml.
+/// Flags come before variables (TUNNELSTITCH_STITCH_MODE=average), these before [options.stitch] in
+/// survey.toml, and that before the defaults. What is printed may be put into survey.toml as it is;
+/// every result has the like beside it in run.toml.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Example:\n  TUNNELSTITCH_STITCH_MODE=average tunnelstitch config my-survey stitch"

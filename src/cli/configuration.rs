@@ -1,5 +1,6 @@
 //! Where options come from. One order for all: a flag on the command line, else a variable
-//! `TUNNELSTITCH_<COMMAND>_<OPTION>`, else `[options.<command>]` of `survey.toml`, else the default.
+//! `TUNNELSTITCH_<COMMAND>_<OPTION>`, else `[options.<command>]` of `survey.toml`, else the
+//! default.
 
 use super::{Cli, Failure};
 use crate::survey::{Survey, toml_path};
@@ -73,10 +74,7 @@ pub fn command() -> Command {
         let order = format!(
             "Options may also be set as TUNNELSTITCH_{}_<OPTION>{}; `tunnelstitch config` shows what is in effect.",
             upper(&name),
-            match CONFIGURABLE.contains(&name.as_str()) {
-                true => format!(" and under [options.{name}] in survey.toml"),
-                false => String::new(),
-            }
+            if CONFIGURABLE.contains(&name.as_str()) { format!(" and under [options.{name}] in survey.toml") } else { String::new() }
         );
         let help = own.get_after_help().map(|help| format!("{help}\n\n"));
         own.after_help(help.unwrap_or_default() + &order)
@@ -95,7 +93,8 @@ fn variable(command: Option<&str>, long: &str) -> String {
 /// Parses `arguments` (the program's name first).
 ///
 /// # Errors
-/// Wrong options in `survey.toml`. Wrong arguments, and what only asks for help, end the program as clap does.
+/// Wrong options in `survey.toml`. Wrong arguments, and what only asks for help, end the program as
+/// clap does.
 pub fn parse(arguments: Vec<OsString>) -> Result<Configuration, Failure> {
     let command = command();
     let given = command.clone().try_get_matches_from(&arguments);

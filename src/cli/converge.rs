@@ -9,15 +9,17 @@ use std::path::PathBuf;
 
 /// Tests on simulated surveys how much noise of the poses the refinement can take.
 ///
-/// Sweeps a grid of rotation and translation sigmas, noise models, walls and turns. Each run simulates a survey (the
-/// `free` experiment with that noise), refines it with default options, and measures every frame's error on the wall
-/// against the true poses, relative to the majority of the frames. A run is a success if every frame is off by less
-/// than 0.5 px. A frame that `refine` calls photometric and that is not as good is a false success. A survey whose true
-/// poses leave the tunnel or look along it is drawn again with the next seed (seed + 1000, …).
+/// Sweeps a grid of rotation and translation sigmas, noise models, walls and turns. Each run
+/// simulates a survey (the `free` experiment with that noise), refines it with default options, and
+/// measures every frame's error on the wall against the true poses, relative to the majority of the
+/// frames. A run is a success if every frame is off by less than 0.5 px. A frame that `refine`
+/// calls photometric and that is not as good is a false success. A survey whose true poses leave
+/// the tunnel or look along it is drawn again with the next seed (seed + 1000, …).
 ///
-/// Writes runs.jsonl (a line for each run as it finishes), converge.json and converge.txt (the runs of each cell of
-/// the grid in numbers) and converge.png (the success rates as a map). Stop it with Ctrl-C and call it again: runs
-/// that are in runs.jsonl are not done again, so more seeds or more values extend a sweep.
+/// Writes runs.jsonl (a line for each run as it finishes), converge.json and converge.txt (the runs
+/// of each cell of the grid in numbers) and converge.png (the success rates as a map). Stop it with
+/// Ctrl-C and call it again: runs that are in runs.jsonl are not done again, so more seeds or more
+/// values extend a sweep.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch converge --out sweep\n      \
@@ -31,9 +33,10 @@ use std::path::PathBuf;
     tunnelstitch converge --efficiency --wall brick,concrete --frames 60 --seeds 10 --out limit\n      \
     how close the poses come to the Cramér–Rao bound, and whether their stated uncertainty is true")]
 pub struct ConvergeArguments {
-    /// Compare the errors with the Cramér–Rao bound (with the wall's texture known, and unknown but for its spectrum, which no
-    /// estimator can do better than that knows no more) and with the stated covariances instead, at 2° of random walk if
-    /// nothing else is asked for; writes efficiency.json and efficiency.txt.
+    /// Compare the errors with the Cramér–Rao bound (with the wall's texture known, and unknown but
+    /// for its spectrum, which no estimator can do better than that knows no more) and with the
+    /// stated covariances instead, at 2° of random walk if nothing else is asked for; writes
+    /// efficiency.json and efficiency.txt.
     #[arg(long)]
     efficiency: bool,
     /// With --efficiency: refine as `refine --joint` does.
@@ -51,8 +54,8 @@ pub struct ConvergeArguments {
         default_value = "2,4,6,8,12"
     )]
     rotation_deg: Vec<f64>,
-    /// 1-σ of the translation noise: `auto` is (2, 2, 3) cm at 2° and in proportion to the rotation; a list is
-    /// multiples of (2, 2, 3) cm, each with every rotation.
+    /// 1-σ of the translation noise: `auto` is (2, 2, 3) cm at 2° and in proportion to the
+    /// rotation; a list is multiples of (2, 2, 3) cm, each with every rotation.
     #[arg(long, value_name = "auto|X,…", default_value = "auto", value_parser = translation_scale)]
     translation_scale: TranslationScale,
     /// Noise models: errors that add up from frame to frame, or each frame on its own; a list.
@@ -64,7 +67,8 @@ pub struct ConvergeArguments {
         default_value = "random-walk,independent"
     )]
     jitter: Vec<JitterArgument>,
-    /// Turn from frame to frame, degrees; a list. A frame is 75° wide, so less turn is more overlap.
+    /// Turn from frame to frame, degrees; a list. A frame is 75° wide, so less turn is more
+    /// overlap.
     #[arg(
         long,
         value_name = "DEG,…",
@@ -88,8 +92,8 @@ pub struct ConvergeArguments {
     /// 1-σ of the sensor's noise, grey levels.
     #[arg(long, value_name = "GREY", default_value_t = ConvergeOptions::default().noise_grey)]
     noise: f64,
-    /// Drop the runs that are in DIR and begin afresh: for other --frames, --size or --noise, and after a change of
-    /// the program.
+    /// Drop the runs that are in DIR and begin afresh: for other --frames, --size or --noise, and
+    /// after a change of the program.
     #[arg(long)]
     force: bool,
     /// Print converge.json on standard output instead of the table.

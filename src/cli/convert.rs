@@ -12,8 +12,9 @@ use std::path::{Path, PathBuf};
 
 /// Writes poses in another format, in the tunnel's frame and the format's own convention.
 ///
-/// One pose per frame, in the frames' order. Frames are named by their paths from the survey's folder (csv, colmap) or from the
-/// file's (nerfstudio). The camera goes with colmap and nerfstudio.
+/// One pose per frame, in the frames' order. Frames are named by their paths from the survey's
+/// folder (csv, colmap) or from the file's (nerfstudio). The camera goes with colmap and
+/// nerfstudio.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch convert survey --poses refined/poses.tum --to colmap --out sparse\n      \
@@ -147,7 +148,8 @@ fn write_colmap(
 
 /// The frames' paths from a folder, with slashes.
 fn names(survey: &Survey, folder: &Path) -> Vec<String> {
-    // Folders are resolved, since `..` leads elsewhere from a link; a frame that is a link keeps its name.
+    // Folders are resolved, since `..` leads elsewhere from a link; a frame that is a link keeps
+    // its name.
     let resolved = |folder: &Path| {
         let folder = if folder.as_os_str().is_empty() {
             Path::new(".")

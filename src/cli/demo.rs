@@ -17,8 +17,8 @@ use std::time::Instant;
 
 /// Shows the whole job: simulates a survey with wrong poses, refines them, stitches and compares.
 ///
-/// The survey is a revolving camera's flight through a brick tunnel: ten turns of twelve frames, each step
-/// 2° and a few centimetres off the plan. An earlier demo in the same folder is replaced.
+/// The survey is a revolving camera's flight through a brick tunnel: ten turns of twelve frames,
+/// each step 2° and a few centimetres off the plan. An earlier demo in the same folder is replaced.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tunnelstitch demo\n  tunnelstitch demo --turns 2 --out small-demo"

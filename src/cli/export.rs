@@ -13,9 +13,11 @@ use crate::trajectory::{Pose, Trajectory, poses_of};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Writes the wall in three dimensions, textured with the panorama: metric, in the tunnel's coordinates.
+/// Writes the wall in three dimensions, textured with the panorama: metric, in the tunnel's
+/// coordinates.
 ///
-/// glTF has y up, the tunnel z: (x, y, z) is written as (x, z, −y). Blender and viewers of 3D Tiles turn it back by themselves.
+/// glTF has y up, the tunnel z: (x, y, z) is written as (x, z, −y). Blender and viewers of 3D Tiles
+/// turn it back by themselves.
 #[derive(Debug, clap::Args)]
 #[command(
     group = clap::ArgGroup::new("output").required(true).multiple(true),
@@ -35,7 +37,8 @@ pub struct ExportArguments {
     /// One file of glTF (GLB), for short pieces of tunnel.
     #[arg(long, value_name = "FILE", group = "output", help_heading = "Output")]
     glb: Option<PathBuf>,
-    /// A folder of OGC 3D Tiles 1.1, for tunnels of any length: tileset.json and tiles in levels of detail.
+    /// A folder of OGC 3D Tiles 1.1, for tunnels of any length: tileset.json and tiles in levels of
+    /// detail.
     #[arg(
         long = "3dtiles",
         value_name = "DIR",
@@ -43,7 +46,8 @@ pub struct ExportArguments {
         help_heading = "Output"
     )]
     tiles: Option<PathBuf>,
-    /// A folder with the viewer and everything it shows, for any web server. Marks stay in the browser; `view` keeps them in files.
+    /// A folder with the viewer and everything it shows, for any web server. Marks stay in the
+    /// browser; `view` keeps them in files.
     #[arg(long, value_name = "DIR", group = "output", help_heading = "Output")]
     web: Option<PathBuf>,
     /// Print what was written as JSON.
@@ -76,9 +80,10 @@ pub fn run(arguments: &ExportArguments, run: &Run, terminal: &Terminal) -> Resul
     check(arguments)?;
     let (survey, given) = arguments.poses.open(&arguments.survey, terminal)?;
     let inputs = record::inputs(&survey, arguments.poses.file())?;
-    let canvas = match arguments.glb.is_some() || arguments.tiles.is_some() {
-        true => Some(files(arguments, &survey, &poses_of(&given), terminal)?),
-        false => None,
+    let canvas = if arguments.glb.is_some() || arguments.tiles.is_some() {
+        Some(files(arguments, &survey, &poses_of(&given), terminal)?)
+    } else {
+        None
     };
     let layers = match &arguments.web {
         Some(folder) => web(arguments, folder, (survey, given), terminal)?,
@@ -145,7 +150,8 @@ fn check(arguments: &ExportArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses a folder that holds something else than an earlier export, known by one of its files: all that is in it would be lost.
+/// Refuses a folder that holds something else than an earlier export, known by one of its files:
+/// all that is in it would be lost.
 fn check_replaceable(folder: &Path, file: &str) -> Result<(), Failure> {
     let empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
     if empty || folder.join(file).is_file() {

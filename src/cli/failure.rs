@@ -19,8 +19,8 @@ use std::io::ErrorKind;
 
 /// An error as the user meets it: one text with the remedy, and an exit code.
 ///
-/// 0 success, 1 a bug of ours, 2 wrong usage, 3 bad input, 4 a quality gate was not met, 75 a passing
-/// obstacle (a full disk): try again.
+/// 0 success, 1 a bug of ours, 2 wrong usage, 3 bad input, 4 a quality gate was not met, 75 a
+/// passing obstacle (a full disk): try again.
 #[derive(Debug)]
 pub struct Failure {
     /// What to print.
@@ -82,9 +82,10 @@ impl From<WriteError> for Failure {
             error.source.kind(),
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::Interrupted
         );
-        match passing {
-            true => Self::passing(error.to_string()),
-            false => Self::input(error.to_string()),
+        if passing {
+            Self::passing(error.to_string())
+        } else {
+            Self::input(error.to_string())
         }
     }
 }

@@ -11,10 +11,12 @@ pub struct FrameTimesArguments {
     /// Number of frames, where there is no survey yet.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     frames: Option<u32>,
-    /// Frames a second, the first at 0 s [default: the survey's times, from its file of times or the frames' names].
+    /// Frames a second, the first at 0 s [default: the survey's times, from its file of times or
+    /// the frames' names].
     #[arg(long, value_name = "HZ", value_parser = positive)]
     fps: Option<f64>,
-    /// Times of the frames: `time`, `time name` or `name time` a line, seconds or whole nanoseconds.
+    /// Times of the frames: `time`, `time name` or `name time` a line, seconds or whole
+    /// nanoseconds.
     #[arg(long, value_name = "FILE", conflicts_with = "fps")]
     frame_times: Option<PathBuf>,
 }
@@ -31,8 +33,8 @@ impl FrameTimesArguments {
     /// Finds the times of a survey's frames, or of frames that are not at hand.
     ///
     /// # Errors
-    /// A survey whose frames cannot be found, a malformed file of times, times that do not increase; neither a survey nor a
-    /// number of frames; two different numbers.
+    /// A survey whose frames cannot be found, a malformed file of times, times that do not
+    /// increase; neither a survey nor a number of frames; two different numbers.
     pub fn find(&self, survey: Option<&Path>) -> Result<FrameTimes, Failure> {
         let (found, told) = match (survey, &self.frame_times) {
             (Some(survey), times) => {
@@ -91,11 +93,12 @@ impl FrameTimes {
     /// # Errors
     /// No clock.
     pub fn clock(&self, what: &str) -> Result<&[f64], Failure> {
-        match self.is_clock {
-            true => Ok(&self.times_s),
-            false => Err(Failure::usage(format!(
+        if self.is_clock {
+            Ok(&self.times_s)
+        } else {
+            Err(Failure::usage(format!(
                 "{what} needs the frames' times: give --fps HZ or --frame-times FILE"
-            ))),
+            )))
         }
     }
 }

@@ -16,11 +16,11 @@ use crate::trajectory::{JitterModel, Rate, read_camera_in_body, tum};
 use nalgebra::{Matrix3, Vector3};
 use std::path::PathBuf;
 
-/// Writes initial poses (TUM) whose rotations are integrated from a gyro's log (gcsv, to which Gyroflow converts those of most
-/// cameras), and whose places are the carrier's plan.
+/// Writes initial poses (TUM) whose rotations are integrated from a gyro's log (gcsv, to which
+/// Gyroflow converts those of most cameras), and whose places are the carrier's plan.
 ///
-/// The bias is the mean rate where the sensor rested, which is found by itself; so is the noise density, from which the prior
-/// for survey.toml follows.
+/// The bias is the mean rate where the sensor rested, which is found by itself; so is the noise
+/// density, from which the prior for survey.toml follows.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
@@ -34,7 +34,8 @@ use std::path::PathBuf;
 pub struct GyroArguments {
     /// The log: Gyroflow's gcsv.
     log: PathBuf,
-    /// Folder of the survey, or its survey.toml: whose frames the poses are for. Poses need not be there yet.
+    /// Folder of the survey, or its survey.toml: whose frames the poses are for. Poses need not be
+    /// there yet.
     #[arg(long, value_name = "SURVEY")]
     survey: Option<PathBuf>,
     /// The file of poses.
@@ -61,8 +62,8 @@ pub struct GyroArguments {
     sensor: SensorArguments,
     #[command(flatten)]
     way: WayArguments,
-    /// θ of the tunnel's bottom, degrees: the first angle is then told by gravity where the sensor rested, rather than by
-    /// --start-angle-deg or the table.
+    /// θ of the tunnel's bottom, degrees: the first angle is then told by gravity where the sensor
+    /// rested, rather than by --start-angle-deg or the table.
     #[arg(
         long,
         value_name = "DEG",
@@ -70,8 +71,8 @@ pub struct GyroArguments {
         help_heading = "Carrier"
     )]
     down_deg: Option<f64>,
-    /// How far the carrier turned about the axis from the first frame to the last, degrees, if known: the bias about the axis is
-    /// changed so that it did.
+    /// How far the carrier turned about the axis from the first frame to the last, degrees, if
+    /// known: the bias about the axis is changed so that it did.
     #[arg(long, value_name = "DEG", help_heading = "Carrier")]
     total_turn_deg: Option<f64>,
     /// 1-σ of each step along x, y and z, metres: how well the carrier keeps to its way.
@@ -85,11 +86,12 @@ pub struct GyroArguments {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Sensor")]
 struct SensorArguments {
-    /// How the sensor sits in the camera, as Gyroflow's IMU orientation: three letters as YxZ [default: as the log says].
+    /// How the sensor sits in the camera, as Gyroflow's IMU orientation: three letters as YxZ
+    /// [default: as the log says].
     #[arg(long, value_name = "XYZ", conflicts_with = "body_to_camera")]
     orientation: Option<String>,
-    /// The motion from the sensor's axes, as the log has them, to the camera's instead: a 4 × 4 matrix, EuRoC's sensor.yaml
-    /// (T_BS), or a camchain of Kalibr (T_cam_imu).
+    /// The motion from the sensor's axes, as the log has them, to the camera's instead: a 4 × 4
+    /// matrix, EuRoC's sensor.yaml (T_BS), or a camchain of Kalibr (T_cam_imu).
     #[arg(long, value_name = "FILE")]
     body_to_camera: Option<PathBuf>,
     /// How long the sensor rested at some time, seconds.
@@ -98,13 +100,16 @@ struct SensorArguments {
     /// When it rested, seconds of the log's clock.
     #[arg(long, value_name = "FROM,TO", value_parser = numbers::<2>, allow_hyphen_values = true, conflicts_with = "rest_s")]
     rest_span_s: Option<[f64; 2]>,
-    /// The bias about the camera's x (right), y (down) and z (forward), degrees a second, instead of the mean rate at rest.
+    /// The bias about the camera's x (right), y (down) and z (forward), degrees a second, instead
+    /// of the mean rate at rest.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true)]
     bias_deg_per_s: Option<[f64; 3]>,
-    /// The noise density as data sheets have it, thousandths of a degree a second per √Hz, instead of that at rest.
+    /// The noise density as data sheets have it, thousandths of a degree a second per √Hz, instead
+    /// of that at rest.
     #[arg(long, value_name = "MDPS/√HZ", value_parser = positive)]
     density_mdps_sqrt_hz: Option<f64>,
-    /// 1-σ of the sensor's scale, per cent of the angle turned: 1 to 3 for most as they come, a tenth of it once calibrated.
+    /// 1-σ of the sensor's scale, per cent of the angle turned: 1 to 3 for most as they come, a
+    /// tenth of it once calibrated.
     #[arg(long, value_name = "PERCENT", default_value_t = 1.0)]
     scale_sigma_percent: f64,
 }

@@ -7,10 +7,12 @@ use crate::trajectory::PoseFormat;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Looks into a folder for frames, calibration and poses, and writes a commented survey.toml for them.
+/// Looks into a folder for frames, calibration and poses, and writes a commented survey.toml for
+/// them.
 ///
-/// Frames are the largest group of pictures of one folder, or those of a video if there are none; a calibration that fits their size and poses that are as many are preferred.
-/// What was recognised is printed, and what is still missing.
+/// Frames are the largest group of pictures of one folder, or those of a video if there are none; a
+/// calibration that fits their size and poses that are as many are preferred. What was recognised
+/// is printed, and what is still missing.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tunnelstitch init my-survey --radius-m 1.5\n  tunnelstitch init my-survey --video my-survey/GX010001.MP4 --every 5"
@@ -21,7 +23,8 @@ pub struct InitArguments {
     /// Radius of the tunnel, metres; else a line to be filled in.
     #[arg(long, value_name = "M", value_parser = super::stitch::positive)]
     radius_m: Option<f64>,
-    /// The video that the frames are in. It is read by ffmpeg, picture by picture; nothing is unpacked.
+    /// The video that the frames are in. It is read by ffmpeg, picture by picture; nothing is
+    /// unpacked.
     #[arg(long, value_name = "FILE")]
     video: Option<PathBuf>,
     /// Every so many-th picture of the video is a frame.
@@ -114,9 +117,10 @@ fn report(found: &Discovery) -> Vec<String> {
         let size = group
             .size
             .map_or("unreadable".to_owned(), |(w, h)| format!("{w} × {h} px"));
-        let which = match k == 0 && found.video.is_none() {
-            true => "frames",
-            false => "other pictures",
+        let which = if k == 0 && found.video.is_none() {
+            "frames"
+        } else {
+            "other pictures"
         };
         lines.push(format!(
             "  {which:<16}{} ({}, {size})",

@@ -13,11 +13,12 @@ use std::path::PathBuf;
 
 /// Finds a point of the wall in the panorama, in the tunnel and in the frames.
 ///
-/// The point is given in any one of these ways, and told in all of them: as a pixel of the panorama, as chainage and angle
-/// or clock position on the wall, or as a pixel of a frame. Pixels count from 0 at the centre of the first.
+/// The point is given in any one of these ways, and told in all of them: as a pixel of the
+/// panorama, as chainage and angle or clock position on the wall, or as a pixel of a frame. Pixels
+/// count from 0 at the centre of the first.
 ///
-/// The clock position is that of θ seen along increasing chainage, twelve o'clock being at θ = 0 unless --twelve-at says
-/// where.
+/// The clock position is that of θ seen along increasing chainage, twelve o'clock being at θ = 0
+/// unless --twelve-at says where.
 #[derive(Debug, clap::Args)]
 #[command(
     group = clap::ArgGroup::new("point").required(true),
@@ -32,8 +33,8 @@ use std::path::PathBuf;
 pub struct LocateArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
-    /// A pixel of the panorama that `stitch` draws from these poses with the same --px-per-metre and --layout (not of the
-    /// pictures of `compare`, nor of one with --ignore-offset).
+    /// A pixel of the panorama that `stitch` draws from these poses with the same --px-per-metre
+    /// and --layout (not of the pictures of `compare`, nor of one with --ignore-offset).
     #[arg(long, group = "point", value_name = "X,Y", value_parser = pair, allow_hyphen_values = true)]
     panorama: Option<[f64; 2]>,
     /// Chainage in metres and angle θ in degrees.
@@ -299,9 +300,10 @@ fn tell(located: &Located, frames: usize, terminal: &Terminal) {
         "chainage {:.4} m, {:.3}°, {} o'clock",
         located.chainage_m, located.theta_deg, located.clock
     ));
-    let outside = match located.in_panorama {
-        true => "",
-        false => ", outside of it",
+    let outside = if located.in_panorama {
+        ""
+    } else {
+        ", outside of it"
     };
     terminal.say(format!(
         "panorama pixel {x:.2}, {y:.2} of {width} × {height} px{outside}"

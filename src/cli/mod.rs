@@ -40,8 +40,8 @@ use crate::atomic;
 use clap::{Parser, Subcommand};
 use std::sync::Arc;
 
-/// Repairs the trajectory of a revolving tunnel camera by photometric consistency and unrolls the wall into
-/// one metric panorama.
+/// Repairs the trajectory of a revolving tunnel camera by photometric consistency and unrolls the
+/// wall into one metric panorama.
 #[derive(Debug, Parser)]
 #[command(
     name = "tunnelstitch",

@@ -13,8 +13,8 @@ use std::path::PathBuf;
 
 /// Writes initial poses (TUM) from the carrier's plan: an even advance and turn, or a table.
 ///
-/// The tunnel's axis is the world's y. At angle 0 and without tilt or roll the camera looks along z, its right towards larger
-/// θ, its lower edge ahead.
+/// The tunnel's axis is the world's y. At angle 0 and without tilt or roll the camera looks along
+/// z, its right towards larger θ, its lower edge ahead.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
@@ -25,14 +25,16 @@ use std::path::PathBuf;
     tunnelstitch plan --frames 120 --advance-m 0.1 --turn-deg 30 --out baseline.tum"
 )]
 pub struct PlanArguments {
-    /// Folder of the survey, or its survey.toml: whose frames the plan is for. Poses need not be there yet.
+    /// Folder of the survey, or its survey.toml: whose frames the plan is for. Poses need not be
+    /// there yet.
     survey: Option<PathBuf>,
     /// The file of poses.
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
     times: FrameTimesArguments,
-    /// 1-σ of each step's rotation about each axis, degrees: how well the carrier keeps to the plan.
+    /// 1-σ of each step's rotation about each axis, degrees: how well the carrier keeps to the
+    /// plan.
     #[arg(long, value_name = "DEG", default_value_t = PriorSection::default().rotation_sigma_deg, value_parser = positive)]
     rotation_sigma_deg: f64,
     /// 1-σ of each step along x, y and z, metres.

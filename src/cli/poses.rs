@@ -13,31 +13,36 @@ pub struct ReadingArguments {
     /// Format of the poses [default: told by their content].
     #[arg(long, value_enum, value_name = "FORMAT")]
     pose_format: Option<FormatArgument>,
-    /// Which way the poses lead: from camera to world, or from world to camera [default: the format's own].
+    /// Which way the poses lead: from camera to world, or from world to camera
+    /// [default: the format's own].
     #[arg(long, value_enum, value_name = "C2W|W2C")]
     pose_convention: Option<DirectionArgument>,
-    /// Axes of the camera: y down and z forward, or y up and z backwards [default: the format's own].
+    /// Axes of the camera: y down and z forward, or y up and z backwards
+    /// [default: the format's own].
     #[arg(long, value_enum, value_name = "AXES")]
     camera_axes: Option<AxesArgument>,
-    /// The motion from the body (IMU) whose poses these are to the camera: a 4 × 4 matrix, EuRoC's sensor.yaml (T_BS), or a
-    /// camchain of Kalibr (T_cam_imu).
+    /// The motion from the body (IMU) whose poses these are to the camera: a 4 × 4 matrix, EuRoC's
+    /// sensor.yaml (T_BS), or a camchain of Kalibr (T_cam_imu).
     #[arg(long, value_name = "FILE")]
     body_to_camera: Option<PathBuf>,
-    /// Where the tunnel's axis lies in the poses' world: JSON {"point_m": [x, y, z], "axis": [x, y, z], "theta_zero": [x, y, z]}
-    /// (the last if wanted), or a 4 × 4 matrix from the tunnel's frame (y along the axis) to the world.
+    /// Where the tunnel's axis lies in the poses' world: JSON {"point_m": [x, y, z], "axis":
+    /// [x, y, z], "theta_zero": [x, y, z]} (the last if wanted), or a 4 × 4 matrix from the
+    /// tunnel's frame (y along the axis) to the world.
     #[arg(long, value_name = "FILE")]
     tunnel_frame: Option<PathBuf>,
     /// What ties poses to frames [default: names if the file has any, else the order].
     #[arg(long, value_enum, value_name = "HOW")]
     associate: Option<AssociateArgument>,
-    /// Times of the frames: `time`, `time name` or `name time` a line, seconds or whole nanoseconds [default: told by the
-    /// frames' names].
+    /// Times of the frames: `time`, `time name` or `name time` a line, seconds or whole nanoseconds
+    /// [default: told by the frames' names].
     #[arg(long, value_name = "FILE")]
     frame_times: Option<PathBuf>,
-    /// With --associate time: the pose nearest to a frame may be this far from it, seconds [default: 0.01].
+    /// With --associate time: the pose nearest to a frame may be this far from it, seconds
+    /// [default: 0.01].
     #[arg(long, value_name = "S")]
     time_tolerance_s: Option<f64>,
-    /// With --associate time: take the pose on the way between the two around a frame, rather than the nearer one.
+    /// With --associate time: take the pose on the way between the two around a frame, rather than
+    /// the nearer one.
     #[arg(long)]
     interpolate: bool,
 }
@@ -150,7 +155,8 @@ impl ReadingArguments {
         Ok(Survey::open_with(survey, |file| self.change(file))?)
     }
 
-    /// Puts what the flags say into a survey's file. Their names are relative to the working folder, not to the survey's.
+    /// Puts what the flags say into a survey's file. Their names are relative to the working
+    /// folder, not to the survey's.
     fn change(&self, file: &mut SurveyFile) {
         let poses = &mut file.poses;
         replace(&mut poses.format, self.pose_format.map(Into::into));
@@ -188,8 +194,9 @@ fn full(path: &Path) -> PathBuf {
 /// Which poses.
 #[derive(Clone, Debug, clap::Args)]
 pub struct PosesArgument {
-    /// Which poses: `initial` and `truth` are those of survey.toml, anything else is a file of any format. A file is taken to
-    /// be in the tunnel's frame, as `refine` and `convert` write it, unless the flags below say otherwise.
+    /// Which poses: `initial` and `truth` are those of survey.toml, anything else is a file of any
+    /// format. A file is taken to be in the tunnel's frame, as `refine` and `convert` write it,
+    /// unless the flags below say otherwise.
     #[arg(
         id = "poses",
         long = "poses",
@@ -220,11 +227,12 @@ impl PosesArgument {
 
     /// Opens a survey, and finds the poses that `initial`, `truth` or the name of a file stand for.
     ///
-    /// A file takes the place of the survey's own poses, and nothing that survey.toml says of those holds for it.
+    /// A file takes the place of the survey's own poses, and nothing that survey.toml says of those
+    /// holds for it.
     ///
     /// # Errors
-    /// Everything that can be wrong with the survey; no true poses where they are asked for; a file that does not hold the
-    /// frames' poses.
+    /// Everything that can be wrong with the survey; no true poses where they are asked for; a file
+    /// that does not hold the frames' poses.
     pub fn open(
         &self,
         survey: &Path,

@@ -46,8 +46,8 @@ fn field_of_view(text: &str) -> Result<f64, String> {
 /// Runs the command.
 ///
 /// # Errors
-/// [`Failure`] for an unreadable photo or calibration, a photo of another size than the calibration's, and
-/// an output that cannot be written.
+/// [`Failure`] for an unreadable photo or calibration, a photo of another size than the
+/// calibration's, and an output that cannot be written.
 pub fn run(arguments: &ProjectArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     let format = picture_output(&arguments.out)?;
     let camera = match &arguments.camera {

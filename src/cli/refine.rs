@@ -21,9 +21,10 @@ use std::sync::Arc;
 
 /// Corrects the poses of a survey by photometric consistency.
 ///
-/// Reads SURVEY/survey.toml and writes poses.tum (camera-to-world, for evo and everything else that reads
-/// TUM), refine.json (costs, residuals, gains, 1-σ of every frame, timings) and covariance.csv (6 × 6
-/// covariance of every frame and of neighbours) into DIR. Interrupted or killed, the same command goes on where it was.
+/// Reads SURVEY/survey.toml and writes poses.tum (camera-to-world, for evo and everything else that
+/// reads TUM), refine.json (costs, residuals, gains, 1-σ of every frame, timings) and
+/// covariance.csv (6 × 6 covariance of every frame and of neighbours) into DIR. Interrupted or
+/// killed, the same command goes on where it was.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tunnelstitch refine my-survey --out refined\n  tunnelstitch refine my-survey --out refined --calibrate focal,radius"
@@ -34,17 +35,18 @@ pub struct RefineArguments {
     /// Folder for the results; made if missing.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-    /// End the last solve with the first step shorter than 0.1 px or twice the uncertainty, most often its first: less time.
+    /// End the last solve with the first step shorter than 0.1 px or twice the uncertainty, most
+    /// often its first: less time.
     #[arg(long)]
     fast: bool,
-    /// Solve once more, for the wall at a third of a pixel jointly with the poses: on walls with sharp edges, as bricks, about
-    /// a third of the error goes, in ten to twenty times the time. Walls that are smooth over a pixel have nothing to gain, and are refined as
-    /// without it.
+    /// Solve once more, for the wall at a third of a pixel jointly with the poses: on walls with
+    /// sharp edges, as bricks, about a third of the error goes, in ten to twenty times the time.
+    /// Walls that are smooth over a pixel have nothing to gain, and are refined as without it.
     #[arg(long, conflicts_with = "fast")]
     joint: bool,
-    /// Estimate what all frames share, too: focal, centre, distortion, radius, axis, or all, with commas between. How far
-    /// off the given values may be is said by the section calibrate of survey.toml. Writes camera.json and survey.toml into DIR, for
-    /// the other commands.
+    /// Estimate what all frames share, too: focal, centre, distortion, radius, axis, or all, with
+    /// commas between. How far off the given values may be is said by the section calibrate of
+    /// survey.toml. Writes camera.json and survey.toml into DIR, for the other commands.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     calibrate: Option<Vec<CalibrateArgument>>,
     /// Steps of each global solve, at the most.
@@ -121,9 +123,10 @@ pub fn run(
             .as_ref()
             .map(|list| list.iter().flat_map(|group| group.groups()).collect()),
         joint: arguments.joint,
-        ..match arguments.fast {
-            true => RefineOptions::fast(),
-            false => RefineOptions::default(),
+        ..if arguments.fast {
+            RefineOptions::fast()
+        } else {
+            RefineOptions::default()
         }
     };
     let survey = arguments.reading.open(&arguments.survey, terminal)?;
@@ -185,8 +188,8 @@ pub fn run(
     Ok(())
 }
 
-/// Refines a survey, going on from a checkpoint if there is one, and writes poses.tum, refine.json and covariance.csv into `out`; returns
-/// the text of refine.json too.
+/// Refines a survey, going on from a checkpoint if there is one, and writes poses.tum, refine.json
+/// and covariance.csv into `out`; returns the text of refine.json too.
 ///
 /// # Errors
 /// Bad input, or an output that cannot be written.
@@ -315,15 +318,16 @@ fn summarise_calibration(calibration: &CalibrationReport, terminal: &Terminal) {
 
 /// What a systematic residual along the rows looks like, and what to do about it.
 fn warn_of_rows(rows: &RowMotion) -> String {
-    let remedy = match rows.given_ms == 0.0 {
-        true => format!(
+    let remedy = if rows.given_ms == 0.0 {
+        format!(
             "a rolling shutter? give [camera] readout_ms = {:.1} in survey.toml",
             rows.estimate_ms
-        ),
-        false => format!(
+        )
+    } else {
+        format!(
             "and not {} ms; check [camera] readout_ms and the times of the initial poses",
             rows.given_ms
-        ),
+        )
     };
     format!(
         "a systematic residual along the rows, the same in all frames: {:.1} px from the first row to the last, as if rows were read \

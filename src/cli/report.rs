@@ -12,24 +12,26 @@ use crate::report::{self, PICTURES, RefinedFiles, Report, Sources};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Makes a page of a refined survey, to look at and to pass on: what was repaired, and how sure it is.
+/// Makes a page of a refined survey, to look at and to pass on: what was repaired, and how sure it
+/// is.
 ///
-/// Writes report.html (one file that needs no other and no network), report.json (the same numbers) and report_pictures/
-/// (the pictures, as they are in the page) into DIR.
+/// Writes report.html (one file that needs no other and no network), report.json (the same numbers)
+/// and report_pictures/ (the pictures, as they are in the page) into DIR.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  tunnelstitch report my-survey --refined refined --out report")]
 pub struct ReportArguments {
     /// Folder of the survey, or its survey.toml.
     survey: PathBuf,
-    /// What refine has written: its folder, or the poses (TUM) in it. Other poses will do; then the page says nothing of how
-    /// they were found. The flags for reading poses are about those of the survey.
+    /// What refine has written: its folder, or the poses (TUM) in it. Other poses will do; then the
+    /// page says nothing of how they were found. The flags for reading poses are about those of the
+    /// survey.
     #[arg(long, value_name = "DIR|FILE")]
     refined: PathBuf,
     /// Folder for the report; made if missing.
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-    /// Pixels per metre of wall at which baseline, refined and true poses are compared [default: the frames' own resolution
-    /// at the wall, less for long surveys].
+    /// Pixels per metre of wall at which baseline, refined and true poses are compared [default:
+    /// the frames' own resolution at the wall, less for long surveys].
     #[arg(long, value_name = "N", value_parser = positive)]
     px_per_metre: Option<f64>,
     /// Print report.json on standard output instead of where it is.
@@ -42,7 +44,8 @@ pub struct ReportArguments {
 /// Runs the command.
 ///
 /// # Errors
-/// [`Failure`] for everything wrong with the survey, the poses, what refine has written, or the output.
+/// [`Failure`] for everything wrong with the survey, the poses, what refine has written, or the
+/// output.
 pub fn run(arguments: &ReportArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     let survey = arguments.reading.open(&arguments.survey, terminal)?;
     let refined = RefinedFiles::read(&survey, &arguments.refined)?;
@@ -81,7 +84,8 @@ pub fn run(arguments: &ReportArguments, run: &Run, terminal: &Terminal) -> Resul
     Ok(())
 }
 
-/// Writes report.html, report.json and report_pictures/ into `out`; returns the report and the text of report.json.
+/// Writes report.html, report.json and report_pictures/ into `out`; returns the report and the text
+/// of report.json.
 ///
 /// # Errors
 /// A flagged frame that cannot be read, or an output that cannot be written.

@@ -34,7 +34,8 @@ pub fn origin(
 }
 
 impl ResumeArguments {
-    /// Does `work` with the checkpoint of `result`, which stays only if the run is interrupted or meets a passing obstacle.
+    /// Does `work` with the checkpoint of `result`, which stays only if the run is interrupted or
+    /// meets a passing obstacle.
     ///
     /// # Errors
     /// Those of the checkpoint and of `work`.

@@ -14,8 +14,8 @@ use std::path::PathBuf;
 
 /// Simulates a survey: frames of a tunnel wall, wrong initial poses, and the true ones.
 ///
-/// Writes a folder that all other commands take: survey.toml, camera.json, frames, baseline.tum (the plan),
-/// groundtruth.tum, and simulation.json, which records the options.
+/// Writes a folder that all other commands take: survey.toml, camera.json, frames, baseline.tum
+/// (the plan), groundtruth.tum, and simulation.json, which records the options.
 #[derive(Debug, clap::Args)]
 #[command(
     allow_negative_numbers = true,
@@ -58,8 +58,8 @@ pub struct SimulateArguments {
     /// Time from frame to frame, seconds: the poses' times.
     #[arg(long, value_name = "S", default_value_t = 1.0, value_parser = positive)]
     interval_s: f64,
-    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds; negative: bottom-up. Poses are
-    /// those of the middle row.
+    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds;
+    /// negative: bottom-up. Poses are those of the middle row.
     #[arg(
         long,
         value_name = "MS",
@@ -78,7 +78,8 @@ pub struct SimulateArguments {
     /// Vertical field of view, degrees.
     #[arg(long, value_name = "DEG", default_value_t = 60.0)]
     fov_deg: f64,
-    /// Radial distortion of the lens: k1 in OpenCV's convention. The field of view is that without distortion.
+    /// Radial distortion of the lens: k1 in OpenCV's convention. The field of view is that without
+    /// distortion.
     #[arg(
         long,
         value_name = "K1",
@@ -94,8 +95,8 @@ pub struct SimulateArguments {
         allow_hyphen_values = true
     )]
     k2: f64,
-    /// Noise on the plan: errors that add up from frame to frame, or each frame on its own [default: none; free:
-    /// random-walk].
+    /// Noise on the plan: errors that add up from frame to frame, or each frame on its own
+    /// [default: none; free: random-walk].
     #[arg(long, value_enum)]
     jitter: Option<JitterArgument>,
     /// 1-σ of the jitter about each axis, degrees [default: 2 with jitter].
@@ -124,7 +125,8 @@ pub struct SimulateArguments {
     supersample: u32,
     #[command(flatten)]
     hardships: HardshipArguments,
-    /// Seed of all that is random (wall, jitter, noise, hardships): the same seed gives the same bytes.
+    /// Seed of all that is random (wall, jitter, noise, hardships): the same seed gives the same
+    /// bytes.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Print the record (simulation.json) on standard output.
@@ -170,7 +172,8 @@ pub enum WallArgument {
     Concrete,
     /// A tile of 8 × 6 bricks that repeats.
     TiledBrick,
-    /// Dark and bright squares on mid grey, turned by 5°: slanted edges, as ISO 12233 measures sharpness by.
+    /// Dark and bright squares on mid grey, turned by 5°: slanted edges, as ISO 12233 measures
+    /// sharpness by.
     Target,
 }
 

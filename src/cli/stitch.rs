@@ -21,7 +21,8 @@ use std::path::{Path, PathBuf};
 
 /// Draws one panorama of the unrolled wall from given poses.
 ///
-/// The poses are used as they are; `refine` makes them right. Interrupted or killed, the same command goes on where it was.
+/// The poses are used as they are; `refine` makes them right. Interrupted or killed, the same
+/// command goes on where it was.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tunnelstitch stitch my-survey --poses refined/poses.tum --out after.png\n  tunnelstitch stitch my-survey --poses refined/poses.tum --px-per-metre 400 --out wall.tif --maps maps"
@@ -37,7 +38,8 @@ pub struct StitchArguments {
     picture: PictureArguments,
     #[command(flatten)]
     blend: BlendArguments,
-    /// Memory to work with, as 512MiB or 2GiB. Frames that have no room are decoded again when they are needed.
+    /// Memory to work with, as 512MiB or 2GiB. Frames that have no room are decoded again when they
+    /// are needed.
     #[arg(long, value_name = "SIZE", default_value = "2GiB", value_parser = memory_size)]
     memory: u64,
     /// Treat every camera as standing on the tunnel's axis (to see what its position does).
@@ -78,12 +80,12 @@ pub struct BlendArguments {
     /// Which frames a pixel shows.
     #[arg(long, value_enum, default_value_t)]
     pub mode: ModeArgument,
-    /// Leave the frames' values as they are: undo no exposure, level out no light, blend nothing over seams. With
-    /// --interpolation nearest every pixel is one of a frame, unchanged.
+    /// Leave the frames' values as they are: undo no exposure, level out no light, blend nothing
+    /// over seams. With --interpolation nearest every pixel is one of a frame, unchanged.
     #[arg(long)]
     pub no_blend: bool,
-    /// Solve for the wall from all frames that show it, 2 times as fine as any of them. Needs poses good to some hundredths of a
-    /// pixel (refine's), and takes microseconds per pixel and frame.
+    /// Solve for the wall from all frames that show it, 2 times as fine as any of them. Needs poses
+    /// good to some hundredths of a pixel (refine's), and takes microseconds per pixel and frame.
     #[arg(long, value_name = "2", value_parser = clap::value_parser!(u8).range(2..=2), conflicts_with_all = ["no_blend", "mode"])]
     pub super_resolve: Option<u8>,
 }
@@ -289,12 +291,9 @@ pub fn run(arguments: &StitchArguments, run: &Run, terminal: &Terminal) -> Resul
             exposure: plan.exposure().frames(),
             memory: budget,
         };
-        match arguments.json {
-            true => json::print(&report),
-            false => {
-                summarise(&report, terminal);
-                Ok(())
-            }
+        if arguments.json { json::print(&report) } else {
+            summarise(&report, terminal);
+            Ok(())
         }
     })
 }
@@ -376,7 +375,8 @@ fn covariances(
     }
 }
 
-/// The format of a picture to be written; its folder is made if missing. Checked before any work is done.
+/// The format of a picture to be written; its folder is made if missing. Checked before any work is
+/// done.
 ///
 /// # Errors
 /// A name that says no format or belongs to a folder; a folder that cannot be made.

@@ -27,9 +27,12 @@ pub struct Suggestion {
 impl Suggestion {
     /// For poses in the file `out`, of the survey whose folder or `survey.toml` is `survey`.
     pub fn new(out: &Path, survey: Option<&Path>, prior: PriorSection) -> Self {
-        let folder = survey.map(|survey| match survey.is_dir() {
-            true => survey,
-            false => survey.parent().unwrap_or(Path::new("")),
+        let folder = survey.map(|survey| {
+            if survey.is_dir() {
+                survey
+            } else {
+                survey.parent().unwrap_or(Path::new(""))
+            }
         });
         let full = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let relative = folder.and_then(|folder| pathdiff::diff_paths(full(out), full(folder)));

@@ -6,8 +6,8 @@ use std::io::Write;
 use std::sync::Mutex;
 use std::time::Duration;
 
-/// Draws progress bars on standard error (hidden off a terminal or with `--quiet`) and prints summaries on
-/// standard output.
+/// Draws progress bars on standard error (hidden off a terminal or with `--quiet`) and prints
+/// summaries on standard output.
 pub struct Terminal {
     quiet: bool,
     bar: Mutex<Option<ProgressBar>>,

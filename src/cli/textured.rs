@@ -1,4 +1,5 @@
-//! Panoramas that become textures: how they are drawn, and the layers of a tunnel that the viewer shows.
+//! Panoramas that become textures: how they are drawn, and the layers of a tunnel that the viewer
+//! shows.
 
 use super::poses::PosesArgument;
 use super::stitch::{BlendArguments, memory_size, positive};
@@ -19,7 +20,8 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Textures")]
 pub struct TextureArguments {
-    /// Pixels per metre of wall, or a little more [default: the frames' own resolution at the wall].
+    /// Pixels per metre of wall, or a little more
+    /// [default: the frames' own resolution at the wall].
     #[arg(long, value_name = "N", value_parser = positive)]
     px_per_metre: Option<f64>,
     #[command(flatten)]
@@ -74,7 +76,8 @@ impl TextureArguments {
 #[derive(Debug, clap::Args)]
 #[command(next_help_heading = "Layers of the page")]
 pub struct LayersArguments {
-    /// Poses to switch between, with commas, the first of them shown first [default: all there are; `refined` are those of a file of --poses].
+    /// Poses to switch between, with commas, the first of them shown first
+    /// [default: all there are; `refined` are those of a file of --poses].
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     layers: Option<Vec<LayerName>>,
     /// The angle θ of twelve o'clock, degrees.
@@ -121,7 +124,8 @@ pub struct Poses {
 }
 
 impl LayersArguments {
-    /// All layers that are wanted of the survey at `path`, in the order given; by default the refined ones first. It has been opened with `poses`.
+    /// All layers that are wanted of the survey at `path`, in the order given; by default the
+    /// refined ones first. It has been opened with `poses`.
     ///
     /// # Errors
     /// A layer that is not there.

@@ -20,7 +20,8 @@ pub struct TunnelArguments {
     /// Height of any other section, metres.
     #[arg(long, value_name = "M", value_parser = positive)]
     height_m: Option<f64>,
-    /// File of the line along the middle of a tunnel that is not straight: `x y z [radius]` a line, metres.
+    /// File of the line along the middle of a tunnel that is not straight: `x y z [radius]` a line,
+    /// metres.
     #[arg(long, value_name = "FILE")]
     centreline: Option<PathBuf>,
 }

@@ -9,10 +9,12 @@ use crate::render::place;
 use crate::survey::{SURVEY_FILE, Survey};
 use std::path::{Path, PathBuf};
 
-/// Shows the tunnel in the browser: walk along the wall, measure, mark defects, look at the frames behind a place.
+/// Shows the tunnel in the browser: walk along the wall, measure, mark defects, look at the frames
+/// behind a place.
 ///
-/// The page is served on 127.0.0.1, for this machine only, until Ctrl-C. Marks are kept in marks.geojson and marks.csv beside
-/// survey.toml (or in the folder of `export --web`); nothing else is written.
+/// The page is served on 127.0.0.1, for this machine only, until Ctrl-C. Marks are kept in
+/// marks.geojson and marks.csv beside survey.toml (or in the folder of `export --web`); nothing
+/// else is written.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     tunnelstitch view my-survey --poses refined/poses.tum\n      \
@@ -22,7 +24,8 @@ use std::path::{Path, PathBuf};
     tunnelstitch export my-survey --poses refined/poses.tum --web walk; tunnelstitch view walk\n      \
     draws once, shows often; without the frames")]
 pub struct ViewArguments {
-    /// Folder of the survey, or its survey.toml; or a folder that `refine` or `export --web` has written.
+    /// Folder of the survey, or its survey.toml; or a folder that `refine` or `export --web` has
+    /// written.
     survey: PathBuf,
     #[command(flatten)]
     poses: PosesArgument,

@@ -12,8 +12,8 @@ const GAP: u32 = 12;
 
 /// The middle stretch of two panoramas of the same canvas, `before` above `after`, on white.
 ///
-/// Both are cropped to the same rows and shrunk by the same factor, so what lies at the same place of the
-/// halves lies at the same place on the wall.
+/// Both are cropped to the same rows and shrunk by the same factor, so what lies at the same place
+/// of the halves lies at the same place on the wall.
 pub fn before_after(before: &DynamicImage, after: &DynamicImage) -> RgbImage {
     let (columns, rows) = (before.width().max(1), before.height().max(1));
     let stretch = rows.min(((f64::from(columns) * ASPECT) as u32).max(1));

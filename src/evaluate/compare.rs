@@ -95,12 +95,13 @@ pub struct Drawings {
 
 /// Compares initial with refined poses, and both with the true ones where they are known.
 ///
-/// With truth, both are first moved along the tunnel's [gauge](crate::surface::Gauge) onto it, so that the
-/// panoramas lie over each other. All panoramas share one canvas, which holds the footprints of all.
+/// With truth, both are first moved along the tunnel's [gauge](crate::surface::Gauge) onto it, so
+/// that the panoramas lie over each other. All panoramas share one canvas, which holds the
+/// footprints of all.
 ///
 /// # Errors
-/// [`EvaluateError::Count`]; [`EvaluateError::Frame`] and [`EvaluateError::Render`] for poses that cannot be
-/// laid on the wall, and for unreadable frames.
+/// [`EvaluateError::Count`]; [`EvaluateError::Frame`] and [`EvaluateError::Render`] for poses that
+/// cannot be laid on the wall, and for unreadable frames.
 pub fn compare(
     input: &CompareInput,
     progress: &dyn Progress,

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ImageMetrics {
-    /// Peak signal-to-noise ratio `10 log₁₀(255² / MSE)`, decibels; `None` if the pictures are equal or
-    /// nowhere covered by both.
+    /// Peak signal-to-noise ratio `10 log₁₀(255² / MSE)`, decibels; `None` if the pictures are
+    /// equal or nowhere covered by both.
     pub psnr_db: Option<f64>,
     /// Mean structural similarity, at most 1; `None` if no 11 × 11 window is covered by both.
     pub ssim: Option<f64>,
@@ -17,8 +17,8 @@ pub struct ImageMetrics {
     pub pixels: usize,
 }
 
-/// Compares two panoramas of the same canvas by their grey values (luma of colour), on the pixels that both
-/// cover; SSIM counts only windows that are covered entirely.
+/// Compares two panoramas of the same canvas by their grey values (luma of colour), on the pixels
+/// that both cover; SSIM counts only windows that are covered entirely.
 ///
 /// # Errors
 /// [`EvaluateError::Canvas`] if the canvases differ in size.

@@ -8,12 +8,14 @@ const OVERSAMPLING: f64 = 4.0;
 
 /// The frequency, cycles per metre, at which a picture's contrast falls to half: its MTF50.
 ///
-/// `samples` are pixels around a straight edge, each with its distance from the edge (metres) and its value; `pixel_m` is
-/// the picture's pixel, metres. The edge is slanted, so that its pixels' distances take all values: their mean over bins of
-/// a quarter of a pixel is the edge's profile (ESF), the difference of neighbouring bins the line spread function (LSF),
-/// and the modulus of its Fourier transform the modulation transfer function (MTF), relative to that at frequency 0 and
-/// less what the differences take. A Hann window keeps the noise of the outer bins away; the samples should reach fifteen
-/// times as far to either side as the edge is blurred (1-σ), for it makes wider ones look sharper. `None` where bins are empty, or if it does not fall to half.
+/// `samples` are pixels around a straight edge, each with its distance from the edge (metres) and
+/// its value; `pixel_m` is the picture's pixel, metres. The edge is slanted, so that its pixels'
+/// distances take all values: their mean over bins of a quarter of a pixel is the edge's profile
+/// (ESF), the difference of neighbouring bins the line spread function (LSF), and the modulus of
+/// its Fourier transform the modulation transfer function (MTF), relative to that at frequency 0
+/// and less what the differences take. A Hann window keeps the noise of the outer bins away; the
+/// samples should reach fifteen times as far to either side as the edge is blurred (1-σ), for it
+/// makes wider ones look sharper. `None` where bins are empty, or if it does not fall to half.
 ///
 /// Source: ISO 12233:2017, annex D (edge-based spatial frequency response).
 pub fn mtf50(samples: impl IntoIterator<Item = (f64, f64)>, pixel_m: f64) -> Option<f64> {
@@ -26,7 +28,8 @@ pub fn mtf50(samples: impl IntoIterator<Item = (f64, f64)>, pixel_m: f64) -> Opt
     let per_bin = OVERSAMPLING / (n as f64 * pixel_m);
     let mut last = 1.0;
     for (k, value) in spectrum.iter().enumerate().skip(1) {
-        // A central difference over two bins, and a bin's mean: sinc(2f) and sinc(f), f in cycles a bin.
+        // A central difference over two bins, and a bin's mean: sinc(2f) and sinc(f), f in cycles a
+        // bin.
         let f = k as f64 / n as f64;
         let taken = sinc(2.0 * f) * sinc(f);
         let mtf = f64::from(value.norm()) / (still * taken);
@@ -41,7 +44,8 @@ pub fn mtf50(samples: impl IntoIterator<Item = (f64, f64)>, pixel_m: f64) -> Opt
     None
 }
 
-/// The mean of the samples in each bin of `bin_m` from the least distance to the greatest; `None` if one is empty.
+/// The mean of the samples in each bin of `bin_m` from the least distance to the greatest; `None`
+/// if one is empty.
 fn edge_spread(samples: impl IntoIterator<Item = (f64, f64)>, bin_m: f64) -> Option<Vec<f64>> {
     let samples: Vec<(i64, f64)> = samples
         .into_iter()
@@ -99,7 +103,8 @@ mod tests {
     #[test]
     fn a_gaussian_blur_has_its_mtf50() {
         for sigma_m in [0.003, 0.004, 0.006] {
-            // An approximation of the error function, good to 1.5e-7 (Abramowitz and Stegun, 7.1.26).
+            // An approximation of the error function, good to 1.5e-7 (Abramowitz and Stegun,
+            // 7.1.26).
             let erf = |x: f64| {
                 let t = 1.0 / (1.0 + 0.3275911 * x.abs());
                 let tail =

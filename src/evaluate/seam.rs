@@ -45,11 +45,13 @@ pub struct SeamMap {
 impl SeamMap {
     /// Compares placed frames on the wall of `canvas`.
     ///
-    /// At each point x of a square grid on the wall, the mean square difference over the pairs of the n frames
-    /// that see it is `2/(n−1) Σ (I_i(x) − Ī(x))²`; the residual of a part of the wall is the root of its mean over the
-    /// points with n ≥ 2. With true poses what remains is noise, light and interpolation.
+    /// At each point x of a square grid on the wall, the mean square difference over the pairs of
+    /// the n frames that see it is `2/(n−1) Σ (I_i(x) − Ī(x))²`; the residual of a part of the wall
+    /// is the root of its mean over the points with n ≥ 2. With true poses what remains is noise,
+    /// light and interpolation.
     ///
-    /// `frames` (those that are held) and `placements` in the same order; pictures sampled bilinearly, luma of colour.
+    /// `frames` (those that are held) and `placements` in the same order; pictures sampled
+    /// bilinearly, luma of colour.
     pub fn new(
         surface: &dyn Surface,
         frames: &FrameStack,
@@ -119,8 +121,8 @@ impl SeamMap {
         self.chainage_m
     }
 
-    /// Root mean square difference of two frames in each cell, grey levels; `None` where no two overlap. A row per
-    /// stretch of the axis, from θ = 0 on.
+    /// Root mean square difference of two frames in each cell, grey levels; `None` where no two
+    /// overlap. A row per stretch of the axis, from θ = 0 on.
     pub fn rms_grey(&self) -> Vec<Option<f64>> {
         self.cells.iter().map(Sums::rms_grey).collect()
     }
@@ -132,7 +134,8 @@ impl SeamMap {
     }
 }
 
-/// The seam residual of placed frames on the wall of `canvas`, see [`SeamMap::new`]; `None` if no two frames overlap.
+/// The seam residual of placed frames on the wall of `canvas`, see [`SeamMap::new`]; `None` if no
+/// two frames overlap.
 pub fn seam_residual(
     surface: &dyn Surface,
     frames: &FrameStack,

@@ -15,12 +15,12 @@ const BAND: usize = 256;
 
 /// Sum of SSIM over the pixels whose whole window is in `valid`, and their number.
 ///
-/// `SSIM = (2 μ_a μ_b + C1)(2 σ_ab + C2) / ((μ_a² + μ_b² + C1)(σ_a² + σ_b² + C2))` with means, variances
-/// and covariance under an 11 × 11 Gaussian of σ = 1.5 px, `C1 = (0.01 L)²`, `C2 = (0.03 L)²`, `L = 255`.
-/// `a`, `b`, `valid`: row-major, `width` pixels a row.
+/// `SSIM = (2 μ_a μ_b + C1)(2 σ_ab + C2) / ((μ_a² + μ_b² + C1)(σ_a² + σ_b² + C2))` with means,
+/// variances and covariance under an 11 × 11 Gaussian of σ = 1.5 px, `C1 = (0.01 L)²`,
+/// `C2 = (0.03 L)²`, `L = 255`. `a`, `b`, `valid`: row-major, `width` pixels a row.
 ///
-/// Source: Wang, Bovik, Sheikh, Simoncelli, "Image quality assessment: from error visibility to structural
-/// similarity", 2004.
+/// Source: Wang, Bovik, Sheikh, Simoncelli, "Image quality assessment: from error visibility to
+/// structural similarity", 2004.
 pub(super) fn sum_of_ssim(a: &[f32], b: &[f32], valid: &[bool], width: usize) -> (f64, usize) {
     let height = a.len() / width;
     if width <= 2 * RADIUS || height <= 2 * RADIUS {

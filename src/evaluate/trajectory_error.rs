@@ -6,8 +6,8 @@ use crate::surface::{Gauge, GaugeMotion};
 use crate::trajectory::Pose;
 use serde::{Deserialize, Serialize};
 
-/// Pose errors after the tunnel's gauge is removed, and only it: a similarity fit (Umeyama) would also hide
-/// errors that pictures do show, as an offset from the axis or a wrong scale.
+/// Pose errors after the tunnel's gauge is removed, and only it: a similarity fit (Umeyama) would
+/// also hide errors that pictures do show, as an offset from the axis or a wrong scale.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TrajectoryError {
@@ -23,7 +23,8 @@ pub struct TrajectoryError {
     pub frame_translation_m: Vec<f64>,
 }
 
-/// Compares poses with the true ones, frame by frame, after moving them along `gauge` as close to the truth as it goes.
+/// Compares poses with the true ones, frame by frame, after moving them along `gauge` as close to
+/// the truth as it goes.
 ///
 /// # Errors
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`].
@@ -64,7 +65,8 @@ mod tests {
         let mut estimated = gauge.apply_all(&truth);
         let error = trajectory_error(both, &estimated, &truth).unwrap();
         assert!(error.rotation_deg.max < 1e-6 && error.translation_m.max < 1e-12);
-        // One frame tilted by 1° about its viewing axis's normal and 10 mm off the axis: neither is gauge.
+        // One frame tilted by 1° about its viewing axis's normal and 10 mm off the axis: neither is
+        // gauge.
         estimated[3].r_wc *= so3::exp(&(Vector3::x() * 1f64.to_radians()));
         estimated[3].t_wc.x += 0.010;
         let error = trajectory_error(both, &estimated, &truth).unwrap();

@@ -5,10 +5,12 @@ use super::{EvaluateError, Spread};
 use crate::trajectory::Pose;
 use serde::{Deserialize, Serialize};
 
-/// Errors of poses without anything removed, not even the gauge: what `evo_ape tum` and `evo_rpe tum` print for the same two
-/// files, without `--align` and with `--delta 1 --delta_unit f`.
+/// Errors of poses without anything removed, not even the gauge: what `evo_ape tum` and
+/// `evo_rpe tum` print for the same two files, without `--align` and with
+/// `--delta 1 --delta_unit f`.
 ///
-/// The relative errors do not depend on the gauge; the absolute ones do, and mean something only where it is fixed alike in both.
+/// The relative errors do not depend on the gauge; the absolute ones do, and mean something only
+/// where it is fixed alike in both.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct UnalignedError {
@@ -16,8 +18,8 @@ pub struct UnalignedError {
     pub ape_translation_m: Spread,
     /// Angle of `R_trueᵀ R_est`, degrees (`evo_ape -r angle_deg`).
     pub ape_rotation_deg: Spread,
-    /// Translation of `(Q_k⁻¹ Q_k+1)⁻¹ (P_k⁻¹ P_k+1)` with Q the true poses and P the estimated, metres (`evo_rpe`); zeros for a
-    /// single frame.
+    /// Translation of `(Q_k⁻¹ Q_k+1)⁻¹ (P_k⁻¹ P_k+1)` with Q the true poses and P the estimated,
+    /// metres (`evo_rpe`); zeros for a single frame.
     pub rpe_translation_m: Spread,
     /// Its angle, degrees (`evo_rpe -r angle_deg`).
     pub rpe_rotation_deg: Spread,

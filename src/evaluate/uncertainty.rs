@@ -6,11 +6,11 @@ use crate::surface::Surface;
 use crate::trajectory::Pose;
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
 
-/// Errors of poses with the gauge fixed at the first one: steps `ξ` from the estimated to the true poses
-/// ([`Pose::retract`]; rad, m).
+/// Errors of poses with the gauge fixed at the first one: steps `ξ` from the estimated to the true
+/// poses ([`Pose::retract`]; rad, m).
 ///
-/// The estimated poses are moved along the gauge until the first one's error has no part along it, just as its covariance
-/// has none.
+/// The estimated poses are moved along the gauge until the first one's error has no part along it,
+/// just as its covariance has none.
 ///
 /// # Errors
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`].
@@ -53,10 +53,12 @@ pub fn tied_errors(
 /// Steps to the gauge motion; each squares the error.
 const ROUNDS: usize = 5;
 
-/// Normalised errors squared, `ξᵀ Σ⁻¹ ξ`: 6 on average if the covariances are true, and distributed as χ² with 6 degrees
-/// of freedom. None where the covariance is singular or unknown (as the first frame's, where the gauge is tied).
+/// Normalised errors squared, `ξᵀ Σ⁻¹ ξ`: 6 on average if the covariances are true, and distributed
+/// as χ² with 6 degrees of freedom. None where the covariance is singular or unknown (as the first
+/// frame's, where the gauge is tied).
 ///
-/// Source: Y. Bar-Shalom, X. Li, T. Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, 5.4.
+/// Source: Y. Bar-Shalom, X. Li, T. Kirubarajan, "Estimation with Applications to Tracking and
+/// Navigation", 2001, 5.4.
 pub fn normalised_errors(
     errors: &[Vector6<f64>],
     covariances: &[Matrix6<f64>],

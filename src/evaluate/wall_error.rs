@@ -11,9 +11,9 @@ use std::f64::consts::TAU;
 
 /// Distances on the unrolled wall between where the estimated and the true pose put a pixel.
 ///
-/// Over 9 × 7 pixels a frame ([`Camera::rays_across`]). The mean `Δs` and the mean `Δh` over all pixels
-/// of all frames are removed as far as the tunnel's [gauge](crate::surface::Gauge) leaves them free: no
-/// picture fixes them.
+/// Over 9 × 7 pixels a frame ([`Camera::rays_across`]). The mean `Δs` and the mean `Δh` over all
+/// pixels of all frames are removed as far as the tunnel's [gauge](crate::surface::Gauge) leaves
+/// them free: no picture fixes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct WallError {
@@ -23,7 +23,8 @@ pub struct WallError {
     pub shift_h_m: f64,
     /// All pixels, millimetres.
     pub mm: Spread,
-    /// All pixels, in pixels of the frame at its centre: metres over `distance / f`, both of the true pose.
+    /// All pixels, in pixels of the frame at its centre: metres over `distance / f`, both of the
+    /// true pose.
     pub px: Spread,
     /// Root mean square of each frame, millimetres.
     pub frame_rms_mm: Vec<f64>,
@@ -40,7 +41,8 @@ pub struct WallError {
 /// Compares where estimated and true poses put the pixels on the wall.
 ///
 /// # Errors
-/// [`EvaluateError::Count`], [`EvaluateError::Empty`]; [`EvaluateError::Frame`] if a ray meets no wall.
+/// [`EvaluateError::Count`], [`EvaluateError::Empty`]; [`EvaluateError::Frame`] if a ray meets no
+/// wall.
 pub fn wall_error(
     surface: &dyn Surface,
     camera: &Camera,
@@ -141,8 +143,8 @@ pub(super) fn frame_offsets(
     })
 }
 
-/// The mean of arcs on a circle of perimeter P: the direction of `Σ exp(2πi Δs / P)` first, then the mean of
-/// the shortest arcs around it until it stays.
+/// The mean of arcs on a circle of perimeter P: the direction of `Σ exp(2πi Δs / P)` first, then
+/// the mean of the shortest arcs around it until it stays.
 pub(super) fn mean_arc(arcs_m: &[f64], perimeter_m: f64) -> f64 {
     let (mut sin, mut cos) = (0.0, 0.0);
     for arc in arcs_m {

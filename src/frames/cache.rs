@@ -5,18 +5,22 @@ use crate::camera::Camera;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
-/// Part of the memory that is for pyramids where not all of them fit; the rest holds frames as they are stored.
+/// Part of the memory that is for pyramids where not all of them fit; the rest holds frames as they
+/// are stored.
 const PYRAMIDS: f64 = 0.25;
-/// Bytes of a pyramid per pixel: four, a third of it more for the smaller levels, and the contrast of one of those.
+/// Bytes of a pyramid per pixel: four, a third of it more for the smaller levels, and the contrast
+/// of one of those.
 const PYRAMID_BYTES: f64 = 6.0;
 
 /// The grey pyramids of a survey's frames: decoded when first asked for, kept while there is room.
 ///
-/// Where there is no room for all pyramids, those used last are kept, and of the other frames as many as there is room for
-/// in the form of [`StoredFrame`], from which a pyramid is soon made. Which ones does not change: a survey is gone through
-/// from one end to the other, again and again, and what was used longest ago is needed next.
+/// Where there is no room for all pyramids, those used last are kept, and of the other frames as
+/// many as there is room for in the form of [`StoredFrame`], from which a pyramid is soon made.
+/// Which ones does not change: a survey is gone through from one end to the other, again and again,
+/// and what was used longest ago is needed next.
 ///
-/// Results never depend on what happens to be kept: a frame that is decoded again is the same frame.
+/// Results never depend on what happens to be kept: a frame that is decoded again is the same
+/// frame.
 #[derive(Debug)]
 pub struct FrameCache {
     source: Source,
@@ -50,17 +54,18 @@ struct Store {
 }
 
 impl FrameCache {
-    /// The `frames` of `camera`, with `levels` pyramid levels each, in no more than `bytes` of memory (but
-    /// always room for one).
+    /// The `frames` of `camera`, with `levels` pyramid levels each, in no more than `bytes` of
+    /// memory (but always room for one).
     pub fn new(frames: &FrameSet, camera: &Camera, levels: usize, bytes: usize) -> Self {
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let pyramids = |share: f64| (share * bytes as f64 / (PYRAMID_BYTES * pixels)) as usize;
-        let (room, stored) = match pyramids(1.0) >= frames.len() {
-            true => (frames.len(), 0),
-            false => (
+        let (room, stored) = if pyramids(1.0) >= frames.len() {
+            (frames.len(), 0)
+        } else {
+            (
                 pyramids(PYRAMIDS),
                 ((1.0 - PYRAMIDS) * bytes as f64) as usize,
-            ),
+            )
         };
         Self {
             source: Source::Files(frames.clone(), *camera),
@@ -96,7 +101,8 @@ impl FrameCache {
         }
     }
 
-    /// Which pixels show the wall in the pictures that `camera`, at any level, takes; all of them if there is no mask.
+    /// Which pixels show the wall in the pictures that `camera`, at any level, takes; all of them
+    /// if there is no mask.
     pub fn mask(&self, camera: &Camera) -> Option<HalvedMask> {
         match &self.source {
             Source::Files(frames, _) => {
@@ -143,7 +149,8 @@ impl FrameCache {
                 return Ok(Arc::clone(pyramid));
             }
         }
-        // Decoded without the lock; if two threads do the same frame at once, one result is dropped.
+        // Decoded without the lock; if two threads do the same frame at once, one result is
+        // dropped.
         let mut image = self.stored(&frames[frame], camera)?.grey();
         if let Some(mask) = frames.mask() {
             mask.blank(&mut image);

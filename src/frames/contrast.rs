@@ -1,4 +1,5 @@
-//! Local contrast: a picture freed of light and exposure, for comparing frames before either is known.
+//! Local contrast: a picture freed of light and exposure, for comparing frames before either is
+//! known.
 
 use super::{GreyImage, MAD_TO_SIGMA};
 
@@ -23,14 +24,15 @@ pub struct LocalContrast {
     pub sensitivity: GreyImage,
 }
 
-/// Detail beyond this many times its median size (as a Gaussian's σ) is cut: glints and things that are not wall would
-/// outweigh a faint wall otherwise.
+/// Detail beyond this many times its median size (as a Gaussian's σ) is cut: glints and things that
+/// are not wall would outweigh a faint wall otherwise.
 const MOST_DETAIL: f32 = 1.5;
 
-/// Detail and contrast with mean and variance over a square window of `2 reach + 1` pixels around each pixel.
+/// Detail and contrast with mean and variance over a square window of `2 reach + 1` pixels around
+/// each pixel.
 ///
-/// Any smooth light cancels, be it fixed to the world or to the camera, as do gain and bias. Pixels without a value
-/// stay without one and do not count.
+/// Any smooth light cancels, be it fixed to the world or to the camera, as do gain and bias. Pixels
+/// without a value stay without one and do not count.
 pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
     let w = image.width();
     let values = without_extremes(image, reach, MOST_DETAIL);
@@ -49,8 +51,8 @@ pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
     }
 }
 
-/// The pixels with their detail, over windows of `2 reach + 1` pixels, cut at `most` times its median size (as a
-/// Gaussian's σ).
+/// The pixels with their detail, over windows of `2 reach + 1` pixels, cut at `most` times its
+/// median size (as a Gaussian's σ).
 fn without_extremes(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
     let mut values = image.data().to_vec();
     let (means, sigma) = detail(image, reach);
@@ -61,8 +63,8 @@ fn without_extremes(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
     values
 }
 
-/// The means over windows of `2 reach + 1` pixels, and the median size of what pixels differ from them (as a Gaussian's σ; 0 of a
-/// picture without a value).
+/// The means over windows of `2 reach + 1` pixels, and the median size of what pixels differ from
+/// them (as a Gaussian's σ; 0 of a picture without a value).
 fn detail(image: &GreyImage, reach: usize) -> (Vec<f32>, f32) {
     let windows = Windows::new(image.data(), image.width(), reach);
     let means: Vec<f32> = windows.moments().map(|m| m.mean).collect();
@@ -80,9 +82,9 @@ fn detail(image: &GreyImage, reach: usize) -> (Vec<f32>, f32) {
     (means, MAD_TO_SIGMA as f32 * *median)
 }
 
-/// A picture without its extremes: what stands out of its surroundings by more than a few times what is usual in the
-/// picture is cut down to that. On a coarser level glints and things before the wall would blend into it, and no
-/// robust loss could tell them apart any more.
+/// A picture without its extremes: what stands out of its surroundings by more than a few times
+/// what is usual in the picture is cut down to that. On a coarser level glints and things before
+/// the wall would blend into it, and no robust loss could tell them apart any more.
 pub fn subdued(image: &GreyImage) -> GreyImage {
     let values = without_extremes(image, wide_window(image), MOST_EXTREME);
     GreyImage::new(image.width(), image.height(), values)
@@ -91,17 +93,19 @@ pub fn subdued(image: &GreyImage) -> GreyImage {
 /// Detail that [`subdued`] leaves, in σ of the usual.
 const MOST_EXTREME: f32 = 3.0;
 
-/// A picture of the usual alone: what stands out of its surroundings, as wet patches and glints do, has no value.
+/// A picture of the usual alone: what stands out of its surroundings, as wet patches and glints do,
+/// has no value.
 pub fn usual(image: &GreyImage) -> GreyImage {
     // Against surroundings without extremes, lest these draw the mean to them.
     let (means, sigma) = detail(&subdued(image), wide_window(image));
     let pixels = image.data().iter().zip(&means);
-    let values = pixels.map(
-        |(value, mean)| match (value - mean).abs() > MOST_USUAL * sigma {
-            true => f32::NAN,
-            false => *value,
-        },
-    );
+    let values = pixels.map(|(value, mean)| {
+        if (value - mean).abs() > MOST_USUAL * sigma {
+            f32::NAN
+        } else {
+            *value
+        }
+    });
     GreyImage::new(image.width(), image.height(), values.collect())
 }
 

@@ -1,7 +1,8 @@
 //! A single-channel picture in floating point.
 
-/// A grey image, row-major, in grey levels of an 8-bit picture (0–255; 16-bit input is scaled to that
-/// range and keeps its finer steps). NaN where the picture has no value: clipped white or black.
+/// A grey image, row-major, in grey levels of an 8-bit picture (0–255; 16-bit input is scaled to
+/// that range and keeps its finer steps). NaN where the picture has no value: clipped white or
+/// black.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GreyImage {
     width: usize,
@@ -53,13 +54,14 @@ impl GreyImage {
         self.data[y * self.width + x]
     }
 
-    /// Half the size: each pixel is the `[1 3 3 1]/8 ⊗ [1 3 3 1]/8` mean around the corner shared by four.
+    /// Half the size: each pixel is the `[1 3 3 1]/8 ⊗ [1 3 3 1]/8` mean around the corner shared
+    /// by four.
     ///
     /// The filter is even, so the new centre lies exactly between the old ones
     /// (see [`crate::camera::Camera::at_level`]); borders repeat the outermost pixel.
     ///
-    /// Pixels without a value count for nothing; where they make up more than half of the weight, the result
-    /// has no value either.
+    /// Pixels without a value count for nothing; where they make up more than half of the weight,
+    /// the result has no value either.
     pub fn halved(&self) -> Self {
         if !self.has_gaps() {
             return self.filtered_half();

@@ -83,7 +83,8 @@ pub enum FrameError {
 pub struct FrameFile {
     /// Index of the frame in the survey.
     pub index: usize,
-    /// The picture, or the video's path with the picture's number as if it were a file in it: `survey.mp4/000012`.
+    /// The picture, or the video's path with the picture's number as if it were a file in it:
+    /// `survey.mp4/000012`.
     pub path: PathBuf,
     /// The video that it is in, and which picture of it.
     pub(super) video: Option<(Arc<Video>, usize)>,
@@ -155,7 +156,8 @@ impl FrameFile {
     }
 }
 
-/// The files that match `pattern` (glob syntax, relative to `folder`), sorted by name, but for the mask.
+/// The files that match `pattern` (glob syntax, relative to `folder`), sorted by name, but for the
+/// mask.
 ///
 /// # Errors
 /// A malformed pattern, an unreadable folder, no match.
@@ -196,16 +198,19 @@ pub fn list(
 /// # Errors
 /// A missing, truncated or unknown file; a size other than `(width, height)`.
 pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicImage, FrameError> {
-    let check = |found: (u32, u32)| match found == (width, height) {
-        true => Ok(()),
-        false => Err(FrameError::Size {
-            index: file.index,
-            path: file.path.clone(),
-            width: found.0,
-            height: found.1,
-            expected_width: width,
-            expected_height: height,
-        }),
+    let check = |found: (u32, u32)| {
+        if found == (width, height) {
+            Ok(())
+        } else {
+            Err(FrameError::Size {
+                index: file.index,
+                path: file.path.clone(),
+                width: found.0,
+                height: found.1,
+                expected_width: width,
+                expected_height: height,
+            })
+        }
     };
     let fail = |what: String| file.fault(what);
     if let Some((video, picture)) = &file.video {
@@ -226,8 +231,8 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
     DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))
 }
 
-/// A TIFF file of this size in grey or colour of 8 bits; None if it is anything else, or damaged. The general decoder makes two pictures of
-/// it on the way: slow, where there is nothing to decode.
+/// A TIFF file of this size in grey or colour of 8 bits; None if it is anything else, or damaged.
+/// The general decoder makes two pictures of it on the way: slow, where there is nothing to decode.
 fn plain_tiff(bytes: &[u8], width: u32, height: u32) -> Option<DynamicImage> {
     let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).ok()?;
     if decoder.dimensions().ok()? != (width, height) {
@@ -255,7 +260,8 @@ fn plain_tiff(bytes: &[u8], width: u32, height: u32) -> Option<DynamicImage> {
     }
 }
 
-/// What is in a file. Its memory serves for the thread's next file: memory that the system clears anew for each costs as much as reading.
+/// What is in a file. Its memory serves for the thread's next file: memory that the system clears
+/// anew for each costs as much as reading.
 struct Content(Vec<u8>);
 
 thread_local! {
@@ -300,8 +306,8 @@ fn decoder<R: BufRead + Seek + 'static>(reader: ImageReader<R>) -> ImageResult<i
     reader.with_guessed_format()?.into_decoder()
 }
 
-/// True if a JPEG file holds its end-of-image marker (the decoder fills what is missing with grey and
-/// says nothing). Padding after the marker is allowed.
+/// True if a JPEG file holds its end-of-image marker (the decoder fills what is missing with grey
+/// and says nothing). Padding after the marker is allowed.
 fn jpeg_is_complete(bytes: &[u8]) -> bool {
     let end = bytes.len().saturating_sub(4096);
     bytes[end..].windows(2).any(|pair| pair == [0xff, 0xd9])

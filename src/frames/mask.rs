@@ -1,4 +1,5 @@
-//! Which pixels of all frames never show the wall: the carrier's shaft, the water line, the rim of a housing.
+//! Which pixels of all frames never show the wall: the carrier's shaft, the water line, the rim of
+//! a housing.
 
 use super::{FrameError, GreyImage};
 use crate::camera::Camera;
@@ -15,13 +16,14 @@ const MOST_GREY: f64 = 0.1;
 
 /// What every frame hides of the wall, at the frames' full size.
 ///
-/// Kept as the distance of each pixel to the nearest that does not show the wall, so that one look tells whether a kernel of any
-/// width is free of such pixels.
+/// Kept as the distance of each pixel to the nearest that does not show the wall, so that one look
+/// tells whether a kernel of any width is free of such pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
     width: usize,
     height: usize,
-    /// `max(|Δu|, |Δv|)` to the nearest pixel that does not show the wall, 0 for one of these; row-major.
+    /// `max(|Δu|, |Δv|)` to the nearest pixel that does not show the wall, 0 for one of these;
+    /// row-major.
     distance_px: Vec<u16>,
     hidden: usize,
 }
@@ -30,8 +32,8 @@ impl Mask {
     /// Reads a mask: white shows the wall, black does not.
     ///
     /// # Errors
-    /// [`FrameError::Mask`]: an unreadable file, another size than the frames', a picture that is not black and white or is black
-    /// all over.
+    /// [`FrameError::Mask`]: an unreadable file, another size than the frames', a picture that is
+    /// not black and white or is black all over.
     pub fn read(path: &Path, width: u32, height: u32) -> Result<Self, FrameError> {
         let fail = |what: String| FrameError::Mask {
             path: path.to_owned(),
@@ -88,10 +90,11 @@ impl Mask {
 
     /// A mask from its pixels, row-major: true for those that show the wall.
     ///
-    /// The distance `max(|Δu|, |Δv|)` is found in two passes, each pixel from its eight neighbours: those before it in the order
-    /// of rows, then those after it.
+    /// The distance `max(|Δu|, |Δv|)` is found in two passes, each pixel from its eight neighbours:
+    /// those before it in the order of rows, then those after it.
     ///
-    /// Source: A. Rosenfeld, J. L. Pfaltz, "Distance functions on digital pictures", Pattern Recognition 1, 1968.
+    /// Source: A. Rosenfeld, J. L. Pfaltz, "Distance functions on digital pictures", Pattern
+    /// Recognition 1, 1968.
     ///
     /// # Panics
     /// If `wall` does not hold `width · height` pixels.
@@ -152,8 +155,8 @@ impl Mask {
         self.hidden as f64 / self.distance_px.len().max(1) as f64
     }
 
-    /// True if the pixels within `reach_px` of `(u, v)` along both axes all show the wall. What lies outside of the picture
-    /// hides nothing.
+    /// True if the pixels within `reach_px` of `(u, v)` along both axes all show the wall. What
+    /// lies outside of the picture hides nothing.
     #[inline]
     pub fn is_clear(&self, u: f32, v: f32, reach_px: f32) -> bool {
         // The casts saturate.
@@ -203,8 +206,9 @@ impl HalvedMask {
         }
     }
 
-    /// [`Mask::is_clear`] in pixels of the halved picture, each the mean of a square of full-size pixels: at full size,
-    /// `u = 2^l u_l + (2^l − 1)/2`, and a pixel reaches `(2^l − 1)/2` to each side.
+    /// [`Mask::is_clear`] in pixels of the halved picture, each the mean of a square of full-size
+    /// pixels: at full size, `u = 2^l u_l + (2^l − 1)/2`, and a pixel reaches `(2^l − 1)/2` to each
+    /// side.
     #[inline]
     pub fn is_clear(&self, u: f32, v: f32, reach_px: f32) -> bool {
         let scale = (1u32 << self.level) as f32;

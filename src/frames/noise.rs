@@ -8,10 +8,11 @@ pub(crate) const MAD_TO_SIGMA: f64 = 1.4826;
 const STRIDE: usize = 3;
 
 /// 1-σ of a picture's noise, grey levels: the median of `|M ∗ I|` with the mask
-/// `M = [1 −2 1; −2 4 −2; 1 −2 1]`, which no plane and no straight edge along an axis excites; `M ∗` noise has 6 σ.
+/// `M = [1 −2 1; −2 4 −2; 1 −2 1]`, which no plane and no straight edge along an axis excites;
+/// `M ∗` noise has 6 σ.
 ///
-/// Source: J. Immerkær, "Fast noise variance estimation", Computer Vision and Image Understanding 64(2), 1996; the
-/// median instead of the mean, for the sake of walls with edges.
+/// Source: J. Immerkær, "Fast noise variance estimation", Computer Vision and Image Understanding
+/// 64(2), 1996; the median instead of the mean, for the sake of walls with edges.
 pub fn noise_sigma(image: &GreyImage) -> Option<f64> {
     let (w, h) = (image.width(), image.height());
     let mut found = Vec::new();
@@ -32,10 +33,12 @@ pub fn noise_sigma(image: &GreyImage) -> Option<f64> {
     Some(MAD_TO_SIGMA * f64::from(*median) / 6.0)
 }
 
-/// Variance of a bilinear sample between the pixels of a pyramid level, over the variance of a pixel at full size.
+/// Variance of a bilinear sample between the pixels of a pyramid level, over the variance of a
+/// pixel at full size.
 ///
-/// Each level filters with `[1 3 3 1]/8` along each axis and takes every other pixel. A sample at fraction f mixes two
-/// neighbours whose noise correlates by ρ: on average over f, `2/3 + ρ/3` of the variance is left.
+/// Each level filters with `[1 3 3 1]/8` along each axis and takes every other pixel. A sample at
+/// fraction f mixes two neighbours whose noise correlates by ρ: on average over f, `2/3 + ρ/3` of
+/// the variance is left.
 pub fn noise_at_level(level: usize) -> f64 {
     let mut kernel = vec![1.0f64];
     for k in 0..level {

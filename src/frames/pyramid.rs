@@ -36,7 +36,8 @@ impl Pyramid {
         }
     }
 
-    /// The local contrast at `level`, over a window as wide as light is smooth; made when first asked for.
+    /// The local contrast at `level`, over a window as wide as light is smooth; made when first
+    /// asked for.
     pub fn contrast(&self, level: usize) -> Arc<LocalContrast> {
         let image = self.level(level);
         let made = self.contrasts[level]

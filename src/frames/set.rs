@@ -4,8 +4,8 @@ use super::{FrameFile, Mask};
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// The frames of a survey, in their order, and the [`Mask`] they share, if there is one: together they say which pixels show the
-/// wall.
+/// The frames of a survey, in their order, and the [`Mask`] they share, if there is one: together
+/// they say which pixels show the wall.
 #[derive(Clone, Debug, Default)]
 pub struct FrameSet {
     files: Vec<FrameFile>,

@@ -9,10 +9,11 @@ const DEGREE: usize = 6;
 /// Its terms: all `x^i y^j` with `1 ≤ i + j ≤ 6`. A constant would be every frame's gain.
 pub const TERMS: usize = (DEGREE + 1) * (DEGREE + 2) / 2 - 1;
 
-/// Smooth shading fixed to the camera, `V(u, v) = exp(Σ c_k B_k(u, v))`, where a frame shows `I = a V S + b`.
+/// Smooth shading fixed to the camera, `V(u, v) = exp(Σ c_k B_k(u, v))`, where a frame shows
+/// `I = a V S + b`.
 ///
-/// `B_k` are products of Legendre polynomials in the pixel coordinates scaled to ±1, so that the terms hardly
-/// depend on one another.
+/// `B_k` are products of Legendre polynomials in the pixel coordinates scaled to ±1, so that the
+/// terms hardly depend on one another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Shading {
     size: (usize, usize),
@@ -107,8 +108,8 @@ impl Shading {
         range
     }
 
-    /// By what share two shadings of the same pictures differ, at the most, once their exposures are made equal: half of
-    /// the spread of `ln V/V'`.
+    /// By what share two shadings of the same pictures differ, at the most, once their exposures
+    /// are made equal: half of the spread of `ln V/V'`.
     pub fn differs(&self, other: &Self) -> f64 {
         let ratio = self.changed(&other.coefficients.map(|c| -c));
         let [least, greatest] = ratio.range();
@@ -141,14 +142,15 @@ impl Shading {
         }
     }
 
-    /// The shading that explains the mean of many frames, `log mean(u, v) = c + Σ c_k B_k`, if it is one.
+    /// The shading that explains the mean of many frames, `log mean(u, v) = c + Σ c_k B_k`, if it
+    /// is one.
     ///
-    /// Over a survey every pixel sees all kinds of wall, so that what is left in the mean is the camera's own. `mean`
-    /// is a picture of any smaller size that shows the whole frame (cell centres at `(i + ½)/n` of its width), NaN
-    /// where nothing is known.
+    /// Over a survey every pixel sees all kinds of wall, so that what is left in the mean is the
+    /// camera's own. `mean` is a picture of any smaller size that shows the whole frame (cell
+    /// centres at `(i + ½)/n` of its width), NaN where nothing is known.
     ///
-    /// The wall's texture does not average out completely; the fit stands only if it explains most of what varies
-    /// over the mean. Otherwise [`None`].
+    /// The wall's texture does not average out completely; the fit stands only if it explains most
+    /// of what varies over the mean. Otherwise [`None`].
     pub fn of_mean(mean: &GreyImage, size: (usize, usize)) -> Option<Self> {
         let (w, h) = (mean.width(), mean.height());
         let mut rows = Vec::new();

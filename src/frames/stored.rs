@@ -4,7 +4,8 @@ use super::GreyImage;
 use super::load::{FrameError, FrameFile, load_colour};
 use image::DynamicImage;
 
-/// A decoded frame in a quarter (8 bits) or half (16 bits, colour) of the memory of a [`GreyImage`].
+/// A decoded frame in a quarter (8 bits) or half (16 bits, colour) of the memory of a
+/// [`GreyImage`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StoredFrame {
     width: usize,
@@ -42,8 +43,8 @@ impl StoredFrame {
 
     /// The grey levels, 0 to 255; 16 bits keep their finer steps (65535 = 255 · 257).
     ///
-    /// Full white and full black are NaN: the sensor or the encoder has clipped them, so they only say that the wall is at
-    /// least as bright or as dark.
+    /// Full white and full black are NaN: the sensor or the encoder has clipped them, so they only
+    /// say that the wall is at least as bright or as dark.
     pub fn grey(&self) -> GreyImage {
         let data = match &self.values {
             Values::Eight(values) => {

@@ -24,8 +24,8 @@ pub enum PictureFormat {
         /// 1 to 100.
         quality: u8,
     },
-    /// `.tif`, `.tiff`: uncompressed, colour with alpha (grey too, since few programs read grey with
-    /// alpha from TIFF).
+    /// `.tif`, `.tiff`: uncompressed, colour with alpha (grey too, since few programs read grey
+    /// with alpha from TIFF).
     Tiff,
 }
 
@@ -96,9 +96,10 @@ pub fn write_picture(
             }
             PictureFormat::Jpeg { quality } => {
                 let encoder = JpegEncoder::new_with_quality(writer, quality);
-                match image.color().has_color() {
-                    true => image.to_rgb8().write_with_encoder(encoder),
-                    false => image.to_luma8().write_with_encoder(encoder),
+                if image.color().has_color() {
+                    image.to_rgb8().write_with_encoder(encoder)
+                } else {
+                    image.to_luma8().write_with_encoder(encoder)
                 }
             }
             PictureFormat::Tiff => {

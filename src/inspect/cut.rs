@@ -11,7 +11,8 @@ use crate::render::{Band, Canvas, PixelFormat, Samples};
 use crate::surface::Surface;
 use std::io;
 
-/// The wall is straight between the corners of its triangles within this many pixels of the texture.
+/// The wall is straight between the corners of its triangles within this many pixels of the
+/// texture.
 const TOLERANCE_PX: f64 = 0.125;
 
 /// Cuts bands into the blocks of all levels.

@@ -1,10 +1,11 @@
 //! glTF 2.0 in one binary file (GLB).
 //!
-//! **Axes.** The world has z up at θ = 0, y along the axis, x to the right of whoever looks along it. glTF has y up: a world
-//! point (x, y, z) is written as (x, z, −y), a rotation. Blender and 3D Tiles turn it back, so that there coordinates are
-//! the world's again.
+//! **Axes.** The world has z up at θ = 0, y along the axis, x to the right of whoever looks along
+//! it. glTF has y up: a world point (x, y, z) is written as (x, z, −y), a rotation. Blender and 3D
+//! Tiles turn it back, so that there coordinates are the world's again.
 //!
-//! Materials are unlit (`KHR_materials_unlit`): the picture is the wall as the camera saw it. Faces are seen from inside only.
+//! Materials are unlit (`KHR_materials_unlit`): the picture is the wall as the camera saw it. Faces
+//! are seen from inside only.
 
 use super::mesh::Mesh;
 use crate::PROGRAM;
@@ -23,7 +24,8 @@ pub(super) struct Part {
     pub(super) place: Place,
 }
 
-/// Where a picture lies on the wall: texture coordinates (u, v) are at `s = s₀ + u Δs`, `h = h₀ + v Δh`.
+/// Where a picture lies on the wall: texture coordinates (u, v) are at `s = s₀ + u Δs`,
+/// `h = h₀ + v Δh`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
     /// `s₀` and `h₀`, metres.
@@ -113,7 +115,8 @@ impl Binary {
     }
 }
 
-/// A GLB of parts, each a node at its own origin. `extras.wall` of a mesh says where its picture lies on the wall.
+/// A GLB of parts, each a node at its own origin. `extras.wall` of a mesh says where its picture
+/// lies on the wall.
 pub(super) fn glb(parts: &[Part]) -> Vec<u8> {
     let mut binary = Binary::default();
     let (mut nodes, mut meshes, mut materials) = (Vec::new(), Vec::new(), Vec::new());

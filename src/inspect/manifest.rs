@@ -18,8 +18,9 @@ pub const WALL: &str = "wall.json";
 
 const SCHEMA_VERSION: u32 = 1;
 
-/// The points of the wall may be this far from the straight lines between them, as a share of the section's outline: 2 mm in a
-/// tunnel of 3 m radius, whose lengths are then right to a ten-thousandth.
+/// The points of the wall may be this far from the straight lines between them, as a share of the
+/// section's outline: 2 mm in a tunnel of 3 m radius, whose lengths are then right to a
+/// ten-thousandth.
 const TOLERANCE: f64 = 1e-4;
 
 /// What a folder shows.
@@ -33,13 +34,15 @@ pub struct Manifest {
     pub perimeter_m: f64,
     /// The angle θ of twelve o'clock, degrees.
     pub twelve_at_deg: f64,
-    /// The angles θ of the arc lengths k/N of the perimeter, k from 0 to N, degrees, as seen from the axis; never falling.
+    /// The angles θ of the arc lengths k/N of the perimeter, k from 0 to N, degrees, as seen from
+    /// the axis; never falling.
     theta_deg: Vec<f64>,
     /// From and to, metres, over all layers.
     pub chainage_m: [f64; 2],
     /// Names of the frames.
     pub frames: Vec<String>,
-    /// Directions of the corners of a frame in camera coordinates, of unit length, around the picture.
+    /// Directions of the corners of a frame in camera coordinates, of unit length, around the
+    /// picture.
     pub corners: Vec<[f64; 3]>,
     /// What there is to be seen, the one to begin with first.
     pub layers: Vec<Layer>,
@@ -62,7 +65,8 @@ pub struct Layer {
     poses: Vec<[f64; 7]>,
 }
 
-/// The pictures of a map: one level of the tiles' own textures, `folder/ROW.jpg`, θ to the right and chainage down.
+/// The pictures of a map: one level of the tiles' own textures, `folder/ROW.jpg`, θ to the right
+/// and chainage down.
 #[derive(Clone, Debug, Serialize)]
 pub struct MapPlace {
     folder: String,
@@ -164,7 +168,8 @@ fn angles_deg(surface: &dyn Surface) -> Vec<f64> {
     (0..=ANGLES).map(angle).collect()
 }
 
-/// Points of the wall between which it is nearly straight: the page finds places by them whatever the tunnel's shape.
+/// Points of the wall between which it is nearly straight: the page finds places by them whatever
+/// the tunnel's shape.
 #[derive(Debug, Serialize)]
 pub struct WallPoints {
     /// Arc lengths, metres, from 0 to the perimeter.

@@ -1,7 +1,8 @@
 //! Defects that the inspector has marked: a GeoJSON file and the same as a table.
 //!
-//! `marks.geojson` is what counts: it is read again. `marks.csv` is written along with it. Coordinates are those of the unrolled
-//! wall in metres, arc length and chainage, as a GeoTIFF of `stitch` has them, so that both lie on each other in a GIS.
+//! `marks.geojson` is what counts: it is read again. `marks.csv` is written along with it.
+//! Coordinates are those of the unrolled wall in metres, arc length and chainage, as a GeoTIFF of
+//! `stitch` has them, so that both lie on each other in a GIS.
 
 use super::InspectError;
 use crate::atomic;
@@ -13,7 +14,8 @@ pub const MARKS_GEOJSON: &str = "marks.geojson";
 /// The same as a table.
 pub const MARKS_CSV: &str = "marks.csv";
 
-/// Most marks of a survey, and characters of a text in them: beyond this, it is not an inspector who writes.
+/// Most marks of a survey, and characters of a text in them: beyond this, it is not an inspector
+/// who writes.
 const MOST_MARKS: usize = 100_000;
 const MOST_CHARACTERS: usize = 10_000;
 
@@ -42,7 +44,8 @@ enum FeatureKind {
 pub enum Geometry {
     /// A place.
     Point([f64; 2]),
-    /// What was measured, from end to end. Arc lengths may go beyond the perimeter, so that the line takes the shorter way.
+    /// What was measured, from end to end. Arc lengths may go beyond the perimeter, so that the
+    /// line takes the shorter way.
     LineString([[f64; 2]; 2]),
 }
 
@@ -198,7 +201,8 @@ impl Marks {
             .map_err(|error| self.fail(MARKS_GEOJSON, error.to_string()))
     }
 
-    /// Adds a mark, or replaces the one of its name, and writes the files. Where that fails, nothing has changed.
+    /// Adds a mark, or replaces the one of its name, and writes the files. Where that fails,
+    /// nothing has changed.
     ///
     /// # Errors
     /// [`InspectError::Marks`] for a mark that is none; whatever the system says.

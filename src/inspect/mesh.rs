@@ -1,9 +1,10 @@
 //! Pieces of the wall as triangles.
 //!
-//! A piece is a rectangle of the unrolled wall. It is cut along lines of constant `s` and `h` that lie as close as the wall
-//! is bent there: between two lines no point of the wall is farther than a tolerance from the straight line between its
-//! ends. Nothing but [`Surface::frame`] is asked, so every shape and every curve is cut the same way; a corner of the
-//! section gets lines close to it, and a straight tunnel none along its length.
+//! A piece is a rectangle of the unrolled wall. It is cut along lines of constant `s` and `h` that
+//! lie as close as the wall is bent there: between two lines no point of the wall is farther than a
+//! tolerance from the straight line between its ends. Nothing but [`Surface::frame`] is asked, so
+//! every shape and every curve is cut the same way; a corner of the section gets lines close to it,
+//! and a straight tunnel none along its length.
 
 use crate::surface::{Surface, WallPoint};
 use nalgebra::Vector3;
@@ -30,11 +31,13 @@ pub struct Lines {
 const ACROSS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
 /// Where the wall is compared with the straight line between two of its points.
 const BETWEEN: [f64; 3] = [0.25, 0.5, 0.75];
-/// Halvings of a patch, at the most: a wall that is bent nowhere more than its section's outline needs far fewer.
+/// Halvings of a patch, at the most: a wall that is bent nowhere more than its section's outline
+/// needs far fewer.
 const HALVINGS: u32 = 16;
 
 impl Lines {
-    /// Lines between which the wall is straight within `tolerance_m`, unless they are `finest_m` apart already.
+    /// Lines between which the wall is straight within `tolerance_m`, unless they are `finest_m`
+    /// apart already.
     pub fn cut(surface: &dyn Surface, patch: &Patch, tolerance_m: f64, finest_m: f64) -> Self {
         let point = |s_m, h_m| surface.frame(WallPoint { s_m, h_m }).x_w;
         let at = |[from, to]: [f64; 2], share: f64| from + share * (to - from);
@@ -152,7 +155,8 @@ mod tests {
         let circle = Circle::new(3.0).unwrap();
         let lines = Lines::cut(&circle, &PATCH, 1e-3, 0.0);
         assert_eq!(lines.h_m, PATCH.h_m);
-        // The sagitta of a chord over Δs is Δs²/8r; here each half has twice what is needed at the most.
+        // The sagitta of a chord over Δs is Δs²/8r; here each half has twice what is needed at the
+        // most.
         let widest = lines.s_m.windows(2).map(|pair| pair[1] - pair[0]);
         let widest = widest.fold(0.0, f64::max);
         let sagitta = widest * widest / (8.0 * 3.0);
@@ -179,7 +183,8 @@ mod tests {
         assert!((low.y, high.y) == (9_990.0, 10_050.0) && high.x > 2.99);
     }
 
-    /// A box and a bend of it: between the corners of its triangles the wall is where they are, and they face inwards.
+    /// A box and a bend of it: between the corners of its triangles the wall is where they are, and
+    /// they face inwards.
     #[test]
     fn corners_and_bends_are_followed() {
         let section = || Box::new(Pieces::rectangle(4.0, 3.0).unwrap());

@@ -9,8 +9,9 @@
 //! index.html, viewer.js (Viewer) ────────────────┘                            └── Marks: marks.geojson, marks.csv
 //! ```
 //!
-//! Textures are cut from the bands of the panorama as they are drawn; a few hundred rows of every level are held. All of it is
-//! metric and in the world's coordinates; positions are relative to a point nearby.
+//! Textures are cut from the bands of the panorama as they are drawn; a few hundred rows of every
+//! level are held. All of it is metric and in the world's coordinates; positions are relative to a
+//! point nearby.
 //!
 //! # Example
 //!

@@ -1,7 +1,8 @@
 //! One level of the panorama's pyramid, as blocks with a border of their neighbours' pixels.
 //!
-//! A renderer samples between pixels, and beyond a texture's edge there are none: without a border, a line would show
-//! where two textures meet. Around the section the border goes on at the other side.
+//! A renderer samples between pixels, and beyond a texture's edge there are none: without a border,
+//! a line would show where two textures meet. Around the section the border goes on at the other
+//! side.
 
 use crate::raster::{EDGE, RasterTile};
 use rayon::prelude::*;

@@ -14,7 +14,8 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Takes bands and writes `tileset.json` and `LEVEL/COLUMN_ROW.glb` into a folder: textures of 512 × 512 px and their borders.
+/// Takes bands and writes `tileset.json` and `LEVEL/COLUMN_ROW.glb` into a folder: textures of 512
+/// × 512 px and their borders.
 pub struct TilesTarget<'a> {
     surface: &'a dyn Surface,
     folder: PathBuf,
@@ -24,7 +25,8 @@ pub struct TilesTarget<'a> {
     map: Option<usize>,
 }
 
-/// Columns of the canvas are a multiple of this, so that overviews go around as exactly as the canvas does.
+/// Columns of the canvas are a multiple of this, so that overviews go around as exactly as the
+/// canvas does.
 const COLUMNS: f64 = 64.0;
 
 /// Columns of the level of which a map is made, at the most.
@@ -33,7 +35,8 @@ const MAP_COLUMNS: u32 = 512;
 /// Folder of the map's pictures.
 pub(super) const MAP: &str = "map";
 
-/// The next resolution from `px_per_metre` on at which the levels of a tunnel meet themselves around the section.
+/// The next resolution from `px_per_metre` on at which the levels of a tunnel meet themselves
+/// around the section.
 pub fn tiles_px_per_metre(surface: &dyn Surface, px_per_metre: f64) -> f64 {
     let perimeter_m = surface.perimeter_m();
     // A resolution of this kind stays as it is, whatever its last digit.
@@ -70,7 +73,8 @@ impl<'a> TilesTarget<'a> {
         })
     }
 
-    /// Also writes the pictures of one level into `map/ROW.jpg`, for [`super::Manifest`]; its place in it.
+    /// Also writes the pictures of one level into `map/ROW.jpg`, for [`super::Manifest`]; its place
+    /// in it.
     ///
     /// # Errors
     /// Whatever the system says.

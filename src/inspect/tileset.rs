@@ -1,11 +1,12 @@
 //! The tree of a tileset: OGC 3D Tiles 1.1, explicit tiling.
 //!
-//! Levels are those of the panorama's pyramid, and a tile has up to four children of half its size on the wall that replace
-//! it. Coordinates are the world's: 3D Tiles has z up as the world has, and turns glTF's axes by itself.
+//! Levels are those of the panorama's pyramid, and a tile has up to four children of half its size
+//! on the wall that replace it. Coordinates are the world's: 3D Tiles has z up as the world has,
+//! and turns glTF's axes by itself.
 //!
-//! **Geometric error.** What a tile lacks is sharpness. Programs refine a tile whose error seems larger than some 16 pixels, so
-//! the error of a tile is [`SCREEN_PX`] of its texture's pixels, in metres: then a pixel of it fills at most one of the screen.
-//! The finest tiles have no error.
+//! **Geometric error.** What a tile lacks is sharpness. Programs refine a tile whose error seems
+//! larger than some 16 pixels, so the error of a tile is [`SCREEN_PX`] of its texture's pixels, in
+//! metres: then a pixel of it fills at most one of the screen. The finest tiles have no error.
 
 use crate::PROGRAM;
 use nalgebra::Vector3;
@@ -15,7 +16,8 @@ use std::collections::HashMap;
 /// The error on the screen at which programs refine by default, pixels.
 pub(super) const SCREEN_PX: f64 = 16.0;
 
-/// Levels of one file: a file has at most 4⁰ + … + 4⁴ tiles, so that a long tunnel streams its tree, too.
+/// Levels of one file: a file has at most 4⁰ + … + 4⁴ tiles, so that a long tunnel streams its
+/// tree, too.
 const LEVELS_A_FILE: usize = 5;
 
 /// Level (0 is the finest), column and row.
@@ -71,7 +73,8 @@ impl Tree<'_> {
         }
     }
 
-    /// A tile and all below it; the least and largest coordinates of all that. Files of deeper parts are added to `files`.
+    /// A tile and all below it; the least and largest coordinates of all that. Files of deeper
+    /// parts are added to `files`.
     fn tile(&self, key: Key, files: &mut Vec<(String, Value)>) -> (Value, [Vector3<f64>; 2]) {
         let (level, column, row) = key;
         let mut bounds = self.bounds_m.get(&key).copied().unwrap_or_default();

@@ -22,13 +22,14 @@ impl Viewer {
     /// [`InspectError::NoViewer`] if npm was missing then.
     pub fn bundled() -> Result<Self, InspectError> {
         let script = include_bytes!(concat!(env!("OUT_DIR"), "/viewer.js"));
-        match script.is_empty() {
-            true => Err(InspectError::NoViewer),
-            false => Ok(Self {
+        if script.is_empty() {
+            Err(InspectError::NoViewer)
+        } else {
+            Ok(Self {
                 page: include_bytes!("web/index.html"),
                 style: include_bytes!("web/style.css"),
                 script,
-            }),
+            })
         }
     }
 

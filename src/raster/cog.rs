@@ -1,4 +1,5 @@
-//! Cloud-Optimised GeoTIFF: one file of which any window at any resolution is read without the rest.
+//! Cloud-Optimised GeoTIFF: one file of which any window at any resolution is read without the
+//! rest.
 
 use super::compression::Packed;
 use super::directory::{self, Directory, Values, tag};
@@ -15,11 +16,12 @@ use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes a picture as Cloud-Optimised GeoTIFF (BigTIFF, tiles of [`EDGE`] pixels, overviews down to one tile).
+/// Writes a picture as Cloud-Optimised GeoTIFF (BigTIFF, tiles of [`EDGE`] pixels, overviews down
+/// to one tile).
 ///
-/// Packed tiles wait in a temporary file beside the target and are copied into it by [`CogWriter::finish`], smallest
-/// overview first, so for that time twice the size of the file is needed on the disk. Tiles with nothing in them take
-/// no room.
+/// Packed tiles wait in a temporary file beside the target and are copied into it by
+/// [`CogWriter::finish`], smallest overview first, so for that time twice the size of the file is
+/// needed on the disk. Tiles with nothing in them take no room.
 pub struct CogWriter {
     spec: RasterSpec,
     compression: Compression,
@@ -66,8 +68,8 @@ impl CogWriter {
     /// Begins the file that will be `target`.
     ///
     /// # Errors
-    /// [`RasterError::Unsupported`] for a raster that contradicts itself or that `compression` cannot hold; whatever
-    /// the system says about the temporary file.
+    /// [`RasterError::Unsupported`] for a raster that contradicts itself or that `compression`
+    /// cannot hold; whatever the system says about the temporary file.
     pub fn begin(
         target: &Path,
         spec: RasterSpec,
@@ -76,7 +78,8 @@ impl CogWriter {
         Self::with(target, spec, compression, || Spool::beside(target))
     }
 
-    /// Begins it, or goes on from `state`, with the packed tiles in the file `tiles`, which stays whatever happens.
+    /// Begins it, or goes on from `state`, with the packed tiles in the file `tiles`, which stays
+    /// whatever happens.
     ///
     /// # Errors
     /// As [`CogWriter::begin`]; fewer tiles in the file than the state tells of.
@@ -135,11 +138,12 @@ impl CogWriter {
         })
     }
 
-    /// Takes tiles of full resolution, each of the picture once, in any order. It is given up if this fails.
+    /// Takes tiles of full resolution, each of the picture once, in any order. It is given up if
+    /// this fails.
     ///
     /// # Errors
-    /// [`RasterError::Tile`] for one that is no part of the picture, came twice or is of the wrong size; whatever the
-    /// system says.
+    /// [`RasterError::Tile`] for one that is no part of the picture, came twice or is of the wrong
+    /// size; whatever the system says.
     pub fn add(&mut self, batch: Vec<RasterTile>) -> Result<(), RasterError> {
         let fail = |source| WriteError::new(&self.target, source);
         let (spec, compression) = (self.spec, self.compression);
@@ -192,8 +196,8 @@ impl CogWriter {
         directory::encode(&ghost, &self.directories(levels, length as u64))
     }
 
-    /// The directories of all levels, full resolution first, each before that of its mask; `at` is where the first tile
-    /// begins.
+    /// The directories of all levels, full resolution first, each before that of its mask; `at` is
+    /// where the first tile begins.
     fn directories(&self, levels: &[Vec<Stored>], mut at: u64) -> Vec<Directory> {
         let mut directories = Vec::new();
         for (level, tiles) in levels.iter().enumerate().rev() {
@@ -328,7 +332,8 @@ fn ghost(masked: bool) -> String {
     )
 }
 
-/// A tile between its leader, the number of its bytes, and its trailer, the last four of them; nothing if it is empty.
+/// A tile between its leader, the number of its bytes, and its trailer, the last four of them;
+/// nothing if it is empty.
 fn write_block(writer: &mut impl Write, block: &[u8]) -> io::Result<()> {
     let Some(last) = block.last_chunk::<{ FRAME as usize }>() else {
         return Ok(());
@@ -338,8 +343,8 @@ fn write_block(writer: &mut impl Write, block: &[u8]) -> io::Result<()> {
     writer.write_all(last)
 }
 
-/// Where the picture lies: a plane of metres that belongs to no map of the world. The matrix says it for axes of any
-/// direction.
+/// Where the picture lies: a plane of metres that belongs to no map of the world. The matrix says
+/// it for axes of any direction.
 fn geo_tags(georeference: &Georeference) -> [(u16, Values); 2] {
     let Georeference {
         origin_m: [x, y],

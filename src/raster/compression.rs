@@ -10,7 +10,8 @@ use std::io;
 pub enum Compression {
     /// Without loss.
     Deflate,
-    /// With loss: [`SampleType::U8`] only. An alpha becomes a mask of one bit beside the picture, without loss.
+    /// With loss: [`SampleType::U8`] only. An alpha becomes a mask of one bit beside the picture,
+    /// without loss.
     Jpeg {
         /// 1 to 100.
         quality: u8,
@@ -56,9 +57,10 @@ impl Compression {
             Self::Deflate => deflate::deflate(spec, pixels),
             Self::Jpeg { quality } => jpeg::encode(spec, pixels, extent, [EDGE; 2], quality)?,
         };
-        let mask = match self.masks(spec) {
-            true => deflate::deflate_mask(spec, pixels),
-            false => Vec::new(),
+        let mask = if self.masks(spec) {
+            deflate::deflate_mask(spec, pixels)
+        } else {
+            Vec::new()
         };
         Ok(Packed { image, mask })
     }

@@ -16,8 +16,8 @@ pub(super) fn predictor(samples: SampleType) -> u16 {
 
 /// The pixels of a tile as differences along the rows, little-endian, as a zlib stream.
 ///
-/// Differences of 8 bits go through a code of fixed lengths that was made for them and is several times as fast; for
-/// wider samples it is no good, and they go through one that finds repetitions.
+/// Differences of 8 bits go through a code of fixed lengths that was made for them and is several
+/// times as fast; for wider samples it is no good, and they go through one that finds repetitions.
 pub(super) fn deflate(spec: &RasterSpec, pixels: &[u8]) -> Vec<u8> {
     let n = spec.samples_per_pixel();
     match spec.samples {
@@ -32,8 +32,8 @@ fn wide(bytes: &[u8]) -> Vec<u8> {
     miniz_oxide::deflate::compress_to_vec_zlib(bytes, LEVEL)
 }
 
-/// One bit per pixel of 8-bit samples, the highest first, that says whether its last sample, alpha, is more than 0; as a
-/// zlib stream.
+/// One bit per pixel of 8-bit samples, the highest first, that says whether its last sample, alpha,
+/// is more than 0; as a zlib stream.
 pub(super) fn deflate_mask(spec: &RasterSpec, pixels: &[u8]) -> Vec<u8> {
     wide(&match spec.channels {
         1 => mask::<2>(pixels),
@@ -99,8 +99,8 @@ fn differences<S: Sample, const B: usize>(
     predicted
 }
 
-/// The predictor of floating point of TIFF's technical note 3: the bytes of a row, those of most weight of all its
-/// numbers first, and of these the differences.
+/// The predictor of floating point of TIFF's technical note 3: the bytes of a row, those of most
+/// weight of all its numbers first, and of these the differences.
 fn byte_planes(pixels: &[u8], samples_per_pixel: usize) -> Vec<u8> {
     let mut predicted = vec![0; pixels.len()];
     let row_bytes = EDGE * samples_per_pixel * f32::BYTES;

@@ -64,8 +64,8 @@ pub(super) type Directory = Vec<(u16, Values)>;
 /// Most bytes of values that stand in the directory itself.
 const INLINE: usize = 8;
 
-/// Header, `ghost` area and directories of a BigTIFF file. The places of the tiles come after all else: whoever reads
-/// a part of the file has all directories at once.
+/// Header, `ghost` area and directories of a BigTIFF file. The places of the tiles come after all
+/// else: whoever reads a part of the file has all directories at once.
 ///
 /// Its length depends on how many values there are, and not on the values.
 pub(super) fn encode(ghost: &str, directories: &[Directory]) -> Vec<u8> {

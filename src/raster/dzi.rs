@@ -1,4 +1,5 @@
-//! Deep Zoom: a folder of small pictures that a viewer in the browser reads without a server's help.
+//! Deep Zoom: a folder of small pictures that a viewer in the browser reads without a server's
+//! help.
 
 use super::pyramid::{LevelTile, Pyramid, Waiting};
 use super::{EDGE, RasterError, RasterSpec, RasterTile, SampleType, jpeg};
@@ -25,8 +26,9 @@ pub enum DziFormat {
     Png,
 }
 
-/// Writes a picture as Deep Zoom: `NAME.dzi` and the folder `NAME_files/LEVEL/COLUMN_ROW.jpg` or `.png`, from one pixel
-/// at level 0 to full resolution, in tiles of [`EDGE`] pixels without overlap. 8-bit samples only.
+/// Writes a picture as Deep Zoom: `NAME.dzi` and the folder `NAME_files/LEVEL/COLUMN_ROW.jpg` or
+/// `.png`, from one pixel at level 0 to full resolution, in tiles of [`EDGE`] pixels without
+/// overlap. 8-bit samples only.
 pub struct DziWriter {
     spec: RasterSpec,
     format: DziFormat,
@@ -48,18 +50,20 @@ pub struct DziState<'a> {
 }
 
 impl DziWriter {
-    /// Begins the picture that will be `target`, a name that ends in `.dzi`, and the folder beside it.
+    /// Begins the picture that will be `target`, a name that ends in `.dzi`, and the folder beside
+    /// it.
     ///
     /// # Errors
-    /// [`RasterError::Unsupported`] for another name, or a raster that contradicts itself or has no samples of 8 bits;
-    /// whatever the system says.
+    /// [`RasterError::Unsupported`] for another name, or a raster that contradicts itself or has no
+    /// samples of 8 bits; whatever the system says.
     pub fn begin(target: &Path, spec: RasterSpec, format: DziFormat) -> Result<Self, RasterError> {
         Self::with(target, spec, format, || {
             StagedFolder::begin(&files_folder(target))
         })
     }
 
-    /// Begins it, or goes on from `state`, with the tiles in `folder` on the same disk, which stays whatever happens.
+    /// Begins it, or goes on from `state`, with the tiles in `folder` on the same disk, which stays
+    /// whatever happens.
     ///
     /// # Errors
     /// As [`DziWriter::begin`].
@@ -137,11 +141,12 @@ impl DziWriter {
         })
     }
 
-    /// Takes tiles of full resolution, each of the picture once, in any order. It is given up if this fails.
+    /// Takes tiles of full resolution, each of the picture once, in any order. It is given up if
+    /// this fails.
     ///
     /// # Errors
-    /// [`RasterError::Tile`] for one that is no part of the picture, came twice or is of the wrong size; whatever the
-    /// system says.
+    /// [`RasterError::Tile`] for one that is no part of the picture, came twice or is of the wrong
+    /// size; whatever the system says.
     pub fn add(&mut self, batch: Vec<RasterTile>) -> Result<(), RasterError> {
         let complete = self.pyramid.add(batch)?;
         let written: Vec<PathBuf> = complete

@@ -25,8 +25,8 @@ pub(super) fn check(spec: &RasterSpec, quality: u8) -> Result<(), RasterError> {
     Ok(())
 }
 
-/// The upper left `size` (columns, rows) of a tile without its alpha. What lies beyond `extent` repeats the last column
-/// and row, so that no false edge is there to be drawn.
+/// The upper left `size` (columns, rows) of a tile without its alpha. What lies beyond `extent`
+/// repeats the last column and row, so that no false edge is there to be drawn.
 pub(super) fn encode(
     spec: &RasterSpec,
     pixels: &[u8],
@@ -66,7 +66,8 @@ struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// Adds the first `C` bytes of every pixel of a row; those of the last one again for the pixels that are not there.
+    /// Adds the first `C` bytes of every pixel of a row; those of the last one again for the pixels
+    /// that are not there.
     fn push<const C: usize>(&self, y: usize, out: &mut Vec<u8>) {
         let start = y.min(self.extent[1] - 1) * EDGE * self.bytes;
         let there = self.extent[0].min(self.size[0]);

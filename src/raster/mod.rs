@@ -6,12 +6,14 @@
 //!  in any order        └─ tiles of all levels ──────────────────────────┘    DziWriter ──> NAME.dzi, NAME_files/
 //! ```
 //!
-//! A [`RasterSpec`] says what a pixel is and what *nothing* looks like in it; the picture then arrives as squares of
-//! [`EDGE`] pixels, each exactly once. A batch is reduced and compressed on all threads of the current rayon pool.
-//! The files do not depend on the order of the tiles, how they were batched, or the number of threads, to the byte.
+//! A [`RasterSpec`] says what a pixel is and what *nothing* looks like in it; the picture then
+//! arrives as squares of [`EDGE`] pixels, each exactly once. A batch is reduced and compressed on
+//! all threads of the current rayon pool. The files do not depend on the order of the tiles, how
+//! they were batched, or the number of threads, to the byte.
 //!
 //! What is held in memory is the batch and the overview tiles that wait for a part of theirs:
-//! [`RasterSpec::pending_bytes`]. Tiles that arrive along the shorter side of the picture keep that small.
+//! [`RasterSpec::pending_bytes`]. Tiles that arrive along the shorter side of the picture keep that
+//! small.
 //!
 //! # Example
 //!

@@ -64,7 +64,8 @@ impl Pyramid {
         self.waiting = waiting;
     }
 
-    /// Takes tiles of full resolution and hands on all that are complete by that: these, and overview tiles.
+    /// Takes tiles of full resolution and hands on all that are complete by that: these, and
+    /// overview tiles.
     ///
     /// # Errors
     /// [`RasterError::Tile`]; the batch is lost then, and the picture will not be whole.

@@ -6,8 +6,8 @@ use crate::vectors::wide;
 /// Columns and rows of a reduced tile.
 pub(super) const HALF: usize = EDGE / 2;
 
-/// A tile reduced to [`HALF`] × [`HALF`] pixels; `extent` are its columns and rows within the picture, and what lies
-/// beyond counts for nothing and becomes 0.
+/// A tile reduced to [`HALF`] × [`HALF`] pixels; `extent` are its columns and rows within the
+/// picture, and what lies beyond counts for nothing and becomes 0.
 pub(super) fn reduce(spec: &RasterSpec, pixels: &[u8], extent: [usize; 2]) -> Vec<u8> {
     match spec.samples {
         SampleType::U8 => of_type::<u8>(spec, pixels, extent),
@@ -60,7 +60,8 @@ macro_rules! whole_number {
                 let sum: $sum = (0..4)
                     .map(|i| <$sum>::from(values[i]) * <$sum>::from(there[i]))
                     .sum();
-                // To the nearest, halves up. Constants are divided by faster; the mean fits where its parts did.
+                // To the nearest, halves up. Constants are divided by faster; the mean fits where
+                // its parts did.
                 (match count {
                     1 => sum,
                     2 => sum.div_ceil(2),

@@ -65,15 +65,16 @@ pub enum Nodata {
 pub struct Georeference {
     /// x and y of the upper left corner of the first pixel, metres.
     pub origin_m: [f64; 2],
-    /// What a column to the right adds to x and a row down to y, metres; negative where the coordinate falls.
+    /// What a column to the right adds to x and a row down to y, metres; negative where the
+    /// coordinate falls.
     pub step_m: [f64; 2],
 }
 
 /// What a raster is.
 ///
-/// A pixel is its channels and then, if there is one, its alpha, in native byte order. *Nothing* is an alpha of 0, NaN,
-/// or the number that [`RasterSpec::nodata`] names; where there is an alpha it is either 0 or the largest number, and
-/// the channels of a pixel that is nothing are 0.
+/// A pixel is its channels and then, if there is one, its alpha, in native byte order. *Nothing* is
+/// an alpha of 0, NaN, or the number that [`RasterSpec::nodata`] names; where there is an alpha it
+/// is either 0 or the largest number, and the channels of a pixel that is nothing are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RasterSpec {
     /// Columns, pixels; at least 1.
@@ -101,7 +102,8 @@ pub struct RasterTile {
     pub column: u32,
     /// Row in the grid of tiles, from the top.
     pub row: u32,
-    /// Its pixels, row by row; what lies beyond the right and lower border of the picture is there and 0.
+    /// Its pixels, row by row; what lies beyond the right and lower border of the picture is there
+    /// and 0.
     pub pixels: Vec<u8>,
 }
 
@@ -117,8 +119,9 @@ pub enum TileOrder {
 impl RasterSpec {
     /// Most bytes of overview tiles that wait for a part of theirs while tiles arrive in `order`.
     ///
-    /// Each level holds at most a row (or column) of its tiles. Besides there is what [`CogWriter::add`] was given: the
-    /// batch itself, a quarter of it as the batch is reduced, and its compressed form.
+    /// Each level holds at most a row (or column) of its tiles. Besides there is what
+    /// [`CogWriter::add`] was given: the batch itself, a quarter of it as the batch is reduced, and
+    /// its compressed form.
     ///
     /// [`CogWriter::add`]: super::CogWriter::add
     pub fn pending_bytes(&self, order: TileOrder) -> u64 {
@@ -197,7 +200,8 @@ impl RasterSpec {
         .count()
     }
 
-    /// The number that a sample without value has where there is no alpha and it is no NaN; 0 otherwise.
+    /// The number that a sample without value has where there is no alpha and it is no NaN; 0
+    /// otherwise.
     pub(super) fn nothing(&self) -> u32 {
         match self.nodata {
             Some(Nodata::Max) => self.samples.max().unwrap_or_default(),

@@ -1,22 +1,25 @@
 //! How well are two frames aligned where they overlap, and how sure is that?
 //!
-//! Gauss–Newton compares each frame with the wall fused from all. Where the trajectory is bent, that wall is blurred, the
-//! robust loss turns away from what does not fit, and every residual looks bearable. Two frames by themselves hide
-//! nothing: where they overlap, the displacement of the one against the other is measured, an affine field
+//! Gauss–Newton compares each frame with the wall fused from all. Where the trajectory is bent,
+//! that wall is blurred, the robust loss turns away from what does not fit, and every residual
+//! looks bearable. Two frames by themselves hide nothing: where they overlap, the displacement of
+//! the one against the other is measured, an affine field
 //!
 //! `d(x) = P (1, s, h)ᵀ`,   P: 2 × 3,
 //!
-//! that minimises `Σ ω (a I_a(x) + b − I_b(x + d(x)))²` at a fine pyramid level, with the exposure a, b and the biweight ω of
-//! [`Loss`] for what is not wall. With N the normal matrix, freed of the noise in its slopes, and v the variance of the
-//! residuals, P has covariance `v N⁻¹` if they are noise. Glints are not: steeper than a faint wall, they move with the
-//! camera. So no sample has more influence than one a few times as steep as usual, and with g the parts that patches of
-//! samples have in the gradient, the covariance is `C = N⁻¹ (Σ g gᵀ) N⁻¹` where that makes σ larger, whatever the residuals
-//! are like. The root mean square of the displacement over the overlap is `e = √(pᵀWp)`, of which errors alone make
-//! `σ = √tr(C W)`. By the triangle inequality, frames that are aligned to τ show `e > τ + z σ` no more often than a Gaussian
-//! exceeds z standard deviations.
+//! that minimises `Σ ω (a I_a(x) + b − I_b(x + d(x)))²` at a fine pyramid level, with the exposure
+//! a, b and the biweight ω of [`Loss`] for what is not wall. With N the normal matrix, freed of the
+//! noise in its slopes, and v the variance of the residuals, P has covariance `v N⁻¹` if they are
+//! noise. Glints are not: steeper than a faint wall, they move with the camera. So no sample has
+//! more influence than one a few times as steep as usual, and with g the parts that patches of
+//! samples have in the gradient, the covariance is `C = N⁻¹ (Σ g gᵀ) N⁻¹` where that makes σ
+//! larger, whatever the residuals are like. The root mean square of the displacement over the
+//! overlap is `e = √(pᵀWp)`, of which errors alone make `σ = √tr(C W)`. By the triangle inequality,
+//! frames that are aligned to τ show `e > τ + z σ` no more often than a Gaussian exceeds z standard
+//! deviations.
 //!
-//! Source: B. D. Lucas and T. Kanade, "An iterative image registration technique with an application to stereo vision",
-//! 1981.
+//! Source: B. D. Lucas and T. Kanade, "An iterative image registration technique with an
+//! application to stereo vision", 1981.
 
 use super::overlaps::{Batch, Overlaps};
 use super::problem::{ProblemError, Scene};
@@ -33,7 +36,8 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Pyramid level at which displacements are measured: small against a brick's edge, and half the noise of full size.
+/// Pyramid level at which displacements are measured: small against a brick's edge, and half the
+/// noise of full size.
 const LEVEL: usize = 1;
 /// Every how many pixels of it a sample is taken, along each axis.
 const STRIDE: f64 = 4.0;
@@ -42,7 +46,8 @@ const STEPS: usize = 8;
 /// Least samples that two frames share, and as a share of the one's own.
 const LEAST_SAMPLES: usize = 40;
 const LEAST_OVERLAP: f64 = 0.02;
-/// Gauss–Newton finds no displacement larger than this, pixels of the level: it is no measurement then.
+/// Gauss–Newton finds no displacement larger than this, pixels of the level: it is no measurement
+/// then.
 const MOST_PX: f64 = 8.0;
 /// Share of the squared slopes that must be texture and not noise: with less, N is chance.
 const LEAST_TEXTURE: f64 = 0.3;
@@ -50,7 +55,8 @@ const LEAST_TEXTURE: f64 = 0.3;
 const STEEPEST: f32 = 10.0;
 /// Samples along the side of a patch: larger than most glints.
 const PATCH: usize = 4;
-/// A step shorter than this, pixels of the level, is the last; one longer than three times this is no end.
+/// A step shorter than this, pixels of the level, is the last; one longer than three times this is
+/// no end.
 const LAST_STEP_PX: f64 = 0.03;
 /// Noise of the residuals that is assumed at least, grey levels: rounding.
 const LEAST_SIGMA: f32 = 0.3;
@@ -68,13 +74,13 @@ pub struct Alignment {
     pub error_px: f64,
     /// σ, likewise; infinite where the texture is too faint to tell.
     pub sigma_px: f64,
-    /// Correlation of their grey values at the poses as they are, with no weight that could hide that two frames show
-    /// different things: of all samples or of most, whichever is greater.
+    /// Correlation of their grey values at the poses as they are, with no weight that could hide
+    /// that two frames show different things: of all samples or of most, whichever is greater.
     pub correlation: f64,
 }
 
-/// Measures how those of a run of frames that are believed and overlap are aligned; `finest` is the finest level that
-/// tracking uses.
+/// Measures how those of a run of frames that are believed and overlap are aligned; `finest` is the
+/// finest level that tracking uses.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -284,7 +290,8 @@ impl Template {
             exposure = Some((gain + step[6], bias + step[7]));
             let moved = fit.rms(&Vector6::from(step.fixed_rows::<6>(0)));
             let alignment = fit.alignment(&p, self.scale, f64::from(variance));
-            // Where the steps lead nowhere, the first is what is known: small where the poses are right.
+            // Where the steps lead nowhere, the first is what is known: small where the poses are
+            // right.
             let first = *first.get_or_insert(alignment);
             let lost = fit.rms(&p) > MOST_PX;
             let ended = !lost && moved < 3.0 * LAST_STEP_PX;
@@ -297,7 +304,8 @@ impl Template {
     }
 }
 
-/// Gives samples steeper than most a weight such that none has more influence than `√STEEPEST` times the usual.
+/// Gives samples steeper than most a weight such that none has more influence than `√STEEPEST`
+/// times the usual.
 fn bound_influence(samples: &mut [Sample]) {
     let square = |sample: &Sample| sample.slope[0].powi(2) + sample.slope[1].powi(2);
     let mut squares: Vec<f32> = samples.iter().map(square).collect();
@@ -333,8 +341,9 @@ fn line(seen: &[(&Sample, f32)]) -> (f64, f64) {
     (gain, (y - gain * x) / n)
 }
 
-/// Correlation of grey values, −1 to 1: of all samples or of most, whichever is greater. Glints outweigh a faint wall in
-/// the former; where most of the wall is flat, the latter is that of noise.
+/// Correlation of grey values, −1 to 1: of all samples or of most, whichever is greater. Glints
+/// outweigh a faint wall in the former; where most of the wall is flat, the latter is that of
+/// noise.
 fn correlation(seen: &[(&Sample, f32)]) -> f64 {
     let pairs: Vec<(f32, f32)> = seen.iter().map(|(s, value)| (s.grey, *value)).collect();
     let mut m = [0.0f64; 6];
@@ -387,7 +396,8 @@ impl Fit {
             let outer = regressors * regressors.transpose();
             w += outer;
             let (gs, gh) = (gain32 * sample.slope[0], gain32 * sample.slope[1]);
-            // I_b(x + d) ≈ a I_a(x) + b − a ∇I_a · (remaining d), so the row of the remaining d is −a∇I_a.
+            // I_b(x + d) ≈ a I_a(x) + b − a ∇I_a · (remaining d), so the row of the remaining d is
+            // −a∇I_a.
             let row = SVector::<f64, 8>::from_column_slice(&[
                 f64::from(-gs * x[0]),
                 f64::from(-gs * x[1]),
@@ -434,9 +444,10 @@ impl Fit {
 
     /// None where the texture tells nothing.
     fn step(&self) -> Option<SVector<f64, 8>> {
-        match self.textured {
-            true => Some(self.n.cholesky()?.solve(&self.right)),
-            false => None,
+        if self.textured {
+            Some(self.n.cholesky()?.solve(&self.right))
+        } else {
+            None
         }
     }
 

@@ -1,30 +1,36 @@
 //! The Cramér–Rao bound: how exact any unbiased estimate of the poses can be.
 //!
-//! Each pixel reads `I = a S(x(ξ)) + b + n` with the wall's texture S (as a pixel sees it, averaged over its square)
-//! unknown, and n Gaussian with variance σ². Parameters are the poses' ξ, exposures and S at every wall point.
-//! The Fisher information of one observation is `σ⁻² ∂I ∂Iᵀ`, with `∂I/∂ξ_i = a φᵀ B_i` as in [`super::tile`] and
-//! `∂I/∂S = a`. Eliminating S at each wall point by the Schur complement leaves for the poses
+//! Each pixel reads `I = a S(x(ξ)) + b + n` with the wall's texture S (as a pixel sees it, averaged
+//! over its square) unknown, and n Gaussian with variance σ². Parameters are the poses' ξ,
+//! exposures and S at every wall point. The Fisher information of one observation is `σ⁻² ∂I ∂Iᵀ`,
+//! with `∂I/∂ξ_i = a φᵀ B_i` as in [`super::tile`] and `∂I/∂S = a`. Eliminating S at each wall
+//! point by the Schur complement leaves for the poses
 //!
 //! `J_ij = σ⁻² Σ_x (w_i δ_ij − w_i w_j / Σ_k w_k) B_iᵀ φ φᵀ B_j`,   `w_i = q_i a_i²`,
 //!
-//! with q the pixels per wall sample: the normal matrix of the estimator, but with the slopes of the true texture. Its
-//! null space is the gauge, fixed at the first frame. `cov(ξ̂) ⪰ J⁻¹` for any unbiased estimate, and with the prior's
-//! information added the Bayesian bound (van Trees) for any estimate at all.
+//! with q the pixels per wall sample: the normal matrix of the estimator, but with the slopes of
+//! the true texture. Its null space is the gauge, fixed at the first frame. `cov(ξ̂) ⪰ J⁻¹` for any
+//! unbiased estimate, and with the prior's information added the Bayesian bound (van Trees) for any
+//! estimate at all.
 //!
 //! # What can be reached
 //!
-//! This bound takes the slopes of the texture for known, and an estimator has them from the same pixels. The same with the texture
-//! integrated out, as a Gaussian process with the wall's own spectrum, is derived in [`super::unknown_texture`]: M of a tile that N
-//! frames see is left with a share of its part that belongs to displacements. On faint walls the share is the less the more noise there is;
-//! on sharp walls, because of aliasing, the less the *less* noise there is. An estimator that knows no more of the wall than its spectrum
-//! cannot undercut it; one that knows more, as that edges are straight, can. `benches/reach.py` computes the same share on its own.
+//! This bound takes the slopes of the texture for known, and an estimator has them from the same
+//! pixels. The same with the texture integrated out, as a Gaussian process with the wall's own
+//! spectrum, is derived in [`super::unknown_texture`]: M of a tile that N frames see is left with a
+//! share of its part that belongs to displacements. On faint walls the share is the less the more
+//! noise there is; on sharp walls, because of aliasing, the less the *less* noise there is. An
+//! estimator that knows no more of the wall than its spectrum cannot undercut it; one that knows
+//! more, as that edges are straight, can. `benches/reach.py` computes the same share on its own.
 //!
 //! # How exact it is
 //!
-//! Slopes are differences over an eighth of a pixel to each side of frames with 4 × 4 times the pixels, interpolated by a cubic. For the
-//! spectrum of bricks that misses 6 % of their information, of concrete 2.5 %, so both bounds are too large by half of that.
+//! Slopes are differences over an eighth of a pixel to each side of frames with 4 × 4 times the
+//! pixels, interpolated by a cubic. For the spectrum of bricks that misses 6 % of their
+//! information, of concrete 2.5 %, so both bounds are too large by half of that.
 //!
-//! Source: C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection, Estimation, and Modulation Theory", 1968.
+//! Source: C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection, Estimation, and
+//! Modulation Theory", 1968.
 
 use super::calibration::{Calibration, Kappa};
 use super::covariance::Covariances;
@@ -45,7 +51,8 @@ use std::borrow::Cow;
 
 /// Times that the frames of the bound have as many pixels along each axis.
 pub const FINER: u32 = 4;
-/// Wall samples per fine pixel: slopes of the texture are differences over an eighth of a pixel to each side.
+/// Wall samples per fine pixel: slopes of the texture are differences over an eighth of a pixel to
+/// each side.
 const DENSITY: f64 = 2.0;
 
 /// Covariances that no estimate of the true poses undercuts.
@@ -62,8 +69,8 @@ pub struct PoseBounds {
 /// The bounds for a survey that has true poses.
 ///
 /// `fine` are its frames without noise and with [`FINER`] times as many pixels along each axis: the
-/// slopes of what a pixel sees can only be had from finer pixels. `noise_grey`: σ of a pixel, grey levels; `texture`: what can be
-/// known of the wall's.
+/// slopes of what a pixel sees can only be had from finer pixels. `noise_grey`: σ of a pixel, grey
+/// levels; `texture`: what can be known of the wall's.
 ///
 /// # Errors
 /// [`RefineError`]; [`RefineError::NoOverlap`] for a survey without true poses, too.
@@ -173,8 +180,8 @@ fn of_pose(block: &Block) -> Block {
     pose
 }
 
-/// The camera of frames with pixels [`FINER`] times as fine, each averaged with its neighbours to the right and below: pixel
-/// `(u', v')` is centred at `(u'/FINER, v'/FINER)` of the camera's own.
+/// The camera of frames with pixels [`FINER`] times as fine, each averaged with its neighbours to
+/// the right and below: pixel `(u', v')` is centred at `(u'/FINER, v'/FINER)` of the camera's own.
 fn finer_camera(camera: &Camera) -> Camera {
     let scale = f64::from(FINER);
     Camera {

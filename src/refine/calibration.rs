@@ -1,18 +1,21 @@
 //! Self-calibration: what all frames have in common and nobody has measured well enough.
 //!
-//! The shared unknowns are deviations from what was given, `κ = (ln f, cx, cy, k1, k2, ln r, τ_x, τ_z, o_x, o_z, ρ)`.
+//! The shared unknowns are deviations from what was given,
+//! `κ = (ln f, cx, cy, k1, k2, ln r, τ_x, τ_z, o_x, o_z, ρ)`.
 //!
-//! - Focal length (fx and fy alike), principal point and distortion enter through the rays, so pixels see them
-//!   ([`crate::camera::Camera::intrinsics_jacobian`]).
-//! - Pictures stay as they are when the radius and all positions grow together. So poses are estimated in the tunnel of the
-//!   radius given, and the radius is `exp(ln r)` times that: only the prior, which is in metres, sees it.
-//! - Pictures show how the cameras stand in the tunnel, whatever frame the initial poses are in. So where that frame
-//!   has the axis is seen by the prior alone, too: two tilts τ and two offsets o (turning about the axis and shifting along
-//!   it are the gauge).
+//! - Focal length (fx and fy alike), principal point and distortion enter through the rays, so
+//!   pixels see them ([`crate::camera::Camera::intrinsics_jacobian`]).
+//! - Pictures stay as they are when the radius and all positions grow together. So poses are
+//!   estimated in the tunnel of the radius given, and the radius is `exp(ln r)` times that: only
+//!   the prior, which is in metres, sees it.
+//! - Pictures show how the cameras stand in the tunnel, whatever frame the initial poses are in. So
+//!   where that frame has the axis is seen by the prior alone, too: two tilts τ and two offsets o
+//!   (turning about the axis and shifting along it are the gauge).
 //!
-//! The latter five are [`Metric`]. The last, ρ, is the time from reading a frame's first row to reading its last; it is free only to
-//! ask whether the frames want another one ([`super::rows`]). Every unknown has a Gaussian prior around 0; one that the data leave nearly as uncertain
-//! as that is refused ([`super::observed`]).
+//! The latter five are [`Metric`]. The last, ρ, is the time from reading a frame's first row to
+//! reading its last; it is free only to ask whether the frames want another one ([`super::rows`]).
+//! Every unknown has a Gaussian prior around 0; one that the data leave nearly as uncertain as that
+//! is refused ([`super::observed`]).
 
 use crate::camera::Camera;
 use crate::survey::{CalibrateSection, CalibrationGroup};
@@ -101,9 +104,9 @@ impl Calibration {
         self
     }
 
-    /// The noise of the initial poses as long as radius and axis are not known better than given: `σ² + δ²`, with δ how far
-    /// they may carry a pose (or a step, where errors add up) off. `arm_m`: length of the longest step, or distance of
-    /// the farthest pose from the middle.
+    /// The noise of the initial poses as long as radius and axis are not known better than given:
+    /// `σ² + δ²`, with δ how far they may carry a pose (or a step, where errors add up) off.
+    /// `arm_m`: length of the longest step, or distance of the farthest pose from the middle.
     pub fn widened(&self, jitter: &Jitter, arm_m: f64) -> Jitter {
         let sigma = |k: usize| if self.free[k] { self.sigma[k] } else { 0.0 };
         let tilt = sigma(6).hypot(sigma(7));
@@ -204,13 +207,15 @@ impl Metric {
 
     /// `J` with `exp(J δτ) R_G` the turn after a change δτ of the tilt.
     pub fn tilt_jacobian(&self) -> Matrix3<f64> {
-        // The left Jacobian is the right one of the opposite rotation; it is singular only at a whole turn.
+        // The left Jacobian is the right one of the opposite rotation; it is singular only at a
+        // whole turn.
         so3::right_jacobian_inverse(&-self.tilt)
             .try_inverse()
             .unwrap_or_else(Matrix3::identity)
     }
 
-    /// The tunnel's axis in the initial poses' frame: its point at the middle of the poses, metres, and its direction.
+    /// The tunnel's axis in the initial poses' frame: its point at the middle of the poses, metres,
+    /// and its direction.
     pub fn axis(&self) -> (Vector3<f64>, Vector3<f64>) {
         let back = self.turn.inverse();
         (self.pivot - back * self.offset, back * Vector3::y())

@@ -10,12 +10,12 @@ use super::problem::{ProblemError, Scene};
 use super::shared::SharedBlock;
 use super::strain::{Strain, strained, strains};
 
-/// Share of frames that may fit nowhere before nothing is believed about what all frames share: the others may fit each
-/// other in wrong places.
+/// Share of frames that may fit nowhere before nothing is believed about what all frames share: the
+/// others may fit each other in wrong places.
 const MOST_MISFITS: f64 = 0.1;
-/// 1-σ of the median frame on the wall, pixels, beyond which nothing is believed about what all frames share. Frames tied so
-/// loosely can tilt and shift together, the camera with them, for less than aliasing does; that is more than the
-/// covariance knows of.
+/// 1-σ of the median frame on the wall, pixels, beyond which nothing is believed about what all
+/// frames share. Frames tied so loosely can tilt and shift together, the camera with them, for less
+/// than aliasing does; that is more than the covariance knows of.
 const MOST_LOOSE_PX: f64 = 0.2;
 
 /// The covariance of a solution.
@@ -33,7 +33,8 @@ impl Certainty {
     /// At a solution, for the free unknowns of `calibration`; `scene`: with the solution's own κ.
     ///
     /// # Errors
-    /// [`ProblemError::Factor`] if shared unknowns were estimated and the poses' normal matrix is singular.
+    /// [`ProblemError::Factor`] if shared unknowns were estimated and the poses' normal matrix is
+    /// singular.
     pub fn at(
         scene: &Scene,
         solution: &Solution,
@@ -91,8 +92,9 @@ impl Certainty {
         doubts
     }
 
-    /// The shared unknowns that the data do not observe: all, where too many frames do not fit the others, or only under strain, or
-    /// where all are tied too loosely. `scene`: with the solution's own κ.
+    /// The shared unknowns that the data do not observe: all, where too many frames do not fit the
+    /// others, or only under strain, or where all are tied too loosely. `scene`: with the
+    /// solution's own κ.
     pub fn refused(
         &self,
         scene: &Scene,

@@ -1,19 +1,21 @@
 //! Choosing wall samples by information.
 //!
-//! Most of a wall says little about poses: a tile's share of the normal matrix goes with the squared slopes of its
-//! texture, and edges are few. So a solve that only has to come close may do with the most informative tiles: as many as
-//! hold a given share of the information. They are chosen block by block, so that every frame keeps tiles all over its
-//! picture, as all six unknowns of its pose need; and in either direction, by
-//! `Σ (∂S/∂s)² / Σ_block + Σ (∂S/∂h)² / Σ_block`, lest the joints between the courses of bricks, longer than those
-//! across, be all that is left.
+//! Most of a wall says little about poses: a tile's share of the normal matrix goes with the
+//! squared slopes of its texture, and edges are few. So a solve that only has to come close may do
+//! with the most informative tiles: as many as hold a given share of the information. They are
+//! chosen block by block, so that every frame keeps tiles all over its picture, as all six unknowns
+//! of its pose need; and in either direction, by `Σ (∂S/∂s)² / Σ_block + Σ (∂S/∂h)² / Σ_block`,
+//! lest the joints between the courses of bricks, longer than those across, be all that is left.
 //!
-//! Not for the last solve: with a share f of the information its error would be more than the `1/√f` times as large that
-//! counting noise alone would have it. Frames also differ in blur and interpolation, which leaves residuals that go with
-//! the texture's curvature; their products with its slope, `S″ S′ = (S′²)′/2`, cancel over the whole of a wall, but not at
-//! the seams of a patchwork.
+//! Not for the last solve: with a share f of the information its error would be more than the
+//! `1/√f` times as large that counting noise alone would have it. Frames also differ in blur and
+//! interpolation, which leaves residuals that go with the texture's curvature; their products with
+//! its slope, `S″ S′ = (S′²)′/2`, cancel over the whole of a wall, but not at the seams of a
+//! patchwork.
 //!
-//! The slopes are those in one picture, of the frame that shows most of the tile. Its noise does not bias the solve, being
-//! as likely to have either sign; it makes tiles look more alike than they are, so that more of them are kept.
+//! The slopes are those in one picture, of the frame that shows most of the tile. Its noise does
+//! not bias the solve, being as likely to have either sign; it makes tiles look more alike than
+//! they are, so that more of them are kept.
 
 use super::grid::{TilePoints, WallGrid};
 use super::tile::slope_squares;

@@ -1,9 +1,10 @@
 //! Do frames that show the same wall show the same thing?
 //!
-//! Gauss–Newton ends in a minimum, not always the right one; neighbours may agree with each other and not with the turn
-//! before. So once all frames are placed, every pair that overlaps is compared on the wall: local contrast of the one
-//! against that of the other. Right pairs correlate as well as the texture lets them, wrong ones do not, and a low
-//! residual fused from several frames cannot hide it.
+//! Gauss–Newton ends in a minimum, not always the right one; neighbours may agree with each other
+//! and not with the turn before. So once all frames are placed, every pair that overlaps is
+//! compared on the wall: local contrast of the one against that of the other. Right pairs correlate
+//! as well as the texture lets them, wrong ones do not, and a low residual fused from several
+//! frames cannot hide it.
 
 use super::doubt::Doubt;
 use super::overlaps::{Batch, Overlaps};
@@ -20,7 +21,8 @@ use std::ops::Range;
 const LEAST_OVERLAP: f64 = 0.03;
 /// Correlation, noise aside, that a right pair reaches.
 const LEAST_QUALITY: f64 = 0.6;
-/// Share of what two frames share that must be left without what stands out of it, for the rest to speak for them.
+/// Share of what two frames share that must be left without what stands out of it, for the rest to
+/// speak for them.
 const LEAST_LEFT: f64 = 0.5;
 /// One above this is not asked for that of most samples.
 const SURE_QUALITY: f64 = 0.85;
@@ -42,19 +44,20 @@ pub struct Pair {
     pub wrong: bool,
     /// Correlation of local contrast there, noise aside.
     pub quality: f64,
-    /// Variance of the earlier frame's finest detail over the later one's there, gains removed; None where noise
-    /// drowns it.
+    /// Variance of the earlier frame's finest detail over the later one's there, gains removed;
+    /// None where noise drowns it.
     pub sharpness: Option<f64>,
 }
 
-/// Compares those of a run of frames that are believed and overlap: at pyramid level `level`, in windows that hold a brick or two, and
-/// in finest detail.
+/// Compares those of a run of frames that are believed and overlap: at pyramid level `level`, in
+/// windows that hold a brick or two, and in finest detail.
 ///
-/// The first tells whether they show the same wall; finest detail only where the first is drowned by noise, for of a pattern it is
-/// edges alone, and they coincide wherever the pattern does, whatever is between them. Where two frames do not show the same wall,
-/// they are looked at once more without what stands out of it: water is dark in one and glints in the other, and on a faint wall
-/// a few such patches in a strip are all that is compared. Two frames contradict unless the wall between agrees; where little of it
-/// is left they neither agree nor contradict.
+/// The first tells whether they show the same wall; finest detail only where the first is drowned
+/// by noise, for of a pattern it is edges alone, and they coincide wherever the pattern does,
+/// whatever is between them. Where two frames do not show the same wall, they are looked at once
+/// more without what stands out of it: water is dark in one and glints in the other, and on a faint
+/// wall a few such patches in a strip are all that is compared. Two frames contradict unless the
+/// wall between agrees; where little of it is left they neither agree nor contradict.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -260,8 +263,8 @@ fn compare(
         .collect()
 }
 
-/// Correlation of the textures behind the noise, of all samples or of most, whichever is greater: a few glints
-/// outweigh a faint wall.
+/// Correlation of the textures behind the noise, of all samples or of most, whichever is greater: a
+/// few glints outweigh a faint wall.
 fn quality(likeness: &Likeness, shared: &[(f32, f32)]) -> Option<f64> {
     let of_all = likeness.match_quality()?;
     if of_all > SURE_QUALITY {
@@ -273,8 +276,9 @@ fn quality(likeness: &Likeness, shared: &[(f32, f32)]) -> Option<f64> {
 
 /// The frames that contradict the rest, worst first.
 ///
-/// Frames are taken out one by one, always the one with the largest share of its overlap in pairs that do not
-/// match, until no frame contradicts the others by more than a little. Pairs count by their samples.
+/// Frames are taken out one by one, always the one with the largest share of its overlap in pairs
+/// that do not match, until no frame contradicts the others by more than a little. Pairs count by
+/// their samples.
 pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
     let (mut all, mut bad) = (vec![0.0; frames], vec![0.0; frames]);
     let mut of_frame: Vec<Vec<usize>> = vec![Vec::new(); frames];

@@ -1,34 +1,42 @@
 //! How sure the estimate is.
 //!
-//! The estimate is where the score g, the gradient of the cost, is zero. Errors of the pixels that add ε to it there move the estimate by
-//! `−D⁻¹ ε`, D the derivative of the score; so its covariance is `D⁻¹ Q D⁻¹` with Q the variance of ε.
+//! The estimate is where the score g, the gradient of the cost, is zero. Errors of the pixels that
+//! add ε to it there move the estimate by `−D⁻¹ ε`, D the derivative of the score; so its
+//! covariance is `D⁻¹ Q D⁻¹` with Q the variance of ε.
 //!
-//! **D is not the normal matrix H.** Gauss–Newton weighs a residual by `ω = ψ(e)/e`, but as it grows its weight fades: a score
-//! `Σ ψ(e) ∂e` has the derivative `Σ ψ'(e) ∂e ∂eᵀ`, and ψ' is less than ω (0.89 of it in the mean, for Gaussian residuals). Where
-//! slopes are not quite those of the wall, as on one that is faint or very sharp, that makes a difference, too. What D is for poses
+//! **D is not the normal matrix H.** Gauss–Newton weighs a residual by `ω = ψ(e)/e`, but as it
+//! grows its weight fades: a score `Σ ψ(e) ∂e` has the derivative `Σ ψ'(e) ∂e ∂eᵀ`, and ψ' is less
+//! than ω (0.89 of it in the mean, for Gaussian residuals). Where slopes are not quite those of the
+//! wall, as on one that is faint or very sharp, that makes a difference, too. What D is for poses
 //! the solver sees from step to step: `D = κ H`, with κ the [`SolveRecord::curvature`], about 0.9.
 //!
-//! **Q** is told by the scatter of the gradients of the parts of the cost, `V = Σ_b g_b g_bᵀ` over blocks
-//! b of the wall (32 × 32 pixels: errors of neighbouring samples hang together, those of blocks hardly), whatever the residuals are like, over κ², plus
-//! the prior's own information P. Were the residuals independent Gaussian noise of the assumed size, c would be 0.97. They are not quite:
-//! where the wall is steep, aliasing and interpolation add errors that depend on how pixels happen to fall, and hang together more or
-//! less than noise does. With one factor for all poses, and J the normal matrix of the poses with the exposures eliminated,
+//! **Q** is told by the scatter of the gradients of the parts of the cost, `V = Σ_b g_b g_bᵀ` over
+//! blocks b of the wall (32 × 32 pixels: errors of neighbouring samples hang together, those of
+//! blocks hardly), whatever the residuals are like, over κ², plus the prior's own information P.
+//! Were the residuals independent Gaussian noise of the assumed size, c would be 0.97. They are not
+//! quite: where the wall is steep, aliasing and interpolation add errors that depend on how pixels
+//! happen to fall, and hang together more or less than noise does. With one factor for all poses,
+//! and J the normal matrix of the poses with the exposures eliminated,
 //!
-//! `Σ = c J⁻¹`,   `c = tr(J⁻¹ E Q Eᵀ) / freedoms`,   `Q = V/κ² + P`,   `J = H_pp − H_pe H_ee⁻¹ H_ep`,   `E = (I, −H_pe H_ee⁻¹)`,
+//! `Σ = c J⁻¹`, `c = tr(J⁻¹ E Q Eᵀ) / freedoms`, `Q = V/κ² + P`, `J = H_pp − H_pe H_ee⁻¹ H_ep`,
+//! `E = (I, −H_pe H_ee⁻¹)`,
 //!
-//! the freedoms being six of each frame less those of the gauge. The exposures are left out since they err in a way of their own: where
-//! a wall is sharp, a frame that sees it from aslant is blurred, which passes for a lower gain, block after block, and says nothing of
-//! its pose. As `H⁻¹ = Eᵀ J⁻¹ E + diag(0, H_ee⁻¹)`,
+//! the freedoms being six of each frame less those of the gauge. The exposures are left out since
+//! they err in a way of their own: where a wall is sharp, a frame that sees it from aslant is
+//! blurred, which passes for a lower gain, block after block, and says nothing of its pose. As
+//! `H⁻¹ = Eᵀ J⁻¹ E + diag(0, H_ee⁻¹)`,
 //!
 //! `tr(J⁻¹ E Q Eᵀ) = tr(H⁻¹ Q) − tr(H_ee⁻¹ Q_ee)`,
 //!
-//! for which only those blocks of `H⁻¹` and `H_ee⁻¹` are needed where H itself has blocks ([`super::selected_inverse`]). And `J⁻¹` is the
-//! poses' part of `H⁻¹`. c is about 0.35 on sharp bricks, where aliasing, which every sample's weight counts as if it were by itself, cancels
-//! over a block, and 0.7 on noisy walls of low contrast.
+//! for which only those blocks of `H⁻¹` and `H_ee⁻¹` are needed where H itself has blocks
+//! ([`super::selected_inverse`]). And `J⁻¹` is the poses' part of `H⁻¹`. c is about 0.35 on sharp
+//! bricks, where aliasing, which every sample's weight counts as if it were by itself, cancels over
+//! a block, and 0.7 on noisy walls of low contrast.
 //!
-//! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard conditions", 1967 (`D⁻¹ Q D⁻¹`);
-//! F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw, W. A. Stahel, "Robust Statistics: The Approach Based on Influence
-//! Functions", 1986, 6.3 (ψ' in D); R. W. M. Wedderburn, "Quasi-likelihood functions", Biometrika 61(3), 1974 (one factor for all).
+//! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard
+//! conditions", 1967 (`D⁻¹ Q D⁻¹`); F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw, W. A. Stahel,
+//! "Robust Statistics: The Approach Based on Influence Functions", 1986, 6.3 (ψ' in D); R. W. M.
+//! Wedderburn, "Quasi-likelihood functions", Biometrika 61(3), 1974 (one factor for all).
 //!
 //! [`SolveRecord::curvature`]: super::SolveRecord::curvature
 
@@ -59,20 +67,24 @@ pub struct FrameSigma {
     /// Translation, root mean square over the three axes, metres.
     #[serde(deserialize_with = "nan_if_null")]
     pub translation_m: f64,
-    /// Position on the wall of what the frame shows: root mean square over the picture ([`Camera::rays_across`]), metres.
+    /// Position on the wall of what the frame shows: root mean square over the picture
+    /// ([`Camera::rays_across`]), metres.
     #[serde(deserialize_with = "nan_if_null")]
     pub wall_m: f64,
-    /// The same in pixels of the frame at its middle, as [`crate::evaluate::WallError`] counts them.
+    /// The same in pixels of the frame at its middle, as [`crate::evaluate::WallError`] counts
+    /// them.
     #[serde(deserialize_with = "nan_if_null")]
     pub wall_px: f64,
 }
 
-/// Covariances of the poses' steps `ξ = (ω, ρ)` ([`crate::trajectory::Pose::retract`]): rad², rad·m, m².
+/// Covariances of the poses' steps `ξ = (ω, ρ)` ([`crate::trajectory::Pose::retract`]): rad²,
+/// rad·m, m².
 #[derive(Clone, Debug)]
 pub struct Covariances {
     /// Of every frame, all others marginalised.
     pub frames: Vec<Matrix6<f64>>,
-    /// Of every frame (rows) with the next (columns); not a number where the two have nothing in common.
+    /// Of every frame (rows) with the next (columns); not a number where the two have nothing in
+    /// common.
     pub next: Vec<Matrix6<f64>>,
     /// The factor c.
     pub variance_factor: f64,
@@ -110,8 +122,8 @@ impl Covariances {
         self
     }
 
-    /// The covariances after all poses have moved along the gauge: positions turn with it, `ρ → R_n ρ`; rotations are in
-    /// the cameras' own axes.
+    /// The covariances after all poses have moved along the gauge: positions turn with it,
+    /// `ρ → R_n ρ`; rotations are in the cameras' own axes.
     pub(super) fn moved(mut self, motion: &GaugeMotion) -> Self {
         let turn = motion.rotation();
         let mut t = Matrix6::identity();
@@ -125,9 +137,10 @@ impl Covariances {
 
     /// As `covariance.csv`: one line per frame and one per pair of neighbours.
     ///
-    /// Columns: `frame_a`, `frame_b` (the same for a frame by itself, the next for a pair), 1-σ of the frame on the wall
-    /// in mm (empty for pairs), then the 36 elements row by row, rows `ξ_a` and columns `ξ_b` with
-    /// `ξ = (ω_x, ω_y, ω_z, ρ_x, ρ_y, ρ_z)`, rad and m, in the convention `R ← R exp(ω)`, `t ← t + ρ`.
+    /// Columns: `frame_a`, `frame_b` (the same for a frame by itself, the next for a pair), 1-σ of
+    /// the frame on the wall in mm (empty for pairs), then the 36 elements row by row, rows `ξ_a`
+    /// and columns `ξ_b` with `ξ = (ω_x, ω_y, ω_z, ρ_x, ρ_y, ρ_z)`, rad and m, in the convention
+    /// `R ← R exp(ω)`, `t ← t + ρ`.
     pub fn csv(&self, sigmas: &[FrameSigma]) -> String {
         let names = ["wx", "wy", "wz", "x", "y", "z"];
         let mut text = "frame_a,frame_b,wall_sigma_mm".to_owned();
@@ -157,8 +170,8 @@ impl Covariances {
     }
 }
 
-/// The covariances at a solution: `normal` with `tied` freedoms of the gauge tied, `scatter` V of the pixels, `prior` P, all on
-/// `pattern`; `curvature`: κ.
+/// The covariances at a solution: `normal` with `tied` freedoms of the gauge tied, `scatter` V of
+/// the pixels, `prior` P, all on `pattern`; `curvature`: κ.
 ///
 /// # Errors
 /// [`FactorError`] if the normal matrix is singular.
@@ -232,8 +245,9 @@ fn exposures_alone(pattern: &Pattern, normal: &NormalEquations) -> NormalEquatio
 
 /// Reads a pose covariance as σ of rotation, translation and wall position.
 ///
-/// `shared`: W of the frame and `Σ_κ`, where they were estimated. As `ξ` moves by `−W κ` with κ, their covariance is `−W Σ_κ`,
-/// and what a pixel shows, `A ξ + C κ`, is more certain than the pose alone.
+/// `shared`: W of the frame and `Σ_κ`, where they were estimated. As `ξ` moves by `−W κ` with κ,
+/// their covariance is `−W Σ_κ`, and what a pixel shows, `A ξ + C κ`, is more certain than the pose
+/// alone.
 pub fn frame_sigma(
     surface: &dyn Surface,
     camera: &Camera,
@@ -295,8 +309,9 @@ mod tests {
         assert_eq!(lines[0][4], "wx_wy");
     }
 
-    /// If the scatter is what the model says, so is the covariance; twice the scatter, twice the covariance; half the curvature,
-    /// twice the error by pixels; and what the exposures scatter more is not the poses'.
+    /// If the scatter is what the model says, so is the covariance; twice the scatter, twice the
+    /// covariance; half the curvature, twice the error by pixels; and what the exposures scatter
+    /// more is not the poses'.
     #[test]
     fn the_factor_follows_scatter_and_curvature() {
         let pattern = Pattern::new(3, [(0, 1), (1, 2)]);
@@ -362,8 +377,8 @@ mod tests {
         assert!((found.variance_factor / expected - 1.0).abs() < 1e-9);
     }
 
-    /// A camera that may be off by a millimetre along the tunnel shows all of the wall a millimetre off; how many pixels that is goes
-    /// by the middle, even where the corners are far away.
+    /// A camera that may be off by a millimetre along the tunnel shows all of the wall a millimetre
+    /// off; how many pixels that is goes by the middle, even where the corners are far away.
     #[test]
     fn pixels_on_the_wall_are_those_of_the_middle() {
         let circle = crate::surface::Circle::new(3.0).unwrap();

@@ -27,7 +27,8 @@ pub enum CovarianceError {
     },
 }
 
-/// The covariances of the frames ([`super::Covariances::frames`]) in a file that [`super::Covariances::csv`] has written.
+/// The covariances of the frames ([`super::Covariances::frames`]) in a file that
+/// [`super::Covariances::csv`] has written.
 ///
 /// # Errors
 /// [`CovarianceError`]; other frames than 0 to `frames − 1` in their order.

@@ -1,7 +1,7 @@
 //! The wall in stretches along the tunnel, each with the frames that see it.
 //!
-//! The wall is worked through stretch by stretch, so that memory for samples and frames does not grow with the
-//! tunnel's length.
+//! The wall is worked through stretch by stretch, so that memory for samples and frames does not
+//! grow with the tunnel's length.
 
 use super::choice::most_informative;
 use super::estimate::FrameEstimate;
@@ -19,10 +19,11 @@ use std::sync::Arc;
 
 /// Observations of a stretch: enough work for all threads, little enough to hold in memory.
 const STRETCH_OBSERVATIONS: f64 = 1e6;
-/// Frames of a stretch, apart from those that reach over from its neighbours, or as many as there is room for: at coarse
-/// levels so many observations would be more.
+/// Frames of a stretch, apart from those that reach over from its neighbours, or as many as there
+/// is room for: at coarse levels so many observations would be more.
 const STRETCH_FRAMES: f64 = 256.0;
-/// Observations whose visibility is kept from one linearisation to the next; beyond, it is found anew each time.
+/// Observations whose visibility is kept from one linearisation to the next; beyond, it is found
+/// anew each time.
 const KEPT_OBSERVATIONS: usize = 16_000_000;
 
 /// A stretch of the wall that is worked on at once.
@@ -66,7 +67,8 @@ pub struct Coverage<'a> {
     hidden: Hidden<'a>,
     /// Share of the information that the tiles compared hold.
     information: f64,
-    /// Where the participants stood when the samples were chosen; None for those that are not compared.
+    /// Where the participants stood when the samples were chosen; None for those that are not
+    /// compared.
     placed: Vec<Option<Placed>>,
     stretches: Vec<Stretch>,
     kept: Vec<Option<Visibility>>,
@@ -76,13 +78,14 @@ pub struct Coverage<'a> {
     pub tiles: usize,
     /// Number of tiles there are.
     pub all_tiles: usize,
-    /// Participants that see wall in common: pairs in ascending order, each once, a frame with itself included.
+    /// Participants that see wall in common: pairs in ascending order, each once, a frame with
+    /// itself included.
     pub pairs: Vec<(usize, usize)>,
 }
 
 impl<'a> Coverage<'a> {
-    /// Finds the tiles of all participants' frames, and chooses those that hold a share `information` of what they tell if
-    /// it is less than 1.
+    /// Finds the tiles of all participants' frames, and chooses those that hold a share
+    /// `information` of what they tell if it is less than 1.
     ///
     /// # Errors
     /// [`FrameError`] of a picture that is needed to choose.
@@ -136,7 +139,8 @@ impl<'a> Coverage<'a> {
         self.stretches.len()
     }
 
-    /// The participants whose frames see some of a stretch; a [`Visibility`]'s frames are places in this list.
+    /// The participants whose frames see some of a stretch; a [`Visibility`]'s frames are places in
+    /// this list.
     pub fn frames(&self, stretch: usize) -> &[usize] {
         &self.stretches[stretch].frames
     }

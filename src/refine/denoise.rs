@@ -1,29 +1,35 @@
 //! What of the fused texture is texture and not noise.
 //!
-//! The derivative of a residual takes the slopes of the fused texture S, and S is noisy. On a wall of low contrast most
-//! of a slope between neighbouring samples is noise: the score `Σ e φ` then picks up noise times noise. So at full size
-//! slopes are taken of the texture as it most likely is, given what is typical of the wall.
+//! The derivative of a residual takes the slopes of the fused texture S, and S is noisy. On a wall
+//! of low contrast most of a slope between neighbouring samples is noise: the score `Σ e φ` then
+//! picks up noise times noise. So at full size slopes are taken of the texture as it most likely
+//! is, given what is typical of the wall.
 //!
-//! A tile of S (10 × 10 samples with its ring) is written in polynomials `p_k(s) p_l(h)`, orthonormal on the samples, so
-//! that a ramp is one of them and does not bend at the tile's border. A coefficient `c_kl` has the noise variance
-//! `n_kl` and, over many tiles of the wall, the mean square `m_kl`. The share
+//! A tile of S (10 × 10 samples with its ring) is written in polynomials `p_k(s) p_l(h)`,
+//! orthonormal on the samples, so that a ramp is one of them and does not bend at the tile's
+//! border. A coefficient `c_kl` has the noise variance `n_kl` and, over many tiles of the wall, the
+//! mean square `m_kl`. The share
 //!
 //! `W_kl = max(0, 1 − n_kl/m_kl)`
 //!
-//! of its square is texture, and `W_kl c_kl` is the best linear estimate of it. Let `φ̂` be the slopes of what is left: the
-//! mean of `φ̂φ̂ᵀ` is that of `φ̂φᵀ` with the true slopes φ, the derivative of the score; so M needs no correction for
-//! the noise in it.
+//! of its square is texture, and `W_kl c_kl` is the best linear estimate of it. Let `φ̂` be the
+//! slopes of what is left: the mean of `φ̂φ̂ᵀ` is that of `φ̂φᵀ` with the true slopes φ, the
+//! derivative of the score; so M needs no correction for the noise in it.
 //!
-//! `S = Σ q_i a_i² z_i / Σ q_i a_i²`, and the noise of z_i has the variance `σ²/a_i²` and, along each axis, the autocorrelation
-//! `β(d)/β(0)` of the interpolation's kernel ([`Interpolation::autocorrelation`]), d pixels apart. With `d_i = √q_i` pixels from sample to
+//! `S = Σ q_i a_i² z_i / Σ q_i a_i²`, and the noise of z_i has the variance `σ²/a_i²` and, along
+//! each axis, the autocorrelation `β(d)/β(0)` of the interpolation's kernel
+//! ([`Interpolation::autocorrelation`]), d pixels apart. With `d_i = √q_i` pixels from sample to
 //! sample of frame i, on average over the tiles,
 //!
-//! `n_kl = σ² ⟨Σ_i u_i ν_k(d_i) ν_l(d_i)⟩`,  `u_i = (q_i a_i)² / (Σ_j q_j a_j²)²`,  `ν_k(d) = Σ_ij p_k(i) p_k(j) β(|i − j| d)/β(0)`.
+//! `n_kl = σ² ⟨Σ_i u_i ν_k(d_i) ν_l(d_i)⟩`, `u_i = (q_i a_i)² / (Σ_j q_j a_j²)²`,
+//! `ν_k(d) = Σ_ij p_k(i) p_k(j) β(|i − j| d)/β(0)`.
 //!
-//! From aslant a frame has fewer pixels to a sample, whose noise hangs together the more, and more of it is in the slopes.
+//! From aslant a frame has fewer pixels to a sample, whose noise hangs together the more, and more
+//! of it is in the slopes.
 //!
-//! Source: N. Wiener, "Extrapolation, Interpolation, and Smoothing of Stationary Time Series", 1949; J. P. Gram, "Ueber die
-//! Entwickelung reeller Functionen in Reihen mittelst der Methode der kleinsten Quadrate", 1883 (the polynomials).
+//! Source: N. Wiener, "Extrapolation, Interpolation, and Smoothing of Stationary Time Series",
+//! 1949; J. P. Gram, "Ueber die Entwickelung reeller Functionen in Reihen mittelst der Methode der
+//! kleinsten Quadrate", 1883 (the polynomials).
 
 use super::grid::{Plane, SIDE, ZERO};
 use super::interpolation::Interpolation;
@@ -217,8 +223,8 @@ mod tests {
         );
     }
 
-    /// Ramps of all slopes in noise that does not correlate: of each filtered tile, the slope is nearer to the truth than of
-    /// the noisy one, and `φ̂²` is on average `φ̂φ`.
+    /// Ramps of all slopes in noise that does not correlate: of each filtered tile, the slope is
+    /// nearer to the truth than of the noisy one, and `φ̂²` is on average `φ̂φ`.
     #[test]
     fn slopes_are_nearer_to_the_truth_and_their_squares_unbiased() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);

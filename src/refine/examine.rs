@@ -11,9 +11,11 @@ use rayon::prelude::*;
 const RUN: usize = 64;
 /// Spread of grey values below which a frame shows nothing, grey levels at the coarsest level.
 const LEAST_CONTRAST: f64 = 0.75;
-/// Root mean square difference below which two frames are the same picture, grey levels at the coarsest level.
+/// Root mean square difference below which two frames are the same picture, grey levels at the
+/// coarsest level.
 const SAME_PICTURE: f64 = 0.1;
-/// Movement between the initial poses beyond which two equal pictures cannot both be right, pixels of full size.
+/// Movement between the initial poses beyond which two equal pictures cannot both be right, pixels
+/// of full size.
 const MOVED_PX: f64 = 20.0;
 
 /// What the first look finds.

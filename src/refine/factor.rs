@@ -23,8 +23,8 @@ pub enum FactorError {
 
 /// The symbolic factorisation of a pattern: made once, used for every step.
 ///
-/// faer works sequentially here (`Par::Seq`): faster at these sizes, and its parallel sums would depend on
-/// the number of threads.
+/// faer works sequentially here (`Par::Seq`): faster at these sizes, and its parallel sums would
+/// depend on the number of threads.
 #[derive(Debug)]
 pub struct Symbolic {
     structure: SymbolicSparseColMat<usize>,
@@ -32,7 +32,8 @@ pub struct Symbolic {
 }
 
 impl Symbolic {
-    /// Analyses a pattern: fill-reducing order (approximate minimum degree), elimination tree, supernodes.
+    /// Analyses a pattern: fill-reducing order (approximate minimum degree), elimination tree,
+    /// supernodes.
     ///
     /// # Errors
     /// [`FactorError::Structure`].

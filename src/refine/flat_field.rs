@@ -1,19 +1,22 @@
 //! The camera's shading, from frames that see the same wall in different parts of the picture.
 //!
-//! The mean over all frames shows the lamp and the lens ([`Shading::of_mean`]) up to what is left of the wall's texture
-//! in it: enough to place frames. On a faint wall a shading that is wrong by a grey level is still steeper than the texture, and it is
-//! fixed to the camera: frames get displaced for it. Where frames overlap, the wall itself tells. For a tile x and a frame
-//! i that sees it at pixel `u_i(x)`, with z the mean value there by the present shading V, gain and bias,
+//! The mean over all frames shows the lamp and the lens ([`Shading::of_mean`]) up to what is left
+//! of the wall's texture in it: enough to place frames. On a faint wall a shading that is wrong by
+//! a grey level is still steeper than the texture, and it is fixed to the camera: frames get
+//! displaced for it. Where frames overlap, the wall itself tells. For a tile x and a frame i that
+//! sees it at pixel `u_i(x)`, with z the mean value there by the present shading V, gain and bias,
 //!
 //! `ln z_i(x) = s(x) + α_i + β_i/(a_i V z_i) + Σ_k c_k B_k(u_i(x)) + noise`,
 //!
-//! s the logarithm of the wall, α and β what is still wrong with the frame's gain and bias, and `exp(Σ c_k B_k)` what the shading
-//! lacks. Robust least squares (biweight, s eliminated) over all overlaps of a run of frames gives all of them at once.
+//! s the logarithm of the wall, α and β what is still wrong with the frame's gain and bias, and
+//! `exp(Σ c_k B_k)` what the shading lacks. Robust least squares (biweight, s eliminated) over all
+//! overlaps of a run of frames gives all of them at once.
 //!
 //! Only the shading is taken over; the solves that follow find the rest for themselves.
 //!
-//! Source: D. J. Fixsen, S. H. Moseley and R. G. Arendt, "Calibrating array detectors", Astrophysical Journal Supplement
-//! 128, 2000 (flat fields from pictures that show the same sky in different places).
+//! Source: D. J. Fixsen, S. H. Moseley and R. G. Arendt, "Calibrating array detectors",
+//! Astrophysical Journal Supplement 128, 2000 (flat fields from pictures that show the same sky in
+//! different places).
 
 use super::neighbourhood::Neighbourhood;
 use super::options::RefineOptions;
@@ -31,7 +34,8 @@ const TILES: usize = 1000;
 const RUN: usize = 100;
 /// Times that the shading is corrected with solves between, at the most.
 const ROUNDS: usize = 2;
-/// Steps of reweighting at the most: from equal weights it takes ten until glints weigh nothing, and three leave the shading 0.7 % off.
+/// Steps of reweighting at the most: from equal weights it takes ten until glints weigh nothing,
+/// and three leave the shading 0.7 % off.
 const STEPS: usize = 30;
 /// The reweighting has settled when the variance of the residuals changes by less than this share.
 const SETTLED: f64 = 0.01;
@@ -78,7 +82,8 @@ pub fn flatten(
     Ok(())
 }
 
-/// Corrects the shading by what the frames tell at their present poses; false if they find nothing wrong.
+/// Corrects the shading by what the frames tell at their present poses; false if they find nothing
+/// wrong.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -200,8 +205,8 @@ impl Sums {
 
     /// Adds a tile; `x`: the solution so far, `variance`: that of the residuals.
     ///
-    /// With `r_i` the rows, `y_i` the logarithms and w the weights: `N = Σ w r rᵀ − (Σ w r)(Σ w r)ᵀ/Σ w`, likewise the
-    /// right side.
+    /// With `r_i` the rows, `y_i` the logarithms and w the weights:
+    /// `N = Σ w r rᵀ − (Σ w r)(Σ w r)ᵀ/Σ w`, likewise the right side.
     fn add(&mut self, tile: &[Glimpse], x: &DVector<f64>, variance: f64) {
         let left: Vec<f64> = tile.iter().map(|glimpse| glimpse.left(x)).collect();
         let Agreement {
@@ -274,7 +279,8 @@ mod tests {
     use nalgebra::Vector2;
     use rand::{Rng, SeedableRng};
 
-    /// Two and a half turns past a wall in a light that depends on the pixel, and exposures that depend on the frame.
+    /// Two and a half turns past a wall in a light that depends on the pixel, and exposures that
+    /// depend on the frame.
     fn corrected(light: fn(f64, f64) -> f64) -> Option<impl Fn(f64, f64) -> f64> {
         let mut wall = TestWall::ring(waves);
         wall.poses = spiral(30, 0.05, 30f64.to_radians());
@@ -324,9 +330,10 @@ mod tests {
                     let light: f64 = truth.iter().zip(&terms).map(|(c, term)| c * term).sum();
                     let noise = rng.random_range(-0.002..0.002);
                     let middle = (u - 0.5).hypot(v - 0.5) < 0.3;
-                    let glint = match middle && rng.random_range(0..3) == 0 {
-                        true => rng.random_range(0.0..0.5),
-                        false => 0.0,
+                    let glint = if middle && rng.random_range(0..3) == 0 {
+                        rng.random_range(0.0..0.5)
+                    } else {
+                        0.0
                     };
                     Glimpse {
                         frame: (tile + k) % frames,

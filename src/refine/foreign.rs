@@ -1,16 +1,19 @@
 //! What is in a frame but not on the wall: glints, things that moved, smears.
 //!
-//! The robust loss rejects what stands out by itself, sample by sample. The flanks of a glint do not: a few grey levels
-//! too bright, over some pixels, they pass for noise, yet they move with the camera, and on a faint wall they are as steep
-//! as anything on it. All samples of a tile together tell them from noise. For each frame that sees a tile
+//! The robust loss rejects what stands out by itself, sample by sample. The flanks of a glint do
+//! not: a few grey levels too bright, over some pixels, they pass for noise, yet they move with the
+//! camera, and on a faint wall they are as steep as anything on it. All samples of a tile together
+//! tell them from noise. For each frame that sees a tile
 //!
 //! `R = Σ_x v ρ(e)/v / Σ_x v`,   e: residual from the median over the frames,
 //!
-//! is about ½ whatever the texture, if the frame shows the wall. What R is usual is read from the survey itself, the
-//! median and the spread for flat tiles and for steep ones; a frame is left out of a tile where R exceeds what is usual
-//! by [`SURE`] times the spread, or where it and the tiles around it do so together.
+//! is about ½ whatever the texture, if the frame shows the wall. What R is usual is read from the
+//! survey itself, the median and the spread for flat tiles and for steep ones; a frame is left out
+//! of a tile where R exceeds what is usual by [`SURE`] times the spread, or where it and the tiles
+//! around it do so together.
 //!
-//! Decided once before a solve, not step by step: the observations stay the same while the poses move.
+//! Decided once before a solve, not step by step: the observations stay the same while the poses
+//! move.
 
 use super::grid::{BLOCK, TileId, TilePoints, WallGrid};
 use super::robust::{NoiseModel, median_and_sigma};
@@ -222,8 +225,9 @@ mod tests {
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
 
-    /// A glint in the middle of one frame, 40 grey levels bright and 6 pixels wide: its tiles are left out there and
-    /// nowhere else, its flanks too, where it is no brighter than the noise; and next to nothing of what is wall.
+    /// A glint in the middle of one frame, 40 grey levels bright and 6 pixels wide: its tiles are
+    /// left out there and nowhere else, its flanks too, where it is no brighter than the noise; and
+    /// next to nothing of what is wall.
     #[test]
     fn a_glint_is_left_out_with_its_flanks_and_the_wall_is_not() {
         const GLINTING: usize = 5;

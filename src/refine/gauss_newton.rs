@@ -20,8 +20,8 @@ pub struct Stopping {
     pub max_iterations: u64,
     /// A step that moves no wall point by more than this ends the solve, pixels of full size.
     pub step_px: f64,
-    /// A step shorter than this share of the estimate's own uncertainty ends the solve: `√(δᵀHδ / unknowns)`, with
-    /// H the inverse covariance.
+    /// A step shorter than this share of the estimate's own uncertainty ends the solve:
+    /// `√(δᵀHδ / unknowns)`, with H the inverse covariance.
     pub step_sigma: f64,
 }
 
@@ -44,14 +44,15 @@ pub enum StopReason {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct StepRecord {
-    /// Robust cost after it, on the same wall samples as at the start; None after a last step, which is not judged.
+    /// Robust cost after it, on the same wall samples as at the start; None after a last step,
+    /// which is not judged.
     pub cost: Option<f64>,
     /// Largest movement of the wall, pixels of full size.
     pub step_px: f64,
     /// λ with which it was taken; 0 is plain Gauss–Newton.
     pub damping: f64,
-    /// How much the gradient changed along the step, over what the normal equations foretell: `δᵀ(g' − g)/δᵀHδ`, of the poses' part of
-    /// the step δ. None where it was not looked at.
+    /// How much the gradient changed along the step, over what the normal equations foretell:
+    /// `δᵀ(g' − g)/δᵀHδ`, of the poses' part of the step δ. None where it was not looked at.
     pub curvature: Option<f64>,
 }
 
@@ -77,14 +78,15 @@ pub struct SolveRecord {
     pub stop: StopReason,
 }
 
-/// What the curvature is for Gaussian residuals and slopes without error: the mean of `ψ'` over that of `ω` with [`super::robust::Loss`].
+/// What the curvature is for Gaussian residuals and slopes without error: the mean of `ψ'` over
+/// that of `ω` with [`super::robust::Loss`].
 const USUAL_CURVATURE: f64 = 0.89;
 /// The curvatures that are believed; others are those of a solve that was still far from its end.
 const CURVATURES: RangeInclusive<f64> = 0.6..=1.2;
 
 impl SolveRecord {
-    /// How much the derivative of the gradient is of the normal matrix: the mean over all steps that tell, by the squares of their
-    /// lengths ([`super::covariance`]).
+    /// How much the derivative of the gradient is of the normal matrix: the mean over all steps
+    /// that tell, by the squares of their lengths ([`super::covariance`]).
     pub fn curvature(&self) -> f64 {
         let steps = self.steps.iter().filter_map(|step| {
             let curvature = step.curvature.filter(|of| CURVATURES.contains(of))?;
@@ -93,9 +95,10 @@ impl SolveRecord {
         let (weights, sum) = steps.fold((0.0, 0.0), |(weights, sum), (weight, curvature)| {
             (weights + weight, sum + weight * curvature)
         });
-        match weights > 0.0 {
-            true => sum / weights,
-            false => USUAL_CURVATURE,
+        if weights > 0.0 {
+            sum / weights
+        } else {
+            USUAL_CURVATURE
         }
     }
 }
@@ -148,10 +151,11 @@ type Unknowns = (Vec<FrameEstimate>, Kappa);
 
 type Iterate = IterState<Unknowns, (), (), (), (), f64>;
 
-/// Of the slope along a step, `δᵀ g`, this much must be gone after one that does not lower the cost.
+/// Of the slope along a step, `δᵀ g`, this much must be gone after one that does not lower the
+/// cost.
 const LEAST_SLOPE_GONE: f64 = 0.5;
-/// Share of the cost by which it may rise along a good step. On sharp bricks it rises and falls by up to 0.9 % while the whole survey moves
-/// along its gauge, which changes nothing.
+/// Share of the cost by which it may rise along a good step. On sharp bricks it rises and falls by
+/// up to 0.9 % while the whole survey moves along its gauge, which changes nothing.
 const ROUGHNESS: f64 = 0.01;
 /// First damping tried after a rejected step, and the factor between tries.
 const DAMPING: (f64, f64) = (1e-4, 10.0);
@@ -160,17 +164,22 @@ const TRIES: usize = 8;
 
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
 ///
-/// λ starts at 0 and rises when a step is none for the better; such a step is never taken. It is for the better if it lowers the
-/// robust cost on the same wall samples; or, within a pixel, if it leaves less than half of the slope along it ([`LEAST_SLOPE_GONE`])
-/// and the cost as it was but for its [`ROUGHNESS`]. What is sought is where the gradient is zero, and that is not quite the derivative of the
-/// cost: it takes the slopes of the fused texture ([`super::tile`]), so it is smooth, whereas the cost of sharp edges
-/// depends on where between pixels samples happen to fall. Along weak directions, in which all frames move together by half a pixel
-/// and hardly against each other, that outweighs what there is to gain, and a solve that asked for a lower cost would be stuck.
+/// λ starts at 0 and rises when a step is none for the better; such a step is never taken. It is
+/// for the better if it lowers the robust cost on the same wall samples; or, within a pixel, if it
+/// leaves less than half of the slope along it ([`LEAST_SLOPE_GONE`]) and the cost as it was but
+/// for its [`ROUGHNESS`]. What is sought is where the gradient is zero, and that is not quite the
+/// derivative of the cost: it takes the slopes of the fused texture ([`super::tile`]), so it is
+/// smooth, whereas the cost of sharp edges depends on where between pixels samples happen to fall.
+/// Along weak directions, in which all frames move together by half a pixel and hardly against each
+/// other, that outweighs what there is to gain, and a solve that asked for a lower cost would be
+/// stuck.
 ///
 /// Frames that a step would bring where they cannot be ([`Problem::admits`]) stay where they are.
-/// Only the last step, undamped and shorter than the tolerance, is taken on trust: cost and equations are those before it.
+/// Only the last step, undamped and shorter than the tolerance, is taken on trust: cost and
+/// equations are those before it.
 ///
-/// Source: P. Wolfe, "Convergence conditions for ascent methods", SIAM Review 11(2), 1969 (the slope along a step).
+/// Source: P. Wolfe, "Convergence conditions for ascent methods", SIAM Review 11(2), 1969 (the
+/// slope along a step).
 struct DampedGaussNewton<'b> {
     stopping: Stopping,
     lambda: f64,
@@ -183,8 +192,8 @@ struct DampedGaussNewton<'b> {
 }
 
 impl DampedGaussNewton<'_> {
-    /// Why a step that moves the wall by `step_px` and lowers the quadratic model by `½ decrement` is the last one,
-    /// if it is.
+    /// Why a step that moves the wall by `step_px` and lowers the quadratic model by `½ decrement`
+    /// is the last one, if it is.
     fn reason_to_stop(&self, step_px: f64, decrement: f64, unknowns: usize) -> Option<StopReason> {
         if step_px < self.stopping.step_px {
             Some(StopReason::StepBelowTolerance)
@@ -353,7 +362,8 @@ impl Observe<Iterate> for Reporter {
     }
 }
 
-/// Solves `problem` from the estimates it was made with; `announce` names the stage to a progress display.
+/// Solves `problem` from the estimates it was made with; `announce` names the stage to a progress
+/// display.
 ///
 /// # Errors
 /// [`ProblemError::Factor`] if the normal equations stay singular whatever the damping.

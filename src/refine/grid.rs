@@ -9,10 +9,11 @@ pub const TILE: usize = 8;
 pub const SIDE: usize = TILE + 2;
 /// Samples of a tile with its ring.
 pub const AREA: usize = SIDE * SIDE;
-/// Values that vector instructions work on at once; sums run in as many lanes, whatever the processor has.
+/// Values that vector instructions work on at once; sums run in as many lanes, whatever the
+/// processor has.
 pub const LANES: usize = 8;
-/// A value at every sample of a tile with its ring, row by row (s runs fastest), in whole vectors: the last few repeat
-/// the tile's middle and count for nothing.
+/// A value at every sample of a tile with its ring, row by row (s runs fastest), in whole vectors:
+/// the last few repeat the tile's middle and count for nothing.
 pub type Plane = [f32; AREA.next_multiple_of(LANES)];
 /// Zero everywhere.
 pub const ZERO: Plane = [0.0; AREA.next_multiple_of(LANES)];
@@ -49,8 +50,8 @@ impl TileId {
     }
 }
 
-/// Two numbers from 0 to 1 for a column and row, of a sequence that fills the square evenly: `frac(row φ⁻¹ + column φ⁻²)` and its
-/// mirror with φ³ = φ + 1.
+/// Two numbers from 0 to 1 for a column and row, of a sequence that fills the square evenly:
+/// `frac(row φ⁻¹ + column φ⁻²)` and its mirror with φ³ = φ + 1.
 ///
 /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
 pub fn fractions(column: i64, row: i64) -> [f64; 2] {
@@ -97,9 +98,9 @@ impl WallGrid {
 
     /// The middle of a tile, a fraction of a sample off the regular place.
     ///
-    /// Walls repeat in step with a regular lattice: courses of bricks run along its rows, so that every joint would
-    /// be sampled at the same fraction everywhere, and what falls between the samples would not average out.
-    /// The fractions are [`fractions`].
+    /// Walls repeat in step with a regular lattice: courses of bricks run along its rows, so that
+    /// every joint would be sampled at the same fraction everywhere, and what falls between the
+    /// samples would not average out. The fractions are [`fractions`].
     pub fn centre(&self, tile: TileId) -> WallPoint {
         let (width, height) = self.tile_size_m();
         let (column, row) = (tile.column as f64, tile.row as f64);
@@ -138,8 +139,8 @@ impl WallGrid {
     }
 }
 
-/// World coordinates of the samples of one tile with its ring, relative to its middle (so that single
-/// precision is enough).
+/// World coordinates of the samples of one tile with its ring, relative to its middle (so that
+/// single precision is enough).
 #[derive(Clone, Debug)]
 pub struct TilePoints {
     /// The wall at the tile's middle.

@@ -1,10 +1,11 @@
 //! What a frame shows between its pixels.
 //!
-//! Along each axis a sample at the fraction f from one pixel to the next is `Σ_i K(i − f) I_i`. Sharp edges are where it matters: what a
-//! sample shows of one depends on f, and that passes for a displacement of some hundredths of a pixel.
+//! Along each axis a sample at the fraction f from one pixel to the next is `Σ_i K(i − f) I_i`.
+//! Sharp edges are where it matters: what a sample shows of one depends on f, and that passes for a
+//! displacement of some hundredths of a pixel.
 //!
-//! Source: R. G. Keys, "Cubic convolution interpolation for digital image processing", IEEE Transactions on Acoustics, Speech, and
-//! Signal Processing 29(6), 1981.
+//! Source: R. G. Keys, "Cubic convolution interpolation for digital image processing", IEEE
+//! Transactions on Acoustics, Speech, and Signal Processing 29(6), 1981.
 
 use crate::render;
 use serde::{Deserialize, Serialize};
@@ -30,8 +31,9 @@ impl Interpolation {
         }
     }
 
-    /// Covariance, along one axis, of samples `apart_px` pixels apart in a picture of white noise of variance 1, on average over all
-    /// fractions: `∫ K(x) K(x + d) dx`. So the variance of a sample is the square of this at 0; bilinear: 4/9.
+    /// Covariance, along one axis, of samples `apart_px` pixels apart in a picture of white noise
+    /// of variance 1, on average over all fractions: `∫ K(x) K(x + d) dx`. So the variance of a
+    /// sample is the square of this at 0; bilinear: 4/9.
     pub fn autocorrelation(self, apart_px: f64) -> f64 {
         let kernel = self.kernel();
         let steps = (2.0 * kernel.reach()) as usize * STEPS;
@@ -41,7 +43,8 @@ impl Interpolation {
     }
 }
 
-/// Weights of the pixels at −1, 0, 1 and 2 at the fraction `f` from 0 to 1: `K(i − f)` of [`Interpolation::Bicubic`].
+/// Weights of the pixels at −1, 0, 1 and 2 at the fraction `f` from 0 to 1: `K(i − f)` of
+/// [`Interpolation::Bicubic`].
 #[inline(always)]
 pub fn cubic_weights(f: f32) -> [f32; 4] {
     let g = 1.0 - f;

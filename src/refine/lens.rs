@@ -11,7 +11,8 @@ const SEEN: usize = LENS + 1;
 /// Their places among all.
 const PLACES: [usize; SEEN] = [0, 1, 2, 3, 4, READOUT];
 
-/// Sums over the tiles of one block for the unknowns that pixels see, for the few frames that see it.
+/// Sums over the tiles of one block for the unknowns that pixels see, for the few frames that see
+/// it.
 #[derive(Clone, Debug)]
 pub struct LensSums {
     /// `H_pκ`, a block a frame.
@@ -32,7 +33,8 @@ impl LensSums {
         }
     }
 
-    /// Adds a tile: `H_pκ,i = w̄_i B_iᵀ M (C_i − C̄)`, `H_κκ = Σ_i w̄_i (C_i − C̄)ᵀ M (C_i − C̄)`, `g_κ = −Σ_i C_iᵀ g_i`.
+    /// Adds a tile: `H_pκ,i = w̄_i B_iᵀ M (C_i − C̄)`, `H_κκ = Σ_i w̄_i (C_i − C̄)ᵀ M (C_i − C̄)`,
+    /// `g_κ = −Σ_i C_iᵀ g_i`.
     ///
     /// `columns` are all its observers, `features`: M, `total`: their weight.
     pub fn add_tile(&mut self, columns: &[Column], features: &Matrix4<f64>, total: f64) {
@@ -57,7 +59,8 @@ impl LensSums {
         }
     }
 
-    /// Adds the block to the border, and its gradients (those of its frames `slots`, too) to the border's scatter.
+    /// Adds the block to the border, and its gradients (those of its frames `slots`, too) to the
+    /// border's scatter.
     pub fn add_to(
         &self,
         slots: &[usize],

@@ -1,12 +1,12 @@
-//! The estimator: every frame's pose and exposure from the photometric consistency of overlapping strips of
-//! the wall.
+//! The estimator: every frame's pose and exposure from the photometric consistency of overlapping
+//! strips of the wall.
 //!
 //! It minimises over all poses `T_i`, log-gains `α_i` and biases `b_i`
 //!
 //! `E = Σ_x Σ_i q_i ρ((I_i(π(T_i⁻¹ X(x))) − b_i)/a_i − S(x)) / σ² + prior`
 //!
-//! over wall samples x ([`grid`]), with the wall's texture S eliminated exactly ([`tile`]); q is the number
-//! of pixels a sample stands for in a frame.
+//! over wall samples x ([`grid`]), with the wall's texture S eliminated exactly ([`tile`]); q is
+//! the number of pixels a sample stands for in a frame.
 //!
 //! | step | where |
 //! | --- | --- |
@@ -22,20 +22,26 @@
 //! | going on after an interruption | [`state`] |
 //! | how sure | [`certainty`], [`covariance`]; how sure it could be at best: [`bound`] |
 //!
-//! At full size what is in a frame but not on the wall is left out of a solve beforehand: [`foreign`]. Every solve is the
-//! same: `samples → linearise → reduce → solve → accept`. [`grid`], [`visibility`], [`coverage`] and [`choice`] choose the
-//! samples, [`tile`] derives residual, Jacobian and the elimination of S and linearises, with the slopes of S as
-//! [`denoise`] finds them ([`joint`] does the same with the wall solved for finer than pixels, if asked for), [`problem`] reduces to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
+//! At full size what is in a frame but not on the wall is left out of a solve beforehand:
+//! [`foreign`]. Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`],
+//! [`visibility`], [`coverage`] and [`choice`] choose the samples, [`tile`] derives residual,
+//! Jacobian and the elimination of S and linearises, with the slopes of S as [`denoise`] finds them
+//! ([`joint`] does the same with the wall solved for finer than pixels, if asked for), [`problem`]
+//! reduces to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
 //!
 //! # Speed
 //!
-//! - The work on a tile is loops over whole vectors ([`tile`], [`view`]), compiled for several processors, the one at
-//!   hand chosen when it runs; sums keep their order, so results stay the same.
-//! - The last solve looks at the wall twice a pixel along each axis; those before it at the parts that tell most
-//!   ([`choice`]). With `--fast` it does so 1.5 times a pixel and takes a single step, if that is short.
-//! - Each linearisation serves twice: its cost judges the step that led there, its equations make the next. The last step
-//!   of a solve is within its tolerance and is not judged ([`gauss_newton`]).
-//! - Where a tile's corners are is computed once for all frames ([`visibility`]), local contrast once for a picture.
+//! - The work on a tile is loops over whole vectors ([`tile`], [`view`]), compiled for several
+//!   processors, the one at hand chosen when it runs; sums keep their order, so results stay the
+//!   same.
+//! - The last solve looks at the wall twice a pixel along each axis; those before it at the parts
+//!   that tell most ([`choice`]). With `--fast` it does so 1.5 times a pixel and takes a single
+//!   step, if that is short.
+//! - Each linearisation serves twice: its cost judges the step that led there, its equations make
+//!   the next. The last step of a solve is within its tolerance and is not judged
+//!   ([`gauss_newton`]).
+//! - Where a tile's corners are is computed once for all frames ([`visibility`]), local contrast
+//!   once for a picture.
 //!
 #![doc = include_str!("ablation.md")]
 

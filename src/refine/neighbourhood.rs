@@ -1,7 +1,9 @@
-//! What is solved again when few of many frames have changed: their neighbourhood, with all else held.
+//! What is solved again when few of many frames have changed: their neighbourhood, with all else
+//! held.
 //!
-//! A wrong frame bends its neighbours over a few turns; a survey may have hundreds. So what a doubted frame makes to be
-//! solved does not grow with the length of the survey. What it has bent farther off is left to the next solve of all.
+//! A wrong frame bends its neighbours over a few turns; a survey may have hundreds. So what a
+//! doubted frame makes to be solved does not grow with the length of the survey. What it has bent
+//! farther off is left to the next solve of all.
 
 use super::gauss_newton::solve;
 use super::options::RefineOptions;
@@ -23,7 +25,8 @@ pub struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    /// Those of the frames that are believed now and were not `before`, or the other way round, or stand elsewhere.
+    /// Those of the frames that are believed now and were not `before`, or the other way round, or
+    /// stand elsewhere.
     ///
     /// # Errors
     /// [`ProblemError::Placement`].
@@ -68,8 +71,8 @@ impl Neighbourhood {
         }
     }
 
-    /// Solves the believed frames at some pyramid levels, coarse to fine, each close enough for the next; returns how each
-    /// frame took part in the last.
+    /// Solves the believed frames at some pyramid levels, coarse to fine, each close enough for the
+    /// next; returns how each frame took part in the last.
     ///
     /// # Errors
     /// [`ProblemError`].
@@ -101,7 +104,8 @@ pub fn changes(before: &Tracked, now: &Tracked) -> Vec<usize> {
     (0..now.estimates.len()).filter(changed).collect()
 }
 
-/// Runs of frames that reach [`REACH`] to either side of those given, ascending; joined where they touch.
+/// Runs of frames that reach [`REACH`] to either side of those given, ascending; joined where they
+/// touch.
 fn around(frames: &[usize], count: usize) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for k in frames {

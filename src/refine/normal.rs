@@ -6,7 +6,8 @@ use nalgebra::SMatrix;
 /// One block of the normal matrix.
 pub type Block = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
 
-/// Which blocks of the upper triangle exist: for every block column the ascending rows up to the diagonal.
+/// Which blocks of the upper triangle exist: for every block column the ascending rows up to the
+/// diagonal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern {
     rows: Vec<Vec<usize>>,
@@ -14,8 +15,8 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of `frames` unknown frames whose `pairs` (any order, repeated or not) interact; the
-    /// diagonal always exists.
+    /// The pattern of `frames` unknown frames whose `pairs` (any order, repeated or not) interact;
+    /// the diagonal always exists.
     pub fn new(frames: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Self {
         let mut rows: Vec<Vec<usize>> = (0..frames).map(|k| vec![k]).collect();
         for (a, b) in pairs {

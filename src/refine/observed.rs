@@ -1,7 +1,8 @@
 //! What the data tell about the shared unknowns, and what they cannot.
 //!
-//! After a solve, `Σ_κ` ([`super::shared`]) is the covariance of the free unknowns. One that is hardly more certain than its prior is refused: it is held at the value given, and the rest solved without it. The
-//! worst goes first, for without it another may be certain.
+//! After a solve, `Σ_κ` ([`super::shared`]) is the covariance of the free unknowns. One that is
+//! hardly more certain than its prior is refused: it is held at the value given, and the rest
+//! solved without it. The worst goes first, for without it another may be certain.
 
 use super::calibration::{Calibration, Kappa, SHARED};
 use super::factor::FactorError;
@@ -165,8 +166,8 @@ const NAMES: [(&str, Kind); SHARED] = [
 #[derive(Clone, Debug, Serialize)]
 #[non_exhaustive]
 pub struct UnknownReport {
-    /// `focal` (fx), `cx`, `cy`, `k1`, `k2`, `radius`, or of the tunnel's axis in the frame of the initial poses: how far it
-    /// tilts about x and z, and how far it lies off along x and z.
+    /// `focal` (fx), `cx`, `cy`, `k1`, `k2`, `radius`, or of the tunnel's axis in the frame of the
+    /// initial poses: how far it tilts about x and z, and how far it lies off along x and z.
     pub name: &'static str,
     /// Its unit: `px`, `m`, `deg`, or `1`.
     pub unit: &'static str,

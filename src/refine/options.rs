@@ -2,7 +2,8 @@
 
 use crate::survey::CalibrationGroup;
 
-/// How to refine. The defaults suit most surveys; the noise model of the poses comes from the survey.
+/// How to refine. The defaults suit most surveys; the noise model of the poses comes from the
+/// survey.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct RefineOptions {
     /// What to estimate besides the poses; if None, what the survey asks for.
@@ -14,27 +15,32 @@ pub struct RefineOptions {
     pub bias_sigma: f64,
     /// Pixels of the shorter side at the coarsest pyramid level, at least.
     pub coarsest_side: u32,
-    /// Pyramid levels that tracking and windows use, from the coarsest; the global solve starts where they end.
+    /// Pyramid levels that tracking and windows use, from the coarsest; the global solve starts
+    /// where they end.
     pub tracking_levels: usize,
     /// Frames placed between two solves of the sliding window.
     pub window_stride: usize,
     /// Wall samples per pixel along each axis in the last solve (but for a joint one).
     pub final_density: f64,
-    /// Wall samples per pixel along each axis where, before the last solve, the frames are searched for what is not wall; if
-    /// None, the samples of that solve. (Before a joint one two a pixel, whatever this says.)
+    /// Wall samples per pixel along each axis where, before the last solve, the frames are searched
+    /// for what is not wall; if None, the samples of that solve. (Before a joint one two a pixel,
+    /// whatever this says.)
     pub foreign_density: Option<f64>,
-    /// Share of the information that the global solves before it use, below the level where tracking ends: they look at
-    /// the parts of the wall that tell most.
+    /// Share of the information that the global solves before it use, below the level where
+    /// tracking ends: they look at the parts of the wall that tell most.
     pub close_information: f64,
-    /// Look for each frame over the whole prior before it is refined; otherwise it starts where the prior expects it.
+    /// Look for each frame over the whole prior before it is refined; otherwise it starts where the
+    /// prior expects it.
     pub search: bool,
     /// Solve sliding windows while tracking.
     pub windows: bool,
-    /// Linearise with the gradient of the texture fused from all frames; otherwise each frame with its own picture's.
+    /// Linearise with the gradient of the texture fused from all frames; otherwise each frame with
+    /// its own picture's.
     pub fused_gradient: bool,
-    /// Solve once more, for the wall at a third of a pixel jointly with the poses, instead of taking what the frames show between
-    /// their pixels for it: on walls with sharp edges errors about a third smaller, in ten to twenty times the time. Where the wall is so smooth
-    /// that there is nothing between the pixels, that is found out and the solve left out.
+    /// Solve once more, for the wall at a third of a pixel jointly with the poses, instead of
+    /// taking what the frames show between their pixels for it: on walls with sharp edges errors
+    /// about a third smaller, in ten to twenty times the time. Where the wall is so smooth that
+    /// there is nothing between the pixels, that is found out and the solve left out.
     pub joint: bool,
     /// Memory for decoded frames, bytes. Frames that do not fit are decoded anew when needed.
     pub cache_bytes: usize,
@@ -42,7 +48,8 @@ pub struct RefineOptions {
     pub max_iterations: u64,
     /// The last global solve ends when no wall point moves by more than this in a step, pixels, ...
     pub step_tolerance_px: f64,
-    /// ... or when a step is shorter than this share of the estimate's own uncertainty. (A joint one ends sooner: at three tenths of it.)
+    /// ... or when a step is shorter than this share of the estimate's own uncertainty. (A joint
+    /// one ends sooner: at three tenths of it.)
     pub step_tolerance_sigma: f64,
 }
 
@@ -71,8 +78,9 @@ impl Default for RefineOptions {
 }
 
 impl RefineOptions {
-    /// For speed: the last solve ends with the first step shorter than a tenth of a pixel or twice the uncertainty, most
-    /// often its first. Gauss–Newton leaves a few hundredths of such a step. What is not wall is looked for more coarsely.
+    /// For speed: the last solve ends with the first step shorter than a tenth of a pixel or twice
+    /// the uncertainty, most often its first. Gauss–Newton leaves a few hundredths of such a step.
+    /// What is not wall is looked for more coarsely.
     pub fn fast() -> Self {
         Self {
             final_density: 1.5,
@@ -83,7 +91,8 @@ impl RefineOptions {
         }
     }
 
-    /// The coarsest pyramid level for frames whose shorter side has this many pixels (0 is full size).
+    /// The coarsest pyramid level for frames whose shorter side has this many pixels (0 is full
+    /// size).
     pub fn coarsest_level(&self, side: u32) -> usize {
         let mut level = 0;
         while side >> (level + 1) >= self.coarsest_side.max(2) {

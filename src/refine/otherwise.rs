@@ -1,8 +1,8 @@
 //! Whether the pictures agree with another reading of the initial poses.
 //!
-//! In a round tunnel a camera on the axis looks at the wall whichever way its poses are read: from camera to world or back, along
-//! +z or −z. The geometry cannot tell; the frames' overlaps can. Where a refinement has failed, the first frames are refined in
-//! each reading.
+//! In a round tunnel a camera on the axis looks at the wall whichever way its poses are read: from
+//! camera to world or back, along +z or −z. The geometry cannot tell; the frames' overlaps can.
+//! Where a refinement has failed, the first frames are refined in each reading.
 
 use super::{RefineOptions, refine};
 use crate::progress::{Progress, Silent};
@@ -28,9 +28,10 @@ fn tried(survey: &Survey) -> usize {
     (enough + 2).clamp(TRIED.0, TRIED.1)
 }
 
-/// The flags of the readings that make more than half of the first frames sure where the given one does not: those with the
-/// fewest changes. There may be two: poses exactly as planned, seen from the tunnel's other end, are those of another convention.
-/// Empty if there is none, or if the given one does.
+/// The flags of the readings that make more than half of the first frames sure where the given one
+/// does not: those with the fewest changes. There may be two: poses exactly as planned, seen from
+/// the tunnel's other end, are those of another convention. Empty if there is none, or if the given
+/// one does.
 ///
 /// # Errors
 /// Poses that cannot be read any more.

@@ -56,15 +56,14 @@ impl Overlaps {
         let frames = tracked.estimates.par_iter().zip(&tracked.doubts);
         let footprints = frames
             .enumerate()
-            .map(
-                |(k, (estimate, doubt))| match run.contains(&k) && doubt.is_none() {
-                    false => Ok(None),
-                    true => {
-                        let camera = camera.sweeping(&tracked.sweep(scene, k));
-                        footprint(scene, &camera, k, &estimate.pose).map(Some)
-                    }
-                },
-            )
+            .map(|(k, (estimate, doubt))| {
+                if !(run.contains(&k) && doubt.is_none()) {
+                    Ok(None)
+                } else {
+                    let camera = camera.sweeping(&tracked.sweep(scene, k));
+                    footprint(scene, &camera, k, &estimate.pose).map(Some)
+                }
+            })
             .collect::<Result<_, _>>()?;
         Ok(Self {
             footprints,

@@ -1,4 +1,5 @@
-//! Placing one frame on the wall that others show: search, brief refinement of the hypotheses, verdict.
+//! Placing one frame on the wall that others show: search, brief refinement of the hypotheses,
+//! verdict.
 
 use super::doubt::Doubt;
 use super::estimate::FrameEstimate;
@@ -35,7 +36,8 @@ const CLOSER_LOOKS: usize = 4;
 const CLOSE_RAD: f64 = 0.05;
 /// Gain in log-posterior, as a factor, for which another closer look is worth its time.
 const WORTH_ANOTHER: f64 = 1.02;
-/// Two places are told apart by the pixels if what they leave unexplained, `1 − c²`, differs by this factor, ...
+/// Two places are told apart by the pixels if what they leave unexplained, `1 − c²`, differs by
+/// this factor, ...
 pub const UNEXPLAINED: f64 = 2.0;
 /// ... or else by the prior if its log-densities differ by this (3 σ).
 const PRIOR_MARGIN: f64 = 4.5;
@@ -132,12 +134,13 @@ pub fn place(
     let sweep = surroundings.sweep(scene, frame);
     let portrait = Portrait::new(scene, level, frame, &sweep)?;
     let wall = FusedWall::new(scene, &portraits, &camera, (frame, &expected.pose), margin)?;
-    let found = match options.search {
-        true => search(scene, &wall, &portrait, &expected.pose, sigma, HYPOTHESES),
-        false => vec![Hypothesis {
+    let found = if options.search {
+        search(scene, &wall, &portrait, &expected.pose, sigma, HYPOTHESES)
+    } else {
+        vec![Hypothesis {
             pose: expected.pose,
             score: 0.0,
-        }],
+        }]
     };
     let best = found.first().map_or(0.0, |hypothesis| hypothesis.score);
 
@@ -196,7 +199,8 @@ pub fn place(
         }
         candidates.extend(refined(&hypothesis.pose)?);
     }
-    // A half-right pose has stretched and sheared what it unrolled; from there the search sees better.
+    // A half-right pose has stretched and sheared what it unrolled; from there the search sees
+    // better.
     let close = sigma.map(|s| s.min(CLOSE_RAD));
     let looks = if options.search { CLOSER_LOOKS } else { 0 };
     for _ in 0..looks {
@@ -252,7 +256,8 @@ pub fn place(
     }))
 }
 
-/// `1 − c²`, c the correlation with the wall, noise aside; none if too little is shared, or the two do not correlate.
+/// `1 − c²`, c the correlation with the wall, noise aside; none if too little is shared, or the two
+/// do not correlate.
 ///
 /// Where noise drowns the texture, nothing speaks against the pose; its σ will tell.
 pub fn unexplained(likeness: &Likeness, portrait: &Portrait) -> Option<f64> {
@@ -278,7 +283,8 @@ pub fn near(
     Ok(near.collect())
 }
 
-/// σ of pitch, yaw and roll as they appear in the picture: a shift across the view looks like a turn.
+/// σ of pitch, yaw and roll as they appear in the picture: a shift across the view looks like a
+/// turn.
 fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
     let turn = jitter.rotation_sigma_rad;
     let [x, y, z] = jitter.translation_sigma_m;

@@ -14,12 +14,13 @@ use std::ops::Range;
 ///
 /// - `independent`: each pose around its initial value, `e = (Log(R̂ᵀR), t − t̂)`;
 /// - `random-walk`: each step around its initial value,
-///   `e = (Log(ΔR̂ᵀ R_{k−1}ᵀ R_k), (t_k − t_{k−1}) − (t̂_k − t̂_{k−1}))` with `ΔR̂ = R̂_{k−1}ᵀ R̂_k`, and the
-///   first frame around its initial pose, which also fixes the two gauge freedoms;
-/// - where the initial poses' frame and metres lie otherwise to the tunnel ([`Metric`]), `R̂` and `t̂` are the initial poses as
-///   placed in the tunnel, and t is multiplied by the scale;
-/// - log-gain and bias of every frame around 0: without it they would swallow misalignment, and all of
-///   them together could drift.
+///   `e = (Log(ΔR̂ᵀ R_{k−1}ᵀ R_k), (t_k − t_{k−1}) − (t̂_k − t̂_{k−1}))` with
+///   `ΔR̂ = R̂_{k−1}ᵀ R̂_k`, and the first frame around its initial pose, which also fixes the two
+///   gauge freedoms;
+/// - where the initial poses' frame and metres lie otherwise to the tunnel ([`Metric`]), `R̂` and
+///   `t̂` are the initial poses as placed in the tunnel, and t is multiplied by the scale;
+/// - log-gain and bias of every frame around 0: without it they would swallow misalignment, and all
+///   of them together could drift.
 #[derive(Clone, Debug)]
 pub struct Prior {
     /// Noise model of the initial poses.
@@ -51,7 +52,8 @@ pub fn predict(pose: &Pose, from: &Pose, to: &Pose) -> Pose {
 }
 
 impl Prior {
-    /// How many usual steps lie between two frames, by their times: variances of a random walk grow by so much.
+    /// How many usual steps lie between two frames, by their times: variances of a random walk grow
+    /// by so much.
     ///
     /// The usual step is the median one; a step counts for no less than one.
     pub fn steps_between(&self, a: usize, b: usize) -> f64 {
@@ -63,8 +65,8 @@ impl Prior {
         ((self.times_s[k + 1] - self.times_s[k]) / self.usual_step_s).max(1.0)
     }
 
-    /// How far a wrong scale or tilt reaches: the longest step of a random walk, or the distance of the farthest of
-    /// independent poses from their middle, metres.
+    /// How far a wrong scale or tilt reaches: the longest step of a random walk, or the distance of
+    /// the farthest of independent poses from their middle, metres.
     pub fn arm_m(&self) -> f64 {
         let poses = &self.initial;
         let lengths: Vec<f64> = match self.jitter.model {
@@ -81,7 +83,8 @@ impl Prior {
         lengths.into_iter().fold(0.0, f64::max)
     }
 
-    /// The pose of frame `to` if frame `from` is at `pose` and the initial steps between them are right.
+    /// The pose of frame `to` if frame `from` is at `pose` and the initial steps between them are
+    /// right.
     pub fn predict(&self, from: usize, pose: &Pose, to: usize) -> Pose {
         predict(pose, &self.initial[from], &self.initial[to])
     }
@@ -96,8 +99,8 @@ impl Prior {
 
     /// Adds the prior's cost `½ Σ eᵀ Σ⁻¹ e`, gradient and matrix for the `active` frames.
     ///
-    /// `estimates` are those of the frames `participants`, which include the active ones. `border`: what it adds for the
-    /// shared unknowns, if they are estimated.
+    /// `estimates` are those of the frames `participants`, which include the active ones. `border`:
+    /// what it adds for the shared unknowns, if they are estimated.
     #[expect(
         clippy::too_many_arguments,
         reason = "what is known, then what is added to"
@@ -138,8 +141,8 @@ impl Prior {
         cost
     }
 
-    /// The gauge motion after which the poses agree best with the prior: at the first frame for a random walk,
-    /// over all frames for independent errors.
+    /// The gauge motion after which the poses agree best with the prior: at the first frame for a
+    /// random walk, over all frames for independent errors.
     pub fn settle_gauge(
         &self,
         gauge: &Gauge,
@@ -240,7 +243,8 @@ struct Sums<'s> {
 /// Derivative of an error by `(ln r, τ_x, τ_z, o_x, o_z)`.
 type ByMetric = SMatrix<f64, 6, METRIC>;
 
-/// Error of a pose around its initial value (as placed in the tunnel), and its derivative by the pose's step.
+/// Error of a pose around its initial value (as placed in the tunnel), and its derivative by the
+/// pose's step.
 fn absolute(initial: &Pose, pose: &Pose, scale: f64) -> (Vector6<f64>, Matrix6<f64>) {
     let e = initial.local(&Pose::new(pose.r_wc, pose.t_wc * scale));
     let mut j = Matrix6::identity() * scale;
@@ -251,7 +255,8 @@ fn absolute(initial: &Pose, pose: &Pose, scale: f64) -> (Vector6<f64>, Matrix6<f
 
 /// Derivative of [`absolute`] by how the initial pose is placed.
 fn absolute_by_metric(metric: &Metric, initial: &Pose, pose: &Pose, e: &Vector6<f64>) -> ByMetric {
-    // The initial attitude turns by exp(Jδτ) on the left, so the error turns by exp(−RᵀJδτ) on the right.
+    // The initial attitude turns by exp(Jδτ) on the left, so the error turns by exp(−RᵀJδτ) on the
+    // right.
     let tilt = metric.tilt_jacobian();
     let r_cw = pose.r_wc.inverse().to_rotation_matrix();
     let right = so3::right_jacobian_inverse(&e.fixed_rows::<3>(0).into());
@@ -278,7 +283,8 @@ fn by_metric(metric: &Metric, arm: &Vector3<f64>, t: &Vector3<f64>) -> ByMetric 
     j
 }
 
-/// Error of the step between two poses, and its derivatives by the earlier and the later pose's step.
+/// Error of the step between two poses, and its derivatives by the earlier and the later pose's
+/// step.
 fn relative(
     initial_before: &Pose,
     initial: &Pose,
@@ -301,7 +307,8 @@ fn relative(
     (e, j_before, j)
 }
 
-/// Derivative of [`relative`] by how the initial poses are placed: steps turn with them, and offsets cancel.
+/// Derivative of [`relative`] by how the initial poses are placed: steps turn with them, and
+/// offsets cancel.
 fn relative_by_metric(
     metric: &Metric,
     (initial_before, initial): (&Pose, &Pose),
@@ -426,7 +433,8 @@ mod tests {
         }
     }
 
-    /// The assembled gradient is the derivative of the assembled cost, for both models and for what is shared, too.
+    /// The assembled gradient is the derivative of the assembled cost, for both models and for what
+    /// is shared, too.
     #[test]
     fn the_gradient_is_the_derivative_of_the_cost() {
         for model in [JitterModel::RandomWalk, JitterModel::Independent] {

@@ -1,9 +1,9 @@
 //! Taking apart what does not hold, and putting it together again.
 //!
-//! A wrong frame bends those it is compared with, and a bent wall makes the next frame's place wrong. Gauss–Newton at
-//! full size cannot undo it: many pixels off, it has nothing to follow. So when frames are found wrong, they are taken out,
-//! the others are solved again from the coarsest level, and the frames in doubt are placed once more on the wall as it is
-//! then.
+//! A wrong frame bends those it is compared with, and a bent wall makes the next frame's place
+//! wrong. Gauss–Newton at full size cannot undo it: many pixels off, it has nothing to follow. So
+//! when frames are found wrong, they are taken out, the others are solved again from the coarsest
+//! level, and the frames in doubt are placed once more on the wall as it is then.
 
 use super::alignment::{Alignment, alignments};
 use super::consistency::{compare_pairs, contradictions};
@@ -23,8 +23,8 @@ const TRIES: usize = 3;
 /// Times that frames are taken out, at the most.
 const ROUNDS: usize = 8;
 
-/// Takes out the frames that the others do not bear out, places them again, and solves their neighbourhood, until
-/// nothing changes. `solved`: the survey as the last solve left it.
+/// Takes out the frames that the others do not bear out, places them again, and solves their
+/// neighbourhood, until nothing changes. `solved`: the survey as the last solve left it.
 ///
 /// Returns the frames that the wall's repeats leave undecided.
 ///
@@ -62,9 +62,10 @@ pub fn repair(
         {
             best = Some(tracked.clone());
         }
-        let placed = match round < TRIES {
-            true => retry(scene, options, tracked)?,
-            false => 0,
+        let placed = if round < TRIES {
+            retry(scene, options, tracked)?
+        } else {
+            0
         };
         if !changed && placed == 0 {
             let settled = settle_repeats(scene, options, tracked)?;

@@ -1,16 +1,18 @@
 //! Walls that repeat.
 //!
-//! Where bricks come as a printed tile, a frame moved by a whole tile shows the same, exactly: no residual, and no
-//! comparison of frames can tell. Only the prior can. So at the end each frame is compared with the wall at all gauge
-//! motions (turns about the axis, shifts along it) within the prior's reach; where it fits as well as where it is, the
-//! likelier of the two is taken, and if the odds are not clear, the frame is ambiguous and both are reported.
+//! Where bricks come as a printed tile, a frame moved by a whole tile shows the same, exactly: no
+//! residual, and no comparison of frames can tell. Only the prior can. So at the end each frame is
+//! compared with the wall at all gauge motions (turns about the axis, shifts along it) within the
+//! prior's reach; where it fits as well as where it is, the likelier of the two is taken, and if
+//! the odds are not clear, the frame is ambiguous and both are reported.
 //!
-//! With errors that add up, what can be wrong by a tile is a step, and with it all frames after it; with independent
-//! errors a frame by itself. Where less than half of the frames would be clear, none is: what they are clear against has
-//! been settled by the others.
+//! With errors that add up, what can be wrong by a tile is a step, and with it all frames after it;
+//! with independent errors a frame by itself. Where less than half of the frames would be clear,
+//! none is: what they are clear against has been settled by the others.
 //!
-//! A frame may fit where it is and, for all that is seen there, nowhere else, because those that it is compared with are wrong by a
-//! tile as well. If the prior would clearly have it a period of the wall away, as others have shown it, it is ambiguous, too.
+//! A frame may fit where it is and, for all that is seen there, nowhere else, because those that it
+//! is compared with are wrong by a tile as well. If the prior would clearly have it a period of the
+//! wall away, as others have shown it, it is ambiguous, too.
 
 use super::options::RefineOptions;
 use super::place::{
@@ -29,7 +31,8 @@ use std::collections::BTreeMap;
 
 /// Difference of log-posteriors from which on one place is believed: odds of 1000 to 1.
 const CLEAR: f64 = 6.9;
-/// Share of the squared correlation that is left, at least, where the shift is known to a whole sample only.
+/// Share of the squared correlation that is left, at least, where the shift is known to a whole
+/// sample only.
 const LEFT_BY_STEPS: f64 = 0.5;
 /// Motions closer to none than this are none, samples of the search level.
 const APART: f64 = 3.0;
@@ -67,8 +70,9 @@ struct Evidence<'a> {
 }
 
 impl Choice {
-    /// Where most frames are undecided, so is every other, too: those that a `first` choice, by clear odds, found in doubt, those
-    /// that fit elsewhere, and those that fit nowhere else, perhaps because what they are compared with is a period off as well.
+    /// Where most frames are undecided, so is every other, too: those that a `first` choice, by
+    /// clear odds, found in doubt, those that fit elsewhere, and those that fit nowhere else,
+    /// perhaps because what they are compared with is a period off as well.
     fn leave_none_clear(
         &mut self,
         first: &Self,
@@ -86,8 +90,8 @@ impl Choice {
 /// What has become of frames that fit elsewhere as well.
 #[derive(Debug, Default)]
 pub struct Settled {
-    /// Those that have moved, and how they would go back. They have been compared where they were; where they are now, the others
-    /// may tell otherwise.
+    /// Those that have moved, and how they would go back. They have been compared where they were;
+    /// where they are now, the others may tell otherwise.
     pub moved: Vec<Rival>,
     /// Those for which the prior does not decide.
     pub undecided: Vec<Rival>,
@@ -103,7 +107,8 @@ impl Settled {
     }
 }
 
-/// Moves the frames that fit elsewhere as well to where the prior has them, until none moves any more.
+/// Moves the frames that fit elsewhere as well to where the prior has them, until none moves any
+/// more.
 ///
 /// Returns those of which it is not known where they belong.
 ///
@@ -261,16 +266,18 @@ fn repeats_of(
     Ok(found)
 }
 
-/// What a place may leave unexplained, as a share of the contrast, to fit as well as one that leaves `here`.
+/// What a place may leave unexplained, as a share of the contrast, to fit as well as one that
+/// leaves `here`.
 ///
-/// By odds: (1 − u)/u no less than half of what it is here. Where little is explained here, a place that explains nothing is no
-/// rival, though it leaves less than twice as much.
+/// By odds: (1 − u)/u no less than half of what it is here. Where little is explained here, a place
+/// that explains nothing is no rival, though it leaves less than twice as much.
 fn most_unexplained(here: f64) -> f64 {
     let here = here.max(LEAST_UNEXPLAINED);
     UNEXPLAINED * here / (1.0 + (UNEXPLAINED - 1.0) * here)
 }
 
-/// The motions by which the wall repeats: those of all frames and their opposites, without those nearly the same.
+/// The motions by which the wall repeats: those of all frames and their opposites, without those
+/// nearly the same.
 fn periods(repeats: &[Vec<GaugeMotion>], radius_m: f64) -> Vec<GaugeMotion> {
     let length = |motion: &GaugeMotion| (radius_m * motion.turn_rad).hypot(motion.shift_m);
     let mut found: Vec<GaugeMotion> = Vec::new();
@@ -286,8 +293,8 @@ fn periods(repeats: &[Vec<GaugeMotion>], radius_m: f64) -> Vec<GaugeMotion> {
     found
 }
 
-/// The likeliest of some motions, and the second if it is less likely by no more than `clear`; or one of the wall's `periods`, if
-/// it is likelier by more than that.
+/// The likeliest of some motions, and the second if it is less likely by no more than `clear`; or
+/// one of the wall's `periods`, if it is likelier by more than that.
 fn likeliest(
     motions: &[GaugeMotion],
     periods: &[GaugeMotion],
@@ -320,7 +327,8 @@ impl Evidence<'_> {
         }
     }
 
-    /// Errors that add up: step by step. Of the runs of frames between undecided steps, the longest is believed.
+    /// Errors that add up: step by step. Of the runs of frames between undecided steps, the longest
+    /// is believed.
     fn by_steps(&self, clear: f64) -> Choice {
         let count = self.frames.len();
         let mut motion = vec![GaugeMotion::default(); count];
@@ -363,7 +371,8 @@ impl Evidence<'_> {
         Choice { motion, rival }
     }
 
-    /// Independent errors: frame by frame, against the gauge that all have taken on, until nothing changes.
+    /// Independent errors: frame by frame, against the gauge that all have taken on, until nothing
+    /// changes.
     fn by_frames(&self, clear: f64) -> Choice {
         let initial: Vec<Pose> = self.frames.iter().map(|k| self.prior.initial[*k]).collect();
         let mut choice = Choice {
@@ -473,7 +482,8 @@ mod tests {
         assert_eq!(found, [tile(), tile().reversed(), turn, turn.reversed()]);
     }
 
-    /// Those that a frame was compared with are a tile off, too, so it fits nowhere else; others have shown that the wall repeats.
+    /// Those that a frame was compared with are a tile off, too, so it fits nowhere else; others
+    /// have shown that the wall repeats.
     #[test]
     fn what_the_prior_would_have_a_period_away_is_ambiguous() {
         for model in [JitterModel::RandomWalk, JitterModel::Independent] {

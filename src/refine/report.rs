@@ -61,7 +61,8 @@ pub struct FrameReport {
     pub other_pose: Option<PoseReport>,
     /// Wall samples at which it was compared with other frames.
     pub points: usize,
-    /// Root mean square of its residuals against the fused wall, grey levels, as weighted by the robust loss.
+    /// Root mean square of its residuals against the fused wall, grey levels, as weighted by the
+    /// robust loss.
     pub residual: f64,
     /// Share of its pixels' weight that the robust loss left, 0 to 1.
     pub inlier_share: f64,
@@ -71,8 +72,8 @@ pub struct FrameReport {
     pub bias: f64,
     /// 1-σ relative to the first frame.
     pub sigma: FrameSigma,
-    /// What patches of it are off by against the others, beyond noise: root mean square, pixels. Much of it speaks of a wrong camera,
-    /// radius or shape.
+    /// What patches of it are off by against the others, beyond noise: root mean square, pixels.
+    /// Much of it speaks of a wrong camera, radius or shape.
     #[serde(default)]
     pub strain_px: f64,
 }
@@ -115,8 +116,8 @@ pub struct RefineReport {
     pub frames: Vec<FrameReport>,
     /// Frames whose pose rests on the prior.
     pub frames_on_prior: usize,
-    /// The covariance over the inverse of the normal matrix, c of [`super::covariance`]: above 1 where residuals err together, below
-    /// where they cancel.
+    /// The covariance over the inverse of the normal matrix, c of [`super::covariance`]: above 1
+    /// where residuals err together, below where they cancel.
     pub variance_factor: f64,
     /// The readout time that the frames want, as far as they can tell.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -1,11 +1,13 @@
 //! Tracking in a light and with a camera that are only roughly known.
 //!
-//! The mean of all frames shows the camera's light up to what is left of the wall in it, which on a faint wall is as much as there is
-//! to see. So a few frames are tracked first; where they overlap they tell the light ([`super::flat_field`]), and they are
-//! tracked again in that, until the light stays as it is. Then the others follow.
+//! The mean of all frames shows the camera's light up to what is left of the wall in it, which on a
+//! faint wall is as much as there is to see. So a few frames are tracked first; where they overlap
+//! they tell the light ([`super::flat_field`]), and they are tracked again in that, until the light
+//! stays as it is. Then the others follow.
 //!
-//! Likewise, frames placed with a wrong camera fit badly where they overlap, and some end up in the wrong place. But what they tell of
-//! the camera is much better than what was given, so they are tracked again with that, until the camera stays as it is.
+//! Likewise, frames placed with a wrong camera fit badly where they overlap, and some end up in the
+//! wrong place. But what they tell of the camera is much better than what was given, so they are
+//! tracked again with that, until the camera stays as it is.
 
 use super::calibration::Kappa;
 use super::doubt::Doubt;
@@ -20,7 +22,8 @@ use serde::{Deserialize, Serialize};
 
 /// Times that the frames are tracked, at the most.
 const ROUNDS: usize = 5;
-/// A camera that has moved a pixel by less than this, pixels of full size, is the one the frames were placed with.
+/// A camera that has moved a pixel by less than this, pixels of full size, is the one the frames
+/// were placed with.
 const SAME_CAMERA_PX: f64 = 2.0;
 /// Times that a few frames are tracked for the light, at the most.
 const LIGHT_ROUNDS: usize = 3;
@@ -53,7 +56,8 @@ impl Retracking {
         }
     }
 
-    /// Places the first frames and corrects the shading, if there is one, by what they tell where they overlap.
+    /// Places the first frames and corrects the shading, if there is one, by what they tell where
+    /// they overlap.
     fn find_light(
         &mut self,
         scene: &Scene,
@@ -82,8 +86,8 @@ impl Retracking {
         Ok(())
     }
 
-    /// Places all frames that are left, with the camera's unknowns if they are to be estimated. `between` is called after
-    /// every frame.
+    /// Places all frames that are left, with the camera's unknowns if they are to be estimated.
+    /// `between` is called after every frame.
     ///
     /// # Errors
     /// As [`Tracking::place_next`], and those of `between`.

@@ -2,11 +2,12 @@
 
 use crate::frames::MAD_TO_SIGMA;
 
-/// Residuals' variance at a wall point whose texture changes by g grey levels from one sample to the next:
-/// `v(g) = σ² + κ g²`.
+/// Residuals' variance at a wall point whose texture changes by g grey levels from one sample to
+/// the next: `v(g) = σ² + κ g²`.
 ///
-/// σ is the sensor's noise. κ stands for what sampling adds where the picture is steep: aliasing, differences
-/// of blur between near and oblique views, interpolation, and the misalignment still to be removed.
+/// σ is the sensor's noise. κ stands for what sampling adds where the picture is steep: aliasing,
+/// differences of blur between near and oblique views, interpolation, and the misalignment still to
+/// be removed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseModel {
     /// σ², grey levels².
@@ -23,16 +24,17 @@ impl NoiseModel {
     }
 }
 
-/// Tukey's biweight of a residual e with variance v: `ρ = c²/6 (1 − (1 − e²/c²)³)`, weight `ω = ρ'(e)/e = (1 − e²/c²)²`,
-/// both constant beyond `c² = 36 v`.
+/// Tukey's biweight of a residual e with variance v: `ρ = c²/6 (1 − (1 − e²/c²)³)`, weight
+/// `ω = ρ'(e)/e = (1 − e²/c²)²`, both constant beyond `c² = 36 v`.
 ///
-/// Something that moved or a wet patch costs `c²/6` and pulls nothing at all. (With a loss whose weight only fades, glints
-/// on a faint wall, fifty times as steep as its texture, stiffen the normal matrix so much that steps come to
-/// nothing.) With c at six times the residuals' own standard deviation it loses about 2 % of the information in
-/// Gaussian noise. Polynomial, so it vectorises. Arguments: `e²` and `1/v`.
+/// Something that moved or a wet patch costs `c²/6` and pulls nothing at all. (With a loss whose
+/// weight only fades, glints on a faint wall, fifty times as steep as its texture, stiffen the
+/// normal matrix so much that steps come to nothing.) With c at six times the residuals' own
+/// standard deviation it loses about 2 % of the information in Gaussian noise. Polynomial, so it
+/// vectorises. Arguments: `e²` and `1/v`.
 ///
-/// Source: A. E. Beaton and J. W. Tukey, "The fitting of power series, meaning polynomials, illustrated on
-/// band-spectroscopic data", Technometrics 16(2), 1974.
+/// Source: A. E. Beaton and J. W. Tukey, "The fitting of power series, meaning polynomials,
+/// illustrated on band-spectroscopic data", Technometrics 16(2), 1974.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Loss;
 
@@ -55,8 +57,8 @@ impl Loss {
     }
 }
 
-/// Median of some values and their robust standard deviation: the median distance from it, as a Gaussian's σ. The values are
-/// lost; 0, 0 of none.
+/// Median of some values and their robust standard deviation: the median distance from it, as a
+/// Gaussian's σ. The values are lost; 0, 0 of none.
 pub fn median_and_sigma(values: &mut [f32]) -> (f32, f32) {
     let middle = values.len() / 2;
     if values.is_empty() {
@@ -71,11 +73,11 @@ pub fn median_and_sigma(values: &mut [f32]) -> (f32, f32) {
 }
 
 /// Robust correlation, −1 to 1, of pairs of values: with both scaled to robust σ 1,
-/// `(σ²(x + y) − σ²(x − y))/(σ²(x + y) + σ²(x − y))`. It is that of most pairs, whatever the rest shows; 0 of values without
-/// spread.
+/// `(σ²(x + y) − σ²(x − y))/(σ²(x + y) + σ²(x − y))`. It is that of most pairs, whatever the rest
+/// shows; 0 of values without spread.
 ///
-/// Source: R. Gnanadesikan and J. R. Kettenring, "Robust estimates, residuals, and outlier detection with multiresponse
-/// data", Biometrics 28, 1972.
+/// Source: R. Gnanadesikan and J. R. Kettenring, "Robust estimates, residuals, and outlier
+/// detection with multiresponse data", Biometrics 28, 1972.
 pub fn robust_correlation(pairs: &[(f32, f32)]) -> f64 {
     let sigma = |value: &dyn Fn(&(f32, f32)) -> f32| {
         let mut values: Vec<f32> = pairs.iter().map(value).collect();
@@ -132,8 +134,8 @@ impl NoiseHistogram {
         self
     }
 
-    /// Fits `v(g)` to the robust variance `(1.4826 · median |e|)²` of each gradient bin, by least squares
-    /// weighted by the counts over the variances squared (their sampling variance).
+    /// Fits `v(g)` to the robust variance `(1.4826 · median |e|)²` of each gradient bin, by least
+    /// squares weighted by the counts over the variances squared (their sampling variance).
     pub fn fit(&self) -> NoiseModel {
         // Sums of 1, x, x², y, xy with x = g², y = variance.
         let mut m = [0.0f64; 5];

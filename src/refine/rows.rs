@@ -1,10 +1,11 @@
 //! Do the frames look as if their rows were read in another time than given?
 //!
-//! A camera that moves while rows are read puts what it sees ever farther off from row to row, by the time since the middle
-//! row. Poses take up most of that where it is ignored: frames roll, and the whole wall is wound around the axis a little. What
-//! they cannot take up is the same in all frames, a residual along the rows. It is asked for in one number: the readout time
-//! with which the frames fit best, with everything else free ([`super::shared`]), and how sure it is. The lens is free, too, as far
-//! as it usually may be off: a wrong one must not pass for a wrong time.
+//! A camera that moves while rows are read puts what it sees ever farther off from row to row, by
+//! the time since the middle row. Poses take up most of that where it is ignored: frames roll, and
+//! the whole wall is wound around the axis a little. What they cannot take up is the same in all
+//! frames, a residual along the rows. It is asked for in one number: the readout time with which
+//! the frames fit best, with everything else free ([`super::shared`]), and how sure it is. The lens
+//! is free, too, as far as it usually may be off: a wrong one must not pass for a wrong time.
 
 use super::calibration::{Calibration, Kappa, LENS, READOUT};
 use super::gauss_newton::{Stopping, solve};
@@ -27,20 +28,23 @@ const STOPPING: Stopping = Stopping {
 };
 /// A difference of the time is systematic if it is this many times its 1-σ, ...
 const SURE: f64 = 6.0;
-/// ... and shifts the picture's rows against one another by this much from the first to the last, pixels.
+/// ... and shifts the picture's rows against one another by this much from the first to the last,
+/// pixels.
 const LEAST_SHIFT_PX: f64 = 0.5;
 
 /// The readout time that the frames want.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[non_exhaustive]
 pub struct RowMotion {
-    /// Time from reading a frame's first row to reading its last as given, milliseconds; 0 for a global shutter.
+    /// Time from reading a frame's first row to reading its last as given, milliseconds; 0 for a
+    /// global shutter.
     pub given_ms: f64,
     /// The same with which the frames fit best.
     pub estimate_ms: f64,
     /// 1-σ of that.
     pub sigma_ms: f64,
-    /// How far the difference shifts the first row against the last, pixels in the middle of the median frame.
+    /// How far the difference shifts the first row against the last, pixels in the middle of the
+    /// median frame.
     pub shift_px: f64,
     /// True if that is a systematic error.
     pub systematic: bool,
@@ -113,7 +117,8 @@ fn with_readout(scene: &Scene) -> Calibration {
     calibration
 }
 
-/// How far the first row is shifted against the last in the middle of the median frame if the readout takes a second, pixels.
+/// How far the first row is shifted against the last in the middle of the median frame if the
+/// readout takes a second, pixels.
 fn shift_px_per_s(scene: &Scene, tracked: &Tracked) -> f64 {
     let all = 0..tracked.estimates.len();
     let between = 1.0 - 1.0 / f64::from(scene.camera.height);

@@ -74,17 +74,21 @@ pub struct Refined {
     pub covariances: Covariances,
 }
 
-/// All solves but the last end with a step shorter than this, pixels of their level, or this share of the uncertainty.
+/// All solves but the last end with a step shorter than this, pixels of their level, or this share
+/// of the uncertainty.
 const CLOSE_PX: f64 = 0.01;
 const CLOSE_SIGMA: f64 = 2.0;
 /// Share of a frame's pixels that must overlap other frames for its pose to count as photometric.
 const LEAST_PIXEL_SHARE: f64 = 0.02;
-/// Largest step left of a pose that counts as photometric: pixels on the wall, or multiples of σ if that is more.
+/// Largest step left of a pose that counts as photometric: pixels on the wall, or multiples of σ if
+/// that is more.
 const LARGEST_STEP: (f64, f64) = (0.25, 2.0);
-/// Largest 1-σ on the wall of a pose that counts as photometric, pixels: twice that is half a pixel.
+/// Largest 1-σ on the wall of a pose that counts as photometric, pixels: twice that is half a
+/// pixel.
 const LARGEST_SIGMA_PX: f64 = 0.25;
-/// Share of a frame's weight that the robust loss may reject. Things before the wall, glints and oblique views cost a
-/// right frame some; whether its pose is right is asked of its alignment with others.
+/// Share of a frame's weight that the robust loss may reject. Things before the wall, glints and
+/// oblique views cost a right frame some; whether its pose is right is asked of its alignment with
+/// others.
 const MOST_REJECTED: f64 = 0.3;
 
 /// Refines the poses of `survey`.
@@ -103,7 +107,8 @@ pub fn refine(
 
 /// The same, with what is done kept in a checkpoint; goes on from the state that is in it.
 ///
-/// The result has the same bytes however often the run was interrupted, but for the times that stages took.
+/// The result has the same bytes however often the run was interrupted, but for the times that
+/// stages took.
 ///
 /// # Errors
 /// [`RefineError`].
@@ -218,7 +223,8 @@ pub fn refine_keeping(
 
     let mut last = None;
     while let Some((sampling, stopping)) = solving.stages.front().copied() {
-        // Not between a solve and the one with the wall: that may turn out to be for nothing, and then the solution before it is wanted.
+        // Not between a solve and the one with the wall: that may turn out to be for nothing, and
+        // then the solution before it is wanted.
         if !sampling.joint {
             keeper.if_due(|| keep(Phase::Solving(Box::new(solving.clone())), &clock))?;
         }
@@ -252,9 +258,10 @@ pub fn refine_keeping(
         }
         // Before the frames are aligned at full size, residuals are mostly misalignment.
         if level == 0 {
-            let density = match sampling.joint {
-                true => Some(joint::FOREIGN_DENSITY),
-                false => options.foreign_density.filter(|_| sampling.by_variance),
+            let density = if sampling.joint {
+                Some(joint::FOREIGN_DENSITY)
+            } else {
+                options.foreign_density.filter(|_| sampling.by_variance)
             };
             problem = problem.without_foreign(density)?;
         }
@@ -297,7 +304,8 @@ pub fn refine_keeping(
         (solving.kappa, solving.free) = (scene.kappa, calibration.free);
         if !refused.is_empty() && !more_for_certain(&solving.stages) {
             solving.stages.push_front((sampling, stopping));
-            // Without the unknown the wall may look smooth, and then a solution without it is wanted.
+            // Without the unknown the wall may look smooth, and then a solution without it is
+            // wanted.
             if sampling.joint {
                 solving.stages.push_front(finest(options));
             }
@@ -419,9 +427,10 @@ fn calibration_of(
 ) -> Result<Calibration, RefineError> {
     let section = survey.file.calibrate.clone().unwrap_or_default();
     let groups = options.calibrate.as_ref().unwrap_or(&section.unknowns);
-    let calibration = match groups.is_empty() {
-        true => Calibration::none(&survey.camera),
-        false => Calibration::new(groups, &section, &survey.camera, initial),
+    let calibration = if groups.is_empty() {
+        Calibration::none(&survey.camera)
+    } else {
+        Calibration::new(groups, &section, &survey.camera, initial)
     };
     for (group, unknown) in [
         (CalibrationGroup::Radius, "the radius"),
@@ -447,12 +456,14 @@ fn adopt(scene: &mut Scene, calibration: &mut Calibration, mut kappa: Kappa, ref
     *scene = scene.at(kappa);
 }
 
-/// The global solves: coarse to fine, the finest once more with a denser look at the wall, and, if asked for, jointly with the wall.
-/// Those between only bring the estimate close for the next, and a share of the information is enough for that.
+/// The global solves: coarse to fine, the finest once more with a denser look at the wall, and, if
+/// asked for, jointly with the wall. Those between only bring the estimate close for the next, and
+/// a share of the information is enough for that.
 ///
-/// One sample per pixel is too sparse to end with: the products of residual and gradient vary faster than either,
-/// and where the wall repeats in step with the samples (courses of bricks run along them) what falls between
-/// them does not average out. On brick this alone is 0.05 px of wall error over two turns.
+/// One sample per pixel is too sparse to end with: the products of residual and gradient vary
+/// faster than either, and where the wall repeats in step with the samples (courses of bricks run
+/// along them) what falls between them does not average out. On brick this alone is 0.05 px of wall
+/// error over two turns.
 fn stages(options: &RefineOptions, side: u32) -> impl Iterator<Item = (Sampling, Stopping)> + '_ {
     let (finest, last) = finest(options);
     let with_wall = Sampling {
@@ -510,8 +521,8 @@ pub fn close(options: &RefineOptions, level: usize) -> Stopping {
     }
 }
 
-/// Compares all frames pair by pair, takes out those that contradict the rest, tries once more to place what is not
-/// placed, and solves again.
+/// Compares all frames pair by pair, takes out those that contradict the rest, tries once more to
+/// place what is not placed, and solves again.
 fn recheck(
     scene: &Scene,
     options: &RefineOptions,
@@ -542,7 +553,8 @@ fn recheck(
 /// Times that contradictions are looked for, and frames in doubt tried again between.
 const ROUNDS: usize = 3;
 
-/// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve does without them.
+/// Doubts the frames that the robust loss has mostly rejected at full size, so that the last solve
+/// does without them.
 pub fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) {
     for (share, doubt) in shares.iter().zip(doubts) {
         if doubt.is_none() && share.pixels > 0.0 {
@@ -551,7 +563,8 @@ pub fn disagreements(shares: &[FrameShare], doubts: &mut [Option<Doubt>]) {
     }
 }
 
-/// How far an undamped step of the poses would still move each frame, for want of steps or of descent, pixels on the wall.
+/// How far an undamped step of the poses would still move each frame, for want of steps or of
+/// descent, pixels on the wall.
 ///
 /// # Errors
 /// [`ProblemError::Factor`].

@@ -90,7 +90,8 @@ mod tests {
     use crate::camera::{Lens, Sweep};
     use crate::trajectory::so3;
 
-    /// A picture of its own pixel coordinates, sampled where the camera itself projects a point, lens included.
+    /// A picture of its own pixel coordinates, sampled where the camera itself projects a point,
+    /// lens included.
     #[test]
     fn a_point_is_seen_where_the_camera_projects_it() {
         let mut camera = Camera::from_vertical_fov(64, 48, 1.0);

@@ -1,20 +1,24 @@
 //! Looking for a frame beyond the basin of Gauss–Newton.
 //!
-//! A wall of bricks correlates with itself over a fraction of a brick only; the prior is wider than that. So
-//! before a frame is refined, it is compared with the wall fused from the frames already placed, over the whole width
-//! of the prior: the frame, unrolled under a few hypotheses of pitch and roll, is correlated with the wall over all
-//! shifts at once, by Fourier transform (a shift of the camera looks nearly like a turn, and refinement tells them
-//! apart). The best maxima are handed on as hypotheses.
+//! A wall of bricks correlates with itself over a fraction of a brick only; the prior is wider than
+//! that. So before a frame is refined, it is compared with the wall fused from the frames already
+//! placed, over the whole width of the prior: the frame, unrolled under a few hypotheses of pitch
+//! and roll, is correlated with the wall over all shifts at once, by Fourier transform (a shift of
+//! the camera looks nearly like a turn, and refinement tells them apart). The best maxima are
+//! handed on as hypotheses.
 //!
-//! Both are compared by their local contrast ([`crate::frames::local_contrast`]), normalised over what both show: with masks m,
+//! Both are compared by their local contrast ([`crate::frames::local_contrast`]), normalised over
+//! what both show: with masks m,
 //!
 //! `c(d) = Σ A(x) W(x+d) / √(Σ A²(x) m_W(x+d) · Σ m_A(x) W²(x+d))`.
 //!
 //! The score of a hypothesis is its log-posterior with exposure and noise profiled out:
-//! `ℓ = −(n/2ν) ln(1 − c²) − ½ ωᵀΣ⁻¹ω`, n the samples both show, ν those that share one independent piece of texture.
+//! `ℓ = −(n/2ν) ln(1 − c²) − ½ ωᵀΣ⁻¹ω`, n the samples both show, ν those that share one independent
+//! piece of texture.
 //!
-//! Source: J. P. Lewis, "Fast normalized cross-correlation", 1995 (correlation by transform); D. Padfield, "Masked
-//! object registration in the Fourier domain", IEEE Trans. Image Processing 21(5), 2012 (masks).
+//! Source: J. P. Lewis, "Fast normalized cross-correlation", 1995 (correlation by transform); D.
+//! Padfield, "Masked object registration in the Fourier domain", IEEE Trans. Image Processing
+//! 21(5), 2012 (masks).
 
 use super::problem::Scene;
 use super::spectrum::{Spectrum, Transform};
@@ -71,8 +75,8 @@ struct Peak {
     score: f64,
 }
 
-/// Searches around `predicted` over `sigma_rad`, the prior's σ of pitch, yaw and roll as seen in the picture; returns at
-/// most `count` local maxima, best first.
+/// Searches around `predicted` over `sigma_rad`, the prior's σ of pitch, yaw and roll as seen in
+/// the picture; returns at most `count` local maxima, best first.
 pub fn search(
     scene: &Scene,
     wall: &FusedWall,
@@ -88,7 +92,8 @@ pub fn search(
         return Vec::new();
     };
     let spacing = wall.lattice.spacing_m;
-    // How far a radian moves the middle of the view: of pitch along the tunnel, about the tunnel's axis around it.
+    // How far a radian moves the middle of the view: of pitch along the tunnel, about the tunnel's
+    // axis around it.
     let a = wall_jacobian(predicted, &scene.surface.frame(hit.wall));
     let axis = axis_seen(scene, predicted);
     let Some(tilt) = tilt_axis(&axis) else {
@@ -99,7 +104,8 @@ pub fn search(
     let cells = |length: f64| (length / spacing).ceil() as usize;
     let camera = portrait.camera();
     let half_diagonal = 0.5 * f64::from(camera.width).hypot(f64::from(camera.height));
-    // The more steeply a frame looks along the tunnel, the faster its picture on the wall stretches with the pitch.
+    // The more steeply a frame looks along the tunnel, the faster its picture on the wall stretches
+    // with the pitch.
     let steep = (hit.range / along).clamp(LEAST_PITCH_STEP, 1.0);
     let pitches = steps(REACH * sigma_rad[0], PITCH_STEP * steep);
     let rolls = steps(REACH * sigma_rad[2], ROLL_STEP / half_diagonal);
@@ -186,14 +192,16 @@ fn axis_seen(scene: &Scene, pose: &Pose) -> Vector3<f64> {
     scene.surface.straightened(pose).r_wc.inverse() * Vector3::y()
 }
 
-/// The axis, in the camera's frame, about which a turn moves the middle of the view along the tunnel and nowhere else: its
-/// own x for a camera that is not rolled. None for one that looks along the tunnel's axis.
+/// The axis, in the camera's frame, about which a turn moves the middle of the view along the
+/// tunnel and nowhere else: its own x for a camera that is not rolled. None for one that looks
+/// along the tunnel's axis.
 fn tilt_axis(axis: &Vector3<f64>) -> Option<Vector3<f64>> {
     axis.cross(&Vector3::z()).try_normalize(1e-6)
 }
 
-/// Where else on the wall a frame at `pose` fits: shifts along s and h, metres, up to `reach_m`, at which the squared
-/// correlation has a maximum of at least `least`; the shift of none is one of them, where the pose is right.
+/// Where else on the wall a frame at `pose` fits: shifts along s and h, metres, up to `reach_m`, at
+/// which the squared correlation has a maximum of at least `least`; the shift of none is one of
+/// them, where the pose is right.
 pub fn matches(
     wall: &FusedWall,
     portrait: &Portrait,
@@ -219,8 +227,9 @@ fn steps(half: f64, step: f64) -> Vec<f64> {
     (-n..=n).map(|k| f64::from(k) * step).collect()
 }
 
-/// The pose turned so that its middle looks at a wall point `shift_m` away from where it does: about the tunnel's axis,
-/// which moves the picture along s and leaves it as it is, however steeply it looks along the tunnel, and in pitch.
+/// The pose turned so that its middle looks at a wall point `shift_m` away from where it does:
+/// about the tunnel's axis, which moves the picture along s and leaves it as it is, however steeply
+/// it looks along the tunnel, and in pitch.
 fn shifted(scene: &Scene, pose: &Pose, shift_m: &Vector2<f64>) -> Option<Pose> {
     let look = |pose: &Pose| scene.surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()));
     let from = look(pose).ok()?.wall;

@@ -1,15 +1,16 @@
 //! Blocks of the inverse of the normal matrix where its factor has blocks, without the rest.
 //!
-//! With `H = L D Lᵀ` (L unit lower triangular in 8 × 8 blocks, in the frames' own order, in which the matrix is banded),
-//! `Z = H⁻¹` obeys `Z = D⁻¹ L⁻¹ + (I − Lᵀ) Z`, so that from the last column to the first, over the rows R_j of L's column j,
+//! With `H = L D Lᵀ` (L unit lower triangular in 8 × 8 blocks, in the frames' own order, in which
+//! the matrix is banded), `Z = H⁻¹` obeys `Z = D⁻¹ L⁻¹ + (I − Lᵀ) Z`, so that from the last column
+//! to the first, over the rows R_j of L's column j,
 //!
 //! `Z_ij = −Σ_{k∈R_j} Z_ik L_kj`  (i ∈ R_j),   `Z_jj = D_j⁻¹ − Σ_{k∈R_j} L_kjᵀ Z_kj`,
 //!
-//! and every `Z_ik` with i, k ∈ R_j is itself among the blocks of the factor. Work and memory grow with the number of
-//! frames, not with its square.
+//! and every `Z_ik` with i, k ∈ R_j is itself among the blocks of the factor. Work and memory grow
+//! with the number of frames, not with its square.
 //!
-//! Source: K. Takahashi, J. Fagan, M. Chin, "Formation of a sparse bus impedance matrix and its application to short
-//! circuit study", 1973.
+//! Source: K. Takahashi, J. Fagan, M. Chin, "Formation of a sparse bus impedance matrix and its
+//! application to short circuit study", 1973.
 
 use super::factor::FactorError;
 use super::normal::{Block, NormalEquations, Pattern};
@@ -122,8 +123,8 @@ impl SymmetricUpper for Block {
     }
 }
 
-/// Rows of the factor's columns below the diagonal: those of the matrix, and of every column that hands its rows on (to
-/// the first of them).
+/// Rows of the factor's columns below the diagonal: those of the matrix, and of every column that
+/// hands its rows on (to the first of them).
 fn fill(pattern: &Pattern) -> Vec<Vec<usize>> {
     let count = pattern.frames();
     let mut rows: Vec<Vec<usize>> = vec![Vec::new(); count];

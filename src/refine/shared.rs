@@ -6,16 +6,20 @@
 //!
 //! with H_pp sparse as ever. Eliminating the poses by its factor leaves the few equations
 //!
-//! `S δκ = −(g_κ − Wᵀ g_p)`,  `S = H_κκ − H_κp W`,  `W = H_pp⁻¹ H_pκ`,   and then `δp = −H_pp⁻¹ g_p − W δκ`.
+//! `S δκ = −(g_κ − Wᵀ g_p)`, `S = H_κκ − H_κp W`, `W = H_pp⁻¹ H_pκ`, and then
+//! `δp = −H_pp⁻¹ g_p − W δκ`.
 //!
-//! With Q the scatter of the whole gradient over the square of its curvature (both of [`super::covariance`]), `Σ_κ = S⁻¹ (E Q Eᵀ) S⁻¹` with `E = (−Wᵀ, I)` is
-//! the covariance of κ with the poses unknown, and `Z + W Σ_κ Wᵀ` that of the poses with κ unknown.
+//! With Q the scatter of the whole gradient over the square of its curvature (both of
+//! [`super::covariance`]), `Σ_κ = S⁻¹ (E Q Eᵀ) S⁻¹` with `E = (−Wᵀ, I)` is the covariance of κ with
+//! the poses unknown, and `Z + W Σ_κ Wᵀ` that of the poses with κ unknown.
 //!
-//! What a tile adds ([`super::lens`]): if κ changes, the pixel of frame i that looks at x shows the wall at `x − C_i δκ` instead, with
-//! `C_i = ∂(s, h)/∂κ`, so C_i stands beside A_i (see [`super::tile`]). The sums over all other frames of the bracket
-//! `w_i δ_ij − w_i w_j / Σw` are those from the mean `C̄ = Σ w C / Σ w`:
+//! What a tile adds ([`super::lens`]): if κ changes, the pixel of frame i that looks at x shows the
+//! wall at `x − C_i δκ` instead, with `C_i = ∂(s, h)/∂κ`, so C_i stands beside A_i (see
+//! [`super::tile`]). The sums over all other frames of the bracket `w_i δ_ij − w_i w_j / Σw` are
+//! those from the mean `C̄ = Σ w C / Σ w`:
 //!
-//! `H_pκ,i = w̄_i B_iᵀ M (C_i − C̄)`,  `H_κκ = Σ_i w̄_i (C_i − C̄)ᵀ M (C_i − C̄)`,  `g_κ = −Σ_i C_iᵀ g_i`.
+//! `H_pκ,i = w̄_i B_iᵀ M (C_i − C̄)`, `H_κκ = Σ_i w̄_i (C_i − C̄)ᵀ M (C_i − C̄)`,
+//! `g_κ = −Σ_i C_iᵀ g_i`.
 
 use super::calibration::{Calibration, Kappa, SHARED};
 use super::estimate::{FrameStep, UNKNOWNS};
@@ -56,7 +60,8 @@ impl Border {
         self.gradient *= factor;
     }
 
-    /// Counts a part of the cost with the gradients `frames` (slot by slot) and `shared` into the scatter.
+    /// Counts a part of the cost with the gradients `frames` (slot by slot) and `shared` into the
+    /// scatter.
     pub fn count(&mut self, frames: impl Iterator<Item = (usize, FrameStep)>, shared: &Kappa) {
         for (slot, gradient) in frames {
             self.frames[slot] += gradient * shared.transpose();
@@ -116,7 +121,8 @@ impl Border {
     }
 }
 
-/// `E Q Eᵀ` with `E = (−Wᵀ, I)`: what a matrix of poses (`blocks` on `pattern`) and shared unknowns is to these alone.
+/// `E Q Eᵀ` with `E = (−Wᵀ, I)`: what a matrix of poses (`blocks` on `pattern`) and shared unknowns
+/// is to these alone.
 pub fn reduce(
     pattern: &Pattern,
     blocks: &[Block],
@@ -238,12 +244,13 @@ mod tests {
             block
         };
         let blocks: Vec<Block> = (0..pattern.blocks())
-            .map(
-                |k| match (0..frames).any(|f| pattern.place(f, f) == Some(k)) {
-                    true => upper(k),
-                    false => normal.blocks[k],
-                },
-            )
+            .map(|k| {
+                if (0..frames).any(|f| pattern.place(f, f) == Some(k)) {
+                    upper(k)
+                } else {
+                    normal.blocks[k]
+                }
+            })
             .collect();
         assert!((reduce(&pattern, &blocks, &border, &w) - schur).norm() < 1e-10);
         let inverse = schur.try_inverse().unwrap();

@@ -21,7 +21,8 @@ pub struct Transform {
 }
 
 impl Transform {
-    /// For rasters of at least `columns × rows`, rounded up to sizes that transform fast (`2^a 3^b 5^c`).
+    /// For rasters of at least `columns × rows`, rounded up to sizes that transform fast
+    /// (`2^a 3^b 5^c`).
     pub fn at_least(columns: usize, rows: usize) -> Self {
         let (columns, rows) = (fast_size(columns), fast_size(rows));
         let mut real = RealFftPlanner::new();
@@ -53,7 +54,8 @@ impl Transform {
         spectrum
     }
 
-    /// The correlation `C(d) = Σ_x a(x) b(x + d)` (cyclic) of two rasters, from their spectra: `Ā B` back.
+    /// The correlation `C(d) = Σ_x a(x) b(x + d)` (cyclic) of two rasters, from their spectra:
+    /// `Ā B` back.
     pub fn correlate(&self, a: &Spectrum, b: &Spectrum) -> Vec<f32> {
         let width = self.width();
         let mut product: Spectrum = a.iter().zip(b).map(|(a, b)| a.conj() * b).collect();

@@ -1,11 +1,13 @@
 //! How far a frame is pulled hither and thither.
 //!
-//! Where the model is wrong (a camera's focal length, a turn closed a period off and bent), patches of the wall pull a frame hither
-//! and thither, and it rests between. Were it noise, the scatter of what the patches pull would be `V_k ≈ H_k`, the frame's own blocks
-//! on the diagonal, all other frames held. With `q = tr(H_k⁻¹ V_k)/6` over the pose ([`pull`]) a patch lies `√q` times as
-//! far off as by noise. By noise, N patches of information I px⁻² each, which together fix six unknowns, leave the mean point of the
-//! picture the variance `σ² = 6/(N I)`, and a patch by itself, in both directions, is uncertain by `2/I = N σ²/3`. So what patches are
-//! off by, beyond noise, is
+//! Where the model is wrong (a camera's focal length, a turn closed a period off and bent), patches
+//! of the wall pull a frame hither and thither, and it rests between. Were it noise, the scatter of
+//! what the patches pull would be `V_k ≈ H_k`, the frame's own blocks on the diagonal, all other
+//! frames held. With `q = tr(H_k⁻¹ V_k)/6` over the pose ([`pull`]) a patch lies `√q` times as far
+//! off as by noise. By noise, N patches of information I px⁻² each, which together fix six
+//! unknowns, leave the mean point of the picture the variance `σ² = 6/(N I)`, and a patch by
+//! itself, in both directions, is uncertain by `2/I = N σ²/3`. So what patches are off by, beyond
+//! noise, is
 //!
 //! `strain² = (q − 1) N σ²/3`   px².
 
@@ -20,14 +22,15 @@ use super::tile::SAMPLES;
 use crate::median::upper_median;
 use nalgebra::Matrix6;
 
-/// Largest strain that can be borne of a frame by itself, if it is that many times what noise does ([`Strain`]): a glint on a faint
-/// wall makes it a pixel and five to ten times, in one patch of a frame that is right.
+/// Largest strain that can be borne of a frame by itself, if it is that many times what noise does
+/// ([`Strain`]): a glint on a faint wall makes it a pixel and five to ten times, in one patch of a
+/// frame that is right.
 const MOST_STRAIN: Strain = Strain {
     times: 12.0,
     px: 0.25,
 };
-/// Largest strain of the median frame, pixels. Right surveys have none, whatever wall, light and noise; a focal length 0.3 % off makes it
-/// 0.05, one 1 % off 0.13.
+/// Largest strain of the median frame, pixels. Right surveys have none, whatever wall, light and
+/// noise; a focal length 0.3 % off makes it 0.05, one 1 % off 0.13.
 const MOST_USUAL_STRAIN_PX: f64 = 0.04;
 /// Wall samples of a patch: of the blocks over which the scatter is told.
 const PATCH: i64 = BLOCK * BLOCK * SAMPLES as i64;
@@ -42,7 +45,8 @@ pub struct Strain {
 }
 
 impl Strain {
-    /// From q, the number N of patches, and σ of the mean point of the picture by noise, all other frames held.
+    /// From q, the number N of patches, and σ of the mean point of the picture by noise, all other
+    /// frames held.
     fn new(q: f64, patches: f64, sigma_px: f64) -> Self {
         Self {
             times: q.sqrt(),
@@ -50,8 +54,8 @@ impl Strain {
         }
     }
 
-    /// Of a frame with its own block of the normal matrix, `information`, and of V, `scatter`, over a number of `patches`. None if the
-    /// frame is not fixed by the others.
+    /// Of a frame with its own block of the normal matrix, `information`, and of V, `scatter`, over
+    /// a number of `patches`. None if the frame is not fixed by the others.
     fn of_frame(
         scene: &Scene,
         estimate: &FrameEstimate,
@@ -66,8 +70,9 @@ impl Strain {
 
 /// q and, by noise alone, the covariance of the pose with all other frames held.
 ///
-/// The exposure goes along: with `E = (I, −H_pe H_ee⁻¹)`, pulls on the pose p that the exposure e does not make up for have the scatter
-/// `E V Eᵀ`; and `E` is `Z_pp⁻¹ (Z_pp Z_pe)` with `Z = H_k⁻¹`.
+/// The exposure goes along: with `E = (I, −H_pe H_ee⁻¹)`, pulls on the pose p that the exposure e
+/// does not make up for have the scatter `E V Eᵀ`; and `E` is `Z_pp⁻¹ (Z_pp Z_pe)` with
+/// `Z = H_k⁻¹`.
 fn pull(information: &Block, scatter: &Block) -> Option<(f64, Matrix6<f64>)> {
     let inverse = information.cholesky()?.inverse();
     let rows = inverse.fixed_rows::<6>(0);
@@ -77,7 +82,8 @@ fn pull(information: &Block, scatter: &Block) -> Option<(f64, Matrix6<f64>)> {
     Some((q, pose))
 }
 
-/// Each frame's strain at a solution; none of those that show nothing. `scene`: with the solution's own κ.
+/// Each frame's strain at a solution; none of those that show nothing. `scene`: with the solution's
+/// own κ.
 pub fn strains(scene: &Scene, solution: &Solution) -> Vec<Strain> {
     let at = &solution.linearisation;
     let pattern = solution.problem.pattern();
@@ -92,7 +98,8 @@ pub fn strains(scene: &Scene, solution: &Solution) -> Vec<Strain> {
     frames.map(|frame| of(frame).unwrap_or_default()).collect()
 }
 
-/// Which of the frames believed so far are under more strain than can be borne; where their median is, all are.
+/// Which of the frames believed so far are under more strain than can be borne; where their median
+/// is, all are.
 pub fn strained(strains: &[Strain], doubts: &[Option<Doubt>]) -> Vec<bool> {
     let believed = (0..doubts.len()).filter(|k| doubts[*k].is_none());
     let usual = upper_median(believed.map(|k| strains[k].px).collect());
@@ -107,10 +114,12 @@ pub fn strained(strains: &[Strain], doubts: &[Option<Doubt>]) -> Vec<bool> {
 mod tests {
     use super::*;
 
-    /// Patches that all pull at random, each by its own noise, are no strain; those that pull by half a pixel more are half a pixel.
+    /// Patches that all pull at random, each by its own noise, are no strain; those that pull by
+    /// half a pixel more are half a pixel.
     #[test]
     fn strain_is_what_patches_are_off_by_beyond_noise() {
-        // N patches, each with information I px⁻² about both directions of a picture that can move in six ways.
+        // N patches, each with information I px⁻² about both directions of a picture that can move
+        // in six ways.
         let (patches, information) = (300.0, 40.0);
         let sigma_px = f64::sqrt(6.0 / (patches * information));
         assert_eq!(Strain::new(1.0, patches, sigma_px).px, 0.0);

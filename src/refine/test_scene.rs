@@ -59,7 +59,8 @@ pub fn tracked(poses: &[Pose]) -> Tracked {
     }
 }
 
-/// A tunnel of 3 m radius, a camera, the lattice of its pixels there, and a spiral of so many frames, all to be estimated.
+/// A tunnel of 3 m radius, a camera, the lattice of its pixels there, and a spiral of so many
+/// frames, all to be estimated.
 pub fn placed_spiral(frames: usize) -> (Circle, Camera, WallGrid, Vec<Placed>) {
     let circle = Circle::new(3.0).unwrap();
     let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());

@@ -1,41 +1,45 @@
 //! One tile of the wall: texture, residuals and their first and second moments.
 //!
-//! For wall samples x of the tile and the frames i that see it, with gain `a_i = exp(α_i) V` (the frame's own times the
-//! camera's shading V there) and values `z_i(x) = (I_i(x) − b_i)/a_i`:
+//! For wall samples x of the tile and the frames i that see it, with gain `a_i = exp(α_i) V` (the
+//! frame's own times the camera's shading V there) and values `z_i(x) = (I_i(x) − b_i)/a_i`:
 //!
-//! - residual in the frame's own grey levels `e_i = I_i − b_i − a_i S = a_i r_i` with `r_i = z_i − S`: noise is
-//!   equal there, whatever the gain (in the wall's units a large gain would hide any residual);
-//! - weight `w_i = q_i a_i² ω(e_i) τ` of `r_i²`, with q the pixels per sample, ω the robust weight, and, in the last solve, `τ = σ²/v` by
-//!   the variance v of residuals where the texture is as steep as here ([`super::robust::NoiseModel`]), else 1: it is aliasing that
-//!   makes residuals at edges large, and without τ the sharpest edges would decide all; like the v in ω, τ is taken to stay as it is
-//!   while the poses move;
-//! - texture `S(x) = Σ w_i z_i / Σ w_i`, the robust weighted mean: for given poses and exposures this is the
-//!   minimiser, so S is eliminated exactly (variable projection);
-//! - derivative. If frame i moves by ξ, the pixel that looks at x shows the wall at `x − A_i ξ` instead,
-//!   with `A_i = ∂(s, h)/∂ξ` ([`crate::surface::wall_jacobian`]), hence `∂e_i/∂ξ = −a_i ∇Sᵀ A_i`;
-//!   `∂e_i/∂α_i = −a_i S` and `∂e_i/∂b_i = −1`. All frames share one feature vector
-//!   `φ(x) = (∂S/∂s, ∂S/∂h, S, 1)`:
+//! - residual in the frame's own grey levels `e_i = I_i − b_i − a_i S = a_i r_i` with
+//!   `r_i = z_i − S`: noise is equal there, whatever the gain (in the wall's units a large gain
+//!   would hide any residual);
+//! - weight `w_i = q_i a_i² ω(e_i) τ` of `r_i²`, with q the pixels per sample, ω the robust weight,
+//!   and, in the last solve, `τ = σ²/v` by the variance v of residuals where the texture is as
+//!   steep as here ([`super::robust::NoiseModel`]), else 1: it is aliasing that makes residuals at
+//!   edges large, and without τ the sharpest edges would decide all; like the v in ω, τ is taken to
+//!   stay as it is while the poses move;
+//! - texture `S(x) = Σ w_i z_i / Σ w_i`, the robust weighted mean: for given poses and exposures
+//!   this is the minimiser, so S is eliminated exactly (variable projection);
+//! - derivative. If frame i moves by ξ, the pixel that looks at x shows the wall at `x − A_i ξ`
+//!   instead, with `A_i = ∂(s, h)/∂ξ` ([`crate::surface::wall_jacobian`]), hence
+//!   `∂e_i/∂ξ = −a_i ∇Sᵀ A_i`; `∂e_i/∂α_i = −a_i S` and `∂e_i/∂b_i = −1`. All frames share one
+//!   feature vector `φ(x) = (∂S/∂s, ∂S/∂h, S, 1)`:
 //!
 //!   `∂e_i = −a_i φ(x)ᵀ B_i`,   `B_i = diag(A_i, 1, 1/a_i)`  (4 × 8).
 //!
-//! With each frame's own gradient instead of the fused one, its noise would add to the diagonal blocks of
-//! the normal matrix but not to the others, and the weak modes of the trajectory would turn stiff.
+//! With each frame's own gradient instead of the fused one, its noise would add to the diagonal
+//! blocks of the normal matrix but not to the others, and the weak modes of the trajectory would
+//! turn stiff.
 //!
 //! Within a tile A_i is nearly constant, so the normal equations need only moments:
 //!
 //! - `g_i = Σ_x w_i r_i φ` (4), the gradient of frame i being `−B_iᵀ g_i`;
-//! - `M = Σ_x p φ φᵀ` (4 × 4), p the sample's share of the information, and the mean weights `w̄_i`: eliminating S leaves
-//!   `H_ij = (w̄_i δ_ij − w̄_i w̄_j / Σ_k w̄_k) B_iᵀ M B_j`.
+//! - `M = Σ_x p φ φᵀ` (4 × 4), p the sample's share of the information, and the mean weights
+//!   `w̄_i`: eliminating S leaves `H_ij = (w̄_i δ_ij − w̄_i w̄_j / Σ_k w̄_k) B_iᵀ M B_j`.
 //!
-//! The slopes in φ are those of the denoised texture ([`super::denoise`]) once the frames are aligned at full size.
+//! The slopes in φ are those of the denoised texture ([`super::denoise`]) once the frames are
+//! aligned at full size.
 //!
-//! Frames that do not show the wall in a tile take no part in it ([`super::foreign`]).
-//! Where a frame has no value (clipped pixels) its weight is zero, and its cost that of plain noise.
+//! Frames that do not show the wall in a tile take no part in it ([`super::foreign`]). Where a
+//! frame has no value (clipped pixels) its weight is zero, and its cost that of plain noise.
 //!
 //! What edges that are sharp against a pixel need beyond this is in [`super::joint`].
 //!
-//! Rows of the bracket sum to zero, so what moves all frames of a tile alike costs nothing: the gauge
-//! directions are exact null vectors of the data term.
+//! Rows of the bracket sum to zero, so what moves all frames of a tile alike costs nothing: the
+//! gauge directions are exact null vectors of the data term.
 
 use super::denoise::{Denoiser, TextureSpectrum};
 use super::grid::{LANES, Plane, SIDE, TILE, TilePoints, ZERO};
@@ -46,8 +50,8 @@ use nalgebra::{Matrix4, Vector4};
 /// Samples of a tile without its ring.
 pub const SAMPLES: usize = TILE * TILE;
 
-/// A value at every sample of a tile's own rows, the ring's columns included, which count for nothing: its place is
-/// [`SIDE`] before that in a [`Plane`].
+/// A value at every sample of a tile's own rows, the ring's columns included, which count for
+/// nothing: its place is [`SIDE`] before that in a [`Plane`].
 type Rows = [f32; TILE * SIDE];
 const NO_ROWS: Rows = [0.0; TILE * SIDE];
 
@@ -225,12 +229,12 @@ impl TileWork {
         })
     }
 
-    /// Squared gradient of the texture as the frames show it, in their own grey levels a sample: of the frame that shows
-    /// least (with four frames or more, the second least).
+    /// Squared gradient of the texture as the frames show it, in their own grey levels a sample: of
+    /// the frame that shows least (with four frames or more, the second least).
     ///
-    /// Where only one frame is steep it shows a glint or an edge of something before the wall, which must not pass for
-    /// the noise of a steep texture. (In the wall's units a common factor of all gains would change the noise
-    /// model, and with it the cost.)
+    /// Where only one frame is steep it shows a glint or an edge of something before the wall,
+    /// which must not pass for the noise of a steep texture. (In the wall's units a common factor
+    /// of all gains would change the noise model, and with it the cost.)
     #[inline(always)]
     fn activity(&self) -> Plane {
         let (mut least, mut second) = ([f32::INFINITY; TILE * SIDE], [f32::INFINITY; TILE * SIDE]);
@@ -259,7 +263,8 @@ impl TileWork {
         )
     }
 
-    /// Of each observer, for the noise of S ([`super::denoise`]): `√q`, the pixels from sample to sample, and `(q a)² / (Σ q a²)²`.
+    /// Of each observer, for the noise of S ([`super::denoise`]): `√q`, the pixels from sample to
+    /// sample, and `(q a)² / (Σ q a²)²`.
     fn noise_shares(&self) -> impl Iterator<Item = (f64, f64)> {
         let weight = |frame: &Samples| f64::from(frame.pixels * frame.gain * frame.gain);
         let sum: f64 = self.samples.iter().map(weight).sum();
@@ -269,11 +274,11 @@ impl TileWork {
         })
     }
 
-    /// One step of iteratively reweighted least squares: sets every weight by the residual from `reference`
-    /// and returns the mean with these weights.
+    /// One step of iteratively reweighted least squares: sets every weight by the residual from
+    /// `reference` and returns the mean with these weights.
     ///
-    /// The weighted residuals from that mean sum to zero at every sample, exactly; otherwise the gradient
-    /// would have a part along the gauge, where nothing but the weak prior resists.
+    /// The weighted residuals from that mean sum to zero at every sample, exactly; otherwise the
+    /// gradient would have a part along the gauge, where nothing but the weak prior resists.
     #[inline(always)]
     fn reweight(&mut self, reference: &Plane, precision: &Plane) -> Plane {
         let mut sum = ZERO;
@@ -354,11 +359,11 @@ impl TileWork {
         }
     }
 
-    /// How much each sample tells about poses, relative to one at which every frame has its mean weight: the trace of the
-    /// bracket, `Σ w − Σ w²/Σ w`, there and with the mean weights.
+    /// How much each sample tells about poses, relative to one at which every frame has its mean
+    /// weight: the trace of the bracket, `Σ w − Σ w²/Σ w`, there and with the mean weights.
     ///
-    /// Where all frames but one are rejected (a glint in it), the texture is that frame's own and says nothing, however
-    /// steep it is.
+    /// Where all frames but one are rejected (a glint in it), the texture is that frame's own and
+    /// says nothing, however steep it is.
     #[inline(always)]
     fn shares(&self, trust: &Rows) -> Rows {
         let (mut total, mut square) = (NO_ROWS, NO_ROWS);
@@ -468,8 +473,8 @@ impl TileWork {
         median
     }
 
-    /// Counts the residuals around the plain mean, each scaled by `√(n/(n−1))` for the share of the mean
-    /// that it has itself made; and the texture, if all of it is known.
+    /// Counts the residuals around the plain mean, each scaled by `√(n/(n−1))` for the share of the
+    /// mean that it has itself made; and the texture, if all of it is known.
     #[inline(always)]
     pub fn count_residuals<'a>(
         &mut self,
@@ -517,8 +522,8 @@ fn gradient_squares(texture: &Plane) -> Rows {
     squares
 }
 
-/// Sums over a tile of the squared differences between neighbours along s and h, in the values that one frame shows. NaN
-/// where it lacks one.
+/// Sums over a tile of the squared differences between neighbours along s and h, in the values that
+/// one frame shows. NaN where it lacks one.
 #[inline(always)]
 pub fn slope_squares(points: &TilePoints, view: &View, shade: f32) -> [f64; 2] {
     let mut values = ZERO;
@@ -548,7 +553,8 @@ fn with_ring(rows: &Rows) -> Plane {
     plane
 }
 
-/// The first three features of a texture, `∂S/∂s, ∂S/∂h, S`, with no slope where it is not `covered`.
+/// The first three features of a texture, `∂S/∂s, ∂S/∂h, S`, with no slope where it is not
+/// `covered`.
 #[inline(always)]
 fn features(texture: &Plane, slopes: [f32; 2], covered: &Rows) -> [Rows; 3] {
     let mut phi = [NO_ROWS; 3];

@@ -1,12 +1,15 @@
-//! Tracking: placing one frame after another, with a sliding window that keeps the errors from growing.
+//! Tracking: placing one frame after another, with a sliding window that keeps the errors from
+//! growing.
 //!
-//! Registering each frame only against those already placed gains error exponentially. Solving the last
-//! frames that can overlap again together, every few frames, with the oldest third held, keeps it bounded. When a
-//! turn closes, frames may have drifted apart by many pixels, or by next to nothing: the window is solved both from the coarsest
-//! level, which reaches far and on a wall that repeats may end at another place that fits, and from the finest, which stays where
-//! it is; what fits better in the end is kept.
+//! Registering each frame only against those already placed gains error exponentially. Solving the
+//! last frames that can overlap again together, every few frames, with the oldest third held, keeps
+//! it bounded. When a turn closes, frames may have drifted apart by many pixels, or by next to
+//! nothing: the window is solved both from the coarsest level, which reaches far and on a wall that
+//! repeats may end at another place that fits, and from the finest, which stays where it is; what
+//! fits better in the end is kept.
 //!
-//! A frame that cannot be placed stays where the prior expects it, and no other is compared with it.
+//! A frame that cannot be placed stays where the prior expects it, and no other is compared with
+//! it.
 
 use super::calibration::Kappa;
 use super::doubt::Doubt;
@@ -27,8 +30,8 @@ use std::ops::Range;
 
 /// How far back overlap is looked for, frames.
 pub const FARTHEST: usize = 256;
-/// Frames of a long window, and frames placed between two of them: what short windows have bent a little, each a bit
-/// farther than the one before, is straightened by a look at several turns.
+/// Frames of a long window, and frames placed between two of them: what short windows have bent a
+/// little, each a bit farther than the one before, is straightened by a look at several turns.
 const LONG_WINDOW: usize = 160;
 const LONG_STRIDE: usize = 30;
 /// Stopping rule of a window; the global solve does the rest.
@@ -56,8 +59,8 @@ impl Tracked {
         self.members_of(all.clone(), all)
     }
 
-    /// The frames `participants`, of which those `active` are to be estimated and the others held; those in doubt by the
-    /// prior alone.
+    /// The frames `participants`, of which those `active` are to be estimated and the others held;
+    /// those in doubt by the prior alone.
     pub fn members_of(&self, participants: Range<usize>, active: Range<usize>) -> Members<'_> {
         Members {
             estimates: &self.estimates[participants.clone()],
@@ -134,7 +137,8 @@ impl Tracking {
     /// Places the next frame, and solves the windows that end with it.
     ///
     /// # Errors
-    /// [`ProblemError`] if the frame cannot be read, its initial pose stands outside the tunnel, or an equation has no solution.
+    /// [`ProblemError`] if the frame cannot be read, its initial pose stands outside the tunnel, or
+    /// an equation has no solution.
     pub fn place_next(
         &mut self,
         scene: &Scene,
@@ -170,8 +174,8 @@ impl Tracking {
                 }
             }
         }
-        // The frame looks farther back than the one before it did: a turn has closed on wall that was placed
-        // without it, and what has drifted apart meanwhile may be many pixels.
+        // The frame looks farther back than the one before it did: a turn has closed on wall that
+        // was placed without it, and what has drifted apart meanwhile may be many pixels.
         let closes = first < self.earliest;
         self.earliest = first;
         let side = scene.camera.shorter_side();
@@ -229,9 +233,11 @@ impl WindowState {
     }
 }
 
-/// Solves the frames of a window together, the oldest `held` of them held; where none is, with the camera's unknowns.
+/// Solves the frames of a window together, the oldest `held` of them held; where none is, with the
+/// camera's unknowns.
 ///
-/// Returns the cost of an observation at the end, grey levels²; infinity where nothing is seen twice.
+/// Returns the cost of an observation at the end, grey levels²; infinity where nothing is seen
+/// twice.
 fn solve_window(
     scene: &Scene,
     level: usize,
@@ -278,8 +284,9 @@ fn earliest_overlap(scene: &Scene, footprints: &[Footprint]) -> usize {
 
 /// Where the prior expects frame `k`, given the believed frames.
 ///
-/// Random walk: the nearest believed pose and the initial steps from there. Independent: the initial pose, moved by the
-/// gauge (turn about the axis, shift along it) that the believed frames have taken on.
+/// Random walk: the nearest believed pose and the initial steps from there. Independent: the
+/// initial pose, moved by the gauge (turn about the axis, shift along it) that the believed frames
+/// have taken on.
 ///
 /// Where that lies outside the tunnel: the initial pose.
 pub fn expect(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
@@ -326,8 +333,8 @@ fn expect_anywhere(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
     }
 }
 
-/// Tries once more to place the frames in doubt, now that there are frames on both sides of them; returns how many it
-/// has placed. Those that show nothing are not tried.
+/// Tries once more to place the frames in doubt, now that there are frames on both sides of them;
+/// returns how many it has placed. Those that show nothing are not tried.
 ///
 /// # Errors
 /// [`ProblemError`].

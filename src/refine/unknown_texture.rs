@@ -1,30 +1,34 @@
 //! How much pixels tell of displacements where the texture is not known beforehand.
 //!
-//! Let the texture be a Gaussian process with the spectrum P, and let N frames with pixels' noise σ² see it at the sub-pixel places
-//! x_i. What their pixels show at one frequency is the sum of all frequencies g that look alike to them (aliasing), with the
-//! covariance
+//! Let the texture be a Gaussian process with the spectrum P, and let N frames with pixels' noise
+//! σ² see it at the sub-pixel places x_i. What their pixels show at one frequency is the sum of all
+//! frequencies g that look alike to them (aliasing), with the covariance
 //!
 //! `C = Σ_g P(g) a_g a_gᴴ + σ² I`,   `a_g = (exp(2πi g·x_i))_i`,
 //!
-//! and the texture has been integrated out of it. The Fisher information of the places along one axis is
-//! `F_ij = tr(C⁻¹ ∂_iC C⁻¹ ∂_jC)`. With `∂_iC = e_i bᴴ + b e_iᴴ`, `b_j = Σ_g −2πi g P(g) ā_gi a_gj` for j ≠ i, `b_i = 0` (the two halves of
-//! the diagonal cancel), and `G = C⁻¹`,
+//! and the texture has been integrated out of it. The Fisher information of the places along one
+//! axis is `F_ij = tr(C⁻¹ ∂_iC C⁻¹ ∂_jC)`. With `∂_iC = e_i bᴴ + b e_iᴴ`,
+//! `b_j = Σ_g −2πi g P(g) ā_gi a_gj` for j ≠ i, `b_i = 0` (the two halves of the diagonal cancel),
+//! and `G = C⁻¹`,
 //!
 //! `F_ii = 2 G_ii bᴴGb + 2 Re (e_iᴴGb)²`.
 //!
-//! With the texture's slopes known it is `J_ii = 2 Σ_g (2πg)² P(g)/σ² (1 − 1/N)`. On average over all places both
-//! matrices are multiples of `I − 11ᵀ/N`: they are alike in all frames, and what moves all of them together tells nothing. So the share
-//! `tr F / tr J` of the information is left, and slopes count by its root.
+//! With the texture's slopes known it is `J_ii = 2 Σ_g (2πg)² P(g)/σ² (1 − 1/N)`. On average over
+//! all places both matrices are multiples of `I − 11ᵀ/N`: they are alike in all frames, and what
+//! moves all of them together tells nothing. So the share `tr F / tr J` of the information is left,
+//! and slopes count by its root.
 //!
-//! Without aliases the share of a frequency is `Nρ/(1 + Nρ)`, `ρ = P/σ²`: detail below the noise of the mean of all frames is of no use.
-//! With them it stays below 1 however little noise there is: how much looks like something coarser must be told from the same pixels, which
-//! takes as many frames as there are frequencies that look alike.
+//! Without aliases the share of a frequency is `Nρ/(1 + Nρ)`, `ρ = P/σ²`: detail below the noise of
+//! the mean of all frames is of no use. With them it stays below 1 however little noise there is:
+//! how much looks like something coarser must be told from the same pixels, which takes as many
+//! frames as there are frequencies that look alike.
 //!
-//! Source: W. J. Bangs, "Array processing with generalized beamformers", thesis, Yale, 1971; W. R. Hahn and S. A. Tretter, "Optimum
-//! processing for delay-vector estimation in passive signal arrays", IEEE Transactions on Information Theory 19(5), 1973;
-//! P. Stoica and A. Nehorai, "Performance study of conditional and unconditional direction-of-arrival estimation", IEEE Transactions on
-//! Acoustics, Speech, and Signal Processing 38(10), 1990 (that the bound with a known texture is not to be reached, however much data
-//! there is, and this one is).
+//! Source: W. J. Bangs, "Array processing with generalized beamformers", thesis, Yale, 1971; W. R.
+//! Hahn and S. A. Tretter, "Optimum processing for delay-vector estimation in passive signal
+//! arrays", IEEE Transactions on Information Theory 19(5), 1973; P. Stoica and A. Nehorai,
+//! "Performance study of conditional and unconditional direction-of-arrival estimation", IEEE
+//! Transactions on Acoustics, Speech, and Signal Processing 38(10), 1990 (that the bound with a
+//! known texture is not to be reached, however much data there is, and this one is).
 
 use super::spectrum::Transform;
 use crate::frames::GreyImage;
@@ -43,7 +47,8 @@ const PLACES: usize = 4;
 /// Frames that see a point, at the most; beyond, little changes.
 const MOST_FRAMES: usize = 24;
 
-/// Shares of the information of displacements, by the number of frames that see a point of the wall.
+/// Shares of the information of displacements, by the number of frames that see a point of the
+/// wall.
 #[derive(Clone, Debug)]
 pub struct UnknownTexture {
     /// Roots of the shares along s and h for two frames, three, …
@@ -51,8 +56,9 @@ pub struct UnknownTexture {
 }
 
 impl UnknownTexture {
-    /// For the wall shown by `wall` (columns along s, rows along h, at least [`UnknownTexture::least_side`] of each), `finer` times as
-    /// fine as pixels of a frame, with noise of `noise_grey` grey levels (1-σ) in these.
+    /// For the wall shown by `wall` (columns along s, rows along h, at least
+    /// [`UnknownTexture::least_side`] of each), `finer` times as fine as pixels of a frame, with
+    /// noise of `noise_grey` grey levels (1-σ) in these.
     pub fn of_wall(wall: &GreyImage, finer: usize, noise_grey: f64) -> Self {
         let spectrum = WallSpectrum::of(wall, finer);
         let shares = (2..=MOST_FRAMES).into_par_iter();
@@ -88,7 +94,8 @@ struct WallSpectrum {
 }
 
 impl WallSpectrum {
-    /// The mean of the periodograms of patches that overlap by half, under Hann's window (Welch's method).
+    /// The mean of the periodograms of patches that overlap by half, under Hann's window (Welch's
+    /// method).
     fn of(wall: &GreyImage, finer: usize) -> Self {
         let side = UnknownTexture::least_side(finer);
         let transform = Transform::at_least(side, side);
@@ -129,9 +136,10 @@ impl WallSpectrum {
         let density = (0..side * side).map(|k| {
             let (column, row) = (k % side, k / side);
             // The spectrum of a real raster is that of its mirror image in the origin.
-            let square = match column < width {
-                true => half[row * width + column],
-                false => half[(side - row) % side * width + side - column],
+            let square = if column < width {
+                half[row * width + column]
+            } else {
+                half[(side - row) % side * width + side - column]
             };
             scale * square * smoothing(column) * smoothing(row)
         });
@@ -142,7 +150,8 @@ impl WallSpectrum {
         }
     }
 
-    /// `tr F / tr J` along s and h for `frames` frames, over frequencies and places drawn at random, always the same ones.
+    /// `tr F / tr J` along s and h for `frames` frames, over frequencies and places drawn at
+    /// random, always the same ones.
     fn shares(&self, frames: usize, noise_grey: f64) -> [f64; 2] {
         let mut random = ChaCha8Rng::seed_from_u64(frames as u64);
         let half = (PATCH_PX / 2) as i64;
@@ -231,9 +240,10 @@ fn informations(alike: &[Wave], places: &[[f64; 2]], noise_grey: f64) -> [[f64; 
 
 /// `k` of a transform of `side` values as a frequency of either sign.
 fn signed(k: usize, side: usize) -> i64 {
-    match k < side / 2 {
-        true => k as i64,
-        false => k as i64 - side as i64,
+    if k < side / 2 {
+        k as i64
+    } else {
+        k as i64 - side as i64
     }
 }
 
@@ -309,7 +319,8 @@ mod tests {
         }
     }
 
-    /// White noise through a pixel: `P = V sinc² sinc²`, V the variance of the wall's pixels over their number in one.
+    /// White noise through a pixel: `P = V sinc² sinc²`, V the variance of the wall's pixels over
+    /// their number in one.
     #[test]
     fn the_spectrum_is_that_of_what_pixels_see() {
         let (finer, sigma) = (4, 12.0);

@@ -1,15 +1,17 @@
 //! Which frames the others bear out, once all are solved at full size.
 //!
-//! A frame is believed if it is aligned with every believed frame that it shares wall with, and if such pairs tie it to
-//! the rest. Agreement of neighbours is not enough: a group of frames can be right in itself and stand in the wrong
-//! place, when all it shares with the others is a strip that says nothing, or the prior.
+//! A frame is believed if it is aligned with every believed frame that it shares wall with, and if
+//! such pairs tie it to the rest. Agreement of neighbours is not enough: a group of frames can be
+//! right in itself and stand in the wrong place, when all it shares with the others is a strip that
+//! says nothing, or the prior.
 
 use super::alignment::Alignment;
 use super::doubt::Doubt;
 
 /// Pairs may be misaligned by this much, pixels, ...
 const TOLERANCE_PX: f64 = 0.5;
-/// ... or by this many times what is usual in the survey: where all pairs are, the calibration is at fault, no frame.
+/// ... or by this many times what is usual in the survey: where all pairs are, the calibration is
+/// at fault, no frame.
 const TIMES_USUAL: f64 = 4.0;
 /// z: a pair that is aligned to the tolerance is called misaligned about once in a million.
 const SURE: f64 = 5.0;
@@ -20,8 +22,9 @@ const TIED_PX: f64 = 1.0;
 
 /// The frames that the others do not bear out, with the reason.
 ///
-/// Where two frames are misaligned, one is to blame: the one with the larger share of its overlap in such pairs is taken
-/// out first, until no pair is left. Of what remains, the largest group that pairs tie together is believed.
+/// Where two frames are misaligned, one is to blame: the one with the larger share of its overlap
+/// in such pairs is taken out first, until no pair is left. Of what remains, the largest group that
+/// pairs tie together is believed.
 pub fn unsupported(alignments: &[Alignment], frames: usize) -> Vec<(usize, Doubt)> {
     let most_px = most_px(alignments);
     let mut out = vec![false; frames];

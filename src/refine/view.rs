@@ -10,8 +10,8 @@ use crate::surface::{lens_jacobian, wall_jacobian};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix2x6, Matrix3, Vector3};
 
-/// Added to a float from 0 on, 2²³ rounds it to an integer that stands in the last bits of the sum. Unlike a cast, which
-/// saturates, this is done on whole vectors.
+/// Added to a float from 0 on, 2²³ rounds it to an integer that stands in the last bits of the sum.
+/// Unlike a cast, which saturates, this is done on whole vectors.
 const INTEGER: f32 = 8_388_608.0;
 
 /// For every sample of a tile, where in a picture's data the pixel to its upper left is.
@@ -64,17 +64,18 @@ impl<'a> View<'a> {
         }
     }
 
-    /// What a pixel (by its number, row-major) says of the wall where the shading is `shade`, with noise of `sigma` grey
-    /// levels; nothing where it has no value.
+    /// What a pixel (by its number, row-major) says of the wall where the shading is `shade`, with
+    /// noise of `sigma` grey levels; nothing where it has no value.
     #[inline(always)]
     pub fn reading(&self, pixel: u32, shade: f32, sigma: f32) -> Reading {
         let value = (self.image.data()[pixel as usize] - self.bias / shade) / self.gain;
-        match value.is_finite() {
-            true => Reading {
+        if value.is_finite() {
+            Reading {
                 value,
                 inverse_sigma: self.gain * shade / sigma,
-            },
-            false => Reading::default(),
+            }
+        } else {
+            Reading::default()
         }
     }
 
@@ -85,16 +86,18 @@ impl<'a> View<'a> {
 
     /// `∂(s, h)/∂ξ` at the middle of a tile.
     ///
-    /// With a sweep, the ray starts where the camera is when the row is read, millimetres off: to a thousandth, that is no matter.
+    /// With a sweep, the ray starts where the camera is when the row is read, millimetres off: to a
+    /// thousandth, that is no matter.
     pub fn wall_jacobian(&self, points: &TilePoints) -> Matrix2x6<f64> {
         wall_jacobian(&self.pose, &points.centre)
     }
 
-    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2, ρ)` at the middle of a tile, for the `camera` at full size; `a`: the pose's
-    /// Jacobian there, `rate`: the motion of the frame's camera during a readout of one second.
+    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2, ρ)` at the middle of a tile, for the `camera` at full
+    /// size; `a`: the pose's Jacobian there, `rate`: the motion of the frame's camera during a
+    /// readout of one second.
     ///
-    /// A row read at the share τ of the picture's time is where the pose moved by `(ω τ, R ν τ)` would put it, with ω and ν in
-    /// proportion to the readout time ρ: `∂(s, h)/∂ρ = A (ω, R ν) τ`.
+    /// A row read at the share τ of the picture's time is where the pose moved by `(ω τ, R ν τ)`
+    /// would put it, with ω and ν in proportion to the readout time ρ: `∂(s, h)/∂ρ = A (ω, R ν) τ`.
     pub fn shared_jacobian(
         &self,
         points: &TilePoints,
@@ -113,9 +116,9 @@ impl<'a> View<'a> {
         seen
     }
 
-    /// The wall's values `(I/V − b/V)/a` as this frame shows them, into `values`; the frame
-    /// holds `I/V`, and `shade` is V around the tile. NaN where a pixel that the interpolation takes has no value.
-    /// Samples that a step has moved out of the picture repeat its border.
+    /// The wall's values `(I/V − b/V)/a` as this frame shows them, into `values`; the frame holds
+    /// `I/V`, and `shade` is V around the tile. NaN where a pixel that the interpolation takes has
+    /// no value. Samples that a step has moved out of the picture repeat its border.
     #[inline(always)]
     pub fn sample(&self, points: &TilePoints, shade: f32, values: &mut Plane) {
         match self.lens {
@@ -278,7 +281,8 @@ mod tests {
         }
     }
 
-    /// A frame whose grey value is a linear function of the pixel: either interpolation must return it exactly.
+    /// A frame whose grey value is a linear function of the pixel: either interpolation must return
+    /// it exactly.
     #[test]
     fn samples_are_where_the_camera_projects_them() {
         let straight = Camera::from_vertical_fov(160, 120, 60f64.to_radians());

@@ -13,14 +13,15 @@ use rayon::prelude::*;
 use std::collections::HashSet;
 use std::ops::Range;
 
-/// Pixels that a tile must stay away from the frame's border and from what is masked: room for the steps to come.
+/// Pixels that a tile must stay away from the frame's border and from what is masked: room for the
+/// steps to come.
 const MARGIN_PX: f64 = 1.0;
 
 /// Area of a tile between its outermost samples, in samples.
 const SAMPLES_BETWEEN_CORNERS: f64 = ((SIDE - 1) * (SIDE - 1)) as f64;
 
-/// Least area of a sample in a frame over that where the lattice was made for: a tile seen more obliquely, or from
-/// farther away, is left out.
+/// Least area of a sample in a frame over that where the lattice was made for: a tile seen more
+/// obliquely, or from farther away, is left out.
 const LEAST_PIXELS: f64 = 0.05;
 
 /// How far along the tunnel a frame is compared, in radii of a circle with the section's perimeter.
@@ -36,9 +37,9 @@ pub fn reach_m(surface: &dyn Surface) -> f64 {
 pub struct Observer {
     /// The frame, counted among those of the [`Visibility`].
     pub frame: u32,
-    /// Pixels that a sample of the tile stands for in this frame, q: the weight that makes every pixel count
-    /// once, however obliquely it sees the wall. It stays as it is while the poses move; otherwise a step could
-    /// lower the cost by looking at the wall more obliquely.
+    /// Pixels that a sample of the tile stands for in this frame, q: the weight that makes every
+    /// pixel count once, however obliquely it sees the wall. It stays as it is while the poses
+    /// move; otherwise a step could lower the cost by looking at the wall more obliquely.
     pub pixels: f32,
     /// The camera's shading V at the tile's middle; it stays as it is, too.
     pub shade: f32,
@@ -96,11 +97,12 @@ impl Hidden<'_> {
     };
 }
 
-/// The observations of a set of frames: every tile that at least two frames see, one of them active.
+/// The observations of a set of frames: every tile that at least two frames see, one of them
+/// active.
 ///
-/// A frame either sees a whole tile (with the ring its gradients need) or does not count there at all: every sample of
-/// a tile averages the same frames, and the set stays the same while the poses move, so that costs before and after
-/// a step are of the same points.
+/// A frame either sees a whole tile (with the ring its gradients need) or does not count there at
+/// all: every sample of a tile averages the same frames, and the set stays the same while the poses
+/// move, so that costs before and after a step are of the same points.
 #[derive(Clone, Debug, Default)]
 pub struct Visibility {
     /// Tiles, block by block.
@@ -262,7 +264,8 @@ pub fn rows_of(grid: &WallGrid, footprint: &Footprint) -> Range<i64> {
     (footprint.h_min_m / height).floor() as i64..(footprint.h_max_m / height).floor() as i64 + 1
 }
 
-/// All tiles in some rows of the lattice, numbered block by block: neighbours in order are neighbours on the wall.
+/// All tiles in some rows of the lattice, numbered block by block: neighbours in order are
+/// neighbours on the wall.
 struct Cells<'g> {
     grid: &'g WallGrid,
     /// First row of blocks.
@@ -316,8 +319,8 @@ impl<'g> Cells<'g> {
         })
     }
 
-    /// The corners of all tiles that some frame may see, ring included, row by row; each is computed once for all frames. None for
-    /// tiles with wall that is ignored.
+    /// The corners of all tiles that some frame may see, ring included, row by row; each is
+    /// computed once for all frames. None for tiles with wall that is ignored.
     fn corners(
         &self,
         surface: &dyn Surface,

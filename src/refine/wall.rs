@@ -15,9 +15,11 @@ use std::sync::Arc;
 /// Lattice cells at the most: a frame that looks far along the tunnel sees more, but not well.
 const MOST_CELLS: usize = 1 << 20;
 
-/// Least pixels of a piece of wall, over those it has when seen squarely from the axis, with which it is searched.
+/// Least pixels of a piece of wall, over those it has when seen squarely from the axis, with which
+/// it is searched.
 const LEAST_DETAIL: f32 = 0.1;
-/// How far along the tunnel that is, radii, with some room: `cos³ φ` of the pixels are left at an angle φ to the section.
+/// How far along the tunnel that is, radii, with some room: `cos³ φ` of the pixels are left at an
+/// angle φ to the section.
 const LONGEST_LOOK_RADII: f64 = 2.5;
 /// The wall is sampled as if it were no farther than this, radii.
 const COARSEST_RADII: f64 = 1.25;
@@ -92,7 +94,8 @@ pub struct Portrait {
 }
 
 impl Portrait {
-    /// Frame `frame`, its camera moving by `sweep`, with its contrast over a window as wide as light is smooth.
+    /// Frame `frame`, its camera moving by `sweep`, with its contrast over a window as wide as
+    /// light is smooth.
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
@@ -111,8 +114,9 @@ impl Portrait {
         })
     }
 
-    /// Frame `frame`, its camera moving by `sweep`, with its contrast over no more than `window` pixels to each side: fine detail only.
-    /// `all`: of all that it shows, or of the usual alone ([`usual`]).
+    /// Frame `frame`, its camera moving by `sweep`, with its contrast over no more than `window`
+    /// pixels to each side: fine detail only. `all`: of all that it shows, or of the usual alone
+    /// ([`usual`]).
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
@@ -126,9 +130,10 @@ impl Portrait {
     ) -> Result<Self, ProblemError> {
         let picture = scene.frames.get(frame)?;
         let image = picture.level(level);
-        let local = match all {
-            true => local_contrast(image, window),
-            false => local_contrast(&usual(image), window),
+        let local = if all {
+            local_contrast(image, window)
+        } else {
+            local_contrast(&usual(image), window)
         };
         Ok(Self {
             camera: scene.camera.at_level(level).sweeping(sweep),
@@ -186,7 +191,8 @@ pub struct Gaze<'a> {
 }
 
 impl Gaze<'_> {
-    /// Local contrast at a wall point (relative to the origin) and the variance of its noise, where the frame has a value.
+    /// Local contrast at a wall point (relative to the origin) and the variance of its noise, where
+    /// the frame has a value.
     #[inline]
     pub fn contrast_and_noise(&self, point: &[f32; 3]) -> Option<(f32, f32)> {
         let spot = self.sampler.at(point)?;
@@ -257,12 +263,13 @@ impl Likeness {
         (share(self.xx, self.noise_x) * share(self.yy, self.noise_y)).sqrt()
     }
 
-    /// Correlation of the textures behind the noise: the one as it is over the share that is texture.
+    /// Correlation of the textures behind the noise: the one as it is over the share that is
+    /// texture.
     ///
     /// About 1 where both show the same wall, however noisy. None where noise drowns the texture.
     ///
-    /// Source: C. Spearman, "The proof and measurement of association between two things", 1904 (correction for
-    /// attenuation).
+    /// Source: C. Spearman, "The proof and measurement of association between two things", 1904
+    /// (correction for attenuation).
     pub fn match_quality(&self) -> Option<f64> {
         let texture = self.texture();
         (texture > LEAST_TEXTURE).then(|| (self.correlation() / texture).min(1.0))
@@ -280,13 +287,15 @@ pub struct FusedWall {
     pub origin: Vector3<f64>,
     /// Points of the lattice relative to the origin.
     pub points: Vec<[f32; 3]>,
-    /// Local contrast there, the mean over the frames; NaN where none looks, or what is there is ignored.
+    /// Local contrast there, the mean over the frames; NaN where none looks, or what is there is
+    /// ignored.
     pub contrast: Vec<f32>,
     /// Variance of its noise.
     noise: Vec<f32>,
     /// The wall's grey value there, likewise.
     grey: Vec<f32>,
-    /// Whether the frame that is looked for shows the point in any detail, from where it is expected.
+    /// Whether the frame that is looked for shows the point in any detail, from where it is
+    /// expected.
     pub visible: Vec<bool>,
 }
 
@@ -298,8 +307,9 @@ struct Sight {
 }
 
 impl Sight {
-    /// True if a piece of the wall with this normal has at least [`LEAST_DETAIL`] of the pixels it has when seen squarely
-    /// from the axis: `cos β (r/d)²` of them, at distance d and angle β to the normal.
+    /// True if a piece of the wall with this normal has at least [`LEAST_DETAIL`] of the pixels it
+    /// has when seen squarely from the axis: `cos β (r/d)²` of them, at distance d and angle β to
+    /// the normal.
     #[inline]
     fn sees(&self, point: &[f32; 3], normal: &Vector3<f32>) -> bool {
         let ray = Vector3::from(*point) - self.centre;
@@ -418,7 +428,8 @@ impl FusedWall {
         likeness
     }
 
-    /// The estimate with `pose` and the gain and bias that fit the wall best: a line through its grey values.
+    /// The estimate with `pose` and the gain and bias that fit the wall best: a line through its
+    /// grey values.
     pub fn exposed(&self, portrait: &Portrait, pose: &Pose) -> FrameEstimate {
         let grey = portrait.grey(pose, &self.origin);
         let (mut n, mut x, mut y, mut xx, mut xy) = (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64);

@@ -17,10 +17,11 @@ pub struct Band {
     pub rows: u32,
     /// What the pixels are.
     pub format: PixelFormat,
-    /// The pixels, row-major over all columns, alpha last: full where some frame sees the wall, 0 in holes.
+    /// The pixels, row-major over all columns, alpha last: full where some frame sees the wall, 0
+    /// in holes.
     pub samples: Samples,
-    /// The frame that each pixel shows most of; [`NO_FRAME`] in holes and where frames are mixed everywhere. Empty unless some target
-    /// asks for it ([`Target::wants_sources`]).
+    /// The frame that each pixel shows most of; [`NO_FRAME`] in holes and where frames are mixed
+    /// everywhere. Empty unless some target asks for it ([`Target::wants_sources`]).
     pub sources: Vec<u32>,
 }
 
@@ -47,9 +48,10 @@ impl Band {
             row: 0,
             rows: 0,
             format,
-            samples: match format.deep {
-                true => Samples::Sixteen(Vec::with_capacity(count)),
-                false => Samples::Eight(Vec::with_capacity(count)),
+            samples: if format.deep {
+                Samples::Sixteen(Vec::with_capacity(count))
+            } else {
+                Samples::Eight(Vec::with_capacity(count))
             },
             sources: Vec::with_capacity(if sources { most } else { 0 }),
         }
@@ -90,7 +92,8 @@ impl Band {
             .collect()
     }
 
-    /// One channel of a region, grey levels of 255; NaN in holes. Rows beyond the band's are those next to them.
+    /// One channel of a region, grey levels of 255; NaN in holes. Rows beyond the band's are those
+    /// next to them.
     pub(super) fn region(&self, canvas: &Canvas, region: &Region, channel: usize) -> Vec<f32> {
         let step = self.format.channels + 1;
         let columns = i64::from(canvas.columns);
@@ -150,9 +153,10 @@ impl Band {
 
 fn grey<T: Sample>(pixel: &[T], channel: usize) -> f32 {
     let covered = pixel[pixel.len() - 1] != T::default();
-    match covered {
-        true => pixel[channel].value() * (255.0 / T::WHITE),
-        false => f32::NAN,
+    if covered {
+        pixel[channel].value() * (255.0 / T::WHITE)
+    } else {
+        f32::NAN
     }
 }
 
@@ -179,8 +183,8 @@ fn alpha<T: Sample, const N: usize>(samples: &[T]) -> Vec<bool> {
 pub struct Place<'a> {
     /// Its pixels, alpha last: full where some frame sees the wall, 0 in holes.
     pub(super) pixels: Rows<'a>,
-    /// The frame that each pixel shows most of, [`NO_FRAME`] in holes and where frames are mixed all over; row by row, or no rows
-    /// if nobody asks.
+    /// The frame that each pixel shows most of, [`NO_FRAME`] in holes and where frames are mixed
+    /// all over; row by row, or no rows if nobody asks.
     pub(super) sources: Vec<&'a mut [u32]>,
 }
 

@@ -1,8 +1,9 @@
 //! One frame at each place of a tile, and how one passes into the next.
 //!
-//! A tile is drawn in strips between two rows of the seams' nodes. What lies inside all frames that share it is drawn a block at a time,
-//! patch by patch of the frames' charts; at the frames' borders and round holes, row by row. (A patch at once where one frame is alone
-//! would be slower: so many rows are far apart in the frame and in the panorama.)
+//! A tile is drawn in strips between two rows of the seams' nodes. What lies inside all frames that
+//! share it is drawn a block at a time, patch by patch of the frames' charts; at the frames'
+//! borders and round holes, row by row. (A patch at once where one frame is alone would be slower:
+//! so many rows are far apart in the frame and in the panorama.)
 
 use super::chart::{EIGHT, PATCH, of_patch};
 use super::draw::NO_FRAME;
@@ -28,7 +29,8 @@ pub struct Scratch {
     down: Vec<f32>,
 }
 
-/// A tile about to be drawn from views, in the order of their frames, along seams; `C`: channels, `L`: lanes of a correction.
+/// A tile about to be drawn from views, in the order of their frames, along seams; `C`: channels,
+/// `L`: lanes of a correction.
 pub struct BestView<'a, const C: usize, const L: usize> {
     seams: &'a Seams,
     views: &'a [View<'a>],
@@ -141,7 +143,8 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         }
     }
 
-    /// Draws what lies inside all frames that show it; which columns these are. `alone`: the frames of those patches that show only one.
+    /// Draws what lies inside all frames that show it; which columns these are. `alone`: the frames
+    /// of those patches that show only one.
     fn blocks<T: Sample>(
         &self,
         strip: &Range<usize>,
@@ -188,7 +191,8 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         drawn
     }
 
-    /// Clears what no frame shows, as far as that is plain for eight columns at once; the columns that are done, those in `drawn` among them.
+    /// Clears what no frame shows, as far as that is plain for eight columns at once; the columns
+    /// that are done, those in `drawn` among them.
     fn holes<T: Sample>(
         &self,
         strip: &Range<usize>,
@@ -218,7 +222,8 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         done
     }
 
-    /// Draws what frames share in some rows and columns of a patch, or one has alone; false without doing it if one does not show all of it.
+    /// Draws what frames share in some rows and columns of a patch, or one has alone; false without
+    /// doing it if one does not show all of it.
     fn block(
         &self,
         rows: &Range<usize>,

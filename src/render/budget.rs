@@ -31,9 +31,11 @@ pub struct Budget {
     pub room: u64,
 }
 
-/// Copies of a band: the one that is drawn, the one before it, the tiles of this that are written, and what becomes of them.
+/// Copies of a band: the one that is drawn, the one before it, the tiles of this that are written,
+/// and what becomes of them.
 const COPIES: u64 = 5;
-/// Copies of a frame while it is decoded: the file, the decoder's picture, and what it is turned into.
+/// Copies of a frame while it is decoded: the file, the decoder's picture, and what it is turned
+/// into.
 const DECODING: u64 = 4;
 
 /// Memory of one tile that is solved, bytes.
@@ -46,7 +48,8 @@ impl Budget {
     /// The memory for drawing `canvas` within `limit` bytes, of which the output holds `output`.
     ///
     /// # Errors
-    /// [`RenderError::Memory`] if even the least is more than the limit, or than the system has free.
+    /// [`RenderError::Memory`] if even the least is more than the limit, or than the system has
+    /// free.
     pub fn new(
         surface: &dyn Surface,
         canvas: &Canvas,
@@ -72,21 +75,21 @@ impl Budget {
         let decoding = DECODING * threads * frames.full_frame_bytes();
         let most = most_in_a_band(canvas, placements) as u64;
         let frames_least = most * frames.frame_bytes();
-        let readings = match options.super_resolve {
-            true => {
-                let samples = frames.frame_bytes() / format.sample_bytes() as u64;
-                most * samples * Readings::SAMPLE_BYTES + threads * SOLVING
-            }
-            false => 0,
+        let readings = if options.super_resolve {
+            let samples = frames.frame_bytes() / format.sample_bytes() as u64;
+            most * samples * Readings::SAMPLE_BYTES + threads * SOLVING
+        } else {
+            0
         };
         let fixed = thumbnails + grid + band + output + decoding + readings;
         let needed = fixed + frames_least;
         memory::check(canvas, frames, needed, Some(limit))?;
-        // With the frames of one band none is decoded twice while bands are drawn; with more, some are not even once more than for
-        // their thumbnails.
-        let room = match frames.is_packed() {
-            true => limit - fixed,
-            false => frames_least,
+        // With the frames of one band none is decoded twice while bands are drawn; with more, some
+        // are not even once more than for their thumbnails.
+        let room = if frames.is_packed() {
+            limit - fixed
+        } else {
+            frames_least
         };
         Ok(Self {
             thumbnails,

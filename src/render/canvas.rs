@@ -13,8 +13,8 @@ pub enum Layout {
     /// θ to the right from 0 to 2π, chainage down: the wall as seen from inside, not mirrored.
     #[default]
     ThetaRight,
-    /// [`Layout::ThetaRight`] turned by 90° counter-clockwise: chainage to the right, θ up. (A transpose
-    /// would mirror all writing on the wall.)
+    /// [`Layout::ThetaRight`] turned by 90° counter-clockwise: chainage to the right, θ up. (A
+    /// transpose would mirror all writing on the wall.)
     ChainageRight,
 }
 
@@ -61,8 +61,9 @@ impl Layout {
 
 /// The pixels of a panorama: once around the tunnel, and along it as far as the frames see.
 ///
-/// Column `j` and row `i` (from 0) have their centre at `s = (j + ½)/ppm`, `h = h_start + (i + ½)/ppm`. The
-/// perimeter is a whole number of columns, so the last column meets the first.
+/// Column `j` and row `i` (from 0) have their centre at `s = (j + ½)/ppm`,
+/// `h = h_start + (i + ½)/ppm`. The perimeter is a whole number of columns, so the last column
+/// meets the first.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Canvas {
     /// Columns around the section.
@@ -81,11 +82,13 @@ const LIMIT_PX: f64 = 1e12;
 const LIMIT_SIDE: f64 = i32::MAX as f64;
 
 impl Canvas {
-    /// The canvas that holds every footprint at about `px_per_metre`: the resolution is changed by less than
-    /// half a column over the whole perimeter, so that the perimeter is a whole number of columns.
+    /// The canvas that holds every footprint at about `px_per_metre`: the resolution is changed by
+    /// less than half a column over the whole perimeter, so that the perimeter is a whole number of
+    /// columns.
     ///
     /// # Errors
-    /// [`RenderError::Resolution`], [`RenderError::TooManyPixels`], [`RenderError::Count`] without any frame.
+    /// [`RenderError::Resolution`], [`RenderError::TooManyPixels`], [`RenderError::Count`] without
+    /// any frame.
     pub fn covering<'a>(
         surface: &dyn Surface,
         footprints: impl IntoIterator<Item = &'a Footprint>,
@@ -171,7 +174,8 @@ impl Canvas {
         }
     }
 
-    /// Column and row of a wall point, the inverse of [`Canvas::wall_at`] for columns from −½ to all less ½.
+    /// Column and row of a wall point, the inverse of [`Canvas::wall_at`] for columns from −½ to
+    /// all less ½.
     pub fn pixel_of(&self, wall: WallPoint) -> [f64; 2] {
         let around_m = f64::from(self.columns) / self.px_per_metre;
         [
@@ -199,7 +203,8 @@ impl Canvas {
         self.with_columns((f64::from(self.columns) / shrink).round().max(1.0))
     }
 
-    /// The same stretch of wall with pixels `step` times as large, about: a multiple of `multiple` columns.
+    /// The same stretch of wall with pixels `step` times as large, about: a multiple of `multiple`
+    /// columns.
     pub fn grid(&self, step: f64, multiple: u32) -> Self {
         let columns = f64::from(self.columns) / step / f64::from(multiple);
         self.with_columns(columns.round().max(1.0) * f64::from(multiple))

@@ -1,13 +1,15 @@
 //! Where the pixels of a tile appear in a frame: polynomials, patch by patch.
 //!
-//! From the wall to a frame everything is smooth: surface, pose, lens, a camera that moves while it reads its rows. Over a patch of
-//! 32 × 32 canvas pixels, u and v are cubic in each of the patch's coordinates `x, y ∈ [−1, 1]`,
+//! From the wall to a frame everything is smooth: surface, pose, lens, a camera that moves while it
+//! reads its rows. Over a patch of 32 × 32 canvas pixels, u and v are cubic in each of the patch's
+//! coordinates `x, y ∈ [−1, 1]`,
 //!
 //! `u(x, y) = Σ_kl c_kl x^k y^l`, `k, l = 0 … 3`,
 //!
-//! through the exact projections of 4 × 4 points at ±1 and ±(√2 − 1). There the error of an interpolated cubic is the same
-//! on the border as in the middle, `0.17/4! ∂⁴u` to first order; in between, at 0, it is measured against the exact projection of nine
-//! points more. A patch where that finds more than [`MOST_OFF_PX`] is projected point by point.
+//! through the exact projections of 4 × 4 points at ±1 and ±(√2 − 1). There the error of an
+//! interpolated cubic is the same on the border as in the middle, `0.17/4! ∂⁴u` to first order; in
+//! between, at 0, it is measured against the exact projection of nine points more. A patch where
+//! that finds more than [`MOST_OFF_PX`] is projected point by point.
 
 use super::warp::{Look, Points};
 use super::{Canvas, Tile};
@@ -24,7 +26,8 @@ pub const EIGHT: usize = 8;
 pub const SCALE: f32 = 2.0 / PATCH as f32;
 /// Error of a polynomial at the most, pixels of the frame.
 const MOST_OFF_PX: f32 = 1e-3;
-/// Points of a patch along each side, the last of which are the next one's first; those at 0 are checked, the others fitted.
+/// Points of a patch along each side, the last of which are the next one's first; those at 0 are
+/// checked, the others fitted.
 const POINTS: [f64; 5] = [-1.0, 1.0 - SQRT_2, 0.0, SQRT_2 - 1.0, 1.0];
 /// Points from patch to patch.
 const STEP: usize = POINTS.len() - 1;
@@ -87,7 +90,8 @@ enum Patch {
     Rough,
 }
 
-/// Where the patch of some rows or columns of a tile, all in one patch, begins, and which of its own they are.
+/// Where the patch of some rows or columns of a tile, all in one patch, begins, and which of its
+/// own they are.
 pub fn of_patch(all: &Range<usize>) -> (usize, Range<usize>) {
     let first = all.start - all.start % PATCH;
     (first, all.start - first..all.end - first)
@@ -160,10 +164,11 @@ impl Chart {
         }
     }
 
-    /// Where these rows and columns of a smooth patch lie, to be sure: between these, along u and along v.
+    /// Where these rows and columns of a smooth patch lie, to be sure: between these, along u and
+    /// along v.
     ///
-    /// Around the middle `(x, y)` of `2a × 2b`: `|Δu| ≤ a max|∂u/∂x| + b max|∂u/∂y|`, and as all powers of x and y are at most 1,
-    /// `|∂u/∂x| ≤ Σ k |c_kl|`, `|∂u/∂y| ≤ Σ l |c_kl|`.
+    /// Around the middle `(x, y)` of `2a × 2b`: `|Δu| ≤ a max|∂u/∂x| + b max|∂u/∂y|`, and as all
+    /// powers of x and y are at most 1, `|∂u/∂x| ≤ Σ k |c_kl|`, `|∂u/∂y| ≤ Σ l |c_kl|`.
     pub fn range(lines: &[Lanes; 4], rows: Range<usize>, columns: Range<usize>) -> [[f32; 2]; 2] {
         let along = |range: Range<usize>| {
             let (first, last) = (range.start as f32, range.end as f32 - 1.0);
@@ -199,7 +204,8 @@ impl Chart {
         self.patches.len()
     }
 
-    /// How far u and v move from one canvas pixel to the next in the middle of a smooth patch, along its row and along its column.
+    /// How far u and v move from one canvas pixel to the next in the middle of a smooth patch,
+    /// along its row and along its column.
     pub fn steps(&self, patch: usize) -> Option<[[f32; 2]; 2]> {
         match &self.patches[patch] {
             Patch::Smooth(c) => Some([
@@ -267,8 +273,8 @@ impl Chart {
         at
     }
 
-    /// Finds where the pixels of the tile's `row` appear, eight of them (of u and v) from column 8 times `eight` on. False if they are to
-    /// be projected one by one.
+    /// Finds where the pixels of the tile's `row` appear, eight of them (of u and v) from column 8
+    /// times `eight` on. False if they are to be projected one by one.
     #[inline(always)]
     pub fn eight(
         &self,
@@ -301,8 +307,10 @@ fn outside(at: &[[f32; 5]; 5], limit: f32) -> bool {
 
 /// From values at ±1 and ±(√2 − 1) to the coefficients of the cubic, the lowest first.
 ///
-/// With `a = √2 − 1`, the even part of the values `e_1 = (p(1) + p(−1))/2`, `e_a` likewise: `c_2 = (e_1 − e_a)/(1 − a²)`,
-/// `c_0 = e_1 − c_2`; odd parts over their place: `o_1 = (p(1) − p(−1))/2`, `o_a = (p(a) − p(−a))/2a`, `c_3 = (o_1 − o_a)/(1 − a²)`, `c_1 = o_1 − c_3`.
+/// With `a = √2 − 1`, the even part of the values `e_1 = (p(1) + p(−1))/2`, `e_a` likewise:
+/// `c_2 = (e_1 − e_a)/(1 − a²)`, `c_0 = e_1 − c_2`; odd parts over their place:
+/// `o_1 = (p(1) − p(−1))/2`, `o_a = (p(a) − p(−a))/2a`, `c_3 = (o_1 − o_a)/(1 − a²)`,
+/// `c_1 = o_1 − c_3`.
 fn cubic([p, q, r, s]: [f32; 4]) -> [f32; 4] {
     const A: f32 = SQRT_2 as f32 - 1.0;
     const INVERSE: f32 = 1.0 / (1.0 - A * A);

@@ -15,14 +15,14 @@ pub struct CylinderPicture {
     pub origin_px: [i64; 2],
 }
 
-/// Projects a photo onto the cylinder of radius 1 around the camera's y axis, with square pixels of the
-/// photo's own focal length:
+/// Projects a photo onto the cylinder of radius 1 around the camera's y axis, with square pixels of
+/// the photo's own focal length:
 ///
 /// `û = fx θ + cx`, `v̂ = fy h + cy`, `θ = atan x`, `h = y / √(x² + 1)`, `x = (u − cx)/fx`,
 /// `y = (v − cy)/fy` (pixels, radians, and lengths in units of the radius).
 ///
-/// Each pixel of the result is taken back by `x = tan θ`, `y = h √(x² + 1)`. The result is cropped to what
-/// the photo covers. `photo` must be as large as the camera's pictures.
+/// Each pixel of the result is taken back by `x = tan θ`, `y = h √(x² + 1)`. The result is cropped
+/// to what the photo covers. `photo` must be as large as the camera's pictures.
 ///
 /// Source: arXiv 1806.10278, Section III.
 pub fn project(photo: &Picture, camera: &Camera, interpolation: Interpolation) -> CylinderPicture {
@@ -45,7 +45,8 @@ pub fn project(photo: &Picture, camera: &Camera, interpolation: Interpolation) -
         (Samples::Sixteen(_), _) => unroll::<u16, 3>(photo, camera, &kernel, origin, size).into(),
     };
     let image = samples.into_image([width as u32, height as u32], channels);
-    // The photo's outermost points may lie between two columns of the result, and reach no whole row.
+    // The photo's outermost points may lie between two columns of the result, and reach no whole
+    // row.
     let [x, y, width, height] = covered(&image);
     CylinderPicture {
         image: image.crop_imm(x, y, width, height),
@@ -53,7 +54,8 @@ pub fn project(photo: &Picture, camera: &Camera, interpolation: Interpolation) -
     }
 }
 
-/// The box around all pixels that are not transparent: its first column and row, width and height; all of the picture if there are none.
+/// The box around all pixels that are not transparent: its first column and row, width and height;
+/// all of the picture if there are none.
 fn covered(image: &DynamicImage) -> [u32; 4] {
     let (mut from, mut to) = ([u32::MAX; 2], [0; 2]);
     for (x, y, pixel) in image.to_luma_alpha8().enumerate_pixels() {
@@ -62,9 +64,10 @@ fn covered(image: &DynamicImage) -> [u32; 4] {
             to = [to[0].max(x + 1), to[1].max(y + 1)];
         }
     }
-    match from[0] < to[0] {
-        true => [from[0], from[1], to[0] - from[0], to[1] - from[1]],
-        false => [0, 0, image.width(), image.height()],
+    if from[0] < to[0] {
+        [from[0], from[1], to[0] - from[0], to[1] - from[1]]
+    } else {
+        [0, 0, image.width(), image.height()]
     }
 }
 
@@ -76,7 +79,8 @@ pub fn to_cylinder(camera: &Camera, u: f64, v: f64) -> Option<[f64; 2]> {
     Some([camera.fx * theta + camera.cx, camera.fy * h + camera.cy])
 }
 
-/// Pixel of the unrolled cylinder → pixel of the photo; `None` where the lens shows nothing, behind a pinhole for one.
+/// Pixel of the unrolled cylinder → pixel of the photo; `None` where the lens shows nothing, behind
+/// a pinhole for one.
 pub fn from_cylinder(camera: &Camera, u_hat: f64, v_hat: f64) -> Option<[f64; 2]> {
     let theta = (u_hat - camera.cx) / camera.fx;
     if theta.abs() >= std::f64::consts::PI {
@@ -96,7 +100,8 @@ const STEPS_PER_EDGE: usize = 64;
 /// They lie on the photo's border: û and v̂ are smooth and one-to-one.
 fn extent(camera: &Camera) -> [f64; 4] {
     let mut border = camera.border(STEPS_PER_EDGE, 0.0);
-    // Without distortion h has its extremes at the sides and in the column where x is nearest to zero.
+    // Without distortion h has its extremes at the sides and in the column where x is nearest to
+    // zero.
     let last = [camera.width - 1, camera.height - 1].map(f64::from);
     let middle = from_cylinder(camera, camera.cx.round(), camera.cy).map_or(0.0, |[u, _]| u);
     let middle = middle.clamp(0.0, last[0]);

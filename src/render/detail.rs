@@ -1,4 +1,5 @@
-//! The panorama finer than any frame: bands drawn as ever and then solved anew from all frames ([`crate::super_resolve`]).
+//! The panorama finer than any frame: bands drawn as ever and then solved anew from all frames
+//! ([`crate::super_resolve`]).
 
 use super::band::Band;
 use super::exposure::{Exposure, Response};
@@ -49,7 +50,8 @@ impl Readings {
         self.frames.extend(read.into_iter().flatten());
     }
 
-    /// Solves a drawn band anew: its pixels that some frame sees become those of the wall that explains all frames.
+    /// Solves a drawn band anew: its pixels that some frame sees become those of the wall that
+    /// explains all frames.
     pub fn resolve(
         &self,
         surface: &dyn Surface,

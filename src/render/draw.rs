@@ -23,7 +23,8 @@ pub enum Mode {
     /// The frame that shows the wall best there; frames change along seams where they agree.
     #[default]
     BestView,
-    /// The mean of all frames, weighted by `tent(u) tent(v)`: 1 in the middle of a frame, 0 at its edge.
+    /// The mean of all frames, weighted by `tent(u) tent(v)`: 1 in the middle of a frame, 0 at its
+    /// edge.
     Average,
     /// The median of all frames: what most of them show.
     Median,
@@ -61,7 +62,8 @@ pub enum Composition<'a> {
 /// No frame, in a map of frames.
 pub const NO_FRAME: u32 = u32::MAX;
 
-/// What drawing a tile needs for a while: made once a thread, since fresh memory costs as much as the work in it.
+/// What drawing a tile needs for a while: made once a thread, since fresh memory costs as much as
+/// the work in it.
 #[derive(Default)]
 pub struct Scratch {
     lattice: Lattice,

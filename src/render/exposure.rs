@@ -1,19 +1,23 @@
 //! What light and exposure do to each frame, and its undoing.
 //!
-//! A frame i shows `I = a_i V(u, v) S + b_i` of the evenly lit wall S: gain a and bias b are the frame's own, V is the
-//! shading of lamp and lens, the same in all frames ([`Shading`]). For a wall point x that frame i shows at pixel `u_i(x)` with value z,
+//! A frame i shows `I = a_i V(u, v) S + b_i` of the evenly lit wall S: gain a and bias b are the
+//! frame's own, V is the shading of lamp and lens, the same in all frames ([`Shading`]). For a wall
+//! point x that frame i shows at pixel `u_i(x)` with value z,
 //!
 //! `ln z_i(x) = ln S(x) + α_i + β_i/m_i(x) + Σ_k c_k B_k(u_i(x)) + noise`
 //!
-//! to first order in the bias, with `a = e^α`, `b = β`, `ln V = Σ c_k B_k` and `m_i = a_i V S`, what the frame shows but for its bias, by
-//! the solution so far. (With z itself in its place, noise on both sides of the equation would look like a bias.) Robust least squares (biweight, S eliminated) over wall
-//! points all over the panorama gives all frames at once, so that nothing drifts from neighbour to neighbour.
+//! to first order in the bias, with `a = e^α`, `b = β`, `ln V = Σ c_k B_k` and `m_i = a_i V S`,
+//! what the frame shows but for its bias, by the solution so far. (With z itself in its place,
+//! noise on both sides of the equation would look like a bias.) Robust least squares (biweight, S
+//! eliminated) over wall points all over the panorama gives all frames at once, so that nothing
+//! drifts from neighbour to neighbour.
 //!
-//! A common factor of gains and wall cannot be seen. It is fixed twice over: V is 1 where it is brightest, and the gains
-//! are 1 in the (geometric) mean.
+//! A common factor of gains and wall cannot be seen. It is fixed twice over: V is 1 where it is
+//! brightest, and the gains are 1 in the (geometric) mean.
 //!
-//! Source: D. J. Fixsen, S. H. Moseley and R. G. Arendt, "Calibrating array detectors", Astrophysical Journal Supplement
-//! 128, 2000; for panoramas D. B. Goldman, "Vignette and exposure calibration and compensation", PAMI 32(12), 2010.
+//! Source: D. J. Fixsen, S. H. Moseley and R. G. Arendt, "Calibrating array detectors",
+//! Astrophysical Journal Supplement 128, 2000; for panoramas D. B. Goldman, "Vignette and exposure
+//! calibration and compensation", PAMI 32(12), 2010.
 
 use super::chart::SCALE;
 use super::glimpses::{Glimpse, glimpses};
@@ -170,7 +174,8 @@ impl Response<'_> {
         self.bias
     }
 
-    /// What values are multiplied by over a patch, by where its ends and middles appear in the frame; None if there is nothing to undo.
+    /// What values are multiplied by over a patch, by where its ends and middles appear in the
+    /// frame; None if there is nothing to undo.
     pub fn light(&self, pixels: impl FnOnce() -> [[[f32; 2]; 3]; 3]) -> Option<Light> {
         if self.is_none() {
             return None;
@@ -182,7 +187,8 @@ impl Response<'_> {
         Some(Light::through(pixels().map(|row| row.map(at))))
     }
 
-    /// Undoes it in the values of some columns of a run that lie in one row of a patch; `first`: the column where the patch begins.
+    /// Undoes it in the values of some columns of a run that lie in one row of a patch; `first`:
+    /// the column where the patch begins.
     pub fn undo_by(
         &self,
         light: &Light,
@@ -301,7 +307,8 @@ impl Table {
 
     #[inline(always)]
     fn at(&self, u: f32, v: f32) -> f32 {
-        // Points that are not seen may be anywhere: the casts saturate, and what comes out is not used.
+        // Points that are not seen may be anywhere: the casts saturate, and what comes out is not
+        // used.
         let x = u * self.scale[0] + self.offset[0];
         let y = v * self.scale[1] + self.offset[1];
         let (i, j) = ((x as usize).min(NODES.0 - 2), (y as usize).min(NODES.1 - 2));
@@ -404,8 +411,8 @@ impl Normal {
 
     /// Adds a wall point; `x`: the solution so far, `variance`: that of the residuals.
     ///
-    /// With `r_i` the rows, `y_i` the logarithms and w the weights: `N = Σ w r rᵀ − (Σ w r)(Σ w r)ᵀ/Σ w`, likewise the
-    /// right side.
+    /// With `r_i` the rows, `y_i` the logarithms and w the weights:
+    /// `N = Σ w r rᵀ − (Σ w r)(Σ w r)ᵀ/Σ w`, likewise the right side.
     fn add(&mut self, point: &[Row], x: &DVector<f64>, variance: f64) {
         let shading = self.border.len();
         let left: Vec<f64> = point

@@ -69,7 +69,8 @@ impl Coverage {
         }
     }
 
-    /// Memory for a canvas, bytes: the cells, which of them have been looked at, and a way through all of them.
+    /// Memory for a canvas, bytes: the cells, which of them have been looked at, and a way through
+    /// all of them.
     pub fn bytes(canvas: &Canvas) -> u64 {
         21 * cells(canvas, cell(canvas))
     }

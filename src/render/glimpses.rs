@@ -29,7 +29,8 @@ impl Glimpse {
     }
 }
 
-/// Darker and brighter than this (grey levels of 255) a frame tells little of a factor: it may be clipped.
+/// Darker and brighter than this (grey levels of 255) a frame tells little of a factor: it may be
+/// clipped.
 const USEFUL: std::ops::Range<f32> = 4.0..250.0;
 
 /// Glimpses of the points of `grid` that at least two frames show, by the thumbnails.

@@ -41,7 +41,8 @@ impl Interpolation {
         match self {
             Self::Nearest => 1.0,
             Self::Bilinear => 1.0 - x,
-            // E. Catmull, R. Rom, "A class of local interpolating splines", 1974 (a = −½ in Keys' kernel).
+            // E. Catmull, R. Rom, "A class of local interpolating splines", 1974 (a = −½ in Keys'
+            // kernel).
             Self::Bicubic if x < 1.0 => 1.0 + x * x * (1.5 * x - 2.5),
             Self::Bicubic => 2.0 + x * (x * (2.5 - 0.5 * x) - 4.0),
             Self::Lanczos3 => sinc(x) * sinc(x / 3.0),
@@ -54,14 +55,15 @@ const PHASES: usize = 512;
 /// The bits that hold a phase.
 const PHASE_BITS: u32 = 2 * PHASES as u32 - 1;
 
-/// The weights of an interpolation along one axis, tabulated, and stretched where the picture is finer than
-/// the canvas so that no pixel is left out (anti-aliasing).
+/// The weights of an interpolation along one axis, tabulated, and stretched where the picture is
+/// finer than the canvas so that no pixel is left out (anti-aliasing).
 #[derive(Clone, Debug)]
 pub struct Kernel {
     taps: usize,
     /// `PHASES + 1` rows of `taps` weights; each row's sum is 1.
     weights: Vec<f32>,
-    /// The same in units of 2⁻¹⁴, rows filled up to [`Kernel::row_of`] with nothing, for the sake of vectors.
+    /// The same in units of 2⁻¹⁴, rows filled up to [`Kernel::row_of`] with nothing, for the sake
+    /// of vectors.
     integers: Vec<i16>,
 }
 
@@ -69,11 +71,12 @@ pub struct Kernel {
 const ONE: f64 = 16384.0;
 
 impl Kernel {
-    /// The kernel of an interpolation, `stretch` (at least 1) times as wide as for a picture that is looked at pixel by
-    /// pixel.
+    /// The kernel of an interpolation, `stretch` (at least 1) times as wide as for a picture that
+    /// is looked at pixel by pixel.
     ///
-    /// Taps are 1 or an even number. Weights are `k((x − t)/stretch)` normalised to a sum of 1, x the pixels and t the point. The nearest pixel is
-    /// never stretched: it is for pictures that must stay what they are.
+    /// Taps are 1 or an even number. Weights are `k((x − t)/stretch)` normalised to a sum of 1, x
+    /// the pixels and t the point. The nearest pixel is never stretched: it is for pictures that
+    /// must stay what they are.
     pub fn new(interpolation: Interpolation, stretch: f64) -> Self {
         if interpolation == Interpolation::Nearest {
             return Self {
@@ -143,7 +146,8 @@ impl Kernel {
         ((t * phases + WHOLE).to_bits() & PHASE_BITS) as i32
     }
 
-    /// The phases that a pixel is divided into for whole-numbered weights: 128 for two taps, which need no table.
+    /// The phases that a pixel is divided into for whole-numbered weights: 128 for two taps, which
+    /// need no table.
     pub fn integer_phases(&self) -> f32 {
         Self::integer_phases_of(self.taps)
     }
@@ -182,7 +186,8 @@ impl Kernel {
     }
 }
 
-/// Weights whose sum is `sum`, in units of 2⁻¹⁴: what rounding has changed of the sum goes to the largest.
+/// Weights whose sum is `sum`, in units of 2⁻¹⁴: what rounding has changed of the sum goes to the
+/// largest.
 fn whole_weights(row: &[f64], sum: f64) -> Vec<i16> {
     let mut whole: Vec<i16> = row.iter().map(|w| (w / sum * ONE).round() as i16).collect();
     let off = ONE as i16 - whole.iter().sum::<i16>();
@@ -226,7 +231,8 @@ mod tests {
         );
     }
 
-    /// A kernel stretched by s passes waves of s pixels and more, and takes out those that the canvas cannot show.
+    /// A kernel stretched by s passes waves of s pixels and more, and takes out those that the
+    /// canvas cannot show.
     #[test]
     fn stretching_takes_out_what_is_too_fine() {
         for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {

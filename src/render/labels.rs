@@ -4,15 +4,16 @@
 //!
 //! `E = Σ_p D_p(l_p) + Σ_{p,q neighbours} V_pq(l_p, l_q)`
 //!
-//! is small. D prefers frames that show the wall finely and squarely, away from their edges, and that show what the others
-//! show, too; V is zero between nodes of the same frame, else a seam's length and what the two frames differ by on both sides of it.
+//! is small. D prefers frames that show the wall finely and squarely, away from their edges, and
+//! that show what the others show, too; V is zero between nodes of the same frame, else a seam's
+//! length and what the two frames differ by on both sides of it.
 //!
-//! Rows and columns of nodes are solved one at a time with their neighbours held, by dynamic programming (Viterbi). A
-//! row is cut open at θ = 0, where its ends are held to what they were. Every other row at once, which does not depend on the
-//! number of threads.
+//! Rows and columns of nodes are solved one at a time with their neighbours held, by dynamic
+//! programming (Viterbi). A row is cut open at θ = 0, where its ends are held to what they were.
+//! Every other row at once, which does not depend on the number of threads.
 //!
-//! Sources: J. Davis, "Mosaics of scenes with moving objects", CVPR 1998 (seams where pictures agree); A. Agarwala et al.,
-//! "Interactive digital photomontage", SIGGRAPH 2004 (the energy).
+//! Sources: J. Davis, "Mosaics of scenes with moving objects", CVPR 1998 (seams where pictures
+//! agree); A. Agarwala et al., "Interactive digital photomontage", SIGGRAPH 2004 (the energy).
 
 use super::draw::{NO_FRAME, median};
 use super::run::{RUN, Run};
@@ -36,7 +37,8 @@ const EDGE: f32 = 2.0;
 const EDGE_SHARE: f32 = 0.15;
 /// Nodes to each side that are a node's surroundings.
 const AROUND: usize = 4;
-/// Cost of one σ beyond the first two that a frame is farther from the median of all frames than the nearest, ...
+/// Cost of one σ beyond the first two that a frame is farther from the median of all frames than
+/// the nearest, ...
 const OUTLIER: f32 = 1.0;
 /// ... and of the most.
 const MOST_OUTLYING: f32 = 12.0;
@@ -202,7 +204,8 @@ fn surroundings(values: &[f32], columns: usize, node: usize) -> f32 {
 /// What a frame shows of a node.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sight {
-    /// Pixels per length of wall along the direction in which they are fewest, in units of the focal length; 0: does not show it.
+    /// Pixels per length of wall along the direction in which they are fewest, in units of the
+    /// focal length; 0: does not show it.
     fineness: f32,
     /// Distance from the nearest edge, of half the width or height.
     inset: f32,
@@ -242,8 +245,9 @@ impl Eyes<'_> {
                 if !run.seen()[k] {
                     continue;
                 }
-                // On a plane at distance d from the camera, at the point x: f cos α/|x| with cos α = d/|x| across, f/z along:
-                // the least is d f/(z |x|) up to the angle between the view and the optical axis.
+                // On a plane at distance d from the camera, at the point x: f cos α/|x| with cos α
+                // = d/|x| across, f/z along: the least is d f/(z |x|) up to the angle between the
+                // view and the optical axis.
                 let wall = &walls[start + k];
                 let ray = wall.x_w - pose.t_wc;
                 let normal = wall.e_s.cross(&wall.e_h);
@@ -408,7 +412,8 @@ impl Lattice {
 /// V of two neighbours for each choice of the first and each of the second.
 #[inline]
 fn seams(first: &Choices, second: &Choices) -> [[f32; CHOICES]; CHOICES] {
-    // What each frame of the second shows at the first, and the other way round; NaN where that is not known.
+    // What each frame of the second shows at the first, and the other way round; NaN where that is
+    // not known.
     let (mut at_first, mut at_second) = ([f32::NAN; CHOICES], [f32::NAN; CHOICES]);
     for (a, there) in first.iter().zip(&mut at_second) {
         for (b, here) in second.iter().zip(&mut at_first) {

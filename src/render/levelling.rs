@@ -1,16 +1,18 @@
 //! Light levelled out over seams: multi-band blending of what exposure has left.
 //!
-//! Let L be the composite of the frames along their seams and `D_i = I_i − L` what frame i shows otherwise, at the nodes of the
-//! grid (zero where the frame sees nothing). With `M_i` the mask of the nodes given to frame i, Gaussian pyramids `G_k M_i` and
-//! Laplacian pyramids `Λ_k D_i`, the correction is the collapsed pyramid of
+//! Let L be the composite of the frames along their seams and `D_i = I_i − L` what frame i shows
+//! otherwise, at the nodes of the grid (zero where the frame sees nothing). With `M_i` the mask of
+//! the nodes given to frame i, Gaussian pyramids `G_k M_i` and Laplacian pyramids `Λ_k D_i`, the
+//! correction is the collapsed pyramid of
 //!
 //! `Σ_i G_k M_i Λ_k D_i / Σ_i G_k M_i`.
 //!
-//! Added to L this is the multi-band blend of all `I_i`: fine differences change over a short
-//! way across a seam, broad ones over a long way. The finest band, between the nodes, is the frames' own.
+//! Added to L this is the multi-band blend of all `I_i`: fine differences change over a short way
+//! across a seam, broad ones over a long way. The finest band, between the nodes, is the frames'
+//! own.
 //!
-//! Source: P. J. Burt, E. H. Adelson, "A multiresolution spline with application to image mosaics", ACM Transactions
-//! on Graphics 2(4), 1983.
+//! Source: P. J. Burt, E. H. Adelson, "A multiresolution spline with application to image mosaics",
+//! ACM Transactions on Graphics 2(4), 1983.
 
 use super::draw::NO_FRAME;
 use super::run::{RUN, Run};
@@ -20,11 +22,13 @@ use super::{Canvas, Exposure, Placement};
 use crate::surface::Surface;
 use rayon::prelude::*;
 
-/// Bands; the coarsest grid's nodes are `2^(BANDS − 1)` as far apart. The grid has a multiple of as many columns.
+/// Bands; the coarsest grid's nodes are `2^(BANDS − 1)` as far apart. The grid has a multiple of as
+/// many columns.
 pub const BANDS: usize = 4;
 /// Distance of the coarsest grid's nodes, in nodes of the finest.
 pub const COARSEST: u32 = 1 << (BANDS - 1);
-/// What is more different than this (grey levels of 255) is no light: something has moved, or glints.
+/// What is more different than this (grey levels of 255) is no light: something has moved, or
+/// glints.
 const MOST: f32 = 20.0;
 /// A weight that is nothing but rounding.
 const LEAST_WEIGHT: f32 = 1e-4;
@@ -51,8 +55,8 @@ struct Layer {
     values: Vec<f32>,
 }
 
-/// What is to be added to the composite at each node, `channels` numbers, in units of the frames' samples (`white`: their
-/// full scale).
+/// What is to be added to the composite at each node, `channels` numbers, in units of the frames'
+/// samples (`white`: their full scale).
 pub fn corrections(
     surface: &dyn Surface,
     thumbnails: &Thumbnails,
@@ -174,8 +178,8 @@ pub fn corrections(
     blend.values
 }
 
-/// The bands of `different`, weighted by the mask's pyramid, and as a last channel the weights; `around`: the window
-/// closes around the tunnel.
+/// The bands of `different`, weighted by the mask's pyramid, and as a last channel the weights;
+/// `around`: the window closes around the tunnel.
 fn weighted_bands(different: Layer, mask: Layer, around: bool) -> Vec<Layer> {
     let mut bands = Vec::with_capacity(BANDS);
     let (mut fine, mut mask) = (different, mask);
@@ -197,7 +201,8 @@ fn weighted_bands(different: Layer, mask: Layer, around: bool) -> Vec<Layer> {
     bands
 }
 
-/// The windows of all frames that have nodes: around these, and as far beyond as the coarsest band reaches.
+/// The windows of all frames that have nodes: around these, and as far beyond as the coarsest band
+/// reaches.
 fn windows(grid: &Canvas, labels: &[u32], frames: usize) -> Vec<(usize, Window)> {
     let columns = grid.columns as usize;
     // Columns are followed the shortest way from the first node of the frame.
@@ -237,7 +242,8 @@ fn windows(grid: &Canvas, labels: &[u32], frames: usize) -> Vec<(usize, Window)>
 }
 
 impl Window {
-    /// Calls `visit(node of the grid, place in the window)` for all nodes of the window that the grid has.
+    /// Calls `visit(node of the grid, place in the window)` for all nodes of the window that the
+    /// grid has.
     fn each(&self, grid: &Canvas, mut visit: impl FnMut(usize, usize)) {
         let columns = grid.columns as usize;
         for row in 0..self.rows {
@@ -315,12 +321,10 @@ fn shown(
     }
 }
 
-/// Fills in what a row of so many nodes has before the first and after the last: around the tunnel, or the same again.
+/// Fills in what a row of so many nodes has before the first and after the last: around the tunnel,
+/// or the same again.
 fn pad(row: &mut [f32], columns: usize, channels: usize, around: bool) {
-    let (first, last) = match around {
-        true => (columns, 1),
-        false => (1, columns),
-    };
+    let (first, last) = if around { (columns, 1) } else { (1, columns) };
     row.copy_within(first * channels..(first + 1) * channels, 0);
     row.copy_within(
         last * channels..(last + 1) * channels,
@@ -366,8 +370,8 @@ impl Layer {
         all
     }
 
-    /// Half as many nodes each way, at the middles of 2 × 2: weights (1, 3, 3, 1)/8 along each axis; `around`: the last
-    /// column is followed by the first, else the border is repeated.
+    /// Half as many nodes each way, at the middles of 2 × 2: weights (1, 3, 3, 1)/8 along each
+    /// axis; `around`: the last column is followed by the first, else the border is repeated.
     fn reduced(&self, around: bool) -> Self {
         const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
         let (columns, rows, c) = (self.columns / 2, self.rows / 2, self.channels);
@@ -394,7 +398,8 @@ impl Layer {
         half
     }
 
-    /// Twice as many nodes each way, bilinear; `around`: the last column is followed by the first, else the border is repeated.
+    /// Twice as many nodes each way, bilinear; `around`: the last column is followed by the first,
+    /// else the border is repeated.
     fn expanded(&self, around: bool) -> Self {
         /// Of the node's own parent, and of the other one next to it.
         const WEIGHTS: [f32; 2] = [0.75, 0.25];

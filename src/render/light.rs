@@ -2,8 +2,9 @@
 
 use super::chart::SCALE;
 
-/// The factor `1/(a V)` of [`super::exposure`] over a patch: quadratic in each of the patch's coordinates `x, y ∈ [−1, 1]`, through its values
-/// at −1, 0 and 1. Light changes so slowly that nothing is lost.
+/// The factor `1/(a V)` of [`super::exposure`] over a patch: quadratic in each of the patch's
+/// coordinates `x, y ∈ [−1, 1]`, through its values at −1, 0 and 1. Light changes so slowly that
+/// nothing is lost.
 #[derive(Clone, Copy, Debug)]
 pub struct Light([[f32; 3]; 3]);
 

@@ -18,17 +18,19 @@ pub struct Sighting {
     pub pixel: [f64; 2],
     /// Distance from the camera's centre, metres.
     pub distance_m: f64,
-    /// Resolution of the frame there, pixels per metre of wall, along the direction in which it is least.
+    /// Resolution of the frame there, pixels per metre of wall, along the direction in which it is
+    /// least.
     pub px_per_metre: f64,
     /// Angle between the view and the wall's normal, degrees.
     pub obliqueness_deg: f64,
 }
 
-/// How far beyond the outermost pixel centres a frame still shows, pixels: what going to the wall and back rounds.
+/// How far beyond the outermost pixel centres a frame still shows, pixels: what going to the wall
+/// and back rounds.
 const ROUNDING_PX: f64 = 1e-6;
 
-/// Resolution at a wall point, pixels per metre, along the direction in which it is least: the smaller singular value of
-/// `∂(u, v)/∂(s, h) = ∂π/∂x_c R_wcᵀ (e_s, e_h)`.
+/// Resolution at a wall point, pixels per metre, along the direction in which it is least: the
+/// smaller singular value of `∂(u, v)/∂(s, h) = ∂π/∂x_c R_wcᵀ (e_s, e_h)`.
 fn least_stretch(camera: &Camera, pose: &Pose, point: &WallFrame) -> f64 {
     let jacobian = camera.project_jacobian(&pose.to_camera(&point.x_w));
     let tangents = [point.e_s, point.e_h].map(|e| pose.r_wc.inverse_transform_vector(&e));
@@ -44,7 +46,8 @@ pub(super) fn px_per_metre(camera: &Camera, pose: &Pose, point: &WallFrame) -> O
         .then(|| least_stretch(camera, pose, point))
 }
 
-/// The frames that show `wall`, the one with the highest resolution there first; what `mask` hides shows nothing.
+/// The frames that show `wall`, the one with the highest resolution there first; what `mask` hides
+/// shows nothing.
 pub fn sightings(
     surface: &dyn Surface,
     camera: &Camera,
@@ -122,7 +125,8 @@ mod tests {
                 let x_w = wall.circle.frame(point).x_w;
                 assert!((hit.x_w - x_w).norm() < 1e-9);
                 assert!(((x_w - pose.t_wc).norm() - sighting.distance_m).abs() < 1e-9);
-                // The farthest that a step of a hundredth of a pixel goes on the wall, in whatever direction.
+                // The farthest that a step of a hundredth of a pixel goes on the wall, in whatever
+                // direction.
                 let farthest = (0..360)
                     .map(|degree| {
                         let (sin, cos) = f64::from(degree).to_radians().sin_cos();

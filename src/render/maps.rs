@@ -22,7 +22,8 @@ pub struct Map {
 }
 
 impl Map {
-    /// Millimetres of wall per pixel of the frame that is shown, along the direction in which they are most.
+    /// Millimetres of wall per pixel of the frame that is shown, along the direction in which they
+    /// are most.
     ///
     /// `labels`: the frames of the grid's nodes; without them, the frame that is finest there.
     pub fn resolution(
@@ -42,8 +43,9 @@ impl Map {
         )
     }
 
-    /// 1-σ of where the wall point that is shown really lies, millimetres, along the direction in which it is largest:
-    /// `√λ_max(A Σ Aᵀ)` with the covariance Σ of the frame's pose and `A = ∂(s, h)/∂ξ` ([`wall_jacobian`]).
+    /// 1-σ of where the wall point that is shown really lies, millimetres, along the direction in
+    /// which it is largest: `√λ_max(A Σ Aᵀ)` with the covariance Σ of the frame's pose and
+    /// `A = ∂(s, h)/∂ξ` ([`wall_jacobian`]).
     pub fn uncertainty(
         surface: &dyn Surface,
         camera: &Camera,

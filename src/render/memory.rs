@@ -8,7 +8,8 @@ pub fn available_bytes() -> Option<u64> {
     parse(&text)
 }
 
-/// Checks that drawing `canvas` from `frames` with `needed` bytes stays within what is `available`, if that is known.
+/// Checks that drawing `canvas` from `frames` with `needed` bytes stays within what is `available`,
+/// if that is known.
 ///
 /// # Errors
 /// [`RenderError::Memory`].

@@ -6,11 +6,13 @@
 //!     └── FrameStack::hold, band by band ───────────────────────────> frames ─┘
 //! ```
 //!
-//! [`stitch()`] does all of it. Every canvas pixel is taken back to its wall point, from there into the frame
-//! that shows it best ([`Mode`] has other ways), and the frame's exposure is undone. The
-//! same function draws the initial, the refined and the true poses, so pictures differ by their poses only.
+//! [`stitch()`] does all of it. Every canvas pixel is taken back to its wall point, from there into
+//! the frame that shows it best ([`Mode`] has other ways), and the frame's exposure is undone. The
+//! same function draws the initial, the refined and the true poses, so pictures differ by their
+//! poses only.
 //!
-//! [`sightings`] goes the other way: from a point of the wall to the frames and pixels that show it.
+//! [`sightings`] goes the other way: from a point of the wall to the frames and pixels that show
+//! it.
 //!
 //! [`cylinder`] is the odd one out: the cylindrical projection of one single photo.
 //!

@@ -7,7 +7,8 @@ use crate::frames::GreyImage;
 use image::DynamicImage;
 use serde::{Deserialize, Serialize};
 
-/// A panorama in memory: samples with an alpha that is full where some frame sees the wall and 0 in holes.
+/// A panorama in memory: samples with an alpha that is full where some frame sees the wall and 0 in
+/// holes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Panorama {
     canvas: Canvas,
@@ -23,9 +24,10 @@ impl Panorama {
         Self {
             canvas,
             format,
-            samples: match format.deep {
-                true => Samples::Sixteen(vec![0; count]),
-                false => Samples::Eight(vec![0; count]),
+            samples: if format.deep {
+                Samples::Sixteen(vec![0; count])
+            } else {
+                Samples::Eight(vec![0; count])
             },
         }
     }
@@ -46,7 +48,8 @@ impl Panorama {
         covered as f64 / self.canvas.pixels() as f64
     }
 
-    /// Grey value (of 255, Rec. 709 luma of colour; 0 in holes) and whether it is covered, of each pixel.
+    /// Grey value (of 255, Rec. 709 luma of colour; 0 in holes) and whether it is covered, of each
+    /// pixel.
     fn values(&self) -> Box<dyn Iterator<Item = (f32, bool)> + '_> {
         let step = self.format.channels + 1;
         match &self.samples {
@@ -55,8 +58,8 @@ impl Panorama {
         }
     }
 
-    /// Grey values (of 255, Rec. 709 luma of colour; 0 in holes) and which pixels are covered, row-major as
-    /// [`Layout::ThetaRight`].
+    /// Grey values (of 255, Rec. 709 luma of colour; 0 in holes) and which pixels are covered,
+    /// row-major as [`Layout::ThetaRight`].
     pub fn grey(&self) -> (GreyImage, Vec<bool>) {
         let (grey, covered) = self.values().unzip();
         let (width, height) = (self.canvas.columns as usize, self.canvas.rows as usize);

@@ -9,7 +9,8 @@ use image::{ColorType, DynamicImage};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-/// A picture of 8- or 16-bit samples, row-major, channels interleaved: 1 (grey) or 3 (red, green, blue).
+/// A picture of 8- or 16-bit samples, row-major, channels interleaved: 1 (grey) or 3 (red, green,
+/// blue).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     width: usize,
@@ -100,8 +101,8 @@ impl Picture {
         &self.samples
     }
 
-    /// The same picture in a format that holds at least as much: grey becomes colour, and 8 bits become 16
-    /// (65535 = 255 · 257).
+    /// The same picture in a format that holds at least as much: grey becomes colour, and 8 bits
+    /// become 16 (65535 = 255 · 257).
     pub fn widened(self, format: PixelFormat) -> Self {
         let (width, height) = (self.width, self.height);
         let copies = if format.channels > self.channels {
@@ -143,7 +144,8 @@ impl Picture {
         half.masked(self.mask.as_ref().map(|mask| mask.halved(1)))
     }
 
-    /// The means of `2^level × 2^level` pixels, 16 bits deep; odd rows and columns at the end are dropped.
+    /// The means of `2^level × 2^level` pixels, 16 bits deep; odd rows and columns at the end are
+    /// dropped.
     pub(super) fn thumbnail(&self, level: usize) -> Self {
         let (width, height) = (self.width >> level, self.height >> level);
         let data = match &self.samples {
@@ -203,8 +205,8 @@ impl Picture {
         data
     }
 
-    /// The value at pixel `(u, v)`, which must lie within the outermost pixel centres. Pixels beyond the
-    /// border repeat the outermost one. A grey picture has it in all three channels.
+    /// The value at pixel `(u, v)`, which must lie within the outermost pixel centres. Pixels
+    /// beyond the border repeat the outermost one. A grey picture has it in all three channels.
     pub fn at(&self, u: f32, v: f32, kernel: &Kernel) -> [f32; 3] {
         let weights = |t: f32| {
             let t = t + kernel.rounding();
@@ -258,8 +260,8 @@ pub struct PixelFormat {
 }
 
 impl PixelFormat {
-    /// How pictures of a file's colour type are held: grey stays grey and everything else becomes colour, 16 bits stay 16
-    /// and everything else becomes 8.
+    /// How pictures of a file's colour type are held: grey stays grey and everything else becomes
+    /// colour, 16 bits stay 16 and everything else becomes 8.
     pub fn of(colour: ColorType) -> Self {
         Self {
             channels: if colour.has_color() { 3 } else { 1 },

@@ -48,8 +48,8 @@ pub fn place(
         .collect()
 }
 
-/// The frames' own resolution at the wall: the median over the frames of `f / distance`, pixels per metre,
-/// with the distance of the wall along the optical axis, metres, and `f = √(fx fy)`, pixels.
+/// The frames' own resolution at the wall: the median over the frames of `f / distance`, pixels per
+/// metre, with the distance of the wall along the optical axis, metres, and `f = √(fx fy)`, pixels.
 ///
 /// # Errors
 /// [`RenderError::Frame`] for a camera that stands outside or looks along the axis.

@@ -24,9 +24,11 @@ pub struct RenderOptions {
     pub interpolation: Interpolation,
     /// Which frames a pixel shows.
     pub mode: Mode,
-    /// Whether exposure is undone and light levelled out over seams; else frames keep the values they have.
+    /// Whether exposure is undone and light levelled out over seams; else frames keep the values
+    /// they have.
     pub blend: bool,
-    /// Whether the wall is solved from all frames, finer than any of them ([`crate::super_resolve`]); exposure must be undone for it.
+    /// Whether the wall is solved from all frames, finer than any of them
+    /// ([`crate::super_resolve`]); exposure must be undone for it.
     pub super_resolve: bool,
 }
 
@@ -70,7 +72,8 @@ impl Settled {
     /// Finds exposures and seams.
     ///
     /// # Errors
-    /// [`RenderError::Count`] unless there is one placement per frame; a frame that cannot be decoded.
+    /// [`RenderError::Count`] unless there is one placement per frame; a frame that cannot be
+    /// decoded.
     pub fn find(
         surface: &dyn Surface,
         frames: &FrameStack,
@@ -182,8 +185,8 @@ impl<'a> Plan<'a> {
         self.settled.seams.as_ref()
     }
 
-    /// Draws all bands into `targets`. The bytes do not depend on the number of threads, nor on the memory that
-    /// frames may take (`room` bytes, and at least those of one band).
+    /// Draws all bands into `targets`. The bytes do not depend on the number of threads, nor on the
+    /// memory that frames may take (`room` bytes, and at least those of one band).
     ///
     /// # Errors
     /// A frame that cannot be decoded; what the targets say.
@@ -267,9 +270,12 @@ impl<'a> Plan<'a> {
 
     fn needed(&self, frames: &FrameStack, tiles: &[Tile]) -> Vec<usize> {
         let scene = self.scene(frames);
-        let of_tile = |tile: &Tile| match self.super_resolve {
-            true => tile.frames.clone(),
-            false => scene.needed(tile),
+        let of_tile = |tile: &Tile| {
+            if self.super_resolve {
+                tile.frames.clone()
+            } else {
+                scene.needed(tile)
+            }
         };
         let mut needed: Vec<usize> = tiles.iter().flat_map(of_tile).collect();
         needed.sort_unstable();

@@ -63,8 +63,8 @@ impl Preview {
         }
     }
 
-    /// The picture, at most 4096 px long, with chainage in metres along one side and clock positions along the other, twelve o'clock
-    /// at θ = `twelve_at_deg`.
+    /// The picture, at most 4096 px long, with chainage in metres along one side and clock
+    /// positions along the other, twelve o'clock at θ = `twelve_at_deg`.
     pub fn picture(&self, surface: &dyn Surface, layout: Layout, twelve_at_deg: f64) -> RgbImage {
         let size = [self.columns as u32, self.rows as u32];
         let [width, height] = match layout {
@@ -75,9 +75,10 @@ impl Preview {
         for row in 0..self.rows {
             for column in 0..self.columns {
                 let [red, green, blue, n] = self.sums[row * self.columns + column];
-                let colour = match n > 0.0 {
-                    true => Rgb([red, green, blue].map(|sum| u8::nearest(sum / n))),
-                    false => HOLE,
+                let colour = if n > 0.0 {
+                    Rgb([red, green, blue].map(|sum| u8::nearest(sum / n)))
+                } else {
+                    HOLE
                 };
                 let (x, y) = match layout {
                     Layout::ThetaRight => (column, row),
@@ -137,15 +138,17 @@ impl Preview {
     }
 }
 
-/// A tick on both sides of the picture with its text: above and below if `across`, else left and right.
+/// A tick on both sides of the picture with its text: above and below if `across`, else left and
+/// right.
 fn axis(image: &mut RgbImage, across: bool, at: f64, text: &str) {
     let (width, height) = image.dimensions();
     let at = MARGIN + at.max(0.0) as u32;
     let half = lettering::width(text, SCALE) / 2;
     for k in 0..TICK {
-        let ends = match across {
-            true => [[at, MARGIN - 1 - k], [at, height - MARGIN + k]],
-            false => [[MARGIN - 1 - k, at], [width - MARGIN + k, at]],
+        let ends = if across {
+            [[at, MARGIN - 1 - k], [at, height - MARGIN + k]]
+        } else {
+            [[MARGIN - 1 - k, at], [width - MARGIN + k, at]]
         };
         for [x, y] in ends {
             if let Some(pixel) = image.get_pixel_mut_checked(x, y) {
@@ -154,21 +157,18 @@ fn axis(image: &mut RgbImage, across: bool, at: f64, text: &str) {
         }
     }
     let letter = LETTER * SCALE;
-    let places = match across {
-        true => {
-            let x = at.saturating_sub(half);
-            [
-                [x, MARGIN - TICK - letter - 4],
-                [x, height - MARGIN + TICK + 4],
-            ]
-        }
-        false => {
-            let y = at.saturating_sub(letter / 2);
-            [
-                [(MARGIN - TICK).saturating_sub(2 * half + 4), y],
-                [width - MARGIN + TICK + 4, y],
-            ]
-        }
+    let places = if across {
+        let x = at.saturating_sub(half);
+        [
+            [x, MARGIN - TICK - letter - 4],
+            [x, height - MARGIN + TICK + 4],
+        ]
+    } else {
+        let y = at.saturating_sub(letter / 2);
+        [
+            [(MARGIN - TICK).saturating_sub(2 * half + 4), y],
+            [width - MARGIN + TICK + 4, y],
+        ]
     };
     for place in places {
         lettering::draw(image, place, text, SCALE, INK);

@@ -59,7 +59,8 @@ enum Writer {
 }
 
 impl RasterTarget {
-    /// A Cloud-Optimised GeoTIFF. Its axes are metres: arc length and chainage, as the layout has them.
+    /// A Cloud-Optimised GeoTIFF. Its axes are metres: arc length and chainage, as the layout has
+    /// them.
     ///
     /// # Errors
     /// As [`CogWriter::kept`].
@@ -233,9 +234,10 @@ fn spec(canvas: &Canvas, format: PixelFormat, layout: Layout, layer: RasterLayer
     };
     match layer {
         RasterLayer::Panorama => RasterSpec {
-            samples: match format.deep {
-                true => SampleType::U16,
-                false => SampleType::U8,
+            samples: if format.deep {
+                SampleType::U16
+            } else {
+                SampleType::U8
             },
             channels: format.channels as u8,
             alpha: true,

@@ -96,7 +96,8 @@ impl Row {
         }
     }
 
-    /// The pixels of some columns, `C` channels and alpha: means, with corrections (`L` lanes, of all columns) added.
+    /// The pixels of some columns, `C` channels and alpha: means, with corrections (`L` lanes, of
+    /// all columns) added.
     pub fn put<T: Sample, const C: usize, const L: usize>(
         &self,
         columns: Range<usize>,

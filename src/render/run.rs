@@ -12,8 +12,8 @@ use std::ops::Range;
 /// Most points of a run: all that is known of a run stays in the first-level cache.
 pub const RUN: usize = 128;
 
-/// Where a run of points appears in a frame, and the values there: colour in the first three of four lanes, grey in the
-/// first.
+/// Where a run of points appears in a frame, and the values there: colour in the first three of
+/// four lanes, grey in the first.
 pub struct Run {
     u: [f32; RUN],
     v: [f32; RUN],
@@ -45,7 +45,8 @@ impl Default for Run {
 }
 
 impl Run {
-    /// Which of the points the frame shows; after [`Run::sample`] and [`Run::copy`], without those whose kernel meets a masked pixel.
+    /// Which of the points the frame shows; after [`Run::sample`] and [`Run::copy`], without those
+    /// whose kernel meets a masked pixel.
     #[inline(always)]
     pub fn seen(&self) -> &[bool; RUN] {
         &self.seen
@@ -91,8 +92,8 @@ impl Run {
         );
     }
 
-    /// Finds the pixels of the points in some columns of a row of a tile by its chart; `points`: all of the tile's, one by one, if the chart
-    /// is rough somewhere, `width` in a row.
+    /// Finds the pixels of the points in some columns of a row of a tile by its chart; `points`:
+    /// all of the tile's, one by one, if the chart is rough somewhere, `width` in a row.
     pub fn locate(
         &mut self,
         chart: &Chart,
@@ -111,7 +112,8 @@ impl Run {
         wide(
             #[inline(always)]
             || {
-                // The closure's own, here and in [`Run::address`]: of what it borrows, loops are not made vectors.
+                // The closure's own, here and in [`Run::address`]: of what it borrows, loops are
+                // not made vectors.
                 let limit = look.limit();
                 for eight in eights.clone() {
                     let (mut own_u, mut own_v) = ([0.0; EIGHT], [0.0; EIGHT]);
@@ -174,8 +176,9 @@ impl Run {
         }
     }
 
-    /// Looks up the values in some columns (`own`) of a row of the patch that begins with the tile's column `first`, all of them inside the picture. False without doing it
-    /// where the processor lacks the vectors for it.
+    /// Looks up the values in some columns (`own`) of a row of the patch that begins with the
+    /// tile's column `first`, all of them inside the picture. False without doing it where the
+    /// processor lacks the vectors for it.
     pub fn sample_row(
         &mut self,
         picture: &Picture,
@@ -195,8 +198,8 @@ impl Run {
         done
     }
 
-    /// Puts the values in some columns whose pixels were found before straight into `pixels`, alpha last; nothing where
-    /// the frame does not show the wall.
+    /// Puts the values in some columns whose pixels were found before straight into `pixels`, alpha
+    /// last; nothing where the frame does not show the wall.
     pub fn copy<const C: usize>(
         &mut self,
         picture: &Picture,
@@ -253,7 +256,8 @@ impl Run {
         }
     }
 
-    /// Sums under the kernel where all of it lies in the picture, anything elsewhere; true if that is everywhere.
+    /// Sums under the kernel where all of it lies in the picture, anything elsewhere; true if that
+    /// is everywhere.
     fn integer_sums<const C: usize>(
         &mut self,
         picture: &Picture,
@@ -320,8 +324,8 @@ impl Run {
         }
     }
 
-    /// The samples and phases that each point needs; those of the first pixel where the kernel does not lie within the picture. True if
-    /// it does everywhere.
+    /// The samples and phases that each point needs; those of the first pixel where the kernel does
+    /// not lie within the picture. True if it does everywhere.
     fn address(
         &mut self,
         picture: &Picture,
@@ -419,7 +423,8 @@ fn fits(picture: &Picture, kernel: &Kernel) -> bool {
     picture.width().min(picture.height()) >= kernel.taps()
 }
 
-/// A number from 0 to 2²² cut to the whole number below it, and what was cut off; anything for other numbers.
+/// A number from 0 to 2²² cut to the whole number below it, and what was cut off; anything for
+/// other numbers.
 #[inline(always)]
 fn whole(value: f32) -> (i32, f32) {
     let nearest = (value + WHOLE) - WHOLE;
@@ -434,7 +439,8 @@ fn whole(value: f32) -> (i32, f32) {
     )
 }
 
-/// The grey value under a kernel that begins with the first sample: down the columns first, side by side.
+/// The grey value under a kernel that begins with the first sample: down the columns first, side by
+/// side.
 ///
 /// Arrays of fixed size, here and in [`colour`], are what the compiler makes vectors of.
 #[inline(always)]
@@ -457,8 +463,8 @@ fn grey<T: Sample, const N: usize>(
     value
 }
 
-/// The colour under a kernel that begins with the first sample. Pixels are read four samples wide; the fourth lane is the
-/// neighbour's and means nothing.
+/// The colour under a kernel that begins with the first sample. Pixels are read four samples wide;
+/// the fourth lane is the neighbour's and means nothing.
 #[inline(always)]
 fn colour<T: Sample, const N: usize>(
     samples: &[T],

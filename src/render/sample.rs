@@ -18,8 +18,8 @@ pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + '
     fn bytes<'a, 'b>(rows: &'a mut [&'b mut [Self]]) -> Option<&'a mut [&'b mut [u8]]>;
 }
 
-/// 2²³: added to a number from 0 to 2²³, it leaves the nearest whole number (of two equally near the even one) in the last bits of the
-/// sum. Unlike a cast, this is what vectors do well.
+/// 2²³: added to a number from 0 to 2²³, it leaves the nearest whole number (of two equally near
+/// the even one) in the last bits of the sum. Unlike a cast, this is what vectors do well.
 pub const WHOLE: f32 = 8_388_608.0;
 
 macro_rules! sample {
@@ -70,8 +70,8 @@ impl Samples {
         self.len() == 0
     }
 
-    /// The picture of `width × height` pixels that they are: grey (one channel) or red-green-blue, each pixel's alpha
-    /// last. An empty one if there are too few.
+    /// The picture of `width × height` pixels that they are: grey (one channel) or red-green-blue,
+    /// each pixel's alpha last. An empty one if there are too few.
     pub(super) fn into_image(self, [width, height]: [u32; 2], channels: usize) -> DynamicImage {
         match (self, channels) {
             (Self::Eight(samples), 1) => {

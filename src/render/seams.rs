@@ -1,8 +1,10 @@
 //! Which frame shows which part of the panorama, and how one passes into the next.
 //!
-//! A grid of nodes, some eight pixels apart (sixteen and more where there would be too many), lies over the canvas. Each node is given to one frame
-//! ([`super::labels`]); between nodes the frames pass into each other with the bilinear weights of their nodes. What they still differ by in light
-//! over longer distances is levelled out by a correction given at the nodes ([`super::levelling`]).
+//! A grid of nodes, some eight pixels apart (sixteen and more where there would be too many), lies
+//! over the canvas. Each node is given to one frame ([`super::labels`]); between nodes the frames
+//! pass into each other with the bilinear weights of their nodes. What they still differ by in
+//! light over longer distances is levelled out by a correction given at the nodes
+//! ([`super::levelling`]).
 
 use super::chart::PATCH;
 use super::draw::NO_FRAME;
@@ -20,7 +22,8 @@ const STEP_PX: f64 = 8.0;
 /// The most nodes of a grid; beyond, they are farther apart.
 const NODES: usize = 4 << 20;
 
-/// Distance of the nodes on a canvas, pixels: by the canvas alone, so that the panorama does not depend on the memory.
+/// Distance of the nodes on a canvas, pixels: by the canvas alone, so that the panorama does not
+/// depend on the memory.
 pub(super) fn step_px(canvas: &Canvas) -> f64 {
     let mut step = STEP_PX;
     loop {
@@ -43,7 +46,8 @@ pub struct Seams {
     grid: Canvas,
     /// The frame of each node, row-major; [`NO_FRAME`] where none sees the wall.
     labels: Vec<u32>,
-    /// What is added to the frames' values at each node, `channels` numbers; nothing at all where frames stay as they are.
+    /// What is added to the frames' values at each node, `channels` numbers; nothing at all where
+    /// frames stay as they are.
     corrections: Vec<f32>,
     channels: usize,
 }
@@ -62,7 +66,8 @@ impl Across {
         self.columns
     }
 
-    /// How far each column lies from the node before to the one after, 0 to 1; anything beyond the last.
+    /// How far each column lies from the node before to the one after, 0 to 1; anything beyond the
+    /// last.
     pub fn between(&self) -> &[f32; RUN] {
         &self.t
     }
@@ -91,7 +96,8 @@ impl Between {
     }
 }
 
-/// The rows of a tile, cut where they pass a row of nodes and where one row of patches ends and the next begins.
+/// The rows of a tile, cut where they pass a row of nodes and where one row of patches ends and the
+/// next begins.
 pub fn strips(down: &[Between]) -> impl Iterator<Item = Range<usize>> {
     let key = |row: usize| (down[row].before, row / PATCH);
     let mut from = 0;
@@ -107,8 +113,8 @@ pub fn strips(down: &[Between]) -> impl Iterator<Item = Range<usize>> {
 }
 
 impl Seams {
-    /// Finds the best frame for each node of the grid over `canvas`, by thumbnails whose exposure is undone; with `blend`, also the
-    /// correction. `white`: full scale of the frames.
+    /// Finds the best frame for each node of the grid over `canvas`, by thumbnails whose exposure
+    /// is undone; with `blend`, also the correction. `white`: full scale of the frames.
     pub(super) fn find(
         surface: &dyn Surface,
         thumbnails: &Thumbnails,
@@ -186,7 +192,8 @@ impl Seams {
         frames
     }
 
-    /// The node before a column of the canvas, from −1 on, and how far from it to the next one the column lies.
+    /// The node before a column of the canvas, from −1 on, and how far from it to the next one the
+    /// column lies.
     fn column_of(&self, canvas: &Canvas, column: u32) -> (i64, f32) {
         let scale = f64::from(self.grid.columns) / f64::from(canvas.columns);
         let at = (f64::from(column) + 0.5) * scale - 0.5;
@@ -241,7 +248,8 @@ impl Seams {
         rows.map(|row| self.row_of(canvas, row)).collect()
     }
 
-    /// The frame that some columns from a row to another are of; None if there are several, or none.
+    /// The frame that some columns from a row to another are of; None if there are several, or
+    /// none.
     pub(super) fn only(
         &self,
         across: &Across,
@@ -266,7 +274,8 @@ impl Seams {
         Some(only? as usize)
     }
 
-    /// What some columns of a row are made of. Between the same nodes nothing changes from row to row where no frames meet.
+    /// What some columns of a row are made of. Between the same nodes nothing changes from row to
+    /// row where no frames meet.
     ///
     /// Without blending each pixel is one frame's, the one with the largest weight.
     pub(super) fn shares(
@@ -353,7 +362,8 @@ impl Seams {
         }
     }
 
-    /// What is added to the values along a row, at each of its columns: nothing in lanes beyond the channels.
+    /// What is added to the values along a row, at each of its columns: nothing in lanes beyond the
+    /// channels.
     pub(super) fn corrections<const L: usize>(
         &self,
         across: &Across,

@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 /// The frames of a survey, all in the same format, with the camera that took them.
 ///
-/// Frames are decoded when [`FrameStack::hold`] asks for them and stay until there is no room: a frame that is decoded again
-/// is the same frame.
+/// Frames are decoded when [`FrameStack::hold`] asks for them and stay until there is no room: a
+/// frame that is decoded again is the same frame.
 #[derive(Clone, Debug)]
 pub struct FrameStack {
     camera: Camera,
@@ -25,8 +25,9 @@ pub struct FrameStack {
 /// Files of no more than this share of their pictures' bytes are packed.
 const PACKED: f64 = 0.9;
 
-/// How many times frames of resolution `native` may be halved before they are coarser than a canvas of
-/// `px_per_metre`: a canvas much coarser than the frames would otherwise pick single pixels out of them.
+/// How many times frames of resolution `native` may be halved before they are coarser than a canvas
+/// of `px_per_metre`: a canvas much coarser than the frames would otherwise pick single pixels out
+/// of them.
 pub fn level_for(camera: &Camera, native_px_per_metre: f64, px_per_metre: f64) -> usize {
     let mut level = 0;
     while native_px_per_metre * 0.5f64.powi(level as i32 + 1) >= px_per_metre
@@ -38,8 +39,8 @@ pub fn level_for(camera: &Camera, native_px_per_metre: f64, px_per_metre: f64) -
 }
 
 impl FrameStack {
-    /// Frames on disk, to be halved `level` times. None is decoded yet; their headers tell the format: colour if any frame has
-    /// colour, 16 bits if any has.
+    /// Frames on disk, to be halved `level` times. None is decoded yet; their headers tell the
+    /// format: colour if any frame has colour, 16 bits if any has.
     ///
     /// # Errors
     /// A frame that is missing or is no picture; the first in the order of the files.
@@ -69,9 +70,12 @@ impl FrameStack {
     }
 
     fn has_packed_files(&self) -> bool {
-        let bytes = |file: &FrameFile| match file.is_in_video() {
-            true => 0,
-            false => std::fs::metadata(&file.path).map_or(0, |file| file.len()),
+        let bytes = |file: &FrameFile| {
+            if file.is_in_video() {
+                0
+            } else {
+                std::fs::metadata(&file.path).map_or(0, |file| file.len())
+            }
         };
         let files: u64 = self.files.iter().map(bytes).sum();
         let pictures = self.full_frame_bytes() * self.len() as u64;
@@ -104,11 +108,13 @@ impl FrameStack {
         }
     }
 
-    /// Decodes those of `frames` that are not there yet (in parallel). Others stay while all take no more than `room` bytes;
-    /// those go first that come last in `later`, the frames in the order in which they will be needed again.
+    /// Decodes those of `frames` that are not there yet (in parallel). Others stay while all take
+    /// no more than `room` bytes; those go first that come last in `later`, the frames in the order
+    /// in which they will be needed again.
     ///
     /// # Errors
-    /// A frame that is missing, damaged or of another size than the calibration's; the first of them.
+    /// A frame that is missing, damaged or of another size than the calibration's; the first of
+    /// them.
     pub fn hold(
         &mut self,
         frames: &[usize],
@@ -222,8 +228,8 @@ impl FrameStack {
         self.pictures.is_empty()
     }
 
-    /// Whether files are smaller than their pictures, so that decoding a frame takes more than reading it: worth the memory that it takes to
-    /// do it once only.
+    /// Whether files are smaller than their pictures, so that decoding a frame takes more than
+    /// reading it: worth the memory that it takes to do it once only.
     pub fn is_packed(&self) -> bool {
         self.packed
     }

@@ -40,8 +40,9 @@ impl Default for StitchOptions {
     }
 }
 
-/// The poses with `t_x = t_z = 0`: chainage and rotation kept, the distance from the axis forgotten. What a
-/// panorama looks like that does not account for the camera's position (bricks seem to zoom).
+/// The poses with `t_x = t_z = 0`: chainage and rotation kept, the distance from the axis
+/// forgotten. What a panorama looks like that does not account for the camera's position (bricks
+/// seem to zoom).
 pub fn on_the_axis(poses: &[Pose]) -> Vec<Pose> {
     poses
         .iter()
@@ -65,7 +66,8 @@ pub struct LaidOut {
     pub canvas: Canvas,
 }
 
-/// Lays frames out for given poses, their rows read by `shutter`, at `px_per_metre` or `finer` times the frames' own resolution: the canvas that [`stitch()`] draws.
+/// Lays frames out for given poses, their rows read by `shutter`, at `px_per_metre` or `finer`
+/// times the frames' own resolution: the canvas that [`stitch()`] draws.
 ///
 /// # Errors
 /// As [`place`], [`native_px_per_metre`] and [`Canvas::covering`].
@@ -97,8 +99,9 @@ pub struct Stitch<'a> {
 }
 
 impl<'a> Stitch<'a> {
-    /// Places the frames for given poses, their rows read by `shutter`, lays out the canvas and looks at the frames' headers. Frames are to be halved where the
-    /// canvas is coarser than half their resolution.
+    /// Places the frames for given poses, their rows read by `shutter`, lays out the canvas and
+    /// looks at the frames' headers. Frames are to be halved where the canvas is coarser than half
+    /// their resolution.
     ///
     /// # Errors
     /// Everything in [`RenderError`]; no frame is decoded yet.
@@ -123,9 +126,10 @@ impl<'a> Stitch<'a> {
         } else {
             poses
         };
-        let finer = match options.render.super_resolve {
-            true => FINER,
-            false => 1.0,
+        let finer = if options.render.super_resolve {
+            FINER
+        } else {
+            1.0
         };
         let laid_out = lay_out(surface, camera, poses, shutter, options.px_per_metre, finer)?;
         let canvas = &laid_out.canvas;
@@ -243,8 +247,8 @@ pub fn render(
     Ok(panorama)
 }
 
-/// Checks that `copies` panoramas (each drawn one, and one on its way to the file) and the frames, all of them held, fit into the
-/// free memory.
+/// Checks that `copies` panoramas (each drawn one, and one on its way to the file) and the frames,
+/// all of them held, fit into the free memory.
 ///
 /// # Errors
 /// [`RenderError::Memory`].

@@ -50,7 +50,8 @@ fn changed(wall: &TestWall, change: impl Fn(usize, usize, usize, f32) -> f32) ->
     FrameStack::from_pictures(wall.camera, pictures.collect())
 }
 
-/// Root mean square and largest difference from the texture, grey levels, and the number of covered pixels.
+/// Root mean square and largest difference from the texture, grey levels, and the number of covered
+/// pixels.
 fn difference(panorama: &Panorama, perimeter_m: f64) -> (f64, f64, usize) {
     let canvas = *panorama.canvas();
     let (grey, covered) = panorama.grey();
@@ -96,7 +97,8 @@ fn the_panorama_is_the_texture() {
             count * 10 > panorama.canvas().pixels() * 7,
             "{count} pixels"
         );
-        // Frames and panorama are rounded to whole grey levels: 0.29 each where one frame sees the wall.
+        // Frames and panorama are rounded to whole grey levels: 0.29 each where one frame sees the
+        // wall.
         assert!(rms < 0.5, "{options:?}: {rms} grey levels");
         assert!(worst < 2.5, "{options:?}: {worst} grey levels");
     }
@@ -148,7 +150,8 @@ fn gains_and_a_headlight_are_undone() {
     let squares: f64 = pairs().map(|(a, b)| (factor * a - b).powi(2)).sum();
     let after = (squares / pairs().count() as f64).sqrt();
     assert!((0.9..1.1).contains(&factor), "{factor}");
-    // Once around, two frames overlap only where both are dark; turns that overlap one another tell more.
+    // Once around, two frames overlap only where both are dark; turns that overlap one another tell
+    // more.
     assert!(
         before > 15.0 && 6.0 * after < before,
         "{before} before, {after} after"
@@ -181,7 +184,8 @@ fn what_one_frame_alone_shows_is_left_out_where_others_see_the_wall() {
     );
 }
 
-/// Without blending and with the nearest pixel, every pixel of the panorama is one of the frame that it is said to be from.
+/// Without blending and with the nearest pixel, every pixel of the panorama is one of the frame
+/// that it is said to be from.
 #[test]
 fn raw_pixels_are_those_of_the_frames() {
     struct Check<'a>(&'a TestWall, &'a FrameStack, usize);
@@ -268,7 +272,8 @@ fn a_mark_on_the_wall_is_not_mirrored_and_chainage_right_is_a_turn() {
     let upright = panorama.clone().into_image(Layout::ThetaRight).to_luma8();
     assert_eq!(upright.dimensions(), (columns, rows));
     let near = 20;
-    // Just right of θ = 0, lower half: bright. Upper half: middling. Left of it (the last columns): dark.
+    // Just right of θ = 0, lower half: bright. Upper half: middling. Left of it (the last columns):
+    // dark.
     assert_eq!(upright.get_pixel(near, rows * 3 / 4).0, [250]);
     assert_eq!(upright.get_pixel(near, rows / 4).0, [150]);
     assert_eq!(upright.get_pixel(columns - near, rows / 4).0, [50]);
@@ -334,7 +339,8 @@ fn colour_and_depth_change_nothing_in_grey() {
             .into_iter()
             .zip(drawn.to_rgba16().into_raw());
         let most = pairs.map(|(a, b)| a.abs_diff(b)).max();
-        // Half a grey level of 8 bits that the deeper picture keeps, and 1/40 that sums in whole numbers may be off.
+        // Half a grey level of 8 bits that the deeper picture keeps, and 1/40 that sums in whole
+        // numbers may be off.
         assert!(most <= Some(if deep { 135 } else { 0 }), "{most:?}");
     }
 }
@@ -402,7 +408,8 @@ fn little_memory_changes_nothing_but_the_time() {
     assert!(draw(u64::MAX) == draw(0));
 }
 
-/// The paper's zoom effect: an off-centre camera that is treated as centred puts the wall elsewhere.
+/// The paper's zoom effect: an off-centre camera that is treated as centred puts the wall
+/// elsewhere.
 #[test]
 fn ignoring_the_offset_moves_the_camera_to_the_axis_only() {
     let wall = TestWall::ring(test_wall::waves);

@@ -27,7 +27,8 @@ impl Thumbnails {
     /// Frames that are not held are decoded and let go again.
     ///
     /// # Errors
-    /// A frame that is missing, damaged or of another size than the calibration's; the first of them.
+    /// A frame that is missing, damaged or of another size than the calibration's; the first of
+    /// them.
     pub fn of(
         frames: &FrameStack,
         level: usize,
@@ -144,7 +145,8 @@ pub struct ThumbnailView<'a> {
 }
 
 impl ThumbnailView<'_> {
-    /// Looks at `count` of the points from index `start`: where they appear, and the values there, bilinear.
+    /// Looks at `count` of the points from index `start`: where they appear, and the values there,
+    /// bilinear.
     pub fn look_at(&self, run: &mut Run, start: usize, count: usize) {
         run.project(&self.look, self.points, start, count);
         run.sample(self.picture, self.bilinear, 0..count);

@@ -57,8 +57,8 @@ impl Tile {
     }
 }
 
-/// The tiles of a canvas, `edge` pixels (at most [`EDGE`]) wide and high, in bands from the first row to the last, each band
-/// from the first column to the last.
+/// The tiles of a canvas, `edge` pixels (at most [`EDGE`]) wide and high, in bands from the first
+/// row to the last, each band from the first column to the last.
 pub(crate) fn tiles(
     surface: &dyn Surface,
     canvas: &Canvas,

@@ -14,8 +14,8 @@ use std::ops::Range;
 
 /// Kernels are made for stretches of this step from 1 upwards.
 const STRETCH_STEP: f64 = 0.25;
-/// The widest kernel: frames are halved before they are more than twice as fine as the canvas, save where a camera stands
-/// much nearer to the wall than the others.
+/// The widest kernel: frames are halved before they are more than twice as fine as the canvas, save
+/// where a camera stands much nearer to the wall than the others.
 const MOST_STRETCH: f64 = 4.0;
 
 /// The kernels of an interpolation for all stretches.
@@ -30,8 +30,8 @@ impl Kernels {
         Self((0..=steps).map(kernel).collect())
     }
 
-    /// The kernel for canvas pixels that are these steps apart in a frame, u and v of each: as wide as that axis asks along which
-    /// there are more frame pixels.
+    /// The kernel for canvas pixels that are these steps apart in a frame, u and v of each: as wide
+    /// as that axis asks along which there are more frame pixels.
     fn for_steps(&self, [s, h]: [[f32; 2]; 2]) -> &Kernel {
         let square = |k: usize| s[k] * s[k] + h[k] * h[k];
         self.stretched(square(0).max(square(1)).sqrt())
@@ -48,9 +48,11 @@ impl Kernels {
 /// A patch of the chart in a frame.
 #[derive(Clone, Copy)]
 struct PatchView<'a> {
-    /// As wide as the frame is finer than the canvas in the middle of the patch; None where it is rough or not in the frame.
+    /// As wide as the frame is finer than the canvas in the middle of the patch; None where it is
+    /// rough or not in the frame.
     kernel: Option<&'a Kernel>,
-    /// Between which u and between which v all of the kernel lies within the picture; None if it is looked up otherwise, or masked.
+    /// Between which u and between which v all of the kernel lies within the picture; None if it is
+    /// looked up otherwise, or masked.
     within: Option<[[f32; 2]; 2]>,
     /// True if that is so all over the patch.
     inside: bool,
@@ -151,7 +153,8 @@ impl<'a> View<'a> {
         self.chart.is_rough()
     }
 
-    /// True if it is plain that the frame shows nothing of some rows and columns of a tile, all in one patch.
+    /// True if it is plain that the frame shows nothing of some rows and columns of a tile, all in
+    /// one patch.
     pub fn misses(&self, rows: &Range<usize>, columns: &Range<usize>) -> bool {
         let Some(lines) = self
             .chart
@@ -164,8 +167,9 @@ impl<'a> View<'a> {
         axes.any(|([least, most], limit)| most < -ROUNDING_PX || least > limit + ROUNDING_PX)
     }
 
-    /// Looks at some columns of a row of a tile `width` columns wide: where they appear, and the values there with the frame's exposure
-    /// undone. `points`: all of the tile's, if the view is rough.
+    /// Looks at some columns of a row of a tile `width` columns wide: where they appear, and the
+    /// values there with the frame's exposure undone. `points`: all of the tile's, if the view is
+    /// rough.
     pub fn look_at(
         &self,
         run: &mut Run,
@@ -197,7 +201,8 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Finds where columns of one patch appear; false if it is plain that the frame shows none of them.
+    /// Finds where columns of one patch appear; false if it is plain that the frame shows none of
+    /// them.
     fn locate(
         &self,
         run: &mut Run,
@@ -206,9 +211,10 @@ impl<'a> View<'a> {
         columns: Range<usize>,
     ) -> bool {
         let misses = self.misses(&(place.0..place.0 + 1), &columns);
-        match misses {
-            true => run.see_nothing(columns),
-            false => run.locate(&self.chart, &self.look, points, place, columns),
+        if misses {
+            run.see_nothing(columns)
+        } else {
+            run.locate(&self.chart, &self.look, points, place, columns)
         }
         !misses
     }
@@ -249,7 +255,8 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Whether [`View::copy`] can do it: 8 bits, more than the nearest pixel, no exposure to be undone.
+    /// Whether [`View::copy`] can do it: 8 bits, more than the nearest pixel, no exposure to be
+    /// undone.
     pub fn copies(&self) -> bool {
         let eight = matches!(self.picture.samples(), Samples::Eight(_));
         eight && self.kernels.stretched(1.0).taps() > 1 && self.response.is_none()
@@ -267,9 +274,10 @@ impl<'a> View<'a> {
         for piece in pieces(columns.clone()) {
             let first = (piece.start - columns.start) * (C + 1);
             let own = &mut pixels[first..first + piece.len() * (C + 1)];
-            let kernel = match self.locate(run, points, place, piece.clone()) {
-                true => self.kernel(run, points, place, piece.clone()),
-                false => None,
+            let kernel = if self.locate(run, points, place, piece.clone()) {
+                self.kernel(run, points, place, piece.clone())
+            } else {
+                None
             };
             match (kernel, self.picture.samples()) {
                 (Some(kernel), Samples::Eight(samples)) => {
@@ -280,8 +288,9 @@ impl<'a> View<'a> {
         }
     }
 
-    /// Draws some rows and columns of a tile, all in one patch, into these rows' pixels: the bytes of [`View::copy`]. False without
-    /// doing it where they do not lie inside an 8-bit frame, or the processor lacks the vectors for it.
+    /// Draws some rows and columns of a tile, all in one patch, into these rows' pixels: the bytes
+    /// of [`View::copy`]. False without doing it where they do not lie inside an 8-bit frame, or
+    /// the processor lacks the vectors for it.
     pub fn block<const C: usize>(
         &self,
         rows: Range<usize>,
@@ -301,7 +310,8 @@ impl<'a> View<'a> {
         integer::block::<C>(&block, pixels)
     }
 
-    /// What the frame has in some rows and columns of a tile, all in one patch, if they lie inside an 8-bit frame.
+    /// What the frame has in some rows and columns of a tile, all in one patch, if they lie inside
+    /// an 8-bit frame.
     pub fn part(
         &self,
         rows: &Range<usize>,
@@ -317,7 +327,8 @@ impl<'a> View<'a> {
         })
     }
 
-    /// The patch that these rows and columns of a tile lie in, and what is to be sampled there, if they lie inside an 8-bit frame.
+    /// The patch that these rows and columns of a tile lie in, and what is to be sampled there, if
+    /// they lie inside an 8-bit frame.
     fn patch(&self, rows: &Range<usize>, columns: &Range<usize>) -> Option<(usize, Patch<'_>)> {
         let at = self.chart.patch(rows.start, columns.start);
         let PatchView {
@@ -349,7 +360,8 @@ impl<'a> View<'a> {
         Some((at, patch))
     }
 
-    /// The kernel for points of a patch that were found before; None if the frame shows none of them.
+    /// The kernel for points of a patch that were found before; None if the frame shows none of
+    /// them.
     fn kernel(
         &self,
         run: &Run,
@@ -371,7 +383,8 @@ impl<'a> View<'a> {
         Some(self.kernels.for_steps(steps))
     }
 
-    /// How far u and v move from one point to the next, or from the one before where a row or column ends.
+    /// How far u and v move from one point to the next, or from the one before where a row or
+    /// column ends.
     fn exact_steps(
         &self,
         points: &Points,
@@ -391,7 +404,8 @@ impl<'a> View<'a> {
         [step(right, left), step(below, at.checked_sub(width))]
     }
 
-    /// `tent(u) tent(v)`: 1 in the middle, falling to 0 half a pixel beyond the outermost pixel centres.
+    /// `tent(u) tent(v)`: 1 in the middle, falling to 0 half a pixel beyond the outermost pixel
+    /// centres.
     #[inline(always)]
     pub fn feather(&self, u: f32, v: f32) -> f32 {
         let [across, down, right, bottom] = self.feather;

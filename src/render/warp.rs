@@ -8,7 +8,8 @@ use nalgebra::{Matrix3, Vector3};
 /// Where points appear, u and v, and whether the lens shows them.
 pub type Pixels<'a> = (&'a mut [f32], &'a mut [f32], &'a mut [bool]);
 
-/// Wall points in single precision, relative to an origin near them: coordinates are exact to 10⁻⁷ of the patch's size.
+/// Wall points in single precision, relative to an origin near them: coordinates are exact to 10⁻⁷
+/// of the patch's size.
 #[derive(Debug, Default)]
 pub struct Points {
     /// The origin in the world, metres.
@@ -47,8 +48,9 @@ impl Points {
     }
 }
 
-/// A camera at a pose, ready to look at wall points relative to an origin: `x_c = R_wcᵀ x + R_wcᵀ (origin − t_wc)`, then the
-/// lens and `u = fx x + cx`, `v = fy y + cy` ([`Camera::project`]).
+/// A camera at a pose, ready to look at wall points relative to an origin:
+/// `x_c = R_wcᵀ x + R_wcᵀ (origin − t_wc)`, then the lens and `u = fx x + cx`, `v = fy y + cy`
+/// ([`Camera::project`]).
 ///
 /// Single precision: to about 10⁻⁴ px.
 #[derive(Clone, Copy, Debug)]
@@ -88,8 +90,8 @@ impl Look {
         [u, v]
     }
 
-    /// Finds the pixels of the points from index `start` on, as many as `u`, `v` and `shown` (by the lens, within the picture or
-    /// not) hold.
+    /// Finds the pixels of the points from index `start` on, as many as `u`, `v` and `shown` (by
+    /// the lens, within the picture or not) hold.
     pub fn project_all(&self, points: &Points, start: usize, (u, v, shown): Pixels) {
         match self.lens {
             SingleLens::Straight(lens) => self.project_through(lens, points, start, u, v, shown),

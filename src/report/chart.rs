@@ -11,7 +11,8 @@ const SIZE: [f64; 2] = [380.0, 214.0];
 const PLOT: [f64; 4] = [48.0, 372.0, 8.0, 172.0];
 /// Share of the values' span that is left free above and below.
 const AIR: f64 = 0.07;
-/// Flagged frames up to so many have lines as high as the plot; more have short ones, which hide nothing.
+/// Flagged frames up to so many have lines as high as the plot; more have short ones, which hide
+/// nothing.
 const MOST_LINES: usize = 24;
 const SHORT_LINE: f64 = 7.0;
 /// Curves of no more points than this show them.
@@ -225,9 +226,10 @@ impl Chart {
         let [left, right, top, bottom] = PLOT;
         let (width, height) = (right - left, bottom - top);
         let columns = width as usize;
-        let y_ticks = match frame.logarithmic {
-            true => ticks::logarithmic(frame.y[0], frame.y[1], 6),
-            false => ticks::linear(frame.y[0], frame.y[1], 5),
+        let y_ticks = if frame.logarithmic {
+            ticks::logarithmic(frame.y[0], frame.y[1], 6)
+        } else {
+            ticks::linear(frame.y[0], frame.y[1], 5)
         };
         let (from, to) = (frame.x[0].min(frame.x[1]), frame.x[0].max(frame.x[1]));
         let mut x_ticks = ticks::linear(from, to, 6);
@@ -244,9 +246,10 @@ impl Chart {
             .collect();
         marks.sort_unstable();
         marks.dedup();
-        let foot = match marks.len() > MOST_LINES {
-            true => top + SHORT_LINE,
-            false => bottom,
+        let foot = if marks.len() > MOST_LINES {
+            top + SHORT_LINE
+        } else {
+            bottom
         };
         let shown = |point: &[f64; 2]| !frame.logarithmic || point[1] > 0.0;
         html! {

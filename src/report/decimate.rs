@@ -1,8 +1,8 @@
 //! Fewer points that look the same.
 
-/// The points of a curve that are seen when it is drawn in `columns` pixel columns over `[low, high]`: of each column the
-/// first, the lowest, the highest and the last, in their order. Points must be in the order of the curve; those that are
-/// no numbers are dropped.
+/// The points of a curve that are seen when it is drawn in `columns` pixel columns over
+/// `[low, high]`: of each column the first, the lowest, the highest and the last, in their order.
+/// Points must be in the order of the curve; those that are no numbers are dropped.
 pub fn decimate(points: &[[f64; 2]], [low, high]: [f64; 2], columns: usize) -> Vec<[f64; 2]> {
     let finite = |point: &&[f64; 2]| point[0].is_finite() && point[1].is_finite();
     let points: Vec<[f64; 2]> = points.iter().filter(finite).copied().collect();

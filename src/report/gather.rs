@@ -156,9 +156,10 @@ fn abscissa(frames: &[FrameRow]) -> Abscissa {
     let ahead = chainages.windows(2).all(|pair| pair[0] <= pair[1]);
     let back = chainages.windows(2).all(|pair| pair[0] >= pair[1]);
     let moves = chainages.first() != chainages.last();
-    match (ahead || back) && moves {
-        true => Abscissa::Chainage,
-        false => Abscissa::Frame,
+    if (ahead || back) && moves {
+        Abscissa::Chainage
+    } else {
+        Abscissa::Frame
     }
 }
 

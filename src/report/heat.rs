@@ -7,8 +7,8 @@ use image::{Rgba, RgbaImage};
 
 /// Cividis at eight places: as bright to those who see few colours as to all others.
 ///
-/// Source: J. R. Nuñez, C. R. Anderton, R. S. Renslow, "Optimizing colormaps with consideration for color vision
-/// deficiency", PLOS ONE 13(7), 2018.
+/// Source: J. R. Nuñez, C. R. Anderton, R. S. Renslow, "Optimizing colormaps with consideration for
+/// color vision deficiency", PLOS ONE 13(7), 2018.
 const CIVIDIS: [[u8; 3]; 8] = [
     [0, 34, 78],
     [39, 61, 109],
@@ -33,9 +33,10 @@ impl Scale {
     /// Where a value lies between the ends, 0 to 1.
     pub fn share(&self, value: f64) -> f64 {
         let [low, high] = self.range;
-        let share = match self.logarithmic {
-            true => (value.max(low) / low).ln() / (high / low).ln(),
-            false => (value - low) / (high - low),
+        let share = if self.logarithmic {
+            (value.max(low) / low).ln() / (high / low).ln()
+        } else {
+            (value - low) / (high - low)
         };
         if share.is_finite() {
             share.clamp(0.0, 1.0)
@@ -69,7 +70,8 @@ pub fn gradient() -> String {
     format!("linear-gradient(to right, {})", stops.join(", "))
 }
 
-/// A map as a PNG file, a pixel a cell: chainage to the right, θ up; what has no value is transparent.
+/// A map as a PNG file, a pixel a cell: chainage to the right, θ up; what has no value is
+/// transparent.
 ///
 /// `values` hold a row for each of the `along` stretches of the axis, `around` cells each.
 ///

@@ -7,8 +7,9 @@
 //!                                                └─ page ──> report.html
 //! ```
 //!
-//! All that the page says is in [`Report`], which is `report.json`; the pictures lie beside it under the names that
-//! it gives, and are inside the page, which needs no other file and no network.
+//! All that the page says is in [`Report`], which is `report.json`; the pictures lie beside it
+//! under the names that it gives, and are inside the page, which needs no other file and no
+//! network.
 //!
 //! | what | where |
 //! | --- | --- |

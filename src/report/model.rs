@@ -1,14 +1,16 @@
 //! `report.json`.
 //!
-//! Lengths are metres, angles degrees, grey values those of an 8-bit picture; names say so. Numbers that do not exist (no
-//! truth, no covariance) are null or missing. Lists of frames are in the order of the survey.
+//! Lengths are metres, angles degrees, grey values those of an 8-bit picture; names say so. Numbers
+//! that do not exist (no truth, no covariance) are null or missing. Lists of frames are in the
+//! order of the survey.
 
 use super::refined::Refinement;
 use crate::evaluate::Comparison;
 use crate::render::Layout;
 use serde::{Deserialize, Serialize};
 
-/// Version of the schema of `report.json`. It grows when a name, a unit or a meaning changes, not when something is added.
+/// Version of the schema of `report.json`. It grows when a name, a unit or a meaning changes, not
+/// when something is added.
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// All that the page says.
@@ -19,7 +21,8 @@ pub struct Report {
     pub schema_version: u32,
     /// Name and version of the program.
     pub program: String,
-    /// The command lines that led here, in their order: that of refine, if known, and that of the report.
+    /// The command lines that led here, in their order: that of refine, if known, and that of the
+    /// report.
     pub commands: Vec<Vec<String>>,
     /// What was surveyed.
     pub survey: SurveyFacts,
@@ -67,7 +70,8 @@ pub struct SurveyFacts {
     pub camera: serde_json::Map<String, serde_json::Value>,
 }
 
-/// The result in a few numbers; residuals and errors against the truth are in [`Report::comparison`].
+/// The result in a few numbers; residuals and errors against the truth are in
+/// [`Report::comparison`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Verdict {
@@ -83,8 +87,8 @@ pub struct Verdict {
     pub sigma_wall_mm: Option<f64>,
     /// The same in pixels of the frames.
     pub sigma_wall_px: Option<f64>,
-    /// Root mean square error of the repaired frames on the wall, millimetres; null without truth. That of all frames is in
-    /// [`Report::comparison`].
+    /// Root mean square error of the repaired frames on the wall, millimetres; null without truth.
+    /// That of all frames is in [`Report::comparison`].
     pub error_wall_mm: Option<f64>,
     /// The same in pixels of the frames.
     pub error_wall_px: Option<f64>,
@@ -101,8 +105,9 @@ pub enum Abscissa {
     Frame,
 }
 
-/// The poses of one frame. Initial and refined ones are as in their files; the true one is moved along the tunnel's gauge
-/// (turn about the axis, shift along it) so that all true poses lie as close to the refined ones as they go.
+/// The poses of one frame. Initial and refined ones are as in their files; the true one is moved
+/// along the tunnel's gauge (turn about the axis, shift along it) so that all true poses lie as
+/// close to the refined ones as they go.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct FrameRow {
@@ -160,7 +165,8 @@ pub struct Strip {
     pub height: u32,
 }
 
-/// Measures of the wall, cell by cell. Lists hold a row for each stretch of the axis, from θ = 0 on.
+/// Measures of the wall, cell by cell. Lists hold a row for each stretch of the axis, from θ = 0
+/// on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WallMaps {
     /// Cells around the section.
@@ -169,7 +175,8 @@ pub struct WallMaps {
     pub along: usize,
     /// Chainage of the first cell's beginning and of the last one's end.
     pub chainage_m: [f64; 2],
-    /// Root mean square difference of two frames with the initial poses, grey levels; null where no two overlap.
+    /// Root mean square difference of two frames with the initial poses, grey levels; null where no
+    /// two overlap.
     pub baseline_grey: Vec<Option<f64>>,
     /// With the refined poses.
     pub refined_grey: Vec<Option<f64>>,

@@ -30,7 +30,8 @@ const HOLE: Rgb<u8> = Rgb([158, 170, 194]);
 /// Quality of panoramas and of thumbnails.
 const QUALITY: [u8; 2] = [82, 75];
 
-/// The panoramas as strips; what is longer than it is wide lies with the chainage to the right, in pieces.
+/// The panoramas as strips; what is longer than it is wide lies with the chainage to the right, in
+/// pieces.
 ///
 /// # Errors
 /// [`ReportError::Encode`].
@@ -39,9 +40,10 @@ pub fn panoramas(
     drawings: &Drawings,
     pictures: &mut Pictures,
 ) -> Result<PanoramaStrips, ReportError> {
-    let layout = match canvas.rows > canvas.columns {
-        true => Layout::ChainageRight,
-        false => Layout::ThetaRight,
+    let layout = if canvas.rows > canvas.columns {
+        Layout::ChainageRight
+    } else {
+        Layout::ThetaRight
     };
     let pixels = canvas.pixels() as f64;
     let mut scale = (PANORAMA_PIXELS / pixels).sqrt().min(1.0);
@@ -79,12 +81,11 @@ fn opaque(image: &DynamicImage) -> RgbImage {
 
 fn shrunk(image: &RgbImage, scale: f64) -> RgbImage {
     let side = |length: u32| ((f64::from(length) * scale).round() as u32).max(1);
-    match scale < 1.0 {
-        true => {
-            let (width, height) = (side(image.width()), side(image.height()));
-            imageops::resize(image, width, height, FilterType::Triangle)
-        }
-        false => image.clone(),
+    if scale < 1.0 {
+        let (width, height) = (side(image.width()), side(image.height()));
+        imageops::resize(image, width, height, FilterType::Triangle)
+    } else {
+        image.clone()
     }
 }
 

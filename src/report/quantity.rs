@@ -1,6 +1,7 @@
 //! Numbers as people read them.
 
-/// A number with about `digits` significant digits, without an exponent, with a true minus sign; a dash for none.
+/// A number with about `digits` significant digits, without an exponent, with a true minus sign; a
+/// dash for none.
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return "–".to_owned();

@@ -83,19 +83,22 @@ pub struct RefinedFiles {
     pub poses: Vec<Pose>,
     /// `refine.json`, if it is there.
     pub refinement: Option<Refinement>,
-    /// The poses' covariances ([`crate::refine::Covariances::frames`]), if `covariance.csv` is there.
+    /// The poses' covariances ([`crate::refine::Covariances::frames`]), if `covariance.csv` is
+    /// there.
     pub covariances: Option<Vec<Matrix6<f64>>>,
 }
 
 impl RefinedFiles {
-    /// Reads the folder that `refine` has written, or a TUM file and what `refine` has written beside it.
+    /// Reads the folder that `refine` has written, or a TUM file and what `refine` has written
+    /// beside it.
     ///
     /// # Errors
     /// [`ReportError`]: no poses, or files of another survey or version.
     pub fn read(survey: &Survey, path: &Path) -> Result<Self, ReportError> {
-        let poses_path = match path.is_dir() {
-            true => path.join("poses.tum"),
-            false => path.to_owned(),
+        let poses_path = if path.is_dir() {
+            path.join("poses.tum")
+        } else {
+            path.to_owned()
         };
         if path.is_dir() && !poses_path.is_file() {
             return Err(ReportError::NoPoses {

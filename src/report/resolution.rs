@@ -12,7 +12,8 @@ const MOST_BYTES: u64 = 2 << 30;
 /// By how much the resolution is lowered at a time.
 const COARSER: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
-/// Pixels per metre at which all frames and the panoramas of a survey fit into the memory; `None` for the frames' own.
+/// Pixels per metre at which all frames and the panoramas of a survey fit into the memory; `None`
+/// for the frames' own.
 ///
 /// # Errors
 /// [`ReportError::Render`]: poses that lie nowhere on the wall, frames that cannot be read.

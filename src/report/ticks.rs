@@ -2,7 +2,8 @@
 
 use super::quantity::fixed;
 
-/// About `wanted` (three or more) round values in `[low, high]` with how they are written: multiples of 1, 2 or 5 times a power of ten.
+/// About `wanted` (three or more) round values in `[low, high]` with how they are written:
+/// multiples of 1, 2 or 5 times a power of ten.
 pub fn linear(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {
@@ -28,8 +29,8 @@ pub fn linear(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
         .collect()
 }
 
-/// Powers of ten in `[low, high]` (both positive), about `wanted` of them; within less than two decades 1, 2 and 5 times
-/// them, too, and within less than one whatever is round.
+/// Powers of ten in `[low, high]` (both positive), about `wanted` of them; within less than two
+/// decades 1, 2 and 5 times them, too, and within less than one whatever is round.
 pub fn logarithmic(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Vec::new();
@@ -37,9 +38,10 @@ pub fn logarithmic(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let decades = (last - first).max(1) as usize;
     let stride = decades.div_ceil(wanted.max(1)).max(1);
-    let factors: &[f64] = match (high / low).log10() < 2.0 {
-        true => &[1.0, 2.0, 5.0],
-        false => &[1.0],
+    let factors: &[f64] = if (high / low).log10() < 2.0 {
+        &[1.0, 2.0, 5.0]
+    } else {
+        &[1.0]
     };
     let ticks: Vec<(f64, String)> = (first..=last)
         .step_by(stride)
@@ -47,36 +49,37 @@ pub fn logarithmic(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
         .filter(|value| (0.999 * low..=1.001 * high).contains(value))
         .map(|value| (value, power_text(value)))
         .collect();
-    match ticks.len() < 3 && high < 10.0 * low {
-        true => linear(low, high, wanted.min(4)),
-        false => ticks,
+    if ticks.len() < 3 && high < 10.0 * low {
+        linear(low, high, wanted.min(4))
+    } else {
+        ticks
     }
 }
 
 /// Ordinary digits where they are short, else `10` with an exponent.
 fn power_text(value: f64) -> String {
-    match (1e-4..1e5).contains(&value) {
-        true => super::quantity::significant(value, 1),
-        false => {
-            let exponent = value.log10().floor();
-            let factor = (value / 10f64.powf(exponent)).round();
-            let superscript: String = format!("{exponent}")
-                .chars()
-                .map(|c| match c {
-                    '-' => '⁻',
-                    '1' => '¹',
-                    '2' => '²',
-                    '3' => '³',
-                    '0' | '4'..='9' => {
-                        char::from_u32(0x2070 + c.to_digit(10).unwrap_or_default()).unwrap_or(c)
-                    }
-                    other => other,
-                })
-                .collect();
-            match factor == 1.0 {
-                true => format!("10{superscript}"),
-                false => format!("{factor}·10{superscript}"),
-            }
+    if (1e-4..1e5).contains(&value) {
+        super::quantity::significant(value, 1)
+    } else {
+        let exponent = value.log10().floor();
+        let factor = (value / 10f64.powf(exponent)).round();
+        let superscript: String = format!("{exponent}")
+            .chars()
+            .map(|c| match c {
+                '-' => '⁻',
+                '1' => '¹',
+                '2' => '²',
+                '3' => '³',
+                '0' | '4'..='9' => {
+                    char::from_u32(0x2070 + c.to_digit(10).unwrap_or_default()).unwrap_or(c)
+                }
+                other => other,
+            })
+            .collect();
+        if factor == 1.0 {
+            format!("10{superscript}")
+        } else {
+            format!("{factor}·10{superscript}")
         }
     }
 }

@@ -62,8 +62,9 @@ impl BadFrames {
         missing.map(|run| run.last - run.first + 1).sum()
     }
 
-    /// The frame whose picture a frame shows: its own, or of a repeated frame the last one before it that is neither
-    /// repeated nor missing. `None` if the frame is missing or has nothing to repeat.
+    /// The frame whose picture a frame shows: its own, or of a repeated frame the last one before
+    /// it that is neither repeated nor missing. `None` if the frame is missing or has nothing to
+    /// repeat.
     pub fn shown(&self, frame: usize) -> Option<usize> {
         if self.fault(frame) == Some(Fault::Missing) {
             return None;
@@ -80,8 +81,8 @@ impl BadFrames {
     /// Checks the list against the survey's number of frames.
     ///
     /// # Errors
-    /// [`BadFramesError`] for the first item that names a frame beyond the last one or repeats what is not there,
-    /// and when no frame is left.
+    /// [`BadFramesError`] for the first item that names a frame beyond the last one or repeats what
+    /// is not there, and when no frame is left.
     pub(super) fn check(&self, frames: usize) -> Result<(), BadFramesError> {
         for run in &self.0 {
             let wrong = if run.last >= frames {

@@ -12,8 +12,8 @@ pub(super) const RUN: usize = 64;
 
 /// Rows of texels between two chainages, once around: lit grey levels.
 ///
-/// Texel `(k, n)` is centred at `s = (k + ½) texel`, `h = (n + ½) texel` for n from `first_row`, so texels of
-/// the same wall are the same in whatever band they lie.
+/// Texel `(k, n)` is centred at `s = (k + ½) texel`, `h = (n + ½) texel` for n from `first_row`, so
+/// texels of the same wall are the same in whatever band they lie.
 pub(super) struct Band {
     texel_m: f64,
     columns: usize,
@@ -86,9 +86,9 @@ impl Band {
             });
     }
 
-    /// Adds the brightness that the camera's lamp adds where rays meet the wall at angles θ (in `[0, 2π)`) and chainages h (metres,
-    /// within the band), [`RUN`] at the most, to grey levels; `d`: the rays' directions. Of the nearest texel: texels are finer
-    /// than pixels.
+    /// Adds the brightness that the camera's lamp adds where rays meet the wall at angles θ (in
+    /// `[0, 2π)`) and chainages h (metres, within the band), [`RUN`] at the most, to grey levels;
+    /// `d`: the rays' directions. Of the nearest texel: texels are finer than pixels.
     #[inline(always)]
     pub fn add_glints(
         &self,
@@ -121,8 +121,8 @@ impl Band {
         ((h_m[1] / texel_m).floor() - (h_m[0] / texel_m).floor()) as usize + 3
     }
 
-    /// The grey levels at angles θ (in `[0, 2π)`) and chainages h (metres, within the band), [`RUN`] at the most, bilinear;
-    /// 0 where they are NaN.
+    /// The grey levels at angles θ (in `[0, 2π)`) and chainages h (metres, within the band),
+    /// [`RUN`] at the most, bilinear; 0 where they are NaN.
     #[inline(always)]
     pub fn look(&self, theta: &[f64], h_m: &[f64], values: &mut [f32]) {
         let columns = self.columns as f64;

@@ -86,8 +86,8 @@ impl Texture for BrickWall {
     }
 }
 
-/// Share of the interval of `width` around `x` that is brick, in a cell of length `pitch` with half a joint at
-/// either end. Exact while `width` is no more than the joint.
+/// Share of the interval of `width` around `x` that is brick, in a cell of length `pitch` with half
+/// a joint at either end. Exact while `width` is no more than the joint.
 fn share_of_brick(x: f64, pitch: f64, width: f64) -> f32 {
     let from = (x - 0.5 * width).max(0.5 * JOINT_M);
     let to = (x + 0.5 * width).min(pitch - 0.5 * JOINT_M);

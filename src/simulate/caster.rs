@@ -15,9 +15,9 @@ const CELLS: usize = 2;
 
 /// Renders a frame: each pixel is the mean of `n × n` points spread evenly over its square.
 ///
-/// Rays are cast through the corners of half pixels; what lies between meets the wall between them, to within
-/// some 10⁻⁴ of a pixel (an eighth of the square of half a pixel times the map's curvature; more towards the axis's
-/// vanishing points).
+/// Rays are cast through the corners of half pixels; what lies between meets the wall between them,
+/// to within some 10⁻⁴ of a pixel (an eighth of the square of half a pixel times the map's
+/// curvature; more towards the axis's vanishing points).
 ///
 /// `pose`: where the camera is when a row is read.
 pub(super) fn cast(
@@ -64,7 +64,8 @@ pub(super) fn cast(
     GreyImage::new(width, height, data)
 }
 
-/// Adds what is seen at one point of each of some pixels of a row, from column `first` on; `between`: theirs.
+/// Adds what is seen at one point of each of some pixels of a row, from column `first` on;
+/// `between`: theirs.
 #[inline(always)]
 fn add_points(
     band: &Band,
@@ -130,8 +131,9 @@ impl Point {
     }
 }
 
-/// Where rays through the corners of cells meet the wall: for each of a pixel's [`CELLS`] first corners along a row a list, in which entry u is
-/// that of pixel u. The first list is longer by one: the last corner of a pixel is the first one of the next.
+/// Where rays through the corners of cells meet the wall: for each of a pixel's [`CELLS`] first
+/// corners along a row a list, in which entry u is that of pixel u. The first list is longer by
+/// one: the last corner of a pixel is the first one of the next.
 #[derive(Default)]
 struct Places {
     /// Places, radians; NaN where the lens shows nothing, and so is all that lies next to it.
@@ -258,7 +260,8 @@ mod tests {
         }
     }
 
-    /// What lies between rays is where rays of its own would meet the wall, across θ = 0 and through a lens, too.
+    /// What lies between rays is where rays of its own would meet the wall, across θ = 0 and
+    /// through a lens, too.
     #[test]
     fn points_between_rays_lie_where_their_own_rays_would() {
         let pose = Pose::new(
@@ -292,7 +295,8 @@ mod tests {
         }
     }
 
-    /// Known wall points, projected forward by the camera's equation, show the wall's grey value there.
+    /// Known wall points, projected forward by the camera's equation, show the wall's grey value
+    /// there.
     #[test]
     fn pixels_show_the_wall_that_projects_onto_them() {
         let (radius_m, columns) = (2.0, 4000);

@@ -23,8 +23,9 @@ const LOBE: f64 = 0.075;
 
 /// Patches of water all over the wall.
 ///
-/// Ellipses are strewn evenly over the wall, λ a square metre, independent of one another; each diameter is uniform
-/// in [`DIAMETER_M`]. A place is dry when no centre lies close enough, so they cover
+/// Ellipses are strewn evenly over the wall, λ a square metre, independent of one another; each
+/// diameter is uniform in [`DIAMETER_M`]. A place is dry when no centre lies close enough, so they
+/// cover
 ///
 /// ```text
 /// P = 1 − exp(−λ E[A]),   E[A] = π/4 E[diameter]²
@@ -83,7 +84,8 @@ impl Damp {
     /// The patches of a cell: their number is a Poisson variable.
     fn patches(&self, i: i64, j: i64) -> impl Iterator<Item = Patch> + '_ {
         let draw = move |purpose| f64::from(uniform(derived_seed(self.seed, purpose), i, j));
-        // By inversion: the count is the first n whose cumulative probability exceeds the number drawn.
+        // By inversion: the count is the first n whose cumulative probability exceeds the number
+        // drawn.
         let (mut count, mut share) = (0, (-self.per_cell).exp());
         let mut left = draw(0) - share;
         while left >= 0.0 && count < 64 {
@@ -161,10 +163,12 @@ impl Water {
         1.0 - DARKER * f32::from(self.wet) / 255.0
     }
 
-    /// Brightness of the glint that a ray of direction d sees at angle θ (radians) of the wall, grey levels.
+    /// Brightness of the glint that a ray of direction d sees at angle θ (radians) of the wall,
+    /// grey levels.
     ///
-    /// The lamp sits at the lens, so it glints where the water faces the camera. With e_s and e_h along the wall and
-    /// n its normal into the tunnel, the water's normal is `n' ∝ n + α e_s + β e_h`, α and β its slopes, and
+    /// The lamp sits at the lens, so it glints where the water faces the camera. With e_s and e_h
+    /// along the wall and n its normal into the tunnel, the water's normal is
+    /// `n' ∝ n + α e_s + β e_h`, α and β its slopes, and
     ///
     /// ```text
     /// glint = wet · GLINT · max(0, −n'·d/|d|)^m,   cos^m(LOBE) = ½.
@@ -225,8 +229,8 @@ mod tests {
         assert!(dry[0].iter().all(|water| water.wet == 0));
     }
 
-    /// Few enough that they do not touch: runs along s are no longer than the largest diameter with its rim, and
-    /// the wall is closed across the wrap.
+    /// Few enough that they do not touch: runs along s are no longer than the largest diameter with
+    /// its rim, and the wall is closed across the wrap.
     #[test]
     fn patches_have_their_size() {
         let damp = Damp::new(1, 0.5, PERIMETER_M);
@@ -265,7 +269,8 @@ mod tests {
             assert!((glint(flat, side * LOBE) / GLINT - 0.5).abs() < 0.01);
             assert!(glint(flat, side * 0.3) < 0.01);
         }
-        // Water that leans by β glints for a camera that much aside: the ray comes from below, its normal points there.
+        // Water that leans by β glints for a camera that much aside: the ray comes from below, its
+        // normal points there.
         let leaning = Water {
             slope: [0, 127],
             ..flat

@@ -5,8 +5,8 @@ use super::noise::Purpose;
 use crate::frames::GreyImage;
 use rand::Rng;
 
-/// How a frame turns light into grey levels: `I = a L + b`, with L the grey level that an exposure of gain 1 and
-/// bias 0 would give.
+/// How a frame turns light into grey levels: `I = a L + b`, with L the grey level that an exposure
+/// of gain 1 and bias 0 would give.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposure {
     /// Gain a.
@@ -16,8 +16,9 @@ pub struct Exposure {
 }
 
 impl Exposure {
-    /// The exposure of a frame: with independent x and y, uniform in [−1, 1), `a = 1 + x P/100` and `b = y B`, where
-    /// P is [`SimulateOptions::gain_percent`] and B is [`SimulateOptions::bias_grey`].
+    /// The exposure of a frame: with independent x and y, uniform in [−1, 1), `a = 1 + x P/100` and
+    /// `b = y B`, where P is [`SimulateOptions::gain_percent`] and B is
+    /// [`SimulateOptions::bias_grey`].
     pub(super) fn of(options: &SimulateOptions, frame: usize) -> Self {
         let mut rng = Purpose::Exposure.rng(options.seed, frame);
         // Both are drawn always, so that asking for one does not change the other.

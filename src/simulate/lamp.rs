@@ -2,20 +2,21 @@
 
 use crate::frames::GreyImage;
 
-/// Where the light is brightest, as shares of the way from the first to the last pixel centre of a row and of a
-/// column: off the middle, so that no symmetry hides an error.
+/// Where the light is brightest, as shares of the way from the first to the last pixel centre of a
+/// row and of a column: off the middle, so that no symmetry hides an error.
 const BRIGHTEST: [f64; 2] = [0.6, 0.4];
 
 /// A lamp that moves with the camera, or a lens that darkens towards its corners.
 ///
-/// With d the distance of pixel (u, v) from the brightest spot and D that of the corner farthest from it, pixels,
+/// With d the distance of pixel (u, v) from the brightest spot and D that of the corner farthest
+/// from it, pixels,
 ///
 /// ```text
 /// shade(u, v) = 1/(1 + (1/√c − 1) d²/D²)²,
 /// ```
 ///
-/// 1 at the brightest spot and c in that corner. It is the cos⁴ law of a lens, `cos⁴ φ = 1/(1 + tan² φ)²`, with
-/// tan φ in proportion to d.
+/// 1 at the brightest spot and c in that corner. It is the cos⁴ law of a lens,
+/// `cos⁴ φ = 1/(1 + tan² φ)²`, with tan φ in proportion to d.
 pub(super) struct Lamp {
     /// The brightest spot (u, v), pixels.
     spot: [f64; 2],
@@ -24,8 +25,8 @@ pub(super) struct Lamp {
 }
 
 impl Lamp {
-    /// The lamp of frames of `width × height` pixels that shines with `corner` (0–1) of its light in the farthest
-    /// corner.
+    /// The lamp of frames of `width × height` pixels that shines with `corner` (0–1) of its light
+    /// in the farthest corner.
     pub fn new(corner: f64, width: usize, height: usize) -> Self {
         let last = [width, height].map(|size| size as f64 - 1.0);
         let spot = [BRIGHTEST[0] * last[0], BRIGHTEST[1] * last[1]];

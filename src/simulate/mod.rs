@@ -11,12 +11,13 @@
 //!                                                                   └─ bad frames ─ sensor ──> frames
 //! ```
 //!
-//! Each pixel is the mean of points spread over its square, between rays cast with a ray–wall intersection of the
-//! simulator's own: it shares no warp code with the renderer or the estimator, so that it can judge them.
+//! Each pixel is the mean of points spread over its square, between rays cast with a ray–wall
+//! intersection of the simulator's own: it shares no warp code with the renderer or the estimator,
+//! so that it can judge them.
 //!
-//! [`SimulateOptions::centred`], [`SimulateOptions::off_centre`] and [`SimulateOptions::free`] are the three
-//! experiments of the paper (arXiv 1806.10278); [`run()`] writes a whole survey folder, [`Scene`] renders single
-//! frames in memory.
+//! [`SimulateOptions::centred`], [`SimulateOptions::off_centre`] and [`SimulateOptions::free`] are
+//! the three experiments of the paper (arXiv 1806.10278); [`run()`] writes a whole survey folder,
+//! [`Scene`] renders single frames in memory.
 
 mod bad_frames;
 mod band;

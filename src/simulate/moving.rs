@@ -39,12 +39,11 @@ impl Thing {
     /// A thing somewhere in a frame of `width × height` pixels.
     fn draw(rng: &mut ChaCha8Rng, width: usize, height: usize) -> Self {
         let half = 0.5 * rng.random_range(SIZE[0]..SIZE[1]) * height as f64;
-        let shape = match rng.random::<bool>() {
-            true => Shape::Ellipse([half, half * rng.random_range(0.4..1.0)]),
-            false => {
-                let half_width = (LINE_WIDTH * half).max(0.5);
-                Shape::Line([(half - half_width).max(0.0), half_width])
-            }
+        let shape = if rng.random::<bool>() {
+            Shape::Ellipse([half, half * rng.random_range(0.4..1.0)])
+        } else {
+            let half_width = (LINE_WIDTH * half).max(0.5);
+            Shape::Line([(half - half_width).max(0.0), half_width])
         };
         Self {
             centre: [width, height].map(|size| rng.random_range(-0.5..size as f64 - 0.5)),
@@ -142,9 +141,10 @@ mod tests {
             // A tenth of the height, and the edge.
             assert!(right - left <= 22 && bottom - top <= 22, "frame {k}");
             centres.push((left + right, top + bottom));
-            match picture.data()[hidden[hidden.len() / 2]] < 128.0 {
-                true => dark += 1,
-                false => bright += 1,
+            if picture.data()[hidden[hidden.len() / 2]] < 128.0 {
+                dark += 1
+            } else {
+                bright += 1
             }
         }
         assert!(dark > 10 && bright > 10, "{dark} {bright}");

@@ -5,8 +5,8 @@ use rand_chacha::ChaCha8Rng;
 
 /// 64 well-mixed bits of three integers.
 ///
-/// Source: the finaliser of SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators",
-/// 2014).
+/// Source: the finaliser of SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number
+/// generators", 2014).
 fn hash(seed: u64, i: i64, j: i64) -> u64 {
     let mut z = seed
         .wrapping_add((i as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15))
@@ -26,7 +26,8 @@ pub(super) fn derived_seed(seed: u64, purpose: i64) -> u64 {
     hash(seed, purpose, -1)
 }
 
-/// What a simulation's random numbers are for (those of jitter and sensor noise are the seed's own streams).
+/// What a simulation's random numbers are for (those of jitter and sensor noise are the seed's own
+/// streams).
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Purpose {
     /// The wall.
@@ -55,7 +56,8 @@ impl Purpose {
     }
 }
 
-/// Smooth noise: uniform numbers on a lattice of the wall, interpolated by `3t² − 2t³` along s and h.
+/// Smooth noise: uniform numbers on a lattice of the wall, interpolated by `3t² − 2t³` along s and
+/// h.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ValueNoise {
     /// Which noise.
@@ -71,8 +73,8 @@ pub(super) struct ValueNoise {
 }
 
 impl ValueNoise {
-    /// Noise with cells of about `cell_m` that is unique along h and repeats after `repeat_m` along s, which must
-    /// divide the perimeter.
+    /// Noise with cells of about `cell_m` that is unique along h and repeats after `repeat_m` along
+    /// s, which must divide the perimeter.
     pub fn unique(seed: u64, amplitude: f32, cell_m: f64, repeat_m: f64) -> Self {
         let period_s = (repeat_m / cell_m).round().max(1.0);
         Self {

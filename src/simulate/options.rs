@@ -16,9 +16,11 @@ pub enum Wall {
     Brick,
     /// Cast concrete: smooth stains, low contrast.
     Concrete,
-    /// A tile of 8 × 6 bricks that repeats all over the tunnel: pictures of different places look alike.
+    /// A tile of 8 × 6 bricks that repeats all over the tunnel: pictures of different places look
+    /// alike.
     TiledBrick,
-    /// Dark and bright squares on mid grey, turned by 5° ([`super::SlantedEdge`]): a test target for sharpness.
+    /// Dark and bright squares on mid grey, turned by 5° ([`super::SlantedEdge`]): a test target
+    /// for sharpness.
     Target,
     /// A picture that repeats all over the tunnel.
     Texture {
@@ -56,8 +58,9 @@ pub struct SimulateOptions {
     /// Time from frame to frame, seconds.
     #[serde(skip_serializing_if = "is_a_second")]
     pub interval_s: f64,
-    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds; negative if rows are read
-    /// bottom-up, 0 if all are read at once. Poses are those of the middle row; between them the camera moves smoothly.
+    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds;
+    /// negative if rows are read bottom-up, 0 if all are read at once. Poses are those of the
+    /// middle row; between them the camera moves smoothly.
     #[serde(skip_serializing_if = "is_default")]
     pub readout_ms: f64,
     /// Where the camera really stands, relative to the plan, metres; the initial poses do not know.
@@ -70,14 +73,16 @@ pub struct SimulateOptions {
     pub light: Light,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise_grey: f64,
-    /// Most that a frame's gain differs from 1, percent: uniform in `1 ± P/100`, each frame on its own.
+    /// Most that a frame's gain differs from 1, percent: uniform in `1 ± P/100`, each frame on its
+    /// own.
     #[serde(skip_serializing_if = "is_default")]
     pub gain_percent: f64,
     /// Most that a frame's bias differs from 0, grey levels: uniform in ±B, each frame on its own.
     #[serde(skip_serializing_if = "is_default")]
     pub bias_grey: f64,
-    /// Shading that moves with the camera, if any: the light in the frame's darkest corner, as a share (0–1) of that
-    /// at the brightest spot, which lies a tenth of the frame right of and above its middle.
+    /// Shading that moves with the camera, if any: the light in the frame's darkest corner, as a
+    /// share (0–1) of that at the brightest spot, which lies a tenth of the frame right of and
+    /// above its middle.
     #[serde(skip_serializing_if = "is_default")]
     pub lamp_corner: Option<f64>,
     /// How much of the wall is covered by damp patches in which the camera's lamp glints, percent.
@@ -86,8 +91,8 @@ pub struct SimulateOptions {
     /// Things in each frame that are not on the wall, at other places in every frame.
     #[serde(skip_serializing_if = "is_default")]
     pub moving: u32,
-    /// Width of the carrier's shaft, which hides the wall at the same place of every frame, percent of the frames' width; 0: none.
-    /// The survey has a mask then.
+    /// Width of the carrier's shaft, which hides the wall at the same place of every frame, percent
+    /// of the frames' width; 0: none. The survey has a mask then.
     #[serde(skip_serializing_if = "is_default")]
     pub shaft_percent: f64,
     /// Bits of a frame's grey values.
@@ -96,8 +101,9 @@ pub struct SimulateOptions {
     /// Frames that are no good.
     #[serde(skip_serializing_if = "is_default")]
     pub bad_frames: BadFrames,
-    /// Points along each side of a pixel; a pixel is the mean of its square. The wall is painted with some three to six
-    /// texels over the width of a pixel (more where pixels are large), and fewer points than that alias.
+    /// Points along each side of a pixel; a pixel is the mean of its square. The wall is painted
+    /// with some three to six texels over the width of a pixel (more where pixels are large), and
+    /// fewer points than that alias.
     pub supersample: u32,
     /// Seed of everything that is random.
     pub seed: u64,
@@ -150,7 +156,8 @@ impl SimulateOptions {
         }
     }
 
-    /// The third: ten turns of twelve frames, 0.10 m and 30° a frame, each step 2° and (2, 2, 3) cm off.
+    /// The third: ten turns of twelve frames, 0.10 m and 30° a frame, each step 2° and (2, 2, 3) cm
+    /// off.
     pub fn free() -> Self {
         Self {
             frames: 120,
@@ -160,8 +167,8 @@ impl SimulateOptions {
         }
     }
 
-    /// The noise model that goes into the survey: the jitter, or for a plan without any, wide enough for the
-    /// camera's offset from it.
+    /// The noise model that goes into the survey: the jitter, or for a plan without any, wide
+    /// enough for the camera's offset from it.
     pub(super) fn prior(&self) -> PriorSection {
         // A prior of zero width is none.
         const LEAST: (f64, f64) = (0.01, 1e-4);
@@ -188,11 +195,14 @@ impl SimulateOptions {
     pub(super) fn check(&self) -> Result<(), SimulateError> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let not_negative = |v: f64| v.is_finite() && v >= 0.0;
-        let check = |good: bool, what: &str| match good {
-            true => Ok(()),
-            false => Err(SimulateError::Option {
-                what: what.to_owned(),
-            }),
+        let check = |good: bool, what: &str| {
+            if good {
+                Ok(())
+            } else {
+                Err(SimulateError::Option {
+                    what: what.to_owned(),
+                })
+            }
         };
         check(
             (1..=1_000_000).contains(&self.frames),

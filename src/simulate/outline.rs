@@ -1,6 +1,8 @@
-//! Sections of the simulated tunnel, by equations of their own: nothing is shared with [`crate::surface`], which they judge.
+//! Sections of the simulated tunnel, by equations of their own: nothing is shared with
+//! [`crate::surface`], which they judge.
 //!
-//! Each outline is the set `G = 1` of a convex function that grows in proportion to the distance from the axis.
+//! Each outline is the set `G = 1` of a convex function that grows in proportion to the distance
+//! from the axis.
 
 use crate::survey::Shape;
 use std::f64::consts::{FRAC_PI_2, TAU};

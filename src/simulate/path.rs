@@ -4,15 +4,18 @@ use crate::trajectory::Pose;
 
 /// The camera's smooth way through the true poses of the frames, one every `interval_s` seconds.
 ///
-/// A Catmull–Rom spline by the pyramid of linear interpolations (on the sphere of rotations, along great circles) of Barry and
-/// Goldman: between the poses P_k and P_{k+1}, at the share s of the interval,
+/// A Catmull–Rom spline by the pyramid of linear interpolations (on the sphere of rotations, along
+/// great circles) of Barry and Goldman: between the poses P_k and P_{k+1}, at the share s of the
+/// interval,
 ///
-/// `A_i = P_{k+i−2} → P_{k+i−1} at s + 2 − i` for i = 1, 2, 3, `B_1 = A_1 → A_2 at (s + 1)/2`, `B_2 = A_2 → A_3 at s/2`,
-/// `B_1 → B_2 at s`.
+/// `A_i = P_{k+i−2} → P_{k+i−1} at s + 2 − i` for i = 1, 2, 3, `B_1 = A_1 → A_2 at (s + 1)/2`,
+/// `B_2 = A_2 → A_3 at s/2`, `B_1 → B_2 at s`.
 ///
-/// A steady turn stays one. Beyond the first and the last pose the motion goes on as between the last two.
+/// A steady turn stays one. Beyond the first and the last pose the motion goes on as between the
+/// last two.
 ///
-/// Source: P. J. Barry, R. N. Goldman, "A recursive evaluation algorithm for a class of Catmull–Rom splines", SIGGRAPH 1988.
+/// Source: P. J. Barry, R. N. Goldman, "A recursive evaluation algorithm for a class of Catmull–Rom
+/// splines", SIGGRAPH 1988.
 pub(super) struct Path {
     poses: Vec<Pose>,
     /// Time from the first row to the last over that from frame to frame.
@@ -22,7 +25,8 @@ pub(super) struct Path {
 }
 
 impl Path {
-    /// Through `poses`; rows (from the first to the last, `rows` of them) take `readout_share` of the time between frames.
+    /// Through `poses`; rows (from the first to the last, `rows` of them) take `readout_share` of
+    /// the time between frames.
     pub fn new(poses: Vec<Pose>, readout_share: f64, rows: u32) -> Self {
         Self {
             poses,
@@ -43,9 +47,10 @@ impl Path {
         }
         let last = f64::from(self.rows - 1);
         let s = self.readout_share * (v / last - 0.5);
-        match s < 0.0 {
-            true => self.between(frame as i64 - 1, s + 1.0),
-            false => self.between(frame as i64, s),
+        if s < 0.0 {
+            self.between(frame as i64 - 1, s + 1.0)
+        } else {
+            self.between(frame as i64, s)
         }
     }
 
@@ -70,9 +75,10 @@ impl Path {
         let end = k.clamp(0, last);
         let inward = if k < 0 { end + 1 } else { end - 1 };
         let (at_end, inner) = (self.poses[end as usize], inward.clamp(0, last) as usize);
-        match k == end {
-            true => at_end,
-            false => towards(&self.poses[inner], &at_end, 1.0 + (k - end).abs() as f64),
+        if k == end {
+            at_end
+        } else {
+            towards(&self.poses[inner], &at_end, 1.0 + (k - end).abs() as f64)
         }
     }
 }

@@ -5,8 +5,8 @@ use super::wall::Texture;
 use crate::frames::GreyImage;
 use std::path::Path;
 
-/// A picture that repeats along s and h, upright and unmirrored as seen from inside: its x runs along s, its y
-/// along h.
+/// A picture that repeats along s and h, upright and unmirrored as seen from inside: its x runs
+/// along s, its y along h.
 pub(super) struct PictureWall {
     picture: GreyImage,
     /// Metres of wall a pixel of the picture.

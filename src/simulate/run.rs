@@ -23,11 +23,12 @@ pub struct Simulated {
     pub options: SimulateOptions,
 }
 
-/// Writes a survey folder: `survey.toml`, `camera.json`, `frames/000000.png` …, `baseline.tum` (the plan),
-/// `groundtruth.tum` and `simulation.json`; with a shaft before the wall `mask.png`, too.
+/// Writes a survey folder: `survey.toml`, `camera.json`, `frames/000000.png` …, `baseline.tum` (the
+/// plan), `groundtruth.tum` and `simulation.json`; with a shaft before the wall `mask.png`, too.
 ///
-/// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier simulated
-/// survey of that name is replaced. The same options give the same bytes, whatever the number of threads.
+/// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier
+/// simulated survey of that name is replaced. The same options give the same bytes, whatever the
+/// number of threads.
 ///
 /// # Errors
 /// [`SimulateError`].
@@ -189,7 +190,8 @@ fn write_mask(scene: &Scene, path: &Path) -> Result<(), WriteError> {
     write_picture(path, &mask.into(), PictureFormat::Png)
 }
 
-/// Renders and writes all frames that are there, each named by its number in the plan, batch by batch, the frames of a batch in parallel.
+/// Renders and writes all frames that are there, each named by its number in the plan, batch by
+/// batch, the frames of a batch in parallel.
 fn write_frames(scene: &Scene, folder: &Path, progress: &dyn Progress) -> Result<(), WriteError> {
     atomic::create_folder(folder)?;
     progress.start("simulating", scene.frames().count());

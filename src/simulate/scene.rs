@@ -54,8 +54,8 @@ impl Scene {
     /// Lays out the survey: plan, true poses, wall.
     ///
     /// # Errors
-    /// [`SimulateError`] for impossible options, an unusable texture, and true poses outside the tunnel or with a
-    /// view along it.
+    /// [`SimulateError`] for impossible options, an unusable texture, and true poses outside the
+    /// tunnel or with a view along it.
     pub fn new(options: &SimulateOptions) -> Result<Self, SimulateError> {
         options.check()?;
         let camera = options.camera;
@@ -140,9 +140,9 @@ impl Scene {
         (0..self.options.frames).filter(|frame| self.options.bad_frames.shown(*frame).is_some())
     }
 
-    /// A frame without noise, as if it were a good one, in grey levels that are neither rounded nor saturated: the wall
-    /// with all that the light does to it (damp patches and their glints, moving things, the camera's lamp, gain and
-    /// bias).
+    /// A frame without noise, as if it were a good one, in grey levels that are neither rounded nor
+    /// saturated: the wall with all that the light does to it (damp patches and their glints,
+    /// moving things, the camera's lamp, gain and bias).
     ///
     /// # Panics
     /// If there is no such frame.
@@ -150,8 +150,8 @@ impl Scene {
         self.exact(&self.band(self.reaches[frame]), frame)
     }
 
-    /// All frames that are there as [`Self::render_exact`] has them, but with `times` as many pixels along each axis, cast from the
-    /// same raster.
+    /// All frames that are there as [`Self::render_exact`] has them, but with `times` as many
+    /// pixels along each axis, cast from the same raster.
     pub fn render_finer(&self, times: u32) -> Vec<GreyImage> {
         let frames_of = |batch: Batch| {
             let band = self.band(batch.h_m);
@@ -170,9 +170,10 @@ impl Scene {
         Some(self.delivered(&self.band(self.reaches[shown]), shown))
     }
 
-    /// The wall as it is, in the light that falls on it but without glints: `rows` rows of `columns` square pixels once
-    /// around from θ = 0, the first beginning at chainage `h_start_m` (metres). Each pixel is the mean of points spread
-    /// over its square, as many as over a frame's pixel, of the raster that frames are cast from.
+    /// The wall as it is, in the light that falls on it but without glints: `rows` rows of
+    /// `columns` square pixels once around from θ = 0, the first beginning at chainage `h_start_m`
+    /// (metres). Each pixel is the mean of points spread over its square, as many as over a frame's
+    /// pixel, of the raster that frames are cast from.
     pub fn wall(&self, columns: usize, rows: usize, h_start_m: f64) -> GreyImage {
         let n = self.options.supersample as usize;
         let pixel_m = self.tunnel.perimeter_m() / columns as f64;
@@ -202,8 +203,8 @@ impl Scene {
         GreyImage::new(columns, rows, data)
     }
 
-    /// Runs of the frames that are there, each with the chainages that their pictures show, so short that a band of
-    /// the wall for each fits into bounded memory.
+    /// Runs of the frames that are there, each with the chainages that their pictures show, so
+    /// short that a band of the wall for each fits into bounded memory.
     pub(super) fn batches(&self) -> Vec<Batch> {
         let mut batches: Vec<Batch> = Vec::new();
         for frame in 0..self.options.frames {
@@ -273,8 +274,8 @@ impl Scene {
         (percent > 0.0).then(|| Shaft::new(percent, width, height))
     }
 
-    /// The picture that a frame takes as the sensor delivers it, of a band that holds all it sees; its noise is a stream
-    /// of its own.
+    /// The picture that a frame takes as the sensor delivers it, of a band that holds all it sees;
+    /// its noise is a stream of its own.
     pub(super) fn delivered(&self, band: &Band, frame: usize) -> DynamicImage {
         let options = &self.options;
         let exact = self.exact(band, frame);
@@ -353,8 +354,8 @@ fn reach(
     }
 }
 
-/// Size of a texel: a third of a pixel where a camera comes nearest to the wall, but of one at half the radius at
-/// the finest, metres.
+/// Size of a texel: a third of a pixel where a camera comes nearest to the wall, but of one at half
+/// the radius at the finest, metres.
 fn texel_m(tunnel: &Tunnel, camera: &Camera, truth: &[Pose]) -> f64 {
     let outward = truth.iter().map(|pose| tunnel.outward(&pose.t_wc).0);
     let nearest_m = tunnel.nearest_m() * (1.0 - outward.fold(0.0, f64::max)).max(0.5);
@@ -479,7 +480,8 @@ mod tests {
         assert!(along.contains("along the tunnel"), "{along}");
     }
 
-    /// Where a frame of a centred camera looks straight at the wall, its pixels are squares of the wall.
+    /// Where a frame of a centred camera looks straight at the wall, its pixels are squares of the
+    /// wall.
     #[test]
     fn the_wall_is_what_frames_show() {
         let options = SimulateOptions {
@@ -582,8 +584,8 @@ mod tests {
         }
     }
 
-    /// On the axis and level, the water faces the camera where the wall is nearest: in the middle row of the frame.
-    /// An advance of the camera takes the glint along.
+    /// On the axis and level, the water faces the camera where the wall is nearest: in the middle
+    /// row of the frame. An advance of the camera takes the glint along.
     #[test]
     fn glints_stay_before_the_camera_and_move_over_the_wall() {
         let options = SimulateOptions {

@@ -28,7 +28,8 @@ impl From<Bits> for u8 {
     }
 }
 
-/// Adds white noise of 1-σ `noise_grey` (grey levels), saturates, and rounds to the values that so many bits know.
+/// Adds white noise of 1-σ `noise_grey` (grey levels), saturates, and rounds to the values that so
+/// many bits know.
 pub(super) fn deliver(
     exact: &GreyImage,
     noise_grey: f64,

@@ -3,12 +3,15 @@
 use crate::frames::GreyImage;
 use std::f64::consts::TAU;
 
-/// Where the shaft stands at the frame's lower edge and at its tip, and how high the tip is: shares of the frame's width and height.
+/// Where the shaft stands at the frame's lower edge and at its tip, and how high the tip is: shares
+/// of the frame's width and height.
 const FOOT: f64 = 0.42;
 const TIP: [f64; 2] = [0.36, 0.25];
-/// Grey level of the shaft's edge, and what its middle has more: a lamp beside the camera shines on a round bar.
+/// Grey level of the shaft's edge, and what its middle has more: a lamp beside the camera shines on
+/// a round bar.
 const TONES: [f32; 2] = [18.0, 30.0];
-/// Rings along it: what they add at the most, grey levels, and how far apart they are, as a share of the width.
+/// Rings along it: what they add at the most, grey levels, and how far apart they are, as a share
+/// of the width.
 const RINGS: (f32, f64) = (14.0, 0.45);
 
 /// A dark round bar with rings, before the wall at the same place of every frame.

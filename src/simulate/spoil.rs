@@ -13,8 +13,8 @@ const OBJECT_GREY: f32 = 25.0;
 /// Contrast of its texture, grey levels, and size, pixels.
 const OBJECT_TEXTURE: [(f32, f64); 2] = [(10.0, 24.0), (8.0, 5.0)];
 
-/// What a fault makes of a frame's noise-free picture. A repeated or a missing frame has no picture of its own that
-/// could be spoilt.
+/// What a fault makes of a frame's noise-free picture. A repeated or a missing frame has no picture
+/// of its own that could be spoilt.
 pub(super) fn spoil(fault: Fault, seed: u64, frame: usize, picture: GreyImage) -> GreyImage {
     let mut rng = Purpose::BadFrames.rng(seed, frame);
     let (width, height) = (picture.width(), picture.height());
@@ -29,8 +29,8 @@ pub(super) fn spoil(fault: Fault, seed: u64, frame: usize, picture: GreyImage) -
     }
 }
 
-/// The mean along a line of `length_px` pixels through every pixel, at `angle` (radians) from u towards v; the border
-/// repeats the outermost pixels.
+/// The mean along a line of `length_px` pixels through every pixel, at `angle` (radians) from u
+/// towards v; the border repeats the outermost pixels.
 fn motion_blurred(picture: &GreyImage, length_px: f64, angle: f64) -> GreyImage {
     let (width, height) = (picture.width(), picture.height());
     let (sin, cos) = angle.sin_cos();

@@ -14,8 +14,8 @@ const GROUND: f32 = 128.0;
 /// Grey levels of squares, in turn.
 const SQUARES: [f32; 2] = [72.0, 184.0];
 
-/// Squares in rows and columns, dark and bright in turn, each turned by 5°: slanted edges, as ISO 12233 measures
-/// sharpness by.
+/// Squares in rows and columns, dark and bright in turn, each turned by 5°: slanted edges, as ISO
+/// 12233 measures sharpness by.
 pub(super) struct TargetWall {
     /// Distance from square to square along s, metres.
     pitch_s_m: f64,
@@ -40,7 +40,8 @@ fn squares_around(perimeter_m: f64) -> f64 {
 }
 
 impl Texture for TargetWall {
-    /// A texel's share of a square as if its sides were the square's: the mean to within a few thousandths of the step.
+    /// A texel's share of a square as if its sides were the square's: the mean to within a few
+    /// thousandths of the step.
     fn row(&self, h_m: f64, texel_m: f64, row: &mut [f32]) {
         let (sin, cos) = SLANT_DEG.to_radians().sin_cos();
         let down = (h_m / PITCH_M).floor();
@@ -66,13 +67,14 @@ pub struct SlantedEdge {
     pub middle: WallPoint,
     /// Unit vector across it along (s, h), out of the square.
     pub normal: [f64; 2],
-    /// How far from its middle it may be looked at along it and across it, metres: nothing else lies there.
+    /// How far from its middle it may be looked at along it and across it, metres: nothing else
+    /// lies there.
     pub clear_m: [f64; 2],
 }
 
 impl SlantedEdge {
-    /// The edges of all squares of a wall of the given perimeter whose middles lie between two chainages, metres: of each
-    /// square the right, lower, left and upper one.
+    /// The edges of all squares of a wall of the given perimeter whose middles lie between two
+    /// chainages, metres: of each square the right, lower, left and upper one.
     pub fn all(perimeter_m: f64, h_m: [f64; 2]) -> Vec<Self> {
         let around = squares_around(perimeter_m);
         let (sin, cos) = SLANT_DEG.to_radians().sin_cos();
@@ -98,7 +100,8 @@ impl SlantedEdge {
         edges
     }
 
-    /// Distance of a wall point from the edge, metres, positive outside of the square, if it lies where nothing else does.
+    /// Distance of a wall point from the edge, metres, positive outside of the square, if it lies
+    /// where nothing else does.
     pub fn distance_m(&self, wall: &WallPoint, perimeter_m: f64) -> Option<f64> {
         let s = shortest_arc(wall.s_m - self.middle.s_m, perimeter_m);
         let h = wall.h_m - self.middle.h_m;

@@ -1,7 +1,8 @@
 //! The simulated tunnel: which place of the wall a ray meets.
 //!
-//! Round straight tunnels have a closed form; all others are searched for the place where the ray leaves the inside, by false position. The
-//! line along the middle of a curved tunnel is the survey's, since it is a part of what is given; everything else is this module's own.
+//! Round straight tunnels have a closed form; all others are searched for the place where the ray
+//! leaves the inside, by false position. The line along the middle of a curved tunnel is the
+//! survey's, since it is a part of what is given; everything else is this module's own.
 
 use super::outline::Outline;
 use super::{SimulateError, SimulateOptions};
@@ -104,7 +105,8 @@ impl Tunnel {
         Pose::new(at.frame * pose.r_wc, at.point + at.frame * across)
     }
 
-    /// A point as the section at its chainage sees it, of nominal size: x, chainage, z; the chainage is near `h_m`.
+    /// A point as the section at its chainage sees it, of nominal size: x, chainage, z; the
+    /// chainage is near `h_m`.
     fn local(line: Option<&Centreline>, point: &Vector3<f64>, h_m: f64) -> Vector3<f64> {
         let Some(line) = line else {
             return *point;
@@ -115,7 +117,8 @@ impl Tunnel {
         Vector3::new(arm.x, h_m, arm.z)
     }
 
-    /// How far towards the wall a point is: 0 on the axis, 1 on the wall; and its distance from the axis, metres.
+    /// How far towards the wall a point is: 0 on the axis, 1 on the wall; and its distance from the
+    /// axis, metres.
     pub fn outward(&self, point: &Vector3<f64>) -> (f64, f64) {
         match self {
             Self::Round(radius_m) => {
@@ -182,8 +185,8 @@ impl Rays<'_> {
         }
     }
 
-    /// With `d̂ = d_xz/|d_xz|`, the way along it is `−t·d̂ + √(r² − (t × d̂)²)`: from the foot of the perpendicular on the axis's
-    /// side to the circle.
+    /// With `d̂ = d_xz/|d_xz|`, the way along it is `−t·d̂ + √(r² − (t × d̂)²)`: from the foot of
+    /// the perpendicular on the axis's side to the circle.
     #[inline]
     fn round(&self, radius_m: f64, d: &Vector3<f64>) -> Place {
         let across = (d.x * d.x + d.z * d.z).sqrt();
@@ -236,12 +239,13 @@ struct OnRay {
     way_m: f64,
     /// As the section at its chainage sees it.
     point: Vector3<f64>,
-    /// How far it lies beyond the wall, as a share of the distance from the axis; less than 0 inside.
+    /// How far it lies beyond the wall, as a share of the distance from the axis; less than 0
+    /// inside.
     beyond: f64,
 }
 
-/// Where a ray meets the wall between a point inside and one beyond: the rule of false position as the Illinois algorithm has it, by which an
-/// end that stays counts half.
+/// Where a ray meets the wall between a point inside and one beyond: the rule of false position as
+/// the Illinois algorithm has it, by which an end that stays counts half.
 fn closed_in(
     mut inside: OnRay,
     mut outside: OnRay,

@@ -1,10 +1,13 @@
 //! Conjugate gradients.
 
-/// Brings x closer to the solution of `A x = right` by a number of steps, with the diagonal of A as preconditioner.
+/// Brings x closer to the solution of `A x = right` by a number of steps, with the diagonal of A as
+/// preconditioner.
 ///
-/// `times(x, y)` sets `y = A x` for a symmetric, positive semidefinite A; where the diagonal is 0, x stays as it is.
+/// `times(x, y)` sets `y = A x` for a symmetric, positive semidefinite A; where the diagonal is 0,
+/// x stays as it is.
 ///
-/// Source: M. R. Hestenes and E. Stiefel, "Methods of conjugate gradients for solving linear systems", 1952.
+/// Source: M. R. Hestenes and E. Stiefel, "Methods of conjugate gradients for solving linear
+/// systems", 1952.
 pub(super) fn conjugate_gradients(
     mut times: impl FnMut(&[f32], &mut [f32]),
     diagonal: &[f32],

@@ -1,4 +1,5 @@
-//! The pixels of all frames that show a region of the wall, each with its footprint as a stencil of fine pixels.
+//! The pixels of all frames that show a region of the wall, each with its footprint as a stencil of
+//! fine pixels.
 
 use super::stencils::{REACH, Spot, Stencils};
 use super::{Lattice, Reading, Region};
@@ -20,15 +21,16 @@ pub struct View<'a> {
     pub pose: &'a Pose,
 }
 
-/// What each pixel of each view reads of the fine pixels of a region: the shares of its square, projected onto the wall,
-/// that lie in each.
+/// What each pixel of each view reads of the fine pixels of a region: the shares of its square,
+/// projected onto the wall, that lie in each.
 pub struct Footprints {
     pub(super) region: Region,
     pub(super) views: Vec<Stencils>,
 }
 
 impl Footprints {
-    /// The footprints of the pixels whose footprints lie in the region entirely; of `views` in their order.
+    /// The footprints of the pixels whose footprints lie in the region entirely; of `views` in
+    /// their order.
     pub fn new(surface: &dyn Surface, lattice: &Lattice, region: Region, views: &[View]) -> Self {
         let stencils = views
             .iter()
@@ -86,7 +88,8 @@ impl Footprints {
         total.into_iter().map(|total| total > SEEN).collect()
     }
 
-    /// The mean of what all pixels read, each weighing by its precision and its share of a fine pixel; NaN where none does.
+    /// The mean of what all pixels read, each weighing by its precision and its share of a fine
+    /// pixel; NaN where none does.
     ///
     /// `readings`: of each view's pixels, as [`Footprints::super_resolve`] takes them.
     pub fn mean(&self, readings: &[Vec<Reading>]) -> Vec<f32> {
@@ -100,7 +103,8 @@ impl Footprints {
     }
 }
 
-/// The pixels' places in the region: those whose footprints lie in it entirely and are not too wide.
+/// The pixels' places in the region: those whose footprints lie in it entirely and are not too
+/// wide.
 fn spots(surface: &dyn Surface, lattice: &Lattice, region: &Region, view: &View) -> Vec<Spot> {
     let (camera, pose) = (&view.camera, view.pose);
     let Some([columns, rows]) = window(surface, lattice, region, view) else {
@@ -149,8 +153,8 @@ fn spots(surface: &dyn Surface, lattice: &Lattice, region: &Region, view: &View)
     spots
 }
 
-/// Columns and rows, each from and to before, of the frame's pixels that may show the region; `None` if it shows nothing
-/// of it.
+/// Columns and rows, each from and to before, of the frame's pixels that may show the region;
+/// `None` if it shows nothing of it.
 fn window(
     surface: &dyn Surface,
     lattice: &Lattice,
@@ -187,7 +191,8 @@ mod tests {
     use crate::test_wall::{TestWall, waves};
     use nalgebra::Vector3;
 
-    /// A region of 60 × 40 fine pixels that the fourth frame of the ring shows, across θ = 0 if asked for.
+    /// A region of 60 × 40 fine pixels that the fourth frame of the ring shows, across θ = 0 if
+    /// asked for.
     fn seen(across: bool) -> (TestWall, Lattice, Footprints, usize) {
         let wall = TestWall::ring(waves);
         let frame = if across { 0 } else { 3 };
@@ -215,8 +220,8 @@ mod tests {
         (wall, lattice, footprints, frame)
     }
 
-    /// Of a wall that grows evenly, a pixel reads what lies under its middle, but for what a fine pixel is even in itself:
-    /// an eighth of a fine pixel over the pixel's width at the most.
+    /// Of a wall that grows evenly, a pixel reads what lies under its middle, but for what a fine
+    /// pixel is even in itself: an eighth of a fine pixel over the pixel's width at the most.
     #[test]
     fn a_footprint_is_centred_where_the_pixel_looks() {
         for across in [false, true] {

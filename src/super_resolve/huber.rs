@@ -4,7 +4,8 @@ use crate::frames::MAD_TO_SIGMA;
 
 /// Weight of a residual r: 1 up to the limit, `limit/|r|` beyond, where the loss is linear.
 ///
-/// Source: P. J. Huber, "Robust estimation of a location parameter", Annals of Mathematical Statistics 35(1), 1964.
+/// Source: P. J. Huber, "Robust estimation of a location parameter", Annals of Mathematical
+/// Statistics 35(1), 1964.
 pub fn weight(residual: f32, limit: f32) -> f32 {
     if residual.abs() <= limit {
         1.0
@@ -13,7 +14,8 @@ pub fn weight(residual: f32, limit: f32) -> f32 {
     }
 }
 
-/// Robust standard deviation of values around 0, from the median of their moduli, as a Gaussian's σ; 0 of none.
+/// Robust standard deviation of values around 0, from the median of their moduli, as a Gaussian's
+/// σ; 0 of none.
 pub(super) fn sigma(values: impl Iterator<Item = f32>) -> f32 {
     let mut moduli: Vec<f32> = values.map(f32::abs).collect();
     if moduli.is_empty() {

@@ -24,7 +24,8 @@ const SMOOTH: f64 = 1e-6;
 /// What pixels say of how rough a wall is.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Evidence {
-    /// `γ_i`: degrees of freedom of the fine pixels that the pixels determine, of each kind of difference.
+    /// `γ_i`: degrees of freedom of the fine pixels that the pixels determine, of each kind of
+    /// difference.
     freedoms: [f64; KINDS],
     /// `xᵀ D_iᵀ w_i D_i x`, grey levels².
     energies: [f64; KINDS],
@@ -40,7 +41,8 @@ impl Evidence {
         }
     }
 
-    /// The strengths `a_i = γ_i/(xᵀ D_iᵀ w_i D_i x)` under which the pixels are most likely, grey levels⁻²; 0 without evidence.
+    /// The strengths `a_i = γ_i/(xᵀ D_iᵀ w_i D_i x)` under which the pixels are most likely, grey
+    /// levels⁻²; 0 without evidence.
     pub fn strengths(&self) -> [f64; KINDS] {
         let ratio = |k: usize| self.freedoms[k] / self.energies[k].max(f64::MIN_POSITIVE);
         std::array::from_fn(ratio)
@@ -59,23 +61,25 @@ pub struct Resolved {
 impl Footprints {
     /// The most likely fine pixels of the region, row-major, in one channel.
     ///
-    /// `readings`: of the pixels of each view, in the order of [`Footprints::pixels`]. `start`: a panorama of the region,
-    /// row-major, NaN in its holes; what no pixel shows stays as it is there.
+    /// `readings`: of the pixels of each view, in the order of [`Footprints::pixels`]. `start`: a
+    /// panorama of the region, row-major, NaN in its holes; what no pixel shows stays as it is
+    /// there.
     ///
-    /// Each round improves x by conjugate gradients, then finds the strengths `a_i` of the roughness under which the
-    /// pixels are most likely: of the fine pixels' n degrees of freedom
+    /// Each round improves x by conjugate gradients, then finds the strengths `a_i` of the
+    /// roughness under which the pixels are most likely: of the fine pixels' n degrees of freedom
     ///
     /// ```text
     /// γ_i = n E_f[a_i |D_i(f)|² P(f)] − a_i tr(A⁻¹ D_iᵀ w_i D_i),    a_i = γ_i/(xᵀ D_iᵀ w_i D_i x)
     /// ```
     ///
-    /// are determined by the pixels rather than by the prior and belong to kind i; A is the matrix of the normal equations,
-    /// and the trace is taken with one vector of random signs.
+    /// are determined by the pixels rather than by the prior and belong to kind i; A is the matrix
+    /// of the normal equations, and the trace is taken with one vector of random signs.
     ///
     /// The same input gives the same numbers; nothing runs in parallel.
     ///
-    /// Sources: D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4(3), 1992; M. F. Hutchinson, "A stochastic
-    /// estimator of the trace of the influence matrix", Communications in Statistics 18, 1989.
+    /// Sources: D. J. C. MacKay, "Bayesian interpolation", Neural Computation 4(3), 1992; M. F.
+    /// Hutchinson, "A stochastic estimator of the trace of the influence matrix", Communications in
+    /// Statistics 18, 1989.
     ///
     /// # Panics
     /// As [`WallSolve::new`].
@@ -116,9 +120,10 @@ impl Footprints {
     }
 }
 
-/// Weighs each pixel by what it reads of x: `Ω = ω/(σ² v)` with Huber's weight ω for residuals beyond [`LIMIT`] of
-/// their own robust standard deviation. v is what they say of the noise over what was stated, if that is more than
-/// 1, where `free` is the share of the residuals that x is not fitted to.
+/// Weighs each pixel by what it reads of x: `Ω = ω/(σ² v)` with Huber's weight ω for residuals
+/// beyond [`LIMIT`] of their own robust standard deviation. v is what they say of the noise over
+/// what was stated, if that is more than 1, where `free` is the share of the residuals that x is
+/// not fitted to.
 fn weigh(solve: &mut WallSolve, free: f32) {
     let residuals = solve.observations.residuals(&solve.x);
     let sigma = huber::sigma(solve.observations.known(&residuals)).max(free.sqrt());
@@ -153,7 +158,8 @@ fn learn(
 
 /// A random sign for each fine pixel that is seen, 0 elsewhere.
 ///
-/// Source: the finaliser of SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
+/// Source: the finaliser of SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number
+/// generators", 2014).
 fn signs(seen: &[bool]) -> Vec<f32> {
     let sign = |k: u64| {
         let mut z = k.wrapping_mul(0x9e37_79b9_7f4a_7c15);

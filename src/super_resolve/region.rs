@@ -2,8 +2,8 @@
 
 use crate::surface::{WallPoint, shortest_arc};
 
-/// A raster of fine pixels on the unrolled wall: column `j` and row `i` (from 0) have their centre at `s = s_start + (j + ½) Δs`,
-/// `h = h_start + (i + ½) Δh`.
+/// A raster of fine pixels on the unrolled wall: column `j` and row `i` (from 0) have their centre
+/// at `s = s_start + (j + ½) Δs`, `h = h_start + (i + ½) Δh`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     /// Columns around the section: the last meets the first.
@@ -62,8 +62,8 @@ pub(super) struct Chart {
 }
 
 impl Chart {
-    /// In fine pixels from the region's first corner (the first pixel's middle is at ½): the nearest way around to the
-    /// region's middle.
+    /// In fine pixels from the region's first corner (the first pixel's middle is at ½): the
+    /// nearest way around to the region's middle.
     pub fn place(&self, wall: &WallPoint) -> [f32; 2] {
         let s_m = shortest_arc(wall.s_m - self.middle.s_m, self.perimeter_m);
         let h_m = wall.h_m - self.middle.h_m;

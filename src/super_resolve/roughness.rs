@@ -7,8 +7,8 @@ use std::f64::consts::PI;
 /// Fine pixels over which an edge is expected to go on as it is, along the axes.
 const STRAIGHT: usize = 6;
 
-/// Differences of fine pixels: `∂s`, `∂h`, `∂ss`, `∂hh`, `∂sh`, each as (column, row, factor), and what changes of `∂h` along s and of `∂s`
-/// along h over [`STRAIGHT`] fine pixels.
+/// Differences of fine pixels: `∂s`, `∂h`, `∂ss`, `∂hh`, `∂sh`, each as (column, row, factor), and
+/// what changes of `∂h` along s and of `∂s` along h over [`STRAIGHT`] fine pixels.
 const DIFFERENCES: [&[(usize, usize, f32)]; 7] = [
     &[(0, 0, -1.0), (1, 0, 1.0)],
     &[(0, 0, -1.0), (0, 1, 1.0)],
@@ -35,18 +35,21 @@ const LEAST_WEIGHT: f32 = 1e-4;
 /// Frequencies along each axis at which spectra are looked at.
 const FREQUENCIES: usize = 24;
 
-/// The roughness of a raster, `Σ_i a_i Σ_n w_in (D_i x)_n²`: the negative logarithm (times two) of a Gaussian prior.
+/// The roughness of a raster, `Σ_i a_i Σ_n w_in (D_i x)_n²`: the negative logarithm (times two) of
+/// a Gaussian prior.
 ///
-/// Its spectrum is `1/P(f) = Σ_i a_i |D_i(f)|²`: between first differences, the `1/f²` of natural scenes, second ones,
-/// the `1/f⁴` of smooth ones, and mixed ones, of walls whose edges run along and across the tunnel. Where grain lies over them, what
-/// neighbours have in common says little of an edge, and it takes what is farther along it, too: errors of an edge that hang together along
+/// Its spectrum is `1/P(f) = Σ_i a_i |D_i(f)|²`: between first differences, the `1/f²` of natural
+/// scenes, second ones, the `1/f⁴` of smooth ones, and mixed ones, of walls whose edges run along
+/// and across the tunnel. Where grain lies over them, what neighbours have in common says little of
+/// an edge, and it takes what is farther along it, too: errors of an edge that hang together along
 /// a course of bricks bend trajectories.
 pub struct Roughness {
     columns: usize,
     rows: usize,
     /// `a`, grey levels⁻².
     pub strengths: [f64; KINDS],
-    /// `w`, difference by difference, at the first of its fine pixels; 0 where one of them is not seen.
+    /// `w`, difference by difference, at the first of its fine pixels; 0 where one of them is not
+    /// seen.
     pub weights: [Vec<f32>; KINDS],
     /// Number of differences of each kind over that of fine pixels, of those that are seen.
     coverage: [f64; KINDS],
@@ -103,8 +106,8 @@ impl Roughness {
         );
     }
 
-    /// Weighs each difference of x by Huber's loss, beyond `limit` of the robust standard deviation of its kind: where
-    /// the wall has an edge, it may.
+    /// Weighs each difference of x by Huber's loss, beyond `limit` of the robust standard deviation
+    /// of its kind: where the wall has an edge, it may.
     pub fn weigh(&mut self, x: &[f32], limit: f32) {
         let mut differences = vec![0.0; x.len()];
         for kind in 0..KINDS {
@@ -174,7 +177,8 @@ impl Roughness {
         }
     }
 
-    /// The mean over all frequencies of each kind's share of `1/P(f)`. A kind whose differences reach beyond what is seen has the less of it.
+    /// The mean over all frequencies of each kind's share of `1/P(f)`. A kind whose differences
+    /// reach beyond what is seen has the less of it.
     pub fn shares(&self) -> [f64; KINDS] {
         let mut shares = [0.0; KINDS];
         let strengths = std::array::from_fn(|kind| self.coverage[kind] * self.strengths[kind]);
@@ -189,9 +193,10 @@ impl Roughness {
     }
 }
 
-/// Variance, grey levels², of what a pixel as wide as `width` fine pixels reads of the frequencies above its own Nyquist frequency along
-/// either axis, on a wall of the given strengths: `E_f[P(f) B(f)²]` over them, with `B(ω) = sin(ω width/2)/(width sin(ω/2))` along each
-/// axis. It passes for something coarser, another thing in each frame (aliasing).
+/// Variance, grey levels², of what a pixel as wide as `width` fine pixels reads of the frequencies
+/// above its own Nyquist frequency along either axis, on a wall of the given strengths:
+/// `E_f[P(f) B(f)²]` over them, with `B(ω) = sin(ω width/2)/(width sin(ω/2))` along each axis. It
+/// passes for something coarser, another thing in each frame (aliasing).
 pub fn aliased_variance(strengths: &[f64; KINDS], width: f64) -> f64 {
     let box_mean = |omega: f64| (0.5 * width * omega).sin() / (width * (0.5 * omega).sin());
     let finer = frequencies().filter(|omega| omega.iter().any(|omega| omega * width > PI));
@@ -203,7 +208,8 @@ pub fn aliased_variance(strengths: &[f64; KINDS], width: f64) -> f64 {
     variances.sum::<f64>() / (FREQUENCIES * FREQUENCIES) as f64
 }
 
-/// Angular frequencies spread evenly over a quarter of the spectrum: along s and h, radians per fine pixel.
+/// Angular frequencies spread evenly over a quarter of the spectrum: along s and h, radians per
+/// fine pixel.
 fn frequencies() -> impl Iterator<Item = [f64; 2]> {
     let at = |k: usize| ((k as f64 + 0.5) / FREQUENCIES as f64) * PI;
     (0..FREQUENCIES * FREQUENCIES).map(move |k| [at(k / FREQUENCIES), at(k % FREQUENCIES)])
@@ -218,7 +224,8 @@ fn parts(strengths: &[f64; KINDS], omega: [f64; 2]) -> [f64; KINDS] {
     std::array::from_fn(|kind| strengths[kind] * responses[kind])
 }
 
-/// Number of columns and of rows, the first ones of a raster, in which differences begin; none if they do not fit into it.
+/// Number of columns and of rows, the first ones of a raster, in which differences begin; none if
+/// they do not fit into it.
 fn starts(columns: usize, rows: usize, taps: &[(usize, usize, f32)]) -> [usize; 2] {
     let reach = |along: fn(&(usize, usize, f32)) -> usize| taps.iter().map(along).max();
     let columns = columns.saturating_sub(reach(|tap| tap.0).unwrap_or(0));
@@ -333,8 +340,8 @@ mod tests {
         }
     }
 
-    /// A wall whose second differences alone are known, `1/P = a (s + h)²`, has nearly all of its power in what pixels can tell; not so one of
-    /// edges along and across.
+    /// A wall whose second differences alone are known, `1/P = a (s + h)²`, has nearly all of its
+    /// power in what pixels can tell; not so one of edges along and across.
     #[test]
     fn a_smooth_wall_hardly_aliases() {
         let of = |near: [f64; 5]| {

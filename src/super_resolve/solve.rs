@@ -21,8 +21,8 @@ pub struct WallSolve<'a> {
 impl<'a> WallSolve<'a> {
     /// Begins at `start`, row-major, whose holes are NaN.
     ///
-    /// `readings`: of the pixels of each view, in the order of [`Footprints::pixels`]; `strengths`: how rough the wall is,
-    /// grey levels⁻² ([`super::Evidence::strengths`]).
+    /// `readings`: of the pixels of each view, in the order of [`Footprints::pixels`]; `strengths`:
+    /// how rough the wall is, grey levels⁻² ([`super::Evidence::strengths`]).
     ///
     /// # Panics
     /// If `start` has not the region's size, or there are not as many readings as pixels.
@@ -73,8 +73,8 @@ impl<'a> WallSolve<'a> {
         conjugate_gradients(times, &diagonal, right, steps, x);
     }
 
-    /// How what a view's pixels read of x changes if they show `more` than they do, grey levels of the wall: `W A⁻¹ Wᵀ Ω more`, A the
-    /// matrix of the normal equations.
+    /// How what a view's pixels read of x changes if they show `more` than they do, grey levels of
+    /// the wall: `W A⁻¹ Wᵀ Ω more`, A the matrix of the normal equations.
     pub fn follow(&self, view: usize, more: &[f32], steps: usize) -> Vec<f32> {
         let mut right = vec![0.0; self.x.len()];
         let more = more.iter().copied();

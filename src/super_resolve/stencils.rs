@@ -3,8 +3,8 @@
 use super::Region;
 use crate::vectors::wide;
 
-/// Fine pixels along the side of a stencil, at the most: a pixel that looks so obliquely that its footprint is wider
-/// tells little of the wall's detail, and is left out.
+/// Fine pixels along the side of a stencil, at the most: a pixel that looks so obliquely that its
+/// footprint is wider tells little of the wall's detail, and is left out.
 pub(super) const REACH: usize = 12;
 /// Parts of a pixel along each side.
 const PARTS: usize = 4;
@@ -34,12 +34,13 @@ impl Spot {
     }
 }
 
-/// The stencils of one view's pixels: pixel p reads `Σ_k w_pk x_k` with `w_pk` the share of its square, projected onto
-/// the wall, that lies in fine pixel k.
+/// The stencils of one view's pixels: pixel p reads `Σ_k w_pk x_k` with `w_pk` the share of its
+/// square, projected onto the wall, that lies in fine pixel k.
 ///
-/// The square is a parallelogram on the wall (the map from pixels to the wall is linear within a pixel). It is taken in
-/// [`PARTS`]² parts, and each part as the upright rectangle of its width and height around its middle: exact for an
-/// upright camera, and of the right area, middle and about the right width for a turned one.
+/// The square is a parallelogram on the wall (the map from pixels to the wall is linear within a
+/// pixel). It is taken in [`PARTS`]² parts, and each part as the upright rectangle of its width and
+/// height around its middle: exact for an upright camera, and of the right area, middle and about
+/// the right width for a turned one.
 pub(super) struct Stencils {
     /// Fine pixels from one row of the region to the next.
     stride: usize,
@@ -71,7 +72,8 @@ impl Stencils {
         if region.columns < width || region.rows < height {
             spots.clear();
         }
-        // Stencils are wider than some footprints, and begin earlier where they would end beyond the region.
+        // Stencils are wider than some footprints, and begin earlier where they would end beyond
+        // the region.
         let corner = |spot: &Spot| {
             let column = (spot.first(0) as usize).min(region.columns.saturating_sub(width));
             let row = (spot.first(1) as usize).min(region.rows.saturating_sub(height));
@@ -150,7 +152,8 @@ impl Stencils {
         }
     }
 
-    /// Adds `Σ_p w_pk ω_p Σ_l w_pl x_l` to every fine pixel k: the view's part of the normal matrix times x.
+    /// Adds `Σ_p w_pk ω_p Σ_l w_pl x_l` to every fine pixel k: the view's part of the normal matrix
+    /// times x.
     #[inline(always)]
     pub fn add_normal(&self, omega: &[f32], x: &[f32], y: &mut [f32]) {
         match self.width {

@@ -1,12 +1,15 @@
 //! The line along the middle of a curved tunnel.
 //!
-//! Points given by the user are joined by a cubic spline of their chord lengths (C², with the ends bent as the circles through the first and
-//! last three points). It is walked in even steps of its own length: the nodes. Each has a frame `Q = (E_x, T, E_z)` that turns along as little as
-//! possible (the rotation-minimising frame: from node to node, T is carried over by the smallest rotation). Between nodes position
-//! and size of the section are cubic Hermite polynomials, and the frame `Q_k Exp(τ ω_k)` with `ω_k = Log(Q_kᵀ Q_{k+1})`, so that
-//! derivatives are exact. Beyond both ends the tunnel goes on straight.
+//! Points given by the user are joined by a cubic spline of their chord lengths (C², with the ends
+//! bent as the circles through the first and last three points). It is walked in even steps of its
+//! own length: the nodes. Each has a frame `Q = (E_x, T, E_z)` that turns along as little as
+//! possible (the rotation-minimising frame: from node to node, T is carried over by the smallest
+//! rotation). Between nodes position and size of the section are cubic Hermite polynomials, and the
+//! frame `Q_k Exp(τ ω_k)` with `ω_k = Log(Q_kᵀ Q_{k+1})`, so that derivatives are exact. Beyond
+//! both ends the tunnel goes on straight.
 //!
-//! Source: W. Wang, B. Jüttler, D. Zheng, Y. Liu, "Computation of rotation minimizing frames", ACM TOG 27(1), 2008.
+//! Source: W. Wang, B. Jüttler, D. Zheng, Y. Liu, "Computation of rotation minimizing frames", ACM
+//! TOG 27(1), 2008.
 
 use super::SurfaceError;
 use crate::trajectory::so3;
@@ -73,11 +76,12 @@ pub struct Centreline {
 }
 
 impl Centreline {
-    /// The line through points, for a section that reaches `farthest_m` from it, of a nominal radius.
+    /// The line through points, for a section that reaches `farthest_m` from it, of a nominal
+    /// radius.
     ///
     /// # Errors
-    /// [`SurfaceError::Centreline`]: fewer than two points, two at one place, a radius that is not positive, a bend tighter
-    /// than the section, a tunnel that runs into itself.
+    /// [`SurfaceError::Centreline`]: fewer than two points, two at one place, a radius that is not
+    /// positive, a bend tighter than the section, a tunnel that runs into itself.
     pub fn through(
         points: &[CentrePoint],
         nominal_m: f64,
@@ -197,9 +201,10 @@ impl Centreline {
         let last = self.turns.len();
         let length_m = self.length_m();
         if h_m < 0.0 || h_m > length_m {
-            let (node, from_m) = match h_m < 0.0 {
-                true => (&self.nodes[0], 0.0),
-                false => (&self.nodes[last], length_m),
+            let (node, from_m) = if h_m < 0.0 {
+                (&self.nodes[0], 0.0)
+            } else {
+                (&self.nodes[last], length_m)
             };
             let along = node.frame * Vector3::y();
             return Station {
@@ -252,7 +257,8 @@ impl Centreline {
         self.refined(point, nearest.1 as f64 * self.step_m)
     }
 
-    /// The chainage whose section's plane holds a point, near `h_m`: `Tᵀ(p − c) = 0` by Newton's method.
+    /// The chainage whose section's plane holds a point, near `h_m`: `Tᵀ(p − c) = 0` by Newton's
+    /// method.
     pub fn refined(&self, point: &Vector3<f64>, h_m: f64) -> f64 {
         let mut h_m = h_m;
         for _ in 0..20 {
@@ -280,13 +286,14 @@ impl Centreline {
     }
 }
 
-/// Slopes of the section's scale at the given points over the chords, so that the cubics between them are smooth and monotone: none overshoots
-/// the radii given. There is none at the ends, beyond which the scale stays.
+/// Slopes of the section's scale at the given points over the chords, so that the cubics between
+/// them are smooth and monotone: none overshoots the radii given. There is none at the ends, beyond
+/// which the scale stays.
 ///
 /// Of neighbouring slopes of one sign it is the weighted harmonic mean, else 0.
 ///
-/// Source: F. N. Fritsch, J. Butland, "A method for constructing local monotone piecewise cubic interpolants", SIAM J. Sci. Stat.
-/// Comput. 5(2), 1984.
+/// Source: F. N. Fritsch, J. Butland, "A method for constructing local monotone piecewise cubic
+/// interpolants", SIAM J. Sci. Stat. Comput. 5(2), 1984.
 fn rises(scales: &[f64], chords: &[f64]) -> Vec<f64> {
     let slope = |k: usize| (scales[k + 1] - scales[k]) / chords[k];
     let mut rises = vec![0.0; scales.len()];
@@ -324,8 +331,9 @@ struct Spline {
 }
 
 impl Spline {
-    /// C²: `m_{k−1}/c_{k−1} + 2 (1/c_{k−1} + 1/c_k) m_k + m_{k+1}/c_k = 3 (Δ_{k−1}/c_{k−1}² + Δ_k/c_k²)`, a tridiagonal system; the
-    /// slopes at the ends are those of the circles through three points.
+    /// C²: `m_{k−1}/c_{k−1} + 2 (1/c_{k−1} + 1/c_k) m_k + m_{k+1}/c_k = 3 (Δ_{k−1}/c_{k−1}² +
+    /// Δ_k/c_k²)`, a tridiagonal system; the slopes at the ends are those of the circles through
+    /// three points.
     fn through(points: Vec<Vector3<f64>>) -> Self {
         let n = points.len();
         let chords: Vec<f64> = points.windows(2).map(|p| (p[1] - p[0]).norm()).collect();
@@ -406,7 +414,8 @@ impl Spline {
     }
 }
 
-/// The direction at the first of three points of the circle through them; of the line, if they lie on one.
+/// The direction at the first of three points of the circle through them; of the line, if they lie
+/// on one.
 ///
 /// The angle between chord and tangent is that which the chord subtends at the third point.
 fn end_slope(p: [Vector3<f64>; 3]) -> Vector3<f64> {

@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 
 /// A straight tunnel with a circular section around the world's y axis.
 ///
-/// `s = r θ` with `θ = atan2(x, z)` in `[0, 2π)`, `h = y`; the wall point is `(r sin θ, h, r cos θ)`.
+/// `s = r θ` with `θ = atan2(x, z)` in `[0, 2π)`, `h = y`; the wall point is
+/// `(r sin θ, h, r cos θ)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Circle {
     radius_m: f64,
@@ -29,11 +30,12 @@ impl Circle {
 }
 
 impl Surface for Circle {
-    /// Solves `a λ² + 2 b λ + c = 0` with `a = c1² + c3²`, `b = c1 t_x + c3 t_z`, `c = t_x² + t_z² − r²` for
-    /// a ray `d = (c1, c2, c3)`: `λ = (−b + √(b² − a c)) / a`.
+    /// Solves `a λ² + 2 b λ + c = 0` with `a = c1² + c3²`, `b = c1 t_x + c3 t_z`,
+    /// `c = t_x² + t_z² − r²` for a ray `d = (c1, c2, c3)`: `λ = (−b + √(b² − a c)) / a`.
     ///
-    /// From inside `c < 0`, so the discriminant `b² − a c` is positive and the + root is the wall ahead.
-    /// For `b > 0` the same root is computed as `−c / (b + √(b² − a c))`, which does not cancel.
+    /// From inside `c < 0`, so the discriminant `b² − a c` is positive and the + root is the wall
+    /// ahead. For `b > 0` the same root is computed as `−c / (b + √(b² − a c))`, which does not
+    /// cancel.
     ///
     /// Source: arXiv 1806.10278, Section IV (whose printed discriminant lacks the square on b).
     fn hit(&self, t: &Vector3<f64>, d: &Vector3<f64>) -> Result<Hit, SurfaceError> {

@@ -5,16 +5,17 @@ use crate::camera::Camera;
 use crate::trajectory::{Pose, so3};
 use nalgebra::{Matrix2x5, Matrix2x6, Vector3};
 
-/// `∂(s, h)/∂ξ` of the wall point seen through a fixed pixel, for `ξ = (ω, ρ)` of [`Pose::retract`].
+/// `∂(s, h)/∂ξ` of the wall point seen through a fixed pixel, for `ξ = (ω, ρ)` of
+/// [`Pose::retract`].
 ///
 /// The pixel's ray meets the wall at `x_w = t + λ R d_c`. Moving the pose moves that point by
-/// `e_s δs + e_h δh = m + δλ d`, where `m = ρ + R (ω × x_c) = ρ − R [x_c]ₓ ω` and `d = x_w − t`. The dual
-/// vectors `a = e_h × d` and `b = d × e_s` are orthogonal to the unknown `δλ d`, so
+/// `e_s δs + e_h δh = m + δλ d`, where `m = ρ + R (ω × x_c) = ρ − R [x_c]ₓ ω` and `d = x_w − t`.
+/// The dual vectors `a = e_h × d` and `b = d × e_s` are orthogonal to the unknown `δλ d`, so
 ///
 /// `δs = a·m / a·e_s`,  `δh = b·m / b·e_h`.
 ///
-/// No assumption on the shape enters: any surface with tangents will do. Rows: s, h (metres); columns: ω
-/// (radians), ρ (metres). The result is not finite where the ray grazes the wall.
+/// No assumption on the shape enters: any surface with tangents will do. Rows: s, h (metres);
+/// columns: ω (radians), ρ (metres). The result is not finite where the ray grazes the wall.
 pub fn wall_jacobian(pose: &Pose, wall: &WallFrame) -> Matrix2x6<f64> {
     let d = wall.x_w - pose.t_wc;
     let x_c: Vector3<f64> = pose.r_wc.inverse_transform_vector(&d);
@@ -34,11 +35,13 @@ pub fn wall_jacobian(pose: &Pose, wall: &WallFrame) -> Matrix2x6<f64> {
     jacobian
 }
 
-/// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2)` of the wall point `x_c` (camera coordinates) seen through a fixed pixel.
+/// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2)` of the wall point `x_c` (camera coordinates) seen through
+/// a fixed pixel.
 ///
-/// With `π(x_c, κ)` the pixel, a point on its ray moves across by `∂x_c = −J⁺ ∂π/∂κ`, `J = ∂π/∂x_c`, `J⁺ = Jᵀ (J Jᵀ)⁻¹`, when κ
-/// changes, and the wall as if the camera had moved so: `C = A_ρ R ∂x_c`, with `A_ρ` the last three columns of `a`
-/// ([`wall_jacobian`]). Rows: s, h (metres).
+/// With `π(x_c, κ)` the pixel, a point on its ray moves across by `∂x_c = −J⁺ ∂π/∂κ`,
+/// `J = ∂π/∂x_c`, `J⁺ = Jᵀ (J Jᵀ)⁻¹`, when κ changes, and the wall as if the camera had moved so:
+/// `C = A_ρ R ∂x_c`, with `A_ρ` the last three columns of `a` ([`wall_jacobian`]). Rows: s, h
+/// (metres).
 pub fn lens_jacobian(
     pose: &Pose,
     a: &Matrix2x6<f64>,

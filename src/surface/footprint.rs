@@ -6,8 +6,8 @@ use crate::trajectory::Pose;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-/// Rays along each edge of a frame. The box of the curved outline is short by the sagitta of one step:
-/// about 0.01 px for a 640 px wide frame.
+/// Rays along each edge of a frame. The box of the curved outline is short by the sagitta of one
+/// step: about 0.01 px for a 640 px wide frame.
 const STEPS_PER_EDGE: usize = 64;
 
 /// Steps from the middle of a frame to its first corner, to follow `s` without losing a turn.
@@ -20,7 +20,8 @@ pub fn shortest_arc(delta_s_m: f64, perimeter_m: f64) -> f64 {
 
 /// Bounding box of a frame on the unrolled wall, metres.
 ///
-/// `s` is unwrapped: a frame across θ = 0 has a negative `s_min_m` or an `s_max_m` beyond the perimeter.
+/// `s` is unwrapped: a frame across θ = 0 has a negative `s_min_m` or an `s_max_m` beyond the
+/// perimeter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Footprint {
     /// Least arc length.
@@ -36,11 +37,13 @@ pub struct Footprint {
 impl Footprint {
     /// Traces the frame's border on the wall, through the outermost pixel centres.
     ///
-    /// Pixel → wall is one-to-one and smooth, so `s` and `h` take their extremes on the frame's border.
+    /// Pixel → wall is one-to-one and smooth, so `s` and `h` take their extremes on the frame's
+    /// border.
     ///
     /// # Errors
-    /// A camera outside the tunnel; [`SurfaceError::Parallel`] for a border pixel that looks along the axis;
-    /// [`SurfaceError::LooksAlongTheAxis`] if the axis's vanishing point lies within the picture.
+    /// A camera outside the tunnel; [`SurfaceError::Parallel`] for a border pixel that looks along
+    /// the axis; [`SurfaceError::LooksAlongTheAxis`] if the axis's vanishing point lies within the
+    /// picture.
     pub fn trace(
         surface: &dyn Surface,
         camera: &Camera,
@@ -90,8 +93,8 @@ impl Footprint {
 
     /// The same for any view, but no farther than `reach_m` along the tunnel from the camera.
     ///
-    /// A frame that holds the tunnel's vanishing point sees all the way around, and wall without end: its box is the
-    /// whole section on both sides of the camera, as far as the reach.
+    /// A frame that holds the tunnel's vanishing point sees all the way around, and wall without
+    /// end: its box is the whole section on both sides of the camera, as far as the reach.
     ///
     /// # Errors
     /// [`SurfaceError::CameraOutside`], [`SurfaceError::NotFinite`].
@@ -133,8 +136,9 @@ impl Footprint {
             || behind + other.s_max_m - other.s_min_m >= perimeter_m
     }
 
-    /// The box with so much more on every side that it holds all that the frame sees and `pixel_m` around it, metres: the box comes
-    /// from single rays, and 2 % of its size cover what bulges between them.
+    /// The box with so much more on every side that it holds all that the frame sees and `pixel_m`
+    /// around it, metres: the box comes from single rays, and 2 % of its size cover what bulges
+    /// between them.
     pub fn widened_to_be_sure(&self, pixel_m: f64) -> Self {
         let span_m = (self.s_max_m - self.s_min_m).max(self.h_max_m - self.h_min_m);
         self.widened(pixel_m + 0.02 * span_m)

@@ -30,12 +30,14 @@ impl Axis {
     }
 }
 
-/// The rigid motions that leave a tunnel's shape unchanged. Moving all poses by one of them changes no
-/// picture, so they are fixed by the prior and removed (and only they) before errors are computed.
+/// The rigid motions that leave a tunnel's shape unchanged. Moving all poses by one of them changes
+/// no picture, so they are fixed by the prior and removed (and only they) before errors are
+/// computed.
 ///
-/// They turn about an axis and shift along it: a straight round tunnel allows both, a straight one of another section the
-/// shift, a straight round one whose radius changes the turn, a bend of constant curvature the turn about the bend's own axis (which
-/// goes along the tunnel), a helix a turn with the shift of its pitch.
+/// They turn about an axis and shift along it: a straight round tunnel allows both, a straight one
+/// of another section the shift, a straight round one whose radius changes the turn, a bend of
+/// constant curvature the turn about the bend's own axis (which goes along the tunnel), a helix a
+/// turn with the shift of its pitch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gauge {
     /// The axis.
@@ -71,8 +73,9 @@ impl Gauge {
         usize::from(self.turn) + usize::from(self.shift)
     }
 
-    /// The steps `ξ` ([`Pose::retract`]) by which `pose` moves along each freedom, per radian and per metre:
-    /// `(Rᵀn, n × (t − p) + pitch n)` for the turn about the axis through p along n and `(0, n)` for the shift.
+    /// The steps `ξ` ([`Pose::retract`]) by which `pose` moves along each freedom, per radian and
+    /// per metre: `(Rᵀn, n × (t − p) + pitch n)` for the turn about the axis through p along n and
+    /// `(0, n)` for the shift.
     pub fn directions(&self, pose: &Pose) -> Vec<Vector6<f64>> {
         let Axis { point, direction } = self.axis;
         let mut directions = Vec::with_capacity(2);
@@ -101,11 +104,13 @@ impl Gauge {
 
     /// The motion that best carries `from` onto `to`, pose by pose, in closed form.
     ///
-    /// Turn: the α that minimises `Σ |R_to − R_n(α) R_from|²`. With `M = Σ R_to R_fromᵀ` and the axis n,
-    /// `α = atan2(nᵀ(M − Mᵀ)ᵛ, tr M − nᵀ M n)`. Shift: the mean difference of `nᵀt`. Freedoms that the shape does not have stay zero.
+    /// Turn: the α that minimises `Σ |R_to − R_n(α) R_from|²`. With `M = Σ R_to R_fromᵀ` and the
+    /// axis n, `α = atan2(nᵀ(M − Mᵀ)ᵛ, tr M − nᵀ M n)`. Shift: the mean difference of `nᵀt`.
+    /// Freedoms that the shape does not have stay zero.
     ///
-    /// Where only the turn is free, it may go along the tunnel, and then positions tell it better than rotations do: the sum has
-    /// `Σ |t_to − R_n(α) t_from|²` across the axis, too, a radian counting as much as a metre.
+    /// Where only the turn is free, it may go along the tunnel, and then positions tell it better
+    /// than rotations do: the sum has `Σ |t_to − R_n(α) t_from|²` across the axis, too, a radian
+    /// counting as much as a metre.
     pub fn align(&self, from: &[Pose], to: &[Pose]) -> GaugeMotion {
         let Axis {
             point,
@@ -138,10 +143,12 @@ impl Gauge {
     }
 }
 
-/// The part of a displacement `(Δs, Δh)` of the wall, metres, that the gauge can make, and the motion that makes it.
+/// The part of a displacement `(Δs, Δh)` of the wall, metres, that the gauge can make, and the
+/// motion that makes it.
 ///
-/// On a straight tunnel a turn moves the wall along s and a shift along h. A turn that is free by itself moves it in one direction, the same
-/// everywhere: as at the point that the camera at `pose` looks at.
+/// On a straight tunnel a turn moves the wall along s and a shift along h. A turn that is free by
+/// itself moves it in one direction, the same everywhere: as at the point that the camera at `pose`
+/// looks at.
 pub fn free_part(
     surface: &dyn Surface,
     pose: &Pose,
@@ -156,9 +163,10 @@ pub fn free_part(
         });
         let per_radian = per_radian.unwrap_or_default();
         let square = per_radian.norm_squared();
-        let turn_rad = match square > 0.0 {
-            true => per_radian.dot(moved) / square,
-            false => 0.0,
+        let turn_rad = if square > 0.0 {
+            per_radian.dot(moved) / square
+        } else {
+            0.0
         };
         return (per_radian * turn_rad, gauge.motion(turn_rad, 0.0));
     }

@@ -1,8 +1,8 @@
-//! The shape of the tunnel: ray → wall, wall coordinates → point, and how the wall point of a pixel moves
-//! with the pose.
+//! The shape of the tunnel: ray → wall, wall coordinates → point, and how the wall point of a pixel
+//! moves with the pose.
 //!
-//! A wall point has two coordinates in metres: `s`, the arc length around the section (periodic), and
-//! `h`, the chainage along the axis. One file per shape; each implements [`Surface`].
+//! A wall point has two coordinates in metres: `s`, the arc length around the section (periodic),
+//! and `h`, the chainage along the axis. One file per shape; each implements [`Surface`].
 //!
 //! # Example
 //!
@@ -127,9 +127,10 @@ pub enum SurfaceError {
 
 /// Refuses a size that is not positive and finite.
 fn check_size(name: &'static str, size_m: f64) -> Result<(), SurfaceError> {
-    match size_m.is_finite() && size_m > 0.0 {
-        true => Ok(()),
-        false => Err(SurfaceError::Size { name, size_m }),
+    if size_m.is_finite() && size_m > 0.0 {
+        Ok(())
+    } else {
+        Err(SurfaceError::Size { name, size_m })
     }
 }
 
@@ -155,7 +156,8 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
     /// The wall around `wall`; any `s` and `h` are allowed, `s` is periodic.
     fn frame(&self, wall: WallPoint) -> WallFrame;
 
-    /// World coordinates of the lattice `s_m × h_m` of wall points, in `points` row by row (s runs fastest).
+    /// World coordinates of the lattice `s_m × h_m` of wall points, in `points` row by row (s runs
+    /// fastest).
     ///
     /// Same as [`Surface::frame`] point by point; shapes override it where the lattice shares work.
     fn lattice(&self, s_m: &[f64], h_m: &[f64], points: &mut Vec<Vector3<f64>>) {
@@ -178,17 +180,20 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
         t.y
     }
 
-    /// A pose as the section at its chainage sees it: what it would be if the tunnel were straight along y.
+    /// A pose as the section at its chainage sees it: what it would be if the tunnel were straight
+    /// along y.
     fn straightened(&self, pose: &Pose) -> Pose {
         *pose
     }
 
-    /// The angle of the wall at `s_m` as seen from the axis, from z towards x, in `[0, 2π)`, radians.
+    /// The angle of the wall at `s_m` as seen from the axis, from z towards x, in `[0, 2π)`,
+    /// radians.
     fn angle_rad(&self, s_m: f64) -> f64 {
         TAU * (s_m / self.perimeter_m()).rem_euclid(1.0)
     }
 
-    /// The place on the section's outline at an angle from z towards x, metres; see [`Surface::angle_rad`].
+    /// The place on the section's outline at an angle from z towards x, metres; see
+    /// [`Surface::angle_rad`].
     fn s_at_m(&self, angle_rad: f64) -> f64 {
         self.perimeter_m() * (angle_rad / TAU).rem_euclid(1.0)
     }

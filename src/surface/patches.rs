@@ -17,8 +17,9 @@ impl Patches {
         perimeter_m: 0.0,
     };
 
-    /// Adds what lies between two angles θ, in the direction in which it grows, through 0 if the second is the lesser, and between
-    /// two chainages; without either, all around or all along. Angles are those of [`Surface::angle_rad`].
+    /// Adds what lies between two angles θ, in the direction in which it grows, through 0 if the
+    /// second is the lesser, and between two chainages; without either, all around or all along.
+    /// Angles are those of [`Surface::angle_rad`].
     pub fn add(
         &mut self,
         surface: &dyn Surface,

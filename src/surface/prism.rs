@@ -68,9 +68,10 @@ impl Surface for Prism {
     }
 
     fn gauge(&self) -> Gauge {
-        match self.section.is_round() {
-            true => Gauge::round(),
-            false => Gauge::straight(),
+        if self.section.is_round() {
+            Gauge::round()
+        } else {
+            Gauge::straight()
         }
     }
 
@@ -79,12 +80,13 @@ impl Surface for Prism {
             return Err(SurfaceError::NotFinite);
         }
         let point = Vector2::new(t.x, t.z);
-        match self.section.contains(&point) {
-            true => Ok(()),
-            false => Err(SurfaceError::CameraOutside {
+        if self.section.contains(&point) {
+            Ok(())
+        } else {
+            Err(SurfaceError::CameraOutside {
                 distance_m: point.norm(),
                 wall_m: self.section.distance_m(&point),
-            }),
+            })
         }
     }
 

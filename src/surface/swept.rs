@@ -5,9 +5,11 @@ use super::{Axis, Centreline, Gauge, Hit, Station, Surface, SurfaceError, WallFr
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector2, Vector3, Vector6};
 
-/// A section of size `g(h)` moved along a line `c(h)` with frames `Q(h)`: the wall point is `X(s, h) = c + Q (g x(s), 0, g z(s))`.
+/// A section of size `g(h)` moved along a line `c(h)` with frames `Q(h)`: the wall point is
+/// `X(s, h) = c + Q (g x(s), 0, g z(s))`.
 ///
-/// Source: W. Wang, B. Jüttler, D. Zheng, Y. Liu, "Computation of rotation minimizing frames", ACM TOG 27(1), 2008 (sweep surfaces).
+/// Source: W. Wang, B. Jüttler, D. Zheng, Y. Liu, "Computation of rotation minimizing frames", ACM
+/// TOG 27(1), 2008 (sweep surfaces).
 #[derive(Debug)]
 pub struct Swept {
     section: Box<dyn Section>,
@@ -15,7 +17,8 @@ pub struct Swept {
     gauge: Gauge,
 }
 
-/// Steps of a ray over the distance from the axis to the wall, where it has not come close to the wall.
+/// Steps of a ray over the distance from the axis to the wall, where it has not come close to the
+/// wall.
 const STEP: f64 = 0.25;
 /// A ray that has met no wall after so many is taken to run along the tunnel.
 const STEPS: usize = 4000;
@@ -82,7 +85,8 @@ impl Swept {
                 return (range > 0.0).then_some(Hit { range, x_w, wall });
             }
             last = distance;
-            // Corners of the outline and steep views: no farther than a part of the section at once.
+            // Corners of the outline and steep views: no farther than a part of the section at
+            // once.
             let shortened = (0.2 * size_m / step.fixed_rows::<2>(0).norm()).min(1.0);
             wall.s_m += shortened * step.x;
             wall.h_m += shortened * step.y;
@@ -91,10 +95,11 @@ impl Swept {
         None
     }
 
-    /// The motions that leave the wall where it is: those `(ω, u)` whose velocity `ω × X + u` has no part along the wall's normal
-    /// anywhere.
+    /// The motions that leave the wall where it is: those `(ω, u)` whose velocity `ω × X + u` has
+    /// no part along the wall's normal anywhere.
     ///
-    /// With `a = (X × n, n)`, metres in multiples of the tunnel's size, they are the null vectors of `Σ a aᵀ`.
+    /// With `a = (X × n, n)`, metres in multiples of the tunnel's size, they are the null vectors
+    /// of `Σ a aᵀ`.
     fn found_gauge(&self) -> Gauge {
         let length_m = self.line.length_m();
         let middle = self.line.at(0.5 * length_m).point;
@@ -161,8 +166,8 @@ impl Swept {
 }
 
 impl Surface for Swept {
-    /// Walks along the ray, step by step as if the tunnel went on straight from there, until it is outside, and closes in by Newton's
-    /// method.
+    /// Walks along the ray, step by step as if the tunnel went on straight from there, until it is
+    /// outside, and closes in by Newton's method.
     fn hit(&self, t: &Vector3<f64>, d: &Vector3<f64>) -> Result<Hit, SurfaceError> {
         if !d.iter().all(|v| v.is_finite()) {
             return Err(SurfaceError::NotFinite);
@@ -261,12 +266,13 @@ impl Surface for Swept {
         }
         let at = self.line.at(self.chainage_m(t));
         let local = Self::local(&at, t);
-        match self.section.contains(&local) {
-            true => Ok(()),
-            false => Err(SurfaceError::CameraOutside {
+        if self.section.contains(&local) {
+            Ok(())
+        } else {
+            Err(SurfaceError::CameraOutside {
                 distance_m: local.norm() * at.scale,
                 wall_m: self.section.distance_m(&local) * at.scale,
-            }),
+            })
         }
     }
 

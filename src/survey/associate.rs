@@ -32,8 +32,8 @@ pub(super) struct ByTime {
     pub interpolate: bool,
 }
 
-/// One pose per frame, in the convention of the file, each as many as there are frames. Where the file has times they stay; else
-/// the frames' own, if known, or their places in the list.
+/// One pose per frame, in the convention of the file, each as many as there are frames. Where the
+/// file has times they stay; else the frames' own, if known, or their places in the list.
 ///
 /// # Errors
 /// Another number of poses than of frames.
@@ -64,7 +64,8 @@ pub(super) fn by_order(
         .collect())
 }
 
-/// The pose of each frame's name: the whole path as the file of poses has it, or its end. Poses of other files are left alone.
+/// The pose of each frame's name: the whole path as the file of poses has it, or its end. Poses of
+/// other files are left alone.
 ///
 /// # Errors
 /// A file without names; a frame without a pose, or with several.
@@ -131,12 +132,13 @@ fn stamped(entry: &PoseEntry, frame: usize, times_s: Option<&[f64]>) -> StampedP
     }
 }
 
-/// The pose of each frame's time: the nearest, or the one on the way between its neighbours ([`se3::between`]). Never one from
-/// beyond the first or last pose by extrapolation.
+/// The pose of each frame's time: the nearest, or the one on the way between its neighbours
+/// ([`se3::between`]). Never one from beyond the first or last pose by extrapolation.
 ///
 /// # Errors
-/// A file without times; a frame whose nearest pose is farther than the tolerance; with interpolation, one before the first
-/// pose or after the last, or between two that are turned too far.
+/// A file without times; a frame whose nearest pose is farther than the tolerance; with
+/// interpolation, one before the first pose or after the last, or between two that are turned too
+/// far.
 pub(super) fn by_time(
     file: &PoseFile,
     frames: &[FrameFile],

@@ -30,7 +30,8 @@ impl CalibrationGroup {
     ];
 }
 
-/// `[calibrate]`: what is estimated besides the poses, and how far off the given values may be (1-σ).
+/// `[calibrate]`: what is estimated besides the poses, and how far off the given values may be
+/// (1-σ).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 #[non_exhaustive]

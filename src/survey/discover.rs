@@ -58,7 +58,8 @@ pub struct Discovery {
     pub pictures: Vec<PictureGroup>,
     /// Calibrations, those that fit the frames first: the video's, or the first group of pictures.
     pub calibrations: Vec<(PathBuf, Camera)>,
-    /// Files of poses; first those with as many poses as there are frames, and of these what is not called true.
+    /// Files of poses; first those with as many poses as there are frames, and of these what is not
+    /// called true.
     pub poses: Vec<(PathBuf, PoseFile)>,
 }
 
@@ -129,7 +130,8 @@ impl Discovery {
         Ok(found)
     }
 
-    /// Takes every `every`-th picture of a video, relative to the `folder` that was looked into, for the frames.
+    /// Takes every `every`-th picture of a video, relative to the `folder` that was looked into,
+    /// for the frames.
     ///
     /// # Errors
     /// As [`Video::open`].

@@ -28,8 +28,8 @@ pub struct SurveyFile {
     /// Self-calibration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibrate: Option<CalibrateSection>,
-    /// Options of the program's commands, a table each: what their long flags say, with underscores. The program gives them to the
-    /// command; the library reads over them.
+    /// Options of the program's commands, a table each: what their long flags say, with
+    /// underscores. The program gives them to the command; the library reads over them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub options: BTreeMap<String, toml::Table>,
 }
@@ -63,8 +63,9 @@ pub struct CameraSection {
     /// Which camera, if the file has several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
-    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds of the poses' times; negative if
-    /// rows are read bottom-up. Time and pose of a frame are those of its middle row. Without it, all rows are read at once.
+    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds of
+    /// the poses' times; negative if rows are read bottom-up. Time and pose of a frame are those of
+    /// its middle row. Without it, all rows are read at once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub readout_ms: Option<f64>,
 }
@@ -83,14 +84,15 @@ pub struct FramesSection {
     /// Of the video every so many-th picture is a frame, from the first on; without it every one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every: Option<usize>,
-    /// Of these, only as many as it takes for the view to turn by so much from one to the next, degrees, by the initial poses, which
-    /// must be tied by time.
+    /// Of these, only as many as it takes for the view to turn by so much from one to the next,
+    /// degrees, by the initial poses, which must be tied by time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_step_deg: Option<f64>,
     /// The frames' times, where they are not in their names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
-    /// A picture of the frames' size, black where they never show the wall; see [`crate::frames::Mask`].
+    /// A picture of the frames' size, black where they never show the wall; see
+    /// [`crate::frames::Mask`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mask: Option<PathBuf>,
 }

@@ -18,8 +18,8 @@ pub struct Footage {
 }
 
 impl Footage {
-    /// Finds the frames of the survey whose folder or `survey.toml` is `path`. `frame_times`: a file of their times, instead of the
-    /// survey's.
+    /// Finds the frames of the survey whose folder or `survey.toml` is `path`. `frame_times`: a
+    /// file of their times, instead of the survey's.
     ///
     /// # Errors
     /// A missing or malformed `survey.toml`, no frames, a malformed file of times.

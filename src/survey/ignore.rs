@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct IgnoreSection {
-    /// Angles θ from and to, degrees, in the direction in which θ grows; may go through 0, as `[330, 30]`.
+    /// Angles θ from and to, degrees, in the direction in which θ grows; may go through 0, as
+    /// `[330, 30]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub theta_deg: Option<[f64; 2]>,
     /// Chainages from and to, metres.

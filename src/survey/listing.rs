@@ -16,11 +16,13 @@ pub(super) struct Listing {
 }
 
 impl Listing {
-    /// Finds the frames that the section of the survey at `toml_path` names, relative to its `folder`. `frame_times`: a file of their
-    /// times, instead of the survey's. A mask that lies among the frames is none of them.
+    /// Finds the frames that the section of the survey at `toml_path` names, relative to its
+    /// `folder`. `frame_times`: a file of their times, instead of the survey's. A mask that lies
+    /// among the frames is none of them.
     ///
     /// # Errors
-    /// Neither pictures nor a video, or both; a malformed pattern, no frames, a video that cannot be read, a malformed file of times.
+    /// Neither pictures nor a video, or both; a malformed pattern, no frames, a video that cannot
+    /// be read, a malformed file of times.
     pub fn new(
         section: &FramesSection,
         toml_path: &Path,

@@ -167,8 +167,8 @@ impl Survey {
         Ok(survey)
     }
 
-    /// Reads a file of poses in the tunnel, as `refine` and `convert` write them, in its format's own convention, and checks
-    /// it against the frames and the tunnel.
+    /// Reads a file of poses in the tunnel, as `refine` and `convert` write them, in its format's
+    /// own convention, and checks it against the frames and the tunnel.
     ///
     /// # Errors
     /// A malformed file, poses that cannot be tied to the frames, a camera outside the tunnel.
@@ -192,8 +192,9 @@ impl Survey {
         Ok((trajectory, warning))
     }
 
-    /// The first frames of the survey with their initial poses as they are read, and in every other convention that leaves all
-    /// cameras inside, each with the flags that stand for it (none for the first; the fewer, the earlier).
+    /// The first frames of the survey with their initial poses as they are read, and in every other
+    /// convention that leaves all cameras inside, each with the flags that stand for it (none for
+    /// the first; the fewer, the earlier).
     ///
     /// # Errors
     /// As [`Survey::open`], should the file have changed since.
@@ -231,12 +232,14 @@ impl Survey {
         std::iter::once(given).chain(possible).map(survey).collect()
     }
 
-    /// The files besides the frames that the survey is made of, whether or not something else was read in their place.
+    /// The files besides the frames that the survey is made of, whether or not something else was
+    /// read in their place.
     pub fn own_files(&self) -> &[PathBuf] {
         &self.own_files
     }
 
-    /// What is wrong with the readout time, if anything: no row of a frame can be read after the next frame's.
+    /// What is wrong with the readout time, if anything: no row of a frame can be read after the
+    /// next frame's.
     fn readout_fault(&self) -> Option<String> {
         let readout_ms = self.file.camera.readout_ms?;
         let steps = self
@@ -276,8 +279,9 @@ pub(super) fn folder_of(toml_path: &Path) -> PathBuf {
 
 /// `survey.toml`, of which `path` is the folder or the name.
 pub(crate) fn toml_path(path: &Path) -> PathBuf {
-    match path.is_dir() {
-        true => path.join(SURVEY_FILE),
-        false => path.to_owned(),
+    if path.is_dir() {
+        path.join(SURVEY_FILE)
+    } else {
+        path.to_owned()
     }
 }

@@ -1,8 +1,9 @@
 //! Whether poses make sense in the tunnel, and which other reading of them would.
 //!
-//! A wrong convention puts cameras outside, has them look along the axis, or has them move and turn along another direction. Where
-//! that is so, the other readings are tried, the simplest first, and the one that makes sense is named with its flag. A reading
-//! that leaves all cameras inside and looking at the wall cannot be told from a right one here: only the pictures can
+//! A wrong convention puts cameras outside, has them look along the axis, or has them move and turn
+//! along another direction. Where that is so, the other readings are tried, the simplest first, and
+//! the one that makes sense is named with its flag. A reading that leaves all cameras inside and
+//! looking at the wall cannot be told from a right one here: only the pictures can
 //! ([`Survey::readings`](super::Survey::readings)).
 
 use super::SurveyError;
@@ -15,12 +16,14 @@ use std::path::Path;
 
 /// Fewer frames show no convention.
 const LEAST_FRAMES: usize = 4;
-/// Share of frames that must be outside or look along the axis before another reading is looked for: single ones are wrong poses.
+/// Share of frames that must be outside or look along the axis before another reading is looked
+/// for: single ones are wrong poses.
 const WRONG_SHARE: f64 = 0.34;
 /// Share of frames that may look along the axis in a reading that makes sense: poses err.
 const RIGHT_SHARE: f64 = 0.05;
-/// Motion and turning farther than this from the axis go another way: twice the 30° to which a carrier that sways by 6° a frame and
-/// steers back ([`Jitter`](crate::trajectory::Jitter)) leans. Another axis of the world is 90° off.
+/// Motion and turning farther than this from the axis go another way: twice the 30° to which a
+/// carrier that sways by 6° a frame and steers back ([`Jitter`](crate::trajectory::Jitter)) leans.
+/// Another axis of the world is 90° off.
 const ASKEW_RAD: f64 = std::f64::consts::FRAC_PI_3;
 /// Motion and turning within this of the axis go along it.
 const ALONG_RAD: f64 = std::f64::consts::FRAC_PI_6;
@@ -112,7 +115,8 @@ const LINE_SHARE: f64 = 25.0 / 26.0;
 const TURNING_SHARE: f64 = 0.75;
 /// Turning from frame to frame below this is the carrier's swaying, root mean square.
 const LEAST_TURN_RAD: f64 = 0.05;
-/// Motion below this, in all, is none, metres. Cameras lie inside tunnels of a larger radius in any case.
+/// Motion below this, in all, is none, metres. Cameras lie inside tunnels of a larger radius in any
+/// case.
 const LEAST_MOTION_M: f64 = 1e-6;
 
 impl Course {
@@ -241,8 +245,8 @@ fn along_other_axes(reading: &Reading, convention: &Convention, flags: &[String]
         .collect()
 }
 
-/// The reading that makes sense with the fewest changes, and of several the one with the shortest path: a wrong reading swings
-/// the cameras about with their errors.
+/// The reading that makes sense with the fewest changes, and of several the one with the shortest
+/// path: a wrong reading swings the cameras about with their errors.
 fn remedy(surface: &dyn Surface, camera: &Camera, reading: &Reading) -> Option<String> {
     let mut best: Option<(usize, f64, Other)> = None;
     for other in others(reading) {
@@ -271,8 +275,8 @@ fn path_m(poses: &[Pose]) -> f64 {
         .sum()
 }
 
-/// Axes that the poses of a reading might go along: those of their world, then the line of their motion, then the axis of their
-/// turning.
+/// Axes that the poses of a reading might go along: those of their world, then the line of their
+/// motion, then the axis of their turning.
 fn axes_of(reading: &Reading, convention: &Convention) -> Vec<TunnelAxis> {
     let poses: Vec<Pose> = reading
         .given
@@ -306,7 +310,8 @@ fn axes_of(reading: &Reading, convention: &Convention) -> Vec<TunnelAxis> {
         .collect()
 }
 
-/// The readings with the tunnel's axis where it is that leave all cameras inside: what only pictures can tell apart.
+/// The readings with the tunnel's axis where it is that leave all cameras inside: what only
+/// pictures can tell apart.
 pub(super) fn possible(surface: &dyn Surface, reading: &Reading) -> Vec<(Vec<String>, Convention)> {
     let tunnel = reading.convention.tunnel_in_world;
     let is_inside = |other: &Other| {
@@ -324,10 +329,12 @@ pub(super) fn possible(surface: &dyn Surface, reading: &Reading) -> Vec<(Vec<Str
         .collect()
 }
 
-/// Checks the poses of a file against the tunnel; returns warnings where they are possible but suspicious.
+/// Checks the poses of a file against the tunnel; returns warnings where they are possible but
+/// suspicious.
 ///
 /// # Errors
-/// A camera outside; most cameras looking along the axis, where another reading makes sense of them.
+/// A camera outside; most cameras looking along the axis, where another reading makes sense of
+/// them.
 pub(super) fn check(
     surface: &dyn Surface,
     camera: &Camera,

@@ -12,7 +12,8 @@ use std::path::PathBuf;
 pub struct PosesSection {
     /// The poses to be refined.
     pub initial: PathBuf,
-    /// The true poses, where they are known: only ever used for comparison. Read as the initial ones.
+    /// The true poses, where they are known: only ever used for comparison. Read as the initial
+    /// ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<PathBuf>,
     /// The files' format.
@@ -28,7 +29,8 @@ pub struct PosesSection {
     /// [`read_camera_in_body`](crate::trajectory::read_camera_in_body).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_to_camera: Option<PathBuf>,
-    /// Where the tunnel's axis lies in the poses' world; see [`read_tunnel_frame`](crate::trajectory::read_tunnel_frame).
+    /// Where the tunnel's axis lies in the poses' world; see
+    /// [`read_tunnel_frame`](crate::trajectory::read_tunnel_frame).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tunnel_frame: Option<PathBuf>,
     /// What ties poses to frames: without it their names, if the file has any, else their order.
@@ -37,7 +39,8 @@ pub struct PosesSection {
     /// The pose nearest in time may be this far from its frame, seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_tolerance_s: Option<f64>,
-    /// Whether a frame between two poses takes the one on the way between them, rather than the nearer one.
+    /// Whether a frame between two poses takes the one on the way between them, rather than the
+    /// nearer one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interpolate: Option<bool>,
 }

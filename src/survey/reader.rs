@@ -46,7 +46,8 @@ impl Reading {
 }
 
 impl<'a> PoseReader<'a> {
-    /// Reads what the section names, relative to `folder`. `times_s`: the frames' times, if a file tells them.
+    /// Reads what the section names, relative to `folder`. `times_s`: the frames' times, if a file
+    /// tells them.
     ///
     /// # Errors
     /// A mount or a tunnel's frame that cannot be read.
@@ -74,8 +75,8 @@ impl<'a> PoseReader<'a> {
     /// Reads a file of poses and ties them to the frames.
     ///
     /// # Errors
-    /// A malformed file; poses of a body without its mount; frames and poses that do not pair up; frames whose times do not
-    /// increase.
+    /// A malformed file; poses of a body without its mount; frames and poses that do not pair up;
+    /// frames whose times do not increase.
     pub fn read(&self, path: &Path) -> Result<Reading, SurveyError> {
         let file = read_poses(path, self.section.format)?;
         let mut convention = Convention::of(file.format);
@@ -92,9 +93,10 @@ impl<'a> PoseReader<'a> {
             });
         }
         let (frames, times_s) = (self.frames, self.times_s);
-        let default = match file.has_names() {
-            true => Associate::Name,
-            false => Associate::Order,
+        let default = if file.has_names() {
+            Associate::Name
+        } else {
+            Associate::Order
         };
         let given = match self.section.associate.unwrap_or(default) {
             Associate::Order => by_order(&file, frames, times_s)?,

@@ -5,10 +5,12 @@ use crate::trajectory::{Pose, poses_of};
 use std::path::Path;
 
 impl Survey {
-    /// Leaves out frames until the view turns by `step_deg` from one to the next, as the initial poses say.
+    /// Leaves out frames until the view turns by `step_deg` from one to the next, as the initial
+    /// poses say.
     ///
     /// # Errors
-    /// An impossible step; poses that are not tied by time, so that those of fewer frames could not be told.
+    /// An impossible step; poses that are not tied by time, so that those of fewer frames could not
+    /// be told.
     pub(super) fn thin_by_angle(
         &mut self,
         step_deg: f64,
@@ -41,7 +43,8 @@ impl Survey {
     }
 }
 
-/// The first pose, and each that is turned from the one before it in the list by `step_rad` or more, but for rounding.
+/// The first pose, and each that is turned from the one before it in the list by `step_rad` or
+/// more, but for rounding.
 fn turned(poses: &[Pose], step_rad: f64) -> Vec<usize> {
     const ROUNDING_RAD: f64 = 1e-6;
     let mut kept: Vec<usize> = Vec::new();

@@ -8,9 +8,10 @@ use std::path::Path;
 
 /// Reads the frames' times, seconds, one per frame.
 ///
-/// One line a frame: its time alone, in the order of the frames' names (KITTI's `times.txt`); or time and name in either
-/// order (TUM's `rgb.txt`, EuRoC's `data.csv`), with blanks or a comma between. Whole numbers of 16 digits and more are
-/// nanoseconds, all else is seconds. Lines of files that are no frames of the survey are passed over.
+/// One line a frame: its time alone, in the order of the frames' names (KITTI's `times.txt`); or
+/// time and name in either order (TUM's `rgb.txt`, EuRoC's `data.csv`), with blanks or a comma
+/// between. Whole numbers of 16 digits and more are nanoseconds, all else is seconds. Lines of
+/// files that are no frames of the survey are passed over.
 ///
 /// # Errors
 /// An unreadable file, a line of another form, a frame without a time, two times of one frame.
@@ -18,13 +19,14 @@ pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, Survey
     let lines = read_lines(path)?;
     let file = |what: String| SurveyError::from(PoseError::file(path, what));
     if lines.iter().all(|line| line.name.is_none()) {
-        return match lines.len() == frames.len() {
-            true => Ok(lines.iter().map(|line| line.time_s).collect()),
-            false => Err(file(format!(
+        return if lines.len() == frames.len() {
+            Ok(lines.iter().map(|line| line.time_s).collect())
+        } else {
+            Err(file(format!(
                 "{} times for {} frames; every frame needs one, in the order of the frames' names, or with its name beside it",
                 lines.len(),
                 frames.len()
-            ))),
+            )))
         };
     }
     let mut by_name: HashMap<&str, f64> = HashMap::new();
@@ -146,9 +148,10 @@ mod tests {
             "b.png 2.5\na.png 1.5\nelsewhere.png 9\n",
             "#timestamp [ns],filename\n2500000000000000,b.png\n1500000000000000,a.png\n",
         ] {
-            let expected = match text.contains("ns") {
-                true => [1.5e6, 2.5e6],
-                false => [1.5, 2.5],
+            let expected = if text.contains("ns") {
+                [1.5e6, 2.5e6]
+            } else {
+                [1.5, 2.5]
             };
             assert_eq!(read_text(text).unwrap(), expected, "{text}");
         }

@@ -19,7 +19,8 @@ pub enum Shape {
     Ellipse,
     /// A rectangle, the axis in its middle: `width_m`, `height_m`.
     Box,
-    /// A round arch on straight walls and a flat floor, the axis in the middle of the arch: `width_m`, `height_m`.
+    /// A round arch on straight walls and a flat floor, the axis in the middle of the arch:
+    /// `width_m`, `height_m`.
     Horseshoe,
 }
 
@@ -39,7 +40,8 @@ pub struct TunnelSection {
     /// Height of any other section, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_m: Option<f64>,
-    /// A file of the line along its middle, if it is not the world's y axis; see [`read_centreline`].
+    /// A file of the line along its middle, if it is not the world's y axis; see
+    /// [`read_centreline`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centreline: Option<PathBuf>,
     /// Parts of the wall by which frames are not compared: water, plants, what moves.
@@ -75,7 +77,8 @@ impl TunnelSection {
     /// The tunnel, with the files that it names in `folder`. `toml` is where it is written.
     ///
     /// # Errors
-    /// A size that is missing, impossible or of another shape; a centreline that cannot be read or that no tunnel follows.
+    /// A size that is missing, impossible or of another shape; a centreline that cannot be read or
+    /// that no tunnel follows.
     pub fn surface(&self, toml: &Path, folder: &Path) -> Result<Box<dyn Surface>, SurveyError> {
         let value = |what: String| SurveyError::Value {
             path: toml.to_owned(),
@@ -130,8 +133,9 @@ impl TunnelSection {
     }
 }
 
-/// Reads the line along the middle of a tunnel: `x y z [radius]` a line, metres, in the world of the poses; what follows a `#` is passed over.
-/// A radius (half the width, where the section is no circle) holds at that point and changes smoothly to the next one's.
+/// Reads the line along the middle of a tunnel: `x y z [radius]` a line, metres, in the world of
+/// the poses; what follows a `#` is passed over. A radius (half the width, where the section is no
+/// circle) holds at that point and changes smoothly to the next one's.
 ///
 /// # Errors
 /// An unreadable file, a line of another form.

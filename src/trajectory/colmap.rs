@@ -1,7 +1,7 @@
 //! COLMAP's text model: `images.txt`, two lines an image, **world-to-camera**.
 //!
-//! `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then the points of the image, `X Y POINT3D_ID` each; that line may be
-//! empty. The poses alone are read. What is written has no points.
+//! `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then the points of the image, `X Y POINT3D_ID`
+//! each; that line may be empty. The poses alone are read. What is written has no points.
 
 use super::{Pose, PoseEntry, PoseError, StampedPose, text};
 use nalgebra::Vector3;
@@ -80,16 +80,18 @@ fn parse_line(line: &str) -> Result<PoseEntry, String> {
 fn check_points(line: &str) -> Result<(), String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let are_numbers = words.iter().all(|word| word.parse::<f64>().is_ok());
-    match are_numbers && words.len().is_multiple_of(3) {
-        true => Ok(()),
-        false => Err(
-            "should hold the points of the image above, `X Y POINT3D_ID` each, or be empty: an image has two lines"
-                .to_owned(),
-        ),
+    if are_numbers && words.len().is_multiple_of(3) {
+        Ok(())
+    } else {
+        Err(
+        "should hold the points of the image above, `X Y POINT3D_ID` each, or be empty: an image has two lines"
+            .to_owned(),
+    )
     }
 }
 
-/// The text of `images.txt` for frames called `names`, all of camera 1; `trajectory` is camera-to-world.
+/// The text of `images.txt` for frames called `names`, all of camera 1; `trajectory` is
+/// camera-to-world.
 pub fn format_images(names: &[String], trajectory: &[StampedPose]) -> String {
     let mut text = format!(
         "# Image list with two lines of data per image:\n#   {}\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n\

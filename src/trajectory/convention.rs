@@ -1,4 +1,5 @@
-//! What the numbers of a pose mean: its direction, the camera's axes, whose pose it is, and in which world.
+//! What the numbers of a pose mean: its direction, the camera's axes, whose pose it is, and in
+//! which world.
 
 use super::{Pose, PoseFormat};
 use nalgebra::{Quaternion, UnitQuaternion};
@@ -61,7 +62,8 @@ impl CameraAxes {
         }
     }
 
-    /// A camera-to-world pose of these axes in OpenCV's, and the other way round: `R ← R diag(1, −1, −1)` for OpenGL.
+    /// A camera-to-world pose of these axes in OpenCV's, and the other way round:
+    /// `R ← R diag(1, −1, −1)` for OpenGL.
     pub fn turn(self, pose: &Pose) -> Pose {
         match self {
             Self::OpenCv => *pose,
@@ -81,9 +83,11 @@ pub struct Convention {
     pub direction: Direction,
     /// How the camera's axes lie.
     pub axes: CameraAxes,
-    /// The camera in the body whose poses the file holds, `x_body = T x_camera`; `None` if they are the camera's own.
+    /// The camera in the body whose poses the file holds, `x_body = T x_camera`; `None` if they are
+    /// the camera's own.
     pub camera_in_body: Option<Pose>,
-    /// The tunnel's frame in the world of the poses, `x_world = T x_tunnel`; `None` if they are the same.
+    /// The tunnel's frame in the world of the poses, `x_world = T x_tunnel`; `None` if they are the
+    /// same.
     pub tunnel_in_world: Option<Pose>,
 }
 
@@ -100,8 +104,8 @@ impl Convention {
 
     /// The pose as the program has it: camera-to-world, OpenCV's axes, the tunnel's axis along y.
     ///
-    /// `T = T_world,tunnel⁻¹ T_world,body T_body,camera`, then the camera's axes. A pose that has this convention already is
-    /// returned to the bit.
+    /// `T = T_world,tunnel⁻¹ T_world,body T_body,camera`, then the camera's axes. A pose that has
+    /// this convention already is returned to the bit.
     pub fn to_tunnel(&self, given: &Pose) -> Pose {
         let mut pose = self.to_world(given);
         if let Some(tunnel) = &self.tunnel_in_world {

@@ -1,9 +1,10 @@
 //! CSV with named columns: `frame,time_s,tx_m,ty_m,tz_m,qx,qy,qz,qw`, camera-to-world.
 //!
-//! Columns are found by their names, in any order; those of other names are left alone. `frame` (or `name`, `file`,
-//! `filename`, `image`), a time in `time_s` (`time`, `timestamp`, `timestamp_s`) or in `time_ns` (`timestamp_ns`), or both, may
-//! be missing; whole numbers of 16 digits and more are nanoseconds in any of them. Positions are `tx_m` or `tx`, `x_m`, `x` and
-//! so on, metres. Commas, semicolons and tabs separate; names may stand in quotes.
+//! Columns are found by their names, in any order; those of other names are left alone. `frame` (or
+//! `name`, `file`, `filename`, `image`), a time in `time_s` (`time`, `timestamp`, `timestamp_s`) or
+//! in `time_ns` (`timestamp_ns`), or both, may be missing; whole numbers of 16 digits and more are
+//! nanoseconds in any of them. Positions are `tx_m` or `tx`, `x_m`, `x` and so on, metres. Commas,
+//! semicolons and tabs separate; names may stand in quotes.
 
 use super::{Pose, PoseEntry, PoseError, StampedPose, text, times};
 use csv::{ReaderBuilder, StringRecord, WriterBuilder};

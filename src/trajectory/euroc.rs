@@ -1,7 +1,7 @@
 //! EuRoC: `timestamp [ns], x, y, z, qw, qx, qy, qz, …`, poses of the **body** (IMU) in the world.
 //!
-//! The first eight columns count; velocities and biases may follow. Read only. Source: Burri et al., "The EuRoC micro aerial
-//! vehicle datasets", 2016.
+//! The first eight columns count; velocities and biases may follow. Read only. Source: Burri et
+//! al., "The EuRoC micro aerial vehicle datasets", 2016.
 
 use super::{Pose, PoseEntry, PoseError, text, times};
 use nalgebra::Vector3;
@@ -9,8 +9,8 @@ use std::path::Path;
 
 const FORM: &str = "timestamp [ns], x, y, z, qw, qx, qy, qz";
 
-/// Whether a line is one of such a file: commas, and a first number with as many digits as nanoseconds since 1970 have, or
-/// more than any other time.
+/// Whether a line is one of such a file: commas, and a first number with as many digits as
+/// nanoseconds since 1970 have, or more than any other time.
 pub(super) fn is_line(line: &str) -> bool {
     let mut words = line.split(',');
     let time = words.next().unwrap_or_default().trim();

@@ -18,7 +18,8 @@ pub struct PoseEntry {
     pub pose: Pose,
 }
 
-/// A file of poses, in its own convention; one pose at the least. Its times increase and its names differ, where it has them.
+/// A file of poses, in its own convention; one pose at the least. Its times increase and its names
+/// differ, where it has them.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct PoseFile {
@@ -51,15 +52,17 @@ impl PoseFile {
     }
 }
 
-/// Reads a file of poses, of the given format or of the one that its content tells. A folder is a COLMAP model.
+/// Reads a file of poses, of the given format or of the one that its content tells. A folder is a
+/// COLMAP model.
 ///
 /// # Errors
-/// [`PoseError`]: an unreadable file, an unknown format, a line that is no pose, times that do not increase, two poses of one
-/// frame, no pose at all.
+/// [`PoseError`]: an unreadable file, an unknown format, a line that is no pose, times that do not
+/// increase, two poses of one frame, no pose at all.
 pub fn read_poses(path: &Path, format: Option<PoseFormat>) -> Result<PoseFile, PoseError> {
-    let path = match path.is_dir() {
-        true => path.join(colmap::IMAGES_FILE),
-        false => path.to_owned(),
+    let path = if path.is_dir() {
+        path.join(colmap::IMAGES_FILE)
+    } else {
+        path.to_owned()
     };
     let text = text::read(&path)?;
     let format = match format {

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum JitterModel {
-    /// Each step composes its own error onto the running pose, so errors accumulate (odometry, a plan
-    /// executed blindly; the paper's "after each image capture").
+    /// Each step composes its own error onto the running pose, so errors accumulate (odometry, a
+    /// plan executed blindly; the paper's "after each image capture").
     RandomWalk,
     /// Every pose errs on its own around the plan (an IMU's attitude, a rail).
     Independent,
@@ -29,13 +29,13 @@ pub struct Jitter {
     pub translation_sigma_m: [f64; 3],
 }
 
-/// Share of the lateral offset, and of the tilt against the axis, that a random walk loses at each step: the carrier
-/// steers back to the axis, as any carrier that survives its tunnel does. 2 % keeps their spread below
-/// `σ / √(1 − 0.98²) ≈ 5 σ`, for any length.
+/// Share of the lateral offset, and of the tilt against the axis, that a random walk loses at each
+/// step: the carrier steers back to the axis, as any carrier that survives its tunnel does. 2 %
+/// keeps their spread below `σ / √(1 − 0.98²) ≈ 5 σ`, for any length.
 const STEERING: f64 = 0.02;
 
-/// Turns an executed attitude back towards the planned one by a share of the tilt between their axes of the tunnel.
-/// What it has turned about the axis stays.
+/// Turns an executed attitude back towards the planned one by a share of the tilt between their
+/// axes of the tunnel. What it has turned about the axis stays.
 fn steered(executed: &UnitQuaternion<f64>, planned: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let carried = executed * planned.inverse() * Vector3::y();
     match UnitQuaternion::rotation_between(&carried, &Vector3::y()) {
@@ -48,8 +48,8 @@ fn steered(executed: &UnitQuaternion<f64>, planned: &UnitQuaternion<f64>) -> Uni
 impl Jitter {
     /// The trajectory that results when `plan` is executed with this noise.
     ///
-    /// The first pose of a random walk is the plan's own. Only random numbers from `rng` are used, three
-    /// for the rotation and then three for the translation of each pose.
+    /// The first pose of a random walk is the plan's own. Only random numbers from `rng` are used,
+    /// three for the rotation and then three for the translation of each pose.
     pub fn apply(&self, plan: &[Pose], rng: &mut impl Rng) -> Vec<Pose> {
         let mut executed: Vec<Pose> = Vec::with_capacity(plan.len());
         for (k, planned) in plan.iter().enumerate() {

@@ -1,6 +1,8 @@
-//! KITTI odometry: the twelve numbers of `[R t]` a line, row by row, camera-to-world, metres; no times.
+//! KITTI odometry: the twelve numbers of `[R t]` a line, row by row, camera-to-world, metres; no
+//! times.
 //!
-//! KITTI's own files have the first camera as their world. Any world is read, and the tunnel's is written.
+//! KITTI's own files have the first camera as their world. Any world is read, and the tunnel's is
+//! written.
 
 use super::{PoseEntry, PoseError, StampedPose, rigid, text};
 use std::path::Path;

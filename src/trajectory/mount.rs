@@ -3,14 +3,16 @@
 use super::{Pose, PoseError, rigid, text};
 use std::path::Path;
 
-/// Keys of calibration files that hold such a matrix, and whether it leads from the camera to the body.
+/// Keys of calibration files that hold such a matrix, and whether it leads from the camera to the
+/// body.
 const KEYS: [(&str, bool); 3] = [("T_BS", true), ("T_cam_imu", false), ("T_imu_cam", true)];
 
 /// Reads the camera's place in the body, `x_body = T x_camera`.
 ///
-/// The file holds the motion from body to camera, `x_camera = T x_body`, as a 4 × 4 matrix of text, a row a line; or it is
-/// EuRoC's `sensor.yaml` (`T_BS`, camera to body) or a camchain of Kalibr with one camera (`T_cam_imu`, body to camera; with
-/// `T_imu_cam` the other way), whose keys say which way their matrices lead.
+/// The file holds the motion from body to camera, `x_camera = T x_body`, as a 4 × 4 matrix of text,
+/// a row a line; or it is EuRoC's `sensor.yaml` (`T_BS`, camera to body) or a camchain of Kalibr
+/// with one camera (`T_cam_imu`, body to camera; with `T_imu_cam` the other way), whose keys say
+/// which way their matrices lead.
 ///
 /// # Errors
 /// An unreadable file; no such matrix, or several; a matrix that is no rigid motion.
@@ -95,7 +97,8 @@ mod tests {
         read_camera_in_body(&path)
     }
 
-    /// EuRoC's own calibration of its left camera, and the same the other way round and as Kalibr writes it.
+    /// EuRoC's own calibration of its left camera, and the same the other way round and as Kalibr
+    /// writes it.
     #[test]
     fn all_ways_to_say_it_mean_the_same() {
         let t_bs = "[0.0148655429818, -0.999880929698, 0.00414029679422, -0.0216401454975,\n         \

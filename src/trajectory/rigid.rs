@@ -8,11 +8,12 @@ const MOST_OFF: f64 = 2e-3;
 
 /// The motion `[R t]` of three rows, or of four of which the last is `0 0 0 1`.
 ///
-/// R is replaced by the rotation nearest to it, `U Vᵀ` with `U Σ Vᵀ = R`, which undoes the rounding of its digits.
+/// R is replaced by the rotation nearest to it, `U Vᵀ` with `U Σ Vᵀ = R`, which undoes the rounding
+/// of its digits.
 ///
 /// # Errors
-/// Another size; a number that is not finite; a last row other than `0 0 0 1`; a scale, a mirror image, or anything else
-/// that R holds besides a rotation.
+/// Another size; a number that is not finite; a last row other than `0 0 0 1`; a scale, a mirror
+/// image, or anything else that R holds besides a rotation.
 pub(crate) fn motion(rows: &[[f64; 4]]) -> Result<Pose, String> {
     let [a, b, c] = match rows {
         [a, b, c] => [a, b, c],
@@ -42,10 +43,11 @@ pub(crate) fn motion(rows: &[[f64; 4]]) -> Result<Pose, String> {
     let scale = (square.trace() / 3.0).sqrt();
     let is_rotation = |square: Matrix3<f64>| (square - Matrix3::identity()).amax() <= MOST_OFF;
     if !is_rotation(square) {
-        return Err(match scale > 0.0 && is_rotation(square / (scale * scale)) {
-            true => format!("its rotation is scaled by {scale:.6}; poses are rigid, in metres"),
-            false => "its first three columns are no rotation (they must be perpendicular and of length 1)"
-                .to_owned(),
+        return Err(if scale > 0.0 && is_rotation(square / (scale * scale)) {
+            format!("its rotation is scaled by {scale:.6}; poses are rigid, in metres")
+        } else {
+            "its first three columns are no rotation (they must be perpendicular and of length 1)"
+                .to_owned()
         });
     }
     if r.determinant() < 0.0 {

@@ -1,4 +1,5 @@
-//! Rolling shutter: how the camera moves while the rows of a frame are read, as its neighbours in time tell.
+//! Rolling shutter: how the camera moves while the rows of a frame are read, as its neighbours in
+//! time tell.
 
 use super::{Pose, StampedPose};
 use crate::camera::Sweep;
@@ -7,7 +8,8 @@ use nalgebra::Vector6;
 /// When the rows of frames are read.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shutter {
-    /// Time from reading the first row to reading the last, seconds; 0 for a global shutter, negative if rows are read bottom-up.
+    /// Time from reading the first row to reading the last, seconds; 0 for a global shutter,
+    /// negative if rows are read bottom-up.
     readout_s: f64,
     /// Rows of a frame.
     rows: u32,
@@ -16,8 +18,8 @@ pub struct Shutter {
 }
 
 impl Shutter {
-    /// Of frames of `rows` rows whose last row is read `readout_s` (seconds) after the first; their middle rows' times are
-    /// those of `trajectory`.
+    /// Of frames of `rows` rows whose last row is read `readout_s` (seconds) after the first; their
+    /// middle rows' times are those of `trajectory`.
     pub fn new(readout_s: f64, rows: u32, trajectory: &[StampedPose]) -> Self {
         Self {
             readout_s,
@@ -31,29 +33,33 @@ impl Shutter {
         self.readout_s
     }
 
-    /// How the camera moves while each of the frames is read: its pose goes smoothly through `poses`.
+    /// How the camera moves while each of the frames is read: its pose goes smoothly through
+    /// `poses`.
     pub fn sweeps(&self, poses: &[Pose]) -> Vec<Sweep> {
         let pose = |k: usize| poses.get(k).copied();
         let sweep = |k| self.rate(k, pose).times(self.readout_s);
-        match self.readout_s == 0.0 {
-            true => vec![Sweep::default(); poses.len()],
-            false => (0..poses.len()).map(sweep).collect(),
+        if self.readout_s == 0.0 {
+            vec![Sweep::default(); poses.len()]
+        } else {
+            (0..poses.len()).map(sweep).collect()
         }
     }
 
-    /// How the camera would move while frame `frame` is read if that took a second from the first row to the last; not at all if
-    /// `pose` does not know the frame or any neighbour.
+    /// How the camera would move while frame `frame` is read if that took a second from the first
+    /// row to the last; not at all if `pose` does not know the frame or any neighbour.
     ///
-    /// With `ξ₋`, `ξ₊` the tangent vectors ([`Pose::local`]) to the poses before and after, and `h₋`, `h₊` the times to them, the
-    /// velocity is that of the parabola through the three,
+    /// With `ξ₋`, `ξ₊` the tangent vectors ([`Pose::local`]) to the poses before and after, and
+    /// `h₋`, `h₊` the times to them, the velocity is that of the parabola through the three,
     ///
     /// `(h₋² ξ₊ − h₊² ξ₋)/(h₋ h₊ (h₋ + h₊))`:
     ///
-    /// for even times the central difference, and so the tangent of the Catmull–Rom spline. At the ends of the trajectory the one
-    /// neighbour must do. Between neighbours the camera must turn by less than half a turn.
+    /// for even times the central difference, and so the tangent of the Catmull–Rom spline. At the
+    /// ends of the trajectory the one neighbour must do. Between neighbours the camera must turn by
+    /// less than half a turn.
     ///
-    /// Source: E. Catmull, R. Rom, "A class of local interpolating splines", Computer Aided Geometric Design, 1974; A. W.
-    /// Overhauser, "Analytic definition of curves and surfaces by parabolic blending", 1968.
+    /// Source: E. Catmull, R. Rom, "A class of local interpolating splines", Computer Aided
+    /// Geometric Design, 1974; A. W. Overhauser, "Analytic definition of curves and surfaces by
+    /// parabolic blending", 1968.
     pub fn rate(&self, frame: usize, pose: impl Fn(usize) -> Option<Pose>) -> Sweep {
         let Some(own) = pose(frame) else {
             return Sweep::default();
@@ -89,7 +95,8 @@ mod tests {
     use crate::trajectory::{indexed, so3};
     use nalgebra::Vector3;
 
-    /// A screw motion: constant velocity in the camera's own coordinates for the turn, in the world's for the shift.
+    /// A screw motion: constant velocity in the camera's own coordinates for the turn, in the
+    /// world's for the shift.
     fn screw(time_s: f64) -> Pose {
         let start = so3::exp(&Vector3::new(0.1, 0.7, -0.2));
         let turn = so3::exp(&(Vector3::new(0.1, 1.5, 0.05) * time_s));

@@ -24,7 +24,8 @@ pub(crate) fn read(path: &Path) -> Result<String, PoseError> {
     }
 }
 
-/// The lines that say something, with their 1-based numbers: neither blank nor a comment that begins with `#`.
+/// The lines that say something, with their 1-based numbers: neither blank nor a comment that
+/// begins with `#`.
 pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines()
         .enumerate()
@@ -32,7 +33,8 @@ pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
-/// The pose of each line that says something; `parse_line` is given the line and the time of the pose before.
+/// The pose of each line that says something; `parse_line` is given the line and the time of the
+/// pose before.
 pub(super) fn stamped_lines(
     path: &Path,
     text: &str,
@@ -90,7 +92,8 @@ pub(crate) fn rotation([w, x, y, z]: [f64; 4], order: &str) -> Result<UnitQuater
             "the quaternion has length {norm:.4}, not 1; the order is {order}"
         ));
     }
-    // One that is of unit length to rounding stays to the bit, so that what is written and read again is the same.
+    // One that is of unit length to rounding stays to the bit, so that what is written and read
+    // again is the same.
     if (norm - 1.0).abs() <= 4.0 * f64::EPSILON {
         return Ok(UnitQuaternion::new_unchecked(quaternion));
     }
@@ -117,9 +120,10 @@ pub(crate) struct Names(HashSet<String>);
 impl Names {
     /// Adds a name.
     pub(crate) fn add(&mut self, name: &str) -> Result<(), String> {
-        match self.0.insert(name.to_owned()) {
-            true => Ok(()),
-            false => Err(format!("a second pose of {name}; a frame has one")),
+        if self.0.insert(name.to_owned()) {
+            Ok(())
+        } else {
+            Err(format!("a second pose of {name}; a frame has one"))
         }
     }
 }

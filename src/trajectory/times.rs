@@ -1,6 +1,7 @@
 //! Times as text: seconds, or nanoseconds in whole numbers.
 
-/// A whole number of so many digits is nanoseconds: those since 1970 have 19 from 2001 on, and no clock counts so many seconds.
+/// A whole number of so many digits is nanoseconds: those since 1970 have 19 from 2001 on, and no
+/// clock counts so many seconds.
 pub(crate) const LEAST_NANOSECOND_DIGITS: usize = 16;
 
 /// Seconds of a whole number of nanoseconds.
@@ -17,8 +18,8 @@ pub(crate) fn from_nanoseconds(word: &str) -> Result<f64, String> {
     Ok(seconds as f64 + rest as f64 * 1e-9)
 }
 
-/// Seconds of a number: whole numbers of 16 digits and more are nanoseconds, everything else is seconds. `None` for what is no
-/// finite number.
+/// Seconds of a number: whole numbers of 16 digits and more are nanoseconds, everything else is
+/// seconds. `None` for what is no finite number.
 pub(crate) fn from_word(word: &str) -> Option<f64> {
     let is_whole = !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
     if is_whole && word.len() >= LEAST_NANOSECOND_DIGITS {
@@ -27,8 +28,9 @@ pub(crate) fn from_word(word: &str) -> Option<f64> {
     word.parse::<f64>().ok().filter(|time_s| time_s.is_finite())
 }
 
-/// The time that a file's name (without its extension) tells: its last number, if that has a decimal point (seconds), ten
-/// digits (seconds since 1970) or 16 and more (nanoseconds). Other numbers are taken for counters.
+/// The time that a file's name (without its extension) tells: its last number, if that has a
+/// decimal point (seconds), ten digits (seconds since 1970) or 16 and more (nanoseconds). Other
+/// numbers are taken for counters.
 pub(crate) fn from_name(stem: &str) -> Option<f64> {
     let is_part = |c: char| c.is_ascii_digit() || c == '.';
     let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;

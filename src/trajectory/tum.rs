@@ -1,6 +1,7 @@
 //! TUM: `time tx ty tz qx qy qz qw` a line, seconds and metres, camera-to-world.
 //!
-//! Written with eight columns, single spaces and no trailing space, which is what `evo` accepts. The program's own format.
+//! Written with eight columns, single spaces and no trailing space, which is what `evo` accepts.
+//! The program's own format.
 
 use super::{Pose, PoseEntry, PoseError, PoseFormat, StampedPose, Trajectory, read_poses, text};
 use nalgebra::Vector3;
@@ -12,8 +13,9 @@ pub(super) const FORM: &str = "time tx ty tz qx qy qz qw";
 /// Reads a TUM file.
 ///
 /// # Errors
-/// An unreadable file; a line without exactly eight numbers; a number that is not finite; a quaternion of
-/// length zero (or farther than 1 % from unit length); times that do not increase; no pose at all.
+/// An unreadable file; a line without exactly eight numbers; a number that is not finite; a
+/// quaternion of length zero (or farther than 1 % from unit length); times that do not increase; no
+/// pose at all.
 pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
     Ok(read_poses(path, Some(PoseFormat::Tum))?.trajectory())
 }

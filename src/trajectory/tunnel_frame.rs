@@ -13,8 +13,8 @@ pub struct TunnelAxis {
     pub point_m: [f64; 3],
     /// Its direction, of any length.
     pub axis: [f64; 3],
-    /// The direction in which θ is 0, as far as it is perpendicular to the axis; without it the world's z, or its x for an
-    /// axis along z.
+    /// The direction in which θ is 0, as far as it is perpendicular to the axis; without it the
+    /// world's z, or its x for an axis along z.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub theta_zero: Option<[f64; 3]>,
 }
@@ -56,11 +56,13 @@ impl TunnelAxis {
 
 /// Reads the tunnel's frame in the world of the poses, `x_world = T x_tunnel`.
 ///
-/// The file is either a 4 × 4 matrix of text, a row a line, whose columns are the tunnel's x, y (the axis) and z (θ = 0) and its
-/// origin in the world; or JSON: `{"point_m": [x, y, z], "axis": [x, y, z]}` and, if wanted, `"theta_zero": [x, y, z]`.
+/// The file is either a 4 × 4 matrix of text, a row a line, whose columns are the tunnel's x, y
+/// (the axis) and z (θ = 0) and its origin in the world; or JSON:
+/// `{"point_m": [x, y, z], "axis": [x, y, z]}` and, if wanted, `"theta_zero": [x, y, z]`.
 ///
 /// # Errors
-/// An unreadable file; a matrix that is no rigid motion; JSON with other keys, or without directions.
+/// An unreadable file; a matrix that is no rigid motion; JSON with other keys, or without
+/// directions.
 pub fn read_tunnel_frame(path: &Path) -> Result<Pose, PoseError> {
     let text = text::read(path)?;
     if !text.trim_start().starts_with('{') {

@@ -1,5 +1,5 @@
-//! A table of broken inputs: each ends with exit code 3 (2 for wrong usage), a message that names the file, line or frame, no panic, and
-//! no output.
+//! A table of broken inputs: each ends with exit code 3 (2 for wrong usage), a message that names
+//! the file, line or frame, no panic, and no output.
 
 use crate::support::{self, first_frames, text, tunnelstitch};
 use std::path::Path;
@@ -28,7 +28,8 @@ enum Damage {
 
 use Damage::{Edit, Halve, None, Remove, Write, WriteAndEdit};
 
-/// Damage, command line (`S` is the survey, `O` a name for outputs), exit code, and what the message must hold.
+/// Damage, command line (`S` is the survey, `O` a name for outputs), exit code, and what the
+/// message must hold.
 type Row = (Damage, &'static str, i32, &'static [&'static str]);
 
 const TOML: &str = "survey.toml";

@@ -47,7 +47,8 @@ fn assert_honest(unknown: &serde_json::Value, truth: f64) {
     }
 }
 
-/// The fixture with a focal length 2 % too long: found to 0.05 %, and the refined survey goes with the refined poses.
+/// The fixture with a focal length 2 % too long: found to 0.05 %, and the refined survey goes with
+/// the refined poses.
 #[test]
 fn a_wrong_focal_length_is_found_and_the_result_is_a_survey() {
     let dir = first_frames(48);
@@ -112,7 +113,8 @@ fn everything_wrong_at_once_is_found_or_refused() {
     assert_eq!(unknown("radius")["observed"], false);
 }
 
-/// Initial poses that are sure in metres, in a frame that has the axis tilted and shifted, tell the radius and the axis.
+/// Initial poses that are sure in metres, in a frame that has the axis tilted and shifted, tell the
+/// radius and the axis.
 #[test]
 fn sure_positions_tell_radius_and_axis() {
     let dir = tempfile::tempdir().unwrap();

@@ -149,7 +149,8 @@ fn every_command_takes_options_from_its_survey() {
     let shown = succeed(&["config", text(survey.path()), "convert"]);
     assert!(shown.contains("to = \"kitti\"    # survey.toml"), "{shown}");
     assert!(shown.contains("quiet = true    # survey.toml"), "{shown}");
-    // All of it may be put into the survey: nothing that is so in any case keeps another option out.
+    // All of it may be put into the survey: nothing that is so in any case keeps another option
+    // out.
     let all = succeed(&["config", text(survey.path())]);
     std::fs::write(survey.path().join("survey.toml"), all).unwrap();
     let table = survey.path().join("plan.csv");

@@ -67,7 +67,8 @@ fn numbers(value: &Value) -> Vec<f64> {
         .collect()
 }
 
-/// The names in an object, sorted. The schema of 3D Tiles knows no others than those that are asked for here.
+/// The names in an object, sorted. The schema of 3D Tiles knows no others than those that are asked
+/// for here.
 fn names(value: &Value) -> Vec<&str> {
     let mut names: Vec<&str> = (value.as_object().unwrap().keys())
         .map(String::as_str)
@@ -175,8 +176,9 @@ fn every_vertex_lies_on_the_wall_and_they_go_all_around() {
     );
 }
 
-/// A walk through the tree, as a program does that streams it. Every tile lies in its box, boxes in those above, errors fall, and
-/// the finest tiles cover the wall once: neighbours have the same vertices where they meet.
+/// A walk through the tree, as a program does that streams it. Every tile lies in its box, boxes in
+/// those above, errors fall, and the finest tiles cover the wall once: neighbours have the same
+/// vertices where they meet.
 #[test]
 fn the_tree_holds_together() {
     let folder = &work().tiles;
@@ -268,8 +270,8 @@ fn the_tree_holds_together() {
     let (first, last) = chainages.fold((f64::MAX, f64::MIN), |(a, b), h| (a.min(h), b.max(h)));
     assert!(corners.places.len() > 1000);
     for (vertex, count) in corners.places.values() {
-        // A straight tunnel has vertices at the tiles' upper and lower borders only: there two rows of tiles meet, and four tiles at
-        // their corners.
+        // A straight tunnel has vertices at the tiles' upper and lower borders only: there two rows
+        // of tiles meet, and four tiles at their corners.
         let inner = (first + 1e-3..last - 1e-3).contains(&vertex[1]);
         let expected = if inner { [2, 4] } else { [1, 2] };
         assert!(expected.contains(count), "{vertex:?}: {count}");

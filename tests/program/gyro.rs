@@ -1,4 +1,5 @@
-//! Initial poses from a gyro's log, through the program: a simulated survey, a log made from its true rotations, refinement.
+//! Initial poses from a gyro's log, through the program: a simulated survey, a log made from its
+//! true rotations, refinement.
 
 use crate::support::{fail, simulate, succeed, text, tunnelstitch};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -17,7 +18,8 @@ const REST_S: f64 = 4.0;
 const NOISE_DEG_S: f64 = 0.28;
 const BIAS_DEG_S: [f64; 3] = [0.6, -1.1, 0.3];
 
-/// The log of a sensor with x right, y up and z backwards (`YxZ`) that turns from pose to pose, one a second.
+/// The log of a sensor with x right, y up and z backwards (`YxZ`) that turns from pose to pose, one
+/// a second.
 ///
 /// The tunnel's bottom is at θ = 180°, and the first camera looks up, along z.
 fn gcsv(truth: &[Pose], title: &str) -> String {
@@ -69,8 +71,8 @@ fn simulated(survey: &Path) -> Vec<Pose> {
     poses_of(&tum::read(&survey.join("groundtruth.tum")).unwrap())
 }
 
-/// Simulate, log, integrate, refine: the gyro's poses are far better than the plan's, are as far off as is said, and refinement
-/// ends below a tenth of a pixel.
+/// Simulate, log, integrate, refine: the gyro's poses are far better than the plan's, are as far
+/// off as is said, and refinement ends below a tenth of a pixel.
 #[test]
 fn a_gyros_log_makes_poses_that_refine() {
     let dir = tempfile::tempdir().unwrap();
@@ -130,7 +132,8 @@ fn a_gyros_log_makes_poses_that_refine() {
     // Gravity tells the first angle, to the noise of the way from the rest.
     assert!(poses[0].r_wc.angle_to(&truth[0].r_wc) < 0.01);
 
-    // So does a rest after the last frame, where the carrier is tilted; the bias is known to 0.011°/s there, 0.3° until the first.
+    // So does a rest after the last frame, where the carrier is tilted; the bias is known to
+    // 0.011°/s there, 0.3° until the first.
     let late = dir.path().join("late.tum");
     succeed(&[
         "gyro",
@@ -223,7 +226,8 @@ fn the_clock_is_found_by_the_plan() {
         .unwrap();
     assert!((offset_s - REST_S).abs() < 0.003, "{said}");
     let poses = poses_of(&tum::read(&out).unwrap());
-    // Two seconds of rest tell the bias to 0.28°/s / √400, which is 0.4° about each axis after 29 s: three times that.
+    // Two seconds of rest tell the bias to 0.28°/s / √400, which is 0.4° about each axis after 29
+    // s: three times that.
     let sigma = (29.0 * NOISE_DEG_S / 20.0).to_radians() * 3f64.sqrt();
     assert!(poses[29].r_wc.angle_to(&truth[29].r_wc) < 3.0 * sigma);
     assert!((poses[29].t_wc.y - 1.45).abs() < 1e-9);

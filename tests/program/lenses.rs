@@ -37,7 +37,8 @@ fn assert_repaired(report: &serde_json::Value) {
     let wall_px = |which: &str| report[which]["wall"]["px"]["rms"].as_f64().unwrap();
     assert!(wall_px("baseline") > 10.0, "{report}");
     assert!(wall_px("refined") < 0.05, "{report}");
-    // The warp shows what the simulator drew: the same wall from all frames, and nearly that of the true poses.
+    // The warp shows what the simulator drew: the same wall from all frames, and nearly that of the
+    // true poses.
     assert!(
         report["refined"]["image"]["psnr_db"].as_f64().unwrap() > 35.0,
         "{report}"

@@ -23,7 +23,8 @@ fn near(a: [f64; 2], b: [f64; 2], tolerance: f64) -> bool {
     (a[0] - b[0]).abs() < tolerance && (a[1] - b[1]).abs() < tolerance
 }
 
-/// A pixel of the panorama, its place on the wall, and the pixel of a frame that shows it all lead to each other.
+/// A pixel of the panorama, its place on the wall, and the pixel of a frame that shows it all lead
+/// to each other.
 #[test]
 fn every_way_leads_to_the_same_point() {
     let survey = first_frames(6);
@@ -95,7 +96,8 @@ fn between(picture: &image::RgbImage, [u, v]: [f64; 2], channel: usize) -> f64 {
     row(y) * (1.0 - fy) + row(y + 1) * fy
 }
 
-/// What the picture shows at a pixel, the frames show at theirs. The frames are those of another program.
+/// What the picture shows at a pixel, the frames show at theirs. The frames are those of another
+/// program.
 #[test]
 fn the_frames_show_there_what_the_panorama_shows() {
     let survey = first_frames(4);

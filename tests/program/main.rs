@@ -1,4 +1,5 @@
-//! The program as its users meet it: run from outside, on files, and judged by what it prints and writes.
+//! The program as its users meet it: run from outside, on files, and judged by what it prints and
+//! writes.
 
 mod bad_input;
 mod broken_inputs;

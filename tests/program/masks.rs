@@ -112,7 +112,8 @@ fn panorama(survey: &Path, more: &[&str]) -> image::GrayAlphaImage {
     image::open(&out).unwrap().to_luma_alpha8()
 }
 
-/// Root mean square difference where both show the wall, grey levels, and the share of pixels with more than 25.
+/// Root mean square difference where both show the wall, grey levels, and the share of pixels with
+/// more than 25.
 fn difference(a: &image::GrayAlphaImage, b: &image::GrayAlphaImage) -> (f64, f64) {
     let both = a
         .pixels()
@@ -273,7 +274,8 @@ fn wall_that_moves_is_ignored_if_it_is_said_to() {
             let wall = survey.surface.hit(&pose.t_wc, &ray).unwrap().wall;
             let theta_deg = (wall.s_m / 3.0).to_degrees();
             if (145.0..215.0).contains(&theta_deg) && (0.4..1.4).contains(&wall.h_m) {
-                // Waves that run along with the camera, half as fast again, a tenth of a metre long.
+                // Waves that run along with the camera, half as fast again, a tenth of a metre
+                // long.
                 let at = Vector2::new(wall.s_m, wall.h_m - 1.5 * pose.t_wc.y);
                 let wave = (63.0 * at.y + 9.0 * at.x).sin() + (41.0 * at.x - 17.0 * at.y).sin();
                 pixel.0[0] = (110.0 + 40.0 * wave) as u8;

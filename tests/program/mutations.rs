@@ -1,4 +1,5 @@
-//! Sound files with random damage: every parser answers, with an error or with something finite, and none panics.
+//! Sound files with random damage: every parser answers, with an error or with something finite,
+//! and none panics.
 
 use proptest::prelude::*;
 use std::path::Path;

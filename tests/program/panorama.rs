@@ -1,4 +1,5 @@
-//! Panoramas through the program: what they look like, and that they depend on nothing but the input.
+//! Panoramas through the program: what they look like, and that they depend on nothing but the
+//! input.
 
 use crate::support::{self, blender_survey, fail, first_frames, succeed, text};
 use image::{DynamicImage, GenericImageView};
@@ -15,9 +16,9 @@ fn stitch(survey: &Path, out: &Path, more: &[&str]) -> DynamicImage {
     image::open(out).unwrap()
 }
 
-/// The first turn of the fixture at its true poses against the committed picture, which was looked at:
-/// upright signs, straight mortar lines, no seam. A decoder or a rounding may move a grey level here and
-/// there; a pixel on the wall may not.
+/// The first turn of the fixture at its true poses against the committed picture, which was looked
+/// at: upright signs, straight mortar lines, no seam. A decoder or a rounding may move a grey level
+/// here and there; a pixel on the wall may not.
 #[test]
 fn the_panorama_is_the_golden_picture() {
     let survey = first_frames(12);
@@ -84,7 +85,8 @@ fn chainage_right_is_the_picture_turned() {
     assert_eq!(upright.rotate270().to_rgba8(), turned.to_rgba8());
 }
 
-/// The paper's zoom: a camera 0.71 m off the axis that is treated as standing on it puts all wall at 3 m.
+/// The paper's zoom: a camera 0.71 m off the axis that is treated as standing on it puts all wall
+/// at 3 m.
 #[test]
 fn ignoring_the_offset_puts_the_wall_at_the_radius() {
     let dir = tempfile::tempdir().unwrap();
@@ -101,12 +103,14 @@ fn ignoring_the_offset_puts_the_wall_at_the_radius() {
         let chainage = |k: usize| report["chainage_m"][k].as_f64().unwrap();
         chainage(1) - chainage(0)
     };
-    // From the outermost pixel centres, 35.5 px from the middle; f = 36 px / tan 30°; to a row of the panorama.
+    // From the outermost pixel centres, 35.5 px from the middle; f = 36 px / tan 30°; to a row of
+    // the panorama.
     let slope = 2.0 * 35.5 / 36.0 * 30f64.to_radians().tan();
     let row = 0.05;
     let on_axis = span(&["--ignore-offset"]);
     assert!((0.0..row).contains(&(on_axis - 3.0 * slope)), "{on_axis}");
-    // The farthest wall lies at 225°, between the frames at 210° and 240°: 15° beside their middles.
+    // The farthest wall lies at 225°, between the frames at 210° and 240°: 15° beside their
+    // middles.
     let farthest = 3.0 + 0.5f64.hypot(0.5);
     let off_axis = span(&[]);
     let least = farthest * 15f64.to_radians().cos() * slope;
@@ -284,8 +288,8 @@ fn light_and_exposure_are_undone() {
     }
 }
 
-/// Over more than one band, with tiles that no frame meets: who draws maps keeps account of frames, who does not must leave the same
-/// holes.
+/// Over more than one band, with tiles that no frame meets: who draws maps keeps account of frames,
+/// who does not must leave the same holes.
 #[test]
 fn the_panorama_is_the_same_with_maps_and_without() {
     let dir = tempfile::tempdir().unwrap();

@@ -144,7 +144,8 @@ fn rename_by_time(dir: &Path, times_ns: &[u64]) {
     }
 }
 
-/// EuRoC's poses of a body in another world, more often than there are frames: tied by time, mounted, and moved into the tunnel.
+/// EuRoC's poses of a body in another world, more often than there are frames: tied by time,
+/// mounted, and moved into the tunnel.
 #[test]
 fn a_bodys_poses_in_another_world_are_found_by_time() {
     let survey = first_frames(4);
@@ -161,7 +162,8 @@ fn a_bodys_poses_in_another_world_are_found_by_time() {
     };
     let world = axis.frame().unwrap();
     let body = |pose: &Pose| world.after(pose).after(&camera_in_body.inverse());
-    // A frame every 200 ms; the body's poses 80 ms before each and 40 ms after, on the way to the neighbours.
+    // A frame every 200 ms; the body's poses 80 ms before each and 40 ms after, on the way to the
+    // neighbours.
     let begin_ns = 1_403_636_580_000_000_000u64;
     let frame_ns: Vec<u64> = (0..4).map(|k| begin_ns + k * 200_000_000).collect();
     rename_by_time(dir, &frame_ns);
@@ -310,7 +312,8 @@ fn a_list_of_times_ties_poses_to_numbered_frames() {
     );
 }
 
-/// Poses of other conventions are refused with the flag that mends them, and with it they are right.
+/// Poses of other conventions are refused with the flag that mends them, and with it they are
+/// right.
 #[test]
 fn wrong_conventions_are_named_with_their_flags() {
     let survey = first_frames(24);
@@ -384,7 +387,8 @@ fn wrong_conventions_are_named_with_their_flags() {
     );
 }
 
-/// Planned poses on the axis look at the wall however they are read: the pictures tell, and each flag that is named mends it.
+/// Planned poses on the axis look at the wall however they are read: the pictures tell, and each
+/// flag that is named mends it.
 #[test]
 fn what_only_pictures_can_tell_is_named_by_refine() {
     let survey = first_frames(14);
@@ -412,7 +416,8 @@ fn what_only_pictures_can_tell_is_named_by_refine() {
     }
 }
 
-/// `refine` takes poses of any format and writes the same, to the byte, as from TUM; `compare` reads what `convert` writes.
+/// `refine` takes poses of any format and writes the same, to the byte, as from TUM; `compare`
+/// reads what `convert` writes.
 #[test]
 fn refine_and_compare_take_any_format() {
     let survey = first_frames(6);

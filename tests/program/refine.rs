@@ -55,7 +55,8 @@ fn the_fixture_is_repaired_and_any_number_of_threads_gives_the_same_bytes() {
     }
 }
 
-/// Simulates a survey with the given options and refines it; returns refine.json and what was warned of.
+/// Simulates a survey with the given options and refines it; returns refine.json and what was
+/// warned of.
 fn refine_simulated(options: &[&str]) -> (serde_json::Value, String) {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
@@ -119,7 +120,8 @@ fn poses_in_the_wrong_direction_are_warned_of() {
     let out = survey.path().join("out");
     let output = support::tunnelstitch(&["refine", text(survey.path()), "--out", text(&out)]);
     let warned = String::from_utf8_lossy(&output.stderr);
-    // A plan exactly on the axis, read from world to camera, is one of OpenGL's axes seen from the tunnel's other end.
+    // A plan exactly on the axis, read from world to camera, is one of OpenGL's axes seen from the
+    // tunnel's other end.
     let named = |flag: &str| warned.contains(flag);
     assert!(
         named("--pose-convention w2c") || named("--camera-axes opengl (poses.camera_axes"),
@@ -127,7 +129,8 @@ fn poses_in_the_wrong_direction_are_warned_of() {
     );
 }
 
-/// Root mean square wall error of a refined survey's believed frames, pixels, with the gauge fixed by them.
+/// Root mean square wall error of a refined survey's believed frames, pixels, with the gauge fixed
+/// by them.
 fn believed_wall_px(survey: &Path, out: &Path) -> f64 {
     let survey = tunnelstitch::survey::Survey::open(survey).unwrap();
     let report = json(&out.join("refine.json"));
@@ -156,7 +159,8 @@ fn repaired(options: &[&str]) -> tempfile::TempDir {
     dir
 }
 
-/// Gain ±30 %, a lamp that falls to 40 % at the corners, glints on 3 % of the wall, things before it, 16 bits.
+/// Gain ±30 %, a lamp that falls to 40 % at the corners, glints on 3 % of the wall, things before
+/// it, 16 bits.
 #[test]
 fn uneven_light_glints_and_moving_things_do_no_harm() {
     let light = "--frames 30 --size 480x360 --gain-percent 30 --bias-grey 5 --lamp-corner 0.4 \
@@ -166,7 +170,8 @@ fn uneven_light_glints_and_moving_things_do_no_harm() {
     assert!(px < 0.15, "{px}");
 }
 
-/// The same light on concrete, whose contrast is 3 to 4 grey levels: what the light leaves is steeper than the wall.
+/// The same light on concrete, whose contrast is 3 to 4 grey levels: what the light leaves is
+/// steeper than the wall.
 #[test]
 fn hard_light_does_no_harm_on_a_faint_wall() {
     let light = "--frames 24 --wall concrete --gain-percent 30 --lamp-corner 0.4 --specular-percent 3 --seed 2";
@@ -234,8 +239,8 @@ fn a_wrong_prior_costs_one_frame() {
     assert!(px < 0.05, "{px}");
 }
 
-/// On a wall that repeats every 0.45 m, with steps of 6° and 9 cm: no frame is a tile off and called sure, and one that the
-/// prior leaves undecided has both poses.
+/// On a wall that repeats every 0.45 m, with steps of 6° and 9 cm: no frame is a tile off and
+/// called sure, and one that the prior leaves undecided has both poses.
 #[test]
 fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
     let options = "--wall tiled-brick --frames 24 --size 320x240 --seed 2 \
@@ -253,7 +258,8 @@ fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
     }
 }
 
-/// Where a turn closes on little overlap, the wall's coarse levels would bend it to the next tile, and every pair of frames would fit.
+/// Where a turn closes on little overlap, the wall's coarse levels would bend it to the next tile,
+/// and every pair of frames would fit.
 #[test]
 fn a_turn_closes_on_the_right_tile() {
     let options = "--wall tiled-brick --frames 60 --size 480x360 --seed 2 --jitter random-walk \
@@ -268,7 +274,8 @@ fn a_turn_closes_on_the_right_tile() {
     assert!(px < 0.05, "{px}");
 }
 
-/// A focal length 1 % off leaves errors that no pose takes away: no frame is called sure, and the reason is named.
+/// A focal length 1 % off leaves errors that no pose takes away: no frame is called sure, and the
+/// reason is named.
 #[test]
 fn a_wrong_camera_strains_the_frames() {
     let dir = tempfile::tempdir().unwrap();
@@ -291,7 +298,8 @@ fn a_wrong_camera_strains_the_frames() {
     }
 }
 
-/// Sharp bricks: with the wall solved for, at least a quarter of the error goes, and the uncertainty stated goes with it.
+/// Sharp bricks: with the wall solved for, at least a quarter of the error goes, and the
+/// uncertainty stated goes with it.
 #[test]
 fn solving_for_the_wall_makes_bricks_more_exact() {
     let dir = tempfile::tempdir().unwrap();

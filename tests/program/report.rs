@@ -1,4 +1,5 @@
-//! The report of a survey with a black frame: its numbers, its page, and how that looks in a browser.
+//! The report of a survey with a black frame: its numbers, its page, and how that looks in a
+//! browser.
 
 use crate::support::{
     self,
@@ -113,7 +114,8 @@ fn its_numbers_are_those_of_refine_and_compare() {
             let Some(cost) = step["cost"].as_f64() else {
                 continue;
             };
-            // The cost falls; only a step within a pixel may leave it as rough as it is on sharp walls.
+            // The cost falls; only a step within a pixel may leave it as rough as it is on sharp
+            // walls.
             let settles = step["step_px"].as_f64().unwrap() < pixel_px && cost < 1.01 * last;
             assert!(cost < last || settles, "{last} → {cost} by {step}");
             last = cost;
@@ -229,7 +231,8 @@ fn the_page_is_well_formed_and_needs_nothing_else() {
     }
 }
 
-/// The tags of a page without their brackets; each that needs an end must have it, in the right order.
+/// The tags of a page without their brackets; each that needs an end must have it, in the right
+/// order.
 fn tags(html: &str) -> Vec<&str> {
     const VOID: [&str; 6] = ["!DOCTYPE", "meta", "link", "img", "input", "br"];
     let (mut open, mut found) = (Vec::new(), Vec::new());
@@ -286,9 +289,10 @@ fn it_looks_right_wide_and_narrow_light_and_dark() {
                 |pixel: &image::Rgb<u8>| pixel.0.iter().map(|c| u32::from(*c)).sum::<u32>() / 3;
             let paper = brightness(picture.get_pixel(2, 2));
             let mean = picture.pixels().map(brightness).sum::<u32>() / (size[0] * size[1]);
-            match dark {
-                true => assert!(paper < 40 && mean < 110, "{look:?}: {paper}, {mean}"),
-                false => assert!(paper > 240 && mean > 150, "{look:?}: {paper}, {mean}"),
+            if dark {
+                assert!(paper < 40 && mean < 110, "{look:?}: {paper}, {mean}")
+            } else {
+                assert!(paper > 240 && mean > 150, "{look:?}: {paper}, {mean}")
             }
             // Text stands out from the paper, and there are colours.
             let contrast = picture

@@ -36,7 +36,8 @@ fn start(arguments: &[&str]) -> Child {
         .unwrap()
 }
 
-/// Starts the command and kills it at random moments, at least until one run has gone on with what another one left, and then lets it end.
+/// Starts the command and kills it at random moments, at least until one run has gone on with what
+/// another one left, and then lets it end.
 fn killed(arguments: &[&str], takes: Duration, seed: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut kills, mut resumed) = (0, 0);
@@ -63,9 +64,10 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        match path.is_dir() {
-            true => files.extend(self::files(&path)),
-            false => files.push(path),
+        if path.is_dir() {
+            files.extend(self::files(&path))
+        } else {
+            files.push(path)
         }
     }
     files.sort();
@@ -87,7 +89,8 @@ fn assert_same(left: &Path, right: &Path, tell: impl Fn(&Path) -> Vec<u8>) {
     }
 }
 
-/// The bytes of a file; of refine.json and run.toml without what tells of the run and not of the result.
+/// The bytes of a file; of refine.json and run.toml without what tells of the run and not of the
+/// result.
 fn result(path: &Path) -> Vec<u8> {
     let bytes = std::fs::read(path).unwrap();
     match path.file_name().and_then(|name| name.to_str()) {

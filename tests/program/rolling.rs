@@ -1,4 +1,5 @@
-//! Rolling shutter through the program: rows read over 20 ms while the camera turns at 90 degrees a second.
+//! Rolling shutter through the program: rows read over 20 ms while the camera turns at 90 degrees a
+//! second.
 
 use crate::support::{self, edit, fail, json, succeed, text, tunnelstitch};
 use serde_json::Value;
@@ -67,7 +68,8 @@ fn rows_get_their_own_poses_and_where_they_do_not_the_program_says_so() {
     let shift_px = number(&rows, "/shift_px");
     assert!((shift_px - 6.5).abs() < 0.5, "{rows}");
 
-    // The pictures themselves: true poses agree as well as the noise allows with the rows' own poses, and only so.
+    // The pictures themselves: true poses agree as well as the noise allows with the rows' own
+    // poses, and only so.
     let ignored = compare(&survey, &out, &compared);
     let seam = |of: &Value| number(of, "/truth/seam/rms_grey");
     assert!(seam(&ignored) > 1.5 * seam(&given));

@@ -1,9 +1,11 @@
-//! Tunnels that are not round or not straight, from the simulator, which has equations of its own, to the panorama.
+//! Tunnels that are not round or not straight, from the simulator, which has equations of its own,
+//! to the panorama.
 
 use crate::support::{fail, json, simulate, succeed, text};
 use std::path::Path;
 
-/// Simulates a survey, refines it and compares: the wall error, pixels RMS, and that of the initial poses.
+/// Simulates a survey, refines it and compares: the wall error, pixels RMS, and that of the initial
+/// poses.
 fn refined(folder: &Path, arguments: &[&str]) -> [f64; 2] {
     let path = |name: &str| folder.join(name);
     let (survey, refined, out) = (path("survey"), path("refined"), path("compared"));
@@ -56,14 +58,15 @@ fn circling(pitch_m: f64) -> String {
     (0..50).map(point).collect()
 }
 
-/// How far a tunnel is turned about its own line shows in the bend alone, and a short one tells little of it: the poses are as exact as
-/// they are said to be.
+/// How far a tunnel is turned about its own line shows in the bend alone, and a short one tells
+/// little of it: the poses are as exact as they are said to be.
 #[test]
 fn a_tight_bend_is_refined_as_exactly_as_is_said() {
     a_narrow_tunnel_is_refined_as_exactly_as_is_said(&bend(), "24");
 }
 
-/// Nothing of a line that bends to and fro, in a tunnel that widens and narrows, may be moved without a picture that tells.
+/// Nothing of a line that bends to and fro, in a tunnel that widens and narrows, may be moved
+/// without a picture that tells.
 #[test]
 fn a_winding_tunnel_of_changing_radius_is_refined_as_exactly_as_is_said() {
     let point = |k: i32| {
@@ -98,7 +101,8 @@ fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str, frames: &str) 
     exact_as_said(dir.path(), refined, initial);
 }
 
-/// The wall error, pixels, is no more than three of its own 1-σ as `refine` tells it, and that is little.
+/// The wall error, pixels, is no more than three of its own 1-σ as `refine` tells it, and that is
+/// little.
 fn exact_as_said(folder: &Path, refined: f64, initial: f64) {
     let json = json(&folder.join("refined/refine.json"));
     let frames = json["frames"].as_array().unwrap();

@@ -23,7 +23,8 @@ fn simulate_with(out: &Path, more: &[&str]) -> String {
     succeed(&arguments)
 }
 
-/// All files of a folder and of its folders with their contents, by name; but for the record, which names the folder.
+/// All files of a folder and of its folders with their contents, by name; but for the record, which
+/// names the folder.
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -121,7 +122,8 @@ fn a_texture_papers_the_wall() {
     assert!(frame.iter().all(|value| *value == 180));
 }
 
-/// A record of a survey with nothing special holds nothing special: what was simulated before stays as it was.
+/// A record of a survey with nothing special holds nothing special: what was simulated before stays
+/// as it was.
 #[test]
 fn hardships_are_recorded_and_reproducible() {
     let dir = tempfile::tempdir().unwrap();

@@ -67,7 +67,8 @@ impl Simulated {
         }
     }
 
-    /// The frame with the highest resolution at a wall point, bicubic; the feathered mean of all; how many there are.
+    /// The frame with the highest resolution at a wall point, bicubic; the feathered mean of all;
+    /// how many there are.
     fn bicubic(&self, wall: WallPoint) -> Option<(f32, f32, usize)> {
         let (frame, camera) = (self.circle.frame(wall), self.scene.camera());
         let kernel = &self.bicubic;
@@ -120,12 +121,15 @@ impl Simulated {
                 pose,
             })
             .collect();
-        let read = |value: f32| match value.is_finite() {
-            true => Reading {
-                value,
-                inverse_sigma: 1.0 / self.noise,
-            },
-            false => Reading::default(),
+        let read = |value: f32| {
+            if value.is_finite() {
+                Reading {
+                    value,
+                    inverse_sigma: 1.0 / self.noise,
+                }
+            } else {
+                Reading::default()
+            }
         };
         let clock = Instant::now();
         let footprints = Footprints::new(&self.circle, &self.canvas.lattice(), region, &views);
@@ -154,7 +158,8 @@ impl Simulated {
         (drawn, seconds)
     }
 
-    /// Tiles around the middle of the survey, `bands` high, every `stride`-th around; and the seconds.
+    /// Tiles around the middle of the survey, `bands` high, every `stride`-th around; and the
+    /// seconds.
     fn draw_middle(&self, bands: usize, stride: usize) -> (Vec<Drawn>, f64) {
         let first = (self.canvas.rows as usize / 2).saturating_sub(bands * TILE / 2);
         let (mut drawn, mut seconds) = (Vec::new(), 0.0);
@@ -216,7 +221,8 @@ fn psnr_db(drawn: &[Drawn], value: impl Fn(&Drawn) -> f32) -> f64 {
     10.0 * (255.0f64.powi(2) * drawn.len() as f64 / squares.sum::<f64>()).log10()
 }
 
-/// Two turns in a tunnel of half the radius, with frames of half the size: pixels of the same size on the wall.
+/// Two turns in a tunnel of half the radius, with frames of half the size: pixels of the same size
+/// on the wall.
 fn small(wall: Wall, noise_grey: f64) -> SimulateOptions {
     SimulateOptions {
         frames: 24,
@@ -267,7 +273,8 @@ fn slanted_edges_are_sharper() {
     );
 }
 
-/// `cargo test --release --test program super_resolve:: -- --ignored --nocapture`: the figures of full-size surveys.
+/// `cargo test --release --test program super_resolve:: -- --ignored --nocapture`: the figures of
+/// full-size surveys.
 #[test]
 #[ignore = "minutes; prints a table"]
 fn figures() {

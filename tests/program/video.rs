@@ -30,7 +30,8 @@ fn video_of(pattern: &Path, video: &Path, codec: &[&str]) {
 }
 
 const LOSSLESS: [&str; 4] = ["-c:v", "ffv1", "-pix_fmt", "gray"];
-/// Pictures that hang together over a dozen others, forwards and backwards, and across the key pictures.
+/// Pictures that hang together over a dozen others, forwards and backwards, and across the key
+/// pictures.
 const ENTANGLED: [&str; 12] = [
     "-c:v",
     "libx264",
@@ -66,7 +67,8 @@ fn into_video(survey: &Path, name: &str, codec: &[&str]) {
     );
 }
 
-/// In whatever order they are asked for, by however many at once, pictures are those that come in sequence.
+/// In whatever order they are asked for, by however many at once, pictures are those that come in
+/// sequence.
 #[test]
 fn every_picture_is_the_one_asked_for() {
     let dir = tempfile::tempdir().unwrap();

@@ -247,7 +247,8 @@ fn the_server_answers_its_own_page_and_writes_nothing_but_marks() {
     );
 }
 
-/// A wall once around with bright dots 1000 px of 6283 apart, along the axis and around: a metre, where the perimeter is 6.283 m.
+/// A wall once around with bright dots 1000 px of 6283 apart, along the axis and around: a metre,
+/// where the perimeter is 6.283 m.
 fn target(path: &Path) -> f64 {
     let (width, height) = (6283u32, 2400u32);
     let mut picture = image::GrayImage::from_fn(width, height, |x, y| {

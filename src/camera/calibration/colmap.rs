@@ -7,7 +7,8 @@ use crate::camera::{Camera, Lens, Sweep};
 /// Makes a lens of its coefficients.
 type ReadLens = fn(&[f64]) -> Result<Lens, Fault>;
 
-/// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixels are counted from the corner of the first and converted.
+/// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixels are counted from the corner of the first
+/// and converted.
 pub fn read(text: &str, name: Option<&str>) -> Result<Camera, Fault> {
     let lines = text.lines().enumerate();
     let cameras: Vec<_> = lines

@@ -21,7 +21,8 @@ fn cameras(tree: &Value) -> impl Iterator<Item = (String, &Value)> {
         .map(|(name, value)| (name.clone(), value))
 }
 
-/// Reads `camera_model: pinhole`, `intrinsics: [fx, fy, cx, cy]`, `distortion_model`, `distortion_coeffs` and `resolution`.
+/// Reads `camera_model: pinhole`, `intrinsics: [fx, fy, cx, cy]`, `distortion_model`,
+/// `distortion_coeffs` and `resolution`.
 pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
     let camera = choose(cameras(tree).collect(), name)?;
     let model = word(camera, "camera_model").unwrap_or("pinhole");

@@ -1,5 +1,5 @@
-//! Calibration files: our own (JSON or TOML), OpenCV's YAML, ROS's camera_info, Kalibr's camchain, COLMAP's cameras.txt and
-//! nerfstudio's transforms.json.
+//! Calibration files: our own (JSON or TOML), OpenCV's YAML, ROS's camera_info, Kalibr's camchain,
+//! COLMAP's cameras.txt and nerfstudio's transforms.json.
 //!
 //! | file | told by | lens | first pixel |
 //! | --- | --- | --- | --- |
@@ -80,12 +80,13 @@ const SMALLEST: u32 = 16;
 /// A lens that shows less of the picture than this has other numbers than were meant.
 const LEAST_SHOWN: f64 = 0.5;
 
-/// Reads a calibration file; which kind it is follows from its name and content (see the table in the module's documentation).
-/// `name`: which camera, where a file has several (`cam1`, a COLMAP id).
+/// Reads a calibration file; which kind it is follows from its name and content (see the table in
+/// the module's documentation). `name`: which camera, where a file has several (`cam1`, a COLMAP
+/// id).
 ///
 /// # Errors
-/// An unreadable file; an unknown, missing or impossible entry, with its line where it is known; a lens model that is not
-/// supported; several cameras and no name.
+/// An unreadable file; an unknown, missing or impossible entry, with its line where it is known; a
+/// lens model that is not supported; several cameras and no name.
 pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, CalibrationError> {
     let content = |fault: Fault| CalibrationError::Content {
         path: path.to_owned(),

@@ -13,8 +13,9 @@ pub fn is_transforms(tree: &Value) -> bool {
         .any(|name| tree.get(name).is_some())
 }
 
-/// Reads `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`, `camera_model` and the coefficients, which stand at the top or, if every frame has
-/// its own, in each frame (then `name` is a frame's `file_path`). Pixels are counted from the corner of the first and converted.
+/// Reads `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`, `camera_model` and the coefficients, which stand at
+/// the top or, if every frame has its own, in each frame (then `name` is a frame's `file_path`).
+/// Pixels are counted from the corner of the first and converted.
 pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
     if tree.get("fl_x").is_some() {
         return camera(tree, tree);

@@ -26,9 +26,11 @@ const DISTORTION: [&str; 7] = [
 const WIDTH: [&str; 3] = ["image_width", "width", "image_Width"];
 const HEIGHT: [&str; 3] = ["image_height", "height", "image_Height"];
 
-/// Reads `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height` (or what else these are called).
+/// Reads `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height` (or what else
+/// these are called).
 ///
-/// ROS names the lens in `distortion_model`; OpenCV's own files have a fisheye if `fisheye_model` is 1.
+/// ROS names the lens in `distortion_model`; OpenCV's own files have a fisheye if `fisheye_model`
+/// is 1.
 pub fn read(tree: &Value) -> Result<Camera, Fault> {
     let matrix = entry(tree, &MATRIX).ok_or_else(|| {
         Fault::new(

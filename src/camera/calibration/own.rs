@@ -24,9 +24,10 @@ enum PixelCentre {
     Half,
 }
 
-/// `model` ("pinhole", "brown-conrady" or "kannala-brandt"), `width`, `height`, `fx`, `fy`, `cx`, `cy` in pixels; the
-/// coefficients k1 to k6, p1, p2 of a [`BrownConrady`] or k1 to k4 of a [`KannalaBrandt`], 0 if missing; `max_angle_deg`, the
-/// largest angle off the axis that is to be used, all if missing; and `pixel_centre` ("integer", the default, or "half").
+/// `model` ("pinhole", "brown-conrady" or "kannala-brandt"), `width`, `height`, `fx`, `fy`, `cx`,
+/// `cy` in pixels; the coefficients k1 to k6, p1, p2 of a [`BrownConrady`] or k1 to k4 of a
+/// [`KannalaBrandt`], 0 if missing; `max_angle_deg`, the largest angle off the axis that is to be
+/// used, all if missing; and `pixel_centre` ("integer", the default, or "half").
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraFile {

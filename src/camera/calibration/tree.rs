@@ -3,8 +3,8 @@
 use super::Fault;
 use serde_json::Value;
 
-/// A YAML file. OpenCV's own begin with `%YAML:1.0`, which YAML does not allow, and mark matrices with a tag that nobody else
-/// knows; both are left out.
+/// A YAML file. OpenCV's own begin with `%YAML:1.0`, which YAML does not allow, and mark matrices
+/// with a tag that nobody else knows; both are left out.
 pub fn of_yaml(text: &str) -> Result<Value, Fault> {
     let lines = text.lines().map(|line| {
         let line = if line.starts_with("%YAML") { "" } else { line };

@@ -139,8 +139,8 @@ impl Outputs {
         self.coverage.gaps(surface)
     }
 
-    /// Gives all files their names; the panorama last. `camera`: that of the frames as they are; `covariances`: those of their
-    /// poses, if known.
+    /// Gives all files their names; the panorama last. `camera`: that of the frames as they are;
+    /// `covariances`: those of their poses, if known.
     ///
     /// # Errors
     /// Whatever the system says.

@@ -1,4 +1,5 @@
-//! Where a panorama goes: one picture in memory, or files that are written as it is drawn, and maps beside it.
+//! Where a panorama goes: one picture in memory, or files that are written as it is drawn, and maps
+//! beside it.
 
 mod files;
 
@@ -20,19 +21,21 @@ use std::path::{Path, PathBuf};
 /// Files of a panorama.
 #[derive(Debug, clap::Args)]
 pub struct OutputArguments {
-    /// The panorama: .tif (any length: Cloud-Optimised GeoTIFF, metric), .png or .jpg (held in memory; a .jpg is black where no
-    /// frame sees the wall).
+    /// The panorama: .tif (any length: Cloud-Optimised GeoTIFF, metric), .png or .jpg (held in
+    /// memory; a .jpg is black where no frame sees the wall).
     #[arg(long, short, value_name = "FILE")]
     pub out: PathBuf,
-    /// Also write it as Deep Zoom, for viewers in a browser: FILE must end in .dzi, its tiles lie beside it.
+    /// Also write it as Deep Zoom, for viewers in a browser: FILE must end in .dzi, its tiles lie
+    /// beside it.
     #[arg(long, value_name = "FILE")]
     dzi: Option<PathBuf>,
-    /// Also write maps into DIR: coverage.tif, frames.tif (the index of the frame that each pixel shows), resolution.tif (mm of
-    /// wall per pixel of that frame), uncertainty.tif (1-σ on the wall, mm; needs --covariance), preview.png with
-    /// chainage and clock positions, gaps.csv.
+    /// Also write maps into DIR: coverage.tif, frames.tif (the index of the frame that each pixel
+    /// shows), resolution.tif (mm of wall per pixel of that frame), uncertainty.tif (1-σ on the
+    /// wall, mm; needs --covariance), preview.png with chainage and clock positions, gaps.csv.
     #[arg(long, value_name = "DIR")]
     maps: Option<PathBuf>,
-    /// The covariance.csv that refine wrote beside the poses [default: the one in the folder of the file of --poses].
+    /// The covariance.csv that refine wrote beside the poses
+    /// [default: the one in the folder of the file of --poses].
     #[arg(long, value_name = "FILE", requires = "maps")]
     pub covariance: Option<PathBuf>,
     /// How .tif is packed.
@@ -138,10 +141,10 @@ impl OutputArguments {
     /// Memory that the outputs hold until they are finished, bytes.
     pub fn bytes(&self, canvas: &Canvas, format: PixelFormat, layout: Layout) -> u64 {
         let pending = |layer| RasterTarget::pending_bytes(canvas, format, layout, layer);
-        let mut bytes = match self.is_tiff() {
-            true => pending(RasterLayer::Panorama),
-            // The picture, and what turning or encoding makes of it.
-            false => 2 * canvas.pixels() as u64 * format.pixel_bytes(true) as u64,
+        let mut bytes = if self.is_tiff() {
+            pending(RasterLayer::Panorama)
+        } else {
+            2 * canvas.pixels() as u64 * format.pixel_bytes(true) as u64
         };
         if self.dzi.is_some() {
             bytes += pending(RasterLayer::Panorama);
@@ -237,9 +240,10 @@ impl OutputArguments {
             layout,
             out: self.out.clone(),
             bands: kept.bands,
-            cog: match self.is_tiff() {
-                true => Some(cog(&self.out, panorama, compression, "panorama", kept.cog)?),
-                false => None,
+            cog: if self.is_tiff() {
+                Some(cog(&self.out, panorama, compression, "panorama", kept.cog)?)
+            } else {
+                None
             },
             picture: picture.map(|picture| match kept.picture {
                 Some(drawn) => (drawn.into_owned(), picture),

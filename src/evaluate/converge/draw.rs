@@ -16,11 +16,11 @@ pub(super) struct Draw {
     pub redraws: u64,
 }
 
-/// Draws surveys by the seeds `seed + 1000 k`, k = 0, 1, …, until the true poses stay inside the tunnel and look
-/// at its wall.
+/// Draws surveys by the seeds `seed + 1000 k`, k = 0, 1, …, until the true poses stay inside the
+/// tunnel and look at its wall.
 ///
-/// The more noise, the tamer are the draws that remain, compared with those asked for: the number of redraws says
-/// by how much.
+/// The more noise, the tamer are the draws that remain, compared with those asked for: the number
+/// of redraws says by how much.
 ///
 /// # Errors
 /// [`ConvergeError::Simulate`] if the survey would be impossible without any noise too.
@@ -43,8 +43,8 @@ pub(super) fn draw(
                     redraws,
                 });
             }
-            // The plan is possible, so an option is so only together with this draw: it sees more wall than can be
-            // painted.
+            // The plan is possible, so an option is so only together with this draw: it sees more
+            // wall than can be painted.
             Err(
                 SimulateError::CameraOutside { .. }
                 | SimulateError::LooksAlongTheAxis { .. }

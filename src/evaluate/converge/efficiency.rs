@@ -1,4 +1,5 @@
-//! How close the refinement comes to the Cramér–Rao bound, and whether the uncertainty it states is true.
+//! How close the refinement comes to the Cramér–Rao bound, and whether the uncertainty it states is
+//! true.
 
 use super::draw::draw;
 use super::{Cell, ConvergeError, ConvergeOptions};
@@ -47,8 +48,9 @@ pub struct Ratio {
     pub translation: f64,
     /// Of positions on the wall.
     pub wall: f64,
-    /// Of all six unknowns of a pose, each combination by its own bound: `√(mean ξᵀ Σ⁻¹ ξ / 6)`, Σ the bound. Unlike the others it is not
-    /// ruled by the few combinations that are known least, so it scatters least from survey to survey.
+    /// Of all six unknowns of a pose, each combination by its own bound: `√(mean ξᵀ Σ⁻¹ ξ / 6)`, Σ
+    /// the bound. Unlike the others it is not ruled by the few combinations that are known least,
+    /// so it scatters least from survey to survey.
     pub pose: f64,
 }
 
@@ -102,7 +104,8 @@ pub struct Efficiency {
     pub normalised_error: f64,
     /// Share of frames whose 95 % ellipsoid holds the truth.
     pub inside_95: f64,
-    /// Mean of the covariances over those of independent noise ([`crate::refine::RefineReport::variance_factor`]).
+    /// Mean of the covariances over those of independent noise
+    /// ([`crate::refine::RefineReport::variance_factor`]).
     pub variance_factor: f64,
 }
 
@@ -145,9 +148,11 @@ impl Squares {
     }
 }
 
-/// Runs `options.seeds` surveys of each cell, refined with the wall solved for jointly or not, and writes efficiency.json and efficiency.txt into `out`.
+/// Runs `options.seeds` surveys of each cell, refined with the wall solved for jointly or not, and
+/// writes efficiency.json and efficiency.txt into `out`.
 ///
-/// A sensor rounds to whole grey levels; the bounds are for its noise and the rounding's variance, 1/12, together.
+/// A sensor rounds to whole grey levels; the bounds are for its noise and the rounding's variance,
+/// 1/12, together.
 ///
 /// # Errors
 /// [`ConvergeError`].

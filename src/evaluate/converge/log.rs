@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 /// How every line begins.
 const LINE_START: &[u8] = b"{\"schema_version\":";
 
-/// The log of a sweep, open for more runs. It is never written anew, so that whatever ends the program leaves the
-/// finished runs in it.
+/// The log of a sweep, open for more runs. It is never written anew, so that whatever ends the
+/// program leaves the finished runs in it.
 #[derive(Debug)]
 pub(super) struct RunLog {
     path: PathBuf,
@@ -22,12 +22,13 @@ pub(super) struct RunLog {
 impl RunLog {
     /// Opens the log, or begins it. `afresh` drops all runs that are in it.
     ///
-    /// A last line without an end is what a crash leaves of a run; it is dropped, and the run will be done again.
-    /// Runs of cells or seeds that the sweep does not ask for may stand there and stay there.
+    /// A last line without an end is what a crash leaves of a run; it is dropped, and the run will
+    /// be done again. Runs of cells or seeds that the sweep does not ask for may stand there and
+    /// stay there.
     ///
     /// # Errors
-    /// [`ConvergeError::Log`] for runs of other settings, for lines that are no runs, and if another program has the
-    /// log open; [`ConvergeError::Write`].
+    /// [`ConvergeError::Log`] for runs of other settings, for lines that are no runs, and if
+    /// another program has the log open; [`ConvergeError::Write`].
     pub fn open(path: &Path, settings: &Settings, afresh: bool) -> Result<Self, ConvergeError> {
         let fail = |source| ConvergeError::from(WriteError::new(path, source));
         let mut file = OpenOptions::new()
@@ -59,9 +60,12 @@ impl RunLog {
             .rposition(|byte| *byte == b'\n')
             .map_or(0, |k| k + 1);
         let (lines, rest) = bytes.split_at(end);
-        let runs = read(lines, settings).and_then(|runs| match begins_a_line(rest) {
-            true => Ok(runs),
-            false => Err("its end is no run".to_owned()),
+        let runs = read(lines, settings).and_then(|runs| {
+            if begins_a_line(rest) {
+                Ok(runs)
+            } else {
+                Err("its end is no run".to_owned())
+            }
         });
         let runs = runs.map_err(|what| ConvergeError::Log {
             path: path.to_owned(),

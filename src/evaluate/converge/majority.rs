@@ -11,8 +11,8 @@ use crate::trajectory::Pose;
 /// Wall errors of frames relative to the majority of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MajorityError {
-    /// Root mean square wall error of each frame, pixels of its centre; infinite for a frame whose estimated pose has
-    /// no place on the wall.
+    /// Root mean square wall error of each frame, pixels of its centre; infinite for a frame whose
+    /// estimated pose has no place on the wall.
     pub frame_rms_px: Vec<f64>,
 }
 
@@ -33,13 +33,15 @@ impl MajorityError {
     }
 }
 
-/// Compares where estimated and true poses put the pixels on the wall, with the gauge fixed by the majority.
+/// Compares where estimated and true poses put the pixels on the wall, with the gauge fixed by the
+/// majority.
 ///
-/// As [`wall_error()`](crate::evaluate::wall_error()), but for the gauge shift (Δs, Δh): every frame proposes its own
-/// mean, the proposal under which the most frames are good wins (of equals, that of the least median error), and the
-/// shift becomes the mean over the good frames until they stay the same. No lost frame has a say in it. If the frames
-/// fall into two halves, each right in itself, the larger is right and the other lost. If all frames are good, it is
-/// the shift that `wall_error` takes.
+/// As [`wall_error()`](crate::evaluate::wall_error()), but for the gauge shift (Δs, Δh): every
+/// frame proposes its own mean, the proposal under which the most frames are good wins (of equals,
+/// that of the least median error), and the shift becomes the mean over the good frames until they
+/// stay the same. No lost frame has a say in it. If the frames fall into two halves, each right in
+/// itself, the larger is right and the other lost. If all frames are good, it is the shift that
+/// `wall_error` takes.
 ///
 /// # Errors
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`].
@@ -50,7 +52,8 @@ pub fn majority_error(
     truth: &[Pose],
 ) -> Result<MajorityError, EvaluateError> {
     check_pairs(estimated.len(), truth.len())?;
-    // True poses are inside and look at the wall, or there were no pictures: only an estimate can be off it.
+    // True poses are inside and look at the wall, or there were no pictures: only an estimate can
+    // be off it.
     let offsets: Vec<Option<FrameOffsets>> = estimated
         .iter()
         .zip(truth)
@@ -121,13 +124,15 @@ impl Offsets<'_> {
             }
         }
         let gauge = self.surface.gauge();
-        let shift_s_m = match gauge.turn {
-            true => mean_arc(&delta_s, self.surface.perimeter_m()),
-            false => 0.0,
+        let shift_s_m = if gauge.turn {
+            mean_arc(&delta_s, self.surface.perimeter_m())
+        } else {
+            0.0
         };
-        let shift_h_m = match gauge.shift {
-            true => delta_h.iter().sum::<f64>() / delta_h.len() as f64,
-            false => 0.0,
+        let shift_h_m = if gauge.shift {
+            delta_h.iter().sum::<f64>() / delta_h.len() as f64
+        } else {
+            0.0
         };
         [shift_s_m, shift_h_m]
     }

@@ -1,7 +1,8 @@
 //! converge.png: the success map.
 //!
-//! One panel for each noise model, wall and turn, below each other; in it a row for each translation scale and a
-//! column for each rotation sigma; in each cell the success rate, the runs it is of, and the false successes if any.
+//! One panel for each noise model, wall and turn, below each other; in it a row for each
+//! translation scale and a column for each rotation sigma; in each cell the success rate, the runs
+//! it is of, and the false successes if any.
 
 use super::cell::{jitter_name, unit};
 use super::{CellSummary, Convergence, TranslationScale};
@@ -137,9 +138,10 @@ fn draw_cell(image: &mut RgbImage, [x, y]: [u32; 2], cell: &CellSummary) {
 
 /// Draws a text in the middle of a cell's width, smaller if it is too long for it.
 fn centred(image: &mut RgbImage, [x, y]: [u32; 2], text: &str, scale: u32) {
-    let scale = match lettering::width(text, scale) <= CELL[0] {
-        true => scale,
-        false => 1,
+    let scale = if lettering::width(text, scale) <= CELL[0] {
+        scale
+    } else {
+        1
     };
     let indent = CELL[0].saturating_sub(lettering::width(text, scale)) / 2;
     lettering::draw(image, [x + indent, y], text, scale, INK);

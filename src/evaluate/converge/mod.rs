@@ -1,4 +1,5 @@
-//! Convergence tests: how much noise of the poses the refinement can take, and whether it knows when it was too much.
+//! Convergence tests: how much noise of the poses the refinement can take, and whether it knows
+//! when it was too much.
 //!
 //! ```text
 //! ConvergeOptions ─ cells × seeds ──> draw a survey ─ simulate ─ refine ─ judge ──> runs.jsonl
@@ -6,18 +7,19 @@
 //!                                          converge.json, converge.txt, converge.png <──┘
 //! ```
 //!
-//! A *cell* is one point of the grid: noise model, wall, turn from frame to frame, rotation and translation sigma. A
-//! *run* is one survey of a cell, by its seed. A run *succeeds* if every frame is off by less than [`GOOD_PX`] on the
-//! wall. A *false success* is a frame that the refinement calls photometric and that is not as good as that: the
-//! worst a repair can do is to be wrong and sure.
+//! A *cell* is one point of the grid: noise model, wall, turn from frame to frame, rotation and
+//! translation sigma. A *run* is one survey of a cell, by its seed. A run *succeeds* if every frame
+//! is off by less than [`GOOD_PX`] on the wall. A *false success* is a frame that the refinement
+//! calls photometric and that is not as good as that: the worst a repair can do is to be wrong and
+//! sure.
 //!
 //! # The gauge
 //!
-//! A frame's error is its place relative to the rest of the trajectory, with nothing removed but the tunnel's
-//! [gauge](crate::surface::Gauge). [`wall_error()`](super::wall_error()) fixes that by least squares over all frames,
-//! which lets one lost frame spoil the others' figures. Here the majority fixes it: [`majority_error()`] takes the
-//! shift under which the most frames are good, so that lost frames are counted one by one. Where all frames are good
-//! the two agree.
+//! A frame's error is its place relative to the rest of the trajectory, with nothing removed but
+//! the tunnel's [gauge](crate::surface::Gauge). [`wall_error()`](super::wall_error()) fixes that by
+//! least squares over all frames, which lets one lost frame spoil the others' figures. Here the
+//! majority fixes it: [`majority_error()`] takes the shift under which the most frames are good, so
+//! that lost frames are counted one by one. Where all frames are good the two agree.
 
 mod cell;
 mod draw;

@@ -16,8 +16,8 @@ const VERTICAL_FOV_RAD: f64 = std::f64::consts::FRAC_PI_3;
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum TranslationScale {
-    /// In proportion: the `free` experiment's sigmas at its rotation sigma (2°), twice them at twice that. One axis
-    /// of the grid.
+    /// In proportion: the `free` experiment's sigmas at its rotation sigma (2°), twice them at
+    /// twice that. One axis of the grid.
     Auto,
     /// Each of these multiples of the `free` experiment's sigmas, with every rotation: two axes.
     Factors(Vec<f64>),
@@ -134,11 +134,14 @@ impl ConvergeOptions {
     /// # Errors
     /// [`ConvergeError::Option`] with what is impossible.
     pub(super) fn check(&self) -> Result<(), ConvergeError> {
-        let check = |good: bool, what: &str| match good {
-            true => Ok(()),
-            false => Err(ConvergeError::Option {
-                what: what.to_owned(),
-            }),
+        let check = |good: bool, what: &str| {
+            if good {
+                Ok(())
+            } else {
+                Err(ConvergeError::Option {
+                    what: what.to_owned(),
+                })
+            }
         };
         let sigma = |v: &f64| v.is_finite() && *v >= 0.0;
         check(

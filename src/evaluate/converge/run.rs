@@ -30,11 +30,13 @@ pub struct Swept {
     pub kept: usize,
 }
 
-/// Does all runs of a sweep that `out`/runs.jsonl does not hold yet, each into a line of it, then writes
-/// converge.json, converge.txt and converge.png there. `afresh` drops the runs of earlier calls.
+/// Does all runs of a sweep that `out`/runs.jsonl does not hold yet, each into a line of it, then
+/// writes converge.json, converge.txt and converge.png there. `afresh` drops the runs of earlier
+/// calls.
 ///
-/// The runs go seed by seed through all cells, so that an interrupted sweep knows every cell equally well. Except
-/// for times, the result does not depend on interruptions or the number of threads.
+/// The runs go seed by seed through all cells, so that an interrupted sweep knows every cell
+/// equally well. Except for times, the result does not depend on interruptions or the number of
+/// threads.
 ///
 /// # Errors
 /// [`ConvergeError`]. Whatever the error, the runs that are finished are in the log.

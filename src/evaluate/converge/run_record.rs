@@ -52,8 +52,8 @@ pub struct RunRecord {
     pub cell: Cell,
     /// The seed asked for.
     pub seed: u64,
-    /// The seed of the survey: that one, or the first after it by which the survey could be flown; none if there is
-    /// none, and then nothing was refined.
+    /// The seed of the survey: that one, or the first after it by which the survey could be flown;
+    /// none if there is none, and then nothing was refined.
     pub seed_used: Option<u64>,
     /// Surveys drawn before that nobody could fly.
     pub redraws: u64,
@@ -63,7 +63,8 @@ pub struct RunRecord {
     pub error: Option<String>,
     /// Whether every frame is good.
     pub success: bool,
-    /// Greatest root mean square wall error of a frame, pixels; none if a frame has no place on the wall.
+    /// Greatest root mean square wall error of a frame, pixels; none if a frame has no place on the
+    /// wall.
     pub worst_frame_px: Option<f64>,
     /// Root mean square wall error of all frames, pixels; none as above.
     pub rms_px: Option<f64>,

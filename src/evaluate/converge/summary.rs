@@ -24,8 +24,8 @@ pub struct Convergence {
 
 /// The runs of a cell in a few numbers.
 ///
-/// Errors are over the runs that were flown; one without poses, or with a frame that has no place on the wall, counts
-/// as infinitely wrong, and a number that is infinite for that is none.
+/// Errors are over the runs that were flown; one without poses, or with a frame that has no place
+/// on the wall, counts as infinitely wrong, and a number that is infinite for that is none.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CellSummary {
     /// The cell.

@@ -80,9 +80,10 @@ impl fmt::Display for Convergence {
         for row in &rows {
             for (k, (text, &width)) in row.iter().zip(&widths).enumerate() {
                 let gap = if k == 0 { "" } else { "  " };
-                match k < WORDS {
-                    true => write!(f, "{gap}{text:<width$}")?,
-                    false => write!(f, "{gap}{text:>width$}")?,
+                if k < WORDS {
+                    write!(f, "{gap}{text:<width$}")?
+                } else {
+                    write!(f, "{gap}{text:>width$}")?
                 }
             }
             writeln!(f)?;

@@ -22,7 +22,8 @@ pub struct Decoder {
 }
 
 impl Decoder {
-    /// Starts at a picture: at its time, half the way to the one before, so that no rounding tells them apart wrongly.
+    /// Starts at a picture: at its time, half the way to the one before, so that no rounding tells
+    /// them apart wrongly.
     ///
     /// # Errors
     /// `ffmpeg` is missing.

@@ -1,8 +1,9 @@
 //! Frames out of a video, by the programs `ffprobe` and `ffmpeg`.
 //!
-//! `ffprobe` lists the pictures' times without decoding any ([`probe`]); `ffmpeg` decodes them into a pipe ([`decoder`]): nothing
-//! is written to disk. A decoder runs forwards and is cheap to go on with; a jump starts another at the key picture before. A
-//! picture is the one asked for because it has that one's time, which the decoder tells with each.
+//! `ffprobe` lists the pictures' times without decoding any ([`probe`]); `ffmpeg` decodes them into
+//! a pipe ([`decoder`]): nothing is written to disk. A decoder runs forwards and is cheap to go on
+//! with; a jump starts another at the key picture before. A picture is the one asked for because it
+//! has that one's time, which the decoder tells with each.
 
 mod decoder;
 mod probe;
@@ -19,8 +20,8 @@ const NEAR: usize = 48;
 
 /// A video whose pictures are decoded on demand.
 ///
-/// Pictures are as players show them, turned as the file says, and numbered from 0 in the order of their times. Colour becomes RGB
-/// and grey stays grey, of 8 bits or, where the video has more, 16.
+/// Pictures are as players show them, turned as the file says, and numbered from 0 in the order of
+/// their times. Colour becomes RGB and grey stays grey, of 8 bits or, where the video has more, 16.
 #[derive(Debug)]
 pub struct Video {
     path: PathBuf,
@@ -96,8 +97,8 @@ impl Video {
     /// Looks into a video; no picture is decoded.
     ///
     /// # Errors
-    /// [`FrameError::Video`]: `ffprobe` is missing; a file that is no video, has no pictures, is cut off or interlaced, or is to be
-    /// turned by other than right angles.
+    /// [`FrameError::Video`]: `ffprobe` is missing; a file that is no video, has no pictures, is
+    /// cut off or interlaced, or is to be turned by other than right angles.
     pub fn open(path: &Path) -> Result<Self, FrameError> {
         probe::probe(path).map_err(|what| FrameError::Video {
             path: path.to_owned(),
@@ -125,7 +126,8 @@ impl Video {
         self.moments.len()
     }
 
-    /// By how much pictures are turned from how the sensor read them, degrees: rows are then not what was read at once.
+    /// By how much pictures are turned from how the sensor read them, degrees: rows are then not
+    /// what was read at once.
     pub fn rotation_deg(&self) -> i32 {
         self.rotation_deg
     }

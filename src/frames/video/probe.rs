@@ -83,11 +83,10 @@ pub fn probe(path: &Path) -> Result<Video, String> {
     });
     if !output.status.success() {
         let why = complaint.unwrap_or_else(|| "ffprobe cannot read it".to_owned());
-        let remedy = match path.exists() {
-            true => {
-                "it is no video, or damaged, or was cut off before its end was written: copy it anew"
-            }
-            false => "frames.video is relative to survey.toml",
+        let remedy = if path.exists() {
+            "it is no video, or damaged, or was cut off before its end was written: copy it anew"
+        } else {
+            "frames.video is relative to survey.toml"
         };
         return Err(format!("{why}; {remedy}"));
     }

@@ -1,9 +1,10 @@
 //! The viewer's server: files of one folder, frames, and marks. For this machine only.
 //!
-//! **What it trusts.** Only programs of this machine can connect, since it listens on the loopback address. But any page open in
-//! a browser here can send requests there, so: a `Host` other than its own is refused (a name that was made to point here),
-//! and what changes marks must come from its own page ([`Request::check`]). Paths are names below the folder, taken letter by
-//! letter; nothing is decoded, and what they lead to must lie in it. Nothing is written but the marks.
+//! **What it trusts.** Only programs of this machine can connect, since it listens on the loopback
+//! address. But any page open in a browser here can send requests there, so: a `Host` other than
+//! its own is refused (a name that was made to point here), and what changes marks must come from
+//! its own page ([`Request::check`]). Paths are names below the folder, taken letter by letter;
+//! nothing is decoded, and what they lead to must lie in it. Nothing is written but the marks.
 
 mod files;
 mod reply;
@@ -107,7 +108,8 @@ impl Server {
             for _ in 0..THREADS {
                 scope.spawn(|| {
                     loop {
-                        // A connection that ends before it is there is no error, nor is a browser that has left.
+                        // A connection that ends before it is there is no error, nor is a browser
+                        // that has left.
                         if let Ok((stream, _)) = self.listener.accept() {
                             let _ = self.serve(stream);
                         }

@@ -11,7 +11,8 @@ pub(super) struct Reply {
     body: Vec<u8>,
 }
 
-/// Scripts and everything else from here only, and in no frame of another page. three.js decodes pictures from blobs.
+/// Scripts and everything else from here only, and in no frame of another page. three.js decodes
+/// pictures from blobs.
 const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob: data:; \
                       style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
@@ -44,7 +45,8 @@ impl Reply {
         Self::refuse(404, "there is nothing of that name")
     }
 
-    /// Writes it as the whole of a connection: one answer, then the end. `body`: whether more than its head was asked for.
+    /// Writes it as the whole of a connection: one answer, then the end. `body`: whether more than
+    /// its head was asked for.
     ///
     /// # Errors
     /// A browser that has left.

@@ -106,8 +106,9 @@ impl Request {
         matches!(self.method.as_str(), "GET" | "HEAD")
     }
 
-    /// Refuses what does not come from this machine's user: another `Host`, another page's `Origin`, and changes without the
-    /// `Content-Type` that a browser lets no other page send unasked.
+    /// Refuses what does not come from this machine's user: another `Host`, another page's
+    /// `Origin`, and changes without the `Content-Type` that a browser lets no other page send
+    /// unasked.
     ///
     /// # Errors
     /// The answer.

@@ -28,7 +28,8 @@ fn in_order(tile: &RasterTile) -> u64 {
     u64::from(tile.row) << 32 | u64::from(tile.column)
 }
 
-/// The bytes of the tiles of a level as another's decoder has them, its borders cut off; nothing where there is no tile.
+/// The bytes of the tiles of a level as another's decoder has them, its borders cut off; nothing
+/// where there is no tile.
 fn decoded(file: &[u8], directory: usize) -> Vec<Option<Vec<u8>>> {
     let mut decoder = Decoder::new(io::Cursor::new(file))
         .unwrap()

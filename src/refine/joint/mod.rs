@@ -1,42 +1,54 @@
 //! The wall and the poses at once, where frames are sharper than their pixels.
 //!
-//! [`super::tile`] takes what a frame shows between its pixels by interpolation, and the mean of all frames for the wall.
-//! That is nearly all there is to know of a wall that is smooth over a pixel. A sharp edge is not: every frame shows it at other
-//! fractions of a pixel, and what interpolation makes of them passes for displacements of some hundredths of a pixel. So here
-//! the wall is x, pixels of the density of the samples, and a frame's pixel p reads the mean of its own square on it,
-//! `W_p x`, as cameras do ([`crate::super_resolve`]). Poses and wall together are the most likely ones:
+//! [`super::tile`] takes what a frame shows between its pixels by interpolation, and the mean of
+//! all frames for the wall. That is nearly all there is to know of a wall that is smooth over a
+//! pixel. A sharp edge is not: every frame shows it at other fractions of a pixel, and what
+//! interpolation makes of them passes for displacements of some hundredths of a pixel. So here the
+//! wall is x, pixels of the density of the samples, and a frame's pixel p reads the mean of its own
+//! square on it, `W_p x`, as cameras do ([`crate::super_resolve`]). Poses and wall together are the
+//! most likely ones:
 //!
 //! `J = Σ_p ρ(e_p) + (roughness of x)`,   `e_p = a_i (z_p − W_p x)`,   `z_p = (I_p − b_i)/a_i`.
 //!
-//! For given poses x is the minimiser, so that J changes with the poses as if x stayed as it is (the envelope theorem: `∂J/∂x = 0`). If
-//! frame i moves by ξ, its pixel reads at `A_i ξ` from where it read before, hence `∂e_p/∂ξ = −a_i (W_p ∇x)ᵀ A_i`: with the features
+//! For given poses x is the minimiser, so that J changes with the poses as if x stayed as it is
+//! (the envelope theorem: `∂J/∂x = 0`). If frame i moves by ξ, its pixel reads at `A_i ξ` from
+//! where it read before, hence `∂e_p/∂ξ = −a_i (W_p ∇x)ᵀ A_i`: with the features
 //! `φ_p = (W_p ∂x/∂s, W_p ∂x/∂h, W_p x, 1)` a tile has the same moments as ever,
 //!
 //! - `g_i = Σ_p a_i ω e_p φ_p` over the pixels of frame i whose middles lie in it,
-//! - `M`, the mean of `φ_p φ_pᵀ` over the pixels of all frames, and the weights `w̄_i = Σ_p a_i² ω`,
+//! - `M`, the mean of `φ_p φ_pᵀ` over the pixels of all frames, and the weights
+//!   `w̄_i = Σ_p a_i² ω`,
 //!
 //! and the normal equations are made of them as there.
 //!
-//! **No net force.** What moves all frames of a tile alike moves x with them and changes nothing, so `Σ_i g_i` should be zero,
-//! as it is of residuals from a mean. It is not quite: x is held by its roughness as well, whose forces cancel over the wall but not
-//! tile by tile, and the minimum is approached, not reached. Along weak directions, in which neighbours hardly move against each other, such
-//! forces would add up over all tiles to steps of many σ; so each tile's are taken off its frames by weight, `g_i −= (w̄_i/Σw̄) Σ_j g_j`.
+//! **No net force.** What moves all frames of a tile alike moves x with them and changes nothing,
+//! so `Σ_i g_i` should be zero, as it is of residuals from a mean. It is not quite: x is held by
+//! its roughness as well, whose forces cancel over the wall but not tile by tile, and the minimum
+//! is approached, not reached. Along weak directions, in which neighbours hardly move against each
+//! other, such forces would add up over all tiles to steps of many σ; so each tile's are taken off
+//! its frames by weight, `g_i −= (w̄_i/Σw̄) Σ_j g_j`.
 //!
-//! How rough the wall is, is learned once from blocks spread over all of it; where edges are, anew each time: they may stand out
-//! ([`WallSolve::weigh_edges`]). That is what most is gained by on bricks, whose wall is not at all Gaussian.
+//! How rough the wall is, is learned once from blocks spread over all of it; where edges are, anew
+//! each time: they may stand out ([`WallSolve::weigh_edges`]). That is what most is gained by on
+//! bricks, whose wall is not at all Gaussian.
 //!
-//! Fine pixels are even in themselves, and where an edge runs through one, what they make of it depends on where. Walls repeat in
-//! step with a lattice, as courses of bricks do, and errors that are the same all along a course bend a trajectory; so the lattice of every
-//! block is off by fractions of its own, as the samples of tiles are ([`WallGrid::centre`]).
+//! Fine pixels are even in themselves, and where an edge runs through one, what they make of it
+//! depends on where. Walls repeat in step with a lattice, as courses of bricks do, and errors that
+//! are the same all along a course bend a trajectory; so the lattice of every block is off by
+//! fractions of its own, as the samples of tiles are ([`WallGrid::centre`]).
 //!
-//! **Smooth walls** have nothing between the pixels to be solved for, and interpolation with the mean of all frames does better, as it supposes
-//! nothing of the wall. How much of what pixels read is finer than they are, follows from how rough the wall is
-//! ([`crate::super_resolve::aliased_variance`]); where that is little against the noise, the solve before stands.
+//! **Smooth walls** have nothing between the pixels to be solved for, and interpolation with the
+//! mean of all frames does better, as it supposes nothing of the wall. How much of what pixels read
+//! is finer than they are, follows from how rough the wall is
+//! ([`crate::super_resolve::aliased_variance`]); where that is little against the noise, the solve
+//! before stands.
 //!
-//! Block by block of the wall, with a margin, and nothing is kept of x: memory does not grow with the tunnel's length.
+//! Block by block of the wall, with a margin, and nothing is kept of x: memory does not grow with
+//! the tunnel's length.
 //!
-//! Source: R. C. Hardie, K. J. Barnard, E. E. Armstrong, "Joint MAP registration and high-resolution image estimation
-//! using a sequence of undersampled images", IEEE Transactions on Image Processing 6(12), 1997.
+//! Source: R. C. Hardie, K. J. Barnard, E. E. Armstrong, "Joint MAP registration and
+//! high-resolution image estimation using a sequence of undersampled images", IEEE Transactions on
+//! Image Processing 6(12), 1997.
 
 mod sights;
 mod stiffness;
@@ -60,17 +72,19 @@ use std::ops::Range;
 pub const DENSITY: f64 = 3.0;
 /// Wall samples to a pixel's width where the frames are searched for what is not wall beforehand.
 pub const FOREIGN_DENSITY: f64 = 2.0;
-/// A step shorter than this share of the uncertainty ends the solve: steps take long, and what is left after one is a tenth of it.
+/// A step shorter than this share of the uncertainty ends the solve: steps take long, and what is
+/// left after one is a tenth of it.
 pub const STEP_SIGMA: f64 = 0.3;
 /// Steps of conjugate gradients between two rounds of reweighting.
 const STEPS: usize = 10;
 
-/// Rounds of reweighting; edges take some to become as sharp as they are. On bricks with noise of 2 grey levels, two rounds make the
-/// poses' squared error 14 % larger, and seven 4 % smaller.
+/// Rounds of reweighting; edges take some to become as sharp as they are. On bricks with noise of 2
+/// grey levels, two rounds make the poses' squared error 14 % larger, and seven 4 % smaller.
 const ROUNDS: usize = 4;
 
-/// The loss of pixels in a round, as the weight of a residual in σ: Huber's in the first, which finds most of the wall whatever
-/// glints on it, and then Tukey's, by which poses are estimated ([`super::robust`]), which forgets the glint.
+/// The loss of pixels in a round, as the weight of a residual in σ: Huber's in the first, which
+/// finds most of the wall whatever glints on it, and then Tukey's, by which poses are estimated
+/// ([`super::robust`]), which forgets the glint.
 fn pixel_weight(round: usize, residual: f32) -> f32 {
     match round {
         0 => huber_weight(residual, 2.0),
@@ -106,7 +120,8 @@ pub struct JointBlock<'a> {
 }
 
 impl<'a> JointBlock<'a> {
-    /// The block of tiles `block` with the frames `views` of a visibility, whose noise is `sigma` grey levels.
+    /// The block of tiles `block` with the frames `views` of a visibility, whose noise is `sigma`
+    /// grey levels.
     pub fn new(
         scene: &Scene,
         grid: &WallGrid,
@@ -256,8 +271,8 @@ impl<'a> JointBlock<'a> {
         moments
     }
 
-    /// `∂x/∂s` and `∂x/∂h`, by differences of the fourth order: the detail that poses are told by is but a few fine pixels wide. None at
-    /// the region's border.
+    /// `∂x/∂s` and `∂x/∂h`, by differences of the fourth order: the detail that poses are told by
+    /// is but a few fine pixels wide. None at the region's border.
     fn slopes(&self, x: &[f32]) -> [Vec<f32>; 2] {
         let (columns, rows) = (self.region.columns, self.region.rows);
         let slope = |step: usize, spacing_m: f64| {
@@ -337,7 +352,8 @@ impl Pixel {
     }
 }
 
-/// Makes the sum of weighted features their mean over a sample, and takes the net force off the frames.
+/// Makes the sum of weighted features their mean over a sample, and takes the net force off the
+/// frames.
 fn settle(tile: &mut TileMoments) {
     let total: f64 = tile.observers.iter().map(|observer| observer.weight).sum();
     let force: Vector4<f64> = tile

@@ -23,15 +23,16 @@ pub struct Sights {
 pub struct Sight {
     /// The camera's shading there; 0 if what the frame shows there is not taken for the wall.
     pub shade: f32,
-    /// The tile among those of the block, and the frame among its observers; None where the frame helps to find the wall, but is
-    /// not compared.
+    /// The tile among those of the block, and the frame among its observers; None where the frame
+    /// helps to find the wall, but is not compared.
     pub place: Option<(u32, u32)>,
 }
 
 impl Sights {
-    /// Besides the tiles in which a frame is compared, it is taken for the wall in those next to them, which it sees but partly, and
-    /// next to tiles in which it does not show the wall it is not compared: otherwise frames would be drawn to where the
-    /// wall is known better, away from the borders of what they show of it.
+    /// Besides the tiles in which a frame is compared, it is taken for the wall in those next to
+    /// them, which it sees but partly, and next to tiles in which it does not show the wall it is
+    /// not compared: otherwise frames would be drawn to where the wall is known better, away from
+    /// the borders of what they show of it.
     pub fn new(
         ignored: &Patches,
         grid: &WallGrid,
@@ -172,7 +173,8 @@ mod tests {
     use crate::refine::test_scene::placed_spiral;
     use crate::refine::visibility::Hidden;
 
-    /// Where a frame shows a tile partly it helps; next to where it shows something else it is not compared.
+    /// Where a frame shows a tile partly it helps; next to where it shows something else it is not
+    /// compared.
     #[test]
     fn frames_are_taken_for_the_wall_up_to_their_borders_but_for_what_is_left_out() {
         let (circle, camera, grid, placed) = placed_spiral(6);

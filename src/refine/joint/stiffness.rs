@@ -1,19 +1,23 @@
 //! How stiffly a wall that is solved for holds the frames that show it.
 //!
-//! If a frame is displaced by δ along s, its pixels read `δ W ∂x/∂s` more of the wall as it is, and the wall follows: by
-//! `y = A⁻¹ Wᵀ Ω (δ W ∂x/∂s)`, A the matrix of its normal equations. What is left, and what pulls the frame back, is
-//! `δ (W ∂x/∂s − W y)`. So of the second derivative of the cost with the wall eliminated, a frame's own part is
+//! If a frame is displaced by δ along s, its pixels read `δ W ∂x/∂s` more of the wall as it is, and
+//! the wall follows: by `y = A⁻¹ Wᵀ Ω (δ W ∂x/∂s)`, A the matrix of its normal equations. What is
+//! left, and what pulls the frame back, is `δ (W ∂x/∂s − W y)`. So of the second derivative of the
+//! cost with the wall eliminated, a frame's own part is
 //!
 //! `K_ii = Σ_p a_i² ω (W ∂x/∂s)_p (W ∂x/∂s − W y)_p`
 //!
-//! over its pixels p. A wall that is the mean of what all frames show, point by point, follows by the share `w̄_i/Σw̄`, which makes
-//! `K_ii = (w̄_i − w̄_i²/Σw̄) M_ss` ([`crate::refine::tile`]). One that is finer than pixels has more to follow with: where few frames see
-//! it, detail between their pixels explains much of a displacement. So the stiffness over that of a mean, κ, goes with the number of
-//! frames: on bricks with noise of 1 grey level it is 0.69 for two, 0.83 for three and 0.87 for five or more, with noise of 4, which hides
-//! such detail, more than 0.95. It is found once, from a few blocks spread over the
-//! wall, for each number of frames, and the slopes in M are multiplied by √κ.
+//! over its pixels p. A wall that is the mean of what all frames show, point by point, follows by
+//! the share `w̄_i/Σw̄`, which makes `K_ii = (w̄_i − w̄_i²/Σw̄) M_ss` ([`crate::refine::tile`]).
+//! One that is finer than pixels has more to follow with: where few frames see it, detail between
+//! their pixels explains much of a displacement. So the stiffness over that of a mean, κ, goes with
+//! the number of frames: on bricks with noise of 1 grey level it is 0.69 for two, 0.83 for three
+//! and 0.87 for five or more, with noise of 4, which hides such detail, more than 0.95. It is found
+//! once, from a few blocks spread over the wall, for each number of frames, and the slopes in M are
+//! multiplied by √κ.
 //!
-//! Without it Gauss–Newton would take steps as much too short, and the poses would be called surer than they are.
+//! Without it Gauss–Newton would take steps as much too short, and the poses would be called surer
+//! than they are.
 
 use crate::refine::tile::TileMoments;
 use nalgebra::Matrix4;
@@ -63,11 +67,15 @@ impl Probe {
         }
     }
 
-    /// κ; of numbers of frames that were not met, that of the next lower one that was, or else of all together.
+    /// κ; of numbers of frames that were not met, that of the next lower one that was, or else of
+    /// all together.
     pub fn stiffness(&self) -> Stiffness {
-        let ratio = |held: f64, by_mean: f64| match by_mean > 0.0 {
-            true => (held / by_mean).clamp(LEAST, 1.0),
-            false => 1.0,
+        let ratio = |held: f64, by_mean: f64| {
+            if by_mean > 0.0 {
+                (held / by_mean).clamp(LEAST, 1.0)
+            } else {
+                1.0
+            }
         };
         let mut last = ratio(self.held.iter().sum(), self.by_mean.iter().sum());
         Stiffness(std::array::from_fn(|k| {
@@ -107,7 +115,8 @@ mod tests {
 
     #[test]
     fn stiffness_is_what_was_found_for_as_many_frames() {
-        // By a mean, (1 − ½) 4 along s of each of two frames; a third that is not compared does not count.
+        // By a mean, (1 − ½) 4 along s of each of two frames; a third that is not compared does not
+        // count.
         let (two, three) = (tile(&[1.0, 1.0, 0.0]), tile(&[1.0, 1.0, 2.0]));
         let mut probe = Probe::default();
         probe.add(&two, 0, 0, 0.5);

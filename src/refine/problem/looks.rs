@@ -21,15 +21,17 @@ use std::ops::Range;
 const SCALE_TILES: usize = 600;
 /// Blocks of tiles that are solved for to learn what the wall is like.
 const LEARNED_BLOCKS: usize = 48;
-/// What detail finer than pixels adds to the variance of what they read, over the variance of their noise, at the least, for the wall to be
-/// solved for: less than a fortieth of the error is at stake below. On bricks of 30 × 10 pixels it is 1.1, 0.35 and 0.13 with noise of 1, 2
-/// and 4 grey levels, on concrete 0.02 with 2.
+/// What detail finer than pixels adds to the variance of what they read, over the variance of their
+/// noise, at the least, for the wall to be solved for: less than a fortieth of the error is at
+/// stake below. On bricks of 30 × 10 pixels it is 1.1, 0.35 and 0.13 with noise of 1, 2 and 4 grey
+/// levels, on concrete 0.02 with 2.
 const LEAST_ALIASED: f64 = 0.05;
 /// Factor by which the variance of residuals may be short of the sensor's.
 const MOST_UNDERESTIMATE: f64 = 1.25;
 
 impl Problem<'_> {
-    /// Reads the noise from the residuals around the plain mean in every few tiles, and what is typical of the texture.
+    /// Reads the noise from the residuals around the plain mean in every few tiles, and what is
+    /// typical of the texture.
     pub(super) fn estimate_noise(&mut self) -> Result<(), ProblemError> {
         let counted = self.at_tiles(
             SCALE_TILES,
@@ -49,8 +51,8 @@ impl Problem<'_> {
             spectrum = spectrum.merge(seen);
         }
         self.noise = histogram.fit();
-        // Residuals are a little too small, for S has fitted itself to them; single pictures know the noise better, but
-        // take fine texture for noise.
+        // Residuals are a little too small, for S has fitted itself to them; single pictures know
+        // the noise better, but take fine texture for noise.
         let interpolation = self.sampling.interpolation;
         let axis = interpolation.autocorrelation(0.0);
         let single = self.scene.noise.powi(2)
@@ -73,8 +75,8 @@ impl Problem<'_> {
         Ok(())
     }
 
-    /// Learns how rough the wall is, and how stiffly it holds frames, from blocks spread over all of it; `None` if it is so smooth that there
-    /// is nothing between the pixels to be solved for.
+    /// Learns how rough the wall is, and how stiffly it holds frames, from blocks spread over all
+    /// of it; `None` if it is so smooth that there is nothing between the pixels to be solved for.
     pub(super) fn learn_wall(&self) -> Result<Option<WallModel>, ProblemError> {
         let found = self.at_blocks(|block| block.evidence())?;
         let strengths = found
@@ -132,8 +134,8 @@ impl Problem<'_> {
         )
     }
 
-    /// Leaves out what is in a frame but not on the wall, as its own tiles show it or, if a `density` is given, those of
-    /// another lattice over all of the wall.
+    /// Leaves out what is in a frame but not on the wall, as its own tiles show it or, if a
+    /// `density` is given, those of another lattice over all of the wall.
     ///
     /// # Errors
     /// [`ProblemError`].
@@ -202,8 +204,9 @@ impl Problem<'_> {
         Ok(())
     }
 
-    /// Works on about `count` tiles spread over all of the wall, or all tiles if there are fewer, with the estimates the
-    /// problem was made with; returns what each run of tiles has gathered, always in the same order.
+    /// Works on about `count` tiles spread over all of the wall, or all tiles if there are fewer,
+    /// with the estimates the problem was made with; returns what each run of tiles has gathered,
+    /// always in the same order.
     ///
     /// # Errors
     /// [`ProblemError::Frame`].

@@ -30,14 +30,16 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Blocks of tiles worked on before their sums are added up: bounds the memory, whatever the length.
+/// Blocks of tiles worked on before their sums are added up: bounds the memory, whatever the
+/// length.
 const BATCH: usize = 64;
 /// Samples over a frame's height, at least.
 const LEAST_ROWS: u32 = 90;
 /// A camera looks no farther than this many radii, when the lattice is laid out.
 const LONGEST_VIEW_RADII: f64 = 3.0;
-/// Largest gain that a step may lead to, standard deviations of the prior. A frame that fits nowhere is tempted to say
-/// nothing, with a gain of naught, which rounding then makes something of.
+/// Largest gain that a step may lead to, standard deviations of the prior. A frame that fits
+/// nowhere is tempted to say nothing, with a gain of naught, which rounding then makes something
+/// of.
 const MOST_GAIN_SIGMA: f64 = 10.0;
 /// Stiffness of the gauge at the first frame over that of its pixels.
 const GAUGE_TIE: f64 = 1e6;
@@ -49,8 +51,9 @@ pub struct Linearisation {
     pub cost: f64,
     /// Normal equations over the active frames.
     pub normal: NormalEquations,
-    /// Scatter of the scores, in the pattern's order: `Σ_b g_b g_bᵀ` over the blocks b of the wall, with g the gradient
-    /// of the block's cost. It is the variance of the pixels' gradient, whatever the errors are like.
+    /// Scatter of the scores, in the pattern's order: `Σ_b g_b g_bᵀ` over the blocks b of the wall,
+    /// with g the gradient of the block's cost. It is the variance of the pixels' gradient,
+    /// whatever the errors are like.
     pub scatter: Vec<Block>,
     /// How each active frame took part.
     pub frames: Vec<FrameShare>,
@@ -75,12 +78,14 @@ pub struct FrameShare {
 
 /// The cost of a run of frames on a fixed set of wall samples.
 ///
-/// `participants` are sampled; of them the `active` frames are estimated and the others held. The wall is worked
-/// through in stretches along the tunnel, so that memory for frames and samples does not grow with its length.
+/// `participants` are sampled; of them the `active` frames are estimated and the others held. The
+/// wall is worked through in stretches along the tunnel, so that memory for frames and samples does
+/// not grow with its length.
 ///
-/// With a rolling shutter, the motion of each camera during its picture is that of the poses the problem was made with, and
-/// stays as it is. A step of a frame by ξ changes its neighbours' motion by `readout/(2 interval) ξ`, a few hundredths, and
-/// what is left of that is taken up by the next solve.
+/// With a rolling shutter, the motion of each camera during its picture is that of the poses the
+/// problem was made with, and stays as it is. A step of a frame by ξ changes its neighbours' motion
+/// by `readout/(2 interval) ξ`, a few hundredths, and what is left of that is taken up by the next
+/// solve.
 pub struct Problem<'a> {
     scene: Scene<'a>,
     sampling: Sampling,
@@ -93,7 +98,8 @@ pub struct Problem<'a> {
     /// Motion of each participant's camera if its readout took a second.
     rates: Vec<Sweep>,
     coverage: Coverage<'a>,
-    /// The first active frame that is compared, counted from the first active one: the gauge is tied there.
+    /// The first active frame that is compared, counted from the first active one: the gauge is
+    /// tied there.
     tied: Option<usize>,
     /// Number of frames that are compared.
     compared: usize,
@@ -112,7 +118,8 @@ pub struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    /// Chooses the wall samples for the present estimates and estimates the noise from the residuals there.
+    /// Chooses the wall samples for the present estimates and estimates the noise from the
+    /// residuals there.
     ///
     /// # Errors
     /// [`ProblemError`].
@@ -227,8 +234,8 @@ impl<'a> Problem<'a> {
         Ok(problem)
     }
 
-    /// The same for frames without noise, weighted as if each pixel had noise of `sigma` grey levels: no residual is
-    /// rejected, and all slopes are texture.
+    /// The same for frames without noise, weighted as if each pixel had noise of `sigma` grey
+    /// levels: no residual is rejected, and all slopes are texture.
     pub fn exact(self, sigma: f64) -> Self {
         Self {
             sigma,
@@ -283,7 +290,8 @@ impl<'a> Problem<'a> {
         self.coverage.tiles
     }
 
-    /// True if the wall is solved for jointly with the poses: if it was asked for, and there is something between the pixels to be solved for.
+    /// True if the wall is solved for jointly with the poses: if it was asked for, and there is
+    /// something between the pixels to be solved for.
     pub fn is_joint(&self) -> bool {
         self.wall.is_some()
     }
@@ -314,7 +322,8 @@ impl<'a> Problem<'a> {
         self.scene.camera.sweeping(&sweep)
     }
 
-    /// The frames of a stretch at the given estimates of all participants, seen by `camera` (of the level), read out in `readout_s`.
+    /// The frames of a stretch at the given estimates of all participants, seen by `camera` (of the
+    /// level), read out in `readout_s`.
     fn views<'s>(
         &self,
         stretch: usize,
@@ -350,14 +359,16 @@ impl<'a> Problem<'a> {
         estimates
     }
 
-    /// True if a frame can be so: its camera inside the tunnel, its gain within [`MOST_GAIN_SIGMA`].
+    /// True if a frame can be so: its camera inside the tunnel, its gain within
+    /// [`MOST_GAIN_SIGMA`].
     pub fn admits(&self, estimate: &FrameEstimate) -> bool {
         let most_gain = MOST_GAIN_SIGMA * self.scene.prior.log_gain_sigma;
         let inside = self.scene.surface.check_inside(&estimate.pose.t_wc);
         inside.is_ok() && estimate.log_gain.abs() <= most_gain
     }
 
-    /// Cost and normal equations at the given estimates of the active frames and the problem's own shared unknowns.
+    /// Cost and normal equations at the given estimates of the active frames and the problem's own
+    /// shared unknowns.
     ///
     /// # Errors
     /// As [`Problem::linearise_at`].
@@ -457,15 +468,17 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// By how much the logarithm of the volume that the pixels leave to the positions grows with that of the radius.
+    /// By how much the logarithm of the volume that the pixels leave to the positions grows with
+    /// that of the radius.
     ///
-    /// Pixels fix the 3N − 1 coordinates of N positions (not the one along the axis) in units of the radius. In metres, where
-    /// the prior is a density, they leave a volume that grows as `r^(3N − 1)`. Without this term the radius would
-    /// shrink until the steps had no noise at all.
+    /// Pixels fix the 3N − 1 coordinates of N positions (not the one along the axis) in units of
+    /// the radius. In metres, where the prior is a density, they leave a volume that grows as
+    /// `r^(3N − 1)`. Without this term the radius would shrink until the steps had no noise at all.
     fn volume(&self) -> f64 {
-        match self.scene.calibration.free[RADIUS] {
-            true => (3 * self.compared) as f64 - 1.0,
-            false => 0.0,
+        if self.scene.calibration.free[RADIUS] {
+            (3 * self.compared) as f64 - 1.0
+        } else {
+            0.0
         }
     }
 
@@ -473,7 +486,8 @@ impl<'a> Problem<'a> {
         self.participants.len() - self.active.len()
     }
 
-    /// The prior's part of the normal matrix at the given estimates of the active frames, and of its border.
+    /// The prior's part of the normal matrix at the given estimates of the active frames, and of
+    /// its border.
     pub fn prior_information(
         &self,
         active: &[FrameEstimate],
@@ -487,7 +501,8 @@ impl<'a> Problem<'a> {
         (normal.blocks, border)
     }
 
-    /// Adds the prior of the poses and exposures at the `estimates` of all participants; returns its cost.
+    /// Adds the prior of the poses and exposures at the `estimates` of all participants; returns
+    /// its cost.
     fn add_prior(
         &self,
         estimates: &[FrameEstimate],
@@ -506,9 +521,10 @@ impl<'a> Problem<'a> {
         )
     }
 
-    /// Stiffens the first compared frame against moving along the gauge, where the pixels say nothing and rounding
-    /// would otherwise decide. Neither cost nor gradient change: where the trajectory stands along the gauge
-    /// is settled in closed form, by [`super::prior::Prior::settle_gauge`].
+    /// Stiffens the first compared frame against moving along the gauge, where the pixels say
+    /// nothing and rounding would otherwise decide. Neither cost nor gradient change: where the
+    /// trajectory stands along the gauge is settled in closed form, by
+    /// [`super::prior::Prior::settle_gauge`].
     fn tie_gauge(&self, slot: usize, first: &FrameEstimate, normal: &mut NormalEquations) {
         let Some(place) = self.pattern.place(slot, slot) else {
             return;
@@ -543,8 +559,8 @@ impl<'a> Problem<'a> {
         2f64.powi(self.sampling.level as i32)
     }
 
-    /// How far a step, with `shared` that of the shared unknowns, moves the wall under each active frame, in pixels of full
-    /// size: the largest over the frame's middle and corners.
+    /// How far a step, with `shared` that of the shared unknowns, moves the wall under each active
+    /// frame, in pixels of full size: the largest over the frame's middle and corners.
     pub fn wall_step_px(
         &self,
         active: &[FrameEstimate],
@@ -584,13 +600,14 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// Wall samples per pixel along each axis, at least: one, but more at coarse levels, where whole tiles of pixels
-/// would leave much of the frame's border unused.
+/// Wall samples per pixel along each axis, at least: one, but more at coarse levels, where whole
+/// tiles of pixels would leave much of the frame's border unused.
 fn least_density(rows: u32) -> f64 {
     (f64::from(LEAST_ROWS) / f64::from(rows)).ceil().max(1.0)
 }
 
-/// A pixel's width on the wall in the median frame's middle, metres. Frames that look along the tunnel do not count.
+/// A pixel's width on the wall in the median frame's middle, metres. Frames that look along the
+/// tunnel do not count.
 fn pixel_on_wall<'p>(
     surface: &dyn Surface,
     camera: &Camera,
@@ -622,7 +639,8 @@ mod tests {
     use nalgebra::Vector6;
     use std::borrow::Cow;
 
-    /// A ring of frames of a smooth wall, each with an exposure of its own, and estimates near the truth.
+    /// A ring of frames of a smooth wall, each with an exposure of its own, and estimates near the
+    /// truth.
     struct Ring {
         wall: TestWall,
         frames: FrameCache,
@@ -715,11 +733,12 @@ mod tests {
         }
     }
 
-    /// Central differences of the cost against the gradient, unknown by unknown. The texture is eliminated
-    /// and the loss robust; where frames agree but for their small displacements, the fused texture's
-    /// gradient is each frame's own, so the two must agree up to what sampling leaves (1 to 3 %). (The frames have no noise,
-    /// so the loss is as narrow as it ever gets, and residuals must be well inside: at its shoulders S needs more
-    /// reweightings to be the minimiser than are worth their time on real data.)
+    /// Central differences of the cost against the gradient, unknown by unknown. The texture is
+    /// eliminated and the loss robust; where frames agree but for their small displacements, the
+    /// fused texture's gradient is each frame's own, so the two must agree up to what sampling
+    /// leaves (1 to 3 %). (The frames have no noise, so the loss is as narrow as it ever gets, and
+    /// residuals must be well inside: at its shoulders S needs more reweightings to be the
+    /// minimiser than are worth their time on real data.)
     #[test]
     fn the_gradient_is_the_derivative_of_the_cost() {
         let ring = Ring::new(1e-4);
@@ -734,8 +753,9 @@ mod tests {
         );
     }
 
-    /// With the wall solved for, the gradient is not quite the derivative of what pixels cost (x is held by its roughness, too), but
-    /// it must change as the normal equations say, along every unknown.
+    /// With the wall solved for, the gradient is not quite the derivative of what pixels cost (x is
+    /// held by its roughness, too), but it must change as the normal equations say, along every
+    /// unknown.
     #[test]
     fn the_joint_gradient_changes_as_the_normal_equations_say() {
         let ring = Ring::new(1e-4);
@@ -828,7 +848,8 @@ mod tests {
         }
     }
 
-    /// Half of the information is in less than half of the wall, and the same unknowns are found from it.
+    /// Half of the information is in less than half of the wall, and the same unknowns are found
+    /// from it.
     #[test]
     fn half_the_information_is_in_less_than_half_of_the_wall() {
         let ring = Ring::new(1e-4);

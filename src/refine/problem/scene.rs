@@ -21,15 +21,17 @@ pub struct Sampling {
     pub level: usize,
     /// Wall samples per pixel along each axis.
     pub density: f64,
-    /// Share of the information that is used: the tiles that tell most are chosen until they hold it
-    /// ([`crate::refine::choice`]).
+    /// Share of the information that is used: the tiles that tell most are chosen until they hold
+    /// it ([`crate::refine::choice`]).
     pub information: f64,
     /// Between pixels.
     pub interpolation: Interpolation,
-    /// Whether samples weigh by their variance, steep ones less ([`crate::refine::robust::NoiseModel`]): only once the frames are aligned;
-    /// before that, residuals at steep places are what aligns them.
+    /// Whether samples weigh by their variance, steep ones less
+    /// ([`crate::refine::robust::NoiseModel`]): only once the frames are aligned; before that,
+    /// residuals at steep places are what aligns them.
     pub by_variance: bool,
-    /// Whether the wall is solved for at the density of the samples, jointly with the poses ([`crate::refine::joint`]): at full size only.
+    /// Whether the wall is solved for at the density of the samples, jointly with the poses
+    /// ([`crate::refine::joint`]): at full size only.
     pub joint: bool,
 }
 
@@ -85,14 +87,17 @@ impl Scene<'_> {
         }
     }
 
-    /// How the camera moves while frame `frame` is read, with the frames `run` at their `estimates`.
+    /// How the camera moves while frame `frame` is read, with the frames `run` at their
+    /// `estimates`.
     ///
-    /// Neighbours outside the run (not placed yet, say) are where the initial steps from the frame lead.
+    /// Neighbours outside the run (not placed yet, say) are where the initial steps from the frame
+    /// lead.
     pub fn sweep(&self, frame: usize, run: &Range<usize>, estimates: &[FrameEstimate]) -> Sweep {
         let readout_s = self.calibration.readout_s(&self.kappa);
-        match readout_s == 0.0 {
-            true => Sweep::default(),
-            false => self.sweep_rate(frame, run, estimates).times(readout_s),
+        if readout_s == 0.0 {
+            Sweep::default()
+        } else {
+            self.sweep_rate(frame, run, estimates).times(readout_s)
         }
     }
 

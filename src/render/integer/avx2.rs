@@ -122,7 +122,8 @@ fn one_grey<const TAPS: usize>(
     wide_grey(simd, source, weights, at, taps::<TAPS>(kernel).div_ceil(8))
 }
 
-/// The sums of eight pixels in colour: of the k-th and the k + 4th in the halves of the k-th vector.
+/// The sums of eight pixels in colour: of the k-th and the k + 4th in the halves of the k-th
+/// vector.
 #[inline(always)]
 pub fn colours<const TAPS: usize>(
     simd: V3,
@@ -239,8 +240,8 @@ fn rest(simd: V3, w: __m256i) -> __m256i {
         ._mm256_sub_epi32(simd.avx._mm256_set1_epi32(128), w)
 }
 
-/// `(128 − w, w)` in the halves of each number: a product of it and a number up to 128 has no carry from half to half, as
-/// 128 · 128 = 2¹⁴.
+/// `(128 − w, w)` in the halves of each number: a product of it and a number up to 128 has no carry
+/// from half to half, as 128 · 128 = 2¹⁴.
 #[inline(always)]
 fn pair(simd: V3, w: __m256i) -> __m256i {
     let avx2 = simd.avx2;
@@ -447,7 +448,8 @@ fn four_rows(source: Source<'_>) -> [&[u8]; 4] {
     ]
 }
 
-/// The samples under four taps of a row for pixels `k` to `k + 3`, times their weights: a and b of each.
+/// The samples under four taps of a row for pixels `k` to `k + 3`, times their weights: a and b of
+/// each.
 #[inline(always)]
 fn four_across(simd: V3, row: &[u8], first: &Eight<u32>, k: usize, w_x: __m256i) -> __m256i {
     let pixels = simd.sse2._mm_set_epi32(
@@ -460,7 +462,8 @@ fn four_across(simd: V3, row: &[u8], first: &Eight<u32>, k: usize, w_x: __m256i)
     avx2._mm256_madd_epi16(avx2._mm256_cvtepu8_epi16(pixels), w_x)
 }
 
-/// Twice four numbers, two of which add up to the sum of each of pixels `k` to `k + 3` under four taps.
+/// Twice four numbers, two of which add up to the sum of each of pixels `k` to `k + 3` under four
+/// taps.
 #[inline(always)]
 fn four_by_four(
     simd: V3,
@@ -518,7 +521,8 @@ const ROW_BY_ROW: [[i8; 16]; 2] = [
     [2, 3, NO, NO, 2, 3, NO, NO, NO, NO, NO, NO, NO, NO, NO, NO],
 ];
 
-/// Numbers whose sum is that of a pixel under eight taps and more, `blocks` times eight at the most: a row in each half of a vector.
+/// Numbers whose sum is that of a pixel under eight taps and more, `blocks` times eight at the
+/// most: a row in each half of a vector.
 #[inline(always)]
 fn wide_grey(
     simd: V3,

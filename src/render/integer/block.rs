@@ -1,4 +1,5 @@
-//! Rows of a patch of the chart, from where they appear in a frame to the bytes of the panorama, without a stop between.
+//! Rows of a patch of the chart, from where they appear in a frame to the bytes of the panorama,
+//! without a stop between.
 //!
 //! The numbers are those of [`super::super::run::Run`], to the bit.
 
@@ -121,7 +122,8 @@ fn mixed<const C: usize, const L: usize, const TAPS: usize>(
     }
 }
 
-/// Between corners before and after along `s`, the upper two and then the lower two along `t`: what is given at them, bilinear.
+/// Between corners before and after along `s`, the upper two and then the lower two along `t`: what
+/// is given at them, bilinear.
 #[inline(always)]
 fn bilinear(simd: V3, s: __m256, t: f32, corners: [f32; 4]) -> __m256 {
     let avx = simd.avx;
@@ -160,8 +162,9 @@ impl<'a> Row<'a> {
         }
     }
 
-    /// What the frame shows in the k-th eight columns, at `x`, light undone: `((sum + missing) scale − bias) light`. Of the pixels k and k + 4
-    /// in the halves of the k-th vector in colour, of all in the first one if they are grey.
+    /// What the frame shows in the k-th eight columns, at `x`, light undone:
+    /// `((sum + missing) scale − bias) light`. Of the pixels k and k + 4 in the halves of the k-th
+    /// vector in colour, of all in the first one if they are grey.
     #[inline(always)]
     fn values<const C: usize, const TAPS: usize>(
         &self,
@@ -312,7 +315,8 @@ fn eights(simd: V3, columns: &Range<usize>) -> ArrayVec<Columns, EIGHTS> {
     all
 }
 
-/// Puts those of eight pixels that are meant into a row of the tile, where the patch begins at column `patch`.
+/// Puts those of eight pixels that are meant into a row of the tile, where the patch begins at
+/// column `patch`.
 #[inline(always)]
 fn put<const C: usize>(
     simd: V3,
@@ -388,7 +392,8 @@ fn greys<const TAPS: usize>(simd: V3, patch: &Patch, eight: &Eights) -> __m256i 
     avx2::greys::<TAPS>(simd, source, kernel, &eight.first, eight.phases)
 }
 
-/// Where eight kernels lie: aligned, as what crosses lines of the cache must reach it before it can be read again.
+/// Where eight kernels lie: aligned, as what crosses lines of the cache must reach it before it can
+/// be read again.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
 struct Eights {
@@ -406,7 +411,8 @@ const NOWHERE: Eights = Eights {
     phases: [[0; EIGHT]; 2],
 };
 
-/// Where the kernels of a row lie: of all its columns before the first is looked up, or each would wait for its own.
+/// Where the kernels of a row lie: of all its columns before the first is looked up, or each would
+/// wait for its own.
 #[inline(always)]
 fn place<const C: usize, const TAPS: usize>(
     simd: V3,
@@ -437,7 +443,8 @@ fn place<const C: usize, const TAPS: usize>(
             first: cast(first),
             phases: [cast(s), cast(t)],
         };
-        // What the next rows need: sixteen pixels in colour take less than a line of the cache, or little more.
+        // What the next rows need: sixteen pixels in colour take less than a line of the cache, or
+        // little more.
         if k % 2 == 0 {
             let below = place.first[0] as usize + (taps + 1) * patch.source.stride;
             vectors::prefetch(simd, patch.source.samples, below);
@@ -466,7 +473,8 @@ fn whole(simd: V3, value: __m256, phases: f32) -> (__m256i, __m256i) {
     (below, avx._mm256_cvtps_epi32(phase))
 }
 
-/// The pixels whose sums are those of k and k + 4 in the halves of the k-th vector, alpha last and full.
+/// The pixels whose sums are those of k and k + 4 in the halves of the k-th vector, alpha last and
+/// full.
 #[inline(always)]
 fn colour_bytes<const TAPS: usize>(simd: V3, sums: [__m256i; 4]) -> __m256i {
     let (bits, half) = (bits(TAPS), rounding(TAPS));

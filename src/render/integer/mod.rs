@@ -1,14 +1,15 @@
 //! Sums of 8-bit samples under a kernel, in whole numbers.
 //!
-//! Two taps along each axis: with the phases s, t in 1/128 px, `Σ = Σ_ij w_i(s) w_j(t) I_ij` with `w = (128 − s, s)`, exact, in units of
-//! 2⁻¹⁴.
+//! Two taps along each axis: with the phases s, t in 1/128 px, `Σ = Σ_ij w_i(s) w_j(t) I_ij` with
+//! `w = (128 − s, s)`, exact, in units of 2⁻¹⁴.
 //!
-//! More: weights in units of 2⁻¹⁴ ([`Kernel::integers`]). Rows are summed first, the first and the last two of every four taps by
-//! themselves (a, b); these are cut to units of 2⁻⁶ and then summed down the columns: `Σ = Σ_j w_j (⌊a_j/2⁸⌋ + ⌊b_j/2⁸⌋)`, in units of 2⁻²⁰. What
-//! cutting takes away, half a unit of a and of b each in the mean, is given back at the end.
+//! More: weights in units of 2⁻¹⁴ ([`Kernel::integers`]). Rows are summed first, the first and the
+//! last two of every four taps by themselves (a, b); these are cut to units of 2⁻⁶ and then summed
+//! down the columns: `Σ = Σ_j w_j (⌊a_j/2⁸⌋ + ⌊b_j/2⁸⌋)`, in units of 2⁻²⁰. What cutting takes
+//! away, half a unit of a and of b each in the mean, is given back at the end.
 //!
-//! The same numbers come out of vectors (AVX2) and of the plain loops of [`plain`], to the bit: nothing is rounded but by
-//! the cut.
+//! The same numbers come out of vectors (AVX2) and of the plain loops of [`plain`], to the bit:
+//! nothing is rounded but by the cut.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -67,7 +68,8 @@ pub struct Places<'a> {
 /// Samples that are read beyond those needed.
 pub const PADDING: usize = 16;
 
-/// Sums at each place, one lane a channel: colour in the first three, grey in the first. `C`: 1 or 3 channels.
+/// Sums at each place, one lane a channel: colour in the first three, grey in the first. `C`: 1 or
+/// 3 channels.
 pub fn sums<const C: usize>(
     source: Source,
     kernel: &Kernel,
@@ -138,13 +140,15 @@ pub struct Part<'a> {
     pub bias: f32,
     /// What is multiplied by; None for 1.
     pub light: Option<Light>,
-    /// Weights at the corners of a cell between four nodes, bilinear in between: the upper two, then the lower two.
+    /// Weights at the corners of a cell between four nodes, bilinear in between: the upper two,
+    /// then the lower two.
     pub corners: [f32; 4],
 }
 
 /// Some rows and columns of a patch, the mean of parts with corrections added.
 pub struct LitBlock<'a, const L: usize> {
-    /// The parts, [`PARTS`] at the most, in the order of their frames; their kernels have equally many taps. One alone weighs 1 everywhere.
+    /// The parts, [`PARTS`] at the most, in the order of their frames; their kernels have equally
+    /// many taps. One alone weighs 1 everywhere.
     pub parts: &'a [Part<'a>],
     /// The first row, of the patch.
     pub row: usize,
@@ -160,8 +164,8 @@ pub struct LitBlock<'a, const L: usize> {
     pub corrections: &'a [[f32; L]],
 }
 
-/// Draws a block into rows of a tile, alpha last and full: the bytes nearest to the sums. False without doing it where the processor
-/// lacks the vectors for it.
+/// Draws a block into rows of a tile, alpha last and full: the bytes nearest to the sums. False
+/// without doing it where the processor lacks the vectors for it.
 pub fn block<const C: usize>(block: &Block, pixels: &mut [&mut [u8]]) -> bool {
     #[cfg(target_arch = "x86_64")]
     return by_taps!(block.patch.kernel, |simd, TAPS| block::plain::<C, TAPS>(
@@ -171,8 +175,8 @@ pub fn block<const C: usize>(block: &Block, pixels: &mut [&mut [u8]]) -> bool {
     false
 }
 
-/// Draws a block with light undone and corrections added. False without doing it where the processor lacks the vectors for it, or
-/// kernels have different taps.
+/// Draws a block with light undone and corrections added. False without doing it where the
+/// processor lacks the vectors for it, or kernels have different taps.
 pub fn lit_block<const C: usize, const L: usize>(
     block: &LitBlock<L>,
     pixels: &mut [&mut [u8]],
@@ -193,8 +197,8 @@ pub fn lit_block<const C: usize, const L: usize>(
     false
 }
 
-/// The values in some columns of a row of a patch, in the lanes of [`sums`]; `values`: of all the patch, those around `columns` are
-/// anything.
+/// The values in some columns of a row of a patch, in the lanes of [`sums`]; `values`: of all the
+/// patch, those around `columns` are anything.
 pub fn values<const C: usize>(
     patch: &Patch,
     row: usize,
@@ -263,9 +267,10 @@ mod tests {
         let samples = (0..SIZE * SIZE * C).map(|k| {
             let (x, y) = (k / C % SIZE, k / C / SIZE);
             let noise = (k * 2_654_435_761) >> 13;
-            match x < SIZE / 2 {
-                true => noise as u8,
-                false => 255 * (((x / 3) ^ (y / 2)) & 1) as u8,
+            if x < SIZE / 2 {
+                noise as u8
+            } else {
+                255 * (((x / 3) ^ (y / 2)) & 1) as u8
             }
         });
         Picture::new(SIZE, SIZE, C, samples.collect::<Vec<u8>>())
@@ -316,7 +321,8 @@ mod tests {
         pixels::<C>(&kernel, &fast, &mut bytes[0]);
         plain::pixels::<C>(&fast, &more, bits_of, &mut bytes[1]);
         assert_eq!(bytes[0], bytes[1]);
-        // Against single precision at the same phases, and where phases are 1/1024 px off at the most.
+        // Against single precision at the same phases, and where phases are 1/1024 px off at the
+        // most.
         let scale = f64::from(1u32 << bits(kernel.taps())).recip();
         let (mut worst, mut squares) = (0.0f64, 0.0);
         for ((u, v), sum) in coordinates().zip(&fast) {
@@ -450,7 +456,8 @@ mod tests {
                         let undone = |value: f32| (value - bias) * ((c * x + b) * x + a);
                         let more = corrections[n * RUN + tile_first + k][channel];
                         let even = undone(value) + more;
-                        // Crosswise: the second is half of all in the middle, nothing at two corners.
+                        // Crosswise: the second is half of all in the middle, nothing at two
+                        // corners.
                         let (s, t) = (across[tile_first + k], down[n]);
                         let w = [(1.0 - s) * (1.0 - t) + s * t, s * (1.0 - t) + (1.0 - s) * t];
                         let second = (slow_other[k][channel] + missing(kernel.taps())) as f32

@@ -1,6 +1,8 @@
-//! Eight grey pixels under four taps or six whose samples lie near one another: picked out of a few rows of sixteen.
+//! Eight grey pixels under four taps or six whose samples lie near one another: picked out of a few
+//! rows of sixteen.
 //!
-//! The numbers are those of [`avx2::greys`](super::avx2::greys), to the bit: samples and rows that a pixel has no part in weigh nothing.
+//! The numbers are those of [`avx2::greys`](super::avx2::greys), to the bit: samples and rows that
+//! a pixel has no part in weigh nothing.
 
 use super::avx2::{Eight, cut_pair};
 use super::{Kernel, Source};
@@ -16,8 +18,8 @@ const DOWN: usize = 2;
 /// In an order of bytes: nothing, even if up to 127 is added.
 const NO: i8 = i8::MIN;
 
-/// The sums of eight pixels whose kernels begin in these columns and rows; None if they lie too far apart, or too near to the end of the
-/// picture, or have other taps.
+/// The sums of eight pixels whose kernels begin in these columns and rows; None if they lie too far
+/// apart, or too near to the end of the picture, or have other taps.
 #[inline(always)]
 pub fn greys<const TAPS: usize>(
     simd: V3,
@@ -194,7 +196,8 @@ mod four {
 mod six {
     use super::*;
 
-    /// Eight samples, each as a number of 16 bits. Those beyond the sixteenth, any others instead, weigh nothing.
+    /// Eight samples, each as a number of 16 bits. Those beyond the sixteenth, any others instead,
+    /// weigh nothing.
     const SAMPLES: [i8; 16] = [0, NO, 1, NO, 2, NO, 3, NO, 4, NO, 5, NO, 6, NO, 7, NO];
     /// All bytes in their order.
     const BYTES: [i8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];

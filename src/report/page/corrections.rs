@@ -69,7 +69,8 @@ fn corrected(
     .draw()
 }
 
-/// How much each frame's correction differs from that of the frame before: what a noise of steps shows.
+/// How much each frame's correction differs from that of the frame before: what a noise of steps
+/// shows.
 fn step(view: &View) -> Markup {
     let frames = &view.report.frames;
     let between = |k: usize| {

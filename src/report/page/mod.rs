@@ -1,7 +1,8 @@
 //! `report.html`: the report as one page that needs nothing else.
 //!
-//! One file per section; each draws a part of [`Report`] and knows nothing of where the numbers come from. Without
-//! scripts everything is there; with them the panoramas lie over each other and charts tell the values under the pointer.
+//! One file per section; each draws a part of [`Report`] and knows nothing of where the numbers
+//! come from. Without scripts everything is there; with them the panoramas lie over each other and
+//! charts tell the values under the pointer.
 
 mod convergence;
 mod corrections;
@@ -130,10 +131,7 @@ impl View<'_> {
                 Abscissa::Chainage => "chainage (m)".to_owned(),
                 Abscissa::Frame => "frame".to_owned(),
             },
-            range: match low <= high {
-                true => [low, high],
-                false => [0.0, 1.0],
-            },
+            range: if low <= high { [low, high] } else { [0.0, 1.0] },
             whole: self.report.abscissa == Abscissa::Frame,
         }
     }

@@ -84,13 +84,13 @@ pub fn repeat(view: &View) -> Markup {
 /// A command line as a shell takes it.
 fn shell(line: &[String]) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
-    let quoted =
-        line.iter().map(
-            |argument| match argument.chars().all(plain) && !argument.is_empty() {
-                true => argument.clone(),
-                false => format!("'{}'", argument.replace('\'', r"'\''")),
-            },
-        );
+    let quoted = line.iter().map(|argument| {
+        if argument.chars().all(plain) && !argument.is_empty() {
+            argument.clone()
+        } else {
+            format!("'{}'", argument.replace('\'', r"'\''"))
+        }
+    });
     quoted.collect::<Vec<_>>().join(" ")
 }
 

@@ -55,9 +55,10 @@ pub fn band_and_marks(view: &View) -> Vec<Extra> {
 
 /// The vertical lines, if there are any.
 pub fn marks_key(view: &View) -> Vec<Extra> {
-    match view.marks().is_empty() {
-        true => Vec::new(),
-        false => vec![Extra::Mark],
+    if view.marks().is_empty() {
+        Vec::new()
+    } else {
+        vec![Extra::Mark]
     }
 }
 

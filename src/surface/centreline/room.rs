@@ -22,11 +22,13 @@ impl Centreline {
         Ok(())
     }
 
-    /// Refuses lines on which the tunnel would run into itself: places half a turn of the tightest bend apart along the line, or more,
-    /// and nearer to each other than the two sections are large.
+    /// Refuses lines on which the tunnel would run into itself: places half a turn of the tightest
+    /// bend apart along the line, or more, and nearer to each other than the two sections are
+    /// large.
     ///
-    /// Compares runs of nodes by the spheres around them. A sphere and its middle change by no more than a run's length from one run to the next;
-    /// by that, runs that are far off are passed over.
+    /// Compares runs of nodes by the spheres around them. A sphere and its middle change by no more
+    /// than a run's length from one run to the next; by that, runs that are far off are passed
+    /// over.
     pub(super) fn check_apart(&self, farthest_m: f64) -> Result<(), SurfaceError> {
         let most = self.nodes.iter().map(|node| node.scale);
         let size_m = farthest_m * most.fold(0.0, f64::max);

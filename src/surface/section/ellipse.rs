@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 
 /// An ellipse `(a sin φ, b cos φ)` with its axes along x and z.
 ///
-/// Its length `s(φ) = ∫ √(a² cos² φ + b² sin² φ) dφ` has no closed form: it is added up by Gauss–Legendre quadrature and turned round by
-/// Newton's method, to the last bits.
+/// Its length `s(φ) = ∫ √(a² cos² φ + b² sin² φ) dφ` has no closed form: it is added up by
+/// Gauss–Legendre quadrature and turned round by Newton's method, to the last bits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ellipse {
     a_m: f64,
@@ -77,7 +77,8 @@ impl Ellipse {
         let cell = cell.clamp(1, CELLS) - 1;
         let mut phi_rad = phi(cell);
         let left_m = s_m - self.lengths_m[cell];
-        // The speed changes by parts in a thousand within a cell: every step gains three digits at the least.
+        // The speed changes by parts in a thousand within a cell: every step gains three digits at
+        // the least.
         for _ in 0..6 {
             let ahead_m = left_m - self.length(phi(cell), phi_rad);
             phi_rad += ahead_m / self.speed(phi_rad);

@@ -1,7 +1,7 @@
 //! The outline of a tunnel across its axis.
 //!
-//! Coordinates `(x, z)` in metres, the axis at the origin, z upwards to twelve o'clock. The outline is convex, closed, and runs from
-//! the z axis (`s = 0`) towards x, parametrised by its length `s`.
+//! Coordinates `(x, z)` in metres, the axis at the origin, z upwards to twelve o'clock. The outline
+//! is convex, closed, and runs from the z axis (`s = 0`) towards x, parametrised by its length `s`.
 
 mod ellipse;
 mod pieces;
@@ -38,7 +38,8 @@ pub trait Section: Send + Sync + std::fmt::Debug {
     /// The point at `s_m`, which is periodic.
     fn at(&self, s_m: f64) -> OutlinePoint;
 
-    /// Where the ray `from + range · d` from inside meets it. `from` must be inside and `d` not zero.
+    /// Where the ray `from + range · d` from inside meets it. `from` must be inside and `d` not
+    /// zero.
     fn hit(&self, from: &Vector2<f64>, d: &Vector2<f64>) -> OutlineHit;
 
     /// Whether a point is inside.
@@ -121,9 +122,10 @@ impl Section for Round {
 /// The greater root of `a λ² + 2 b λ + c = 0`, without cancellation where c ≤ 0, as from inside.
 fn forward_root(a: f64, b: f64, c: f64) -> f64 {
     let root = (b * b - a * c).max(0.0).sqrt();
-    match b > 0.0 {
-        true => -c / (b + root),
-        false => (root - b) / a,
+    if b > 0.0 {
+        -c / (b + root)
+    } else {
+        (root - b) / a
     }
 }
 

@@ -63,8 +63,8 @@ impl Piece {
         }
     }
 
-    /// Where a ray meets the line or circle that this is a part of, and how far behind the beginning, metres; nothing if it goes
-    /// away from it.
+    /// Where a ray meets the line or circle that this is a part of, and how far behind the
+    /// beginning, metres; nothing if it goes away from it.
     fn meet(&self, from: &Vector2<f64>, d: &Vector2<f64>) -> Option<(f64, f64)> {
         match *self {
             Self::Line { from: start, to } => {
@@ -144,11 +144,12 @@ impl Pieces {
         Ok(Self::new(lines.collect()))
     }
 
-    /// A round arch on straight walls and a flat floor, the axis in the middle of the arch; sizes in metres.
+    /// A round arch on straight walls and a flat floor, the axis in the middle of the arch; sizes
+    /// in metres.
     ///
     /// # Errors
-    /// [`SurfaceError::Size`] unless both are positive and finite, [`SurfaceError::NoWalls`] unless it is higher than half its
-    /// width.
+    /// [`SurfaceError::Size`] unless both are positive and finite, [`SurfaceError::NoWalls`] unless
+    /// it is higher than half its width.
     pub fn horseshoe(width_m: f64, height_m: f64) -> Result<Self, SurfaceError> {
         super::super::check_size("width_m", width_m)?;
         super::super::check_size("height_m", height_m)?;
@@ -194,7 +195,8 @@ impl Section for Pieces {
         self.pieces[k].at(s_m - self.starts_m[k])
     }
 
-    /// Of the pieces that it meets within their ends, give or take rounding, the nearest: the outline is convex.
+    /// Of the pieces that it meets within their ends, give or take rounding, the nearest: the
+    /// outline is convex.
     fn hit(&self, from: &Vector2<f64>, d: &Vector2<f64>) -> OutlineHit {
         let slack = 1e-9 * self.perimeter_m();
         let mut best = OutlineHit {

@@ -193,7 +193,8 @@ fn radii_between_points_are_on_the_way_from_one_to_the_next() {
     }
 }
 
-/// A straight tunnel whose radius changes may be turned, but not shifted: rotations tell the turn of cameras on the axis.
+/// A straight tunnel whose radius changes may be turned, but not shifted: rotations tell the turn
+/// of cameras on the axis.
 #[test]
 fn a_funnel_turns_about_its_axis() {
     let funnel = tunnel(

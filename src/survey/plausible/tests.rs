@@ -26,7 +26,8 @@ fn tum() -> Convention {
     Convention::of(PoseFormat::Tum)
 }
 
-/// A camera that revolves `offset_m` off the axis, with errors of 2° and (2, 2, 3) cm times `times` a step.
+/// A camera that revolves `offset_m` off the axis, with errors of 2° and (2, 2, 3) cm times `times`
+/// a step.
 fn flight(
     frames: usize,
     advance_m: f64,
@@ -48,7 +49,8 @@ fn flight(
     jitter.apply(&plan, &mut rand_chacha::ChaCha8Rng::seed_from_u64(seed))
 }
 
-/// Rings that hardly advance, on the axis and off it, few frames and many, poses that err by six times as much.
+/// Rings that hardly advance, on the axis and off it, few frames and many, poses that err by six
+/// times as much.
 #[test]
 fn sound_surveys_raise_no_alarm() {
     for seed in 0..40 {
@@ -130,7 +132,8 @@ fn a_short_motion_across_the_tunnel_is_suspicious() {
     assert!(warnings.iter().any(told), "{warnings:?}");
 }
 
-/// A world in which the first pose is far from the origin: the wrong direction puts cameras far outside.
+/// A world in which the first pose is far from the origin: the wrong direction puts cameras far
+/// outside.
 #[test]
 fn the_wrong_direction_is_named() {
     let poses: Vec<Pose> = flight(120, 0.5, 0.5, JitterModel::RandomWalk, 1.0, 3)
@@ -153,7 +156,8 @@ fn the_wrong_direction_is_named() {
     assert!(message.contains("--pose-convention c2w"), "{message}");
 }
 
-/// The body's axes are not the camera's: with the mount the wrong way round the camera looks along the tunnel.
+/// The body's axes are not the camera's: with the mount the wrong way round the camera looks along
+/// the tunnel.
 #[test]
 fn an_inverted_mount_is_named() {
     let camera_in_body = Pose::new(
@@ -192,7 +196,8 @@ fn one_camera_outside_is_no_convention() {
     );
 }
 
-/// On the axis of a short tunnel OpenGL's axes look at the opposite wall: nothing in the poses is wrong.
+/// On the axis of a short tunnel OpenGL's axes look at the opposite wall: nothing in the poses is
+/// wrong.
 #[test]
 fn what_only_pictures_can_tell_raises_no_alarm() {
     let poses: Vec<Pose> = spiral(48, 0.1, 30f64.to_radians())

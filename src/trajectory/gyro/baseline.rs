@@ -9,7 +9,8 @@ use crate::median::upper_median;
 use crate::trajectory::{Mounting, Pose, PoseError, StampedPose, Station, Trajectory};
 use nalgebra::{Matrix3, Vector3};
 
-/// What is known of the frames: when they were taken, where the carrier was meant to stand, and how the camera sits on it.
+/// What is known of the frames: when they were taken, where the carrier was meant to stand, and how
+/// the camera sits on it.
 #[derive(Clone, Copy, Debug)]
 pub struct Frames<'a> {
     /// Their times, seconds, which increase.
@@ -46,8 +47,8 @@ pub enum Clock {
 pub enum Start {
     /// The first frame's station.
     Station,
-    /// The angle about the axis by gravity while the sensor rests, with the tunnel's bottom at this θ, radians; the carrier lies
-    /// along the tunnel at the first frame.
+    /// The angle about the axis by gravity while the sensor rests, with the tunnel's bottom at this
+    /// θ, radians; the carrier lies along the tunnel at the first frame.
     Gravity {
         /// θ of the bottom.
         down_rad: f64,
@@ -65,8 +66,8 @@ pub struct GyroOptions {
     pub density_rad_sqrt_s: Option<f64>,
     /// 1-σ of the sensor's scale, as a share.
     pub scale_sigma: f64,
-    /// By how much the carrier turned about the axis from the first frame to the last, radians: the bias about the axis is
-    /// changed so that it did.
+    /// By how much the carrier turned about the axis from the first frame to the last, radians: the
+    /// bias about the axis is changed so that it did.
     pub total_turn_rad: Option<f64>,
     /// How the clocks stand.
     pub clock: Clock,
@@ -103,8 +104,9 @@ const GAP: f64 = 5.0;
 /// Integrates a log whose axes `to_camera` turns into the camera's.
 ///
 /// # Errors
-/// [`PoseError::File`] of the log: no rest where the bias, the density or gravity is wanted of it; clocks that cannot be
-/// matched; frames that the log does not cover; no accelerations, or gravity along the axis, where it is to tell the angle.
+/// [`PoseError::File`] of the log: no rest where the bias, the density or gravity is wanted of it;
+/// clocks that cannot be matched; frames that the log does not cover; no accelerations, or gravity
+/// along the axis, where it is to tell the angle.
 pub fn baseline_from_gyro(
     log: &GyroLog,
     to_camera: &Matrix3<f64>,
@@ -175,7 +177,8 @@ pub fn baseline_from_gyro(
         Start::Gravity { down_rad } => {
             let rest = rested("gravity tells no angle (--down-deg)")?;
             let up = to_camera * mean_acceleration(log, rest.span_s).map_err(fail)?;
-            // As the first frame's camera would feel it: the carrier lies along the tunnel there, and perhaps not at the rest.
+            // As the first frame's camera would feel it: the carrier lies along the tunnel there,
+            // and perhaps not at the rest.
             let middle_s = 0.5 * (rest.span_s[0] + rest.span_s[1]);
             let up = between(first_s, middle_s)? * up;
             let angle_rad =
@@ -223,12 +226,13 @@ fn covered(rates: &Rates, times_s: &[f64], offset_s: f64) -> Result<Vec<f64>, St
     let [first_s, last_s] = rates.span_s();
     let at = |(frame, time_s): (usize, &f64)| {
         let at_s = time_s + offset_s;
-        match (first_s..=last_s).contains(&at_s) {
-            true => Ok(at_s),
-            false => Err(format!(
+        if (first_s..=last_s).contains(&at_s) {
+            Ok(at_s)
+        } else {
+            Err(format!(
                 "frame {frame} at {time_s} s is at {at_s:.3} s of the log, which goes from {first_s:.3} s to {last_s:.3} s; \
-                 give the log's time minus the frames' (--time-offset-s)"
-            )),
+             give the log's time minus the frames' (--time-offset-s)"
+            ))
         }
     };
     times_s.iter().enumerate().map(at).collect()
@@ -281,7 +285,8 @@ mod tests {
     use crate::trajectory::gyro::GyroSample;
     use crate::trajectory::so3;
 
-    /// A sensor without noise, with a bias of 0.01 rad/s about every axis: three seconds at rest, then 0.5 rad/s about y.
+    /// A sensor without noise, with a bias of 0.01 rad/s about every axis: three seconds at rest,
+    /// then 0.5 rad/s about y.
     fn log(gap: bool, accelerations: bool) -> GyroLog {
         let in_gap = |t: f64| gap && t > 5.0 && t < 5.5;
         let times = (0..1600).map(|k| f64::from(k) / 200.0);

@@ -19,14 +19,17 @@ const LEAST_CORRELATION: f64 = 0.7;
 const MOST_OFFSETS: f64 = 1e7;
 
 impl ClockMatch {
-    /// Finds the offset, within `range_s`, that makes the rate about `axis` (in the camera's axes) agree best with a plan's:
-    /// that of the greatest correlation of the mean rates between frames, with a parabola through its neighbours.
+    /// Finds the offset, within `range_s`, that makes the rate about `axis` (in the camera's axes)
+    /// agree best with a plan's: that of the greatest correlation of the mean rates between frames,
+    /// with a parabola through its neighbours.
     ///
-    /// `times_s` and `angles_rad`: the plan's angle about the axis at the frames. Steps of the search are those of the log.
+    /// `times_s` and `angles_rad`: the plan's angle about the axis at the frames. Steps of the
+    /// search are those of the log.
     ///
     /// # Errors
-    /// Fewer than four frames, a plan that turns evenly, which fits anywhere, a log that does not cover the frames at any
-    /// offset, no offset at which the two agree, or only at an end of the range.
+    /// Fewer than four frames, a plan that turns evenly, which fits anywhere, a log that does not
+    /// cover the frames at any offset, no offset at which the two agree, or only at an end of the
+    /// range.
     pub fn find(
         rates: &Rates,
         axis: &Vector3<f64>,

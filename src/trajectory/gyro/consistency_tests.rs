@@ -1,4 +1,5 @@
-//! Whether integrated rotations are as far off as they are said to be: logs as files, with bias and noise, read back.
+//! Whether integrated rotations are as far off as they are said to be: logs as files, with bias and
+//! noise, read back.
 
 use super::*;
 use crate::trajectory::so3;
@@ -41,7 +42,8 @@ fn log(orientation: &str, bias: Vector3<f64>, sigma: f64, seed: u64) -> String {
     text
 }
 
-/// Errors of the steps from second to second and of the whole, over what they are said to be (squared, over three axes).
+/// Errors of the steps from second to second and of the whole, over what they are said to be
+/// (squared, over three axes).
 fn normalised(orientation: &str, seed: u64) -> (f64, f64) {
     let bias = Vector3::new(0.012, -0.02, 0.007);
     let dir = tempfile::tempdir().unwrap();
@@ -68,8 +70,8 @@ fn normalised(orientation: &str, seed: u64) -> (f64, f64) {
     (steps / STEPS as f64, error(seconds(0), seconds(STEPS)))
 }
 
-/// Whichever way the sensor sits, errors are of the size that is said: for 24 orientations the mean squares of 480 steps (1440
-/// numbers) and of 24 whole ways (72 numbers).
+/// Whichever way the sensor sits, errors are of the size that is said: for 24 orientations the mean
+/// squares of 480 steps (1440 numbers) and of 24 whole ways (72 numbers).
 #[test]
 fn errors_are_what_they_are_said_to_be() {
     let words: Vec<String> = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"]
@@ -91,7 +93,8 @@ fn errors_are_what_they_are_said_to_be() {
         .collect();
     let mean = |of: fn(&(f64, f64)) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
     let (steps, whole) = (mean(|pair| pair.0), mean(|pair| pair.1));
-    // 1 ± 0.04 and 1 ± 0.2 by chance; the density is estimated with some per cent, rather too large than too small.
+    // 1 ± 0.04 and 1 ± 0.2 by chance; the density is estimated with some per cent, rather too large
+    // than too small.
     assert!((0.7..1.2).contains(&steps), "{steps}");
     assert!((0.4..1.6).contains(&whole), "{whole}");
 }

@@ -1,6 +1,8 @@
-//! Gyroflow's gyro log, `.gcsv`: text, `key,value` lines, then a table `t,gx,gy,gz[,ax,ay,az[,mx,my,mz]]`.
+//! Gyroflow's gyro log, `.gcsv`: text, `key,value` lines, then a table
+//! `t,gx,gy,gz[,ax,ay,az[,mx,my,mz]]`.
 //!
-//! `t · tscale` is seconds, `gx · gscale` rad/s, `ax · ascale` multiples of g; all in the sensor's own axes.
+//! `t · tscale` is seconds, `gx · gscale` rad/s, `ax · ascale` multiples of g; all in the sensor's
+//! own axes.
 //!
 //! Source: <https://docs.gyroflow.xyz/app/technical-details/gcsv-format>.
 
@@ -115,9 +117,10 @@ impl GyroLog {
     /// Reads a log.
     ///
     /// # Errors
-    /// An unreadable file; another first line; a header without scales, or with an impossible orientation; a table with other
-    /// columns; a line with more or fewer columns than the table's first, or with something that is no number; times that do
-    /// not increase; fewer than two samples.
+    /// An unreadable file; another first line; a header without scales, or with an impossible
+    /// orientation; a table with other columns; a line with more or fewer columns than the table's
+    /// first, or with something that is no number; times that do not increase; fewer than two
+    /// samples.
     pub fn read(path: &Path) -> Result<Self, PoseError> {
         let text = text::read(path)?;
         let mut lines = text::lines(&text);
@@ -164,9 +167,10 @@ impl GyroLog {
         let scales = Scales {
             seconds: header.scale(path, "tscale", "times")?,
             rad_s: header.scale(path, "gscale", "rates")?,
-            g: match columns > 4 {
-                true => header.scale(path, "ascale", "accelerations")?,
-                false => 1.0,
+            g: if columns > 4 {
+                header.scale(path, "ascale", "accelerations")?
+            } else {
+                1.0
             },
         };
         let readout = header.readout(path)?;

@@ -1,9 +1,11 @@
 //! Rotations from a gyro's log.
 //!
-//! A [`GyroLog`] is the file; an [`Orientation`] or a calibrated mount turns its rates into the camera's axes ([`Rates`]). A
-//! stretch at rest ([`Rest`]) tells the bias, the noise density and which way is up; [`Turning`] integrates what is left to
-//! rotations at the frames' times; [`ClockMatch`] finds how the log's clock stands to that of a plan; [`RotationNoise`] says how
-//! far the rotations may be off. [`baseline_from_gyro`] is all of it, from the log to one pose a frame.
+//! A [`GyroLog`] is the file; an [`Orientation`] or a calibrated mount turns its rates into the
+//! camera's axes ([`Rates`]). A stretch at rest ([`Rest`]) tells the bias, the noise density and
+//! which way is up; [`Turning`] integrates what is left to rotations at the frames' times;
+//! [`ClockMatch`] finds how the log's clock stands to that of a plan; [`RotationNoise`] says how
+//! far the rotations may be off. [`baseline_from_gyro`] is all of it, from the log to one pose a
+//! frame.
 
 mod baseline;
 mod clock;
@@ -31,11 +33,12 @@ pub use turning::Turning;
 use super::Mounting;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// The carrier's attitude angle θ about the tunnel's axis, told by gravity: the carrier's y axis is taken to lie along the
-/// tunnel's, as the plan has it, and the tunnel's bottom at `down_rad`.
+/// The carrier's attitude angle θ about the tunnel's axis, told by gravity: the carrier's y axis is
+/// taken to lie along the tunnel's, as the plan has it, and the tunnel's bottom at `down_rad`.
 ///
-/// `up_c` is the acceleration at rest in the camera's axes. With `u = R_mount up_c`, θ makes `R_y(θ) u`, seen along the axis,
-/// point away from the bottom: `θ = atan2(−sin d, −cos d) − atan2(u_x, u_z)`.
+/// `up_c` is the acceleration at rest in the camera's axes. With `u = R_mount up_c`, θ makes
+/// `R_y(θ) u`, seen along the axis, point away from the bottom:
+/// `θ = atan2(−sin d, −cos d) − atan2(u_x, u_z)`.
 ///
 /// Returns `None` where gravity is within 10° of the axis, along which it tells nothing.
 pub fn angle_from_gravity_rad(

@@ -2,14 +2,16 @@
 
 use nalgebra::Matrix3;
 
-/// An IMU orientation of Gyroflow, as `YxZ`: which of the sensor's axes, in capitals, or against which, in small letters, lies
-/// along each of Gyroflow's own: up, left, and backwards out of the picture. `YxZ` stands for a sensor with x right, y up and z
-/// backwards.
+/// An IMU orientation of Gyroflow, as `YxZ`: which of the sensor's axes, in capitals, or against
+/// which, in small letters, lies along each of Gyroflow's own: up, left, and backwards out of the
+/// picture. `YxZ` stands for a sensor with x right, y up and z backwards.
 ///
-/// There are 48. Half of them are mirrors, of sensors whose axes are left-handed; each axis still has its rate by the
-/// right-hand rule, so rates are taken axis by axis all the same, as Gyroflow does.
+/// There are 48. Half of them are mirrors, of sensors whose axes are left-handed; each axis still
+/// has its rate by the right-hand rule, so rates are taken axis by axis all the same, as Gyroflow
+/// does.
 ///
-/// Source: Gyroflow's documentation of the gcsv format and the way its integrators and its `frame_transform` use the axes.
+/// Source: Gyroflow's documentation of the gcsv format and the way its integrators and its
+/// `frame_transform` use the axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orientation {
     /// Sensor to Gyroflow's axes.
@@ -43,13 +45,15 @@ impl Orientation {
                 -1.0
             };
         }
-        match to_own.determinant() == 0.0 {
-            true => Err(fail()),
-            false => Ok(Self { to_own }),
+        if to_own.determinant() == 0.0 {
+            Err(fail())
+        } else {
+            Ok(Self { to_own })
         }
     }
 
-    /// From the sensor's axes to the camera's (x right, y down, z forward): `(−y, −x, −z)` of Gyroflow's.
+    /// From the sensor's axes to the camera's (x right, y down, z forward): `(−y, −x, −z)` of
+    /// Gyroflow's.
     pub fn to_camera(&self) -> Matrix3<f64> {
         let own_to_camera = Matrix3::new(0.0, -1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
         own_to_camera * self.to_own

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-/// Rates of turn in the camera's axes, rad/s, at times that increase; between them they change evenly.
+/// Rates of turn in the camera's axes, rad/s, at times that increase; between them they change
+/// evenly.
 #[derive(Clone, Debug)]
 pub struct Rates {
     times_s: Vec<f64>,

@@ -3,7 +3,8 @@
 use super::Rates;
 use nalgebra::Vector3;
 
-/// A sensor that is at rest shows no more than this, rad/s: 3°/s, beyond what consumers' gyros are off when switched on.
+/// A sensor that is at rest shows no more than this, rad/s: 3°/s, beyond what consumers' gyros are
+/// off when switched on.
 pub const MOST_BIAS_RAD_S: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
 /// Windows as quiet as this many times the least variance are all taken for quiet ones.
@@ -19,19 +20,22 @@ pub struct Rest {
     pub span_s: [f64; 2],
     /// Mean rate, rad/s.
     pub bias_rad_s: Vector3<f64>,
-    /// White noise density N, rad/√s (that is rad/s/√Hz): the rate's mean over τ seconds has the standard deviation N/√τ.
+    /// White noise density N, rad/√s (that is rad/s/√Hz): the rate's mean over τ seconds has the
+    /// standard deviation N/√τ.
     pub density_rad_sqrt_s: f64,
 }
 
 impl Rest {
-    /// The stretch of `length_s` at which the sensor rested: of the windows with no more than half as much again as the least
-    /// variance, those with the least mean rate (to 0.5°/s), and of them the one with the least variance.
+    /// The stretch of `length_s` at which the sensor rested: of the windows with no more than half
+    /// as much again as the least variance, those with the least mean rate (to 0.5°/s), and of them
+    /// the one with the least variance.
     ///
-    /// Variance alone cannot tell rest from an even turn, and the mean alone would prefer windows with a little turn against the
-    /// bias at their end.
+    /// Variance alone cannot tell rest from an even turn, and the mean alone would prefer windows
+    /// with a little turn against the bias at their end.
     ///
     /// # Errors
-    /// A log shorter than that; no such window with a mean rate below [`MOST_BIAS_RAD_S`]: the carrier never rested.
+    /// A log shorter than that; no such window with a mean rate below [`MOST_BIAS_RAD_S`]: the
+    /// carrier never rested.
     pub fn find(rates: &Rates, length_s: f64) -> Result<Self, String> {
         let times = rates.times_s();
         let [first_s, last_s] = rates.span_s();
@@ -57,7 +61,8 @@ impl Rest {
                 windows.push((squares / count - mean * mean, mean, begin));
             }
         }
-        // Sums that are added to and taken from again are off by rounding: no variance is below that.
+        // Sums that are added to and taken from again are off by rounding: no variance is below
+        // that.
         let rounding = squares_scale(rates) * 1e-12;
         let least = windows
             .iter()
@@ -84,9 +89,9 @@ impl Rest {
 
     /// What a stretch tells, whether or not the sensor rested.
     ///
-    /// The density is the larger of that of single samples and that of means over a twentieth of the stretch, both by the Allan
-    /// variance `N² = ½ τ ⟨(ω̄ₖ₊₁ − ω̄ₖ)²⟩`, which no slow drift adds to: a logger's low pass makes single samples look quieter
-    /// than the rate is.
+    /// The density is the larger of that of single samples and that of means over a twentieth of
+    /// the stretch, both by the Allan variance `N² = ½ τ ⟨(ω̄ₖ₊₁ − ω̄ₖ)²⟩`, which no slow drift
+    /// adds to: a logger's low pass makes single samples look quieter than the rate is.
     ///
     /// # Errors
     /// Fewer than 20 samples.
@@ -148,7 +153,8 @@ mod tests {
 
     const BIAS: Vector3<f64> = Vector3::new(0.01, -0.02, 0.005);
 
-    /// 200 Hz: four seconds of an even turn, three at rest, three of a turn that is not even; noise of 0.01 rad/s a sample.
+    /// 200 Hz: four seconds of an even turn, three at rest, three of a turn that is not even; noise
+    /// of 0.01 rad/s a sample.
     fn log(rest: bool) -> Rates {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -186,7 +192,8 @@ mod tests {
         assert!(Rest::of(&log(true), [4.0, 4.05]).is_err());
     }
 
-    /// A log that was smoothed over ten samples has a third of their deviation and the same density.
+    /// A log that was smoothed over ten samples has a third of their deviation and the same
+    /// density.
     #[test]
     fn a_low_pass_does_not_hide_the_noise() {
         let raw = log(true);

@@ -12,10 +12,11 @@ pub struct Turning {
     since_first: Vec<UnitQuaternion<f64>>,
 }
 
-/// The rotation over `step_s` during which the rate, in the turning axes, goes evenly from `from` to `to`:
-/// `Exp(h (ω₀ + ω₁)/2 + h²/12 ω₀ × ω₁)`, exact but for terms of the fifth order of h.
+/// The rotation over `step_s` during which the rate, in the turning axes, goes evenly from `from`
+/// to `to`: `Exp(h (ω₀ + ω₁)/2 + h²/12 ω₀ × ω₁)`, exact but for terms of the fifth order of h.
 ///
-/// Source: Bortz, "A new mathematical formulation for strapdown inertial navigation", 1971; the fourth-order Magnus expansion.
+/// Source: Bortz, "A new mathematical formulation for strapdown inertial navigation", 1971; the
+/// fourth-order Magnus expansion.
 fn step(from: &Vector3<f64>, to: &Vector3<f64>, step_s: f64) -> UnitQuaternion<f64> {
     so3::exp(&((from + to) * (0.5 * step_s) + from.cross(to) * (step_s * step_s / 12.0)))
 }
@@ -37,7 +38,8 @@ impl Turning {
         Self { rates, since_first }
     }
 
-    /// The camera at a time in the camera at the log's first sample; `None` before that or after the last.
+    /// The camera at a time in the camera at the log's first sample; `None` before that or after
+    /// the last.
     pub fn at(&self, time_s: f64) -> Option<UnitQuaternion<f64>> {
         let times = self.rates.times_s();
         let next = times.partition_point(|t| *t < time_s);
@@ -68,8 +70,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A rotation that is known in closed form, and its rate in its own axes: precession about y at `w` while spinning about z
-    /// at `s`, tilted by 0.3 rad.
+    /// A rotation that is known in closed form, and its rate in its own axes: precession about y at
+    /// `w` while spinning about z at `s`, tilted by 0.3 rad.
     fn truth(w: f64, s: f64, t: f64) -> (UnitQuaternion<f64>, Vector3<f64>) {
         let tilt = so3::exp(&(Vector3::x() * 0.3));
         let r = so3::exp(&(Vector3::y() * (w * t))) * tilt * so3::exp(&(Vector3::z() * (s * t)));
@@ -94,7 +96,8 @@ mod tests {
         }
     }
 
-    /// The coning term is what makes it better than the mean rate: four times the samples, sixteen times as exact.
+    /// The coning term is what makes it better than the mean rate: four times the samples, sixteen
+    /// times as exact.
     #[test]
     fn it_converges_with_the_second_power_and_is_exact_for_even_turns() {
         let off = |hz: f64| {

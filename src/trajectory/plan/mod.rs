@@ -1,7 +1,8 @@
 //! The plan: what the carrier was told to do.
 //!
-//! A [`Station`] is where the carrier stands while a frame is taken. Stations come from even motion ([`Steady`]) or from a
-//! table ([`PlanTable`]); a [`Mounting`] says how the camera sits on the carrier, and makes poses of stations.
+//! A [`Station`] is where the carrier stands while a frame is taken. Stations come from even motion
+//! ([`Steady`]) or from a table ([`PlanTable`]); a [`Mounting`] says how the camera sits on the
+//! carrier, and makes poses of stations.
 
 mod mounting;
 mod station;

@@ -17,7 +17,8 @@ pub struct Station {
 impl Station {
     /// The carrier in the tunnel: its y axis along the tunnel's, its z axis towards θ.
     ///
-    /// `R = [[c, 0, s], [0, 1, 0], [−s, 0, c]]` with `c, s` of the angle: a positive turn moves the view towards larger θ.
+    /// `R = [[c, 0, s], [0, 1, 0], [−s, 0, c]]` with `c, s` of the angle: a positive turn moves the
+    /// view towards larger θ.
     pub fn carrier(&self) -> Pose {
         let [x_m, z_m] = self.offset_m;
         Pose::new(
@@ -26,7 +27,8 @@ impl Station {
         )
     }
 
-    /// The station a share of the way to another: every number on its own, so that whole turns count.
+    /// The station a share of the way to another: every number on its own, so that whole turns
+    /// count.
     pub fn towards(&self, other: &Self, share: f64) -> Self {
         let between = |from: f64, to: f64| from + share * (to - from);
         Self {
@@ -37,8 +39,8 @@ impl Station {
     }
 }
 
-/// `count` poses on the axis of the tunnel: step k stands at chainage `k · advance_m` (metres), turned by
-/// `k · turn_rad` about the axis. The camera is the carrier.
+/// `count` poses on the axis of the tunnel: step k stands at chainage `k · advance_m` (metres),
+/// turned by `k · turn_rad` about the axis. The camera is the carrier.
 pub fn spiral(count: usize, advance_m: f64, turn_rad: f64) -> Vec<Pose> {
     let station = |k: usize| Station {
         chainage_m: k as f64 * advance_m,

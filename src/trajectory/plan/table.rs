@@ -1,7 +1,9 @@
-//! A plan as a table: `frame,chainage_m,angle_deg` or `time_s,chainage_m,angle_deg`, and `x_m,z_m` if wanted.
+//! A plan as a table: `frame,chainage_m,angle_deg` or `time_s,chainage_m,angle_deg`, and `x_m,z_m`
+//! if wanted.
 //!
-//! Columns are found by their names, in any order; others are left alone. Frames count from 0. Between rows all numbers change
-//! evenly, angles as they are given: from 350 to 370 the carrier turns by 20°, from 350 to 10 by 340° backwards.
+//! Columns are found by their names, in any order; others are left alone. Frames count from 0.
+//! Between rows all numbers change evenly, angles as they are given: from 350 to 370 the carrier
+//! turns by 20°, from 350 to 10 by 340° backwards.
 
 use super::Station;
 use crate::trajectory::csv::{separator, split};
@@ -98,8 +100,8 @@ impl PlanTable {
     /// Reads a table.
     ///
     /// # Errors
-    /// An unreadable file; missing columns; a row with more or fewer columns than the first line, or with something that is no
-    /// number; frames or times that do not increase; no row at all.
+    /// An unreadable file; missing columns; a row with more or fewer columns than the first line,
+    /// or with something that is no number; frames or times that do not increase; no row at all.
     pub fn read(path: &Path) -> Result<Self, PoseError> {
         let text = text::read(path)?;
         let mut lines = text::lines(&text);

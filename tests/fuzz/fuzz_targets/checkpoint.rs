@@ -1,5 +1,5 @@
-//! What an interrupted run has kept: with the hash that belongs to it, so that what the bytes mean is read; and if the first byte
-//! is odd, as it is.
+//! What an interrupted run has kept: with the hash that belongs to it, so that what the bytes mean
+//! is read; and if the first byte is odd, as it is.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,5 @@
-//! runs.jsonl, the runs that a sweep has done. The one run that it asks for is refused by the simulator at once.
+//! runs.jsonl, the runs that a sweep has done. The one run that it asks for is refused by the
+//! simulator at once.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,5 @@
-//! What ffprobe says of a video. `tests/fuzz/stand_in` must come first in PATH: its ffprobe says what the file holds.
+//! What ffprobe says of a video. `tests/fuzz/stand_in` must come first in PATH: its ffprobe says
+//! what the file holds.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

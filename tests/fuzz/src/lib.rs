@@ -1,4 +1,5 @@
-//! What the targets share: files of what the fuzzer thinks up, and a small survey to read them with.
+//! What the targets share: files of what the fuzzer thinks up, and a small survey to read them
+//! with.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -18,7 +19,8 @@ pub fn file(name: &str, content: &[u8]) -> (TempDir, PathBuf) {
 /// Frames of the small survey.
 pub const FRAMES: usize = 4;
 
-/// Files of the small survey that its survey.toml may name, besides those that the simulator writes.
+/// Files of the small survey that its survey.toml may name, besides those that the simulator
+/// writes.
 const OTHERS: [(&str, &str); 4] = [
     ("times.txt", "0\n1\n2\n3\n"),
     ("curve.txt", "0 -50 0\n0 0 0 3.1\n1 50 0\n"),

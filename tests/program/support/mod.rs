@@ -1,4 +1,5 @@
-//! What the integration tests share: the fixture, copies of its first frames, and running the program.
+//! What the integration tests share: the fixture, copies of its first frames, and running the
+//! program.
 
 pub mod chromium;
 pub mod npm;
@@ -82,7 +83,8 @@ pub fn text(path: &Path) -> &str {
     path.to_str().expect("a path in UTF-8")
 }
 
-/// Runs the program until something appears in `folder`, interrupts it as Ctrl-C does, and returns its exit code.
+/// Runs the program until something appears in `folder`, interrupts it as Ctrl-C does, and returns
+/// its exit code.
 #[cfg(unix)]
 pub fn interrupt(arguments: &[&str], folder: &Path) -> Option<i32> {
     let mut child = Command::new(env!("CARGO_BIN_EXE_tunnelstitch"))

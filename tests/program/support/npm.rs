@@ -1,9 +1,11 @@
-//! Programs from npm that judge what is written: `.ci/run` installs what `src/inspect/web/package-lock.json` names.
+//! Programs from npm that judge what is written: `.ci/run` installs what
+//! `src/inspect/web/package-lock.json` names.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The folder `node_modules` with these programs. Without it, `None` after saying so; where the environment says CI, a failure.
+/// The folder `node_modules` with these programs. Without it, `None` after saying so; where the
+/// environment says CI, a failure.
 pub fn find() -> Option<PathBuf> {
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent()?;
     let modules = target.join("npm/node_modules");
