@@ -89,23 +89,20 @@
 /// Name and version, as results carry them.
 const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
 
-pub mod atomic;
+mod bitmap_text;
 pub mod camera;
 pub mod check;
-pub mod checkpoint;
 pub mod cli;
 pub mod evaluate;
 pub mod frames;
 pub mod inspect;
-mod lettering;
-mod median;
+mod numerics;
+pub mod persist;
 pub mod progress;
-pub mod provenance;
 pub mod raster;
 pub mod refine;
 pub mod render;
 pub mod report;
-mod signal;
 pub mod simulate;
 pub mod super_resolve;
 pub mod surface;
@@ -113,4 +110,3 @@ pub mod survey;
 #[cfg(test)]
 mod test_wall;
 pub mod trajectory;
-mod vectors;

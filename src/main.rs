@@ -5,7 +5,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     // A panic, in whatever thread, is a bug and ends the program with its code.
     std::panic::set_hook(Box::new(|panic| {
-        tunnelstitch::atomic::remove_unfinished();
+        tunnelstitch::persist::remove_unfinished();
         eprintln!("bug in tunnelstitch {}: {panic}", env!("CARGO_PKG_VERSION"));
         eprintln!("please report it with the command line and, if you can, the survey");
         std::process::exit(1);

@@ -13,7 +13,7 @@ pub use effort::Effort;
 pub use overlap::OverlapCheck;
 pub use pictures::PictureCheck;
 
-use crate::median::upper_median;
+use crate::numerics::median::upper_median;
 use crate::render::native_px_per_metre;
 use crate::surface::{SurfaceError, WallPoint};
 use crate::survey::Survey;

@@ -3,8 +3,8 @@
 use super::poses::PosesArgument;
 use super::record::{self, RUN_FILE, Run};
 use super::{Failure, Terminal};
-use crate::atomic::{self, StagedFolder, WriteError};
 use crate::camera::ColmapCamera;
+use crate::persist::atomic::{self, StagedFolder, WriteError};
 use crate::survey::Survey;
 use crate::trajectory::{StampedPose, colmap, csv, kitti, nerfstudio, tum};
 use clap::ValueEnum;

@@ -5,7 +5,7 @@ use super::record::{RUN_FILE, Run};
 use super::refine::{refine_into, summarise};
 use super::report::report_into;
 use super::{Failure, Terminal, json};
-use crate::atomic;
+use crate::persist::atomic;
 use crate::refine::RefineOptions;
 use crate::render::{Interpolation, Layout};
 use crate::report::{RefinedFiles, Sources};

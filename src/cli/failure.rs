@@ -1,12 +1,12 @@
 //! What went wrong, and the exit code that says so.
 
-use crate::atomic::WriteError;
 use crate::camera::CalibrationError;
-use crate::checkpoint::CheckpointError;
 use crate::evaluate::EvaluateError;
 use crate::evaluate::converge::ConvergeError;
 use crate::frames::FrameError;
 use crate::inspect::InspectError;
+use crate::persist::atomic::WriteError;
+use crate::persist::checkpoint::CheckpointError;
 use crate::raster::RasterError;
 use crate::refine::{CovarianceError, ProblemError, RefineError};
 use crate::render::RenderError;

@@ -6,7 +6,7 @@ use super::record::{self, Run};
 use super::stitch::{parent_folder, positive};
 use super::suggestion::{Suggestion, SuggestionArguments};
 use super::{Failure, Terminal};
-use crate::atomic;
+use crate::persist::atomic;
 use crate::survey::PriorSection;
 use crate::trajectory::gyro::{
     Clock, Frames, GyroBaseline, GyroLog, GyroOptions, Orientation, ReadoutDirection, RestChoice,

@@ -1,7 +1,7 @@
 //! `tunnelstitch init`: a `survey.toml` for what a folder holds.
 
 use super::{Failure, Terminal};
-use crate::atomic;
+use crate::persist::atomic;
 use crate::survey::{Discovery, SURVEY_FILE, Survey};
 use crate::trajectory::PoseFormat;
 use std::fmt::Write;

@@ -1,7 +1,7 @@
 //! Results for programs, on standard output.
 
 use super::Failure;
-use crate::atomic::WriteError;
+use crate::persist::atomic::WriteError;
 use serde::Serialize;
 use std::io::Write;
 use std::path::Path;

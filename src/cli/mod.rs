@@ -36,7 +36,7 @@ mod view;
 pub use failure::Failure;
 pub use terminal::Terminal;
 
-use crate::atomic;
+use crate::persist::atomic;
 use clap::{Parser, Subcommand};
 use std::sync::Arc;
 

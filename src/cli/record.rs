@@ -2,9 +2,10 @@
 
 use super::Failure;
 use super::configuration::{EffectiveOption, Source};
-use crate::provenance::{self, HashError, Input};
+use crate::PROGRAM;
+use crate::persist::atomic;
+use crate::persist::provenance::{self, HashError, Input};
 use crate::survey::Survey;
-use crate::{PROGRAM, atomic};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

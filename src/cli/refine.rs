@@ -5,9 +5,9 @@ use super::record::{self, RUN_FILE, Run};
 use super::resume::{self, ResumeArguments};
 use super::{Failure, Terminal, json};
 use crate::PROGRAM;
-use crate::atomic;
 use crate::camera::format_calibration;
-use crate::checkpoint::Checkpoint;
+use crate::persist::atomic;
+use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::{
     CalibrationReport, FrameFlag, FrameReport, RefineOptions, RefineReport, Refined, RowMotion,

@@ -5,7 +5,7 @@ use super::poses::ReadingArguments;
 use super::record::{self, RUN_FILE, Run};
 use super::stitch::positive;
 use super::{Failure, Terminal, json};
-use crate::atomic::{self, StagedFolder};
+use crate::persist::atomic::{self, StagedFolder};
 use crate::progress::Progress;
 use crate::render::Interpolation;
 use crate::report::{self, PICTURES, RefinedFiles, Report, Sources};

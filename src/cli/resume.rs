@@ -2,8 +2,8 @@
 
 use super::Failure;
 use crate::PROGRAM;
-use crate::checkpoint::{Checkpoint, Origin, folder_of};
-use crate::provenance::Input;
+use crate::persist::checkpoint::{Checkpoint, Origin, folder_of};
+use crate::persist::provenance::Input;
 use crate::survey::Survey;
 use serde::Serialize;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! `tunnelstitch completions` and `tunnelstitch man`: what shells and `man` know of the program.
 
 use super::{Failure, Terminal, configuration, json};
-use crate::atomic::{self, WriteError};
+use crate::persist::atomic::{self, WriteError};
 use clap_complete::Shell;
 use std::path::PathBuf;
 

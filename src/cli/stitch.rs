@@ -5,8 +5,8 @@ use super::poses::PosesArgument;
 use super::record::{self, Run};
 use super::resume::{self, ResumeArguments};
 use super::{Failure, Terminal, json};
-use crate::atomic;
 use crate::frames::PictureFormat;
+use crate::persist::atomic;
 use crate::progress::Progress;
 use crate::refine::read_covariances;
 use crate::render::{

@@ -1,7 +1,7 @@
 //! What belongs into `survey.toml` for poses that were just written.
 
 use super::{Failure, Terminal};
-use crate::atomic;
+use crate::persist::atomic;
 use crate::survey::{PosesSection, PriorSection};
 use serde::Serialize;
 use std::path::{Path, PathBuf};

@@ -4,11 +4,11 @@
 use super::poses::PosesArgument;
 use super::stitch::{BlendArguments, memory_size, positive};
 use super::{Failure, Terminal};
-use crate::atomic;
 use crate::frames::JPEG_QUALITY;
 use crate::inspect::{
     Layer, MANIFEST, Manifest, TilesTarget, WALL, WallPoints, tiles_px_per_metre,
 };
+use crate::persist::atomic;
 use crate::render::{RenderOptions, Stitch, StitchOptions};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, Shutter, Trajectory, poses_of};

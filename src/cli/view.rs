@@ -3,8 +3,8 @@
 use super::poses::PosesArgument;
 use super::textured::{LayersArguments, Poses, TextureArguments};
 use super::{Failure, Terminal};
-use crate::atomic::ScratchFolder;
 use crate::inspect::{MANIFEST, Marks, Originals, Served, Server, Viewer};
+use crate::persist::atomic::ScratchFolder;
 use crate::render::place;
 use crate::survey::{SURVEY_FILE, Survey};
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! How fine the detail is that a picture shows, from a slanted edge.
 
-use crate::signal::{hann, sinc};
+use crate::numerics::signal::{hann, sinc};
 use realfft::RealFftPlanner;
 
 /// Bins of the edge's profile over the width of one of the picture's pixels.

@@ -1,6 +1,6 @@
 //! Picture files.
 
-use crate::atomic::{self, WriteError};
+use crate::persist::atomic::{self, WriteError};
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::codecs::tiff::TiffEncoder;

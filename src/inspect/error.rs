@@ -1,6 +1,6 @@
 //! Why a tunnel cannot be exported or shown.
 
-use crate::atomic::WriteError;
+use crate::persist::atomic::WriteError;
 use crate::raster::RasterError;
 use std::path::PathBuf;
 

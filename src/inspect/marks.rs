@@ -5,7 +5,7 @@
 //! `stitch` has them, so that both lie on each other in a GIS.
 
 use super::InspectError;
-use crate::atomic;
+use crate::persist::atomic;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

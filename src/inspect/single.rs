@@ -3,7 +3,7 @@
 use super::InspectError;
 use super::cut::{Cutter, part};
 use super::glb::{Part, glb};
-use crate::atomic::{self, WriteError};
+use crate::persist::atomic::{self, WriteError};
 use crate::raster::{EDGE, RasterError};
 use crate::render::{Band, Canvas, PixelFormat, RenderError, Target};
 use crate::surface::Surface;

@@ -5,7 +5,7 @@ use super::cut::{Cutter, part};
 use super::glb::{Part, glb};
 use super::strip::Block;
 use super::tileset::{Key, Tree, content_name};
-use crate::atomic::{self, StagedFolder, WriteError};
+use crate::persist::atomic::{self, StagedFolder, WriteError};
 use crate::raster::RasterError;
 use crate::render::{Band, Canvas, PixelFormat, RenderError, Target};
 use crate::surface::Surface;

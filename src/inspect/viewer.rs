@@ -1,7 +1,7 @@
 //! The viewer's page, bundled by `build.rs`.
 
 use super::InspectError;
-use crate::atomic::WriteError;
+use crate::persist::atomic::WriteError;
 use std::path::Path;
 
 /// The page and what belongs to it.

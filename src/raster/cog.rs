@@ -9,7 +9,7 @@ use super::{
     Compression, EDGE, Georeference, Nodata, RasterError, RasterSpec, RasterTile, SampleType,
     deflate, jpeg,
 };
-use crate::atomic::{self, WriteError};
+use crate::persist::atomic::{self, WriteError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;

@@ -3,7 +3,7 @@
 
 use super::pyramid::{LevelTile, Pyramid, Waiting};
 use super::{EDGE, RasterError, RasterSpec, RasterTile, SampleType, jpeg};
-use crate::atomic::{self, StagedFolder, WriteError};
+use crate::persist::atomic::{self, StagedFolder, WriteError};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
 use rayon::prelude::*;

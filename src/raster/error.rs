@@ -1,6 +1,6 @@
 //! Why a raster cannot be written.
 
-use crate::atomic::WriteError;
+use crate::persist::atomic::WriteError;
 
 /// Why a raster cannot be written.
 #[derive(Debug, thiserror::Error)]

@@ -1,7 +1,7 @@
 //! Tiles with loss.
 
 use super::{EDGE, RasterError, RasterSpec, SampleType};
-use crate::vectors::wide;
+use crate::numerics::simd_dispatch::wide;
 use jpeg_encoder::{ColorType, Encoder, EncodingError, ImageBuffer, JpegColorType, SamplingFactor};
 use std::io;
 

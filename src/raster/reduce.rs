@@ -1,7 +1,7 @@
 //! Overviews: 2 × 2 pixels become one.
 
 use super::{EDGE, RasterSpec, Reduce, SampleType};
-use crate::vectors::wide;
+use crate::numerics::simd_dispatch::wide;
 
 /// Columns and rows of a reduced tile.
 pub(super) const HALF: usize = EDGE / 2;

@@ -1,7 +1,7 @@
 //! Packed tiles on disk until their order is known.
 
 use super::compression::Packed;
-use crate::atomic::{ScratchFolder, WriteError, beside};
+use crate::persist::atomic::{ScratchFolder, WriteError, beside};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};

@@ -21,8 +21,8 @@ use super::grid::{TilePoints, WallGrid};
 use super::tile::slope_squares;
 use super::view::View;
 use super::visibility::{Tile, Visibility};
+use crate::numerics::simd_dispatch::wide;
 use crate::surface::Surface;
-use crate::vectors::wide;
 use rayon::prelude::*;
 use std::ops::Range;
 

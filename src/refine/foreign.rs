@@ -20,8 +20,8 @@ use super::robust::{NoiseModel, median_and_sigma};
 use super::tile::{Misfit, TileWork};
 use super::view::View;
 use super::visibility::{Tile, Visibility};
+use crate::numerics::simd_dispatch::wide;
 use crate::surface::Surface;
-use crate::vectors::wide;
 use rayon::prelude::*;
 use std::collections::HashMap;
 

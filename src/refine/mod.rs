@@ -86,7 +86,6 @@ mod sampler;
 mod search;
 mod selected_inverse;
 mod shared;
-mod spectrum;
 mod state;
 mod strain;
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::calibration::{LENS, METRIC, Metric};
 use super::estimate::{FrameEstimate, FrameStep};
 use super::normal::{Block, NormalEquations, Pattern};
 use super::shared::Border;
-use crate::median::upper_median;
+use crate::numerics::median::upper_median;
 use crate::surface::{Gauge, GaugeMotion};
 use crate::trajectory::{Jitter, JitterModel, Pose, so3};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};

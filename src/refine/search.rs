@@ -21,8 +21,8 @@
 //! 21(5), 2012 (masks).
 
 use super::problem::Scene;
-use super::spectrum::{Spectrum, Transform};
 use super::wall::{FusedWall, Portrait};
+use crate::numerics::spectrum::{Spectrum, Transform};
 use crate::surface::{WallPoint, shortest_arc, wall_jacobian};
 use crate::trajectory::{Pose, so3};
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};

@@ -8,8 +8,8 @@ use super::repeats::Rival;
 use super::report::{LevelReport, StageTime};
 use super::retrack::Retracking;
 use super::track::Tracked;
-use crate::checkpoint::{Checkpoint, CheckpointError};
 use crate::frames::Shading;
+use crate::persist::checkpoint::{Checkpoint, CheckpointError};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 

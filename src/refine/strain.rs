@@ -19,7 +19,7 @@ use super::grid::BLOCK;
 use super::normal::Block;
 use super::problem::Scene;
 use super::tile::SAMPLES;
-use crate::median::upper_median;
+use crate::numerics::median::upper_median;
 use nalgebra::Matrix6;
 
 /// Largest strain that can be borne of a frame by itself, if it is that many times what noise does

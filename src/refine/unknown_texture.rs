@@ -30,9 +30,9 @@
 //! Transactions on Acoustics, Speech, and Signal Processing 38(10), 1990 (that the bound with a
 //! known texture is not to be reached, however much data there is, and this one is).
 
-use super::spectrum::Transform;
 use crate::frames::GreyImage;
-use crate::signal::{hann, sinc};
+use crate::numerics::signal::{hann, sinc};
+use crate::numerics::spectrum::Transform;
 use nalgebra::{Complex, DMatrix, DVector, Matrix4};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

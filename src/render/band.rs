@@ -4,8 +4,8 @@ use super::draw::NO_FRAME;
 use super::plan::BAND_ROWS;
 use super::sample::{Sample, Samples};
 use super::{Canvas, PixelFormat, RenderError, Tile};
+use crate::numerics::simd_dispatch::wide;
 use crate::super_resolve::Region;
-use crate::vectors::wide;
 
 /// A stretch of the canvas, all around and some rows along.
 #[derive(Clone, Debug)]

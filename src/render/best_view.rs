@@ -15,7 +15,7 @@ use super::seams::{Across, Between, Seams, Share, Shares, strips};
 use super::view::{View, cut, pieces};
 use super::warp::Points;
 use super::{Canvas, Tile};
-use crate::vectors::prefetch_rows;
+use crate::numerics::simd_dispatch::prefetch_rows;
 use arrayvec::ArrayVec;
 use std::ops::Range;
 

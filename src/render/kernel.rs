@@ -1,7 +1,7 @@
 //! Interpolation: the weights of the pixels around a point.
 
 use super::sample::WHOLE;
-use crate::signal::sinc;
+use crate::numerics::signal::sinc;
 use serde::Serialize;
 
 /// How values between pixel centres are found.

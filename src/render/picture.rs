@@ -4,7 +4,7 @@ use super::integer::PADDING;
 use super::kernel::Kernel;
 use super::sample::{Sample, Samples};
 use crate::frames::HalvedMask;
-use crate::vectors::wide;
+use crate::numerics::simd_dispatch::wide;
 use image::{ColorType, DynamicImage};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,7 @@
 use super::band::{Band, Target};
 use super::sample::{Sample, Samples};
 use super::{Canvas, Layout, RenderError};
-use crate::lettering::{self, LETTER};
+use crate::bitmap_text::{self, LETTER};
 use crate::surface::Surface;
 use image::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
@@ -143,7 +143,7 @@ impl Preview {
 fn axis(image: &mut RgbImage, across: bool, at: f64, text: &str) {
     let (width, height) = image.dimensions();
     let at = MARGIN + at.max(0.0) as u32;
-    let half = lettering::width(text, SCALE) / 2;
+    let half = bitmap_text::width(text, SCALE) / 2;
     for k in 0..TICK {
         let ends = if across {
             [[at, MARGIN - 1 - k], [at, height - MARGIN + k]]
@@ -171,7 +171,7 @@ fn axis(image: &mut RgbImage, across: bool, at: f64, text: &str) {
         ]
     };
     for place in places {
-        lettering::draw(image, place, text, SCALE, INK);
+        bitmap_text::draw(image, place, text, SCALE, INK);
     }
 }
 

@@ -4,7 +4,7 @@ use super::band::{Band, Target};
 use super::plan::BAND_ROWS;
 use super::sample::Samples;
 use super::{Canvas, Layout, PixelFormat, RenderError};
-use crate::atomic::WriteError;
+use crate::persist::atomic::WriteError;
 use crate::raster::{
     CogState, CogWriter, Compression, DziFormat, DziState, DziWriter, EDGE, Georeference, Nodata,
     RasterError, RasterSpec, RasterTile, Reduce, SampleType, TileOrder,

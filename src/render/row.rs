@@ -3,7 +3,7 @@
 use super::draw::NO_FRAME;
 use super::run::{RUN, Run};
 use super::sample::Sample;
-use crate::vectors::wide;
+use crate::numerics::simd_dispatch::wide;
 use std::ops::Range;
 
 /// Weighted sums of values, column by column.

@@ -6,7 +6,7 @@ use super::kernel::Kernel;
 use super::picture::Picture;
 use super::sample::{Sample, Samples, WHOLE};
 use super::warp::{Look, Points};
-use crate::vectors::wide;
+use crate::numerics::simd_dispatch::wide;
 use std::ops::Range;
 
 /// Most points of a run: all that is known of a run stays in the first-level cache.

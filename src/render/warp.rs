@@ -1,8 +1,8 @@
 //! From wall points into a frame.
 
 use crate::camera::{Bend, Camera, SingleLens};
+use crate::numerics::simd_dispatch::wide;
 use crate::trajectory::Pose;
-use crate::vectors::wide;
 use nalgebra::{Matrix3, Vector3};
 
 /// Where points appear, u and v, and whether the lens shows them.

@@ -6,7 +6,7 @@ use super::pictures::{Pictures, panoramas, thumbnails};
 use super::refined::{RefinedFiles, Refinement};
 use crate::PROGRAM;
 use crate::evaluate::{Comparison, Drawings, SeamMap, WallError};
-use crate::median::upper_median;
+use crate::numerics::median::upper_median;
 use crate::refine::FrameFlag;
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};

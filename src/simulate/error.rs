@@ -1,7 +1,7 @@
 //! Why a survey cannot be simulated.
 
 use super::BadFramesError;
-use crate::atomic::WriteError;
+use crate::persist::atomic::WriteError;
 use std::path::PathBuf;
 
 /// Why a survey cannot be simulated.

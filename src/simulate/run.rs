@@ -1,9 +1,9 @@
 //! Writing a simulated survey.
 
 use super::{Scene, SimulateError, SimulateOptions};
-use crate::atomic::{self, StagedFolder, WriteError};
 use crate::camera::format_calibration;
 use crate::frames::{PictureFormat, write_picture};
+use crate::persist::atomic::{self, StagedFolder, WriteError};
 use crate::progress::Progress;
 use crate::survey::{
     CameraSection, FramesSection, PosesSection, SURVEY_FILE, SurveyFile, TunnelSection,

@@ -1,7 +1,7 @@
 //! What the frames read of a region.
 
 use super::footprints::Footprints;
-use crate::vectors::wide;
+use crate::numerics::simd_dispatch::wide;
 
 /// What a pixel says of the wall.
 #[derive(Clone, Copy, Debug, Default)]

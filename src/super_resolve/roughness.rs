@@ -1,7 +1,7 @@
 //! What is known of a wall before a pixel is seen: how rough it is.
 
 use super::huber;
-use crate::vectors::wide;
+use crate::numerics::simd_dispatch::wide;
 use std::f64::consts::PI;
 
 /// Fine pixels over which an edge is expected to go on as it is, along the axes.

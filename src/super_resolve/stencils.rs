@@ -1,7 +1,7 @@
 //! What pixels read of fine pixels, as sparse rows of a matrix.
 
 use super::Region;
-use crate::vectors::wide;
+use crate::numerics::simd_dispatch::wide;
 
 /// Fine pixels along the side of a stencil, at the most: a pixel that looks so obliquely that its
 /// footprint is wider tells little of the wall's detail, and is left out.

@@ -1,11 +1,11 @@
 //! The files of a panorama while it is being drawn.
 
 use super::{GAPS, PREVIEW, RESOLUTION, UNCERTAINTY};
-use crate::atomic::{self, WriteError};
 use crate::camera::Camera;
-use crate::checkpoint::Checkpoint;
 use crate::cli::Failure;
 use crate::frames::{PictureFormat, write_picture};
+use crate::persist::atomic::{self, WriteError};
+use crate::persist::checkpoint::Checkpoint;
 use crate::raster::RasterError;
 use crate::render::{
     Band, Canvas, Coverage, Gap, Layout, Map, Panorama, Plan, Preview, RasterState, RasterTarget,

@@ -7,9 +7,9 @@ pub use files::{Keeping, Outputs};
 
 use super::stitch::picture_output;
 use super::{Failure, record};
-use crate::atomic;
-use crate::checkpoint::Checkpoint;
 use crate::frames::{JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat};
+use crate::persist::atomic;
+use crate::persist::checkpoint::Checkpoint;
 use crate::raster::{Compression, DziFormat, files_folder};
 use crate::render::{
     Canvas, Coverage, Kept, Layout, Panorama, PixelFormat, Preview, RasterLayer, RasterTarget,

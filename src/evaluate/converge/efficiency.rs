@@ -3,9 +3,9 @@
 
 use super::draw::draw;
 use super::{Cell, ConvergeError, ConvergeOptions};
-use crate::atomic::{self, ScratchFolder};
 use crate::camera::Camera;
 use crate::evaluate::{normalised_errors, tied_errors};
+use crate::persist::atomic::{self, ScratchFolder};
 use crate::progress::{Progress, Silent};
 use crate::refine::{
     Covariances, FINER, PoseBounds, RefineOptions, UnknownTexture, pose_bounds, refine,

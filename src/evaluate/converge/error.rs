@@ -1,7 +1,7 @@
 //! Why a sweep is impossible.
 
-use crate::atomic::WriteError;
 use crate::evaluate::EvaluateError;
+use crate::persist::atomic::WriteError;
 use crate::refine::RefineError;
 use crate::simulate::SimulateError;
 use crate::survey::SurveyError;

@@ -1,7 +1,7 @@
 //! runs.jsonl: the runs that are finished, one a line.
 
 use super::{Cell, ConvergeError, RunRecord, Settings};
-use crate::atomic::WriteError;
+use crate::persist::atomic::WriteError;
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};

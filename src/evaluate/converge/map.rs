@@ -6,7 +6,7 @@
 
 use super::cell::{jitter_name, unit};
 use super::{CellSummary, Convergence, TranslationScale};
-use crate::lettering::{self, LETTER};
+use crate::bitmap_text::{self, LETTER};
 use image::{Rgb, RgbImage};
 
 /// Scale of the lettering; of the fine print it is 1.
@@ -38,10 +38,10 @@ pub fn draw(result: &Convergence) -> RgbImage {
     let widest = heading
         .iter()
         .chain(&titles)
-        .map(|line| lettering::width(line, SCALE))
+        .map(|line| bitmap_text::width(line, SCALE))
         .chain([
             NAMES + columns as u32 * CELL[0],
-            NAMES + lettering::width(axis, SCALE),
+            NAMES + bitmap_text::width(axis, SCALE),
         ])
         .max()
         .unwrap_or_default();
@@ -52,16 +52,16 @@ pub fn draw(result: &Convergence) -> RgbImage {
 
     let mut y = MARGIN;
     for line in &heading {
-        lettering::draw(&mut image, [MARGIN, y], line, SCALE, INK);
+        bitmap_text::draw(&mut image, [MARGIN, y], line, SCALE, INK);
         y += LINE;
     }
     for (panel, title) in panels.iter().zip(&titles) {
-        lettering::draw(&mut image, [MARGIN, y], title, SCALE, INK);
+        bitmap_text::draw(&mut image, [MARGIN, y], title, SCALE, INK);
         y += LINE;
         for (row, cells) in panel.chunks(columns).enumerate() {
             let name = row_name(&options.translation, row);
             let middle = y + (CELL[1] - LETTER * SCALE) / 2;
-            lettering::draw(&mut image, [MARGIN, middle], &name, SCALE, INK);
+            bitmap_text::draw(&mut image, [MARGIN, middle], &name, SCALE, INK);
             for (column, cell) in cells.iter().enumerate() {
                 let x = MARGIN + NAMES + column as u32 * CELL[0];
                 draw_cell(&mut image, [x, y], cell);
@@ -75,7 +75,7 @@ pub fn draw(result: &Convergence) -> RgbImage {
         centred(&mut image, [left, y], &format!("{rotation_deg}°"), SCALE);
     }
     y += LINE;
-    lettering::draw(&mut image, [MARGIN + NAMES, y], axis, SCALE, INK);
+    bitmap_text::draw(&mut image, [MARGIN + NAMES, y], axis, SCALE, INK);
     image
 }
 
@@ -138,13 +138,13 @@ fn draw_cell(image: &mut RgbImage, [x, y]: [u32; 2], cell: &CellSummary) {
 
 /// Draws a text in the middle of a cell's width, smaller if it is too long for it.
 fn centred(image: &mut RgbImage, [x, y]: [u32; 2], text: &str, scale: u32) {
-    let scale = if lettering::width(text, scale) <= CELL[0] {
+    let scale = if bitmap_text::width(text, scale) <= CELL[0] {
         scale
     } else {
         1
     };
-    let indent = CELL[0].saturating_sub(lettering::width(text, scale)) / 2;
-    lettering::draw(image, [x + indent, y], text, scale, INK);
+    let indent = CELL[0].saturating_sub(bitmap_text::width(text, scale)) / 2;
+    bitmap_text::draw(image, [x + indent, y], text, scale, INK);
 }
 
 /// From red over yellow to green, light enough for black letters.

@@ -6,8 +6,8 @@ use super::{
     Cell, CellSummary, ConvergeError, ConvergeOptions, Convergence, GOOD_PX, RunRecord,
     majority_error, map,
 };
-use crate::atomic::{self, ScratchFolder};
 use crate::frames::{PictureFormat, write_picture};
+use crate::persist::atomic::{self, ScratchFolder};
 use crate::progress::{Progress, Silent};
 use crate::refine::{FrameFlag, RefineOptions, Refined, refine};
 use crate::simulate::{self, SimulateOptions};

@@ -2,6 +2,7 @@
 
 use super::{FrameShare, Problem};
 use crate::camera::Camera;
+use crate::numerics::simd_dispatch::wide;
 use crate::refine::estimate::{FrameStep, UNKNOWNS};
 use crate::refine::grid::TilePoints;
 use crate::refine::lens::LensSums;
@@ -9,7 +10,6 @@ use crate::refine::normal::{Block, NormalEquations, Pattern};
 use crate::refine::tile::{ObserverMoments, SAMPLES, TileMoments, TileWork, Weighing};
 use crate::refine::view::View;
 use crate::refine::visibility::{Tile, Visibility};
-use crate::vectors::wide;
 use nalgebra::{Matrix2x6, Matrix4, SMatrix};
 use std::ops::Range;
 

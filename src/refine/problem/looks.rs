@@ -2,6 +2,7 @@
 
 use super::{Members, Problem, ProblemError, Sampling};
 use crate::frames::noise_at_level;
+use crate::numerics::simd_dispatch::wide;
 use crate::refine::denoise::TextureSpectrum;
 use crate::refine::foreign::Foreign;
 use crate::refine::grid::{BLOCK, TilePoints};
@@ -12,7 +13,6 @@ use crate::refine::tile::{Misfit, Seen, TileWork};
 use crate::refine::view::View;
 use crate::refine::visibility::{Observer, Tile, Visibility};
 use crate::super_resolve::{Evidence, aliased_variance};
-use crate::vectors::wide;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;

@@ -1,8 +1,8 @@
 //! What a problem is made of.
 
 use crate::camera::{Camera, Sweep};
-use crate::checkpoint::CheckpointError;
 use crate::frames::{FrameCache, FrameError};
+use crate::persist::checkpoint::CheckpointError;
 use crate::refine::calibration::{Calibration, Kappa};
 use crate::refine::estimate::FrameEstimate;
 use crate::refine::factor::FactorError;

@@ -12,7 +12,7 @@ use super::window;
 use super::{
     Block, EIGHT, Kernel, LitBlock, PARTS, Part, Patch, bits, missing, reach, rounding, scale,
 };
-use crate::vectors;
+use crate::numerics::simd_dispatch;
 use arrayvec::ArrayVec;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
@@ -447,7 +447,7 @@ fn place<const C: usize, const TAPS: usize>(
         // little more.
         if k % 2 == 0 {
             let below = place.first[0] as usize + (taps + 1) * patch.source.stride;
-            vectors::prefetch(simd, patch.source.samples, below);
+            simd_dispatch::prefetch(simd, patch.source.samples, below);
         }
     }
 }

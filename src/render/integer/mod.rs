@@ -23,7 +23,7 @@ use super::chart::{EIGHT, Lanes, PATCH};
 use super::kernel::Kernel;
 use super::light::Light;
 #[cfg(target_arch = "x86_64")]
-use crate::vectors;
+use crate::numerics::simd_dispatch;
 use std::ops::Range;
 
 /// Does the work with code made for the kernel's taps; 0 stands for any other number of them.
@@ -40,7 +40,7 @@ macro_rules! by_taps {
     };
     ($number:literal, $simd:ident, $taps:ident, $work:expr) => {{
         const $taps: usize = $number;
-        vectors::avx2(
+        simd_dispatch::avx2(
             #[inline(always)]
             |$simd| $work,
         )
@@ -91,7 +91,7 @@ pub fn pixels<const C: usize>(kernel: &Kernel, sums: &[[i32; 4]], pixels: &mut [
     let mut more = [rounding(kernel.taps()); 4];
     more[C] = 255 << bits;
     #[cfg(target_arch = "x86_64")]
-    if vectors::avx2(
+    if simd_dispatch::avx2(
         #[inline(always)]
         |simd| avx2::pixels::<C>(simd, sums, &more, bits, pixels),
     ) {

@@ -5,7 +5,7 @@ use super::{
     ClockMatch, GyroLog, Rates, Rest, RotationNoise, Turning, angle_from_gravity_rad,
     axis_in_camera,
 };
-use crate::median::upper_median;
+use crate::numerics::median::upper_median;
 use crate::trajectory::{Mounting, Pose, PoseError, StampedPose, Station, Trajectory};
 use nalgebra::{Matrix3, Vector3};
 

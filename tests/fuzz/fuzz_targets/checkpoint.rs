@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tunnelstitch::checkpoint::{Checkpoint, Origin};
+use tunnelstitch::persist::checkpoint::{Checkpoint, Origin};
 use tunnelstitch::frames::Shading;
 use tunnelstitch::refine::{FrameReport, LevelReport};
 

@@ -15,7 +15,10 @@ pub(crate) fn sync_files(files: &[PathBuf]) -> io::Result<()> {
         // Some systems ask for one that may be written.
         File::options().write(true).open(path)?.sync_all()
     })?;
-    let mut folders: Vec<&Path> = files.iter().map(|path| super::beside(path)).collect();
+    let mut folders: Vec<&Path> = files
+        .iter()
+        .map(|path| crate::persist::atomic::beside(path))
+        .collect();
     folders.sort_unstable();
     folders.dedup();
     folders.into_iter().for_each(sync_folder);

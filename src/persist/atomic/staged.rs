@@ -1,7 +1,7 @@
 //! Folders that appear as a whole, and folders for a while.
 
-use super::temporary::{self, ASIDE, TemporaryFolder};
 use super::{WriteError, beside, create_folder, durable};
+use crate::persist::atomic::temporary::{self, ASIDE, TemporaryFolder};
 use std::path::{Path, PathBuf};
 
 /// A folder that is being filled under another name beside its final one.
@@ -142,7 +142,7 @@ impl ScratchFolder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::atomic::write_text;
+    use crate::persist::atomic::write_text;
 
     #[test]
     fn a_staged_folder_appears_whole_or_not_at_all() {

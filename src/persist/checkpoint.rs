@@ -14,7 +14,7 @@
 //!
 //! ```
 //! use std::sync::Arc;
-//! use tunnelstitch::checkpoint::{Checkpoint, Origin, folder_of};
+//! use tunnelstitch::persist::checkpoint::{Checkpoint, Origin, folder_of};
 //! use tunnelstitch::progress::{Progress, Silent};
 //! use tunnelstitch::refine::{RefineOptions, refine_keeping};
 //! # use tunnelstitch::simulate::{self, SimulateOptions};
@@ -38,8 +38,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::atomic::{self, WriteError};
-use crate::provenance::Input;
+use crate::persist::atomic::{self, WriteError};
+use crate::persist::provenance::Input;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
