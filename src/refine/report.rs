@@ -1,11 +1,11 @@
 //! `refine.json`: what the estimator did and how sure it is.
 
-use super::covariance::FrameSigma;
-use super::gauss_newton::SolveRecord;
-use super::observed::CalibrationReport;
-use super::rows::RowMotion;
+use crate::refine::solver::gauss_newton::SolveRecord;
+use crate::refine::uncertainty::covariance::FrameSigma;
+use crate::refine::uncertainty::observability::CalibrationReport;
+use crate::refine::uncertainty::rolling_shutter_test::RowMotion;
 use crate::trajectory::Pose;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Serialize};
 
 /// What a frame's refined pose rests on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,11 +36,6 @@ impl From<&Pose> for PoseReport {
             quaternion_xyzw: pose.r_wc.coords.into(),
         }
     }
-}
-
-/// Reads a number that JSON does not have: NaN is written as null.
-pub(crate) fn nan_if_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
 /// One frame of the report.
@@ -116,7 +111,7 @@ pub struct RefineReport {
     pub frames: Vec<FrameReport>,
     /// Frames whose pose rests on the prior.
     pub frames_on_prior: usize,
-    /// The covariance over the inverse of the normal matrix, c of [`super::covariance`]: above 1
+    /// The covariance over the inverse of the normal matrix, c of [`crate::refine::uncertainty::covariance`]: above 1
     /// where residuals err together, below where they cancel.
     pub variance_factor: f64,
     /// The readout time that the frames want, as far as they can tell.

@@ -1,14 +1,14 @@
 //! A scene of a [`TestWall`], for tests.
 
-use super::calibration::{Calibration, Kappa};
-use super::estimate::FrameEstimate;
-use super::grid::WallGrid;
-use super::prior::Prior;
-use super::problem::Scene;
-use super::track::Tracked;
-use super::visibility::Placed;
 use crate::camera::{Camera, Sweep};
 use crate::frames::FrameCache;
+use crate::refine::model::context::Scene;
+use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::prior::Prior;
+use crate::refine::parameters::calibration::{Calibration, Kappa};
+use crate::refine::parameters::frame_estimate::FrameEstimate;
+use crate::refine::samples::visibility::Placed;
+use crate::refine::tiles::grid::WallGrid;
 use crate::surface::{Circle, Footprint, Patches};
 use crate::test_wall::TestWall;
 use crate::trajectory::{Jitter, JitterModel, Pose, Shutter, spiral};

@@ -8,7 +8,7 @@
 //! `K_ii = Σ_p a_i² ω (W ∂x/∂s)_p (W ∂x/∂s − W y)_p`
 //!
 //! over its pixels p. A wall that is the mean of what all frames show, point by point, follows by
-//! the share `w̄_i/Σw̄`, which makes `K_ii = (w̄_i − w̄_i²/Σw̄) M_ss` ([`crate::refine::tile`]).
+//! the share `w̄_i/Σw̄`, which makes `K_ii = (w̄_i − w̄_i²/Σw̄) M_ss` ([`crate::refine::tiles::tile`]).
 //! One that is finer than pixels has more to follow with: where few frames see it, detail between
 //! their pixels explains much of a displacement. So the stiffness over that of a mean, κ, goes with
 //! the number of frames: on bricks with noise of 1 grey level it is 0.69 for two, 0.83 for three
@@ -19,7 +19,7 @@
 //! Without it Gauss–Newton would take steps as much too short, and the poses would be called surer
 //! than they are.
 
-use crate::refine::tile::TileMoments;
+use crate::refine::tiles::tile::TileMoments;
 use nalgebra::Matrix4;
 
 /// Numbers of frames that are told apart: from so many on, all are alike.
@@ -99,7 +99,7 @@ impl Stiffness {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::refine::tile::ObserverMoments;
+    use crate::refine::tiles::tile::ObserverMoments;
 
     fn tile(weights: &[f64]) -> TileMoments {
         let observer = |weight: &f64| ObserverMoments {

@@ -1,0 +1,57 @@
+//! The columns that one observer of a tile adds to the normal equations.
+
+use crate::refine::linear::normal_equations::Block;
+use crate::refine::parameters::frame_estimate::UNKNOWNS;
+use crate::refine::tiles::tile::ObserverMoments;
+use nalgebra::{Matrix2x6, Matrix4, SMatrix};
+
+/// An active observer of a tile.
+pub struct Column {
+    /// Which of the block's frames.
+    pub place: usize,
+    pub moments: ObserverMoments,
+    /// M of the frame's own gradient, where that is what the derivative takes.
+    pub own_features: Option<Matrix4<f64>>,
+    /// A.
+    pub a: Matrix2x6<f64>,
+    /// C; zero unless shared unknowns are estimated.
+    pub c: Matrix2x6<f64>,
+    /// `1/a`, shading included.
+    pub inverse_gain: f64,
+}
+
+impl Column {
+    /// `M B` (4 × 8) for this observer's `B = diag(A, 1, 1/a)`.
+    #[inline(always)]
+    pub fn features_times_b(&self, m: &Matrix4<f64>) -> SMatrix<f64, 4, UNKNOWNS> {
+        let mut product = SMatrix::<f64, 4, UNKNOWNS>::zeros();
+        for c in 0..6 {
+            for r in 0..4 {
+                product[(r, c)] = m[(r, 0)] * self.a[(0, c)] + m[(r, 1)] * self.a[(1, c)];
+            }
+        }
+        for r in 0..4 {
+            product[(r, 6)] = m[(r, 2)];
+            product[(r, 7)] = m[(r, 3)] * self.inverse_gain;
+        }
+        product
+    }
+
+    /// Adds `scale · Bᵀ F` to a block.
+    #[inline(always)]
+    pub fn add_b_transposed_times(
+        &self,
+        f: &SMatrix<f64, 4, UNKNOWNS>,
+        scale: f64,
+        block: &mut Block,
+    ) {
+        for c in 0..UNKNOWNS {
+            let (f0, f1) = (scale * f[(0, c)], scale * f[(1, c)]);
+            for r in 0..6 {
+                block[(r, c)] += self.a[(0, r)] * f0 + self.a[(1, r)] * f1;
+            }
+            block[(6, c)] += scale * f[(2, c)];
+            block[(7, c)] += scale * f[(3, c)] * self.inverse_gain;
+        }
+    }
+}

@@ -1,0 +1,4 @@
+//! Damped Gauss–Newton over a photometric problem.
+
+pub mod gauss_newton;
+pub mod neighbourhood;

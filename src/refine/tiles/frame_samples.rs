@@ -1,0 +1,348 @@
+//! Sampling a frame at the wall samples of a tile.
+
+use crate::camera::{Bend, Camera, SingleLens, Sweep};
+use crate::frames::GreyImage;
+use crate::refine::parameters::frame_estimate::FrameEstimate;
+use crate::refine::tiles::grid::{Plane, TilePoints, ZERO};
+use crate::refine::tiles::interpolation::{Interpolation, cubic_weights};
+use crate::super_resolve::{self, Reading};
+use crate::surface::{lens_jacobian, wall_jacobian};
+use crate::trajectory::Pose;
+use nalgebra::{Matrix2x6, Matrix3, Vector3};
+
+/// Added to a float from 0 on, 2²³ rounds it to an integer that stands in the last bits of the sum.
+/// Unlike a cast, which saturates, this is done on whole vectors.
+const INTEGER: f32 = 8_388_608.0;
+
+/// For every sample of a tile, where in a picture's data the pixel to its upper left is.
+type Indices = [u32; ZERO.len()];
+
+/// A frame at one pyramid level with its current estimate, ready to be sampled.
+pub struct View<'a> {
+    image: &'a GreyImage,
+    camera: Camera,
+    /// `fx, fy, cx, cy`.
+    intrinsics: [f32; 4],
+    lens: SingleLens,
+    pose: Pose,
+    r_cw: Matrix3<f32>,
+    gain: f32,
+    bias: f32,
+    interpolation: Interpolation,
+}
+
+impl<'a> View<'a> {
+    /// A frame's `image` seen by `camera` (of the same level).
+    pub fn new(image: &'a GreyImage, camera: Camera, estimate: &FrameEstimate) -> Self {
+        let r_wc = estimate.pose.r_wc.to_rotation_matrix();
+        Self {
+            image,
+            camera,
+            intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy].map(|v| v as f32),
+            lens: SingleLens::new(&camera),
+            pose: estimate.pose,
+            r_cw: r_wc.matrix().transpose().cast(),
+            gain: estimate.log_gain.exp() as f32,
+            bias: estimate.bias as f32,
+            interpolation: Interpolation::Bilinear,
+        }
+    }
+
+    /// The same, interpolated so.
+    pub fn interpolated(self, interpolation: Interpolation) -> Self {
+        Self {
+            interpolation,
+            ..self
+        }
+    }
+
+    /// The frame as its footprints are sought.
+    pub fn placed(&self) -> super_resolve::View<'_> {
+        super_resolve::View {
+            camera: self.camera,
+            pose: &self.pose,
+        }
+    }
+
+    /// What a pixel (by its number, row-major) says of the wall where the shading is `shade`, with
+    /// noise of `sigma` grey levels; nothing where it has no value.
+    #[inline(always)]
+    pub fn reading(&self, pixel: u32, shade: f32, sigma: f32) -> Reading {
+        let value = (self.image.data()[pixel as usize] - self.bias / shade) / self.gain;
+        if value.is_finite() {
+            Reading {
+                value,
+                inverse_sigma: self.gain * shade / sigma,
+            }
+        } else {
+            Reading::default()
+        }
+    }
+
+    /// The gain `a`.
+    pub fn gain(&self) -> f32 {
+        self.gain
+    }
+
+    /// `∂(s, h)/∂ξ` at the middle of a tile.
+    ///
+    /// With a sweep, the ray starts where the camera is when the row is read, millimetres off: to a
+    /// thousandth, that is no matter.
+    pub fn wall_jacobian(&self, points: &TilePoints) -> Matrix2x6<f64> {
+        wall_jacobian(&self.pose, &points.centre)
+    }
+
+    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2, ρ)` at the middle of a tile, for the `camera` at full
+    /// size; `a`: the pose's Jacobian there, `rate`: the motion of the frame's camera during a
+    /// readout of one second.
+    ///
+    /// A row read at the share τ of the picture's time is where the pose moved by `(ω τ, R ν τ)`
+    /// would put it, with ω and ν in proportion to the readout time ρ: `∂(s, h)/∂ρ = A (ω, R ν) τ`.
+    pub fn shared_jacobian(
+        &self,
+        points: &TilePoints,
+        a: &Matrix2x6<f64>,
+        camera: &Camera,
+        rate: &Sweep,
+    ) -> Matrix2x6<f64> {
+        let x_c = self.pose.to_camera(&points.centre.x_w);
+        let lens = lens_jacobian(&self.pose, a, camera, &x_c);
+        let share = (camera.project(&x_c)).map_or(0.0, |pixel| camera.share(pixel.y));
+        let shift = self.pose.r_wc * rate.nu_m;
+        let moved = a.fixed_columns::<3>(0) * rate.omega_rad + a.fixed_columns::<3>(3) * shift;
+        let mut seen = Matrix2x6::zeros();
+        seen.fixed_columns_mut::<5>(0).copy_from(&lens);
+        seen.set_column(5, &(moved * share));
+        seen
+    }
+
+    /// The wall's values `(I/V − b/V)/a` as this frame shows them, into `values`; the frame holds
+    /// `I/V`, and `shade` is V around the tile. NaN where a pixel that the interpolation takes has
+    /// no value. Samples that a step has moved out of the picture repeat its border.
+    #[inline(always)]
+    pub fn sample(&self, points: &TilePoints, shade: f32, values: &mut Plane) {
+        match self.lens {
+            SingleLens::Straight(lens) => self.sample_through(lens, points, shade, values),
+            SingleLens::Brown(lens) => self.sample_through(lens, points, shade, values),
+            SingleLens::Fisheye(lens) => self.sample_through(lens, points, shade, values),
+            SingleLens::RollingStraight(lens) => self.sample_through(lens, points, shade, values),
+            SingleLens::RollingBrown(lens) => self.sample_through(lens, points, shade, values),
+            SingleLens::RollingFisheye(lens) => self.sample_through(lens, points, shade, values),
+        }
+    }
+
+    #[inline(always)]
+    fn sample_through(&self, lens: impl Bend, points: &TilePoints, shade: f32, values: &mut Plane) {
+        let c: Vector3<f32> = self.pose.to_camera(&points.centre.x_w).cast();
+        let r = &self.r_cw;
+        let [fx, fy, cx, cy] = self.intrinsics;
+        let (width, height) = (self.image.width(), self.image.height());
+        // The cubic takes a pixel more on either side.
+        let more = match self.interpolation {
+            Interpolation::Bicubic if width.min(height) >= 4 => 1,
+            _ => 0,
+        };
+        let first = more as f32;
+        let (last_u, last_v) = ((width - 2 - more) as f32, (height - 2 - more) as f32);
+        let mut index: Indices = [0; ZERO.len()];
+        let (mut fu, mut fv) = (ZERO, ZERO);
+        for k in 0..ZERO.len() {
+            let (dx, dy, dz) = (points.dx[k], points.dy[k], points.dz[k]);
+            let x = c.x + r[(0, 0)] * dx + r[(0, 1)] * dy + r[(0, 2)] * dz;
+            let y = c.y + r[(1, 0)] * dx + r[(1, 1)] * dy + r[(1, 2)] * dz;
+            let z = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
+            let (p, q, _) = lens.bend(x, y, z);
+            let (u, v) = (fx * p + cx, fy * q + cy);
+            // `max` first: a NaN (a sample behind the camera) becomes the first pixel.
+            let x0 = (u - 0.5).max(first).min(last_u) + INTEGER;
+            let y0 = (v - 0.5).max(first).min(last_v) + INTEGER;
+            fu[k] = (u - (x0 - INTEGER)).clamp(0.0, 1.0);
+            fv[k] = (v - (y0 - INTEGER)).clamp(0.0, 1.0);
+            index[k] = (y0.to_bits() - INTEGER.to_bits()) * width as u32
+                + (x0.to_bits() - INTEGER.to_bits());
+        }
+        match more {
+            0 => self.bilinear(&index, [&fu, &fv], values),
+            _ => self.bicubic(&index, [&fu, &fv], values),
+        }
+        let (inverse_gain, bias) = (1.0 / self.gain, self.bias / shade);
+        for value in values.iter_mut() {
+            *value = (*value - bias) * inverse_gain;
+        }
+    }
+
+    /// What the picture shows at the fractions `fu`, `fv` from the pixels at `index` to the next.
+    #[inline(always)]
+    fn bilinear(&self, index: &Indices, [fu, fv]: [&Plane; 2], values: &mut Plane) {
+        let (data, width) = (self.image.data(), self.image.width());
+        let (mut upper, mut lower) = ([[0.0f32; 2]; ZERO.len()], [[0.0f32; 2]; ZERO.len()]);
+        for k in 0..ZERO.len() {
+            let top = index[k] as usize;
+            upper[k].copy_from_slice(&data[top..top + 2]);
+            lower[k].copy_from_slice(&data[top + width..top + width + 2]);
+        }
+        for k in 0..ZERO.len() {
+            let a = upper[k][0] + fu[k] * (upper[k][1] - upper[k][0]);
+            let b = lower[k][0] + fu[k] * (lower[k][1] - lower[k][0]);
+            values[k] = a + fv[k] * (b - a);
+        }
+    }
+
+    /// The same by cubics: of four rows first, then of what they make of four columns.
+    #[inline(always)]
+    fn bicubic(&self, index: &Indices, [fu, fv]: [&Plane; 2], values: &mut Plane) {
+        let (data, width) = (self.image.data(), self.image.width());
+        let (mut across, mut down) = ([ZERO; 4], [ZERO; 4]);
+        for k in 0..ZERO.len() {
+            let (u, v) = (cubic_weights(fu[k]), cubic_weights(fv[k]));
+            for i in 0..4 {
+                (across[i][k], down[i][k]) = (u[i], v[i]);
+            }
+        }
+        let mut columns = [[0.0f32; 4]; ZERO.len()];
+        for k in 0..ZERO.len() {
+            let start = index[k] as usize - width - 1;
+            for (row, weights) in down.iter().enumerate() {
+                let at = start + row * width;
+                let pixels: &[f32] = &data[at..at + 4];
+                for i in 0..4 {
+                    columns[k][i] += weights[k] * pixels[i];
+                }
+            }
+        }
+        for k in 0..ZERO.len() {
+            let [a, b, c, d] = columns[k];
+            let left = across[0][k] * a + across[1][k] * b;
+            values[k] = left + (across[2][k] * c + across[3][k] * d);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{KannalaBrandt, Lens};
+    use crate::refine::parameters::calibration::{Calibration, Kappa, LENS};
+    use crate::refine::tiles::grid::{AREA, SIDE, TileId, WallGrid};
+    use crate::surface::{Circle, Surface, WallPoint};
+    use crate::trajectory::so3;
+
+    /// The wall point that a pixel shows, against central differences over the camera's unknowns.
+    #[test]
+    fn the_wall_follows_the_lens() {
+        let circle = Circle::new(3.0).unwrap();
+        let calibration = Calibration::none(&Camera {
+            lens: Lens::radial(-0.1, 0.02),
+            ..Camera::from_vertical_fov(160, 120, 60f64.to_radians())
+        });
+        let image = GreyImage::new(160, 120, vec![0.0; 160 * 120]);
+        let estimate = FrameEstimate::at(Pose::new(
+            so3::exp(&Vector3::new(0.05, 0.3, -0.1)),
+            Vector3::new(0.4, 10.0, -0.2),
+        ));
+        let pose = estimate.pose;
+        let camera = calibration.given;
+        let rate = Sweep {
+            omega_rad: Vector3::new(0.1, 0.5, -0.2),
+            nu_m: Vector3::new(0.3, -0.1, 0.2),
+        };
+        let view = View::new(&image, camera.at_level(1), &estimate);
+        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
+        let wall_of = |camera: &Camera, pixel: &nalgebra::Vector2<f64>| {
+            let ray = pose.r_wc * camera.ray(pixel.x, pixel.y).unwrap();
+            let start = pose.to_world(&camera.origin(pixel.y));
+            circle.hit(&start, &ray).unwrap().wall
+        };
+        let seen = wall_of(&camera, &nalgebra::Vector2::new(130.0, 25.0));
+        let (width, height) = grid.tile_size_m();
+        let tile = TileId {
+            column: (seen.s_m / width) as i64,
+            row: (seen.h_m / height) as i64,
+        };
+        let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
+        let pixel = camera.project(&pose.to_camera(&points.centre.x_w)).unwrap();
+        let analytic = view.shared_jacobian(&points, &view.wall_jacobian(&points), &camera, &rate);
+        let step = 1e-6;
+        for k in 0..=LENS {
+            let moved = |amount: f64| {
+                let mut kappa = Kappa::zeros();
+                if k < LENS {
+                    kappa[k] = amount;
+                }
+                let camera = calibration.camera(&kappa).unwrap();
+                let readout_s = if k == LENS { amount } else { 0.0 };
+                wall_of(&camera.sweeping(&rate.times(readout_s)), &pixel)
+            };
+            let (plus, minus) = (moved(step), moved(-step));
+            let s = (plus.s_m - minus.s_m) / (2.0 * step);
+            let h = (plus.h_m - minus.h_m) / (2.0 * step);
+            let expected = nalgebra::Vector2::new(s, h);
+            assert!((expected - analytic.column(k)).norm() < 1e-7, "column {k}");
+        }
+    }
+
+    /// A frame whose grey value is a linear function of the pixel: either interpolation must return
+    /// it exactly.
+    #[test]
+    fn samples_are_where_the_camera_projects_them() {
+        let straight = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
+        sampled_where_projected(straight);
+        let fisheye = KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]);
+        for lens in [Lens::radial(-0.1, 0.02), Lens::KannalaBrandt(fisheye)] {
+            let camera = Camera { lens, ..straight };
+            sampled_where_projected(camera);
+            sampled_where_projected(camera.sweeping(&Sweep {
+                omega_rad: Vector3::new(0.01, 0.03, -0.01),
+                nu_m: Vector3::new(0.001, -0.002, 0.001),
+            }));
+        }
+    }
+
+    fn sampled_where_projected(camera: Camera) {
+        for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
+            interpolated_where_projected(camera, interpolation);
+        }
+    }
+
+    fn interpolated_where_projected(camera: Camera, interpolation: Interpolation) {
+        let circle = Circle::new(3.0).unwrap();
+        let data = (0..160 * 120)
+            .map(|k| 0.5 * (k % 160) as f32 + 1.5 * (k / 160) as f32)
+            .collect();
+        let image = GreyImage::new(160, 120, data);
+        let mut estimate = FrameEstimate::at(Pose::new(
+            so3::exp(&Vector3::new(0.05, 0.3, -0.1)),
+            Vector3::new(0.4, 10.0, -0.2),
+        ));
+        estimate.log_gain = 0.2;
+        estimate.bias = 3.0;
+        let view = View::new(&image, camera, &estimate).interpolated(interpolation);
+        let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
+        let hit = circle
+            .hit(&estimate.pose.t_wc, &(estimate.pose.r_wc * Vector3::z()))
+            .unwrap();
+        let (width, height) = grid.tile_size_m();
+        let tile = TileId {
+            column: (hit.wall.s_m / width) as i64,
+            row: (hit.wall.h_m / height) as i64,
+        };
+        let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
+        let mut values = ZERO;
+        let shade = 0.5;
+        view.sample(&points, shade, &mut values);
+        let centre = grid.centre(tile);
+        for (k, value) in values[..AREA].iter().enumerate() {
+            let (i, j) = ((k % SIDE) as f64 - 4.5, (k / SIDE) as f64 - 4.5);
+            let wall = WallPoint {
+                s_m: centre.s_m + i * grid.spacing_s_m,
+                h_m: centre.h_m + j * grid.spacing_h_m,
+            };
+            let x_w = circle.frame(wall).x_w;
+            let pixel = camera.project(&estimate.pose.to_camera(&x_w)).unwrap();
+            let grey = 0.5 * pixel.x + 1.5 * pixel.y;
+            let bias = estimate.bias / f64::from(shade);
+            let expected = (grey - bias) / estimate.log_gain.exp();
+            assert!((f64::from(*value) - expected).abs() < 2e-3);
+        }
+    }
+}

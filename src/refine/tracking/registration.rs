@@ -1,0 +1,313 @@
+//! Placing one frame on the wall that others show: search, brief refinement of the hypotheses,
+//! verdict.
+
+use crate::camera::Sweep;
+use crate::refine::model::context::{Members, Sampling, Scene};
+use crate::refine::model::problem_error::ProblemError;
+use crate::refine::model::rejection::Doubt;
+use crate::refine::options::RefineOptions;
+use crate::refine::parameters::frame_estimate::FrameEstimate;
+use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::samples::footprints::footprint;
+use crate::refine::solver::gauss_newton::{Stopping, solve};
+use crate::refine::tracking::correlation_search::{
+    Hypothesis, REACH, least_samples, log_likelihood, search,
+};
+use crate::refine::tracking::reference_mosaic::{FusedWall, Likeness, Portrait, pixel_m};
+use crate::surface::{Footprint, shortest_arc, viewing_distance};
+use crate::trajectory::{Jitter, Pose};
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// Hypotheses refined per frame, at the most.
+const HYPOTHESES: usize = 10;
+/// A hypothesis is refined if its log-posterior is at least this share of the best one's.
+const WORTH_REFINING: f64 = 0.5;
+/// Stopping rule of a single frame; the global solve does the rest.
+const STOPPING: Stopping = Stopping {
+    max_iterations: 12,
+    step_px: 0.1,
+    step_sigma: 0.0,
+};
+/// Correlation of local contrast with the wall, noise aside, that a placed frame must reach.
+const LEAST_QUALITY: f64 = 0.5;
+/// Share of the texture that even the right pose leaves unexplained: blur, interpolation.
+pub const LEAST_UNEXPLAINED: f64 = 0.05;
+/// Correlation from which on a pose is settled and is not looked for any closer.
+const SETTLED: f64 = 0.9;
+/// Closer looks at the most, and half their σ, radians.
+const CLOSER_LOOKS: usize = 4;
+const CLOSE_RAD: f64 = 0.05;
+/// Gain in log-posterior, as a factor, for which another closer look is worth its time.
+const WORTH_ANOTHER: f64 = 1.02;
+/// Two places are told apart by the pixels if what they leave unexplained, `1 − c²`, differs by
+/// this factor, ...
+pub const UNEXPLAINED: f64 = 2.0;
+/// ... or else by the prior if its log-densities differ by this (3 σ).
+const PRIOR_MARGIN: f64 = 4.5;
+/// `½ eᵀΣ⁻¹e` beyond which a pose is not what the prior allows: all six unknowns 3.5 σ off.
+pub const MOST_DEVIATION: f64 = 0.5 * 6.0 * REACH * REACH;
+/// Places closer than this are one, samples of the search level.
+const APART: f64 = 2.0;
+
+/// What is known of a frame before it is placed.
+#[derive(Clone, Copy, Debug)]
+pub struct Expectation {
+    /// Pose that the prior predicts.
+    pub pose: Pose,
+    /// σ of that prediction over that of the prior's single step.
+    pub widened: f64,
+}
+
+/// A frame that has found its place.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed {
+    /// Its estimate.
+    pub estimate: FrameEstimate,
+    /// False if it matches the wall less well than it should: the wall itself may be bent.
+    pub settled: bool,
+}
+
+/// A candidate after its refinement.
+struct Candidate {
+    estimate: FrameEstimate,
+    /// `1 − c²`.
+    unexplained: f64,
+    /// Correlation c with the wall, noise aside.
+    quality: f64,
+    likelihood: f64,
+    /// `½ eᵀΣ⁻¹e` of the prior.
+    deviation: f64,
+}
+
+impl Candidate {
+    fn score(&self) -> f64 {
+        self.likelihood - self.deviation
+    }
+}
+
+/// The frames around the one that is placed.
+pub struct Surroundings<'s> {
+    /// A run of frames that includes the one to be placed.
+    pub run: Range<usize>,
+    /// Their estimates.
+    pub estimates: &'s [FrameEstimate],
+    /// Which of them show the wall: those placed already.
+    pub placed: &'s [bool],
+    /// What they see of it.
+    pub footprints: &'s [Footprint],
+}
+
+impl Surroundings<'_> {
+    /// How the camera of one of the run moves while its rows are read.
+    pub fn sweep(&self, scene: &Scene, frame: usize) -> Sweep {
+        scene.sweep(frame, &self.run, self.estimates)
+    }
+}
+
+/// Places frame `frame` on the wall that the placed frames around it show.
+///
+/// # Errors
+/// [`ProblemError`]: a frame that cannot be read, equations without a solution.
+pub fn place(
+    scene: &Scene,
+    options: &RefineOptions,
+    frame: usize,
+    expected: &Expectation,
+    surroundings: &Surroundings,
+) -> Result<Result<Placed, Doubt>, ProblemError> {
+    let side = scene.camera.shorter_side();
+    let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
+    let level = finest.max(coarsest.saturating_sub(1));
+    let camera = scene.camera.at_level(level);
+    let no_match = |correlation| Ok(Err(Doubt::NoMatch { correlation }));
+    let Ok(distance) = viewing_distance(scene.surface, &expected.pose) else {
+        return no_match(0.0);
+    };
+    let sigma = picture_sigma(&scene.prior.jitter, distance).map(|s| s * expected.widened);
+    // Beyond half a turn there is no more wall to look at.
+    let widest = 0.5 * scene.surface.perimeter_m();
+    let margin = (REACH * sigma[1].max(sigma[0]) * distance).min(widest);
+    let near = near(scene, frame, &expected.pose, margin, surroundings)?;
+    let mut portraits = Vec::new();
+    for (k, _) in near.iter().enumerate().filter(|(_, near)| **near) {
+        let sweep = surroundings.sweep(scene, surroundings.run.start + k);
+        let portrait = Portrait::new(scene, level, surroundings.run.start + k, &sweep)?;
+        portraits.push((portrait, surroundings.estimates[k]));
+    }
+    let sweep = surroundings.sweep(scene, frame);
+    let portrait = Portrait::new(scene, level, frame, &sweep)?;
+    let wall = FusedWall::new(scene, &portraits, &camera, (frame, &expected.pose), margin)?;
+    let found = if options.search {
+        search(scene, &wall, &portrait, &expected.pose, sigma, HYPOTHESES)
+    } else {
+        vec![Hypothesis {
+            pose: expected.pose,
+            score: 0.0,
+        }]
+    };
+    let best = found.first().map_or(0.0, |hypothesis| hypothesis.score);
+
+    let refine_at = |level: usize, estimate: FrameEstimate| {
+        let own = frame - surroundings.run.start;
+        let mut estimates = surroundings.estimates.to_vec();
+        estimates[own] = estimate;
+        let mut compared = near.clone();
+        compared[own] = true;
+        let members = Members {
+            participants: surroundings.run.clone(),
+            active: frame..frame + 1,
+            estimates: &estimates,
+            compared: Cow::Owned(compared),
+        };
+        let problem = Problem::new(scene, Sampling::of(level), members)?;
+        if problem.tiles() == 0 {
+            return Ok(estimate);
+        }
+        Ok(solve(problem, STOPPING, None)?.estimates[0])
+    };
+    // Gauss–Newton from a pose; None if it leads out of the tunnel or off the wall.
+    let refined = |pose: &Pose| -> Result<Option<Candidate>, ProblemError> {
+        let mut estimate = wall.exposed(&portrait, pose);
+        for level in (level..=coarsest).rev() {
+            estimate = match refine_at(level, estimate) {
+                Ok(refined) => refined,
+                Err(ProblemError::Placement { .. } | ProblemError::Factor { .. }) => {
+                    return Ok(None);
+                }
+                Err(error) => return Err(error),
+            };
+        }
+        let likeness = wall.likeness(scene, &portrait, &estimate.pose);
+        let correlation = likeness.correlation();
+        let Some(unexplained) = unexplained(&likeness, &portrait) else {
+            return Ok(None);
+        };
+        let deviation =
+            scene.prior.deviation_cost(&expected.pose, &estimate.pose) / expected.widened.powi(2);
+        if deviation > MOST_DEVIATION {
+            return Ok(None);
+        }
+        Ok(Some(Candidate {
+            estimate,
+            unexplained: unexplained.max(LEAST_UNEXPLAINED),
+            quality: (1.0 - unexplained).sqrt(),
+            likelihood: log_likelihood(correlation, likeness.samples),
+            deviation,
+        }))
+    };
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for hypothesis in found {
+        if hypothesis.score < WORTH_REFINING * best {
+            break;
+        }
+        candidates.extend(refined(&hypothesis.pose)?);
+    }
+    // A half-right pose has stretched and sheared what it unrolled; from there the search sees
+    // better.
+    let close = sigma.map(|s| s.min(CLOSE_RAD));
+    let looks = if options.search { CLOSER_LOOKS } else { 0 };
+    for _ in 0..looks {
+        candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
+        let Some(first) = candidates.first().filter(|c| c.quality < SETTLED) else {
+            break;
+        };
+        let from = first.estimate.pose;
+        let before = first.score();
+        for hypothesis in search(scene, &wall, &portrait, &from, close, 2) {
+            candidates.extend(refined(&hypothesis.pose)?);
+        }
+        if candidates
+            .iter()
+            .all(|c| c.score() < WORTH_ANOTHER * before)
+        {
+            break;
+        }
+    }
+    candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
+    let Some(first) = candidates.first() else {
+        return no_match(0.0);
+    };
+    if first.quality < LEAST_QUALITY {
+        return no_match(first.quality);
+    }
+    // Those that the pixels alone cannot tell from the best.
+    let pixel = pixel_m(scene, &camera, &first.estimate.pose);
+    let rivals: Vec<&Candidate> = candidates
+        .iter()
+        .filter(|c| c.unexplained < UNEXPLAINED * first.unexplained)
+        .collect();
+    let best = rivals
+        .iter()
+        .min_by(|a, b| a.deviation.total_cmp(&b.deviation))
+        .unwrap_or(&first);
+    for rival in &rivals {
+        let apart_m = apart_m(scene, &best.estimate.pose, &rival.estimate.pose);
+        if apart_m > APART * pixel && rival.deviation - best.deviation < PRIOR_MARGIN {
+            return Ok(Err(Doubt::Ambiguous {
+                other: rival.estimate.pose,
+                apart_m,
+            }));
+        }
+    }
+    let mut estimate = best.estimate;
+    for level in (finest..level).rev() {
+        estimate = refine_at(level, estimate)?;
+    }
+    Ok(Ok(Placed {
+        estimate,
+        settled: best.quality >= SETTLED,
+    }))
+}
+
+/// `1 − c²`, c the correlation with the wall, noise aside; none if too little is shared, or the two
+/// do not correlate.
+///
+/// Where noise drowns the texture, nothing speaks against the pose; its σ will tell.
+pub fn unexplained(likeness: &Likeness, portrait: &Portrait) -> Option<f64> {
+    let compared = likeness.samples >= least_samples(portrait) && likeness.correlation() > 0.0;
+    let quality = likeness.match_quality().unwrap_or(1.0);
+    compared.then_some(1.0 - quality * quality)
+}
+
+/// Which placed frames may show wall that `pose` sees, or would see `margin_m` farther.
+pub fn near(
+    scene: &Scene,
+    frame: usize,
+    pose: &Pose,
+    margin_m: f64,
+    surroundings: &Surroundings,
+) -> Result<Vec<bool>, ProblemError> {
+    let perimeter = scene.surface.perimeter_m();
+    let own = footprint(scene, &scene.camera, frame, pose)?.widened(margin_m);
+    let frames = surroundings.footprints.iter().zip(surroundings.placed);
+    let near = frames.enumerate().map(|(k, (footprint, placed))| {
+        *placed && surroundings.run.start + k != frame && footprint.overlaps(&own, perimeter)
+    });
+    Ok(near.collect())
+}
+
+/// σ of pitch, yaw and roll as they appear in the picture: a shift across the view looks like a
+/// turn.
+fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
+    let turn = jitter.rotation_sigma_rad;
+    let [x, y, z] = jitter.translation_sigma_m;
+    let (along, across) = (y / distance_m, x.max(z) / distance_m);
+    [turn.hypot(along), turn.hypot(across), turn]
+}
+
+/// How far apart two poses put the frame on the wall: the mean over its middle and corners, metres.
+pub fn apart_m(scene: &Scene, a: &Pose, b: &Pose) -> f64 {
+    let perimeter = scene.surface.perimeter_m();
+    (scene.camera.probes().iter())
+        .filter_map(|ray_c| {
+            let look = |pose: &Pose| {
+                let ray = pose.r_wc * ray_c;
+                scene.surface.hit(&pose.t_wc, &ray).ok()
+            };
+            let (a, b) = (look(a)?.wall, look(b)?.wall);
+            Some(shortest_arc(a.s_m - b.s_m, perimeter).hypot(a.h_m - b.h_m))
+        })
+        .sum::<f64>()
+        / 5.0
+}

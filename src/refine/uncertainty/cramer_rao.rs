@@ -1,0 +1,210 @@
+//! The Cramér–Rao bound: how exact any unbiased estimate of the poses can be.
+//!
+//! Each pixel reads `I = a S(x(ξ)) + b + n` with the wall's texture S (as a pixel sees it, averaged
+//! over its square) unknown, and n Gaussian with variance σ². Parameters are the poses' ξ,
+//! exposures and S at every wall point. The Fisher information of one observation is `σ⁻² ∂I ∂Iᵀ`,
+//! with `∂I/∂ξ_i = a φᵀ B_i` as in [`crate::refine::tiles::tile`] and `∂I/∂S = a`. Eliminating S at each wall
+//! point by the Schur complement leaves for the poses
+//!
+//! `J_ij = σ⁻² Σ_x (w_i δ_ij − w_i w_j / Σ_k w_k) B_iᵀ φ φᵀ B_j`,   `w_i = q_i a_i²`,
+//!
+//! with q the pixels per wall sample: the normal matrix of the estimator, but with the slopes of
+//! the true texture. Its null space is the gauge, fixed at the first frame. `cov(ξ̂) ⪰ J⁻¹` for any
+//! unbiased estimate, and with the prior's information added the Bayesian bound (van Trees) for any
+//! estimate at all.
+//!
+//! # What can be reached
+//!
+//! This bound takes the slopes of the texture for known, and an estimator has them from the same
+//! pixels. The same with the texture integrated out, as a Gaussian process with the wall's own
+//! spectrum, is derived in [`crate::refine::problem::unknown_texture`]: M of a tile that N frames see is left with a
+//! share of its part that belongs to displacements. On faint walls the share is the less the more
+//! noise there is; on sharp walls, because of aliasing, the less the *less* noise there is. An
+//! estimator that knows no more of the wall than its spectrum cannot undercut it; one that knows
+//! more, as that edges are straight, can. `benches/reach.py` computes the same share on its own.
+//!
+//! # How exact it is
+//!
+//! Slopes are differences over an eighth of a pixel to each side of frames with 4 × 4 times the
+//! pixels, interpolated by a cubic. For the spectrum of bricks that misses 6 % of their
+//! information, of concrete 2.5 %, so both bounds are too large by half of that.
+//!
+//! Source: C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection, Estimation, and
+//! Modulation Theory", 1968.
+
+use crate::camera::Camera;
+use crate::frames::{FrameCache, GreyImage, Pyramid};
+use crate::refine::linear::normal_equations::{Block, NormalEquations};
+use crate::refine::linear::selected_inverse::SelectedInverse;
+use crate::refine::model::context::{Members, Sampling, Scene};
+use crate::refine::model::prior::{Prior, usual_step_s};
+use crate::refine::parameters::calibration::{Calibration, Kappa};
+use crate::refine::parameters::frame_estimate::FrameEstimate;
+use crate::refine::pipeline::RefineError;
+use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::unknown_texture::UnknownTexture;
+use crate::refine::tiles::interpolation::Interpolation;
+use crate::refine::uncertainty::covariance::Covariances;
+use crate::survey::Survey;
+use crate::trajectory::{Shutter, poses_of};
+use nalgebra::Matrix6;
+use std::borrow::Cow;
+
+/// Times that the frames of the bound have as many pixels along each axis.
+pub const FINER: u32 = 4;
+/// Wall samples per fine pixel: slopes of the texture are differences over an eighth of a pixel to
+/// each side.
+const DENSITY: f64 = 2.0;
+
+/// Covariances that no estimate of the true poses undercuts.
+#[derive(Clone, Debug)]
+pub struct PoseBounds {
+    /// Cramér–Rao bound: of unbiased estimates, with the slopes of the texture known.
+    pub known: Covariances,
+    /// The same with the texture unknown but for its spectrum.
+    pub unknown: Covariances,
+    /// Bayesian bound (van Trees): the first, of estimates that also know the survey's prior.
+    pub bayesian: Covariances,
+}
+
+/// The bounds for a survey that has true poses.
+///
+/// `fine` are its frames without noise and with [`FINER`] times as many pixels along each axis: the
+/// slopes of what a pixel sees can only be had from finer pixels. `noise_grey`: σ of a pixel, grey
+/// levels; `texture`: what can be known of the wall's.
+///
+/// # Errors
+/// [`RefineError`]; [`RefineError::NoOverlap`] for a survey without true poses, too.
+pub fn pose_bounds(
+    survey: &Survey,
+    fine: &[GreyImage],
+    noise_grey: f64,
+    texture: &UnknownTexture,
+) -> Result<PoseBounds, RefineError> {
+    let Some(truth) = &survey.truth else {
+        return Err(RefineError::NoOverlap);
+    };
+    let count = truth.len();
+    let times_s: Vec<f64> = survey
+        .initial
+        .iter()
+        .map(|stamped| stamped.time_s)
+        .collect();
+    let options = crate::refine::RefineOptions::default();
+    let prior = Prior {
+        jitter: survey.prior,
+        initial: survey.initial_poses(),
+        usual_step_s: usual_step_s(&times_s),
+        times_s,
+        log_gain_sigma: options.log_gain_sigma,
+        bias_sigma: options.bias_sigma,
+    };
+    let camera = finer_camera(&survey.camera);
+    let frames = fine
+        .iter()
+        .map(|frame| Pyramid::new(as_pixels_see(frame), 1));
+    let frames = FrameCache::of_pyramids(frames.collect());
+    // The rows' own poses change next to nothing of what can be known.
+    let shutter = Shutter::default();
+    let scene = Scene {
+        surface: survey.surface.as_ref(),
+        ignored: &survey.ignored,
+        camera,
+        shutter: &shutter,
+        calibration: Calibration::none(&camera),
+        kappa: Kappa::zeros(),
+        frames: &frames,
+        prior: &prior,
+        noise: 0.0,
+        fused_gradient: true,
+    };
+    let estimates: Vec<FrameEstimate> =
+        poses_of(truth).into_iter().map(FrameEstimate::at).collect();
+    let members = Members {
+        participants: 0..count,
+        active: 0..count,
+        estimates: &estimates,
+        compared: Cow::Owned(vec![true; count]),
+    };
+    let sampling = Sampling {
+        density: DENSITY,
+        interpolation: Interpolation::Bicubic,
+        ..Sampling::of(0)
+    };
+    // FINER² fine pixels are a pixel.
+    let noise_grey = f64::from(FINER) * noise_grey;
+    let problem = Problem::new(&scene, sampling, members)?.exact(noise_grey);
+    let (prior, _) = problem.prior_information(&estimates, &Kappa::zeros());
+    let with_prior = problem.linearise(&estimates)?.normal;
+    let bayesian = covariances(&problem, &with_prior)?;
+    let known = covariances(&problem, &without(&prior, with_prior))?;
+    let problem = problem.of_unknown_texture(texture);
+    let pixels = without(&prior, problem.linearise(&estimates)?.normal);
+    Ok(PoseBounds {
+        known,
+        unknown: covariances(&problem, &pixels)?,
+        bayesian,
+    })
+}
+
+/// Normal equations without the prior of poses: exposures keep theirs.
+fn without(prior: &[Block], mut normal: NormalEquations) -> NormalEquations {
+    for (block, prior) in normal.blocks.iter_mut().zip(prior) {
+        *block -= of_pose(prior);
+    }
+    normal
+}
+
+/// The inverse of an information, as far as neighbours go.
+fn covariances(problem: &Problem, normal: &NormalEquations) -> Result<Covariances, RefineError> {
+    let inverse = SelectedInverse::new(problem.pattern(), normal)
+        .map_err(|source| problem.factor_error(source))?;
+    let pose = |row: usize, column: usize| {
+        let block = inverse.block(row, column);
+        block.map_or(Matrix6::from_element(f64::NAN), |block| {
+            block.fixed_view::<6, 6>(0, 0).into_owned()
+        })
+    };
+    let count = normal.gradient.len();
+    Ok(Covariances {
+        frames: (0..count).map(|k| pose(k, k)).collect(),
+        next: (1..count).map(|k| pose(k - 1, k)).collect(),
+        variance_factor: 1.0,
+    })
+}
+
+/// The part of a block that belongs to poses.
+fn of_pose(block: &Block) -> Block {
+    let mut pose = Block::zeros();
+    pose.fixed_view_mut::<6, 6>(0, 0)
+        .copy_from(&block.fixed_view::<6, 6>(0, 0));
+    pose
+}
+
+/// The camera of frames with pixels [`FINER`] times as fine, each averaged with its neighbours to
+/// the right and below: pixel `(u', v')` is centred at `(u'/FINER, v'/FINER)` of the camera's own.
+fn finer_camera(camera: &Camera) -> Camera {
+    let scale = f64::from(FINER);
+    Camera {
+        width: FINER * (camera.width - 1) + 1,
+        height: FINER * (camera.height - 1) + 1,
+        cx: scale * camera.cx,
+        cy: scale * camera.cy,
+        ..camera.finer(FINER)
+    }
+}
+
+/// What full pixels see at every fine pixel: means over [`FINER`] × [`FINER`] fine pixels.
+fn as_pixels_see(fine: &GreyImage) -> GreyImage {
+    let n = FINER as usize;
+    let (width, height) = (fine.width() + 1 - n, fine.height() + 1 - n);
+    let mut columns = vec![0.0; fine.width()];
+    let mut data = Vec::with_capacity(width * height);
+    for y in 0..height {
+        for (x, column) in columns.iter_mut().enumerate() {
+            *column = (y..y + n).map(|y| fine.at(x, y)).sum::<f32>() / (n * n) as f32;
+        }
+        data.extend(columns.windows(n).map(|run| run.iter().sum::<f32>()));
+    }
+    GreyImage::new(width, height, data)
+}
