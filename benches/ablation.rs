@@ -78,7 +78,7 @@ fn variants() -> Vec<(&'static str, RefineOptions)> {
         (
             "solves before the last on all of the wall",
             RefineOptions {
-                close_information: 1.0,
+                intermediate_information: 1.0,
                 ..all.clone()
             },
         ),

@@ -10,8 +10,8 @@ use crate::persist::atomic;
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::{
-    CalibrationReport, FrameFlag, FrameReport, RefineOptions, RefineReport, Refined, RowMotion,
-    other_readings, refine_keeping,
+    CalibrationReport, FrameFlag, FrameReport, ReadoutEstimate, RefineOptions, RefineReport,
+    Refined, refine_with_checkpoint, search_pose_conventions,
 };
 use crate::survey::{CalibrationGroup, SURVEY_FILE, Survey, SurveyFile};
 use crate::trajectory::tum;
@@ -153,7 +153,7 @@ pub fn run(
     })?;
     if 2 * refined.report.frames_on_prior > survey.frames.len() {
         terminal.start("other conventions", 1);
-        let others = other_readings(&survey);
+        let others = search_pose_conventions(&survey);
         terminal.finish();
         let others = others?;
         if !others.is_empty() {
@@ -211,7 +211,7 @@ pub fn refine_into(
         check_apart(&survey.folder, out)?;
     }
     let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
-    let refined = refine_keeping(survey, options, checkpoint, &progress)?;
+    let refined = refine_with_checkpoint(survey, options, checkpoint, &progress)?;
     let json = json::text(&ReportFile {
         program: PROGRAM,
         command: &run.arguments,
@@ -317,7 +317,7 @@ fn summarise_calibration(calibration: &CalibrationReport, terminal: &Terminal) {
 }
 
 /// What a systematic residual along the rows looks like, and what to do about it.
-fn warn_of_rows(rows: &RowMotion) -> String {
+fn warn_of_rows(rows: &ReadoutEstimate) -> String {
     let remedy = if rows.given_ms == 0.0 {
         format!(
             "a rolling shutter? give [camera] readout_ms = {:.1} in survey.toml",
@@ -367,7 +367,7 @@ pub fn summarise(refined: &Refined, terminal: &Terminal) {
     if let Some(calibration) = &report.calibration {
         summarise_calibration(calibration, terminal);
     }
-    if let Some(rows) = report.rows.filter(|rows| rows.systematic) {
+    if let Some(rows) = report.rolling_shutter.filter(|rows| rows.systematic) {
         terminal.warn(warn_of_rows(&rows));
     }
     let seconds: f64 = report.timings.iter().map(|t| t.seconds).sum();

@@ -16,7 +16,7 @@
 //! use std::sync::Arc;
 //! use tunnelstitch::persist::checkpoint::{Checkpoint, Origin, folder_of};
 //! use tunnelstitch::progress::{Progress, Silent};
-//! use tunnelstitch::refine::{RefineOptions, refine_keeping};
+//! use tunnelstitch::refine::{RefineOptions, refine_with_checkpoint};
 //! # use tunnelstitch::simulate::{self, SimulateOptions};
 //! use tunnelstitch::survey::Survey;
 //!
@@ -33,7 +33,7 @@
 //! };
 //! let mut checkpoint = Checkpoint::open(&folder_of(&path), &origin, false)?;
 //! let silent: Arc<dyn Progress> = Arc::new(Silent);
-//! refine_keeping(&survey, &RefineOptions::default(), Some(&mut checkpoint), &silent)?;
+//! refine_with_checkpoint(&survey, &RefineOptions::default(), Some(&mut checkpoint), &silent)?;
 //! checkpoint.finish()?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

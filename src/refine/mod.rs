@@ -13,14 +13,14 @@
 //! | a first look: useless frames, common light, noise | [`examine`] |
 //! | one frame after another, sliding windows | [`track`]; a single frame: [`place`], [`search`] on the fused [`wall`]; again with a better camera: [`retrack`] |
 //! | light that moves with the camera, from the overlaps | [`flat_field`] |
-//! | do overlapping frames show the same? take out, try again | [`consistency`], [`doubt`] |
+//! | do overlapping frames show the same? take out, try again | [`consistency`], [`rejection`] |
 //! | displaced pairs at full size, what nothing ties to the rest; unbend and place again | [`alignment`], [`verdict`], [`repair`], [`neighbourhood`] |
 //! | walls that repeat | [`repeats`] |
 //! | all frames together, coarse to fine | [`run`](mod@run) |
 //! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
 //! | are rows read when they are said to be | [`rows`] |
 //! | going on after an interruption | [`state`] |
-//! | how sure | [`certainty`], [`covariance`]; how sure it could be at best: [`bound`] |
+//! | how sure | [`uncertainty_of_solution`], [`covariance`]; how sure it could be at best: [`bound`] |
 //!
 //! At full size what is in a frame but not on the wall is left out of a solve beforehand:
 //! [`foreign`]. Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`],
@@ -45,18 +45,21 @@
 //!
 #![doc = include_str!("ablation.md")]
 
+mod error;
+mod inputs;
 mod joint;
 mod linear;
 mod model;
 mod options;
 mod parameters;
 mod pipeline;
-mod pipeline_state;
 mod pose_convention_search;
 mod problem;
+mod refined;
 mod report;
 mod samples;
 mod solver;
+mod stages;
 #[cfg(test)]
 mod test_scene;
 mod tiles;
@@ -64,15 +67,18 @@ mod tracking;
 mod uncertainty;
 mod validation;
 
+pub use error::RefineError;
 pub use model::problem_error::ProblemError;
 pub use options::RefineOptions;
-pub use pipeline::{RefineError, Refined, refine, refine_keeping};
-pub use pose_convention_search::other_readings;
+pub use pipeline::{refine, refine_with_checkpoint};
+pub use pose_convention_search::search_pose_conventions;
 pub use problem::unknown_texture::UnknownTexture;
+pub use refined::Refined;
 pub use report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
-pub use solver::gauss_newton::{SolveRecord, StepRecord, StopReason};
+pub use solver::solve_record::{SolveRecord, StepRecord};
+pub use solver::stopping::StopReason;
 pub use uncertainty::covariance::{Covariances, FrameSigma};
 pub use uncertainty::covariance_file::{CovarianceError, read_covariances};
 pub use uncertainty::cramer_rao::{FINER, PoseBounds, pose_bounds};
 pub use uncertainty::observability::{CalibrationReport, UnknownReport};
-pub use uncertainty::rolling_shutter_test::RowMotion;
+pub use uncertainty::rolling_shutter_test::ReadoutEstimate;

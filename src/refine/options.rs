@@ -25,18 +25,15 @@ pub struct RefineOptions {
     /// Wall samples per pixel along each axis where, before the last solve, the frames are searched
     /// for what is not wall; if None, the samples of that solve. (Before a joint one two a pixel,
     /// whatever this says.)
-    pub foreign_density: Option<f64>,
+    pub outlier_mask_density: Option<f64>,
     /// Share of the information that the global solves before it use, below the level where
     /// tracking ends: they look at the parts of the wall that tell most.
-    pub close_information: f64,
+    pub intermediate_information: f64,
     /// Look for each frame over the whole prior before it is refined; otherwise it starts where the
     /// prior expects it.
     pub search: bool,
     /// Solve sliding windows while tracking.
     pub windows: bool,
-    /// Linearise with the gradient of the texture fused from all frames; otherwise each frame with
-    /// its own picture's.
-    pub fused_gradient: bool,
     /// Solve once more, for the wall at a third of a pixel jointly with the poses, instead of
     /// taking what the frames show between their pixels for it: on walls with sharp edges errors
     /// about a third smaller, in ten to twenty times the time. Where the wall is so smooth that
@@ -63,11 +60,10 @@ impl Default for RefineOptions {
             tracking_levels: 3,
             window_stride: 6,
             final_density: 2.0,
-            foreign_density: None,
-            close_information: 0.5,
+            outlier_mask_density: None,
+            intermediate_information: 0.5,
             search: true,
             windows: true,
-            fused_gradient: true,
             joint: false,
             cache_bytes: 2 << 30,
             max_iterations: 20,
@@ -84,7 +80,7 @@ impl RefineOptions {
     pub fn fast() -> Self {
         Self {
             final_density: 1.5,
-            foreign_density: Some(1.0),
+            outlier_mask_density: Some(1.0),
             step_tolerance_px: 0.1,
             step_tolerance_sigma: 2.0,
             ..Self::default()

@@ -36,7 +36,7 @@ fn tried(survey: &Survey) -> usize {
 ///
 /// # Errors
 /// Poses that cannot be read any more.
-pub fn other_readings(survey: &Survey) -> Result<Vec<String>, SurveyError> {
+pub fn search_pose_conventions(survey: &Survey) -> Result<Vec<String>, SurveyError> {
     let options = RefineOptions {
         // Nothing besides the poses.
         calibrate: Some(Vec::new()),

@@ -1,9 +1,9 @@
 //! `refine.json`: what the estimator did and how sure it is.
 
-use crate::refine::solver::gauss_newton::SolveRecord;
+use crate::refine::solver::solve_record::SolveRecord;
 use crate::refine::uncertainty::covariance::FrameSigma;
 use crate::refine::uncertainty::observability::CalibrationReport;
-use crate::refine::uncertainty::rolling_shutter_test::RowMotion;
+use crate::refine::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::trajectory::Pose;
 use serde::{Deserialize, Serialize};
 
@@ -69,8 +69,8 @@ pub struct FrameReport {
     pub sigma: FrameSigma,
     /// What patches of it are off by against the others, beyond noise: root mean square, pixels.
     /// Much of it speaks of a wrong camera, radius or shape.
-    #[serde(default)]
-    pub strain_px: f64,
+    #[serde(default, alias = "strain_px")]
+    pub overdispersion_px: f64,
 }
 
 /// One global solve of the report.
@@ -116,7 +116,7 @@ pub struct RefineReport {
     pub variance_factor: f64,
     /// The readout time that the frames want, as far as they can tell.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub rows: Option<RowMotion>,
+    pub rolling_shutter: Option<ReadoutEstimate>,
     /// Self-calibration, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,

@@ -2,12 +2,12 @@
 
 use crate::camera::{Camera, Sweep};
 use crate::frames::FrameCache;
-use crate::refine::model::context::Scene;
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::EstimationContext;
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::prior::Prior;
 use crate::refine::parameters::calibration::{Calibration, Kappa};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
-use crate::refine::samples::visibility::Placed;
+use crate::refine::samples::visibility::PosedFrame;
 use crate::refine::tiles::grid::WallGrid;
 use crate::surface::{Circle, Footprint, Patches};
 use crate::test_wall::TestWall;
@@ -35,8 +35,12 @@ static NOWHERE: Patches = Patches::NONE;
 static GLOBAL: LazyLock<Shutter> = LazyLock::new(Shutter::default);
 
 /// The wall with frames without noise, nothing but poses and exposures unknown.
-pub fn scene<'a>(wall: &'a TestWall, frames: &'a FrameCache, prior: &'a Prior) -> Scene<'a> {
-    Scene {
+pub fn scene<'a>(
+    wall: &'a TestWall,
+    frames: &'a FrameCache,
+    prior: &'a Prior,
+) -> EstimationContext<'a> {
+    EstimationContext {
         surface: &wall.circle,
         ignored: &NOWHERE,
         camera: wall.camera,
@@ -46,28 +50,27 @@ pub fn scene<'a>(wall: &'a TestWall, frames: &'a FrameCache, prior: &'a Prior) -
         frames,
         prior,
         noise: 0.0,
-        fused_gradient: true,
     }
 }
 
-/// Frames at these poses, all believed.
-pub fn tracked(poses: &[Pose]) -> Tracked {
-    Tracked {
+/// Frames at these poses, all inliers.
+pub fn tracked(poses: &[Pose]) -> FrameStates {
+    FrameStates {
         estimates: poses.iter().map(|pose| FrameEstimate::at(*pose)).collect(),
-        doubts: vec![None; poses.len()],
+        rejections: vec![None; poses.len()],
         kappa: Kappa::zeros(),
     }
 }
 
 /// A tunnel of 3 m radius, a camera, the lattice of its pixels there, and a spiral of so many
 /// frames, all to be estimated.
-pub fn placed_spiral(frames: usize) -> (Circle, Camera, WallGrid, Vec<Placed>) {
+pub fn placed_spiral(frames: usize) -> (Circle, Camera, WallGrid, Vec<PosedFrame>) {
     let circle = Circle::new(3.0).unwrap();
     let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
     let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
     let placed = spiral(frames, 0.1, 30f64.to_radians())
         .into_iter()
-        .map(|pose| Placed {
+        .map(|pose| PosedFrame {
             sweep: Sweep::default(),
             pose,
             footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),

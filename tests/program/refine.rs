@@ -294,7 +294,10 @@ fn a_wrong_camera_strains_the_frames() {
         assert_ne!(frame["flag"], "photometric", "{frame}");
         let reason = frame["reason"].as_str().unwrap();
         assert!(reason.contains("under strain"), "{reason}");
-        assert!(frame["strain_px"].as_f64().unwrap() > 0.04, "{frame}");
+        assert!(
+            frame["overdispersion_px"].as_f64().unwrap() > 0.04,
+            "{frame}"
+        );
     }
 }
 

@@ -50,11 +50,11 @@
 //! high-resolution image estimation using a sequence of undersampled images", IEEE Transactions on
 //! Image Processing 6(12), 1997.
 
-use crate::refine::joint::observation_mask::Sights;
+use crate::refine::joint::observation_mask::ObservationMask;
 use crate::refine::joint::stiffness::{Probe, Stiffness};
-use crate::refine::model::context::Scene;
+use crate::refine::model::context::EstimationContext;
 use crate::refine::samples::visibility::{Tile, Visibility};
-use crate::refine::tiles::frame_samples::View;
+use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{TILE, TileId, WallGrid, fractions};
 use crate::refine::tiles::residual_weighting::Loss;
 use crate::refine::tiles::tile::{ObserverMoments, SAMPLES, TileMoments};
@@ -67,7 +67,7 @@ use std::ops::Range;
 /// Fine pixels to a pixel's width.
 pub const DENSITY: f64 = 3.0;
 /// Wall samples to a pixel's width where the frames are searched for what is not wall beforehand.
-pub const FOREIGN_DENSITY: f64 = 2.0;
+pub const OUTLIER_MASK_DENSITY: f64 = 2.0;
 /// A step shorter than this share of the uncertainty ends the solve: steps take long, and what is
 /// left after one is a tenth of it.
 pub const STEP_SIGMA: f64 = 0.3;
@@ -104,13 +104,13 @@ pub struct WallModel {
 pub struct JointBlock<'a> {
     visibility: &'a Visibility,
     tiles: &'a [Tile],
-    views: &'a [View<'a>],
+    views: &'a [SampledFrame<'a>],
     sigma: f32,
     spacing_m: [f64; 2],
     frames: Vec<usize>,
     region: Region,
     footprints: Footprints,
-    sights: Sights,
+    observations: ObservationMask,
     /// Of each frame's pixels.
     readings: Vec<Vec<Reading>>,
 }
@@ -119,11 +119,11 @@ impl<'a> JointBlock<'a> {
     /// The block of tiles `block` with the frames `views` of a visibility, whose noise is `sigma`
     /// grey levels.
     pub fn new(
-        scene: &Scene,
+        scene: &EstimationContext,
         grid: &WallGrid,
         visibility: &'a Visibility,
         block: &Range<usize>,
-        views: &'a [View<'a>],
+        views: &'a [SampledFrame<'a>],
         sigma: f64,
     ) -> Self {
         let tiles = &visibility.tiles[block.clone()];
@@ -136,14 +136,16 @@ impl<'a> JointBlock<'a> {
             spacing_m,
             start_m: [shift[0] * spacing_m[0], shift[1] * spacing_m[1]],
         };
-        let sights =
-            Sights::new(scene.ignored, grid, visibility, block, &frames, &region).shifted(shift);
+        let observations =
+            ObservationMask::new(scene.ignored, grid, visibility, block, &frames, &region)
+                .shifted(shift);
         let shown: Vec<_> = frames.iter().map(|k| views[*k].placed()).collect();
         let footprints = Footprints::new(scene.surface, &lattice, region, &shown);
         let sigma = sigma as f32;
         let readings = frames.iter().enumerate().map(|(n, frame)| {
             let pixels = footprints.pixels(n).iter().zip(footprints.places(n));
-            let reading = |(pixel, place): (&u32, &[f32; 2])| match sights.of(*place, n).shade {
+            let reading = |(pixel, place): (&u32, &[f32; 2])| match observations.of(*place, n).shade
+            {
                 0.0 => Reading::default(),
                 shade => views[*frame].reading(*pixel, shade, sigma),
             };
@@ -159,7 +161,7 @@ impl<'a> JointBlock<'a> {
             frames,
             region,
             footprints,
-            sights,
+            observations,
             readings,
         }
     }
@@ -234,9 +236,9 @@ impl<'a> JointBlock<'a> {
             let gain = self.views[*frame].gain();
             let places = self.footprints.places(n).iter().zip(&self.readings[n]);
             let pixels = places.enumerate().filter_map(|(p, (place, reading))| {
-                let sight = self.sights.of(*place, n);
-                let (tile, observer) = sight.place.filter(|_| reading.inverse_sigma > 0.0)?;
-                let gain = gain * sight.shade;
+                let observation = self.observations.of(*place, n);
+                let (tile, observer) = observation.place.filter(|_| reading.inverse_sigma > 0.0)?;
+                let gain = gain * observation.shade;
                 let residual = gain * (reading.value - value[p]);
                 Some(Pixel {
                     number: p,
@@ -382,7 +384,6 @@ mod tests {
                 observer([4.0, -1.0, 0.0, 0.0], 3.0),
             ],
             features: Matrix4::identity() * 8.0,
-            own_features: Vec::new(),
         };
         settle(&mut tile);
         let [first, second] = [0, 1].map(|k| tile.observers[k].gradient);

@@ -7,20 +7,20 @@ use crate::surface::Patches;
 use std::ops::Range;
 
 /// Who sees what of the tiles of a region.
-pub struct Sights {
+pub struct ObservationMask {
     /// Which tiles.
     columns: Range<i64>,
     rows: Range<i64>,
     /// Fine pixels from the first tile's corner to the region's.
     offset: [f32; 2],
     /// Row by row, column by column, frame by frame.
-    all: Vec<Sight>,
+    all: Vec<Observation>,
     frames: usize,
 }
 
 /// How a frame sees a tile.
 #[derive(Clone, Copy, Default)]
-pub struct Sight {
+pub struct Observation {
     /// The camera's shading there; 0 if what the frame shows there is not taken for the wall.
     pub shade: f32,
     /// The tile among those of the block, and the frame among its observers; None where the frame
@@ -28,7 +28,7 @@ pub struct Sight {
     pub place: Option<(u32, u32)>,
 }
 
-impl Sights {
+impl ObservationMask {
     /// Besides the tiles in which a frame is compared, it is taken for the wall in those next to
     /// them, which it sees but partly, and next to tiles in which it does not show the wall it is
     /// not compared: otherwise frames would be drawn to where the wall is known better, away from
@@ -41,32 +41,35 @@ impl Sights {
         frames: &[usize],
         region: &Region,
     ) -> Self {
-        let mut sights = Self::compared(grid, visibility, block, frames, region);
-        let compared = sights.all.clone();
-        for tile in sights.tiles() {
+        let mut observations = Self::compared(grid, visibility, block, frames, region);
+        let compared = observations.all.clone();
+        for tile in observations.tiles() {
             let id = around(grid, tile);
             if visibility.tile(id).is_none() && ignored.meet(&grid.area(id)) {
                 continue;
             }
             for (n, frame) in frames.iter().enumerate() {
                 if !visibility.leaves_out(id, *frame) {
-                    let shades = sights.next_to(tile).map(|k| compared[k + n].shade);
+                    let shades = observations.next_to(tile).map(|k| compared[k + n].shade);
                     let shade = shades.fold(0.0, f32::max);
-                    let sight = sights.at(tile, n);
-                    if sight.shade == 0.0 {
-                        sight.shade = shade;
+                    let observation = observations.at(tile, n);
+                    if observation.shade == 0.0 {
+                        observation.shade = shade;
                     }
                 }
             }
         }
-        for tile in sights.tiles() {
+        for tile in observations.tiles() {
             for n in 0..frames.len() {
-                if sights.next_to(tile).any(|k| sights.all[k + n].shade == 0.0) {
-                    sights.at(tile, n).place = None;
+                if observations
+                    .next_to(tile)
+                    .any(|k| observations.all[k + n].shade == 0.0)
+                {
+                    observations.at(tile, n).place = None;
                 }
             }
         }
-        sights
+        observations
     }
 
     /// Only the tiles in which frames are compared.
@@ -83,28 +86,28 @@ impl Sights {
         let columns = region.column.div_euclid(side)..end(region.column, region.columns);
         let rows = region.row.div_euclid(side)..end(region.row, region.rows);
         let tiles = ((columns.end - columns.start) * (rows.end - rows.start)) as usize;
-        let mut sights = Self {
+        let mut observations = Self {
             columns,
             rows,
             offset: [region.column, region.row].map(|pixel| pixel.rem_euclid(side) as f32),
-            all: vec![Sight::default(); tiles * frames.len()],
+            all: vec![Observation::default(); tiles * frames.len()],
             frames: frames.len(),
         };
-        for tile in sights.tiles() {
+        for tile in observations.tiles() {
             let Some((index, seen)) = visibility.tile(around(grid, tile)) else {
                 continue;
             };
             let own = block.contains(&index);
             for (n, observer) in visibility.observers(seen).iter().enumerate() {
                 if let Ok(frame) = frames.binary_search(&(observer.frame as usize)) {
-                    *sights.at(tile, frame) = Sight {
+                    *observations.at(tile, frame) = Observation {
                         shade: observer.shade,
                         place: own.then(|| ((index - block.start) as u32, n as u32)),
                     };
                 }
             }
         }
-        sights
+        observations
     }
 
     /// The region's lattice begins these fractions of a fine pixel later than the tiles.
@@ -141,13 +144,13 @@ impl Sights {
         (row as usize * columns + column as usize) * self.frames
     }
 
-    fn at(&mut self, tile: TileId, frame: usize) -> &mut Sight {
+    fn at(&mut self, tile: TileId, frame: usize) -> &mut Observation {
         let start = self.start(tile);
         &mut self.all[start + frame]
     }
 
     /// How a frame sees the tile around a place in the region.
-    pub fn of(&self, [x, y]: [f32; 2], frame: usize) -> Sight {
+    pub fn of(&self, [x, y]: [f32; 2], frame: usize) -> Observation {
         let tile = |at: f32, offset: f32| ((at + offset) / TILE as f32) as i64;
         let id = TileId {
             column: self.columns.start + tile(x, self.offset[0]),
@@ -169,7 +172,7 @@ fn around(grid: &WallGrid, tile: TileId) -> TileId {
 mod tests {
     use super::*;
     use crate::refine::joint::joint_block::region_of;
-    use crate::refine::samples::observer_marks::Marks;
+    use crate::refine::samples::observer_marks::ObserverMarks;
     use crate::refine::samples::visibility::Hidden;
     use crate::refine::test_scene::placed_spiral;
 
@@ -184,22 +187,22 @@ mod tests {
         let sights_of = |visibility: &Visibility, block: &Range<usize>| {
             let region = region_of(&grid, &visibility.tiles[block.clone()]);
             let frames = visibility.frames(block);
-            Sights::new(&Patches::NONE, &grid, visibility, block, &frames, &region)
+            ObservationMask::new(&Patches::NONE, &grid, visibility, block, &frames, &region)
         };
         let (mut partly, mut compared) = (0, 0);
         for block in &all.blocks {
-            let sights = sights_of(&all, block);
-            for tile in sights.tiles() {
+            let observations = sights_of(&all, block);
+            for tile in observations.tiles() {
                 let seen = all
                     .tile(around(&grid, tile))
                     .map(|(_, tile)| all.observers(tile));
                 for (n, frame) in all.frames(block).into_iter().enumerate() {
-                    let sight = sights.all[sights.start(tile) + n];
+                    let observation = observations.all[observations.start(tile) + n];
                     let wholly = seen.is_some_and(|s| s.iter().any(|o| o.frame as usize == frame));
-                    partly += usize::from(sight.shade > 0.0 && !wholly);
-                    compared += usize::from(sight.place.is_some());
-                    assert!(!wholly || sight.shade == 1.0);
-                    assert!(wholly || sight.place.is_none());
+                    partly += usize::from(observation.shade > 0.0 && !wholly);
+                    compared += usize::from(observation.place.is_some());
+                    assert!(!wholly || observation.shade == 1.0);
+                    assert!(wholly || observation.place.is_none());
                 }
             }
         }
@@ -209,7 +212,7 @@ mod tests {
         let middle = block.start + block.len() / 2;
         let (id, observers) = (all.tiles[middle].id, all.tiles[middle].observers.clone());
         let frame = all.observers[observers.start].frame as usize;
-        let mut marks = Marks::none(all.observers.len());
+        let mut marks = ObserverMarks::none(all.observers.len());
         marks.set(observers.start);
         let without = all.without(&marks);
         let block = without
@@ -217,14 +220,14 @@ mod tests {
             .iter()
             .find(|block| without.tiles[block.start].id.block() == id.block());
         let block = block.unwrap();
-        let sights = sights_of(&without, block);
+        let observations = sights_of(&without, block);
         let n = without.frames(block).binary_search(&frame).unwrap();
-        assert_eq!(sights.all[sights.start(id) + n].shade, 0.0);
-        assert!(sights.next_to(id).count() == 9);
+        assert_eq!(observations.all[observations.start(id) + n].shade, 0.0);
+        assert!(observations.next_to(id).count() == 9);
         assert!(
-            sights
+            observations
                 .next_to(id)
-                .all(|k| sights.all[k + n].place.is_none())
+                .all(|k| observations.all[k + n].place.is_none())
         );
     }
 }

@@ -24,7 +24,7 @@ use nalgebra::Matrix4;
 
 /// Numbers of frames that are told apart: from so many on, all are alike.
 const MOST: usize = 12;
-/// The least stiffness that is believed.
+/// The least stiffness that is inliers.
 const LEAST: f64 = 0.05;
 
 /// Stiffnesses found, by the number of frames.
@@ -109,7 +109,6 @@ mod tests {
         TileMoments {
             observers: weights.iter().map(observer).collect(),
             features: Matrix4::from_diagonal(&[4.0, 8.0, 1.0, 1.0].into()),
-            own_features: Vec::new(),
         }
     }
 

@@ -34,7 +34,7 @@ pub type SharedBlock = SMatrix<f64, SHARED, SHARED>;
 
 /// The border of the normal equations.
 #[derive(Clone, Debug)]
-pub struct Border {
+pub struct SharedBorder {
     /// `H_pκ`, a block a frame.
     pub frames: Vec<BorderBlock>,
     /// `H_κκ`.
@@ -43,7 +43,7 @@ pub struct Border {
     pub gradient: Kappa,
 }
 
-impl Border {
+impl SharedBorder {
     /// All zero.
     pub fn zeros(frames: usize) -> Self {
         Self {
@@ -126,7 +126,7 @@ impl Border {
 pub fn reduce(
     pattern: &Pattern,
     blocks: &[Block],
-    border: &Border,
+    border: &SharedBorder,
     w: &[BorderBlock],
 ) -> SharedBlock {
     let mut reduced = border.own;
@@ -174,7 +174,7 @@ mod tests {
         let frames = 6;
         let pattern = Pattern::new(frames, (1..frames).map(|k| (k - 1, k)));
         let mut normal = NormalEquations::zeros(&pattern);
-        let mut border = Border::zeros(frames);
+        let mut border = SharedBorder::zeros(frames);
         let n = frames * UNKNOWNS;
         let mut dense = DMatrix::zeros(n + SHARED, n + SHARED);
         let mut gradient = DVector::zeros(n + SHARED);

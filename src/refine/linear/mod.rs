@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! NormalEquations (block-sparse H, gradient g) ─ Symbolic ─> Factor (sparse Cholesky) ─┬─> step δ = −H⁻¹ g
-//! Border (shared parameters) ── Schur complement ──────────────────────────────────────┤
+//! SharedBorder (shared parameters) ── Schur complement ──────────────────────────────────────┤
 //!                                                                                      └─> blocks of H⁻¹
 //! ```
 

@@ -27,7 +27,7 @@ pub struct Sampling {
     /// Whether samples weigh by their variance, steep ones less
     /// ([`crate::refine::tiles::residual_weighting::NoiseModel`]): only once the frames are aligned; before that,
     /// residuals at steep places are what aligns them.
-    pub by_variance: bool,
+    pub variance_weighting: bool,
     /// Whether the wall is solved for at the density of the samples, jointly with the poses
     /// ([`crate::refine::joint::joint_block`]): at full size only.
     pub joint: bool,
@@ -41,7 +41,7 @@ impl Sampling {
             density: 1.0,
             information: 1.0,
             interpolation: Interpolation::Bilinear,
-            by_variance: false,
+            variance_weighting: false,
             joint: false,
         }
     }
@@ -49,7 +49,7 @@ impl Sampling {
 
 /// Everything the estimator is given.
 #[derive(Clone, Copy)]
-pub struct Scene<'a> {
+pub struct EstimationContext<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
     /// Parts of the wall by which frames are not compared.
@@ -68,11 +68,9 @@ pub struct Scene<'a> {
     pub prior: &'a Prior,
     /// The sensor's noise, 1-σ in grey levels, as single pictures show it.
     pub noise: f64,
-    /// Whether the derivative takes the gradient of the fused texture, or each frame's own.
-    pub fused_gradient: bool,
 }
 
-impl Scene<'_> {
+impl EstimationContext<'_> {
     /// The same with the shared unknowns at `kappa`; as it is where they make no camera.
     pub fn at(self, kappa: Kappa) -> Self {
         match self.calibration.camera(&kappa) {
@@ -123,7 +121,7 @@ impl Scene<'_> {
 }
 
 /// The frames that take part in a problem.
-pub struct Members<'m> {
+pub struct FrameWindow<'m> {
     /// A run of frames.
     pub participants: Range<usize>,
     /// Those of them that are estimated; the others are held.

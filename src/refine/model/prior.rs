@@ -1,7 +1,7 @@
 //! What is known before a pixel is read: how far the initial poses and plain exposures may be off.
 
 use crate::numerics::median::upper_median;
-use crate::refine::linear::bordered_system::Border;
+use crate::refine::linear::bordered_system::SharedBorder;
 use crate::refine::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::refine::parameters::calibration::{LENS, METRIC, Metric};
 use crate::refine::parameters::frame_estimate::{FrameEstimate, FrameStep};
@@ -113,7 +113,7 @@ impl Prior {
         metric: &Metric,
         pattern: &Pattern,
         normal: &mut NormalEquations,
-        border: Option<&mut Border>,
+        border: Option<&mut SharedBorder>,
     ) -> f64 {
         let mut cost = 0.0;
         let mut sums = Sums {
@@ -237,7 +237,7 @@ struct Sums<'s> {
     metric: &'s Metric,
     pattern: &'s Pattern,
     normal: &'s mut NormalEquations,
-    border: Option<&'s mut Border>,
+    border: Option<&'s mut SharedBorder>,
 }
 
 /// Derivative of an error by `(ln r, τ_x, τ_z, o_x, o_z)`.
@@ -323,7 +323,7 @@ fn relative_by_metric(
 
 /// Adds an error's part in the border; its derivatives by poses belong to the slots.
 fn add_shared<const N: usize>(
-    border: &mut Border,
+    border: &mut SharedBorder,
     j_shared: &ByMetric,
     weighted: &Matrix6<f64>,
     e: &Vector6<f64>,
@@ -461,7 +461,7 @@ mod tests {
                 .collect();
             let evaluate = |estimates: &[FrameEstimate], kappa: &Kappa| {
                 let mut normal = NormalEquations::zeros(&pattern);
-                let mut border = Border::zeros(3);
+                let mut border = SharedBorder::zeros(3);
                 let metric = calibration().metric(kappa);
                 let cost = prior.add(
                     &participants,

@@ -1,4 +1,4 @@
-//! Why a frame's pixels are not believed.
+//! Why a frame's pixels are not inliers.
 
 use crate::trajectory::Pose;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use std::fmt;
 
 /// A reason to leave a frame at its prior.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Doubt {
+pub enum RejectionReason {
     /// Hardly any contrast: black, white, lamp off, lens covered.
     Featureless,
     /// The same picture as an earlier frame's.
@@ -21,7 +21,7 @@ pub enum Doubt {
         /// The second one.
         other: Pose,
         /// How far apart the two put the frame's middle on the wall, metres.
-        apart_m: f64,
+        separation_m: f64,
     },
     /// It contradicts frames that agree among themselves.
     Contradicts {
@@ -46,12 +46,12 @@ pub enum Doubt {
         error_px: f64,
     },
     /// Nothing sure ties it, or the group of frames that it agrees with, to the others.
-    Apart {
+    Disconnected {
         /// Frames of that group.
         frames: usize,
     },
     /// The last solve had not come to rest.
-    Unsettled {
+    NotConverged {
         /// The step that was left, pixels on the wall.
         step_px: f64,
     },
@@ -61,9 +61,9 @@ pub enum Doubt {
         share: f64,
     },
     /// Its patches do not all fit the others at once.
-    Strained {
+    Overdispersed {
         /// What they are off by, beyond noise, pixels.
-        strain_px: f64,
+        overdispersion_px: f64,
     },
     /// Too little texture to fix its place.
     Uncertain {
@@ -72,7 +72,7 @@ pub enum Doubt {
     },
 }
 
-impl Doubt {
+impl RejectionReason {
     /// True if the frame shows something, but nothing that fits the others.
     pub fn is_misfit(&self) -> bool {
         matches!(
@@ -85,7 +85,7 @@ impl Doubt {
     }
 
     /// True if another try, with other frames around, may place the frame.
-    pub fn may_pass(&self) -> bool {
+    pub fn is_retriable(&self) -> bool {
         matches!(
             self,
             Self::NoMatch { .. }
@@ -93,12 +93,12 @@ impl Doubt {
                 | Self::Contradicts { .. }
                 | Self::Disagrees { .. }
                 | Self::Misaligned { .. }
-                | Self::Apart { .. }
+                | Self::Disconnected { .. }
         )
     }
 }
 
-impl fmt::Display for Doubt {
+impl fmt::Display for RejectionReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Featureless => write!(f, "it shows hardly any contrast (dark, white or covered)"),
@@ -107,9 +107,9 @@ impl fmt::Display for Doubt {
                 f,
                 "it does not match the wall anywhere near its prior (correlation {correlation:.2} at best)"
             ),
-            Self::Ambiguous { apart_m, .. } => write!(
+            Self::Ambiguous { separation_m, .. } => write!(
                 f,
-                "it matches the wall equally well at two places {apart_m:.2} m apart, and the prior does not tell which"
+                "it matches the wall equally well at two places {separation_m:.2} m apart, and the prior does not tell which"
             ),
             Self::Contradicts { frame, correlation } => write!(
                 f,
@@ -129,12 +129,14 @@ impl fmt::Display for Doubt {
                 f,
                 "it is displaced by {error_px:.1} px against frames that show the same wall"
             ),
-            Self::Apart { frames: 1 } => write!(f, "nothing sure ties it to the other frames"),
-            Self::Apart { frames } => write!(
+            Self::Disconnected { frames: 1 } => {
+                write!(f, "nothing sure ties it to the other frames")
+            }
+            Self::Disconnected { frames } => write!(
                 f,
                 "it is one of {frames} frames that agree with each other but that nothing sure ties to the others"
             ),
-            Self::Unsettled { step_px } => write!(
+            Self::NotConverged { step_px } => write!(
                 f,
                 "its pose had not come to rest: the next step would move it by {step_px:.1} px"
             ),
@@ -146,9 +148,9 @@ impl fmt::Display for Doubt {
                 "only {:.1} % of its pixels overlap other frames",
                 100.0 * share
             ),
-            Self::Strained { strain_px } => write!(
+            Self::Overdispersed { overdispersion_px } => write!(
                 f,
-                "it fits the others only under strain (patches of it are off by {strain_px:.2} px, or those of most frames are): a wrong \
+                "it fits the others only under overdispersion (patches of it are off by {overdispersion_px:.2} px, or those of most frames are): a wrong \
                  camera, radius or shape, or a wall that repeats and is closed a period off"
             ),
             Self::Uncertain { wall_px } => write!(

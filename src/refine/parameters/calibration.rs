@@ -15,7 +15,7 @@
 //! The latter five are [`Metric`]. The last, ρ, is the time from reading a frame's first row to
 //! reading its last; it is free only to ask whether the frames want another one ([`crate::refine::uncertainty::rolling_shutter_test`]).
 //! Every unknown has a Gaussian prior around 0; one that the data leave nearly as uncertain as that
-//! is refused ([`crate::refine::uncertainty::observability`]).
+//! is unobservable ([`crate::refine::uncertainty::observability`]).
 
 use crate::camera::Camera;
 use crate::survey::{CalibrateSection, CalibrationGroup};

@@ -2,7 +2,7 @@
 
 use crate::refine::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::refine::parameters::frame_estimate::FrameStep;
-use crate::refine::problem::intrinsics_terms::LensSums;
+use crate::refine::problem::intrinsics_terms::IntrinsicsSums;
 use crate::refine::problem::linearisation::FrameShare;
 use crate::refine::problem::observer_column::Column;
 use crate::refine::tiles::tile::SAMPLES;
@@ -29,7 +29,7 @@ pub struct BlockSums {
     /// Upper triangle, row by row.
     blocks: Vec<Block>,
     /// The lens's part, if it is estimated.
-    pub lens: Option<LensSums>,
+    pub lens: Option<IntrinsicsSums>,
 }
 
 impl BlockSums {
@@ -41,7 +41,7 @@ impl BlockSums {
             gradient: vec![FrameStep::zeros(); n],
             shares: vec![FrameShare::default(); n],
             blocks: vec![Block::zeros(); n * (n + 1) / 2],
-            lens: calibrates.then(|| LensSums::new(n)),
+            lens: calibrates.then(|| IntrinsicsSums::new(n)),
         }
     }
 
@@ -74,12 +74,6 @@ impl BlockSums {
             gradient[6] -= moments.gradient[2];
             gradient[7] -= moments.gradient[3] * b.inverse_gain;
             let f = b.features_times_b(features);
-            if let Some(own) = &b.own_features {
-                // Its noise is in the diagonal blocks only: `w̄ Bᵀ (M_i − M) B` more.
-                let index = self.block_index(b.place, b.place);
-                let more = b.features_times_b(&(own - features));
-                b.add_b_transposed_times(&more, moments.weight, &mut self.blocks[index]);
-            }
             for a in &columns[..=n] {
                 let own = if a.place == b.place {
                     a.moments.weight

@@ -1,6 +1,6 @@
 //! What a block of the wall adds to the border of the normal equations ([`crate::refine::linear::bordered_system`]).
 
-use crate::refine::linear::bordered_system::Border;
+use crate::refine::linear::bordered_system::SharedBorder;
 use crate::refine::parameters::calibration::{Kappa, LENS, READOUT};
 use crate::refine::parameters::frame_estimate::{FrameStep, UNKNOWNS};
 use crate::refine::problem::observer_column::Column;
@@ -14,7 +14,7 @@ const PLACES: [usize; SEEN] = [0, 1, 2, 3, 4, READOUT];
 /// Sums over the tiles of one block for the unknowns that pixels see, for the few frames that see
 /// it.
 #[derive(Clone, Debug)]
-pub struct LensSums {
+pub struct IntrinsicsSums {
     /// `H_pκ`, a block a frame.
     frames: Vec<SMatrix<f64, UNKNOWNS, SEEN>>,
     /// `H_κκ`.
@@ -23,7 +23,7 @@ pub struct LensSums {
     gradient: Vector6<f64>,
 }
 
-impl LensSums {
+impl IntrinsicsSums {
     /// All zero.
     pub fn new(frames: usize) -> Self {
         Self {
@@ -65,8 +65,8 @@ impl LensSums {
         &self,
         slots: &[usize],
         gradient: &[FrameStep],
-        border: &mut Border,
-        scatter: &mut Border,
+        border: &mut SharedBorder,
+        scatter: &mut SharedBorder,
     ) {
         for (slot, block) in slots.iter().zip(&self.frames) {
             for (column, place) in PLACES.into_iter().enumerate() {

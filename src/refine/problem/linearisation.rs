@@ -1,6 +1,6 @@
 //! Cost and normal equations of a photometric problem at one estimate.
 
-use crate::refine::linear::bordered_system::Border;
+use crate::refine::linear::bordered_system::SharedBorder;
 use crate::refine::linear::normal_equations::{Block, NormalEquations};
 
 /// Cost and normal equations at one estimate.
@@ -17,9 +17,9 @@ pub struct Linearisation {
     /// How each active frame took part.
     pub frames: Vec<FrameShare>,
     /// The shared unknowns' part of the equations, if they are estimated.
-    pub border: Option<Border>,
+    pub border: Option<SharedBorder>,
     /// Their part of the scatter.
-    pub border_scatter: Option<Border>,
+    pub border_scatter: Option<SharedBorder>,
 }
 
 /// How a frame took part in a linearisation.

@@ -4,13 +4,13 @@ use crate::frames::noise_at_level;
 use crate::numerics::simd_dispatch::wide;
 use crate::refine::joint::joint_block::{JointBlock, WallModel};
 use crate::refine::joint::stiffness::Probe;
-use crate::refine::model::context::{Members, Sampling};
+use crate::refine::model::context::{FrameWindow, Sampling};
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::problem::photometric_problem::Problem;
-use crate::refine::samples::outlier_mask::Foreign;
+use crate::refine::samples::outlier_mask::OutlierMask;
 use crate::refine::samples::visibility::{Observer, Tile, Visibility};
 use crate::refine::tiles::denoising::TextureSpectrum;
-use crate::refine::tiles::frame_samples::View;
+use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, TilePoints};
 use crate::refine::tiles::interpolation::Interpolation;
 use crate::refine::tiles::residual_weighting::NoiseHistogram;
@@ -125,7 +125,7 @@ impl Problem<'_> {
         &self,
         visibility: &'v Visibility,
         block: &Range<usize>,
-        views: &'v [View<'v>],
+        views: &'v [SampledFrame<'v>],
     ) -> JointBlock<'v> {
         JointBlock::new(
             &self.scene,
@@ -142,7 +142,7 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// [`ProblemError`].
-    pub fn without_foreign(mut self, density: Option<f64>) -> Result<Self, ProblemError> {
+    pub fn without_outliers(mut self, density: Option<f64>) -> Result<Self, ProblemError> {
         let mut foreign = match density {
             None => self.no_foreign()?,
             Some(density) => {
@@ -152,7 +152,7 @@ impl Problem<'_> {
                     joint: false,
                     ..self.sampling
                 };
-                let members = Members {
+                let members = FrameWindow {
                     participants: self.participants.clone(),
                     active: self.active.clone(),
                     estimates: &self.held,
@@ -182,7 +182,7 @@ impl Problem<'_> {
     }
 
     /// Nothing found yet, and what misfit is usual.
-    fn no_foreign(&self) -> Result<Foreign, ProblemError> {
+    fn no_foreign(&self) -> Result<OutlierMask, ProblemError> {
         let found = self.at_tiles(SCALE_TILES, |misfits: &mut Vec<Misfit>, look| {
             wide(
                 #[inline(always)]
@@ -190,7 +190,7 @@ impl Problem<'_> {
             );
             misfits.append(&mut look.work.misfits);
         })?;
-        Ok(Foreign::new(self.grid, found.concat()))
+        Ok(OutlierMask::new(self.grid, found.concat()))
     }
 
     /// Adds what is in a frame but not on the wall in a stretch.
@@ -198,7 +198,7 @@ impl Problem<'_> {
         &self,
         stretch: usize,
         visibility: &Visibility,
-        foreign: &mut Foreign,
+        foreign: &mut OutlierMask,
     ) -> Result<(), ProblemError> {
         let frames = self.coverage.frames(stretch);
         let pictures = self.pictures.of(frames)?;
@@ -216,7 +216,7 @@ impl Problem<'_> {
     pub fn at_tiles<T: Default + Send>(
         &self,
         count: usize,
-        work: impl Fn(&mut T, &mut Look) + Sync,
+        work: impl Fn(&mut T, &mut ObservedTile) + Sync,
     ) -> Result<Vec<T>, ProblemError> {
         let stride = (self.coverage.tiles / count).max(1);
         let mut gathered = Vec::new();
@@ -233,7 +233,7 @@ impl Problem<'_> {
                 for tile in tiles {
                     let points =
                         TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
-                    let mut look = Look {
+                    let mut look = ObservedTile {
                         work: &mut tile_work,
                         points: &points,
                         observers: visibility.observers(tile),
@@ -251,7 +251,7 @@ impl Problem<'_> {
 }
 
 /// A tile and those who see it.
-pub struct Look<'l> {
+pub struct ObservedTile<'l> {
     /// Room to work in.
     pub work: &'l mut TileWork,
     /// The tile's samples.
@@ -259,12 +259,12 @@ pub struct Look<'l> {
     /// The frames that see it.
     pub observers: &'l [Observer],
     /// The frames of the stretch, and which participants they are.
-    pub views: &'l [View<'l>],
+    pub views: &'l [SampledFrame<'l>],
     /// See `views`.
     pub frames: &'l [usize],
 }
 
-impl<'l> Look<'l> {
+impl<'l> ObservedTile<'l> {
     /// The observers as the tile's work wants them.
     #[inline(always)]
     pub fn seen(&self) -> impl Iterator<Item = Seen<'l>> + use<'l> {

@@ -10,8 +10,6 @@ pub struct Column {
     /// Which of the block's frames.
     pub place: usize,
     pub moments: ObserverMoments,
-    /// M of the frame's own gradient, where that is what the derivative takes.
-    pub own_features: Option<Matrix4<f64>>,
     /// A.
     pub a: Matrix2x6<f64>,
     /// C; zero unless shared unknowns are estimated.

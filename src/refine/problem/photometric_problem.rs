@@ -3,10 +3,10 @@
 use crate::camera::{Camera, Sweep};
 use crate::frames::Pyramid;
 use crate::refine::joint::joint_block::WallModel;
-use crate::refine::linear::bordered_system::Border;
+use crate::refine::linear::bordered_system::SharedBorder;
 use crate::refine::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::refine::linear::sparse_cholesky::{FactorError, Symbolic};
-use crate::refine::model::context::{Members, Sampling, Scene};
+use crate::refine::model::context::{EstimationContext, FrameWindow, Sampling};
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::parameters::calibration::{Kappa, LENS, RADIUS};
 use crate::refine::parameters::frame_estimate::{FrameEstimate, FrameStep};
@@ -15,9 +15,9 @@ use crate::refine::problem::linearisation::{FrameShare, Linearisation};
 use crate::refine::problem::unknown_texture::UnknownTexture;
 use crate::refine::samples::footprints::footprint;
 use crate::refine::samples::tile_coverage::{Coverage, Pictures};
-use crate::refine::samples::visibility::{Hidden, Placed};
+use crate::refine::samples::visibility::{Hidden, PosedFrame};
 use crate::refine::tiles::denoising::Denoiser;
-use crate::refine::tiles::frame_samples::View;
+use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::WallGrid;
 use crate::refine::tiles::residual_weighting::NoiseModel;
 use crate::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
@@ -51,7 +51,7 @@ const GAUGE_TIE: f64 = 1e6;
 /// by `readout/(2 interval) ξ`, a few hundredths, and what is left of that is taken up by the next
 /// solve.
 pub struct Problem<'a> {
-    pub(super) scene: Scene<'a>,
+    pub(super) scene: EstimationContext<'a>,
     pub(super) sampling: Sampling,
     pub(super) pictures: Pictures<'a>,
     pub(super) camera: Camera,
@@ -88,9 +88,9 @@ impl<'a> Problem<'a> {
     /// # Errors
     /// [`ProblemError`].
     pub fn new(
-        scene: &Scene<'a>,
+        scene: &EstimationContext<'a>,
         sampling: Sampling,
-        members: Members,
+        members: FrameWindow,
     ) -> Result<Self, ProblemError> {
         let Sampling {
             level,
@@ -98,7 +98,7 @@ impl<'a> Problem<'a> {
             information,
             ..
         } = sampling;
-        let Members {
+        let FrameWindow {
             participants,
             active,
             estimates,
@@ -122,18 +122,18 @@ impl<'a> Problem<'a> {
                 }
                 let pose = estimate.pose;
                 let sweep = rates[frame - participants.start].times(readout_s);
-                Ok(Some(Placed {
+                Ok(Some(PosedFrame {
                     pose,
                     sweep,
                     footprint: footprint(scene, &camera.sweeping(&sweep), frame, &pose)?,
                     active: active.contains(&frame),
                 }))
             })
-            .collect::<Result<Vec<Option<Placed>>, ProblemError>>()?;
-        let pixel_m = pixel_on_wall(scene.surface, &camera, placed.iter().flatten());
+            .collect::<Result<Vec<Option<PosedFrame>>, ProblemError>>()?;
+        let pixel_size_m = pixel_on_wall(scene.surface, &camera, placed.iter().flatten());
         let grid = WallGrid::new(
             scene.surface,
-            pixel_m,
+            pixel_size_m,
             density.max(least_density(camera.height)),
         );
         let pictures = Pictures {
@@ -200,7 +200,7 @@ impl<'a> Problem<'a> {
 
     /// The same for frames without noise, weighted as if each pixel had noise of `sigma` grey
     /// levels: no residual is rejected, and all slopes are texture.
-    pub fn exact(self, sigma: f64) -> Self {
+    pub fn with_known_noise(self, sigma: f64) -> Self {
         Self {
             sigma,
             noise: NoiseModel {
@@ -295,12 +295,12 @@ impl<'a> Problem<'a> {
         estimates: &[FrameEstimate],
         camera: Camera,
         readout_s: f64,
-    ) -> Vec<View<'s>> {
+    ) -> Vec<SampledFrame<'s>> {
         let frames = self.coverage.frames(stretch).iter();
         frames
             .zip(pictures)
             .map(|(k, picture)| {
-                View::new(
+                SampledFrame::new(
                     picture.level(self.sampling.level),
                     camera.sweeping(&self.rates[*k].times(readout_s)),
                     &estimates[*k],
@@ -315,7 +315,7 @@ impl<'a> Problem<'a> {
         &self,
         stretch: usize,
         pictures: &'s [Arc<Pyramid>],
-    ) -> Vec<View<'s>> {
+    ) -> Vec<SampledFrame<'s>> {
         let readout_s = self.scene.calibration.readout_s(&self.scene.kappa);
         self.views(stretch, pictures, &self.held, self.camera, readout_s)
     }
@@ -329,7 +329,7 @@ impl<'a> Problem<'a> {
 
     /// True if a frame can be so: its camera inside the tunnel, its gain within
     /// [`MOST_GAIN_SIGMA`].
-    pub fn admits(&self, estimate: &FrameEstimate) -> bool {
+    pub fn is_feasible(&self, estimate: &FrameEstimate) -> bool {
         let most_gain = MOST_GAIN_SIGMA * self.scene.prior.log_gain_sigma;
         let inside = self.scene.surface.check_inside(&estimate.pose.t_wc);
         inside.is_ok() && estimate.log_gain.abs() <= most_gain
@@ -361,7 +361,9 @@ impl<'a> Problem<'a> {
         let mut normal = NormalEquations::zeros(&self.pattern);
         let mut frames = vec![FrameShare::default(); self.active.len()];
         let mut scatter = vec![Block::zeros(); self.pattern.blocks()];
-        let mut border = self.calibrates.then(|| Border::zeros(self.active.len()));
+        let mut border = self
+            .calibrates
+            .then(|| SharedBorder::zeros(self.active.len()));
         let calibration = self.scene.calibration;
         let Some(lens) = calibration.camera(kappa) else {
             return Ok(Linearisation {
@@ -460,9 +462,9 @@ impl<'a> Problem<'a> {
         &self,
         active: &[FrameEstimate],
         kappa: &Kappa,
-    ) -> (Vec<Block>, Border) {
+    ) -> (Vec<Block>, SharedBorder) {
         let mut normal = NormalEquations::zeros(&self.pattern);
-        let mut border = Border::zeros(self.active.len());
+        let mut border = SharedBorder::zeros(self.active.len());
         let estimates = self.with_active(active);
         self.add_prior(&estimates, kappa, &mut normal, Some(&mut border));
         border.close(&self.scene.calibration, kappa);
@@ -476,7 +478,7 @@ impl<'a> Problem<'a> {
         estimates: &[FrameEstimate],
         kappa: &Kappa,
         normal: &mut NormalEquations,
-        border: Option<&mut Border>,
+        border: Option<&mut SharedBorder>,
     ) -> f64 {
         self.scene.prior.add(
             &self.participants,
@@ -579,7 +581,7 @@ fn least_density(rows: u32) -> f64 {
 fn pixel_on_wall<'p>(
     surface: &dyn Surface,
     camera: &Camera,
-    placed: impl Iterator<Item = &'p Placed>,
+    placed: impl Iterator<Item = &'p PosedFrame>,
 ) -> f64 {
     let mut ranges: Vec<f64> = placed
         .filter_map(|frame| viewing_distance(surface, &frame.pose).ok())
@@ -672,7 +674,7 @@ mod tests {
         fn joint(&self) -> Sampling {
             Sampling {
                 interpolation: Interpolation::Bicubic,
-                by_variance: true,
+                variance_weighting: true,
                 joint: true,
                 ..self.sampling()
             }
@@ -686,12 +688,12 @@ mod tests {
         }
 
         fn problem_of(&self, sampling: Sampling) -> Problem<'_> {
-            let scene = Scene {
+            let scene = EstimationContext {
                 calibration: self.calibration,
                 ..scene(&self.wall, &self.frames, &self.prior)
             };
             let all = 0..self.estimates.len();
-            let members = Members {
+            let members = FrameWindow {
                 participants: all.clone(),
                 active: all,
                 estimates: &self.estimates,
@@ -715,7 +717,7 @@ mod tests {
             &ring,
             &ring.problem_of(Sampling {
                 interpolation: Interpolation::Bicubic,
-                by_variance: true,
+                variance_weighting: true,
                 ..ring.sampling()
             }),
         );
@@ -840,15 +842,15 @@ mod tests {
         let ring = Ring::new(1e-4);
         let problem = ring.problem();
         let estimate = ring.estimates[2];
-        assert!(problem.admits(&estimate));
+        assert!(problem.is_feasible(&estimate));
         let mut outside = estimate;
         outside.pose.t_wc.z += 2.0 * ring.wall.circle.perimeter_m() / std::f64::consts::TAU;
-        assert!(!problem.admits(&outside));
+        assert!(!problem.is_feasible(&outside));
         let silent = FrameEstimate {
             log_gain: -14.0,
             ..estimate
         };
-        assert!(!problem.admits(&silent));
+        assert!(!problem.is_feasible(&silent));
     }
 
     /// From 2 mrad and 2 mm off to the truth, along the gauge's freedoms, in undamped steps.

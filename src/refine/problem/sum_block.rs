@@ -6,9 +6,9 @@ use crate::refine::problem::block_sums::{BlockSums, TileSums};
 use crate::refine::problem::observer_column::Column;
 use crate::refine::problem::photometric_problem::Problem;
 use crate::refine::samples::visibility::{Tile, Visibility};
-use crate::refine::tiles::frame_samples::View;
+use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::TilePoints;
-use crate::refine::tiles::tile::{TileMoments, TileWork, Weighing};
+use crate::refine::tiles::tile::{ResidualWeighting, TileMoments, TileWork};
 use nalgebra::Matrix2x6;
 use std::ops::Range;
 
@@ -19,7 +19,7 @@ impl Problem<'_> {
         stretch: usize,
         visibility: &Visibility,
         block: &Range<usize>,
-        views: &[View],
+        views: &[SampledFrame],
         lens: &Camera,
     ) -> BlockSums {
         let tiles = &visibility.tiles[block.clone()];
@@ -35,17 +35,16 @@ impl Problem<'_> {
         let mut work = TileWork::default();
         let mut scratch = Vec::new();
         let spacing = (self.grid.spacing_s_m, self.grid.spacing_h_m);
-        let weighing = Weighing {
+        let weighting = ResidualWeighting {
             noise: &self.noise,
-            by_variance: self.sampling.by_variance,
-            fused: self.scene.fused_gradient,
+            variance_weighting: self.sampling.variance_weighting,
             denoiser: self.denoiser.as_ref(),
         };
         let mut summed: Vec<TileSums> = Vec::with_capacity(tiles.len());
         let mut add = |tile: &Tile, points: &TilePoints, found: &TileMoments| {
             let observers = visibility.observers(tile);
             let mut columns = Vec::with_capacity(observers.len());
-            for (k, (observer, moments)) in observers.iter().zip(&found.observers).enumerate() {
+            for (observer, moments) in observers.iter().zip(&found.observers) {
                 sums.cost += moments.cost;
                 let view = &views[observer.frame as usize];
                 if let Some(slot) = stretch_slots[observer.frame as usize] {
@@ -59,7 +58,6 @@ impl Problem<'_> {
                     columns.push(Column {
                         place: sums.place(slot),
                         moments: *moments,
-                        own_features: found.own_features.get(k).copied(),
                         a,
                         c,
                         inverse_gain: 1.0 / f64::from(view.gain() * observer.shade),
@@ -91,7 +89,7 @@ impl Problem<'_> {
                     #[inline(always)]
                     || {
                         let seen = visibility.observers(tile).iter().map(|o| o.seen(views));
-                        work.moments(&points, seen, spacing, &weighing);
+                        work.moments(&points, seen, spacing, &weighting);
                     },
                 );
                 add(tile, &points, &work.found);

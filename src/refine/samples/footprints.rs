@@ -1,8 +1,8 @@
 //! The parts of the wall that frames see.
 
 use crate::camera::Camera;
-use crate::refine::model::context::Scene;
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::EstimationContext;
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::surface::{Footprint, Surface};
 use crate::trajectory::Pose;
@@ -23,7 +23,7 @@ pub fn reach_m(surface: &dyn Surface) -> f64 {
 /// # Errors
 /// [`ProblemError::Placement`].
 pub fn footprint(
-    scene: &Scene,
+    scene: &EstimationContext,
     camera: &Camera,
     frame: usize,
     pose: &Pose,
@@ -36,7 +36,10 @@ pub fn footprint(
 ///
 /// # Errors
 /// [`ProblemError::Placement`].
-pub fn footprints(scene: &Scene, tracked: &Tracked) -> Result<Vec<Footprint>, ProblemError> {
+pub fn footprints(
+    scene: &EstimationContext,
+    tracked: &FrameStates,
+) -> Result<Vec<Footprint>, ProblemError> {
     let estimates = tracked.estimates.par_iter().enumerate();
     estimates
         .map(|(k, estimate)| {

@@ -1,12 +1,12 @@
-//! Marks on single observations of wall tiles.
+//! ObserverMarks on single observations of wall tiles.
 
-/// Marks on some of the observers of a [`crate::refine::samples::visibility::Visibility`], a bit each.
+/// ObserverMarks on some of the observers of a [`crate::refine::samples::visibility::Visibility`], a bit each.
 #[derive(Clone, Debug)]
-pub struct Marks {
+pub struct ObserverMarks {
     bits: Vec<u64>,
 }
 
-impl Marks {
+impl ObserverMarks {
     /// None of so many observers.
     pub fn none(observers: usize) -> Self {
         Self {
@@ -14,7 +14,7 @@ impl Marks {
         }
     }
 
-    /// Marks an observer.
+    /// ObserverMarks an observer.
     pub fn set(&mut self, observer: usize) {
         self.bits[observer / 64] |= 1 << (observer % 64);
     }

@@ -16,9 +16,9 @@
 //! move.
 
 use crate::numerics::simd_dispatch::wide;
-use crate::refine::samples::observer_marks::Marks;
+use crate::refine::samples::observer_marks::ObserverMarks;
 use crate::refine::samples::visibility::{Tile, Visibility};
-use crate::refine::tiles::frame_samples::View;
+use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, TileId, TilePoints, WallGrid};
 use crate::refine::tiles::residual_weighting::{NoiseModel, median_and_sigma};
 use crate::refine::tiles::tile::{Misfit, TileWork};
@@ -71,14 +71,14 @@ impl Usual {
 
 /// Where frames show something else than the wall.
 #[derive(Clone, Debug)]
-pub struct Foreign {
+pub struct OutlierMask {
     grid: WallGrid,
     usual: Usual,
     /// The participants that do, ascending, tile by tile.
     tiles: HashMap<TileId, Vec<usize>>,
 }
 
-impl Foreign {
+impl OutlierMask {
     /// Nothing yet; `misfits` are those of some tiles of `grid`.
     pub fn new(grid: WallGrid, misfits: Vec<Misfit>) -> Self {
         Self {
@@ -99,7 +99,7 @@ impl Foreign {
         surface: &dyn Surface,
         visibility: &Visibility,
         frames: &[usize],
-        views: &[View],
+        views: &[SampledFrame],
         noise: &NoiseModel,
     ) {
         let found = visibility.blocks.par_iter().map(|block| {
@@ -142,8 +142,13 @@ impl Foreign {
     }
 
     /// For each observer in a stretch of another lattice, whether it shows something else there.
-    pub fn among(&self, visibility: &Visibility, grid: &WallGrid, frames: &[usize]) -> Marks {
-        let mut marks = Marks::none(visibility.observers.len());
+    pub fn among(
+        &self,
+        visibility: &Visibility,
+        grid: &WallGrid,
+        frames: &[usize],
+    ) -> ObserverMarks {
+        let mut marks = ObserverMarks::none(visibility.observers.len());
         for tile in &visibility.tiles {
             let foreign = self.tiles.get(&self.grid.tile_around(grid, &tile.id));
             let Some(foreign) = foreign else { continue };
@@ -195,7 +200,7 @@ mod tests {
     use crate::camera::Sweep;
     use crate::frames::GreyImage;
     use crate::refine::parameters::frame_estimate::FrameEstimate;
-    use crate::refine::samples::visibility::{Hidden, Placed};
+    use crate::refine::samples::visibility::{Hidden, PosedFrame};
     use crate::surface::Footprint;
     use crate::test_wall::{TestWall, waves};
     use rand::SeedableRng;
@@ -224,13 +229,13 @@ mod tests {
             .collect();
         let camera = wall.camera;
         let estimates = wall.poses.iter().map(|pose| FrameEstimate::at(*pose));
-        let views: Vec<View> = (images.iter().zip(estimates))
-            .map(|(image, estimate)| View::new(image, camera, &estimate))
+        let views: Vec<SampledFrame> = (images.iter().zip(estimates))
+            .map(|(image, estimate)| SampledFrame::new(image, camera, &estimate))
             .collect();
-        let placed: Vec<Placed> = wall
+        let placed: Vec<PosedFrame> = wall
             .poses
             .iter()
-            .map(|pose| Placed {
+            .map(|pose| PosedFrame {
                 sweep: Sweep::default(),
                 pose: *pose,
                 footprint: Footprint::within(&wall.circle, &camera, pose, 6.0).unwrap(),
@@ -261,7 +266,7 @@ mod tests {
             work.misfit(&points, observers.map(|o| o.seen(&views)), &model);
             misfits.append(&mut work.misfits);
         }
-        let mut foreign = Foreign::new(grid, misfits);
+        let mut foreign = OutlierMask::new(grid, misfits);
         foreign.look(&wall.circle, &visibility, &frames, &views, &model);
         let marks = foreign.among(&visibility, &grid, &frames);
         let (mut near, mut left_near, mut elsewhere, mut left_elsewhere) = (0, 0, 0, 0);

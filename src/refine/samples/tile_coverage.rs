@@ -6,10 +6,10 @@
 use crate::camera::Camera;
 use crate::frames::{FrameCache, FrameError, Pyramid};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
-use crate::refine::samples::observer_marks::Marks;
+use crate::refine::samples::observer_marks::ObserverMarks;
 use crate::refine::samples::tile_selection::most_informative;
-use crate::refine::samples::visibility::{Hidden, Placed, Visibility, rows_of};
-use crate::refine::tiles::frame_samples::View;
+use crate::refine::samples::visibility::{Hidden, PosedFrame, Visibility, rows_of};
+use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, WallGrid};
 use crate::surface::Surface;
 use rayon::prelude::*;
@@ -69,11 +69,11 @@ pub struct Coverage<'a> {
     information: f64,
     /// Where the participants stood when the samples were chosen; None for those that are not
     /// compared.
-    placed: Vec<Option<Placed>>,
+    placed: Vec<Option<PosedFrame>>,
     stretches: Vec<Stretch>,
     kept: Vec<Option<Visibility>>,
     /// Which observers are left out, stretch by stretch; empty where none is.
-    left_out: Vec<Marks>,
+    left_out: Vec<ObserverMarks>,
     /// Number of tiles that are compared.
     pub tiles: usize,
     /// Number of tiles there are.
@@ -96,7 +96,7 @@ impl<'a> Coverage<'a> {
         pictures: Pictures<'a>,
         hidden: Hidden<'a>,
         information: f64,
-        placed: Vec<Option<Placed>>,
+        placed: Vec<Option<PosedFrame>>,
     ) -> Result<Self, FrameError> {
         let mut coverage = Self {
             stretches: stretches(&grid, &placed, pictures.frames.room()),
@@ -163,7 +163,7 @@ impl<'a> Coverage<'a> {
     }
 
     /// Leaves out the observers that are marked, stretch by stretch.
-    pub fn leave_out(&mut self, marks: Vec<Marks>) {
+    pub fn leave_out(&mut self, marks: Vec<ObserverMarks>) {
         for (kept, marks) in self.kept.iter_mut().zip(&marks) {
             if let Some(kept) = kept {
                 *kept = kept.without(marks);
@@ -175,7 +175,7 @@ impl<'a> Coverage<'a> {
     /// The observations of a stretch, and the number of tiles they are chosen from.
     fn find(&self, stretch: usize) -> Result<(Visibility, usize), FrameError> {
         let Stretch { rows, frames } = &self.stretches[stretch];
-        let placed: Vec<Placed> = frames.iter().filter_map(|k| self.placed[*k]).collect();
+        let placed: Vec<PosedFrame> = frames.iter().filter_map(|k| self.placed[*k]).collect();
         let all = Visibility::find(
             self.surface,
             &self.grid,
@@ -190,13 +190,13 @@ impl<'a> Coverage<'a> {
             return Ok((all, count));
         }
         let pictures = self.pictures.of(frames)?;
-        let views: Vec<View> = pictures
+        let views: Vec<SampledFrame> = pictures
             .iter()
             .zip(&placed)
             .map(|(picture, placed)| {
                 let picture = picture.level(self.pictures.level);
                 let camera = self.camera.sweeping(&placed.sweep);
-                View::new(picture, camera, &FrameEstimate::at(placed.pose))
+                SampledFrame::new(picture, camera, &FrameEstimate::at(placed.pose))
             })
             .collect();
         let chosen = most_informative(&all, self.information, &self.grid, self.surface, &views);
@@ -220,7 +220,7 @@ impl<'a> Coverage<'a> {
 }
 
 /// Cuts the lattice's rows into stretches of about [`STRETCH_OBSERVATIONS`] or [`STRETCH_FRAMES`].
-fn stretches(grid: &WallGrid, placed: &[Option<Placed>], room: usize) -> Vec<Stretch> {
+fn stretches(grid: &WallGrid, placed: &[Option<PosedFrame>], room: usize) -> Vec<Stretch> {
     let most_frames = STRETCH_FRAMES.min(room as f64);
     let rows: Vec<Option<Range<i64>>> = placed
         .iter()

@@ -19,7 +19,7 @@
 
 use crate::numerics::simd_dispatch::wide;
 use crate::refine::samples::visibility::{Tile, Visibility};
-use crate::refine::tiles::frame_samples::View;
+use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{TilePoints, WallGrid};
 use crate::refine::tiles::tile::slope_squares;
 use crate::surface::Surface;
@@ -32,7 +32,7 @@ pub fn most_informative(
     information: f64,
     grid: &WallGrid,
     surface: &dyn Surface,
-    views: &[View],
+    views: &[SampledFrame],
 ) -> Visibility {
     let kept: Vec<Vec<usize>> = visibility
         .blocks
@@ -54,7 +54,7 @@ fn squares(
     block: &Range<usize>,
     grid: &WallGrid,
     surface: &dyn Surface,
-    views: &[View],
+    views: &[SampledFrame],
 ) -> Vec<[f64; 2]> {
     let mut scratch = Vec::new();
     let tiles = visibility.tiles[block.clone()].iter();

@@ -2,8 +2,8 @@
 
 use crate::camera::{Camera, Sweep};
 use crate::frames::{HalvedMask, Shading};
-use crate::refine::samples::observer_marks::Marks;
-use crate::refine::tiles::frame_samples::View;
+use crate::refine::samples::observer_marks::ObserverMarks;
+use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, SIDE, TileId, WallGrid};
 use crate::refine::tiles::tile::Seen;
 use crate::surface::{Footprint, Patches, Surface};
@@ -40,7 +40,7 @@ pub struct Observer {
 impl Observer {
     /// As the work on its tile wants it; `views` are those of the [`Visibility`]'s frames.
     #[inline(always)]
-    pub fn seen<'v>(&self, views: &'v [View<'v>]) -> Seen<'v> {
+    pub fn seen<'v>(&self, views: &'v [SampledFrame<'v>]) -> Seen<'v> {
         Seen {
             view: &views[self.frame as usize],
             pixels: self.pixels,
@@ -60,7 +60,7 @@ pub struct Tile {
 
 /// A frame as it is placed when the samples are chosen.
 #[derive(Clone, Copy, Debug)]
-pub struct Placed {
+pub struct PosedFrame {
     /// Its pose.
     pub pose: Pose,
     /// Its motion while the rows are read.
@@ -115,7 +115,7 @@ impl Visibility {
         camera: &Camera,
         shading: Option<&Shading>,
         hidden: &Hidden,
-        placed: &[Placed],
+        placed: &[PosedFrame],
         rows: &Range<i64>,
     ) -> Self {
         let cells = Cells::over(grid, rows);
@@ -136,7 +136,7 @@ impl Visibility {
                     let Some(corners) = &corners[tile] else {
                         continue;
                     };
-                    if let Some(seen) = sight(grid, camera, mask, &frame.pose, corners) {
+                    if let Some(seen) = project_tile(grid, camera, mask, &frame.pose, corners) {
                         tiles.push((tile, seen.observer(k, camera, shading)));
                     }
                 }
@@ -203,7 +203,7 @@ impl Visibility {
     }
 
     /// Without the observers that are marked, and the tiles of which fewer than two are left.
-    pub fn without(&self, marks: &Marks) -> Self {
+    pub fn without(&self, marks: &ObserverMarks) -> Self {
         let mut visibility = Self::default();
         for tile in &self.tiles {
             let marked = tile.observers.clone().filter(|k| marks.has(*k));
@@ -360,7 +360,7 @@ impl Field {
 }
 
 /// A tile as a frame sees it.
-struct Sight {
+struct TileProjection {
     /// Where its middle appears.
     middle: Vector2<f64>,
     /// See [`Observer::pixels`].
@@ -368,13 +368,13 @@ struct Sight {
 }
 
 /// The tile with these corners as a frame at `pose` sees it, if it sees all of it.
-fn sight(
+fn project_tile(
     grid: &WallGrid,
     camera: &Camera,
     mask: Option<&HalvedMask>,
     pose: &Pose,
     corners: &[Vector3<f64>; 4],
-) -> Option<Sight> {
+) -> Option<TileProjection> {
     let pixel = |x_w: &Vector3<f64>| {
         camera
             .project(&pose.to_camera(x_w))
@@ -398,10 +398,10 @@ fn sight(
             return None;
         }
     }
-    Some(Sight { middle, pixels })
+    Some(TileProjection { middle, pixels })
 }
 
-impl Sight {
+impl TileProjection {
     /// Frame `frame` as the observer of the tile.
     fn observer(&self, frame: usize, camera: &Camera, shading: Option<&Shading>) -> Observer {
         let shade = shading.map_or(1.0, |shading| shading.at_level(&self.middle, camera));
@@ -472,7 +472,7 @@ mod tests {
         };
         assert!(all.tile(nowhere).is_none());
         let (tile, first) = (&all.tiles[17], all.tiles[17].observers.start);
-        let mut marks = Marks::none(all.observers.len());
+        let mut marks = ObserverMarks::none(all.observers.len());
         marks.set(first);
         let without = all.without(&marks);
         let frames = all.observers(tile).iter().map(|o| o.frame as usize);

@@ -1,4 +1,7 @@
 //! Damped Gauss–Newton over a photometric problem.
 
+pub mod argmin_glue;
 pub mod gauss_newton;
 pub mod neighbourhood;
+pub mod solve_record;
+pub mod stopping;

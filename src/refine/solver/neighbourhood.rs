@@ -5,15 +5,15 @@
 //! doubted frame makes to be solved does not grow with the length of the survey. What it has bent
 //! farther off is left to the next solve of all.
 
-use crate::refine::model::context::{Sampling, Scene};
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
-use crate::refine::pipeline::close;
 use crate::refine::problem::linearisation::FrameShare;
 use crate::refine::problem::photometric_problem::Problem;
 use crate::refine::samples::footprints::{FARTHEST, footprints};
-use crate::refine::solver::gauss_newton::solve;
+use crate::refine::solver::argmin_glue::solve;
+use crate::refine::solver::stopping::Stopping;
 use std::ops::{Range, RangeInclusive};
 
 /// Frames on either side of a changed one that are solved again.
@@ -29,15 +29,15 @@ pub struct Neighbourhood {
 }
 
 impl Neighbourhood {
-    /// Those of the frames that are believed now and were not `before`, or the other way round, or
+    /// Those of the frames that are inliers now and were not `before`, or the other way round, or
     /// stand elsewhere.
     ///
     /// # Errors
     /// [`ProblemError::Placement`].
     pub fn of_changes(
-        scene: &Scene,
-        before: &Tracked,
-        now: &Tracked,
+        scene: &EstimationContext,
+        before: &FrameStates,
+        now: &FrameStates,
     ) -> Result<Vec<Self>, ProblemError> {
         let runs = around(&changes(before, now), now.estimates.len());
         if runs.is_empty() {
@@ -67,7 +67,7 @@ impl Neighbourhood {
     }
 
     /// All frames.
-    pub fn of_all(tracked: &Tracked) -> Self {
+    pub fn of_all(tracked: &FrameStates) -> Self {
         let all = 0..tracked.estimates.len();
         Self {
             active: all.clone(),
@@ -75,23 +75,23 @@ impl Neighbourhood {
         }
     }
 
-    /// Solves the believed frames at some pyramid levels, coarse to fine, each close enough for the
+    /// Solves the inliers frames at some pyramid levels, coarse to fine, each close enough for the
     /// next; returns how each frame took part in the last.
     ///
     /// # Errors
     /// [`ProblemError`].
     pub fn solve(
         &self,
-        scene: &Scene,
+        scene: &EstimationContext,
         options: &RefineOptions,
         levels: RangeInclusive<usize>,
-        tracked: &mut Tracked,
+        tracked: &mut FrameStates,
     ) -> Result<Vec<FrameShare>, ProblemError> {
         let mut shares = Vec::new();
         for level in levels.rev() {
-            let members = tracked.members_of(self.participants.clone(), self.active.clone());
+            let members = tracked.window_of(self.participants.clone(), self.active.clone());
             let problem = Problem::new(scene, Sampling::of(level), members)?;
-            let solution = solve(problem, close(options, level), None)?;
+            let solution = solve(problem, Stopping::intermediate(options, level))?;
             tracked.estimates[self.active.clone()].copy_from_slice(&solution.estimates);
             shares = solution.linearisation.frames;
         }
@@ -99,10 +99,13 @@ impl Neighbourhood {
     }
 }
 
-/// The frames whose belief or, of those believed, whose pose has changed.
-pub fn changes(before: &Tracked, now: &Tracked) -> Vec<usize> {
+/// The frames whose belief or, of those inliers, whose pose has changed.
+pub fn changes(before: &FrameStates, now: &FrameStates) -> Vec<usize> {
     let changed = |k: &usize| {
-        let (was, is) = (before.doubts[*k].is_none(), now.doubts[*k].is_none());
+        let (was, is) = (
+            before.rejections[*k].is_none(),
+            now.rejections[*k].is_none(),
+        );
         was != is || is && before.estimates[*k].pose != now.estimates[*k].pose
     };
     (0..now.estimates.len()).filter(changed).collect()

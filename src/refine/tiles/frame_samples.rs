@@ -18,7 +18,7 @@ const INTEGER: f32 = 8_388_608.0;
 type Indices = [u32; ZERO.len()];
 
 /// A frame at one pyramid level with its current estimate, ready to be sampled.
-pub struct View<'a> {
+pub struct SampledFrame<'a> {
     image: &'a GreyImage,
     camera: Camera,
     /// `fx, fy, cx, cy`.
@@ -31,7 +31,7 @@ pub struct View<'a> {
     interpolation: Interpolation,
 }
 
-impl<'a> View<'a> {
+impl<'a> SampledFrame<'a> {
     /// A frame's `image` seen by `camera` (of the same level).
     pub fn new(image: &'a GreyImage, camera: Camera, estimate: &FrameEstimate) -> Self {
         let r_wc = estimate.pose.r_wc.to_rotation_matrix();
@@ -246,7 +246,7 @@ mod tests {
             omega_rad: Vector3::new(0.1, 0.5, -0.2),
             nu_m: Vector3::new(0.3, -0.1, 0.2),
         };
-        let view = View::new(&image, camera.at_level(1), &estimate);
+        let view = SampledFrame::new(&image, camera.at_level(1), &estimate);
         let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
         let wall_of = |camera: &Camera, pixel: &nalgebra::Vector2<f64>| {
             let ray = pose.r_wc * camera.ray(pixel.x, pixel.y).unwrap();
@@ -316,7 +316,7 @@ mod tests {
         ));
         estimate.log_gain = 0.2;
         estimate.bias = 3.0;
-        let view = View::new(&image, camera, &estimate).interpolated(interpolation);
+        let view = SampledFrame::new(&image, camera, &estimate).interpolated(interpolation);
         let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
         let hit = circle
             .hit(&estimate.pose.t_wc, &(estimate.pose.r_wc * Vector3::z()))

@@ -64,9 +64,9 @@ pub fn fractions(column: i64, row: i64) -> [f64; 2] {
 }
 
 impl WallGrid {
-    /// A lattice with about `density` samples to a pixel's width of `pixel_m` on the wall.
-    pub fn new(surface: &dyn Surface, pixel_m: f64, density: f64) -> Self {
-        let spacing_m = pixel_m / density;
+    /// A lattice with about `density` samples to a pixel's width of `pixel_size_m` on the wall.
+    pub fn new(surface: &dyn Surface, pixel_size_m: f64, density: f64) -> Self {
+        let spacing_m = pixel_size_m / density;
         let tiles = surface.perimeter_m() / (spacing_m * TILE as f64);
         let columns = (tiles.round() as i64).max(1);
         Self {

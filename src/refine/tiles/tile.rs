@@ -42,7 +42,7 @@
 //! gauge directions are exact null vectors of the data term.
 
 use crate::refine::tiles::denoising::{Denoiser, TextureSpectrum};
-use crate::refine::tiles::frame_samples::View;
+use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{LANES, Plane, SIDE, TILE, TilePoints, ZERO};
 use crate::refine::tiles::residual_weighting::{Loss, NoiseHistogram, NoiseModel};
 use nalgebra::{Matrix4, Vector4};
@@ -98,8 +98,6 @@ pub struct TileMoments {
     pub observers: Vec<ObserverMoments>,
     /// `Σ_x p φ φᵀ`.
     pub features: Matrix4<f64>,
-    /// M of each observer's own gradient, if that is asked for.
-    pub own_features: Vec<Matrix4<f64>>,
 }
 
 /// How a frame fits the others over a tile.
@@ -113,13 +111,11 @@ pub struct Misfit {
 
 /// How residuals are weighed and slopes are taken.
 #[derive(Clone, Copy)]
-pub struct Weighing<'a> {
+pub struct ResidualWeighting<'a> {
     /// The residuals' variance.
     pub noise: &'a NoiseModel,
     /// Whether samples weigh by `τ = σ²/v`, else all alike.
-    pub by_variance: bool,
-    /// Whether the derivative takes the gradient of S, and not each frame's own.
-    pub fused: bool,
+    pub variance_weighting: bool,
     /// What takes the noise from S for its slopes.
     pub denoiser: Option<&'a Denoiser>,
 }
@@ -127,7 +123,7 @@ pub struct Weighing<'a> {
 /// A frame that sees a tile.
 pub struct Seen<'a> {
     /// The frame.
-    pub view: &'a View<'a>,
+    pub view: &'a SampledFrame<'a>,
     /// Pixels per wall sample, q.
     pub pixels: f32,
     /// The camera's shading V around the tile.
@@ -313,14 +309,13 @@ impl TileWork {
         points: &TilePoints,
         observers: impl Iterator<Item = Seen<'a>>,
         spacing_m: (f64, f64),
-        weighing: &Weighing,
+        weighting: &ResidualWeighting,
     ) {
-        let Weighing {
+        let ResidualWeighting {
             noise,
-            by_variance,
-            fused,
+            variance_weighting,
             denoiser,
-        } = *weighing;
+        } = *weighting;
         self.sample(points, observers);
         let precision = self.precision(noise);
         let mut texture = self.mean();
@@ -338,23 +333,15 @@ impl TileWork {
         let mut trust = [1.0; NO_ROWS.len()];
         for k in 0..NO_ROWS.len() {
             variance[k] = 1.0 / precision[k + SIDE];
-            if by_variance {
+            if variance_weighting {
                 trust[k] = noise.floor * precision[k + SIDE];
             }
         }
         let shares = self.shares(&trust);
         self.found.features = feature_moments(&phi, &shares);
         self.found.observers.clear();
-        self.found.own_features.clear();
         for frame in &self.samples {
-            let moments = if fused {
-                observer_moments(frame, &phi, &precision, [&variance, &trust])
-            } else {
-                let [own_s, own_h, _] = features(&frame.values, slopes, &covered);
-                let own = [own_s, own_h, phi[2]];
-                self.found.own_features.push(feature_moments(&own, &shares));
-                observer_moments(frame, &own, &precision, [&variance, &trust])
-            };
+            let moments = observer_moments(frame, &phi, &precision, [&variance, &trust]);
             self.found.observers.push(moments);
         }
     }
@@ -525,7 +512,7 @@ fn gradient_squares(texture: &Plane) -> Rows {
 /// Sums over a tile of the squared differences between neighbours along s and h, in the values that
 /// one frame shows. NaN where it lacks one.
 #[inline(always)]
-pub fn slope_squares(points: &TilePoints, view: &View, shade: f32) -> [f64; 2] {
+pub fn slope_squares(points: &TilePoints, view: &SampledFrame, shade: f32) -> [f64; 2] {
     let mut values = ZERO;
     view.sample(points, shade, &mut values);
     let (mut along_s, mut along_h) = (NO_ROWS, NO_ROWS);
@@ -684,13 +671,13 @@ mod tests {
                 GreyImage::new(160, 120, data)
             })
             .collect();
-        let views: Vec<View> = images
+        let views: Vec<SampledFrame> = images
             .iter()
             .enumerate()
             .map(|(k, image)| {
                 let turn = Vector3::new(0.01, 0.02, 0.05) * k as f64;
                 let pose = Pose::new(so3::exp(&turn), Vector3::zeros());
-                View::new(image, camera, &FrameEstimate::at(pose))
+                SampledFrame::new(image, camera, &FrameEstimate::at(pose))
             })
             .collect();
         // A bilinear sample has 4/9 of a pixel's variance on average.
@@ -726,13 +713,12 @@ mod tests {
             let mut slopes = |denoiser: Option<&Denoiser>| {
                 let mut sum = 0.0;
                 for points in &tiles {
-                    let weighing = Weighing {
+                    let weighting = ResidualWeighting {
                         noise: &model,
-                        by_variance: false,
-                        fused: true,
+                        variance_weighting: false,
                         denoiser,
                     };
-                    work.moments(points, seen(), spacing, &weighing);
+                    work.moments(points, seen(), spacing, &weighting);
                     sum += work.found.features[(0, 0)] + work.found.features[(1, 1)];
                 }
                 sum

@@ -11,15 +11,16 @@
 
 use crate::camera::Camera;
 use crate::progress::Progress;
-use crate::refine::model::context::{Sampling, Scene};
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::model::rejection::Doubt;
+use crate::refine::model::rejection::RejectionReason;
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::calibration::Kappa;
 use crate::refine::problem::photometric_problem::Problem;
-use crate::refine::solver::gauss_newton::{Stopping, solve};
-use crate::refine::tracking::shading_correction::{MOST_FRAMES, flatten};
+use crate::refine::solver::argmin_glue::solve;
+use crate::refine::solver::stopping::Stopping;
+use crate::refine::tracking::shading_correction::{MOST_FRAMES, correct_until_settled};
 use crate::refine::tracking::track::Tracking;
 use serde::{Deserialize, Serialize};
 
@@ -37,25 +38,25 @@ const STEPS_PER_EDGE: usize = 4;
 
 /// Frames being placed, in one round after another.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Retracking {
+pub struct AlternatingCalibration {
     /// The round, from 0.
     round: usize,
     /// The shared unknowns that it began with.
     kappa: Kappa,
     /// Why frames are known to be useless beforehand.
-    useless: Vec<Option<Doubt>>,
+    useless: Vec<Option<RejectionReason>>,
     tracking: Tracking,
 }
 
-impl Retracking {
-    /// Nothing placed yet. `doubts` are frames known to be useless beforehand.
-    pub fn begin(doubts: Vec<Option<Doubt>>) -> Self {
+impl AlternatingCalibration {
+    /// Nothing placed yet. `rejections` are frames known to be useless beforehand.
+    pub fn begin(rejections: Vec<Option<RejectionReason>>) -> Self {
         let kappa = Kappa::zeros();
         Self {
             round: 0,
             kappa,
-            tracking: Tracking::begin(doubts.clone(), kappa),
-            useless: doubts,
+            tracking: Tracking::begin(rejections.clone(), kappa),
+            useless: rejections,
         }
     }
 
@@ -63,7 +64,7 @@ impl Retracking {
     /// they overlap.
     fn find_light(
         &mut self,
-        scene: &Scene,
+        scene: &EstimationContext,
         options: &RefineOptions,
         progress: &dyn Progress,
     ) -> Result<(), ProblemError> {
@@ -80,7 +81,7 @@ impl Retracking {
             }
             progress.finish();
             let mut tracked = self.tracking.so_far();
-            flatten(&scene.at(tracked.kappa), options, &mut tracked)?;
+            correct_until_settled(&scene.at(tracked.kappa), options, &mut tracked)?;
             let after = scene.frames.shading();
             if after.is_none_or(|after| after.differs(&before) < SAME_LIGHT) {
                 break;
@@ -96,13 +97,13 @@ impl Retracking {
     /// As [`Tracking::place_next`], and those of `between`.
     pub fn finish(
         mut self,
-        scene: &Scene,
+        scene: &EstimationContext,
         options: &RefineOptions,
         stopping: Stopping,
         progress: &dyn Progress,
         mut between: impl FnMut(&Self) -> Result<(), ProblemError>,
-    ) -> Result<Tracked, ProblemError> {
-        let mut scene = Scene {
+    ) -> Result<FrameStates, ProblemError> {
+        let mut scene = EstimationContext {
             calibration: scene.calibration.of_camera(),
             ..*scene
         }
@@ -126,9 +127,9 @@ impl Retracking {
             let before = scene.camera;
             scene = scene.at(tracked.kappa);
             let level = options.handover_level(scene.camera.shorter_side());
-            let problem = Problem::new(&scene, Sampling::of(level), tracked.members())?;
+            let problem = Problem::new(&scene, Sampling::of(level), tracked.window())?;
             if problem.tiles() > 0 {
-                let solution = solve(problem.calibrating(), stopping, None)?;
+                let solution = solve(problem.calibrating(), stopping)?;
                 tracked.estimates = solution.estimates;
                 tracked.kappa = solution.kappa;
             }

@@ -21,8 +21,8 @@
 //! 21(5), 2012 (masks).
 
 use crate::numerics::spectrum::{Spectrum, Transform};
-use crate::refine::model::context::Scene;
-use crate::refine::tracking::reference_mosaic::{FusedWall, Portrait};
+use crate::refine::model::context::EstimationContext;
+use crate::refine::tracking::reference_mosaic::{ReferenceMosaic, UnwrappedFrame};
 use crate::surface::{WallPoint, shortest_arc, wall_jacobian};
 use crate::trajectory::{Pose, so3};
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
@@ -61,8 +61,8 @@ pub fn log_likelihood(correlation: f64, samples: f64) -> f64 {
 }
 
 /// Least number of samples a frame must share with the wall to be compared.
-pub fn least_samples(portrait: &Portrait) -> f64 {
-    let camera = portrait.camera();
+pub fn least_samples(unwrapped: &UnwrappedFrame) -> f64 {
+    let camera = unwrapped.camera();
     LEAST_OVERLAP * f64::from(camera.width) * f64::from(camera.height)
 }
 
@@ -78,9 +78,9 @@ struct Peak {
 /// Searches around `predicted` over `sigma_rad`, the prior's σ of pitch, yaw and roll as seen in
 /// the picture; returns at most `count` local maxima, best first.
 pub fn search(
-    scene: &Scene,
-    wall: &FusedWall,
-    portrait: &Portrait,
+    scene: &EstimationContext,
+    wall: &ReferenceMosaic,
+    unwrapped: &UnwrappedFrame,
     predicted: &Pose,
     sigma_rad: [f64; 3],
     count: usize,
@@ -102,7 +102,7 @@ pub fn search(
     let along = (a.fixed_columns::<3>(0) * tilt).norm();
     let across = (a.fixed_columns::<3>(0) * axis).norm();
     let cells = |length: f64| (length / spacing).ceil() as usize;
-    let camera = portrait.camera();
+    let camera = unwrapped.camera();
     let half_diagonal = 0.5 * f64::from(camera.width).hypot(f64::from(camera.height));
     // The more steeply a frame looks along the tunnel, the faster its picture on the wall stretches
     // with the pitch.
@@ -121,7 +121,7 @@ pub fn search(
         cells((half_pitch * along).min(widest)),
     );
     let correlator = Correlator::new(wall, reach);
-    let least = least_samples(portrait);
+    let least = least_samples(unwrapped);
     let hypotheses: Vec<(f64, f64)> = pitches
         .iter()
         .flat_map(|pitch| rolls.iter().map(|roll| (*pitch, *roll)))
@@ -132,7 +132,7 @@ pub fn search(
             let turn = so3::exp(&(tilt * pitch)) * so3::exp(&(Vector3::z() * roll));
             let pose = Pose::new(predicted.r_wc * turn, predicted.t_wc);
             let mut own: Vec<Peak> = correlator
-                .correlate(wall, portrait, &pose)
+                .correlate(wall, unwrapped, &pose)
                 .into_iter()
                 .filter(|found| found.samples >= least)
                 .map(|found| {
@@ -188,7 +188,7 @@ pub fn search(
 }
 
 /// The direction of the tunnel where a camera stands, in the camera's frame.
-fn axis_seen(scene: &Scene, pose: &Pose) -> Vector3<f64> {
+fn axis_seen(scene: &EstimationContext, pose: &Pose) -> Vector3<f64> {
     scene.surface.straightened(pose).r_wc.inverse() * Vector3::y()
 }
 
@@ -203,8 +203,8 @@ fn tilt_axis(axis: &Vector3<f64>) -> Option<Vector3<f64>> {
 /// which the squared correlation has a maximum of at least `least`; the shift of none is one of
 /// them, where the pose is right.
 pub fn matches(
-    wall: &FusedWall,
-    portrait: &Portrait,
+    wall: &ReferenceMosaic,
+    unwrapped: &UnwrappedFrame,
     pose: &Pose,
     reach_m: [f64; 2],
     least: f64,
@@ -212,9 +212,9 @@ pub fn matches(
     let spacing = wall.lattice.spacing_m;
     let cells = |length: f64| (length / spacing).ceil() as usize;
     let correlator = Correlator::new(wall, (cells(reach_m[0]), cells(reach_m[1])));
-    let samples = least_samples(portrait);
+    let samples = least_samples(unwrapped);
     correlator
-        .correlate(wall, portrait, pose)
+        .correlate(wall, unwrapped, pose)
         .into_iter()
         .filter(|found| found.samples >= samples && found.correlation.powi(2) >= least)
         .map(|found| (found.shift * spacing).into())
@@ -230,7 +230,7 @@ fn steps(half: f64, step: f64) -> Vec<f64> {
 /// The pose turned so that its middle looks at a wall point `shift_m` away from where it does:
 /// about the tunnel's axis, which moves the picture along s and leaves it as it is, however steeply
 /// it looks along the tunnel, and in pitch.
-fn shifted(scene: &Scene, pose: &Pose, shift_m: &Vector2<f64>) -> Option<Pose> {
+fn shifted(scene: &EstimationContext, pose: &Pose, shift_m: &Vector2<f64>) -> Option<Pose> {
     let look = |pose: &Pose| scene.surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()));
     let from = look(pose).ok()?.wall;
     let target = WallPoint {
@@ -275,12 +275,12 @@ struct Correlator {
 }
 
 impl Correlator {
-    fn new(wall: &FusedWall, reach: (usize, usize)) -> Self {
+    fn new(wall: &ReferenceMosaic, reach: (usize, usize)) -> Self {
         let lattice = &wall.lattice;
         // Room for shifts beyond the wall's end, so that nothing comes around from the other.
         let transform = Transform::at_least(lattice.columns + reach.0, lattice.rows + reach.1);
         let spread = |value: fn(f32) -> f32| {
-            let raster = place(&transform, lattice.columns, &wall.contrast, value);
+            let raster = pad_raster(&transform, lattice.columns, &wall.contrast, value);
             transform.forward(raster)
         };
         Self {
@@ -293,8 +293,13 @@ impl Correlator {
     }
 
     /// Local maxima of the correlation of the frame at `pose` over shifts, in samples.
-    fn correlate(&self, wall: &FusedWall, portrait: &Portrait, pose: &Pose) -> Vec<Maximum> {
-        let contrast = portrait.contrast(pose, &wall.origin);
+    fn correlate(
+        &self,
+        wall: &ReferenceMosaic,
+        unwrapped: &UnwrappedFrame,
+        pose: &Pose,
+    ) -> Vec<Maximum> {
+        let contrast = unwrapped.contrast(pose, &wall.origin);
         let unrolled: Vec<f32> = wall
             .points
             .iter()
@@ -306,8 +311,9 @@ impl Correlator {
             .collect();
         let transform = &self.transform;
         let columns = wall.lattice.columns;
-        let spread =
-            |value: fn(f32) -> f32| transform.forward(place(transform, columns, &unrolled, value));
+        let spread = |value: fn(f32) -> f32| {
+            transform.forward(pad_raster(transform, columns, &unrolled, value))
+        };
         let (contrast, square, mask) = (spread(|v| v), spread(|v| v * v), spread(|_| 1.0));
         let product = transform.correlate(&contrast, &self.contrast);
         let own = transform.correlate(&square, &self.mask);
@@ -347,7 +353,12 @@ impl Correlator {
 }
 
 /// A lattice's values in a raster of the transform's size; 0 where there is none.
-fn place(transform: &Transform, columns: usize, values: &[f32], value: fn(f32) -> f32) -> Vec<f32> {
+fn pad_raster(
+    transform: &Transform,
+    columns: usize,
+    values: &[f32],
+    value: fn(f32) -> f32,
+) -> Vec<f32> {
     let mut raster = vec![0.0; transform.columns * transform.rows];
     let rows = raster.chunks_exact_mut(transform.columns);
     for (row, values) in rows.zip(values.chunks_exact(columns)) {

@@ -2,9 +2,9 @@
 
 use crate::frames::{GreyImage, Shading, noise_sigma};
 use crate::progress::Progress;
-use crate::refine::model::context::Scene;
+use crate::refine::model::context::EstimationContext;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::model::rejection::Doubt;
+use crate::refine::model::rejection::RejectionReason;
 use crate::surface::viewing_distance;
 use rayon::prelude::*;
 
@@ -20,9 +20,9 @@ const SAME_PICTURE: f64 = 0.1;
 const MOVED_PX: f64 = 20.0;
 
 /// What the first look finds.
-pub struct Examined {
+pub struct Prescreened {
     /// Frames that are useless, with the reason.
-    pub doubts: Vec<Option<Doubt>>,
+    pub rejections: Vec<Option<RejectionReason>>,
     /// Shading that all frames have in common, if there is one.
     pub shading: Option<Shading>,
     /// 1-σ of the sensor's noise, grey levels: the median over the frames.
@@ -33,14 +33,14 @@ pub struct Examined {
 ///
 /// # Errors
 /// [`ProblemError::Frame`].
-pub fn examine(
-    scene: &Scene,
+pub fn prescreen(
+    scene: &EstimationContext,
     coarsest: usize,
     progress: &dyn Progress,
-) -> Result<Examined, ProblemError> {
+) -> Result<Prescreened, ProblemError> {
     let count = scene.frames.frames();
     progress.start("decoding", count);
-    let mut doubts = Vec::with_capacity(count);
+    let mut rejections = Vec::with_capacity(count);
     let mut sums: Vec<[f64; 2]> = Vec::new();
     let mut last: Option<(usize, GreyImage)> = None;
     let mut size = (0, 0);
@@ -61,12 +61,12 @@ pub fn examine(
             let repeated = last.as_ref().filter(|(earlier, other)| {
                 difference(other, &picture) < SAME_PICTURE && moved(scene, *earlier, k)
             });
-            doubts.push(if known < 0.1 || spread < LEAST_CONTRAST {
-                Some(Doubt::Featureless)
+            rejections.push(if known < 0.1 || spread < LEAST_CONTRAST {
+                Some(RejectionReason::Featureless)
             } else {
-                repeated.map(|(earlier, _)| Doubt::Repeated(*earlier))
+                repeated.map(|(earlier, _)| RejectionReason::Repeated(*earlier))
             });
-            if doubts[k].is_none() {
+            if rejections[k].is_none() {
                 noises.extend(noise);
                 for (sum, value) in sums.iter_mut().zip(picture.data()) {
                     if !value.is_nan() {
@@ -83,11 +83,11 @@ pub fn examine(
     let mean = sums.iter().map(|[sum, n]| (100.0 * sum / n) as f32);
     let mean = GreyImage::new(size.0, size.1, mean.collect());
     let full = (scene.camera.width as usize, scene.camera.height as usize);
-    let enough = doubts.iter().filter(|d| d.is_none()).count() >= LEAST_FRAMES;
+    let enough = rejections.iter().filter(|d| d.is_none()).count() >= LEAST_FRAMES;
     noises.sort_unstable_by(f64::total_cmp);
-    Ok(Examined {
+    Ok(Prescreened {
         noise: noises.get(noises.len() / 2).copied().unwrap_or(0.0),
-        doubts,
+        rejections,
         shading: enough.then(|| Shading::of_mean(&mean, full)).flatten(),
     })
 }
@@ -123,7 +123,7 @@ fn difference(a: &GreyImage, b: &GreyImage) -> f64 {
 }
 
 /// True if the initial poses put two frames well apart.
-fn moved(scene: &Scene, a: usize, b: usize) -> bool {
+fn moved(scene: &EstimationContext, a: usize, b: usize) -> bool {
     let (from, to) = (&scene.prior.initial[a], &scene.prior.initial[b]);
     let Ok(range) = viewing_distance(scene.surface, from) else {
         return true;

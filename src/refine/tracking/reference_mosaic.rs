@@ -2,7 +2,7 @@
 
 use crate::camera::{Camera, Sweep};
 use crate::frames::{GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level, usual};
-use crate::refine::model::context::Scene;
+use crate::refine::model::context::EstimationContext;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::samples::footprints::reach_m;
@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Lattice cells at the most: a frame that looks far along the tunnel sees more, but not well.
+/// MosaicGrid cells at the most: a frame that looks far along the tunnel sees more, but not well.
 const MOST_CELLS: usize = 1 << 20;
 
 /// Least pixels of a piece of wall, over those it has when seen squarely from the axis, with which
@@ -27,7 +27,7 @@ const COARSEST_RADII: f64 = 1.25;
 
 /// A lattice on the unrolled wall: one sample a pixel of a pyramid level, where the frame looks.
 #[derive(Clone, Copy, Debug)]
-pub struct Lattice {
+pub struct MosaicGrid {
     /// Arc length of the first column, metres.
     pub s_m: f64,
     /// Chainage of the first row, metres.
@@ -40,7 +40,7 @@ pub struct Lattice {
     pub rows: usize,
 }
 
-impl Lattice {
+impl MosaicGrid {
     /// Covers `footprint` with cells of `spacing_m`, coarser if they would be too many.
     pub fn over(footprint: &Footprint, spacing_m: f64) -> Self {
         let (width, height) = (
@@ -68,7 +68,7 @@ impl Lattice {
     }
 
     /// World points of the lattice, row by row.
-    pub fn points(&self, scene: &Scene) -> Vec<Vector3<f64>> {
+    pub fn points(&self, scene: &EstimationContext) -> Vec<Vector3<f64>> {
         let axis = |from: f64, n: usize| -> Vec<f64> {
             (0..n).map(|k| from + k as f64 * self.spacing_m).collect()
         };
@@ -80,28 +80,28 @@ impl Lattice {
 }
 
 /// A pixel's width on the wall where `pose` looks, metres.
-pub fn pixel_m(scene: &Scene, camera: &Camera, pose: &Pose) -> f64 {
+pub fn pixel_size_m(scene: &EstimationContext, camera: &Camera, pose: &Pose) -> f64 {
     let radius_m = scene.surface.perimeter_m() / std::f64::consts::TAU;
     let range = viewing_distance(scene.surface, pose).unwrap_or(radius_m);
     range.min(3.0 * radius_m) / camera.fy
 }
 
 /// One frame at a pyramid level: its grey values and its local contrast.
-pub struct Portrait {
+pub struct UnwrappedFrame {
     camera: Camera,
     level: usize,
     picture: Arc<Pyramid>,
     local: Arc<LocalContrast>,
 }
 
-impl Portrait {
+impl UnwrappedFrame {
     /// Frame `frame`, its camera moving by `sweep`, with its contrast over a window as wide as
     /// light is smooth.
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
     pub fn new(
-        scene: &Scene,
+        scene: &EstimationContext,
         level: usize,
         frame: usize,
         sweep: &Sweep,
@@ -122,7 +122,7 @@ impl Portrait {
     /// # Errors
     /// [`ProblemError::Frame`].
     pub fn fine(
-        scene: &Scene,
+        scene: &EstimationContext,
         level: usize,
         frame: usize,
         sweep: &Sweep,
@@ -150,9 +150,14 @@ impl Portrait {
     }
 
     /// The frame as `pose` would put it on the wall; points will be relative to `origin`.
-    pub fn at(&self, scene: &Scene, pose: &Pose, origin: &Vector3<f64>) -> Gaze<'_> {
-        Gaze {
-            portrait: self,
+    pub fn at(
+        &self,
+        scene: &EstimationContext,
+        pose: &Pose,
+        origin: &Vector3<f64>,
+    ) -> UnwrappedSampler<'_> {
+        UnwrappedSampler {
+            unwrapped: self,
             sampler: Sampler::new(&self.camera, pose, origin),
             variance: (scene.noise * scene.noise * noise_at_level(self.level)) as f32,
         }
@@ -184,20 +189,20 @@ impl Portrait {
 }
 
 /// A frame on the wall, ready to be looked at.
-pub struct Gaze<'a> {
-    portrait: &'a Portrait,
+pub struct UnwrappedSampler<'a> {
+    unwrapped: &'a UnwrappedFrame,
     sampler: Sampler,
     /// Variance of a pixel's noise.
     variance: f32,
 }
 
-impl Gaze<'_> {
+impl UnwrappedSampler<'_> {
     /// Local contrast at a wall point (relative to the origin) and the variance of its noise, where
     /// the frame has a value.
     #[inline]
     pub fn contrast_and_noise(&self, point: &[f32; 3]) -> Option<(f32, f32)> {
         let spot = self.sampler.at(point)?;
-        let contrast = spot.known(&self.portrait.local.contrast)?;
+        let contrast = spot.known(&self.unwrapped.local.contrast)?;
         Some((contrast, self.noise(&spot)))
     }
 
@@ -205,8 +210,8 @@ impl Gaze<'_> {
     #[inline]
     pub fn contrast_and_detail(&self, point: &[f32; 3]) -> Option<(f32, f32, f32)> {
         let spot = self.sampler.at(point)?;
-        let contrast = spot.known(&self.portrait.local.contrast)?;
-        let detail = spot.of(&self.portrait.local.detail);
+        let contrast = spot.known(&self.unwrapped.local.contrast)?;
+        let detail = spot.of(&self.unwrapped.local.detail);
         Some((contrast, self.noise(&spot), detail))
     }
 
@@ -214,23 +219,23 @@ impl Gaze<'_> {
     #[inline]
     fn contrast_and_grey(&self, point: &[f32; 3]) -> Option<(f32, f32, f32)> {
         let spot = self.sampler.at(point)?;
-        let contrast = spot.known(&self.portrait.local.contrast)?;
+        let contrast = spot.known(&self.unwrapped.local.contrast)?;
         Some((
             contrast,
             self.noise(&spot),
-            spot.of(self.portrait.picture()),
+            spot.of(self.unwrapped.picture()),
         ))
     }
 
     #[inline]
     fn noise(&self, spot: &Spot) -> f32 {
-        self.variance * spot.of(&self.portrait.local.sensitivity)
+        self.variance * spot.of(&self.unwrapped.local.sensitivity)
     }
 }
 
 /// Sums over the samples that two pictures of the wall share.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Likeness {
+pub struct NccScore {
     /// Samples.
     pub samples: f64,
     xx: f64,
@@ -240,7 +245,7 @@ pub struct Likeness {
     noise_y: f64,
 }
 
-impl Likeness {
+impl NccScore {
     /// Adds a sample: both contrasts and the variances of their noise.
     #[inline]
     pub fn add(&mut self, (x, noise_x): (f32, f32), (y, noise_y): (f32, f32)) {
@@ -281,9 +286,9 @@ impl Likeness {
 const LEAST_TEXTURE: f64 = 0.2;
 
 /// The wall around a frame, fused from the frames already placed.
-pub struct FusedWall {
+pub struct ReferenceMosaic {
     /// Where it is sampled.
-    pub lattice: Lattice,
+    pub lattice: MosaicGrid,
     /// World point that others are relative to.
     pub origin: Vector3<f64>,
     /// Points of the lattice relative to the origin.
@@ -301,13 +306,13 @@ pub struct FusedWall {
 }
 
 /// How much of a frame's detail is left on a wall seen from afar or obliquely.
-struct Sight {
+struct ViewCone {
     /// The camera, relative to the origin, metres.
     centre: Vector3<f32>,
     radius_m: f32,
 }
 
-impl Sight {
+impl ViewCone {
     /// True if a piece of the wall with this normal has at least [`LEAST_DETAIL`] of the pixels it
     /// has when seen squarely from the axis: `cos β (r/d)²` of them, at distance d and angle β to
     /// the normal.
@@ -320,14 +325,14 @@ impl Sight {
     }
 }
 
-impl FusedWall {
+impl ReferenceMosaic {
     /// Fuses the `placed` frames over where `pose` looks, `margin_m` metres more on every side.
     ///
     /// # Errors
     /// [`ProblemError::Placement`] for a `pose` outside the tunnel, named as frame `frame`.
     pub fn new(
-        scene: &Scene,
-        placed: &[(Portrait, FrameEstimate)],
+        scene: &EstimationContext,
+        placed: &[(UnwrappedFrame, FrameEstimate)],
         camera: &Camera,
         (frame, pose): (usize, &Pose),
         margin_m: f64,
@@ -338,8 +343,9 @@ impl FusedWall {
             .map_err(|source| ProblemError::Placement { frame, source })?
             .widened(margin_m);
         // A frame that looks along the tunnel has its detail where the wall is near.
-        let spacing_m = pixel_m(scene, camera, pose).min(COARSEST_RADII * radius_m / camera.fy);
-        let lattice = Lattice::over(&footprint, spacing_m);
+        let spacing_m =
+            pixel_size_m(scene, camera, pose).min(COARSEST_RADII * radius_m / camera.fy);
+        let lattice = MosaicGrid::over(&footprint, spacing_m);
         let middle = WallPoint {
             s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
             h_m: 0.5 * (footprint.h_min_m + footprint.h_max_m),
@@ -360,20 +366,20 @@ impl FusedWall {
             .iter()
             .map(|x_w| (x_w - origin).cast().into())
             .collect();
-        let sight = |pose: &Pose| Sight {
+        let cone = |pose: &Pose| ViewCone {
             centre: (pose.t_wc - origin).cast(),
             radius_m: radius_m as f32,
         };
-        let in_sight =
-            |sight: &Sight, k: usize| sight.sees(&points[k], &normals[k % lattice.columns]);
-        let own = sight(pose);
-        let visible: Vec<bool> = (0..points.len()).map(|k| in_sight(&own, k)).collect();
-        let gazes: Vec<(Sight, Gaze, f32, f32)> = placed
+        let in_view =
+            |cone: &ViewCone, k: usize| cone.sees(&points[k], &normals[k % lattice.columns]);
+        let own = cone(pose);
+        let visible: Vec<bool> = (0..points.len()).map(|k| in_view(&own, k)).collect();
+        let samplers: Vec<(ViewCone, UnwrappedSampler, f32, f32)> = placed
             .iter()
-            .map(|(portrait, estimate)| {
+            .map(|(unwrapped, estimate)| {
                 (
-                    sight(&estimate.pose),
-                    portrait.at(scene, &estimate.pose, &origin),
+                    cone(&estimate.pose),
+                    unwrapped.at(scene, &estimate.pose, &origin),
                     (-estimate.log_gain).exp() as f32,
                     estimate.bias as f32,
                 )
@@ -387,11 +393,11 @@ impl FusedWall {
                 if scene.ignored.hold(&lattice.wall(k)) {
                     return [f32::NAN; 3];
                 }
-                for (sight, gaze, inverse_gain, bias) in &gazes {
-                    if !in_sight(sight, k) {
+                for (cone, sampler, inverse_gain, bias) in &samplers {
+                    if !in_view(cone, k) {
                         continue;
                     }
-                    if let Some((contrast, noise, grey)) = gaze.contrast_and_grey(point) {
+                    if let Some((contrast, noise, grey)) = sampler.contrast_and_grey(point) {
                         sum[0] += contrast;
                         sum[1] += noise;
                         sum[2] += (grey - bias) * inverse_gain;
@@ -414,25 +420,30 @@ impl FusedWall {
     }
 
     /// Compares a frame at `pose` with the wall.
-    pub fn likeness(&self, scene: &Scene, portrait: &Portrait, pose: &Pose) -> Likeness {
-        let gaze = portrait.at(scene, pose, &self.origin);
-        let mut likeness = Likeness::default();
+    pub fn ncc_score(
+        &self,
+        scene: &EstimationContext,
+        unwrapped: &UnwrappedFrame,
+        pose: &Pose,
+    ) -> NccScore {
+        let sampler = unwrapped.at(scene, pose, &self.origin);
+        let mut ncc_score = NccScore::default();
         let wall = self.contrast.iter().zip(&self.noise);
         for (point, (wall, wall_noise)) in self.points.iter().zip(wall) {
             if wall.is_nan() {
                 continue;
             }
-            if let Some(own) = gaze.contrast_and_noise(point) {
-                likeness.add((*wall, *wall_noise), own);
+            if let Some(own) = sampler.contrast_and_noise(point) {
+                ncc_score.add((*wall, *wall_noise), own);
             }
         }
-        likeness
+        ncc_score
     }
 
     /// The estimate with `pose` and the gain and bias that fit the wall best: a line through its
     /// grey values.
-    pub fn exposed(&self, portrait: &Portrait, pose: &Pose) -> FrameEstimate {
-        let grey = portrait.grey(pose, &self.origin);
+    pub fn exposed(&self, unwrapped: &UnwrappedFrame, pose: &Pose) -> FrameEstimate {
+        let grey = unwrapped.grey(pose, &self.origin);
         let (mut n, mut x, mut y, mut xx, mut xy) = (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
         for (point, wall) in self.points.iter().zip(&self.grey) {
             if wall.is_nan() {

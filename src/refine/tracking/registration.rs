@@ -2,18 +2,21 @@
 //! verdict.
 
 use crate::camera::Sweep;
-use crate::refine::model::context::{Members, Sampling, Scene};
+use crate::refine::model::context::{EstimationContext, FrameWindow, Sampling};
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::model::rejection::Doubt;
+use crate::refine::model::rejection::RejectionReason;
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::problem::photometric_problem::Problem;
 use crate::refine::samples::footprints::footprint;
-use crate::refine::solver::gauss_newton::{Stopping, solve};
+use crate::refine::solver::argmin_glue::solve;
+use crate::refine::solver::stopping::Stopping;
 use crate::refine::tracking::correlation_search::{
     Hypothesis, REACH, least_samples, log_likelihood, search,
 };
-use crate::refine::tracking::reference_mosaic::{FusedWall, Likeness, Portrait, pixel_m};
+use crate::refine::tracking::reference_mosaic::{
+    NccScore, ReferenceMosaic, UnwrappedFrame, pixel_size_m,
+};
 use crate::surface::{Footprint, shortest_arc, viewing_distance};
 use crate::trajectory::{Jitter, Pose};
 use std::borrow::Cow;
@@ -61,7 +64,7 @@ pub struct Expectation {
 
 /// A frame that has found its place.
 #[derive(Clone, Copy, Debug)]
-pub struct Placed {
+pub struct Registered {
     /// Its estimate.
     pub estimate: FrameEstimate,
     /// False if it matches the wall less well than it should: the wall itself may be bent.
@@ -87,7 +90,7 @@ impl Candidate {
 }
 
 /// The frames around the one that is placed.
-pub struct Surroundings<'s> {
+pub struct Neighbours<'s> {
     /// A run of frames that includes the one to be placed.
     pub run: Range<usize>,
     /// Their estimates.
@@ -98,9 +101,9 @@ pub struct Surroundings<'s> {
     pub footprints: &'s [Footprint],
 }
 
-impl Surroundings<'_> {
+impl Neighbours<'_> {
     /// How the camera of one of the run moves while its rows are read.
-    pub fn sweep(&self, scene: &Scene, frame: usize) -> Sweep {
+    pub fn sweep(&self, scene: &EstimationContext, frame: usize) -> Sweep {
         scene.sweep(frame, &self.run, self.estimates)
     }
 }
@@ -109,18 +112,18 @@ impl Surroundings<'_> {
 ///
 /// # Errors
 /// [`ProblemError`]: a frame that cannot be read, equations without a solution.
-pub fn place(
-    scene: &Scene,
+pub fn register_frame(
+    scene: &EstimationContext,
     options: &RefineOptions,
     frame: usize,
     expected: &Expectation,
-    surroundings: &Surroundings,
-) -> Result<Result<Placed, Doubt>, ProblemError> {
+    neighbours: &Neighbours,
+) -> Result<Result<Registered, RejectionReason>, ProblemError> {
     let side = scene.camera.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
     let level = finest.max(coarsest.saturating_sub(1));
     let camera = scene.camera.at_level(level);
-    let no_match = |correlation| Ok(Err(Doubt::NoMatch { correlation }));
+    let no_match = |correlation| Ok(Err(RejectionReason::NoMatch { correlation }));
     let Ok(distance) = viewing_distance(scene.surface, &expected.pose) else {
         return no_match(0.0);
     };
@@ -128,18 +131,24 @@ pub fn place(
     // Beyond half a turn there is no more wall to look at.
     let widest = 0.5 * scene.surface.perimeter_m();
     let margin = (REACH * sigma[1].max(sigma[0]) * distance).min(widest);
-    let near = near(scene, frame, &expected.pose, margin, surroundings)?;
-    let mut portraits = Vec::new();
+    let near = near(scene, frame, &expected.pose, margin, neighbours)?;
+    let mut unwrapped_frames = Vec::new();
     for (k, _) in near.iter().enumerate().filter(|(_, near)| **near) {
-        let sweep = surroundings.sweep(scene, surroundings.run.start + k);
-        let portrait = Portrait::new(scene, level, surroundings.run.start + k, &sweep)?;
-        portraits.push((portrait, surroundings.estimates[k]));
+        let sweep = neighbours.sweep(scene, neighbours.run.start + k);
+        let unwrapped = UnwrappedFrame::new(scene, level, neighbours.run.start + k, &sweep)?;
+        unwrapped_frames.push((unwrapped, neighbours.estimates[k]));
     }
-    let sweep = surroundings.sweep(scene, frame);
-    let portrait = Portrait::new(scene, level, frame, &sweep)?;
-    let wall = FusedWall::new(scene, &portraits, &camera, (frame, &expected.pose), margin)?;
+    let sweep = neighbours.sweep(scene, frame);
+    let unwrapped = UnwrappedFrame::new(scene, level, frame, &sweep)?;
+    let wall = ReferenceMosaic::new(
+        scene,
+        &unwrapped_frames,
+        &camera,
+        (frame, &expected.pose),
+        margin,
+    )?;
     let found = if options.search {
-        search(scene, &wall, &portrait, &expected.pose, sigma, HYPOTHESES)
+        search(scene, &wall, &unwrapped, &expected.pose, sigma, HYPOTHESES)
     } else {
         vec![Hypothesis {
             pose: expected.pose,
@@ -149,13 +158,13 @@ pub fn place(
     let best = found.first().map_or(0.0, |hypothesis| hypothesis.score);
 
     let refine_at = |level: usize, estimate: FrameEstimate| {
-        let own = frame - surroundings.run.start;
-        let mut estimates = surroundings.estimates.to_vec();
+        let own = frame - neighbours.run.start;
+        let mut estimates = neighbours.estimates.to_vec();
         estimates[own] = estimate;
         let mut compared = near.clone();
         compared[own] = true;
-        let members = Members {
-            participants: surroundings.run.clone(),
+        let members = FrameWindow {
+            participants: neighbours.run.clone(),
             active: frame..frame + 1,
             estimates: &estimates,
             compared: Cow::Owned(compared),
@@ -164,11 +173,11 @@ pub fn place(
         if problem.tiles() == 0 {
             return Ok(estimate);
         }
-        Ok(solve(problem, STOPPING, None)?.estimates[0])
+        Ok(solve(problem, STOPPING)?.estimates[0])
     };
     // Gauss–Newton from a pose; None if it leads out of the tunnel or off the wall.
     let refined = |pose: &Pose| -> Result<Option<Candidate>, ProblemError> {
-        let mut estimate = wall.exposed(&portrait, pose);
+        let mut estimate = wall.exposed(&unwrapped, pose);
         for level in (level..=coarsest).rev() {
             estimate = match refine_at(level, estimate) {
                 Ok(refined) => refined,
@@ -178,9 +187,9 @@ pub fn place(
                 Err(error) => return Err(error),
             };
         }
-        let likeness = wall.likeness(scene, &portrait, &estimate.pose);
-        let correlation = likeness.correlation();
-        let Some(unexplained) = unexplained(&likeness, &portrait) else {
+        let ncc_score = wall.ncc_score(scene, &unwrapped, &estimate.pose);
+        let correlation = ncc_score.correlation();
+        let Some(unexplained) = unexplained(&ncc_score, &unwrapped) else {
             return Ok(None);
         };
         let deviation =
@@ -192,7 +201,7 @@ pub fn place(
             estimate,
             unexplained: unexplained.max(LEAST_UNEXPLAINED),
             quality: (1.0 - unexplained).sqrt(),
-            likelihood: log_likelihood(correlation, likeness.samples),
+            likelihood: log_likelihood(correlation, ncc_score.samples),
             deviation,
         }))
     };
@@ -214,7 +223,7 @@ pub fn place(
         };
         let from = first.estimate.pose;
         let before = first.score();
-        for hypothesis in search(scene, &wall, &portrait, &from, close, 2) {
+        for hypothesis in search(scene, &wall, &unwrapped, &from, close, 2) {
             candidates.extend(refined(&hypothesis.pose)?);
         }
         if candidates
@@ -232,7 +241,7 @@ pub fn place(
         return no_match(first.quality);
     }
     // Those that the pixels alone cannot tell from the best.
-    let pixel = pixel_m(scene, &camera, &first.estimate.pose);
+    let pixel = pixel_size_m(scene, &camera, &first.estimate.pose);
     let rivals: Vec<&Candidate> = candidates
         .iter()
         .filter(|c| c.unexplained < UNEXPLAINED * first.unexplained)
@@ -242,11 +251,11 @@ pub fn place(
         .min_by(|a, b| a.deviation.total_cmp(&b.deviation))
         .unwrap_or(&first);
     for rival in &rivals {
-        let apart_m = apart_m(scene, &best.estimate.pose, &rival.estimate.pose);
-        if apart_m > APART * pixel && rival.deviation - best.deviation < PRIOR_MARGIN {
-            return Ok(Err(Doubt::Ambiguous {
+        let separation_m = separation_m(scene, &best.estimate.pose, &rival.estimate.pose);
+        if separation_m > APART * pixel && rival.deviation - best.deviation < PRIOR_MARGIN {
+            return Ok(Err(RejectionReason::Ambiguous {
                 other: rival.estimate.pose,
-                apart_m,
+                separation_m,
             }));
         }
     }
@@ -254,7 +263,7 @@ pub fn place(
     for level in (finest..level).rev() {
         estimate = refine_at(level, estimate)?;
     }
-    Ok(Ok(Placed {
+    Ok(Ok(Registered {
         estimate,
         settled: best.quality >= SETTLED,
     }))
@@ -264,25 +273,25 @@ pub fn place(
 /// do not correlate.
 ///
 /// Where noise drowns the texture, nothing speaks against the pose; its σ will tell.
-pub fn unexplained(likeness: &Likeness, portrait: &Portrait) -> Option<f64> {
-    let compared = likeness.samples >= least_samples(portrait) && likeness.correlation() > 0.0;
-    let quality = likeness.match_quality().unwrap_or(1.0);
+pub fn unexplained(ncc_score: &NccScore, unwrapped: &UnwrappedFrame) -> Option<f64> {
+    let compared = ncc_score.samples >= least_samples(unwrapped) && ncc_score.correlation() > 0.0;
+    let quality = ncc_score.match_quality().unwrap_or(1.0);
     compared.then_some(1.0 - quality * quality)
 }
 
 /// Which placed frames may show wall that `pose` sees, or would see `margin_m` farther.
 pub fn near(
-    scene: &Scene,
+    scene: &EstimationContext,
     frame: usize,
     pose: &Pose,
     margin_m: f64,
-    surroundings: &Surroundings,
+    neighbours: &Neighbours,
 ) -> Result<Vec<bool>, ProblemError> {
     let perimeter = scene.surface.perimeter_m();
     let own = footprint(scene, &scene.camera, frame, pose)?.widened(margin_m);
-    let frames = surroundings.footprints.iter().zip(surroundings.placed);
+    let frames = neighbours.footprints.iter().zip(neighbours.placed);
     let near = frames.enumerate().map(|(k, (footprint, placed))| {
-        *placed && surroundings.run.start + k != frame && footprint.overlaps(&own, perimeter)
+        *placed && neighbours.run.start + k != frame && footprint.overlaps(&own, perimeter)
     });
     Ok(near.collect())
 }
@@ -297,7 +306,7 @@ fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
 }
 
 /// How far apart two poses put the frame on the wall: the mean over its middle and corners, metres.
-pub fn apart_m(scene: &Scene, a: &Pose, b: &Pose) -> f64 {
+pub fn separation_m(scene: &EstimationContext, a: &Pose, b: &Pose) -> f64 {
     let perimeter = scene.surface.perimeter_m();
     (scene.camera.probes().iter())
         .filter_map(|ray_c| {

@@ -19,8 +19,8 @@
 //! different places).
 
 use crate::frames::{Agreement, MAD_TO_SIGMA, SHADING_TERMS, Shading, shading_terms};
-use crate::refine::model::context::{Sampling, Scene};
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
 use crate::refine::problem::photometric_problem::Problem;
@@ -68,10 +68,10 @@ struct Glimpse {
 ///
 /// # Errors
 /// [`ProblemError`].
-pub fn flatten(
-    scene: &Scene,
+pub fn correct_until_settled(
+    scene: &EstimationContext,
     options: &RefineOptions,
-    tracked: &mut Tracked,
+    tracked: &mut FrameStates,
 ) -> Result<(), ProblemError> {
     let side = scene.camera.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
@@ -90,15 +90,15 @@ pub fn flatten(
 /// # Errors
 /// [`ProblemError`].
 pub fn correct(
-    scene: &Scene,
+    scene: &EstimationContext,
     options: &RefineOptions,
-    tracked: &Tracked,
+    tracked: &FrameStates,
 ) -> Result<bool, ProblemError> {
     let level = options.handover_level(scene.camera.shorter_side());
     let count = tracked.estimates.len();
     let first = count.saturating_sub(MOST_FRAMES) / 2;
     let run = first..(first + MOST_FRAMES).min(count);
-    let members = tracked.members_of(run.clone(), run.clone());
+    let members = tracked.window_of(run.clone(), run.clone());
     let problem = Problem::new(scene, Sampling::of(level), members)?;
     let size = (scene.camera.width as usize, scene.camera.height as usize);
     let tiles = problem.at_tiles(TILES, |tiles: &mut Vec<Vec<Glimpse>>, look| {

@@ -11,19 +11,20 @@
 //! A frame that cannot be placed stays where the prior expects it, and no other is compared with
 //! it.
 
-use crate::refine::model::context::{Sampling, Scene};
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::prior::predict;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::model::rejection::Doubt;
+use crate::refine::model::rejection::RejectionReason;
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::calibration::Kappa;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::problem::photometric_problem::Problem;
 use crate::refine::samples::footprints::footprint;
 use crate::refine::samples::footprints::{FARTHEST, footprints};
-use crate::refine::solver::gauss_newton::{Stopping, solve};
-use crate::refine::tracking::registration::{Expectation, Surroundings, place};
+use crate::refine::solver::argmin_glue::solve;
+use crate::refine::solver::stopping::Stopping;
+use crate::refine::tracking::registration::{Expectation, Neighbours, register_frame};
 use crate::surface::Footprint;
 use crate::trajectory::{JitterModel, Pose};
 use serde::{Deserialize, Serialize};
@@ -43,8 +44,8 @@ const WINDOW_STOPPING: Stopping = Stopping {
 /// Frames being placed, one after another.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Tracking {
-    /// Those placed so far; the doubts are of all frames.
-    tracked: Tracked,
+    /// Those placed so far; the rejections are of all frames.
+    tracked: FrameStates,
     /// What they saw of the wall when they were placed.
     footprints: Vec<Footprint>,
     /// The first frame that the last one may share wall with.
@@ -54,12 +55,12 @@ pub struct Tracking {
 }
 
 impl Tracking {
-    /// Nothing placed yet. `doubts` are frames known to be useless beforehand.
-    pub fn begin(doubts: Vec<Option<Doubt>>, kappa: Kappa) -> Self {
+    /// Nothing placed yet. `rejections` are frames known to be useless beforehand.
+    pub fn begin(rejections: Vec<Option<RejectionReason>>, kappa: Kappa) -> Self {
         Self {
-            tracked: Tracked {
-                estimates: Vec::with_capacity(doubts.len()),
-                doubts,
+            tracked: FrameStates {
+                estimates: Vec::with_capacity(rejections.len()),
+                rejections,
                 kappa,
             },
             footprints: Vec::new(),
@@ -75,18 +76,18 @@ impl Tracking {
 
     /// Whether all frames are placed.
     pub fn is_complete(&self) -> bool {
-        self.placed() == self.tracked.doubts.len()
+        self.placed() == self.tracked.rejections.len()
     }
 
     /// The frames placed so far, as if there were no others.
-    pub fn so_far(&self) -> Tracked {
+    pub fn so_far(&self) -> FrameStates {
         let mut tracked = self.tracked.clone();
-        tracked.doubts.truncate(tracked.estimates.len());
+        tracked.rejections.truncate(tracked.estimates.len());
         tracked
     }
 
     /// All frames.
-    pub fn finish(self) -> Tracked {
+    pub fn finish(self) -> FrameStates {
         self.tracked
     }
 
@@ -97,10 +98,10 @@ impl Tracking {
     /// an equation has no solution.
     pub fn place_next(
         &mut self,
-        scene: &Scene,
+        scene: &EstimationContext,
         options: &RefineOptions,
     ) -> Result<(), ProblemError> {
-        let (k, count) = (self.placed(), self.tracked.doubts.len());
+        let (k, count) = (self.placed(), self.tracked.rejections.len());
         let scene = &scene.at(self.kappa).at(self.tracked.kappa);
         self.kappa = scene.kappa;
         let tracked = &mut self.tracked;
@@ -110,23 +111,23 @@ impl Tracking {
             .push(footprint(scene, &scene.camera, k, &expected.pose)?);
         let first = earliest_overlap(scene, &self.footprints);
         let mut settled = true;
-        if tracked.doubts[k].is_none() && first < k {
+        if tracked.rejections[k].is_none() && first < k {
             let run = first..k + 1;
-            let mut placed = tracked.believed(&run);
+            let mut placed = tracked.inliers(&run);
             placed[k - first] = false;
             if placed.iter().any(|placed| *placed) {
-                let surroundings = Surroundings {
+                let neighbours = Neighbours {
                     estimates: &tracked.estimates[run.clone()],
                     placed: &placed,
                     footprints: &self.footprints[run.clone()],
                     run,
                 };
-                match place(scene, options, k, &expected, &surroundings)? {
+                match register_frame(scene, options, k, &expected, &neighbours)? {
                     Ok(placed) => {
                         tracked.estimates[k] = placed.estimate;
                         settled = placed.settled;
                     }
-                    Err(doubt) => tracked.doubts[k] = Some(doubt),
+                    Err(rejection) => tracked.rejections[k] = Some(rejection),
                 }
             }
         }
@@ -176,14 +177,14 @@ struct WindowState {
 }
 
 impl WindowState {
-    fn of(tracked: &Tracked, window: &Range<usize>) -> Self {
+    fn of(tracked: &FrameStates, window: &Range<usize>) -> Self {
         Self {
             estimates: tracked.estimates[window.clone()].to_vec(),
             kappa: tracked.kappa,
         }
     }
 
-    fn restore(&self, tracked: &mut Tracked, window: &Range<usize>) {
+    fn restore(&self, tracked: &mut FrameStates, window: &Range<usize>) {
         tracked.estimates[window.clone()].copy_from_slice(&self.estimates);
         tracked.kappa = self.kappa;
     }
@@ -195,19 +196,19 @@ impl WindowState {
 /// Returns the cost of an observation at the end, grey levels²; infinity where nothing is seen
 /// twice.
 fn solve_window(
-    scene: &Scene,
+    scene: &EstimationContext,
     level: usize,
     window: Range<usize>,
     held: usize,
-    tracked: &mut Tracked,
+    tracked: &mut FrameStates,
 ) -> Result<f64, ProblemError> {
     let active = window.start + held..window.end;
-    let members = tracked.members_of(window, active.clone());
+    let members = tracked.window_of(window, active.clone());
     let problem = Problem::new(scene, Sampling::of(level), members)?.calibrating();
     if problem.tiles() == 0 {
         return Ok(f64::INFINITY);
     }
-    let solution = solve(problem, WINDOW_STOPPING, None)?;
+    let solution = solve(problem, WINDOW_STOPPING)?;
     tracked.kappa = solution.kappa;
     tracked.estimates[active].copy_from_slice(&solution.estimates);
     let record = solution.record;
@@ -216,7 +217,7 @@ fn solve_window(
 }
 
 /// The first frame that may share wall with the last one.
-fn earliest_overlap(scene: &Scene, footprints: &[Footprint]) -> usize {
+fn earliest_overlap(scene: &EstimationContext, footprints: &[Footprint]) -> usize {
     let last = footprints.len() - 1;
     let perimeter = scene.surface.perimeter_m();
     (last.saturating_sub(FARTHEST)..last)
@@ -224,14 +225,14 @@ fn earliest_overlap(scene: &Scene, footprints: &[Footprint]) -> usize {
         .unwrap_or(last)
 }
 
-/// Where the prior expects frame `k`, given the believed frames.
+/// Where the prior expects frame `k`, given the inliers frames.
 ///
-/// Random walk: the nearest believed pose and the initial steps from there. Independent: the
-/// initial pose, moved by the gauge (turn about the axis, shift along it) that the believed frames
+/// Random walk: the nearest inliers pose and the initial steps from there. Independent: the
+/// initial pose, moved by the gauge (turn about the axis, shift along it) that the inliers frames
 /// have taken on.
 ///
 /// Where that lies outside the tunnel: the initial pose.
-pub fn expect(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
+pub fn expect(scene: &EstimationContext, k: usize, tracked: &FrameStates) -> Expectation {
     let expected = expect_anywhere(scene, k, tracked);
     match scene.surface.check_inside(&expected.pose.t_wc) {
         Ok(()) => expected,
@@ -242,13 +243,13 @@ pub fn expect(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
     }
 }
 
-fn expect_anywhere(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
+fn expect_anywhere(scene: &EstimationContext, k: usize, tracked: &FrameStates) -> Expectation {
     let metric = scene.calibration.metric(&scene.kappa);
     let initial = |k: usize| metric.place_nominal(&scene.prior.initial[k]);
     let around = k.saturating_sub(FARTHEST)..(k + FARTHEST).min(tracked.estimates.len());
-    let believed = around.filter(|i| *i != k && tracked.doubts[*i].is_none());
+    let inliers = around.filter(|i| *i != k && tracked.rejections[*i].is_none());
     match scene.prior.jitter.model {
-        JitterModel::RandomWalk => match believed.min_by_key(|i| i.abs_diff(k)) {
+        JitterModel::RandomWalk => match inliers.min_by_key(|i| i.abs_diff(k)) {
             Some(near) => {
                 let pose = &tracked.estimates[near].pose;
                 let steps = scene.prior.steps_between(near.min(k), near.max(k));
@@ -263,7 +264,7 @@ fn expect_anywhere(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
             },
         },
         JitterModel::Independent => {
-            let (from, to): (Vec<Pose>, Vec<Pose>) = believed
+            let (from, to): (Vec<Pose>, Vec<Pose>) = inliers
                 .map(|i| (initial(i), tracked.estimates[i].pose))
                 .unzip();
             let motion = scene.surface.gauge().align(&from, &to);
@@ -275,35 +276,38 @@ fn expect_anywhere(scene: &Scene, k: usize, tracked: &Tracked) -> Expectation {
     }
 }
 
-/// Tries once more to place the frames in doubt, now that there are frames on both sides of them;
+/// Tries once more to place the frames in rejection, now that there are frames on both sides of them;
 /// returns how many it has placed. Those that show nothing are not tried.
 ///
 /// # Errors
 /// [`ProblemError`].
-pub fn retry(
-    scene: &Scene,
+pub fn register_rejected(
+    scene: &EstimationContext,
     options: &RefineOptions,
-    tracked: &mut Tracked,
+    tracked: &mut FrameStates,
 ) -> Result<usize, ProblemError> {
     let count = tracked.estimates.len();
     let mut won = 0;
     let mut footprints = footprints(scene, tracked)?;
     for k in 0..count {
-        if !tracked.doubts[k].as_ref().is_some_and(Doubt::may_pass) {
+        if !tracked.rejections[k]
+            .as_ref()
+            .is_some_and(RejectionReason::is_retriable)
+        {
             continue;
         }
         let run = k.saturating_sub(FARTHEST)..(k + FARTHEST).min(count);
         let expected = expect(scene, k, tracked);
-        let placed = tracked.believed(&run);
-        let surroundings = Surroundings {
+        let placed = tracked.inliers(&run);
+        let neighbours = Neighbours {
             estimates: &tracked.estimates[run.clone()],
             placed: &placed,
             footprints: &footprints[run.clone()],
             run,
         };
-        tracked.estimates[k] = match place(scene, options, k, &expected, &surroundings)? {
+        tracked.estimates[k] = match register_frame(scene, options, k, &expected, &neighbours)? {
             Ok(placed) => {
-                tracked.doubts[k] = None;
+                tracked.rejections[k] = None;
                 won += 1;
                 placed.estimate
             }

@@ -34,13 +34,13 @@
 
 use crate::camera::Camera;
 use crate::frames::{FrameCache, GreyImage, Pyramid};
+use crate::refine::error::RefineError;
 use crate::refine::linear::normal_equations::{Block, NormalEquations};
 use crate::refine::linear::selected_inverse::SelectedInverse;
-use crate::refine::model::context::{Members, Sampling, Scene};
+use crate::refine::model::context::{EstimationContext, FrameWindow, Sampling};
 use crate::refine::model::prior::{Prior, usual_step_s};
 use crate::refine::parameters::calibration::{Calibration, Kappa};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
-use crate::refine::pipeline::RefineError;
 use crate::refine::problem::photometric_problem::Problem;
 use crate::refine::problem::unknown_texture::UnknownTexture;
 use crate::refine::tiles::interpolation::Interpolation;
@@ -106,7 +106,7 @@ pub fn pose_bounds(
     let frames = FrameCache::of_pyramids(frames.collect());
     // The rows' own poses change next to nothing of what can be known.
     let shutter = Shutter::default();
-    let scene = Scene {
+    let scene = EstimationContext {
         surface: survey.surface.as_ref(),
         ignored: &survey.ignored,
         camera,
@@ -116,11 +116,10 @@ pub fn pose_bounds(
         frames: &frames,
         prior: &prior,
         noise: 0.0,
-        fused_gradient: true,
     };
     let estimates: Vec<FrameEstimate> =
         poses_of(truth).into_iter().map(FrameEstimate::at).collect();
-    let members = Members {
+    let members = FrameWindow {
         participants: 0..count,
         active: 0..count,
         estimates: &estimates,
@@ -133,7 +132,7 @@ pub fn pose_bounds(
     };
     // FINER² fine pixels are a pixel.
     let noise_grey = f64::from(FINER) * noise_grey;
-    let problem = Problem::new(&scene, sampling, members)?.exact(noise_grey);
+    let problem = Problem::new(&scene, sampling, members)?.with_known_noise(noise_grey);
     let (prior, _) = problem.prior_information(&estimates, &Kappa::zeros());
     let with_prior = problem.linearise(&estimates)?.normal;
     let bayesian = covariances(&problem, &with_prior)?;

@@ -1,7 +1,7 @@
 //! What the data tell about the shared unknowns, and what they cannot.
 //!
 //! After a solve, `Σ_κ` ([`crate::refine::linear::bordered_system`]) is the covariance of the free unknowns. One that is
-//! hardly more certain than its prior is refused: it is held at the value given, and the rest
+//! hardly more certain than its prior is unobservable: it is held at the value given, and the rest
 //! solved without it. The worst goes first, for without it another may be certain.
 
 use crate::camera::Camera;
@@ -19,7 +19,7 @@ const CLOSE_CORRELATION: f64 = 0.9;
 
 /// An unknown that was to be estimated and cannot be.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Refusal {
+pub struct UnobservableParameter {
     /// Which.
     pub unknown: usize,
     /// Its 1-σ had it been estimated.
@@ -76,9 +76,9 @@ impl Posterior {
     }
 
     /// Refuses what the data cannot observe, one by one, the worst first. A singular S refuses all.
-    pub fn refuse(&self, calibration: &Calibration) -> Vec<Refusal> {
+    pub fn find_unobservable(&self, calibration: &Calibration) -> Vec<UnobservableParameter> {
         let mut free = calibration.free;
-        let mut refusals = Vec::new();
+        let mut unobservable = Vec::new();
         while free.contains(&true) {
             let covariance = self
                 .covariance(&free)
@@ -93,14 +93,14 @@ impl Posterior {
             };
             // The prior bounds it, whatever the scatter.
             let sigma = covariance[(worst, worst)].sqrt();
-            refusals.push(Refusal {
+            unobservable.push(UnobservableParameter {
                 unknown: worst,
                 sigma: sigma.min(calibration.sigma[worst]),
                 reason: reason(worst, &covariance, &free),
             });
             free[worst] = false;
         }
-        refusals
+        unobservable
     }
 }
 
@@ -203,12 +203,12 @@ pub struct CalibrationReport {
 }
 
 impl CalibrationReport {
-    /// Reads κ with its covariance; `refusals` are at their given values.
+    /// Reads κ with its covariance; `unobservable` are at their given values.
     pub fn new(
         calibration: &Calibration,
         kappa: &Kappa,
         covariance: &SharedBlock,
-        refusals: &[Refusal],
+        unobservable: &[UnobservableParameter],
         given_radius_m: f64,
     ) -> Self {
         let given = &calibration.given;
@@ -243,9 +243,10 @@ impl CalibrationReport {
             0.0,
             1e3 * calibration.readout_s,
         ];
-        let asked = |k: &usize| calibration.free[*k] || refusals.iter().any(|r| r.unknown == *k);
+        let asked =
+            |k: &usize| calibration.free[*k] || unobservable.iter().any(|r| r.unknown == *k);
         let unknowns = (0..SHARED).filter(asked).map(|k| {
-            let refusal = refusals.iter().find(|refusal| refusal.unknown == k);
+            let refusal = unobservable.iter().find(|refusal| refusal.unknown == k);
             let (name, kind) = NAMES[k];
             // From κ to the unit of the report.
             let (unit, scale) = match kind {
@@ -305,13 +306,13 @@ mod tests {
         // The prior's information is 100.
         let mut schur = SharedBlock::identity() * 1e4;
         schur[(5, 5)] = 110.0;
-        let refusals = posterior(schur).refuse(&calibration());
-        assert_eq!(refusals.len(), 1);
-        assert_eq!(refusals[0].unknown, 5);
-        assert!((refusals[0].sigma - 110f64.powf(-0.5)).abs() < 1e-12);
-        assert!(refusals[0].reason.contains("radius"));
+        let unobservable = posterior(schur).find_unobservable(&calibration());
+        assert_eq!(unobservable.len(), 1);
+        assert_eq!(unobservable[0].unknown, 5);
+        assert!((unobservable[0].sigma - 110f64.powf(-0.5)).abs() < 1e-12);
+        assert!(unobservable[0].reason.contains("radius"));
         let sure = posterior(SharedBlock::identity() * 1e4);
-        assert!(sure.refuse(&calibration()).is_empty());
+        assert!(sure.find_unobservable(&calibration()).is_empty());
     }
 
     /// Two that the data know only together: one goes, the other stays.
@@ -321,13 +322,13 @@ mod tests {
         for (r, c) in [(3, 3), (3, 4), (4, 3), (4, 4)] {
             schur[(r, c)] = 1e6 + if r == c { 100.0 } else { 0.0 };
         }
-        let refusals = posterior(schur).refuse(&calibration());
-        assert_eq!(refusals.len(), 1);
-        assert!([3, 4].contains(&refusals[0].unknown));
+        let unobservable = posterior(schur).find_unobservable(&calibration());
+        assert_eq!(unobservable.len(), 1);
+        assert!([3, 4].contains(&unobservable[0].unknown));
         assert!(
-            refusals[0].reason.contains("goes with k"),
+            unobservable[0].reason.contains("goes with k"),
             "{}",
-            refusals[0].reason
+            unobservable[0].reason
         );
     }
 

@@ -13,8 +13,8 @@
 
 use crate::numerics::median::upper_median;
 use crate::refine::linear::normal_equations::Block;
-use crate::refine::model::context::Scene;
-use crate::refine::model::rejection::Doubt;
+use crate::refine::model::context::EstimationContext;
+use crate::refine::model::rejection::RejectionReason;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::solver::gauss_newton::Solution;
 use crate::refine::tiles::grid::BLOCK;
@@ -22,14 +22,14 @@ use crate::refine::tiles::tile::SAMPLES;
 use crate::refine::uncertainty::covariance::frame_sigma;
 use nalgebra::Matrix6;
 
-/// Largest strain that can be borne of a frame by itself, if it is that many times what noise does
-/// ([`Strain`]): a glint on a faint wall makes it a pixel and five to ten times, in one patch of a
+/// Largest overdispersion that can be borne of a frame by itself, if it is that many times what noise does
+/// ([`Overdispersion`]): a glint on a faint wall makes it a pixel and five to ten times, in one patch of a
 /// frame that is right.
-const MOST_STRAIN: Strain = Strain {
+const MOST_STRAIN: Overdispersion = Overdispersion {
     times: 12.0,
     px: 0.25,
 };
-/// Largest strain of the median frame, pixels. Right surveys have none, whatever wall, light and
+/// Largest overdispersion of the median frame, pixels. Right surveys have none, whatever wall, light and
 /// noise; a focal length 0.3 % off makes it 0.05, one 1 % off 0.13.
 const MOST_USUAL_STRAIN_PX: f64 = 0.04;
 /// Wall samples of a patch: of the blocks over which the scatter is told.
@@ -37,14 +37,14 @@ const PATCH: i64 = BLOCK * BLOCK * SAMPLES as i64;
 
 /// How far patches of the wall pull a frame's pose apart: see the [module](self).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Strain {
+pub struct Overdispersion {
     /// What patches are off by, in terms of what they are by noise: √q.
     pub times: f64,
     /// What they are off by beyond noise, pixels, root mean square.
     pub px: f64,
 }
 
-impl Strain {
+impl Overdispersion {
     /// From q, the number N of patches, and σ of the mean point of the picture by noise, all other
     /// frames held.
     fn new(q: f64, patches: f64, sigma_px: f64) -> Self {
@@ -57,7 +57,7 @@ impl Strain {
     /// Of a frame with its own block of the normal matrix, `information`, and of V, `scatter`, over
     /// a number of `patches`. None if the frame is not fixed by the others.
     fn of_frame(
-        scene: &Scene,
+        scene: &EstimationContext,
         estimate: &FrameEstimate,
         (information, scatter): (&Block, &Block),
         patches: f64,
@@ -82,9 +82,9 @@ fn pull(information: &Block, scatter: &Block) -> Option<(f64, Matrix6<f64>)> {
     Some((q, pose))
 }
 
-/// Each frame's strain at a solution; none of those that show nothing. `scene`: with the solution's
+/// Each frame's overdispersion at a solution; none of those that show nothing. `scene`: with the solution's
 /// own κ.
-pub fn strains(scene: &Scene, solution: &Solution) -> Vec<Strain> {
+pub fn overdispersions(scene: &EstimationContext, solution: &Solution) -> Vec<Overdispersion> {
     let at = &solution.linearisation;
     let pattern = solution.problem.pattern();
     let patch = PATCH as f64 * solution.problem.share_of_wall();
@@ -92,21 +92,26 @@ pub fn strains(scene: &Scene, solution: &Solution) -> Vec<Strain> {
         let place = pattern.place(k, k)?;
         let blocks = (&at.normal.blocks[place], &at.scatter[place]);
         let patches = at.frames[k].samples as f64 / patch;
-        Strain::of_frame(scene, estimate, blocks, patches)
+        Overdispersion::of_frame(scene, estimate, blocks, patches)
     };
     let frames = solution.estimates.iter().enumerate();
     frames.map(|frame| of(frame).unwrap_or_default()).collect()
 }
 
-/// Which of the frames believed so far are under more strain than can be borne; where their median
+/// Which of the frames inliers so far are under more overdispersion than can be borne; where their median
 /// is, all are.
-pub fn strained(strains: &[Strain], doubts: &[Option<Doubt>]) -> Vec<bool> {
-    let believed = (0..doubts.len()).filter(|k| doubts[*k].is_none());
-    let usual = upper_median(believed.map(|k| strains[k].px).collect());
+pub fn overdispersed(
+    overdispersions: &[Overdispersion],
+    rejections: &[Option<RejectionReason>],
+) -> Vec<bool> {
+    let inliers = (0..rejections.len()).filter(|k| rejections[*k].is_none());
+    let usual = upper_median(inliers.map(|k| overdispersions[k].px).collect());
     let all = usual.is_some_and(|px| px > MOST_USUAL_STRAIN_PX);
-    let beyond = |strain: &Strain| strain.px > MOST_STRAIN.px && strain.times > MOST_STRAIN.times;
-    (0..doubts.len())
-        .map(|k| doubts[k].is_none() && (all || beyond(&strains[k])))
+    let beyond = |overdispersion: &Overdispersion| {
+        overdispersion.px > MOST_STRAIN.px && overdispersion.times > MOST_STRAIN.times
+    };
+    (0..rejections.len())
+        .map(|k| rejections[k].is_none() && (all || beyond(&overdispersions[k])))
         .collect()
 }
 
@@ -114,7 +119,7 @@ pub fn strained(strains: &[Strain], doubts: &[Option<Doubt>]) -> Vec<bool> {
 mod tests {
     use super::*;
 
-    /// Patches that all pull at random, each by its own noise, are no strain; those that pull by
+    /// Patches that all pull at random, each by its own noise, are no overdispersion; those that pull by
     /// half a pixel more are half a pixel.
     #[test]
     fn strain_is_what_patches_are_off_by_beyond_noise() {
@@ -122,11 +127,11 @@ mod tests {
         // in six ways.
         let (patches, information) = (300.0, 40.0);
         let sigma_px = f64::sqrt(6.0 / (patches * information));
-        assert_eq!(Strain::new(1.0, patches, sigma_px).px, 0.0);
+        assert_eq!(Overdispersion::new(1.0, patches, sigma_px).px, 0.0);
         let off_px = 0.5;
         // Pull I · off in each of the two directions, so its square over that by noise, I.
         let q = 1.0 + 0.5 * information * off_px * off_px;
-        assert!((Strain::new(q, patches, sigma_px).px - off_px).abs() < 1e-12);
+        assert!((Overdispersion::new(q, patches, sigma_px).px - off_px).abs() < 1e-12);
         let scatter = Block::identity() * 12.0;
         let (q, pose) = pull(&(Block::identity() * 4.0), &scatter).unwrap();
         assert!((q - 3.0).abs() < 1e-12);
@@ -145,17 +150,22 @@ mod tests {
 
     #[test]
     fn what_strains_the_median_frame_strains_all() {
-        let mut doubts = vec![None; 4];
-        doubts[0] = Some(Doubt::Featureless);
-        let strain = |times, px| Strain { times, px };
-        let of = |strains: [Strain; 4]| strained(&strains, &doubts);
-        let (none, usual, much) = (strain(1.5, 0.01), strain(10.0, 0.1), strain(20.0, 0.5));
-        let (faint, clean) = (strain(8.0, 1.0), strain(20.0, 0.02));
+        let mut rejections = vec![None; 4];
+        rejections[0] = Some(RejectionReason::Featureless);
+        let overdispersion = |times, px| Overdispersion { times, px };
+        let of =
+            |overdispersions: [Overdispersion; 4]| overdispersed(&overdispersions, &rejections);
+        let (none, usual, much) = (
+            overdispersion(1.5, 0.01),
+            overdispersion(10.0, 0.1),
+            overdispersion(20.0, 0.5),
+        );
+        let (faint, clean) = (overdispersion(8.0, 1.0), overdispersion(20.0, 0.02));
         assert_eq!(of([much, none, none, none]), [false; 4]);
         assert_eq!(of([none, none, much, usual]), [false, true, true, true]);
         assert_eq!(of([none, none, much, none]), [false, false, true, false]);
         assert_eq!(of([usual, none, usual, none]), [false; 4]);
         assert_eq!(of([none, clean, faint, clean]), [false; 4]);
-        assert_eq!(strained(&[], &[]), [false; 0]);
+        assert_eq!(overdispersed(&[], &[]), [false; 0]);
     }
 }

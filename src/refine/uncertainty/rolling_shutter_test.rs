@@ -7,13 +7,14 @@
 //! the frames fit best, with everything else free ([`crate::refine::linear::bordered_system`]), and how sure it is. The lens
 //! is free, too, as far as it usually may be off: a wrong one must not pass for a wrong time.
 
-use crate::refine::model::context::{Sampling, Scene};
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::calibration::{Calibration, Kappa, LENS, READOUT};
 use crate::refine::problem::photometric_problem::Problem;
-use crate::refine::solver::gauss_newton::{Stopping, solve};
+use crate::refine::solver::argmin_glue::solve;
+use crate::refine::solver::stopping::Stopping;
 use crate::refine::uncertainty::observability::Posterior;
 use crate::surface::viewing_distance;
 use crate::survey::{CalibrateSection, CalibrationGroup};
@@ -37,7 +38,7 @@ const LEAST_SHIFT_PX: f64 = 0.5;
 /// The readout time that the frames want.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[non_exhaustive]
-pub struct RowMotion {
+pub struct ReadoutEstimate {
     /// Time from reading a frame's first row to reading its last as given, milliseconds; 0 for a
     /// global shutter.
     pub given_ms: f64,
@@ -56,29 +57,29 @@ pub struct RowMotion {
 ///
 /// # Errors
 /// [`ProblemError`] for a frame that cannot be read.
-pub fn row_motion(
-    scene: &Scene,
+pub fn estimate_readout(
+    scene: &EstimationContext,
     options: &RefineOptions,
-    tracked: &Tracked,
-) -> Result<Option<RowMotion>, ProblemError> {
+    tracked: &FrameStates,
+) -> Result<Option<ReadoutEstimate>, ProblemError> {
     let count = tracked.estimates.len();
     let first = count.saturating_sub(MOST_FRAMES) / 2;
     let run = first..(first + MOST_FRAMES).min(count);
     let calibration = with_readout(scene);
-    let scene = &Scene {
+    let scene = &EstimationContext {
         calibration,
         ..*scene
     };
     let sampling = Sampling {
-        information: options.close_information,
+        information: options.intermediate_information,
         ..Sampling::of(options.handover_level(scene.camera.shorter_side()))
     };
-    let members = tracked.members_of(run.clone(), run.clone());
+    let members = tracked.window_of(run.clone(), run.clone());
     let problem = Problem::new(scene, sampling, members)?.calibrating();
     if problem.tiles() == 0 {
         return Ok(None);
     }
-    let solution = match solve(problem, STOPPING, None) {
+    let solution = match solve(problem, STOPPING) {
         Ok(solution) => solution,
         Err(ProblemError::Factor { .. }) => return Ok(None),
         Err(error) => return Err(error),
@@ -95,7 +96,7 @@ pub fn row_motion(
     let off_ms = estimate_ms - given_ms;
     let shift_px = 1e-3 * off_ms.abs() * shift_px_per_s(scene, tracked);
     let sure = off_ms.abs() > SURE * sigma_ms;
-    Ok(sigma_ms.is_finite().then_some(RowMotion {
+    Ok(sigma_ms.is_finite().then_some(ReadoutEstimate {
         given_ms,
         estimate_ms,
         sigma_ms,
@@ -105,7 +106,7 @@ pub fn row_motion(
 }
 
 /// What is estimated of the scene's calibration, the lens, and the readout time.
-fn with_readout(scene: &Scene) -> Calibration {
+fn with_readout(scene: &EstimationContext) -> Calibration {
     use CalibrationGroup::{Centre, Distortion, Focal};
     let mut calibration = scene.calibration.of_camera();
     let section = CalibrateSection::default();
@@ -121,7 +122,7 @@ fn with_readout(scene: &Scene) -> Calibration {
 
 /// How far the first row is shifted against the last in the middle of the median frame if the
 /// readout takes a second, pixels.
-fn shift_px_per_s(scene: &Scene, tracked: &Tracked) -> f64 {
+fn shift_px_per_s(scene: &EstimationContext, tracked: &FrameStates) -> f64 {
     let all = 0..tracked.estimates.len();
     let between = 1.0 - 1.0 / f64::from(scene.camera.height);
     let shift = |k: usize| {

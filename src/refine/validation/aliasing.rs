@@ -14,16 +14,16 @@
 //! is compared with are wrong by a tile as well. If the prior would clearly have it a period of the
 //! wall away, as others have shown it, it is ambiguous, too.
 
-use crate::refine::model::context::Scene;
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::EstimationContext;
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::prior::Prior;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
 use crate::refine::samples::footprints::{FARTHEST, footprints};
 use crate::refine::tracking::correlation_search::matches;
-use crate::refine::tracking::reference_mosaic::{FusedWall, Portrait};
+use crate::refine::tracking::reference_mosaic::{ReferenceMosaic, UnwrappedFrame};
 use crate::refine::tracking::registration::{
-    LEAST_UNEXPLAINED, MOST_DEVIATION, Surroundings, UNEXPLAINED, near, unexplained,
+    LEAST_UNEXPLAINED, MOST_DEVIATION, Neighbours, UNEXPLAINED, near, unexplained,
 };
 use crate::surface::{Footprint, Gauge, GaugeMotion, free_part};
 use crate::trajectory::{JitterModel, Pose};
@@ -31,7 +31,7 @@ use nalgebra::Vector2;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Difference of log-posteriors from which on one place is believed: odds of 1000 to 1.
+/// Difference of log-posteriors from which on one place is inliers: odds of 1000 to 1.
 const CLEAR: f64 = 6.9;
 /// Share of the squared correlation that is left, at least, where the shift is known to a whole
 /// sample only.
@@ -46,7 +46,7 @@ const SAME: f64 = 0.1;
 const ROUNDS: usize = 8;
 
 /// A frame, and where it might be as well.
-pub type Rival = (usize, GaugeMotion);
+pub type AliasHypothesis = (usize, GaugeMotion);
 
 /// What the prior makes of the repeats.
 #[derive(Debug, PartialEq)]
@@ -73,7 +73,7 @@ struct Evidence<'a> {
 
 impl Choice {
     /// Where most frames are undecided, so is every other, too: those that a `first` choice, by
-    /// clear odds, found in doubt, those that fit elsewhere, and those that fit nowhere else,
+    /// clear odds, found in rejection, those that fit elsewhere, and those that fit nowhere else,
     /// perhaps because what they are compared with is a period off as well.
     fn leave_none_clear(
         &mut self,
@@ -94,14 +94,14 @@ impl Choice {
 pub struct Settled {
     /// Those that have moved, and how they would go back. They have been compared where they were;
     /// where they are now, the others may tell otherwise.
-    pub moved: Vec<Rival>,
+    pub moved: Vec<AliasHypothesis>,
     /// Those for which the prior does not decide.
-    pub undecided: Vec<Rival>,
+    pub undecided: Vec<AliasHypothesis>,
 }
 
 impl Settled {
     /// All that nothing decides, if this is where it ends.
-    pub fn unsure(self) -> Vec<Rival> {
+    pub fn unsure(self) -> Vec<AliasHypothesis> {
         let Self { moved, undecided } = self;
         let mut unsure: BTreeMap<usize, GaugeMotion> = moved.into_iter().collect();
         unsure.extend(undecided);
@@ -116,17 +116,17 @@ impl Settled {
 ///
 /// # Errors
 /// [`ProblemError`].
-pub fn settle_all_repeats(
-    scene: &Scene,
+pub fn resolve_all_aliases(
+    scene: &EstimationContext,
     options: &RefineOptions,
-    tracked: &mut Tracked,
-) -> Result<Vec<Rival>, ProblemError> {
-    let mut settled = settle_repeats(scene, options, tracked)?;
+    tracked: &mut FrameStates,
+) -> Result<Vec<AliasHypothesis>, ProblemError> {
+    let mut settled = resolve_aliases(scene, options, tracked)?;
     for _ in 1..ROUNDS {
         if settled.moved.is_empty() {
             break;
         }
-        settled = settle_repeats(scene, options, tracked)?;
+        settled = resolve_aliases(scene, options, tracked)?;
     }
     Ok(settled.unsure())
 }
@@ -135,14 +135,14 @@ pub fn settle_all_repeats(
 ///
 /// # Errors
 /// [`ProblemError`].
-pub fn settle_repeats(
-    scene: &Scene,
+pub fn resolve_aliases(
+    scene: &EstimationContext,
     options: &RefineOptions,
-    tracked: &mut Tracked,
+    tracked: &mut FrameStates,
 ) -> Result<Settled, ProblemError> {
     let all = 0..tracked.estimates.len();
-    let believed = tracked.believed(&all);
-    let frames: Vec<usize> = all.filter(|k| believed[*k]).collect();
+    let inliers = tracked.inliers(&all);
+    let frames: Vec<usize> = all.filter(|k| inliers[*k]).collect();
     let footprints = footprints(scene, tracked)?;
     let repeats = frames
         .par_iter()
@@ -184,10 +184,10 @@ pub fn settle_repeats(
 
 /// The gauge motions after which frame `frame` matches what the others show as well as it does now.
 fn repeats_of(
-    scene: &Scene,
+    scene: &EstimationContext,
     options: &RefineOptions,
     frame: usize,
-    tracked: &Tracked,
+    tracked: &FrameStates,
     footprints: &[Footprint],
 ) -> Result<Vec<GaugeMotion>, ProblemError> {
     let side = scene.camera.shorter_side();
@@ -196,9 +196,9 @@ fn repeats_of(
         .max(options.coarsest_level(side).saturating_sub(1));
     let camera = scene.camera.at_level(level);
     let run = frame.saturating_sub(FARTHEST)..(frame + FARTHEST).min(tracked.estimates.len());
-    let mut placed = tracked.believed(&run);
+    let mut placed = tracked.inliers(&run);
     placed[frame - run.start] = false;
-    let surroundings = Surroundings {
+    let neighbours = Neighbours {
         estimates: &tracked.estimates[run.clone()],
         placed: &placed,
         footprints: &footprints[run.clone()],
@@ -213,23 +213,23 @@ fn repeats_of(
         (farthest * jitter.translation_sigma_m[1]).min(std::f64::consts::PI * radius_m),
     ];
     let margin = reach_m[0].max(reach_m[1]);
-    let near = near(scene, frame, &pose, margin, &surroundings)?;
-    let mut portraits = Vec::new();
+    let near = near(scene, frame, &pose, margin, &neighbours)?;
+    let mut unwrapped_frames = Vec::new();
     for (k, _) in near.iter().enumerate().filter(|(_, near)| **near) {
-        let sweep = surroundings.sweep(scene, surroundings.run.start + k);
-        let portrait = Portrait::new(scene, level, surroundings.run.start + k, &sweep)?;
-        portraits.push((portrait, surroundings.estimates[k]));
+        let sweep = neighbours.sweep(scene, neighbours.run.start + k);
+        let unwrapped = UnwrappedFrame::new(scene, level, neighbours.run.start + k, &sweep)?;
+        unwrapped_frames.push((unwrapped, neighbours.estimates[k]));
     }
-    if portraits.is_empty() {
+    if unwrapped_frames.is_empty() {
         return Ok(Vec::new());
     }
-    let sweep = surroundings.sweep(scene, frame);
-    let portrait = Portrait::new(scene, level, frame, &sweep)?;
-    let wall = FusedWall::new(scene, &portraits, &camera, (frame, &pose), margin)?;
-    let likeness = |pose: &Pose| wall.likeness(scene, &portrait, pose);
-    let left = |pose: &Pose| unexplained(&likeness(pose), &portrait);
-    let at_home = likeness(&pose);
-    let Some(here) = unexplained(&at_home, &portrait) else {
+    let sweep = neighbours.sweep(scene, frame);
+    let unwrapped = UnwrappedFrame::new(scene, level, frame, &sweep)?;
+    let wall = ReferenceMosaic::new(scene, &unwrapped_frames, &camera, (frame, &pose), margin)?;
+    let ncc_score = |pose: &Pose| wall.ncc_score(scene, &unwrapped, pose);
+    let left = |pose: &Pose| unexplained(&ncc_score(pose), &unwrapped);
+    let at_home = ncc_score(&pose);
+    let Some(here) = unexplained(&at_home, &unwrapped) else {
         return Ok(Vec::new());
     };
     let most = most_unexplained(here);
@@ -239,7 +239,7 @@ fn repeats_of(
     let mut found = Vec::new();
     // Of the correlation as it is, noise and all.
     let least = LEFT_BY_STEPS * (1.0 - most).max(0.0) * at_home.texture().powi(2);
-    for shift_m in matches(&wall, &portrait, &pose, reach_m, least) {
+    for shift_m in matches(&wall, &unwrapped, &pose, reach_m, least) {
         // Where the shape forbids a motion, no repeat leads there.
         let (made_m, _) = motion(shift_m);
         let missed_m = (made_m - Vector2::from(shift_m)).norm();
@@ -330,7 +330,7 @@ impl Evidence<'_> {
     }
 
     /// Errors that add up: step by step. Of the runs of frames between undecided steps, the longest
-    /// is believed.
+    /// is inliers.
     fn by_steps(&self, clear: f64) -> Choice {
         let count = self.frames.len();
         let mut motion = vec![GaugeMotion::default(); count];
@@ -503,7 +503,7 @@ mod tests {
         }
     }
 
-    /// What is in doubt by clear odds is so, too, where no odds are clear enough.
+    /// What is in rejection by clear odds is so, too, where no odds are clear enough.
     #[test]
     fn no_frame_is_clear_because_others_are_not() {
         let (none, other) = (GaugeMotion::default(), tile().reversed());

@@ -1,11 +1,12 @@
 //! Which frames the others bear out, once all are solved at full size.
 //!
-//! A frame is believed if it is aligned with every believed frame that it shares wall with, and if
+//! A frame is inliers if it is aligned with every inliers frame that it shares wall with, and if
 //! such pairs tie it to the rest. Agreement of neighbours is not enough: a group of frames can be
 //! right in itself and stand in the wrong place, when all it shares with the others is a strip that
 //! says nothing, or the prior.
 
-use crate::refine::model::rejection::Doubt;
+use crate::refine::model::rejection::RejectionReason;
+use crate::refine::problem::linearisation::FrameShare;
 use crate::refine::validation::pairwise_lucas_kanade::Alignment;
 
 /// Pairs may be misaligned by this much, pixels, ...
@@ -20,15 +21,42 @@ const LEAST_CORRELATION: f64 = 0.3;
 /// σ of a displacement, pixels, up to which a pair ties its frames to each other.
 const TIED_PX: f64 = 1.0;
 
+/// Share of a frame's weight that the robust loss may reject. Things before the wall, glints and
+/// oblique views cost a right frame some; whether its pose is right is decided by its alignment with
+/// others. Higher: fewer frames are rejected.
+const MAX_REJECTED_SHARE: f64 = 0.3;
+
+/// Rejects the frames of which the robust loss has rejected most pixels at full size, so that the
+/// last solve does without them.
+pub fn reject_disagreeing_frames(
+    shares: &[FrameShare],
+    rejections: &mut [Option<RejectionReason>],
+) {
+    for (share, rejection) in shares.iter().zip(rejections) {
+        if rejection.is_none() && share.pixels > 0.0 {
+            *rejection = find_disagreement(share);
+        }
+    }
+}
+
+/// The rejection reason of a frame of which the robust loss has rejected most pixels.
+pub fn find_disagreement(share: &FrameShare) -> Option<RejectionReason> {
+    let share = 1.0 - share.inliers / share.pixels.max(1e-9);
+    (share > MAX_REJECTED_SHARE).then_some(RejectionReason::Disagrees { share })
+}
+
 /// The frames that the others do not bear out, with the reason.
 ///
 /// Where two frames are misaligned, one is to blame: the one with the larger share of its overlap
 /// in such pairs is taken out first, until no pair is left. Of what remains, the largest group that
-/// pairs tie together is believed.
-pub fn unsupported(alignments: &[Alignment], frames: usize) -> Vec<(usize, Doubt)> {
+/// pairs tie together is inliers.
+pub fn find_inconsistent_frames(
+    alignments: &[Alignment],
+    frames: usize,
+) -> Vec<(usize, RejectionReason)> {
     let most_px = most_px(alignments);
     let mut out = vec![false; frames];
-    let mut doubts = Vec::new();
+    let mut rejections = Vec::new();
     loop {
         let (mut all, mut bad) = (vec![0.0; frames], vec![0.0; frames]);
         let mut worst_px = vec![0.0f64; frames];
@@ -47,9 +75,9 @@ pub fn unsupported(alignments: &[Alignment], frames: usize) -> Vec<(usize, Doubt
             .max_by(|a, b| share(*a).total_cmp(&share(*b)));
         let Some(worst) = worst else { break };
         out[worst] = true;
-        doubts.push((
+        rejections.push((
             worst,
-            Doubt::Misaligned {
+            RejectionReason::Misaligned {
                 error_px: worst_px[worst],
             },
         ));
@@ -72,11 +100,11 @@ pub fn unsupported(alignments: &[Alignment], frames: usize) -> Vec<(usize, Doubt
     }
     let largest = (0..frames).max_by_key(|k| (sizes[*k], std::cmp::Reverse(*k)));
     let apart = judged.iter().filter(|k| Some(group[**k]) != largest);
-    doubts.extend(apart.map(|k| {
+    rejections.extend(apart.map(|k| {
         let frames = sizes[group[*k]];
-        (*k, Doubt::Apart { frames })
+        (*k, RejectionReason::Disconnected { frames })
     }));
-    doubts
+    rejections
 }
 
 fn misaligned(pair: &Alignment, most_px: f64) -> bool {
@@ -135,7 +163,7 @@ mod tests {
 
     #[test]
     fn aligned_frames_are_all_believed() {
-        assert!(unsupported(&chain(0..9), 9).is_empty());
+        assert!(find_inconsistent_frames(&chain(0..9), 9).is_empty());
     }
 
     #[test]
@@ -144,32 +172,39 @@ mod tests {
         for pair in pairs.iter_mut().filter(|p| p.a == 4 || p.b == 4) {
             pair.error_px = 2.0;
         }
-        let doubts = unsupported(&pairs, 9);
-        assert_eq!(doubts, vec![(4, Doubt::Misaligned { error_px: 2.0 })]);
+        let rejections = find_inconsistent_frames(&pairs, 9);
+        assert_eq!(
+            rejections,
+            vec![(4, RejectionReason::Misaligned { error_px: 2.0 })]
+        );
     }
 
     #[test]
     fn an_error_within_its_uncertainty_is_no_error() {
         let mut pairs = chain(0..9);
         (pairs[3].error_px, pairs[3].sigma_px) = (1.5, 0.4);
-        assert!(unsupported(&pairs, 9).is_empty());
+        assert!(find_inconsistent_frames(&pairs, 9).is_empty());
     }
 
     #[test]
     fn of_two_groups_that_nothing_ties_the_larger_is_believed() {
         let mut pairs = chain(0..4);
         pairs.extend(chain(4..9));
-        let doubts = unsupported(&pairs, 9);
-        let frames: Vec<usize> = doubts.iter().map(|(k, _)| *k).collect();
+        let rejections = find_inconsistent_frames(&pairs, 9);
+        let frames: Vec<usize> = rejections.iter().map(|(k, _)| *k).collect();
         assert_eq!(frames, [0, 1, 2, 3]);
-        assert!(doubts.iter().all(|(_, d)| *d == Doubt::Apart { frames: 4 }));
+        assert!(
+            rejections
+                .iter()
+                .all(|(_, d)| *d == RejectionReason::Disconnected { frames: 4 })
+        );
         // A strip that tells nothing ties nothing.
         let mut weak = pair(3, 4, 3.0);
         weak.sigma_px = 2.0;
         pairs.push(weak);
-        assert_eq!(unsupported(&pairs, 9).len(), 4);
+        assert_eq!(find_inconsistent_frames(&pairs, 9).len(), 4);
         pairs.push(pair(2, 4, 0.1));
-        assert!(unsupported(&pairs, 9).is_empty());
+        assert!(find_inconsistent_frames(&pairs, 9).is_empty());
     }
 
     /// A robust fit of two different things may end anywhere, near none too.
@@ -180,7 +215,7 @@ mod tests {
         let mut chance = pair(3, 4, 0.1);
         chance.correlation = 0.1;
         pairs.push(chance);
-        let doubted = unsupported(&pairs, 11);
+        let doubted = find_inconsistent_frames(&pairs, 11);
         assert!((0..4).all(|k| doubted.iter().any(|(frame, _)| *frame == k)));
     }
 
@@ -190,6 +225,6 @@ mod tests {
         for pair in &mut pairs {
             pair.error_px = 1.2;
         }
-        assert!(unsupported(&pairs, 9).is_empty());
+        assert!(find_inconsistent_frames(&pairs, 9).is_empty());
     }
 }

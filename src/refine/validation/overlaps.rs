@@ -1,8 +1,8 @@
 //! Which frames see wall in common.
 
 use crate::camera::Camera;
-use crate::refine::model::context::Scene;
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::EstimationContext;
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::samples::footprints::FARTHEST;
 use crate::refine::samples::footprints::footprint;
@@ -13,9 +13,9 @@ use std::ops::Range;
 /// Frames compared at once: bounds the memory.
 const BATCH: usize = 32;
 
-/// The believed frames of a run on the wall.
+/// The inliers frames of a run on the wall.
 pub struct Overlaps {
-    /// What each sees; None for those in doubt and outside the run.
+    /// What each sees; None for those in rejection and outside the run.
     pub footprints: Vec<Option<Footprint>>,
     run: Range<usize>,
     perimeter_m: f64,
@@ -35,16 +35,16 @@ impl Overlaps {
     /// # Errors
     /// [`ProblemError::Placement`].
     pub fn of(
-        scene: &Scene,
+        scene: &EstimationContext,
         camera: &Camera,
-        tracked: &Tracked,
+        tracked: &FrameStates,
         run: &Range<usize>,
     ) -> Result<Self, ProblemError> {
-        let frames = tracked.estimates.par_iter().zip(&tracked.doubts);
+        let frames = tracked.estimates.par_iter().zip(&tracked.rejections);
         let footprints = frames
             .enumerate()
-            .map(|(k, (estimate, doubt))| {
-                if !(run.contains(&k) && doubt.is_none()) {
+            .map(|(k, (estimate, rejection))| {
+                if !(run.contains(&k) && rejection.is_none()) {
                     Ok(None)
                 } else {
                     let camera = camera.sweeping(&tracked.sweep(scene, k));

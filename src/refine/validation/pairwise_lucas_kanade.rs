@@ -23,12 +23,12 @@
 
 use crate::camera::Camera;
 use crate::frames::{MAD_TO_SIGMA, Pyramid, noise_at_level};
-use crate::refine::model::context::Scene;
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::EstimationContext;
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::samples::point_sampler::Sampler;
 use crate::refine::tiles::residual_weighting::{Loss, robust_correlation};
-use crate::refine::tracking::reference_mosaic::{Lattice, pixel_m};
+use crate::refine::tracking::reference_mosaic::{MosaicGrid, pixel_size_m};
 use crate::refine::validation::overlaps::{Batch, Overlaps};
 use crate::surface::{Footprint, WallPoint};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
@@ -80,15 +80,15 @@ pub struct Alignment {
     pub correlation: f64,
 }
 
-/// Measures how those of a run of frames that are believed and overlap are aligned; `finest` is the
+/// Measures how those of a run of frames that are inliers and overlap are aligned; `finest` is the
 /// finest level that tracking uses.
 ///
 /// # Errors
 /// [`ProblemError`].
-pub fn alignments(
-    scene: &Scene,
+pub fn align_pairs(
+    scene: &EstimationContext,
     finest: usize,
-    tracked: &Tracked,
+    tracked: &FrameStates,
     frames: &Range<usize>,
 ) -> Result<Vec<Alignment>, ProblemError> {
     let level = LEVEL.min(finest);
@@ -129,7 +129,7 @@ pub fn alignments(
 
 /// A frame at its pose.
 struct Look<'a> {
-    scene: &'a Scene<'a>,
+    scene: &'a EstimationContext<'a>,
     level: usize,
     camera: Camera,
     picture: &'a Pyramid,
@@ -170,7 +170,7 @@ struct Template {
     /// Patches that they are counted by.
     patches: usize,
     /// A pixel of the level on the wall, metres.
-    pixel_m: f64,
+    pixel_size_m: f64,
     /// Pixels of full size per pixel of the level.
     scale: f64,
     /// Variance of a slope's noise, and of a grey value's.
@@ -181,8 +181,8 @@ struct Template {
 impl Template {
     fn new(look: &Look, footprint: &Footprint) -> Self {
         let scene = look.scene;
-        let pixel_m = pixel_m(scene, &look.camera, look.pose);
-        let lattice = Lattice::over(footprint, STRIDE * pixel_m);
+        let pixel_size_m = pixel_size_m(scene, &look.camera, look.pose);
+        let lattice = MosaicGrid::over(footprint, STRIDE * pixel_size_m);
         let middle = WallPoint {
             s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
             h_m: 0.5 * (footprint.h_min_m + footprint.h_max_m),
@@ -194,7 +194,7 @@ impl Template {
             0.5 * (footprint.s_max_m - footprint.s_min_m),
             0.5 * (footprint.h_max_m - footprint.h_min_m),
         ];
-        let [width, height] = half.map(|half| half.max(pixel_m));
+        let [width, height] = half.map(|half| half.max(pixel_size_m));
         let patch_columns = lattice.columns.div_ceil(PATCH);
         for row in 0..lattice.rows {
             for column in 0..lattice.columns {
@@ -206,7 +206,7 @@ impl Template {
                 let point: [f32; 3] = (frame.x_w - origin).cast().into();
                 let (e_s, e_h): ([f32; 3], [f32; 3]) =
                     (frame.e_s.cast().into(), frame.e_h.cast().into());
-                let step = pixel_m as f32;
+                let step = pixel_size_m as f32;
                 let at = |ds: f32, dh: f32| grey(&moved(&point, &e_s, &e_h, ds, dh));
                 let (Some(value), Some(left), Some(right), Some(up), Some(down)) = (
                     grey(&point),
@@ -240,7 +240,7 @@ impl Template {
             origin,
             samples,
             patches: lattice.rows.div_ceil(PATCH) * patch_columns,
-            pixel_m,
+            pixel_size_m,
             scale: f64::from(1u32 << look.level),
             slope_noise: 0.5 * noise,
             noise: noise as f32,
@@ -257,7 +257,7 @@ impl Template {
         let mut result = None;
         for _ in 0..STEPS {
             let mut seen: Vec<(&Sample, f32)> = Vec::with_capacity(self.samples.len());
-            let field: [f32; 6] = (p * self.pixel_m).cast::<f32>().into();
+            let field: [f32; 6] = (p * self.pixel_size_m).cast::<f32>().into();
             for sample in &self.samples {
                 let x = &sample.x;
                 let ds = field[0] * x[0] + field[1] * x[1] + field[2] * x[2];
@@ -508,7 +508,7 @@ mod tests {
         let prior = prior(poses);
         let scene = scene(wall, &frames, &prior);
         let tracked = tracked(poses);
-        alignments(&scene, 0, &tracked, &(0..tracked.estimates.len())).unwrap()
+        align_pairs(&scene, 0, &tracked, &(0..tracked.estimates.len())).unwrap()
     }
 
     #[test]

@@ -6,12 +6,14 @@
 //! as well as the texture lets them, wrong ones do not, and a low residual fused from several
 //! frames cannot hide it.
 
-use crate::refine::model::context::Scene;
-use crate::refine::model::frame_states::Tracked;
+use crate::refine::model::context::EstimationContext;
+use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::model::rejection::Doubt;
+use crate::refine::model::rejection::RejectionReason;
 use crate::refine::tiles::residual_weighting::robust_correlation;
-use crate::refine::tracking::reference_mosaic::{Lattice, Likeness, Portrait, pixel_m};
+use crate::refine::tracking::reference_mosaic::{
+    MosaicGrid, NccScore, UnwrappedFrame, pixel_size_m,
+};
 use crate::refine::validation::overlaps::{Batch, Overlaps};
 use crate::surface::Footprint;
 use rayon::prelude::*;
@@ -50,7 +52,7 @@ pub struct Pair {
     pub sharpness: Option<f64>,
 }
 
-/// Compares those of a run of frames that are believed and overlap: at pyramid level `level`, in
+/// Compares those of a run of frames that are inliers and overlap: at pyramid level `level`, in
 /// windows that hold a brick or two, and in finest detail.
 ///
 /// The first tells whether they show the same wall; finest detail only where the first is drowned
@@ -62,10 +64,10 @@ pub struct Pair {
 ///
 /// # Errors
 /// [`ProblemError`].
-pub fn compare_pairs(
-    scene: &Scene,
+pub fn compute_pairwise_ncc(
+    scene: &EstimationContext,
     level: usize,
-    tracked: &Tracked,
+    tracked: &FrameStates,
     frames: &Range<usize>,
 ) -> Result<Vec<Pair>, ProblemError> {
     let any = |_, _| true;
@@ -156,9 +158,9 @@ struct Compared {
 
 /// Compares the pairs that are `wanted`.
 fn compare_at(
-    scene: &Scene,
+    scene: &EstimationContext,
     comparison: Comparison,
-    tracked: &Tracked,
+    tracked: &FrameStates,
     frames: &Range<usize>,
     wanted: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Vec<Compared>, ProblemError> {
@@ -171,19 +173,22 @@ fn compare_at(
     let camera = scene.camera.at_level(level);
     let overlaps = Overlaps::of(scene, &camera, tracked, frames)?;
     let mut pairs = Vec::new();
-    let mut portraits: BTreeMap<usize, Portrait> = BTreeMap::new();
+    let mut unwrapped_frames: BTreeMap<usize, UnwrappedFrame> = BTreeMap::new();
     for Batch { partners, needed } in overlaps.batches(wanted) {
         // What the batch before has left is not made again.
-        portraits.retain(|k, _| needed.binary_search(k).is_ok());
-        let made: Vec<(usize, Portrait)> = needed
+        unwrapped_frames.retain(|k, _| needed.binary_search(k).is_ok());
+        let made: Vec<(usize, UnwrappedFrame)> = needed
             .into_par_iter()
-            .filter(|k| !portraits.contains_key(k))
+            .filter(|k| !unwrapped_frames.contains_key(k))
             .map(|k| {
                 let sweep = tracked.sweep(scene, k);
-                Ok((k, Portrait::fine(scene, level, k, &sweep, window, all)?))
+                Ok((
+                    k,
+                    UnwrappedFrame::fine(scene, level, k, &sweep, window, all)?,
+                ))
             })
             .collect::<Result<_, ProblemError>>()?;
-        portraits.extend(made);
+        unwrapped_frames.extend(made);
         let compared: Vec<Vec<Compared>> = partners
             .par_iter()
             .map(|(a, others)| {
@@ -193,7 +198,7 @@ fn compare_at(
                     others,
                     stride,
                     &overlaps.footprints,
-                    &portraits,
+                    &unwrapped_frames,
                     tracked,
                 )
             })
@@ -204,26 +209,26 @@ fn compare_at(
 }
 
 fn compare(
-    scene: &Scene,
+    scene: &EstimationContext,
     a: usize,
     others: &[usize],
     stride: usize,
     footprints: &[Option<Footprint>],
-    portraits: &BTreeMap<usize, Portrait>,
-    tracked: &Tracked,
+    unwrapped_frames: &BTreeMap<usize, UnwrappedFrame>,
+    tracked: &FrameStates,
 ) -> Vec<Compared> {
-    let (Some(own), Some(footprint)) = (portraits.get(&a), &footprints[a]) else {
+    let (Some(own), Some(footprint)) = (unwrapped_frames.get(&a), &footprints[a]) else {
         return Vec::new();
     };
     let pose = &tracked.estimates[a].pose;
-    let lattice = Lattice::over(
+    let lattice = MosaicGrid::over(
         footprint,
-        stride as f64 * pixel_m(scene, own.camera(), pose),
+        stride as f64 * pixel_size_m(scene, own.camera(), pose),
     );
     let points = lattice.points(scene);
     let origin = points[points.len() / 2];
     let gain = |k: usize| tracked.estimates[k].log_gain.exp();
-    let gaze = own.at(scene, pose, &origin);
+    let sampler = own.at(scene, pose, &origin);
     let seen: Vec<([f32; 3], (f32, f32, f32))> = points
         .iter()
         .enumerate()
@@ -231,33 +236,33 @@ fn compare(
         .filter_map(|(_, x_w)| {
             let offset = x_w - origin;
             let point = [offset.x as f32, offset.y as f32, offset.z as f32];
-            Some((point, gaze.contrast_and_detail(&point)?))
+            Some((point, sampler.contrast_and_detail(&point)?))
         })
         .collect();
     let least = LEAST_OVERLAP * seen.len() as f64;
     others
         .iter()
         .filter_map(|b| {
-            let portrait = portraits.get(b)?;
+            let unwrapped = unwrapped_frames.get(b)?;
             let pose = &tracked.estimates[*b].pose;
-            let gaze = portrait.at(scene, pose, &origin);
-            let mut likeness = Likeness::default();
+            let sampler = unwrapped.at(scene, pose, &origin);
+            let mut ncc_score = NccScore::default();
             let (mut own_detail, mut other_detail) = (0.0f64, 0.0f64);
             let mut shared = Vec::with_capacity(seen.len());
             for (point, (x, noise_x, own)) in &seen {
-                if let Some((y, noise_y, other)) = gaze.contrast_and_detail(point) {
-                    likeness.add((*x, *noise_x), (y, noise_y));
+                if let Some((y, noise_y, other)) = sampler.contrast_and_detail(point) {
+                    ncc_score.add((*x, *noise_x), (y, noise_y));
                     shared.push((*x, y));
                     own_detail += f64::from(*own).powi(2);
                     other_detail += f64::from(other).powi(2);
                 }
             }
             let exposure = gain(*b) / gain(a);
-            (likeness.samples >= least).then(|| Compared {
+            (ncc_score.samples >= least).then(|| Compared {
                 a,
                 b: *b,
-                samples: likeness.samples,
-                quality: quality(&likeness, &shared),
+                samples: ncc_score.samples,
+                quality: quality(&ncc_score, &shared),
                 sharpness: exposure * exposure * own_detail / other_detail.max(f64::MIN_POSITIVE),
             })
         })
@@ -266,12 +271,12 @@ fn compare(
 
 /// Correlation of the textures behind the noise, of all samples or of most, whichever is greater: a
 /// few glints outweigh a faint wall.
-fn quality(likeness: &Likeness, shared: &[(f32, f32)]) -> Option<f64> {
-    let of_all = likeness.match_quality()?;
+fn quality(ncc_score: &NccScore, shared: &[(f32, f32)]) -> Option<f64> {
+    let of_all = ncc_score.match_quality()?;
     if of_all > SURE_QUALITY {
         return Some(of_all);
     }
-    let of_most = robust_correlation(shared) / likeness.texture();
+    let of_most = robust_correlation(shared) / ncc_score.texture();
     Some(of_all.max(of_most.min(1.0)))
 }
 
@@ -280,7 +285,7 @@ fn quality(likeness: &Likeness, shared: &[(f32, f32)]) -> Option<f64> {
 /// Frames are taken out one by one, always the one with the largest share of its overlap in pairs
 /// that do not match, until no frame contradicts the others by more than a little. Pairs count by
 /// their samples.
-pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
+pub fn find_contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, RejectionReason)> {
     let (mut all, mut bad) = (vec![0.0; frames], vec![0.0; frames]);
     let mut of_frame: Vec<Vec<usize>> = vec![Vec::new(); frames];
     for (k, pair) in pairs.iter().enumerate() {
@@ -293,13 +298,13 @@ pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
         }
     }
     let mut out = vec![false; frames];
-    let mut doubts = Vec::new();
+    let mut rejections = Vec::new();
     loop {
         let worst = (0..frames)
             .filter(|k| !out[*k] && bad[*k] > MOST_CONTRADICTION * all[*k])
             .max_by(|a, b| (bad[*a] / all[*a]).total_cmp(&(bad[*b] / all[*b])));
         let Some(worst) = worst else {
-            return doubts;
+            return rejections;
         };
         out[worst] = true;
         let mut against = (worst, 1.0);
@@ -316,9 +321,9 @@ pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
                 }
             }
         }
-        doubts.push((
+        rejections.push((
             worst,
-            Doubt::Contradicts {
+            RejectionReason::Contradicts {
                 frame: against.0,
                 correlation: against.1,
             },
@@ -327,7 +332,7 @@ pub fn contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
 }
 
 /// The frames that show less fine detail than those they overlap.
-pub fn blurred(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
+pub fn find_blurred_frames(pairs: &[Pair], frames: usize) -> Vec<(usize, RejectionReason)> {
     let mut ratios: Vec<Vec<f64>> = vec![Vec::new(); frames];
     for (pair, sharpness) in pairs.iter().filter_map(|p| Some((p, p.sharpness?))) {
         ratios[pair.a].push(sharpness);
@@ -339,7 +344,7 @@ pub fn blurred(pairs: &[Pair], frames: usize) -> Vec<(usize, Doubt)> {
         .filter_map(|(frame, mut ratios)| {
             ratios.sort_unstable_by(f64::total_cmp);
             let share = *ratios.get(ratios.len() / 2)?;
-            (share < LEAST_SHARPNESS).then_some((frame, Doubt::Blurred { share }))
+            (share < LEAST_SHARPNESS).then_some((frame, RejectionReason::Blurred { share }))
         })
         .collect()
 }
@@ -374,7 +379,7 @@ mod tests {
         let prior = prior(poses);
         let scene = scene(wall, &frames, &prior);
         let tracked = tracked(poses);
-        compare_pairs(&scene, 0, &tracked, &(0..poses.len())).unwrap()
+        compute_pairwise_ncc(&scene, 0, &tracked, &(0..poses.len())).unwrap()
     }
 
     #[test]
@@ -445,17 +450,17 @@ mod tests {
                 pairs.push(pair(a, b, if wrong { 0.2 } else { 0.9 }));
             }
         }
-        let doubts = contradictions(&pairs, 8);
-        assert_eq!(doubts.len(), 1);
-        assert_eq!(doubts[0].0, 5);
-        assert!(contradictions(&pairs[..1], 8).is_empty());
+        let rejections = find_contradictions(&pairs, 8);
+        assert_eq!(rejections.len(), 1);
+        assert_eq!(rejections[0].0, 5);
+        assert!(find_contradictions(&pairs[..1], 8).is_empty());
     }
 
     #[test]
     fn the_frame_without_fine_detail_is_the_blurred_one() {
         let mut pairs = vec![pair(0, 1, 0.9), pair(1, 2, 0.9), pair(0, 2, 0.9)];
         (pairs[0].sharpness, pairs[1].sharpness) = (Some(5.0), Some(0.2));
-        let blurred = blurred(&pairs, 3);
+        let blurred = find_blurred_frames(&pairs, 3);
         assert_eq!(blurred.len(), 1);
         assert_eq!(blurred[0].0, 1);
     }

@@ -1,15 +1,15 @@
 //! How sure a solution is, and what of the shared unknowns it does not tell.
 
 use crate::refine::linear::bordered_system::SharedBlock;
-use crate::refine::model::context::Scene;
+use crate::refine::model::context::EstimationContext;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::model::rejection::Doubt;
+use crate::refine::model::rejection::RejectionReason;
 use crate::refine::parameters::calibration::{Calibration, SHARED};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::solver::gauss_newton::Solution;
 use crate::refine::uncertainty::covariance::{Covariances, FrameSigma, covariances, frame_sigma};
-use crate::refine::uncertainty::observability::{Posterior, Refusal};
-use crate::refine::uncertainty::overdispersion::{Strain, strained, strains};
+use crate::refine::uncertainty::observability::{Posterior, UnobservableParameter};
+use crate::refine::uncertainty::overdispersion::{Overdispersion, overdispersed, overdispersions};
 
 /// Share of frames that may fit nowhere before nothing is believed about what all frames share: the
 /// others may fit each other in wrong places.
@@ -20,24 +20,24 @@ const MOST_MISFITS: f64 = 0.1;
 const MOST_LOOSE_PX: f64 = 0.2;
 
 /// The covariance of a solution.
-pub struct Certainty {
+pub struct SolutionUncertainty {
     /// Of the poses.
     pub covariances: Covariances,
     /// `Σ_κ`, where it was estimated.
     pub shared: Option<SharedBlock>,
-    /// Each frame's strain; none of those that show nothing.
-    pub strains: Vec<Strain>,
+    /// Each frame's overdispersion; none of those that show nothing.
+    pub overdispersions: Vec<Overdispersion>,
     posterior: Option<Posterior>,
 }
 
-impl Certainty {
+impl SolutionUncertainty {
     /// At a solution, for the free unknowns of `calibration`; `scene`: with the solution's own κ.
     ///
     /// # Errors
     /// [`ProblemError::Factor`] if shared unknowns were estimated and the poses' normal matrix is
     /// singular.
     pub fn at(
-        scene: &Scene,
+        scene: &EstimationContext,
         solution: &Solution,
         calibration: &Calibration,
     ) -> Result<Self, ProblemError> {
@@ -63,13 +63,18 @@ impl Certainty {
         Ok(Self {
             covariances,
             shared,
-            strains: strains(scene, solution),
+            overdispersions: overdispersions(scene, solution),
             posterior,
         })
     }
 
     /// 1-σ of frame `k`.
-    pub fn of_frame(&self, scene: &Scene, k: usize, estimate: &FrameEstimate) -> FrameSigma {
+    pub fn of_frame(
+        &self,
+        scene: &EstimationContext,
+        k: usize,
+        estimate: &FrameEstimate,
+    ) -> FrameSigma {
         let w = self.posterior.as_ref().map(|posterior| &posterior.w[k]);
         frame_sigma(
             scene.surface,
@@ -80,34 +85,44 @@ impl Certainty {
         )
     }
 
-    /// The doubts with those about frames whose residuals are no noise.
-    pub fn with_strain(&self, mut doubts: Vec<Option<Doubt>>) -> Vec<Option<Doubt>> {
-        let strained = strained(&self.strains, &doubts);
-        for ((doubt, strained), strain) in doubts.iter_mut().zip(strained).zip(&self.strains) {
-            if strained {
-                *doubt = Some(Doubt::Strained {
-                    strain_px: strain.px,
+    /// The rejections with those about frames whose residuals are no noise.
+    pub fn with_overdispersion(
+        &self,
+        mut rejections: Vec<Option<RejectionReason>>,
+    ) -> Vec<Option<RejectionReason>> {
+        let overdispersed = overdispersed(&self.overdispersions, &rejections);
+        for ((rejection, overdispersed), overdispersion) in rejections
+            .iter_mut()
+            .zip(overdispersed)
+            .zip(&self.overdispersions)
+        {
+            if overdispersed {
+                *rejection = Some(RejectionReason::Overdispersed {
+                    overdispersion_px: overdispersion.px,
                 });
             }
         }
-        doubts
+        rejections
     }
 
     /// The shared unknowns that the data do not observe: all, where too many frames do not fit the
-    /// others, or only under strain, or where all are tied too loosely. `scene`: with the
+    /// others, or only under overdispersion, or where all are tied too loosely. `scene`: with the
     /// solution's own κ.
-    pub fn refused(
+    pub fn unobservable(
         &self,
-        scene: &Scene,
+        scene: &EstimationContext,
         calibration: &Calibration,
         estimates: &[FrameEstimate],
-        doubts: &[Option<Doubt>],
-    ) -> Vec<Refusal> {
+        rejections: &[Option<RejectionReason>],
+    ) -> Vec<UnobservableParameter> {
         let Some(posterior) = &self.posterior else {
             return Vec::new();
         };
-        let misfits = doubts.iter().flatten().filter(|doubt| doubt.is_misfit());
-        let (wrong, count) = (misfits.count(), doubts.len());
+        let misfits = rejections
+            .iter()
+            .flatten()
+            .filter(|rejection| rejection.is_misfit());
+        let (wrong, count) = (misfits.count(), rejections.len());
         if wrong as f64 > MOST_MISFITS * count as f64 {
             let reason = format!(
                 "{wrong} of {count} frames do not fit the others, so the rest may fit in wrong places; give better poses or \
@@ -115,11 +130,11 @@ impl Certainty {
             );
             return refuse_all(calibration, &reason);
         }
-        let strained = strained(&self.strains, doubts);
-        let sure = (0..count).filter(|k| doubts[*k].is_none() && !strained[*k]);
+        let overdispersed = overdispersed(&self.overdispersions, rejections);
+        let sure = (0..count).filter(|k| rejections[*k].is_none() && !overdispersed[*k]);
         let sure: Vec<usize> = sure.collect();
-        if sure.is_empty() && strained.contains(&true) {
-            let reason = "the frames fit each other only under strain: a wall that repeats and is closed a period off, a wrong shape, \
+        if sure.is_empty() && overdispersed.contains(&true) {
+            let reason = "the frames fit each other only under overdispersion: a wall that repeats and is closed a period off, a wrong shape, \
                           or what is not estimated";
             return refuse_all(calibration, reason);
         }
@@ -136,14 +151,14 @@ impl Certainty {
             );
             return refuse_all(calibration, &reason);
         }
-        posterior.refuse(calibration)
+        posterior.find_unobservable(calibration)
     }
 }
 
 /// Refuses every free unknown.
-fn refuse_all(calibration: &Calibration, reason: &str) -> Vec<Refusal> {
+fn refuse_all(calibration: &Calibration, reason: &str) -> Vec<UnobservableParameter> {
     let free = (0..SHARED).filter(|k| calibration.free[*k]);
-    free.map(|unknown| Refusal {
+    free.map(|unknown| UnobservableParameter {
         unknown,
         sigma: calibration.sigma[unknown],
         reason: reason.to_owned(),
@@ -162,8 +177,8 @@ mod tests {
         let mut calibration = Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0));
         calibration.sigma = Kappa::repeat(0.1);
         calibration.free[3] = true;
-        let refusals = refuse_all(&calibration, "because");
-        assert_eq!(refusals.len(), 1);
-        assert_eq!((refusals[0].unknown, refusals[0].sigma), (3, 0.1));
+        let unobservable = refuse_all(&calibration, "because");
+        assert_eq!(unobservable.len(), 1);
+        assert_eq!((unobservable[0].unknown, unobservable[0].sigma), (3, 0.1));
     }
 }

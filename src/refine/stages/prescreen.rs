@@ -1,0 +1,28 @@
+//! Stage: rejects frames that show nothing, estimates the common shading and the sensor's noise.
+
+use crate::refine::error::RefineError;
+use crate::refine::inputs::Inputs;
+use crate::refine::stages::session::Session;
+use crate::refine::stages::state::Estimation;
+use crate::refine::tracking::prescreening;
+
+/// Runs the stage on every frame at the coarsest pyramid level.
+///
+/// # Errors
+/// A frame that cannot be read.
+pub fn run<'a>(
+    inputs: &'a Inputs<'a>,
+    mut estimation: Estimation<'a>,
+    session: &mut Session,
+) -> Result<Estimation<'a>, RefineError> {
+    let context = inputs.initial_context(estimation.state.noise);
+    let coarsest = inputs.coarsest_level();
+    let prescreened = prescreening::prescreen(&context, coarsest, session.progress.as_ref())?;
+    if let Some(shading) = prescreened.shading {
+        inputs.frames.set_shading(shading);
+    }
+    estimation.state.noise = prescreened.noise;
+    estimation.state.frames.rejections = prescreened.rejections;
+    session.record_time("decode");
+    Ok(estimation)
+}

@@ -1,0 +1,32 @@
+//! Stage: repairs the trajectory where frames do not support each other.
+
+use crate::refine::error::RefineError;
+use crate::refine::inputs::Inputs;
+use crate::refine::stages::session::Session;
+use crate::refine::stages::state::Estimation;
+use crate::refine::validation::repair;
+
+/// Runs the stage on frames that have been solved at full size; without such a solve it does nothing.
+///
+/// # Errors
+/// A frame that cannot be read, equations without a solution.
+pub fn run<'a>(
+    inputs: &'a Inputs<'a>,
+    mut estimation: Estimation<'a>,
+    session: &mut Session,
+) -> Result<Estimation<'a>, RefineError> {
+    let state = &mut estimation.state;
+    if state.levels.is_empty() {
+        return Ok(estimation);
+    }
+    let context = inputs.context(state);
+    state.aliases = repair::repair(
+        &context,
+        inputs.options,
+        &mut state.frames,
+        state.solved.clone(),
+        session.progress.as_ref(),
+    )?;
+    session.record_time("repair");
+    Ok(estimation)
+}

@@ -1,0 +1,255 @@
+//! Stage: solves all frames together at one pyramid level.
+
+use crate::refine::error::RefineError;
+use crate::refine::inputs::Inputs;
+use crate::refine::joint::joint_block as joint;
+use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::problem_error::ProblemError;
+use crate::refine::options::RefineOptions;
+use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::report::LevelReport;
+use crate::refine::solver::argmin_glue::{self, Observation};
+use crate::refine::solver::gauss_newton::{Solution, SolveState};
+use crate::refine::solver::stopping::Stopping;
+use crate::refine::stages::session::Session;
+use crate::refine::stages::stage::Stage;
+use crate::refine::stages::state::{Estimation, PipelineState};
+use crate::refine::tiles::interpolation::Interpolation;
+use crate::refine::tracking::shading_correction::correct;
+use crate::refine::uncertainty::observability::UnobservableParameter;
+use crate::refine::uncertainty::solution_uncertainty::SolutionUncertainty;
+use crate::refine::validation::inconsistent_frames::reject_disagreeing_frames;
+use serde::{Deserialize, Serialize};
+
+/// Sampling and stopping rule of one global solve.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SolvePlan {
+    /// The wall samples.
+    pub sampling: Sampling,
+    /// When to stop.
+    pub stopping: Stopping,
+}
+
+impl SolvePlan {
+    /// A solve that only brings the estimate close for the next one, finer level; the first, at the
+    /// level where tracking ended, uses all of the information.
+    pub fn intermediate(options: &RefineOptions, level: usize, handover_level: usize) -> Self {
+        let information = if level == handover_level {
+            1.0
+        } else {
+            options.intermediate_information
+        };
+        Self {
+            sampling: Sampling {
+                information,
+                ..Sampling::of(level)
+            },
+            stopping: Stopping::intermediate(options, level),
+        }
+    }
+
+    /// The last solve, at full size with denser samples.
+    ///
+    /// One sample per pixel is too sparse to end with: the products of residual and gradient vary
+    /// faster than either, and where the wall repeats in step with the samples (courses of bricks run
+    /// along them) what falls between them does not average out. On brick this alone is 0.05 px of
+    /// wall error over two turns.
+    pub fn last(options: &RefineOptions) -> Self {
+        Self {
+            sampling: Sampling {
+                density: options.final_density,
+                interpolation: Interpolation::Bicubic,
+                variance_weighting: true,
+                ..Sampling::of(0)
+            },
+            stopping: Stopping {
+                max_iterations: options.max_iterations,
+                step_px: options.step_tolerance_px,
+                step_sigma: options.step_tolerance_sigma,
+            },
+        }
+    }
+
+    /// The solve after the last one, jointly with the wall ([`crate::refine::joint`]).
+    pub fn joint(options: &RefineOptions) -> Self {
+        let last = Self::last(options);
+        Self {
+            sampling: Sampling {
+                density: joint::DENSITY,
+                joint: true,
+                ..last.sampling
+            },
+            stopping: Stopping {
+                step_sigma: joint::STEP_SIGMA,
+                ..last.stopping
+            },
+        }
+    }
+
+    /// The solve in words, for the progress display and the timings.
+    fn name(&self) -> String {
+        let Sampling {
+            level,
+            density,
+            information,
+            ..
+        } = self.sampling;
+        let mut name = format!("level {level}");
+        if density != 1.0 {
+            name += &format!(", {density} samples per pixel");
+        }
+        if information != 1.0 {
+            name += &format!(", {:.0} % of the information", 100.0 * information);
+        }
+        name
+    }
+}
+
+/// Runs the stage; a snapshot may be kept between two steps.
+///
+/// A parameter that the last solve finds unobservable is fixed, and the solve planned again.
+///
+/// # Errors
+/// A frame that cannot be read, equations without a solution.
+pub fn run<'a>(
+    plan: SolvePlan,
+    inputs: &'a Inputs<'a>,
+    mut estimation: Estimation<'a>,
+    session: &mut Session,
+) -> Result<Estimation<'a>, RefineError> {
+    let state = &mut estimation.state;
+    let context = inputs.context(state);
+    let Some(problem) = problem_of(&plan, inputs, &context, state)? else {
+        session.record_time("joint model of the wall");
+        return Ok(estimation);
+    };
+    // Without overlap the prior is all there is to report.
+    if problem.tiles() == 0 && state.frames.rejections.iter().all(Option::is_none) {
+        return Ok(estimation);
+    }
+    let solution = solve(&plan, problem, inputs, state, session)?;
+    state.frames.estimates.clone_from(&solution.estimates);
+    let unobservable = find_unobservable(&plan, inputs, &context, state, &solution)?;
+    state.kappa = solution.kappa;
+    for parameter in &unobservable {
+        state.kappa[parameter.unknown] = 0.0;
+        state.free[parameter.unknown] = false;
+    }
+    let context = inputs.context(state);
+    state.kappa = context.kappa;
+    if !unobservable.is_empty() && !has_solve_ahead(state) {
+        plan_again(&plan, inputs.options, state);
+    }
+    state.unobservable.extend(unobservable);
+    state.solved.clone_from(&state.frames);
+    if plan.sampling.level == 0 {
+        reject_disagreeing_frames(&solution.linearisation.frames, &mut state.frames.rejections);
+    }
+    state.levels.push(LevelReport {
+        level: plan.sampling.level,
+        samples_per_pixel: plan.sampling.density,
+        share_of_wall: solution.problem.share_of_wall(),
+        joint: solution.problem.is_joint(),
+        solve: solution.record.clone(),
+    });
+    if has_solve_ahead(state) && inputs.frames.shading().is_some() {
+        correct(&context, inputs.options, &state.frames)?;
+    }
+    // The assessment uses the last one only.
+    estimation.solution = (!has_solve_ahead(state)).then_some((solution, plan.stopping));
+    session.record_time(&format!("global {}", plan.name()));
+    Ok(estimation)
+}
+
+/// Sets up the problem; none if it was to be joint and the wall is too smooth for that.
+fn problem_of<'a>(
+    plan: &SolvePlan,
+    inputs: &Inputs,
+    context: &EstimationContext<'a>,
+    state: &PipelineState,
+) -> Result<Option<Problem<'a>>, ProblemError> {
+    let sampling = plan.sampling;
+    let problem = Problem::new(context, sampling, state.frames.window())?.calibrating();
+    if sampling.joint && !problem.is_joint() {
+        return Ok(None);
+    }
+    // Before the frames are aligned at full size, residuals are mostly misalignment.
+    if sampling.level > 0 {
+        return Ok(Some(problem));
+    }
+    let density = if sampling.joint {
+        Some(joint::OUTLIER_MASK_DENSITY)
+    } else {
+        let chosen = inputs.options.outlier_mask_density;
+        chosen.filter(|_| sampling.variance_weighting)
+    };
+    problem.without_outliers(density).map(Some)
+}
+
+/// Solves the problem, from where an interrupted solve was.
+fn solve<'a>(
+    plan: &SolvePlan,
+    problem: Problem<'a>,
+    inputs: &Inputs,
+    state: &mut PipelineState,
+    session: &mut Session,
+) -> Result<Solution<'a>, ProblemError> {
+    let progress = session.progress;
+    let begun = state.solve.take();
+    let state = &*state;
+    let mut keep = |solve: SolveState| {
+        session.keep_if_due(inputs, || PipelineState {
+            solve: Some(solve),
+            ..state.clone()
+        })
+    };
+    let name = plan.name();
+    progress.start("global", inputs.options.max_iterations as usize);
+    let observation = Observation {
+        stage: &name,
+        progress,
+        keep: &mut keep,
+    };
+    let solution = argmin_glue::resume(problem, plan.stopping, begun, Some(observation))?;
+    progress.finish();
+    Ok(solution)
+}
+
+/// The shared parameters that a full-size solution does not observe.
+fn find_unobservable(
+    plan: &SolvePlan,
+    inputs: &Inputs,
+    context: &EstimationContext,
+    state: &PipelineState,
+    solution: &Solution,
+) -> Result<Vec<UnobservableParameter>, ProblemError> {
+    let calibration = inputs.calibration_at(state);
+    if plan.sampling.level > 0 || !calibration.any() {
+        return Ok(Vec::new());
+    }
+    let solved = context.at(solution.kappa);
+    let uncertainty = SolutionUncertainty::at(&solved, solution, &calibration)?;
+    Ok(uncertainty.unobservable(
+        &solved,
+        &calibration,
+        &solution.estimates,
+        &state.frames.rejections,
+    ))
+}
+
+/// Whether another solve is certain to follow; a joint one may turn out to be needless.
+fn has_solve_ahead(state: &PipelineState) -> bool {
+    let mut ahead = state.stages.iter().skip(1);
+    ahead.any(|stage| matches!(stage, Stage::Solve(plan) if !plan.sampling.joint))
+}
+
+/// Plans the solve once more, after this one. Without the unobservable parameter the wall may look
+/// smooth, so a joint solve is preceded by one that is not.
+fn plan_again(plan: &SolvePlan, options: &RefineOptions, state: &mut PipelineState) {
+    state.stages.insert(1, Stage::Solve(*plan));
+    if plan.sampling.joint {
+        state
+            .stages
+            .insert(1, Stage::Solve(SolvePlan::last(options)));
+    }
+}

@@ -1,0 +1,45 @@
+//! Stage: compares all frames pair by pair, rejects those that contradict the others or are blurred,
+//! registers rejected ones again, and solves.
+
+use crate::refine::error::RefineError;
+use crate::refine::inputs::Inputs;
+use crate::refine::solver::neighbourhood::Neighbourhood;
+use crate::refine::stages::session::Session;
+use crate::refine::stages::state::Estimation;
+use crate::refine::tracking::track::register_rejected;
+use crate::refine::validation::pairwise_ncc::{
+    compute_pairwise_ncc, find_blurred_frames, find_contradictions,
+};
+
+/// Comparisons, with rejected frames registered again between two, at the most.
+const MAX_ITERATIONS: usize = 3;
+
+/// Runs the stage at the finest level of tracking.
+///
+/// # Errors
+/// A frame that cannot be read, equations without a solution.
+pub fn run<'a>(
+    inputs: &'a Inputs<'a>,
+    mut estimation: Estimation<'a>,
+    session: &mut Session,
+) -> Result<Estimation<'a>, RefineError> {
+    let state = &mut estimation.state;
+    let context = inputs.context(state);
+    let (count, options) = (inputs.count(), inputs.options);
+    let (coarsest, finest) = (inputs.coarsest_level(), inputs.handover_level());
+    let frames = &mut state.frames;
+    session.progress.start("check", MAX_ITERATIONS);
+    for iteration in 0..MAX_ITERATIONS {
+        let pairs = compute_pairwise_ncc(&context, finest, frames, &(0..count))?;
+        frames.reject(find_contradictions(&pairs, count));
+        frames.reject(find_blurred_frames(&pairs, count));
+        if iteration + 1 == MAX_ITERATIONS || register_rejected(&context, options, frames)? == 0 {
+            break;
+        }
+        Neighbourhood::of_all(frames).solve(&context, options, finest..=coarsest, frames)?;
+        session.progress.advance(1);
+    }
+    session.progress.finish();
+    session.record_time("check");
+    Ok(estimation)
+}
