@@ -62,6 +62,7 @@ mod solver;
 mod stages;
 #[cfg(test)]
 mod test_scene;
+mod thresholds;
 mod tiles;
 mod tracking;
 mod uncertainty;
