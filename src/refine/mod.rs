@@ -1,52 +1,59 @@
 //! The estimator: every frame's pose and exposure from the photometric consistency of overlapping
 //! strips of the wall.
 //!
-//! It minimises over all poses `T_i`, log-gains `α_i` and biases `b_i`
+//! It minimises the robust photometric cost plus the priors, over all poses, exposures and, if asked
+//! for, parameters that all frames share. The wall's texture is eliminated exactly. The objective is
+//! stated and derived in one place, beside the code that computes it: [`tiles::tile`].
 //!
-//! `E = Σ_x Σ_i q_i ρ((I_i(π(T_i⁻¹ X(x))) − b_i)/a_i − S(x)) / σ² + prior`
+//! # The pipeline
 //!
-//! over wall samples x ([`grid`]), with the wall's texture S eliminated exactly ([`tile`]); q is
-//! the number of pixels a sample stands for in a frame.
+//! [`pipeline`] runs a list of [`stages`], each a function from an estimation to an estimation:
+//!
+//! | stage | what it does | works with |
+//! | --- | --- | --- |
+//! | [`prescreen`](stages::prescreen) | rejects useless frames; common shading, sensor noise | [`tracking::prescreening`] |
+//! | [`track`](stages::track) | registers one frame after another on the wall that its predecessors show; sliding windows | [`tracking`] |
+//! | [`correct_shading`](stages::correct_shading) | light that moves with the camera, from the overlaps | [`crate::photometry`] |
+//! | [`solve`](stages::solve) | all frames together, coarse to fine | [`problem`], [`solver`] |
+//! | [`validate_pairs`](stages::validate_pairs) | rejects frames that contradict the others | [`validation::pairwise_ncc`] |
+//! | [`repair`](stages::repair) | rejects inconsistent frames, registers them again, resolves aliases | [`validation`] |
+//! | [`solve`](stages::solve), last | full size, dense samples; then jointly with the wall, if asked for | [`joint`] |
+//! | [`assess`](stages::assess) | uncertainty and verdict of every frame | [`uncertainty`] |
+//!
+//! # A solve
+//!
+//! Every solve, of one frame, a window or all frames, is the same: choose samples, linearise, reduce,
+//! solve, accept.
 //!
 //! | step | where |
 //! | --- | --- |
-//! | a first look: useless frames, common light, noise | [`examine`] |
-//! | one frame after another, sliding windows | [`track`]; a single frame: [`place`], [`search`] on the fused [`wall`]; again with a better camera: [`retrack`] |
-//! | light that moves with the camera, from the overlaps | [`flat_field`] |
-//! | do overlapping frames show the same? take out, try again | [`consistency`], [`rejection`] |
-//! | displaced pairs at full size, what nothing ties to the rest; unbend and place again | [`alignment`], [`verdict`], [`repair`], [`neighbourhood`] |
-//! | walls that repeat | [`repeats`] |
-//! | all frames together, coarse to fine | [`run`](mod@run) |
-//! | what all frames share, if asked for | [`calibration`], [`shared`], [`lens`], [`observed`] |
-//! | are rows read when they are said to be | [`rows`] |
-//! | going on after an interruption | [`state`] |
-//! | how sure | [`uncertainty_of_solution`], [`covariance`]; how sure it could be at best: [`bound`] |
+//! | samples: tiles of the wall, the frames that see them, the most informative ones, no outliers | [`samples`] |
+//! | linearise: texture, residuals, Jacobian and their moments over a tile | [`tiles`] |
+//! | reduce: sums over tiles to cost and normal equations | [`problem`] |
+//! | solve: sparse Cholesky, shared parameters by Schur complement | [`linear`] |
+//! | accept: damping, step test, stopping | [`solver::gauss_newton`] |
 //!
-//! At full size what is in a frame but not on the wall is left out of a solve beforehand:
-//! [`foreign`]. Every solve is the same: `samples → linearise → reduce → solve → accept`. [`grid`],
-//! [`visibility`], [`coverage`] and [`choice`] choose the samples, [`tile`] derives residual,
-//! Jacobian and the elimination of S and linearises, with the slopes of S as [`denoise`] finds them
-//! ([`joint`] does the same with the wall solved for finer than pixels, if asked for), [`problem`]
-//! reduces to normal equations, [`factor`] solves them, [`gauss_newton`] accepts.
+//! Dependencies point downwards only, in the order parameters, linear, model, tiles, samples, joint,
+//! problem, solver, tracking, validation, uncertainty, stages, pipeline. Every tuned number is in
+//! [`thresholds`].
 //!
 //! # Speed
 //!
-//! - The work on a tile is loops over whole vectors ([`tile`], [`view`]), compiled for several
-//!   processors, the one at hand chosen when it runs; sums keep their order, so results stay the
-//!   same.
-//! - The last solve looks at the wall twice a pixel along each axis; those before it at the parts
-//!   that tell most ([`choice`]). With `--fast` it does so 1.5 times a pixel and takes a single
-//!   step, if that is short.
-//! - Each linearisation serves twice: its cost judges the step that led there, its equations make
-//!   the next. The last step of a solve is within its tolerance and is not judged
-//!   ([`gauss_newton`]).
-//! - Where a tile's corners are is computed once for all frames ([`visibility`]), local contrast
+//! - The work on a tile is loops over whole vectors ([`tiles::tile`]), compiled for several processors;
+//!   the version for the present one is chosen at run time. Sums keep their order, so results stay
+//!   the same.
+//! - The last solve samples the wall twice a pixel along each axis; those before it use the tiles with
+//!   most information ([`samples::tile_selection`]). `--fast` samples 1.5 times a pixel and takes a
+//!   single step, if that is short.
+//! - Each linearisation serves twice: its cost judges the step that led there, its equations make the
+//!   next. The last step of a solve is within its tolerance and is not judged.
+//! - The corners of tiles are computed once for all frames ([`samples::visibility`]), local contrast
 //!   once for a picture.
 //!
 #![doc = include_str!("ablation.md")]
 
 mod error;
-mod inputs;
+mod input;
 mod joint;
 mod linear;
 mod model;
@@ -58,6 +65,7 @@ mod problem;
 mod refined;
 mod report;
 mod samples;
+mod setup;
 mod solver;
 mod stages;
 #[cfg(test)]
@@ -69,6 +77,7 @@ mod uncertainty;
 mod validation;
 
 pub use error::RefineError;
+pub use input::RefineInput;
 pub use model::problem_error::ProblemError;
 pub use options::RefineOptions;
 pub use pipeline::{refine, refine_with_checkpoint};

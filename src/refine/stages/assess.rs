@@ -1,7 +1,8 @@
 //! Stage: states the uncertainty and the verdict of every frame, and writes the report.
 
+use crate::camera::Camera;
+use crate::frames::FrameSet;
 use crate::refine::error::RefineError;
-use crate::refine::inputs::Inputs;
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
@@ -11,6 +12,7 @@ use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::problem::linearisation::FrameShare;
 use crate::refine::refined::Refined;
 use crate::refine::report::{FrameFlag, FrameReport, PoseReport, RefineReport};
+use crate::refine::setup::Setup;
 use crate::refine::solver::gauss_newton::Solution;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::{Estimation, PipelineState};
@@ -22,7 +24,6 @@ use crate::refine::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::refine::validation::inconsistent_frames::{find_disagreement, find_inconsistent_frames};
 use crate::refine::validation::pairwise_lucas_kanade::align_pairs;
 use crate::surface::GaugeMotion;
-use crate::survey::Survey;
 use crate::trajectory::{StampedPose, Trajectory};
 
 /// Share of a frame's pixels that must overlap other frames for its pose to count as photometric.
@@ -40,21 +41,21 @@ const MAX_SIGMA_PX: f64 = 0.25;
 /// # Errors
 /// [`RefineError::NoOverlap`] if nothing could be solved at full size; a frame that cannot be read.
 pub fn run<'a>(
-    inputs: &'a Inputs<'a>,
+    setup: &'a Setup<'a>,
     mut estimation: Estimation<'a>,
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
     let (solution, stopping) = estimation.solution.take().ok_or(RefineError::NoOverlap)?;
     session.progress.start("covariance", 1);
     let state = &mut estimation.state;
-    let context = inputs.context(state);
-    reject_finally(inputs, &context, state)?;
-    let readout = estimate_readout(&context, inputs.options, &state.frames)?;
-    let calibration = inputs.calibration_at(state);
+    let context = setup.context(state);
+    reject_finally(setup, &context, state)?;
+    let readout = estimate_readout(&context, setup.options, &state.frames)?;
+    let calibration = setup.calibration_at(state);
     let uncertainty = SolutionUncertainty::at(&context, &solution, &calibration)?;
     let metric = calibration.metric(&context.kappa);
     let estimates = &state.frames.estimates;
-    let motion = inputs
+    let motion = setup
         .prior
         .settle_gauge(&context.surface.gauge(), estimates, &metric);
     for rejection in state.frames.rejections.iter_mut().flatten() {
@@ -62,7 +63,7 @@ pub fn run<'a>(
             *other = metric.in_metres(&motion.apply(other));
         }
     }
-    let frames = report_frames(inputs, &context, &state.frames, &solution, &uncertainty);
+    let frames = report_frames(setup, &context, &state.frames, &solution, &uncertainty);
     session.progress.finish();
     session.record_time("covariance");
     let on_prior = frames
@@ -76,11 +77,11 @@ pub fn run<'a>(
         levels: std::mem::take(&mut state.levels),
         rolling_shutter: readout,
         variance_factor: uncertainty.covariances.variance_factor,
-        calibration: report_calibration(inputs, &calibration, &context.kappa, &uncertainty, state),
+        calibration: report_calibration(setup, &calibration, &context.kappa, &uncertainty, state),
         timings: std::mem::take(&mut session.timings),
     };
     estimation.refined = Some(Refined {
-        trajectory: trajectory(inputs.survey, &state.frames, &metric, &motion),
+        trajectory: trajectory(setup.input.initial, &state.frames, &metric, &motion),
         report,
         covariances: uncertainty.covariances.moved(&motion).scaled(metric.scale),
     });
@@ -90,11 +91,11 @@ pub fn run<'a>(
 /// Rejects frames with an alias that the prior does not exclude, and frames that the others do not
 /// support at full size.
 fn reject_finally(
-    inputs: &Inputs,
+    setup: &Setup,
     context: &EstimationContext,
     state: &mut PipelineState,
 ) -> Result<(), ProblemError> {
-    let (count, finest) = (inputs.count(), inputs.handover_level());
+    let (count, finest) = (setup.count(), setup.handover_level());
     let pairs = align_pairs(context, finest, &state.frames, &(0..count))?;
     let inconsistent = find_inconsistent_frames(&pairs, count);
     let aliases = std::mem::take(&mut state.aliases).into_iter();
@@ -117,23 +118,23 @@ fn reject_finally(
 
 /// The report of every frame.
 fn report_frames(
-    inputs: &Inputs,
+    setup: &Setup,
     context: &EstimationContext,
     frames: &FrameStates,
     solution: &Solution,
     uncertainty: &SolutionUncertainty,
 ) -> Vec<FrameReport> {
-    let count = inputs.count();
+    let count = setup.count();
     // Without a covariance there is no step either; its lack is reported already.
     let steps_px = steps_left(solution).unwrap_or_else(|_| vec![0.0; count]);
     let rejections = uncertainty.with_overdispersion(frames.rejections.clone());
     let reports = rejections.into_iter().enumerate().map(|(k, rejection)| {
         let sigma = uncertainty.of_frame(context, k, &frames.estimates[k]);
-        let rejection =
-            rejection.or_else(|| final_rejection(inputs.survey, k, solution, steps_px[k], &sigma));
+        let rejection = rejection
+            .or_else(|| final_rejection(&setup.input.camera, k, solution, steps_px[k], &sigma));
         let overdispersion_px = uncertainty.overdispersions[k].px;
         report_frame(
-            inputs.survey,
+            setup.input.frames,
             k,
             solution,
             rejection,
@@ -148,7 +149,7 @@ fn report_frames(
 
 /// The report of the self-calibration, if there was one.
 fn report_calibration(
-    inputs: &Inputs,
+    setup: &Setup,
     calibration: &Calibration,
     kappa: &Kappa,
     uncertainty: &SolutionUncertainty,
@@ -161,19 +162,19 @@ fn report_calibration(
             kappa,
             &uncertainty.shared.unwrap_or_default(),
             &state.unobservable,
-            inputs.survey.file.tunnel.nominal_m(),
+            setup.input.nominal_radius_m,
         )
     })
 }
 
 /// The refined poses in metres, with the times of the initial ones.
 fn trajectory(
-    survey: &Survey,
+    initial: &[StampedPose],
     frames: &FrameStates,
     metric: &Metric,
     motion: &GaugeMotion,
 ) -> Trajectory {
-    let poses = survey.initial.iter().zip(&frames.estimates);
+    let poses = initial.iter().zip(&frames.estimates);
     let poses = poses.map(|(initial, estimate)| StampedPose {
         time_s: initial.time_s,
         pose: metric.in_metres(&motion.apply(&estimate.pose)),
@@ -199,16 +200,14 @@ fn steps_left(solution: &Solution) -> Result<Vec<f64>, ProblemError> {
 
 /// The rejection reason of a frame that no other test has rejected, if the solution gives one.
 fn final_rejection(
-    survey: &Survey,
+    camera: &Camera,
     k: usize,
     solution: &Solution,
     step_px: f64,
     sigma: &FrameSigma,
 ) -> Option<RejectionReason> {
     let share: &FrameShare = &solution.linearisation.frames[k];
-    let all = f64::from(survey.camera.width)
-        * f64::from(survey.camera.height)
-        * solution.problem.share_of_wall();
+    let all = f64::from(camera.width) * f64::from(camera.height) * solution.problem.share_of_wall();
     if share.pixels < MIN_PIXEL_SHARE * all {
         Some(RejectionReason::NoOverlap {
             share: share.pixels / all,
@@ -228,7 +227,7 @@ fn final_rejection(
 
 /// The report of one frame.
 fn report_frame(
-    survey: &Survey,
+    frames: &FrameSet,
     k: usize,
     solution: &Solution,
     rejection: Option<RejectionReason>,
@@ -239,7 +238,7 @@ fn report_frame(
     let estimate: &FrameEstimate = &solution.estimates[k];
     FrameReport {
         index: k,
-        file: survey.frames[k].name(),
+        file: frames[k].name(),
         flag: match &rejection {
             None => FrameFlag::Photometric,
             Some(RejectionReason::Ambiguous { .. }) => FrameFlag::Ambiguous,

@@ -1,7 +1,7 @@
 //! Stage: corrects the common shading until overlapping frames agree.
 
 use crate::refine::error::RefineError;
-use crate::refine::inputs::Inputs;
+use crate::refine::setup::Setup;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::Estimation;
 use crate::refine::tracking::shading_correction::correct_until_settled;
@@ -11,13 +11,13 @@ use crate::refine::tracking::shading_correction::correct_until_settled;
 /// # Errors
 /// A frame that cannot be read, equations without a solution.
 pub fn run<'a>(
-    inputs: &'a Inputs<'a>,
+    setup: &'a Setup<'a>,
     mut estimation: Estimation<'a>,
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
     let state = &mut estimation.state;
-    let context = inputs.context(state);
-    correct_until_settled(&context, inputs.options, &mut state.frames)?;
+    let context = setup.context(state);
+    correct_until_settled(&context, setup.options, &mut state.frames)?;
     state.solved = state.frames.clone();
     session.record_time("shading");
     Ok(estimation)

@@ -1,8 +1,8 @@
 //! The stages of a refinement, one file each.
 //!
-//! Every stage is a function `run(inputs, estimation, session) -> estimation`: it takes the estimation
+//! Every stage is a function `run(setup, estimation, session) -> estimation`: it takes the estimation
 //! as the stage before has left it and returns it changed. What is fixed is in
-//! [`Inputs`](crate::refine::inputs::Inputs), what a checkpoint keeps in [`state::PipelineState`]; checkpoints,
+//! [`Setup`](crate::refine::setup::Setup), what a checkpoint keeps in [`state::PipelineState`]; checkpoints,
 //! progress and times go through [`session::Session`].
 
 pub mod assess;

@@ -1,7 +1,7 @@
 //! Stage: rejects frames that show nothing, estimates the common shading and the sensor's noise.
 
 use crate::refine::error::RefineError;
-use crate::refine::inputs::Inputs;
+use crate::refine::setup::Setup;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::Estimation;
 use crate::refine::tracking::prescreening;
@@ -11,15 +11,15 @@ use crate::refine::tracking::prescreening;
 /// # Errors
 /// A frame that cannot be read.
 pub fn run<'a>(
-    inputs: &'a Inputs<'a>,
+    setup: &'a Setup<'a>,
     mut estimation: Estimation<'a>,
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
-    let context = inputs.initial_context(estimation.state.noise);
-    let coarsest = inputs.coarsest_level();
+    let context = setup.initial_context(estimation.state.noise);
+    let coarsest = setup.coarsest_level();
     let prescreened = prescreening::prescreen(&context, coarsest, session.progress.as_ref())?;
     if let Some(shading) = prescreened.shading {
-        inputs.frames.set_shading(shading);
+        setup.frames.set_shading(shading);
     }
     estimation.state.noise = prescreened.noise;
     estimation.state.frames.rejections = prescreened.rejections;

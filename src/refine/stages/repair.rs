@@ -1,7 +1,7 @@
 //! Stage: repairs the trajectory where frames do not support each other.
 
 use crate::refine::error::RefineError;
-use crate::refine::inputs::Inputs;
+use crate::refine::setup::Setup;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::Estimation;
 use crate::refine::validation::repair;
@@ -11,7 +11,7 @@ use crate::refine::validation::repair;
 /// # Errors
 /// A frame that cannot be read, equations without a solution.
 pub fn run<'a>(
-    inputs: &'a Inputs<'a>,
+    setup: &'a Setup<'a>,
     mut estimation: Estimation<'a>,
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
@@ -19,10 +19,10 @@ pub fn run<'a>(
     if state.levels.is_empty() {
         return Ok(estimation);
     }
-    let context = inputs.context(state);
+    let context = setup.context(state);
     state.aliases = repair::repair(
         &context,
-        inputs.options,
+        setup.options,
         &mut state.frames,
         state.solved.clone(),
         session.progress.as_ref(),

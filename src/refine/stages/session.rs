@@ -2,9 +2,9 @@
 
 use crate::persist::checkpoint::{Checkpoint, CheckpointError};
 use crate::progress::Progress;
-use crate::refine::inputs::Inputs;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::report::StageTime;
+use crate::refine::setup::Setup;
 use crate::refine::stages::state::{PipelineState, Snapshot};
 use std::sync::Arc;
 use std::time::Instant;
@@ -40,7 +40,7 @@ impl<'a> Session<'a> {
     ///
     /// # Errors
     /// [`ProblemError::Checkpoint`] if it is damaged.
-    pub fn restore(&mut self, inputs: &Inputs) -> Result<Option<PipelineState>, ProblemError> {
+    pub fn restore(&mut self, setup: &Setup) -> Result<Option<PipelineState>, ProblemError> {
         let Some(checkpoint) = &self.checkpoint else {
             return Ok(None);
         };
@@ -48,7 +48,7 @@ impl<'a> Session<'a> {
             return Ok(None);
         };
         if let Some(shading) = snapshot.shading {
-            inputs.frames.set_shading(shading);
+            setup.frames.set_shading(shading);
         }
         self.timings = snapshot.timings;
         self.before_s = snapshot.elapsed_s;
@@ -61,7 +61,7 @@ impl<'a> Session<'a> {
     /// [`ProblemError::Checkpoint`] with whatever the system says.
     pub fn keep_if_due(
         &mut self,
-        inputs: &Inputs,
+        setup: &Setup,
         state: impl FnOnce() -> PipelineState,
     ) -> Result<(), ProblemError> {
         let elapsed_s = self.elapsed_s();
@@ -70,7 +70,7 @@ impl<'a> Session<'a> {
         {
             let snapshot = Snapshot {
                 state: state(),
-                shading: inputs.frames.shading().as_deref().cloned(),
+                shading: setup.frames.shading().as_deref().cloned(),
                 timings: self.timings.clone(),
                 elapsed_s,
             };

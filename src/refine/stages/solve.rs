@@ -1,13 +1,13 @@
 //! Stage: solves all frames together at one pyramid level.
 
 use crate::refine::error::RefineError;
-use crate::refine::inputs::Inputs;
 use crate::refine::joint::joint_block as joint;
 use crate::refine::model::context::{EstimationContext, Sampling};
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
 use crate::refine::problem::photometric_problem::Problem;
 use crate::refine::report::LevelReport;
+use crate::refine::setup::Setup;
 use crate::refine::solver::argmin_glue::{self, Observation};
 use crate::refine::solver::gauss_newton::{Solution, SolveState};
 use crate::refine::solver::stopping::Stopping;
@@ -113,13 +113,13 @@ impl SolvePlan {
 /// A frame that cannot be read, equations without a solution.
 pub fn run<'a>(
     plan: SolvePlan,
-    inputs: &'a Inputs<'a>,
+    setup: &'a Setup<'a>,
     mut estimation: Estimation<'a>,
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
     let state = &mut estimation.state;
-    let context = inputs.context(state);
-    let Some(problem) = problem_of(&plan, inputs, &context, state)? else {
+    let context = setup.context(state);
+    let Some(problem) = problem_of(&plan, setup, &context, state)? else {
         session.record_time("joint model of the wall");
         return Ok(estimation);
     };
@@ -127,18 +127,18 @@ pub fn run<'a>(
     if problem.tiles() == 0 && state.frames.rejections.iter().all(Option::is_none) {
         return Ok(estimation);
     }
-    let solution = solve(&plan, problem, inputs, state, session)?;
+    let solution = solve(&plan, problem, setup, state, session)?;
     state.frames.estimates.clone_from(&solution.estimates);
-    let unobservable = find_unobservable(&plan, inputs, &context, state, &solution)?;
+    let unobservable = find_unobservable(&plan, setup, &context, state, &solution)?;
     state.kappa = solution.kappa;
     for parameter in &unobservable {
         state.kappa[parameter.unknown] = 0.0;
         state.free[parameter.unknown] = false;
     }
-    let context = inputs.context(state);
+    let context = setup.context(state);
     state.kappa = context.kappa;
     if !unobservable.is_empty() && !has_solve_ahead(state) {
-        plan_again(&plan, inputs.options, state);
+        plan_again(&plan, setup.options, state);
     }
     state.unobservable.extend(unobservable);
     state.solved.clone_from(&state.frames);
@@ -152,8 +152,8 @@ pub fn run<'a>(
         joint: solution.problem.is_joint(),
         solve: solution.record.clone(),
     });
-    if has_solve_ahead(state) && inputs.frames.shading().is_some() {
-        correct(&context, inputs.options, &state.frames)?;
+    if has_solve_ahead(state) && setup.frames.shading().is_some() {
+        correct(&context, setup.options, &state.frames)?;
     }
     // The assessment uses the last one only.
     estimation.solution = (!has_solve_ahead(state)).then_some((solution, plan.stopping));
@@ -164,7 +164,7 @@ pub fn run<'a>(
 /// Sets up the problem; none if it was to be joint and the wall is too smooth for that.
 fn problem_of<'a>(
     plan: &SolvePlan,
-    inputs: &Inputs,
+    setup: &Setup,
     context: &EstimationContext<'a>,
     state: &PipelineState,
 ) -> Result<Option<Problem<'a>>, ProblemError> {
@@ -180,7 +180,7 @@ fn problem_of<'a>(
     let density = if sampling.joint {
         Some(joint::OUTLIER_MASK_DENSITY)
     } else {
-        let chosen = inputs.options.outlier_mask_density;
+        let chosen = setup.options.outlier_mask_density;
         chosen.filter(|_| sampling.variance_weighting)
     };
     problem.without_outliers(density).map(Some)
@@ -190,7 +190,7 @@ fn problem_of<'a>(
 fn solve<'a>(
     plan: &SolvePlan,
     problem: Problem<'a>,
-    inputs: &Inputs,
+    setup: &Setup,
     state: &mut PipelineState,
     session: &mut Session,
 ) -> Result<Solution<'a>, ProblemError> {
@@ -198,13 +198,13 @@ fn solve<'a>(
     let begun = state.solve.take();
     let state = &*state;
     let mut keep = |solve: SolveState| {
-        session.keep_if_due(inputs, || PipelineState {
+        session.keep_if_due(setup, || PipelineState {
             solve: Some(solve),
             ..state.clone()
         })
     };
     let name = plan.name();
-    progress.start("global", inputs.options.max_iterations as usize);
+    progress.start("global", setup.options.max_iterations as usize);
     let observation = Observation {
         stage: &name,
         progress,
@@ -218,12 +218,12 @@ fn solve<'a>(
 /// The shared parameters that a full-size solution does not observe.
 fn find_unobservable(
     plan: &SolvePlan,
-    inputs: &Inputs,
+    setup: &Setup,
     context: &EstimationContext,
     state: &PipelineState,
     solution: &Solution,
 ) -> Result<Vec<UnobservableParameter>, ProblemError> {
-    let calibration = inputs.calibration_at(state);
+    let calibration = setup.calibration_at(state);
     if plan.sampling.level > 0 || !calibration.any() {
         return Ok(Vec::new());
     }

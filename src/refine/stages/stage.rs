@@ -1,7 +1,7 @@
 //! The stages of a refinement, by name.
 
 use crate::refine::error::RefineError;
-use crate::refine::inputs::Inputs;
+use crate::refine::setup::Setup;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::solve::SolvePlan;
 use crate::refine::stages::state::Estimation;
@@ -36,18 +36,18 @@ impl Stage {
     /// [`RefineError`].
     pub fn run<'a>(
         self,
-        inputs: &'a Inputs<'a>,
+        setup: &'a Setup<'a>,
         estimation: Estimation<'a>,
         session: &mut Session,
     ) -> Result<Estimation<'a>, RefineError> {
         match self {
-            Self::Prescreen => prescreen::run(inputs, estimation, session),
-            Self::Track => track::run(inputs, estimation, session),
-            Self::CorrectShading => correct_shading::run(inputs, estimation, session),
-            Self::Solve(plan) => solve::run(plan, inputs, estimation, session),
-            Self::ValidatePairs => validate_pairs::run(inputs, estimation, session),
-            Self::Repair => repair::run(inputs, estimation, session),
-            Self::Assess => assess::run(inputs, estimation, session),
+            Self::Prescreen => prescreen::run(setup, estimation, session),
+            Self::Track => track::run(setup, estimation, session),
+            Self::CorrectShading => correct_shading::run(setup, estimation, session),
+            Self::Solve(plan) => solve::run(plan, setup, estimation, session),
+            Self::ValidatePairs => validate_pairs::run(setup, estimation, session),
+            Self::Repair => repair::run(setup, estimation, session),
+            Self::Assess => assess::run(setup, estimation, session),
         }
     }
 }

@@ -2,8 +2,8 @@
 //! only roughly known.
 
 use crate::refine::error::RefineError;
-use crate::refine::inputs::Inputs;
 use crate::refine::model::context::EstimationContext;
+use crate::refine::setup::Setup;
 use crate::refine::solver::stopping::Stopping;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::{Estimation, PipelineState};
@@ -14,28 +14,28 @@ use crate::refine::tracking::alternating_calibration::AlternatingCalibration;
 /// # Errors
 /// A frame that cannot be read, an initial pose outside the tunnel, equations without a solution.
 pub fn run<'a>(
-    inputs: &'a Inputs<'a>,
+    setup: &'a Setup<'a>,
     mut estimation: Estimation<'a>,
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
     let state = &mut estimation.state;
-    let initial = inputs.initial_context(state.noise);
+    let initial = setup.initial_context(state.noise);
     let context = EstimationContext {
-        prior: &inputs.tracking_prior,
+        prior: &setup.tracking_prior,
         ..initial
     };
     let tracking = state.tracking.take();
     let tracking =
         tracking.unwrap_or_else(|| AlternatingCalibration::begin(state.frames.rejections.clone()));
-    let stopping = Stopping::intermediate(inputs.options, inputs.handover_level());
+    let stopping = Stopping::intermediate(setup.options, setup.handover_level());
     let progress = session.progress.clone();
     let keep = |tracking: &AlternatingCalibration| {
-        session.keep_if_due(inputs, || PipelineState {
+        session.keep_if_due(setup, || PipelineState {
             tracking: Some(tracking.clone()),
             ..state.clone()
         })
     };
-    let frames = tracking.finish(&context, inputs.options, stopping, progress.as_ref(), keep)?;
+    let frames = tracking.finish(&context, setup.options, stopping, progress.as_ref(), keep)?;
     state.kappa = initial.at(frames.kappa).kappa;
     state.frames = frames;
     session.record_time("track");

@@ -2,7 +2,7 @@
 //! registers rejected ones again, and solves.
 
 use crate::refine::error::RefineError;
-use crate::refine::inputs::Inputs;
+use crate::refine::setup::Setup;
 use crate::refine::solver::neighbourhood::Neighbourhood;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::Estimation;
@@ -19,14 +19,14 @@ const MAX_ITERATIONS: usize = 3;
 /// # Errors
 /// A frame that cannot be read, equations without a solution.
 pub fn run<'a>(
-    inputs: &'a Inputs<'a>,
+    setup: &'a Setup<'a>,
     mut estimation: Estimation<'a>,
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
     let state = &mut estimation.state;
-    let context = inputs.context(state);
-    let (count, options) = (inputs.count(), inputs.options);
-    let (coarsest, finest) = (inputs.coarsest_level(), inputs.handover_level());
+    let context = setup.context(state);
+    let (count, options) = (setup.count(), setup.options);
+    let (coarsest, finest) = (setup.coarsest_level(), setup.handover_level());
     let frames = &mut state.frames;
     session.progress.start("check", MAX_ITERATIONS);
     for iteration in 0..MAX_ITERATIONS {

@@ -1,19 +1,20 @@
-//! Everything that is fixed during a refinement: the survey, the options, and what follows from both.
+//! Everything that is fixed during a refinement: the input, the options, and what follows from both.
 
 use crate::frames::FrameCache;
 use crate::refine::error::RefineError;
+use crate::refine::input::RefineInput;
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::prior::{Prior, usual_step_s};
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::calibration::{Calibration, Kappa};
 use crate::refine::stages::state::PipelineState;
-use crate::survey::{CalibrationGroup, Survey};
-use crate::trajectory::{Pose, Shutter};
+use crate::survey::CalibrationGroup;
+use crate::trajectory::{Pose, poses_of};
 
-/// The survey and the options of a refinement, with what follows from both.
-pub struct Inputs<'a> {
-    /// The survey.
-    pub survey: &'a Survey,
+/// The input and the options of a refinement, with what follows from both.
+pub struct Setup<'a> {
+    /// Frames, poses, camera and tunnel.
+    pub input: RefineInput<'a>,
     /// How to refine.
     pub options: &'a RefineOptions,
     /// The frames' grey pyramids.
@@ -23,72 +24,65 @@ pub struct Inputs<'a> {
     /// The same widened by what the shared parameters may still be off, for registering frames before
     /// they are estimated.
     pub tracking_prior: Prior,
-    /// When the rows of the frames are read.
-    pub shutter: Shutter,
     /// The shared parameters that are estimated, and their priors.
     pub calibration: Calibration,
 }
 
-impl<'a> Inputs<'a> {
-    /// Prepares the refinement of `survey`.
+impl<'a> Setup<'a> {
+    /// Prepares a refinement.
     ///
     /// # Errors
     /// [`RefineError::SingleFrame`], [`RefineError::OnlyRound`].
-    pub fn new(survey: &'a Survey, options: &'a RefineOptions) -> Result<Self, RefineError> {
-        if survey.frames.len() < 2 {
+    pub fn new(input: RefineInput<'a>, options: &'a RefineOptions) -> Result<Self, RefineError> {
+        if input.frames.len() < 2 {
             return Err(RefineError::SingleFrame);
         }
-        let coarsest = options.coarsest_level(survey.camera.shorter_side());
+        let coarsest = options.coarsest_level(input.camera.shorter_side());
         let frames = FrameCache::new(
-            &survey.frames,
-            &survey.camera,
+            input.frames,
+            &input.camera,
             coarsest + 1,
             options.cache_bytes,
         );
-        let times_s: Vec<f64> = survey
-            .initial
-            .iter()
-            .map(|stamped| stamped.time_s)
-            .collect();
+        let times_s: Vec<f64> = input.initial.iter().map(|stamped| stamped.time_s).collect();
         let prior = Prior {
-            jitter: survey.prior,
-            initial: survey.initial_poses(),
+            jitter: input.prior,
+            initial: poses_of(input.initial),
             usual_step_s: usual_step_s(&times_s),
             times_s,
             log_gain_sigma: options.log_gain_sigma,
             bias_sigma: options.bias_sigma,
         };
-        let calibration = calibration_of(survey, options, &prior.initial)?;
+        let calibration = calibration_of(&input, options, &prior.initial)?;
         let tracking_prior = Prior {
             jitter: calibration.widened(&prior.jitter, prior.arm_m()),
             ..prior.clone()
         };
         Ok(Self {
-            survey,
+            input,
             options,
             frames,
             prior,
             tracking_prior,
-            shutter: survey.shutter(),
             calibration,
         })
     }
 
     /// Number of frames.
     pub fn count(&self) -> usize {
-        self.survey.frames.len()
+        self.input.frames.len()
     }
 
     /// The coarsest pyramid level.
     pub fn coarsest_level(&self) -> usize {
         self.options
-            .coarsest_level(self.survey.camera.shorter_side())
+            .coarsest_level(self.input.camera.shorter_side())
     }
 
     /// The finest pyramid level of tracking.
     pub fn handover_level(&self) -> usize {
         self.options
-            .handover_level(self.survey.camera.shorter_side())
+            .handover_level(self.input.camera.shorter_side())
     }
 
     /// The shared parameters with those fixed that have turned out unobservable.
@@ -103,10 +97,10 @@ impl<'a> Inputs<'a> {
     /// grey levels.
     pub fn initial_context(&self, noise: f64) -> EstimationContext<'_> {
         EstimationContext {
-            surface: self.survey.surface.as_ref(),
-            ignored: &self.survey.ignored,
-            camera: self.survey.camera,
-            shutter: &self.shutter,
+            surface: self.input.surface,
+            ignored: self.input.ignored,
+            camera: self.input.camera,
+            shutter: &self.input.shutter,
             calibration: self.calibration,
             kappa: Kappa::zeros(),
             frames: &self.frames,
@@ -125,32 +119,33 @@ impl<'a> Inputs<'a> {
     }
 }
 
-/// What is to be estimated of the survey's calibration.
+/// The shared parameters to be estimated, with their priors.
 ///
 /// # Errors
 /// [`RefineError::OnlyRound`].
 fn calibration_of(
-    survey: &Survey,
+    input: &RefineInput,
     options: &RefineOptions,
     initial: &[Pose],
 ) -> Result<Calibration, RefineError> {
-    let section = survey.file.calibrate.clone().unwrap_or_default();
+    let section = &input.calibrate;
     let groups = options.calibrate.as_ref().unwrap_or(&section.unknowns);
     let calibration = if groups.is_empty() {
-        Calibration::none(&survey.camera)
+        Calibration::none(&input.camera)
     } else {
-        Calibration::new(groups, &section, &survey.camera, initial)
+        Calibration::new(groups, section, &input.camera, initial)
     };
+    let is_straight_and_round = input.surface.gauge().freedoms() == 2;
     for (group, unknown) in [
         (CalibrationGroup::Radius, "the radius"),
         (CalibrationGroup::Axis, "the axis"),
     ] {
-        if groups.contains(&group) && !survey.file.tunnel.is_straight_and_round() {
+        if groups.contains(&group) && !is_straight_and_round {
             return Err(RefineError::OnlyRound { unknown });
         }
     }
     Ok(Calibration {
-        readout_s: survey.shutter().readout_s(),
+        readout_s: input.shutter.readout_s(),
         ..calibration
     })
 }
