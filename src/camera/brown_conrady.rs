@@ -1,6 +1,6 @@
 //! Lens distortion after Brown and Conrady.
 
-use super::rising::{end_of_rise, invert};
+use super::monotone::{end_of_rise, invert};
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::{FRAC_PI_2, TAU};
 

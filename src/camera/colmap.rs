@@ -1,6 +1,10 @@
 //! Cameras as COLMAP and nerfstudio write them.
 
-use super::{BrownCoefficients, Camera, Lens};
+use super::brown_conrady::BrownCoefficients;
+
+use super::projection::Camera;
+
+use super::lens::Lens;
 use serde_json::{Map, Value, json};
 
 /// A camera model of COLMAP with its parameters; pixels count from the corner of the first, whose
@@ -107,7 +111,8 @@ impl ColmapCamera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{BrownConrady, KannalaBrandt};
+    use crate::camera::brown_conrady::BrownConrady;
+    use crate::camera::kannala_brandt::KannalaBrandt;
 
     #[test]
     fn pixels_count_from_the_corner() {

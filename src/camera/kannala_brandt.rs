@@ -1,6 +1,6 @@
 //! The fisheye lens of Kannala and Brandt.
 
-use super::rising::{end_of_rise, invert};
+use super::monotone::{end_of_rise, invert};
 use nalgebra::{Matrix2, Matrix2x3, RowVector3, Vector2, Vector3};
 use std::f64::consts::PI;
 

@@ -1,6 +1,8 @@
 //! The lens: from a point before the camera to where it appears, focal length 1.
 
-use super::{BrownConrady, KannalaBrandt};
+use super::brown_conrady::BrownConrady;
+
+use super::kannala_brandt::KannalaBrandt;
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
 /// A lens model. What it gives, `p_d`, becomes a pixel by `u = fx p_d.x + cx`, `v = fy p_d.y + cy`

@@ -22,9 +22,9 @@ mod calibration;
 mod colmap;
 mod kannala_brandt;
 mod lens;
+mod monotone;
 mod projection;
-mod rising;
-mod single;
+mod single_precision;
 mod sweep;
 
 pub use brown_conrady::{BrownCoefficients, BrownConrady};
@@ -33,5 +33,5 @@ pub use colmap::ColmapCamera;
 pub use kannala_brandt::KannalaBrandt;
 pub use lens::Lens;
 pub use projection::Camera;
-pub use single::{Bend, SingleLens};
+pub use single_precision::{Bend, SingleLens};
 pub use sweep::Sweep;

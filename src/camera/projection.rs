@@ -1,7 +1,8 @@
 //! The camera: pixels and rays.
 
+use super::lens::Lens;
 use super::sweep::LARGEST_SHARE;
-use super::{Lens, Sweep};
+use super::sweep::Sweep;
 use nalgebra::{Matrix2, Matrix2x3, Matrix2x5, Vector2, Vector3};
 use serde::{Serialize, Serializer};
 
@@ -321,7 +322,8 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{BrownCoefficients, BrownConrady, KannalaBrandt};
+    use crate::camera::brown_conrady::{BrownCoefficients, BrownConrady};
+    use crate::camera::kannala_brandt::KannalaBrandt;
     use nalgebra::Rotation3;
     use proptest::prelude::*;
 

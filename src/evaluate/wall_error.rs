@@ -3,7 +3,7 @@
 use super::error::check_pairs;
 use super::{EvaluateError, Spread, spread::root_mean_square};
 use crate::camera::Camera;
-use crate::surface::{Surface, WallPoint, free_part, shortest_arc};
+use crate::surface::{Surface, WallPoint, gauge_component, shortest_arc};
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -64,7 +64,7 @@ pub fn wall_error(
         mean_arc(&delta_s, perimeter_m),
         delta_h.iter().sum::<f64>() / delta_h.len() as f64,
     );
-    let (shift, _) = free_part(surface, &truth[0], &mean);
+    let (shift, _) = gauge_component(surface, &truth[0], &mean);
     let (shift_s_m, shift_h_m) = (shift.x, shift.y);
     let distances_mm: Vec<f64> = delta_s
         .iter()

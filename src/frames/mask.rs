@@ -1,7 +1,9 @@
 //! Which pixels of all frames never show the wall: the carrier's shaft, the water line, the rim of
 //! a housing.
 
-use super::{FrameError, GreyImage};
+use super::error::FrameError;
+
+use super::grey::GreyImage;
 use crate::camera::Camera;
 use image::{DynamicImage, ImageDecoder};
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! The sensor's noise, read from single pictures.
 
-use super::GreyImage;
+use super::grey::GreyImage;
 
 /// A Gaussian's standard deviation over the median of its distances from the middle.
 pub(crate) const MAD_TO_SIGMA: f64 = 1.4826;

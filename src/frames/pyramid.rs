@@ -1,11 +1,11 @@
 //! The image pyramid of a frame.
 
-use super::GreyImage;
-use super::contrast::{LocalContrast, local_contrast, subdued, wide_window};
+use super::grey::GreyImage;
+use super::local_contrast::{LocalContrast, local_contrast, subdued, wide_window};
 use std::sync::{Arc, OnceLock};
 
 /// A frame at full size (level 0) and halved again and again, from level 1 on without its extremes
-/// ([`super::contrast::subdued`]).
+/// ([`crate::frames::local_contrast::subdued`]).
 #[derive(Clone, Debug)]
 pub struct Pyramid {
     full: GreyImage,

@@ -38,8 +38,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::persist::atomic::{self, WriteError};
-use crate::persist::provenance::Input;
+use super::atomic::{self, WriteError};
+use super::provenance::Input;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};

@@ -1,14 +1,14 @@
 //! Cloud-Optimised GeoTIFF: one file of which any window at any resolution is read without the
 //! rest.
 
+use super::compression::Compression;
 use super::compression::Packed;
 use super::directory::{self, Directory, Values, tag};
-use super::pyramid::{LevelTile, Pyramid, Waiting};
+use super::error::RasterError;
+use super::overviews::{LevelTile, Pyramid, Waiting};
+use super::spec::{EDGE, Georeference, Nodata, RasterSpec, RasterTile, SampleType};
 use super::spool::{Spool, Stored};
-use super::{
-    Compression, EDGE, Georeference, Nodata, RasterError, RasterSpec, RasterTile, SampleType,
-    deflate, jpeg,
-};
+use super::{deflate, jpeg};
 use crate::persist::atomic::{self, WriteError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};

@@ -1,7 +1,9 @@
 //! How the tiles of a [`CogWriter`](super::CogWriter) are packed.
 
-use super::pyramid::LevelTile;
-use super::{EDGE, Nodata, RasterError, RasterSpec, RasterTile, SampleType, deflate, jpeg};
+use super::error::RasterError;
+use super::overviews::LevelTile;
+use super::spec::{EDGE, Nodata, RasterSpec, RasterTile, SampleType};
+use super::{deflate, jpeg};
 use std::io;
 
 /// How the tiles of a [`CogWriter`](super::CogWriter) are packed.

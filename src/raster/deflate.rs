@@ -1,7 +1,7 @@
 //! Tiles without loss: a predictor, then deflate.
 
-use super::reduce::{Sample, is_full};
-use super::{EDGE, RasterSpec, SampleType};
+use super::downsample::{Sample, is_full};
+use super::spec::{EDGE, RasterSpec, SampleType};
 
 /// Effort of [`miniz_oxide`], of 10.
 const LEVEL: u8 = 1;

@@ -1,8 +1,10 @@
 //! Deep Zoom: a folder of small pictures that a viewer in the browser reads without a server's
 //! help.
 
-use super::pyramid::{LevelTile, Pyramid, Waiting};
-use super::{EDGE, RasterError, RasterSpec, RasterTile, SampleType, jpeg};
+use super::error::RasterError;
+use super::jpeg;
+use super::overviews::{LevelTile, Pyramid, Waiting};
+use super::spec::{EDGE, RasterSpec, RasterTile, SampleType};
 use crate::persist::atomic::{self, StagedFolder, WriteError};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};

@@ -1,6 +1,8 @@
 //! Tiles with loss.
 
-use super::{EDGE, RasterError, RasterSpec, SampleType};
+use super::spec::{EDGE, RasterSpec, SampleType};
+
+use super::error::RasterError;
 use crate::numerics::simd_dispatch::wide;
 use jpeg_encoder::{ColorType, Encoder, EncodingError, ImageBuffer, JpegColorType, SamplingFactor};
 use std::io;

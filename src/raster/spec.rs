@@ -1,6 +1,6 @@
 //! What a raster is: its size, its pixels and its place.
 
-use super::RasterError;
+use super::error::RasterError;
 
 /// Columns and rows of a tile, pixels.
 pub const EDGE: usize = 512;

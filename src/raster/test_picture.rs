@@ -1,6 +1,6 @@
 //! Pictures for the tests of rasters.
 
-use super::{EDGE, RasterSpec, RasterTile, Reduce, SampleType};
+use super::spec::{EDGE, RasterSpec, RasterTile, Reduce, SampleType};
 
 /// 8-bit grey with alpha, overviews by the mean.
 pub(super) fn grey_alpha(width: u32, height: u32) -> RasterSpec {

@@ -1,6 +1,12 @@
 //! The circular tunnel `x² + z² = r²`.
 
-use super::{Gauge, Hit, Surface, SurfaceError, WallFrame, WallPoint};
+use super::gauge::Gauge;
+
+use super::wall::{Hit, WallFrame, WallPoint};
+
+use super::shape::Surface;
+
+use super::error::{SurfaceError, check_size};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -19,7 +25,7 @@ impl Circle {
     /// # Errors
     /// [`SurfaceError::Size`] unless the radius is positive and finite.
     pub fn new(radius_m: f64) -> Result<Self, SurfaceError> {
-        super::check_size("radius_m", radius_m)?;
+        check_size("radius_m", radius_m)?;
         Ok(Self { radius_m })
     }
 

@@ -1,6 +1,6 @@
 //! How the wall point of a fixed pixel moves when the pose moves.
 
-use super::WallFrame;
+use super::wall::WallFrame;
 use crate::camera::Camera;
 use crate::trajectory::{Pose, so3};
 use nalgebra::{Matrix2x5, Matrix2x6, Vector3};
@@ -59,7 +59,8 @@ pub fn lens_jacobian(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{Circle, Surface};
+    use crate::surface::circle::Circle;
+    use crate::surface::shape::Surface;
     use nalgebra::Vector6;
 
     #[test]

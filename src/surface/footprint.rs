@@ -1,6 +1,8 @@
 //! The part of the wall that a frame sees.
 
-use super::{Surface, SurfaceError};
+use super::shape::Surface;
+
+use super::error::SurfaceError;
 use crate::camera::Camera;
 use crate::trajectory::Pose;
 use nalgebra::Vector2;
@@ -158,7 +160,7 @@ impl Footprint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Circle;
+    use crate::surface::circle::Circle;
     use crate::trajectory::{so3, spiral};
     use nalgebra::Vector3;
     use std::f64::consts::TAU;

@@ -1,8 +1,7 @@
 //! What no picture of the wall can tell: the motions that map the tunnel onto itself.
 
-use super::{Surface, wall_jacobian};
 use crate::trajectory::{Pose, so3};
-use nalgebra::{UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// A directed line in the world.
@@ -143,41 +142,6 @@ impl Gauge {
     }
 }
 
-/// The part of a displacement `(Δs, Δh)` of the wall, metres, that the gauge can make, and the
-/// motion that makes it.
-///
-/// On a straight tunnel a turn moves the wall along s and a shift along h. A turn that is free by
-/// itself moves it in one direction, the same everywhere: as at the point that the camera at `pose`
-/// looks at.
-pub fn free_part(
-    surface: &dyn Surface,
-    pose: &Pose,
-    moved: &Vector2<f64>,
-) -> (Vector2<f64>, GaugeMotion) {
-    let gauge = surface.gauge();
-    if gauge.turn && !gauge.shift {
-        let hit = surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z())).ok();
-        let per_radian = hit.map(|hit| {
-            let wall = surface.frame(hit.wall);
-            wall_jacobian(pose, &wall) * gauge.directions(pose)[0]
-        });
-        let per_radian = per_radian.unwrap_or_default();
-        let square = per_radian.norm_squared();
-        let turn_rad = if square > 0.0 {
-            per_radian.dot(moved) / square
-        } else {
-            0.0
-        };
-        return (per_radian * turn_rad, gauge.motion(turn_rad, 0.0));
-    }
-    let radius_m = surface.perimeter_m() / std::f64::consts::TAU;
-    let motion = gauge.motion(moved.x / radius_m, moved.y);
-    (
-        Vector2::new(motion.turn_rad * radius_m, motion.shift_m),
-        motion,
-    )
-}
-
 /// A motion along the gauge: a turn about the axis, then a shift along it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GaugeMotion {
@@ -247,7 +211,9 @@ impl GaugeMotion {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{Circle, Surface, wall_jacobian};
+    use crate::surface::circle::Circle;
+    use crate::surface::displacement::wall_jacobian;
+    use crate::surface::shape::Surface;
     use proptest::prelude::*;
 
     fn poses() -> Vec<Pose> {

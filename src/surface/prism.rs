@@ -1,7 +1,10 @@
 //! A straight tunnel of any section.
 
+use super::error::SurfaceError;
+use super::gauge::Gauge;
 use super::section::Section;
-use super::{Gauge, Hit, Surface, SurfaceError, WallFrame, WallPoint};
+use super::shape::Surface;
+use super::wall::{Hit, WallFrame, WallPoint};
 use nalgebra::{Vector2, Vector3};
 
 /// A section moved along the world's y axis: the wall point is `(x(s), h, z(s))`.

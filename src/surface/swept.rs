@@ -1,7 +1,11 @@
 //! A curved tunnel: a section carried along a centreline.
 
+use super::centreline::{Centreline, Station};
+use super::error::SurfaceError;
+use super::gauge::{Axis, Gauge};
 use super::section::Section;
-use super::{Axis, Centreline, Gauge, Hit, Station, Surface, SurfaceError, WallFrame, WallPoint};
+use super::shape::Surface;
+use super::wall::{Hit, WallFrame, WallPoint};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector2, Vector3, Vector6};
 

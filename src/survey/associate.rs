@@ -1,6 +1,6 @@
 //! Which pose belongs to which frame.
 
-use super::SurveyError;
+use super::error::SurveyError;
 use crate::frames::FrameFile;
 use crate::trajectory::{PoseEntry, PoseFile, StampedPose, Trajectory, se3};
 use serde::{Deserialize, Serialize};

@@ -1,8 +1,8 @@
 //! What a folder holds that a survey can be made of.
 
+use super::file::SURVEY_FILE;
 use crate::camera::{Camera, read_calibration};
 use crate::frames::{FrameError, Video};
-use crate::survey::SURVEY_FILE;
 use crate::trajectory::{PoseFile, read_poses};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

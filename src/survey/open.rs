@@ -1,11 +1,14 @@
 //! A survey, opened and checked.
 
 use super::associate::TIME_TOLERANCE_S;
+use super::calibrate::CalibrateSection;
+use super::error::SurveyError;
 use super::file::read_survey_file;
-use super::listing::Listing;
-use super::reader::{PoseReader, Reading};
-use super::{CalibrateSection, PosesSection, SURVEY_FILE, SurveyError, SurveyFile};
-use super::{ignore, plausible};
+use super::file::{SURVEY_FILE, SurveyFile};
+use super::frame_list::Listing;
+use super::pose_reader::{PoseReader, Reading};
+use super::poses_section::PosesSection;
+use super::{ignore, pose_validation};
 use crate::camera::{Camera, read_calibration};
 use crate::frames::{FrameSet, Mask};
 use crate::surface::{Patches, Surface};
@@ -188,7 +191,7 @@ impl Survey {
         let trajectory = reading.trajectory();
         let poses = poses_of(&trajectory);
         let surface = self.surface.as_ref();
-        let warning = plausible::check(surface, &self.camera, &reading, &poses, path)?;
+        let warning = pose_validation::check(surface, &self.camera, &reading, &poses, path)?;
         Ok((trajectory, warning))
     }
 
@@ -204,7 +207,7 @@ impl Survey {
         let reading = PoseReader::new(section, &self.folder, &self.frames, times_s)?
             .read(&self.folder.join(&section.initial))?;
         let given = (Vec::new(), reading.convention);
-        let possible = plausible::possible(self.surface.as_ref(), &reading);
+        let possible = pose_validation::possible(self.surface.as_ref(), &reading);
         let survey = |(flags, convention): (Vec<String>, Convention)| {
             let stamped = reading.given.iter().map(|stamped| StampedPose {
                 time_s: stamped.time_s,

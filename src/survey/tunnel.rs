@@ -1,6 +1,8 @@
 //! `[tunnel]`: the shape of the tunnel.
 
-use super::{IgnoreSection, SurveyError};
+use super::ignore::IgnoreSection;
+
+use super::error::SurveyError;
 use crate::surface::section::{Ellipse, Pieces, Round, Section};
 use crate::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
 use crate::trajectory::{PoseError, text};

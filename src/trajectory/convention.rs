@@ -1,7 +1,9 @@
 //! What the numbers of a pose mean: its direction, the camera's axes, whose pose it is, and in
 //! which world.
 
-use super::{Pose, PoseFormat};
+use super::pose::Pose;
+
+use super::format::PoseFormat;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 

@@ -1,7 +1,10 @@
 //! The formats that poses are kept in, and which one a file is.
 
-use super::{CameraAxes, Direction, colmap};
-use super::{PoseError, csv, euroc, kitti, text, tum};
+use super::convention::{CameraAxes, Direction};
+
+use super::colmap;
+use super::error::PoseError;
+use super::{csv, euroc, kitti, text, tum};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 

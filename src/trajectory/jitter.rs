@@ -1,6 +1,8 @@
 //! Noise on a plan: what really happened while the carrier followed it.
 
-use super::{Pose, so3};
+use super::pose::Pose;
+
+use super::so3;
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -86,7 +88,7 @@ impl Jitter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::spiral;
+    use crate::trajectory::plan::spiral;
     use rand::SeedableRng;
 
     fn jitter(model: JitterModel) -> Jitter {

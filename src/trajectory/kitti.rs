@@ -4,7 +4,13 @@
 //! KITTI's own files have the first camera as their world. Any world is read, and the tunnel's is
 //! written.
 
-use super::{PoseEntry, PoseError, StampedPose, rigid, text};
+use super::pose_file::PoseEntry;
+
+use super::error::PoseError;
+
+use super::stamped_pose::StampedPose;
+
+use super::{rigid, text};
 use std::path::Path;
 
 pub(super) const FORM: &str = "r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz";

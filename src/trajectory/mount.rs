@@ -1,6 +1,10 @@
 //! How the camera is mounted on the body whose poses a file holds.
 
-use super::{Pose, PoseError, rigid, text};
+use super::pose::Pose;
+
+use super::error::PoseError;
+
+use super::{rigid, text};
 use std::path::Path;
 
 /// Keys of calibration files that hold such a matrix, and whether it leads from the camera to the

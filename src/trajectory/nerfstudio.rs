@@ -3,7 +3,15 @@
 //!
 //! `applied_transform`, by which the poses were moved after they were made, is undone.
 
-use super::{Pose, PoseEntry, PoseError, StampedPose, rigid, text};
+use super::pose::Pose;
+
+use super::pose_file::PoseEntry;
+
+use super::error::PoseError;
+
+use super::stamped_pose::StampedPose;
+
+use super::{rigid, text};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! Matrices that should be rigid motions.
 
-use super::Pose;
+use super::pose::Pose;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// How far `R Rᵀ` may be from the identity, each element: numbers with three digits pass.

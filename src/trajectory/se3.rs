@@ -1,6 +1,8 @@
 //! Rigid motions SE(3): the way from one pose to the next.
 
-use super::{Pose, so3};
+use super::pose::Pose;
+
+use super::so3;
 use nalgebra::{Matrix3, Vector3};
 
 /// Rotations between two poses beyond this have no sure shorter way, radians.
@@ -51,7 +53,7 @@ fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::spiral;
+    use crate::trajectory::plan::spiral;
     use proptest::prelude::*;
 
     fn pose(a: f64, b: f64, c: f64) -> Pose {

@@ -1,7 +1,9 @@
 //! Rolling shutter: how the camera moves while the rows of a frame are read, as its neighbours in
 //! time tell.
 
-use super::{Pose, StampedPose};
+use super::pose::Pose;
+
+use super::stamped_pose::StampedPose;
 use crate::camera::Sweep;
 use nalgebra::Vector6;
 
@@ -92,7 +94,8 @@ impl Shutter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::{indexed, so3};
+    use crate::trajectory::so3;
+    use crate::trajectory::stamped_pose::indexed;
     use nalgebra::Vector3;
 
     /// A screw motion: constant velocity in the camera's own coordinates for the turn, in the

@@ -1,6 +1,8 @@
 //! What all text formats are made of: lines, numbers, quaternions, times that increase.
 
-use super::{PoseEntry, PoseError};
+use super::pose_file::PoseEntry;
+
+use super::error::PoseError;
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::collections::HashSet;
 use std::path::Path;

@@ -3,7 +3,17 @@
 //! Written with eight columns, single spaces and no trailing space, which is what `evo` accepts.
 //! The program's own format.
 
-use super::{Pose, PoseEntry, PoseError, PoseFormat, StampedPose, Trajectory, read_poses, text};
+use super::pose::Pose;
+
+use super::pose_file::{PoseEntry, read_poses};
+
+use super::error::PoseError;
+
+use super::format::PoseFormat;
+
+use super::stamped_pose::{StampedPose, Trajectory};
+
+use super::text;
 use nalgebra::Vector3;
 use std::fmt::Write;
 use std::path::Path;

@@ -1,6 +1,10 @@
 //! Where the tunnel's axis lies in the world of the poses.
 
-use super::{Pose, PoseError, mount, text};
+use super::pose::Pose;
+
+use super::error::PoseError;
+
+use super::{mount, text};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -1,15 +1,18 @@
 //! COLMAP's cameras.txt.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
-use super::{Fault, choose};
-use crate::camera::{Camera, Lens, Sweep};
+use super::error::ParseError;
+use super::selection::choose;
+use crate::camera::lens::Lens;
+use crate::camera::projection::Camera;
+use crate::camera::sweep::Sweep;
 
 /// Makes a lens of its coefficients.
-type ReadLens = fn(&[f64]) -> Result<Lens, Fault>;
+type ReadLens = fn(&[f64]) -> Result<Lens, ParseError>;
 
 /// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixels are counted from the corner of the first
 /// and converted.
-pub fn read(text: &str, name: Option<&str>) -> Result<Camera, Fault> {
+pub fn read(text: &str, name: Option<&str>) -> Result<Camera, ParseError> {
     let lines = text.lines().enumerate();
     let cameras: Vec<_> = lines
         .map(|(k, line)| (k + 1, line.trim()))
@@ -24,7 +27,7 @@ pub fn read(text: &str, name: Option<&str>) -> Result<Camera, Fault> {
         })
         .collect();
     let (number, line) = choose(cameras, name)?;
-    camera(line).map_err(|what| Fault::at(number, what))
+    camera(line).map_err(|what| ParseError::at(number, what))
 }
 
 fn camera(line: &str) -> Result<Camera, String> {
@@ -84,7 +87,7 @@ fn camera(line: &str) -> Result<Camera, String> {
         fy,
         cx: cx - 0.5,
         cy: cy - 0.5,
-        lens: lens(&params[central..]).map_err(|fault| fault.what)?,
+        lens: lens(&params[central..]).map_err(|error| error.what)?,
         sweep: Sweep::default(),
     })
 }

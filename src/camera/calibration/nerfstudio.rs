@@ -1,9 +1,12 @@
 //! The camera in nerfstudio's transforms.json.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
-use super::tree::{number, pixels, word};
-use super::{Fault, choose};
-use crate::camera::{Camera, Lens, Sweep};
+use super::error::ParseError;
+use super::selection::choose;
+use super::value_tree::{number, pixels, word};
+use crate::camera::lens::Lens;
+use crate::camera::projection::Camera;
+use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
 /// True of a tree with `fl_x`, or with `frames`.
@@ -16,7 +19,7 @@ pub fn is_transforms(tree: &Value) -> bool {
 /// Reads `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`, `camera_model` and the coefficients, which stand at
 /// the top or, if every frame has its own, in each frame (then `name` is a frame's `file_path`).
 /// Pixels are counted from the corner of the first and converted.
-pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
+pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
     if tree.get("fl_x").is_some() {
         return camera(tree, tree);
     }
@@ -31,7 +34,7 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
         })
         .collect();
     if own.is_empty() {
-        return Err(Fault::new(
+        return Err(ParseError::new(
             "there is no `fl_x`; the focal lengths in pixels must be given as fl_x and fl_y",
         ));
     }
@@ -51,7 +54,7 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
     camera(choose(own, name)?, tree)
 }
 
-fn camera(own: &Value, tree: &Value) -> Result<Camera, Fault> {
+fn camera(own: &Value, tree: &Value) -> Result<Camera, ParseError> {
     let coefficient = |name: &str| match own.get(name) {
         None => Ok(0.0),
         Some(_) => number(own, &[name]),
@@ -68,14 +71,14 @@ fn camera(own: &Value, tree: &Value) -> Result<Camera, Fault> {
         "PINHOLE" | "SIMPLE_PINHOLE" => Lens::default(),
         "OPENCV" | "SIMPLE_RADIAL" | "RADIAL" => {
             if k4 != 0.0 {
-                return Err(Fault::new(
+                return Err(ParseError::new(
                     "k4 is the eighth power of the radius in nerfstudio's model and is not supported; it must be 0",
                 ));
             }
             brown_conrady(&[k1, k2, coefficient("p1")?, coefficient("p2")?, k3])?
         }
         other => {
-            return Err(Fault::new(format!(
+            return Err(ParseError::new(format!(
                 "the camera model {other} is not supported; known are PINHOLE, OPENCV and OPENCV_FISHEYE"
             )));
         }

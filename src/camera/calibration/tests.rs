@@ -1,5 +1,8 @@
 use super::*;
-use crate::camera::{BrownCoefficients, BrownConrady, KannalaBrandt, Lens, Sweep};
+use crate::camera::brown_conrady::{BrownCoefficients, BrownConrady};
+use crate::camera::kannala_brandt::KannalaBrandt;
+use crate::camera::lens::Lens;
+use crate::camera::sweep::Sweep;
 
 fn read_as(name: &str, text: &str) -> Result<Camera, CalibrationError> {
     read_camera(name, text, None)

@@ -1,6 +1,6 @@
 //! One run of `ffmpeg` through a video.
 
-use super::{Video, missing};
+use super::info::{VideoInfo, start_error};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -27,7 +27,7 @@ impl Decoder {
     ///
     /// # Errors
     /// `ffmpeg` is missing.
-    pub fn start(video: &Video, picture: usize) -> Result<Self, String> {
+    pub fn start(video: &VideoInfo, picture: usize) -> Result<Self, String> {
         let mut command = Command::new("ffmpeg");
         // Levels tell complaints from the rest; showinfo reports at `info`.
         command.args([
@@ -48,10 +48,18 @@ impl Decoder {
         command.args(["-map", "0:v:0", "-fps_mode", "passthrough"]);
         command.args(["-vf", "showinfo=checksum=0"]);
         command.args(["-sws_flags", "bitexact+accurate_rnd+full_chroma_int"]);
-        command.args(["-f", "rawvideo", "-pix_fmt", video.format.pixels(), "-"]);
+        command.args([
+            "-f",
+            "rawvideo",
+            "-pix_fmt",
+            video.layout.ffmpeg_name(),
+            "-",
+        ]);
         command.stdin(Stdio::null());
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = command.spawn().map_err(|error| missing("ffmpeg", &error))?;
+        let mut child = command
+            .spawn()
+            .map_err(|error| start_error("ffmpeg", &error))?;
         let (Some(pictures), Some(log)) = (child.stdout.take(), child.stderr.take()) else {
             return Err("ffmpeg has no output".to_owned());
         };
@@ -75,8 +83,8 @@ impl Decoder {
     ///
     /// # Errors
     /// The video ends before, is damaged, or has no picture of that time.
-    pub fn advance(&mut self, video: &Video, picture: usize) -> Result<Vec<u8>, String> {
-        let mut bytes = vec![0; video.format.bytes()];
+    pub fn advance(&mut self, video: &VideoInfo, picture: usize) -> Result<Vec<u8>, String> {
+        let mut bytes = vec![0; video.layout.bytes()];
         loop {
             let read = self.pictures.read_exact(&mut bytes);
             let time = read.ok().and_then(|()| self.times.recv().ok());
@@ -103,7 +111,7 @@ impl Decoder {
     }
 
     /// Why no more pictures come.
-    fn ended(&mut self, video: &Video) -> String {
+    fn ended(&mut self, video: &VideoInfo) -> String {
         let _ = self.child.kill();
         let _ = self.child.wait();
         let complaints = self
@@ -118,7 +126,7 @@ impl Decoder {
         format!(
             "the video is damaged or cut off: it decodes up to picture {} of {}{said}",
             self.next,
-            video.pictures()
+            video.moments.len()
         )
     }
 }

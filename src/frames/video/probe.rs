@@ -1,20 +1,10 @@
 //! What `ffprobe` says of a video.
 
-use super::{Format, Video, missing};
+use super::info::{Moment, PixelLayout, VideoInfo, start_error};
 use image::ColorType;
 use serde::Deserialize;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
-
-/// When a picture is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Moment {
-    /// Its time in ticks of the stream.
-    pub ticks: i64,
-    /// Whether decoding may begin with it.
-    pub key: bool,
-}
 
 /// `ffprobe -of json`.
 #[derive(Deserialize)]
@@ -54,8 +44,8 @@ const CUT_OFF: [&str; 3] = ["prematurely", "partial file", "truncat"];
 /// Looks into the video at `path`.
 ///
 /// # Errors
-/// See [`Video::open`].
-pub fn probe(path: &Path) -> Result<Video, String> {
+/// See [`super::Video::open`].
+pub fn probe(path: &Path) -> Result<VideoInfo, String> {
     let mut command = Command::new("ffprobe");
     command.args([
         "-v",
@@ -73,7 +63,7 @@ pub fn probe(path: &Path) -> Result<Video, String> {
         .arg(path)
         .stdin(Stdio::null())
         .output()
-        .map_err(|error| missing("ffprobe", &error))?;
+        .map_err(|error| start_error("ffprobe", &error))?;
     let said = String::from_utf8_lossy(&output.stderr);
     // It begins with the file's own name at times, or with the address of a structure.
     let complaint = said.lines().last().map(|line| {
@@ -100,13 +90,13 @@ pub fn probe(path: &Path) -> Result<Video, String> {
     let probed: Probed = serde_json::from_slice(&output.stdout)
         .map_err(|error| format!("ffprobe says what cannot be understood: {error}"))?;
     let video = of(path, probed)?;
-    Ok(Video {
+    Ok(VideoInfo {
         warning: complaint.map(|said| format!("{}: ffprobe says: {said}", path.display())),
         ..video
     })
 }
 
-fn of(path: &Path, probed: Probed) -> Result<Video, String> {
+fn of(path: &Path, probed: Probed) -> Result<VideoInfo, String> {
     let stream = probed.streams.first().ok_or("has no video stream")?;
     let (Some(width), Some(height), Some(pixels), Some(time_base)) = (
         stream.width,
@@ -156,9 +146,9 @@ fn of(path: &Path, probed: Probed) -> Result<Video, String> {
     if moments.is_empty() {
         return Err("holds no pictures; it was cut off or is still being written".to_owned());
     }
-    Ok(Video {
+    Ok(VideoInfo {
         path: path.to_owned(),
-        format: Format {
+        layout: PixelLayout {
             width,
             height,
             colour: colour(pixels),
@@ -167,7 +157,6 @@ fn of(path: &Path, probed: Probed) -> Result<Video, String> {
         tick_s: fraction(time_base).ok_or("has a clock without ticks")?,
         rotation_deg: rotation as i32,
         warning: None,
-        idle: Mutex::default(),
     })
 }
 
@@ -200,7 +189,7 @@ fn fraction(text: &str) -> Option<[i64; 2]> {
 mod tests {
     use super::*;
 
-    fn probed(json: &str) -> Result<Video, String> {
+    fn probed(json: &str) -> Result<VideoInfo, String> {
         of(Path::new("a.mp4"), serde_json::from_str(json).unwrap())
     }
 

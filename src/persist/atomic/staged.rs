@@ -1,7 +1,11 @@
 //! Folders that appear as a whole, and folders for a while.
 
-use super::{WriteError, beside, create_folder, durable};
-use crate::persist::atomic::temporary::{self, ASIDE, TemporaryFolder};
+use super::error::WriteError;
+
+use super::file::{beside, create_folder};
+
+use super::durable;
+use super::temporary::{self, ASIDE, TemporaryFolder};
 use std::path::{Path, PathBuf};
 
 /// A folder that is being filled under another name beside its final one.
@@ -142,7 +146,7 @@ impl ScratchFolder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::persist::atomic::write_text;
+    use crate::persist::atomic::file::write_text;
 
     #[test]
     fn a_staged_folder_appears_whole_or_not_at_all() {

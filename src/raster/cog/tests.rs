@@ -1,5 +1,5 @@
 use super::*;
-use crate::raster::Reduce;
+use crate::raster::spec::Reduce;
 use crate::raster::test_picture::{grey_alpha, pixel, tiles};
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;

@@ -1,7 +1,8 @@
 //! The ellipse.
 
-use super::{OutlineHit, OutlinePoint, Section, forward_root};
-use crate::surface::SurfaceError;
+use super::outline::{OutlineHit, OutlinePoint, Section, forward_root};
+
+use crate::surface::error::{SurfaceError, check_size};
 use nalgebra::Vector2;
 use std::f64::consts::TAU;
 
@@ -34,8 +35,8 @@ impl Ellipse {
     /// # Errors
     /// [`SurfaceError::Size`] unless both are positive and finite.
     pub fn new(width_m: f64, height_m: f64) -> Result<Self, SurfaceError> {
-        super::super::check_size("width_m", width_m)?;
-        super::super::check_size("height_m", height_m)?;
+        check_size("width_m", width_m)?;
+        check_size("height_m", height_m)?;
         let mut ellipse = Self {
             a_m: 0.5 * width_m,
             b_m: 0.5 * height_m,

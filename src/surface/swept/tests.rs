@@ -1,6 +1,9 @@
 use super::*;
+use crate::surface::centreline::CentrePoint;
+use crate::surface::circle::Circle;
+use crate::surface::displacement::wall_jacobian;
+use crate::surface::gauge_component;
 use crate::surface::section::{Ellipse, Pieces, Round};
-use crate::surface::{CentrePoint, Circle, free_part, wall_jacobian};
 use crate::trajectory::{Pose, so3};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -214,7 +217,7 @@ fn a_funnel_turns_about_its_axis() {
         assert!(truth.local(pose).norm() < 1e-6);
     }
     // Around, as it may be turned; not along.
-    let (made_m, _) = free_part(&funnel, &truth[1], &nalgebra::Vector2::new(0.2, 0.1));
+    let (made_m, _) = gauge_component(&funnel, &truth[1], &nalgebra::Vector2::new(0.2, 0.1));
     assert!(
         (made_m.x - 0.2).abs() < 1e-6 && made_m.y.abs() < 1e-6,
         "{made_m}"

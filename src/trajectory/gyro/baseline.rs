@@ -1,12 +1,18 @@
 //! From a log to one pose a frame.
 
-use super::clock::Turned;
-use super::{
-    ClockMatch, GyroLog, Rates, Rest, RotationNoise, Turning, angle_from_gravity_rad,
-    axis_in_camera,
-};
+use super::clock_offset::ClockMatch;
+use super::clock_offset::Turned;
+use super::gcsv::GyroLog;
+use super::gravity::{angle_from_gravity_rad, axis_in_camera};
+use super::integration::Turning;
+use super::noise::RotationNoise;
+use super::rates::Rates;
+use super::stationary::Rest;
 use crate::numerics::median::upper_median;
-use crate::trajectory::{Mounting, Pose, PoseError, StampedPose, Station, Trajectory};
+use crate::trajectory::error::PoseError;
+use crate::trajectory::plan::{Mounting, Station};
+use crate::trajectory::pose::Pose;
+use crate::trajectory::stamped_pose::{StampedPose, Trajectory};
 use nalgebra::{Matrix3, Vector3};
 
 /// What is known of the frames: when they were taken, where the carrier was meant to stand, and how
@@ -282,7 +288,7 @@ fn gaps(rates: &Rates, span_s: [f64; 2]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::gyro::GyroSample;
+    use crate::trajectory::gyro::gcsv::GyroSample;
     use crate::trajectory::so3;
 
     /// A sensor without noise, with a bias of 0.01 rad/s about every axis: three seconds at rest,

@@ -6,8 +6,11 @@
 //!
 //! Source: <https://docs.gyroflow.xyz/app/technical-details/gcsv-format>.
 
-use super::{Orientation, Rates};
-use crate::trajectory::{PoseError, text};
+use super::orientation::Orientation;
+
+use super::rates::Rates;
+use crate::trajectory::error::PoseError;
+use crate::trajectory::text;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

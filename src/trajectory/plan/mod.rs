@@ -6,10 +6,10 @@
 
 mod mounting;
 mod station;
-mod steady;
 mod table;
+mod uniform_motion;
 
 pub use mounting::Mounting;
 pub use station::{Station, spiral};
-pub use steady::{Rate, Steady};
 pub use table::PlanTable;
+pub use uniform_motion::{Rate, Steady};

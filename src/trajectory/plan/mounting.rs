@@ -1,6 +1,8 @@
 //! How the camera sits on the carrier.
 
-use crate::trajectory::{Pose, so3};
+use crate::trajectory::pose::Pose;
+
+use crate::trajectory::so3;
 use nalgebra::Vector3;
 
 /// How the camera sits on a carrier that turns about the tunnel's axis. All zero: the lens on the
@@ -30,7 +32,7 @@ impl Mounting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::Station;
+    use crate::trajectory::plan::station::Station;
     use std::f64::consts::FRAC_PI_2;
 
     #[test]

@@ -1,6 +1,8 @@
 //! Where the carrier stands.
 
-use crate::trajectory::{Pose, so3};
+use crate::trajectory::pose::Pose;
+
+use crate::trajectory::so3;
 use nalgebra::Vector3;
 
 /// Where the carrier stands, and how far it is turned about the tunnel's axis.

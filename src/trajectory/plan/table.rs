@@ -5,9 +5,10 @@
 //! Between rows all numbers change evenly, angles as they are given: from 350 to 370 the carrier
 //! turns by 20°, from 350 to 10 by 340° backwards.
 
-use super::Station;
+use super::station::Station;
 use crate::trajectory::csv::{separator, split};
-use crate::trajectory::{PoseError, text};
+use crate::trajectory::error::PoseError;
+use crate::trajectory::text;
 use csv::StringRecord;
 use std::path::{Path, PathBuf};
 

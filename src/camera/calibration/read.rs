@@ -1,0 +1,98 @@
+//! Reading and validation of calibration files.
+
+use super::error::{CalibrationError, ParseError};
+use super::{colmap, kalibr, native, nerfstudio, opencv, value_tree};
+use crate::camera::projection::Camera;
+use std::path::Path;
+
+/// Pixels along a side of the smallest picture.
+const SMALLEST: u32 = 16;
+/// A lens that shows less of the picture than this has other numbers than were meant.
+const LEAST_SHOWN: f64 = 0.5;
+
+/// Reads a calibration file; which kind it is follows from its name and content (see the table in
+/// the module's documentation). `name`: which camera, where a file has several (`cam1`, a COLMAP
+/// id).
+///
+/// # Errors
+/// An unreadable file; an unknown, missing or impossible entry, with its line where it is known; a
+/// lens model that is not supported; several cameras and no name.
+pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, CalibrationError> {
+    let content = |error: ParseError| CalibrationError::Content {
+        path: path.to_owned(),
+        line: error.line,
+        what: error.what,
+    };
+    let bytes = std::fs::read(path).map_err(|source| CalibrationError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let text = String::from_utf8(bytes).map_err(|_| {
+        content(ParseError::new(
+            "this is no text; give the calibration file itself",
+        ))
+    })?;
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    parse(
+        text.trim_start_matches('\u{feff}'),
+        &extension.to_lowercase(),
+        name,
+    )
+    .and_then(checked)
+    .map_err(content)
+}
+
+fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, ParseError> {
+    match extension {
+        "yaml" | "yml" => {
+            let tree = value_tree::of_yaml(text)?;
+            if kalibr::is_camchain(&tree) {
+                kalibr::read(&tree, name)
+            } else {
+                opencv::read(&tree)
+            }
+        }
+        "txt" => colmap::read(text, name),
+        "toml" => native::read_toml(text),
+        "xml" => Err(ParseError::new(
+            "OpenCV's XML is not read; save the calibration as YAML (a name that ends in .yml)",
+        )),
+        _ => match value_tree::of_json(text) {
+            Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
+            _ => native::read_json(text),
+        },
+    }
+}
+
+/// Refuses numbers that make no camera.
+fn checked(camera: Camera) -> Result<Camera, ParseError> {
+    if camera.width < SMALLEST || camera.height < SMALLEST {
+        return Err(ParseError::new(format!(
+            "width and height are {} × {}; they must be the frames' size in pixels, {SMALLEST} at the least",
+            camera.width, camera.height
+        )));
+    }
+    for (name, value) in [("fx", camera.fx), ("fy", camera.fy)] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(ParseError::new(format!(
+                "{name} is {value}; a focal length in pixels is positive"
+            )));
+        }
+    }
+    for (name, value) in [("cx", camera.cx), ("cy", camera.cy)] {
+        if !value.is_finite() {
+            return Err(ParseError::new(format!(
+                "{name} is {value}; it must be a number"
+            )));
+        }
+    }
+    let shown = camera.shown_share();
+    if shown < LEAST_SHOWN {
+        return Err(ParseError::new(format!(
+            "the distortion folds the picture back on itself: only {:.0} % of it is shown; check its coefficients and their \
+             order, and that fx and fy are in pixels",
+            100.0 * shown
+        )));
+    }
+    Ok(camera)
+}

@@ -1,0 +1,94 @@
+//! A file of poses, as it is.
+
+use super::pose::Pose;
+
+use super::error::PoseError;
+
+use super::format::PoseFormat;
+
+use super::stamped_pose::{StampedPose, Trajectory};
+
+use super::{colmap, csv, euroc, kitti, nerfstudio, text, tum};
+use std::path::{Path, PathBuf};
+
+/// One pose of a file, in the file's own convention.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct PoseEntry {
+    /// The frame it belongs to, if the file says so.
+    pub name: Option<String>,
+    /// Its time in seconds, if the file says so.
+    pub time_s: Option<f64>,
+    /// The pose.
+    pub pose: Pose,
+}
+
+/// A file of poses, in its own convention; one pose at the least. Its times increase and its names
+/// differ, where it has them.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct PoseFile {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Its format.
+    pub format: PoseFormat,
+    /// Its poses.
+    pub entries: Vec<PoseEntry>,
+}
+
+impl PoseFile {
+    /// The poses with their times, or with their places in the file where it has none.
+    pub fn trajectory(&self) -> Trajectory {
+        let stamped = |(index, entry): (usize, &PoseEntry)| StampedPose {
+            time_s: entry.time_s.unwrap_or(index as f64),
+            pose: entry.pose,
+        };
+        self.entries.iter().enumerate().map(stamped).collect()
+    }
+
+    /// Whether all poses have names.
+    pub fn has_names(&self) -> bool {
+        self.entries.iter().all(|entry| entry.name.is_some())
+    }
+
+    /// Whether all poses have times.
+    pub fn has_times(&self) -> bool {
+        self.entries.iter().all(|entry| entry.time_s.is_some())
+    }
+}
+
+/// Reads a file of poses, of the given format or of the one that its content tells. A folder is a
+/// COLMAP model.
+///
+/// # Errors
+/// [`PoseError`]: an unreadable file, an unknown format, a line that is no pose, times that do not
+/// increase, two poses of one frame, no pose at all.
+pub fn read_poses(path: &Path, format: Option<PoseFormat>) -> Result<PoseFile, PoseError> {
+    let path = if path.is_dir() {
+        path.join(colmap::IMAGES_FILE)
+    } else {
+        path.to_owned()
+    };
+    let text = text::read(&path)?;
+    let format = match format {
+        Some(format) => format,
+        None => PoseFormat::detect(&path, &text)?,
+    };
+    let parse = match format {
+        PoseFormat::Tum => tum::parse,
+        PoseFormat::Kitti => kitti::parse,
+        PoseFormat::Csv => csv::parse,
+        PoseFormat::Colmap => colmap::parse,
+        PoseFormat::Nerfstudio => nerfstudio::parse,
+        PoseFormat::Euroc => euroc::parse,
+    };
+    let entries = parse(&path, &text)?;
+    if entries.is_empty() {
+        return Err(PoseError::file(&path, "holds no poses"));
+    }
+    Ok(PoseFile {
+        path,
+        format,
+        entries,
+    })
+}
