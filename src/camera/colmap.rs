@@ -1,10 +1,8 @@
 //! Cameras as COLMAP and nerfstudio write them.
 
 use super::brown_conrady::BrownCoefficients;
-
-use super::projection::Camera;
-
 use super::lens::Lens;
+use super::projection::Camera;
 use serde_json::{Map, Value, json};
 
 /// A camera model of COLMAP with its parameters; pixels count from the corner of the first, whose

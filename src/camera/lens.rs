@@ -1,7 +1,6 @@
 //! The lens: from a point before the camera to where it appears, focal length 1.
 
 use super::brown_conrady::BrownConrady;
-
 use super::kannala_brandt::KannalaBrandt;
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 

@@ -4,7 +4,6 @@ use super::lens::Lens;
 use super::sweep::LARGEST_SHARE;
 use super::sweep::Sweep;
 use nalgebra::{Matrix2, Matrix2x3, Matrix2x5, Vector2, Vector3};
-use serde::{Serialize, Serializer};
 
 /// A camera: `u = fx p_d.x + cx`, `v = fy p_d.y + cy`, pixels counted from the centre of the first,
 /// with p_d where the lens shows a point ([`Lens`]).
@@ -31,12 +30,6 @@ pub struct Camera {
     pub lens: Lens,
     /// Its motion while a picture is read; the frames of a survey each have their own.
     pub sweep: Sweep,
-}
-
-impl Serialize for Camera {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        super::calibration::CameraFile::of(self).serialize(serializer)
-    }
 }
 
 /// Steps that find where the lens's picture ends on the way to a border pixel.

@@ -1,17 +1,11 @@
 //! Frames on demand, in bounded memory.
 
 use super::error::FrameError;
-
 use super::frame_file::FrameFile;
-
 use super::frame_set::FrameSet;
-
 use super::mask::HalvedMask;
-
 use super::pyramid::Pyramid;
-
 use super::shading::Shading;
-
 use super::stored_frame::StoredFrame;
 use crate::camera::Camera;
 use std::collections::HashMap;

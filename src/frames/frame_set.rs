@@ -1,7 +1,6 @@
 //! The frames of a survey and what none of them shows.
 
 use super::frame_file::FrameFile;
-
 use super::mask::Mask;
 use std::ops::Deref;
 use std::sync::Arc;

@@ -2,7 +2,6 @@
 //! known.
 
 use super::grey::GreyImage;
-
 use super::noise::MAD_TO_SIGMA;
 
 /// Half width of the widest sensible window, as a share of the picture's shorter side.

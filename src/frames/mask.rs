@@ -2,7 +2,6 @@
 //! a housing.
 
 use super::error::FrameError;
-
 use super::grey::GreyImage;
 use crate::camera::Camera;
 use image::{DynamicImage, ImageDecoder};

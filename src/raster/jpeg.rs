@@ -1,8 +1,7 @@
 //! Tiles with loss.
 
-use super::spec::{EDGE, RasterSpec, SampleType};
-
 use super::error::RasterError;
+use super::spec::{EDGE, RasterSpec, SampleType};
 use crate::numerics::simd_dispatch::wide;
 use jpeg_encoder::{ColorType, Encoder, EncodingError, ImageBuffer, JpegColorType, SamplingFactor};
 use std::io;

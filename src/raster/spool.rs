@@ -1,7 +1,7 @@
 //! Packed tiles on disk until their order is known.
 
 use super::compression::Packed;
-use crate::persist::atomic::{ScratchFolder, WriteError, beside};
+use crate::persist::atomic::{ScratchFolder, WriteError, parent_folder};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -28,7 +28,7 @@ pub(super) struct Stored {
 impl Spool {
     /// An empty one beside `target`, for a while.
     pub(super) fn beside(target: &Path) -> Result<Self, WriteError> {
-        let folder = ScratchFolder::inside(beside(target))?;
+        let folder = ScratchFolder::inside(parent_folder(target))?;
         let path = folder.path().join("tiles");
         let file = File::options()
             .read(true)

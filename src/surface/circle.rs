@@ -1,12 +1,9 @@
 //! The circular tunnel `x² + z² = r²`.
 
-use super::gauge::Gauge;
-
-use super::wall::{Hit, WallFrame, WallPoint};
-
-use super::shape::Surface;
-
 use super::error::{SurfaceError, check_size};
+use super::gauge::Gauge;
+use super::shape::Surface;
+use super::wall::{Hit, WallFrame, WallPoint};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 

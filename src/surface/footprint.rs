@@ -1,8 +1,7 @@
 //! The part of the wall that a frame sees.
 
-use super::shape::Surface;
-
 use super::error::SurfaceError;
+use super::shape::Surface;
 use crate::camera::Camera;
 use crate::trajectory::Pose;
 use nalgebra::Vector2;

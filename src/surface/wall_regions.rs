@@ -1,9 +1,7 @@
 //! Parts of the wall, between angles and chainages.
 
 use super::footprint::Footprint;
-
 use super::shape::Surface;
-
 use super::wall::WallPoint;
 use std::f64::consts::TAU;
 

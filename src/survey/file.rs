@@ -1,11 +1,8 @@
 //! `survey.toml` as written.
 
 use super::calibrate::CalibrateSection;
-
-use super::poses_section::PosesSection;
-
 use super::error::SurveyError;
-
+use super::poses_section::PosesSection;
 use super::tunnel::TunnelSection;
 use crate::trajectory::{Jitter, JitterModel};
 use serde::{Deserialize, Serialize};

@@ -1,9 +1,7 @@
 //! From `[frames]` to the frames.
 
-use super::file::FramesSection;
-
 use super::error::SurveyError;
-
+use super::file::FramesSection;
 use super::frame_times;
 use crate::frames::{self, FrameFile, Video};
 use std::path::Path;

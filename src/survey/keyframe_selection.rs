@@ -1,10 +1,8 @@
 //! Fewer frames than a video has pictures, by how far the view turns.
 
 use super::associate::Associate;
-
-use super::open::Survey;
-
 use super::error::SurveyError;
+use super::open::Survey;
 use crate::trajectory::{Pose, poses_of};
 use std::path::Path;
 

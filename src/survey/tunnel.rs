@@ -1,8 +1,7 @@
 //! `[tunnel]`: the shape of the tunnel.
 
-use super::ignore::IgnoreSection;
-
 use super::error::SurveyError;
+use super::ignore::IgnoreSection;
 use crate::surface::section::{Ellipse, Pieces, Round, Section};
 use crate::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
 use crate::trajectory::{PoseError, text};

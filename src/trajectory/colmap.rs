@@ -3,14 +3,10 @@
 //! `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then the points of the image, `X Y POINT3D_ID`
 //! each; that line may be empty. The poses alone are read. What is written has no points.
 
-use super::pose::Pose;
-
-use super::pose_file::PoseEntry;
-
 use super::error::PoseError;
-
+use super::pose::Pose;
+use super::pose_entry::PoseEntry;
 use super::stamped_pose::StampedPose;
-
 use super::text;
 use nalgebra::Vector3;
 use std::fmt::Write;

@@ -6,14 +6,10 @@
 //! nanoseconds in any of them. Positions are `tx_m` or `tx`, `x_m`, `x` and so on, metres. Commas,
 //! semicolons and tabs separate; names may stand in quotes.
 
-use super::pose::Pose;
-
-use super::pose_file::PoseEntry;
-
 use super::error::PoseError;
-
+use super::pose::Pose;
+use super::pose_entry::PoseEntry;
 use super::stamped_pose::StampedPose;
-
 use super::{text, times};
 use csv::{ReaderBuilder, StringRecord, WriterBuilder};
 use nalgebra::Vector3;

@@ -3,12 +3,9 @@
 //! The first eight columns count; velocities and biases may follow. Read only. Source: Burri et
 //! al., "The EuRoC micro aerial vehicle datasets", 2016.
 
-use super::pose::Pose;
-
-use super::pose_file::PoseEntry;
-
 use super::error::PoseError;
-
+use super::pose::Pose;
+use super::pose_entry::PoseEntry;
 use super::{text, times};
 use nalgebra::Vector3;
 use std::path::Path;

@@ -1,7 +1,6 @@
 //! Noise on a plan: what really happened while the carrier followed it.
 
 use super::pose::Pose;
-
 use super::so3;
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::Rng;

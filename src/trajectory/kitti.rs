@@ -4,12 +4,9 @@
 //! KITTI's own files have the first camera as their world. Any world is read, and the tunnel's is
 //! written.
 
-use super::pose_file::PoseEntry;
-
 use super::error::PoseError;
-
+use super::pose_entry::PoseEntry;
 use super::stamped_pose::StampedPose;
-
 use super::{rigid, text};
 use std::path::Path;
 

@@ -26,9 +26,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod axes;
 pub mod colmap;
 mod convention;
 pub mod csv;
+mod detection;
 mod error;
 mod euroc;
 mod format;
@@ -39,6 +41,7 @@ mod mount;
 pub mod nerfstudio;
 mod plan;
 mod pose;
+mod pose_entry;
 mod pose_file;
 mod rigid;
 pub mod se3;
@@ -53,14 +56,16 @@ mod tunnel_frame;
 #[cfg(test)]
 mod format_tests;
 
-pub use convention::{CameraAxes, Convention, Direction};
+pub use axes::{CameraAxes, Direction};
+pub use convention::Convention;
 pub use error::PoseError;
 pub use format::PoseFormat;
 pub use jitter::{Jitter, JitterModel};
 pub use mount::read_camera_in_body;
 pub use plan::{Mounting, PlanTable, Rate, Station, Steady, spiral};
 pub use pose::Pose;
-pub use pose_file::{PoseEntry, PoseFile, read_poses};
+pub use pose_entry::PoseEntry;
+pub use pose_file::{PoseFile, read_poses};
 pub use shutter::Shutter;
 pub use stamped_pose::{StampedPose, Trajectory, indexed, poses_of};
 pub use tunnel_frame::{TunnelAxis, read_tunnel_frame};

@@ -1,9 +1,7 @@
 //! How the camera is mounted on the body whose poses a file holds.
 
-use super::pose::Pose;
-
 use super::error::PoseError;
-
+use super::pose::Pose;
 use super::{rigid, text};
 use std::path::Path;
 

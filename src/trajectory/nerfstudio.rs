@@ -3,14 +3,11 @@
 //!
 //! `applied_transform`, by which the poses were moved after they were made, is undone.
 
-use super::pose::Pose;
-
-use super::pose_file::PoseEntry;
-
+use super::axes::CameraAxes;
 use super::error::PoseError;
-
+use super::pose::Pose;
+use super::pose_entry::PoseEntry;
 use super::stamped_pose::StampedPose;
-
 use super::{rigid, text};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -70,7 +67,7 @@ pub fn format(camera: Map<String, Value>, names: &[String], trajectory: &[Stampe
         .iter()
         .zip(trajectory)
         .map(|(name, stamped)| {
-            let [a, b, c] = rigid::rows(&super::CameraAxes::OpenGl.turn(&stamped.pose));
+            let [a, b, c] = rigid::rows(&CameraAxes::OpenGl.turn(&stamped.pose));
             json!({ "file_path": name, "transform_matrix": [a, b, c, [0.0, 0.0, 0.0, 1.0]] })
         })
         .collect();

@@ -1,27 +1,12 @@
 //! A file of poses, as it is.
 
-use super::pose::Pose;
-
+use super::detection::detect_format;
 use super::error::PoseError;
-
 use super::format::PoseFormat;
-
+use super::pose_entry::PoseEntry;
 use super::stamped_pose::{StampedPose, Trajectory};
-
 use super::{colmap, csv, euroc, kitti, nerfstudio, text, tum};
 use std::path::{Path, PathBuf};
-
-/// One pose of a file, in the file's own convention.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct PoseEntry {
-    /// The frame it belongs to, if the file says so.
-    pub name: Option<String>,
-    /// Its time in seconds, if the file says so.
-    pub time_s: Option<f64>,
-    /// The pose.
-    pub pose: Pose,
-}
 
 /// A file of poses, in its own convention; one pose at the least. Its times increase and its names
 /// differ, where it has them.
@@ -72,7 +57,7 @@ pub fn read_poses(path: &Path, format: Option<PoseFormat>) -> Result<PoseFile, P
     let text = text::read(&path)?;
     let format = match format {
         Some(format) => format,
-        None => PoseFormat::detect(&path, &text)?,
+        None => detect_format(&path, &text)?,
     };
     let parse = match format {
         PoseFormat::Tum => tum::parse,

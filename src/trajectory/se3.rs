@@ -1,7 +1,6 @@
 //! Rigid motions SE(3): the way from one pose to the next.
 
 use super::pose::Pose;
-
 use super::so3;
 use nalgebra::{Matrix3, Vector3};
 

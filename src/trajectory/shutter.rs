@@ -2,7 +2,6 @@
 //! time tell.
 
 use super::pose::Pose;
-
 use super::stamped_pose::StampedPose;
 use crate::camera::Sweep;
 use nalgebra::Vector6;

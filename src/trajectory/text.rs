@@ -1,8 +1,7 @@
 //! What all text formats are made of: lines, numbers, quaternions, times that increase.
 
-use super::pose_file::PoseEntry;
-
 use super::error::PoseError;
+use super::pose_entry::PoseEntry;
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::collections::HashSet;
 use std::path::Path;

@@ -3,16 +3,10 @@
 //! Written with eight columns, single spaces and no trailing space, which is what `evo` accepts.
 //! The program's own format.
 
-use super::pose::Pose;
-
-use super::pose_file::{PoseEntry, read_poses};
-
 use super::error::PoseError;
-
-use super::format::PoseFormat;
-
+use super::pose::Pose;
+use super::pose_entry::PoseEntry;
 use super::stamped_pose::{StampedPose, Trajectory};
-
 use super::text;
 use nalgebra::Vector3;
 use std::fmt::Write;
@@ -27,7 +21,15 @@ pub(super) const FORM: &str = "time tx ty tz qx qy qz qw";
 /// quaternion of length zero (or farther than 1 % from unit length); times that do not increase; no
 /// pose at all.
 pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
-    Ok(read_poses(path, Some(PoseFormat::Tum))?.trajectory())
+    let entries = parse(path, &text::read(path)?)?;
+    if entries.is_empty() {
+        return Err(PoseError::file(path, "holds no poses"));
+    }
+    let stamped = |entry: PoseEntry| StampedPose {
+        time_s: entry.time_s.unwrap_or_default(),
+        pose: entry.pose,
+    };
+    Ok(entries.into_iter().map(stamped).collect())
 }
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {

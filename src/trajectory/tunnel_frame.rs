@@ -1,9 +1,7 @@
 //! Where the tunnel's axis lies in the world of the poses.
 
-use super::pose::Pose;
-
 use super::error::PoseError;
-
+use super::pose::Pose;
 use super::{mount, text};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};

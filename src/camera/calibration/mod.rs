@@ -24,6 +24,5 @@ mod tests;
 mod value_tree;
 
 pub use error::CalibrationError;
-pub(super) use native::CameraFile;
 pub use native::format_calibration;
 pub use read::read_calibration;

@@ -6,7 +6,7 @@ use crate::camera::kannala_brandt::KannalaBrandt;
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
 use crate::camera::sweep::Sweep;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -91,6 +91,12 @@ pub fn read_toml(text: &str) -> Result<Camera, ParseError> {
 pub fn format_calibration(camera: &Camera) -> String {
     // Numbers and plain names always serialise.
     serde_json::to_string_pretty(&CameraFile::of(camera)).unwrap_or_default() + "\n"
+}
+
+impl Serialize for Camera {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        CameraFile::of(self).serialize(serializer)
+    }
 }
 
 impl CameraFile {

@@ -2,6 +2,7 @@ use super::*;
 use crate::camera::brown_conrady::{BrownCoefficients, BrownConrady};
 use crate::camera::kannala_brandt::KannalaBrandt;
 use crate::camera::lens::Lens;
+use crate::camera::projection::Camera;
 use crate::camera::sweep::Sweep;
 
 fn read_as(name: &str, text: &str) -> Result<Camera, CalibrationError> {

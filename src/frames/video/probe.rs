@@ -203,10 +203,13 @@ mod tests {
                  "streams": [{{{STREAM}, "side_data_list": [{{}}, {{"rotation": -90}}]}}]}}"#
         );
         let video = probed(&json).unwrap();
-        let times: Vec<f64> = (0..video.pictures()).map(|k| video.time_s(k)).collect();
+        let times: Vec<f64> = (0..video.moments.len()).map(|k| video.time_s(k)).collect();
         assert_eq!(times, [0.0, 20.0 / 600.0, 0.1]);
-        assert_eq!((video.size(), video.rotation_deg()), ((48, 64), 270));
-        assert_eq!(video.colour(), ColorType::Rgb16);
+        assert_eq!(
+            (video.layout.width, video.layout.height, video.rotation_deg),
+            (48, 64, 270)
+        );
+        assert_eq!(video.layout.colour, ColorType::Rgb16);
     }
 
     #[test]

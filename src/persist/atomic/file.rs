@@ -1,6 +1,7 @@
 //! Files that are complete or absent.
 
 use super::error::WriteError;
+use super::parent::parent_folder;
 use super::{durable, temporary};
 use std::io::Write;
 use std::path::Path;
@@ -14,7 +15,7 @@ pub fn write(
     fill: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
 ) -> Result<(), WriteError> {
     let fail = |source| WriteError::new(path, source);
-    let temporary = temporary::file_in(beside(path)).map_err(fail)?;
+    let temporary = temporary::file_in(parent_folder(path)).map_err(fail)?;
     let mut writer = std::io::BufWriter::new(temporary.file);
     fill(&mut writer).map_err(fail)?;
     let file = writer
@@ -30,7 +31,7 @@ pub fn write(
     // Until now it was locked.
     drop(file);
     if is_final {
-        durable::sync_folder(beside(path));
+        durable::sync_folder(parent_folder(path));
     }
     Ok(())
 }
@@ -41,14 +42,6 @@ pub fn write(
 /// As [`write()`].
 pub fn write_text(path: &Path, text: &str) -> Result<(), WriteError> {
     write(path, |writer| writer.write_all(text.as_bytes()))
-}
-
-/// The folder that holds `path`.
-pub(crate) fn beside(path: &Path) -> &Path {
-    match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    }
 }
 
 /// Removes a file, if it is there.

@@ -10,12 +10,13 @@
 mod durable;
 mod error;
 mod file;
+mod parent;
 mod staged;
 mod temporary;
 
 pub(crate) use durable::sync_files;
 pub use error::WriteError;
-pub(crate) use file::beside;
 pub use file::{create_folder, remove_file, write, write_text};
+pub(crate) use parent::parent_folder;
 pub use staged::{ScratchFolder, StagedFolder};
 pub use temporary::remove_unfinished;

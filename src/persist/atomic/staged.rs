@@ -1,10 +1,9 @@
 //! Folders that appear as a whole, and folders for a while.
 
-use super::error::WriteError;
-
-use super::file::{beside, create_folder};
-
 use super::durable;
+use super::error::WriteError;
+use super::file::create_folder;
+use super::parent::parent_folder;
 use super::temporary::{self, ASIDE, TemporaryFolder};
 use std::path::{Path, PathBuf};
 
@@ -24,7 +23,7 @@ impl StagedFolder {
     /// holds the folder the program works in.
     pub fn begin(target: &Path) -> Result<Self, WriteError> {
         check_replaceable(target)?;
-        let parent = beside(target);
+        let parent = parent_folder(target);
         create_folder(parent)?;
         let temporary =
             temporary::folder_in(parent).map_err(|source| WriteError::new(target, source))?;
@@ -64,7 +63,7 @@ impl StagedFolder {
         {
             use std::os::unix::fs::PermissionsExt;
             // A temporary folder is private; the finished one is as its parent.
-            let mode = std::fs::metadata(beside(&self.target))
+            let mode = std::fs::metadata(parent_folder(&self.target))
                 .map_err(fail)?
                 .permissions()
                 .mode();
@@ -75,7 +74,7 @@ impl StagedFolder {
         // The old folder steps aside first and goes only when the new one is in place.
         let mut old = None;
         if self.target.exists() {
-            let aside = temporary::folder_in(beside(&self.target)).map_err(fail)?;
+            let aside = temporary::folder_in(parent_folder(&self.target)).map_err(fail)?;
             std::fs::rename(&self.target, aside.folder.path().join(ASIDE)).map_err(fail)?;
             old = Some(aside);
         }
@@ -89,7 +88,7 @@ impl StagedFolder {
             // It is no longer temporary.
             let _ = folder.keep();
         }
-        durable::sync_folder(beside(&self.target));
+        durable::sync_folder(parent_folder(&self.target));
         if let Some(aside) = old {
             let aside = aside.folder.path();
             // From now on it may be tidied away.

@@ -1,7 +1,6 @@
 //! The ellipse.
 
 use super::outline::{OutlineHit, OutlinePoint, Section, forward_root};
-
 use crate::surface::error::{SurfaceError, check_size};
 use nalgebra::Vector2;
 use std::f64::consts::TAU;

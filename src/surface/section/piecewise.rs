@@ -1,7 +1,6 @@
 //! Outlines of straight lines and arcs: boxes and horseshoes.
 
 use super::outline::{OutlineHit, OutlinePoint, Section, forward_root};
-
 use crate::surface::error::{SurfaceError, check_size};
 use nalgebra::Vector2;
 use std::f64::consts::{FRAC_PI_2, TAU};

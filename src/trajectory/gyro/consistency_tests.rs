@@ -3,6 +3,7 @@
 
 use super::*;
 use crate::trajectory::so3;
+use nalgebra::{UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;

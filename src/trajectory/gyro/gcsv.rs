@@ -7,7 +7,6 @@
 //! Source: <https://docs.gyroflow.xyz/app/technical-details/gcsv-format>.
 
 use super::orientation::Orientation;
-
 use super::rates::Rates;
 use crate::trajectory::error::PoseError;
 use crate::trajectory::text;

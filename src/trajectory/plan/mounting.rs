@@ -1,7 +1,6 @@
 //! How the camera sits on the carrier.
 
 use crate::trajectory::pose::Pose;
-
 use crate::trajectory::so3;
 use nalgebra::Vector3;
 

@@ -1,7 +1,6 @@
 //! Where the carrier stands.
 
 use crate::trajectory::pose::Pose;
-
 use crate::trajectory::so3;
 use nalgebra::Vector3;
 
