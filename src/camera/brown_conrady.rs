@@ -1,6 +1,6 @@
 //! Lens distortion after Brown and Conrady.
 
-use super::monotone::{end_of_rise, invert};
+use super::monotone::{invert_monotone, monotone_limit};
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -36,13 +36,13 @@ pub struct BrownConrady {
 }
 
 /// Directions in which a lens with tangential distortion is looked at for its limit.
-const DIRECTIONS: usize = 72;
+const LIMIT_DIRECTIONS: usize = 72;
 /// Radius up to which it is looked at: 89.4° off the axis.
-const WIDEST: f64 = 100.0;
+const MAX_RADIUS: f64 = 100.0;
 /// Steps of the inverse.
-const STEPS: usize = 50;
+const MAX_NEWTON_ITERATIONS: usize = 50;
 /// Residual of the inverse, of rays with z = 1.
-const EXACT: f64 = 1e-14;
+const RESIDUAL_TOLERANCE: f64 = 1e-14;
 
 impl BrownConrady {
     /// The lens with these coefficients, its limit found.
@@ -58,7 +58,7 @@ impl BrownConrady {
         let directions = if coefficients.p == [0.0; 2] {
             1
         } else {
-            DIRECTIONS
+            LIMIT_DIRECTIONS
         };
         let rises = |k: usize| {
             let (sin, cos) = (TAU * k as f64 / directions as f64).sin_cos();
@@ -73,7 +73,7 @@ impl BrownConrady {
                     -1.0
                 }
             };
-            end_of_rise(determinant, WIDEST)
+            monotone_limit(determinant, MAX_RADIUS)
         };
         lens.limit = (0..directions)
             .map(rises)
@@ -110,7 +110,7 @@ impl BrownConrady {
     }
 
     /// True for a lens without distortion and limit.
-    pub fn is_straight(&self) -> bool {
+    pub fn is_distortion_free(&self) -> bool {
         self.coefficients == BrownCoefficients::default() && self.limit == f64::INFINITY
     }
 
@@ -162,12 +162,12 @@ impl BrownConrady {
 
     /// The point that appears at `p_d`; None if none within the limit does.
     ///
-    /// The radial part has one unknown ([`invert`]). Tangential distortion is removed from there by
+    /// The radial part has one unknown ([`invert_monotone`]). Tangential distortion is removed from there by
     /// Newton's method with steps halved until they bring the picture nearer and stay within the
     /// limit.
     pub fn undistort(&self, p_d: &Vector2<f64>) -> Option<Vector2<f64>> {
         let target = p_d.norm();
-        if self.is_straight() || target == 0.0 {
+        if self.is_distortion_free() || target == 0.0 {
             return Some(*p_d);
         }
         let end = self.limit.sqrt();
@@ -176,7 +176,7 @@ impl BrownConrady {
             let (f, slope) = self.factor(q);
             (rho * f, f + 2.0 * q * slope)
         };
-        let rho = invert(radial, target, end);
+        let rho = invert_monotone(radial, target, end);
         if self.coefficients.p == [0.0; 2] {
             return rho.map(|rho| p_d * (rho / target));
         }
@@ -184,7 +184,7 @@ impl BrownConrady {
         let start = rho.unwrap_or(0.9 * end.min(target)).min(0.999 * end);
         let mut p = p_d * (start / target);
         let mut error = self.distort(&p) - p_d;
-        for _ in 0..STEPS {
+        for _ in 0..MAX_NEWTON_ITERATIONS {
             let step = self.jacobian(&p).try_inverse()? * error;
             let mut share = 1.0;
             let (next, next_error) = loop {
@@ -196,16 +196,16 @@ impl BrownConrady {
                 }
                 share *= 0.5;
                 if share < 1e-6 {
-                    let exact = error.norm() <= EXACT * (1.0 + target) * 100.0;
+                    let exact = error.norm() <= RESIDUAL_TOLERANCE * (1.0 + target) * 100.0;
                     return exact.then_some(p);
                 }
             };
             (p, error) = (next, next_error);
-            if error.norm() <= EXACT * (1.0 + target) {
+            if error.norm() <= RESIDUAL_TOLERANCE * (1.0 + target) {
                 break;
             }
         }
-        (error.norm() <= EXACT * (1.0 + target) * 100.0).then_some(p)
+        (error.norm() <= RESIDUAL_TOLERANCE * (1.0 + target) * 100.0).then_some(p)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The fisheye lens of Kannala and Brandt.
 
-use super::monotone::{end_of_rise, invert};
+use super::monotone::{invert_monotone, monotone_limit};
 use nalgebra::{Matrix2, Matrix2x3, RowVector3, Vector2, Vector3};
 use std::f64::consts::PI;
 
@@ -23,7 +23,7 @@ pub struct KannalaBrandt {
 }
 
 /// Below this share of z, the distance from the axis is too small to divide by.
-const NEAR_AXIS: f64 = 1e-9;
+const MIN_RADIAL_RATIO: f64 = 1e-9;
 
 impl KannalaBrandt {
     /// The lens with the coefficients k1 to k4, its limit found.
@@ -33,7 +33,7 @@ impl KannalaBrandt {
             max_angle_rad: PI,
             limit_rad: PI,
         };
-        lens.limit_rad = end_of_rise(|theta| lens.radius(theta).1, PI).min(PI);
+        lens.limit_rad = monotone_limit(|theta| lens.radius(theta).1, PI).min(PI);
         lens
     }
 
@@ -75,7 +75,7 @@ impl KannalaBrandt {
         if theta >= self.limit_rad || !theta.is_finite() {
             return None;
         }
-        if rho <= NEAR_AXIS * x_c.z {
+        if rho <= MIN_RADIAL_RATIO * x_c.z {
             return (x_c.z > 0.0).then(|| x_c.xy() / x_c.z);
         }
         Some(x_c.xy() * (self.radius(theta).0 / rho))
@@ -85,7 +85,7 @@ impl KannalaBrandt {
     /// `ρ = √(x² + y²)`, `∂θ/∂x_c = (z eᵀ, −ρ)/(ρ² + z²)`.
     pub fn jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
         let rho = x_c.xy().norm();
-        if rho <= NEAR_AXIS * x_c.z {
+        if rho <= MIN_RADIAL_RATIO * x_c.z {
             return Matrix2x3::identity() / x_c.z;
         }
         let e = x_c.xy() / rho;
@@ -101,7 +101,7 @@ impl KannalaBrandt {
     /// `∂p_d/∂(k1, k2) = (θ³ e, θ⁵ e)`.
     pub fn coefficient_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2<f64> {
         let rho = x_c.xy().norm();
-        if rho <= NEAR_AXIS * x_c.z {
+        if rho <= MIN_RADIAL_RATIO * x_c.z {
             return Matrix2::zeros();
         }
         let e = x_c.xy() / rho;
@@ -112,7 +112,7 @@ impl KannalaBrandt {
     /// The direction (of unit length) that appears at `p_d`; None beyond the limit.
     pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
         let radius = p_d.norm();
-        let theta = invert(|theta| self.radius(theta), radius, self.limit_rad)?;
+        let theta = invert_monotone(|theta| self.radius(theta), radius, self.limit_rad)?;
         let e = if radius > 0.0 {
             p_d / radius
         } else {

@@ -28,8 +28,8 @@ impl Lens {
     }
 
     /// True for a pinhole without distortion and limit.
-    pub fn is_straight(&self) -> bool {
-        matches!(self, Self::BrownConrady(lens) if lens.is_straight())
+    pub fn is_distortion_free(&self) -> bool {
+        matches!(self, Self::BrownConrady(lens) if lens.is_distortion_free())
     }
 
     /// Where the point `x_c` appears; None beyond what the lens shows.
@@ -40,7 +40,7 @@ impl Lens {
                     return None;
                 }
                 let p = x_c.xy() / x_c.z;
-                if lens.is_straight() {
+                if lens.is_distortion_free() {
                     return Some(p);
                 }
                 (p.norm_squared() < lens.limit()).then(|| lens.distort(&p))

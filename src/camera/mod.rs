@@ -33,5 +33,5 @@ pub use colmap::ColmapCamera;
 pub use kannala_brandt::KannalaBrandt;
 pub use lens::Lens;
 pub use projection::Camera;
-pub use single_precision::{Bend, SingleLens};
+pub use single_precision::{LensF32, ProjectF32};
 pub use sweep::Sweep;

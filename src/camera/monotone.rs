@@ -1,20 +1,20 @@
 //! Functions that rise from 0: how far they do, and their inverse.
 
 /// Steps of the inverse: bisection alone would end at rounding.
-const STEPS: usize = 80;
-/// Steps, each larger by [`GROWTH`], in which the end of the rise is looked for.
-const SCAN: usize = 1200;
-const FIRST: f64 = 1e-3;
-const GROWTH: f64 = 1.01;
+const MAX_INVERSION_ITERATIONS: usize = 80;
+/// Steps, each larger by [`SCAN_GROWTH`], in which the end of the rise is looked for.
+const MAX_SCAN_STEPS: usize = 1200;
+const SCAN_START: f64 = 1e-3;
+const SCAN_GROWTH: f64 = 1.01;
 
 /// The first place up to `end` where `slope` is no longer positive; infinity if there is none.
 ///
 /// Looked for from 0.001 on in steps of one percent, then halved to rounding: a dip narrower than a
 /// percent is not seen.
-pub fn end_of_rise(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
+pub fn monotone_limit(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
     let rises = |at: f64| slope(at) > 0.0;
-    let (mut low, mut high) = (0.0, FIRST);
-    for _ in 0..SCAN {
+    let (mut low, mut high) = (0.0, SCAN_START);
+    for _ in 0..MAX_SCAN_STEPS {
         if low >= end {
             return f64::INFINITY;
         }
@@ -30,7 +30,7 @@ pub fn end_of_rise(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
             }
             return low;
         }
-        (low, high) = (high, high * GROWTH);
+        (low, high) = (high, high * SCAN_GROWTH);
     }
     f64::INFINITY
 }
@@ -39,7 +39,7 @@ pub fn end_of_rise(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
 /// None if it does not get that far.
 ///
 /// Newton's method, kept between bounds that close in on the root.
-pub fn invert(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> Option<f64> {
+pub fn invert_monotone(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> Option<f64> {
     if target == 0.0 {
         return Some(0.0);
     }
@@ -48,7 +48,7 @@ pub fn invert(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> Option<f6
     }
     let (mut low, mut high) = (0.0, end);
     let mut x = target.min(end);
-    for _ in 0..STEPS {
+    for _ in 0..MAX_INVERSION_ITERATIONS {
         let (value, slope) = f(x);
         let error = value - target;
         if error > 0.0 {
@@ -80,11 +80,11 @@ mod tests {
     #[test]
     fn the_end_is_where_the_slope_vanishes() {
         // x − x³ rises to 1/√3.
-        let end = end_of_rise(|x| 1.0 - 3.0 * x * x, 10.0);
+        let end = monotone_limit(|x| 1.0 - 3.0 * x * x, 10.0);
         assert!((end - 3f64.sqrt().recip()).abs() < 1e-12);
-        assert_eq!(end_of_rise(|x| 1.0 + x, 10.0), f64::INFINITY);
+        assert_eq!(monotone_limit(|x| 1.0 + x, 10.0), f64::INFINITY);
         assert_eq!(
-            end_of_rise(|x| 1.0 - 3.0 * x * x, 0.5),
+            monotone_limit(|x| 1.0 - 3.0 * x * x, 0.5),
             f64::INFINITY,
             "beyond what is asked for"
         );
@@ -96,12 +96,12 @@ mod tests {
         let end = 3f64.sqrt().recip();
         for k in 0..100 {
             let x = end * f64::from(k) / 100.0;
-            let back = invert(f, f(x).0, end).unwrap();
+            let back = invert_monotone(f, f(x).0, end).unwrap();
             assert!((back - x).abs() < 1e-8, "{x}: {back}");
         }
-        assert!(invert(f, 0.4, end).is_none());
-        assert!(invert(f, f64::NAN, end).is_none());
-        let steep = invert(|x| (x * x * x, 3.0 * x * x), 1e6, f64::INFINITY).unwrap();
+        assert!(invert_monotone(f, 0.4, end).is_none());
+        assert!(invert_monotone(f, f64::NAN, end).is_none());
+        let steep = invert_monotone(|x| (x * x * x, 3.0 * x * x), 1e6, f64::INFINITY).unwrap();
         assert!((steep - 100.0).abs() < 1e-9);
     }
 }

@@ -1,7 +1,7 @@
 //! The camera: pixels and rays.
 
 use super::lens::Lens;
-use super::sweep::LARGEST_SHARE;
+use super::sweep::MAX_SHARE;
 use super::sweep::Sweep;
 use nalgebra::{Matrix2, Matrix2x3, Matrix2x5, Vector2, Vector3};
 
@@ -33,12 +33,12 @@ pub struct Camera {
 }
 
 /// Steps that find where the lens's picture ends on the way to a border pixel.
-const HALVINGS: usize = 50;
+const MAX_BISECTION_ITERATIONS: usize = 50;
 /// Pixels along each side at which the lens is asked whether it shows them.
-const ASKED: usize = 33;
+const VISIBILITY_GRID: usize = 33;
 /// Steps that find the row of a point at the most, and the change of the share that ends them.
-const MOST_SHARES: usize = 30;
-const EXACT_SHARE: f64 = 1e-13;
+const MAX_SHARE_ITERATIONS: usize = 30;
+const SHARE_TOLERANCE: f64 = 1e-13;
 
 impl Camera {
     /// A pinhole with square pixels and its principal point in the middle, from its vertical field
@@ -58,7 +58,7 @@ impl Camera {
     }
 
     /// The same camera in motion.
-    pub fn sweeping(&self, sweep: &Sweep) -> Self {
+    pub fn with_sweep(&self, sweep: &Sweep) -> Self {
         Self {
             sweep: *sweep,
             ..*self
@@ -68,7 +68,7 @@ impl Camera {
     /// The share of the picture's time at which row `v` is read ([`Sweep`]).
     pub fn share(&self, v: f64) -> f64 {
         let height = f64::from(self.height);
-        ((v - 0.5 * (height - 1.0)) / height).clamp(-LARGEST_SHARE, LARGEST_SHARE)
+        ((v - 0.5 * (height - 1.0)) / height).clamp(-MAX_SHARE, MAX_SHARE)
     }
 
     /// A vector along the ray of a pixel, in camera coordinates (z = 1, of unit length for a
@@ -81,7 +81,7 @@ impl Camera {
         if self.sweep.is_none() {
             Some(ray)
         } else {
-            Some(self.sweep.turn(self.share(v)) * ray)
+            Some(self.sweep.rotation_at(self.share(v)) * ray)
         }
     }
 
@@ -100,7 +100,7 @@ impl Camera {
         if self.sweep.is_none() {
             self.project_at(x_c)
         } else {
-            self.project_at(&self.sweep.at(x_c, self.share_of(x_c)?))
+            self.project_at(&self.sweep.point_at(x_c, self.share_of(x_c)?))
         }
     }
 
@@ -112,11 +112,11 @@ impl Camera {
     /// on the way.
     fn share_of(&self, x_c: &Vector3<f64>) -> Option<f64> {
         let mut share = 0.0;
-        for _ in 0..MOST_SHARES {
-            let next = self.share(self.project_at(&self.sweep.at(x_c, share))?.y);
+        for _ in 0..MAX_SHARE_ITERATIONS {
+            let next = self.share(self.project_at(&self.sweep.point_at(x_c, share))?.y);
             let change = next - share;
             share = next;
-            if change.abs() < EXACT_SHARE {
+            if change.abs() < SHARE_TOLERANCE {
                 break;
             }
         }
@@ -142,8 +142,8 @@ impl Camera {
             return self.jacobian_at(x_c);
         }
         let share = self.share_of(x_c).unwrap_or_default();
-        let at = self.sweep.at(x_c, share);
-        let turned = self.jacobian_at(&at) * self.sweep.turn(-share).matrix();
+        let at = self.sweep.point_at(x_c, share);
+        let turned = self.jacobian_at(&at) * self.sweep.rotation_at(-share).matrix();
         self.feedback(&at, share) * turned
     }
 
@@ -154,7 +154,7 @@ impl Camera {
 
     /// `(I − g eᵀ)⁻¹` of a point that lies at `at` in the coordinates of its own row.
     fn feedback(&self, at: &Vector3<f64>, share: f64) -> Matrix2<f64> {
-        let g = self.jacobian_at(at) * self.sweep.rate(at, share) / f64::from(self.height);
+        let g = self.jacobian_at(at) * self.sweep.point_rate(at, share) / f64::from(self.height);
         let inverse = 1.0 / (1.0 - g.y);
         Matrix2::new(1.0, g.x * inverse, 0.0, inverse)
     }
@@ -166,7 +166,7 @@ impl Camera {
             return self.intrinsics_jacobian_at(x_c);
         }
         let share = self.share_of(x_c).unwrap_or_default();
-        let at = self.sweep.at(x_c, share);
+        let at = self.sweep.point_at(x_c, share);
         self.feedback(&at, share) * self.intrinsics_jacobian_at(&at)
     }
 
@@ -185,14 +185,15 @@ impl Camera {
     }
 
     /// Share of the picture that the lens shows: 1 if it is one-to-one out to the outermost pixels.
-    pub fn shown_share(&self) -> f64 {
-        let place = |k: usize, size: u32| f64::from(size - 1) * k as f64 / (ASKED - 1) as f64;
-        let shown = (0..ASKED * ASKED).filter(|k| {
-            let (column, row) = (k % ASKED, k / ASKED);
+    pub fn visible_fraction(&self) -> f64 {
+        let place =
+            |k: usize, size: u32| f64::from(size - 1) * k as f64 / (VISIBILITY_GRID - 1) as f64;
+        let shown = (0..VISIBILITY_GRID * VISIBILITY_GRID).filter(|k| {
+            let (column, row) = (k % VISIBILITY_GRID, k / VISIBILITY_GRID);
             let (u, v) = (place(column, self.width), place(row, self.height));
             self.ray(u, v).is_some()
         });
-        shown.count() as f64 / (ASKED * ASKED) as f64
+        shown.count() as f64 / (VISIBILITY_GRID * VISIBILITY_GRID) as f64
     }
 
     /// Pixels of the image's shorter side.
@@ -201,7 +202,7 @@ impl Camera {
     }
 
     /// True if the pixel lies at least `margin` pixels inside the outermost pixel centres.
-    pub fn sees(&self, pixel: &Vector2<f64>, margin: f64) -> bool {
+    pub fn is_in_image(&self, pixel: &Vector2<f64>, margin: f64) -> bool {
         pixel.x >= margin
             && pixel.y >= margin
             && pixel.x <= f64::from(self.width - 1) - margin
@@ -227,7 +228,7 @@ impl Camera {
     }
 
     /// The same camera with `times` as many pixels along each axis.
-    pub fn finer(&self, times: u32) -> Self {
+    pub fn upsampled(&self, times: u32) -> Self {
         let scale = f64::from(times);
         Self {
             width: times * self.width,
@@ -243,7 +244,7 @@ impl Camera {
 
     /// Rays through the four corners, as far as the lens shows them, and along the optical axis:
     /// where these meet the wall tells how far a frame moves.
-    pub fn probes(&self) -> Vec<Vector3<f64>> {
+    pub fn corner_and_centre_rays(&self) -> Vec<Vector3<f64>> {
         let corners = self.border(1, 0.0).into_iter();
         corners
             .filter_map(|pixel| self.ray(pixel.x, pixel.y))
@@ -258,7 +259,7 @@ impl Camera {
 
     /// Rays through 9 × 7 pixels spread evenly over the picture, its border included, as far as the
     /// lens shows them: all of what a frame shows.
-    pub fn rays_across(&self) -> Vec<Vector3<f64>> {
+    pub fn grid_rays(&self) -> Vec<Vector3<f64>> {
         const COLUMNS: u32 = 9;
         const ROWS: u32 = 7;
         let place = |k, count, pixels| f64::from((pixels - 1) * k) / f64::from(count - 1);
@@ -300,7 +301,7 @@ impl Camera {
         }
         let centre = Vector2::new(self.cx, self.cy);
         let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..HALVINGS {
+        for _ in 0..MAX_BISECTION_ITERATIONS {
             let middle = 0.5 * (low + high);
             if shown(&(centre + (pixel - centre) * middle)) {
                 low = middle;
@@ -338,7 +339,7 @@ mod tests {
         let sweeps = sweeps();
         let moving = cameras()
             .into_iter()
-            .flat_map(move |camera| sweeps.map(|sweep| camera.sweeping(&sweep)));
+            .flat_map(move |camera| sweeps.map(|sweep| camera.with_sweep(&sweep)));
         cameras().into_iter().chain(moving)
     }
 
@@ -386,7 +387,7 @@ mod tests {
         fn rays_of_a_moving_camera_lead_back_to_their_pixels(
             lens in 0usize..4, sweep in 0usize..3, u in 0.0..639.0f64, v in 0.0..479.0f64, far in 0.5..9.0f64,
         ) {
-            let camera = cameras()[lens].sweeping(&sweeps()[sweep]);
+            let camera = cameras()[lens].with_sweep(&sweeps()[sweep]);
             let x_c = camera.origin(v) + camera.ray(u, v).unwrap() * far;
             let pixel = camera.project(&x_c).unwrap();
             prop_assert!((pixel - Vector2::new(u, v)).norm() < 1e-8, "{pixel}");
@@ -397,7 +398,7 @@ mod tests {
     #[test]
     fn rows_of_a_moving_camera_are_those_of_cameras_at_rest() {
         for (rest, sweep) in cameras().iter().zip(sweeps().iter().cycle()) {
-            let camera = rest.sweeping(sweep);
+            let camera = rest.with_sweep(sweep);
             for (u, v) in [(0.0, 0.0), (320.0, 100.0), (639.0, 479.0)] {
                 let x_c = camera.origin(v) + camera.ray(u, v).unwrap() * 2.0;
                 let share = (v - 239.5) / 480.0;
@@ -416,9 +417,9 @@ mod tests {
             lens: Lens::radial(k1, 0.0),
             ..camera()
         };
-        assert_eq!(lens(-0.1).shown_share(), 1.0);
+        assert_eq!(lens(-0.1).visible_fraction(), 1.0);
         let folding = lens(-0.4);
-        assert!((0.3..0.9).contains(&folding.shown_share()));
+        assert!((0.3..0.9).contains(&folding.visible_fraction()));
         assert!(folding.ray(0.0, 0.0).is_none());
         // 1 / (3 · 0.4) is less than 1.
         assert!(folding.project(&Vector3::new(1.0, 0.0, 1.0)).is_none());
@@ -427,7 +428,9 @@ mod tests {
             assert!(folding.ray(pixel.x, pixel.y).is_some());
             let outwards = pixel - Vector2::new(folding.cx, folding.cy);
             let beyond = pixel + outwards * 1e-6;
-            assert!(!folding.sees(&beyond, 0.0) || folding.ray(beyond.x, beyond.y).is_none());
+            assert!(
+                !folding.is_in_image(&beyond, 0.0) || folding.ray(beyond.x, beyond.y).is_none()
+            );
         }
     }
 
@@ -498,7 +501,7 @@ mod tests {
     #[test]
     fn rays_go_across_all_of_the_picture() {
         let camera = Camera::from_vertical_fov(160, 120, 1.0);
-        let rays = camera.rays_across();
+        let rays = camera.grid_rays();
         assert_eq!(rays.len(), 63);
         let corners = [(0, (0.0, 0.0)), (8, (159.0, 0.0)), (62, (159.0, 119.0))];
         for (k, (u, v)) in corners {

@@ -1,38 +1,38 @@
 //! Lenses in single precision, for loops over many points.
 //!
-//! A loop is written once over [`Bend`] and entered with the lens at hand, not the enum of all, so
+//! A loop is written once over [`ProjectF32`] and entered with the lens at hand, not the enum of all, so
 //! that the compiler makes vectors of it.
 
 use super::lens::Lens;
 use super::projection::Camera;
-use super::sweep::LARGEST_SHARE;
+use super::sweep::MAX_SHARE;
 use std::f64::consts::PI;
 
 /// A lens in a loop.
-pub trait Bend: Copy {
+pub trait ProjectF32: Copy {
     /// Where a point (camera coordinates) appears at focal length 1, and whether the lens shows it.
     /// Beyond its limit the answer is finite but means nothing.
-    fn bend(self, x: f32, y: f32, z: f32) -> (f32, f32, bool);
+    fn project_f32(self, x: f32, y: f32, z: f32) -> (f32, f32, bool);
 }
 
 /// A lens in single precision.
 #[derive(Clone, Copy, Debug)]
-pub enum SingleLens {
+pub enum LensF32 {
     /// No distortion.
-    Straight(Straight),
+    Pinhole(PinholeF32),
     /// [`crate::camera::BrownConrady`].
-    Brown(Brown),
+    BrownConrady(BrownConradyF32),
     /// [`crate::camera::KannalaBrandt`].
-    Fisheye(Fisheye),
+    KannalaBrandt(KannalaBrandtF32),
     /// The same three of a camera that moves while its rows are read.
-    RollingStraight(Rolling<Straight>),
-    /// See [`SingleLens::RollingStraight`].
-    RollingBrown(Rolling<Brown>),
-    /// See [`SingleLens::RollingStraight`].
-    RollingFisheye(Rolling<Fisheye>),
+    RollingPinhole(RollingShutter<PinholeF32>),
+    /// See [`LensF32::RollingPinhole`].
+    RollingBrownConrady(RollingShutter<BrownConradyF32>),
+    /// See [`LensF32::RollingPinhole`].
+    RollingKannalaBrandt(RollingShutter<KannalaBrandtF32>),
 }
 
-impl SingleLens {
+impl LensF32 {
     /// The lens of a camera, with its motion.
     pub fn new(camera: &Camera) -> Self {
         let lens = Self::at_rest(&camera.lens);
@@ -40,41 +40,46 @@ impl SingleLens {
             return lens;
         }
         match lens {
-            Self::Straight(lens) => Self::RollingStraight(Rolling::new(lens, camera)),
-            Self::Brown(lens) => Self::RollingBrown(Rolling::new(lens, camera)),
-            Self::Fisheye(lens) => Self::RollingFisheye(Rolling::new(lens, camera)),
+            Self::Pinhole(lens) => Self::RollingPinhole(RollingShutter::new(lens, camera)),
+            Self::BrownConrady(lens) => {
+                Self::RollingBrownConrady(RollingShutter::new(lens, camera))
+            }
+            Self::KannalaBrandt(lens) => {
+                Self::RollingKannalaBrandt(RollingShutter::new(lens, camera))
+            }
             rolling => rolling,
         }
     }
 
     fn at_rest(lens: &Lens) -> Self {
         match lens {
-            Lens::BrownConrady(lens) if lens.is_straight() => Self::Straight(Straight),
+            Lens::BrownConrady(lens) if lens.is_distortion_free() => Self::Pinhole(PinholeF32),
             Lens::BrownConrady(lens) => {
                 let coefficients = lens.coefficients();
-                Self::Brown(Brown {
+                Self::BrownConrady(BrownConradyF32 {
                     k: coefficients.k.map(|k| k as f32),
                     p: coefficients.p.map(|p| p as f32),
                     limit: lens.limit() as f32,
                 })
             }
-            Lens::KannalaBrandt(lens) => {
-                Self::Fisheye(Fisheye::new(|theta| lens.radius(theta).0, lens.limit_rad()))
-            }
+            Lens::KannalaBrandt(lens) => Self::KannalaBrandt(KannalaBrandtF32::new(
+                |theta| lens.radius(theta).0,
+                lens.limit_rad(),
+            )),
         }
     }
 }
 
-impl Bend for SingleLens {
+impl ProjectF32 for LensF32 {
     #[inline(always)]
-    fn bend(self, x: f32, y: f32, z: f32) -> (f32, f32, bool) {
+    fn project_f32(self, x: f32, y: f32, z: f32) -> (f32, f32, bool) {
         match self {
-            Self::Straight(lens) => lens.bend(x, y, z),
-            Self::Brown(lens) => lens.bend(x, y, z),
-            Self::Fisheye(lens) => lens.bend(x, y, z),
-            Self::RollingStraight(lens) => lens.bend(x, y, z),
-            Self::RollingBrown(lens) => lens.bend(x, y, z),
-            Self::RollingFisheye(lens) => lens.bend(x, y, z),
+            Self::Pinhole(lens) => lens.project_f32(x, y, z),
+            Self::BrownConrady(lens) => lens.project_f32(x, y, z),
+            Self::KannalaBrandt(lens) => lens.project_f32(x, y, z),
+            Self::RollingPinhole(lens) => lens.project_f32(x, y, z),
+            Self::RollingBrownConrady(lens) => lens.project_f32(x, y, z),
+            Self::RollingKannalaBrandt(lens) => lens.project_f32(x, y, z),
         }
     }
 }
@@ -86,7 +91,7 @@ impl Bend for SingleLens {
 /// px at 90 °/s over 20 ms with a focal length of 415 px. The row is found by two steps of
 /// `τ ← share(v(x_c(τ)))` and one of Aitken's, which leaves the square of what a third step would.
 #[derive(Clone, Copy, Debug)]
-pub struct Rolling<L> {
+pub struct RollingShutter<L> {
     lens: L,
     omega: [f32; 3],
     nu: [f32; 3],
@@ -95,7 +100,7 @@ pub struct Rolling<L> {
     offset: f32,
 }
 
-impl<L> Rolling<L> {
+impl<L> RollingShutter<L> {
     fn new(lens: L, camera: &Camera) -> Self {
         let height = f64::from(camera.height);
         Self {
@@ -111,8 +116,8 @@ impl<L> Rolling<L> {
     fn share(&self, q: f32) -> f32 {
         // `max` first: a NaN becomes an end.
         (self.slope * q + self.offset)
-            .max(-LARGEST_SHARE as f32)
-            .min(LARGEST_SHARE as f32)
+            .max(-MAX_SHARE as f32)
+            .min(MAX_SHARE as f32)
     }
 }
 
@@ -126,33 +131,33 @@ fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
 }
 
 /// Keeps Aitken's step from dividing by nothing in the middle row, where there is no step to take.
-const LEAST_SQUARE_SHARE: f32 = 1e-12;
+const MIN_SQUARED_SHARE: f32 = 1e-12;
 
-impl<L: Bend> Bend for Rolling<L> {
+impl<L: ProjectF32> ProjectF32 for RollingShutter<L> {
     #[inline(always)]
-    fn bend(self, x: f32, y: f32, z: f32) -> (f32, f32, bool) {
+    fn project_f32(self, x: f32, y: f32, z: f32) -> (f32, f32, bool) {
         let turned = cross(self.omega, [x, y, z]);
         let a: [f32; 3] = std::array::from_fn(|k| turned[k] + self.nu[k]);
         let b = cross(self.omega, std::array::from_fn(|k| a[k] + self.nu[k]));
         let at = |share: f32| {
             let point = |x: f32, k: usize| x + share * (0.5 * share * b[k] - a[k]);
-            self.lens.bend(point(x, 0), point(y, 1), point(z, 2))
+            self.lens.project_f32(point(x, 0), point(y, 1), point(z, 2))
         };
-        let first = self.share(self.lens.bend(x, y, z).1);
+        let first = self.share(self.lens.project_f32(x, y, z).1);
         let second = self.share(at(first).1);
         let change = second - first;
-        let slope = change * first / (first * first + LEAST_SQUARE_SHARE);
+        let slope = change * first / (first * first + MIN_SQUARED_SHARE);
         at(second + change * slope / (1.0 - slope))
     }
 }
 
 /// `(x/z, y/z)`.
 #[derive(Clone, Copy, Debug)]
-pub struct Straight;
+pub struct PinholeF32;
 
-impl Bend for Straight {
+impl ProjectF32 for PinholeF32 {
     #[inline(always)]
-    fn bend(self, x: f32, y: f32, z: f32) -> (f32, f32, bool) {
+    fn project_f32(self, x: f32, y: f32, z: f32) -> (f32, f32, bool) {
         let inverse = 1.0 / z;
         (x * inverse, y * inverse, z > 0.0)
     }
@@ -160,15 +165,15 @@ impl Bend for Straight {
 
 /// Radial and tangential distortion.
 #[derive(Clone, Copy, Debug)]
-pub struct Brown {
+pub struct BrownConradyF32 {
     k: [f32; 6],
     p: [f32; 2],
     limit: f32,
 }
 
-impl Bend for Brown {
+impl ProjectF32 for BrownConradyF32 {
     #[inline(always)]
-    fn bend(self, x: f32, y: f32, z: f32) -> (f32, f32, bool) {
+    fn project_f32(self, x: f32, y: f32, z: f32) -> (f32, f32, bool) {
         let [k1, k2, k3, k4, k5, k6] = self.k;
         let [p1, p2] = self.p;
         let inverse = 1.0 / z;
@@ -186,9 +191,9 @@ impl Bend for Brown {
 }
 
 /// Degree of the polynomial of a fisheye.
-const DEGREE: usize = 17;
+const POLYNOMIAL_DEGREE: usize = 17;
 /// Nearer to 180° off the axis, `θ_d/sin θ` grows beyond what a polynomial follows.
-const WIDEST_RAD: f64 = 0.75 * PI;
+const MAX_ANGLE_RAD: f64 = 0.75 * PI;
 
 /// A fisheye: `p_d = G(cos θ) (x, y)/|x_c|` with `G = θ_d/sin θ`, which is smooth in `cos θ` as far
 /// as 180°.
@@ -196,20 +201,20 @@ const WIDEST_RAD: f64 = 0.75 * PI;
 /// G is interpolated at Chebyshev's nodes over the angles that the lens shows, to about the
 /// rounding of single precision as far as 120° off the axis; beyond 135° nothing is shown.
 #[derive(Clone, Copy, Debug)]
-pub struct Fisheye {
+pub struct KannalaBrandtF32 {
     /// Coefficients of G in `t = cos θ · scale + offset`, which runs from −1 to 1; the lowest
     /// first.
-    g: [f32; DEGREE + 1],
+    g: [f32; POLYNOMIAL_DEGREE + 1],
     scale: f32,
     offset: f32,
-    least_cos: f32,
+    min_cos: f32,
 }
 
-impl Fisheye {
+impl KannalaBrandtF32 {
     /// With θ_d = `radius(θ)` up to the angle `limit_rad`.
     fn new(radius: impl Fn(f64) -> f64, limit_rad: f64) -> Self {
-        let least_cos = limit_rad.min(WIDEST_RAD).cos();
-        let (middle, half) = (0.5 * (1.0 + least_cos), 0.5 * (1.0 - least_cos));
+        let min_cos = limit_rad.min(MAX_ANGLE_RAD).cos();
+        let (middle, half) = (0.5 * (1.0 + min_cos), 0.5 * (1.0 - min_cos));
         let g = interpolate(|t| {
             let theta = (middle + half * t).min(1.0).acos();
             if theta < 1e-6 {
@@ -222,36 +227,36 @@ impl Fisheye {
             g: g.map(|c| c as f32),
             scale: (1.0 / half) as f32,
             offset: (-middle / half) as f32,
-            least_cos: least_cos as f32,
+            min_cos: min_cos as f32,
         }
     }
 }
 
-impl Bend for Fisheye {
+impl ProjectF32 for KannalaBrandtF32 {
     #[inline(always)]
-    fn bend(self, x: f32, y: f32, z: f32) -> (f32, f32, bool) {
+    fn project_f32(self, x: f32, y: f32, z: f32) -> (f32, f32, bool) {
         let inverse = 1.0 / (x * x + y * y + z * z).sqrt();
         let cos = z * inverse;
-        let t = (cos.max(self.least_cos) * self.scale + self.offset).min(1.0);
-        let mut g = self.g[DEGREE];
-        for c in self.g[..DEGREE].iter().rev() {
+        let t = (cos.max(self.min_cos) * self.scale + self.offset).min(1.0);
+        let mut g = self.g[POLYNOMIAL_DEGREE];
+        for c in self.g[..POLYNOMIAL_DEGREE].iter().rev() {
             g = g * t + c;
         }
         let stretch = g * inverse;
-        (x * stretch, y * stretch, cos > self.least_cos)
+        (x * stretch, y * stretch, cos > self.min_cos)
     }
 }
 
 /// Coefficients (the lowest first) of the polynomial that has the values of `f` at Chebyshev's
 /// nodes in [−1, 1].
-fn interpolate(f: impl Fn(f64) -> f64) -> [f64; DEGREE + 1] {
-    let count = DEGREE + 1;
+fn interpolate(f: impl Fn(f64) -> f64) -> [f64; POLYNOMIAL_DEGREE + 1] {
+    let count = POLYNOMIAL_DEGREE + 1;
     let angle = |j: usize| PI * (j as f64 + 0.5) / count as f64;
     let values: Vec<f64> = (0..count).map(|j| f(angle(j).cos())).collect();
     // T_0 and T_1, and from there T_k = 2 t T_{k−1} − T_{k−2}.
-    let mut before = [0.0; DEGREE + 1];
-    let mut now = [0.0; DEGREE + 1];
-    let mut sum = [0.0; DEGREE + 1];
+    let mut before = [0.0; POLYNOMIAL_DEGREE + 1];
+    let mut now = [0.0; POLYNOMIAL_DEGREE + 1];
+    let mut sum = [0.0; POLYNOMIAL_DEGREE + 1];
     now[0] = 1.0;
     for k in 0..count {
         let projected: f64 = (values.iter().enumerate())
@@ -263,7 +268,7 @@ fn interpolate(f: impl Fn(f64) -> f64) -> [f64; DEGREE + 1] {
         }
         let mut next = before.map(|b: f64| -b);
         let twice = if k == 0 { 1.0 } else { 2.0 };
-        for place in 0..DEGREE {
+        for place in 0..POLYNOMIAL_DEGREE {
             next[place + 1] += twice * now[place];
         }
         if k == 0 {
@@ -286,7 +291,7 @@ mod tests {
         let mut seen = 0;
         for x_c in directions {
             let (x, y, z) = (x_c.x as f32, x_c.y as f32, x_c.z as f32);
-            let (p, q, shown) = SingleLens::at_rest(lens).bend(x, y, z);
+            let (p, q, shown) = LensF32::at_rest(lens).project_f32(x, y, z);
             let exact = lens.project(&Vector3::new(f64::from(x), f64::from(y), f64::from(z)));
             assert_eq!(shown, exact.is_some(), "{lens:?} {x_c}");
             if let Some(exact) = exact {
@@ -348,7 +353,7 @@ mod tests {
                     },
                     ..Camera::from_vertical_fov(640, 480, 60f64.to_radians())
                 };
-                let single = SingleLens::new(&camera);
+                let single = LensF32::new(&camera);
                 for (u, v) in [
                     (0.0, 0.0),
                     (639.0, 10.0),
@@ -358,7 +363,8 @@ mod tests {
                 ] {
                     let far = 1.0 + f64::from(k % 5);
                     let x_c = camera.origin(v) + camera.ray(u, v).unwrap() * far;
-                    let (p, q, shown) = single.bend(x_c.x as f32, x_c.y as f32, x_c.z as f32);
+                    let (p, q, shown) =
+                        single.project_f32(x_c.x as f32, x_c.y as f32, x_c.z as f32);
                     let (du, dv) = (
                         camera.fx * f64::from(p) + camera.cx - u,
                         camera.fy * f64::from(q) + camera.cy - v,
@@ -372,6 +378,6 @@ mod tests {
     #[test]
     fn a_camera_at_rest_has_the_lens_itself() {
         let camera = Camera::from_vertical_fov(640, 480, 1.0);
-        assert!(matches!(SingleLens::new(&camera), SingleLens::Straight(_)));
+        assert!(matches!(LensF32::new(&camera), LensF32::Pinhole(_)));
     }
 }

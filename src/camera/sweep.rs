@@ -26,7 +26,7 @@ pub struct Sweep {
 
 /// The largest share: rows farther than half a picture's height beyond its border are taken as if
 /// they were read there.
-pub(super) const LARGEST_SHARE: f64 = 1.0;
+pub(super) const MAX_SHARE: f64 = 1.0;
 
 impl Sweep {
     /// True for a global shutter, or a camera that stands still.
@@ -35,7 +35,7 @@ impl Sweep {
     }
 
     /// The motion during `factor` times the time.
-    pub fn times(&self, factor: f64) -> Self {
+    pub fn scaled(&self, factor: f64) -> Self {
         Self {
             omega_rad: self.omega_rad * factor,
             nu_m: self.nu_m * factor,
@@ -43,18 +43,18 @@ impl Sweep {
     }
 
     /// `Exp(ω τ)`: from the coordinates of the row read at the share τ to the middle row's.
-    pub(super) fn turn(&self, share: f64) -> Rotation3<f64> {
+    pub(super) fn rotation_at(&self, share: f64) -> Rotation3<f64> {
         Rotation3::new(self.omega_rad * share)
     }
 
     /// `x_c(τ)`.
-    pub(super) fn at(&self, x_c: &Vector3<f64>, share: f64) -> Vector3<f64> {
-        self.turn(-share) * (x_c - self.nu_m * share)
+    pub(super) fn point_at(&self, x_c: &Vector3<f64>, share: f64) -> Vector3<f64> {
+        self.rotation_at(-share) * (x_c - self.nu_m * share)
     }
 
     /// `∂x_c(τ)/∂τ = −ω × x_c(τ) − Exp(−ω τ) ν` of a point that lies at `at` in the row's
     /// coordinates.
-    pub(super) fn rate(&self, at: &Vector3<f64>, share: f64) -> Vector3<f64> {
-        -self.omega_rad.cross(at) - self.turn(-share) * self.nu_m
+    pub(super) fn point_rate(&self, at: &Vector3<f64>, share: f64) -> Vector3<f64> {
+        -self.omega_rad.cross(at) - self.rotation_at(-share) * self.nu_m
     }
 }

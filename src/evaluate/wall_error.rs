@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 
 /// Distances on the unrolled wall between where the estimated and the true pose put a pixel.
 ///
-/// Over 9 × 7 pixels a frame ([`Camera::rays_across`]). The mean `Δs` and the mean `Δh` over all
+/// Over 9 × 7 pixels a frame ([`Camera::grid_rays`]). The mean `Δs` and the mean `Δh` over all
 /// pixels of all frames are removed as far as the tunnel's [gauge](crate::surface::Gauge) leaves
 /// them free: no picture fixes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -130,7 +130,7 @@ pub(super) fn frame_offsets(
     };
     let (mut delta_s_m, mut delta_h_m) = (Vec::new(), Vec::new());
     // What the lens does not show has no place on the wall.
-    for ray in camera.rays_across() {
+    for ray in camera.grid_rays() {
         let here: WallPoint = hit(estimate, "estimated", &ray)?.wall;
         let there: WallPoint = hit(truth, "true", &ray)?.wall;
         delta_s_m.push(here.s_m - there.s_m);

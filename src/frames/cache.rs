@@ -3,7 +3,7 @@
 use super::error::FrameError;
 use super::frame_file::FrameFile;
 use super::frame_set::FrameSet;
-use super::mask::HalvedMask;
+use super::mask::PyramidMask;
 use super::pyramid::Pyramid;
 use super::shading::Shading;
 use super::stored_frame::StoredFrame;
@@ -13,10 +13,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 /// Part of the memory that is for pyramids where not all of them fit; the rest holds frames as they
 /// are stored.
-const PYRAMIDS: f64 = 0.25;
+const PYRAMID_MEMORY_FRACTION: f64 = 0.25;
 /// Bytes of a pyramid per pixel: four, a third of it more for the smaller levels, and the contrast
 /// of one of those.
-const PYRAMID_BYTES: f64 = 6.0;
+const PYRAMID_BYTES_PER_PIXEL: f64 = 6.0;
 
 /// The grey pyramids of a survey's frames: decoded when first asked for, kept while there is room.
 ///
@@ -34,8 +34,8 @@ pub struct FrameCache {
     shading: RwLock<Option<Arc<Shading>>>,
     /// Pyramids that there is room for.
     room: usize,
-    shelf: Mutex<Shelf>,
-    stored: Mutex<Store>,
+    shelf: Mutex<RecentPyramids>,
+    stored: Mutex<StoredFrames>,
 }
 
 #[derive(Debug)]
@@ -46,14 +46,14 @@ enum Source {
 
 /// The pyramids used last.
 #[derive(Debug, Default)]
-struct Shelf {
+struct RecentPyramids {
     kept: HashMap<usize, (u64, Arc<Pyramid>)>,
     clock: u64,
 }
 
 /// Frames as they are stored.
 #[derive(Debug, Default)]
-struct Store {
+struct StoredFrames {
     kept: HashMap<usize, Arc<StoredFrame>>,
     /// Bytes left.
     room: usize,
@@ -64,13 +64,14 @@ impl FrameCache {
     /// memory (but always room for one).
     pub fn new(frames: &FrameSet, camera: &Camera, levels: usize, bytes: usize) -> Self {
         let pixels = f64::from(camera.width) * f64::from(camera.height);
-        let pyramids = |share: f64| (share * bytes as f64 / (PYRAMID_BYTES * pixels)) as usize;
+        let pyramids =
+            |share: f64| (share * bytes as f64 / (PYRAMID_BYTES_PER_PIXEL * pixels)) as usize;
         let (room, stored) = if pyramids(1.0) >= frames.len() {
             (frames.len(), 0)
         } else {
             (
-                pyramids(PYRAMIDS),
-                ((1.0 - PYRAMIDS) * bytes as f64) as usize,
+                pyramids(PYRAMID_MEMORY_FRACTION),
+                ((1.0 - PYRAMID_MEMORY_FRACTION) * bytes as f64) as usize,
             )
         };
         Self {
@@ -79,7 +80,7 @@ impl FrameCache {
             shading: RwLock::default(),
             room: room.max(1),
             shelf: Mutex::default(),
-            stored: Mutex::new(Store {
+            stored: Mutex::new(StoredFrames {
                 kept: HashMap::new(),
                 room: stored,
             }),
@@ -109,18 +110,18 @@ impl FrameCache {
 
     /// Which pixels show the wall in the pictures that `camera`, at any level, takes; all of them
     /// if there is no mask.
-    pub fn mask(&self, camera: &Camera) -> Option<HalvedMask> {
+    pub fn mask(&self, camera: &Camera) -> Option<PyramidMask> {
         match &self.source {
             Source::Files(frames, _) => {
                 let mask = Arc::clone(frames.mask()?);
-                Some(HalvedMask::for_camera(mask, camera))
+                Some(PyramidMask::for_camera(mask, camera))
             }
             Source::Memory(_) => None,
         }
     }
 
     /// Pyramids that may be held at once.
-    pub fn room(&self) -> usize {
+    pub fn pyramid_capacity(&self) -> usize {
         self.room
     }
 

@@ -70,7 +70,7 @@ impl FrameFile {
 ///
 /// # Errors
 /// A malformed pattern, an unreadable folder, no match.
-pub fn list(
+pub fn list_frames(
     folder: &Path,
     pattern: &str,
     mask: Option<&Path>,

@@ -5,13 +5,13 @@ use super::grey::GreyImage;
 use super::noise::MAD_TO_SIGMA;
 
 /// Half width of the widest sensible window, as a share of the picture's shorter side.
-const REACH: f64 = 1.0 / 8.0;
+const WINDOW_FRACTION: f64 = 1.0 / 8.0;
 /// Share of the picture's own spread that is added to the local one: flat places stay flat.
-const LEAST_SPREAD: f32 = 0.3;
+const MIN_SPREAD_FRACTION: f32 = 0.3;
 
 /// Half width of the window for comparing whole pictures: an eighth of the shorter side, pixels.
 pub fn wide_window(image: &GreyImage) -> usize {
-    ((REACH * image.width().min(image.height()) as f64).round() as usize).max(2)
+    ((WINDOW_FRACTION * image.width().min(image.height()) as f64).round() as usize).max(2)
 }
 
 /// What of a picture is local.
@@ -27,7 +27,7 @@ pub struct LocalContrast {
 
 /// Detail beyond this many times its median size (as a Gaussian's σ) is cut: glints and things that
 /// are not wall would outweigh a faint wall otherwise.
-const MOST_DETAIL: f32 = 1.5;
+const MAX_DETAIL_SIGMAS: f32 = 1.5;
 
 /// Detail and contrast with mean and variance over a square window of `2 reach + 1` pixels around
 /// each pixel.
@@ -36,11 +36,11 @@ const MOST_DETAIL: f32 = 1.5;
 /// without a value stay without one and do not count.
 pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
     let w = image.width();
-    let values = without_extremes(image, reach, MOST_DETAIL);
+    let values = clip_detail(image, reach, MAX_DETAIL_SIGMAS);
     let windows = Windows::new(&values, w, reach);
     let moments: Vec<Moments> = windows.moments().collect();
     let overall = moments.iter().map(|m| m.variance).sum::<f32>() / moments.len().max(1) as f32;
-    let floor = LEAST_SPREAD * LEAST_SPREAD * overall + 1e-6;
+    let floor = MIN_SPREAD_FRACTION * MIN_SPREAD_FRACTION * overall + 1e-6;
     let picture = |value: &dyn Fn(f32, &Moments) -> f32| {
         let data = values.iter().zip(&moments).map(|(v, m)| value(*v, m));
         GreyImage::new(w, image.height(), data.collect())
@@ -54,7 +54,7 @@ pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
 
 /// The pixels with their detail, over windows of `2 reach + 1` pixels, cut at `most` times its
 /// median size (as a Gaussian's σ).
-fn without_extremes(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
+fn clip_detail(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
     let mut values = image.data().to_vec();
     let (means, sigma) = detail(image, reach);
     for (value, mean) in values.iter_mut().zip(&means) {
@@ -86,22 +86,22 @@ fn detail(image: &GreyImage, reach: usize) -> (Vec<f32>, f32) {
 /// A picture without its extremes: what stands out of its surroundings by more than a few times
 /// what is usual in the picture is cut down to that. On a coarser level glints and things before
 /// the wall would blend into it, and no robust loss could tell them apart any more.
-pub fn subdued(image: &GreyImage) -> GreyImage {
-    let values = without_extremes(image, wide_window(image), MOST_EXTREME);
+pub fn clip_outliers(image: &GreyImage) -> GreyImage {
+    let values = clip_detail(image, wide_window(image), MAX_CLIPPED_SIGMAS);
     GreyImage::new(image.width(), image.height(), values)
 }
 
-/// Detail that [`subdued`] leaves, in σ of the usual.
-const MOST_EXTREME: f32 = 3.0;
+/// Detail that [`clip_outliers`] leaves, in σ of the usual.
+const MAX_CLIPPED_SIGMAS: f32 = 3.0;
 
 /// A picture of the usual alone: what stands out of its surroundings, as wet patches and glints do,
 /// has no value.
-pub fn usual(image: &GreyImage) -> GreyImage {
+pub fn mask_outliers(image: &GreyImage) -> GreyImage {
     // Against surroundings without extremes, lest these draw the mean to them.
-    let (means, sigma) = detail(&subdued(image), wide_window(image));
+    let (means, sigma) = detail(&clip_outliers(image), wide_window(image));
     let pixels = image.data().iter().zip(&means);
     let values = pixels.map(|(value, mean)| {
-        if (value - mean).abs() > MOST_USUAL * sigma {
+        if (value - mean).abs() > MAX_KEPT_SIGMAS * sigma {
             f32::NAN
         } else {
             *value
@@ -110,8 +110,8 @@ pub fn usual(image: &GreyImage) -> GreyImage {
     GreyImage::new(image.width(), image.height(), values.collect())
 }
 
-/// Detail that is usual, in its σ: less than [`subdued`] cuts to.
-const MOST_USUAL: f32 = 2.5;
+/// Detail that is usual, in its σ: less than [`clip_outliers`] cuts to.
+const MAX_KEPT_SIGMAS: f32 = 2.5;
 
 /// Mean and variance of the values in a window.
 struct Moments {
@@ -216,7 +216,7 @@ mod tests {
             (x, y) if wet(x, y) => 60.0,
             (x, y) => 100.0 + 2.0 * texture(x, y),
         };
-        let left = usual(&GreyImage::new(200, 160, (0..32000).map(value).collect()));
+        let left = mask_outliers(&GreyImage::new(200, 160, (0..32000).map(value).collect()));
         for (k, value) in left.data().iter().enumerate() {
             assert_eq!(value.is_nan(), wet(k % 200, k / 200), "{k}");
         }

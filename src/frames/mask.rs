@@ -9,11 +9,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Grey level (of 255) from which a pixel of the picture shows the wall.
-const WALL: u8 = 128;
+const MIN_WALL_GREY: u8 = 128;
 /// Grey levels (of 255) between these are neither black nor white, ...
-const GREY: std::ops::Range<u8> = 32..224;
+const UNDECIDED_GREY: std::ops::Range<u8> = 32..224;
 /// ... and with more than this share of them the picture is no mask.
-const MOST_GREY: f64 = 0.1;
+const MAX_UNDECIDED_FRACTION: f64 = 0.1;
 
 /// What every frame hides of the wall, at the frames' full size.
 ///
@@ -66,20 +66,27 @@ impl Mask {
                     .to_owned(),
             ));
         }
-        let coloured = |rgb: [u8; 3]| rgb.iter().any(|c| c.abs_diff(rgb[0]) > GREY.start);
+        let coloured = |rgb: [u8; 3]| {
+            rgb.iter()
+                .any(|c| c.abs_diff(rgb[0]) > UNDECIDED_GREY.start)
+        };
         let colour = picture.to_rgb8();
         let grey = picture.to_luma8();
         let pixels = colour.pixels().zip(grey.pixels());
-        let odd = pixels.filter(|(rgb, grey)| coloured(rgb.0) || GREY.contains(&grey.0[0]));
+        let odd =
+            pixels.filter(|(rgb, grey)| coloured(rgb.0) || UNDECIDED_GREY.contains(&grey.0[0]));
         let share = odd.count() as f64 / grey.len() as f64;
-        if share > MOST_GREY {
+        if share > MAX_UNDECIDED_FRACTION {
             return Err(fail(format!(
                 "{:.0} % of its pixels are neither black nor white; a mask is black where the frames never show the wall and white \
                  elsewhere",
                 100.0 * share
             )));
         }
-        let wall: Vec<bool> = grey.pixels().map(|grey| grey.0[0] >= WALL).collect();
+        let wall: Vec<bool> = grey
+            .pixels()
+            .map(|grey| grey.0[0] >= MIN_WALL_GREY)
+            .collect();
         if !wall.contains(&true) {
             return Err(fail(
                 "is black all over, so that no pixel would show the wall; black is what does not, and white the wall: invert it"
@@ -152,7 +159,7 @@ impl Mask {
     }
 
     /// Share of the picture that does not show the wall.
-    pub fn share(&self) -> f64 {
+    pub fn masked_fraction(&self) -> f64 {
         self.hidden as f64 / self.distance_px.len().max(1) as f64
     }
 
@@ -179,14 +186,14 @@ impl Mask {
 
 /// A [`Mask`] for pictures that were halved.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct HalvedMask {
+pub struct PyramidMask {
     mask: Arc<Mask>,
     level: u32,
 }
 
-impl HalvedMask {
+impl PyramidMask {
     /// For pictures of full size.
-    pub fn of(mask: Arc<Mask>) -> Self {
+    pub fn new(mask: Arc<Mask>) -> Self {
         Self { mask, level: 0 }
     }
 
@@ -220,7 +227,7 @@ impl HalvedMask {
     }
 
     /// True if the halved picture's pixel is free of full-size pixels that do not show the wall.
-    pub fn shows(&self, u: usize, v: usize) -> bool {
+    pub fn is_wall(&self, u: usize, v: usize) -> bool {
         self.is_clear(u as f32, v as f32, 0.0)
     }
 }
@@ -242,9 +249,9 @@ mod tests {
             .collect();
         let mask = Arc::new(Mask::new(width, height, &wall));
         let hidden = wall.iter().filter(|w| !**w).count();
-        assert_eq!(mask.share(), hidden as f64 / 1200.0);
+        assert_eq!(mask.masked_fraction(), hidden as f64 / 1200.0);
         for level in 0..3 {
-            let halved = HalvedMask::of(Arc::clone(&mask)).halved(level);
+            let halved = PyramidMask::new(Arc::clone(&mask)).halved(level);
             let edge = 1usize << level;
             // All full-size pixels of the halved ones within a reach.
             let all_wall = |u: f32, v: f32, reach: f32| {
@@ -261,7 +268,7 @@ mod tests {
                 }
             }
             for (k, wall) in wall.iter().enumerate().filter(|_| level == 0) {
-                assert_eq!(halved.shows(k % width, k / width), *wall);
+                assert_eq!(halved.is_wall(k % width, k / width), *wall);
             }
         }
     }
@@ -284,12 +291,14 @@ mod tests {
         };
         let half = |u: u32| if u < 8 { 0 } else { 255 };
         let good = GrayImage::from_fn(32, 24, |u, _| Luma([half(u)]));
-        assert_eq!(read(good.into()).unwrap().share(), 0.25);
+        assert_eq!(read(good.into()).unwrap().masked_fraction(), 0.25);
         let colour = RgbImage::from_fn(32, 24, |u, _| Rgb([half(u); 3]));
-        assert_eq!(read(colour.into()).unwrap().share(), 0.25);
+        assert_eq!(read(colour.into()).unwrap().masked_fraction(), 0.25);
         let sixteen = image::ImageBuffer::from_fn(32, 24, |u, _| Luma([257 * u16::from(half(u))]));
         assert_eq!(
-            read(DynamicImage::ImageLuma16(sixteen)).unwrap().share(),
+            read(DynamicImage::ImageLuma16(sixteen))
+                .unwrap()
+                .masked_fraction(),
             0.25
         );
         let bad: [(DynamicImage, &str); 5] = [

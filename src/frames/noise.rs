@@ -5,7 +5,7 @@ use super::grey::GreyImage;
 /// A Gaussian's standard deviation over the median of its distances from the middle.
 pub(crate) const MAD_TO_SIGMA: f64 = 1.4826;
 /// Every how many rows and columns the noise is looked at.
-const STRIDE: usize = 3;
+const SAMPLING_STRIDE: usize = 3;
 
 /// 1-σ of a picture's noise, grey levels: the median of `|M ∗ I|` with the mask
 /// `M = [1 −2 1; −2 4 −2; 1 −2 1]`, which no plane and no straight edge along an axis excites;
@@ -16,8 +16,8 @@ const STRIDE: usize = 3;
 pub fn noise_sigma(image: &GreyImage) -> Option<f64> {
     let (w, h) = (image.width(), image.height());
     let mut found = Vec::new();
-    for y in (1..h.saturating_sub(1)).step_by(STRIDE) {
-        for x in (1..w.saturating_sub(1)).step_by(STRIDE) {
+    for y in (1..h.saturating_sub(1)).step_by(SAMPLING_STRIDE) {
+        for x in (1..w.saturating_sub(1)).step_by(SAMPLING_STRIDE) {
             let row = |y: usize| image.at(x - 1, y) - 2.0 * image.at(x, y) + image.at(x + 1, y);
             let response = (row(y - 1) - 2.0 * row(y) + row(y + 1)).abs();
             if !response.is_nan() {

@@ -1,11 +1,11 @@
 //! The image pyramid of a frame.
 
 use super::grey::GreyImage;
-use super::local_contrast::{LocalContrast, local_contrast, subdued, wide_window};
+use super::local_contrast::{LocalContrast, clip_outliers, local_contrast, wide_window};
 use std::sync::{Arc, OnceLock};
 
 /// A frame at full size (level 0) and halved again and again, from level 1 on without its extremes
-/// ([`crate::frames::local_contrast::subdued`]).
+/// ([`crate::frames::local_contrast::clip_outliers`]).
 #[derive(Clone, Debug)]
 pub struct Pyramid {
     full: GreyImage,
@@ -32,7 +32,9 @@ impl Pyramid {
     pub fn level(&self, level: usize) -> &GreyImage {
         match level.checked_sub(1) {
             None => &self.full,
-            Some(finer) => self.halved[finer].get_or_init(|| subdued(&self.level(finer).halved())),
+            Some(finer) => {
+                self.halved[finer].get_or_init(|| clip_outliers(&self.level(finer).halved()))
+            }
         }
     }
 

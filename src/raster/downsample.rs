@@ -1,12 +1,12 @@
 //! Overviews: 2 × 2 pixels become one.
 
-use super::spec::{EDGE, RasterSpec, Reduce, SampleType};
-use crate::numerics::simd_dispatch::wide;
+use super::spec::{RasterSpec, Reduce, SampleType, TILE_EDGE_PX};
+use crate::numerics::simd_dispatch::dispatch_simd;
 
 /// Columns and rows of a reduced tile.
-pub(super) const HALF: usize = EDGE / 2;
+pub(super) const HALF_EDGE_PX: usize = TILE_EDGE_PX / 2;
 
-/// A tile reduced to [`HALF`] × [`HALF`] pixels; `extent` are its columns and rows within the
+/// A tile reduced to [`HALF_EDGE_PX`] × [`HALF_EDGE_PX`] pixels; `extent` are its columns and rows within the
 /// picture, and what lies beyond counts for nothing and becomes 0.
 pub(super) fn reduce(spec: &RasterSpec, pixels: &[u8], extent: [usize; 2]) -> Vec<u8> {
     match spec.samples {
@@ -128,15 +128,15 @@ fn of_pixel<S: Sample, const N: usize>(
     let read = |pixel: &[u8]| -> [S; N] {
         std::array::from_fn(|k| S::read(&pixel[k * S::BYTES..][..S::BYTES]))
     };
-    let mut reduced = vec![0; HALF * HALF * bytes];
-    let two_rows = pixels.chunks_exact(2 * EDGE * bytes);
+    let mut reduced = vec![0; HALF_EDGE_PX * HALF_EDGE_PX * bytes];
+    let two_rows = pixels.chunks_exact(2 * TILE_EDGE_PX * bytes);
     for (y, (rows, out)) in two_rows
-        .zip(reduced.chunks_exact_mut(HALF * bytes))
+        .zip(reduced.chunks_exact_mut(HALF_EDGE_PX * bytes))
         .take(height.div_ceil(2))
         .enumerate()
     {
-        let (upper, lower) = rows.split_at(EDGE * bytes);
-        let all = width == EDGE && 2 * y + 1 < height;
+        let (upper, lower) = rows.split_at(TILE_EDGE_PX * bytes);
+        let all = width == TILE_EDGE_PX && 2 * y + 1 < height;
         if all
             && spec.alpha
             && spec.reduce == Reduce::Mean
@@ -192,7 +192,7 @@ fn of_pixel<S: Sample, const N: usize>(
 /// Whether pixels of `N` bytes are all there, by their alpha.
 pub(super) fn is_full<const N: usize>(pixels: &[[u8; N]]) -> bool {
     let mut least = u8::MAX;
-    wide(
+    dispatch_simd(
         #[inline(always)]
         || {
             for pixel in pixels {
@@ -208,7 +208,7 @@ fn means<const N: usize>(upper: &[u8], lower: &[u8], out: &mut [u8]) {
     let (upper, _) = upper.as_chunks::<N>().0.as_chunks::<2>();
     let (lower, _) = lower.as_chunks::<N>().0.as_chunks::<2>();
     let (out, _) = out.as_chunks_mut::<N>();
-    wide(
+    dispatch_simd(
         #[inline(always)]
         || {
             for (([a, b], [c, d]), out) in upper.iter().zip(lower).zip(out.iter_mut()) {
@@ -249,7 +249,7 @@ mod tests {
         let mut pixels = vec![0; spec.tile_bytes()];
         for (i, pixel) in four.iter().enumerate() {
             for (k, sample) in pixel.iter().enumerate() {
-                let place = (i / 2 * EDGE + i % 2) * bytes + k * T::BYTES;
+                let place = (i / 2 * TILE_EDGE_PX + i % 2) * bytes + k * T::BYTES;
                 sample.write(&mut pixels[place..][..T::BYTES]);
             }
         }

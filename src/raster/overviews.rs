@@ -1,8 +1,8 @@
 //! Overviews on the way: a tile of one is complete once all tiles under it have arrived.
 
-use super::downsample::{HALF, reduce};
+use super::downsample::{HALF_EDGE_PX, reduce};
 use super::error::RasterError;
-use super::spec::{EDGE, RasterSpec, RasterTile};
+use super::spec::{RasterSpec, RasterTile, TILE_EDGE_PX};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
@@ -18,7 +18,7 @@ pub(crate) struct LevelTile {
 
 /// The overviews of a picture that is arriving.
 #[derive(Debug)]
-pub(crate) struct Pyramid {
+pub(crate) struct OverviewBuilder {
     spec: RasterSpec,
     levels: usize,
     waiting: Waiting,
@@ -41,7 +41,7 @@ struct Pending {
     pixels: Vec<u8>,
 }
 
-impl Pyramid {
+impl OverviewBuilder {
     /// A pyramid of `levels` levels, full resolution included.
     pub(crate) fn new(spec: RasterSpec, levels: usize) -> Result<Self, RasterError> {
         spec.check()?;
@@ -125,12 +125,14 @@ impl Pyramid {
                 pixels: vec![0; spec.tile_bytes()],
             });
             let bytes = spec.pixel_bytes();
-            let corner = (tile.row as usize % 2 * EDGE + tile.column as usize % 2) * HALF * bytes;
+            let corner = (tile.row as usize % 2 * TILE_EDGE_PX + tile.column as usize % 2)
+                * HALF_EDGE_PX
+                * bytes;
             for (from, to) in quarter
-                .chunks_exact(HALF * bytes)
-                .zip(above.pixels[corner..].chunks_mut(EDGE * bytes))
+                .chunks_exact(HALF_EDGE_PX * bytes)
+                .zip(above.pixels[corner..].chunks_mut(TILE_EDGE_PX * bytes))
             {
-                to[..HALF * bytes].copy_from_slice(from);
+                to[..HALF_EDGE_PX * bytes].copy_from_slice(from);
             }
             above.missing -= 1;
             if above.missing == 0
@@ -162,7 +164,7 @@ mod tests {
     fn every_tile_of_every_level_is_complete_once() {
         let spec = grey_alpha(1300, 2100);
         let levels = spec.levels_to(1);
-        let mut pyramid = Pyramid::new(spec, levels).unwrap();
+        let mut pyramid = OverviewBuilder::new(spec, levels).unwrap();
         let mut seen = Vec::new();
         for tile in tiles(&spec).into_iter().rev() {
             for done in pyramid.add(vec![tile]).unwrap() {
@@ -182,7 +184,7 @@ mod tests {
         use crate::raster::spec::TileOrder;
         let spec = grey_alpha(2500, 1600);
         for order in [TileOrder::Rows, TileOrder::Columns] {
-            let mut pyramid = Pyramid::new(spec, spec.levels_to_one_tile()).unwrap();
+            let mut pyramid = OverviewBuilder::new(spec, spec.levels_to_one_tile()).unwrap();
             let mut all = tiles(&spec);
             if order == TileOrder::Columns {
                 all.sort_by_key(|tile| (tile.column, tile.row));
@@ -201,7 +203,7 @@ mod tests {
     #[test]
     fn a_tile_from_elsewhere_or_seen_before_is_refused() {
         let spec = grey_alpha(600, 100);
-        let mut pyramid = Pyramid::new(spec, 2).unwrap();
+        let mut pyramid = OverviewBuilder::new(spec, 2).unwrap();
         let all = tiles(&spec);
         pyramid.add(vec![all[0].clone()]).unwrap();
         let short = RasterTile {

@@ -105,7 +105,7 @@ pub fn alignments(
                 let look = |k: usize| Look {
                     scene,
                     level,
-                    camera: camera.sweeping(&tracked.sweep(scene, k)),
+                    camera: camera.with_sweep(&tracked.sweep(scene, k)),
                     picture: &pictures[&k],
                     pose: &tracked.estimates[k].pose,
                 };
@@ -198,7 +198,7 @@ impl Template {
         for row in 0..lattice.rows {
             for column in 0..lattice.columns {
                 let wall = lattice.wall(row * lattice.columns + column);
-                if scene.ignored.hold(&wall) {
+                if scene.ignored.contains(&wall) {
                     continue;
                 }
                 let frame = scene.surface.frame(wall);

@@ -21,7 +21,7 @@ use super::grid::{TilePoints, WallGrid};
 use super::tile::slope_squares;
 use super::view::View;
 use super::visibility::{Tile, Visibility};
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::surface::Surface;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -66,7 +66,7 @@ fn squares(
                 return [0.0; 2];
             };
             let view = &views[nearest.frame as usize];
-            let squares = wide(
+            let squares = dispatch_simd(
                 #[inline(always)]
                 || slope_squares(&points, view, nearest.shade),
             );

@@ -226,7 +226,7 @@ fn compare(
     let seen: Vec<([f32; 3], (f32, f32, f32))> = points
         .iter()
         .enumerate()
-        .filter(|(k, _)| !scene.ignored.hold(&lattice.wall(*k)))
+        .filter(|(k, _)| !scene.ignored.contains(&lattice.wall(*k)))
         .filter_map(|(_, x_w)| {
             let offset = x_w - origin;
             let point = [offset.x as f32, offset.y as f32, offset.z as f32];

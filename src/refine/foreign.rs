@@ -20,7 +20,7 @@ use super::robust::{NoiseModel, median_and_sigma};
 use super::tile::{Misfit, TileWork};
 use super::view::View;
 use super::visibility::{Tile, Visibility};
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::surface::Surface;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -135,7 +135,7 @@ impl Foreign {
             for tile in tiles {
                 let points = TilePoints::new(&self.grid, surface, tile.id, &mut scratch);
                 let observers = visibility.observers(tile);
-                wide(
+                dispatch_simd(
                     #[inline(always)]
                     || work.misfit(&points, observers.iter().map(|o| o.seen(views)), noise),
                 );

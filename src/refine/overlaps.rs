@@ -60,7 +60,7 @@ impl Overlaps {
                 if !(run.contains(&k) && doubt.is_none()) {
                     Ok(None)
                 } else {
-                    let camera = camera.sweeping(&tracked.sweep(scene, k));
+                    let camera = camera.with_sweep(&tracked.sweep(scene, k));
                     footprint(scene, &camera, k, &estimate.pose).map(Some)
                 }
             })

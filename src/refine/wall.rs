@@ -5,7 +5,9 @@ use super::problem::{ProblemError, Scene};
 use super::sampler::{Sampler, Spot};
 use super::visibility::reach_m;
 use crate::camera::{Camera, Sweep};
-use crate::frames::{GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level, usual};
+use crate::frames::{
+    GreyImage, LocalContrast, Pyramid, local_contrast, mask_outliers, noise_at_level,
+};
 use crate::surface::{Footprint, WallPoint, viewing_distance};
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
@@ -107,7 +109,7 @@ impl Portrait {
     ) -> Result<Self, ProblemError> {
         let picture = scene.frames.get(frame)?;
         Ok(Self {
-            camera: scene.camera.at_level(level).sweeping(sweep),
+            camera: scene.camera.at_level(level).with_sweep(sweep),
             local: picture.contrast(level),
             level,
             picture,
@@ -133,10 +135,10 @@ impl Portrait {
         let local = if all {
             local_contrast(image, window)
         } else {
-            local_contrast(&usual(image), window)
+            local_contrast(&mask_outliers(image), window)
         };
         Ok(Self {
-            camera: scene.camera.at_level(level).sweeping(sweep),
+            camera: scene.camera.at_level(level).with_sweep(sweep),
             local: Arc::new(local),
             level,
             picture,
@@ -383,7 +385,7 @@ impl FusedWall {
             .enumerate()
             .map(|(k, point)| {
                 let (mut sum, mut seen) = ([0.0f32; 3], 0.0f32);
-                if scene.ignored.hold(&lattice.wall(k)) {
+                if scene.ignored.contains(&lattice.wall(k)) {
                     return [f32::NAN; 3];
                 }
                 for (sight, gaze, inverse_gain, bias) in &gazes {

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 /// Rays along each edge of a frame. The box of the curved outline is short by the sagitta of one
 /// step: about 0.01 px for a 640 px wide frame.
-const STEPS_PER_EDGE: usize = 64;
+const SAMPLES_PER_EDGE: usize = 64;
 
 /// Steps from the middle of a frame to its first corner, to follow `s` without losing a turn.
-const STEPS_TO_CORNER: usize = 16;
+const SAMPLES_TO_CORNER: usize = 16;
 
 /// The shortest way around: `Δs − P round(Δs / P)`, in `[−P/2, P/2]` metres.
 pub fn shortest_arc(delta_s_m: f64, perimeter_m: f64) -> f64 {
@@ -56,7 +56,7 @@ impl Footprint {
             let start = pose.to_world(&camera.origin(pixel.y));
             surface.hit(&start, &(pose.r_wc * ray)).map(|hit| hit.wall)
         };
-        let border = camera.border(STEPS_PER_EDGE, 0.0);
+        let border = camera.border(SAMPLES_PER_EDGE, 0.0);
         let middle = 0.5 * Vector2::new(f64::from(camera.width - 1), f64::from(camera.height - 1));
         // `s` near the point before, so that no turn is lost on the way to the corner and around.
         let follow = |s_m: f64, before_m: f64| before_m + shortest_arc(s_m - before_m, perimeter_m);
@@ -65,8 +65,8 @@ impl Footprint {
             other => other,
         };
         let mut s_m = wall(&middle).map_err(inward)?.s_m;
-        for step in 1..STEPS_TO_CORNER {
-            let pixel = middle + (border[0] - middle) * (step as f64 / STEPS_TO_CORNER as f64);
+        for step in 1..SAMPLES_TO_CORNER {
+            let pixel = middle + (border[0] - middle) * (step as f64 / SAMPLES_TO_CORNER as f64);
             s_m = follow(wall(&pixel).map_err(inward)?.s_m, s_m);
         }
         s_m = follow(wall(&border[0])?.s_m, s_m);
@@ -140,7 +140,7 @@ impl Footprint {
     /// The box with so much more on every side that it holds all that the frame sees and `pixel_m`
     /// around it, metres: the box comes from single rays, and 2 % of its size cover what bulges
     /// between them.
-    pub fn widened_to_be_sure(&self, pixel_m: f64) -> Self {
+    pub fn widened_conservatively(&self, pixel_m: f64) -> Self {
         let span_m = (self.s_max_m - self.s_min_m).max(self.h_max_m - self.h_min_m);
         self.widened(pixel_m + 0.02 * span_m)
     }

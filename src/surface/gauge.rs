@@ -68,7 +68,7 @@ impl Gauge {
     }
 
     /// How many freedoms there are.
-    pub fn freedoms(&self) -> usize {
+    pub fn degrees_of_freedom(&self) -> usize {
         usize::from(self.turn) + usize::from(self.shift)
     }
 

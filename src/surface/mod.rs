@@ -31,7 +31,7 @@ mod swept;
 mod wall;
 mod wall_regions;
 
-pub use centreline::{CentrePoint, Centreline, Station};
+pub use centreline::{CentrePoint, Centreline, CentrelineFrame};
 pub use circle::Circle;
 pub use displacement::{lens_jacobian, wall_jacobian};
 pub use error::SurfaceError;
@@ -42,4 +42,4 @@ pub use prism::Prism;
 pub use shape::{Surface, viewing_distance};
 pub use swept::Swept;
 pub use wall::{Hit, WallFrame, WallPoint};
-pub use wall_regions::Patches;
+pub use wall_regions::WallRegions;

@@ -1,6 +1,6 @@
 //! A curved tunnel: a section carried along a centreline.
 
-use super::centreline::{Centreline, Station};
+use super::centreline::{Centreline, CentrelineFrame};
 use super::error::SurfaceError;
 use super::gauge::{Axis, Gauge};
 use super::section::Section;
@@ -23,13 +23,13 @@ pub struct Swept {
 
 /// Steps of a ray over the distance from the axis to the wall, where it has not come close to the
 /// wall.
-const STEP: f64 = 0.25;
+const RAY_STEP: f64 = 0.25;
 /// A ray that has met no wall after so many is taken to run along the tunnel.
-const STEPS: usize = 4000;
+const MAX_RAY_STEPS: usize = 4000;
 /// A motion moves the wall along itself if it moves it off itself by no more than this share.
-const SAME: f64 = 1e-4;
+const GAUGE_TOLERANCE: f64 = 1e-4;
 /// Sections that are looked at, and points of each, to find such motions.
-const LOOKED_AT: (usize, usize) = (60, 24);
+const GAUGE_SAMPLES: (usize, usize) = (60, 24);
 
 impl Swept {
     /// The tunnel of a section along a line.
@@ -39,7 +39,7 @@ impl Swept {
             line,
             gauge: Gauge::default(),
         };
-        swept.gauge = swept.found_gauge();
+        swept.gauge = swept.find_gauge();
         swept
     }
 
@@ -49,12 +49,12 @@ impl Swept {
     }
 
     /// A point in the section's frame at a station, of the nominal size: x and z of `Qᵀ(p − c)/g`.
-    fn local(at: &Station, point: &Vector3<f64>) -> Vector2<f64> {
+    fn local(at: &CentrelineFrame, point: &Vector3<f64>) -> Vector2<f64> {
         let arm = at.frame.inverse_transform_vector(&(point - at.point)) / at.scale;
         Vector2::new(arm.x, arm.z)
     }
 
-    fn frame_at(&self, at: &Station, s_m: f64) -> WallFrame {
+    fn frame_at(&self, at: &CentrelineFrame, s_m: f64) -> WallFrame {
         let outline = self.section.at(s_m);
         let arm = Vector3::new(outline.point.x, 0.0, outline.point.y);
         let tangent = Vector3::new(outline.tangent.x, 0.0, outline.tangent.y);
@@ -67,7 +67,7 @@ impl Swept {
     }
 
     /// The unknowns of `X(s, h) = t + λ d` by Newton's method from close by; None if they run away.
-    fn settled(
+    fn intersect_newton(
         &self,
         t: &Vector3<f64>,
         d: &Vector3<f64>,
@@ -104,11 +104,11 @@ impl Swept {
     ///
     /// With `a = (X × n, n)`, metres in multiples of the tunnel's size, they are the null vectors
     /// of `Σ a aᵀ`.
-    fn found_gauge(&self) -> Gauge {
+    fn find_gauge(&self) -> Gauge {
         let length_m = self.line.length_m();
         let middle = self.line.at(0.5 * length_m).point;
         let unit_m = (0.5 * length_m).max(self.section.farthest_m());
-        let (sections, points) = LOOKED_AT;
+        let (sections, points) = GAUGE_SAMPLES;
         let mut normal = Matrix6::zeros();
         for k in 0..sections {
             let at = self.line.at((k as f64 + 0.5) / sections as f64 * length_m);
@@ -123,7 +123,7 @@ impl Swept {
         }
         let eigen = SymmetricEigen::new(normal / (sections * points) as f64);
         let free: Vec<Vector6<f64>> = (0..6)
-            .filter(|k| eigen.eigenvalues[*k] < SAME * SAME)
+            .filter(|k| eigen.eigenvalues[*k] < GAUGE_TOLERANCE * GAUGE_TOLERANCE)
             .map(|k| eigen.eigenvectors.column(k).into_owned())
             .collect();
         // As rotation (radians) and velocity (metres) of the world about its origin.
@@ -137,7 +137,7 @@ impl Swept {
             [twist] => {
                 let (omega, velocity) = screw(twist);
                 let rate = omega.norm();
-                if rate * unit_m < SAME {
+                if rate * unit_m < GAUGE_TOLERANCE {
                     return Gauge {
                         axis: Axis {
                             point: middle,
@@ -181,12 +181,12 @@ impl Surface for Swept {
         if speed <= 0.0 {
             return Err(SurfaceError::Parallel);
         }
-        let most = STEP * self.section.farthest_m() / speed;
+        let most = RAY_STEP * self.section.farthest_m() / speed;
         let mut range = 0.0;
         let mut h_m = self.chainage_m(t);
-        for _ in 0..STEPS {
+        for _ in 0..MAX_RAY_STEPS {
             let point = t + d * range;
-            h_m = self.line.refined(&point, h_m);
+            h_m = self.line.refine_chainage_m(&point, h_m);
             let at = self.line.at(h_m);
             let (local, ray) = (
                 Self::local(&at, &point),
@@ -203,7 +203,7 @@ impl Surface for Swept {
                     let wall = WallPoint { s_m, h_m };
                     if !inside {
                         return self
-                            .settled(t, d, wall, range)
+                            .intersect_newton(t, d, wall, range)
                             .ok_or(SurfaceError::Parallel);
                     }
                     range += most * at.scale;
@@ -215,7 +215,7 @@ impl Surface for Swept {
                     s_m: straight.s_m,
                     h_m: h_m + straight.range * ray.y * at.scale / at.velocity.norm(),
                 };
-                if let Some(hit) = self.settled(t, d, wall, range + straight.range) {
+                if let Some(hit) = self.intersect_newton(t, d, wall, range + straight.range) {
                     return Ok(hit);
                 }
             }

@@ -7,12 +7,12 @@ use std::f64::consts::TAU;
 
 /// Some parts of the wall, each between two angles and two chainages.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Patches {
+pub struct WallRegions {
     boxes: Vec<Footprint>,
     perimeter_m: f64,
 }
 
-impl Patches {
+impl WallRegions {
     /// No part of the wall.
     pub const NONE: Self = Self {
         boxes: Vec::new(),
@@ -45,14 +45,14 @@ impl Patches {
     }
 
     /// True if some of the wall in `area` belongs to them.
-    pub fn meet(&self, area: &Footprint) -> bool {
+    pub fn intersects(&self, area: &Footprint) -> bool {
         let mut boxes = self.boxes.iter();
         boxes.any(|patch| patch.overlaps(area, self.perimeter_m))
     }
 
     /// True if a point belongs to them.
-    pub fn hold(&self, point: &WallPoint) -> bool {
-        self.meet(&Footprint {
+    pub fn contains(&self, point: &WallPoint) -> bool {
+        self.intersects(&Footprint {
             s_min_m: point.s_m,
             s_max_m: point.s_m,
             h_min_m: point.h_m,
@@ -70,10 +70,10 @@ mod tests {
     fn angles_go_on_through_zero_and_what_is_left_out_goes_all_the_way() {
         let circle = Circle::new(2.0).unwrap();
         let hold = |theta_deg: Option<[f64; 2]>, chainage_m, at: [f64; 2]| {
-            let mut patches = Patches::default();
+            let mut patches = WallRegions::default();
             let theta_rad = theta_deg.map(|theta| theta.map(f64::to_radians));
             patches.add(&circle, theta_rad, chainage_m);
-            patches.hold(&WallPoint {
+            patches.contains(&WallPoint {
                 s_m: 2.0 * at[0].to_radians(),
                 h_m: at[1],
             })
@@ -100,6 +100,6 @@ mod tests {
                 "{theta_deg:?} {chainage_m:?} {at:?}"
             );
         }
-        assert!(!Patches::NONE.hold(&WallPoint { s_m: 1.0, h_m: 1.0 }));
+        assert!(!WallRegions::NONE.contains(&WallPoint { s_m: 1.0, h_m: 1.0 }));
     }
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// The frames that a section names.
-pub(super) struct Listing {
+pub(super) struct FrameList {
     /// The frames, sorted by name or time.
     pub frames: Vec<FrameFile>,
     /// Their times, seconds, where a file or a video tells them.
@@ -17,7 +17,7 @@ pub(super) struct Listing {
     pub video: Option<Arc<Video>>,
 }
 
-impl Listing {
+impl FrameList {
     /// Finds the frames that the section of the survey at `toml_path` names, relative to its
     /// `folder`. `frame_times`: a file of their times, instead of the survey's. A mask that lies
     /// among the frames is none of them.
@@ -46,7 +46,7 @@ impl Listing {
             (Some(pattern), None, None) => {
                 let mask = section.mask.as_ref().map(|mask| folder.join(mask));
                 Self {
-                    frames: frames::list(folder, pattern, mask.as_deref())?,
+                    frames: frames::list_frames(folder, pattern, mask.as_deref())?,
                     times_s: None,
                     video: None,
                 }

@@ -92,4 +92,4 @@ pub use open::Survey;
 pub(crate) use open::toml_path;
 pub use poses_section::PosesSection;
 pub use tunnel::{Shape, TunnelSection, read_centreline};
-pub use unposed_frames::Footage;
+pub use unposed_frames::UnposedFrames;

@@ -1,6 +1,6 @@
 //! From a file of poses to one pose of the tunnel per frame.
 
-use super::associate::{Associate, ByTime, TIME_TOLERANCE_S, by_name, by_order, by_time};
+use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by_order, by_time};
 use super::error::SurveyError;
 use super::frame_times;
 use super::poses_section::PosesSection;
@@ -21,14 +21,14 @@ pub(super) struct PoseReader<'a> {
 }
 
 /// The poses of a file, one per frame.
-pub(super) struct Reading {
+pub(super) struct InterpretedPoses {
     /// As the file has them.
     pub given: Trajectory,
     /// What they mean.
     pub convention: Convention,
 }
 
-impl Reading {
+impl InterpretedPoses {
     /// The poses in the tunnel.
     pub fn trajectory(&self) -> Trajectory {
         let in_tunnel = |stamped: &StampedPose| StampedPose {
@@ -79,7 +79,7 @@ impl<'a> PoseReader<'a> {
     /// # Errors
     /// A malformed file; poses of a body without its mount; frames and poses that do not pair up;
     /// frames whose times do not increase.
-    pub fn read(&self, path: &Path) -> Result<Reading, SurveyError> {
+    pub fn read(&self, path: &Path) -> Result<InterpretedPoses, SurveyError> {
         let file = read_poses(path, self.section.format)?;
         let mut convention = Convention::of(file.format);
         convention.direction = self.section.convention.unwrap_or(convention.direction);
@@ -104,7 +104,7 @@ impl<'a> PoseReader<'a> {
             Associate::Order => by_order(&file, frames, times_s)?,
             Associate::Name => by_name(&file, frames, times_s)?,
             Associate::Time => {
-                let how = ByTime {
+                let how = TimeAssociation {
                     tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
                     interpolate: self.section.interpolate.unwrap_or(false),
                 };
@@ -130,6 +130,6 @@ impl<'a> PoseReader<'a> {
                 });
             }
         }
-        Ok(Reading { given, convention })
+        Ok(InterpretedPoses { given, convention })
     }
 }

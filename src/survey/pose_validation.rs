@@ -4,10 +4,10 @@
 //! along another direction. Where that is so, the other readings are tried, the simplest first, and
 //! the one that makes sense is named with its flag. A reading that leaves all cameras inside and
 //! looking at the wall cannot be told from a right one here: only the pictures can
-//! ([`Survey::readings`](crate::survey::Survey::readings)).
+//! ([`Survey::pose_convention_variants`](crate::survey::Survey::pose_convention_variants)).
 
 use super::error::SurveyError;
-use super::pose_reader::Reading;
+use super::pose_reader::InterpretedPoses;
 use crate::camera::Camera;
 use crate::surface::Surface;
 use crate::trajectory::{Convention, Pose, TunnelAxis, so3};
@@ -15,29 +15,29 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
 
 /// Fewer frames show no convention.
-const LEAST_FRAMES: usize = 4;
+const MIN_FRAMES: usize = 4;
 /// Share of frames that must be outside or look along the axis before another reading is looked
 /// for: single ones are wrong poses.
-const WRONG_SHARE: f64 = 0.34;
+const MAX_WRONG_FRACTION: f64 = 0.34;
 /// Share of frames that may look along the axis in a reading that makes sense: poses err.
-const RIGHT_SHARE: f64 = 0.05;
+const MAX_AXIAL_FRACTION: f64 = 0.05;
 /// Motion and turning farther than this from the axis go another way: twice the 30° to which a
 /// carrier that sways by 6° a frame and steers back ([`Jitter`](crate::trajectory::Jitter)) leans.
 /// Another axis of the world is 90° off.
-const ASKEW_RAD: f64 = std::f64::consts::FRAC_PI_3;
+const MIN_ASKEW_ANGLE_RAD: f64 = std::f64::consts::FRAC_PI_3;
 /// Motion and turning within this of the axis go along it.
-const ALONG_RAD: f64 = std::f64::consts::FRAC_PI_6;
+const MAX_ALIGNED_ANGLE_RAD: f64 = std::f64::consts::FRAC_PI_6;
 
 /// How poses stand in the tunnel.
-struct Stand {
+struct PoseSummary {
     frames: usize,
     outside: usize,
     axial: usize,
     /// Of poses in the tunnel's frame.
-    course: Course,
+    course: MotionDirections,
 }
 
-impl Stand {
+impl PoseSummary {
     fn of(surface: &dyn Surface, camera: &Camera, poses: &[Pose]) -> Self {
         let outside = |pose: &&Pose| surface.check_inside(&pose.t_wc).is_err();
         let straight: Vec<Pose> = poses
@@ -51,7 +51,7 @@ impl Stand {
                 .iter()
                 .filter(|pose| looks_along_the_axis(camera, pose))
                 .count(),
-            course: Course::of(&straight),
+            course: MotionDirections::of(&straight),
         }
     }
 
@@ -60,15 +60,15 @@ impl Stand {
     }
 
     fn is_wrong(&self) -> bool {
-        self.frames >= LEAST_FRAMES && self.share(self.outside.max(self.axial)) > WRONG_SHARE
+        self.frames >= MIN_FRAMES && self.share(self.outside.max(self.axial)) > MAX_WRONG_FRACTION
     }
 
     fn is_right(&self) -> bool {
         let along = |direction: &Option<Vector3<f64>>| {
-            direction.is_none_or(|d| d.y.abs() > ALONG_RAD.cos())
+            direction.is_none_or(|d| d.y.abs() > MAX_ALIGNED_ANGLE_RAD.cos())
         };
         self.outside == 0
-            && self.share(self.axial) <= RIGHT_SHARE
+            && self.share(self.axial) <= MAX_AXIAL_FRACTION
             && along(&self.course.motion)
             && along(&self.course.turning)
     }
@@ -77,14 +77,14 @@ impl Stand {
     fn is_suspicious(&self) -> bool {
         let askew = |direction: &Option<Vector3<f64>>| direction.is_some_and(|d| is_askew(&d));
         let (motion, turning) = (askew(&self.course.motion), askew(&self.course.turning));
-        let some_axial = self.share(self.axial) > RIGHT_SHARE;
-        self.frames >= LEAST_FRAMES
+        let some_axial = self.share(self.axial) > MAX_AXIAL_FRACTION;
+        self.frames >= MIN_FRAMES
             && ((turning && (motion || some_axial)) || (motion && !self.course.turns))
     }
 }
 
 fn is_askew(direction: &Vector3<f64>) -> bool {
-    direction.y.abs() < ASKEW_RAD.cos()
+    direction.y.abs() < MIN_ASKEW_ANGLE_RAD.cos()
 }
 
 /// Whether the picture holds a vanishing point of the axis.
@@ -93,12 +93,12 @@ fn looks_along_the_axis(camera: &Camera, pose: &Pose) -> bool {
         let direction = pose.r_wc.inverse_transform_vector(along);
         camera
             .project(&direction)
-            .is_some_and(|pixel| camera.sees(&pixel, 0.0))
+            .is_some_and(|pixel| camera.is_in_image(&pixel, 0.0))
     })
 }
 
 /// The directions in which a trajectory goes, if it has any; unit vectors.
-struct Course {
+struct MotionDirections {
     /// The line along which the cameras lie, towards the last.
     motion: Option<Vector3<f64>>,
     /// Whether they turn at all.
@@ -110,16 +110,16 @@ struct Course {
 }
 
 /// Share of the spread that the line of motion must hold: five times as long as wide.
-const LINE_SHARE: f64 = 25.0 / 26.0;
+const MIN_LINE_FRACTION: f64 = 25.0 / 26.0;
 /// Share of all turning that must be about one axis.
-const TURNING_SHARE: f64 = 0.75;
+const MIN_AXIS_FRACTION: f64 = 0.75;
 /// Turning from frame to frame below this is the carrier's swaying, root mean square.
-const LEAST_TURN_RAD: f64 = 0.05;
+const MIN_ROTATION_RAD: f64 = 0.05;
 /// Motion below this, in all, is none, metres. Cameras lie inside tunnels of a larger radius in any
 /// case.
-const LEAST_MOTION_M: f64 = 1e-6;
+const MIN_MOTION_M: f64 = 1e-6;
 
-impl Course {
+impl MotionDirections {
     fn of(poses: &[Pose]) -> Self {
         let count = poses.len().max(1) as f64;
         let middle = poses.iter().map(|pose| pose.t_wc).sum::<Vector3<f64>>() / count;
@@ -136,9 +136,9 @@ impl Course {
             })
             .map(|omega| omega * omega.transpose())
             .sum::<Matrix3<f64>>();
-        let does_turn = (turns.trace() / count).sqrt() > LEAST_TURN_RAD;
-        let motion = main_direction(&spread, LINE_SHARE)
-            .filter(|_| (spread.trace() / count).sqrt() > LEAST_MOTION_M)
+        let does_turn = (turns.trace() / count).sqrt() > MIN_ROTATION_RAD;
+        let motion = main_direction(&spread, MIN_LINE_FRACTION)
+            .filter(|_| (spread.trace() / count).sqrt() > MIN_MOTION_M)
             .map(|line| match (poses.first(), poses.last()) {
                 (Some(first), Some(last)) if line.dot(&(last.t_wc - first.t_wc)) < 0.0 => -line,
                 _ => line,
@@ -146,7 +146,7 @@ impl Course {
         Self {
             motion,
             turns: does_turn,
-            turning: main_direction(&turns, TURNING_SHARE).filter(|_| does_turn),
+            turning: main_direction(&turns, MIN_AXIS_FRACTION).filter(|_| does_turn),
             middle,
         }
     }
@@ -164,20 +164,20 @@ fn main_direction(moments: &Matrix3<f64>, share: f64) -> Option<Vector3<f64>> {
 }
 
 /// Another reading of the same file.
-struct Other {
+struct ConventionChange {
     convention: Convention,
     /// What would have to be said for it, one after the other.
     flags: Vec<String>,
 }
 
-impl Other {
+impl ConventionChange {
     fn remedy(&self) -> String {
         self.flags.join(" and ")
     }
 }
 
 /// All other readings.
-fn others(reading: &Reading) -> Vec<Other> {
+fn convention_changes(reading: &InterpretedPoses) -> Vec<ConventionChange> {
     let given = reading.convention;
     let mut found = Vec::new();
     for direction in [given.direction, given.direction.other()] {
@@ -213,9 +213,9 @@ fn others(reading: &Reading) -> Vec<Other> {
                     },
                     ..given
                 };
-                found.extend(along_other_axes(reading, &convention, &flags));
+                found.extend(with_other_axes(reading, &convention, &flags));
                 if !flags.is_empty() {
-                    found.push(Other { convention, flags });
+                    found.push(ConventionChange { convention, flags });
                 }
             }
         }
@@ -224,14 +224,18 @@ fn others(reading: &Reading) -> Vec<Other> {
 }
 
 /// A reading with the tunnel's axis elsewhere.
-fn along_other_axes(reading: &Reading, convention: &Convention, flags: &[String]) -> Vec<Other> {
+fn with_other_axes(
+    reading: &InterpretedPoses,
+    convention: &Convention,
+    flags: &[String],
+) -> Vec<ConventionChange> {
     let along = |axis: TunnelAxis| {
         // The frame is that of the numbers as they are printed.
         let frame = axis.frame().ok()?;
         let json = serde_json::to_string(&axis).ok()?;
         let flag =
             format!("--tunnel-frame FILE (poses.tunnel_frame in survey.toml) with the FILE {json}");
-        Some(Other {
+        Some(ConventionChange {
             convention: Convention {
                 tunnel_in_world: Some(frame),
                 ..*convention
@@ -247,16 +251,16 @@ fn along_other_axes(reading: &Reading, convention: &Convention, flags: &[String]
 
 /// The reading that makes sense with the fewest changes, and of several the one with the shortest
 /// path: a wrong reading swings the cameras about with their errors.
-fn remedy(surface: &dyn Surface, camera: &Camera, reading: &Reading) -> Option<String> {
-    let mut best: Option<(usize, f64, Other)> = None;
-    for other in others(reading) {
+fn remedy(surface: &dyn Surface, camera: &Camera, reading: &InterpretedPoses) -> Option<String> {
+    let mut best: Option<(usize, f64, ConventionChange)> = None;
+    for other in convention_changes(reading) {
         let poses = reading.poses_in(&other.convention);
-        if !Stand::of(surface, camera, &poses).is_right() {
+        if !PoseSummary::of(surface, camera, &poses).is_right() {
             continue;
         }
         let (changes, path_m) = (other.flags.len(), path_m(&poses));
         let is_better = best.as_ref().is_none_or(|(least, shortest_m, _)| {
-            changes < *least || (changes == *least && path_m < *shortest_m * (1.0 - TIE))
+            changes < *least || (changes == *least && path_m < *shortest_m * (1.0 - PATH_TIE_RATIO))
         });
         if is_better {
             best = Some((changes, path_m, other));
@@ -266,7 +270,7 @@ fn remedy(surface: &dyn Surface, camera: &Camera, reading: &Reading) -> Option<S
 }
 
 /// Paths that differ by less than this share are equally long.
-const TIE: f64 = 1e-3;
+const PATH_TIE_RATIO: f64 = 1e-3;
 
 /// Length of the way from camera to camera, metres.
 fn path_m(poses: &[Pose]) -> f64 {
@@ -277,13 +281,13 @@ fn path_m(poses: &[Pose]) -> f64 {
 
 /// Axes that the poses of a reading might go along: those of their world, then the line of their
 /// motion, then the axis of their turning.
-fn axes_of(reading: &Reading, convention: &Convention) -> Vec<TunnelAxis> {
+fn axes_of(reading: &InterpretedPoses, convention: &Convention) -> Vec<TunnelAxis> {
     let poses: Vec<Pose> = reading
         .given
         .iter()
         .map(|stamped| convention.to_world(&stamped.pose))
         .collect();
-    let course = Course::of(&poses);
+    let course = MotionDirections::of(&poses);
     let towards = course.motion.unwrap_or(Vector3::zeros());
     let axis = |point: Vector3<f64>, direction: Vector3<f64>| {
         let direction = if direction.dot(&towards) < 0.0 {
@@ -312,37 +316,43 @@ fn axes_of(reading: &Reading, convention: &Convention) -> Vec<TunnelAxis> {
 
 /// The readings with the tunnel's axis where it is that leave all cameras inside: what only
 /// pictures can tell apart.
-pub(super) fn possible(surface: &dyn Surface, reading: &Reading) -> Vec<(Vec<String>, Convention)> {
+pub(super) fn feasible_conventions(
+    surface: &dyn Surface,
+    reading: &InterpretedPoses,
+) -> Vec<(Vec<String>, Convention)> {
     let tunnel = reading.convention.tunnel_in_world;
-    let is_inside = |other: &Other| {
+    let is_inside = |other: &ConventionChange| {
         let poses = reading.poses_in(&other.convention);
         other.convention.tunnel_in_world == tunnel
             && poses
                 .iter()
                 .all(|pose| surface.check_inside(&pose.t_wc).is_ok())
     };
-    let mut possible: Vec<Other> = others(reading).into_iter().filter(is_inside).collect();
-    possible.sort_by_key(|other| other.flags.len());
-    possible
+    let mut feasible_conventions: Vec<ConventionChange> = convention_changes(reading)
+        .into_iter()
+        .filter(is_inside)
+        .collect();
+    feasible_conventions.sort_by_key(|other| other.flags.len());
+    feasible_conventions
         .into_iter()
         .map(|other| (other.flags, other.convention))
         .collect()
 }
 
-/// Checks the poses of a file against the tunnel; returns warnings where they are possible but
+/// Checks the poses of a file against the tunnel; returns warnings where they are feasible_conventions but
 /// suspicious.
 ///
 /// # Errors
 /// A camera outside; most cameras looking along the axis, where another reading makes sense of
 /// them.
-pub(super) fn check(
+pub(super) fn validate_poses(
     surface: &dyn Surface,
     camera: &Camera,
-    reading: &Reading,
+    reading: &InterpretedPoses,
     poses: &[Pose],
     path: &Path,
 ) -> Result<Vec<String>, SurveyError> {
-    let stand = Stand::of(surface, camera, poses);
+    let stand = PoseSummary::of(surface, camera, poses);
     let remedy = || remedy(surface, camera, reading);
     let outside = poses.iter().enumerate().find_map(|(frame, pose)| {
         surface
@@ -361,7 +371,7 @@ pub(super) fn check(
                     "{} of {} cameras are; they would all be inside and look at the wall with {other}",
                     stand.outside, stand.frames
                 ),
-                None => "check radius_m and the poses' origin, units and convention (--pose-convention, --tunnel-frame)"
+                None => "validate_poses radius_m and the poses' origin, units and convention (--pose-convention, --tunnel-frame)"
                     .to_owned(),
             },
         });

@@ -2,7 +2,7 @@
 
 use super::error::SurveyError;
 use super::file::read_survey_file;
-use super::frame_list::Listing;
+use super::frame_list::FrameList;
 use super::frame_times;
 use super::open::{folder_of, toml_path};
 use crate::frames::FrameFile;
@@ -11,14 +11,14 @@ use std::path::Path;
 /// The frames of a survey, and when they were taken, before anything is known of their poses.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
-pub struct Footage {
+pub struct UnposedFrames {
     /// The frames, sorted by name.
     pub frames: Vec<FrameFile>,
     /// Their times, seconds, where a file, a video or all names tell them.
     pub times_s: Option<Vec<f64>>,
 }
 
-impl Footage {
+impl UnposedFrames {
     /// Finds the frames of the survey whose folder or `survey.toml` is `path`. `frame_times`: a
     /// file of their times, instead of the survey's.
     ///
@@ -28,9 +28,9 @@ impl Footage {
         let toml_path = toml_path(path);
         let file = read_survey_file(&toml_path)?;
         let folder = folder_of(&toml_path);
-        let Listing {
+        let FrameList {
             frames, times_s, ..
-        } = Listing::new(&file.frames, &toml_path, &folder, frame_times)?;
+        } = FrameList::new(&file.frames, &toml_path, &folder, frame_times)?;
         let times_s = times_s.or_else(|| frame_times::from_names(&frames).ok());
         Ok(Self { frames, times_s })
     }

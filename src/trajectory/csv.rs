@@ -103,7 +103,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
             .and_then(|entry| {
                 entry
                     .time_s
-                    .map_or(Ok(()), |time_s| text::after(time_s, last_s))?;
+                    .map_or(Ok(()), |time_s| text::check_increasing(time_s, last_s))?;
                 entry
                     .name
                     .as_deref()

@@ -17,7 +17,7 @@ const FORM: &str = "timestamp [ns], x, y, z, qw, qx, qy, qz";
 pub(super) fn is_line(line: &str) -> bool {
     let mut words = line.split(',');
     let time = words.next().unwrap_or_default().trim();
-    time.len() >= times::LEAST_NANOSECOND_DIGITS
+    time.len() >= times::MIN_NANOSECOND_DIGITS
         && time.bytes().all(|byte| byte.is_ascii_digit())
         && words.count() >= 7
 }
@@ -35,7 +35,7 @@ fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {
         return Err(format!("{} columns where `{FORM}` has 8", words.len()));
     }
     let time_s = times::from_nanoseconds(time)?;
-    text::after(time_s, last_s)?;
+    text::check_increasing(time_s, last_s)?;
     let mut values = [0.0; 7];
     for (value, word) in values.iter_mut().zip(pose) {
         *value = text::number(word, FORM)?;

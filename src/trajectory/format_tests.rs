@@ -214,7 +214,7 @@ fn nerfstudios_applied_transform_is_undone() {
     let mut keys = serde_json::Map::new();
     keys.insert(
         "applied_transform".to_owned(),
-        serde_json::json!(rigid::rows(&applied)),
+        serde_json::json!(rigid::to_rows(&applied)),
     );
     let text = nerfstudio::format(keys, &names(2), &moved);
     assert_restored(&trajectory, PoseFormat::Nerfstudio, &text, 1e-13);

@@ -33,14 +33,14 @@ pub struct Jitter {
 /// Share of the lateral offset, and of the tilt against the axis, that a random walk loses at each
 /// step: the carrier steers back to the axis, as any carrier that survives its tunnel does. 2 %
 /// keeps their spread below `σ / √(1 − 0.98²) ≈ 5 σ`, for any length.
-const STEERING: f64 = 0.02;
+const STEERING_RATE: f64 = 0.02;
 
 /// Turns an executed attitude back towards the planned one by a share of the tilt between their
 /// axes of the tunnel. What it has turned about the axis stays.
 fn steered(executed: &UnitQuaternion<f64>, planned: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let carried = executed * planned.inverse() * Vector3::y();
     match UnitQuaternion::rotation_between(&carried, &Vector3::y()) {
-        Some(tilt) => so3::exp(&(so3::log(&tilt) * STEERING)) * executed,
+        Some(tilt) => so3::exp(&(so3::log(&tilt) * STEERING_RATE)) * executed,
         // Upside down: every way back is as good as another.
         None => *executed,
     }
@@ -61,8 +61,8 @@ impl Jitter {
                     let increment = before.r_wc.inverse() * planned.r_wc;
                     let (omega, rho) = self.draw(rng);
                     let mut t_wc = last.t_wc + (planned.t_wc - before.t_wc) + rho;
-                    t_wc.x *= 1.0 - STEERING;
-                    t_wc.z *= 1.0 - STEERING;
+                    t_wc.x *= 1.0 - STEERING_RATE;
+                    t_wc.z *= 1.0 - STEERING_RATE;
                     let r_wc = last.r_wc * increment * so3::exp(&omega);
                     Pose::new(steered(&r_wc, &planned.r_wc), t_wc)
                 }

@@ -23,14 +23,14 @@ fn parse_line(line: &str) -> Result<PoseEntry, String> {
     Ok(PoseEntry {
         name: None,
         time_s: None,
-        pose: rigid::motion(&[[a, b, c, d], [e, f, g, h], [i, j, k, l]])?,
+        pose: rigid::from_rows(&[[a, b, c, d], [e, f, g, h], [i, j, k, l]])?,
     })
 }
 
 /// The text of a KITTI file.
 pub fn format(trajectory: &[StampedPose]) -> String {
     let line = |stamped: &StampedPose| {
-        let numbers = rigid::rows(&stamped.pose).concat();
+        let numbers = rigid::to_rows(&stamped.pose).concat();
         let words: Vec<String> = numbers.iter().map(f64::to_string).collect();
         words.join(" ") + "\n"
     };

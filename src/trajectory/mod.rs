@@ -62,7 +62,7 @@ pub use error::PoseError;
 pub use format::PoseFormat;
 pub use jitter::{Jitter, JitterModel};
 pub use mount::read_camera_in_body;
-pub use plan::{Mounting, PlanTable, Rate, Station, Steady, spiral};
+pub use plan::{Mounting, PlanTable, Rate, Station, UniformMotion, spiral};
 pub use pose::Pose;
 pub use pose_entry::PoseEntry;
 pub use pose_file::{PoseFile, read_poses};

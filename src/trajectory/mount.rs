@@ -29,7 +29,7 @@ pub fn read_camera_in_body(path: &Path) -> Result<Pose, PoseError> {
         [] => Ok(read_matrix(path, &text)?.inverse()),
         [(key, from_camera, rest)] => {
             let motion = bracketed(rest)
-                .and_then(|rows| rigid::motion(&rows))
+                .and_then(|rows| rigid::from_rows(&rows))
                 .map_err(|what| fail(format!("{key}: {what}")))?;
             Ok(match from_camera {
                 true => motion,
@@ -50,7 +50,7 @@ pub(super) fn read_matrix(path: &Path, text: &str) -> Result<Pose, PoseError> {
             .map_err(|what| PoseError::line(path, number, what))?;
         rows.push(row);
     }
-    rigid::motion(&rows).map_err(|what| PoseError::file(path, what))
+    rigid::from_rows(&rows).map_err(|what| PoseError::file(path, what))
 }
 
 /// What follows each `key:` of a YAML text.
@@ -112,7 +112,7 @@ mod tests {
         );
         let camera_in_body = read_text(&euroc).unwrap();
         assert!((camera_in_body.t_wc.y + 0.064676986768).abs() < 1e-12);
-        let rows = rigid::rows(&camera_in_body.inverse());
+        let rows = rigid::to_rows(&camera_in_body.inverse());
         let lines = rows.map(|row| row.map(|v| v.to_string()));
         let matrix = lines.each_ref().map(|row| row.join(" ")).join("\n") + "\n0 0 0 1\n";
         let kalibr = format!(

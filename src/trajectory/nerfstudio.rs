@@ -38,7 +38,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         )));
     }
     let applied = match &transforms.applied_transform {
-        Some(rows) => rigid::motion(rows)
+        Some(rows) => rigid::from_rows(rows)
             .map_err(|what| fail(format!("applied_transform: {what}")))?
             .inverse(),
         None => Pose::identity(),
@@ -49,7 +49,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         let of_frame =
             |what: String| fail(format!("frames[{index}] ({}): {what}", frame.file_path));
         names.add(&frame.file_path).map_err(of_frame)?;
-        let pose = rigid::motion(&frame.transform_matrix)
+        let pose = rigid::from_rows(&frame.transform_matrix)
             .map_err(|what| of_frame(format!("transform_matrix: {what}")))?;
         entries.push(PoseEntry {
             name: Some(frame.file_path),
@@ -67,7 +67,7 @@ pub fn format(camera: Map<String, Value>, names: &[String], trajectory: &[Stampe
         .iter()
         .zip(trajectory)
         .map(|(name, stamped)| {
-            let [a, b, c] = rigid::rows(&CameraAxes::OpenGl.turn(&stamped.pose));
+            let [a, b, c] = rigid::to_rows(&CameraAxes::OpenGl.turn(&stamped.pose));
             json!({ "file_path": name, "transform_matrix": [a, b, c, [0.0, 0.0, 0.0, 1.0]] })
         })
         .collect();

@@ -4,7 +4,7 @@ use super::pose::Pose;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 /// How far `R Rᵀ` may be from the identity, each element: numbers with three digits pass.
-const MOST_OFF: f64 = 2e-3;
+const MAX_ORTHOGONALITY_ERROR: f64 = 2e-3;
 
 /// The motion `[R t]` of three rows, or of four of which the last is `0 0 0 1`.
 ///
@@ -14,7 +14,7 @@ const MOST_OFF: f64 = 2e-3;
 /// # Errors
 /// Another size; a number that is not finite; a last row other than `0 0 0 1`; a scale, a mirror
 /// image, or anything else that R holds besides a rotation.
-pub(crate) fn motion(rows: &[[f64; 4]]) -> Result<Pose, String> {
+pub(crate) fn from_rows(rows: &[[f64; 4]]) -> Result<Pose, String> {
     let [a, b, c] = match rows {
         [a, b, c] => [a, b, c],
         [a, b, c, last] => {
@@ -41,7 +41,8 @@ pub(crate) fn motion(rows: &[[f64; 4]]) -> Result<Pose, String> {
     }
     let square = r * r.transpose();
     let scale = (square.trace() / 3.0).sqrt();
-    let is_rotation = |square: Matrix3<f64>| (square - Matrix3::identity()).amax() <= MOST_OFF;
+    let is_rotation =
+        |square: Matrix3<f64>| (square - Matrix3::identity()).amax() <= MAX_ORTHOGONALITY_ERROR;
     if !is_rotation(square) {
         return Err(if scale > 0.0 && is_rotation(square / (scale * scale)) {
             format!("its rotation is scaled by {scale:.6}; poses are rigid, in metres")
@@ -62,7 +63,7 @@ pub(crate) fn motion(rows: &[[f64; 4]]) -> Result<Pose, String> {
 }
 
 /// The rows `[R t]` of a motion.
-pub(crate) fn rows(pose: &Pose) -> [[f64; 4]; 3] {
+pub(crate) fn to_rows(pose: &Pose) -> [[f64; 4]; 3] {
     let (r, t) = (pose.r_wc.to_rotation_matrix(), &pose.t_wc);
     [0, 1, 2].map(|k| [r[(k, 0)], r[(k, 1)], r[(k, 2)], t[k]])
 }
@@ -77,7 +78,7 @@ mod tests {
         #[test]
         fn rows_and_back(x in -4.0f64..4.0, y in -4.0f64..4.0, z in -4.0f64..4.0, h in -1e4f64..1e4) {
             let pose = Pose::new(so3::exp(&Vector3::new(x, y, z)), Vector3::new(x, h, z));
-            let back = motion(&rows(&pose)).unwrap();
+            let back = from_rows(&to_rows(&pose)).unwrap();
             prop_assert_eq!(back.t_wc, pose.t_wc);
             prop_assert!(back.r_wc.angle_to(&pose.r_wc) < 1e-14);
         }
@@ -106,7 +107,7 @@ mod tests {
             (vec![row(0, f64::NAN), row(1, 1.0), row(2, 1.0)], "finite"),
             (vec![row(0, 1.0)], "1 rows"),
         ] {
-            let message = motion(&rows).unwrap_err();
+            let message = from_rows(&rows).unwrap_err();
             assert!(message.contains(expected), "{message}");
         }
     }

@@ -5,7 +5,7 @@ use super::so3;
 use nalgebra::{Matrix3, Vector3};
 
 /// Rotations between two poses beyond this have no sure shorter way, radians.
-pub const MOST_TURN_RAD: f64 = 170.0 * std::f64::consts::PI / 180.0;
+pub const MAX_ROTATION_RAD: f64 = 170.0 * std::f64::consts::PI / 180.0;
 
 /// The pose on the geodesic of SE(3) from `from` (share 0) to `to` (share 1): the one screw motion
 /// that leads from one to the other, `T(s) = T₀ Exp(s Log(T₀⁻¹ T₁))`.
@@ -14,14 +14,14 @@ pub const MOST_TURN_RAD: f64 = 170.0 * std::f64::consts::PI / 180.0;
 /// whichever rigid part of the carrier is followed (body or camera) and whether poses or their
 /// inverses are given.
 ///
-/// Returns `None` where the rotation between the two is more than [`MOST_TURN_RAD`].
+/// Returns `None` where the rotation between the two is more than [`MAX_ROTATION_RAD`].
 ///
 /// Source: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics", eqs.
 /// 172–174.
 pub fn between(from: &Pose, to: &Pose, share: f64) -> Option<Pose> {
     let step = from.inverse().after(to);
     let phi = so3::log(&step.r_wc);
-    if phi.norm() > MOST_TURN_RAD {
+    if phi.norm() > MAX_ROTATION_RAD {
         return None;
     }
     // V⁻¹ is the inverse of the left Jacobian: the right one's of −φ.

@@ -38,7 +38,7 @@ impl Shutter {
     /// `poses`.
     pub fn sweeps(&self, poses: &[Pose]) -> Vec<Sweep> {
         let pose = |k: usize| poses.get(k).copied();
-        let sweep = |k| self.rate(k, pose).times(self.readout_s);
+        let sweep = |k| self.rate(k, pose).scaled(self.readout_s);
         if self.readout_s == 0.0 {
             vec![Sweep::default(); poses.len()]
         } else {

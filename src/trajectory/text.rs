@@ -102,7 +102,7 @@ pub(crate) fn rotation([w, x, y, z]: [f64; 4], order: &str) -> Result<UnitQuater
 }
 
 /// Checks that times increase.
-pub(crate) fn after(time_s: f64, last_s: Option<f64>) -> Result<(), String> {
+pub(crate) fn check_increasing(time_s: f64, last_s: Option<f64>) -> Result<(), String> {
     match last_s {
         Some(last) if time_s == last => Err(format!(
             "duplicate timestamp {time_s}: every pose needs a time of its own"

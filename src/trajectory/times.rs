@@ -2,7 +2,7 @@
 
 /// A whole number of so many digits is nanoseconds: those since 1970 have 19 from 2001 on, and no
 /// clock counts so many seconds.
-pub(crate) const LEAST_NANOSECOND_DIGITS: usize = 16;
+pub(crate) const MIN_NANOSECOND_DIGITS: usize = 16;
 
 /// Seconds of a whole number of nanoseconds.
 ///
@@ -22,7 +22,7 @@ pub(crate) fn from_nanoseconds(word: &str) -> Result<f64, String> {
 /// seconds. `None` for what is no finite number.
 pub(crate) fn from_word(word: &str) -> Option<f64> {
     let is_whole = !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
-    if is_whole && word.len() >= LEAST_NANOSECOND_DIGITS {
+    if is_whole && word.len() >= MIN_NANOSECOND_DIGITS {
         return from_nanoseconds(word).ok();
     }
     word.parse::<f64>().ok().filter(|time_s| time_s.is_finite())
@@ -38,8 +38,7 @@ pub(crate) fn from_name(stem: &str) -> Option<f64> {
         at + stem[at..].chars().next().map_or(1, char::len_utf8)
     });
     let word = stem[begin..end].trim_start_matches('.');
-    let tells_time =
-        word.contains('.') || word.len() == 10 || word.len() >= LEAST_NANOSECOND_DIGITS;
+    let tells_time = word.contains('.') || word.len() == 10 || word.len() >= MIN_NANOSECOND_DIGITS;
     tells_time.then(|| from_word(word)).flatten()
 }
 

@@ -38,7 +38,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
 
 fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {
     let [time_s, tx, ty, tz, qx, qy, qz, qw] = text::numbers(line, FORM)?;
-    text::after(time_s, last_s)?;
+    text::check_increasing(time_s, last_s)?;
     let rotation = text::rotation([qw, qx, qy, qz], "qx qy qz qw")?;
     Ok(PoseEntry {
         name: None,

@@ -22,7 +22,7 @@ pub struct TunnelAxis {
 }
 
 /// Directions closer together than this have no plane between them, as the sine of their angle.
-const LEAST_SINE: f64 = 1e-3;
+const MIN_SINE: f64 = 1e-3;
 
 impl TunnelAxis {
     /// The tunnel's frame, `x_world = T x_tunnel`: y along the axis, z towards θ = 0, x = y × z.
@@ -49,7 +49,7 @@ impl TunnelAxis {
             None => Vector3::x(),
         };
         let z = (towards - y * towards.dot(&y))
-            .try_normalize(LEAST_SINE)
+            .try_normalize(MIN_SINE)
             .ok_or("theta_zero is the axis's own direction; it must point away from it")?;
         let r = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[y.cross(&z), y, z]));
         Ok(Pose::new(UnitQuaternion::from_rotation_matrix(&r), point))

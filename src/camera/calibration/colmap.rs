@@ -2,7 +2,7 @@
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;
-use super::selection::choose;
+use super::selection::select_camera;
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
 use crate::camera::sweep::Sweep;
@@ -26,7 +26,7 @@ pub fn read(text: &str, name: Option<&str>) -> Result<Camera, ParseError> {
             (id, (number, line))
         })
         .collect();
-    let (number, line) = choose(cameras, name)?;
+    let (number, line) = select_camera(cameras, name)?;
     camera(line).map_err(|what| ParseError::at(number, what))
 }
 
@@ -35,16 +35,17 @@ fn camera(line: &str) -> Result<Camera, String> {
     let [_, model, width, height, params @ ..] = &words[..] else {
         return Err("a camera is `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`".to_owned());
     };
-    let size = |word: &str| {
-        word.parse::<u32>()
-            .map_err(|_| format!("{word:?} is no number of pixels"))
+    let size = |text_entry: &str| {
+        text_entry
+            .parse::<u32>()
+            .map_err(|_| format!("{text_entry:?} is no number of pixels"))
     };
     let (width, height) = (size(width)?, size(height)?);
     let params: Vec<f64> = params
         .iter()
-        .map(|word| match word.parse::<f64>() {
+        .map(|text_entry| match text_entry.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(format!("{word:?} is no number")),
+            _ => Err(format!("{text_entry:?} is no number")),
         })
         .collect::<Result<_, String>>()?;
     let fail = |count: usize| {

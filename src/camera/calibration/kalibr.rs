@@ -2,8 +2,8 @@
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;
-use super::selection::choose;
-use super::value_tree::{numbers, word};
+use super::selection::select_camera;
+use super::value_tree::{numbers, text_entry};
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
 use crate::camera::sweep::Sweep;
@@ -27,8 +27,8 @@ fn cameras(tree: &Value) -> impl Iterator<Item = (String, &Value)> {
 /// Reads `camera_model: pinhole`, `intrinsics: [fx, fy, cx, cy]`, `distortion_model`,
 /// `distortion_coeffs` and `resolution`.
 pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
-    let camera = choose(cameras(tree).collect(), name)?;
-    let model = word(camera, "camera_model").unwrap_or("pinhole");
+    let camera = select_camera(cameras(tree).collect(), name)?;
+    let model = text_entry(camera, "camera_model").unwrap_or("pinhole");
     if model != "pinhole" {
         return Err(ParseError::new(format!(
             "the camera model {model:?} is not supported; calibrate with pinhole-radtan or pinhole-equi"
@@ -55,7 +55,7 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
             ));
         }
     };
-    let lens = match word(camera, "distortion_model") {
+    let lens = match text_entry(camera, "distortion_model") {
         None | Some("none") => Lens::default(),
         Some("radtan") => brown_conrady(&list("distortion_coeffs")?)?,
         Some("equidistant" | "equi") => kannala_brandt(&list("distortion_coeffs")?)?,

@@ -105,7 +105,7 @@ impl CameraFile {
         let (model, k, [p1, p2], max_angle_rad, all_rad) = match &camera.lens {
             Lens::BrownConrady(lens) => {
                 let BrownCoefficients { k, p } = *lens.coefficients();
-                let model = if lens.is_straight() {
+                let model = if lens.is_distortion_free() {
                     Model::Pinhole
                 } else {
                     Model::BrownConrady

@@ -2,8 +2,8 @@
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;
-use super::selection::choose;
-use super::value_tree::{number, pixels, word};
+use super::selection::select_camera;
+use super::value_tree::{number, pixels, text_entry};
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
 use crate::camera::sweep::Sweep;
@@ -29,7 +29,7 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
         .flatten()
         .filter(|frame| frame.get("fl_x").is_some())
         .map(|frame| {
-            let path = word(frame, "file_path").unwrap_or("?");
+            let path = text_entry(frame, "file_path").unwrap_or("?");
             (path.to_owned(), frame)
         })
         .collect();
@@ -51,7 +51,7 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
     if own.iter().all(|(_, frame)| alike(frame)) {
         return camera(first, tree);
     }
-    camera(choose(own, name)?, tree)
+    camera(select_camera(own, name)?, tree)
 }
 
 fn camera(own: &Value, tree: &Value) -> Result<Camera, ParseError> {
@@ -65,7 +65,7 @@ fn camera(own: &Value, tree: &Value) -> Result<Camera, ParseError> {
         coefficient("k3")?,
         coefficient("k4")?,
     ];
-    let model = word(own, "camera_model").or_else(|| word(tree, "camera_model"));
+    let model = text_entry(own, "camera_model").or_else(|| text_entry(tree, "camera_model"));
     let lens = match model.unwrap_or("OPENCV") {
         "OPENCV_FISHEYE" => kannala_brandt(&[k1, k2, k3, k4])?,
         "PINHOLE" | "SIMPLE_PINHOLE" => Lens::default(),

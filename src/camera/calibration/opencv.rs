@@ -2,7 +2,7 @@
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;
-use super::value_tree::{entry, numbers, pixels, word};
+use super::value_tree::{entry, numbers, pixels, text_entry};
 use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
 use crate::camera::sweep::Sweep;
@@ -70,7 +70,7 @@ pub fn read(tree: &Value) -> Result<Camera, ParseError> {
     };
     let fisheye = entry(tree, &["fisheye_model", "fisheye"])
         .is_some_and(|flag| flag.as_f64() == Some(1.0) || flag.as_bool() == Some(true));
-    let lens = match word(tree, "distortion_model") {
+    let lens = match text_entry(tree, "distortion_model") {
         _ if fisheye => kannala_brandt(&d)?,
         None | Some("plumb_bob" | "rational_polynomial" | "radtan" | "") => brown_conrady(&d)?,
         Some("equidistant" | "fisheye") => kannala_brandt(&d)?,

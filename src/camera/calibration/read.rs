@@ -6,9 +6,9 @@ use crate::camera::projection::Camera;
 use std::path::Path;
 
 /// Pixels along a side of the smallest picture.
-const SMALLEST: u32 = 16;
+const MIN_IMAGE_SIDE_PX: u32 = 16;
 /// A lens that shows less of the picture than this has other numbers than were meant.
-const LEAST_SHOWN: f64 = 0.5;
+const MIN_VISIBLE_FRACTION: f64 = 0.5;
 
 /// Reads a calibration file; which kind it is follows from its name and content (see the table in
 /// the module's documentation). `name`: which camera, where a file has several (`cam1`, a COLMAP
@@ -38,14 +38,14 @@ pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, Calib
         &extension.to_lowercase(),
         name,
     )
-    .and_then(checked)
+    .and_then(validate)
     .map_err(content)
 }
 
 fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, ParseError> {
     match extension {
         "yaml" | "yml" => {
-            let tree = value_tree::of_yaml(text)?;
+            let tree = value_tree::parse_yaml(text)?;
             if kalibr::is_camchain(&tree) {
                 kalibr::read(&tree, name)
             } else {
@@ -57,7 +57,7 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
         "xml" => Err(ParseError::new(
             "OpenCV's XML is not read; save the calibration as YAML (a name that ends in .yml)",
         )),
-        _ => match value_tree::of_json(text) {
+        _ => match value_tree::parse_json(text) {
             Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
             _ => native::read_json(text),
         },
@@ -65,10 +65,10 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
 }
 
 /// Refuses numbers that make no camera.
-fn checked(camera: Camera) -> Result<Camera, ParseError> {
-    if camera.width < SMALLEST || camera.height < SMALLEST {
+fn validate(camera: Camera) -> Result<Camera, ParseError> {
+    if camera.width < MIN_IMAGE_SIDE_PX || camera.height < MIN_IMAGE_SIDE_PX {
         return Err(ParseError::new(format!(
-            "width and height are {} × {}; they must be the frames' size in pixels, {SMALLEST} at the least",
+            "width and height are {} × {}; they must be the frames' size in pixels, {MIN_IMAGE_SIDE_PX} at the least",
             camera.width, camera.height
         )));
     }
@@ -86,8 +86,8 @@ fn checked(camera: Camera) -> Result<Camera, ParseError> {
             )));
         }
     }
-    let shown = camera.shown_share();
-    if shown < LEAST_SHOWN {
+    let shown = camera.visible_fraction();
+    if shown < MIN_VISIBLE_FRACTION {
         return Err(ParseError::new(format!(
             "the distortion folds the picture back on itself: only {:.0} % of it is shown; check its coefficients and their \
              order, and that fx and fy are in pixels",

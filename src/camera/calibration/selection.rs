@@ -3,7 +3,10 @@
 use super::error::ParseError;
 
 /// The one camera of several that is meant, of those with their names.
-pub fn choose<T>(mut cameras: Vec<(String, T)>, name: Option<&str>) -> Result<T, ParseError> {
+pub fn select_camera<T>(
+    mut cameras: Vec<(String, T)>,
+    name: Option<&str>,
+) -> Result<T, ParseError> {
     let names = || {
         let names: Vec<_> = cameras.iter().map(|(name, _)| name.as_str()).collect();
         names.join(", ")

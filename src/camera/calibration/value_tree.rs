@@ -5,7 +5,7 @@ use serde_json::Value;
 
 /// A YAML file. OpenCV's own begin with `%YAML:1.0`, which YAML does not allow, and mark matrices
 /// with a tag that nobody else knows; both are left out.
-pub fn of_yaml(text: &str) -> Result<Value, ParseError> {
+pub fn parse_yaml(text: &str) -> Result<Value, ParseError> {
     let lines = text.lines().map(|line| {
         let line = if line.starts_with("%YAML") { "" } else { line };
         line.replace("!!opencv-matrix", "")
@@ -28,7 +28,7 @@ pub fn of_yaml(text: &str) -> Result<Value, ParseError> {
 }
 
 /// A JSON file.
-pub fn of_json(text: &str) -> Result<Value, ParseError> {
+pub fn parse_json(text: &str) -> Result<Value, ParseError> {
     serde_json::from_str(text).map_err(|error| ParseError::at(error.line(), error.to_string()))
 }
 
@@ -78,6 +78,6 @@ pub fn numbers(value: &Value, name: &str) -> Result<Vec<f64>, ParseError> {
 }
 
 /// The entry as text.
-pub fn word<'a>(tree: &'a Value, name: &str) -> Option<&'a str> {
+pub fn text_entry<'a>(tree: &'a Value, name: &str) -> Option<&'a str> {
     tree.get(name).and_then(Value::as_str)
 }

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
 /// Lines of what `ffmpeg` complains about that are told.
-const TOLD: usize = 2;
+const MAX_REPORTED_LINES: usize = 2;
 
 /// A running `ffmpeg` that has still to deliver picture `next` and those after it.
 #[derive(Debug)]
@@ -119,7 +119,7 @@ impl Decoder {
             .take()
             .and_then(|listener| listener.join().ok());
         let complaints = complaints.unwrap_or_default();
-        let said = match complaints.len().saturating_sub(TOLD) {
+        let said = match complaints.len().saturating_sub(MAX_REPORTED_LINES) {
             _ if complaints.is_empty() => String::new(),
             from => format!(" ({})", complaints[from..].join("; ")),
         };

@@ -39,7 +39,7 @@ struct SideData {
 }
 
 /// What `ffprobe` calls files that end too early.
-const CUT_OFF: [&str; 3] = ["prematurely", "partial file", "truncat"];
+const TRUNCATION_WORDS: [&str; 3] = ["prematurely", "partial file", "truncat"];
 
 /// Looks into the video at `path`.
 ///
@@ -80,7 +80,7 @@ pub fn probe(path: &Path) -> Result<VideoInfo, String> {
         };
         return Err(format!("{why}; {remedy}"));
     }
-    if CUT_OFF.iter().any(|sign| said.contains(sign)) {
+    if TRUNCATION_WORDS.iter().any(|sign| said.contains(sign)) {
         return Err(format!(
             "the video is cut off ({}): copy it anew, or keep what there is with ffmpeg -i {} -c copy whole.mkv",
             complaint.unwrap_or_default(),

@@ -9,7 +9,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 /// Pictures that are rather decoded on the way than jumped over.
-const NEAR: usize = 48;
+const MAX_SKIPPED_PICTURES: usize = 48;
 
 /// A video whose pictures are decoded on demand.
 ///
@@ -107,7 +107,8 @@ impl Video {
             .filter(|(_, next)| *next <= picture)
             .max_by_key(|(_, next)| *next)?;
         let between = &self.info.moments[next..=picture];
-        let near = between.len() <= NEAR || !between.iter().any(|moment| moment.key);
+        let near =
+            between.len() <= MAX_SKIPPED_PICTURES || !between.iter().any(|moment| moment.key);
         near.then(|| idle.remove(at))
     }
 

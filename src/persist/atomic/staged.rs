@@ -4,7 +4,7 @@ use super::durable;
 use super::error::WriteError;
 use super::file::create_folder;
 use super::parent::parent_folder;
-use super::temporary::{self, ASIDE, TemporaryFolder};
+use super::temporary::{self, REPLACED_NAME, TemporaryFolder};
 use std::path::{Path, PathBuf};
 
 /// A folder that is being filled under another name beside its final one.
@@ -39,7 +39,7 @@ impl StagedFolder {
     ///
     /// # Errors
     /// As [`StagedFolder::begin`].
-    pub fn kept(target: &Path, folder: &Path) -> Result<Self, WriteError> {
+    pub fn adopt(target: &Path, folder: &Path) -> Result<Self, WriteError> {
         check_replaceable(target)?;
         Ok(Self {
             folder: folder.to_owned(),
@@ -75,12 +75,13 @@ impl StagedFolder {
         let mut old = None;
         if self.target.exists() {
             let aside = temporary::folder_in(parent_folder(&self.target)).map_err(fail)?;
-            std::fs::rename(&self.target, aside.folder.path().join(ASIDE)).map_err(fail)?;
+            std::fs::rename(&self.target, aside.folder.path().join(REPLACED_NAME)).map_err(fail)?;
             old = Some(aside);
         }
         if let Err(error) = std::fs::rename(&self.folder, &self.target) {
             if let Some(aside) = &old {
-                std::fs::rename(aside.folder.path().join(ASIDE), &self.target).map_err(fail)?;
+                std::fs::rename(aside.folder.path().join(REPLACED_NAME), &self.target)
+                    .map_err(fail)?;
             }
             return Err(fail(error));
         }
@@ -92,7 +93,7 @@ impl StagedFolder {
         if let Some(aside) = old {
             let aside = aside.folder.path();
             // From now on it may be tidied away.
-            std::fs::rename(aside.join(ASIDE), aside.join("replaced")).map_err(fail)?;
+            std::fs::rename(aside.join(REPLACED_NAME), aside.join("replaced")).map_err(fail)?;
         }
         Ok(())
     }

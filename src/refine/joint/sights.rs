@@ -3,7 +3,7 @@
 use crate::refine::grid::{TILE, TileId, WallGrid};
 use crate::refine::visibility::Visibility;
 use crate::super_resolve::Region;
-use crate::surface::Patches;
+use crate::surface::WallRegions;
 use std::ops::Range;
 
 /// Who sees what of the tiles of a region.
@@ -34,7 +34,7 @@ impl Sights {
     /// not compared: otherwise frames would be drawn to where the wall is known better, away from
     /// the borders of what they show of it.
     pub fn new(
-        ignored: &Patches,
+        ignored: &WallRegions,
         grid: &WallGrid,
         visibility: &Visibility,
         block: &Range<usize>,
@@ -45,7 +45,7 @@ impl Sights {
         let compared = sights.all.clone();
         for tile in sights.tiles() {
             let id = around(grid, tile);
-            if visibility.tile(id).is_none() && ignored.meet(&grid.area(id)) {
+            if visibility.tile(id).is_none() && ignored.intersects(&grid.area(id)) {
                 continue;
             }
             for (n, frame) in frames.iter().enumerate() {
@@ -184,7 +184,14 @@ mod tests {
         let sights_of = |visibility: &Visibility, block: &Range<usize>| {
             let region = region_of(&grid, &visibility.tiles[block.clone()]);
             let frames = visibility.frames(block);
-            Sights::new(&Patches::NONE, &grid, visibility, block, &frames, &region)
+            Sights::new(
+                &WallRegions::NONE,
+                &grid,
+                visibility,
+                block,
+                &frames,
+                &region,
+            )
         };
         let (mut partly, mut compared) = (0, 0);
         for block in &all.blocks {

@@ -2,7 +2,7 @@
 
 use super::{FrameShare, Problem};
 use crate::camera::Camera;
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::refine::estimate::{FrameStep, UNKNOWNS};
 use crate::refine::grid::TilePoints;
 use crate::refine::lens::LensSums;
@@ -88,7 +88,7 @@ impl Problem<'_> {
         } else {
             for tile in tiles {
                 let points = points_of(tile, &mut scratch);
-                wide(
+                dispatch_simd(
                     #[inline(always)]
                     || {
                         let seen = visibility.observers(tile).iter().map(|o| o.seen(views));
@@ -98,7 +98,7 @@ impl Problem<'_> {
                 add(tile, &points, &work.found);
             }
         }
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 for tile in &summed {

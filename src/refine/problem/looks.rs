@@ -2,7 +2,7 @@
 
 use super::{Members, Problem, ProblemError, Sampling};
 use crate::frames::noise_at_level;
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::refine::denoise::TextureSpectrum;
 use crate::refine::foreign::Foreign;
 use crate::refine::grid::{BLOCK, TilePoints};
@@ -36,7 +36,7 @@ impl Problem<'_> {
         let counted = self.at_tiles(
             SCALE_TILES,
             |(histogram, spectrum): &mut (NoiseHistogram, TextureSpectrum), look| {
-                wide(
+                dispatch_simd(
                     #[inline(always)]
                     || {
                         look.work
@@ -181,7 +181,7 @@ impl Problem<'_> {
     /// Nothing found yet, and what misfit is usual.
     fn no_foreign(&self) -> Result<Foreign, ProblemError> {
         let found = self.at_tiles(SCALE_TILES, |misfits: &mut Vec<Misfit>, look| {
-            wide(
+            dispatch_simd(
                 #[inline(always)]
                 || look.work.misfit(look.points, look.seen(), &self.noise),
             );

@@ -8,7 +8,7 @@ use crate::refine::estimate::FrameEstimate;
 use crate::refine::factor::FactorError;
 use crate::refine::interpolation::Interpolation;
 use crate::refine::prior::{Prior, predict};
-use crate::surface::{Patches, Surface, SurfaceError};
+use crate::surface::{Surface, SurfaceError, WallRegions};
 use crate::trajectory::{Pose, Shutter};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -55,7 +55,7 @@ pub struct Scene<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
     /// Parts of the wall by which frames are not compared.
-    pub ignored: &'a Patches,
+    pub ignored: &'a WallRegions,
     /// The camera at full size, as far as it is known by now, at rest.
     pub camera: Camera,
     /// When the rows of the frames are read.
@@ -97,7 +97,7 @@ impl Scene<'_> {
         if readout_s == 0.0 {
             Sweep::default()
         } else {
-            self.sweep_rate(frame, run, estimates).times(readout_s)
+            self.sweep_rate(frame, run, estimates).scaled(readout_s)
         }
     }
 

@@ -1,7 +1,7 @@
 //! The line along the middle of a curved tunnel.
 //!
 //! Points given by the user are joined by a cubic spline of their chord lengths (C², with the ends
-//! bent as the circles through the first and last three points). It is walked in even steps of its
+//! bent as the circles through the first and last three points). It is sample_spline in even steps of its
 //! own length: the nodes. Each has a frame `Q = (E_x, T, E_z)` that turns along as little as
 //! possible (the rotation-minimising frame: from node to node, T is carried over by the smallest
 //! rotation). Between nodes position and size of the section are cubic Hermite polynomials, and the
@@ -27,7 +27,7 @@ pub struct CentrePoint {
 
 /// The centreline at a chainage.
 #[derive(Clone, Copy, Debug)]
-pub struct Station {
+pub struct CentrelineFrame {
     /// Where it is, metres.
     pub point: Vector3<f64>,
     /// `∂point/∂h`.
@@ -52,13 +52,13 @@ pub(super) struct Node {
 }
 
 /// Nodes whose surrounding sphere is kept, to find the nearest.
-pub(super) const RUN: usize = 64;
+pub(super) const NODES_PER_SPHERE: usize = 64;
 /// Steps between nodes over the section's size.
-const STEP: f64 = 0.02;
+const NODE_STEP: f64 = 0.02;
 /// A step of Newton's method after which no other is taken, over the length between nodes.
-const SETTLED: f64 = 1e-7;
+const CHAINAGE_TOLERANCE: f64 = 1e-7;
 /// Nodes at the most.
-const MOST_NODES: usize = 4_000_000;
+const MAX_NODES: usize = 4_000_000;
 /// A smooth line with frames.
 #[derive(Clone, Debug)]
 pub struct Centreline {
@@ -119,24 +119,24 @@ impl Centreline {
         }
         let spline = Spline::through(points.iter().map(|point| point.point).collect());
         let scales: Vec<f64> = (0..points.len()).map(scale).collect();
-        let line = Self::walked(&spline, &scales, STEP * farthest_m)?;
+        let line = Self::sample_spline(&spline, &scales, NODE_STEP * farthest_m)?;
         line.check_bends(farthest_m)?;
-        line.check_apart(farthest_m)?;
+        line.check_self_intersection(farthest_m)?;
         Ok(line)
     }
 
     /// Walks a spline in steps of about `step_m`.
-    fn walked(spline: &Spline, scales: &[f64], step_m: f64) -> Result<Self, SurfaceError> {
+    fn sample_spline(spline: &Spline, scales: &[f64], step_m: f64) -> Result<Self, SurfaceError> {
         let lengths = spline.lengths();
         let length_m = lengths[lengths.len() - 1];
         let steps = (length_m / step_m).ceil().max(1.0);
-        if !steps.is_finite() || steps > MOST_NODES as f64 {
+        if !steps.is_finite() || steps > MAX_NODES as f64 {
             return Err(SurfaceError::Centreline {
                 what: format!("{length_m:.0} m are too long for a tunnel of this size"),
             });
         }
         let step_m = length_m / steps;
-        let rises = monotone_slopes(scales, &spline.chords);
+        let slopes = monotone_slopes(scales, &spline.chords);
         let mut frame: Option<UnitQuaternion<f64>> = None;
         let nodes: Vec<Node> = (0..=steps as usize)
             .map(|k| {
@@ -146,7 +146,7 @@ impl Centreline {
                 let chord_m = spline.chords[place];
                 let (scale, rise) = hermite(
                     [scales[place], scales[place + 1]],
-                    [rises[place], rises[place + 1]].map(|rise| rise * chord_m),
+                    [slopes[place], slopes[place + 1]].map(|rise| rise * chord_m),
                     share,
                 );
                 let before = frame.unwrap_or_default();
@@ -171,7 +171,7 @@ impl Centreline {
             .map(|pair| so3::log(&(pair[0].frame.inverse() * pair[1].frame)))
             .collect();
         let spheres = nodes
-            .chunks(RUN)
+            .chunks(NODES_PER_SPHERE)
             .map(|run| {
                 let middle = run[run.len() / 2].point;
                 let radius = run.iter().map(|node| (node.point - middle).norm());
@@ -192,7 +192,7 @@ impl Centreline {
     }
 
     /// The line at a chainage; beyond its ends it goes on straight.
-    pub fn at(&self, h_m: f64) -> Station {
+    pub fn at(&self, h_m: f64) -> CentrelineFrame {
         let last = self.turns.len();
         let length_m = self.length_m();
         if h_m < 0.0 || h_m > length_m {
@@ -202,7 +202,7 @@ impl Centreline {
                 (&self.nodes[last], length_m)
             };
             let along = node.frame * Vector3::y();
-            return Station {
+            return CentrelineFrame {
                 point: node.point + along * (h_m - from_m),
                 velocity: along,
                 frame: node.frame,
@@ -224,7 +224,7 @@ impl Centreline {
             [a.growth, b.growth].map(|growth| growth * self.step_m),
             share,
         );
-        Station {
+        CentrelineFrame {
             point,
             velocity: velocity / self.step_m,
             frame: a.frame * so3::exp(&(self.turns[k] * share)),
@@ -242,19 +242,19 @@ impl Centreline {
             if (point - middle).norm() - radius >= nearest.0 {
                 continue;
             }
-            for k in run * RUN..((run + 1) * RUN).min(self.nodes.len()) {
+            for k in run * NODES_PER_SPHERE..((run + 1) * NODES_PER_SPHERE).min(self.nodes.len()) {
                 let distance = (point - self.nodes[k].point).norm();
                 if distance < nearest.0 {
                     nearest = (distance, k);
                 }
             }
         }
-        self.refined(point, nearest.1 as f64 * self.step_m)
+        self.refine_chainage_m(point, nearest.1 as f64 * self.step_m)
     }
 
     /// The chainage whose section's plane holds a point, near `h_m`: `Tᵀ(p − c) = 0` by Newton's
     /// method.
-    pub fn refined(&self, point: &Vector3<f64>, h_m: f64) -> f64 {
+    pub fn refine_chainage_m(&self, point: &Vector3<f64>, h_m: f64) -> f64 {
         let mut h_m = h_m;
         for _ in 0..20 {
             let at = self.at(h_m);
@@ -273,7 +273,7 @@ impl Centreline {
             };
             h_m += step.clamp(-most, most);
             // What is left is of the step's square.
-            if step.abs() < SETTLED * self.step_m {
+            if step.abs() < CHAINAGE_TOLERANCE * self.step_m {
                 break;
             }
         }

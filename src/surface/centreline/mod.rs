@@ -10,4 +10,4 @@ mod line;
 mod self_intersection;
 mod spline;
 
-pub use line::{CentrePoint, Centreline, Station};
+pub use line::{CentrePoint, Centreline, CentrelineFrame};

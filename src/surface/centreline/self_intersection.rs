@@ -1,6 +1,6 @@
 //! Whether a tunnel has room along its line.
 
-use super::line::{Centreline, RUN};
+use super::line::{Centreline, NODES_PER_SPHERE};
 use crate::surface::error::SurfaceError;
 use std::f64::consts::PI;
 
@@ -29,16 +29,16 @@ impl Centreline {
     /// Compares runs of nodes by the spheres around them. A sphere and its middle change by no more
     /// than a run's length from one run to the next; by that, runs that are far off are passed
     /// over.
-    pub(super) fn check_apart(&self, farthest_m: f64) -> Result<(), SurfaceError> {
+    pub(super) fn check_self_intersection(&self, farthest_m: f64) -> Result<(), SurfaceError> {
         let most = self.nodes.iter().map(|node| node.scale);
         let size_m = farthest_m * most.fold(0.0, f64::max);
-        let run_m = RUN as f64 * self.step_m;
+        let run_m = NODES_PER_SPHERE as f64 * self.step_m;
         for (a, (middle, radius)) in self.spheres.iter().enumerate() {
             let mut b = a;
             while let Some((other, other_radius)) = self.spheres.get(b) {
                 let between_m = (other - middle).norm() - radius - other_radius;
                 if between_m < 2.0 * size_m {
-                    self.check_runs(a, b, farthest_m)?;
+                    self.check_sphere_pair(a, b, farthest_m)?;
                 }
                 b += ((between_m - 2.0 * size_m) / (2.0 * run_m)).max(1.0) as usize;
             }
@@ -46,8 +46,10 @@ impl Centreline {
         Ok(())
     }
 
-    fn check_runs(&self, a: usize, b: usize, farthest_m: f64) -> Result<(), SurfaceError> {
-        let nodes = |run: usize| run * RUN..((run + 1) * RUN).min(self.nodes.len());
+    fn check_sphere_pair(&self, a: usize, b: usize, farthest_m: f64) -> Result<(), SurfaceError> {
+        let nodes = |run: usize| {
+            run * NODES_PER_SPHERE..((run + 1) * NODES_PER_SPHERE).min(self.nodes.len())
+        };
         for i in nodes(a) {
             for j in nodes(b).rev() {
                 let (from, to) = (&self.nodes[i], &self.nodes[j]);

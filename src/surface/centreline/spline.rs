@@ -4,8 +4,8 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use std::ops::{Add, Mul, Sub};
 
-/// Pieces of the spline's parameter between two given points, to measure its length.
-const FINE: usize = 64;
+/// PiecewiseOutline of the spline's parameter between two given points, to measure its length.
+const LENGTH_STEPS: usize = 64;
 
 /// Slopes of the section's scale at the given points over the chords, so that the cubics between
 /// them are smooth and monotone: none overshoots the radii given. There is none at the ends, beyond
@@ -17,16 +17,16 @@ const FINE: usize = 64;
 /// interpolants", SIAM J. Sci. Stat. Comput. 5(2), 1984.
 pub(super) fn monotone_slopes(scales: &[f64], chords: &[f64]) -> Vec<f64> {
     let slope = |k: usize| (scales[k + 1] - scales[k]) / chords[k];
-    let mut rises = vec![0.0; scales.len()];
+    let mut slopes = vec![0.0; scales.len()];
     for k in 1..chords.len() {
         let (before, after) = (slope(k - 1), slope(k));
         if before * after > 0.0 {
             let (a, b) = (chords[k - 1], chords[k]);
             let (a, b) = (a + 2.0 * b, 2.0 * a + b);
-            rises[k] = (a + b) / (a / before + b / after);
+            slopes[k] = (a + b) / (a / before + b / after);
         }
     }
-    rises
+    slopes
 }
 
 /// Value and derivative of the cubic with the given ends and end slopes.
@@ -111,14 +111,18 @@ impl Spline {
         self.ends(place, share).1
     }
 
-    /// Length of the line up to each of [`FINE`] steps between each two points (Simpson's rule).
+    /// Length of the line up to each of [`LENGTH_STEPS`] steps between each two points (Simpson's rule).
     pub(super) fn lengths(&self) -> Vec<f64> {
         let mut lengths = vec![0.0];
         let mut length = 0.0;
         for (place, chord) in self.chords.iter().enumerate() {
-            for k in 0..FINE {
-                let speed = |x: f64| self.velocity(place, (k as f64 + x) / FINE as f64).norm();
-                length += (speed(0.0) + 4.0 * speed(0.5) + speed(1.0)) / 6.0 * chord / FINE as f64;
+            for k in 0..LENGTH_STEPS {
+                let speed = |x: f64| {
+                    self.velocity(place, (k as f64 + x) / LENGTH_STEPS as f64)
+                        .norm()
+                };
+                length += (speed(0.0) + 4.0 * speed(0.5) + speed(1.0)) / 6.0 * chord
+                    / LENGTH_STEPS as f64;
                 lengths.push(length);
             }
         }
@@ -131,8 +135,8 @@ impl Spline {
         let k = k.clamp(1, lengths.len() - 1) - 1;
         let within = (length_m - lengths[k]) / (lengths[k + 1] - lengths[k]);
         let fine = k as f64 + within.clamp(0.0, 1.0);
-        let place = (k / FINE).min(self.chords.len() - 1);
-        (place, fine / FINE as f64 - place as f64)
+        let place = (k / LENGTH_STEPS).min(self.chords.len() - 1);
+        (place, fine / LENGTH_STEPS as f64 - place as f64)
     }
 }
 

@@ -13,12 +13,12 @@ use std::f64::consts::TAU;
 pub struct Ellipse {
     a_m: f64,
     b_m: f64,
-    /// `s(φ)` at [`CELLS`] + 1 even steps of φ once around, metres.
+    /// `s(φ)` at [`TABLE_CELLS`] + 1 even steps of φ once around, metres.
     lengths_m: Vec<f64>,
 }
 
 /// Steps of φ: within one, five points of quadrature are exact.
-const CELLS: usize = 512;
+const TABLE_CELLS: usize = 512;
 /// Nodes and weights of Gauss–Legendre quadrature on `[0, 1]`.
 const QUADRATURE: [(f64, f64); 5] = [
     (0.046_910_077_030_668, 0.118_463_442_528_095),
@@ -42,7 +42,7 @@ impl Ellipse {
             lengths_m: vec![0.0],
         };
         let mut length_m = 0.0;
-        for k in 0..CELLS {
+        for k in 0..TABLE_CELLS {
             length_m += ellipse.length(phi(k), phi(k + 1));
             ellipse.lengths_m.push(length_m);
         }
@@ -67,14 +67,14 @@ impl Ellipse {
 
     fn s_of(&self, phi_rad: f64) -> f64 {
         let phi_rad = phi_rad.rem_euclid(TAU);
-        let cell = ((phi_rad / TAU * CELLS as f64) as usize).min(CELLS - 1);
+        let cell = ((phi_rad / TAU * TABLE_CELLS as f64) as usize).min(TABLE_CELLS - 1);
         self.lengths_m[cell] + self.length(phi(cell), phi_rad)
     }
 
     fn phi_of(&self, s_m: f64) -> f64 {
         let s_m = s_m.rem_euclid(self.perimeter_m());
         let cell = self.lengths_m.partition_point(|length| *length <= s_m);
-        let cell = cell.clamp(1, CELLS) - 1;
+        let cell = cell.clamp(1, TABLE_CELLS) - 1;
         let mut phi_rad = phi(cell);
         let left_m = s_m - self.lengths_m[cell];
         // The speed changes by parts in a thousand within a cell: every step gains three digits at
@@ -88,12 +88,12 @@ impl Ellipse {
 }
 
 fn phi(cell: usize) -> f64 {
-    TAU * cell as f64 / CELLS as f64
+    TAU * cell as f64 / TABLE_CELLS as f64
 }
 
 impl Section for Ellipse {
     fn perimeter_m(&self) -> f64 {
-        self.lengths_m[CELLS]
+        self.lengths_m[TABLE_CELLS]
     }
 
     fn at(&self, s_m: f64) -> OutlinePoint {

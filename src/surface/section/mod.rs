@@ -12,5 +12,5 @@ mod tests;
 
 pub use ellipse::Ellipse;
 pub use outline::{OutlineHit, OutlinePoint, Section, angle_rad, s_at_m};
-pub use piecewise::{Piece, Pieces};
-pub use round::Round;
+pub use piecewise::{OutlinePiece, PiecewiseOutline};
+pub use round::CircleOutline;

@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// A piece of an outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Piece {
+pub enum OutlinePiece {
     /// A straight line.
     Line {
         /// Where it begins, metres.
@@ -28,7 +28,7 @@ pub enum Piece {
     },
 }
 
-impl Piece {
+impl OutlinePiece {
     fn length_m(&self) -> f64 {
         match self {
             Self::Line { from, to } => (to - from).norm(),
@@ -99,15 +99,15 @@ impl Piece {
 
 /// An outline of pieces, one after another.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pieces {
-    pieces: Vec<Piece>,
+pub struct PiecewiseOutline {
+    pieces: Vec<OutlinePiece>,
     /// Where each begins, and where the last ends, metres.
     starts_m: Vec<f64>,
     farthest_m: f64,
 }
 
-impl Pieces {
-    fn new(pieces: Vec<Piece>) -> Self {
+impl PiecewiseOutline {
+    fn new(pieces: Vec<OutlinePiece>) -> Self {
         let mut starts_m = vec![0.0];
         let mut end_m = 0.0;
         for piece in &pieces {
@@ -115,8 +115,8 @@ impl Pieces {
             starts_m.push(end_m);
         }
         let ends = pieces.iter().map(|piece| match piece {
-            Piece::Line { from, to } => from.norm().max(to.norm()),
-            Piece::Arc {
+            OutlinePiece::Line { from, to } => from.norm().max(to.norm()),
+            OutlinePiece::Arc {
                 centre, radius_m, ..
             } => centre.norm() + radius_m,
         });
@@ -137,7 +137,7 @@ impl Pieces {
         let (x, z) = (0.5 * width_m, 0.5 * height_m);
         let corners = [(0.0, z), (x, z), (x, -z), (-x, -z), (-x, z), (0.0, z)];
         let corners = corners.map(|(x, z)| Vector2::new(x, z));
-        let lines = corners.windows(2).map(|ends| Piece::Line {
+        let lines = corners.windows(2).map(|ends| OutlinePiece::Line {
             from: ends[0],
             to: ends[1],
         });
@@ -158,11 +158,11 @@ impl Pieces {
         if floor >= 0.0 {
             return Err(SurfaceError::NoWalls { width_m, height_m });
         }
-        let line = |from: (f64, f64), to: (f64, f64)| Piece::Line {
+        let line = |from: (f64, f64), to: (f64, f64)| OutlinePiece::Line {
             from: Vector2::new(from.0, from.1),
             to: Vector2::new(to.0, to.1),
         };
-        let arc = |from_rad: f64| Piece::Arc {
+        let arc = |from_rad: f64| OutlinePiece::Arc {
             centre: Vector2::zeros(),
             radius_m: r,
             from_rad,
@@ -178,12 +178,12 @@ impl Pieces {
     }
 
     /// The pieces.
-    pub fn pieces(&self) -> &[Piece] {
+    pub fn pieces(&self) -> &[OutlinePiece] {
         &self.pieces
     }
 }
 
-impl Section for Pieces {
+impl Section for PiecewiseOutline {
     fn perimeter_m(&self) -> f64 {
         self.starts_m[self.pieces.len()]
     }
@@ -236,12 +236,12 @@ mod tests {
 
     #[test]
     fn sizes_are_those_asked_for() {
-        let section = Pieces::rectangle(4.0, 3.0).unwrap();
+        let section = PiecewiseOutline::rectangle(4.0, 3.0).unwrap();
         assert!((section.perimeter_m() - 14.0).abs() < 1e-12);
         assert!((section.distance_m(&Vector2::x()) - 2.0).abs() < 1e-12);
         assert!((section.distance_m(&-Vector2::y()) - 1.5).abs() < 1e-12);
         assert!((section.farthest_m() - 2.5).abs() < 1e-12);
-        let section = Pieces::horseshoe(4.0, 3.5).unwrap();
+        let section = PiecewiseOutline::horseshoe(4.0, 3.5).unwrap();
         let expected = 2.0 * std::f64::consts::PI + 3.0 + 4.0;
         assert!((section.perimeter_m() - expected).abs() < 1e-12);
         assert!((section.distance_m(&Vector2::y()) - 2.0).abs() < 1e-12);
@@ -251,10 +251,16 @@ mod tests {
     #[test]
     fn impossible_sizes_are_refused() {
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(Pieces::rectangle(bad, 1.0).is_err() && Pieces::rectangle(1.0, bad).is_err());
-            assert!(Pieces::horseshoe(bad, 1.0).is_err() && Pieces::horseshoe(1.0, bad).is_err());
+            assert!(
+                PiecewiseOutline::rectangle(bad, 1.0).is_err()
+                    && PiecewiseOutline::rectangle(1.0, bad).is_err()
+            );
+            assert!(
+                PiecewiseOutline::horseshoe(bad, 1.0).is_err()
+                    && PiecewiseOutline::horseshoe(1.0, bad).is_err()
+            );
         }
-        let flat = Pieces::horseshoe(4.0, 2.0).unwrap_err();
+        let flat = PiecewiseOutline::horseshoe(4.0, 2.0).unwrap_err();
         assert!(matches!(flat, SurfaceError::NoWalls { .. }));
     }
 }

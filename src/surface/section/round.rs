@@ -6,12 +6,12 @@ use std::f64::consts::TAU;
 
 /// The circle around the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Round {
+pub struct CircleOutline {
     /// Its radius, metres.
     pub radius_m: f64,
 }
 
-impl Section for Round {
+impl Section for CircleOutline {
     fn perimeter_m(&self) -> f64 {
         TAU * self.radius_m
     }

@@ -5,11 +5,11 @@ use proptest::prelude::*;
 
 fn sections() -> Vec<Box<dyn Section>> {
     vec![
-        Box::new(Round { radius_m: 2.0 }),
+        Box::new(CircleOutline { radius_m: 2.0 }),
         Box::new(Ellipse::new(4.0, 2.5).unwrap()),
         Box::new(Ellipse::new(1.0, 8.0).unwrap()),
-        Box::new(Pieces::rectangle(4.0, 3.0).unwrap()),
-        Box::new(Pieces::horseshoe(4.0, 3.5).unwrap()),
+        Box::new(PiecewiseOutline::rectangle(4.0, 3.0).unwrap()),
+        Box::new(PiecewiseOutline::horseshoe(4.0, 3.5).unwrap()),
     ]
 }
 

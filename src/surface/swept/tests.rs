@@ -3,7 +3,7 @@ use crate::surface::centreline::CentrePoint;
 use crate::surface::circle::Circle;
 use crate::surface::displacement::wall_jacobian;
 use crate::surface::gauge_component;
-use crate::surface::section::{Ellipse, Pieces, Round};
+use crate::surface::section::{CircleOutline, Ellipse, PiecewiseOutline};
 use crate::trajectory::{Pose, so3};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -44,7 +44,11 @@ fn helix() -> Swept {
         let (sin, cos) = (TAU * t).sin_cos();
         [30.0 * cos, 20.0 * t, 30.0 * sin]
     };
-    tunnel(Box::new(Round { radius_m: 3.0 }), 3.0, &along(120, point))
+    tunnel(
+        Box::new(CircleOutline { radius_m: 3.0 }),
+        3.0,
+        &along(120, point),
+    )
 }
 
 fn s_curve() -> Swept {
@@ -63,14 +67,14 @@ fn funnel() -> Swept {
         [0.0, 20.0, 1.0, 2.0],
         [0.5, 30.0, 1.0, 2.0],
     ];
-    tunnel(Box::new(Round { radius_m: 3.0 }), 3.0, &points)
+    tunnel(Box::new(CircleOutline { radius_m: 3.0 }), 3.0, &points)
 }
 
 fn tunnels() -> Vec<Swept> {
     vec![
-        bend(Box::new(Round { radius_m: 3.0 })),
-        bend(Box::new(Pieces::rectangle(4.0, 3.0).unwrap())),
-        bend(Box::new(Pieces::horseshoe(5.0, 4.0).unwrap())),
+        bend(Box::new(CircleOutline { radius_m: 3.0 })),
+        bend(Box::new(PiecewiseOutline::rectangle(4.0, 3.0).unwrap())),
+        bend(Box::new(PiecewiseOutline::horseshoe(5.0, 4.0).unwrap())),
         helix(),
         s_curve(),
         funnel(),
@@ -122,7 +126,7 @@ proptest! {
 
 #[test]
 fn a_straight_line_along_y_is_the_straight_tunnel() {
-    let section = Box::new(Round { radius_m: 3.0 });
+    let section = Box::new(CircleOutline { radius_m: 3.0 });
     let swept = tunnel(
         section,
         3.0,
@@ -146,7 +150,7 @@ fn a_straight_line_along_y_is_the_straight_tunnel() {
 
 #[test]
 fn a_bend_is_as_long_as_its_arc_and_turns_about_its_own_axis() {
-    let bend = bend(Box::new(Round { radius_m: 3.0 }));
+    let bend = bend(Box::new(CircleOutline { radius_m: 3.0 }));
     assert!((bend.line().length_m() - 0.2 * TAU * 60.0).abs() < 1e-4);
     let gauge = bend.gauge();
     assert!(gauge.turn && !gauge.shift, "{gauge:?}");
@@ -184,7 +188,7 @@ fn radii_between_points_are_on_the_way_from_one_to_the_next() {
         .map(|k| 0.5 * f64::from(k))
         .map(|y| [0.0, y, 0.0, radius_m(y)])
         .collect();
-    let tunnel = tunnel(Box::new(Round { radius_m: 3.0 }), 3.0, &points);
+    let tunnel = tunnel(Box::new(CircleOutline { radius_m: 3.0 }), 3.0, &points);
     for k in 100..1900 {
         let y = 0.01 * f64::from(k);
         let at = tunnel.line().at(y);
@@ -201,7 +205,7 @@ fn radii_between_points_are_on_the_way_from_one_to_the_next() {
 #[test]
 fn a_funnel_turns_about_its_axis() {
     let funnel = tunnel(
-        Box::new(Round { radius_m: 3.0 }),
+        Box::new(CircleOutline { radius_m: 3.0 }),
         3.0,
         &[[0.0, 0.0, 0.0, 3.0], [0.0, 10.0, 0.0, 2.0]],
     );

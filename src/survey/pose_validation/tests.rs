@@ -9,16 +9,16 @@ use rand::SeedableRng;
 
 const RADIUS_M: f64 = 3.0;
 
-/// What the check says of poses in the convention of `given`.
+/// What the validate_poses says of poses in the convention of `given`.
 fn verdict(poses: &[Pose], given: Convention) -> Result<Vec<String>, String> {
-    let reading = Reading {
+    let reading = InterpretedPoses {
         given: indexed(poses.iter().copied()),
         convention: given,
     };
     let surface = Circle::new(RADIUS_M).unwrap();
     let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
     let all = poses_of(&reading.trajectory());
-    check(&surface, &camera, &reading, &all, Path::new("poses.tum"))
+    validate_poses(&surface, &camera, &reading, &all, Path::new("poses.tum"))
         .map_err(|error| error.to_string())
 }
 
@@ -191,7 +191,7 @@ fn one_camera_outside_is_no_convention() {
     poses[7].t_wc.x = 4.0;
     let message = verdict(&poses, tum()).unwrap_err();
     assert!(
-        message.contains("frame 7") && message.contains("check radius_m"),
+        message.contains("frame 7") && message.contains("validate_poses radius_m"),
         "{message}"
     );
 }

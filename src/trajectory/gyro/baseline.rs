@@ -4,10 +4,10 @@ use super::clock_offset::ClockMatch;
 use super::clock_offset::Turned;
 use super::gcsv::GyroLog;
 use super::gravity::{angle_from_gravity_rad, axis_in_camera};
-use super::integration::Turning;
+use super::integration::IntegratedRotation;
 use super::noise::RotationNoise;
-use super::rates::Rates;
-use super::stationary::Rest;
+use super::rates::AngularRates;
+use super::stationary::StationaryInterval;
 use crate::numerics::median::upper_median;
 use crate::trajectory::error::PoseError;
 use crate::trajectory::plan::{Mounting, Station};
@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, Vector3};
 /// What is known of the frames: when they were taken, where the carrier was meant to stand, and how
 /// the camera sits on it.
 #[derive(Clone, Copy, Debug)]
-pub struct Frames<'a> {
+pub struct FrameStations<'a> {
     /// Their times, seconds, which increase.
     pub times_s: &'a [f64],
     /// As many stations.
@@ -30,7 +30,7 @@ pub struct Frames<'a> {
 /// Where the sensor rested.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum RestChoice {
+pub enum StationaryChoice {
     /// The best stretch of so many seconds.
     Find(f64),
     /// From and to, seconds of the log's clock.
@@ -40,9 +40,9 @@ pub enum RestChoice {
 /// The log's time minus the frames'.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Clock {
+pub enum ClockOffset {
     /// Seconds.
-    Offset(f64),
+    Given(f64),
     /// Whatever within this range, seconds, makes rates agree best with the stations'.
     Match([f64; 2]),
 }
@@ -50,7 +50,7 @@ pub enum Clock {
 /// What the first attitude is told by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Start {
+pub enum InitialAttitude {
     /// The first frame's station.
     Station,
     /// The angle about the axis by gravity while the sensor rests, with the tunnel's bottom at this
@@ -65,7 +65,7 @@ pub enum Start {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GyroOptions {
     /// Where the sensor rested.
-    pub rest: RestChoice,
+    pub rest: StationaryChoice,
     /// The bias in the camera's axes, rad/s, instead of the mean rate at rest; taken for exact.
     pub bias_rad_s: Option<Vector3<f64>>,
     /// The noise density, rad/√s, instead of that at rest.
@@ -76,9 +76,9 @@ pub struct GyroOptions {
     /// bias about the axis is changed so that it did.
     pub total_turn_rad: Option<f64>,
     /// How the clocks stand.
-    pub clock: Clock,
+    pub clock: ClockOffset,
     /// The first attitude.
-    pub start: Start,
+    pub start: InitialAttitude,
 }
 
 /// What a log tells.
@@ -87,7 +87,7 @@ pub struct GyroBaseline {
     /// A pose a frame: its rotation from the log, its place from the station.
     pub trajectory: Trajectory,
     /// Where the sensor rested, if that was asked for or found.
-    pub rest: Option<Rest>,
+    pub rest: Option<StationaryInterval>,
     /// The bias that was taken off, rad/s in the camera's axes.
     pub bias_rad_s: Vector3<f64>,
     /// The log's time minus the frames', seconds.
@@ -105,7 +105,7 @@ pub struct GyroBaseline {
 }
 
 /// Steps of the log beyond so many median ones are gaps.
-const GAP: f64 = 5.0;
+const MIN_GAP_STEPS: f64 = 5.0;
 
 /// Integrates a log whose axes `to_camera` turns into the camera's.
 ///
@@ -116,14 +116,14 @@ const GAP: f64 = 5.0;
 pub fn baseline_from_gyro(
     log: &GyroLog,
     to_camera: &Matrix3<f64>,
-    frames: &Frames,
+    frames: &FrameStations,
     options: &GyroOptions,
 ) -> Result<GyroBaseline, PoseError> {
     let fail = |what: String| PoseError::file(&log.path, what);
     let rates = log.rates(to_camera);
     let found = match options.rest {
-        RestChoice::Find(length_s) => Rest::find(&rates, length_s),
-        RestChoice::Given(span_s) => Rest::of(&rates, span_s),
+        StationaryChoice::Find(length_s) => StationaryInterval::find(&rates, length_s),
+        StationaryChoice::Given(span_s) => StationaryInterval::of(&rates, span_s),
     };
     let rest = found.as_ref().ok().copied();
     let rested = |wanted: &str| {
@@ -143,8 +143,8 @@ pub fn baseline_from_gyro(
     };
     let axis = axis_in_camera(&frames.mounting);
     let (offset_s, clock) = match options.clock {
-        Clock::Offset(offset_s) => (offset_s, None),
-        Clock::Match(range_s) => {
+        ClockOffset::Given(offset_s) => (offset_s, None),
+        ClockOffset::Match(range_s) => {
             let angles: Vec<f64> = frames.stations.iter().map(|s| s.angle_rad).collect();
             let clock = ClockMatch::find(&rates, &axis, frames.times_s, &angles, range_s)
                 .map_err(|what| fail(format!("{what} (--match-plan-s, --time-offset-s)")))?;
@@ -165,7 +165,7 @@ pub fn baseline_from_gyro(
     {
         bias += axis * ((measured_rad - total_rad) / (last_s - first_s));
     }
-    let turning = Turning::new(rates.without(&bias));
+    let turning = IntegratedRotation::new(rates.without(&bias));
     let between = |from_s: f64, to_s: f64| {
         let turn = turning.between(from_s, to_s);
         turn.ok_or_else(|| fail(format!("it does not hold {from_s} s to {to_s} s")))
@@ -179,8 +179,8 @@ pub fn baseline_from_gyro(
         station.carrier().r_wc * mount.r_wc
     };
     let start = match options.start {
-        Start::Station => attitude(frames.stations.first().map_or(0.0, |s| s.angle_rad)),
-        Start::Gravity { down_rad } => {
+        InitialAttitude::Station => attitude(frames.stations.first().map_or(0.0, |s| s.angle_rad)),
+        InitialAttitude::Gravity { down_rad } => {
             let rest = rested("gravity tells no angle (--down-deg)")?;
             let up = to_camera * mean_acceleration(log, rest.span_s).map_err(fail)?;
             // As the first frame's camera would feel it: the carrier lies along the tunnel there,
@@ -228,7 +228,7 @@ pub fn baseline_from_gyro(
 }
 
 /// The frames' times by the log's clock, all of which the log must cover.
-fn covered(rates: &Rates, times_s: &[f64], offset_s: f64) -> Result<Vec<f64>, String> {
+fn covered(rates: &AngularRates, times_s: &[f64], offset_s: f64) -> Result<Vec<f64>, String> {
     let [first_s, last_s] = rates.span_s();
     let at = |(frame, time_s): (usize, &f64)| {
         let at_s = time_s + offset_s;
@@ -270,14 +270,14 @@ fn step_sigma_rad(noise: &RotationNoise, trajectory: &[StampedPose]) -> f64 {
 }
 
 /// A warning of the longest step between samples while frames were taken, if it is a gap.
-fn gaps(rates: &Rates, span_s: [f64; 2]) -> Option<String> {
+fn gaps(rates: &AngularRates, span_s: [f64; 2]) -> Option<String> {
     let median_s = rates.steps_s()[0];
     let steps = rates.times_s().windows(2).filter_map(|pair| match pair {
         [from, to] if *to >= span_s[0] && *from <= span_s[1] => Some((to - from, *from)),
         _ => None,
     });
     let (longest_s, at_s) = steps.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (longest_s > GAP * median_s).then(|| {
+    (longest_s > MIN_GAP_STEPS * median_s).then(|| {
         format!(
             "the log has a gap of {longest_s:.3} s after {at_s:.3} s, where it usually has a sample each {median_s:.4} s; \
              the rate is taken to change evenly there"
@@ -311,13 +311,13 @@ mod tests {
     }
 
     const OPTIONS: GyroOptions = GyroOptions {
-        rest: RestChoice::Find(2.0),
+        rest: StationaryChoice::Find(2.0),
         bias_rad_s: None,
         density_rad_sqrt_s: None,
         scale_sigma: 0.0,
         total_turn_rad: None,
-        clock: Clock::Offset(3.5),
-        start: Start::Station,
+        clock: ClockOffset::Given(3.5),
+        start: InitialAttitude::Station,
     };
 
     fn baseline(log: &GyroLog, options: &GyroOptions) -> Result<GyroBaseline, PoseError> {
@@ -328,7 +328,7 @@ mod tests {
             offset_m: [0.1, 0.0],
         };
         let stations: Vec<Station> = times_s.iter().map(station).collect();
-        let frames = Frames {
+        let frames = FrameStations {
             times_s: &times_s,
             stations: &stations,
             mounting: Mounting {
@@ -379,7 +379,7 @@ mod tests {
     #[test]
     fn what_gravity_cannot_tell_is_refused() {
         let options = GyroOptions {
-            start: Start::Gravity { down_rad: 0.0 },
+            start: InitialAttitude::Gravity { down_rad: 0.0 },
             ..OPTIONS
         };
         for (accelerations, expected) in [
@@ -390,7 +390,7 @@ mod tests {
             assert!(error.to_string().contains(expected), "{error}");
         }
         let beyond = GyroOptions {
-            clock: Clock::Offset(4.5),
+            clock: ClockOffset::Given(4.5),
             ..OPTIONS
         };
         let error = baseline(&log(false, true), &beyond)

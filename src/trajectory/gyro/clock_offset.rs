@@ -1,6 +1,6 @@
 //! How the log's clock stands to that of the frames, from the turn that the plan has.
 
-use super::rates::Rates;
+use super::rates::AngularRates;
 use nalgebra::Vector3;
 
 /// The offset between the clocks at which rates agree best.
@@ -12,11 +12,11 @@ pub struct ClockMatch {
     pub correlation: f64,
 }
 
-/// Rates that agree less than this are not of the same motion.
-const LEAST_CORRELATION: f64 = 0.7;
+/// AngularRates that agree less than this are not of the same motion.
+const MIN_CORRELATION: f64 = 0.7;
 
 /// More offsets than this are not tried.
-const MOST_OFFSETS: f64 = 1e7;
+const MAX_OFFSETS: f64 = 1e7;
 
 impl ClockMatch {
     /// Finds the offset, within `range_s`, that makes the rate about `axis` (in the camera's axes)
@@ -31,7 +31,7 @@ impl ClockMatch {
     /// cover the frames at any offset, no offset at which the two agree, or only at an end of the
     /// range.
     pub fn find(
-        rates: &Rates,
+        rates: &AngularRates,
         axis: &Vector3<f64>,
         times_s: &[f64],
         angles_rad: &[f64],
@@ -66,7 +66,7 @@ impl ClockMatch {
         };
         let [step_s, _] = rates.steps_s();
         let count = ((range_s[1] - range_s[0]) / step_s).ceil().max(0.0);
-        if !count.is_finite() || count > MOST_OFFSETS {
+        if !count.is_finite() || count > MAX_OFFSETS {
             return Err(format!(
                 "the range of {:.3} s holds {count:.0} of the log's steps of {step_s:.1e} s; see to the log's tscale, or narrow the range",
                 range_s[1] - range_s[0]
@@ -82,7 +82,7 @@ impl ClockMatch {
         let Some((k, correlation)) = best else {
             return Err("the log covers all frames at no offset in the range".to_owned());
         };
-        if correlation < LEAST_CORRELATION {
+        if correlation < MIN_CORRELATION {
             return Err(format!(
                 "the rate about the axis agrees with the plan's nowhere in the range: the greatest correlation is {correlation:.2}, \
                  at {:.3} s; see to the sensor's orientation, or widen the range",
@@ -132,7 +132,7 @@ pub(super) struct Turned<'a> {
 }
 
 impl<'a> Turned<'a> {
-    pub(super) fn new(rates: &'a Rates, axis: &Vector3<f64>) -> Self {
+    pub(super) fn new(rates: &'a AngularRates, axis: &Vector3<f64>) -> Self {
         let times_s = rates.times_s();
         let rates: Vec<f64> = rates.rates().iter().map(|rate| rate.dot(axis)).collect();
         let mut angles = Vec::with_capacity(rates.len());
@@ -175,14 +175,14 @@ mod tests {
             + 0.02 * (0.7 * t).sin() * t
     }
 
-    fn log(offset_s: f64, axis: &Vector3<f64>) -> Rates {
+    fn log(offset_s: f64, axis: &Vector3<f64>) -> AngularRates {
         let times: Vec<f64> = (0..8000).map(|k| f64::from(k) / 200.0).collect();
         let rate = |t: &f64| (angle(t - offset_s + 1e-4) - angle(t - offset_s - 1e-4)) / 2e-4;
         let rates = times
             .iter()
             .map(|t| axis * rate(t) + Vector3::new(0.01, 0.02, 0.0));
         let rates = rates.collect();
-        Rates::new(times, rates)
+        AngularRates::new(times, rates)
     }
 
     /// As of a log whose tscale is wrong.
@@ -190,7 +190,7 @@ mod tests {
     fn a_range_of_countless_steps_is_refused() {
         let axis = Vector3::z();
         let times: Vec<f64> = (0..100).map(|k| f64::from(k) * 1e-12).collect();
-        let rates = Rates::new(times, vec![axis; 100]);
+        let rates = AngularRates::new(times, vec![axis; 100]);
         let at = [0.0, 0.1, 0.2, 0.3, 0.4];
         let angles = at.map(|t| t * t);
         let refused = ClockMatch::find(&rates, &axis, &at, &angles, [-1.0, 1.0]).unwrap_err();

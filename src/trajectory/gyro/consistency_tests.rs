@@ -52,14 +52,14 @@ fn normalised(orientation: &str, seed: u64) -> (f64, f64) {
     std::fs::write(&path, log(orientation, bias, 0.02, seed)).unwrap();
     let log = GyroLog::read(&path).unwrap();
     let rates = log.rates(&log.orientation.unwrap().to_camera());
-    let rest = Rest::find(&rates, 2.5).unwrap();
+    let rest = StationaryInterval::find(&rates, 2.5).unwrap();
     assert!(rest.span_s[1] < REST_S + 0.2, "{rest:?}");
     let noise = RotationNoise {
         density_rad_sqrt_s: rest.density_rad_sqrt_s,
         bias_sigma_rad_s: rest.density_rad_sqrt_s / rest.length_s().sqrt(),
         scale_sigma: 0.0,
     };
-    let turning = Turning::new(rates.without(&rest.bias_rad_s));
+    let turning = IntegratedRotation::new(rates.without(&rest.bias_rad_s));
     let error = |from: f64, to: f64| {
         let found = turning.between(from, to).unwrap();
         let expected = truth(from).inverse() * truth(to);

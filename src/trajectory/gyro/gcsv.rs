@@ -7,7 +7,7 @@
 //! Source: <https://docs.gyroflow.xyz/app/technical-details/gcsv-format>.
 
 use super::orientation::Orientation;
-use super::rates::Rates;
+use super::rates::AngularRates;
 use crate::trajectory::error::PoseError;
 use crate::trajectory::text;
 use nalgebra::{Matrix3, Vector3};
@@ -24,7 +24,7 @@ const COLUMNS: [&str; 10] = ["t", "gx", "gy", "gz", "ax", "ay", "az", "mx", "my"
 pub struct GyroSample {
     /// Seconds of the log's clock.
     pub time_s: f64,
-    /// Rates of turn by the right-hand rule, rad/s.
+    /// AngularRates of turn by the right-hand rule, rad/s.
     pub rate_rad_s: Vector3<f64>,
     /// Acceleration that is felt, multiples of g: at rest it points up.
     pub acceleration_g: Option<Vector3<f64>>,
@@ -198,9 +198,9 @@ impl GyroLog {
     }
 
     /// The rates in other axes, of which `to_camera` makes the camera's.
-    pub fn rates(&self, to_camera: &Matrix3<f64>) -> Rates {
+    pub fn rates(&self, to_camera: &Matrix3<f64>) -> AngularRates {
         let samples = self.samples.iter();
-        Rates::new(
+        AngularRates::new(
             samples.clone().map(|sample| sample.time_s).collect(),
             samples
                 .map(|sample| to_camera * sample.rate_rad_s)

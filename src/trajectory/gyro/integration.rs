@@ -1,13 +1,13 @@
-//! Rates integrated to rotations.
+//! AngularRates integrated to rotations.
 
-use super::rates::Rates;
+use super::rates::AngularRates;
 use crate::trajectory::so3;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// Rotations at any time within a log: those at its samples, and the rates that lead on from them.
 #[derive(Clone, Debug)]
-pub struct Turning {
-    rates: Rates,
+pub struct IntegratedRotation {
+    rates: AngularRates,
     /// Camera at each sample in the camera at the first.
     since_first: Vec<UnitQuaternion<f64>>,
 }
@@ -21,9 +21,9 @@ fn step(from: &Vector3<f64>, to: &Vector3<f64>, step_s: f64) -> UnitQuaternion<f
     so3::exp(&((from + to) * (0.5 * step_s) + from.cross(to) * (step_s * step_s / 12.0)))
 }
 
-impl Turning {
+impl IntegratedRotation {
     /// Integrates rates.
-    pub fn new(rates: Rates) -> Self {
+    pub fn new(rates: AngularRates) -> Self {
         let mut since_first = Vec::with_capacity(rates.times_s().len());
         let mut attitude = UnitQuaternion::identity();
         since_first.push(attitude);
@@ -60,7 +60,7 @@ impl Turning {
     }
 
     /// The rates that are integrated.
-    pub fn rates(&self) -> &Rates {
+    pub fn rates(&self) -> &AngularRates {
         &self.rates
     }
 }
@@ -78,10 +78,10 @@ mod tests {
         (r, r.inverse() * (Vector3::y() * w) + Vector3::z() * s)
     }
 
-    fn turning(w: f64, s: f64, hz: f64) -> Turning {
+    fn turning(w: f64, s: f64, hz: f64) -> IntegratedRotation {
         let times: Vec<f64> = (0..=(4.0 * hz) as usize).map(|k| k as f64 / hz).collect();
         let rates = times.iter().map(|t| truth(w, s, *t).1).collect();
-        Turning::new(Rates::new(times, rates))
+        IntegratedRotation::new(AngularRates::new(times, rates))
     }
 
     proptest! {
@@ -91,7 +91,7 @@ mod tests {
         ) {
             let found = turning(w, s, 200.0).between(from, to).unwrap();
             let expected = truth(w, s, from).0.inverse() * truth(w, s, to).0;
-            // Rates are not straight between samples: that is of the second order in 5 ms.
+            // AngularRates are not straight between samples: that is of the second order in 5 ms.
             prop_assert!(found.angle_to(&expected) < 1e-4, "{}", found.angle_to(&expected));
         }
     }

@@ -1,17 +1,17 @@
-//! Rates of turn over time.
+//! AngularRates of turn over time.
 
 use nalgebra::Vector3;
 
-/// Rates of turn in the camera's axes, rad/s, at times that increase; between them they change
+/// AngularRates of turn in the camera's axes, rad/s, at times that increase; between them they change
 /// evenly.
 #[derive(Clone, Debug)]
-pub struct Rates {
+pub struct AngularRates {
     times_s: Vec<f64>,
     rates: Vec<Vector3<f64>>,
 }
 
-impl Rates {
-    /// Rates at times, as many as each other.
+impl AngularRates {
+    /// AngularRates at times, as many as each other.
     ///
     /// # Panics
     /// If they are not.

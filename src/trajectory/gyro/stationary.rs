@@ -1,21 +1,21 @@
 //! A stretch of a log at rest: what the sensor says when nothing turns.
 
-use super::rates::Rates;
+use super::rates::AngularRates;
 use nalgebra::Vector3;
 
 /// A sensor that is at rest shows no more than this, rad/s: 3°/s, beyond what consumers' gyros are
 /// off when switched on.
-pub const MOST_BIAS_RAD_S: f64 = 3.0 * std::f64::consts::PI / 180.0;
+pub const MAX_BIAS_RAD_S: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
 /// Windows as quiet as this many times the least variance are all taken for quiet ones.
-const QUIET: f64 = 1.5;
+const MAX_VARIANCE_RATIO: f64 = 1.5;
 
 /// Mean rates within this of each other are taken for the same, rad/s: 0.5°/s.
-const SAME_RAD_S: f64 = 0.5 * std::f64::consts::PI / 180.0;
+const RATE_TOLERANCE_RAD_S: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
 /// A stretch at rest, with what it tells of the gyro.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rest {
+pub struct StationaryInterval {
     /// From and to, seconds of the log's clock.
     pub span_s: [f64; 2],
     /// Mean rate, rad/s.
@@ -25,7 +25,7 @@ pub struct Rest {
     pub density_rad_sqrt_s: f64,
 }
 
-impl Rest {
+impl StationaryInterval {
     /// The stretch of `length_s` at which the sensor rested: of the windows with no more than half
     /// as much again as the least variance, those with the least mean rate (to 0.5°/s), and of them
     /// the one with the least variance.
@@ -34,9 +34,9 @@ impl Rest {
     /// with a little turn against the bias at their end.
     ///
     /// # Errors
-    /// A log shorter than that; no such window with a mean rate below [`MOST_BIAS_RAD_S`]: the
+    /// A log shorter than that; no such window with a mean rate below [`MAX_BIAS_RAD_S`]: the
     /// carrier never rested.
-    pub fn find(rates: &Rates, length_s: f64) -> Result<Self, String> {
+    pub fn find(rates: &AngularRates, length_s: f64) -> Result<Self, String> {
         let times = rates.times_s();
         let [first_s, last_s] = rates.span_s();
         let mut sum = Vector3::zeros();
@@ -68,16 +68,16 @@ impl Rest {
             .iter()
             .map(|w| w.0.max(rounding))
             .fold(f64::INFINITY, f64::min);
-        let quiet = windows.iter().filter(|w| w.0 <= QUIET * least);
+        let quiet = windows.iter().filter(|w| w.0 <= MAX_VARIANCE_RATIO * least);
         let slowest = quiet.clone().map(|w| w.1).fold(f64::INFINITY, f64::min);
-        let resting = quiet.filter(|w| w.1 <= slowest + SAME_RAD_S);
+        let resting = quiet.filter(|w| w.1 <= slowest + RATE_TOLERANCE_RAD_S);
         let Some((_, mean, begin)) = resting.min_by(|a, b| a.0.total_cmp(&b.0)) else {
             return Err(format!(
                 "there is no stretch of {length_s} s in a log of {:.3} s with 20 samples and more in it",
                 last_s - first_s
             ));
         };
-        if *mean > MOST_BIAS_RAD_S {
+        if *mean > MAX_BIAS_RAD_S {
             return Err(format!(
                 "the sensor never rested for {length_s} s: where its rate is steadiest, it is {:.2}°/s, more than any bias",
                 mean.to_degrees()
@@ -97,7 +97,7 @@ impl Rest {
     /// Fewer than 20 samples.
     ///
     /// Source: IEEE Std 952-1997, annex C.
-    pub fn of(rates: &Rates, span_s: [f64; 2]) -> Result<Self, String> {
+    pub fn of(rates: &AngularRates, span_s: [f64; 2]) -> Result<Self, String> {
         let within = |t: &f64| (span_s[0]..=span_s[1]).contains(t);
         let begin = rates.times_s().iter().position(within).unwrap_or(0);
         let count = rates.times_s().iter().filter(|t| within(t)).count();
@@ -128,7 +128,7 @@ impl Rest {
     }
 }
 
-fn squares_scale(rates: &Rates) -> f64 {
+fn squares_scale(rates: &AngularRates) -> f64 {
     let squares = rates.rates().iter().map(Vector3::norm_squared);
     squares.fold(0.0, f64::max)
 }
@@ -155,7 +155,7 @@ mod tests {
 
     /// 200 Hz: four seconds of an even turn, three at rest, three of a turn that is not even; noise
     /// of 0.01 rad/s a sample.
-    fn log(rest: bool) -> Rates {
+    fn log(rest: bool) -> AngularRates {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let times: Vec<f64> = (0..2000).map(|k| f64::from(k) / 200.0).collect();
@@ -169,12 +169,12 @@ mod tests {
             Vector3::y() * turn + BIAS + noise
         });
         let rates = rates.collect();
-        Rates::new(times, rates)
+        AngularRates::new(times, rates)
     }
 
     #[test]
     fn rest_is_found_beside_an_even_turn_of_the_same_noise() {
-        let rest = Rest::find(&log(true), 2.0).unwrap();
+        let rest = StationaryInterval::find(&log(true), 2.0).unwrap();
         assert!(rest.span_s[0] >= 4.0 && rest.span_s[1] <= 7.0, "{rest:?}");
         // Noise of the mean of 400 samples.
         assert!((rest.bias_rad_s - BIAS).norm() < 4.0 * 0.01 / 20.0);
@@ -185,11 +185,11 @@ mod tests {
 
     #[test]
     fn a_carrier_that_never_rests_is_told_of() {
-        let message = Rest::find(&log(false), 2.0).unwrap_err();
+        let message = StationaryInterval::find(&log(false), 2.0).unwrap_err();
         assert!(message.contains("never rested"), "{message}");
-        let message = Rest::find(&log(true), 20.0).unwrap_err();
+        let message = StationaryInterval::find(&log(true), 20.0).unwrap_err();
         assert!(message.contains("no stretch of 20 s"), "{message}");
-        assert!(Rest::of(&log(true), [4.0, 4.05]).is_err());
+        assert!(StationaryInterval::of(&log(true), [4.0, 4.05]).is_err());
     }
 
     /// A log that was smoothed over ten samples has a third of their deviation and the same
@@ -203,8 +203,12 @@ mod tests {
                 part.iter().sum::<Vector3<f64>>() / part.len() as f64
             })
             .collect();
-        let smooth = Rates::new(raw.times_s().to_vec(), smooth);
-        let density = |rates: &Rates| Rest::of(rates, [4.1, 6.9]).unwrap().density_rad_sqrt_s;
+        let smooth = AngularRates::new(raw.times_s().to_vec(), smooth);
+        let density = |rates: &AngularRates| {
+            StationaryInterval::of(rates, [4.1, 6.9])
+                .unwrap()
+                .density_rad_sqrt_s
+        };
         let ratio = density(&smooth) / (0.01 * (1f64 / 200.0).sqrt());
         assert!((0.6..1.5).contains(&ratio), "{ratio}");
     }

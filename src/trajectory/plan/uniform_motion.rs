@@ -24,7 +24,7 @@ impl Rate {
 
 /// A carrier that advances and turns evenly.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Steady {
+pub struct UniformMotion {
     /// Where it stands at the first frame.
     pub start: Station,
     /// Its advance along the axis, metres.
@@ -33,7 +33,7 @@ pub struct Steady {
     pub turn_rad: Rate,
 }
 
-impl Steady {
+impl UniformMotion {
     /// Where it stands at frames taken at these times, seconds.
     pub fn stations(&self, times_s: &[f64]) -> Vec<Station> {
         let first_s = times_s.first().copied().unwrap_or_default();
@@ -52,7 +52,7 @@ mod tests {
 
     #[test]
     fn it_goes_by_the_frame_or_by_the_second() {
-        let plan = Steady {
+        let plan = UniformMotion {
             start: Station {
                 chainage_m: 5.0,
                 angle_rad: 1.0,
