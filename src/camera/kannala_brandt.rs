@@ -1,32 +1,31 @@
-//! The fisheye lens of Kannala and Brandt.
+//! The Kannala–Brandt fisheye model.
 
 use super::monotone::{invert_monotone, monotone_limit};
 use nalgebra::{Matrix2, Matrix2x3, RowVector3, Vector2, Vector3};
 use std::f64::consts::PI;
 
-/// A point at the angle θ off the axis appears at the distance
-/// `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` from the middle of the picture, in its own
+/// Fisheye projection: a point at the angle θ off the axis appears at the distance
+/// `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` from the centre of distortion, in its own
 /// direction: `p_d = θ_d (x, y)/√(x² + y²)`.
 ///
-/// The same as OpenCV's `fisheye` and the "equidistant" of ROS and Kalibr. Points may lie beside
-/// and behind the camera; they are seen up to the angle [`KannalaBrandt::limit_rad`], within which
-/// θ_d rises.
+/// OpenCV calls this model `fisheye`, ROS and Kalibr "equidistant". Points may lie beside and
+/// behind the camera, up to the angle [`KannalaBrandt::limit_rad`], within which θ_d rises.
 ///
 /// Source: J. Kannala and S. S. Brandt, "A generic camera model and calibration method for
 /// conventional, wide-angle, and fish-eye lenses", PAMI 28(8), 2006.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KannalaBrandt {
     k: [f64; 4],
-    /// The largest angle off the axis that is to be used, radians.
+    /// Largest angle off the axis to be used, radians.
     max_angle_rad: f64,
     limit_rad: f64,
 }
 
-/// Below this share of z, the distance from the axis is too small to divide by.
+/// Smallest ratio of the distance from the axis to z that is divided by.
 const MIN_RADIAL_RATIO: f64 = 1e-9;
 
 impl KannalaBrandt {
-    /// The lens with the coefficients k1 to k4, its limit found.
+    /// Creates the lens with the coefficients k1 to k4 and determines its limit.
     pub fn new(k: [f64; 4]) -> Self {
         let mut lens = Self {
             k,
@@ -37,29 +36,29 @@ impl KannalaBrandt {
         lens
     }
 
-    /// The same lens, used no farther than `max_angle_rad` off its axis.
+    /// This lens, limited to `max_angle_rad` off its axis.
     pub fn limited_to(mut self, max_angle_rad: f64) -> Self {
         self.max_angle_rad = max_angle_rad.min(PI);
         self.limit_rad = self.limit_rad.min(self.max_angle_rad);
         self
     }
 
-    /// The largest angle off the axis that is to be used, radians; 180° if all of it.
+    /// The largest angle off the axis to be used, radians; 180° if there is no limit.
     pub fn max_angle_rad(&self) -> f64 {
         self.max_angle_rad
     }
 
-    /// k1 to k4.
+    /// The coefficients k1 to k4.
     pub fn coefficients(&self) -> &[f64; 4] {
         &self.k
     }
 
-    /// The largest angle off the axis that is seen, radians.
+    /// The limit of the field of view: the largest angle off the axis, radians.
     pub fn limit_rad(&self) -> f64 {
         self.limit_rad
     }
 
-    /// θ_d and its slope at the angle θ.
+    /// The radius θ_d and its derivative at the angle θ.
     pub fn radius(&self, theta: f64) -> (f64, f64) {
         let [k1, k2, k3, k4] = self.k;
         let q = theta * theta;
@@ -68,7 +67,7 @@ impl KannalaBrandt {
         (theta * factor, slope)
     }
 
-    /// Where a point appears, or None beyond the limit.
+    /// Projects a point; None beyond the limit.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
         let rho = x_c.xy().norm();
         let theta = rho.atan2(x_c.z);
@@ -109,7 +108,7 @@ impl KannalaBrandt {
         Matrix2::from_columns(&[e * theta.powi(3), e * theta.powi(5)])
     }
 
-    /// The direction (of unit length) that appears at `p_d`; None beyond the limit.
+    /// Back-projects `p_d` to a unit vector; None beyond the limit.
     pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
         let radius = p_d.norm();
         let theta = invert_monotone(|theta| self.radius(theta), radius, self.limit_rad)?;

@@ -1,8 +1,8 @@
-//! Camera models: pixel → ray and point → pixel, with analytic Jacobians, and the calibration files
-//! they come from.
+//! Camera models: back-projection (pixel → ray), projection (point → pixel) with analytic
+//! Jacobians, and calibration files.
 //!
-//! Pixel convention: the centre of the first pixel is (0, 0). Files that count from the corner
-//! (`pixel_centre = "half"`, COLMAP, nerfstudio) are converted when read.
+//! Pixel convention: the centre of the first pixel is (0, 0). Files that count from the corner of
+//! the first pixel (`pixel_centre = "half"`, COLMAP, nerfstudio) are converted when read.
 //!
 //! # Example
 //!

@@ -1,16 +1,18 @@
-//! Functions that rise from 0: how far they do, and their inverse.
+//! Monotone functions of one variable: the end of the interval in which they rise, and their
+//! inverse.
 
-/// Steps of the inverse: bisection alone would end at rounding.
+/// Iterations of the inverse; bisection alone reaches rounding within them.
 const MAX_INVERSION_ITERATIONS: usize = 80;
-/// Steps, each larger by [`SCAN_GROWTH`], in which the end of the rise is looked for.
+/// Steps of the scan for the end of the rise, each larger than the last by [`SCAN_GROWTH`].
 const MAX_SCAN_STEPS: usize = 1200;
 const SCAN_START: f64 = 1e-3;
 const SCAN_GROWTH: f64 = 1.01;
 
-/// The first place up to `end` where `slope` is no longer positive; infinity if there is none.
+/// The smallest argument up to `end` at which `slope` is no longer positive; infinity if there is
+/// none.
 ///
-/// Looked for from 0.001 on in steps of one percent, then halved to rounding: a dip narrower than a
-/// percent is not seen.
+/// The scan starts at 0.001 and proceeds in steps of one per cent, then bisects to rounding. A dip
+/// narrower than one per cent is missed.
 pub fn monotone_limit(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
     let rises = |at: f64| slope(at) > 0.0;
     let (mut low, mut high) = (0.0, SCAN_START);
@@ -35,10 +37,10 @@ pub fn monotone_limit(slope: impl Fn(f64) -> f64, end: f64) -> f64 {
     f64::INFINITY
 }
 
-/// The `x` from 0 to `end` with `f(x) = target ≥ 0`, where `f` gives value and slope and rises;
-/// None if it does not get that far.
+/// Solves `f(x) = target ≥ 0` for `x` in `[0, end]`, where `f` returns value and slope and rises;
+/// None if f(end) is less than the target.
 ///
-/// Newton's method, kept between bounds that close in on the root.
+/// Newton's method, safeguarded by a bracket around the root.
 pub fn invert_monotone(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> Option<f64> {
     if target == 0.0 {
         return Some(0.0);
@@ -69,7 +71,7 @@ pub fn invert_monotone(f: impl Fn(f64) -> (f64, f64), target: f64, end: f64) -> 
         }
         x = next;
     }
-    // A last bit that goes to and fro.
+    // The last bit alternates.
     ((f(x).0 - target).abs() <= 1e-12 * target).then_some(x)
 }
 

@@ -1,21 +1,22 @@
-//! Lenses in single precision, for loops over many points.
+//! Lens models in single precision, for loops over many points.
 //!
-//! A loop is written once over [`ProjectF32`] and entered with the lens at hand, not the enum of all, so
-//! that the compiler makes vectors of it.
+//! A loop is generic over [`ProjectF32`] and instantiated per lens model, not over the enum, so
+//! that the compiler can vectorise it.
 
 use super::lens::Lens;
 use super::projection::Camera;
 use super::sweep::MAX_SHARE;
 use std::f64::consts::PI;
 
-/// A lens in a loop.
+/// Projection through a lens in single precision.
 pub trait ProjectF32: Copy {
-    /// Where a point (camera coordinates) appears at focal length 1, and whether the lens shows it.
-    /// Beyond its limit the answer is finite but means nothing.
+    /// Projects a point (camera coordinates) to the image plane at focal length 1; the flag is true
+    /// if the point lies within the lens's limit. Beyond the limit the coordinates are finite but
+    /// meaningless.
     fn project_f32(self, x: f32, y: f32, z: f32) -> (f32, f32, bool);
 }
 
-/// A lens in single precision.
+/// A lens model in single precision.
 #[derive(Clone, Copy, Debug)]
 pub enum LensF32 {
     /// No distortion.
@@ -24,16 +25,16 @@ pub enum LensF32 {
     BrownConrady(BrownConradyF32),
     /// [`crate::camera::KannalaBrandt`].
     KannalaBrandt(KannalaBrandtF32),
-    /// The same three of a camera that moves while its rows are read.
+    /// No distortion, with a rolling shutter.
     RollingPinhole(RollingShutter<PinholeF32>),
-    /// See [`LensF32::RollingPinhole`].
+    /// [`crate::camera::BrownConrady`], with a rolling shutter.
     RollingBrownConrady(RollingShutter<BrownConradyF32>),
-    /// See [`LensF32::RollingPinhole`].
+    /// [`crate::camera::KannalaBrandt`], with a rolling shutter.
     RollingKannalaBrandt(RollingShutter<KannalaBrandtF32>),
 }
 
 impl LensF32 {
-    /// The lens of a camera, with its motion.
+    /// Converts the lens and the sweep of a camera.
     pub fn new(camera: &Camera) -> Self {
         let lens = Self::at_rest(&camera.lens);
         if camera.sweep.is_none() {
@@ -84,12 +85,14 @@ impl ProjectF32 for LensF32 {
     }
 }
 
-/// A lens of a camera that moves while the rows are read ([`crate::camera::Sweep`]).
+/// A lens with a rolling shutter: the camera moves while its rows are read
+/// ([`crate::camera::Sweep`]).
 ///
-/// The motion is expanded to the second order in the share τ of the picture's time,
+/// The motion is expanded to the second order in the share τ of the readout time,
 /// `x_c(τ) ≈ x − τ a + τ²/2 ω × (a + ν)` with `a = ω × x + ν`, which is off by `f |ω τ|³/6`: 0.0003
-/// px at 90 °/s over 20 ms with a focal length of 415 px. The row is found by two steps of
-/// `τ ← share(v(x_c(τ)))` and one of Aitken's, which leaves the square of what a third step would.
+/// px at 90 °/s over 20 ms with a focal length of 415 px. The row is found by two fixed-point steps
+/// `τ ← share(v(x_c(τ)))` and one step of Aitken's Δ² process, whose error is the square of that of
+/// a third step.
 #[derive(Clone, Copy, Debug)]
 pub struct RollingShutter<L> {
     lens: L,
@@ -130,7 +133,7 @@ fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     ]
 }
 
-/// Keeps Aitken's step from dividing by nothing in the middle row, where there is no step to take.
+/// Added to the denominator of Aitken's step, which vanishes in the middle row.
 const MIN_SQUARED_SHARE: f32 = 1e-12;
 
 impl<L: ProjectF32> ProjectF32 for RollingShutter<L> {
@@ -151,7 +154,7 @@ impl<L: ProjectF32> ProjectF32 for RollingShutter<L> {
     }
 }
 
-/// `(x/z, y/z)`.
+/// Pinhole projection `(x/z, y/z)`.
 #[derive(Clone, Copy, Debug)]
 pub struct PinholeF32;
 
@@ -163,7 +166,7 @@ impl ProjectF32 for PinholeF32 {
     }
 }
 
-/// Radial and tangential distortion.
+/// Brown–Conrady projection: radial and tangential distortion.
 #[derive(Clone, Copy, Debug)]
 pub struct BrownConradyF32 {
     k: [f32; 6],
@@ -190,20 +193,19 @@ impl ProjectF32 for BrownConradyF32 {
     }
 }
 
-/// Degree of the polynomial of a fisheye.
+/// Degree of the polynomial that approximates a fisheye.
 const POLYNOMIAL_DEGREE: usize = 17;
-/// Nearer to 180° off the axis, `θ_d/sin θ` grows beyond what a polynomial follows.
+/// Largest angle off the axis that the polynomial covers: nearer to 180°, `θ_d/sin θ` diverges.
 const MAX_ANGLE_RAD: f64 = 0.75 * PI;
 
-/// A fisheye: `p_d = G(cos θ) (x, y)/|x_c|` with `G = θ_d/sin θ`, which is smooth in `cos θ` as far
-/// as 180°.
+/// Kannala–Brandt projection `p_d = G(cos θ) (x, y)/|x_c|` with `G = θ_d/sin θ`, which is smooth in
+/// `cos θ` as far as 180°.
 ///
-/// G is interpolated at Chebyshev's nodes over the angles that the lens shows, to about the
-/// rounding of single precision as far as 120° off the axis; beyond 135° nothing is shown.
+/// G is interpolated at Chebyshev nodes over the lens's field of view, to about the rounding of
+/// single precision up to 120° off the axis. Points beyond 135° count as outside.
 #[derive(Clone, Copy, Debug)]
 pub struct KannalaBrandtF32 {
-    /// Coefficients of G in `t = cos θ · scale + offset`, which runs from −1 to 1; the lowest
-    /// first.
+    /// Coefficients of G in `t = cos θ · scale + offset ∈ [−1, 1]`, lowest degree first.
     g: [f32; POLYNOMIAL_DEGREE + 1],
     scale: f32,
     offset: f32,
@@ -211,7 +213,7 @@ pub struct KannalaBrandtF32 {
 }
 
 impl KannalaBrandtF32 {
-    /// With θ_d = `radius(θ)` up to the angle `limit_rad`.
+    /// Approximates θ_d = `radius(θ)` up to the angle `limit_rad`.
     fn new(radius: impl Fn(f64) -> f64, limit_rad: f64) -> Self {
         let min_cos = limit_rad.min(MAX_ANGLE_RAD).cos();
         let (middle, half) = (0.5 * (1.0 + min_cos), 0.5 * (1.0 - min_cos));
@@ -247,8 +249,8 @@ impl ProjectF32 for KannalaBrandtF32 {
     }
 }
 
-/// Coefficients (the lowest first) of the polynomial that has the values of `f` at Chebyshev's
-/// nodes in [−1, 1].
+/// Coefficients (lowest degree first) of the polynomial that interpolates `f` at the Chebyshev
+/// nodes of [−1, 1].
 fn interpolate(f: impl Fn(f64) -> f64) -> [f64; POLYNOMIAL_DEGREE + 1] {
     let count = POLYNOMIAL_DEGREE + 1;
     let angle = |j: usize| PI * (j as f64 + 0.5) / count as f64;
@@ -330,8 +332,8 @@ mod tests {
         let narrow = KannalaBrandt::new(real).limited_to(1.2);
         compare(&Lens::KannalaBrandt(narrow), 1e-6, directions(1.2));
     }
-    /// The expansion against the exact row's pose: a wall at 1 to 5 m, 90 °/s over 20 ms about any
-    /// axis, 640 × 480 px.
+    /// Compares the expansion with the exact pose of the row: a wall at 1 to 5 m, 90 °/s over 20 ms
+    /// about any axis, 640 × 480 px.
     #[test]
     fn a_moving_camera_projects_to_a_thousandth_of_a_pixel() {
         let fisheye = KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]);

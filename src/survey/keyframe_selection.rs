@@ -36,7 +36,7 @@ impl Survey {
             );
         }
         let (all, _) = self.read_as(section, &self.folder.join(&section.initial))?;
-        let kept = keyframes(&poses_of(&all), step_deg.to_radians());
+        let kept = keyframe_indices(&poses_of(&all), step_deg.to_radians());
         self.frames = self.frames.only(&kept);
         if let Some(times_s) = &mut self.times_s {
             *times_s = kept.iter().map(|k| times_s[*k]).collect();
@@ -45,9 +45,9 @@ impl Survey {
     }
 }
 
-/// The first pose, and each that is keyframes from the one before it in the list by `step_rad` or
+/// The first pose, and each that is turned from the one before it in the list by `step_rad` or
 /// more, but for rounding.
-fn keyframes(poses: &[Pose], step_rad: f64) -> Vec<usize> {
+fn keyframe_indices(poses: &[Pose], step_rad: f64) -> Vec<usize> {
     const ANGLE_TOLERANCE_RAD: f64 = 1e-6;
     let mut kept: Vec<usize> = Vec::new();
     for (k, pose) in poses.iter().enumerate() {
@@ -68,11 +68,11 @@ mod tests {
     #[test]
     fn views_are_as_far_apart_as_asked() {
         let poses = spiral(20, 0.01, 4f64.to_radians());
-        let kept = |step_deg: f64| keyframes(&poses, step_deg.to_radians());
+        let kept = |step_deg: f64| keyframe_indices(&poses, step_deg.to_radians());
         assert_eq!(kept(12.0), [0, 3, 6, 9, 12, 15, 18]);
         assert_eq!(kept(30.0), [0, 8, 16]);
         assert_eq!(kept(1.0).len(), 20);
         // A carrier that stands still adds nothing.
-        assert_eq!(keyframes(&[poses[0]; 5], 0.1), [0]);
+        assert_eq!(keyframe_indices(&[poses[0]; 5], 0.1), [0]);
     }
 }

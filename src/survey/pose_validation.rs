@@ -328,18 +328,18 @@ pub(super) fn feasible_conventions(
                 .iter()
                 .all(|pose| surface.check_inside(&pose.t_wc).is_ok())
     };
-    let mut feasible_conventions: Vec<ConventionChange> = convention_changes(reading)
+    let mut feasible: Vec<ConventionChange> = convention_changes(reading)
         .into_iter()
         .filter(is_inside)
         .collect();
-    feasible_conventions.sort_by_key(|other| other.flags.len());
-    feasible_conventions
+    feasible.sort_by_key(|other| other.flags.len());
+    feasible
         .into_iter()
         .map(|other| (other.flags, other.convention))
         .collect()
 }
 
-/// Checks the poses of a file against the tunnel; returns warnings where they are feasible_conventions but
+/// Checks the poses of a file against the tunnel; returns warnings where they are possible but
 /// suspicious.
 ///
 /// # Errors
@@ -371,7 +371,7 @@ pub(super) fn validate_poses(
                     "{} of {} cameras are; they would all be inside and look at the wall with {other}",
                     stand.outside, stand.frames
                 ),
-                None => "validate_poses radius_m and the poses' origin, units and convention (--pose-convention, --tunnel-frame)"
+                None => "check radius_m and the poses' origin, units and convention (--pose-convention, --tunnel-frame)"
                     .to_owned(),
             },
         });

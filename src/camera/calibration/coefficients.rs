@@ -1,11 +1,12 @@
-//! Lists of distortion coefficients, in the orders of other programs.
+//! Lists of distortion coefficients in the order of OpenCV.
 
 use super::error::ParseError;
 use crate::camera::brown_conrady::{BrownCoefficients, BrownConrady};
 use crate::camera::kannala_brandt::KannalaBrandt;
 use crate::camera::lens::Lens;
 
-/// OpenCV's `k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [τx τy]]]]`, of which the last six must be 0.
+/// Reads OpenCV's `k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [τx τy]]]]`, of which the last six must
+/// be 0.
 pub fn brown_conrady(d: &[f64]) -> Result<Lens, ParseError> {
     if !matches!(d.len(), 0 | 2 | 4 | 5 | 8 | 12 | 14) {
         return Err(ParseError::new(format!(
@@ -26,7 +27,7 @@ pub fn brown_conrady(d: &[f64]) -> Result<Lens, ParseError> {
     })))
 }
 
-/// `k1 k2 k3 k4` of a fisheye; missing ones at the end are 0.
+/// Reads `k1 k2 k3 k4` of a fisheye; missing ones at the end are 0.
 pub fn kannala_brandt(d: &[f64]) -> Result<Lens, ParseError> {
     if d.len() > 4 {
         return Err(ParseError::new(format!(

@@ -1,4 +1,4 @@
-//! COLMAP's cameras.txt.
+//! COLMAP's `cameras.txt`.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;
@@ -7,11 +7,11 @@ use crate::camera::lens::Lens;
 use crate::camera::projection::Camera;
 use crate::camera::sweep::Sweep;
 
-/// Makes a lens of its coefficients.
+/// Creates a lens from its coefficients.
 type ReadLens = fn(&[f64]) -> Result<Lens, ParseError>;
 
-/// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixels are counted from the corner of the first
-/// and converted.
+/// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixel coordinates are counted from the corner of
+/// the first pixel and converted.
 pub fn read(text: &str, name: Option<&str>) -> Result<Camera, ParseError> {
     let lines = text.lines().enumerate();
     let cameras: Vec<_> = lines
@@ -35,22 +35,22 @@ fn camera(line: &str) -> Result<Camera, String> {
     let [_, model, width, height, params @ ..] = &words[..] else {
         return Err("a camera is `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`".to_owned());
     };
-    let size = |text_entry: &str| {
-        text_entry
+    let size = |word: &str| {
+        word
             .parse::<u32>()
-            .map_err(|_| format!("{text_entry:?} is no number of pixels"))
+            .map_err(|_| format!("{word:?} is not a number of pixels"))
     };
     let (width, height) = (size(width)?, size(height)?);
     let params: Vec<f64> = params
         .iter()
-        .map(|text_entry| match text_entry.parse::<f64>() {
+        .map(|word| match word.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(format!("{text_entry:?} is no number")),
+            _ => Err(format!("{word:?} is not a number")),
         })
         .collect::<Result<_, String>>()?;
     let fail = |count: usize| {
         format!(
-            "{model} has {count} parameters, and here are {}",
+            "{model} has {count} parameters, not {}",
             params.len()
         )
     };

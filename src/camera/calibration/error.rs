@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Why a calibration file cannot be used.
+/// An error of a calibration file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
@@ -11,17 +11,17 @@ pub enum CalibrationError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// The file does not hold what it should.
+    /// The content is invalid.
     #[error("{}:{}{what}", path.display(), line_prefix(*line))]
     Content {
         /// The file.
         path: PathBuf,
-        /// The line, from 1, where it is known.
+        /// The line, from 1, if known.
         line: Option<usize>,
-        /// What is wrong, and what to do.
+        /// The problem and the remedy.
         what: String,
     },
 }
@@ -30,7 +30,7 @@ fn line_prefix(line: Option<usize>) -> String {
     line.map_or(" ".to_owned(), |line| format!("{line}: "))
 }
 
-/// What a parser found wrong, and in which line.
+/// An error of a parser, with its line if known.
 #[derive(Debug, PartialEq)]
 pub(super) struct ParseError {
     pub line: Option<usize>,

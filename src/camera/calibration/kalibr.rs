@@ -1,4 +1,4 @@
-//! Kalibr's camchain.
+//! Kalibr's camchain files.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;
@@ -9,7 +9,7 @@ use crate::camera::projection::Camera;
 use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
-/// True of a tree with `cam0`, `cam1`, …
+/// True for a file with entries `cam0`, `cam1`, …
 pub fn is_camchain(tree: &Value) -> bool {
     cameras(tree).next().is_some()
 }

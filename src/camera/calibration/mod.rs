@@ -1,11 +1,11 @@
-//! Calibration files: our own (JSON or TOML), OpenCV's YAML, ROS's camera_info, Kalibr's camchain,
-//! COLMAP's cameras.txt and nerfstudio's transforms.json.
+//! Calibration files: the program's own format (JSON or TOML), OpenCV's YAML, ROS's camera_info,
+//! Kalibr's camchain, COLMAP's cameras.txt and nerfstudio's transforms.json.
 //!
-//! | file | told by | lens | first pixel |
+//! | file | recognised by | lens | centre of the first pixel |
 //! | --- | --- | --- | --- |
-//! | own | `.json`, `.toml` | [`own`] | `pixel_centre` |
-//! | OpenCV | `.yaml`, `.yml`; a matrix with `rows`, `cols`, `data` named `camera_matrix` or alike | 4, 5 or 8 coefficients; fisheye if it says `fisheye_model: 1` | (0, 0) |
-//! | ROS | the same with `distortion_model` | `plumb_bob`, `rational_polynomial`, `equidistant` | (0, 0) |
+//! | own | `.json`, `.toml` | [`native`] | `pixel_centre` |
+//! | OpenCV | `.yaml`, `.yml`; a matrix with `rows`, `cols`, `data` named `camera_matrix` or similar | 4, 5 or 8 coefficients; fisheye if `fisheye_model: 1` | (0, 0) |
+//! | ROS | as OpenCV, with `distortion_model` | `plumb_bob`, `rational_polynomial`, `equidistant` | (0, 0) |
 //! | Kalibr | `.yaml` with `cam0:` | `radtan`, `equidistant`, `none` | (0, 0) |
 //! | COLMAP | `.txt` | PINHOLE … FULL_OPENCV, the fisheyes | (½, ½) |
 //! | nerfstudio | `.json` with `fl_x` or `frames` | PINHOLE, OPENCV, OPENCV_FISHEYE | (½, ½) |

@@ -1,4 +1,4 @@
-//! Our own calibration file, `camera.json` or `camera.toml`.
+//! The program's own calibration format, `camera.json` or `camera.toml`.
 
 use super::error::ParseError;
 use crate::camera::brown_conrady::{BrownCoefficients, BrownConrady};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize, Serializer};
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Model {
-    /// With the coefficients of [`Model::BrownConrady`], too, if there are any.
+    /// Pinhole; coefficients of [`Model::BrownConrady`] are accepted.
     Pinhole,
     BrownConrady,
     #[serde(alias = "fisheye", alias = "equidistant")]
@@ -28,10 +28,10 @@ enum PixelCentre {
     Half,
 }
 
-/// `model` ("pinhole", "brown-conrady" or "kannala-brandt"), `width`, `height`, `fx`, `fy`, `cx`,
-/// `cy` in pixels; the coefficients k1 to k6, p1, p2 of a [`BrownConrady`] or k1 to k4 of a
-/// [`KannalaBrandt`], 0 if missing; `max_angle_deg`, the largest angle off the axis that is to be
-/// used, all if missing; and `pixel_centre` ("integer", the default, or "half").
+/// A calibration file: `model` ("pinhole", "brown-conrady" or "kannala-brandt"), `width`, `height`,
+/// `fx`, `fy`, `cx`, `cy` in pixels; the coefficients k1 to k6, p1, p2 of a [`BrownConrady`] or k1
+/// to k4 of a [`KannalaBrandt`], 0 if missing; `max_angle_deg`, the largest angle off the axis to
+/// be used (no limit if missing); and `pixel_centre` ("integer", the default, or "half").
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraFile {
@@ -87,7 +87,7 @@ pub fn read_toml(text: &str) -> Result<Camera, ParseError> {
     file.camera()
 }
 
-/// The text of a `camera.json` that [`crate::camera::calibration::read_calibration`] restores exactly.
+/// Formats a `camera.json` that [`crate::camera::calibration::read_calibration`] restores exactly.
 pub fn format_calibration(camera: &Camera) -> String {
     // Numbers and plain names always serialise.
     serde_json::to_string_pretty(&CameraFile::of(camera)).unwrap_or_default() + "\n"
@@ -100,7 +100,7 @@ impl Serialize for Camera {
 }
 
 impl CameraFile {
-    /// The file of a camera.
+    /// Converts a camera to its file.
     pub fn of(camera: &Camera) -> Self {
         let (model, k, [p1, p2], max_angle_rad, all_rad) = match &camera.lens {
             Lens::BrownConrady(lens) => {
@@ -183,7 +183,7 @@ impl CameraFile {
             let foreign = |(name, value): &&(&str, f64)| foreign.contains(name) && *value != 0.0;
             if let Some((name, _)) = coefficients.iter().find(foreign) {
                 return Err(ParseError::new(format!(
-                    "a kannala-brandt lens has k1 to k4 only, and no {name}"
+                    "a kannala-brandt lens has k1 to k4 only, not {name}"
                 )));
             }
             let lens = KannalaBrandt::new([self.k1, self.k2, self.k3, self.k4]);

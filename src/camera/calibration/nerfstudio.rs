@@ -1,4 +1,4 @@
-//! The camera in nerfstudio's transforms.json.
+//! The camera in nerfstudio's `transforms.json`.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;
@@ -9,16 +9,16 @@ use crate::camera::projection::Camera;
 use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
-/// True of a tree with `fl_x`, or with `frames`.
+/// True for a file with `fl_x` or `frames`.
 pub fn is_transforms(tree: &Value) -> bool {
     ["fl_x", "frames", "camera_angle_x"]
         .iter()
         .any(|name| tree.get(name).is_some())
 }
 
-/// Reads `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`, `camera_model` and the coefficients, which stand at
-/// the top or, if every frame has its own, in each frame (then `name` is a frame's `file_path`).
-/// Pixels are counted from the corner of the first and converted.
+/// Reads `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`, `camera_model` and the coefficients, given at the
+/// top level or, if every frame has its own, in each frame (then `name` is a frame's `file_path`).
+/// Pixel coordinates are counted from the corner of the first pixel and converted.
 pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
     if tree.get("fl_x").is_some() {
         return camera(tree, tree);
@@ -38,7 +38,7 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
             "there is no `fl_x`; the focal lengths in pixels must be given as fl_x and fl_y",
         ));
     }
-    // The same camera in every frame is one.
+    // Identical cameras of all frames count as one.
     let (_, first) = &own[0];
     let intrinsics = [
         "fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "k4", "p1", "p2",

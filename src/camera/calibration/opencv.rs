@@ -1,4 +1,4 @@
-//! OpenCV's YAML, and ROS's camera_info, which is alike.
+//! OpenCV's YAML and ROS's `camera_info`, which share a structure.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
 use super::error::ParseError;
@@ -28,15 +28,15 @@ const DISTORTION: [&str; 7] = [
 const WIDTH: [&str; 3] = ["image_width", "width", "image_Width"];
 const HEIGHT: [&str; 3] = ["image_height", "height", "image_Height"];
 
-/// Reads `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height` (or what else
-/// these are called).
+/// Reads `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height` (or their
+/// other common names).
 ///
-/// ROS names the lens in `distortion_model`; OpenCV's own files have a fisheye if `fisheye_model`
+/// ROS names the lens model in `distortion_model`; OpenCV's files hold a fisheye if `fisheye_model`
 /// is 1.
 pub fn read(tree: &Value) -> Result<Camera, ParseError> {
     let matrix = entry(tree, &MATRIX).ok_or_else(|| {
         ParseError::new(
-            "no `camera_matrix`: this is no calibration of OpenCV, ROS or Kalibr that is known here",
+            "no `camera_matrix`: this is not a known calibration file of OpenCV, ROS or Kalibr",
         )
     })?;
     let k = numbers(matrix, "camera_matrix")?;

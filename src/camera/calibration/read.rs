@@ -5,14 +5,13 @@ use super::{colmap, kalibr, native, nerfstudio, opencv, value_tree};
 use crate::camera::projection::Camera;
 use std::path::Path;
 
-/// Pixels along a side of the smallest picture.
+/// Smallest width and height of an image, pixels.
 const MIN_IMAGE_SIDE_PX: u32 = 16;
-/// A lens that shows less of the picture than this has other numbers than were meant.
+/// Smallest visible fraction of the image; below it, the coefficients are assumed to be wrong.
 const MIN_VISIBLE_FRACTION: f64 = 0.5;
 
-/// Reads a calibration file; which kind it is follows from its name and content (see the table in
-/// the module's documentation). `name`: which camera, where a file has several (`cam1`, a COLMAP
-/// id).
+/// Reads a calibration file of any supported format (see the table in the module's documentation).
+/// `name` selects the camera if the file holds several (`cam1`, a COLMAP id).
 ///
 /// # Errors
 /// An unreadable file; an unknown, missing or impossible entry, with its line where it is known; a
@@ -29,7 +28,7 @@ pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, Calib
     })?;
     let text = String::from_utf8(bytes).map_err(|_| {
         content(ParseError::new(
-            "this is no text; give the calibration file itself",
+            "this is not a text file; give the calibration file itself",
         ))
     })?;
     let extension = path.extension().unwrap_or_default().to_string_lossy();
@@ -55,7 +54,7 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
         "txt" => colmap::read(text, name),
         "toml" => native::read_toml(text),
         "xml" => Err(ParseError::new(
-            "OpenCV's XML is not read; save the calibration as YAML (a name that ends in .yml)",
+            "OpenCV's XML is not supported; save the calibration as YAML (a name that ends in .yml)",
         )),
         _ => match value_tree::parse_json(text) {
             Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
@@ -64,11 +63,11 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
     }
 }
 
-/// Refuses numbers that make no camera.
+/// Rejects impossible camera parameters.
 fn validate(camera: Camera) -> Result<Camera, ParseError> {
     if camera.width < MIN_IMAGE_SIDE_PX || camera.height < MIN_IMAGE_SIDE_PX {
         return Err(ParseError::new(format!(
-            "width and height are {} × {}; they must be the frames' size in pixels, {MIN_IMAGE_SIDE_PX} at the least",
+            "width and height are {} × {}; they must be the frames' size in pixels, at least {MIN_IMAGE_SIDE_PX} each",
             camera.width, camera.height
         )));
     }

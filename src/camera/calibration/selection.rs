@@ -2,7 +2,7 @@
 
 use super::error::ParseError;
 
-/// The one camera of several that is meant, of those with their names.
+/// Selects a camera by name; the name may be omitted if there is only one.
 pub fn select_camera<T>(
     mut cameras: Vec<(String, T)>,
     name: Option<&str>,
@@ -16,13 +16,13 @@ pub fn select_camera<T>(
             .iter()
             .position(|(name, _)| name == wanted)
             .ok_or_else(|| {
-                ParseError::new(format!("there is no camera {wanted:?}; it has {}", names()))
+                ParseError::new(format!("there is no camera {wanted:?}; the file has {}", names()))
             })?,
         None if cameras.len() == 1 => 0,
-        None if cameras.is_empty() => return Err(ParseError::new("it holds no camera")),
+        None if cameras.is_empty() => return Err(ParseError::new("the file holds no camera")),
         None => {
             return Err(ParseError::new(format!(
-                "it holds several cameras ({}); say which with `name` under [camera] of survey.toml",
+                "the file holds several cameras ({}); select one with `name` under [camera] of survey.toml",
                 names()
             )));
         }

@@ -54,7 +54,7 @@ fn half_pixel_centres_are_converted() {
     assert_eq!((camera.cx, camera.cy), (1.5, 0.5));
 }
 
-/// What `cv2.FileStorage` and OpenCV's calibration sample write.
+/// A file as `cv2.FileStorage` and OpenCV's calibration sample write it.
 const OPENCV: &str = "%YAML:1.0
 ---
 calibration_time: \"Mon 02 Nov 2026\"
@@ -276,7 +276,7 @@ fn bad_files_say_where_and_what() {
         (
             "c.yml",
             OPENCV.replace(", -2.0e-02 ]", " "),
-            "no valid YAML",
+            "not valid YAML",
         ),
         (
             "c.yml",
@@ -309,7 +309,7 @@ fn bad_files_say_where_and_what() {
         (
             "c.txt",
             "1 PINHOLE 640 480 415 417 318 x\n".to_owned(),
-            "\"x\" is no number",
+            "\"x\" is not a number",
         ),
         (
             "c.json",
@@ -330,5 +330,5 @@ fn bad_files_say_where_and_what() {
     let path = dir.path().join("c.yml");
     std::fs::write(&path, [0xff, 0xfe, 0x00]).unwrap();
     let message = read_calibration(&path, None).unwrap_err().to_string();
-    assert!(message.contains("no text"), "{message}");
+    assert!(message.contains("not a text file"), "{message}");
 }

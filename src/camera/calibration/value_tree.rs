@@ -1,10 +1,10 @@
-//! A calibration file as a tree of values, and what is looked up in it.
+//! Calibration files parsed to a tree of values, and look-ups in it.
 
 use super::error::ParseError;
 use serde_json::Value;
 
-/// A YAML file. OpenCV's own begin with `%YAML:1.0`, which YAML does not allow, and mark matrices
-/// with a tag that nobody else knows; both are left out.
+/// Parses a YAML file. OpenCV's files begin with `%YAML:1.0`, which YAML does not allow, and mark
+/// matrices with a tag of their own; both are removed first.
 pub fn parse_yaml(text: &str) -> Result<Value, ParseError> {
     let lines = text.lines().map(|line| {
         let line = if line.starts_with("%YAML") { "" } else { line };
@@ -17,7 +17,7 @@ pub fn parse_yaml(text: &str) -> Result<Value, ParseError> {
         let what = what.lines().next().unwrap_or_default();
         ParseError {
             line,
-            what: format!("this is no valid YAML: {what}"),
+            what: format!("this is not valid YAML: {what}"),
         }
     })?;
     if tree.is_object() {
@@ -27,17 +27,17 @@ pub fn parse_yaml(text: &str) -> Result<Value, ParseError> {
     }
 }
 
-/// A JSON file.
+/// Parses a JSON file.
 pub fn parse_json(text: &str) -> Result<Value, ParseError> {
     serde_json::from_str(text).map_err(|error| ParseError::at(error.line(), error.to_string()))
 }
 
-/// The first of the entries that there is.
+/// The first entry that exists under one of the names.
 pub fn entry<'a>(tree: &'a Value, names: &[&str]) -> Option<&'a Value> {
     names.iter().find_map(|name| tree.get(name))
 }
 
-/// The same, as a number.
+/// The first entry that exists under one of the names, as a number.
 pub fn number(tree: &Value, names: &[&str]) -> Result<f64, ParseError> {
     let value = entry(tree, names)
         .ok_or_else(|| ParseError::new(format!("the entry `{}` is missing", names[0])))?;
@@ -47,7 +47,7 @@ pub fn number(tree: &Value, names: &[&str]) -> Result<f64, ParseError> {
         .ok_or_else(|| ParseError::new(format!("`{}` is {value}; it must be a number", names[0])))
 }
 
-/// The same, as a number of pixels.
+/// The first entry that exists under one of the names, as a number of pixels.
 pub fn pixels(tree: &Value, names: &[&str]) -> Result<u32, ParseError> {
     let value = number(tree, names)?;
     if value.fract() == 0.0 && (1.0..=1e6).contains(&value) {

@@ -13,7 +13,7 @@ use tempfile::{TempDir, TempPath};
 const PREFIX: &str = ".tunnelstitch-";
 
 /// Name, in a temporary folder, of a result that steps aside for its successor. Such a folder is
-/// never tidied away: it may lock_new the only copy.
+/// never tidied away: it may hold the only copy.
 pub(super) const REPLACED_NAME: &str = "old";
 
 /// Temporary names in use.
@@ -205,7 +205,7 @@ mod tests {
         folder(".tunnelstitch-alive", "half.png");
         folder(".tunnelstitch-aside", REPLACED_NAME);
         std::fs::write(path("result.tif"), "whole").unwrap();
-        // As another process would lock_new them.
+        // As another process would hold them.
         let names = [".tunnelstitch-alive.part", ".tunnelstitch-alive"];
         let locks = names.map(|name| File::open(path(name)).unwrap());
         locks.iter().for_each(|lock| lock.lock().unwrap());

@@ -1,7 +1,7 @@
 //! The line along the middle of a curved tunnel.
 //!
 //! Points given by the user are joined by a cubic spline of their chord lengths (C², with the ends
-//! bent as the circles through the first and last three points). It is sample_spline in even steps of its
+//! bent as the circles through the first and last three points). It is sampled in even steps of its
 //! own length: the nodes. Each has a frame `Q = (E_x, T, E_z)` that turns along as little as
 //! possible (the rotation-minimising frame: from node to node, T is carried over by the smallest
 //! rotation). Between nodes position and size of the section are cubic Hermite polynomials, and the

@@ -4,7 +4,7 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use std::ops::{Add, Mul, Sub};
 
-/// PiecewiseOutline of the spline's parameter between two given points, to measure its length.
+/// Pieces of the spline's parameter between two given points, to measure its length.
 const LENGTH_STEPS: usize = 64;
 
 /// Slopes of the section's scale at the given points over the chords, so that the cubics between

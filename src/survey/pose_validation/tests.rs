@@ -9,7 +9,7 @@ use rand::SeedableRng;
 
 const RADIUS_M: f64 = 3.0;
 
-/// What the validate_poses says of poses in the convention of `given`.
+/// What the check says of poses in the convention of `given`.
 fn verdict(poses: &[Pose], given: Convention) -> Result<Vec<String>, String> {
     let reading = InterpretedPoses {
         given: indexed(poses.iter().copied()),
@@ -191,7 +191,7 @@ fn one_camera_outside_is_no_convention() {
     poses[7].t_wc.x = 4.0;
     let message = verdict(&poses, tum()).unwrap_err();
     assert!(
-        message.contains("frame 7") && message.contains("validate_poses radius_m"),
+        message.contains("frame 7") && message.contains("check radius_m"),
         "{message}"
     );
 }

@@ -12,7 +12,7 @@ pub struct ClockMatch {
     pub correlation: f64,
 }
 
-/// AngularRates that agree less than this are not of the same motion.
+/// Rates that agree less than this are not of the same motion.
 const MIN_CORRELATION: f64 = 0.7;
 
 /// More offsets than this are not tried.

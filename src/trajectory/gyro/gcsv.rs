@@ -24,7 +24,7 @@ const COLUMNS: [&str; 10] = ["t", "gx", "gy", "gz", "ax", "ay", "az", "mx", "my"
 pub struct GyroSample {
     /// Seconds of the log's clock.
     pub time_s: f64,
-    /// AngularRates of turn by the right-hand rule, rad/s.
+    /// Rates of turn by the right-hand rule, rad/s.
     pub rate_rad_s: Vector3<f64>,
     /// Acceleration that is felt, multiples of g: at rest it points up.
     pub acceleration_g: Option<Vector3<f64>>,

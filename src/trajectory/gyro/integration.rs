@@ -1,4 +1,4 @@
-//! AngularRates integrated to rotations.
+//! Rates integrated to rotations.
 
 use super::rates::AngularRates;
 use crate::trajectory::so3;
@@ -91,7 +91,7 @@ mod tests {
         ) {
             let found = turning(w, s, 200.0).between(from, to).unwrap();
             let expected = truth(w, s, from).0.inverse() * truth(w, s, to).0;
-            // AngularRates are not straight between samples: that is of the second order in 5 ms.
+            // Rates are not straight between samples: that is of the second order in 5 ms.
             prop_assert!(found.angle_to(&expected) < 1e-4, "{}", found.angle_to(&expected));
         }
     }

@@ -1,8 +1,8 @@
-//! AngularRates of turn over time.
+//! Rates of turn over time.
 
 use nalgebra::Vector3;
 
-/// AngularRates of turn in the camera's axes, rad/s, at times that increase; between them they change
+/// Rates of turn in the camera's axes, rad/s, at times that increase; between them they change
 /// evenly.
 #[derive(Clone, Debug)]
 pub struct AngularRates {
@@ -11,7 +11,7 @@ pub struct AngularRates {
 }
 
 impl AngularRates {
-    /// AngularRates at times, as many as each other.
+    /// Rates at times, as many as each other.
     ///
     /// # Panics
     /// If they are not.
