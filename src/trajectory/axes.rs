@@ -4,10 +4,10 @@ use super::pose::Pose;
 use nalgebra::{Quaternion, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
-/// Which way a pose leads.
+/// The direction of a pose's transformation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Direction {
-    /// From the camera (or the body) to the world: the translation is where it stands.
+    /// From the camera (or the body) to the world: the translation is the camera's position.
     #[serde(rename = "c2w")]
     CameraToWorld,
     /// From the world to the camera.
@@ -16,7 +16,7 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// The other one.
+    /// The opposite direction.
     pub fn other(self) -> Self {
         match self {
             Self::CameraToWorld => Self::WorldToCamera,
@@ -24,7 +24,7 @@ impl Direction {
         }
     }
 
-    /// As flags and files name it.
+    /// The name in flags and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::CameraToWorld => "c2w",
@@ -33,7 +33,7 @@ impl Direction {
     }
 }
 
-/// How a camera's axes lie.
+/// The orientation of a camera's axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
@@ -45,7 +45,7 @@ pub enum CameraAxes {
 }
 
 impl CameraAxes {
-    /// The other ones.
+    /// The other convention.
     pub fn other(self) -> Self {
         match self {
             Self::OpenCv => Self::OpenGl,
@@ -53,7 +53,7 @@ impl CameraAxes {
         }
     }
 
-    /// As flags and files name them.
+    /// The name in flags and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::OpenCv => "opencv",
@@ -61,12 +61,12 @@ impl CameraAxes {
         }
     }
 
-    /// A camera-to-world pose of these axes in OpenCV's, and the other way round:
+    /// Converts a camera-to-world pose between these axes and OpenCV's, in either direction:
     /// `R ← R diag(1, −1, −1)` for OpenGL.
     pub fn turn(self, pose: &Pose) -> Pose {
         match self {
             Self::OpenCv => *pose,
-            // Half a turn about x: exact, since it only swaps the quaternion's numbers.
+            // Half a turn about x is exact: it only permutes the quaternion's components.
             Self::OpenGl => {
                 let half_turn = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
                 Pose::new(pose.r_wc * half_turn, pose.t_wc)

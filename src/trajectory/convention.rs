@@ -1,5 +1,4 @@
-//! What the numbers of a pose mean: its direction, the camera's axes, whose pose it is, and in
-//! which world.
+//! Pose conventions: direction, camera axes, body and world frame.
 
 use super::axes::{CameraAxes, Direction};
 use super::format::PoseFormat;
@@ -8,9 +7,9 @@ use super::pose::Pose;
 /// The convention of a file of poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Convention {
-    /// Which way its poses lead.
+    /// The direction of the poses.
     pub direction: Direction,
-    /// How the camera's axes lie.
+    /// The camera's axes.
     pub axes: CameraAxes,
     /// The camera in the body whose poses the file holds, `x_body = T x_camera`; `None` if they are
     /// the camera's own.
@@ -21,7 +20,7 @@ pub struct Convention {
 }
 
 impl Convention {
-    /// What a format means where nothing else is said.
+    /// The default convention of a format.
     pub fn of(format: PoseFormat) -> Self {
         Self {
             direction: format.direction(),
@@ -31,10 +30,11 @@ impl Convention {
         }
     }
 
-    /// The pose as the program has it: camera-to-world, OpenCV's axes, the tunnel's axis along y.
+    /// Converts a pose to the program's convention: camera-to-world, OpenCV's axes, the tunnel's
+    /// axis along y.
     ///
-    /// `T = T_world,tunnel⁻¹ T_world,body T_body,camera`, then the camera's axes. A pose that has
-    /// this convention already is returned to the bit.
+    /// `T = T_world,tunnel⁻¹ T_world,body T_body,camera`, then the camera's axes. A pose that
+    /// already has this convention is returned bit for bit.
     pub fn to_tunnel(&self, given: &Pose) -> Pose {
         let mut pose = self.to_world(given);
         if let Some(tunnel) = &self.tunnel_in_world {
@@ -43,7 +43,7 @@ impl Convention {
         pose
     }
 
-    /// The same in the world of the file.
+    /// Converts a pose to camera-to-world with OpenCV's axes in the world of the file.
     pub fn to_world(&self, given: &Pose) -> Pose {
         let mut pose = match self.direction {
             Direction::CameraToWorld => *given,
@@ -96,7 +96,7 @@ mod tests {
         ] {
             assert!((turned.r_wc * axis - pose.r_wc * axis * sign).norm() < 1e-15);
         }
-        // Twice is a whole turn: the same rotation, the quaternion's sign changed.
+        // Twice is a full turn: the same rotation with the quaternion's sign changed.
         let twice = CameraAxes::OpenGl.turn(&turned);
         assert_eq!(twice.r_wc.coords, -pose.r_wc.coords);
     }

@@ -5,16 +5,16 @@ use super::format::PoseFormat;
 use super::{colmap, csv, euroc, kitti, text, tum};
 use std::path::Path;
 
-/// The format of a text, by what it holds.
+/// Detects the format of a pose file from its content.
 ///
 /// # Errors
-/// A text that is none of them, named with what was found.
+/// A text in none of the formats.
 pub(super) fn detect_format(path: &Path, text: &str) -> Result<PoseFormat, PoseError> {
     if text.trim_start().starts_with('{') {
         return Ok(PoseFormat::Nerfstudio);
     }
     let Some((number, line)) = text::lines(text).next() else {
-        // Only comments: COLMAP's say what they are about.
+        // Only comments.
         return Err(PoseError::file(path, "holds no poses"));
     };
     if csv::is_header(line) {
@@ -32,7 +32,7 @@ pub(super) fn detect_format(path: &Path, text: &str) -> Result<PoseFormat, PoseE
         .filter(|word| word.parse::<f64>().is_ok())
         .count();
     match (numbers, words.len()) {
-        // A line too long or too short is the business of the format it is nearest to.
+        // A line of a wrong length is reported by the parser of the nearest format.
         (12, 12) => Ok(PoseFormat::Kitti),
         (most, all) if most >= 5 && all <= 9 => Ok(PoseFormat::Tum),
         _ => Err(PoseError::line(

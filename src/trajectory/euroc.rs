@@ -12,8 +12,8 @@ use std::path::Path;
 
 const FORM: &str = "timestamp [ns], x, y, z, qw, qx, qy, qz";
 
-/// Whether a line is one of such a file: commas, and a first number with as many digits as
-/// nanoseconds since 1970 have, or more than any other time.
+/// True for a line of such a file: comma-separated, with a first number that has the digits of
+/// nanoseconds since 1970, or more digits than any other time.
 pub(super) fn is_line(line: &str) -> bool {
     let mut words = line.split(',');
     let time = words.next().unwrap_or_default().trim();

@@ -3,16 +3,16 @@
 use super::axes::{CameraAxes, Direction};
 use serde::{Deserialize, Serialize};
 
-/// A format of a file of poses.
+/// The format of a pose file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum PoseFormat {
-    /// `time tx ty tz qx qy qz qw`.
+    /// Lines `time tx ty tz qx qy qz qw`.
     Tum,
-    /// The twelve numbers of a 3 × 4 matrix.
+    /// Lines with the twelve numbers of a 3 × 4 matrix.
     Kitti,
-    /// Named columns.
+    /// A table with named columns.
     Csv,
     /// COLMAP's text model: a folder with images.txt, or that file.
     Colmap,
@@ -23,7 +23,7 @@ pub enum PoseFormat {
 }
 
 impl PoseFormat {
-    /// The format's own direction of poses.
+    /// The direction of the format's poses.
     pub fn direction(self) -> Direction {
         match self {
             Self::Colmap => Direction::WorldToCamera,
@@ -31,7 +31,7 @@ impl PoseFormat {
         }
     }
 
-    /// The format's own axes of a camera.
+    /// The camera axes of the format.
     pub fn axes(self) -> CameraAxes {
         match self {
             Self::Nerfstudio => CameraAxes::OpenGl,

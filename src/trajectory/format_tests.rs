@@ -1,4 +1,4 @@
-//! Every format: written and read again, and everything that can be wrong with it.
+//! Round trips and errors of every format.
 
 use super::*;
 use crate::camera::{Camera, ColmapCamera};
@@ -24,7 +24,7 @@ fn names(count: usize) -> Vec<String> {
         .collect()
 }
 
-/// The same poses in every format that is written, with what reading tells of it.
+/// Formats the poses in every writable format.
 fn written(trajectory: &[StampedPose]) -> Vec<(PoseFormat, String)> {
     let names = names(trajectory.len());
     let camera = ColmapCamera::of(&Camera::from_vertical_fov(64, 48, 1.0));
@@ -240,7 +240,7 @@ fn wrong_lines_are_named_with_the_remedy() {
         ("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1\n".into(), ":2: 11 columns"),
         ("1 0 0 0 0 1 0 0 0 0 1 inf\n".into(), ":1: `inf` is not finite"),
         ("2 0 0 0 0 2 0 0 0 0 2 0\n".into(), ":1: its rotation is scaled by 2"),
-        ("1 0 0 0 0 1 0 0 0 0 -1 0\n".into(), ":1: its rotation is a mirror image"),
+        ("1 0 0 0 0 1 0 0 0 0 -1 0\n".into(), ":1: its rotation is a reflection"),
         // CSV.
         (header.into(), "holds no poses"),
         ("time_s,tx_m,ty_m,qx,qy,qz,qw\n".into(), ":1: no column `tz_m` or `tz`"),
@@ -265,7 +265,7 @@ fn wrong_lines_are_named_with_the_remedy() {
         ("{}".into(), "missing field `frames`"),
         (
             "{\"frames\": [{\"file_path\": \"a\", \"transform_matrix\": [[1,0,0,0],[0,1,0,0],[0,0,2,0]]}]}".into(),
-            "frames[0] (a): transform_matrix: its first three columns are no rotation",
+            "frames[0] (a): transform_matrix: its first three columns are not a rotation",
         ),
         ("{\"frames\": [], \"applied_scale\": 0.5}".into(), "applied_scale is 0.5"),
         // EuRoC.

@@ -1,8 +1,8 @@
-//! KITTI odometry: the twelve numbers of `[R t]` a line, row by row, camera-to-world, metres; no
-//! times.
+//! KITTI odometry: lines with the twelve numbers of `[R t]`, row by row, camera-to-world, metres;
+//! no times.
 //!
-//! KITTI's own files have the first camera as their world. Any world is read, and the tunnel's is
-//! written.
+//! KITTI's own files use the first camera as their world. Files are read in any world and written
+//! in the tunnel's frame.
 
 use super::error::PoseError;
 use super::pose_entry::PoseEntry;
@@ -27,7 +27,7 @@ fn parse_line(line: &str) -> Result<PoseEntry, String> {
     })
 }
 
-/// The text of a KITTI file.
+/// Formats a KITTI file.
 pub fn format(trajectory: &[StampedPose]) -> String {
     let line = |stamped: &StampedPose| {
         let numbers = rigid::to_rows(&stamped.pose).concat();

@@ -1,5 +1,4 @@
-//! Where the camera was: poses, the plan they should have followed, the jitter that moved them off
-//! it, and the files they are kept in.
+//! Camera trajectories: poses, motion plans, pose noise, gyroscope integration and pose files.
 //!
 //! | format | its own convention | times | names |
 //! | --- | --- | --- | --- |
@@ -10,8 +9,8 @@
 //! | [`nerfstudio`] | camera-to-world, OpenGL's axes | | yes |
 //! | `euroc` (read only) | body-to-world | nanoseconds | |
 //!
-//! [`read_poses`] reads any of them as they are; a [`Convention`] says what the numbers mean and
-//! makes poses of the tunnel of them.
+//! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
+//! poses to the tunnel's frame.
 //!
 //! # Example
 //!

@@ -1,7 +1,7 @@
 //! nerfstudio's `transforms.json`: `frames`, each with `file_path` and a camera-to-world
 //! `transform_matrix` in OpenGL's axes (y up, z backwards).
 //!
-//! `applied_transform`, by which the poses were moved after they were made, is undone.
+//! `applied_transform`, which was applied to the poses afterwards, is inverted.
 
 use super::axes::CameraAxes;
 use super::error::PoseError;
@@ -60,7 +60,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
     Ok(entries)
 }
 
-/// The text of a `transforms.json`. `camera` are the keys of the camera, `names` the frames' paths
+/// Formats a `transforms.json`. `camera` holds the keys of the camera, `names` the frames' paths
 /// from the file's folder; `trajectory` is camera-to-world in OpenCV's axes.
 pub fn format(camera: Map<String, Value>, names: &[String], trajectory: &[StampedPose]) -> String {
     let frames: Vec<Value> = names

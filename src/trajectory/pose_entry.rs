@@ -6,9 +6,9 @@ use super::pose::Pose;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct PoseEntry {
-    /// The frame it belongs to, if the file says so.
+    /// The name of its frame, if the file has names.
     pub name: Option<String>,
-    /// Its time in seconds, if the file says so.
+    /// Its time in seconds, if the file has times.
     pub time_s: Option<f64>,
     /// The pose.
     pub pose: Pose,

@@ -1,4 +1,4 @@
-//! A file of poses, as it is.
+//! Pose files in their own convention.
 
 use super::detection::detect_format;
 use super::error::PoseError;
@@ -8,21 +8,21 @@ use super::stamped_pose::{StampedPose, Trajectory};
 use super::{colmap, csv, euroc, kitti, nerfstudio, text, tum};
 use std::path::{Path, PathBuf};
 
-/// A file of poses, in its own convention; one pose at the least. Its times increase and its names
-/// differ, where it has them.
+/// A file of poses, in its own convention, with at least one pose. Times, if present, increase;
+/// names, if present, differ.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct PoseFile {
-    /// Where it is.
+    /// The path of the file.
     pub path: PathBuf,
-    /// Its format.
+    /// The format of the file.
     pub format: PoseFormat,
-    /// Its poses.
+    /// The poses.
     pub entries: Vec<PoseEntry>,
 }
 
 impl PoseFile {
-    /// The poses with their times, or with their places in the file where it has none.
+    /// The poses with their times, or with their indices in the file if it has no times.
     pub fn trajectory(&self) -> Trajectory {
         let stamped = |(index, entry): (usize, &PoseEntry)| StampedPose {
             time_s: entry.time_s.unwrap_or(index as f64),
@@ -31,19 +31,19 @@ impl PoseFile {
         self.entries.iter().enumerate().map(stamped).collect()
     }
 
-    /// Whether all poses have names.
+    /// True if all poses have names.
     pub fn has_names(&self) -> bool {
         self.entries.iter().all(|entry| entry.name.is_some())
     }
 
-    /// Whether all poses have times.
+    /// True if all poses have times.
     pub fn has_times(&self) -> bool {
         self.entries.iter().all(|entry| entry.time_s.is_some())
     }
 }
 
-/// Reads a file of poses, of the given format or of the one that its content tells. A folder is a
-/// COLMAP model.
+/// Reads a file of poses, in the given format or in the one detected from its content. A folder is
+/// a COLMAP model.
 ///
 /// # Errors
 /// [`PoseError`]: an unreadable file, an unknown format, a line that is no pose, times that do not

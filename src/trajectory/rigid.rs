@@ -1,19 +1,19 @@
-//! Matrices that should be rigid motions.
+//! Conversion between matrices and rigid motions.
 
 use super::pose::Pose;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// How far `R Rᵀ` may be from the identity, each element: numbers with three digits pass.
+/// Largest deviation of an element of `R Rᵀ` from the identity; numbers with three digits pass.
 const MAX_ORTHOGONALITY_ERROR: f64 = 2e-3;
 
-/// The motion `[R t]` of three rows, or of four of which the last is `0 0 0 1`.
+/// The motion `[R t]` of a matrix of three rows, or of four if the last is `0 0 0 1`.
 ///
 /// R is replaced by the rotation nearest to it, `U Vᵀ` with `U Σ Vᵀ = R`, which undoes the rounding
 /// of its digits.
 ///
 /// # Errors
-/// Another size; a number that is not finite; a last row other than `0 0 0 1`; a scale, a mirror
-/// image, or anything else that R holds besides a rotation.
+/// Another size; a number that is not finite; another last row than `0 0 0 1`; an R that is scaled,
+/// a reflection or otherwise no rotation.
 pub(crate) fn from_rows(rows: &[[f64; 4]]) -> Result<Pose, String> {
     let [a, b, c] = match rows {
         [a, b, c] => [a, b, c],
@@ -47,16 +47,16 @@ pub(crate) fn from_rows(rows: &[[f64; 4]]) -> Result<Pose, String> {
         return Err(if scale > 0.0 && is_rotation(square / (scale * scale)) {
             format!("its rotation is scaled by {scale:.6}; poses are rigid, in metres")
         } else {
-            "its first three columns are no rotation (they must be perpendicular and of length 1)"
+            "its first three columns are not a rotation (they must be perpendicular and of length 1)"
                 .to_owned()
         });
     }
     if r.determinant() < 0.0 {
-        return Err("its rotation is a mirror image (determinant −1)".to_owned());
+        return Err("its rotation is a reflection (determinant −1)".to_owned());
     }
     let svd = r.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return Err("its rotation cannot be told".to_owned());
+        return Err("its rotation cannot be determined".to_owned());
     };
     let nearest = Rotation3::from_matrix_unchecked(u * v_t);
     Ok(Pose::new(UnitQuaternion::from_rotation_matrix(&nearest), t))

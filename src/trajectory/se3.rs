@@ -1,20 +1,21 @@
-//! Rigid motions SE(3): the way from one pose to the next.
+//! Interpolation of rigid motions in SE(3).
 
 use super::pose::Pose;
 use super::so3;
 use nalgebra::{Matrix3, Vector3};
 
-/// Rotations between two poses beyond this have no sure shorter way, radians.
+/// Largest rotation between two poses that are interpolated, radians; beyond it, the direction of
+/// rotation is ambiguous.
 pub const MAX_ROTATION_RAD: f64 = 170.0 * std::f64::consts::PI / 180.0;
 
 /// The pose on the geodesic of SE(3) from `from` (share 0) to `to` (share 1): the one screw motion
 /// that leads from one to the other, `T(s) = T₀ Exp(s Log(T₀⁻¹ T₁))`.
 ///
-/// With `(φ, ρ) = Log(T)`: `φ = Log(R)`, `ρ = V(φ)⁻¹ t`, and V of [`left_jacobian`]. It is the same
-/// whichever rigid part of the carrier is followed (body or camera) and whether poses or their
-/// inverses are given.
+/// With `(φ, ρ) = Log(T)`: `φ = Log(R)`, `ρ = V(φ)⁻¹ t`, and V of [`left_jacobian`]. The result
+/// does not depend on which rigid part of the carrier is followed (body or camera), nor on whether
+/// poses or their inverses are given.
 ///
-/// Returns `None` where the rotation between the two is more than [`MAX_ROTATION_RAD`].
+/// Returns `None` if the rotation between the two is more than [`MAX_ROTATION_RAD`].
 ///
 /// Source: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics", eqs.
 /// 172–174.
@@ -81,7 +82,7 @@ mod tests {
         }
     }
 
-    /// A carrier that turns and advances evenly moves along a screw.
+    /// A carrier with constant advance and rotation follows a screw motion.
     #[test]
     fn a_spiral_is_met_exactly() {
         let fine = spiral(9, 0.05, 0.2);

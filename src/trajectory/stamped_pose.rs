@@ -11,7 +11,7 @@ pub struct StampedPose {
     pub pose: Pose,
 }
 
-/// Poses in the order of their frames, times strictly increasing.
+/// A trajectory: poses in the order of their frames, times strictly increasing.
 pub type Trajectory = Vec<StampedPose>;
 
 /// The poses of a trajectory, without their times.

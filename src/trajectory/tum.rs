@@ -1,7 +1,7 @@
-//! TUM: `time tx ty tz qx qy qz qw` a line, seconds and metres, camera-to-world.
+//! TUM: lines `time tx ty tz qx qy qz qw`, seconds and metres, camera-to-world.
 //!
-//! Written with eight columns, single spaces and no trailing space, which is what `evo` accepts.
-//! The program's own format.
+//! The program's own format. It is written with eight columns, single spaces and no trailing space,
+//! as `evo` requires.
 
 use super::error::PoseError;
 use super::pose::Pose;
@@ -47,7 +47,7 @@ fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {
     })
 }
 
-/// The text of a TUM file; every number with the digits that restore it exactly.
+/// Formats a TUM file; every number has the digits that restore it exactly.
 pub fn format(trajectory: &[StampedPose]) -> String {
     let mut text = String::new();
     for StampedPose { time_s, pose } in trajectory {

@@ -1,34 +1,35 @@
-//! How the log's clock stands to that of the frames, from the turn that the plan has.
+//! Estimation of the offset between the log's clock and the frames' clock from the planned
+//! rotation.
 
 use super::rates::AngularRates;
 use nalgebra::Vector3;
 
-/// The offset between the clocks at which rates agree best.
+/// The offset between the clocks at which the rates correlate best.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockMatch {
     /// The log's time minus the frames', seconds.
     pub offset_s: f64,
-    /// Correlation of the two rates there, 1 at most.
+    /// Correlation of the two rates at the offset, at most 1.
     pub correlation: f64,
 }
 
-/// Rates that agree less than this are not of the same motion.
+/// Smallest correlation of rates of the same motion.
 const MIN_CORRELATION: f64 = 0.7;
 
-/// More offsets than this are not tried.
+/// Largest number of offsets to try.
 const MAX_OFFSETS: f64 = 1e7;
 
 impl ClockMatch {
-    /// Finds the offset, within `range_s`, that makes the rate about `axis` (in the camera's axes)
-    /// agree best with a plan's: that of the greatest correlation of the mean rates between frames,
-    /// with a parabola through its neighbours.
+    /// Estimates the offset within `range_s` that maximises the correlation of the mean rates about
+    /// `axis` (camera coordinates) between frames with those of a plan, with parabolic
+    /// interpolation of the maximum.
     ///
     /// `times_s` and `angles_rad`: the plan's angle about the axis at the frames. Steps of the
     /// search are those of the log.
     ///
     /// # Errors
-    /// Fewer than four frames, a plan that turns evenly, which fits anywhere, a log that does not
-    /// cover the frames at any offset, no offset at which the two agree, or only at an end of the
+    /// Fewer than four frames, a plan of constant rate, which fits any offset, a log that does not
+    /// cover the frames at any offset, no sufficient correlation, or a maximum at an end of the
     /// range.
     pub fn find(
         rates: &AngularRates,
@@ -45,13 +46,13 @@ impl ClockMatch {
             .map(|(angle, step)| (angle[1] - angle[0]) / step)
             .collect();
         if planned.len() < 3 {
-            return Err("a plan of fewer than four frames tells no offset".to_owned());
+            return Err("the offset cannot be estimated from fewer than four frames".to_owned());
         }
         let mean = planned.iter().sum::<f64>() / planned.len() as f64;
         let spread = planned.iter().map(|p| (p - mean).abs()).fold(0.0, f64::max);
         if spread <= 1e-6 * mean.abs().max(1e-6) {
             return Err(
-                "the plan turns evenly, which fits the log anywhere; give the offset, or a plan with its stops".to_owned(),
+                "the plan turns at a constant rate, which fits the log at any offset; give the offset, or a plan with its stops".to_owned(),
             );
         }
         let at = |offset_s: f64| {
@@ -68,7 +69,7 @@ impl ClockMatch {
         let count = ((range_s[1] - range_s[0]) / step_s).ceil().max(0.0);
         if !count.is_finite() || count > MAX_OFFSETS {
             return Err(format!(
-                "the range of {:.3} s holds {count:.0} of the log's steps of {step_s:.1e} s; see to the log's tscale, or narrow the range",
+                "the range of {:.3} s holds {count:.0} of the log's steps of {step_s:.1e} s; check the log's tscale, or narrow the range",
                 range_s[1] - range_s[0]
             ));
         }
@@ -85,7 +86,7 @@ impl ClockMatch {
         if correlation < MIN_CORRELATION {
             return Err(format!(
                 "the rate about the axis agrees with the plan's nowhere in the range: the greatest correlation is {correlation:.2}, \
-                 at {:.3} s; see to the sensor's orientation, or widen the range",
+                 at {:.3} s; check the sensor's orientation, or widen the range",
                 offset(k)
             ));
         }
@@ -95,7 +96,7 @@ impl ClockMatch {
                 offset(k)
             ));
         };
-        // The parabola's top.
+        // The vertex of the parabola.
         let bend = before - 2.0 * correlation + after;
         let shift = if bend < 0.0 {
             0.5 * (before - after) / bend
@@ -109,7 +110,7 @@ impl ClockMatch {
     }
 }
 
-/// Pearson's correlation; `None` where one does not vary.
+/// Pearson's correlation coefficient; `None` if one of them is constant.
 fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     let (mean_a, mean_b) = (mean(a), mean(b));
@@ -124,7 +125,7 @@ fn correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     (norm > 0.0).then(|| ab / norm)
 }
 
-/// The angle turned about an axis since the log's first sample.
+/// The rotation angle about an axis since the log's first sample.
 pub(super) struct Turned<'a> {
     times_s: &'a [f64],
     rates: Vec<f64>,
@@ -168,7 +169,7 @@ impl<'a> Turned<'a> {
 mod tests {
     use super::*;
 
-    /// Turns and stops: 20° every two seconds, within one.
+    /// The angle of a plan with stops: 20° within one second, every two seconds.
     fn angle(t: f64) -> f64 {
         let (step, part) = ((t / 2.0).floor(), t.rem_euclid(2.0).min(1.0));
         (step + part - (std::f64::consts::TAU * part).sin() / std::f64::consts::TAU) * 0.35
@@ -185,7 +186,7 @@ mod tests {
         AngularRates::new(times, rates)
     }
 
-    /// As of a log whose tscale is wrong.
+    /// Rates of a log with a wrong tscale.
     #[test]
     fn a_range_of_countless_steps_is_refused() {
         let axis = Vector3::z();
@@ -223,7 +224,7 @@ mod tests {
             ClockMatch::find(&rates, &axis, &times, &angles, range_s).unwrap_err()
         };
         for (message, expected) in [
-            (of(&|t| 0.5 * t, [0.0, 8.0]), "turns evenly"),
+            (of(&|t| 0.5 * t, [0.0, 8.0]), "at a constant rate"),
             (of(&angle, [100.0, 101.0]), "covers all frames at no offset"),
             (of(&angle, [4.0, 8.0]), "end of the range"),
             (

@@ -1,5 +1,5 @@
-//! Whether integrated rotations are as far off as they are said to be: logs as files, with bias and
-//! noise, read back.
+//! Consistency of the stated and the actual errors of integrated rotations, for log files with bias
+//! and noise.
 
 use super::*;
 use crate::trajectory::so3;
@@ -21,7 +21,7 @@ fn truth(t: f64) -> UnitQuaternion<f64> {
     so3::exp(&(Vector3::y() * turned)) * so3::exp(&sway)
 }
 
-/// The log of that motion by a sensor that sits in the camera as `orientation` says.
+/// The log of that motion by a sensor with the given orientation in the camera.
 fn log(orientation: &str, bias: Vector3<f64>, sigma: f64, seed: u64) -> String {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -43,8 +43,7 @@ fn log(orientation: &str, bias: Vector3<f64>, sigma: f64, seed: u64) -> String {
     text
 }
 
-/// Errors of the steps from second to second and of the whole, over what they are said to be
-/// (squared, over three axes).
+/// Normalised squared errors (over three axes) of the steps from second to second and of the whole.
 fn normalised(orientation: &str, seed: u64) -> (f64, f64) {
     let bias = Vector3::new(0.012, -0.02, 0.007);
     let dir = tempfile::tempdir().unwrap();
@@ -71,8 +70,8 @@ fn normalised(orientation: &str, seed: u64) -> (f64, f64) {
     (steps / STEPS as f64, error(seconds(0), seconds(STEPS)))
 }
 
-/// Whichever way the sensor sits, errors are of the size that is said: for 24 orientations the mean
-/// squares of 480 steps (1440 numbers) and of 24 whole ways (72 numbers).
+/// Errors match their stated size for 24 orientations: the mean squares of 480 steps (1440 numbers)
+/// and of 24 complete logs (72 numbers).
 #[test]
 fn errors_are_what_they_are_said_to_be() {
     let words: Vec<String> = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"]

@@ -3,14 +3,14 @@
 use crate::trajectory::plan::Mounting;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// The carrier's attitude angle θ about the tunnel's axis, told by gravity: the carrier's y axis is
-/// taken to lie along the tunnel's, as the plan has it, and the tunnel's bottom at `down_rad`.
+/// The carrier's attitude angle θ about the tunnel's axis from gravity. The carrier's y axis is
+/// assumed to lie along the tunnel's axis, as in the plan, and the tunnel's bottom at `down_rad`.
 ///
 /// `up_c` is the acceleration at rest in the camera's axes. With `u = R_mount up_c`, θ makes
 /// `R_y(θ) u`, seen along the axis, point away from the bottom:
 /// `θ = atan2(−sin d, −cos d) − atan2(u_x, u_z)`.
 ///
-/// Returns `None` where gravity is within 10° of the axis, along which it tells nothing.
+/// Returns `None` if gravity is within 10° of the axis, where the angle is unobservable.
 pub fn angle_from_gravity_rad(
     up_c: &Vector3<f64>,
     mounting: &Mounting,
@@ -22,7 +22,7 @@ pub fn angle_from_gravity_rad(
         .then(|| (-down_rad.sin()).atan2(-down_rad.cos()) - up.x.atan2(up.z))
 }
 
-/// The carrier's axis of the turn in the camera's axes: `R_mountᵀ y`.
+/// The carrier's axis of rotation in camera coordinates: `R_mountᵀ y`.
 pub fn axis_in_camera(mounting: &Mounting) -> Vector3<f64> {
     let r: UnitQuaternion<f64> = mounting.camera_in_carrier().r_wc;
     r.inverse() * Vector3::y()

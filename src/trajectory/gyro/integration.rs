@@ -1,19 +1,19 @@
-//! Rates integrated to rotations.
+//! Integration of angular rates to rotations.
 
 use super::rates::AngularRates;
 use crate::trajectory::so3;
 use nalgebra::{UnitQuaternion, Vector3};
 
-/// Rotations at any time within a log: those at its samples, and the rates that lead on from them.
+/// Rotations at any time within a log, integrated from the rates.
 #[derive(Clone, Debug)]
 pub struct IntegratedRotation {
     rates: AngularRates,
-    /// Camera at each sample in the camera at the first.
+    /// Rotation from the camera at each sample to the camera at the first.
     since_first: Vec<UnitQuaternion<f64>>,
 }
 
-/// The rotation over `step_s` during which the rate, in the turning axes, goes evenly from `from`
-/// to `to`: `Exp(h (ω₀ + ω₁)/2 + h²/12 ω₀ × ω₁)`, exact but for terms of the fifth order of h.
+/// The rotation over `step_s` during which the rate, in body axes, changes linearly from `from` to
+/// `to`: `Exp(h (ω₀ + ω₁)/2 + h²/12 ω₀ × ω₁)`, exact up to terms of fifth order in h.
 ///
 /// Source: Bortz, "A new mathematical formulation for strapdown inertial navigation", 1971; the
 /// fourth-order Magnus expansion.
@@ -30,7 +30,7 @@ impl IntegratedRotation {
         for (times, pair) in rates.times_s().windows(2).zip(rates.rates().windows(2)) {
             if let ([begin_s, end_s], [from, to]) = (times, pair) {
                 attitude *= step(from, to, end_s - begin_s);
-                // Rounding does not add up.
+                // Renormalised, so that rounding does not accumulate.
                 attitude.renormalize_fast();
                 since_first.push(attitude);
             }
@@ -38,8 +38,8 @@ impl IntegratedRotation {
         Self { rates, since_first }
     }
 
-    /// The camera at a time in the camera at the log's first sample; `None` before that or after
-    /// the last.
+    /// The rotation from the camera at a time to the camera at the log's first sample; `None`
+    /// outside the log.
     pub fn at(&self, time_s: f64) -> Option<UnitQuaternion<f64>> {
         let times = self.rates.times_s();
         let next = times.partition_point(|t| *t < time_s);
@@ -70,8 +70,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A rotation that is known in closed form, and its rate in its own axes: precession about y at
-    /// `w` while spinning about z at `s`, tilted by 0.3 rad.
+    /// A rotation known in closed form, and its rate in body axes: precession about y at `w` while
+    /// spinning about z at `s`, tilted by 0.3 rad.
     fn truth(w: f64, s: f64, t: f64) -> (UnitQuaternion<f64>, Vector3<f64>) {
         let tilt = so3::exp(&(Vector3::x() * 0.3));
         let r = so3::exp(&(Vector3::y() * (w * t))) * tilt * so3::exp(&(Vector3::z() * (s * t)));
@@ -96,8 +96,7 @@ mod tests {
         }
     }
 
-    /// The coning term is what makes it better than the mean rate: four times the samples, sixteen
-    /// times as exact.
+    /// With the coning term the error falls by sixteen for four times the samples.
     #[test]
     fn it_converges_with_the_second_power_and_is_exact_for_even_turns() {
         let off = |hz: f64| {
@@ -115,7 +114,7 @@ mod tests {
         assert!(even.angle_to(&expected) < 1e-12);
     }
 
-    /// One long step with rates along a line against a thousand short ones.
+    /// Compares one long step of linearly changing rate with a thousand short ones.
     #[test]
     fn one_step_is_as_good_as_many() {
         let (from, to) = (Vector3::new(0.4, -0.1, 0.3), Vector3::new(-0.2, 0.5, 0.1));

@@ -1,11 +1,11 @@
-//! Rotations from a gyro's log.
+//! Rotations from a gyroscope's log.
 //!
-//! A [`GyroLog`] is the file; an [`Orientation`] or a calibrated mount turns its rates into the
-//! camera's axes ([`AngularRates`]). A stretch at rest ([`StationaryInterval`]) tells the bias, the noise density and
-//! which way is up; [`IntegratedRotation`] integrates what is left to rotations at the frames' times;
-//! [`ClockMatch`] finds how the log's clock stands to that of a plan; [`RotationNoise`] says how
-//! far the rotations may be off. [`baseline_from_gyro`] is all of it, from the log to one pose a
-//! frame.
+//! A [`GyroLog`] is the file; an [`Orientation`] or a calibrated mount converts its rates to the
+//! camera's axes ([`AngularRates`]). An interval at rest ([`StationaryInterval`]) gives the bias,
+//! the noise density and the direction of gravity; [`IntegratedRotation`] integrates the rates to
+//! rotations at the frames' times; [`ClockMatch`] estimates the offset between the log's clock and
+//! that of a plan; [`RotationNoise`] is the uncertainty of the rotations. [`baseline_from_gyro`]
+//! combines these steps, from the log to one pose per frame.
 
 mod baseline;
 mod clock_offset;

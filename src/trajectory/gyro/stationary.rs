@@ -1,22 +1,22 @@
-//! A stretch of a log at rest: what the sensor says when nothing turns.
+//! Intervals of a log at rest, which give the sensor's bias and noise density.
 
 use super::rates::AngularRates;
 use nalgebra::Vector3;
 
-/// A sensor that is at rest shows no more than this, rad/s: 3°/s, beyond what consumers' gyros are
-/// off when switched on.
+/// Largest mean rate of a sensor at rest, rad/s: 3°/s, beyond the turn-on bias of consumer
+/// gyroscopes.
 pub const MAX_BIAS_RAD_S: f64 = 3.0 * std::f64::consts::PI / 180.0;
 
-/// Windows as quiet as this many times the least variance are all taken for quiet ones.
+/// Windows with up to this multiple of the least variance count as quiet.
 const MAX_VARIANCE_RATIO: f64 = 1.5;
 
-/// Mean rates within this of each other are taken for the same, rad/s: 0.5°/s.
+/// Mean rates within this difference count as equal, rad/s: 0.5°/s.
 const RATE_TOLERANCE_RAD_S: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
-/// A stretch at rest, with what it tells of the gyro.
+/// An interval at rest with the sensor's bias and noise density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StationaryInterval {
-    /// From and to, seconds of the log's clock.
+    /// Begin and end, seconds of the log's clock.
     pub span_s: [f64; 2],
     /// Mean rate, rad/s.
     pub bias_rad_s: Vector3<f64>,
@@ -26,16 +26,16 @@ pub struct StationaryInterval {
 }
 
 impl StationaryInterval {
-    /// The stretch of `length_s` at which the sensor rested: of the windows with no more than half
-    /// as much again as the least variance, those with the least mean rate (to 0.5°/s), and of them
-    /// the one with the least variance.
+    /// Finds the interval of `length_s` at which the sensor was at rest: among the windows with at
+    /// most 1.5 times the least variance, those with the least mean rate (to 0.5°/s), and among
+    /// these the one with the least variance.
     ///
-    /// Variance alone cannot tell rest from an even turn, and the mean alone would prefer windows
-    /// with a little turn against the bias at their end.
+    /// Variance alone cannot distinguish rest from a uniform rotation; the mean alone would prefer
+    /// windows whose end contains a rotation against the bias.
     ///
     /// # Errors
-    /// A log shorter than that; no such window with a mean rate below [`MAX_BIAS_RAD_S`]: the
-    /// carrier never rested.
+    /// A shorter log; no quiet window with a mean rate below [`MAX_BIAS_RAD_S`], i.e. the carrier
+    /// was never at rest.
     pub fn find(rates: &AngularRates, length_s: f64) -> Result<Self, String> {
         let times = rates.times_s();
         let [first_s, last_s] = rates.span_s();
@@ -46,7 +46,7 @@ impl StationaryInterval {
         for (end, (time_s, rate)) in times.iter().zip(rates.rates()).enumerate() {
             sum += rate;
             squares += rate.norm_squared();
-            // The longest window that is no longer than asked for.
+            // The longest window that does not exceed the given length.
             while times.get(begin).is_some_and(|t| time_s - t > length_s)
                 && let Some(gone) = rates.rates().get(begin)
             {
@@ -61,8 +61,7 @@ impl StationaryInterval {
                 windows.push((squares / count - mean * mean, mean, begin));
             }
         }
-        // Sums that are added to and taken from again are off by rounding: no variance is below
-        // that.
+        // Running sums accumulate rounding errors; no variance below them is meaningful.
         let rounding = squares_scale(rates) * 1e-12;
         let least = windows
             .iter()
@@ -87,11 +86,12 @@ impl StationaryInterval {
         Self::of(rates, [begin_s, begin_s + length_s])
     }
 
-    /// What a stretch tells, whether or not the sensor rested.
+    /// Bias and noise density of an interval, assuming that the sensor was at rest.
     ///
-    /// The density is the larger of that of single samples and that of means over a twentieth of
-    /// the stretch, both by the Allan variance `N² = ½ τ ⟨(ω̄ₖ₊₁ − ω̄ₖ)²⟩`, which no slow drift
-    /// adds to: a logger's low pass makes single samples look quieter than the rate is.
+    /// The density is the larger of those of single samples and of means over a twentieth of the
+    /// interval, both by the Allan variance `N² = ½ τ ⟨(ω̄ₖ₊₁ − ω̄ₖ)²⟩`, which is insensitive to
+    /// slow drift. A logger's low-pass filter reduces the noise of single samples but not that of
+    /// the means.
     ///
     /// # Errors
     /// Fewer than 20 samples.
@@ -108,7 +108,7 @@ impl StationaryInterval {
             .unwrap_or_default();
         let (Some(first_s), Some(last_s), true) = (times.first(), times.last(), count >= 20) else {
             return Err(format!(
-                "only {count} samples from {} s to {} s; 20 are the least to rest on",
+                "only {count} samples from {} s to {} s; at least 20 are needed",
                 span_s[0], span_s[1]
             ));
         };
@@ -122,7 +122,7 @@ impl StationaryInterval {
         })
     }
 
-    /// How long it is, seconds.
+    /// Length of the interval, seconds.
     pub fn length_s(&self) -> f64 {
         self.span_s[1] - self.span_s[0]
     }
@@ -133,7 +133,8 @@ fn squares_scale(rates: &AngularRates) -> f64 {
     squares.fold(0.0, f64::max)
 }
 
-/// `N²` by the Allan variance of means over `run` samples, of the three axes together, (rad/s)² s.
+/// Squared noise density `N²` by the Allan variance of means over `run` samples, of the three axes
+/// together, (rad/s)² s.
 fn allan_density_squared(rates: &[Vector3<f64>], run: usize, step_s: f64) -> f64 {
     let run = run.max(1);
     let means: Vec<Vector3<f64>> = rates
@@ -153,8 +154,8 @@ mod tests {
 
     const BIAS: Vector3<f64> = Vector3::new(0.01, -0.02, 0.005);
 
-    /// 200 Hz: four seconds of an even turn, three at rest, three of a turn that is not even; noise
-    /// of 0.01 rad/s a sample.
+    /// A log at 200 Hz: four seconds of uniform rotation, three at rest, three of non-uniform
+    /// rotation; noise of 0.01 rad/s per sample.
     fn log(rest: bool) -> AngularRates {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -192,8 +193,7 @@ mod tests {
         assert!(StationaryInterval::of(&log(true), [4.0, 4.05]).is_err());
     }
 
-    /// A log that was smoothed over ten samples has a third of their deviation and the same
-    /// density.
+    /// A log smoothed over ten samples has a third of the standard deviation and the same density.
     #[test]
     fn a_low_pass_does_not_hide_the_noise() {
         let raw = log(true);

@@ -1,19 +1,19 @@
-//! Even motion.
+//! Uniform motion of the carrier.
 
 use super::station::Station;
 
-/// How fast something changes.
+/// A rate of change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Rate {
-    /// From frame to frame.
+    /// Change per frame.
     PerFrame(f64),
-    /// Each second.
+    /// Change per second.
     PerSecond(f64),
 }
 
 impl Rate {
-    /// The change until frame `frame`, `time_s` after the first.
+    /// The change from the first frame to frame `frame`, which is `time_s` later.
     fn until(self, frame: usize, time_s: f64) -> f64 {
         match self {
             Self::PerFrame(step) => step * frame as f64,
@@ -22,19 +22,19 @@ impl Rate {
     }
 }
 
-/// A carrier that advances and turns evenly.
+/// A carrier that advances and rotates at constant rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UniformMotion {
-    /// Where it stands at the first frame.
+    /// The station at the first frame.
     pub start: Station,
-    /// Its advance along the axis, metres.
+    /// Advance along the axis, metres.
     pub advance_m: Rate,
-    /// Its turn about the axis, radians.
+    /// Rotation about the axis, radians.
     pub turn_rad: Rate,
 }
 
 impl UniformMotion {
-    /// Where it stands at frames taken at these times, seconds.
+    /// The stations at the frames' times, seconds.
     pub fn stations(&self, times_s: &[f64]) -> Vec<Station> {
         let first_s = times_s.first().copied().unwrap_or_default();
         let station = |(k, time_s): (usize, &f64)| Station {
