@@ -234,12 +234,15 @@ mod tests {
 
     proptest! {
         #[test]
-        fn undistorting_inverts_within_the_limit(which in 0usize..8, share in 0.0f64..0.98, turn in 0.0..TAU) {
+        fn undistorting_inverts_within_the_limit(
+            which in 0usize..8, share in 0.0f64..0.98, turn in 0.0..TAU,
+        ) {
             let lens = lenses()[which];
             let rho = lens.limit().sqrt().min(3.0) * share;
             let p = Vector2::new(turn.cos(), turn.sin()) * rho;
             let back = lens.undistort(&lens.distort(&p));
-            prop_assert!(back.is_some_and(|back| (back - p).norm() < 1e-9 * (1.0 + rho)), "{lens:?} at {p}: {back:?}");
+            let is_restored = back.is_some_and(|back| (back - p).norm() < 1e-9 * (1.0 + rho));
+            prop_assert!(is_restored, "{lens:?} at {p}: {back:?}");
         }
 
         /// A solution lies within the limit and distorts to the given point.
@@ -254,7 +257,9 @@ mod tests {
         }
 
         #[test]
-        fn jacobians_match_central_differences(which in 0usize..8, x in -0.6f64..0.6, y in -0.6f64..0.6) {
+        fn jacobians_match_central_differences(
+            which in 0usize..8, x in -0.6f64..0.6, y in -0.6f64..0.6,
+        ) {
             let lens = lenses()[which];
             let (p, step) = (Vector2::new(x, y), 1e-6);
             let jacobian = lens.jacobian(&p);
@@ -262,7 +267,8 @@ mod tests {
             for axis in 0..2 {
                 let mut delta = Vector2::zeros();
                 delta[axis] = step;
-                let numeric = (lens.distort(&(p + delta)) - lens.distort(&(p - delta))) / (2.0 * step);
+                let difference = lens.distort(&(p + delta)) - lens.distort(&(p - delta));
+                let numeric = difference / (2.0 * step);
                 prop_assert!((numeric - jacobian.column(axis)).norm() < 1e-7);
                 let moved = |amount: f64| {
                     let mut moved = *lens.coefficients();

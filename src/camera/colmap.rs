@@ -70,7 +70,8 @@ impl ColmapCamera {
     pub fn cameras_txt(&self) -> String {
         let values: Vec<String> = self.parameters.iter().map(|(_, v)| v.to_string()).collect();
         format!(
-            "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n\
+            "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, \
+             HEIGHT, PARAMS[]\n\
              # Number of cameras: 1\n1 {} {} {} {}\n",
             self.model,
             self.width,

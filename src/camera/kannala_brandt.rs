@@ -138,16 +138,21 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_ray_inverts_the_projection(which in 0usize..4, share in 0.0f64..0.99, turn in -3.0f64..3.0, far in 0.1f64..30.0) {
+        fn the_ray_inverts_the_projection(
+            which in 0usize..4, share in 0.0f64..0.99, turn in -3.0f64..3.0, far in 0.1f64..30.0,
+        ) {
             let lens = lenses()[which];
             let (sin, cos) = (lens.limit_rad() * share).sin_cos();
             let ray = Vector3::new(sin * turn.cos(), sin * turn.sin(), cos);
             let back = lens.project(&(ray * far)).and_then(|p_d| lens.ray(&p_d));
-            prop_assert!(back.is_some_and(|back| (back - ray).norm() < 1e-9), "{lens:?}: {ray} {back:?}");
+            prop_assert!(back.is_some_and(|back| (back - ray).norm() < 1e-9), "{lens:?}: {ray} \
+                                                                               {back:?}");
         }
 
         #[test]
-        fn jacobians_match_central_differences(which in 0usize..3, x in -2.0f64..2.0, y in -2.0f64..2.0, z in 0.1f64..2.0) {
+        fn jacobians_match_central_differences(
+            which in 0usize..3, x in -2.0f64..2.0, y in -2.0f64..2.0, z in 0.1f64..2.0,
+        ) {
             let lens = lenses()[which];
             let (x_c, step) = (Vector3::new(x, y, z), 1e-6);
             prop_assume!(lens.project(&(x_c - Vector3::z() * 1e-3)).is_some());

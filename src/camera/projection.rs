@@ -389,7 +389,8 @@ mod tests {
         /// A point anywhere on the ray of a pixel appears in that pixel again.
         #[test]
         fn rays_of_a_moving_camera_lead_back_to_their_pixels(
-            lens in 0usize..4, sweep in 0usize..3, u in 0.0..639.0f64, v in 0.0..479.0f64, far in 0.5..9.0f64,
+            lens in 0usize..4, sweep in 0usize..3, u in 0.0..639.0f64, v in 0.0..479.0f64,
+            far in 0.5..9.0f64,
         ) {
             let camera = cameras()[lens].with_sweep(&sweeps()[sweep]);
             let x_c = camera.origin(v) + camera.ray(u, v).unwrap() * far;

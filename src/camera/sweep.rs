@@ -15,7 +15,8 @@ use nalgebra::{Rotation3, Vector3};
 /// at row v. The share of a row stays the same in a halved image ([`super::Camera::at_level`]), to
 /// within half a row if the number of rows was odd.
 ///
-/// Source: M. Meingast, C. Geyer, S. Sastry, "Geometric models of rolling-shutter cameras", OMNIVIS 2005.
+/// Source: M. Meingast, C. Geyer, S. Sastry, "Geometric models of rolling-shutter cameras", OMNIVIS
+/// 2005.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sweep {
     /// ω, radians.

@@ -4,10 +4,10 @@ use pulp::{Arch, Simd, WithSimd};
 
 /// Does `work` with the code compiled for this processor's vector instructions.
 ///
-/// Write it as `dispatch_simd(#[inline(always)] || …)`, and mark what it calls `#[inline(always)]` as well:
-/// only what is inlined is compiled anew. The numbers are the same on every processor: vectors
-/// change neither the order of operations nor their rounding, and nothing is contracted to a fused
-/// multiply–add.
+/// Write it as `dispatch_simd(#[inline(always)] || …)`, and mark what it calls `#[inline(always)]`
+/// as well: only what is inlined is compiled anew. The numbers are the same on every processor:
+/// vectors change neither the order of operations nor their rounding, and nothing is contracted to
+/// a fused multiply–add.
 #[inline(always)]
 pub fn dispatch_simd<R>(work: impl FnMut() -> R) -> R {
     Arch::new().dispatch(Work(work))
@@ -27,8 +27,8 @@ impl<R, F: FnMut() -> R> WithSimd for Work<F> {
 /// Does `work` with the code compiled for AVX2, which it is handed; false without doing it where
 /// the processor has none.
 ///
-/// Write it as [`dispatch_simd`]. What is not inlined is neither fast nor wrong: no closures, no `map` of
-/// arrays in loops.
+/// Write it as [`dispatch_simd`]. What is not inlined is neither fast nor wrong: no closures, no
+/// `map` of arrays in loops.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub fn dispatch_avx2(work: impl FnMut(pulp::x86::V3)) -> bool {

@@ -6,12 +6,12 @@ use super::shape::Surface;
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
 
-/// The part of a displacement `(Δs, Δh)` of the wall, metres, that the gauge can make, and the
-/// motion that makes it.
+/// The component of a wall displacement `(Δs, Δh)`, metres, that a gauge motion explains, and that
+/// motion.
 ///
-/// On a straight tunnel a turn moves the wall along s and a shift along h. A turn that is free by
-/// itself moves it in one direction, the same everywhere: as at the point that the camera at `pose`
-/// looks at.
+/// On a straight tunnel the rotation displaces the wall along s and the translation along h. A
+/// rotation that is free by itself displaces it in one direction, evaluated at the wall point on
+/// the optical axis of the camera at `pose`.
 pub fn gauge_component(
     surface: &dyn Surface,
     pose: &Pose,

@@ -1,5 +1,5 @@
-//! The shape of the tunnel: ray → wall, wall coordinates → point, and how the wall point of a pixel
-//! moves with the pose.
+//! Tunnel shapes: ray–wall intersection, wall coordinates, and the Jacobian of a pixel's wall point
+//! with respect to the pose.
 //!
 //! A wall point has two coordinates in metres: `s`, the arc length around the section (periodic),
 //! and `h`, the chainage along the axis. One file per shape; each implements [`Surface`].

@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 /// A tunnel: a closed section swept along the axis.
 pub trait Surface: Send + Sync + std::fmt::Debug {
-    /// The point where the ray `t + range · d` from inside meets the wall ahead.
+    /// Intersects the ray `t + range · d`, which starts inside, with the wall ahead.
     ///
     /// `t`: camera centre, metres; `d`: direction in the world, any length.
     ///
@@ -17,13 +17,14 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
     /// [`SurfaceError::CameraOutside`], [`SurfaceError::Parallel`], [`SurfaceError::NotFinite`].
     fn hit(&self, t: &Vector3<f64>, d: &Vector3<f64>) -> Result<Hit, SurfaceError>;
 
-    /// The wall around `wall`; any `s` and `h` are allowed, `s` is periodic.
+    /// Point and tangents of the wall at `wall`; any `s` and `h` are allowed, `s` is periodic.
     fn frame(&self, wall: WallPoint) -> WallFrame;
 
-    /// World coordinates of the lattice `s_m × h_m` of wall points, in `points` row by row (s runs
-    /// fastest).
+    /// World coordinates of the grid `s_m × h_m` of wall points, written to `points` row by row (s
+    /// runs fastest).
     ///
-    /// Same as [`Surface::frame`] point by point; shapes override it where the lattice shares work.
+    /// The points equal those of [`Surface::frame`]; shapes override it to share work within the
+    /// grid.
     fn lattice(&self, s_m: &[f64], h_m: &[f64], points: &mut Vec<Vector3<f64>>) {
         points.clear();
         for &h_m in h_m {
@@ -36,15 +37,15 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
     /// Length of the section's outline, metres: the period of `s`.
     fn perimeter_m(&self) -> f64;
 
-    /// The motions that map the tunnel onto itself.
+    /// The rigid motions that map the tunnel onto itself.
     fn gauge(&self) -> Gauge;
 
-    /// How far along the tunnel a point is, metres: the chainage of the section that holds it.
+    /// Chainage of the section that contains a point, metres.
     fn chainage_m(&self, t: &Vector3<f64>) -> f64 {
         t.y
     }
 
-    /// A pose as the section at its chainage sees it: what it would be if the tunnel were straight
+    /// Converts a pose to the frame of the section at its chainage, as if the tunnel were straight
     /// along y.
     fn straightened(&self, pose: &Pose) -> Pose {
         *pose
@@ -56,13 +57,13 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
         TAU * (s_m / self.perimeter_m()).rem_euclid(1.0)
     }
 
-    /// The place on the section's outline at an angle from z towards x, metres; see
+    /// The arc length on the section's outline at an angle from z towards x, metres; see
     /// [`Surface::angle_rad`].
     fn s_at_m(&self, angle_rad: f64) -> f64 {
         self.perimeter_m() * (angle_rad / TAU).rem_euclid(1.0)
     }
 
-    /// Checks that a camera stands inside.
+    /// Checks that a camera is inside.
     ///
     /// # Errors
     /// [`SurfaceError::CameraOutside`] or [`SurfaceError::NotFinite`].
@@ -72,7 +73,7 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
 /// Distance of the wall along a camera's optical axis, metres.
 ///
 /// # Errors
-/// As [`Surface::hit`].
+/// The errors of [`Surface::hit`].
 pub fn viewing_distance(surface: &dyn Surface, pose: &Pose) -> Result<f64, SurfaceError> {
     let hit = surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()))?;
     Ok(hit.range)

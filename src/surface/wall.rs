@@ -11,7 +11,7 @@ pub struct WallPoint {
     pub h_m: f64,
 }
 
-/// Where a ray meets the wall.
+/// The intersection of a ray with the wall.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit {
     /// Multiple of the ray's direction that reaches the wall.
@@ -22,7 +22,7 @@ pub struct Hit {
     pub wall: WallPoint,
 }
 
-/// The wall around one of its points.
+/// A point of the wall with its tangents.
 #[derive(Clone, Copy, Debug)]
 pub struct WallFrame {
     /// The point in the world, metres.

@@ -1,11 +1,11 @@
-//! Parts of the wall, between angles and chainages.
+//! Regions of the wall, bounded by angles and chainages.
 
 use super::footprint::Footprint;
 use super::shape::Surface;
 use super::wall::WallPoint;
 use std::f64::consts::TAU;
 
-/// Some parts of the wall, each between two angles and two chainages.
+/// A set of wall regions, each between two angles and two chainages.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WallRegions {
     boxes: Vec<Footprint>,
@@ -13,15 +13,16 @@ pub struct WallRegions {
 }
 
 impl WallRegions {
-    /// No part of the wall.
+    /// The empty set.
     pub const NONE: Self = Self {
         boxes: Vec::new(),
         perimeter_m: 0.0,
     };
 
-    /// Adds what lies between two angles θ, in the direction in which it grows, through 0 if the
-    /// second is the lesser, and between two chainages; without either, all around or all along.
-    /// Angles are those of [`Surface::angle_rad`].
+    /// Adds the region between two angles θ, in the direction of increasing θ, through 0 if the
+    /// second is smaller, and between two chainages. Without angles it covers the full
+    /// circumference, without chainages the full length. Angles are those of
+    /// [`Surface::angle_rad`].
     pub fn add(
         &mut self,
         surface: &dyn Surface,
@@ -44,13 +45,13 @@ impl WallRegions {
         });
     }
 
-    /// True if some of the wall in `area` belongs to them.
+    /// True if a region intersects `area`.
     pub fn intersects(&self, area: &Footprint) -> bool {
         let mut boxes = self.boxes.iter();
         boxes.any(|patch| patch.overlaps(area, self.perimeter_m))
     }
 
-    /// True if a point belongs to them.
+    /// True if a region contains a point.
     pub fn contains(&self, point: &WallPoint) -> bool {
         self.intersects(&Footprint {
             s_min_m: point.s_m,

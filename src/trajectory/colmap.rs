@@ -88,7 +88,8 @@ fn check_points(line: &str) -> Result<(), String> {
         Ok(())
     } else {
         Err(
-        "should hold the points of the image above, `X Y POINT3D_ID` each, or be empty: an image has two lines"
+        "should hold the points of the image above, `X Y POINT3D_ID` each, or be empty: an image \
+         has two lines"
             .to_owned(),
     )
     }
@@ -98,7 +99,8 @@ fn check_points(line: &str) -> Result<(), String> {
 /// camera-to-world.
 pub fn format_images(names: &[String], trajectory: &[StampedPose]) -> String {
     let mut text = format!(
-        "# Image list with two lines of data per image:\n#   {}\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n\
+        "# Image list with two lines of data per image:\n#   {}\n#   POINTS2D[] as (X, Y, \
+         POINT3D_ID)\n\
          # Number of images: {}, mean observations per image: 0\n",
         FORM.replace(' ', ", "),
         trajectory.len()

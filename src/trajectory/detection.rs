@@ -39,7 +39,8 @@ pub(super) fn detect_format(path: &Path, text: &str) -> Result<PoseFormat, PoseE
             path,
             number,
             format!(
-                "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line), COLMAP, nerfstudio nor EuRoC; \
+                "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line), COLMAP, \
+                 nerfstudio nor EuRoC; \
                  if it is one of them, name it with --pose-format (poses.format in survey.toml)",
                 tum::FORM,
                 kitti::FORM,

@@ -47,8 +47,9 @@ pub(crate) fn from_rows(rows: &[[f64; 4]]) -> Result<Pose, String> {
         return Err(if scale > 0.0 && is_rotation(square / (scale * scale)) {
             format!("its rotation is scaled by {scale:.6}; poses are rigid, in metres")
         } else {
-            "its first three columns are not a rotation (they must be perpendicular and of length 1)"
-                .to_owned()
+            "its first three columns are not a rotation (they must be perpendicular and of length \
+             1)"
+            .to_owned()
         });
     }
     if r.determinant() < 0.0 {
@@ -76,7 +77,9 @@ mod tests {
 
     proptest! {
         #[test]
-        fn rows_and_back(x in -4.0f64..4.0, y in -4.0f64..4.0, z in -4.0f64..4.0, h in -1e4f64..1e4) {
+        fn rows_and_back(
+            x in -4.0f64..4.0, y in -4.0f64..4.0, z in -4.0f64..4.0, h in -1e4f64..1e4,
+        ) {
             let pose = Pose::new(so3::exp(&Vector3::new(x, y, z)), Vector3::new(x, h, z));
             let back = from_rows(&to_rows(&pose)).unwrap();
             prop_assert_eq!(back.t_wc, pose.t_wc);
@@ -97,9 +100,18 @@ mod tests {
                 vec![row(0, 2.0), row(1, 2.0), row(2, 2.0), last],
                 "scaled by 2",
             ),
-            (vec![row(0, 1.0), row(1, -1.0), row(2, 1.0), last], "mirror"),
-            (vec![row(0, 1.0), row(0, 1.0), row(2, 1.0)], "no rotation"),
-            (vec![row(0, 0.0), row(0, 0.0), row(2, 0.0)], "no rotation"),
+            (
+                vec![row(0, 1.0), row(1, -1.0), row(2, 1.0), last],
+                "reflection",
+            ),
+            (
+                vec![row(0, 1.0), row(0, 1.0), row(2, 1.0)],
+                "not a rotation",
+            ),
+            (
+                vec![row(0, 0.0), row(0, 0.0), row(2, 0.0)],
+                "not a rotation",
+            ),
             (
                 vec![row(0, 1.0), row(1, 1.0), row(2, 1.0), row(3, 2.0)],
                 "last row",

@@ -66,7 +66,8 @@ mod tests {
     proptest! {
         #[test]
         fn it_leads_from_one_to_the_other_whatever_moves_along(
-            a in -0.8f64..0.8, b in -0.8f64..0.8, c in -0.8f64..0.8, d in -0.8f64..0.8, share in 0.0f64..1.0,
+            a in -0.8f64..0.8, b in -0.8f64..0.8, c in -0.8f64..0.8, d in -0.8f64..0.8,
+            share in 0.0f64..1.0,
         ) {
             let (from, to, arm) = (pose(a, b, c), pose(d, a, b), pose(b, c, d));
             let part = between(&from, &to, share).unwrap();

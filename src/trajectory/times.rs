@@ -38,8 +38,8 @@ pub(crate) fn from_name(stem: &str) -> Option<f64> {
         at + stem[at..].chars().next().map_or(1, char::len_utf8)
     });
     let word = stem[begin..end].trim_start_matches('.');
-    let tells_time = word.contains('.') || word.len() == 10 || word.len() >= MIN_NANOSECOND_DIGITS;
-    tells_time.then(|| from_word(word)).flatten()
+    let is_time = word.contains('.') || word.len() == 10 || word.len() >= MIN_NANOSECOND_DIGITS;
+    is_time.then(|| from_word(word)).flatten()
 }
 
 #[cfg(test)]

@@ -10,14 +10,16 @@ use crate::camera::lens::Lens;
 pub fn brown_conrady(d: &[f64]) -> Result<Lens, ParseError> {
     if !matches!(d.len(), 0 | 2 | 4 | 5 | 8 | 12 | 14) {
         return Err(ParseError::new(format!(
-            "there are {} distortion coefficients; OpenCV's model has 4, 5 or 8 (k1 k2 p1 p2 k3 k4 k5 k6)",
+            "there are {} distortion coefficients; OpenCV's model has 4, 5 or 8 (k1 k2 p1 p2 k3 \
+             k4 k5 k6)",
             d.len()
         )));
     }
     finite(d)?;
     if d.iter().skip(8).any(|c| *c != 0.0) {
         return Err(ParseError::new(
-            "a thin prism or a tilted sensor (coefficients 9 to 14) is not supported; calibrate with 8 coefficients",
+            "a thin prism or a tilted sensor (coefficients 9 to 14) is not supported; calibrate \
+             with 8 coefficients",
         ));
     }
     let at = |k: usize| d.get(k).copied().unwrap_or(0.0);

@@ -36,8 +36,7 @@ fn camera(line: &str) -> Result<Camera, String> {
         return Err("a camera is `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`".to_owned());
     };
     let size = |word: &str| {
-        word
-            .parse::<u32>()
+        word.parse::<u32>()
             .map_err(|_| format!("{word:?} is not a number of pixels"))
     };
     let (width, height) = (size(width)?, size(height)?);
@@ -48,12 +47,7 @@ fn camera(line: &str) -> Result<Camera, String> {
             _ => Err(format!("{word:?} is not a number")),
         })
         .collect::<Result<_, String>>()?;
-    let fail = |count: usize| {
-        format!(
-            "{model} has {count} parameters, not {}",
-            params.len()
-        )
-    };
+    let fail = |count: usize| format!("{model} has {count} parameters, not {}", params.len());
     // Focal lengths and principal point, and how many coefficients follow.
     let (central, rest, lens): (_, _, ReadLens) = match *model {
         "SIMPLE_PINHOLE" => (3, 0, brown_conrady),
@@ -67,8 +61,10 @@ fn camera(line: &str) -> Result<Camera, String> {
         "OPENCV_FISHEYE" => (4, 4, kannala_brandt),
         _ => {
             return Err(format!(
-                "the camera model {model} is not supported; known are SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, \
-                 FULL_OPENCV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE (`colmap model_converter` and \
+                "the camera model {model} is not supported; known are SIMPLE_PINHOLE, PINHOLE, \
+                 SIMPLE_RADIAL, RADIAL, OPENCV, \
+                 FULL_OPENCV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE (`colmap \
+                 model_converter` and \
                  `colmap image_undistorter` make one)"
             ));
         }

@@ -31,7 +31,8 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
     let model = text_entry(camera, "camera_model").unwrap_or("pinhole");
     if model != "pinhole" {
         return Err(ParseError::new(format!(
-            "the camera model {model:?} is not supported; calibrate with pinhole-radtan or pinhole-equi"
+            "the camera model {model:?} is not supported; calibrate with pinhole-radtan or \
+             pinhole-equi"
         )));
     }
     let list = |name: &str| match camera.get(name) {
@@ -61,7 +62,8 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
         Some("equidistant" | "equi") => kannala_brandt(&list("distortion_coeffs")?)?,
         Some(other) => {
             return Err(ParseError::new(format!(
-                "the distortion model {other:?} is not supported; known are radtan, equidistant and none"
+                "the distortion model {other:?} is not supported; known are radtan, equidistant \
+                 and none"
             )));
         }
     };

@@ -174,7 +174,8 @@ impl CameraFile {
             Some(deg) if deg > 0.0 && deg <= 180.0 => deg.to_radians(),
             Some(deg) => {
                 return Err(ParseError::new(format!(
-                    "max_angle_deg is {deg}; it is an angle off the optical axis, above 0 and up to 180"
+                    "max_angle_deg is {deg}; it is an angle off the optical axis, above 0 and up \
+                     to 180"
                 )));
             }
         };

@@ -72,14 +72,16 @@ fn camera(own: &Value, tree: &Value) -> Result<Camera, ParseError> {
         "OPENCV" | "SIMPLE_RADIAL" | "RADIAL" => {
             if k4 != 0.0 {
                 return Err(ParseError::new(
-                    "k4 is the eighth power of the radius in nerfstudio's model and is not supported; it must be 0",
+                    "k4 is the eighth power of the radius in nerfstudio's model and is not \
+                     supported; it must be 0",
                 ));
             }
             brown_conrady(&[k1, k2, coefficient("p1")?, coefficient("p2")?, k3])?
         }
         other => {
             return Err(ParseError::new(format!(
-                "the camera model {other} is not supported; known are PINHOLE, OPENCV and OPENCV_FISHEYE"
+                "the camera model {other} is not supported; known are PINHOLE, OPENCV and \
+                 OPENCV_FISHEYE"
             )));
         }
     };

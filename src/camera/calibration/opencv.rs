@@ -77,7 +77,8 @@ pub fn read(tree: &Value) -> Result<Camera, ParseError> {
         Some("none") => Lens::default(),
         Some(other) => {
             return Err(ParseError::new(format!(
-                "the distortion model {other:?} is not supported; known are plumb_bob, rational_polynomial and equidistant"
+                "the distortion model {other:?} is not supported; known are plumb_bob, \
+                 rational_polynomial and equidistant"
             )));
         }
     };

@@ -54,7 +54,8 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
         "txt" => colmap::read(text, name),
         "toml" => native::read_toml(text),
         "xml" => Err(ParseError::new(
-            "OpenCV's XML is not supported; save the calibration as YAML (a name that ends in .yml)",
+            "OpenCV's XML is not supported; save the calibration as YAML (a name that ends in \
+             .yml)",
         )),
         _ => match value_tree::parse_json(text) {
             Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
@@ -67,7 +68,8 @@ fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, Pars
 fn validate(camera: Camera) -> Result<Camera, ParseError> {
     if camera.width < MIN_IMAGE_SIDE_PX || camera.height < MIN_IMAGE_SIDE_PX {
         return Err(ParseError::new(format!(
-            "width and height are {} × {}; they must be the frames' size in pixels, at least {MIN_IMAGE_SIDE_PX} each",
+            "width and height are {} × {}; they must be the frames' size in pixels, at least \
+             {MIN_IMAGE_SIDE_PX} each",
             camera.width, camera.height
         )));
     }
@@ -88,7 +90,8 @@ fn validate(camera: Camera) -> Result<Camera, ParseError> {
     let shown = camera.visible_fraction();
     if shown < MIN_VISIBLE_FRACTION {
         return Err(ParseError::new(format!(
-            "the distortion folds the picture back on itself: only {:.0} % of it is shown; check its coefficients and their \
+            "the distortion folds the picture back on itself: only {:.0} % of it is shown; check \
+             its coefficients and their \
              order, and that fx and fy are in pixels",
             100.0 * shown
         )));

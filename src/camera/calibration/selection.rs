@@ -16,13 +16,17 @@ pub fn select_camera<T>(
             .iter()
             .position(|(name, _)| name == wanted)
             .ok_or_else(|| {
-                ParseError::new(format!("there is no camera {wanted:?}; the file has {}", names()))
+                ParseError::new(format!(
+                    "there is no camera {wanted:?}; the file has {}",
+                    names()
+                ))
             })?,
         None if cameras.len() == 1 => 0,
         None if cameras.is_empty() => return Err(ParseError::new("the file holds no camera")),
         None => {
             return Err(ParseError::new(format!(
-                "the file holds several cameras ({}); select one with `name` under [camera] of survey.toml",
+                "the file holds several cameras ({}); select one with `name` under [camera] of \
+                 survey.toml",
                 names()
             )));
         }

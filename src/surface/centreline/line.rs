@@ -1,12 +1,11 @@
-//! The line along the middle of a curved tunnel.
+//! The centreline with its rotation-minimising frames.
 //!
-//! Points given by the user are joined by a cubic spline of their chord lengths (C², with the ends
-//! bent as the circles through the first and last three points). It is sampled in even steps of its
-//! own length: the nodes. Each has a frame `Q = (E_x, T, E_z)` that turns along as little as
-//! possible (the rotation-minimising frame: from node to node, T is carried over by the smallest
-//! rotation). Between nodes position and size of the section are cubic Hermite polynomials, and the
-//! frame `Q_k Exp(τ ω_k)` with `ω_k = Log(Q_kᵀ Q_{k+1})`, so that derivatives are exact. Beyond
-//! both ends the tunnel goes on straight.
+//! The given points are interpolated by a cubic spline with chord-length parametrisation (C², with
+//! end tangents of the circles through the first and last three points). It is sampled at nodes of
+//! uniform arc length. Each node has a rotation-minimising frame `Q = (E_x, T, E_z)`: from node to
+//! node, T is transported by the smallest rotation. Between nodes position and size of the section
+//! are cubic Hermite polynomials, and the frame `Q_k Exp(τ ω_k)` with `ω_k = Log(Q_kᵀ Q_{k+1})`, so
+//! that derivatives are exact. Beyond both ends the tunnel continues straight.
 //!
 //! Source: W. Wang, B. Jüttler, D. Zheng, Y. Liu, "Computation of rotation minimizing frames", ACM
 //! TOG 27(1), 2008.
@@ -19,26 +18,26 @@ use nalgebra::{UnitQuaternion, Vector3};
 /// A point that the centreline passes through.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CentrePoint {
-    /// Where it is, metres.
+    /// Position, metres.
     pub point: Vector3<f64>,
-    /// Radius of the tunnel there, metres; as elsewhere, if not given.
+    /// Radius of the tunnel at the point, metres; the nominal radius if not given.
     pub radius_m: Option<f64>,
 }
 
-/// The centreline at a chainage.
+/// Position, frame and scale of the centreline at a chainage.
 #[derive(Clone, Copy, Debug)]
 pub struct CentrelineFrame {
-    /// Where it is, metres.
+    /// Position, metres.
     pub point: Vector3<f64>,
     /// `∂point/∂h`.
     pub velocity: Vector3<f64>,
-    /// From the section's frame (x, along, z) to the world.
+    /// Rotation from the section's frame (x, along, z) to the world.
     pub frame: UnitQuaternion<f64>,
-    /// How the frame turns along the tunnel, in its own axes, radians a metre.
+    /// Rotation rate of the frame along the tunnel, in its own axes, radians per metre.
     pub turn: Vector3<f64>,
-    /// Size of the section over its nominal one, ...
+    /// Scale of the section relative to its nominal size.
     pub scale: f64,
-    /// ... and how that grows, a metre.
+    /// Derivative of the scale, per metre.
     pub growth: f64,
 }
 
@@ -47,36 +46,36 @@ pub(super) struct Node {
     pub(super) point: Vector3<f64>,
     frame: UnitQuaternion<f64>,
     pub(super) scale: f64,
-    /// How the scale grows, a metre.
+    /// Derivative of the scale, per metre.
     growth: f64,
 }
 
-/// Nodes whose surrounding sphere is kept, to find the nearest.
+/// Nodes per bounding sphere, for the nearest-node search.
 pub(super) const NODES_PER_SPHERE: usize = 64;
-/// Steps between nodes over the section's size.
+/// Distance between nodes relative to the section's size.
 const NODE_STEP: f64 = 0.02;
-/// A step of Newton's method after which no other is taken, over the length between nodes.
+/// Newton step at which the chainage has converged, relative to the distance between nodes.
 const CHAINAGE_TOLERANCE: f64 = 1e-7;
-/// Nodes at the most.
+/// Largest number of nodes.
 const MAX_NODES: usize = 4_000_000;
-/// A smooth line with frames.
+/// A smooth centreline with frames.
 #[derive(Clone, Debug)]
 pub struct Centreline {
     pub(super) step_m: f64,
     pub(super) nodes: Vec<Node>,
-    /// Turn from each node to the next, in the node's axes.
+    /// Rotation vector from each node to the next, in the node's axes.
     pub(super) turns: Vec<Vector3<f64>>,
-    /// Middle and radius of every run of nodes.
+    /// Centre and radius of the bounding sphere of every [`NODES_PER_SPHERE`] nodes.
     pub(super) spheres: Vec<(Vector3<f64>, f64)>,
 }
 
 impl Centreline {
-    /// The line through points, for a section that reaches `farthest_m` from it, of a nominal
-    /// radius.
+    /// Creates the centreline through points, for a section with nominal radius `nominal_m` that
+    /// extends to `farthest_m` from the line.
     ///
     /// # Errors
-    /// [`SurfaceError::Centreline`]: fewer than two points, two at one place, a radius that is not
-    /// positive, a bend tighter than the section, a tunnel that runs into itself.
+    /// [`SurfaceError::Centreline`]: fewer than two points, coincident points, a radius that is not
+    /// positive, a bend tighter than the section, a tunnel that intersects itself.
     pub fn through(
         points: &[CentrePoint],
         nominal_m: f64,
@@ -100,7 +99,7 @@ impl Centreline {
             }
             if apart_m < 1e-6 * farthest_m {
                 return Err(fail(format!(
-                    "points {} and {} lie at one place; leave one of them out",
+                    "points {} and {} coincide; remove one of them",
                     k + 1,
                     k + 2
                 )));
@@ -125,14 +124,14 @@ impl Centreline {
         Ok(line)
     }
 
-    /// Walks a spline in steps of about `step_m`.
+    /// Samples a spline in uniform steps of about `step_m`.
     fn sample_spline(spline: &Spline, scales: &[f64], step_m: f64) -> Result<Self, SurfaceError> {
         let lengths = spline.lengths();
         let length_m = lengths[lengths.len() - 1];
         let steps = (length_m / step_m).ceil().max(1.0);
         if !steps.is_finite() || steps > MAX_NODES as f64 {
             return Err(SurfaceError::Centreline {
-                what: format!("{length_m:.0} m are too long for a tunnel of this size"),
+                what: format!("a length of {length_m:.0} m is too long for a tunnel of this size"),
             });
         }
         let step_m = length_m / steps;
@@ -151,7 +150,7 @@ impl Centreline {
                 );
                 let before = frame.unwrap_or_default();
                 let carried = before * Vector3::y();
-                // Exactly against the axis any turn by 180° will do.
+                // For an exactly opposite tangent any rotation by 180° is smallest.
                 let least =
                     UnitQuaternion::rotation_between(&carried, &tangent).unwrap_or_else(|| {
                         UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
@@ -186,12 +185,12 @@ impl Centreline {
         })
     }
 
-    /// Its length, metres.
+    /// Length of the centreline, metres.
     pub fn length_m(&self) -> f64 {
         self.step_m * self.turns.len() as f64
     }
 
-    /// The line at a chainage; beyond its ends it goes on straight.
+    /// The centreline at a chainage; beyond its ends it continues straight.
     pub fn at(&self, h_m: f64) -> CentrelineFrame {
         let last = self.turns.len();
         let length_m = self.length_m();
@@ -234,10 +233,10 @@ impl Centreline {
         }
     }
 
-    /// The chainage whose section's plane holds a point: of the nearest part of the line.
+    /// Chainage of the section whose plane contains a point, on the nearest part of the line.
     pub fn chainage_m(&self, point: &Vector3<f64>) -> f64 {
         let mut nearest = (f64::INFINITY, 0usize);
-        // No node of a run is nearer than its sphere.
+        // No node is nearer than its bounding sphere.
         for (run, (middle, radius)) in self.spheres.iter().enumerate() {
             if (point - middle).norm() - radius >= nearest.0 {
                 continue;
@@ -252,8 +251,8 @@ impl Centreline {
         self.refine_chainage_m(point, nearest.1 as f64 * self.step_m)
     }
 
-    /// The chainage whose section's plane holds a point, near `h_m`: `Tᵀ(p − c) = 0` by Newton's
-    /// method.
+    /// Chainage near `h_m` of the section whose plane contains a point: solves `Tᵀ(p − c) = 0` by
+    /// Newton's method.
     pub fn refine_chainage_m(&self, point: &Vector3<f64>, h_m: f64) -> f64 {
         let mut h_m = h_m;
         for _ in 0..20 {
@@ -264,7 +263,7 @@ impl Centreline {
             let turning = at.frame * at.turn;
             let slope = along.dot(&at.velocity) - turning.cross(&along).dot(&arm);
             let step = ahead / slope.max(0.1);
-            // Beyond the ends the line is straight, and any step is right.
+            // Beyond the ends the line is straight, where Newton's step is exact.
             let outside = h_m < 0.0 || h_m > self.length_m();
             let most = if outside {
                 f64::INFINITY
@@ -272,7 +271,7 @@ impl Centreline {
                 4.0 * self.step_m
             };
             h_m += step.clamp(-most, most);
-            // What is left is of the step's square.
+            // The remaining error is of the order of the step squared.
             if step.abs() < CHAINAGE_TOLERANCE * self.step_m {
                 break;
             }

@@ -1,11 +1,11 @@
-//! Whether a tunnel has room along its line.
+//! Checks for bends tighter than the section and for tunnels that intersect themselves.
 
 use super::line::{Centreline, NODES_PER_SPHERE};
 use crate::surface::error::SurfaceError;
 use std::f64::consts::PI;
 
 impl Centreline {
-    /// Refuses bends in which the section would meet itself.
+    /// Rejects bends tighter than the section.
     pub(super) fn check_bends(&self, farthest_m: f64) -> Result<(), SurfaceError> {
         for (k, turn) in self.turns.iter().enumerate() {
             let bend_m = self.step_m / turn.norm().max(1e-12);
@@ -13,7 +13,8 @@ impl Centreline {
             if bend_m <= size_m {
                 return Err(SurfaceError::Centreline {
                     what: format!(
-                        "at chainage {:.2} m it bends with a radius of {bend_m:.2} m, tighter than the tunnel, which reaches {size_m:.2} m from it",
+                        "at chainage {:.2} m it bends with a radius of {bend_m:.2} m, tighter \
+                         than the tunnel, which reaches {size_m:.2} m from it",
                         k as f64 * self.step_m
                     ),
                 });
@@ -22,13 +23,12 @@ impl Centreline {
         Ok(())
     }
 
-    /// Refuses lines on which the tunnel would run into itself: places half a turn of the tightest
-    /// bend apart along the line, or more, and nearer to each other than the two sections are
-    /// large.
+    /// Rejects lines on which the tunnel intersects itself: pairs of points at least half a turn of
+    /// the tightest bend apart along the line, and nearer to each other than the sum of their
+    /// sections' radii.
     ///
-    /// Compares runs of nodes by the spheres around them. A sphere and its middle change by no more
-    /// than a run's length from one run to the next; by that, runs that are far off are passed
-    /// over.
+    /// Compares bounding spheres of nodes. From one sphere to the next, centre and radius change by
+    /// no more than the length of its nodes, so that distant spheres are skipped.
     pub(super) fn check_self_intersection(&self, farthest_m: f64) -> Result<(), SurfaceError> {
         let most = self.nodes.iter().map(|node| node.scale);
         let size_m = farthest_m * most.fold(0.0, f64::max);
@@ -61,7 +61,8 @@ impl Centreline {
                 if apart_m < farthest_m * (from.scale + to.scale) {
                     return Err(SurfaceError::Centreline {
                         what: format!(
-                            "the tunnel runs into itself: chainages {:.2} m and {:.2} m are {apart_m:.2} m apart",
+                            "the tunnel intersects itself: chainages {:.2} m and {:.2} m are \
+                             {apart_m:.2} m apart",
                             i as f64 * self.step_m,
                             j as f64 * self.step_m
                         ),

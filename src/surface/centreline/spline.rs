@@ -4,14 +4,14 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use std::ops::{Add, Mul, Sub};
 
-/// Pieces of the spline's parameter between two given points, to measure its length.
+/// Parameter steps between two given points for the arc length.
 const LENGTH_STEPS: usize = 64;
 
-/// Slopes of the section's scale at the given points over the chords, so that the cubics between
-/// them are smooth and monotone: none overshoots the radii given. There is none at the ends, beyond
-/// which the scale stays.
+/// Slopes of the section's scale at the given points for monotone cubic interpolation, which does
+/// not overshoot the given radii. The slopes at the ends are 0.
 ///
-/// Of neighbouring slopes of one sign it is the weighted harmonic mean, else 0.
+/// A slope is the weighted harmonic mean of the neighbouring secants if these have the same sign,
+/// else 0.
 ///
 /// Source: F. N. Fritsch, J. Butland, "A method for constructing local monotone piecewise cubic
 /// interpolants", SIAM J. Sci. Stat. Comput. 5(2), 1984.
@@ -29,7 +29,7 @@ pub(super) fn monotone_slopes(scales: &[f64], chords: &[f64]) -> Vec<f64> {
     slopes
 }
 
-/// Value and derivative of the cubic with the given ends and end slopes.
+/// Value and derivative of the cubic Hermite polynomial with the given end values and end slopes.
 pub(super) fn hermite<T>(p: [T; 2], m: [T; 2], t: f64) -> (T, T)
 where
     T: Copy + Add<Output = T> + Sub<Output = T> + Mul<f64, Output = T>,
@@ -53,9 +53,9 @@ pub(super) struct Spline {
 }
 
 impl Spline {
-    /// C²: `m_{k−1}/c_{k−1} + 2 (1/c_{k−1} + 1/c_k) m_k + m_{k+1}/c_k = 3 (Δ_{k−1}/c_{k−1}² +
-    /// Δ_k/c_k²)`, a tridiagonal system; the slopes at the ends are those of the circles through
-    /// three points.
+    /// Interpolates points with C² continuity:
+    /// `m_{k−1}/c_{k−1} + 2 (1/c_{k−1} + 1/c_k) m_k + m_{k+1}/c_k = 3 (Δ_{k−1}/c_{k−1}² + Δ_k/c_k²)`,
+    /// a tridiagonal system; the slopes at the ends are those of the circles through three points.
     pub(super) fn through(points: Vec<Vector3<f64>>) -> Self {
         let n = points.len();
         let chords: Vec<f64> = points.windows(2).map(|p| (p[1] - p[0]).norm()).collect();
@@ -111,7 +111,7 @@ impl Spline {
         self.ends(place, share).1
     }
 
-    /// Length of the line up to each of [`LENGTH_STEPS`] steps between each two points (Simpson's rule).
+    /// Cumulative arc length at [`LENGTH_STEPS`] steps between each two points (Simpson's rule).
     pub(super) fn lengths(&self) -> Vec<f64> {
         let mut lengths = vec![0.0];
         let mut length = 0.0;
@@ -129,7 +129,7 @@ impl Spline {
         lengths
     }
 
-    /// The piece and the share of it at a length.
+    /// Segment and local parameter at an arc length.
     pub(super) fn at_length(&self, lengths: &[f64], length_m: f64) -> (usize, f64) {
         let k = lengths.partition_point(|length| *length <= length_m);
         let k = k.clamp(1, lengths.len() - 1) - 1;
@@ -140,10 +140,10 @@ impl Spline {
     }
 }
 
-/// The direction at the first of three points of the circle through them; of the line, if they lie
-/// on one.
+/// The tangent at the first of three points of the circle through them, or of the line if they are
+/// collinear.
 ///
-/// The angle between chord and tangent is that which the chord subtends at the third point.
+/// The angle between chord and tangent equals the angle that the chord subtends at the third point.
 fn end_slope(p: [Vector3<f64>; 3]) -> Vector3<f64> {
     let (first, second) = (p[1] - p[0], p[2] - p[1]);
     let normal = first.cross(&second);

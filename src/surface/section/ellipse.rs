@@ -7,17 +7,17 @@ use std::f64::consts::TAU;
 
 /// An ellipse `(a sin φ, b cos φ)` with its axes along x and z.
 ///
-/// Its length `s(φ) = ∫ √(a² cos² φ + b² sin² φ) dφ` has no closed form: it is added up by
-/// Gauss–Legendre quadrature and turned round by Newton's method, to the last bits.
+/// Its length `s(φ) = ∫ √(a² cos² φ + b² sin² φ) dφ` has no closed form: it is integrated by
+/// Gauss–Legendre quadrature and inverted by Newton's method, to rounding.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ellipse {
     a_m: f64,
     b_m: f64,
-    /// `s(φ)` at [`TABLE_CELLS`] + 1 even steps of φ once around, metres.
+    /// `s(φ)` at [`TABLE_CELLS`] + 1 uniform steps of φ once around, metres.
     lengths_m: Vec<f64>,
 }
 
-/// Steps of φ: within one, five points of quadrature are exact.
+/// Cells of φ; within one cell, quadrature with five points is exact to rounding.
 const TABLE_CELLS: usize = 512;
 /// Nodes and weights of Gauss–Legendre quadrature on `[0, 1]`.
 const QUADRATURE: [(f64, f64); 5] = [
@@ -29,7 +29,7 @@ const QUADRATURE: [(f64, f64); 5] = [
 ];
 
 impl Ellipse {
-    /// An ellipse of the given width (along x) and height (along z), metres.
+    /// Creates an ellipse of the given width (along x) and height (along z), metres.
     ///
     /// # Errors
     /// [`SurfaceError::Size`] unless both are positive and finite.
@@ -55,7 +55,7 @@ impl Ellipse {
         (self.a_m * cos).hypot(self.b_m * sin)
     }
 
-    /// The length between two φ no farther apart than a cell, metres.
+    /// The length between two φ at most one cell apart, metres.
     fn length(&self, from: f64, to: f64) -> f64 {
         let wide = to - from;
         let terms = QUADRATURE.iter();
@@ -77,8 +77,8 @@ impl Ellipse {
         let cell = cell.clamp(1, TABLE_CELLS) - 1;
         let mut phi_rad = phi(cell);
         let left_m = s_m - self.lengths_m[cell];
-        // The speed changes by parts in a thousand within a cell: every step gains three digits at
-        // the least.
+        // The speed changes by parts in a thousand within a cell, so every step gains at least
+        // three digits.
         for _ in 0..6 {
             let ahead_m = left_m - self.length(phi(cell), phi_rad);
             phi_rad += ahead_m / self.speed(phi_rad);
@@ -104,7 +104,7 @@ impl Section for Ellipse {
         }
     }
 
-    /// The circle of radius 1 in the plane shrunk by a and b.
+    /// Intersects the unit circle in the plane scaled by 1/a and 1/b.
     fn hit(&self, from: &Vector2<f64>, d: &Vector2<f64>) -> OutlineHit {
         let shrink = |v: &Vector2<f64>| Vector2::new(v.x / self.a_m, v.y / self.b_m);
         let (start, along) = (shrink(from), shrink(d));
@@ -134,7 +134,7 @@ impl Section for Ellipse {
 mod tests {
     use super::*;
 
-    /// Ramanujan's second approximation is good to 10⁻⁹ and better for such ellipses.
+    /// Ramanujan's second approximation is accurate to 10⁻⁹ for such ellipses.
     #[test]
     fn the_perimeter_is_ramanujans() {
         for (width, height) in [(4.0, 3.0), (2.0, 5.0), (6.0, 6.0)] {

@@ -1,4 +1,4 @@
-//! The outline of a tunnel across its axis.
+//! Cross-sections of tunnels.
 //!
 //! Coordinates `(x, z)` in metres, the axis at the origin, z upwards to twelve o'clock. The outline
 //! is convex, closed, and runs from the z axis (`s = 0`) towards x, parametrised by its length `s`.

@@ -1,18 +1,18 @@
-//! Outlines of straight lines and arcs: boxes and horseshoes.
+//! Outlines of line segments and arcs: boxes and horseshoes.
 
 use super::outline::{OutlineHit, OutlinePoint, Section, forward_root};
 use crate::surface::error::{SurfaceError, check_size};
 use nalgebra::Vector2;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// A piece of an outline.
+/// A segment of an outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OutlinePiece {
-    /// A straight line.
+    /// A line segment.
     Line {
-        /// Where it begins, metres.
+        /// Start, metres.
         from: Vector2<f64>,
-        /// Where it ends.
+        /// End, metres.
         to: Vector2<f64>,
     },
     /// An arc around a centre, clockwise as seen with z up and x to the right.
@@ -21,9 +21,9 @@ pub enum OutlinePiece {
         centre: Vector2<f64>,
         /// The radius, metres.
         radius_m: f64,
-        /// Where it begins: the angle from z towards x, radians.
+        /// Start: the angle from z towards x, radians.
         from_rad: f64,
-        /// How far it turns, radians.
+        /// Angle of the arc, radians.
         turn_rad: f64,
     },
 }
@@ -38,7 +38,7 @@ impl OutlinePiece {
         }
     }
 
-    /// The point `s_m` behind the beginning.
+    /// The point at `s_m` from the start.
     fn at(&self, s_m: f64) -> OutlinePoint {
         match *self {
             Self::Line { from, to } => {
@@ -63,8 +63,8 @@ impl OutlinePiece {
         }
     }
 
-    /// Where a ray meets the line or circle that this is a part of, and how far behind the
-    /// beginning, metres; nothing if it goes away from it.
+    /// Intersects a ray with the full line or circle of the segment: range, and distance from the
+    /// start in metres; None if the ray points away.
     fn meet(&self, from: &Vector2<f64>, d: &Vector2<f64>) -> Option<(f64, f64)> {
         match *self {
             Self::Line { from: start, to } => {
@@ -87,7 +87,7 @@ impl OutlinePiece {
                 let c = arm.norm_squared() - radius_m * radius_m;
                 let range = forward_root(d.norm_squared(), d.dot(&arm), c);
                 let point = arm + d * range;
-                // Counted from the middle of the arc, which is less than all around.
+                // Relative to the middle of the arc, which is less than a full circle.
                 let middle = from_rad + 0.5 * turn_rad;
                 let angle = point.x.atan2(point.y) - middle;
                 let angle = angle - TAU * (angle / TAU).round();
@@ -97,11 +97,11 @@ impl OutlinePiece {
     }
 }
 
-/// An outline of pieces, one after another.
+/// A closed sequence of segments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PiecewiseOutline {
     pieces: Vec<OutlinePiece>,
-    /// Where each begins, and where the last ends, metres.
+    /// Arc length at the start of each segment and at the end of the last, metres.
     starts_m: Vec<f64>,
     farthest_m: f64,
 }
@@ -127,7 +127,7 @@ impl PiecewiseOutline {
         }
     }
 
-    /// A box, the axis in its middle; sizes in metres.
+    /// Creates a box with the axis in its centre; sizes in metres.
     ///
     /// # Errors
     /// [`SurfaceError::Size`] unless both are positive and finite.
@@ -144,8 +144,8 @@ impl PiecewiseOutline {
         Ok(Self::new(lines.collect()))
     }
 
-    /// A round arch on straight walls and a flat floor, the axis in the middle of the arch; sizes
-    /// in metres.
+    /// Creates a horseshoe: a semicircular arch on straight walls and a flat floor, with the axis
+    /// in the centre of the arch; sizes in metres.
     ///
     /// # Errors
     /// [`SurfaceError::Size`] unless both are positive and finite, [`SurfaceError::NoWalls`] unless
@@ -177,7 +177,7 @@ impl PiecewiseOutline {
         ]))
     }
 
-    /// The pieces.
+    /// The segments.
     pub fn pieces(&self) -> &[OutlinePiece] {
         &self.pieces
     }
@@ -195,8 +195,7 @@ impl Section for PiecewiseOutline {
         self.pieces[k].at(s_m - self.starts_m[k])
     }
 
-    /// Of the pieces that it meets within their ends, give or take rounding, the nearest: the
-    /// outline is convex.
+    /// The nearest intersection within the ends of a segment, to rounding; the outline is convex.
     fn hit(&self, from: &Vector2<f64>, d: &Vector2<f64>) -> OutlineHit {
         let slack = 1e-9 * self.perimeter_m();
         let mut best = OutlineHit {

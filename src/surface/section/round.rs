@@ -4,10 +4,10 @@ use super::outline::{OutlineHit, OutlinePoint, Section, forward_root};
 use nalgebra::Vector2;
 use std::f64::consts::TAU;
 
-/// The circle around the axis.
+/// A circle around the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleOutline {
-    /// Its radius, metres.
+    /// Radius, metres.
     pub radius_m: f64,
 }
 
@@ -24,7 +24,7 @@ impl Section for CircleOutline {
         }
     }
 
-    /// As [`super::Circle`].
+    /// Intersects the ray with the circle; see [`crate::surface::Circle`].
     fn hit(&self, from: &Vector2<f64>, d: &Vector2<f64>) -> OutlineHit {
         let range = forward_root(
             d.norm_squared(),

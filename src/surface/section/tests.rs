@@ -14,10 +14,11 @@ fn sections() -> Vec<Box<dyn Section>> {
 }
 
 proptest! {
-    /// A ray from any point inside towards a point of the outline meets it there.
+    /// A ray from any point inside towards a point of the outline intersects it there.
     #[test]
     fn rays_meet_the_point_they_are_sent_to(
-        which in 0usize..5, share in 0.0f64..1.0, inside in 0.0f64..0.98, towards in 0.0f64..1.0, length in 0.01f64..100.0,
+        which in 0usize..5, share in 0.0f64..1.0, inside in 0.0f64..0.98, towards in 0.0f64..1.0,
+        length in 0.01f64..100.0,
     ) {
         let section = &sections()[which];
         let perimeter_m = section.perimeter_m();
@@ -25,7 +26,7 @@ proptest! {
         prop_assert!(section.contains(&from));
         let target = section.at(share * perimeter_m);
         let d = target.point - from;
-        // Not where the ray grazes the outline.
+        // Grazing rays are excluded.
         prop_assume!(d.perp(&target.tangent).abs() > 1e-3 * d.norm());
         let hit = section.hit(&from, &(d * length));
         prop_assert!((hit.range * length - 1.0).abs() < 1e-9, "{hit:?}");
@@ -43,7 +44,7 @@ proptest! {
         prop_assert!((at.tangent.norm() - 1.0).abs() < 1e-12);
         let step = 1e-6;
         let [before, after] = [-step, step].map(|step| section.at(s_m + step));
-        // Corners have none.
+        // Corners have no tangent.
         prop_assume!((before.tangent - after.tangent).norm() < 1e-4);
         let numeric = (after.point - before.point) / (2.0 * step);
         prop_assert!((numeric - at.tangent).norm() < 1e-7, "{numeric} {at:?}");
@@ -61,7 +62,7 @@ fn outlines_begin_at_twelve_and_run_towards_x() {
         let start = section.at(0.0);
         assert!(start.point.x.abs() < 1e-12 && start.point.y > 0.0);
         assert!(start.tangent.x > 0.999_999);
-        // All around and back, in steps.
+        // Sum of chords once around.
         let n = 20_000;
         let point = |k: usize| {
             section
@@ -71,7 +72,7 @@ fn outlines_begin_at_twelve_and_run_towards_x() {
         let length: f64 = (0..n as usize)
             .map(|k| (point(k + 1) - point(k)).norm())
             .sum();
-        // Each of four corners is cut by half a step at the most.
+        // Each of four corners is cut by at most half a step.
         assert!((length / section.perimeter_m() - 1.0).abs() < 2.0 / f64::from(n));
     }
 }

@@ -235,7 +235,8 @@ fn covered(rates: &AngularRates, times_s: &[f64], offset_s: f64) -> Result<Vec<f
             Ok(at_s)
         } else {
             Err(format!(
-                "frame {frame} at {time_s} s is at {at_s:.3} s of the log, which goes from {first_s:.3} s to {last_s:.3} s; \
+                "frame {frame} at {time_s} s is at {at_s:.3} s of the log, which goes from \
+                 {first_s:.3} s to {last_s:.3} s; \
              give the log's time minus the frames' (--time-offset-s)"
             ))
         }
@@ -278,7 +279,8 @@ fn gaps(rates: &AngularRates, span_s: [f64; 2]) -> Option<String> {
     let (longest_s, at_s) = steps.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (longest_s > MIN_GAP_STEPS * median_s).then(|| {
         format!(
-            "the log has a gap of {longest_s:.3} s after {at_s:.3} s, where it usually has a sample each {median_s:.4} s; \
+            "the log has a gap of {longest_s:.3} s after {at_s:.3} s, where it usually has a \
+             sample each {median_s:.4} s; \
              the rate is taken to change evenly there"
         )
     })
@@ -366,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_are_told_of() {
+    fn gaps_are_reported() {
         let found = baseline(&log(true, true), &OPTIONS).unwrap();
         let warning = &found.warnings[0];
         assert!(

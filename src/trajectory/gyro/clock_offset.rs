@@ -52,7 +52,9 @@ impl ClockMatch {
         let spread = planned.iter().map(|p| (p - mean).abs()).fold(0.0, f64::max);
         if spread <= 1e-6 * mean.abs().max(1e-6) {
             return Err(
-                "the plan turns at a constant rate, which fits the log at any offset; give the offset, or a plan with its stops".to_owned(),
+                "the plan turns at a constant rate, which fits the log at any offset; give the \
+                 offset, or a plan with its stops"
+                    .to_owned(),
             );
         }
         let at = |offset_s: f64| {
@@ -69,7 +71,8 @@ impl ClockMatch {
         let count = ((range_s[1] - range_s[0]) / step_s).ceil().max(0.0);
         if !count.is_finite() || count > MAX_OFFSETS {
             return Err(format!(
-                "the range of {:.3} s holds {count:.0} of the log's steps of {step_s:.1e} s; check the log's tscale, or narrow the range",
+                "the range of {:.3} s holds {count:.0} of the log's steps of {step_s:.1e} s; \
+                 check the log's tscale, or narrow the range",
                 range_s[1] - range_s[0]
             ));
         }
@@ -85,14 +88,16 @@ impl ClockMatch {
         };
         if correlation < MIN_CORRELATION {
             return Err(format!(
-                "the rate about the axis agrees with the plan's nowhere in the range: the greatest correlation is {correlation:.2}, \
+                "the rate about the axis agrees with the plan's nowhere in the range: the \
+                 greatest correlation is {correlation:.2}, \
                  at {:.3} s; check the sensor's orientation, or widen the range",
                 offset(k)
             ));
         }
         let (Some(before), Some(after)) = (k.checked_sub(1).and_then(value), value(k + 1)) else {
             return Err(format!(
-                "rates agree best at {:.3} s, at the end of the range or of the log; widen the range",
+                "rates agree best at {:.3} s, at the end of the range or of the log; widen the \
+                 range",
                 offset(k)
             ));
         };
@@ -215,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn what_tells_nothing_is_refused() {
+    fn uninformative_plans_are_refused() {
         let axis = Vector3::y();
         let rates = log(4.0, &axis);
         let times: Vec<f64> = (0..60).map(|k| f64::from(k) * 0.3).collect();

@@ -30,7 +30,8 @@ fn log(orientation: &str, bias: Vector3<f64>, sigma: f64, seed: u64) -> String {
         .to_camera()
         .transpose();
     let mut text = format!(
-        "GYROFLOW IMU LOG\nversion,1.3\norientation,{orientation}\ntscale,0.0001\ngscale,0.00001\nt,gx,gy,gz\n"
+        "GYROFLOW IMU \
+         LOG\nversion,1.3\norientation,{orientation}\ntscale,0.0001\ngscale,0.00001\nt,gx,gy,gz\n"
     );
     let half = 1e-4;
     for k in 0..((REST_S + STEPS as f64) * HZ) as usize + 2 {

@@ -135,7 +135,8 @@ impl GyroLog {
                     path,
                     number,
                     format!(
-                        "`{found}` where a gcsv log begins with `{}`; Gyroflow converts others to it",
+                        "`{found}` where a gcsv log begins with `{}`; Gyroflow converts others to \
+                         it",
                         TITLES[0]
                     ),
                 ));
@@ -247,7 +248,8 @@ fn sample(
         .collect::<Result<Vec<f64>, String>>()?;
     if values.len() != columns {
         return Err(format!(
-            "{} columns where the table's first line names {columns}; if the log was cut off, delete this line",
+            "{} columns where the table's first line names {columns}; if the log was cut off, \
+             delete this line",
             values.len()
         ));
     }
@@ -260,7 +262,8 @@ fn sample(
         && time_s <= last_s
     {
         return Err(format!(
-            "time {time_s} s after {last_s} s: times must increase; sort the table, and leave one of samples of the same time"
+            "time {time_s} s after {last_s} s: times must increase; sort the table, and leave one \
+             of samples of the same time"
         ));
     }
     Ok(GyroSample {
@@ -306,7 +309,8 @@ mod tests {
 
     #[test]
     fn gyro_alone_magnetometers_line_ends_and_the_neutral_title_are_fine() {
-        let plain = "\u{feff}CAMERA IMU LOG\r\nversion,1.0\r\ntscale,1e-6\r\ngscale,1\r\nt,gx,gy,gz\r\n\
+        let plain = "\u{feff}CAMERA IMU \
+                     LOG\r\nversion,1.0\r\ntscale,1e-6\r\ngscale,1\r\nt,gx,gy,gz\r\n\
             0, 0.1,0.2,0.3\r\n1000,1,2,3\r\n\r\n";
         let log = read(plain).unwrap();
         assert_eq!(log.samples[1].time_s, 0.001);
@@ -339,9 +343,11 @@ mod tests {
             ("GYROFLOW IMU LOG\norientation,XXZ\ntscale,1\ngscale,1\nt,gx,gy,gz\n".to_owned(), ":2: `XXZ`"),
             ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,ax,ay,az\n".to_owned(), ":4: columns"),
             ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,gx,gy,gz,ax\n".to_owned(), ":4: columns"),
-            ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,gx,gy,gz,ax,ay,az\n".to_owned(), "no `ascale`"),
+            ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,gx,gy,gz,ax,ay,az\n".to_owned(), "no \
+                                                                                        `ascale`"),
             (
-                "GYROFLOW IMU LOG\nframe_readout_time,1\nframe_readout_direction,7\ntscale,1\ngscale,1\nt,gx,gy,gz\n"
+                "GYROFLOW IMU \
+                 LOG\nframe_readout_time,1\nframe_readout_direction,7\ntscale,1\ngscale,1\nt,gx,gy,gz\n"
                     .to_owned(),
                 ":3: frame_readout_direction is `7`",
             ),

@@ -35,7 +35,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     #[test]
-    fn gravity_tells_the_angle_about_the_axis() {
+    fn gravity_gives_the_angle_about_the_axis() {
         let mounting = Mounting {
             tilt_rad: 0.2,
             roll_rad: -0.4,

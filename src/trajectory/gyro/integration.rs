@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_told_beyond_the_log() {
+    fn there_are_no_rotations_beyond_the_log() {
         let turning = turning(1.0, 0.0, 10.0);
         assert!(turning.at(-0.01).is_none() && turning.at(4.01).is_none());
         assert!(turning.at(0.0).is_some() && turning.at(4.0).is_some());

@@ -25,7 +25,8 @@ impl Orientation {
     pub fn parse(text: &str) -> Result<Self, String> {
         let fail = || {
             format!(
-                "`{text}` is not an orientation; it must be three letters such as YxZ, each of x, y and z once, in capitals or not"
+                "`{text}` is not an orientation; it must be three letters such as YxZ, each of x, \
+                 y and z once, in capitals or not"
             )
         };
         let letters: Vec<char> = text.chars().collect();

@@ -72,13 +72,15 @@ impl StationaryInterval {
         let resting = quiet.filter(|w| w.1 <= slowest + RATE_TOLERANCE_RAD_S);
         let Some((_, mean, begin)) = resting.min_by(|a, b| a.0.total_cmp(&b.0)) else {
             return Err(format!(
-                "there is no stretch of {length_s} s in a log of {:.3} s with 20 samples and more in it",
+                "there is no stretch of {length_s} s in a log of {:.3} s with 20 samples and more \
+                 in it",
                 last_s - first_s
             ));
         };
         if *mean > MAX_BIAS_RAD_S {
             return Err(format!(
-                "the sensor never rested for {length_s} s: where its rate is steadiest, it is {:.2}°/s, more than any bias",
+                "the sensor never rested for {length_s} s: where its rate is steadiest, it is \
+                 {:.2}°/s, more than any bias",
                 mean.to_degrees()
             ));
         }
@@ -185,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn a_carrier_that_never_rests_is_told_of() {
+    fn a_carrier_that_never_rests_is_reported() {
         let message = StationaryInterval::find(&log(false), 2.0).unwrap_err();
         assert!(message.contains("never rested"), "{message}");
         let message = StationaryInterval::find(&log(true), 20.0).unwrap_err();

@@ -58,7 +58,8 @@ impl Columns {
             }
             (Some(_), Some(_)) => {
                 return Err(
-                    "has both `frame` and `time_s`; leave only the one that orders the rows".to_owned(),
+                    "has both `frame` and `time_s`; leave only the one that orders the rows"
+                        .to_owned(),
                 );
             }
         };
@@ -162,7 +163,8 @@ impl PlanTable {
                 PoseError::file(
                     &self.path,
                     format!(
-                        "{what} lies beyond its rows, which go from {} to {}; nothing is extrapolated",
+                        "{what} lies beyond its rows, which go from {} to {}; nothing is \
+                         extrapolated",
                         key(first),
                         key(last)
                     ),
