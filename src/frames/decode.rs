@@ -12,7 +12,7 @@ use std::io::{BufRead, Cursor, Read, Seek};
 use std::path::Path;
 
 impl FrameFile {
-    /// Width and height, pixels, by the file's header.
+    /// Width and height, pixels, from the file's header.
     ///
     /// # Errors
     /// A missing or unknown file.
@@ -23,7 +23,7 @@ impl FrameFile {
         }
     }
 
-    /// The decoder of a picture of its own, its header read.
+    /// The decoder of a picture file after reading its header.
     fn header(&self) -> Result<impl ImageDecoder, FrameError> {
         ImageReader::open(&self.path)
             .map_err(ImageError::from)
@@ -65,13 +65,13 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
     }
     let decoder =
         decoder(ImageReader::new(Cursor::new(bytes))).map_err(|error| fail(error.to_string()))?;
-    // Before there is room made for as many pixels as a header may claim.
+    // Checked before allocating the memory that the header claims.
     check(decoder.dimensions())?;
     DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))
 }
 
-/// A TIFF file of this size in grey or colour of 8 bits; None if it is anything else, or damaged.
-/// The general decoder makes two pictures of it on the way: slow, where there is nothing to decode.
+/// Decodes an uncompressed TIFF file of this size with 8 bits per channel; None for any other or
+/// damaged file. The general decoder makes two intermediate copies.
 fn plain_tiff(bytes: &[u8], width: u32, height: u32) -> Option<DynamicImage> {
     let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).ok()?;
     if decoder.dimensions().ok()? != (width, height) {
@@ -99,8 +99,8 @@ fn plain_tiff(bytes: &[u8], width: u32, height: u32) -> Option<DynamicImage> {
     }
 }
 
-/// What is in a file. Its memory serves for the thread's next file: memory that the system clears
-/// anew for each costs as much as reading.
+/// The content of a file. Its buffer is reused for the thread's next file, because allocating
+/// zeroed memory costs as much as reading.
 struct Content(Vec<u8>);
 
 thread_local! {
@@ -124,12 +124,12 @@ impl AsRef<[u8]> for Content {
 
 impl Drop for Content {
     fn drop(&mut self) {
-        // A thread that ends has no room to give back to.
+        // The buffer is dropped if the thread is ending.
         let _ = ROOM.try_with(|room| room.replace(std::mem::take(&mut self.0)));
     }
 }
 
-/// What the pixels of a frame are, by its file's header.
+/// The colour type of a frame's pixels, from the file's header.
 ///
 /// # Errors
 /// A missing or unknown file.
@@ -140,13 +140,13 @@ pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
     Ok(file.header()?.color_type())
 }
 
-/// The decoder that the content of a file asks for, its header read.
+/// The decoder for the content of a file, after reading its header.
 fn decoder<R: BufRead + Seek + 'static>(reader: ImageReader<R>) -> ImageResult<impl ImageDecoder> {
     reader.with_guessed_format()?.into_decoder()
 }
 
-/// True if a JPEG file holds its end-of-image marker (the decoder fills what is missing with grey
-/// and says nothing). Padding after the marker is allowed.
+/// True if a JPEG file contains its end-of-image marker; the decoder silently fills missing parts
+/// with grey. Padding after the marker is allowed.
 fn jpeg_is_complete(bytes: &[u8]) -> bool {
     let end = bytes.len().saturating_sub(4096);
     bytes[end..].windows(2).any(|pair| pair == [0xff, 0xd9])
@@ -157,7 +157,7 @@ mod tests {
     use super::*;
     use crate::frames::mask::Mask;
 
-    /// The beginning of a PNG file that says to be one of 60000 × 60000 pixels.
+    /// The beginning of a PNG file whose header claims 60000 × 60000 pixels.
     const BOAST: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\xea`\0\0\xea`\x08\0\0\0\0\xa5\xb9*\x9e\0\0\0\x09IDATx\x9cc\0\0\0\x01\0\x01^\xff}\xf9";
 
     #[test]
@@ -173,7 +173,7 @@ mod tests {
         assert!(refused.contains("60000 × 60000 px"), "{refused}");
     }
 
-    /// Plain TIFF files, and those that are not, or not whole: the same as by the general decoder.
+    /// The fast path and the general decoder agree for plain, other and truncated TIFF files.
     #[test]
     fn tiff_files_are_the_pictures_they_are() {
         let dir = tempfile::tempdir().unwrap();

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-/// Why a frame cannot be used.
+/// An error of a frame, a video or a mask.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrameError {
@@ -11,7 +11,7 @@ pub enum FrameError {
     Pattern {
         /// The pattern.
         pattern: String,
-        /// What is wrong with it.
+        /// The problem.
         what: String,
     },
     /// The pattern matches nothing.
@@ -29,7 +29,7 @@ pub enum FrameError {
         index: usize,
         /// The file.
         path: PathBuf,
-        /// What the decoder said.
+        /// The error of the decoder.
         what: String,
     },
     /// A video cannot be read.
@@ -37,18 +37,18 @@ pub enum FrameError {
     Video {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it, and the remedy.
+        /// The problem and the remedy.
         what: String,
     },
-    /// A mask is unreadable or none.
+    /// A mask is unreadable or invalid.
     #[error("{}: {what}", path.display())]
     Mask {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it, and the remedy.
+        /// The problem and the remedy.
         what: String,
     },
-    /// A frame is not as large as the calibration says.
+    /// A frame's size differs from the calibration's.
     #[error(
         "frame {index} ({}): {width} × {height} px, but the calibration is for {expected_width} × {expected_height} px",
         path.display()

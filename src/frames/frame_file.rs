@@ -5,20 +5,20 @@ use super::video::Video;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A frame on disk.
+/// A frame in a file of its own or in a video.
 #[derive(Clone, Debug)]
 pub struct FrameFile {
     /// Index of the frame in the survey.
     pub index: usize,
-    /// The picture, or the video's path with the picture's number as if it were a file in it:
+    /// Path of the picture, or the video's path followed by the picture's number:
     /// `survey.mp4/000012`.
     pub path: PathBuf,
-    /// The video that it is in, and which picture of it.
+    /// The video that contains it, and the index of the picture.
     pub(super) video: Option<(Arc<Video>, usize)>,
 }
 
 impl FrameFile {
-    /// A frame that is a file of its own.
+    /// A frame with a file of its own.
     pub fn picture(index: usize, path: PathBuf) -> Self {
         Self {
             index,
@@ -36,7 +36,7 @@ impl FrameFile {
         }
     }
 
-    /// The file that it is in.
+    /// The file that contains the frame.
     pub fn file(&self) -> &Path {
         match &self.video {
             Some((video, _)) => video.path(),
@@ -44,7 +44,7 @@ impl FrameFile {
         }
     }
 
-    /// True if it is in a video.
+    /// True if the frame is in a video.
     pub fn is_in_video(&self) -> bool {
         self.video.is_some()
     }
@@ -58,15 +58,15 @@ impl FrameFile {
         }
     }
 
-    /// The picture's name without its folder.
+    /// The file name of the picture.
     pub fn name(&self) -> String {
         let name = self.path.file_name().unwrap_or_default();
         name.to_string_lossy().into_owned()
     }
 }
 
-/// The files that match `pattern` (glob syntax, relative to `folder`), sorted by name, but for the
-/// mask.
+/// Lists the files that match `pattern` (glob syntax, relative to `folder`), sorted by name,
+/// without the mask.
 ///
 /// # Errors
 /// A malformed pattern, an unreadable folder, no match.

@@ -1,12 +1,11 @@
-//! The frames of a survey and what none of them shows.
+//! The frames of a survey with their common mask.
 
 use super::frame_file::FrameFile;
 use super::mask::Mask;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// The frames of a survey, in their order, and the [`Mask`] they share, if there is one: together
-/// they say which pixels show the wall.
+/// The frames of a survey, in order, and their common [`Mask`], if any.
 #[derive(Clone, Debug, Default)]
 pub struct FrameSet {
     files: Vec<FrameFile>,
@@ -14,7 +13,7 @@ pub struct FrameSet {
 }
 
 impl FrameSet {
-    /// Frames of which each hides what `mask` does.
+    /// Creates a set of frames with a common mask.
     pub fn new(files: Vec<FrameFile>, mask: Option<Mask>) -> Self {
         Self {
             files,
@@ -22,12 +21,12 @@ impl FrameSet {
         }
     }
 
-    /// What none of them shows.
+    /// The common mask.
     pub fn mask(&self) -> Option<&Arc<Mask>> {
         self.mask.as_ref()
     }
 
-    /// Those of the given indices, numbered anew.
+    /// The frames of the given indices, renumbered.
     pub fn only(&self, indices: &[usize]) -> Self {
         let chosen = indices.iter().filter_map(|k| self.files.get(*k));
         let numbered = chosen.enumerate().map(|(index, file)| FrameFile {
@@ -40,7 +39,7 @@ impl FrameSet {
         }
     }
 
-    /// The first `most` of them.
+    /// The first `most` frames.
     pub fn first(&self, most: usize) -> Self {
         Self {
             files: self.files.iter().take(most).cloned().collect(),

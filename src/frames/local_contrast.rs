@@ -1,39 +1,39 @@
-//! Local contrast: a picture freed of light and exposure, for comparing frames before either is
-//! known.
+//! Local contrast normalisation, for comparing frames before lighting and exposure are known.
 
 use super::grey::GreyImage;
 use super::noise::MAD_TO_SIGMA;
 
-/// Half width of the widest sensible window, as a share of the picture's shorter side.
+/// Half width of the largest window relative to the image's shorter side.
 const WINDOW_FRACTION: f64 = 1.0 / 8.0;
-/// Share of the picture's own spread that is added to the local one: flat places stay flat.
+/// Fraction of the image's global spread that is added to the local one, so that uniform regions
+/// stay uniform.
 const MIN_SPREAD_FRACTION: f32 = 0.3;
 
-/// Half width of the window for comparing whole pictures: an eighth of the shorter side, pixels.
+/// Half width of the window for comparing whole images: an eighth of the shorter side, pixels.
 pub fn wide_window(image: &GreyImage) -> usize {
     ((WINDOW_FRACTION * image.width().min(image.height()) as f64).round() as usize).max(2)
 }
 
-/// What of a picture is local.
+/// The locally normalised parts of an image.
 #[derive(Debug)]
 pub struct LocalContrast {
     /// `I − mean`, grey levels.
     pub detail: GreyImage,
     /// `(I − mean)/√(variance + floor)`.
     pub contrast: GreyImage,
-    /// `1/(variance + floor)`: the variance that a unit of noise has in the contrast.
+    /// `1/(variance + floor)`: the variance of unit noise in the contrast.
     pub sensitivity: GreyImage,
 }
 
-/// Detail beyond this many times its median size (as a Gaussian's σ) is cut: glints and things that
-/// are not wall would outweigh a faint wall otherwise.
+/// Detail is clipped at this multiple of its robust σ, because glints and foreign objects would
+/// otherwise dominate a faint wall.
 const MAX_DETAIL_SIGMAS: f32 = 1.5;
 
-/// Detail and contrast with mean and variance over a square window of `2 reach + 1` pixels around
-/// each pixel.
+/// Computes detail and contrast with mean and variance over a square window of `2 reach + 1` pixels
+/// around each pixel.
 ///
-/// Any smooth light cancels, be it fixed to the world or to the camera, as do gain and bias. Pixels
-/// without a value stay without one and do not count.
+/// Smooth lighting cancels, whether fixed to the world or to the camera, as do gain and bias.
+/// Pixels without a value are ignored and stay without one.
 pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
     let w = image.width();
     let values = clip_detail(image, reach, MAX_DETAIL_SIGMAS);
@@ -52,8 +52,7 @@ pub fn local_contrast(image: &GreyImage, reach: usize) -> LocalContrast {
     }
 }
 
-/// The pixels with their detail, over windows of `2 reach + 1` pixels, cut at `most` times its
-/// median size (as a Gaussian's σ).
+/// Clips the detail over windows of `2 reach + 1` pixels at `most` times its robust σ.
 fn clip_detail(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
     let mut values = image.data().to_vec();
     let (means, sigma) = detail(image, reach);
@@ -64,8 +63,8 @@ fn clip_detail(image: &GreyImage, reach: usize, most: f32) -> Vec<f32> {
     values
 }
 
-/// The means over windows of `2 reach + 1` pixels, and the median size of what pixels differ from
-/// them (as a Gaussian's σ; 0 of a picture without a value).
+/// The means over windows of `2 reach + 1` pixels, and the robust σ of the deviations from them (0
+/// for an image without values).
 fn detail(image: &GreyImage, reach: usize) -> (Vec<f32>, f32) {
     let windows = Windows::new(image.data(), image.width(), reach);
     let means: Vec<f32> = windows.moments().map(|m| m.mean).collect();
@@ -83,21 +82,21 @@ fn detail(image: &GreyImage, reach: usize) -> (Vec<f32>, f32) {
     (means, MAD_TO_SIGMA as f32 * *median)
 }
 
-/// A picture without its extremes: what stands out of its surroundings by more than a few times
-/// what is usual in the picture is cut down to that. On a coarser level glints and things before
-/// the wall would blend into it, and no robust loss could tell them apart any more.
+/// Clips deviations from the local mean at a few times their robust σ. On a coarser level, glints
+/// and objects in front of the wall would blend into it, where a robust loss could no longer
+/// separate them.
 pub fn clip_outliers(image: &GreyImage) -> GreyImage {
     let values = clip_detail(image, wide_window(image), MAX_CLIPPED_SIGMAS);
     GreyImage::new(image.width(), image.height(), values)
 }
 
-/// Detail that [`clip_outliers`] leaves, in σ of the usual.
+/// Largest detail after [`clip_outliers`], multiples of the robust σ.
 const MAX_CLIPPED_SIGMAS: f32 = 3.0;
 
-/// A picture of the usual alone: what stands out of its surroundings, as wet patches and glints do,
-/// has no value.
+/// Removes outliers: pixels that stand out of their surroundings, such as wet patches and glints,
+/// get no value.
 pub fn mask_outliers(image: &GreyImage) -> GreyImage {
-    // Against surroundings without extremes, lest these draw the mean to them.
+    // Relative to clipped surroundings, so that outliers do not bias the mean.
     let (means, sigma) = detail(&clip_outliers(image), wide_window(image));
     let pixels = image.data().iter().zip(&means);
     let values = pixels.map(|(value, mean)| {
@@ -110,7 +109,8 @@ pub fn mask_outliers(image: &GreyImage) -> GreyImage {
     GreyImage::new(image.width(), image.height(), values.collect())
 }
 
-/// Detail that is usual, in its σ: less than [`clip_outliers`] cuts to.
+/// Largest detail of an inlier, multiples of the robust σ; less than the bound of
+/// [`clip_outliers`].
 const MAX_KEPT_SIGMAS: f32 = 2.5;
 
 /// Mean and variance of the values in a window.
@@ -119,14 +119,14 @@ struct Moments {
     variance: f32,
 }
 
-/// Square windows around all pixels of a picture, by sums over all pixels above and to the left.
+/// Moments in square windows around all pixels, by integral images.
 struct Windows {
     width: usize,
     height: usize,
     reach: usize,
-    /// A level near the mean: values are summed relative to it.
+    /// A grey level near the mean, subtracted before summing.
     level: f32,
-    /// Of 1, I, I².
+    /// Integral images of 1, I, I².
     sums: Vec<[f64; 3]>,
 }
 

@@ -1,4 +1,4 @@
-//! The pictures: loading, grey values, pyramids, writing.
+//! Frames: reading, grey images, pyramids, masks, noise and writing of pictures.
 
 mod agreement;
 mod cache;

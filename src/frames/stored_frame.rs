@@ -1,4 +1,4 @@
-//! A frame's grey values as its file holds them.
+//! Grey values of frames in the bit depth of their files.
 
 use super::decode::load_colour;
 use super::error::FrameError;
@@ -6,7 +6,7 @@ use super::frame_file::FrameFile;
 use super::grey::GreyImage;
 use image::DynamicImage;
 
-/// A decoded frame in a quarter (8 bits) or half (16 bits, colour) of the memory of a
+/// A decoded frame that takes a quarter (8 bits) or half (16 bits, colour) of the memory of a
 /// [`GreyImage`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StoredFrame {
@@ -22,10 +22,10 @@ enum Values {
 }
 
 impl StoredFrame {
-    /// Decodes a frame and checks its size. Colour pictures become Rec. 709 luma of 16 bits.
+    /// Decodes a frame and checks its size. Colour becomes Rec. 709 luma of 16 bits.
     ///
     /// # Errors
-    /// As [`load_colour`].
+    /// The errors of [`load_colour`].
     pub fn decode(file: &FrameFile, width: u32, height: u32) -> Result<Self, FrameError> {
         let values = match load_colour(file, width, height)? {
             DynamicImage::ImageLuma8(grey) => Values::Eight(grey.into_raw()),
@@ -43,10 +43,10 @@ impl StoredFrame {
         })
     }
 
-    /// The grey levels, 0 to 255; 16 bits keep their finer steps (65535 = 255 · 257).
+    /// Converts to grey levels, 0 to 255; 16 bits keep their finer steps (65535 = 255 · 257).
     ///
-    /// Full white and full black are NaN: the sensor or the encoder has clipped them, so they only
-    /// say that the wall is at least as bright or as dark.
+    /// Full white and full black become NaN: they are clipped by the sensor or the encoder and only
+    /// bound the brightness of the wall.
     pub fn grey(&self) -> GreyImage {
         let data = match &self.values {
             Values::Eight(values) => {
@@ -67,7 +67,7 @@ impl StoredFrame {
         GreyImage::new(self.width, self.height, data)
     }
 
-    /// Memory it takes, bytes.
+    /// Memory in use, bytes.
     pub fn bytes(&self) -> usize {
         match &self.values {
             Values::Eight(values) => values.len(),
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn sixteen_bits_keep_their_fractions_of_grey_levels() {
-        // Every value there is.
+        // Every possible value.
         let all = ImageBuffer::from_fn(256, 256, |u, v| image::Luma([(256 * v + u) as u16]));
         let grey = grey_of(&all.into());
         let last = grey.data().len() - 1;

@@ -3,12 +3,12 @@
 use image::{ColorType, DynamicImage, ImageBuffer};
 use std::path::PathBuf;
 
-/// When a picture is shown.
+/// The time of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moment {
     /// Its time in ticks of the stream.
     pub ticks: i64,
-    /// Whether decoding may begin with it.
+    /// True for a key picture, at which decoding can start.
     pub key: bool,
 }
 
@@ -41,7 +41,7 @@ impl VideoInfo {
     }
 }
 
-/// What the pictures are.
+/// Size and colour type of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelLayout {
     pub width: u32,
@@ -50,7 +50,7 @@ pub struct PixelLayout {
 }
 
 impl PixelLayout {
-    /// As `ffmpeg` calls it.
+    /// The pixel format in `ffmpeg`'s notation.
     pub fn ffmpeg_name(&self) -> &'static str {
         match self.colour {
             ColorType::L8 => "gray",
@@ -65,7 +65,7 @@ impl PixelLayout {
         pixels * usize::from(self.colour.bytes_per_pixel())
     }
 
-    /// A picture of its bytes, as [`PixelLayout::ffmpeg_name`] has them.
+    /// Creates a picture from its bytes in the format [`PixelLayout::ffmpeg_name`].
     pub fn picture(&self, bytes: Vec<u8>) -> Option<DynamicImage> {
         let (width, height) = (self.width, self.height);
         let words = |bytes: &[u8]| -> Vec<u16> {
@@ -92,7 +92,7 @@ pub fn start_error(program: &str, error: &std::io::Error) -> String {
     match error.kind() {
         std::io::ErrorKind::NotFound => format!(
             "videos are read by the program {program}, which is not installed; install ffmpeg (apt install ffmpeg, brew install ffmpeg, \
-             winget install ffmpeg), or take the pictures out elsewhere and give frames.images"
+             winget install ffmpeg), or extract the pictures elsewhere and set frames.images"
         ),
         _ => format!("cannot start {program}: {error}"),
     }

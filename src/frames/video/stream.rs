@@ -8,26 +8,26 @@ use image::{ColorType, DynamicImage};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
-/// Pictures that are rather decoded on the way than jumped over.
+/// Largest number of pictures that are decoded sequentially instead of jumping.
 const MAX_SKIPPED_PICTURES: usize = 48;
 
-/// A video whose pictures are decoded on demand.
+/// A video, decoded on demand.
 ///
-/// Pictures are as players show them, turned as the file says, and numbered from 0 in the order of
-/// their times. Colour becomes RGB and grey stays grey, of 8 bits or, where the video has more, 16.
+/// Pictures are rotated as for display and numbered from 0 in the order of their times. Colour
+/// becomes RGB and grey stays grey, with 8 bits or, if the video has more, 16.
 #[derive(Debug)]
 pub struct Video {
     info: VideoInfo,
-    /// Decoders between two pictures, the one used last at the end.
+    /// Idle decoders, the most recently used one last.
     idle: Mutex<Vec<Decoder>>,
 }
 
 impl Video {
-    /// Looks into a video; no picture is decoded.
+    /// Reads the properties of a video without decoding pictures.
     ///
     /// # Errors
-    /// [`FrameError::Video`]: `ffprobe` is missing; a file that is no video, has no pictures, is
-    /// cut off or interlaced, or is to be turned by other than right angles.
+    /// [`FrameError::Video`]: `ffprobe` is missing; a file that is not a video, has no pictures, is
+    /// cut off or interlaced, or is displayed with a rotation other than a multiple of 90°.
     pub fn open(path: &Path) -> Result<Self, FrameError> {
         let info = probe::probe(path).map_err(|what| FrameError::Video {
             path: path.to_owned(),
@@ -49,7 +49,7 @@ impl Video {
         (self.info.layout.width, self.info.layout.height)
     }
 
-    /// What the pixels are.
+    /// Colour type of the pixels.
     pub fn colour(&self) -> ColorType {
         self.info.layout.colour
     }
@@ -59,13 +59,13 @@ impl Video {
         self.info.moments.len()
     }
 
-    /// By how much pictures are turned from how the sensor read them, degrees: rows are then not
-    /// what was read at once.
+    /// Rotation of the displayed pictures against the sensor's, degrees. If it is not 0, rows of
+    /// pixels are not rows of the sensor.
     pub fn rotation_deg(&self) -> i32 {
         self.info.rotation_deg
     }
 
-    /// What is odd about the file but does not keep it from being read.
+    /// A complaint of `ffprobe` that does not keep the file from being read.
     pub fn warning(&self) -> Option<&str> {
         self.info.warning.as_deref()
     }
@@ -75,10 +75,10 @@ impl Video {
         self.info.time_s(picture)
     }
 
-    /// Decodes picture number `picture`; several threads may ask at once.
+    /// Decodes picture number `picture`; may be called from several threads at once.
     ///
     /// # Errors
-    /// What `ffmpeg` says of a video that is damaged there.
+    /// The error of `ffmpeg` if the video is damaged there.
     pub fn decode(&self, picture: usize) -> Result<DynamicImage, String> {
         let mut decoder = match self.take_near(picture) {
             Some(decoder) => decoder,
@@ -86,7 +86,7 @@ impl Video {
         };
         let bytes = match decoder.advance(&self.info, picture) {
             Ok(bytes) => bytes,
-            // Some files cannot be entered everywhere: the whole way is sure.
+            // Some files cannot be entered at every key picture; decode from the start.
             Err(_) => {
                 decoder = Decoder::start(&self.info, 0)?;
                 decoder.advance(&self.info, picture)?
@@ -97,7 +97,7 @@ impl Video {
         picture.ok_or_else(|| "ffmpeg gave a picture of another size".to_owned())
     }
 
-    /// The decoder that has the fewest pictures to go, if it is sooner there than a new one.
+    /// Takes the idle decoder nearest before the picture, if it is faster than a new one.
     fn take_near(&self, picture: usize) -> Option<Decoder> {
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let (at, next) = idle
@@ -112,7 +112,7 @@ impl Video {
         near.then(|| idle.remove(at))
     }
 
-    /// Keeps a decoder for the next picture: one a thread, and the oldest goes.
+    /// Keeps a decoder for the next picture; at most one per thread, the oldest is dropped.
     fn put_back(&self, decoder: Decoder) {
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         if decoder.next() < self.pictures() {
