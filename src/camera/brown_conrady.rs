@@ -1,6 +1,6 @@
-//! Lens distortion after Brown and Conrady.
+//! The Brown–Conrady lens model.
 
-use super::rising::{end_of_rise, invert};
+use super::monotone::{invert_monotone, monotone_limit};
 use nalgebra::{Matrix2, Vector2};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -14,14 +14,14 @@ pub struct BrownCoefficients {
     pub p: [f64; 2],
 }
 
-/// Radial and tangential distortion: the point `p = (x, y) = (x_c/z_c, y_c/z_c)` before the camera
+/// Radial and tangential distortion: the undistorted point `p = (x, y) = (x_c/z_c, y_c/z_c)`
 /// appears at
 ///
 /// `p_d = f p + (2 p1 x y + p2 (q + 2x²), p1 (q + 2y²) + 2 p2 x y)`,
 /// `f = (1 + k1 q + k2 q² + k3 q³)/(1 + k4 q + k5 q² + k6 q³)`, `q = |p|²`.
 ///
-/// Points are seen only up to the radius [`BrownConrady::limit`], within which the picture does not
-/// fold back on itself (`det ∂p_d/∂p > 0` all around).
+/// The field of view is limited to the radius within which the distortion is invertible
+/// (`det ∂p_d/∂p > 0` in all directions; [`BrownConrady::limit`]).
 ///
 /// Source: D. C. Brown, "Close-range camera calibration", Photogrammetric Engineering 37(8), 1971;
 /// the rational form: D. Claus and A. W. Fitzgibbon, "A rational function lens distortion model for
@@ -29,23 +29,23 @@ pub struct BrownCoefficients {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrownConrady {
     coefficients: BrownCoefficients,
-    /// The largest angle off the axis that is to be used, radians.
+    /// Largest angle off the axis to be used, radians.
     max_angle_rad: f64,
-    /// The largest |p|², or infinity.
+    /// Largest |p|², or infinity.
     limit: f64,
 }
 
-/// Directions in which a lens with tangential distortion is looked at for its limit.
-const DIRECTIONS: usize = 72;
-/// Radius up to which it is looked at: 89.4° off the axis.
-const WIDEST: f64 = 100.0;
-/// Steps of the inverse.
-const STEPS: usize = 50;
-/// Residual of the inverse, of rays with z = 1.
-const EXACT: f64 = 1e-14;
+/// Directions in which the limit of a lens with tangential distortion is determined.
+const LIMIT_DIRECTIONS: usize = 72;
+/// Largest radius |p| at which the limit is searched: 89.4° off the axis.
+const MAX_RADIUS: f64 = 100.0;
+/// Newton iterations of the inverse.
+const MAX_NEWTON_ITERATIONS: usize = 50;
+/// Residual at which the inverse has converged, for rays with z = 1.
+const RESIDUAL_TOLERANCE: f64 = 1e-14;
 
 impl BrownConrady {
-    /// The lens with these coefficients, its limit found.
+    /// Creates the lens with these coefficients and determines its limit.
     pub fn new(coefficients: BrownCoefficients) -> Self {
         let mut lens = Self {
             coefficients,
@@ -58,7 +58,7 @@ impl BrownConrady {
         let directions = if coefficients.p == [0.0; 2] {
             1
         } else {
-            DIRECTIONS
+            LIMIT_DIRECTIONS
         };
         let rises = |k: usize| {
             let (sin, cos) = (TAU * k as f64 / directions as f64).sin_cos();
@@ -73,7 +73,7 @@ impl BrownConrady {
                     -1.0
                 }
             };
-            end_of_rise(determinant, WIDEST)
+            monotone_limit(determinant, MAX_RADIUS)
         };
         lens.limit = (0..directions)
             .map(rises)
@@ -90,7 +90,7 @@ impl BrownConrady {
         })
     }
 
-    /// The same lens, used no farther than `max_angle_rad` off its axis.
+    /// This lens, limited to `max_angle_rad` off its axis.
     pub fn limited_to(mut self, max_angle_rad: f64) -> Self {
         if max_angle_rad < FRAC_PI_2 {
             self.max_angle_rad = max_angle_rad;
@@ -99,7 +99,7 @@ impl BrownConrady {
         self
     }
 
-    /// The largest angle off the axis that is to be used, radians; 90° if all of it.
+    /// The largest angle off the axis to be used, radians; 90° if there is no limit.
     pub fn max_angle_rad(&self) -> f64 {
         self.max_angle_rad
     }
@@ -109,12 +109,12 @@ impl BrownConrady {
         &self.coefficients
     }
 
-    /// True for a lens without distortion and limit.
-    pub fn is_straight(&self) -> bool {
+    /// True for a lens without distortion and without a limit of the field of view.
+    pub fn is_distortion_free(&self) -> bool {
         self.coefficients == BrownCoefficients::default() && self.limit == f64::INFINITY
     }
 
-    /// The largest `q = |p|²` that is seen; infinity if all is.
+    /// The limit of the field of view as `q = |p|²`; infinity if there is none.
     pub fn limit(&self) -> f64 {
         self.limit
     }
@@ -130,7 +130,7 @@ impl BrownConrady {
         (f, (above_slope - f * below_slope) / below)
     }
 
-    /// Where the point `p` appears, whatever the limit.
+    /// Distorts the point `p`, regardless of the limit.
     pub fn distort(&self, p: &Vector2<f64>) -> Vector2<f64> {
         let [p1, p2] = self.coefficients.p;
         let q = p.norm_squared();
@@ -160,14 +160,14 @@ impl BrownConrady {
         Matrix2::from_columns(&[p * (q / below), p * (q * q / below)])
     }
 
-    /// The point that appears at `p_d`; None if none within the limit does.
+    /// Inverts the distortion of `p_d`; None if no point within the limit maps to it.
     ///
-    /// The radial part has one unknown ([`invert`]). Tangential distortion is removed from there by
-    /// Newton's method with steps halved until they bring the picture nearer and stay within the
+    /// The radial part has one unknown ([`invert_monotone`]). Newton's method then removes the
+    /// tangential distortion; steps are halved until they reduce the residual and stay within the
     /// limit.
     pub fn undistort(&self, p_d: &Vector2<f64>) -> Option<Vector2<f64>> {
         let target = p_d.norm();
-        if self.is_straight() || target == 0.0 {
+        if self.is_distortion_free() || target == 0.0 {
             return Some(*p_d);
         }
         let end = self.limit.sqrt();
@@ -176,15 +176,15 @@ impl BrownConrady {
             let (f, slope) = self.factor(q);
             (rho * f, f + 2.0 * q * slope)
         };
-        let rho = invert(radial, target, end);
+        let rho = invert_monotone(radial, target, end);
         if self.coefficients.p == [0.0; 2] {
             return rho.map(|rho| p_d * (rho / target));
         }
-        // Without a radial solution the tangential part may still lead to one.
+        // Without a radial solution the tangential part may still allow one.
         let start = rho.unwrap_or(0.9 * end.min(target)).min(0.999 * end);
         let mut p = p_d * (start / target);
         let mut error = self.distort(&p) - p_d;
-        for _ in 0..STEPS {
+        for _ in 0..MAX_NEWTON_ITERATIONS {
             let step = self.jacobian(&p).try_inverse()? * error;
             let mut share = 1.0;
             let (next, next_error) = loop {
@@ -196,16 +196,16 @@ impl BrownConrady {
                 }
                 share *= 0.5;
                 if share < 1e-6 {
-                    let exact = error.norm() <= EXACT * (1.0 + target) * 100.0;
+                    let exact = error.norm() <= RESIDUAL_TOLERANCE * (1.0 + target) * 100.0;
                     return exact.then_some(p);
                 }
             };
             (p, error) = (next, next_error);
-            if error.norm() <= EXACT * (1.0 + target) {
+            if error.norm() <= RESIDUAL_TOLERANCE * (1.0 + target) {
                 break;
             }
         }
-        (error.norm() <= EXACT * (1.0 + target) * 100.0).then_some(p)
+        (error.norm() <= RESIDUAL_TOLERANCE * (1.0 + target) * 100.0).then_some(p)
     }
 }
 
@@ -226,7 +226,7 @@ mod tests {
             BrownConrady::radial(0.2, -0.1),
             BrownConrady::radial(0.0, 0.0),
             lens([-0.3, 0.1, -0.02, 0.0, 0.0, 0.0], [1e-3, -2e-3]),
-            // As OpenCV finds them for wide lenses.
+            // Typical of OpenCV's calibrations of wide lenses.
             lens([4.1, 2.0, 0.1, 4.4, 3.1, 0.45], [-4e-4, 6e-4]),
             lens([0.0; 6], [0.01, 0.02]),
         ]
@@ -234,15 +234,18 @@ mod tests {
 
     proptest! {
         #[test]
-        fn undistorting_inverts_within_the_limit(which in 0usize..8, share in 0.0f64..0.98, turn in 0.0..TAU) {
+        fn undistorting_inverts_within_the_limit(
+            which in 0usize..8, share in 0.0f64..0.98, turn in 0.0..TAU,
+        ) {
             let lens = lenses()[which];
             let rho = lens.limit().sqrt().min(3.0) * share;
             let p = Vector2::new(turn.cos(), turn.sin()) * rho;
             let back = lens.undistort(&lens.distort(&p));
-            prop_assert!(back.is_some_and(|back| (back - p).norm() < 1e-9 * (1.0 + rho)), "{lens:?} at {p}: {back:?}");
+            let is_restored = back.is_some_and(|back| (back - p).norm() < 1e-9 * (1.0 + rho));
+            prop_assert!(is_restored, "{lens:?} at {p}: {back:?}");
         }
 
-        /// Whatever is found lies within the limit and appears where it was looked for.
+        /// A solution lies within the limit and distorts to the given point.
         #[test]
         fn what_is_found_is_a_solution(which in 0usize..8, x in -5.0f64..5.0, y in -5.0f64..5.0) {
             let lens = lenses()[which];
@@ -254,7 +257,9 @@ mod tests {
         }
 
         #[test]
-        fn jacobians_match_central_differences(which in 0usize..8, x in -0.6f64..0.6, y in -0.6f64..0.6) {
+        fn jacobians_match_central_differences(
+            which in 0usize..8, x in -0.6f64..0.6, y in -0.6f64..0.6,
+        ) {
             let lens = lenses()[which];
             let (p, step) = (Vector2::new(x, y), 1e-6);
             let jacobian = lens.jacobian(&p);
@@ -262,7 +267,8 @@ mod tests {
             for axis in 0..2 {
                 let mut delta = Vector2::zeros();
                 delta[axis] = step;
-                let numeric = (lens.distort(&(p + delta)) - lens.distort(&(p - delta))) / (2.0 * step);
+                let difference = lens.distort(&(p + delta)) - lens.distort(&(p - delta));
+                let numeric = difference / (2.0 * step);
                 prop_assert!((numeric - jacobian.column(axis)).norm() < 1e-7);
                 let moved = |amount: f64| {
                     let mut moved = *lens.coefficients();
@@ -285,7 +291,7 @@ mod tests {
         let farthest = lens.distort(&Vector2::new(end, 0.0));
         assert!(lens.undistort(&(farthest * 0.999)).is_some());
         assert!(lens.undistort(&(farthest * 1.001)).is_none());
-        // A pole of the rational form ends it, too.
+        // A pole of the rational form is a limit, too.
         let pole = BrownConrady::new(BrownCoefficients {
             k: [0.0, 0.0, 0.0, -0.25, 0.0, 0.0],
             p: [0.0; 2],

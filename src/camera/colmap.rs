@@ -1,12 +1,14 @@
-//! Cameras as COLMAP and nerfstudio write them.
+//! Camera models in COLMAP's and nerfstudio's notation.
 
-use super::{BrownCoefficients, Camera, Lens};
+use super::brown_conrady::BrownCoefficients;
+use super::lens::Lens;
+use super::projection::Camera;
 use serde_json::{Map, Value, json};
 
 /// A camera model of COLMAP with its parameters; pixels count from the corner of the first, whose
 /// centre is (½, ½).
 ///
-/// Source: COLMAP's documentation, "Camera Models"; nerfstudio has the names of COLMAP's models.
+/// Source: COLMAP's documentation, "Camera Models"; nerfstudio uses the names of COLMAP's models.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColmapCamera {
     /// Name of the model.
@@ -21,7 +23,7 @@ pub struct ColmapCamera {
 
 impl ColmapCamera {
     /// `PINHOLE` for a lens without distortion, `OPENCV` for k1, k2, p1, p2, `FULL_OPENCV` for
-    /// more, `OPENCV_FISHEYE` for a fisheye. How far off its axis the lens is used is not said.
+    /// more, `OPENCV_FISHEYE` for a fisheye. The largest usable angle is not exported.
     pub fn of(camera: &Camera) -> Self {
         let mut parameters = vec![
             ("fx", camera.fx),
@@ -64,11 +66,12 @@ impl ColmapCamera {
         }
     }
 
-    /// The text of a `cameras.txt` with this camera alone, number 1.
+    /// The text of a `cameras.txt` with this camera only, number 1.
     pub fn cameras_txt(&self) -> String {
         let values: Vec<String> = self.parameters.iter().map(|(_, v)| v.to_string()).collect();
         format!(
-            "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n\
+            "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, \
+             HEIGHT, PARAMS[]\n\
              # Number of cameras: 1\n1 {} {} {} {}\n",
             self.model,
             self.width,
@@ -77,8 +80,8 @@ impl ColmapCamera {
         )
     }
 
-    /// The keys of the camera in nerfstudio's `transforms.json`, whose `OPENCV` has k3, too; None
-    /// for a rational lens (k4 to k6), which it has not.
+    /// The keys of the camera in nerfstudio's `transforms.json`, whose `OPENCV` includes k3; None
+    /// for a rational lens (k4 to k6), which nerfstudio lacks.
     pub fn nerfstudio(&self) -> Option<Map<String, Value>> {
         let rational =
             |(name, value): &(&str, f64)| matches!(*name, "k4" | "k5" | "k6") && *value != 0.0;
@@ -107,7 +110,8 @@ impl ColmapCamera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{BrownConrady, KannalaBrandt};
+    use crate::camera::brown_conrady::BrownConrady;
+    use crate::camera::kannala_brandt::KannalaBrandt;
 
     #[test]
     fn pixels_count_from_the_corner() {
@@ -126,7 +130,7 @@ mod tests {
         assert_eq!(distorted.nerfstudio().unwrap()["fl_x"], json!(camera.fx));
     }
 
-    /// What is written is read again as the same camera.
+    /// Writing and reading restores the camera.
     #[test]
     fn every_lens_comes_back() {
         let brown = |k, p| Lens::BrownConrady(BrownConrady::new(BrownCoefficients { k, p }));

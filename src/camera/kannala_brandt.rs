@@ -1,65 +1,64 @@
-//! The fisheye lens of Kannala and Brandt.
+//! The Kannala–Brandt fisheye model.
 
-use super::rising::{end_of_rise, invert};
+use super::monotone::{invert_monotone, monotone_limit};
 use nalgebra::{Matrix2, Matrix2x3, RowVector3, Vector2, Vector3};
 use std::f64::consts::PI;
 
-/// A point at the angle θ off the axis appears at the distance
-/// `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` from the middle of the picture, in its own
+/// Fisheye projection: a point at the angle θ off the axis appears at the distance
+/// `θ_d = θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸)` from the centre of distortion, in its own
 /// direction: `p_d = θ_d (x, y)/√(x² + y²)`.
 ///
-/// The same as OpenCV's `fisheye` and the "equidistant" of ROS and Kalibr. Points may lie beside
-/// and behind the camera; they are seen up to the angle [`KannalaBrandt::limit_rad`], within which
-/// θ_d rises.
+/// OpenCV calls this model `fisheye`, ROS and Kalibr "equidistant". Points may lie beside and
+/// behind the camera, up to the angle [`KannalaBrandt::limit_rad`], within which θ_d rises.
 ///
 /// Source: J. Kannala and S. S. Brandt, "A generic camera model and calibration method for
 /// conventional, wide-angle, and fish-eye lenses", PAMI 28(8), 2006.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KannalaBrandt {
     k: [f64; 4],
-    /// The largest angle off the axis that is to be used, radians.
+    /// Largest angle off the axis to be used, radians.
     max_angle_rad: f64,
     limit_rad: f64,
 }
 
-/// Below this share of z, the distance from the axis is too small to divide by.
-const NEAR_AXIS: f64 = 1e-9;
+/// Smallest ratio of the distance from the axis to z that is divided by.
+const MIN_RADIAL_RATIO: f64 = 1e-9;
 
 impl KannalaBrandt {
-    /// The lens with the coefficients k1 to k4, its limit found.
+    /// Creates the lens with the coefficients k1 to k4 and determines its limit.
     pub fn new(k: [f64; 4]) -> Self {
         let mut lens = Self {
             k,
             max_angle_rad: PI,
             limit_rad: PI,
         };
-        lens.limit_rad = end_of_rise(|theta| lens.radius(theta).1, PI).min(PI);
+        lens.limit_rad = monotone_limit(|theta| lens.radius(theta).1, PI).min(PI);
         lens
     }
 
-    /// The same lens, used no farther than `max_angle_rad` off its axis.
+    /// This lens, limited to `max_angle_rad` off its axis.
     pub fn limited_to(mut self, max_angle_rad: f64) -> Self {
         self.max_angle_rad = max_angle_rad.min(PI);
         self.limit_rad = self.limit_rad.min(self.max_angle_rad);
         self
     }
 
-    /// The largest angle off the axis that is to be used, radians; 180° if all of it.
+    /// The largest angle off the axis to be used, radians; 180° if there is no limit.
     pub fn max_angle_rad(&self) -> f64 {
         self.max_angle_rad
     }
 
-    /// k1 to k4.
+    /// The coefficients k1 to k4.
     pub fn coefficients(&self) -> &[f64; 4] {
         &self.k
     }
 
-    /// The largest angle off the axis that is seen, radians.
+    /// The limit of the field of view: the largest angle off the axis, radians.
     pub fn limit_rad(&self) -> f64 {
         self.limit_rad
     }
 
-    /// θ_d and its slope at the angle θ.
+    /// The radius θ_d and its derivative at the angle θ.
     pub fn radius(&self, theta: f64) -> (f64, f64) {
         let [k1, k2, k3, k4] = self.k;
         let q = theta * theta;
@@ -68,14 +67,14 @@ impl KannalaBrandt {
         (theta * factor, slope)
     }
 
-    /// Where a point appears, or None beyond the limit.
+    /// Projects a point; None beyond the limit.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
         let rho = x_c.xy().norm();
         let theta = rho.atan2(x_c.z);
         if theta >= self.limit_rad || !theta.is_finite() {
             return None;
         }
-        if rho <= NEAR_AXIS * x_c.z {
+        if rho <= MIN_RADIAL_RATIO * x_c.z {
             return (x_c.z > 0.0).then(|| x_c.xy() / x_c.z);
         }
         Some(x_c.xy() * (self.radius(theta).0 / rho))
@@ -85,7 +84,7 @@ impl KannalaBrandt {
     /// `ρ = √(x² + y²)`, `∂θ/∂x_c = (z eᵀ, −ρ)/(ρ² + z²)`.
     pub fn jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
         let rho = x_c.xy().norm();
-        if rho <= NEAR_AXIS * x_c.z {
+        if rho <= MIN_RADIAL_RATIO * x_c.z {
             return Matrix2x3::identity() / x_c.z;
         }
         let e = x_c.xy() / rho;
@@ -101,7 +100,7 @@ impl KannalaBrandt {
     /// `∂p_d/∂(k1, k2) = (θ³ e, θ⁵ e)`.
     pub fn coefficient_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2<f64> {
         let rho = x_c.xy().norm();
-        if rho <= NEAR_AXIS * x_c.z {
+        if rho <= MIN_RADIAL_RATIO * x_c.z {
             return Matrix2::zeros();
         }
         let e = x_c.xy() / rho;
@@ -109,10 +108,10 @@ impl KannalaBrandt {
         Matrix2::from_columns(&[e * theta.powi(3), e * theta.powi(5)])
     }
 
-    /// The direction (of unit length) that appears at `p_d`; None beyond the limit.
+    /// Back-projects `p_d` to a unit vector; None beyond the limit.
     pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
         let radius = p_d.norm();
-        let theta = invert(|theta| self.radius(theta), radius, self.limit_rad)?;
+        let theta = invert_monotone(|theta| self.radius(theta), radius, self.limit_rad)?;
         let e = if radius > 0.0 {
             p_d / radius
         } else {
@@ -139,16 +138,21 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_ray_inverts_the_projection(which in 0usize..4, share in 0.0f64..0.99, turn in -3.0f64..3.0, far in 0.1f64..30.0) {
+        fn the_ray_inverts_the_projection(
+            which in 0usize..4, share in 0.0f64..0.99, turn in -3.0f64..3.0, far in 0.1f64..30.0,
+        ) {
             let lens = lenses()[which];
             let (sin, cos) = (lens.limit_rad() * share).sin_cos();
             let ray = Vector3::new(sin * turn.cos(), sin * turn.sin(), cos);
             let back = lens.project(&(ray * far)).and_then(|p_d| lens.ray(&p_d));
-            prop_assert!(back.is_some_and(|back| (back - ray).norm() < 1e-9), "{lens:?}: {ray} {back:?}");
+            prop_assert!(back.is_some_and(|back| (back - ray).norm() < 1e-9), "{lens:?}: {ray} \
+                                                                               {back:?}");
         }
 
         #[test]
-        fn jacobians_match_central_differences(which in 0usize..3, x in -2.0f64..2.0, y in -2.0f64..2.0, z in 0.1f64..2.0) {
+        fn jacobians_match_central_differences(
+            which in 0usize..3, x in -2.0f64..2.0, y in -2.0f64..2.0, z in 0.1f64..2.0,
+        ) {
             let lens = lenses()[which];
             let (x_c, step) = (Vector3::new(x, y, z), 1e-6);
             prop_assume!(lens.project(&(x_c - Vector3::z() * 1e-3)).is_some());

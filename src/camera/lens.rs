@@ -1,14 +1,15 @@
-//! The lens: from a point before the camera to where it appears, focal length 1.
+//! Lens models: projection of a point in camera coordinates to the image plane at focal length 1.
 
-use super::{BrownConrady, KannalaBrandt};
+use super::brown_conrady::BrownConrady;
+use super::kannala_brandt::KannalaBrandt;
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 
-/// A lens model. What it gives, `p_d`, becomes a pixel by `u = fx p_d.x + cx`, `v = fy p_d.y + cy`
+/// A lens model. Its image point `p_d` becomes a pixel by `u = fx p_d.x + cx`, `v = fy p_d.y + cy`
 /// ([`super::Camera`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Lens {
-    /// Camera, with radial and tangential distortion or without.
+    /// Perspective camera with or without radial and tangential distortion.
     BrownConrady(BrownConrady),
     /// Fisheye.
     KannalaBrandt(KannalaBrandt),
@@ -26,12 +27,12 @@ impl Lens {
         Self::BrownConrady(BrownConrady::radial(k1, k2))
     }
 
-    /// True for a pinhole without distortion and limit.
-    pub fn is_straight(&self) -> bool {
-        matches!(self, Self::BrownConrady(lens) if lens.is_straight())
+    /// True for a pinhole without distortion and without a limit of the field of view.
+    pub fn is_distortion_free(&self) -> bool {
+        matches!(self, Self::BrownConrady(lens) if lens.is_distortion_free())
     }
 
-    /// Where the point `x_c` appears; None beyond what the lens shows.
+    /// Projects the point `x_c`; None outside the field of view.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
         match self {
             Self::BrownConrady(lens) => {
@@ -39,7 +40,7 @@ impl Lens {
                     return None;
                 }
                 let p = x_c.xy() / x_c.z;
-                if lens.is_straight() {
+                if lens.is_distortion_free() {
                     return Some(p);
                 }
                 (p.norm_squared() < lens.limit()).then(|| lens.distort(&p))
@@ -48,8 +49,8 @@ impl Lens {
         }
     }
 
-    /// A vector along the ray that appears at `p_d`, its z 1 for Brown–Conrady and its length 1 for
-    /// Kannala–Brandt; None beyond what the lens shows.
+    /// Back-projects `p_d` to a direction, with z = 1 for Brown–Conrady and unit length for
+    /// Kannala–Brandt; None outside the field of view.
     pub fn ray(&self, p_d: &Vector2<f64>) -> Option<Vector3<f64>> {
         match self {
             Self::BrownConrady(lens) => lens.undistort(p_d).map(|p| p.push(1.0)),
@@ -57,7 +58,7 @@ impl Lens {
         }
     }
 
-    /// `∂p_d/∂x_c`, one over metres.
+    /// `∂p_d/∂x_c`, 1/m.
     pub fn jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
         match self {
             Self::BrownConrady(lens) => {
@@ -71,7 +72,7 @@ impl Lens {
         }
     }
 
-    /// k1 and k2, which self-calibration estimates.
+    /// The coefficients k1 and k2, which self-calibration estimates.
     pub fn k1_k2(&self) -> [f64; 2] {
         match self {
             Self::BrownConrady(lens) => {
@@ -85,7 +86,7 @@ impl Lens {
         }
     }
 
-    /// The same lens with other k1 and k2.
+    /// This lens with k1 and k2 replaced.
     pub fn with_k1_k2(&self, k1: f64, k2: f64) -> Self {
         if self.k1_k2() == [k1, k2] {
             return *self;

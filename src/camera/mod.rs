@@ -1,8 +1,8 @@
-//! Camera models: pixel → ray and point → pixel, with analytic Jacobians, and the calibration files
-//! they come from.
+//! Camera models: back-projection (pixel → ray), projection (point → pixel) with analytic
+//! Jacobians, and calibration files.
 //!
-//! Pixel convention: the centre of the first pixel is (0, 0). Files that count from the corner
-//! (`pixel_centre = "half"`, COLMAP, nerfstudio) are converted when read.
+//! Pixel convention: the centre of the first pixel is (0, 0). Files that count from the corner of
+//! the first pixel (`pixel_centre = "half"`, COLMAP, nerfstudio) are converted when read.
 //!
 //! # Example
 //!
@@ -22,9 +22,9 @@ mod calibration;
 mod colmap;
 mod kannala_brandt;
 mod lens;
+mod monotone;
 mod projection;
-mod rising;
-mod single;
+mod single_precision;
 mod sweep;
 
 pub use brown_conrady::{BrownCoefficients, BrownConrady};
@@ -33,5 +33,5 @@ pub use colmap::ColmapCamera;
 pub use kannala_brandt::KannalaBrandt;
 pub use lens::Lens;
 pub use projection::Camera;
-pub use single::{Bend, SingleLens};
+pub use single_precision::{LensF32, ProjectF32};
 pub use sweep::Sweep;

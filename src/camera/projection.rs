@@ -1,15 +1,16 @@
-//! The camera: pixels and rays.
+//! The camera model: projection, back-projection and their Jacobians.
 
-use super::sweep::LARGEST_SHARE;
-use super::{Lens, Sweep};
+use super::lens::Lens;
+use super::sweep::MAX_SHARE;
+use super::sweep::Sweep;
 use nalgebra::{Matrix2, Matrix2x3, Matrix2x5, Vector2, Vector3};
-use serde::{Serialize, Serializer};
 
 /// A camera: `u = fx p_d.x + cx`, `v = fy p_d.y + cy`, pixels counted from the centre of the first,
-/// with p_d where the lens shows a point ([`Lens`]).
+/// with p_d the distorted image point of the lens model ([`Lens`]).
 ///
-/// With a [`Sweep`], the camera's coordinates are those of the middle row, the point is that of the
-/// row it appears in, and rays start at the row's own centre ([`Camera::origin`]).
+/// With a [`Sweep`], the camera's coordinates are those of the middle row, a point is projected
+/// with the pose of the row it appears in, and rays start at the camera centre of their row
+/// ([`Camera::origin`]).
 ///
 /// Serialises as its calibration file ([`super::format_calibration`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,28 +27,22 @@ pub struct Camera {
     pub cx: f64,
     /// Principal point, v.
     pub cy: f64,
-    /// The lens.
+    /// The lens model.
     pub lens: Lens,
-    /// Its motion while a picture is read; the frames of a survey each have their own.
+    /// The camera's motion during the readout of an image, different for each frame of a survey.
     pub sweep: Sweep,
 }
 
-impl Serialize for Camera {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        super::calibration::CameraFile::of(self).serialize(serializer)
-    }
-}
-
-/// Steps that find where the lens's picture ends on the way to a border pixel.
-const HALVINGS: usize = 50;
-/// Pixels along each side at which the lens is asked whether it shows them.
-const ASKED: usize = 33;
-/// Steps that find the row of a point at the most, and the change of the share that ends them.
-const MOST_SHARES: usize = 30;
-const EXACT_SHARE: f64 = 1e-13;
+/// Bisection steps that find the edge of the lens's field of view towards a border pixel.
+const MAX_BISECTION_ITERATIONS: usize = 50;
+/// Pixels along each side of the grid on which the visible fraction is counted.
+const VISIBILITY_GRID: usize = 33;
+/// Fixed-point iterations that find the row of a point.
+const MAX_SHARE_ITERATIONS: usize = 30;
+const SHARE_TOLERANCE: f64 = 1e-13;
 
 impl Camera {
-    /// A pinhole with square pixels and its principal point in the middle, from its vertical field
+    /// A pinhole camera with square pixels and a central principal point, from its vertical field
     /// of view (radians): `f = (height / 2) / tan(fov / 2)`.
     pub fn from_vertical_fov(width: u32, height: u32, fov_rad: f64) -> Self {
         let f = 0.5 * f64::from(height) / (0.5 * fov_rad).tan();
@@ -63,22 +58,22 @@ impl Camera {
         }
     }
 
-    /// The same camera in motion.
-    pub fn sweeping(&self, sweep: &Sweep) -> Self {
+    /// This camera with a rolling-shutter motion.
+    pub fn with_sweep(&self, sweep: &Sweep) -> Self {
         Self {
             sweep: *sweep,
             ..*self
         }
     }
 
-    /// The share of the picture's time at which row `v` is read ([`Sweep`]).
+    /// The share τ of the readout time at which row `v` is read ([`Sweep`]).
     pub fn share(&self, v: f64) -> f64 {
         let height = f64::from(self.height);
-        ((v - 0.5 * (height - 1.0)) / height).clamp(-LARGEST_SHARE, LARGEST_SHARE)
+        ((v - 0.5 * (height - 1.0)) / height).clamp(-MAX_SHARE, MAX_SHARE)
     }
 
-    /// A vector along the ray of a pixel, in camera coordinates (z = 1, of unit length for a
-    /// fisheye); None where the lens shows nothing.
+    /// Back-projects a pixel to a direction in camera coordinates (z = 1; unit length for a
+    /// fisheye); None outside the lens's field of view.
     pub fn ray(&self, u: f64, v: f64) -> Option<Vector3<f64>> {
         let ray = self.lens.ray(&Vector2::new(
             (u - self.cx) / self.fx,
@@ -87,11 +82,11 @@ impl Camera {
         if self.sweep.is_none() {
             Some(ray)
         } else {
-            Some(self.sweep.turn(self.share(v)) * ray)
+            Some(self.sweep.rotation_at(self.share(v)) * ray)
         }
     }
 
-    /// Where the rays of row `v` start, in camera coordinates, metres: 0 without a sweep.
+    /// The origin of the rays of row `v`, in camera coordinates, metres: 0 without a sweep.
     pub fn origin(&self, v: f64) -> Vector3<f64> {
         if self.sweep.is_none() {
             Vector3::zeros()
@@ -100,36 +95,36 @@ impl Camera {
         }
     }
 
-    /// The pixel of a point in camera coordinates, within the picture or not; None where the lens
-    /// shows nothing.
+    /// Projects a point in camera coordinates to a pixel, inside the image or not; None outside the
+    /// lens's field of view.
     pub fn project(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
         if self.sweep.is_none() {
             self.project_at(x_c)
         } else {
-            self.project_at(&self.sweep.at(x_c, self.share_of(x_c)?))
+            self.project_at(&self.sweep.point_at(x_c, self.share_of(x_c)?))
         }
     }
 
-    /// The share of the picture's time at which a point appears: the solution of
+    /// The share of the readout time at which a point appears: the solution of
     /// `τ = share(v(x_c(τ)))`.
     ///
-    /// Fixed-point iteration from the middle row; a camera that moves a point by n pixels during
-    /// the picture errs by n/H of the error before in each step. None where the lens shows nothing
-    /// on the way.
+    /// Fixed-point iteration from the middle row. If the camera moves a point by n pixels during
+    /// the readout, each step reduces the error by the factor n/H. None if an iterate leaves the
+    /// lens's field of view.
     fn share_of(&self, x_c: &Vector3<f64>) -> Option<f64> {
         let mut share = 0.0;
-        for _ in 0..MOST_SHARES {
-            let next = self.share(self.project_at(&self.sweep.at(x_c, share))?.y);
+        for _ in 0..MAX_SHARE_ITERATIONS {
+            let next = self.share(self.project_at(&self.sweep.point_at(x_c, share))?.y);
             let change = next - share;
             share = next;
-            if change.abs() < EXACT_SHARE {
+            if change.abs() < SHARE_TOLERANCE {
                 break;
             }
         }
         Some(share)
     }
 
-    /// The pixel of a point in the coordinates of its own row.
+    /// Projects a point given in the coordinates of its own row.
     fn project_at(&self, x_c: &Vector3<f64>) -> Option<Vector2<f64>> {
         let p_d = self.lens.project(x_c)?;
         Some(Vector2::new(
@@ -138,9 +133,9 @@ impl Camera {
         ))
     }
 
-    /// `∂(u, v)/∂x_c`, pixels per metre, for a point that the lens shows.
+    /// `∂(u, v)/∂x_c`, pixels per metre, for a point in the lens's field of view.
     ///
-    /// With a sweep, a change of the row changes the row's pose: with J the Jacobian in the row's
+    /// With a sweep, a change of the row changes the pose: with J the Jacobian in the row's
     /// coordinates, `g = J ∂x_c(τ)/∂τ/H` and `e = (0, 1)`,
     /// `∂(u, v)/∂x_c = (I − g eᵀ)⁻¹ J Exp(−ω τ)`.
     pub fn project_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
@@ -148,35 +143,36 @@ impl Camera {
             return self.jacobian_at(x_c);
         }
         let share = self.share_of(x_c).unwrap_or_default();
-        let at = self.sweep.at(x_c, share);
-        let turned = self.jacobian_at(&at) * self.sweep.turn(-share).matrix();
+        let at = self.sweep.point_at(x_c, share);
+        let turned = self.jacobian_at(&at) * self.sweep.rotation_at(-share).matrix();
         self.feedback(&at, share) * turned
     }
 
-    /// The same for a point in the coordinates of its own row, the row as it is.
+    /// `J = ∂(u, v)/∂x_c` of a point in the coordinates of its own row, with the row held fixed.
     fn jacobian_at(&self, x_c: &Vector3<f64>) -> Matrix2x3<f64> {
         Matrix2::new(self.fx, 0.0, 0.0, self.fy) * self.lens.jacobian(x_c)
     }
 
     /// `(I − g eᵀ)⁻¹` of a point that lies at `at` in the coordinates of its own row.
     fn feedback(&self, at: &Vector3<f64>, share: f64) -> Matrix2<f64> {
-        let g = self.jacobian_at(at) * self.sweep.rate(at, share) / f64::from(self.height);
+        let g = self.jacobian_at(at) * self.sweep.point_rate(at, share) / f64::from(self.height);
         let inverse = 1.0 / (1.0 - g.y);
         Matrix2::new(1.0, g.x * inverse, 0.0, inverse)
     }
 
-    /// `∂(u, v)/∂(ln f, cx, cy, k1, k2)` of a point that the lens shows, with fx and fy growing
-    /// alike.
+    /// `∂(u, v)/∂(ln f, cx, cy, k1, k2)` of a point in the lens's field of view; fx and fy scale
+    /// together.
     pub fn intrinsics_jacobian(&self, x_c: &Vector3<f64>) -> Matrix2x5<f64> {
         if self.sweep.is_none() {
             return self.intrinsics_jacobian_at(x_c);
         }
         let share = self.share_of(x_c).unwrap_or_default();
-        let at = self.sweep.at(x_c, share);
+        let at = self.sweep.point_at(x_c, share);
         self.feedback(&at, share) * self.intrinsics_jacobian_at(&at)
     }
 
-    /// The same for a point in the coordinates of its own row, the row as it is.
+    /// `∂(u, v)/∂(ln f, cx, cy, k1, k2)` of a point in the coordinates of its own row, with the row
+    /// held fixed.
     fn intrinsics_jacobian_at(&self, x_c: &Vector3<f64>) -> Matrix2x5<f64> {
         let focal = Matrix2::new(self.fx, 0.0, 0.0, self.fy);
         let p_d = self.lens.project(x_c).unwrap_or_default();
@@ -190,34 +186,36 @@ impl Camera {
         ])
     }
 
-    /// Share of the picture that the lens shows: 1 if it is one-to-one out to the outermost pixels.
-    pub fn shown_share(&self) -> f64 {
-        let place = |k: usize, size: u32| f64::from(size - 1) * k as f64 / (ASKED - 1) as f64;
-        let shown = (0..ASKED * ASKED).filter(|k| {
-            let (column, row) = (k % ASKED, k / ASKED);
+    /// Fraction of the image within the lens's field of view: 1 if the distortion is invertible out
+    /// to the outermost pixels.
+    pub fn visible_fraction(&self) -> f64 {
+        let place =
+            |k: usize, size: u32| f64::from(size - 1) * k as f64 / (VISIBILITY_GRID - 1) as f64;
+        let shown = (0..VISIBILITY_GRID * VISIBILITY_GRID).filter(|k| {
+            let (column, row) = (k % VISIBILITY_GRID, k / VISIBILITY_GRID);
             let (u, v) = (place(column, self.width), place(row, self.height));
             self.ray(u, v).is_some()
         });
-        shown.count() as f64 / (ASKED * ASKED) as f64
+        shown.count() as f64 / (VISIBILITY_GRID * VISIBILITY_GRID) as f64
     }
 
-    /// Pixels of the image's shorter side.
+    /// Length of the image's shorter side, pixels.
     pub fn shorter_side(&self) -> u32 {
         self.width.min(self.height)
     }
 
     /// True if the pixel lies at least `margin` pixels inside the outermost pixel centres.
-    pub fn sees(&self, pixel: &Vector2<f64>, margin: f64) -> bool {
+    pub fn is_in_image(&self, pixel: &Vector2<f64>, margin: f64) -> bool {
         pixel.x >= margin
             && pixel.y >= margin
             && pixel.x <= f64::from(self.width - 1) - margin
             && pixel.y <= f64::from(self.height - 1) - margin
     }
 
-    /// The same camera for an image halved `level` times (odd rows and columns dropped).
+    /// The camera of an image halved `level` times (odd rows and columns dropped).
     ///
-    /// A pixel of the halved image covers 2 × 2 of the one below, so centres shift by half a pixel:
-    /// `u_l = (u + ½)/2^l − ½`.
+    /// A pixel of the halved image covers 2 × 2 pixels of the level below, so centres shift by half
+    /// a pixel: `u_l = (u + ½)/2^l − ½`.
     pub fn at_level(&self, level: usize) -> Self {
         let scale = 0.5f64.powi(level as i32);
         Self {
@@ -232,8 +230,8 @@ impl Camera {
         }
     }
 
-    /// The same camera with `times` as many pixels along each axis.
-    pub fn finer(&self, times: u32) -> Self {
+    /// The camera of an image with `times` as many pixels along each axis.
+    pub fn upsampled(&self, times: u32) -> Self {
         let scale = f64::from(times);
         Self {
             width: times * self.width,
@@ -247,9 +245,9 @@ impl Camera {
         }
     }
 
-    /// Rays through the four corners, as far as the lens shows them, and along the optical axis:
-    /// where these meet the wall tells how far a frame moves.
-    pub fn probes(&self) -> Vec<Vector3<f64>> {
+    /// Rays along the optical axis and through the four corners that lie within the lens's field of
+    /// view. Their wall points bound the displacement of a frame.
+    pub fn corner_and_centre_rays(&self) -> Vec<Vector3<f64>> {
         let corners = self.border(1, 0.0).into_iter();
         corners
             .filter_map(|pixel| self.ray(pixel.x, pixel.y))
@@ -257,14 +255,14 @@ impl Camera {
             .collect()
     }
 
-    /// Focal length, pixels: the geometric mean of both.
+    /// Focal length, pixels: the geometric mean of fx and fy.
     pub fn focal_px(&self) -> f64 {
         (self.fx * self.fy).sqrt()
     }
 
-    /// Rays through 9 × 7 pixels spread evenly over the picture, its border included, as far as the
-    /// lens shows them: all of what a frame shows.
-    pub fn rays_across(&self) -> Vec<Vector3<f64>> {
+    /// Rays through a regular grid of 9 × 7 pixels, the image's border included, without those
+    /// outside the lens's field of view.
+    pub fn grid_rays(&self) -> Vec<Vector3<f64>> {
         const COLUMNS: u32 = 9;
         const ROWS: u32 = 7;
         let place = |k, count, pixels| f64::from((pixels - 1) * k) / f64::from(count - 1);
@@ -276,9 +274,10 @@ impl Camera {
         rays.collect()
     }
 
-    /// The border of the picture as pixels, clockwise from the first, `per_edge` steps an edge,
-    /// along the outermost pixel centres widened by `outset` pixels (½ reaches the pixels' outer
-    /// edges). Where the lens's picture ends before, the border is there.
+    /// The border of the image as pixels, clockwise from the first pixel, `per_edge` points per
+    /// edge, along the outermost pixel centres moved outwards by `outset` pixels (½ reaches the
+    /// pixels' outer edges). Where the lens's field of view ends earlier, the border follows its
+    /// edge.
     pub fn border(&self, per_edge: usize, outset: f64) -> Vec<Vector2<f64>> {
         let (left, top) = (-outset, -outset);
         let right = f64::from(self.width - 1) + outset;
@@ -298,7 +297,7 @@ impl Camera {
         border
     }
 
-    /// The last pixel that the lens shows on the way from the principal point to `pixel`.
+    /// The last pixel within the lens's field of view from the principal point towards `pixel`.
     fn shown_towards(&self, pixel: Vector2<f64>) -> Vector2<f64> {
         let shown = |pixel: &Vector2<f64>| self.ray(pixel.x, pixel.y).is_some();
         if shown(&pixel) {
@@ -306,7 +305,7 @@ impl Camera {
         }
         let centre = Vector2::new(self.cx, self.cy);
         let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..HALVINGS {
+        for _ in 0..MAX_BISECTION_ITERATIONS {
             let middle = 0.5 * (low + high);
             if shown(&(centre + (pixel - centre) * middle)) {
                 low = middle;
@@ -321,7 +320,8 @@ impl Camera {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{BrownCoefficients, BrownConrady, KannalaBrandt};
+    use crate::camera::brown_conrady::{BrownCoefficients, BrownConrady};
+    use crate::camera::kannala_brandt::KannalaBrandt;
     use nalgebra::Rotation3;
     use proptest::prelude::*;
 
@@ -338,12 +338,12 @@ mod tests {
         }
     }
 
-    /// At rest and in motion.
+    /// Cameras at rest and in motion.
     fn moving_cameras() -> impl Iterator<Item = Camera> {
         let sweeps = sweeps();
         let moving = cameras()
             .into_iter()
-            .flat_map(move |camera| sweeps.map(|sweep| camera.sweeping(&sweep)));
+            .flat_map(move |camera| sweeps.map(|sweep| camera.with_sweep(&sweep)));
         cameras().into_iter().chain(moving)
     }
 
@@ -377,7 +377,7 @@ mod tests {
             omega_rad: omega_rad.into(),
             nu_m: nu_m.into(),
         };
-        // 90 °/s about y over 20 ms, something fast about all axes, and read bottom-up.
+        // 90 °/s about y over 20 ms, a fast rotation about all axes, and a bottom-up readout.
         [
             sweep([0.0, 0.0314, 0.0], [0.0, 0.002, 0.0]),
             sweep([0.05, -0.1, 0.07], [0.02, -0.03, 0.01]),
@@ -389,20 +389,21 @@ mod tests {
         /// A point anywhere on the ray of a pixel appears in that pixel again.
         #[test]
         fn rays_of_a_moving_camera_lead_back_to_their_pixels(
-            lens in 0usize..4, sweep in 0usize..3, u in 0.0..639.0f64, v in 0.0..479.0f64, far in 0.5..9.0f64,
+            lens in 0usize..4, sweep in 0usize..3, u in 0.0..639.0f64, v in 0.0..479.0f64,
+            far in 0.5..9.0f64,
         ) {
-            let camera = cameras()[lens].sweeping(&sweeps()[sweep]);
+            let camera = cameras()[lens].with_sweep(&sweeps()[sweep]);
             let x_c = camera.origin(v) + camera.ray(u, v).unwrap() * far;
             let pixel = camera.project(&x_c).unwrap();
             prop_assert!((pixel - Vector2::new(u, v)).norm() < 1e-8, "{pixel}");
         }
     }
 
-    /// Each row is what a camera at rest at the row's own pose shows.
+    /// Compares each row with a camera at rest at the pose of that row.
     #[test]
     fn rows_of_a_moving_camera_are_those_of_cameras_at_rest() {
         for (rest, sweep) in cameras().iter().zip(sweeps().iter().cycle()) {
-            let camera = rest.sweeping(sweep);
+            let camera = rest.with_sweep(sweep);
             for (u, v) in [(0.0, 0.0), (320.0, 100.0), (639.0, 479.0)] {
                 let x_c = camera.origin(v) + camera.ray(u, v).unwrap() * 2.0;
                 let share = (v - 239.5) / 480.0;
@@ -421,18 +422,20 @@ mod tests {
             lens: Lens::radial(k1, 0.0),
             ..camera()
         };
-        assert_eq!(lens(-0.1).shown_share(), 1.0);
+        assert_eq!(lens(-0.1).visible_fraction(), 1.0);
         let folding = lens(-0.4);
-        assert!((0.3..0.9).contains(&folding.shown_share()));
+        assert!((0.3..0.9).contains(&folding.visible_fraction()));
         assert!(folding.ray(0.0, 0.0).is_none());
         // 1 / (3 · 0.4) is less than 1.
         assert!(folding.project(&Vector3::new(1.0, 0.0, 1.0)).is_none());
-        // Its border is where the rays end.
+        // The border coincides with the last valid rays.
         for pixel in folding.border(8, 0.0) {
             assert!(folding.ray(pixel.x, pixel.y).is_some());
             let outwards = pixel - Vector2::new(folding.cx, folding.cy);
             let beyond = pixel + outwards * 1e-6;
-            assert!(!folding.sees(&beyond, 0.0) || folding.ray(beyond.x, beyond.y).is_none());
+            assert!(
+                !folding.is_in_image(&beyond, 0.0) || folding.ray(beyond.x, beyond.y).is_none()
+            );
         }
     }
 
@@ -503,7 +506,7 @@ mod tests {
     #[test]
     fn rays_go_across_all_of_the_picture() {
         let camera = Camera::from_vertical_fov(160, 120, 1.0);
-        let rays = camera.rays_across();
+        let rays = camera.grid_rays();
         assert_eq!(rays.len(), 63);
         let corners = [(0, (0.0, 0.0)), (8, (159.0, 0.0)), (62, (159.0, 119.0))];
         for (k, (u, v)) in corners {

@@ -106,7 +106,7 @@ pub fn check(survey: &Survey) -> Result<Check, SurfaceError> {
     let mut check = Check {
         frames: survey.frames.len(),
         size_px: [survey.camera.width, survey.camera.height],
-        shown_share: survey.camera.shown_share(),
+        shown_share: survey.camera.visible_fraction(),
         masks: MaskCheck::of(survey),
         poses: PosesCheck::of(survey),
         overlap,
@@ -164,9 +164,12 @@ impl MaskCheck {
             h_m: from_m + share(k / ASKED[0], ASKED[1]) * (to_m - from_m),
         };
         let points = ASKED[0] * ASKED[1];
-        let ignored = (0..points).filter(|k| survey.ignored.hold(&point(*k)));
+        let ignored = (0..points).filter(|k| survey.ignored.contains(&point(*k)));
         Self {
-            hidden_share: survey.frames.mask().map_or(0.0, |mask| mask.share()),
+            hidden_share: survey
+                .frames
+                .mask()
+                .map_or(0.0, |mask| mask.masked_fraction()),
             ignored: survey.file.tunnel.ignore.len(),
             ignored_share: ignored.count() as f64 / f64::from(points),
         }

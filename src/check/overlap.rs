@@ -79,7 +79,7 @@ impl<'a> Asked<'a> {
         let hits = self.pixels.iter().filter_map(|[u, v]| {
             let ray = pose.r_wc * survey.camera.ray(*u, *v)?;
             let hit = survey.surface.hit(&pose.t_wc, &ray).ok()?;
-            (!survey.ignored.hold(&hit.wall)).then_some(hit.x_w)
+            (!survey.ignored.contains(&hit.wall)).then_some(hit.x_w)
         });
         hits.collect()
     }
@@ -98,7 +98,7 @@ impl<'a> Asked<'a> {
 /// Whether a pixel of a frame shows wall.
 fn shows(survey: &Survey, pixel: &Vector2<f64>) -> bool {
     let mask = survey.frames.mask();
-    survey.camera.sees(pixel, 0.0)
+    survey.camera.is_in_image(pixel, 0.0)
         && mask.is_none_or(|mask| mask.is_clear(pixel.x as f32, pixel.y as f32, 0.0))
 }
 

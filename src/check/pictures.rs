@@ -64,7 +64,10 @@ impl PictureCheck {
                 Err(error) => Err(error.to_string()),
             })
             .collect();
-        let hidden = survey.frames.mask().map_or(0.0, |mask| mask.share());
+        let hidden = survey
+            .frames
+            .mask()
+            .map_or(0.0, |mask| mask.masked_fraction());
         let mut pictures = Vec::new();
         for picture in decoded {
             match picture {

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::frame_times::FrameTimes;
-use crate::trajectory::{Mounting, PlanTable, Rate, Station, Steady};
+use crate::trajectory::{Mounting, PlanTable, Rate, Station, UniformMotion};
 use std::path::PathBuf;
 
 /// Where the carrier goes.
@@ -85,7 +85,7 @@ impl WayArguments {
             }
             None => Rate::PerFrame(self.advance_m.unwrap_or_default()),
         };
-        let plan = Steady {
+        let plan = UniformMotion {
             start: Station {
                 chainage_m: self.start_chainage_m,
                 angle_rad: self.start_angle_deg.to_radians(),

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::stitch::positive;
-use crate::survey::{Footage, read_frame_times, toml_path};
+use crate::survey::{UnposedFrames, read_frame_times, toml_path};
 use std::path::{Path, PathBuf};
 
 /// When the frames were taken [default: as the survey tells].
@@ -38,7 +38,7 @@ impl FrameTimesArguments {
     pub fn find(&self, survey: Option<&Path>) -> Result<FrameTimes, Failure> {
         let (found, told) = match (survey, &self.frame_times) {
             (Some(survey), times) => {
-                let footage = Footage::open(survey, times.as_deref())?;
+                let footage = UnposedFrames::open(survey, times.as_deref())?;
                 (Some(footage.frames.len()), footage.times_s)
             }
             (None, Some(path)) => {

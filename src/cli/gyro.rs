@@ -9,8 +9,8 @@ use super::{Failure, Terminal};
 use crate::persist::atomic;
 use crate::survey::PriorSection;
 use crate::trajectory::gyro::{
-    Clock, Frames, GyroBaseline, GyroLog, GyroOptions, Orientation, ReadoutDirection, RestChoice,
-    Start, baseline_from_gyro,
+    ClockOffset, FrameStations, GyroBaseline, GyroLog, GyroOptions, InitialAttitude, Orientation,
+    ReadoutDirection, StationaryChoice, baseline_from_gyro,
 };
 use crate::trajectory::{JitterModel, Rate, read_camera_in_body, tum};
 use nalgebra::{Matrix3, Vector3};
@@ -155,7 +155,7 @@ pub fn run(arguments: &GyroArguments, run: &Run, terminal: &Terminal) -> Result<
     let times = arguments.times.find(arguments.survey.as_deref())?;
     let sensor = &arguments.sensor;
     let stations = arguments.way.stations(Rate::PerFrame(0.0), &times)?;
-    let frames = Frames {
+    let frames = FrameStations {
         times_s: times.clock("a gyro's log")?,
         stations: &stations,
         mounting: arguments.mounting.mounting(),
@@ -165,8 +165,8 @@ pub fn run(arguments: &GyroArguments, run: &Run, terminal: &Terminal) -> Result<
     }
     let options = GyroOptions {
         rest: match sensor.rest_span_s {
-            Some(span_s) => RestChoice::Given(span_s),
-            None => RestChoice::Find(sensor.rest_s),
+            Some(span_s) => StationaryChoice::Given(span_s),
+            None => StationaryChoice::Find(sensor.rest_s),
         },
         bias_rad_s: sensor
             .bias_deg_per_s
@@ -175,14 +175,14 @@ pub fn run(arguments: &GyroArguments, run: &Run, terminal: &Terminal) -> Result<
         scale_sigma: 0.01 * sensor.scale_sigma_percent,
         total_turn_rad: arguments.total_turn_deg.map(f64::to_radians),
         clock: match arguments.match_plan_s {
-            Some(range_s) => Clock::Match(range_s),
-            None => Clock::Offset(arguments.time_offset_s),
+            Some(range_s) => ClockOffset::Match(range_s),
+            None => ClockOffset::Given(arguments.time_offset_s),
         },
         start: match arguments.down_deg {
-            Some(down_deg) => Start::Gravity {
+            Some(down_deg) => InitialAttitude::Gravity {
                 down_rad: down_deg.to_radians(),
             },
-            None => Start::Station,
+            None => InitialAttitude::Station,
         },
     };
     let log = GyroLog::read(&arguments.log)?;

@@ -230,7 +230,7 @@ fn point(
     let k = frame_by_name(survey, frame)?;
     let Placement { pose, .. } = &placements[k];
     let camera = placements[k].camera(&survey.camera);
-    if !camera.sees(&Vector2::from(*pixel), 0.0) {
+    if !camera.is_in_image(&Vector2::from(*pixel), 0.0) {
         return Err(Failure::usage(format!(
             "--frame {frame}: no pixel {},{}; they are 0 to {} and 0 to {}",
             pixel[0],

@@ -26,7 +26,7 @@ pub struct ReadingArguments {
     #[arg(long, value_name = "FILE")]
     body_to_camera: Option<PathBuf>,
     /// Where the tunnel's axis lies in the poses' world: JSON {"point_m": [x, y, z], "axis":
-    /// [x, y, z], "theta_zero": [x, y, z]} (the last if wanted), or a 4 × 4 matrix from the
+    /// [x, y, z], "theta_zero": [x, y, z]} (the last is optional), or a 4 × 4 matrix from the
     /// tunnel's frame (y along the axis) to the world.
     #[arg(long, value_name = "FILE")]
     tunnel_frame: Option<PathBuf>,

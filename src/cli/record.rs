@@ -3,6 +3,7 @@
 use super::Failure;
 use super::configuration::{EffectiveOption, Source};
 use crate::PROGRAM;
+use crate::frames::hash_frames;
 use crate::persist::atomic;
 use crate::persist::provenance::{self, HashError, Input};
 use crate::survey::Survey;
@@ -73,7 +74,7 @@ pub fn inputs<'a>(
 ) -> Result<Vec<Input>, Failure> {
     let own = survey.own_files();
     let mut inputs = files(own.iter().map(PathBuf::as_path).chain(others))?;
-    inputs.push(provenance::frames(&survey.frames).map_err(unreadable)?);
+    inputs.push(hash_frames(&survey.frames).map_err(unreadable)?);
     Ok(inputs)
 }
 

@@ -260,7 +260,7 @@ impl SimulateArguments {
             lens: Lens::radial(self.k1, self.k2),
             ..Camera::from_vertical_fov(width, height, self.fov_deg.to_radians())
         };
-        if camera.shown_share() < 1.0 {
+        if camera.visible_fraction() < 1.0 {
             return Err(Failure::usage(
                 "--k1 and --k2 must not fold the picture back on itself before its corners",
             ));

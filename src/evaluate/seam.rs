@@ -166,7 +166,7 @@ fn look(
         for (x_w, seen) in points.iter().zip(&mut seen) {
             let pixel = camera
                 .project(&pose.to_camera(x_w))
-                .filter(|pixel| camera.sees(pixel, MARGIN_PX));
+                .filter(|pixel| camera.is_in_image(pixel, MARGIN_PX));
             if let Some(pixel) = pixel
                 && picture.shows(pixel.x as f32, pixel.y as f32, &bilinear)
             {

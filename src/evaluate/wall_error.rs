@@ -3,7 +3,7 @@
 use super::error::check_pairs;
 use super::{EvaluateError, Spread, spread::root_mean_square};
 use crate::camera::Camera;
-use crate::surface::{Surface, WallPoint, free_part, shortest_arc};
+use crate::surface::{Surface, WallPoint, gauge_component, shortest_arc};
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 
 /// Distances on the unrolled wall between where the estimated and the true pose put a pixel.
 ///
-/// Over 9 × 7 pixels a frame ([`Camera::rays_across`]). The mean `Δs` and the mean `Δh` over all
+/// Over 9 × 7 pixels a frame ([`Camera::grid_rays`]). The mean `Δs` and the mean `Δh` over all
 /// pixels of all frames are removed as far as the tunnel's [gauge](crate::surface::Gauge) leaves
 /// them free: no picture fixes them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -64,7 +64,7 @@ pub fn wall_error(
         mean_arc(&delta_s, perimeter_m),
         delta_h.iter().sum::<f64>() / delta_h.len() as f64,
     );
-    let (shift, _) = free_part(surface, &truth[0], &mean);
+    let (shift, _) = gauge_component(surface, &truth[0], &mean);
     let (shift_s_m, shift_h_m) = (shift.x, shift.y);
     let distances_mm: Vec<f64> = delta_s
         .iter()
@@ -130,7 +130,7 @@ pub(super) fn frame_offsets(
     };
     let (mut delta_s_m, mut delta_h_m) = (Vec::new(), Vec::new());
     // What the lens does not show has no place on the wall.
-    for ray in camera.rays_across() {
+    for ray in camera.grid_rays() {
         let here: WallPoint = hit(estimate, "estimated", &ray)?.wall;
         let there: WallPoint = hit(truth, "true", &ray)?.wall;
         delta_s_m.push(here.s_m - there.s_m);

@@ -1,35 +1,39 @@
-//! Frames on demand, in bounded memory.
+//! A cache of decoded frames with bounded memory.
 
-use super::{FrameError, FrameFile, FrameSet, HalvedMask, Pyramid, Shading, StoredFrame};
+use super::error::FrameError;
+use super::frame_file::FrameFile;
+use super::frame_set::FrameSet;
+use super::mask::PyramidMask;
+use super::pyramid::Pyramid;
+use super::shading::Shading;
+use super::stored_frame::StoredFrame;
 use crate::camera::Camera;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
-/// Part of the memory that is for pyramids where not all of them fit; the rest holds frames as they
-/// are stored.
-const PYRAMIDS: f64 = 0.25;
-/// Bytes of a pyramid per pixel: four, a third of it more for the smaller levels, and the contrast
-/// of one of those.
-const PYRAMID_BYTES: f64 = 6.0;
+/// Fraction of the memory used for pyramids if not all of them fit; the rest holds stored frames.
+const PYRAMID_MEMORY_FRACTION: f64 = 0.25;
+/// Bytes of a pyramid per pixel: four, a third more for the coarser levels, and the contrast of one
+/// level.
+const PYRAMID_BYTES_PER_PIXEL: f64 = 6.0;
 
-/// The grey pyramids of a survey's frames: decoded when first asked for, kept while there is room.
+/// A cache of the grey pyramids of a survey's frames, decoded on demand.
 ///
-/// Where there is no room for all pyramids, those used last are kept, and of the other frames as
-/// many as there is room for in the form of [`StoredFrame`], from which a pyramid is soon made.
-/// Which ones does not change: a survey is gone through from one end to the other, again and again,
-/// and what was used longest ago is needed next.
+/// If not all pyramids fit, the most recently used ones are kept, and as many other frames as fit
+/// in the form of [`StoredFrame`], from which a pyramid is quickly built. The set of stored frames
+/// does not change: a survey is processed from end to end repeatedly, so that the least recently
+/// used frame is needed next.
 ///
-/// Results never depend on what happens to be kept: a frame that is decoded again is the same
-/// frame.
+/// Results do not depend on the state of the cache: decoding is deterministic.
 #[derive(Debug)]
 pub struct FrameCache {
     source: Source,
     levels: usize,
     shading: RwLock<Option<Arc<Shading>>>,
-    /// Pyramids that there is room for.
+    /// Largest number of pyramids.
     room: usize,
-    shelf: Mutex<Shelf>,
-    stored: Mutex<Store>,
+    shelf: Mutex<RecentPyramids>,
+    stored: Mutex<StoredFrames>,
 }
 
 #[derive(Debug)]
@@ -38,33 +42,34 @@ enum Source {
     Memory(Vec<Arc<Pyramid>>),
 }
 
-/// The pyramids used last.
+/// The most recently used pyramids.
 #[derive(Debug, Default)]
-struct Shelf {
+struct RecentPyramids {
     kept: HashMap<usize, (u64, Arc<Pyramid>)>,
     clock: u64,
 }
 
-/// Frames as they are stored.
+/// Frames in the form of their files.
 #[derive(Debug, Default)]
-struct Store {
+struct StoredFrames {
     kept: HashMap<usize, Arc<StoredFrame>>,
-    /// Bytes left.
+    /// Remaining memory, bytes.
     room: usize,
 }
 
 impl FrameCache {
-    /// The `frames` of `camera`, with `levels` pyramid levels each, in no more than `bytes` of
-    /// memory (but always room for one).
+    /// Creates a cache of the `frames` of `camera`, with `levels` pyramid levels each, in at most
+    /// `bytes` of memory, but at least one pyramid.
     pub fn new(frames: &FrameSet, camera: &Camera, levels: usize, bytes: usize) -> Self {
         let pixels = f64::from(camera.width) * f64::from(camera.height);
-        let pyramids = |share: f64| (share * bytes as f64 / (PYRAMID_BYTES * pixels)) as usize;
+        let pyramids =
+            |share: f64| (share * bytes as f64 / (PYRAMID_BYTES_PER_PIXEL * pixels)) as usize;
         let (room, stored) = if pyramids(1.0) >= frames.len() {
             (frames.len(), 0)
         } else {
             (
-                pyramids(PYRAMIDS),
-                ((1.0 - PYRAMIDS) * bytes as f64) as usize,
+                pyramids(PYRAMID_MEMORY_FRACTION),
+                ((1.0 - PYRAMID_MEMORY_FRACTION) * bytes as f64) as usize,
             )
         };
         Self {
@@ -73,14 +78,14 @@ impl FrameCache {
             shading: RwLock::default(),
             room: room.max(1),
             shelf: Mutex::default(),
-            stored: Mutex::new(Store {
+            stored: Mutex::new(StoredFrames {
                 kept: HashMap::new(),
                 room: stored,
             }),
         }
     }
 
-    /// Frames that are in memory anyway, with whatever levels they have.
+    /// Creates a cache of pyramids that are in memory already.
     pub fn of_pyramids(pyramids: Vec<Pyramid>) -> Self {
         let frames = pyramids.len();
         Self {
@@ -101,40 +106,39 @@ impl FrameCache {
         }
     }
 
-    /// Which pixels show the wall in the pictures that `camera`, at any level, takes; all of them
-    /// if there is no mask.
-    pub fn mask(&self, camera: &Camera) -> Option<HalvedMask> {
+    /// The mask at the pyramid level of `camera`; None if there is no mask.
+    pub fn mask(&self, camera: &Camera) -> Option<PyramidMask> {
         match &self.source {
             Source::Files(frames, _) => {
                 let mask = Arc::clone(frames.mask()?);
-                Some(HalvedMask::for_camera(mask, camera))
+                Some(PyramidMask::for_camera(mask, camera))
             }
             Source::Memory(_) => None,
         }
     }
 
-    /// Pyramids that may be held at once.
-    pub fn room(&self) -> usize {
+    /// Largest number of pyramids held at once.
+    pub fn pyramid_capacity(&self) -> usize {
         self.room
     }
 
-    /// The shading that frames are divided by.
+    /// The shading by which frames are divided.
     pub fn shading(&self) -> Option<Arc<Shading>> {
         let shading = self.shading.read();
         shading.unwrap_or_else(PoisonError::into_inner).clone()
     }
 
-    /// From now on, frames are divided by `shading`. The pyramids made so far are dropped.
+    /// Sets the shading by which frames are divided and drops the cached pyramids.
     pub fn set_shading(&self, shading: Shading) {
         let mut present = self.shading.write().unwrap_or_else(PoisonError::into_inner);
         *present = Some(Arc::new(shading));
         lock(&self.shelf).kept.clear();
     }
 
-    /// A frame, divided by the shading; pixels without a value are NaN.
+    /// The pyramid of a frame, divided by the shading; pixels without a value are NaN.
     ///
     /// # Errors
-    /// As [`StoredFrame::decode`].
+    /// The errors of [`StoredFrame::decode`].
     pub fn get(&self, frame: usize) -> Result<Arc<Pyramid>, FrameError> {
         let (frames, camera) = match &self.source {
             Source::Files(frames, camera) => (frames, camera),
@@ -149,7 +153,7 @@ impl FrameCache {
                 return Ok(Arc::clone(pyramid));
             }
         }
-        // Decoded without the lock; if two threads do the same frame at once, one result is
+        // Decoded without holding the lock; if two threads decode the same frame, one result is
         // dropped.
         let mut image = self.stored(&frames[frame], camera)?.grey();
         if let Some(mask) = frames.mask() {
@@ -172,7 +176,7 @@ impl FrameCache {
         Ok(pyramid)
     }
 
-    /// A frame as its file holds it; kept if there is room.
+    /// A frame in the form of its file; kept if there is memory.
     fn stored(&self, file: &FrameFile, camera: &Camera) -> Result<Arc<StoredFrame>, FrameError> {
         if let Some(frame) = lock(&self.stored).kept.get(&file.index) {
             return Ok(Arc::clone(frame));
@@ -188,7 +192,7 @@ impl FrameCache {
     }
 }
 
-/// A panic while the lock is held leaves a map that is still a map.
+/// Locks a mutex; a panic of another thread leaves the map valid.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -214,7 +218,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let camera = Camera::from_vertical_fov(32, 24, 1.0);
         let files = files(folder.path());
-        // Three quarters of it for three frames as they are stored, the rest for a pyramid.
+        // Three quarters for three stored frames, the rest for a pyramid.
         let cache = FrameCache::new(&files, &camera, 2, 4 * 32 * 24);
         let get = |frame: usize| Ok::<_, FrameError>(cache.get(frame)?.level(0).at(3, 3));
         for frame in [0, 1, 2, 0, 3, 4, 0] {

@@ -1,7 +1,7 @@
-//! A single-channel picture in floating point.
+//! Grey images in floating point.
 
-/// A grey image, row-major, in grey levels of an 8-bit picture (0–255; 16-bit input is scaled to
-/// that range and keeps its finer steps). NaN where the picture has no value: clipped white or
+/// A grey image, row-major, in grey levels of an 8-bit image (0–255; 16-bit input is scaled to that
+/// range and keeps its finer steps). NaN marks pixels without a value, such as clipped white or
 /// black.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GreyImage {
@@ -11,7 +11,7 @@ pub struct GreyImage {
 }
 
 impl GreyImage {
-    /// An image from its rows.
+    /// Creates an image from its rows.
     ///
     /// # Panics
     /// If `data` does not hold `width · height` values.
@@ -39,12 +39,12 @@ impl GreyImage {
         &self.data
     }
 
-    /// The pixels, row-major, to be changed.
+    /// The mutable pixels, row-major.
     pub fn data_mut(&mut self) -> &mut [f32] {
         &mut self.data
     }
 
-    /// True if some pixel has no value.
+    /// True if a pixel has no value.
     pub fn has_gaps(&self) -> bool {
         self.data.iter().any(|value| value.is_nan())
     }
@@ -54,14 +54,14 @@ impl GreyImage {
         self.data[y * self.width + x]
     }
 
-    /// Half the size: each pixel is the `[1 3 3 1]/8 ⊗ [1 3 3 1]/8` mean around the corner shared
-    /// by four.
+    /// Halves the image: each pixel is the `[1 3 3 1]/8 ⊗ [1 3 3 1]/8` weighted mean around the
+    /// corner shared by four pixels.
     ///
     /// The filter is even, so the new centre lies exactly between the old ones
     /// (see [`crate::camera::Camera::at_level`]); borders repeat the outermost pixel.
     ///
-    /// Pixels without a value count for nothing; where they make up more than half of the weight,
-    /// the result has no value either.
+    /// Pixels without a value have no weight; where they make up more than half of the kernel, the
+    /// result has no value.
     pub fn halved(&self) -> Self {
         if !self.has_gaps() {
             return self.filtered_half();
@@ -84,7 +84,7 @@ impl GreyImage {
 
     fn filtered_half(&self) -> Self {
         let (w, h) = (self.width / 2, self.height / 2);
-        // Across first: four taps a pixel, into rows of half width.
+        // Horizontally first: four taps per pixel, into rows of half width.
         let mut across = vec![0.0f32; w * self.height];
         for (row, out) in self
             .data

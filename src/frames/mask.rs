@@ -1,29 +1,29 @@
-//! Which pixels of all frames never show the wall: the carrier's shaft, the water line, the rim of
+//! Masks of pixels that never show the wall in any frame, such as the carrier's shaft or the rim of
 //! a housing.
 
-use super::{FrameError, GreyImage};
+use super::error::FrameError;
+use super::grey::GreyImage;
 use crate::camera::Camera;
 use image::{DynamicImage, ImageDecoder};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Grey level (of 255) from which a pixel of the picture shows the wall.
-const WALL: u8 = 128;
-/// Grey levels (of 255) between these are neither black nor white, ...
-const GREY: std::ops::Range<u8> = 32..224;
-/// ... and with more than this share of them the picture is no mask.
-const MOST_GREY: f64 = 0.1;
+/// Smallest grey level (of 255) of a mask pixel that shows the wall.
+const MIN_WALL_GREY: u8 = 128;
+/// Grey levels (of 255) that are neither black nor white.
+const UNDECIDED_GREY: std::ops::Range<u8> = 32..224;
+/// Largest fraction of such pixels in a mask.
+const MAX_UNDECIDED_FRACTION: f64 = 0.1;
 
-/// What every frame hides of the wall, at the frames' full size.
+/// A mask common to all frames, at full resolution.
 ///
-/// Kept as the distance of each pixel to the nearest that does not show the wall, so that one look
-/// tells whether a kernel of any width is free of such pixels.
+/// Stored as the distance of each pixel to the nearest masked pixel, so that one look-up decides
+/// whether a kernel of any width is free of masked pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
     width: usize,
     height: usize,
-    /// `max(|Δu|, |Δv|)` to the nearest pixel that does not show the wall, 0 for one of these;
-    /// row-major.
+    /// `max(|Δu|, |Δv|)` to the nearest masked pixel, 0 for masked pixels; row-major.
     distance_px: Vec<u16>,
     hidden: usize,
 }
@@ -32,8 +32,8 @@ impl Mask {
     /// Reads a mask: white shows the wall, black does not.
     ///
     /// # Errors
-    /// [`FrameError::Mask`]: an unreadable file, another size than the frames', a picture that is
-    /// not black and white or is black all over.
+    /// [`FrameError::Mask`]: an unreadable file, a size other than the frames', an image that is
+    /// not black and white or is entirely black.
     pub fn read(path: &Path, width: u32, height: u32) -> Result<Self, FrameError> {
         let fail = |what: String| FrameError::Mask {
             path: path.to_owned(),
@@ -50,35 +50,42 @@ impl Mask {
             })?
             .into_decoder()
             .map_err(undecodable)?;
-        // Before there is room made for as many pixels as a header may claim.
+        // Checked before allocating the memory that the header claims.
         let found = decoder.dimensions();
         if found != (width, height) {
             return Err(fail(format!(
-                "{} × {} px, but the frames have {width} × {height} px; a mask is a picture of the frames' size",
+                "{} × {} px, but the frames have {width} × {height} px; a mask is an image of the frames' size",
                 found.0, found.1
             )));
         }
         let picture = DynamicImage::from_decoder(decoder).map_err(undecodable)?;
         if picture.to_rgba8().pixels().any(|pixel| pixel.0[3] != 255) {
             return Err(fail(
-                "has transparent pixels; save it without transparency, black where no wall is to be seen and white elsewhere"
+                "has transparent pixels; save it without transparency, black where the wall is hidden and white elsewhere"
                     .to_owned(),
             ));
         }
-        let coloured = |rgb: [u8; 3]| rgb.iter().any(|c| c.abs_diff(rgb[0]) > GREY.start);
+        let coloured = |rgb: [u8; 3]| {
+            rgb.iter()
+                .any(|c| c.abs_diff(rgb[0]) > UNDECIDED_GREY.start)
+        };
         let colour = picture.to_rgb8();
         let grey = picture.to_luma8();
         let pixels = colour.pixels().zip(grey.pixels());
-        let odd = pixels.filter(|(rgb, grey)| coloured(rgb.0) || GREY.contains(&grey.0[0]));
+        let odd =
+            pixels.filter(|(rgb, grey)| coloured(rgb.0) || UNDECIDED_GREY.contains(&grey.0[0]));
         let share = odd.count() as f64 / grey.len() as f64;
-        if share > MOST_GREY {
+        if share > MAX_UNDECIDED_FRACTION {
             return Err(fail(format!(
                 "{:.0} % of its pixels are neither black nor white; a mask is black where the frames never show the wall and white \
                  elsewhere",
                 100.0 * share
             )));
         }
-        let wall: Vec<bool> = grey.pixels().map(|grey| grey.0[0] >= WALL).collect();
+        let wall: Vec<bool> = grey
+            .pixels()
+            .map(|grey| grey.0[0] >= MIN_WALL_GREY)
+            .collect();
         if !wall.contains(&true) {
             return Err(fail(
                 "is black all over, so that no pixel would show the wall; black is what does not, and white the wall: invert it"
@@ -88,10 +95,10 @@ impl Mask {
         Ok(Self::new(width as usize, height as usize, &wall))
     }
 
-    /// A mask from its pixels, row-major: true for those that show the wall.
+    /// Creates a mask from its pixels, row-major: true for pixels that show the wall.
     ///
-    /// The distance `max(|Δu|, |Δv|)` is found in two passes, each pixel from its eight neighbours:
-    /// those before it in the order of rows, then those after it.
+    /// The distance `max(|Δu|, |Δv|)` is computed in two passes over the eight neighbours: first
+    /// those before the pixel in row order, then those after it.
     ///
     /// Source: A. Rosenfeld, J. L. Pfaltz, "Distance functions on digital pictures", Pattern
     /// Recognition 1, 1968.
@@ -150,23 +157,23 @@ impl Mask {
         }
     }
 
-    /// Share of the picture that does not show the wall.
-    pub fn share(&self) -> f64 {
+    /// Fraction of masked pixels.
+    pub fn masked_fraction(&self) -> f64 {
         self.hidden as f64 / self.distance_px.len().max(1) as f64
     }
 
-    /// True if the pixels within `reach_px` of `(u, v)` along both axes all show the wall. What
-    /// lies outside of the picture hides nothing.
+    /// True if all pixels within `reach_px` of `(u, v)` along both axes show the wall. Pixels
+    /// outside the image count as unmasked.
     #[inline]
     pub fn is_clear(&self, u: f32, v: f32, reach_px: f32) -> bool {
         // The casts saturate.
         let nearest = |at: f32, size: usize| ((at + 0.5) as usize).min(size - 1);
         let (x, y) = (nearest(u, self.width), nearest(v, self.height));
-        // The nearest pixel's centre is half a pixel away at the most.
+        // The nearest pixel's centre is at most half a pixel away.
         f32::from(self.distance_px[y * self.width + x]) > reach_px + 0.5
     }
 
-    /// Takes their value from the pixels that do not show the wall; `image` is a full-size picture.
+    /// Removes the values of masked pixels from a full-resolution image.
     pub fn blank(&self, image: &mut GreyImage) {
         for (value, distance) in image.data_mut().iter_mut().zip(&self.distance_px) {
             if *distance == 0 {
@@ -176,20 +183,20 @@ impl Mask {
     }
 }
 
-/// A [`Mask`] for pictures that were halved.
+/// A [`Mask`] at a pyramid level.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct HalvedMask {
+pub struct PyramidMask {
     mask: Arc<Mask>,
     level: u32,
 }
 
-impl HalvedMask {
-    /// For pictures of full size.
-    pub fn of(mask: Arc<Mask>) -> Self {
+impl PyramidMask {
+    /// Creates the mask of level 0.
+    pub fn new(mask: Arc<Mask>) -> Self {
         Self { mask, level: 0 }
     }
 
-    /// For pictures halved `levels` times more.
+    /// The mask at `levels` further pyramid levels.
     pub fn halved(&self, levels: usize) -> Self {
         Self {
             mask: Arc::clone(&self.mask),
@@ -197,7 +204,7 @@ impl HalvedMask {
         }
     }
 
-    /// For the pictures that `camera`, halved or not, takes.
+    /// Creates the mask at the pyramid level of `camera`.
     pub fn for_camera(mask: Arc<Mask>, camera: &Camera) -> Self {
         let level = (mask.width as f64 / f64::from(camera.width)).log2().round();
         Self {
@@ -206,9 +213,9 @@ impl HalvedMask {
         }
     }
 
-    /// [`Mask::is_clear`] in pixels of the halved picture, each the mean of a square of full-size
-    /// pixels: at full size, `u = 2^l u_l + (2^l − 1)/2`, and a pixel reaches `(2^l − 1)/2` to each
-    /// side.
+    /// [`Mask::is_clear`] in pixels of the level, each the mean of a square of full-resolution
+    /// pixels: at full resolution, `u = 2^l u_l + (2^l − 1)/2`, and a pixel reaches `(2^l − 1)/2`
+    /// to each side.
     #[inline]
     pub fn is_clear(&self, u: f32, v: f32, reach_px: f32) -> bool {
         let scale = (1u32 << self.level) as f32;
@@ -218,8 +225,8 @@ impl HalvedMask {
             .is_clear(full(u), full(v), scale * reach_px + half)
     }
 
-    /// True if the halved picture's pixel is free of full-size pixels that do not show the wall.
-    pub fn shows(&self, u: usize, v: usize) -> bool {
+    /// True if a pixel of the level covers no masked pixel at full resolution.
+    pub fn is_wall(&self, u: usize, v: usize) -> bool {
         self.is_clear(u as f32, v as f32, 0.0)
     }
 }
@@ -229,7 +236,7 @@ mod tests {
     use super::*;
     use image::{DynamicImage, GrayImage, Luma, Rgb, RgbImage, RgbaImage};
 
-    /// Two bars and a dot, and what is as far from them as the mask says.
+    /// Two bars and a dot, compared with a brute-force distance.
     #[test]
     fn a_kernel_is_clear_only_if_all_its_pixels_show_the_wall() {
         let (width, height) = (40, 30);
@@ -241,11 +248,11 @@ mod tests {
             .collect();
         let mask = Arc::new(Mask::new(width, height, &wall));
         let hidden = wall.iter().filter(|w| !**w).count();
-        assert_eq!(mask.share(), hidden as f64 / 1200.0);
+        assert_eq!(mask.masked_fraction(), hidden as f64 / 1200.0);
         for level in 0..3 {
-            let halved = HalvedMask::of(Arc::clone(&mask)).halved(level);
+            let halved = PyramidMask::new(Arc::clone(&mask)).halved(level);
             let edge = 1usize << level;
-            // All full-size pixels of the halved ones within a reach.
+            // All full-resolution pixels of the level's pixels within the reach.
             let all_wall = |u: f32, v: f32, reach: f32| {
                 let within = |at: f32, k: usize| ((k / edge) as f32 - at).abs() <= reach;
                 let hit = |k: &usize| within(u, k % width) && within(v, k / width);
@@ -255,12 +262,12 @@ mod tests {
                 for reach in [0.0, 1.0, 2.0] {
                     let clear = halved.is_clear(u, v, reach);
                     assert!(!clear || all_wall(u, v, reach), "{u} {v} {reach}");
-                    // It errs by a pixel at the most.
+                    // The error is at most one pixel.
                     assert!(clear || !all_wall(u, v, reach + 1.5), "{u} {v} {reach}");
                 }
             }
             for (k, wall) in wall.iter().enumerate().filter(|_| level == 0) {
-                assert_eq!(halved.shows(k % width, k / width), *wall);
+                assert_eq!(halved.is_wall(k % width, k / width), *wall);
             }
         }
     }
@@ -283,12 +290,14 @@ mod tests {
         };
         let half = |u: u32| if u < 8 { 0 } else { 255 };
         let good = GrayImage::from_fn(32, 24, |u, _| Luma([half(u)]));
-        assert_eq!(read(good.into()).unwrap().share(), 0.25);
+        assert_eq!(read(good.into()).unwrap().masked_fraction(), 0.25);
         let colour = RgbImage::from_fn(32, 24, |u, _| Rgb([half(u); 3]));
-        assert_eq!(read(colour.into()).unwrap().share(), 0.25);
+        assert_eq!(read(colour.into()).unwrap().masked_fraction(), 0.25);
         let sixteen = image::ImageBuffer::from_fn(32, 24, |u, _| Luma([257 * u16::from(half(u))]));
         assert_eq!(
-            read(DynamicImage::ImageLuma16(sixteen)).unwrap().share(),
+            read(DynamicImage::ImageLuma16(sixteen))
+                .unwrap()
+                .masked_fraction(),
             0.25
         );
         let bad: [(DynamicImage, &str); 5] = [

@@ -1,30 +1,36 @@
-//! The pictures: loading, grey values, pyramids, writing.
+//! Frames: reading, grey images, pyramids, masks, noise and writing of pictures.
 
 mod agreement;
 mod cache;
-mod contrast;
+mod decode;
+mod error;
+mod frame_file;
+mod frame_set;
 mod grey;
-mod load;
+mod hash;
+mod local_contrast;
 mod mask;
 mod noise;
 mod pyramid;
-mod set;
 mod shading;
-mod stored;
+mod stored_frame;
 mod video;
 mod write;
 
 pub(crate) use agreement::Agreement;
 pub use cache::FrameCache;
-pub use contrast::{LocalContrast, local_contrast, usual};
+pub use decode::{colour_type, load_colour};
+pub use error::FrameError;
+pub use frame_file::{FrameFile, list_frames};
+pub use frame_set::FrameSet;
 pub use grey::GreyImage;
-pub use load::{FrameError, FrameFile, colour_type, list, load_colour};
-pub use mask::{HalvedMask, Mask};
+pub(crate) use hash::hash_frames;
+pub use local_contrast::{LocalContrast, local_contrast, mask_outliers};
+pub use mask::{Mask, PyramidMask};
 pub(crate) use noise::MAD_TO_SIGMA;
 pub use noise::{noise_at_level, noise_sigma};
 pub use pyramid::Pyramid;
-pub use set::FrameSet;
 pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
-pub use stored::StoredFrame;
+pub use stored_frame::StoredFrame;
 pub use video::Video;
 pub use write::{FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};

@@ -1,23 +1,23 @@
-//! The sensor's noise, read from single pictures.
+//! Estimation of sensor noise from single images.
 
-use super::GreyImage;
+use super::grey::GreyImage;
 
-/// A Gaussian's standard deviation over the median of its distances from the middle.
+/// Ratio of a Gaussian's standard deviation to its median absolute deviation.
 pub(crate) const MAD_TO_SIGMA: f64 = 1.4826;
-/// Every how many rows and columns the noise is looked at.
-const STRIDE: usize = 3;
+/// Step of rows and columns at which the noise is sampled.
+const SAMPLING_STRIDE: usize = 3;
 
-/// 1-σ of a picture's noise, grey levels: the median of `|M ∗ I|` with the mask
-/// `M = [1 −2 1; −2 4 −2; 1 −2 1]`, which no plane and no straight edge along an axis excites;
-/// `M ∗` noise has 6 σ.
+/// Estimates the 1-σ noise of an image, grey levels: the median of `|M ∗ I|` with the mask
+/// `M = [1 −2 1; −2 4 −2; 1 −2 1]`, which vanishes on planes and on straight edges along an axis;
+/// white noise has 6 σ after the filter.
 ///
 /// Source: J. Immerkær, "Fast noise variance estimation", Computer Vision and Image Understanding
-/// 64(2), 1996; the median instead of the mean, for the sake of walls with edges.
+/// 64(2), 1996; with the median instead of the mean, for robustness against edges.
 pub fn noise_sigma(image: &GreyImage) -> Option<f64> {
     let (w, h) = (image.width(), image.height());
     let mut found = Vec::new();
-    for y in (1..h.saturating_sub(1)).step_by(STRIDE) {
-        for x in (1..w.saturating_sub(1)).step_by(STRIDE) {
+    for y in (1..h.saturating_sub(1)).step_by(SAMPLING_STRIDE) {
+        for x in (1..w.saturating_sub(1)).step_by(SAMPLING_STRIDE) {
             let row = |y: usize| image.at(x - 1, y) - 2.0 * image.at(x, y) + image.at(x + 1, y);
             let response = (row(y - 1) - 2.0 * row(y) + row(y + 1)).abs();
             if !response.is_nan() {
@@ -33,12 +33,12 @@ pub fn noise_sigma(image: &GreyImage) -> Option<f64> {
     Some(MAD_TO_SIGMA * f64::from(*median) / 6.0)
 }
 
-/// Variance of a bilinear sample between the pixels of a pyramid level, over the variance of a
-/// pixel at full size.
+/// Mean variance of a bilinear sample at a pyramid level relative to the variance of a pixel at
+/// full resolution.
 ///
 /// Each level filters with `[1 3 3 1]/8` along each axis and takes every other pixel. A sample at
-/// fraction f mixes two neighbours whose noise correlates by ρ: on average over f, `2/3 + ρ/3` of
-/// the variance is left.
+/// fraction f mixes two neighbours whose noise correlates by ρ: on average over f, the fraction
+/// `2/3 + ρ/3` of the variance remains.
 pub fn noise_at_level(level: usize) -> f64 {
     let mut kernel = vec![1.0f64];
     for k in 0..level {

@@ -1,22 +1,22 @@
-//! The image pyramid of a frame.
+//! Image pyramids of frames.
 
-use super::GreyImage;
-use super::contrast::{LocalContrast, local_contrast, subdued, wide_window};
+use super::grey::GreyImage;
+use super::local_contrast::{LocalContrast, clip_outliers, local_contrast, wide_window};
 use std::sync::{Arc, OnceLock};
 
-/// A frame at full size (level 0) and halved again and again, from level 1 on without its extremes
-/// ([`super::contrast::subdued`]).
+/// A frame at full resolution (level 0) and repeatedly halved; levels from 1 on are clipped
+/// ([`crate::frames::local_contrast::clip_outliers`]).
 #[derive(Clone, Debug)]
 pub struct Pyramid {
     full: GreyImage,
-    /// Level 1 and on, made when first asked for.
+    /// Levels from 1 on, computed on demand.
     halved: Vec<OnceLock<GreyImage>>,
-    /// What has been asked for, level by level.
+    /// Local contrast of the levels, computed on demand.
     contrasts: Vec<OnceLock<Arc<LocalContrast>>>,
 }
 
 impl Pyramid {
-    /// Of `levels` levels (at least one).
+    /// Creates a pyramid of `levels` levels (at least one).
     pub fn new(image: GreyImage, levels: usize) -> Self {
         Self {
             full: image,
@@ -25,19 +25,20 @@ impl Pyramid {
         }
     }
 
-    /// The image at `level`; 0 is full size.
+    /// The image at `level`; 0 is full resolution.
     ///
     /// # Panics
     /// If there is no such level.
     pub fn level(&self, level: usize) -> &GreyImage {
         match level.checked_sub(1) {
             None => &self.full,
-            Some(finer) => self.halved[finer].get_or_init(|| subdued(&self.level(finer).halved())),
+            Some(finer) => {
+                self.halved[finer].get_or_init(|| clip_outliers(&self.level(finer).halved()))
+            }
         }
     }
 
-    /// The local contrast at `level`, over a window as wide as light is smooth; made when first
-    /// asked for.
+    /// The local contrast at `level` over the window for whole images, computed on demand.
     pub fn contrast(&self, level: usize) -> Arc<LocalContrast> {
         let image = self.level(level);
         let made = self.contrasts[level]

@@ -1,6 +1,6 @@
 //! Light that moves with the camera, and vignetting: what every frame is multiplied by.
 
-use super::GreyImage;
+use super::grey::GreyImage;
 use nalgebra::{DMatrix, DVector, Vector2};
 use serde::{Deserialize, Serialize};
 

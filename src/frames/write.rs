@@ -1,4 +1,4 @@
-//! Picture files.
+//! Writing of picture files.
 
 use crate::persist::atomic::{self, WriteError};
 use image::codecs::jpeg::JpegEncoder;
@@ -8,7 +8,7 @@ use image::{DynamicImage, ImageError};
 use std::io;
 use std::path::Path;
 
-/// An output's name does not say a format that can hold a panorama.
+/// An output name without the extension of a supported format.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct FormatError(String);
@@ -19,7 +19,7 @@ pub struct FormatError(String);
 pub enum PictureFormat {
     /// `.png`: grey or colour with alpha.
     Png,
-    /// `.jpg`, `.jpeg`: 8 bits, with loss; holes are black.
+    /// `.jpg`, `.jpeg`: 8 bits, lossy; holes are black.
     Jpeg {
         /// 1 to 100.
         quality: u8,
@@ -29,17 +29,17 @@ pub enum PictureFormat {
     Tiff,
 }
 
-/// Quality of JPEG files, unless it is asked for.
+/// Default quality of JPEG files.
 pub const JPEG_QUALITY: u8 = 90;
 
-/// The longest side of a JPEG picture, pixels.
+/// Longest side of a JPEG picture, pixels.
 pub const JPEG_LIMIT_PX: u32 = 65_535;
 
-/// Most pixels of four bytes that fit into a TIFF's 32-bit offsets, with room for its header.
+/// Largest number of four-byte pixels addressable by a TIFF's 32-bit offsets, less its header.
 const TIFF_LIMIT_PX: u64 = (1 << 30) - (1 << 16);
 
 impl PictureFormat {
-    /// The format that a file's name asks for.
+    /// The format of a file name's extension.
     ///
     /// # Errors
     /// [`FormatError`] with the remedy for every other name.
@@ -62,10 +62,10 @@ impl PictureFormat {
     }
 }
 
-/// Writes a picture; nothing appears under that name unless all of it was written.
+/// Writes a picture atomically: the file appears complete or not at all.
 ///
 /// # Errors
-/// Whatever the system or the encoder says.
+/// An error of the operating system or of the encoder.
 pub fn write_picture(
     path: &Path,
     image: &DynamicImage,

@@ -4,8 +4,8 @@ use super::glb::{Part, Place};
 use super::mesh::{Lines, Mesh, Patch};
 use super::strip::{BORDER, Block, Strip};
 use crate::raster::{
-    EDGE, LevelTile, Pyramid, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
-    compress_jpeg,
+    LevelTile, OverviewBuilder, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
+    TILE_EDGE_PX, compress_jpeg,
 };
 use crate::render::{Band, Canvas, PixelFormat, Samples};
 use crate::surface::Surface;
@@ -18,7 +18,7 @@ const TOLERANCE_PX: f64 = 0.125;
 /// Cuts bands into the blocks of all levels.
 pub(super) struct Cutter {
     spec: RasterSpec,
-    pyramid: Pyramid,
+    pyramid: OverviewBuilder,
     strips: Vec<Strip>,
 }
 
@@ -62,7 +62,7 @@ impl Cutter {
         let strip = |level| Strip::new(spec.size(level), spec.pixel_bytes(), tiles);
         Ok(Self {
             spec,
-            pyramid: Pyramid::new(spec, levels)?,
+            pyramid: OverviewBuilder::new(spec, levels)?,
             strips: (0..levels).map(strip).collect(),
         })
     }
@@ -112,22 +112,22 @@ impl Cutter {
             Samples::Sixteen(samples) => samples.iter().map(|v| (v >> 8) as u8).collect(),
         };
         let tile = |column: usize| {
-            let first = column * EDGE * bytes;
-            let count = EDGE.min(width - column * EDGE) * bytes;
-            let mut pixels = vec![0; EDGE * EDGE * bytes];
+            let first = column * TILE_EDGE_PX * bytes;
+            let count = TILE_EDGE_PX.min(width - column * TILE_EDGE_PX) * bytes;
+            let mut pixels = vec![0; TILE_EDGE_PX * TILE_EDGE_PX * bytes];
             for (to, from) in pixels
-                .chunks_exact_mut(EDGE * bytes)
+                .chunks_exact_mut(TILE_EDGE_PX * bytes)
                 .zip(samples.chunks_exact(width * bytes))
             {
                 to[..count].copy_from_slice(&from[first..][..count]);
             }
             RasterTile {
                 column: column as u32,
-                row: band.row / EDGE as u32,
+                row: band.row / TILE_EDGE_PX as u32,
                 pixels,
             }
         };
-        (0..width.div_ceil(EDGE)).map(tile).collect()
+        (0..width.div_ceil(TILE_EDGE_PX)).map(tile).collect()
     }
 }
 

@@ -87,7 +87,7 @@ impl MapPlace {
             folder: MAP.to_owned(),
             px_per_metre: canvas.px_per_metre / 2f64.powi(level as i32),
             size_px: [canvas.columns, canvas.rows].map(halved),
-            rows_px: crate::raster::EDGE,
+            rows_px: crate::raster::TILE_EDGE_PX,
             border_px: BORDER,
         }
     }

@@ -141,7 +141,7 @@ fn bounds(points: &[Vector3<f64>]) -> [Vector3<f64>; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::section::Pieces;
+    use crate::surface::section::PiecewiseOutline;
     use crate::surface::{CentrePoint, Centreline, Circle, Prism, Swept};
     use std::f64::consts::TAU;
 
@@ -187,7 +187,7 @@ mod tests {
     /// they face inwards.
     #[test]
     fn corners_and_bends_are_followed() {
-        let section = || Box::new(Pieces::rectangle(4.0, 3.0).unwrap());
+        let section = || Box::new(PiecewiseOutline::rectangle(4.0, 3.0).unwrap());
         let points: Vec<CentrePoint> = (0..=40)
             .map(|k| {
                 let (sin, cos) = (0.2 * TAU * f64::from(k) / 40.0).sin_cos();

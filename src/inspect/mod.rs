@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! render::Plan ─ bands ─> Cutter ─ blocks of all levels ─> part: Lines, Mesh, JPEG ─> glb ─┬─> GlbTarget ──> FILE.glb
-//!                          (raster::Pyramid, Strip)                                        └─> TilesTarget ─> tileset.json, LEVEL/*.glb
+//!                          (raster::OverviewBuilder, Strip)                                        └─> TilesTarget ─> tileset.json, LEVEL/*.glb
 //!
 //! tunnel.json, wall.json (Manifest, WallPoints) ─┐
 //! tiles of every layer (TilesTarget) ────────────┼─ a folder ─> any web server, or Server ─> the page (web/)

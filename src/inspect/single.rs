@@ -4,7 +4,7 @@ use super::InspectError;
 use super::cut::{Cutter, part};
 use super::glb::{Part, glb};
 use crate::persist::atomic::{self, WriteError};
-use crate::raster::{EDGE, RasterError};
+use crate::raster::{RasterError, TILE_EDGE_PX};
 use crate::render::{Band, Canvas, PixelFormat, RenderError, Target};
 use crate::surface::Surface;
 use rayon::prelude::*;
@@ -12,7 +12,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Tiles along the side of a texture: with its border it has no more than 4096 pixels.
-const TILES: usize = (4096 - EDGE) / EDGE;
+const TILES: usize = (4096 - TILE_EDGE_PX) / TILE_EDGE_PX;
 
 /// The largest file: what programs still read as one, and half of what the format can say.
 const LIMIT_BYTES: u64 = 2 << 30;

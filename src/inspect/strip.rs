@@ -4,7 +4,7 @@
 //! a line would show where two textures meet. Around the section the border goes on at the other
 //! side.
 
-use crate::raster::{EDGE, RasterTile};
+use crate::raster::{RasterTile, TILE_EDGE_PX};
 use rayon::prelude::*;
 
 /// Pixels of the border: overviews down to an eighth still have one of their own.
@@ -39,7 +39,7 @@ pub(super) struct Strip {
     height: usize,
     /// Bytes of a pixel; the last is alpha.
     pixel_bytes: usize,
-    /// Columns and rows of a block: a multiple of [`EDGE`].
+    /// Columns and rows of a block: a multiple of [`TILE_EDGE_PX`].
     block: usize,
     /// The row that `pixels` begins with.
     first: usize,
@@ -55,7 +55,7 @@ impl Strip {
             width: width as usize,
             height: height as usize,
             pixel_bytes,
-            block: tiles * EDGE,
+            block: tiles * TILE_EDGE_PX,
             first: 0,
             pixels: Vec::new(),
             next: 0,
@@ -64,7 +64,7 @@ impl Strip {
 
     /// The most bytes that it holds.
     pub(super) fn most_bytes(&self) -> u64 {
-        let rows = (self.block + EDGE + 2 * BORDER).min(self.height);
+        let rows = (self.block + TILE_EDGE_PX + 2 * BORDER).min(self.height);
         (rows * self.width * self.pixel_bytes) as u64
     }
 
@@ -73,15 +73,18 @@ impl Strip {
         let stride = self.width * self.pixel_bytes;
         let mut arrived = self.first + self.pixels.len() / stride;
         for tile in tiles {
-            let (row, column) = (tile.row as usize * EDGE, tile.column as usize * EDGE);
-            let rows = EDGE.min(self.height - row);
+            let (row, column) = (
+                tile.row as usize * TILE_EDGE_PX,
+                tile.column as usize * TILE_EDGE_PX,
+            );
+            let rows = TILE_EDGE_PX.min(self.height - row);
             arrived = arrived.max(row + rows);
             self.pixels.resize((arrived - self.first) * stride, 0);
-            let bytes = EDGE.min(self.width - column) * self.pixel_bytes;
+            let bytes = TILE_EDGE_PX.min(self.width - column) * self.pixel_bytes;
             let begin = (row - self.first) * stride + column * self.pixel_bytes;
             for (to, from) in self.pixels[begin..]
                 .chunks_mut(stride)
-                .zip(tile.pixels.chunks_exact(EDGE * self.pixel_bytes))
+                .zip(tile.pixels.chunks_exact(TILE_EDGE_PX * self.pixel_bytes))
                 .take(rows)
             {
                 to[..bytes].copy_from_slice(&from[..bytes]);
@@ -147,10 +150,10 @@ mod tests {
     }
 
     fn tile(column: u32, row: u32) -> RasterTile {
-        let mut pixels = vec![0; EDGE * EDGE * 2];
+        let mut pixels = vec![0; TILE_EDGE_PX * TILE_EDGE_PX * 2];
         for (k, pixel) in pixels.chunks_exact_mut(2).enumerate() {
-            let x = column as usize * EDGE + k % EDGE;
-            let y = row as usize * EDGE + k / EDGE;
+            let x = column as usize * TILE_EDGE_PX + k % TILE_EDGE_PX;
+            let y = row as usize * TILE_EDGE_PX + k / TILE_EDGE_PX;
             if x < WIDTH && y < HEIGHT {
                 pixel.copy_from_slice(&[value(x, y), 255]);
             }
@@ -177,7 +180,7 @@ mod tests {
     fn every_pixel_is_the_levels_own_and_the_border_goes_around() {
         for tiles in [1, 2, 7] {
             let blocks = blocks(tiles);
-            let edge = tiles * EDGE;
+            let edge = tiles * TILE_EDGE_PX;
             assert_eq!(blocks.len(), WIDTH.div_ceil(edge) * HEIGHT.div_ceil(edge));
             for block in &blocks {
                 let [columns, rows] = block.texture_size();

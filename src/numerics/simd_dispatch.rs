@@ -4,18 +4,18 @@ use pulp::{Arch, Simd, WithSimd};
 
 /// Does `work` with the code compiled for this processor's vector instructions.
 ///
-/// Write it as `wide(#[inline(always)] || …)`, and mark what it calls `#[inline(always)]` as well:
-/// only what is inlined is compiled anew. The numbers are the same on every processor: vectors
-/// change neither the order of operations nor their rounding, and nothing is contracted to a fused
-/// multiply–add.
+/// Write it as `dispatch_simd(#[inline(always)] || …)`, and mark what it calls `#[inline(always)]`
+/// as well: only what is inlined is compiled anew. The numbers are the same on every processor:
+/// vectors change neither the order of operations nor their rounding, and nothing is contracted to
+/// a fused multiply–add.
 #[inline(always)]
-pub fn wide<R>(work: impl FnMut() -> R) -> R {
-    Arch::new().dispatch(Wide(work))
+pub fn dispatch_simd<R>(work: impl FnMut() -> R) -> R {
+    Arch::new().dispatch(Work(work))
 }
 
-struct Wide<F>(F);
+struct Work<F>(F);
 
-impl<R, F: FnMut() -> R> WithSimd for Wide<F> {
+impl<R, F: FnMut() -> R> WithSimd for Work<F> {
     type Output = R;
 
     #[inline(always)]
@@ -27,15 +27,15 @@ impl<R, F: FnMut() -> R> WithSimd for Wide<F> {
 /// Does `work` with the code compiled for AVX2, which it is handed; false without doing it where
 /// the processor has none.
 ///
-/// Write it as [`wide`]. What is not inlined is neither fast nor wrong: no closures, no `map` of
-/// arrays in loops.
+/// Write it as [`dispatch_simd`]. What is not inlined is neither fast nor wrong: no closures, no
+/// `map` of arrays in loops.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-pub fn avx2(work: impl FnMut(pulp::x86::V3)) -> bool {
+pub fn dispatch_avx2(work: impl FnMut(pulp::x86::V3)) -> bool {
     let Some(simd) = pulp::x86::V3::try_new() else {
         return false;
     };
-    Simd::vectorize(simd, Avx2(simd, work));
+    Simd::vectorize(simd, Avx2Work(simd, work));
     true
 }
 
@@ -52,13 +52,13 @@ pub fn prefetch(simd: pulp::x86::V3, samples: &[u8], at: usize) {
 pub fn prefetch_rows(rows: &[&mut [u8]]) {
     /// Bytes that come at once.
     #[cfg(target_arch = "x86_64")]
-    const LINE: usize = 64;
+    const CACHE_LINE_BYTES: usize = 64;
     #[cfg(target_arch = "x86_64")]
-    avx2(
+    dispatch_avx2(
         #[inline(always)]
         |simd| {
             for row in rows {
-                for at in (0..row.len()).step_by(LINE) {
+                for at in (0..row.len()).step_by(CACHE_LINE_BYTES) {
                     prefetch(simd, row, at);
                 }
             }
@@ -69,10 +69,10 @@ pub fn prefetch_rows(rows: &[&mut [u8]]) {
 }
 
 #[cfg(target_arch = "x86_64")]
-struct Avx2<F>(pulp::x86::V3, F);
+struct Avx2Work<F>(pulp::x86::V3, F);
 
 #[cfg(target_arch = "x86_64")]
-impl<F: FnMut(pulp::x86::V3)> WithSimd for Avx2<F> {
+impl<F: FnMut(pulp::x86::V3)> WithSimd for Avx2Work<F> {
     type Output = ();
 
     #[inline(always)]

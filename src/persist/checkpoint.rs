@@ -38,8 +38,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use crate::persist::atomic::{self, WriteError};
-use crate::persist::provenance::Input;
+use super::atomic::{self, WriteError};
+use super::provenance::Input;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, TryLockError};
@@ -48,17 +48,17 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Name of the file that says what run it is.
-const ORIGIN: &str = "origin";
+const ORIGIN_FILE: &str = "origin";
 /// Extension of the files with states.
-const STATE: &str = "state";
+const STATE_EXTENSION: &str = "state";
 /// Name of the file that the run holds locked.
-const LOCK: &str = "lock";
+const LOCK_FILE: &str = "lock";
 /// Bytes that are hashed at once.
-const HASHED: usize = 1 << 17;
+const HASH_BUFFER_BYTES: usize = 1 << 17;
 /// Time between two states, at the least ...
-const INTERVAL: Duration = Duration::from_millis(250);
+const MIN_SAVE_INTERVAL: Duration = Duration::from_millis(250);
 /// ... and in multiples of the time that keeping the last one took.
-const RELATIVE: u32 = 50;
+const MIN_SAVE_INTERVAL_RATIO: u32 = 50;
 
 /// Why a run cannot be continued, or not be kept.
 #[derive(Debug, thiserror::Error)]
@@ -164,13 +164,13 @@ impl Checkpoint {
             others: Vec::new(),
             begun: false,
             kept: Instant::now(),
-            wait: INTERVAL,
+            wait: MIN_SAVE_INTERVAL,
             due: None,
             _lock: lock(folder)?,
         };
         checkpoint.begun = !fresh && checkpoint.kept_files()?.iter().any(|path| is_state(path));
         if checkpoint.begun {
-            let what = match checkpoint.read::<Origin>(ORIGIN)? {
+            let what = match checkpoint.read::<Origin>(ORIGIN_FILE)? {
                 Some(kept) => kept.difference(origin),
                 None => Some("it does not say what run it is".to_owned()),
             };
@@ -180,7 +180,7 @@ impl Checkpoint {
             }
         } else {
             checkpoint.clear()?;
-            checkpoint.write(ORIGIN, origin)?;
+            checkpoint.write(ORIGIN_FILE, origin)?;
         }
         Ok(checkpoint)
     }
@@ -191,7 +191,7 @@ impl Checkpoint {
             .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
         let mut paths: Vec<PathBuf> =
             entries.map_err(|source| WriteError::new(&self.folder, source))?;
-        paths.retain(|path| path.file_name() != Some(LOCK.as_ref()));
+        paths.retain(|path| path.file_name() != Some(LOCK_FILE.as_ref()));
         paths.sort_by_key(|path| !is_state(path));
         Ok(paths)
     }
@@ -239,7 +239,7 @@ impl Checkpoint {
     /// # Errors
     /// [`CheckpointError::Damaged`] if it is not what was written, or no `S`.
     pub fn state<S: DeserializeOwned>(&self, name: &str) -> Result<Option<S>, CheckpointError> {
-        self.read(&format!("{name}.{STATE}"))
+        self.read(&format!("{name}.{STATE_EXTENSION}"))
     }
 
     /// Keeps the state `name` in place of the one before. How long that takes, since it was found
@@ -249,9 +249,9 @@ impl Checkpoint {
     /// Whatever the system says.
     pub fn keep<S: Serialize>(&mut self, name: &str, state: &S) -> Result<(), WriteError> {
         let since = self.due.take().unwrap_or_else(Instant::now);
-        self.write(&format!("{name}.{STATE}"), state)?;
+        self.write(&format!("{name}.{STATE_EXTENSION}"), state)?;
         self.kept = Instant::now();
-        self.wait = INTERVAL.max(RELATIVE * since.elapsed());
+        self.wait = MIN_SAVE_INTERVAL.max(MIN_SAVE_INTERVAL_RATIO * since.elapsed());
         Ok(())
     }
 
@@ -288,7 +288,7 @@ impl Checkpoint {
                 hasher: blake3::Hasher::new(),
             };
             // A number at a time is a slow way to hash.
-            let mut hashing = BufWriter::with_capacity(HASHED, hashing);
+            let mut hashing = BufWriter::with_capacity(HASH_BUFFER_BYTES, hashing);
             ciborium::into_writer(state, &mut hashing).map_err(io::Error::other)?;
             let Hashing { writer, hasher } =
                 hashing.into_inner().map_err(IntoInnerError::into_error)?;
@@ -311,7 +311,7 @@ impl Checkpoint {
 }
 
 fn is_state(path: &Path) -> bool {
-    path.extension() == Some(STATE.as_ref())
+    path.extension() == Some(STATE_EXTENSION.as_ref())
 }
 
 /// Hashes all that is written.
@@ -342,7 +342,7 @@ pub fn folder_of(result: &Path) -> PathBuf {
 
 /// Locks the folder for as long as the file lives, or the process.
 fn lock(folder: &Path) -> Result<File, CheckpointError> {
-    let path = folder.join(LOCK);
+    let path = folder.join(LOCK_FILE);
     let fail = |source| WriteError::new(&path, source);
     let file = File::create(&path).map_err(fail)?;
     match file.try_lock() {

@@ -1,6 +1,5 @@
 //! What a result was made from: hashes of the files that went into it.
 
-use crate::frames::FrameFile;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -82,20 +81,16 @@ pub fn input(path: &Path) -> Result<Input, HashError> {
     })
 }
 
-/// Hashes the frames of a survey, in their order, or the video that they are in.
+/// Hashes a list of files of one folder, in their order.
 ///
 /// # Errors
 /// [`HashError`] of the first that cannot be read.
-pub fn frames(frames: &[FrameFile]) -> Result<Input, HashError> {
-    if let Some(frame) = frames.first().filter(|frame| frame.is_in_video()) {
-        return input(frame.file());
-    }
-    let paths: Vec<&Path> = frames.iter().map(|frame| frame.path.as_path()).collect();
+pub fn input_list(paths: &[&Path]) -> Result<Input, HashError> {
     let folder = paths.first().and_then(|path| path.parent());
     Ok(Input {
         path: folder.unwrap_or(Path::new("")).to_owned(),
         files: Some(paths.len()),
-        blake3: hash_files(&paths)?.to_hex().to_string(),
+        blake3: hash_files(paths)?.to_hex().to_string(),
     })
 }
 
@@ -106,23 +101,23 @@ mod tests {
     #[test]
     fn hashes_follow_content_names_and_order() {
         let dir = tempfile::tempdir().unwrap();
-        let frame = |name: &str, content: &str| {
+        let file = |name: &str, content: &str| {
             let path = dir.path().join(name);
             std::fs::write(&path, content).unwrap();
-            FrameFile::picture(0, path)
+            path
         };
-        let (a, b) = (frame("a.png", "one"), frame("b.png", "two"));
-        let both = frames(&[a.clone(), b.clone()]).unwrap();
+        let (a, b) = (file("a.png", "one"), file("b.png", "two"));
+        let both = input_list(&[&a, &b]).unwrap();
         assert_eq!(both.files, Some(2));
-        assert_ne!(both, frames(&[b.clone(), a.clone()]).unwrap());
-        let c = frame("c.png", "one");
-        assert_ne!(both.blake3, frames(&[c, b.clone()]).unwrap().blake3);
+        assert_ne!(both, input_list(&[&b, &a]).unwrap());
+        let c = file("c.png", "one");
+        assert_ne!(both.blake3, input_list(&[&c, &b]).unwrap().blake3);
         assert_eq!(
-            input(&a.path).unwrap().blake3,
+            input(&a).unwrap().blake3,
             blake3::hash(b"one").to_hex().to_string()
         );
-        frame("a.png", "other");
-        assert_ne!(both, frames(&[a, b]).unwrap());
+        file("a.png", "other");
+        assert_ne!(both, input_list(&[&a, &b]).unwrap());
         assert!(input(&dir.path().join("none")).is_err());
     }
 }

@@ -1,14 +1,14 @@
 //! Cloud-Optimised GeoTIFF: one file of which any window at any resolution is read without the
 //! rest.
 
+use super::compression::Compression;
 use super::compression::Packed;
 use super::directory::{self, Directory, Values, tag};
-use super::pyramid::{LevelTile, Pyramid, Waiting};
+use super::error::RasterError;
+use super::overviews::{LevelTile, OverviewBuilder, Waiting};
+use super::spec::{Georeference, Nodata, RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
 use super::spool::{Spool, Stored};
-use super::{
-    Compression, EDGE, Georeference, Nodata, RasterError, RasterSpec, RasterTile, SampleType,
-    deflate, jpeg,
-};
+use super::{deflate, jpeg};
 use crate::persist::atomic::{self, WriteError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -16,7 +16,7 @@ use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes a picture as Cloud-Optimised GeoTIFF (BigTIFF, tiles of [`EDGE`] pixels, overviews down
+/// Writes a picture as Cloud-Optimised GeoTIFF (BigTIFF, tiles of [`TILE_EDGE_PX`] pixels, overviews down
 /// to one tile).
 ///
 /// Packed tiles wait in a temporary file beside the target and are copied into it by
@@ -26,7 +26,7 @@ pub struct CogWriter {
     spec: RasterSpec,
     compression: Compression,
     target: PathBuf,
-    pyramid: Pyramid,
+    pyramid: OverviewBuilder,
     spool: Spool,
     /// The tiles of every level, row by row.
     stored: Vec<Vec<Option<Stored>>>,
@@ -56,13 +56,13 @@ impl Places {
             self.offsets.push(0);
             return;
         }
-        self.offsets.push(*at + FRAME);
-        *at += u64::from(bytes) + 2 * FRAME;
+        self.offsets.push(*at + TILE_FRAME_BYTES);
+        *at += u64::from(bytes) + 2 * TILE_FRAME_BYTES;
     }
 }
 
 /// Bytes of a tile's leader, and of its trailer.
-const FRAME: u64 = 4;
+const TILE_FRAME_BYTES: u64 = 4;
 
 impl CogWriter {
     /// Begins the file that will be `target`.
@@ -75,7 +75,9 @@ impl CogWriter {
         spec: RasterSpec,
         compression: Compression,
     ) -> Result<Self, RasterError> {
-        Self::with(target, spec, compression, || Spool::beside(target))
+        Self::with(target, spec, compression, || {
+            Spool::temporary_beside(target)
+        })
     }
 
     /// Begins it, or goes on from `state`, with the packed tiles in the file `tiles`, which stays
@@ -83,7 +85,7 @@ impl CogWriter {
     ///
     /// # Errors
     /// As [`CogWriter::begin`]; fewer tiles in the file than the state tells of.
-    pub fn kept(
+    pub fn begin_resumable(
         target: &Path,
         spec: RasterSpec,
         compression: Compression,
@@ -91,7 +93,7 @@ impl CogWriter {
         state: Option<CogState>,
     ) -> Result<Self, RasterError> {
         let end = state.as_ref().map_or(0, |state| state.end);
-        let mut writer = Self::with(target, spec, compression, || Spool::kept(tiles, end))?;
+        let mut writer = Self::with(target, spec, compression, || Spool::reopen(tiles, end))?;
         if let Some(state) = state {
             writer.pyramid.go_on(state.waiting.into_owned());
             writer.stored = state.stored.into_owned();
@@ -106,7 +108,7 @@ impl CogWriter {
         spool: impl FnOnce() -> Result<Spool, WriteError>,
     ) -> Result<Self, RasterError> {
         let levels = spec.levels_to_one_tile();
-        let pyramid = Pyramid::new(spec, levels)?;
+        let pyramid = OverviewBuilder::new(spec, levels)?;
         compression.check(&spec)?;
         if target.is_dir() {
             let what = io::Error::other("it is a folder, and a file is to be written");
@@ -293,8 +295,8 @@ impl CogWriter {
                 Values::Short(vec![photometric]),
             ),
             (tag::PLANAR_CONFIGURATION, Values::Short(vec![CONTIGUOUS])),
-            (tag::TILE_WIDTH, Values::Short(vec![EDGE as u16])),
-            (tag::TILE_LENGTH, Values::Short(vec![EDGE as u16])),
+            (tag::TILE_WIDTH, Values::Short(vec![TILE_EDGE_PX as u16])),
+            (tag::TILE_LENGTH, Values::Short(vec![TILE_EDGE_PX as u16])),
             (tag::TILE_OFFSETS, Values::Long8(places.offsets)),
             (tag::TILE_BYTE_COUNTS, Values::Long(places.bytes)),
         ]
@@ -335,7 +337,7 @@ fn ghost(masked: bool) -> String {
 /// A tile between its leader, the number of its bytes, and its trailer, the last four of them;
 /// nothing if it is empty.
 fn write_block(writer: &mut impl Write, block: &[u8]) -> io::Result<()> {
-    let Some(last) = block.last_chunk::<{ FRAME as usize }>() else {
+    let Some(last) = block.last_chunk::<{ TILE_FRAME_BYTES as usize }>() else {
         return Ok(());
     };
     writer.write_all(&(block.len() as u32).to_le_bytes())?;

@@ -1,7 +1,9 @@
 //! How the tiles of a [`CogWriter`](super::CogWriter) are packed.
 
-use super::pyramid::LevelTile;
-use super::{EDGE, Nodata, RasterError, RasterSpec, RasterTile, SampleType, deflate, jpeg};
+use super::error::RasterError;
+use super::overviews::LevelTile;
+use super::spec::{Nodata, RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
+use super::{deflate, jpeg};
 use std::io;
 
 /// How the tiles of a [`CogWriter`](super::CogWriter) are packed.
@@ -55,7 +57,9 @@ impl Compression {
         }
         let image = match self {
             Self::Deflate => deflate::deflate(spec, pixels),
-            Self::Jpeg { quality } => jpeg::encode(spec, pixels, extent, [EDGE; 2], quality)?,
+            Self::Jpeg { quality } => {
+                jpeg::encode(spec, pixels, extent, [TILE_EDGE_PX; 2], quality)?
+            }
         };
         let mask = if self.masks(spec) {
             deflate::deflate_mask(spec, pixels)
@@ -70,7 +74,7 @@ impl Compression {
 fn is_nothing(spec: &RasterSpec, pixels: &[u8], [width, height]: [usize; 2]) -> bool {
     let bytes = spec.pixel_bytes();
     let mut rows = pixels
-        .chunks_exact(EDGE * bytes)
+        .chunks_exact(TILE_EDGE_PX * bytes)
         .take(height)
         .map(|row| &row[..width * bytes]);
     match (spec.samples, spec.nodata) {

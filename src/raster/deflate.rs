@@ -1,10 +1,10 @@
 //! Tiles without loss: a predictor, then deflate.
 
-use super::reduce::{Sample, is_full};
-use super::{EDGE, RasterSpec, SampleType};
+use super::downsample::{Sample, is_full};
+use super::spec::{RasterSpec, SampleType, TILE_EDGE_PX};
 
 /// Effort of [`miniz_oxide`], of 10.
-const LEVEL: u8 = 1;
+const DEFLATE_LEVEL: u8 = 1;
 
 /// How a TIFF's tag 317 calls what [`deflate`] does first.
 pub(super) fn predictor(samples: SampleType) -> u16 {
@@ -22,20 +22,20 @@ pub(super) fn deflate(spec: &RasterSpec, pixels: &[u8]) -> Vec<u8> {
     let n = spec.samples_per_pixel();
     match spec.samples {
         SampleType::U8 => fdeflate::compress_to_vec(&differences(pixels, n, u8_difference)),
-        SampleType::U16 => wide(&differences(pixels, n, u16_difference)),
-        SampleType::U32 => wide(&differences(pixels, n, u32_difference)),
-        SampleType::F32 => wide(&byte_planes(pixels, n)),
+        SampleType::U16 => deflate_repetitions(&differences(pixels, n, u16_difference)),
+        SampleType::U32 => deflate_repetitions(&differences(pixels, n, u32_difference)),
+        SampleType::F32 => deflate_repetitions(&byte_planes(pixels, n)),
     }
 }
 
-fn wide(bytes: &[u8]) -> Vec<u8> {
-    miniz_oxide::deflate::compress_to_vec_zlib(bytes, LEVEL)
+fn deflate_repetitions(bytes: &[u8]) -> Vec<u8> {
+    miniz_oxide::deflate::compress_to_vec_zlib(bytes, DEFLATE_LEVEL)
 }
 
 /// One bit per pixel of 8-bit samples, the highest first, that says whether its last sample, alpha,
 /// is more than 0; as a zlib stream.
 pub(super) fn deflate_mask(spec: &RasterSpec, pixels: &[u8]) -> Vec<u8> {
-    wide(&match spec.channels {
+    deflate_repetitions(&match spec.channels {
         1 => mask::<2>(pixels),
         _ => mask::<4>(pixels),
     })
@@ -45,10 +45,10 @@ pub(super) fn deflate_mask(spec: &RasterSpec, pixels: &[u8]) -> Vec<u8> {
 fn mask<const N: usize>(pixels: &[u8]) -> Vec<u8> {
     let (pixels, _) = pixels.as_chunks::<N>();
     let mut bits = Vec::with_capacity(pixels.len() / 8);
-    for row in pixels.chunks_exact(EDGE) {
+    for row in pixels.chunks_exact(TILE_EDGE_PX) {
         // Most rows are.
         if is_full(row) {
-            bits.resize(bits.len() + EDGE / 8, u8::MAX);
+            bits.resize(bits.len() + TILE_EDGE_PX / 8, u8::MAX);
             continue;
         }
         bits.extend(row.as_chunks::<8>().0.iter().map(|eight| {
@@ -78,7 +78,7 @@ fn differences<S: Sample, const B: usize>(
     difference: impl Fn(S, S) -> [u8; B],
 ) -> Vec<u8> {
     let mut predicted = vec![0; pixels.len()];
-    let row_bytes = EDGE * samples_per_pixel * B;
+    let row_bytes = TILE_EDGE_PX * samples_per_pixel * B;
     let pixel_bytes = samples_per_pixel * B;
     for (row, out) in pixels
         .chunks_exact(row_bytes)
@@ -103,7 +103,7 @@ fn differences<S: Sample, const B: usize>(
 /// weight of all its numbers first, and of these the differences.
 fn byte_planes(pixels: &[u8], samples_per_pixel: usize) -> Vec<u8> {
     let mut predicted = vec![0; pixels.len()];
-    let row_bytes = EDGE * samples_per_pixel * f32::BYTES;
+    let row_bytes = TILE_EDGE_PX * samples_per_pixel * f32::BYTES;
     let mut planes = vec![0; row_bytes];
     for (row, out) in pixels
         .chunks_exact(row_bytes)
@@ -111,7 +111,7 @@ fn byte_planes(pixels: &[u8], samples_per_pixel: usize) -> Vec<u8> {
     {
         for (i, sample) in row.chunks_exact(f32::BYTES).enumerate() {
             for (k, byte) in f32::read(sample).to_be_bytes().into_iter().enumerate() {
-                planes[k * EDGE * samples_per_pixel + i] = byte;
+                planes[k * TILE_EDGE_PX * samples_per_pixel + i] = byte;
             }
         }
         out.copy_from_slice(&planes);

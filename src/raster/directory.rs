@@ -62,7 +62,7 @@ pub(super) mod tag {
 pub(super) type Directory = Vec<(u16, Values)>;
 
 /// Most bytes of values that stand in the directory itself.
-const INLINE: usize = 8;
+const MAX_INLINE_BYTES: usize = 8;
 
 /// Header, `ghost` area and directories of a BigTIFF file. The places of the tiles come after all
 /// else: whoever reads a part of the file has all directories at once.
@@ -86,8 +86,8 @@ pub(super) fn encode(ghost: &str, directories: &[Directory]) -> Vec<u8> {
             out.extend(tag.to_le_bytes());
             out.extend(kind.to_le_bytes());
             out.extend((count as u64).to_le_bytes());
-            if bytes.len() <= INLINE {
-                bytes.resize(INLINE, 0);
+            if bytes.len() <= MAX_INLINE_BYTES {
+                bytes.resize(MAX_INLINE_BYTES, 0);
                 out.extend(bytes);
                 continue;
             }

@@ -1,8 +1,10 @@
 //! Deep Zoom: a folder of small pictures that a viewer in the browser reads without a server's
 //! help.
 
-use super::pyramid::{LevelTile, Pyramid, Waiting};
-use super::{EDGE, RasterError, RasterSpec, RasterTile, SampleType, jpeg};
+use super::error::RasterError;
+use super::jpeg;
+use super::overviews::{LevelTile, OverviewBuilder, Waiting};
+use super::spec::{RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
 use crate::persist::atomic::{self, StagedFolder, WriteError};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -27,13 +29,13 @@ pub enum DziFormat {
 }
 
 /// Writes a picture as Deep Zoom: `NAME.dzi` and the folder `NAME_files/LEVEL/COLUMN_ROW.jpg` or
-/// `.png`, from one pixel at level 0 to full resolution, in tiles of [`EDGE`] pixels without
+/// `.png`, from one pixel at level 0 to full resolution, in tiles of [`TILE_EDGE_PX`] pixels without
 /// overlap. 8-bit samples only.
 pub struct DziWriter {
     spec: RasterSpec,
     format: DziFormat,
     target: PathBuf,
-    pyramid: Pyramid,
+    pyramid: OverviewBuilder,
     levels: usize,
     folder: StagedFolder,
     /// Tiles written.
@@ -67,7 +69,7 @@ impl DziWriter {
     ///
     /// # Errors
     /// As [`DziWriter::begin`].
-    pub fn kept(
+    pub fn begin_resumable(
         target: &Path,
         spec: RasterSpec,
         format: DziFormat,
@@ -75,7 +77,7 @@ impl DziWriter {
         state: Option<DziState>,
     ) -> Result<Self, RasterError> {
         let mut writer = Self::with(target, spec, format, || {
-            StagedFolder::kept(&files_folder(target), folder)
+            StagedFolder::adopt(&files_folder(target), folder)
         })?;
         if let Some(state) = state {
             writer.pyramid.go_on(state.waiting.into_owned());
@@ -106,7 +108,7 @@ impl DziWriter {
         folder: impl FnOnce() -> Result<StagedFolder, WriteError>,
     ) -> Result<Self, RasterError> {
         let levels = spec.levels_to(1);
-        let pyramid = Pyramid::new(spec, levels)?;
+        let pyramid = OverviewBuilder::new(spec, levels)?;
         if let DziFormat::Jpeg { quality } = format {
             jpeg::check(&spec, quality)?;
         }
@@ -228,7 +230,7 @@ fn description(spec: &RasterSpec, format: DziFormat) -> String {
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
          <Image xmlns=\"http://schemas.microsoft.com/deepzoom/2008\" \
-         Format=\"{}\" Overlap=\"0\" TileSize=\"{EDGE}\">\
+         Format=\"{}\" Overlap=\"0\" TileSize=\"{TILE_EDGE_PX}\">\
          <Size Width=\"{}\" Height=\"{}\"/></Image>\n",
         format.extension(),
         spec.width,
@@ -240,7 +242,7 @@ fn description(spec: &RasterSpec, format: DziFormat) -> String {
 fn encode_png(spec: &RasterSpec, pixels: &[u8], extent: [usize; 2]) -> io::Result<Vec<u8>> {
     let [width, height] = extent;
     let bytes = spec.pixel_bytes();
-    let rows = pixels.chunks_exact(EDGE * bytes).take(height);
+    let rows = pixels.chunks_exact(TILE_EDGE_PX * bytes).take(height);
     let visible: Vec<&[u8]> = rows.map(|row| &row[..width * bytes]).collect();
     let visible = visible.concat();
     let colour = match (spec.channels, spec.alpha) {

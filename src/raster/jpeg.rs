@@ -1,7 +1,8 @@
 //! Tiles with loss.
 
-use super::{EDGE, RasterError, RasterSpec, SampleType};
-use crate::numerics::simd_dispatch::wide;
+use super::error::RasterError;
+use super::spec::{RasterSpec, SampleType, TILE_EDGE_PX};
+use crate::numerics::simd_dispatch::dispatch_simd;
 use jpeg_encoder::{ColorType, Encoder, EncodingError, ImageBuffer, JpegColorType, SamplingFactor};
 use std::io;
 
@@ -69,7 +70,7 @@ impl Rows<'_> {
     /// Adds the first `C` bytes of every pixel of a row; those of the last one again for the pixels
     /// that are not there.
     fn push<const C: usize>(&self, y: usize, out: &mut Vec<u8>) {
-        let start = y.min(self.extent[1] - 1) * EDGE * self.bytes;
+        let start = y.min(self.extent[1] - 1) * TILE_EDGE_PX * self.bytes;
         let there = self.extent[0].min(self.size[0]);
         let row = &self.pixels[start..][..there * self.bytes];
         let from = out.len();
@@ -88,7 +89,7 @@ impl Rows<'_> {
 
 /// The first `C` of the `B` bytes of every pixel.
 fn first_of<const B: usize, const C: usize>(row: &[u8], out: &mut [u8]) {
-    wide(
+    dispatch_simd(
         #[inline(always)]
         || {
             let out = out.as_chunks_mut::<C>().0;

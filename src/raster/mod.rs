@@ -1,13 +1,13 @@
 //! Pictures too large for memory, written tile by tile.
 //!
 //! ```text
-//!                      ┌─ Pyramid: overviews, reduced 2 × 2 on the way ─┐
+//!                      ┌─ OverviewBuilder: overviews, reduced 2 × 2 on the way ─┐
 //! RasterTile batches ──┤                                                ├──> CogWriter ──> NAME.tif
 //!  in any order        └─ tiles of all levels ──────────────────────────┘    DziWriter ──> NAME.dzi, NAME_files/
 //! ```
 //!
 //! A [`RasterSpec`] says what a pixel is and what *nothing* looks like in it; the picture then
-//! arrives as squares of [`EDGE`] pixels, each exactly once. A batch is reduced and compressed on
+//! arrives as squares of [`TILE_EDGE_PX`] pixels, each exactly once. A batch is reduced and compressed on
 //! all threads of the current rayon pool. The files do not depend on the order of the tiles, how
 //! they were batched, or the number of threads, to the byte.
 //!
@@ -19,7 +19,7 @@
 //!
 //! ```
 //! use tunnelstitch::raster::{
-//!     CogWriter, Compression, EDGE, RasterSpec, RasterTile, Reduce, SampleType,
+//!     CogWriter, Compression, TILE_EDGE_PX, RasterSpec, RasterTile, Reduce, SampleType,
 //! };
 //!
 //! let folder = tempfile::tempdir()?;
@@ -36,7 +36,7 @@
 //! let path = folder.path().join("wall.tif");
 //! let mut writer = CogWriter::begin(&path, spec, Compression::Deflate)?;
 //! for column in 0..2 {
-//!     let pixels = vec![128; EDGE * EDGE];
+//!     let pixels = vec![128; TILE_EDGE_PX * TILE_EDGE_PX];
 //!     writer.add(vec![RasterTile { column, row: 0, pixels }])?;
 //! }
 //! writer.finish()?;
@@ -48,11 +48,11 @@ mod cog;
 mod compression;
 mod deflate;
 mod directory;
+mod downsample;
 mod dzi;
 mod error;
 mod jpeg;
-mod pyramid;
-mod reduce;
+mod overviews;
 mod spec;
 mod spool;
 #[cfg(test)]
@@ -63,5 +63,7 @@ pub use compression::Compression;
 pub use dzi::{DziFormat, DziState, DziWriter, files_folder};
 pub use error::RasterError;
 pub(crate) use jpeg::compress as compress_jpeg;
-pub(crate) use pyramid::{LevelTile, Pyramid};
-pub use spec::{EDGE, Georeference, Nodata, RasterSpec, RasterTile, Reduce, SampleType, TileOrder};
+pub(crate) use overviews::{LevelTile, OverviewBuilder};
+pub use spec::{
+    Georeference, Nodata, RasterSpec, RasterTile, Reduce, SampleType, TILE_EDGE_PX, TileOrder,
+};

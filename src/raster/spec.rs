@@ -1,9 +1,9 @@
 //! What a raster is: its size, its pixels and its place.
 
-use super::RasterError;
+use super::error::RasterError;
 
 /// Columns and rows of a tile, pixels.
-pub const EDGE: usize = 512;
+pub const TILE_EDGE_PX: usize = 512;
 
 /// The numbers that pixels are made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,7 +95,7 @@ pub struct RasterSpec {
     pub georeference: Option<Georeference>,
 }
 
-/// A square of [`EDGE`] × [`EDGE`] pixels.
+/// A square of [`TILE_EDGE_PX`] × [`TILE_EDGE_PX`] pixels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RasterTile {
     /// Column in the grid of tiles, from the left.
@@ -144,7 +144,7 @@ impl RasterSpec {
 
     /// Bytes of a tile.
     pub fn tile_bytes(&self) -> usize {
-        EDGE * EDGE * self.pixel_bytes()
+        TILE_EDGE_PX * TILE_EDGE_PX * self.pixel_bytes()
     }
 
     /// Bytes of a pixel.
@@ -159,7 +159,8 @@ impl RasterSpec {
 
     /// Columns and rows of tiles at `level`.
     pub(crate) fn grid(&self, level: usize) -> [u32; 2] {
-        self.size(level).map(|side| side.div_ceil(EDGE as u32))
+        self.size(level)
+            .map(|side| side.div_ceil(TILE_EDGE_PX as u32))
     }
 
     /// Tiles of `level`.
@@ -182,13 +183,15 @@ impl RasterSpec {
     /// Columns and rows of a tile that are within the picture.
     pub(super) fn extent(&self, level: usize, column: u32, row: u32) -> [usize; 2] {
         let [width, height] = self.size(level);
-        let within = |side: u32, place: u32| (side as usize - place as usize * EDGE).min(EDGE);
+        let within = |side: u32, place: u32| {
+            (side as usize - place as usize * TILE_EDGE_PX).min(TILE_EDGE_PX)
+        };
         [within(width, column), within(height, row)]
     }
 
     /// Levels until one has both sides within a tile.
     pub(crate) fn levels_to_one_tile(&self) -> usize {
-        self.levels_to(EDGE as u32)
+        self.levels_to(TILE_EDGE_PX as u32)
     }
 
     /// Levels until one has no side longer than `side` pixels, at least 1.

@@ -1,7 +1,7 @@
 //! Packed tiles on disk until their order is known.
 
 use super::compression::Packed;
-use crate::persist::atomic::{ScratchFolder, WriteError, beside};
+use crate::persist::atomic::{ScratchFolder, WriteError, parent_folder};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -27,8 +27,8 @@ pub(super) struct Stored {
 
 impl Spool {
     /// An empty one beside `target`, for a while.
-    pub(super) fn beside(target: &Path) -> Result<Self, WriteError> {
-        let folder = ScratchFolder::inside(beside(target))?;
+    pub(super) fn temporary_beside(target: &Path) -> Result<Self, WriteError> {
+        let folder = ScratchFolder::inside(parent_folder(target))?;
         let path = folder.path().join("tiles");
         let file = File::options()
             .read(true)
@@ -44,7 +44,7 @@ impl Spool {
     }
 
     /// The one in the file `path`, which stays, as far as `end`; what is beyond is dropped.
-    pub(super) fn kept(path: &Path, end: u64) -> Result<Self, WriteError> {
+    pub(super) fn reopen(path: &Path, end: u64) -> Result<Self, WriteError> {
         let fail = |source| WriteError::new(path, source);
         let mut options = File::options();
         let options = options.read(true).write(true).create(true).truncate(false);

@@ -1,6 +1,6 @@
 //! Pictures for the tests of rasters.
 
-use super::{EDGE, RasterSpec, RasterTile, Reduce, SampleType};
+use super::spec::{RasterSpec, RasterTile, Reduce, SampleType, TILE_EDGE_PX};
 
 /// 8-bit grey with alpha, overviews by the mean.
 pub(super) fn grey_alpha(width: u32, height: u32) -> RasterSpec {
@@ -54,9 +54,9 @@ pub(super) fn tiles(spec: &RasterSpec) -> Vec<RasterTile> {
             let bytes = spec.pixel_bytes();
             for y in 0..height {
                 for x in 0..width {
-                    let place = (y * EDGE + x) * bytes;
+                    let place = (y * TILE_EDGE_PX + x) * bytes;
                     let (column, row) = (column as usize, row as usize);
-                    let pixel = pixel(spec, column * EDGE + x, row * EDGE + y);
+                    let pixel = pixel(spec, column * TILE_EDGE_PX + x, row * TILE_EDGE_PX + y);
                     pixels[place..][..bytes].copy_from_slice(&pixel);
                 }
             }

@@ -2,13 +2,13 @@
 
 use crate::camera::Camera;
 use crate::frames::FrameSet;
-use crate::surface::{Patches, Surface};
+use crate::surface::{Surface, WallRegions};
 use crate::survey::{CalibrateSection, Survey};
 use crate::trajectory::{Jitter, Shutter, StampedPose};
 use std::f64::consts::TAU;
 
 /// No part of the wall.
-static NOTHING: Patches = Patches::NONE;
+static NOTHING: WallRegions = WallRegions::NONE;
 
 /// Frames with initial poses, the camera that took them, and the tunnel that they show.
 ///
@@ -28,7 +28,7 @@ pub struct RefineInput<'a> {
     /// When the rows of each frame are read.
     pub shutter: Shutter,
     /// Parts of the wall at which frames are not compared.
-    pub ignored: &'a Patches,
+    pub ignored: &'a WallRegions,
     /// Shared parameters to estimate besides the poses, and their priors.
     pub calibrate: CalibrateSection,
     /// Radius of the tunnel, or half its width, as given; metres.

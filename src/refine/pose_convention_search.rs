@@ -45,7 +45,7 @@ pub fn search_pose_conventions(survey: &Survey) -> Result<Vec<String>, SurveyErr
     let silent: Arc<dyn Progress> = Arc::new(Silent);
     let mut fitting = Vec::new();
     let (tried, mut fewest) = (tried(survey), usize::MAX);
-    for (flags, reading) in survey.readings(tried)? {
+    for (flags, reading) in survey.pose_convention_variants(tried)? {
         // All frames of a short survey have been refined as given.
         let is_known = flags.is_empty() && survey.frames.len() <= tried;
         if is_known || flags.len() > fewest {

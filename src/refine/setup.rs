@@ -135,7 +135,7 @@ fn calibration_of(
     } else {
         Calibration::new(groups, section, &input.camera, initial)
     };
-    let is_straight_and_round = input.surface.gauge().freedoms() == 2;
+    let is_straight_and_round = input.surface.gauge().degrees_of_freedom() == 2;
     for (group, unknown) in [
         (CalibrationGroup::Radius, "the radius"),
         (CalibrationGroup::Axis, "the axis"),

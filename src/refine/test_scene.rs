@@ -9,7 +9,7 @@ use crate::refine::parameters::calibration::{Calibration, Kappa};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::samples::visibility::PosedFrame;
 use crate::refine::tiles::grid::WallGrid;
-use crate::surface::{Circle, Footprint, Patches};
+use crate::surface::{Circle, Footprint, WallRegions};
 use crate::test_wall::TestWall;
 use crate::trajectory::{Jitter, JitterModel, Pose, Shutter, spiral};
 use std::sync::LazyLock;
@@ -31,7 +31,7 @@ pub fn prior(initial: &[Pose]) -> Prior {
 }
 
 /// All rows at once.
-static NOWHERE: Patches = Patches::NONE;
+static NOWHERE: WallRegions = WallRegions::NONE;
 static GLOBAL: LazyLock<Shutter> = LazyLock::new(Shutter::default);
 
 /// The wall with frames without noise, nothing but poses and exposures unknown.

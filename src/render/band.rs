@@ -4,7 +4,7 @@ use super::draw::NO_FRAME;
 use super::plan::BAND_ROWS;
 use super::sample::{Sample, Samples};
 use super::{Canvas, PixelFormat, RenderError, Tile};
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::super_resolve::Region;
 
 /// A stretch of the canvas, all around and some rows along.
@@ -170,7 +170,7 @@ fn put<T: Sample>(pixel: &mut [T], channel: usize, grey: f32) {
 /// Which pixels of `N` samples have an alpha.
 fn alpha<T: Sample, const N: usize>(samples: &[T]) -> Vec<bool> {
     let pixels = samples.as_chunks::<N>().0;
-    wide(
+    dispatch_simd(
         #[inline(always)]
         || {
             let alpha = pixels.iter().map(|pixel| pixel[N - 1] != T::default());

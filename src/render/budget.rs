@@ -125,7 +125,7 @@ fn most_in_a_band(canvas: &Canvas, placements: &[Placement]) -> usize {
     let mut steps = vec![0i64; count + 1];
     for placement in placements {
         let pixel_m = band_m / f64::from(BAND_ROWS);
-        let footprint = placement.footprint.widened_to_be_sure(pixel_m);
+        let footprint = placement.footprint.widened_conservatively(pixel_m);
         let last = (count - 1) as f64;
         steps[band(footprint.h_min_m).clamp(0.0, last) as usize] += 1;
         steps[band(footprint.h_max_m).clamp(0.0, last) as usize + 1] -= 1;

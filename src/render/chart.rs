@@ -381,7 +381,7 @@ mod tests {
             nu_m: [0.0, -0.002, 0.001].into(),
         };
         rest.into_iter()
-            .chain(rest.map(|camera| camera.sweeping(&sweep)))
+            .chain(rest.map(|camera| camera.with_sweep(&sweep)))
             .collect()
     }
 
@@ -431,14 +431,15 @@ mod tests {
                     for k in 0..width {
                         let x_c = placement.pose.to_camera(&exact[row * width + k]);
                         let pixel = camera.project(&x_c);
-                        let there = pixel.is_some_and(|pixel| camera.sees(&pixel, 0.0));
+                        let there = pixel.is_some_and(|pixel| camera.is_in_image(&pixel, 0.0));
                         let (u, v) = (f64::from(run.pixels().0[k]), f64::from(run.pixels().1[k]));
-                        let Some(pixel) = pixel.filter(|pixel| camera.sees(pixel, -1.0)) else {
+                        let Some(pixel) = pixel.filter(|pixel| camera.is_in_image(pixel, -1.0))
+                        else {
                             assert!(!run.seen()[k]);
                             continue;
                         };
                         // At the very border rounding decides.
-                        if camera.sees(&pixel, 2e-3) || !camera.sees(&pixel, -2e-3) {
+                        if camera.is_in_image(&pixel, 2e-3) || !camera.is_in_image(&pixel, -2e-3) {
                             assert_eq!(run.seen()[k], there, "{camera:?} {pixel}");
                         }
                         if there {

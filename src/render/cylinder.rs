@@ -142,7 +142,7 @@ fn unroll<T: Sample, const C: usize>(
             for (column, pixel) in out.chunks_exact_mut(C + 1).enumerate() {
                 let u_hat = (origin[0] + column as i64) as f64;
                 let seen = from_cylinder(camera, u_hat, v_hat)
-                    .filter(|[u, v]| camera.sees(&nalgebra::Vector2::new(*u, *v), -1e-9));
+                    .filter(|[u, v]| camera.is_in_image(&nalgebra::Vector2::new(*u, *v), -1e-9));
                 if let Some([u, v]) = seen {
                     let value = photo.at(u as f32, v as f32, kernel);
                     for (sample, value) in pixel.iter_mut().take(C).zip(value) {

@@ -165,7 +165,7 @@ fn channels<T: Sample>(picture: &Picture, samples: &[T], response: Response) -> 
                 .enumerate()
                 .map(|(k, sample)| {
                     let (u, v) = (k % width, k / width);
-                    let hidden = picture.mask().is_some_and(|mask| !mask.shows(u, v));
+                    let hidden = picture.mask().is_some_and(|mask| !mask.is_wall(u, v));
                     if hidden || *sample == black || *sample == white {
                         return f32::NAN;
                     }

@@ -27,7 +27,7 @@ use super::sample::Sample;
 use super::thumbnails::Thumbnails;
 use super::{Canvas, Placement};
 use crate::frames::{Agreement, MAD_TO_SIGMA, SHADING_TERMS, Shading};
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::surface::Surface;
 use faer::Side;
 use faer::prelude::Solve;
@@ -200,7 +200,7 @@ impl Response<'_> {
         let [a, b, c] = light.row(row);
         let bias = self.bias;
         let values = &mut run.values_mut()[columns.clone()];
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 for (column, value) in columns.clone().zip(values.iter_mut()) {
@@ -227,7 +227,7 @@ impl Response<'_> {
             return;
         };
         let last_column = columns.end.saturating_sub(1);
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 // Light changes so slowly that it is looked up at the ends of short steps only.

@@ -42,7 +42,7 @@ fn least_stretch(camera: &Camera, pose: &Pose, point: &WallFrame) -> f64 {
 pub(super) fn px_per_metre(camera: &Camera, pose: &Pose, point: &WallFrame) -> Option<f64> {
     let pixel = camera.project(&pose.to_camera(&point.x_w))?;
     camera
-        .sees(&pixel, -ROUNDING_PX)
+        .is_in_image(&pixel, -ROUNDING_PX)
         .then(|| least_stretch(camera, pose, point))
 }
 
@@ -62,7 +62,7 @@ pub fn sightings(
         let x_c = pose.to_camera(&point.x_w);
         let pixel = camera
             .project(&x_c)
-            .filter(|pixel| camera.sees(pixel, -ROUNDING_PX))
+            .filter(|pixel| camera.is_in_image(pixel, -ROUNDING_PX))
             .filter(|pixel| {
                 mask.is_none_or(|mask| mask.is_clear(pixel.x as f32, pixel.y as f32, 0.0))
             })?;

@@ -139,7 +139,7 @@ impl Map {
             georeference: Some(georeference(&self.grid, layout)),
         };
         let mut writer = CogWriter::begin(path, spec, Compression::Deflate)?;
-        let edge = crate::raster::EDGE as u32;
+        let edge = crate::raster::TILE_EDGE_PX as u32;
         for row in 0..height.div_ceil(edge) {
             let tiles = (0..width.div_ceil(edge)).map(|column| {
                 let pixels = (0..edge * edge).flat_map(|k| {

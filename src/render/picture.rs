@@ -3,8 +3,8 @@
 use super::integer::PADDING;
 use super::kernel::Kernel;
 use super::sample::{Sample, Samples};
-use crate::frames::HalvedMask;
-use crate::numerics::simd_dispatch::wide;
+use crate::frames::PyramidMask;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use image::{ColorType, DynamicImage};
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,7 @@ pub struct Picture {
     /// [`PADDING`] samples more than there are: pixels are read several at once.
     samples: Samples,
     /// Which pixels show the wall; all if there is none.
-    mask: Option<HalvedMask>,
+    mask: Option<PyramidMask>,
 }
 
 impl Picture {
@@ -49,12 +49,12 @@ impl Picture {
     }
 
     /// The picture of which only what `mask` says shows the wall.
-    pub fn masked(self, mask: Option<HalvedMask>) -> Self {
+    pub fn masked(self, mask: Option<PyramidMask>) -> Self {
         Self { mask, ..self }
     }
 
     /// Which pixels show the wall; all if there is none.
-    pub(super) fn mask(&self) -> Option<&HalvedMask> {
+    pub(super) fn mask(&self) -> Option<&PyramidMask> {
         self.mask.as_ref()
     }
 
@@ -167,7 +167,7 @@ impl Picture {
             // Down the columns first, side by side.
             for row in 0..edge {
                 let row = &samples[(y * edge + row) * self.width * c..][..width * edge * c];
-                wide(
+                dispatch_simd(
                     #[inline(always)]
                     || {
                         for (sum, sample) in sums.iter_mut().zip(row) {

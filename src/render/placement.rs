@@ -19,7 +19,7 @@ pub struct Placement {
 impl Placement {
     /// The frames' camera with the motion of this one.
     pub fn camera(&self, camera: &Camera) -> Camera {
-        camera.sweeping(&self.sweep)
+        camera.with_sweep(&self.sweep)
     }
 }
 
@@ -41,7 +41,7 @@ pub fn place(
             Ok(Placement {
                 pose: *pose,
                 sweep,
-                footprint: Footprint::trace(surface, &camera.sweeping(&sweep), pose)
+                footprint: Footprint::trace(surface, &camera.with_sweep(&sweep), pose)
                     .map_err(|source| RenderError::Frame { frame, source })?,
             })
         })

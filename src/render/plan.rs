@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Rows of a band: those of a raster's tiles.
-pub const BAND_ROWS: u32 = crate::raster::EDGE as u32;
+pub const BAND_ROWS: u32 = crate::raster::TILE_EDGE_PX as u32;
 
 /// How frames become a panorama.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

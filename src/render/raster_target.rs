@@ -6,8 +6,8 @@ use super::sample::Samples;
 use super::{Canvas, Layout, PixelFormat, RenderError};
 use crate::persist::atomic::WriteError;
 use crate::raster::{
-    CogState, CogWriter, Compression, DziFormat, DziState, DziWriter, EDGE, Georeference, Nodata,
-    RasterError, RasterSpec, RasterTile, Reduce, SampleType, TileOrder,
+    CogState, CogWriter, Compression, DziFormat, DziState, DziWriter, Georeference, Nodata,
+    RasterError, RasterSpec, RasterTile, Reduce, SampleType, TILE_EDGE_PX, TileOrder,
 };
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -63,7 +63,7 @@ impl RasterTarget {
     /// them.
     ///
     /// # Errors
-    /// As [`CogWriter::kept`].
+    /// As [`CogWriter::begin_resumable`].
     pub fn cog(
         path: &Path,
         canvas: &Canvas,
@@ -78,14 +78,14 @@ impl RasterTarget {
             Some(RasterState::Cog(state)) => Some(state),
             _ => None,
         };
-        let writer = CogWriter::kept(path, spec, compression, &kept.place, state)?;
+        let writer = CogWriter::begin_resumable(path, spec, compression, &kept.place, state)?;
         Ok(Self::new(layer, layout, &spec, Writer::Cog(writer)))
     }
 
     /// A Deep Zoom picture of the panorama.
     ///
     /// # Errors
-    /// As [`DziWriter::kept`].
+    /// As [`DziWriter::begin_resumable`].
     pub fn dzi(
         path: &Path,
         canvas: &Canvas,
@@ -100,7 +100,7 @@ impl RasterTarget {
             Some(RasterState::Dzi(state)) => Some(state),
             _ => None,
         };
-        let writer = DziWriter::kept(path, spec, dzi, &kept.place, state)?;
+        let writer = DziWriter::begin_resumable(path, spec, dzi, &kept.place, state)?;
         Ok(Self::new(layer, layout, &spec, Writer::Dzi(writer)))
     }
 
@@ -153,21 +153,21 @@ impl RasterTarget {
     fn tile(&self, canvas: &Canvas, band: &Band, pixels: &[u8], place: usize) -> RasterTile {
         let p = self.pixel_bytes;
         let columns = canvas.columns as usize;
-        let first = place * EDGE;
-        let count = EDGE.min(columns - first);
-        let mut tile = vec![0; EDGE * EDGE * p];
+        let first = place * TILE_EDGE_PX;
+        let count = TILE_EDGE_PX.min(columns - first);
+        let mut tile = vec![0; TILE_EDGE_PX * TILE_EDGE_PX * p];
         for row in 0..band.rows as usize {
             let source = &pixels[row * columns * p..][..columns * p];
             match self.layout {
                 Layout::ThetaRight => {
-                    tile[row * EDGE * p..][..count * p]
+                    tile[row * TILE_EDGE_PX * p..][..count * p]
                         .copy_from_slice(&source[first * p..][..count * p]);
                 }
                 // Chainage to the right, the last column on top.
                 Layout::ChainageRight => {
                     for y in 0..count {
                         let column = columns - 1 - first - y;
-                        tile[(y * EDGE + row) * p..][..p]
+                        tile[(y * TILE_EDGE_PX + row) * p..][..p]
                             .copy_from_slice(&source[column * p..][..p]);
                     }
                 }
@@ -207,7 +207,7 @@ impl Target for RasterTarget {
 
     fn put(&mut self, canvas: &Canvas, band: &Band) -> Result<(), RenderError> {
         let pixels = self.bytes(band);
-        let places = (canvas.columns as usize).div_ceil(EDGE);
+        let places = (canvas.columns as usize).div_ceil(TILE_EDGE_PX);
         let tiles = (0..places)
             .into_par_iter()
             .map(|place| self.tile(canvas, band, &pixels, place))

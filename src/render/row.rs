@@ -3,7 +3,7 @@
 use super::draw::NO_FRAME;
 use super::run::{RUN, Run};
 use super::sample::Sample;
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use std::ops::Range;
 
 /// Weighted sums of values, column by column.
@@ -106,7 +106,7 @@ impl Row {
     ) {
         let (sums, weights) = (&self.sums[columns.clone()], &self.weights[columns.clone()]);
         let corrections = &corrections[columns];
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 let means = sums.iter().zip(weights).zip(corrections);

@@ -6,7 +6,7 @@ use super::kernel::Kernel;
 use super::picture::Picture;
 use super::sample::{Sample, Samples, WHOLE};
 use super::warp::{Look, Points};
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use std::ops::Range;
 
 /// Most points of a run: all that is known of a run stays in the first-level cache.
@@ -82,7 +82,7 @@ impl Run {
         let seen = &mut self.seen[..count];
         look.project_all(points, start, (u, v, seen));
         let limit = look.limit();
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 for k in 0..count {
@@ -109,7 +109,7 @@ impl Run {
             self.v.as_chunks_mut::<EIGHT>().0,
         );
         let seen = self.seen.as_chunks_mut::<EIGHT>().0;
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 // The closure's own, here and in [`Run::address`]: of what it borrows, loops are
@@ -241,7 +241,7 @@ impl Run {
         );
         let missing = integer::missing(kernel.taps());
         let scale = integer::scale(kernel.taps());
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 for (value, sum) in values.iter_mut().zip(sums) {
@@ -293,7 +293,7 @@ impl Run {
     ) {
         let all_inside = self.address(picture, kernel, Kernel::PHASES, columns.clone());
         let stride = picture.width() * C;
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 let columns = columns.clone();
@@ -345,7 +345,7 @@ impl Run {
         let [across, down] = &mut self.phases;
         let across = across.as_chunks_mut::<EIGHT>().0;
         let down = down.as_chunks_mut::<EIGHT>().0;
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 let (width, right, bottom) = (width, right, bottom);

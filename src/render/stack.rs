@@ -2,7 +2,7 @@
 
 use super::{Picture, PixelFormat, RenderError};
 use crate::camera::Camera;
-use crate::frames::{FrameFile, FrameSet, HalvedMask, colour_type, load_colour};
+use crate::frames::{FrameFile, FrameSet, PyramidMask, colour_type, load_colour};
 use crate::progress::Progress;
 use rayon::prelude::*;
 
@@ -171,7 +171,7 @@ impl FrameStack {
         }
         let [width, height] = self.full_size;
         let decoded = load_colour(&self.files[frame], width, height)?;
-        let mask = self.files.mask().cloned().map(HalvedMask::of);
+        let mask = self.files.mask().cloned().map(PyramidMask::new);
         let mut picture = Picture::from_decoded(decoded)
             .widened(self.format)
             .masked(mask);

@@ -93,7 +93,7 @@ pub(super) fn tiles_at(
         among
             .filter(|frame| {
                 let footprint = &placements[*frame].footprint;
-                let around = footprint.widened_to_be_sure(pixel_m);
+                let around = footprint.widened_conservatively(pixel_m);
                 around.overlaps(&tile, perimeter_m)
             })
             .collect::<Vec<usize>>()
@@ -145,7 +145,7 @@ mod tests {
                 let seen = points.iter().any(|x_w| {
                     camera
                         .project(&pose.to_camera(x_w))
-                        .is_some_and(|pixel| camera.sees(&pixel, 0.0))
+                        .is_some_and(|pixel| camera.is_in_image(&pixel, 0.0))
                 });
                 assert!(!seen || tile.frames.contains(&frame));
             }

@@ -1,7 +1,7 @@
 //! From wall points into a frame.
 
-use crate::camera::{Bend, Camera, SingleLens};
-use crate::numerics::simd_dispatch::wide;
+use crate::camera::{Camera, LensF32, ProjectF32};
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Vector3};
 
@@ -59,7 +59,7 @@ pub struct Look {
     centre: [f32; 3],
     focal: [f32; 2],
     principal: [f32; 2],
-    lens: SingleLens,
+    lens: LensF32,
     limit: [f32; 2],
 }
 
@@ -73,7 +73,7 @@ impl Look {
             centre: pose.to_camera(origin).cast().into(),
             focal: [camera.fx as f32, camera.fy as f32],
             principal: [camera.cx as f32, camera.cy as f32],
-            lens: SingleLens::new(camera),
+            lens: LensF32::new(camera),
             limit: [(camera.width - 1) as f32, (camera.height - 1) as f32],
         }
     }
@@ -94,16 +94,16 @@ impl Look {
     /// the lens, within the picture or not) hold.
     pub fn project_all(&self, points: &Points, start: usize, (u, v, shown): Pixels) {
         match self.lens {
-            SingleLens::Straight(lens) => self.project_through(lens, points, start, u, v, shown),
-            SingleLens::Brown(lens) => self.project_through(lens, points, start, u, v, shown),
-            SingleLens::Fisheye(lens) => self.project_through(lens, points, start, u, v, shown),
-            SingleLens::RollingStraight(lens) => {
+            LensF32::Pinhole(lens) => self.project_through(lens, points, start, u, v, shown),
+            LensF32::BrownConrady(lens) => self.project_through(lens, points, start, u, v, shown),
+            LensF32::KannalaBrandt(lens) => self.project_through(lens, points, start, u, v, shown),
+            LensF32::RollingPinhole(lens) => {
                 self.project_through(lens, points, start, u, v, shown);
             }
-            SingleLens::RollingBrown(lens) => {
+            LensF32::RollingBrownConrady(lens) => {
                 self.project_through(lens, points, start, u, v, shown);
             }
-            SingleLens::RollingFisheye(lens) => {
+            LensF32::RollingKannalaBrandt(lens) => {
                 self.project_through(lens, points, start, u, v, shown);
             }
         }
@@ -111,7 +111,7 @@ impl Look {
 
     fn project_through(
         &self,
-        lens: impl Bend,
+        lens: impl ProjectF32,
         points: &Points,
         start: usize,
         u: &mut [f32],
@@ -125,7 +125,7 @@ impl Look {
             &points.z[start..][..count],
         );
         let (v, shown) = (&mut v[..count], &mut shown[..count]);
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 for k in 0..count {
@@ -137,12 +137,12 @@ impl Look {
 
     /// Where a point appears, and whether the lens shows it.
     #[inline(always)]
-    fn project(&self, lens: impl Bend, [x, y, z]: [f32; 3]) -> (f32, f32, bool) {
+    fn project(&self, lens: impl ProjectF32, [x, y, z]: [f32; 3]) -> (f32, f32, bool) {
         let [a, b, c]: [f32; 3] = std::array::from_fn(|row| {
             let r = &self.r_cw[row];
             self.centre[row] + (r[0] * x + r[1] * y + r[2] * z)
         });
-        let (p, q, shown) = lens.bend(a, b, c);
+        let (p, q, shown) = lens.project_f32(a, b, c);
         let u = self.focal[0] * p + self.principal[0];
         let v = self.focal[1] * q + self.principal[1];
         (u, v, shown)

@@ -4,7 +4,7 @@ use super::band::{Band, RUN};
 use super::tunnel::{Place, Rays, Tunnel};
 use crate::camera::Camera;
 use crate::frames::GreyImage;
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
@@ -45,7 +45,7 @@ pub(super) fn cast(
         // All of some pixels' points lie close together on the wall.
         for (n, pixels) in row.chunks_mut(RUN).enumerate() {
             let first = n * RUN;
-            wide(
+            dispatch_simd(
                 #[inline(always)]
                 || {
                     for down in &points {
@@ -202,7 +202,7 @@ fn cast_line(rays: &Rays, camera: &Camera, pose: &Pose, v: f64) -> Line {
     let column = |k: usize| k as f64 / CELLS as f64 - 0.5;
     let mut line = Line::default();
     // Without distortion rays move evenly along a row.
-    if let (true, Some(first)) = (camera.lens.is_straight(), camera.ray(0.0, v)) {
+    if let (true, Some(first)) = (camera.lens.is_distortion_free(), camera.ray(0.0, v)) {
         let first = pose.r_wc * first;
         let right = pose.r_wc * Vector3::x() / camera.fx;
         for k in 0..corners {

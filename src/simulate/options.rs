@@ -224,7 +224,7 @@ impl SimulateOptions {
             "the focal lengths must be positive, and the field of view below 180 degrees",
         )?;
         check(
-            camera.shown_share() > 0.0,
+            camera.visible_fraction() > 0.0,
             "the lens must show some of the picture",
         )?;
         check(

@@ -251,7 +251,7 @@ impl Scene {
         let options = &self.options;
         let pose = |v: f64| self.path.at_row(frame, (v + 0.5) / f64::from(times) - 0.5);
         let (camera, points) = (
-            self.camera.finer(times),
+            self.camera.upsampled(times),
             options.supersample.div_ceil(times),
         );
         let wall = cast(band, &self.tunnel, &camera, pose, points);
@@ -326,7 +326,7 @@ fn reach(
             let r_wc = path.at_row(frame, row).r_wc;
             let x_c = r_wc.inverse_transform_vector(&axis);
             if let Some(pixel) = camera.project(&x_c)
-                && camera.sees(&pixel, -1.0)
+                && camera.is_in_image(&pixel, -1.0)
             {
                 return Err(too_far);
             }

@@ -111,7 +111,7 @@ impl Tunnel {
         let Some(line) = line else {
             return *point;
         };
-        let h_m = line.refined(point, h_m);
+        let h_m = line.refine_chainage_m(point, h_m);
         let at = line.at(h_m);
         let arm = at.frame.inverse_transform_vector(&(point - at.point)) / at.scale;
         Vector3::new(arm.x, h_m, arm.z)

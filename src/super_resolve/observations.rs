@@ -1,7 +1,7 @@
 //! What the frames read of a region.
 
 use super::footprints::Footprints;
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 
 /// What a pixel says of the wall.
 #[derive(Clone, Copy, Debug, Default)]
@@ -58,7 +58,7 @@ impl<'a> Observations<'a> {
     /// Adds `Wᵀ Ω W x` to y.
     pub fn add_to(&self, x: &[f32], y: &mut [f32]) {
         for (stencils, omega) in self.footprints.views.iter().zip(&self.omega) {
-            wide(
+            dispatch_simd(
                 #[inline(always)]
                 || stencils.add_normal(omega, x, y),
             );

@@ -1,7 +1,7 @@
 //! What is known of a wall before a pixel is seen: how rough it is.
 
 use super::huber;
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use std::f64::consts::PI;
 
 /// Fine pixels over which an edge is expected to go on as it is, along the axes.
@@ -89,7 +89,7 @@ impl Roughness {
         let taps = DIFFERENCES[kind];
         let [columns, rows] = starts(self.columns, self.rows, taps);
         out.fill(0.0);
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 for row in 0..rows {
@@ -142,7 +142,7 @@ impl Roughness {
             let strength = self.strengths[kind] as f32;
             let weights = &self.weights[kind];
             let [columns, rows] = starts(self.columns, self.rows, taps);
-            wide(
+            dispatch_simd(
                 #[inline(always)]
                 || {
                     for (d, w) in scratch.iter_mut().zip(weights) {

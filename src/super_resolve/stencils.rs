@@ -1,7 +1,7 @@
 //! What pixels read of fine pixels, as sparse rows of a matrix.
 
 use super::Region;
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 
 /// Fine pixels along the side of a stencil, at the most: a pixel that looks so obliquely that its
 /// footprint is wider tells little of the wall's detail, and is left out.
@@ -80,7 +80,7 @@ impl Stencils {
             [column, row]
         };
         let mut weights = vec![0.0; spots.len() * width * height];
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 let stencils = weights.chunks_exact_mut(width * height);

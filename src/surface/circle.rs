@@ -1,6 +1,9 @@
 //! The circular tunnel `x² + z² = r²`.
 
-use super::{Gauge, Hit, Surface, SurfaceError, WallFrame, WallPoint};
+use super::error::{SurfaceError, check_size};
+use super::gauge::Gauge;
+use super::shape::Surface;
+use super::wall::{Hit, WallFrame, WallPoint};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -14,12 +17,12 @@ pub struct Circle {
 }
 
 impl Circle {
-    /// A tunnel of the given radius (metres).
+    /// Creates a tunnel of the given radius (metres).
     ///
     /// # Errors
     /// [`SurfaceError::Size`] unless the radius is positive and finite.
     pub fn new(radius_m: f64) -> Result<Self, SurfaceError> {
-        super::check_size("radius_m", radius_m)?;
+        check_size("radius_m", radius_m)?;
         Ok(Self { radius_m })
     }
 
@@ -30,12 +33,12 @@ impl Circle {
 }
 
 impl Surface for Circle {
-    /// Solves `a λ² + 2 b λ + c = 0` with `a = c1² + c3²`, `b = c1 t_x + c3 t_z`,
-    /// `c = t_x² + t_z² − r²` for a ray `d = (c1, c2, c3)`: `λ = (−b + √(b² − a c)) / a`.
+    /// Intersects the ray by solving `a λ² + 2 b λ + c = 0` with `a = c1² + c3²`,
+    /// `b = c1 t_x + c3 t_z`, `c = t_x² + t_z² − r²` for a ray `d = (c1, c2, c3)`:
+    /// `λ = (−b + √(b² − a c)) / a`.
     ///
-    /// From inside `c < 0`, so the discriminant `b² − a c` is positive and the + root is the wall
-    /// ahead. For `b > 0` the same root is computed as `−c / (b + √(b² − a c))`, which does not
-    /// cancel.
+    /// Inside, `c < 0`, so the discriminant `b² − a c` is positive and the + root is the wall
+    /// ahead. For `b > 0` this root is computed as `−c / (b + √(b² − a c))`, without cancellation.
     ///
     /// Source: arXiv 1806.10278, Section IV (whose printed discriminant lacks the square on b).
     fn hit(&self, t: &Vector3<f64>, d: &Vector3<f64>) -> Result<Hit, SurfaceError> {
@@ -76,7 +79,7 @@ impl Surface for Circle {
         }
     }
 
-    /// One sine and cosine a column.
+    /// Computes one sine and cosine per column.
     fn lattice(&self, s_m: &[f64], h_m: &[f64], points: &mut Vec<Vector3<f64>>) {
         points.clear();
         for &h_m in h_m.iter().take(1) {
@@ -130,15 +133,17 @@ mod tests {
         /// Pixel → wall → pixel for a camera anywhere inside, turned any way.
         #[test]
         fn pixel_to_wall_to_pixel_is_the_identity(
-            radius in 0.1f64..20.0, share in 0.0f64..0.99, around in 0.0f64..TAU, chainage in -1e3f64..1e3,
+            radius in 0.1f64..20.0, share in 0.0f64..0.99, around in 0.0f64..TAU,
+            chainage in -1e3f64..1e3,
             turn in vector(-3.0..3.0), u in 0.0f64..639.0, v in 0.0f64..479.0,
         ) {
             let circle = Circle::new(radius).unwrap();
             let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
-            let t = Vector3::new(share * radius * around.sin(), chainage, share * radius * around.cos());
+            let off = share * radius;
+            let t = Vector3::new(off * around.sin(), chainage, off * around.cos());
             let pose = Pose::new(so3::exp(&turn), t);
             let ray = pose.r_wc * camera.ray(u, v).unwrap();
-            // Rays nearly along the axis meet the wall too far away to be told apart.
+            // Rays nearly along the axis meet the wall too far away to be distinguished.
             prop_assume!(ray.x.hypot(ray.z) > 0.02 * ray.norm());
             let hit = circle.hit(&pose.t_wc, &ray).unwrap();
             prop_assert!(hit.range > 0.0);
@@ -150,7 +155,10 @@ mod tests {
         }
 
         #[test]
-        fn a_camera_outside_is_a_typed_error(radius in 0.1f64..20.0, factor in 1.0f64..5.0, around in 0.0f64..TAU, d in vector(-1.0..1.0)) {
+        fn a_camera_outside_is_a_typed_error(
+            radius in 0.1f64..20.0, factor in 1.0f64..5.0, around in 0.0f64..TAU,
+            d in vector(-1.0..1.0),
+        ) {
             let circle = Circle::new(radius).unwrap();
             let t = Vector3::new(around.sin(), 0.0, around.cos()) * (radius * factor * (1.0 + 1e-12));
             let outside = matches!(circle.hit(&t, &d), Err(SurfaceError::CameraOutside { .. }));
@@ -158,7 +166,9 @@ mod tests {
         }
 
         #[test]
-        fn the_frame_holds_the_derivatives_of_the_point(radius in 0.1f64..20.0, s in -50.0f64..50.0, h in -50.0f64..50.0) {
+        fn the_frame_holds_the_derivatives_of_the_point(
+            radius in 0.1f64..20.0, s in -50.0f64..50.0, h in -50.0f64..50.0,
+        ) {
             let circle = Circle::new(radius).unwrap();
             let frame = circle.frame(WallPoint { s_m: s, h_m: h });
             let step = 1e-5 * radius;

@@ -1,6 +1,6 @@
-//! How the wall point of a fixed pixel moves when the pose moves.
+//! Jacobians of the wall point of a fixed pixel with respect to the pose and the intrinsics.
 
-use super::WallFrame;
+use super::wall::WallFrame;
 use crate::camera::Camera;
 use crate::trajectory::{Pose, so3};
 use nalgebra::{Matrix2x5, Matrix2x6, Vector3};
@@ -8,14 +8,14 @@ use nalgebra::{Matrix2x5, Matrix2x6, Vector3};
 /// `∂(s, h)/∂ξ` of the wall point seen through a fixed pixel, for `ξ = (ω, ρ)` of
 /// [`Pose::retract`].
 ///
-/// The pixel's ray meets the wall at `x_w = t + λ R d_c`. Moving the pose moves that point by
+/// The pixel's ray meets the wall at `x_w = t + λ R d_c`. A change of the pose moves that point by
 /// `e_s δs + e_h δh = m + δλ d`, where `m = ρ + R (ω × x_c) = ρ − R [x_c]ₓ ω` and `d = x_w − t`.
 /// The dual vectors `a = e_h × d` and `b = d × e_s` are orthogonal to the unknown `δλ d`, so
 ///
 /// `δs = a·m / a·e_s`,  `δh = b·m / b·e_h`.
 ///
-/// No assumption on the shape enters: any surface with tangents will do. Rows: s, h (metres);
-/// columns: ω (radians), ρ (metres). The result is not finite where the ray grazes the wall.
+/// The equations hold for any surface with tangents. Rows: s, h (metres); columns: ω (radians), ρ
+/// (metres). The result is not finite where the ray grazes the wall.
 pub fn wall_jacobian(pose: &Pose, wall: &WallFrame) -> Matrix2x6<f64> {
     let d = wall.x_w - pose.t_wc;
     let x_c: Vector3<f64> = pose.r_wc.inverse_transform_vector(&d);
@@ -39,9 +39,9 @@ pub fn wall_jacobian(pose: &Pose, wall: &WallFrame) -> Matrix2x6<f64> {
 /// a fixed pixel.
 ///
 /// With `π(x_c, κ)` the pixel, a point on its ray moves across by `∂x_c = −J⁺ ∂π/∂κ`,
-/// `J = ∂π/∂x_c`, `J⁺ = Jᵀ (J Jᵀ)⁻¹`, when κ changes, and the wall as if the camera had moved so:
-/// `C = A_ρ R ∂x_c`, with `A_ρ` the last three columns of `a` ([`wall_jacobian`]). Rows: s, h
-/// (metres).
+/// `J = ∂π/∂x_c`, `J⁺ = Jᵀ (J Jᵀ)⁻¹`, when κ changes, and the wall point as for a translation of
+/// the camera: `C = A_ρ R ∂x_c`, with `A_ρ` the last three columns of `a` ([`wall_jacobian`]).
+/// Rows: s, h (metres).
 pub fn lens_jacobian(
     pose: &Pose,
     a: &Matrix2x6<f64>,
@@ -50,7 +50,7 @@ pub fn lens_jacobian(
 ) -> Matrix2x5<f64> {
     let r_wc = pose.r_wc.to_rotation_matrix();
     let j = camera.project_jacobian(x_c);
-    // Singular only where the lens's picture folds.
+    // Singular only where the distortion is not invertible.
     let square = (j * j.transpose()).try_inverse().unwrap_or_default();
     let moved = j.transpose() * square * -camera.intrinsics_jacobian(x_c);
     a.fixed_columns::<3>(3) * (r_wc.matrix() * moved)
@@ -59,7 +59,8 @@ pub fn lens_jacobian(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{Circle, Surface};
+    use crate::surface::circle::Circle;
+    use crate::surface::shape::Surface;
     use nalgebra::Vector6;
 
     #[test]

@@ -1,19 +1,21 @@
-//! The part of the wall that a frame sees.
+//! Footprints of frames on the wall.
 
-use super::{Surface, SurfaceError};
+use super::error::SurfaceError;
+use super::shape::Surface;
 use crate::camera::Camera;
 use crate::trajectory::Pose;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
-/// Rays along each edge of a frame. The box of the curved outline is short by the sagitta of one
-/// step: about 0.01 px for a 640 px wide frame.
-const STEPS_PER_EDGE: usize = 64;
+/// Rays along each edge of a frame. The bounding box of the curved outline is too small by the
+/// sagitta of one step: about 0.01 px for a frame 640 px wide.
+const SAMPLES_PER_EDGE: usize = 64;
 
-/// Steps from the middle of a frame to its first corner, to follow `s` without losing a turn.
-const STEPS_TO_CORNER: usize = 16;
+/// Rays from the centre of a frame to its first corner, along which `s` is unwrapped.
+const SAMPLES_TO_CORNER: usize = 16;
 
-/// The shortest way around: `Δs − P round(Δs / P)`, in `[−P/2, P/2]` metres.
+/// Wraps a difference of arc lengths to the shortest: `Δs − P round(Δs / P)`, in `[−P/2, P/2]`
+/// metres.
 pub fn shortest_arc(delta_s_m: f64, perimeter_m: f64) -> f64 {
     delta_s_m - perimeter_m * (delta_s_m / perimeter_m).round()
 }
@@ -35,15 +37,15 @@ pub struct Footprint {
 }
 
 impl Footprint {
-    /// Traces the frame's border on the wall, through the outermost pixel centres.
+    /// Traces the frame's border, through the outermost pixel centres, on the wall.
     ///
-    /// Pixel → wall is one-to-one and smooth, so `s` and `h` take their extremes on the frame's
-    /// border.
+    /// The map from pixel to wall is smooth and injective, so `s` and `h` take their extremes on
+    /// the frame's border.
     ///
     /// # Errors
     /// A camera outside the tunnel; [`SurfaceError::Parallel`] for a border pixel that looks along
     /// the axis; [`SurfaceError::LooksAlongTheAxis`] if the axis's vanishing point lies within the
-    /// picture.
+    /// image.
     pub fn trace(
         surface: &dyn Surface,
         camera: &Camera,
@@ -55,17 +57,17 @@ impl Footprint {
             let start = pose.to_world(&camera.origin(pixel.y));
             surface.hit(&start, &(pose.r_wc * ray)).map(|hit| hit.wall)
         };
-        let border = camera.border(STEPS_PER_EDGE, 0.0);
+        let border = camera.border(SAMPLES_PER_EDGE, 0.0);
         let middle = 0.5 * Vector2::new(f64::from(camera.width - 1), f64::from(camera.height - 1));
-        // `s` near the point before, so that no turn is lost on the way to the corner and around.
+        // Unwraps `s` towards the previous point, so that no turn is lost.
         let follow = |s_m: f64, before_m: f64| before_m + shortest_arc(s_m - before_m, perimeter_m);
         let inward = |error| match error {
             SurfaceError::Parallel => SurfaceError::LooksAlongTheAxis,
             other => other,
         };
         let mut s_m = wall(&middle).map_err(inward)?.s_m;
-        for step in 1..STEPS_TO_CORNER {
-            let pixel = middle + (border[0] - middle) * (step as f64 / STEPS_TO_CORNER as f64);
+        for step in 1..SAMPLES_TO_CORNER {
+            let pixel = middle + (border[0] - middle) * (step as f64 / SAMPLES_TO_CORNER as f64);
             s_m = follow(wall(&pixel).map_err(inward)?.s_m, s_m);
         }
         s_m = follow(wall(&border[0])?.s_m, s_m);
@@ -76,7 +78,7 @@ impl Footprint {
             h_min_m: f64::INFINITY,
             h_max_m: f64::NEG_INFINITY,
         };
-        // Once around and back to the first point.
+        // Once around, back to the first point.
         for pixel in border.iter().chain(&border[..1]) {
             let point = wall(pixel)?;
             s_m = follow(point.s_m, s_m);
@@ -91,10 +93,10 @@ impl Footprint {
         Ok(footprint)
     }
 
-    /// The same for any view, but no farther than `reach_m` along the tunnel from the camera.
+    /// Traces the footprint of any view, cut off at `reach_m` along the tunnel from the camera.
     ///
-    /// A frame that holds the tunnel's vanishing point sees all the way around, and wall without
-    /// end: its box is the whole section on both sides of the camera, as far as the reach.
+    /// A frame that contains the tunnel's vanishing point sees the full circumference without end:
+    /// its box covers all of `s` on both sides of the camera, up to the reach.
     ///
     /// # Errors
     /// [`SurfaceError::CameraOutside`], [`SurfaceError::NotFinite`].
@@ -126,7 +128,7 @@ impl Footprint {
         }
     }
 
-    /// True if the two share some wall; turns around the tunnel do not count.
+    /// True if the two boxes intersect, modulo turns around the tunnel.
     pub fn overlaps(&self, other: &Self, perimeter_m: f64) -> bool {
         if self.h_min_m > other.h_max_m || other.h_min_m > self.h_max_m {
             return false;
@@ -136,15 +138,15 @@ impl Footprint {
             || behind + other.s_max_m - other.s_min_m >= perimeter_m
     }
 
-    /// The box with so much more on every side that it holds all that the frame sees and `pixel_m`
-    /// around it, metres: the box comes from single rays, and 2 % of its size cover what bulges
-    /// between them.
-    pub fn widened_to_be_sure(&self, pixel_m: f64) -> Self {
+    /// The box enlarged so that it certainly contains the frame's footprint and `pixel_m` (metres)
+    /// around it: the box is traced by single rays, and 2 % of its size cover the outline between
+    /// them.
+    pub fn widened_conservatively(&self, pixel_m: f64) -> Self {
         let span_m = (self.s_max_m - self.s_min_m).max(self.h_max_m - self.h_min_m);
         self.widened(pixel_m + 0.02 * span_m)
     }
 
-    /// The box with `margin_m` more on every side, metres.
+    /// The box enlarged by `margin_m` on every side, metres.
     pub fn widened(&self, margin_m: f64) -> Self {
         Self {
             s_min_m: self.s_min_m - margin_m,
@@ -158,7 +160,7 @@ impl Footprint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Circle;
+    use crate::surface::circle::Circle;
     use crate::trajectory::{so3, spiral};
     use nalgebra::Vector3;
     use std::f64::consts::TAU;
@@ -179,7 +181,7 @@ mod tests {
         let half_angle = (camera.cx / camera.fx).atan();
         assert!((footprint.s_max_m - 3.0 * half_angle).abs() < 1e-9);
         assert!((footprint.s_min_m + 3.0 * half_angle).abs() < 1e-9);
-        // The middle of the upper edge is the farthest up: h = −r cy/f, met within the sagitta.
+        // The middle of the upper edge has the smallest h = −r cy/f, reached within the sagitta.
         let h_m = 3.0 * camera.cy / camera.fy;
         assert!((footprint.h_max_m - h_m).abs() < 1e-9 && (footprint.h_min_m + h_m).abs() < 1e-9);
     }
@@ -239,13 +241,13 @@ mod tests {
         let trace = |camera: &Camera, pose: &Pose| Footprint::trace(&circle, camera, pose);
         let along = facing(Vector3::x() * (-TAU / 4.0));
         assert_eq!(trace(&camera, &along), Err(SurfaceError::LooksAlongTheAxis));
-        // The vanishing point within the picture, on no ray that is traced.
+        // The vanishing point is within the image, but on no traced ray.
         let nearly = facing(Vector3::x() * (0.13 - TAU / 4.0));
         assert_eq!(
             trace(&camera, &nearly),
             Err(SurfaceError::LooksAlongTheAxis)
         );
-        // The middle of the upper edge exactly along the axis.
+        // The middle of the upper edge lies exactly along the axis.
         let mut odd = camera;
         (odd.width, odd.cx) = (641, 320.0);
         let tilt = facing(Vector3::x() * (TAU / 4.0 - (camera.cy / camera.fy).atan()));

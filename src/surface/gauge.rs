@@ -1,8 +1,7 @@
-//! What no picture of the wall can tell: the motions that map the tunnel onto itself.
+//! Gauge freedoms: the rigid motions that map the tunnel onto itself, which images cannot observe.
 
-use super::{Surface, wall_jacobian};
 use crate::trajectory::{Pose, so3};
-use nalgebra::{UnitQuaternion, Vector2, Vector3, Vector6};
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// A directed line in the world.
@@ -15,7 +14,7 @@ pub struct Axis {
 }
 
 impl Default for Axis {
-    /// The world's y axis: that of a straight tunnel.
+    /// The world's y axis, the axis of a straight tunnel.
     fn default() -> Self {
         Self {
             point: Vector3::zeros(),
@@ -30,28 +29,28 @@ impl Axis {
     }
 }
 
-/// The rigid motions that leave a tunnel's shape unchanged. Moving all poses by one of them changes
-/// no picture, so they are fixed by the prior and removed (and only they) before errors are
-/// computed.
+/// The rigid motions that leave a tunnel's shape unchanged. Applied to all poses, they change no
+/// image; the prior fixes them, and exactly they are removed before errors are computed.
 ///
-/// They turn about an axis and shift along it: a straight round tunnel allows both, a straight one
-/// of another section the shift, a straight round one whose radius changes the turn, a bend of
-/// constant curvature the turn about the bend's own axis (which goes along the tunnel), a helix a
-/// turn with the shift of its pitch.
+/// They rotate about an axis and translate along it. A straight round tunnel allows both, a
+/// straight one of another section the translation, a straight round one of varying radius the
+/// rotation, a bend of constant curvature the rotation about the bend's axis (a motion along the
+/// tunnel), a helix the screw motion of its pitch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gauge {
     /// The axis.
     pub axis: Axis,
-    /// Turning about it; it shifts by `pitch_m` at the same time.
+    /// True if the rotation about the axis is free; it includes a translation by `pitch_m` per
+    /// radian.
     pub turn: bool,
-    /// Shift that goes with a turn, metres a radian.
+    /// Translation coupled to the rotation, metres per radian.
     pub pitch_m: f64,
-    /// Shifting along it, by itself.
+    /// True if the translation along the axis is free by itself.
     pub shift: bool,
 }
 
 impl Gauge {
-    /// That of a straight round tunnel along the world's y axis.
+    /// The gauge of a straight round tunnel along the world's y axis.
     pub fn round() -> Self {
         Self {
             turn: true,
@@ -60,7 +59,7 @@ impl Gauge {
         }
     }
 
-    /// That of any other straight tunnel along the world's y axis.
+    /// The gauge of any other straight tunnel along the world's y axis.
     pub fn straight() -> Self {
         Self {
             shift: true,
@@ -68,13 +67,13 @@ impl Gauge {
         }
     }
 
-    /// How many freedoms there are.
-    pub fn freedoms(&self) -> usize {
+    /// Number of gauge freedoms.
+    pub fn degrees_of_freedom(&self) -> usize {
         usize::from(self.turn) + usize::from(self.shift)
     }
 
-    /// The steps `ξ` ([`Pose::retract`]) by which `pose` moves along each freedom, per radian and
-    /// per metre: `(Rᵀn, n × (t − p) + pitch n)` for the turn about the axis through p along n and
+    /// The tangent vectors `ξ` ([`Pose::retract`]) of `pose` along each freedom, per radian and per
+    /// metre: `(Rᵀn, n × (t − p) + pitch n)` for the turn about the axis through p along n and
     /// `(0, n)` for the shift.
     pub fn directions(&self, pose: &Pose) -> Vec<Vector6<f64>> {
         let Axis { point, direction } = self.axis;
@@ -91,7 +90,7 @@ impl Gauge {
         directions
     }
 
-    /// The motion by `turn_rad` and `shift_m`, as far as they are free.
+    /// The gauge motion by `turn_rad` and `shift_m`; components that are not free are zero.
     pub fn motion(&self, turn_rad: f64, shift_m: f64) -> GaugeMotion {
         let turn_rad = if self.turn { turn_rad } else { 0.0 };
         let shift_m = if self.shift { shift_m } else { 0.0 };
@@ -102,15 +101,15 @@ impl Gauge {
         }
     }
 
-    /// The motion that best carries `from` onto `to`, pose by pose, in closed form.
+    /// The gauge motion that best aligns `from` to `to`, in closed form.
     ///
     /// Turn: the α that minimises `Σ |R_to − R_n(α) R_from|²`. With `M = Σ R_to R_fromᵀ` and the
     /// axis n, `α = atan2(nᵀ(M − Mᵀ)ᵛ, tr M − nᵀ M n)`. Shift: the mean difference of `nᵀt`.
-    /// Freedoms that the shape does not have stay zero.
+    /// Components that are not free are zero.
     ///
-    /// Where only the turn is free, it may go along the tunnel, and then positions tell it better
-    /// than rotations do: the sum has `Σ |t_to − R_n(α) t_from|²` across the axis, too, a radian
-    /// counting as much as a metre.
+    /// If only the rotation is free, it may move cameras along the tunnel, where positions
+    /// determine it better than rotations: the cost then includes `Σ |t_to − R_n(α) t_from|²`
+    /// across the axis, with one radian weighted like one metre.
     pub fn align(&self, from: &[Pose], to: &[Pose]) -> GaugeMotion {
         let Axis {
             point,
@@ -143,47 +142,12 @@ impl Gauge {
     }
 }
 
-/// The part of a displacement `(Δs, Δh)` of the wall, metres, that the gauge can make, and the
-/// motion that makes it.
-///
-/// On a straight tunnel a turn moves the wall along s and a shift along h. A turn that is free by
-/// itself moves it in one direction, the same everywhere: as at the point that the camera at `pose`
-/// looks at.
-pub fn free_part(
-    surface: &dyn Surface,
-    pose: &Pose,
-    moved: &Vector2<f64>,
-) -> (Vector2<f64>, GaugeMotion) {
-    let gauge = surface.gauge();
-    if gauge.turn && !gauge.shift {
-        let hit = surface.hit(&pose.t_wc, &(pose.r_wc * Vector3::z())).ok();
-        let per_radian = hit.map(|hit| {
-            let wall = surface.frame(hit.wall);
-            wall_jacobian(pose, &wall) * gauge.directions(pose)[0]
-        });
-        let per_radian = per_radian.unwrap_or_default();
-        let square = per_radian.norm_squared();
-        let turn_rad = if square > 0.0 {
-            per_radian.dot(moved) / square
-        } else {
-            0.0
-        };
-        return (per_radian * turn_rad, gauge.motion(turn_rad, 0.0));
-    }
-    let radius_m = surface.perimeter_m() / std::f64::consts::TAU;
-    let motion = gauge.motion(moved.x / radius_m, moved.y);
-    (
-        Vector2::new(motion.turn_rad * radius_m, motion.shift_m),
-        motion,
-    )
-}
-
-/// A motion along the gauge: a turn about the axis, then a shift along it.
+/// A gauge motion: a rotation about the axis, then a translation along it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GaugeMotion {
-    /// Turn about the axis, radians.
+    /// Rotation about the axis, radians.
     pub turn_rad: f64,
-    /// Shift along the axis, metres.
+    /// Translation along the axis, metres.
     pub shift_m: f64,
     /// The axis.
     #[serde(default, skip_serializing_if = "Axis::is_default")]
@@ -200,7 +164,7 @@ impl GaugeMotion {
         }
     }
 
-    /// Whether it moves nothing.
+    /// True for the identity.
     pub fn is_none(&self) -> bool {
         self.turn_rad == 0.0 && self.shift_m == 0.0
     }
@@ -247,7 +211,9 @@ impl GaugeMotion {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{Circle, Surface, wall_jacobian};
+    use crate::surface::circle::Circle;
+    use crate::surface::displacement::wall_jacobian;
+    use crate::surface::shape::Surface;
     use proptest::prelude::*;
 
     fn poses() -> Vec<Pose> {

@@ -1,24 +1,27 @@
-//! A straight tunnel of any section.
+//! Straight tunnels of any section.
 
+use super::error::SurfaceError;
+use super::gauge::Gauge;
 use super::section::Section;
-use super::{Gauge, Hit, Surface, SurfaceError, WallFrame, WallPoint};
+use super::shape::Surface;
+use super::wall::{Hit, WallFrame, WallPoint};
 use nalgebra::{Vector2, Vector3};
 
-/// A section moved along the world's y axis: the wall point is `(x(s), h, z(s))`.
+/// A section extruded along the world's y axis: the wall point is `(x(s), h, z(s))`.
 #[derive(Debug)]
 pub struct Prism {
     section: Box<dyn Section>,
 }
 
 impl Prism {
-    /// The tunnel of a section.
+    /// Creates the tunnel of a section.
     pub fn new(section: Box<dyn Section>) -> Self {
         Self { section }
     }
 }
 
 impl Surface for Prism {
-    /// Along the axis nothing changes: the section's own hit, of the ray seen along the axis.
+    /// Intersects the section with the ray projected along the axis.
     fn hit(&self, t: &Vector3<f64>, d: &Vector3<f64>) -> Result<Hit, SurfaceError> {
         if !d.iter().all(|v| v.is_finite()) {
             return Err(SurfaceError::NotFinite);
@@ -49,7 +52,7 @@ impl Surface for Prism {
         }
     }
 
-    /// One point of the outline a column.
+    /// Evaluates one point of the outline per column.
     fn lattice(&self, s_m: &[f64], h_m: &[f64], points: &mut Vec<Vector3<f64>>) {
         let outline: Vec<Vector2<f64>> =
             s_m.iter().map(|s_m| self.section.at(*s_m).point).collect();

@@ -1,11 +1,15 @@
-//! A curved tunnel: a section carried along a centreline.
+//! Curved tunnels: a section swept along a centreline.
 
+use super::centreline::{Centreline, CentrelineFrame};
+use super::error::SurfaceError;
+use super::gauge::{Axis, Gauge};
 use super::section::Section;
-use super::{Axis, Centreline, Gauge, Hit, Station, Surface, SurfaceError, WallFrame, WallPoint};
+use super::shape::Surface;
+use super::wall::{Hit, WallFrame, WallPoint};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector2, Vector3, Vector6};
 
-/// A section of size `g(h)` moved along a line `c(h)` with frames `Q(h)`: the wall point is
+/// A section of scale `g(h)` swept along a line `c(h)` with frames `Q(h)`: the wall point is
 /// `X(s, h) = c + Q (g x(s), 0, g z(s))`.
 ///
 /// Source: W. Wang, B. Jüttler, D. Zheng, Y. Liu, "Computation of rotation minimizing frames", ACM
@@ -17,25 +21,26 @@ pub struct Swept {
     gauge: Gauge,
 }
 
-/// Steps of a ray over the distance from the axis to the wall, where it has not come close to the
-/// wall.
-const STEP: f64 = 0.25;
-/// A ray that has met no wall after so many is taken to run along the tunnel.
-const STEPS: usize = 4000;
-/// A motion moves the wall along itself if it moves it off itself by no more than this share.
-const SAME: f64 = 1e-4;
-/// Sections that are looked at, and points of each, to find such motions.
-const LOOKED_AT: (usize, usize) = (60, 24);
+/// Step along a ray relative to the distance from the axis to the wall, while the ray is not close
+/// to the wall.
+const RAY_STEP: f64 = 0.25;
+/// Largest number of steps along a ray; a ray that has not met the wall by then counts as parallel
+/// to the tunnel.
+const MAX_RAY_STEPS: usize = 4000;
+/// Largest ratio of normal to total displacement of the wall for a gauge motion.
+const GAUGE_TOLERANCE: f64 = 1e-4;
+/// Sections, and points of each, at which gauge motions are tested.
+const GAUGE_SAMPLES: (usize, usize) = (60, 24);
 
 impl Swept {
-    /// The tunnel of a section along a line.
+    /// Creates the tunnel of a section along a line.
     pub fn new(section: Box<dyn Section>, line: Centreline) -> Self {
         let mut swept = Self {
             section,
             line,
             gauge: Gauge::default(),
         };
-        swept.gauge = swept.found_gauge();
+        swept.gauge = swept.find_gauge();
         swept
     }
 
@@ -44,13 +49,13 @@ impl Swept {
         &self.line
     }
 
-    /// A point in the section's frame at a station, of the nominal size: x and z of `Qᵀ(p − c)/g`.
-    fn local(at: &Station, point: &Vector3<f64>) -> Vector2<f64> {
+    /// Converts a point to the section's frame at nominal scale: x and z of `Qᵀ(p − c)/g`.
+    fn local(at: &CentrelineFrame, point: &Vector3<f64>) -> Vector2<f64> {
         let arm = at.frame.inverse_transform_vector(&(point - at.point)) / at.scale;
         Vector2::new(arm.x, arm.z)
     }
 
-    fn frame_at(&self, at: &Station, s_m: f64) -> WallFrame {
+    fn frame_at(&self, at: &CentrelineFrame, s_m: f64) -> WallFrame {
         let outline = self.section.at(s_m);
         let arm = Vector3::new(outline.point.x, 0.0, outline.point.y);
         let tangent = Vector3::new(outline.tangent.x, 0.0, outline.tangent.y);
@@ -62,8 +67,8 @@ impl Swept {
         }
     }
 
-    /// The unknowns of `X(s, h) = t + λ d` by Newton's method from close by; None if they run away.
-    fn settled(
+    /// Solves `X(s, h) = t + λ d` by Newton's method from a nearby start; None if it diverges.
+    fn intersect_newton(
         &self,
         t: &Vector3<f64>,
         d: &Vector3<f64>,
@@ -85,8 +90,8 @@ impl Swept {
                 return (range > 0.0).then_some(Hit { range, x_w, wall });
             }
             last = distance;
-            // Corners of the outline and steep views: no farther than a part of the section at
-            // once.
+            // Steps are limited to a fraction of the section, for corners of the outline and
+            // grazing views.
             let shortened = (0.2 * size_m / step.fixed_rows::<2>(0).norm()).min(1.0);
             wall.s_m += shortened * step.x;
             wall.h_m += shortened * step.y;
@@ -95,16 +100,16 @@ impl Swept {
         None
     }
 
-    /// The motions that leave the wall where it is: those `(ω, u)` whose velocity `ω × X + u` has
-    /// no part along the wall's normal anywhere.
+    /// Determines the gauge numerically: the motions `(ω, u)` whose velocity `ω × X + u` has no
+    /// component along the wall's normal anywhere.
     ///
     /// With `a = (X × n, n)`, metres in multiples of the tunnel's size, they are the null vectors
     /// of `Σ a aᵀ`.
-    fn found_gauge(&self) -> Gauge {
+    fn find_gauge(&self) -> Gauge {
         let length_m = self.line.length_m();
         let middle = self.line.at(0.5 * length_m).point;
         let unit_m = (0.5 * length_m).max(self.section.farthest_m());
-        let (sections, points) = LOOKED_AT;
+        let (sections, points) = GAUGE_SAMPLES;
         let mut normal = Matrix6::zeros();
         for k in 0..sections {
             let at = self.line.at((k as f64 + 0.5) / sections as f64 * length_m);
@@ -119,10 +124,10 @@ impl Swept {
         }
         let eigen = SymmetricEigen::new(normal / (sections * points) as f64);
         let free: Vec<Vector6<f64>> = (0..6)
-            .filter(|k| eigen.eigenvalues[*k] < SAME * SAME)
+            .filter(|k| eigen.eigenvalues[*k] < GAUGE_TOLERANCE * GAUGE_TOLERANCE)
             .map(|k| eigen.eigenvectors.column(k).into_owned())
             .collect();
-        // As rotation (radians) and velocity (metres) of the world about its origin.
+        // Rotation (radians) and velocity (metres) of the world about its origin.
         let screw = |twist: &Vector6<f64>| {
             let omega: Vector3<f64> = twist.fixed_rows::<3>(0).into_owned() / unit_m;
             let velocity: Vector3<f64> = twist.fixed_rows::<3>(3).into_owned();
@@ -133,7 +138,7 @@ impl Swept {
             [twist] => {
                 let (omega, velocity) = screw(twist);
                 let rate = omega.norm();
-                if rate * unit_m < SAME {
+                if rate * unit_m < GAUGE_TOLERANCE {
                     return Gauge {
                         axis: Axis {
                             point: middle,
@@ -153,7 +158,7 @@ impl Swept {
                     shift: false,
                 }
             }
-            // A straight round tunnel, wherever it lies.
+            // A straight round tunnel in any pose.
             _ => Gauge {
                 axis: Axis {
                     point: middle,
@@ -166,8 +171,8 @@ impl Swept {
 }
 
 impl Surface for Swept {
-    /// Walks along the ray, step by step as if the tunnel went on straight from there, until it is
-    /// outside, and closes in by Newton's method.
+    /// Marches along the ray, each step as if the tunnel continued straight, until the ray is
+    /// outside, and refines the intersection by Newton's method.
     fn hit(&self, t: &Vector3<f64>, d: &Vector3<f64>) -> Result<Hit, SurfaceError> {
         if !d.iter().all(|v| v.is_finite()) {
             return Err(SurfaceError::NotFinite);
@@ -177,12 +182,12 @@ impl Surface for Swept {
         if speed <= 0.0 {
             return Err(SurfaceError::Parallel);
         }
-        let most = STEP * self.section.farthest_m() / speed;
+        let most = RAY_STEP * self.section.farthest_m() / speed;
         let mut range = 0.0;
         let mut h_m = self.chainage_m(t);
-        for _ in 0..STEPS {
+        for _ in 0..MAX_RAY_STEPS {
             let point = t + d * range;
-            h_m = self.line.refined(&point, h_m);
+            h_m = self.line.refine_chainage_m(&point, h_m);
             let at = self.line.at(h_m);
             let (local, ray) = (
                 Self::local(&at, &point),
@@ -193,13 +198,13 @@ impl Surface for Swept {
             let steep = across.norm_squared() <= 1e-18 * ray.norm_squared();
             let straight = match (inside, steep) {
                 (true, false) => self.section.hit(&local, &across),
-                // Just outside: the wall is where the way from the axis meets it.
+                // Just outside: the start is the wall point in the direction from the axis.
                 _ => {
                     let s_m = self.section.hit(&Vector2::zeros(), &local).s_m;
                     let wall = WallPoint { s_m, h_m };
                     if !inside {
                         return self
-                            .settled(t, d, wall, range)
+                            .intersect_newton(t, d, wall, range)
                             .ok_or(SurfaceError::Parallel);
                     }
                     range += most * at.scale;
@@ -211,7 +216,7 @@ impl Surface for Swept {
                     s_m: straight.s_m,
                     h_m: h_m + straight.range * ray.y * at.scale / at.velocity.norm(),
                 };
-                if let Some(hit) = self.settled(t, d, wall, range + straight.range) {
+                if let Some(hit) = self.intersect_newton(t, d, wall, range + straight.range) {
                     return Ok(hit);
                 }
             }
@@ -224,7 +229,7 @@ impl Surface for Swept {
         self.frame_at(&self.line.at(wall.h_m), wall.s_m)
     }
 
-    /// One point of the outline a column, one station a row.
+    /// Evaluates one point of the outline per column and one centreline frame per row.
     fn lattice(&self, s_m: &[f64], h_m: &[f64], points: &mut Vec<Vector3<f64>>) {
         let outline: Vec<Vector3<f64>> = (s_m.iter())
             .map(|s_m| self.section.at(*s_m).point)

@@ -1,6 +1,6 @@
 //! Which pose belongs to which frame.
 
-use super::SurveyError;
+use super::error::SurveyError;
 use crate::frames::FrameFile;
 use crate::trajectory::{PoseEntry, PoseFile, StampedPose, Trajectory, se3};
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,7 @@ pub const TIME_TOLERANCE_S: f64 = 0.01;
 
 /// How poses are found by time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct ByTime {
+pub(super) struct TimeAssociation {
     /// The nearest pose may be this far from the frame, seconds.
     pub tolerance_s: f64,
     /// Whether a frame between two poses takes the one on the way between them.
@@ -143,7 +143,7 @@ pub(super) fn by_time(
     file: &PoseFile,
     frames: &[FrameFile],
     times_s: &[f64],
-    how: ByTime,
+    how: TimeAssociation,
 ) -> Result<Trajectory, SurveyError> {
     let fail = |what: String| SurveyError::Association {
         path: file.path.clone(),
@@ -250,7 +250,7 @@ mod tests {
     #[test]
     fn times_find_the_nearest_or_the_way_between() {
         let file = file(&["", "", ""]);
-        let how = |interpolate| ByTime {
+        let how = |interpolate| TimeAssociation {
             tolerance_s: 0.5,
             interpolate,
         };

@@ -1,23 +1,23 @@
 //! What a folder holds that a survey can be made of.
 
+use super::file::SURVEY_FILE;
 use crate::camera::{Camera, read_calibration};
 use crate::frames::{FrameError, Video};
-use crate::survey::SURVEY_FILE;
 use crate::trajectory::{PoseFile, read_poses};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Folders below the one that is looked into.
-const DEPTH: usize = 3;
+const MAX_DEPTH: usize = 3;
 /// Larger files hold no calibration, ...
-const CALIBRATION_BYTES: u64 = 4 << 20;
+const MAX_CALIBRATION_BYTES: u64 = 4 << 20;
 /// ... and no poses.
-const POSES_BYTES: u64 = 256 << 20;
+const MAX_POSES_BYTES: u64 = 256 << 20;
 /// Endings of pictures.
-const PICTURES: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
+const PICTURE_EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
 
 /// Endings of videos.
-const VIDEOS: [&str; 7] = ["mp4", "mov", "m4v", "mkv", "avi", "webm", "mts"];
+const VIDEO_EXTENSIONS: [&str; 7] = ["mp4", "mov", "m4v", "mkv", "avi", "webm", "mts"];
 
 /// Pictures of one folder and ending.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,7 +70,7 @@ impl Discovery {
     /// A folder that cannot be read.
     pub fn of(folder: &Path) -> std::io::Result<Self> {
         let mut files = Vec::new();
-        walk(folder, Path::new(""), DEPTH, &mut files)?;
+        walk(folder, Path::new(""), MAX_DEPTH, &mut files)?;
         files.sort();
         let mut groups: BTreeMap<(PathBuf, String), Vec<&PathBuf>> = BTreeMap::new();
         let mut found = Self::default();
@@ -81,7 +81,7 @@ impl Discovery {
                 .to_string_lossy()
                 .into_owned();
             let lower = extension.to_lowercase();
-            if PICTURES.contains(&lower.as_str()) {
+            if PICTURE_EXTENSIONS.contains(&lower.as_str()) {
                 if file
                     .file_stem()
                     .is_some_and(|stem| stem.eq_ignore_ascii_case("mask"))
@@ -93,7 +93,7 @@ impl Discovery {
                 groups.entry((parent, extension)).or_default().push(file);
                 continue;
             }
-            if VIDEOS.contains(&lower.as_str()) {
+            if VIDEO_EXTENSIONS.contains(&lower.as_str()) {
                 found.videos.push(file.clone());
                 continue;
             }
@@ -103,13 +103,13 @@ impl Discovery {
                 continue;
             }
             if matches!(lower.as_str(), "json" | "toml" | "yaml" | "yml" | "txt")
-                && bytes <= CALIBRATION_BYTES
+                && bytes <= MAX_CALIBRATION_BYTES
                 && let Ok(camera) = read_calibration(&path, None)
             {
                 found.calibrations.push((file.clone(), camera));
             }
             if matches!(lower.as_str(), "txt" | "tum" | "csv" | "json" | "kitti")
-                && bytes <= POSES_BYTES
+                && bytes <= MAX_POSES_BYTES
                 && let Ok(poses) = read_poses(&path, None)
             {
                 found.poses.push((file.clone(), poses));

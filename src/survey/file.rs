@@ -1,6 +1,9 @@
 //! `survey.toml` as written.
 
-use super::{CalibrateSection, PosesSection, SurveyError, TunnelSection};
+use super::calibrate::CalibrateSection;
+use super::error::SurveyError;
+use super::poses_section::PosesSection;
+use super::tunnel::TunnelSection;
 use crate::trajectory::{Jitter, JitterModel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -161,7 +164,11 @@ pub(super) fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::survey::{Associate, CalibrationGroup, IgnoreSection, Shape, Survey};
+    use crate::survey::associate::Associate;
+    use crate::survey::calibrate::CalibrationGroup;
+    use crate::survey::ignore::IgnoreSection;
+    use crate::survey::open::Survey;
+    use crate::survey::tunnel::Shape;
     use crate::trajectory::{CameraAxes, Direction, PoseFormat};
 
     #[test]

@@ -1,6 +1,6 @@
 //! `[tunnel] ignore`: parts of the wall by which frames are not compared.
 
-use crate::surface::{Patches, Surface};
+use crate::surface::{Surface, WallRegions};
 use serde::{Deserialize, Serialize};
 
 /// A part of the wall; what is left out goes all the way.
@@ -18,7 +18,7 @@ pub struct IgnoreSection {
 }
 
 /// Angles beyond are a mistake, degrees.
-const MOST_DEG: f64 = 720.0;
+const MAX_ANGLE_DEG: f64 = 720.0;
 
 impl IgnoreSection {
     /// What is wrong with it, if anything.
@@ -33,9 +33,11 @@ impl IgnoreSection {
             Self {
                 theta_deg: Some([from, to]),
                 ..
-            } if !(from.abs() <= MOST_DEG && to.abs() <= MOST_DEG) || from == to => Some(format!(
-                "theta_deg is [{from}, {to}]; it must be two different angles in degrees, from and to in the direction in which θ grows"
-            )),
+            } if !(from.abs() <= MAX_ANGLE_DEG && to.abs() <= MAX_ANGLE_DEG) || from == to => {
+                Some(format!(
+                    "theta_deg is [{from}, {to}]; it must be two different angles in degrees, from and to in the direction in which θ grows"
+                ))
+            }
             Self {
                 chainage_m: Some([from, to]),
                 ..
@@ -51,11 +53,11 @@ impl IgnoreSection {
 ///
 /// # Errors
 /// What is wrong with the first that is no part of the wall.
-pub(super) fn patches(
+pub(super) fn wall_regions(
     sections: &[IgnoreSection],
     surface: &dyn Surface,
-) -> Result<Patches, String> {
-    let mut patches = Patches::default();
+) -> Result<WallRegions, String> {
+    let mut patches = WallRegions::default();
     for (k, section) in sections.iter().enumerate() {
         if let Some(fault) = section.fault() {
             return Err(format!("tunnel.ignore, item {}: {fault}", k + 1));
@@ -88,7 +90,7 @@ mod tests {
         ] {
             let table: toml::Table = format!("ignore = {text}").parse().unwrap();
             let sections: Vec<IgnoreSection> = table["ignore"].clone().try_into().unwrap();
-            let fault = patches(&sections, &circle).err();
+            let fault = wall_regions(&sections, &circle).err();
             match expected {
                 None => assert_eq!(fault, None),
                 Some(expected) => assert!(

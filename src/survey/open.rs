@@ -1,14 +1,17 @@
 //! A survey, opened and checked.
 
 use super::associate::TIME_TOLERANCE_S;
+use super::calibrate::CalibrateSection;
+use super::error::SurveyError;
 use super::file::read_survey_file;
-use super::listing::Listing;
-use super::reader::{PoseReader, Reading};
-use super::{CalibrateSection, PosesSection, SURVEY_FILE, SurveyError, SurveyFile};
-use super::{ignore, plausible};
+use super::file::{SURVEY_FILE, SurveyFile};
+use super::frame_list::FrameList;
+use super::pose_reader::{InterpretedPoses, PoseReader};
+use super::poses_section::PosesSection;
+use super::{ignore, pose_validation};
 use crate::camera::{Camera, read_calibration};
 use crate::frames::{FrameSet, Mask};
-use crate::surface::{Patches, Surface};
+use crate::surface::{Surface, WallRegions};
 use crate::trajectory::{Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of};
 use std::path::{Path, PathBuf};
 
@@ -24,7 +27,7 @@ pub struct Survey {
     /// The tunnel.
     pub surface: Box<dyn Surface>,
     /// Parts of the wall by which frames are not compared.
-    pub ignored: Patches,
+    pub ignored: WallRegions,
     /// The frames, sorted by name, with what none of them shows.
     pub frames: FrameSet,
     /// The initial poses, one per frame.
@@ -106,11 +109,11 @@ impl Survey {
         }
         let camera =
             read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
-        let Listing {
+        let FrameList {
             frames,
             times_s,
             video,
-        } = Listing::new(&file.frames, &toml_path, &folder, None)?;
+        } = FrameList::new(&file.frames, &toml_path, &folder, None)?;
         if let Some(video) = &video
             && video.rotation_deg() != 0
             && file.camera.readout_ms.is_some()
@@ -126,7 +129,7 @@ impl Survey {
             Some(mask) => Some(Mask::read(&folder.join(mask), camera.width, camera.height)?),
             None => None,
         };
-        let ignored = ignore::patches(&file.tunnel.ignore, surface.as_ref()).map_err(value)?;
+        let ignored = ignore::wall_regions(&file.tunnel.ignore, surface.as_ref()).map_err(value)?;
         let mut survey = Self {
             camera,
             surface,
@@ -142,7 +145,7 @@ impl Survey {
             file,
         };
         if let Some(step_deg) = survey.file.frames.angle_step_deg {
-            survey.thin_by_angle(step_deg, &toml_path)?;
+            survey.select_keyframes(step_deg, &toml_path)?;
         }
         let section = &survey.file.poses;
         let (initial, mut warnings) =
@@ -183,12 +186,13 @@ impl Survey {
         path: &Path,
     ) -> Result<(Trajectory, Vec<String>), SurveyError> {
         let times_s = self.times_s.as_deref();
-        let reading: Reading =
+        let reading: InterpretedPoses =
             PoseReader::new(section, &self.folder, &self.frames, times_s)?.read(path)?;
         let trajectory = reading.trajectory();
         let poses = poses_of(&trajectory);
         let surface = self.surface.as_ref();
-        let warning = plausible::check(surface, &self.camera, &reading, &poses, path)?;
+        let warning =
+            pose_validation::validate_poses(surface, &self.camera, &reading, &poses, path)?;
         Ok((trajectory, warning))
     }
 
@@ -198,13 +202,16 @@ impl Survey {
     ///
     /// # Errors
     /// As [`Survey::open`], should the file have changed since.
-    pub fn readings(&self, most_frames: usize) -> Result<Vec<(Vec<String>, Self)>, SurveyError> {
+    pub fn pose_convention_variants(
+        &self,
+        most_frames: usize,
+    ) -> Result<Vec<(Vec<String>, Self)>, SurveyError> {
         let section = &self.file.poses;
         let times_s = self.times_s.as_deref();
         let reading = PoseReader::new(section, &self.folder, &self.frames, times_s)?
             .read(&self.folder.join(&section.initial))?;
         let given = (Vec::new(), reading.convention);
-        let possible = plausible::possible(self.surface.as_ref(), &reading);
+        let possible = pose_validation::feasible_conventions(self.surface.as_ref(), &reading);
         let survey = |(flags, convention): (Vec<String>, Convention)| {
             let stamped = reading.given.iter().map(|stamped| StampedPose {
                 time_s: stamped.time_s,

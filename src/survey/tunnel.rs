@@ -1,7 +1,8 @@
 //! `[tunnel]`: the shape of the tunnel.
 
-use super::{IgnoreSection, SurveyError};
-use crate::surface::section::{Ellipse, Pieces, Round, Section};
+use super::error::SurveyError;
+use super::ignore::IgnoreSection;
+use crate::surface::section::{CircleOutline, Ellipse, PiecewiseOutline, Section};
 use crate::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
 use crate::trajectory::{PoseError, text};
 use nalgebra::Vector3;
@@ -124,11 +125,13 @@ impl TunnelSection {
             Shape::Circle => {
                 let radius_m = self.radius_m.unwrap_or_default();
                 Circle::new(radius_m).map_err(fail)?;
-                Box::new(Round { radius_m })
+                Box::new(CircleOutline { radius_m })
             }
             Shape::Ellipse => Box::new(Ellipse::new(width_m, height_m).map_err(fail)?),
-            Shape::Box => Box::new(Pieces::rectangle(width_m, height_m).map_err(fail)?),
-            Shape::Horseshoe => Box::new(Pieces::horseshoe(width_m, height_m).map_err(fail)?),
+            Shape::Box => Box::new(PiecewiseOutline::rectangle(width_m, height_m).map_err(fail)?),
+            Shape::Horseshoe => {
+                Box::new(PiecewiseOutline::horseshoe(width_m, height_m).map_err(fail)?)
+            }
         })
     }
 }

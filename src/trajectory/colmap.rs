@@ -1,25 +1,29 @@
-//! COLMAP's text model: `images.txt`, two lines an image, **world-to-camera**.
+//! COLMAP's text model: `images.txt` with two lines per image, **world-to-camera**.
 //!
 //! `IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME`, then the points of the image, `X Y POINT3D_ID`
-//! each; that line may be empty. The poses alone are read. What is written has no points.
+//! each; that line may be empty. Only the poses are read. Written files have no points.
 
-use super::{Pose, PoseEntry, PoseError, StampedPose, text};
+use super::error::PoseError;
+use super::pose::Pose;
+use super::pose_entry::PoseEntry;
+use super::stamped_pose::StampedPose;
+use super::text;
 use nalgebra::Vector3;
 use std::fmt::Write;
 use std::path::Path;
 
-/// The file of the poses in the folder of a model.
+/// Name of the pose file in the folder of a model.
 pub const IMAGES_FILE: &str = "images.txt";
-/// The file of the cameras.
+/// Name of the camera file.
 pub const CAMERAS_FILE: &str = "cameras.txt";
-/// The file of the points.
+/// Name of the point file.
 pub const POINTS_FILE: &str = "points3D.txt";
 
 const FORM: &str = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME";
-/// Columns before the name.
+/// Number of columns before the name.
 const NUMBERS: usize = 9;
 
-/// Whether a line is the first of an image's two.
+/// True for the first of the two lines of an image.
 pub(super) fn is_line(line: &str) -> bool {
     let words: Vec<&str> = line.split_whitespace().collect();
     words.len() > NUMBERS
@@ -33,7 +37,7 @@ pub(super) fn is_line(line: &str) -> bool {
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
     let mut entries = Vec::new();
     let mut names = text::Names::default();
-    // The points' line comes right after the image's, even if it is empty.
+    // The line of points directly follows the line of the image, even if it is empty.
     let mut points_next = false;
     for (index, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -76,7 +80,7 @@ fn parse_line(line: &str) -> Result<PoseEntry, String> {
     })
 }
 
-/// Checks that a line holds points, or nothing.
+/// Checks that a line holds points or is empty.
 fn check_points(line: &str) -> Result<(), String> {
     let words: Vec<&str> = line.split_whitespace().collect();
     let are_numbers = words.iter().all(|word| word.parse::<f64>().is_ok());
@@ -84,17 +88,19 @@ fn check_points(line: &str) -> Result<(), String> {
         Ok(())
     } else {
         Err(
-        "should hold the points of the image above, `X Y POINT3D_ID` each, or be empty: an image has two lines"
+        "should hold the points of the image above, `X Y POINT3D_ID` each, or be empty: an image \
+         has two lines"
             .to_owned(),
     )
     }
 }
 
-/// The text of `images.txt` for frames called `names`, all of camera 1; `trajectory` is
+/// Formats an `images.txt` for frames called `names`, all of camera 1; `trajectory` is
 /// camera-to-world.
 pub fn format_images(names: &[String], trajectory: &[StampedPose]) -> String {
     let mut text = format!(
-        "# Image list with two lines of data per image:\n#   {}\n#   POINTS2D[] as (X, Y, POINT3D_ID)\n\
+        "# Image list with two lines of data per image:\n#   {}\n#   POINTS2D[] as (X, Y, \
+         POINT3D_ID)\n\
          # Number of images: {}, mean observations per image: 0\n",
         FORM.replace(' ', ", "),
         trajectory.len()
@@ -119,7 +125,7 @@ pub fn format_images(names: &[String], trajectory: &[StampedPose]) -> String {
     text
 }
 
-/// The text of a `points3D.txt` without points.
+/// Formats a `points3D.txt` without points.
 pub fn format_points() -> &'static str {
     "# 3D point list with one line of data per point:\n\
      #   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n\

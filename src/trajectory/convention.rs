@@ -1,87 +1,15 @@
-//! What the numbers of a pose mean: its direction, the camera's axes, whose pose it is, and in
-//! which world.
+//! Pose conventions: direction, camera axes, body and world frame.
 
-use super::{Pose, PoseFormat};
-use nalgebra::{Quaternion, UnitQuaternion};
-use serde::{Deserialize, Serialize};
-
-/// Which way a pose leads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Direction {
-    /// From the camera (or the body) to the world: the translation is where it stands.
-    #[serde(rename = "c2w")]
-    CameraToWorld,
-    /// From the world to the camera.
-    #[serde(rename = "w2c")]
-    WorldToCamera,
-}
-
-impl Direction {
-    /// The other one.
-    pub fn other(self) -> Self {
-        match self {
-            Self::CameraToWorld => Self::WorldToCamera,
-            Self::WorldToCamera => Self::CameraToWorld,
-        }
-    }
-
-    /// As flags and files name it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::CameraToWorld => "c2w",
-            Self::WorldToCamera => "w2c",
-        }
-    }
-}
-
-/// How a camera's axes lie.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-#[non_exhaustive]
-pub enum CameraAxes {
-    /// x right, y down, z forward.
-    OpenCv,
-    /// x right, y up, z backwards.
-    OpenGl,
-}
-
-impl CameraAxes {
-    /// The other ones.
-    pub fn other(self) -> Self {
-        match self {
-            Self::OpenCv => Self::OpenGl,
-            Self::OpenGl => Self::OpenCv,
-        }
-    }
-
-    /// As flags and files name them.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::OpenCv => "opencv",
-            Self::OpenGl => "opengl",
-        }
-    }
-
-    /// A camera-to-world pose of these axes in OpenCV's, and the other way round:
-    /// `R ← R diag(1, −1, −1)` for OpenGL.
-    pub fn turn(self, pose: &Pose) -> Pose {
-        match self {
-            Self::OpenCv => *pose,
-            // Half a turn about x: exact, since it only swaps the quaternion's numbers.
-            Self::OpenGl => {
-                let half_turn = UnitQuaternion::new_unchecked(Quaternion::new(0.0, 1.0, 0.0, 0.0));
-                Pose::new(pose.r_wc * half_turn, pose.t_wc)
-            }
-        }
-    }
-}
+use super::axes::{CameraAxes, Direction};
+use super::format::PoseFormat;
+use super::pose::Pose;
 
 /// The convention of a file of poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Convention {
-    /// Which way its poses lead.
+    /// The direction of the poses.
     pub direction: Direction,
-    /// How the camera's axes lie.
+    /// The camera's axes.
     pub axes: CameraAxes,
     /// The camera in the body whose poses the file holds, `x_body = T x_camera`; `None` if they are
     /// the camera's own.
@@ -92,7 +20,7 @@ pub struct Convention {
 }
 
 impl Convention {
-    /// What a format means where nothing else is said.
+    /// The default convention of a format.
     pub fn of(format: PoseFormat) -> Self {
         Self {
             direction: format.direction(),
@@ -102,10 +30,11 @@ impl Convention {
         }
     }
 
-    /// The pose as the program has it: camera-to-world, OpenCV's axes, the tunnel's axis along y.
+    /// Converts a pose to the program's convention: camera-to-world, OpenCV's axes, the tunnel's
+    /// axis along y.
     ///
-    /// `T = T_world,tunnel⁻¹ T_world,body T_body,camera`, then the camera's axes. A pose that has
-    /// this convention already is returned to the bit.
+    /// `T = T_world,tunnel⁻¹ T_world,body T_body,camera`, then the camera's axes. A pose that
+    /// already has this convention is returned bit for bit.
     pub fn to_tunnel(&self, given: &Pose) -> Pose {
         let mut pose = self.to_world(given);
         if let Some(tunnel) = &self.tunnel_in_world {
@@ -114,7 +43,7 @@ impl Convention {
         pose
     }
 
-    /// The same in the world of the file.
+    /// Converts a pose to camera-to-world with OpenCV's axes in the world of the file.
     pub fn to_world(&self, given: &Pose) -> Pose {
         let mut pose = match self.direction {
             Direction::CameraToWorld => *given,
@@ -167,7 +96,7 @@ mod tests {
         ] {
             assert!((turned.r_wc * axis - pose.r_wc * axis * sign).norm() < 1e-15);
         }
-        // Twice is a whole turn: the same rotation, the quaternion's sign changed.
+        // Twice is a full turn: the same rotation with the quaternion's sign changed.
         let twice = CameraAxes::OpenGl.turn(&turned);
         assert_eq!(twice.r_wc.coords, -pose.r_wc.coords);
     }

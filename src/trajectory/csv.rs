@@ -1,19 +1,23 @@
-//! CSV with named columns: `frame,time_s,tx_m,ty_m,tz_m,qx,qy,qz,qw`, camera-to-world.
+//! CSV files with named columns: `frame,time_s,tx_m,ty_m,tz_m,qx,qy,qz,qw`, camera-to-world.
 //!
-//! Columns are found by their names, in any order; those of other names are left alone. `frame` (or
-//! `name`, `file`, `filename`, `image`), a time in `time_s` (`time`, `timestamp`, `timestamp_s`) or
-//! in `time_ns` (`timestamp_ns`), or both, may be missing; whole numbers of 16 digits and more are
-//! nanoseconds in any of them. Positions are `tx_m` or `tx`, `x_m`, `x` and so on, metres. Commas,
-//! semicolons and tabs separate; names may stand in quotes.
+//! Columns are found by name, in any order; other columns are ignored. `frame` (or `name`, `file`,
+//! `filename`, `image`), a time in `time_s` (`time`, `timestamp`, `timestamp_s`) or in `time_ns`
+//! (`timestamp_ns`), or both, may be missing; whole numbers of 16 digits and more are nanoseconds
+//! in any of them. Positions are `tx_m` or `tx`, `x_m`, `x` and so on, metres. Commas, semicolons
+//! and tabs separate; names may stand in quotes.
 
-use super::{Pose, PoseEntry, PoseError, StampedPose, text, times};
+use super::error::PoseError;
+use super::pose::Pose;
+use super::pose_entry::PoseEntry;
+use super::stamped_pose::StampedPose;
+use super::{text, times};
 use csv::{ReaderBuilder, StringRecord, WriterBuilder};
 use nalgebra::Vector3;
 use std::path::Path;
 
 pub(super) const FORM: &str = "frame,time_s,tx_m,ty_m,tz_m,qx,qy,qz,qw";
 
-/// What a column may be called.
+/// Accepted names of each column.
 const NAME: &[&str] = &["frame", "name", "file", "filename", "image"];
 const TIME_S: &[&str] = &["time_s", "time", "timestamp", "timestamp_s"];
 const TIME_NS: &[&str] = &["time_ns", "timestamp_ns"];
@@ -27,7 +31,7 @@ const POSE: [&[&str]; 7] = [
     &["qw"],
 ];
 
-/// Where the columns are.
+/// Indices of the columns.
 struct Columns {
     name: Option<usize>,
     time_s: Option<usize>,
@@ -66,7 +70,7 @@ impl Columns {
     }
 }
 
-/// Whether a first line names the columns of poses.
+/// True for a header with the columns of poses.
 pub(super) fn is_header(line: &str) -> bool {
     let words = line
         .split([',', ';', '\t'])
@@ -99,7 +103,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
             .and_then(|entry| {
                 entry
                     .time_s
-                    .map_or(Ok(()), |time_s| text::after(time_s, last_s))?;
+                    .map_or(Ok(()), |time_s| text::check_increasing(time_s, last_s))?;
                 entry
                     .name
                     .as_deref()
@@ -112,7 +116,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
     Ok(entries)
 }
 
-/// What separates the columns of a table, by its first line.
+/// The separator of a table's columns, from its first line.
 pub(super) fn separator(header: &str) -> u8 {
     let is_there = |separator: &u8| header.as_bytes().contains(separator);
     [b'\t', b';', b',']
@@ -121,7 +125,7 @@ pub(super) fn separator(header: &str) -> u8 {
         .unwrap_or(b',')
 }
 
-/// The columns of a line.
+/// Splits a line into columns.
 pub(super) fn split(line: &str, separator: u8) -> Result<StringRecord, String> {
     let mut reader = ReaderBuilder::new()
         .delimiter(separator)
@@ -174,7 +178,7 @@ fn parse_record(
     })
 }
 
-/// The text of a CSV of poses; `names` are those of the frames.
+/// Formats a CSV of poses; `names` are those of the frames.
 pub fn format(names: &[String], trajectory: &[StampedPose]) -> String {
     let mut writer = WriterBuilder::new().from_writer(Vec::new());
     // Writing to memory cannot fail.

@@ -1,8 +1,8 @@
-//! Why a file of poses cannot be used.
+//! Errors of pose files.
 
 use std::path::{Path, PathBuf};
 
-/// Why a file of poses, of frames' times or of a rigid motion cannot be used.
+/// An error of a file of poses, of frame times or of a rigid motion.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
@@ -11,31 +11,31 @@ pub enum PoseError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// One line is wrong.
+    /// A line is invalid.
     #[error("{}:{line}: {what}", path.display())]
     Line {
         /// The file.
         path: PathBuf,
         /// 1-based number of the line.
         line: usize,
-        /// What is wrong, and the remedy.
+        /// The problem and the remedy.
         what: String,
     },
-    /// The file as a whole is wrong.
+    /// The file as a whole is invalid.
     #[error("{}: {what}", path.display())]
     File {
         /// The file.
         path: PathBuf,
-        /// What is wrong, and the remedy.
+        /// The problem and the remedy.
         what: String,
     },
 }
 
 impl PoseError {
-    /// Something wrong with a line.
+    /// An error of one line.
     pub(crate) fn line(path: &Path, line: usize, what: impl Into<String>) -> Self {
         Self::Line {
             path: path.to_owned(),
@@ -44,7 +44,7 @@ impl PoseError {
         }
     }
 
-    /// Something wrong with the whole.
+    /// An error of the whole file.
     pub(crate) fn file(path: &Path, what: impl Into<String>) -> Self {
         Self::File {
             path: path.to_owned(),

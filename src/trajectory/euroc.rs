@@ -3,18 +3,21 @@
 //! The first eight columns count; velocities and biases may follow. Read only. Source: Burri et
 //! al., "The EuRoC micro aerial vehicle datasets", 2016.
 
-use super::{Pose, PoseEntry, PoseError, text, times};
+use super::error::PoseError;
+use super::pose::Pose;
+use super::pose_entry::PoseEntry;
+use super::{text, times};
 use nalgebra::Vector3;
 use std::path::Path;
 
 const FORM: &str = "timestamp [ns], x, y, z, qw, qx, qy, qz";
 
-/// Whether a line is one of such a file: commas, and a first number with as many digits as
-/// nanoseconds since 1970 have, or more than any other time.
+/// True for a line of such a file: comma-separated, with a first number that has the digits of
+/// nanoseconds since 1970, or more digits than any other time.
 pub(super) fn is_line(line: &str) -> bool {
     let mut words = line.split(',');
     let time = words.next().unwrap_or_default().trim();
-    time.len() >= times::LEAST_NANOSECOND_DIGITS
+    time.len() >= times::MIN_NANOSECOND_DIGITS
         && time.bytes().all(|byte| byte.is_ascii_digit())
         && words.count() >= 7
 }
@@ -32,7 +35,7 @@ fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {
         return Err(format!("{} columns where `{FORM}` has 8", words.len()));
     }
     let time_s = times::from_nanoseconds(time)?;
-    text::after(time_s, last_s)?;
+    text::check_increasing(time_s, last_s)?;
     let mut values = [0.0; 7];
     for (value, word) in values.iter_mut().zip(pose) {
         *value = text::number(word, FORM)?;

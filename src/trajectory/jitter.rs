@@ -1,12 +1,13 @@
-//! Noise on a plan: what really happened while the carrier followed it.
+//! Pose noise: simulation of the executed trajectory from the planned one.
 
-use super::{Pose, so3};
+use super::pose::Pose;
+use super::so3;
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// How the errors of consecutive poses hang together.
+/// Correlation of the errors of consecutive poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -14,14 +15,14 @@ pub enum JitterModel {
     /// Each step composes its own error onto the running pose, so errors accumulate (odometry, a
     /// plan executed blindly; the paper's "after each image capture").
     RandomWalk,
-    /// Every pose errs on its own around the plan (an IMU's attitude, a rail).
+    /// The errors of the poses around the plan are independent (an IMU's attitude, a rail).
     Independent,
 }
 
 /// Standard deviations of the pose noise, per step (random walk) or per pose (independent).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jitter {
-    /// How errors of consecutive poses hang together.
+    /// Correlation of the errors of consecutive poses.
     pub model: JitterModel,
     /// Rotation about each camera axis, radians.
     pub rotation_sigma_rad: f64,
@@ -29,27 +30,27 @@ pub struct Jitter {
     pub translation_sigma_m: [f64; 3],
 }
 
-/// Share of the lateral offset, and of the tilt against the axis, that a random walk loses at each
-/// step: the carrier steers back to the axis, as any carrier that survives its tunnel does. 2 %
-/// keeps their spread below `σ / √(1 − 0.98²) ≈ 5 σ`, for any length.
-const STEERING: f64 = 0.02;
+/// Fraction of the lateral offset, and of the tilt against the axis, that a random walk loses at
+/// each step, because the carrier steers back to the axis. 2 % keeps their spread below
+/// `σ / √(1 − 0.98²) ≈ 5 σ`, for any length.
+const STEERING_RATE: f64 = 0.02;
 
-/// Turns an executed attitude back towards the planned one by a share of the tilt between their
-/// axes of the tunnel. What it has turned about the axis stays.
+/// Rotates an executed attitude towards the planned one by the fraction [`STEERING_RATE`] of the
+/// tilt between their tunnel axes. The rotation about the axis stays.
 fn steered(executed: &UnitQuaternion<f64>, planned: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
     let carried = executed * planned.inverse() * Vector3::y();
     match UnitQuaternion::rotation_between(&carried, &Vector3::y()) {
-        Some(tilt) => so3::exp(&(so3::log(&tilt) * STEERING)) * executed,
-        // Upside down: every way back is as good as another.
+        Some(tilt) => so3::exp(&(so3::log(&tilt) * STEERING_RATE)) * executed,
+        // Opposite axes: every direction of rotation is equivalent.
         None => *executed,
     }
 }
 
 impl Jitter {
-    /// The trajectory that results when `plan` is executed with this noise.
+    /// Simulates the execution of `plan` with this noise.
     ///
-    /// The first pose of a random walk is the plan's own. Only random numbers from `rng` are used,
-    /// three for the rotation and then three for the translation of each pose.
+    /// The first pose of a random walk equals the plan's. Each pose draws three random numbers for
+    /// the rotation and then three for the translation from `rng`.
     pub fn apply(&self, plan: &[Pose], rng: &mut impl Rng) -> Vec<Pose> {
         let mut executed: Vec<Pose> = Vec::with_capacity(plan.len());
         for (k, planned) in plan.iter().enumerate() {
@@ -60,8 +61,8 @@ impl Jitter {
                     let increment = before.r_wc.inverse() * planned.r_wc;
                     let (omega, rho) = self.draw(rng);
                     let mut t_wc = last.t_wc + (planned.t_wc - before.t_wc) + rho;
-                    t_wc.x *= 1.0 - STEERING;
-                    t_wc.z *= 1.0 - STEERING;
+                    t_wc.x *= 1.0 - STEERING_RATE;
+                    t_wc.z *= 1.0 - STEERING_RATE;
                     let r_wc = last.r_wc * increment * so3::exp(&omega);
                     Pose::new(steered(&r_wc, &planned.r_wc), t_wc)
                 }
@@ -86,7 +87,7 @@ impl Jitter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::spiral;
+    use crate::trajectory::plan::spiral;
     use rand::SeedableRng;
 
     fn jitter(model: JitterModel) -> Jitter {
@@ -127,7 +128,7 @@ mod tests {
         }
     }
 
-    /// However long the survey, the camera looks at the wall and not along the tunnel.
+    /// Tilt and offset stay bounded in a long survey, so that the camera keeps looking at the wall.
     #[test]
     fn a_long_random_walk_keeps_its_tilt_and_offset_bounded() {
         let plan = spiral(12_000, 0.1, 30f64.to_radians());

@@ -1,10 +1,13 @@
-//! KITTI odometry: the twelve numbers of `[R t]` a line, row by row, camera-to-world, metres; no
-//! times.
+//! KITTI odometry: lines with the twelve numbers of `[R t]`, row by row, camera-to-world, metres;
+//! no times.
 //!
-//! KITTI's own files have the first camera as their world. Any world is read, and the tunnel's is
-//! written.
+//! KITTI's own files use the first camera as their world. Files are read in any world and written
+//! in the tunnel's frame.
 
-use super::{PoseEntry, PoseError, StampedPose, rigid, text};
+use super::error::PoseError;
+use super::pose_entry::PoseEntry;
+use super::stamped_pose::StampedPose;
+use super::{rigid, text};
 use std::path::Path;
 
 pub(super) const FORM: &str = "r11 r12 r13 tx r21 r22 r23 ty r31 r32 r33 tz";
@@ -20,14 +23,14 @@ fn parse_line(line: &str) -> Result<PoseEntry, String> {
     Ok(PoseEntry {
         name: None,
         time_s: None,
-        pose: rigid::motion(&[[a, b, c, d], [e, f, g, h], [i, j, k, l]])?,
+        pose: rigid::from_rows(&[[a, b, c, d], [e, f, g, h], [i, j, k, l]])?,
     })
 }
 
-/// The text of a KITTI file.
+/// Formats a KITTI file.
 pub fn format(trajectory: &[StampedPose]) -> String {
     let line = |stamped: &StampedPose| {
-        let numbers = rigid::rows(&stamped.pose).concat();
+        let numbers = rigid::to_rows(&stamped.pose).concat();
         let words: Vec<String> = numbers.iter().map(f64::to_string).collect();
         words.join(" ") + "\n"
     };

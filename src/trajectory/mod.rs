@@ -1,5 +1,4 @@
-//! Where the camera was: poses, the plan they should have followed, the jitter that moved them off
-//! it, and the files they are kept in.
+//! Camera trajectories: poses, motion plans, pose noise, gyroscope integration and pose files.
 //!
 //! | format | its own convention | times | names |
 //! | --- | --- | --- | --- |
@@ -10,8 +9,8 @@
 //! | [`nerfstudio`] | camera-to-world, OpenGL's axes | | yes |
 //! | `euroc` (read only) | body-to-world | nanoseconds | |
 //!
-//! [`read_poses`] reads any of them as they are; a [`Convention`] says what the numbers mean and
-//! makes poses of the tunnel of them.
+//! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
+//! poses to the tunnel's frame.
 //!
 //! # Example
 //!
@@ -26,12 +25,13 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod axes;
 pub mod colmap;
 mod convention;
 pub mod csv;
+mod detection;
 mod error;
 mod euroc;
-mod file;
 mod format;
 pub mod gyro;
 mod jitter;
@@ -40,10 +40,13 @@ mod mount;
 pub mod nerfstudio;
 mod plan;
 mod pose;
+mod pose_entry;
+mod pose_file;
 mod rigid;
 pub mod se3;
 mod shutter;
 pub mod so3;
+mod stamped_pose;
 pub(crate) mod text;
 pub(crate) mod times;
 pub mod tum;
@@ -52,42 +55,16 @@ mod tunnel_frame;
 #[cfg(test)]
 mod format_tests;
 
-pub use convention::{CameraAxes, Convention, Direction};
+pub use axes::{CameraAxes, Direction};
+pub use convention::Convention;
 pub use error::PoseError;
-pub use file::{PoseEntry, PoseFile, read_poses};
 pub use format::PoseFormat;
 pub use jitter::{Jitter, JitterModel};
 pub use mount::read_camera_in_body;
-pub use plan::{Mounting, PlanTable, Rate, Station, Steady, spiral};
+pub use plan::{Mounting, PlanTable, Rate, Station, UniformMotion, spiral};
 pub use pose::Pose;
+pub use pose_entry::PoseEntry;
+pub use pose_file::{PoseFile, read_poses};
 pub use shutter::Shutter;
+pub use stamped_pose::{StampedPose, Trajectory, indexed, poses_of};
 pub use tunnel_frame::{TunnelAxis, read_tunnel_frame};
-
-/// One pose of a trajectory with its time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StampedPose {
-    /// Seconds (or the frame's index, where no clock exists).
-    pub time_s: f64,
-    /// Camera-to-world pose.
-    pub pose: Pose,
-}
-
-/// Poses in the order of their frames, times strictly increasing.
-pub type Trajectory = Vec<StampedPose>;
-
-/// The poses of a trajectory, without their times.
-pub fn poses_of(trajectory: &[StampedPose]) -> Vec<Pose> {
-    trajectory.iter().map(|stamped| stamped.pose).collect()
-}
-
-/// A trajectory whose times are the frames' indices.
-pub fn indexed(poses: impl IntoIterator<Item = Pose>) -> Trajectory {
-    poses
-        .into_iter()
-        .enumerate()
-        .map(|(k, pose)| StampedPose {
-            time_s: k as f64,
-            pose,
-        })
-        .collect()
-}

@@ -1,18 +1,20 @@
-//! How the camera is mounted on the body whose poses a file holds.
+//! Extrinsic calibration: the pose of the camera in the body (IMU) whose poses a file holds.
 
-use super::{Pose, PoseError, rigid, text};
+use super::error::PoseError;
+use super::pose::Pose;
+use super::{rigid, text};
 use std::path::Path;
 
-/// Keys of calibration files that hold such a matrix, and whether it leads from the camera to the
-/// body.
+/// Keys of calibration files with such a matrix; true if the matrix maps camera to body
+/// coordinates.
 const KEYS: [(&str, bool); 3] = [("T_BS", true), ("T_cam_imu", false), ("T_imu_cam", true)];
 
-/// Reads the camera's place in the body, `x_body = T x_camera`.
+/// Reads the pose of the camera in the body, `x_body = T x_camera`.
 ///
 /// The file holds the motion from body to camera, `x_camera = T x_body`, as a 4 × 4 matrix of text,
-/// a row a line; or it is EuRoC's `sensor.yaml` (`T_BS`, camera to body) or a camchain of Kalibr
-/// with one camera (`T_cam_imu`, body to camera; with `T_imu_cam` the other way), whose keys say
-/// which way their matrices lead.
+/// one row per line; or it is EuRoC's `sensor.yaml` (`T_BS`, camera to body) or a camchain of
+/// Kalibr with one camera (`T_cam_imu`, body to camera; with `T_imu_cam` the other way), whose keys
+/// define the direction of their matrices.
 ///
 /// # Errors
 /// An unreadable file; no such matrix, or several; a matrix that is no rigid motion.
@@ -27,7 +29,7 @@ pub fn read_camera_in_body(path: &Path) -> Result<Pose, PoseError> {
         [] => Ok(read_matrix(path, &text)?.inverse()),
         [(key, from_camera, rest)] => {
             let motion = bracketed(rest)
-                .and_then(|rows| rigid::motion(&rows))
+                .and_then(|rows| rigid::from_rows(&rows))
                 .map_err(|what| fail(format!("{key}: {what}")))?;
             Ok(match from_camera {
                 true => motion,
@@ -40,7 +42,7 @@ pub fn read_camera_in_body(path: &Path) -> Result<Pose, PoseError> {
     }
 }
 
-/// A matrix of three or four rows of four numbers, a row a line.
+/// Reads a matrix of three or four rows of four numbers, one row per line.
 pub(super) fn read_matrix(path: &Path, text: &str) -> Result<Pose, PoseError> {
     let mut rows = Vec::new();
     for (number, line) in text::lines(text) {
@@ -48,10 +50,10 @@ pub(super) fn read_matrix(path: &Path, text: &str) -> Result<Pose, PoseError> {
             .map_err(|what| PoseError::line(path, number, what))?;
         rows.push(row);
     }
-    rigid::motion(&rows).map_err(|what| PoseError::file(path, what))
+    rigid::from_rows(&rows).map_err(|what| PoseError::file(path, what))
 }
 
-/// What follows each `key:` of a YAML text.
+/// The text after each `key:` of a YAML text.
 fn values_after<'a>(text: &'a str, key: &'a str) -> impl Iterator<Item = &'a str> {
     let mut offset = 0;
     text.split_inclusive('\n').filter_map(move |line| {
@@ -65,7 +67,7 @@ fn values_after<'a>(text: &'a str, key: &'a str) -> impl Iterator<Item = &'a str
     })
 }
 
-/// The first sixteen numbers within brackets, which lists in lists and lists of lines both have.
+/// Reads the first sixteen numbers within brackets, of nested or flat lists.
 fn bracketed(text: &str) -> Result<Vec<[f64; 4]>, String> {
     let numbers = text
         .split_once('[')
@@ -97,11 +99,11 @@ mod tests {
         read_camera_in_body(&path)
     }
 
-    /// EuRoC's own calibration of its left camera, and the same the other way round and as Kalibr
-    /// writes it.
+    /// EuRoC's calibration of its left camera, its inverse, and Kalibr's notation of it.
     #[test]
     fn all_ways_to_say_it_mean_the_same() {
-        let t_bs = "[0.0148655429818, -0.999880929698, 0.00414029679422, -0.0216401454975,\n         \
+        let t_bs = "[0.0148655429818, -0.999880929698, 0.00414029679422, -0.0216401454975,\n      \
+                       \
             0.999557249008, 0.0149672133247, 0.025715529948, -0.064676986768,\n        \
             -0.0257744366974, 0.00375618835797, 0.999660727178, 0.00981073058949,\n         \
             0.0, 0.0, 0.0, 1.0]";
@@ -110,7 +112,7 @@ mod tests {
         );
         let camera_in_body = read_text(&euroc).unwrap();
         assert!((camera_in_body.t_wc.y + 0.064676986768).abs() < 1e-12);
-        let rows = rigid::rows(&camera_in_body.inverse());
+        let rows = rigid::to_rows(&camera_in_body.inverse());
         let lines = rows.map(|row| row.map(|v| v.to_string()));
         let matrix = lines.each_ref().map(|row| row.join(" ")).join("\n") + "\n0 0 0 1\n";
         let kalibr = format!(

@@ -1,9 +1,14 @@
 //! nerfstudio's `transforms.json`: `frames`, each with `file_path` and a camera-to-world
 //! `transform_matrix` in OpenGL's axes (y up, z backwards).
 //!
-//! `applied_transform`, by which the poses were moved after they were made, is undone.
+//! `applied_transform`, which was applied to the poses afterwards, is inverted.
 
-use super::{Pose, PoseEntry, PoseError, StampedPose, rigid, text};
+use super::axes::CameraAxes;
+use super::error::PoseError;
+use super::pose::Pose;
+use super::pose_entry::PoseEntry;
+use super::stamped_pose::StampedPose;
+use super::{rigid, text};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -33,7 +38,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         )));
     }
     let applied = match &transforms.applied_transform {
-        Some(rows) => rigid::motion(rows)
+        Some(rows) => rigid::from_rows(rows)
             .map_err(|what| fail(format!("applied_transform: {what}")))?
             .inverse(),
         None => Pose::identity(),
@@ -44,7 +49,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
         let of_frame =
             |what: String| fail(format!("frames[{index}] ({}): {what}", frame.file_path));
         names.add(&frame.file_path).map_err(of_frame)?;
-        let pose = rigid::motion(&frame.transform_matrix)
+        let pose = rigid::from_rows(&frame.transform_matrix)
             .map_err(|what| of_frame(format!("transform_matrix: {what}")))?;
         entries.push(PoseEntry {
             name: Some(frame.file_path),
@@ -55,14 +60,14 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
     Ok(entries)
 }
 
-/// The text of a `transforms.json`. `camera` are the keys of the camera, `names` the frames' paths
+/// Formats a `transforms.json`. `camera` holds the keys of the camera, `names` the frames' paths
 /// from the file's folder; `trajectory` is camera-to-world in OpenCV's axes.
 pub fn format(camera: Map<String, Value>, names: &[String], trajectory: &[StampedPose]) -> String {
     let frames: Vec<Value> = names
         .iter()
         .zip(trajectory)
         .map(|(name, stamped)| {
-            let [a, b, c] = rigid::rows(&super::CameraAxes::OpenGl.turn(&stamped.pose));
+            let [a, b, c] = rigid::to_rows(&CameraAxes::OpenGl.turn(&stamped.pose));
             json!({ "file_path": name, "transform_matrix": [a, b, c, [0.0, 0.0, 0.0, 1.0]] })
         })
         .collect();

@@ -16,7 +16,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The camera in the world's origin, looking along +z.
+    /// The camera at the world's origin, looking along +z.
     pub fn identity() -> Self {
         Self {
             r_wc: UnitQuaternion::identity(),
@@ -24,28 +24,28 @@ impl Pose {
         }
     }
 
-    /// A pose from its parts.
+    /// A pose from rotation and translation.
     pub fn new(r_wc: UnitQuaternion<f64>, t_wc: Vector3<f64>) -> Self {
         Self { r_wc, t_wc }
     }
 
-    /// Camera to world: `R_wc x_c + t_wc`.
+    /// Transforms a point from camera to world: `R_wc x_c + t_wc`.
     pub fn to_world(&self, x_c: &Vector3<f64>) -> Vector3<f64> {
         self.r_wc * x_c + self.t_wc
     }
 
-    /// World to camera: `R_wcᵀ (x_w − t_wc)`.
+    /// Transforms a point from world to camera: `R_wcᵀ (x_w − t_wc)`.
     pub fn to_camera(&self, x_w: &Vector3<f64>) -> Vector3<f64> {
         self.r_wc.inverse_transform_vector(&(x_w - self.t_wc))
     }
 
-    /// The motion back: `x_c = R_wcᵀ x_w − R_wcᵀ t_wc`.
+    /// The inverse transformation: `x_c = R_wcᵀ x_w − R_wcᵀ t_wc`.
     pub fn inverse(&self) -> Self {
         let r_cw = self.r_wc.inverse();
         Self::new(r_cw, -(r_cw * self.t_wc))
     }
 
-    /// First `other`, then `self`: `R ← R R_other`, `t ← R t_other + t`.
+    /// The composition of `other`, then `self`: `R ← R R_other`, `t ← R t_other + t`.
     pub fn after(&self, other: &Self) -> Self {
         Self::new(self.r_wc * other.r_wc, self.r_wc * other.t_wc + self.t_wc)
     }

@@ -1,20 +1,20 @@
-//! Matrices that should be rigid motions.
+//! Conversion between matrices and rigid motions.
 
-use super::Pose;
+use super::pose::Pose;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// How far `R Rᵀ` may be from the identity, each element: numbers with three digits pass.
-const MOST_OFF: f64 = 2e-3;
+/// Largest deviation of an element of `R Rᵀ` from the identity; numbers with three digits pass.
+const MAX_ORTHOGONALITY_ERROR: f64 = 2e-3;
 
-/// The motion `[R t]` of three rows, or of four of which the last is `0 0 0 1`.
+/// The motion `[R t]` of a matrix of three rows, or of four if the last is `0 0 0 1`.
 ///
 /// R is replaced by the rotation nearest to it, `U Vᵀ` with `U Σ Vᵀ = R`, which undoes the rounding
 /// of its digits.
 ///
 /// # Errors
-/// Another size; a number that is not finite; a last row other than `0 0 0 1`; a scale, a mirror
-/// image, or anything else that R holds besides a rotation.
-pub(crate) fn motion(rows: &[[f64; 4]]) -> Result<Pose, String> {
+/// Another size; a number that is not finite; another last row than `0 0 0 1`; an R that is scaled,
+/// a reflection or otherwise no rotation.
+pub(crate) fn from_rows(rows: &[[f64; 4]]) -> Result<Pose, String> {
     let [a, b, c] = match rows {
         [a, b, c] => [a, b, c],
         [a, b, c, last] => {
@@ -41,28 +41,30 @@ pub(crate) fn motion(rows: &[[f64; 4]]) -> Result<Pose, String> {
     }
     let square = r * r.transpose();
     let scale = (square.trace() / 3.0).sqrt();
-    let is_rotation = |square: Matrix3<f64>| (square - Matrix3::identity()).amax() <= MOST_OFF;
+    let is_rotation =
+        |square: Matrix3<f64>| (square - Matrix3::identity()).amax() <= MAX_ORTHOGONALITY_ERROR;
     if !is_rotation(square) {
         return Err(if scale > 0.0 && is_rotation(square / (scale * scale)) {
             format!("its rotation is scaled by {scale:.6}; poses are rigid, in metres")
         } else {
-            "its first three columns are no rotation (they must be perpendicular and of length 1)"
-                .to_owned()
+            "its first three columns are not a rotation (they must be perpendicular and of length \
+             1)"
+            .to_owned()
         });
     }
     if r.determinant() < 0.0 {
-        return Err("its rotation is a mirror image (determinant −1)".to_owned());
+        return Err("its rotation is a reflection (determinant −1)".to_owned());
     }
     let svd = r.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        return Err("its rotation cannot be told".to_owned());
+        return Err("its rotation cannot be determined".to_owned());
     };
     let nearest = Rotation3::from_matrix_unchecked(u * v_t);
     Ok(Pose::new(UnitQuaternion::from_rotation_matrix(&nearest), t))
 }
 
 /// The rows `[R t]` of a motion.
-pub(crate) fn rows(pose: &Pose) -> [[f64; 4]; 3] {
+pub(crate) fn to_rows(pose: &Pose) -> [[f64; 4]; 3] {
     let (r, t) = (pose.r_wc.to_rotation_matrix(), &pose.t_wc);
     [0, 1, 2].map(|k| [r[(k, 0)], r[(k, 1)], r[(k, 2)], t[k]])
 }
@@ -75,9 +77,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn rows_and_back(x in -4.0f64..4.0, y in -4.0f64..4.0, z in -4.0f64..4.0, h in -1e4f64..1e4) {
+        fn rows_and_back(
+            x in -4.0f64..4.0, y in -4.0f64..4.0, z in -4.0f64..4.0, h in -1e4f64..1e4,
+        ) {
             let pose = Pose::new(so3::exp(&Vector3::new(x, y, z)), Vector3::new(x, h, z));
-            let back = motion(&rows(&pose)).unwrap();
+            let back = from_rows(&to_rows(&pose)).unwrap();
             prop_assert_eq!(back.t_wc, pose.t_wc);
             prop_assert!(back.r_wc.angle_to(&pose.r_wc) < 1e-14);
         }
@@ -96,9 +100,18 @@ mod tests {
                 vec![row(0, 2.0), row(1, 2.0), row(2, 2.0), last],
                 "scaled by 2",
             ),
-            (vec![row(0, 1.0), row(1, -1.0), row(2, 1.0), last], "mirror"),
-            (vec![row(0, 1.0), row(0, 1.0), row(2, 1.0)], "no rotation"),
-            (vec![row(0, 0.0), row(0, 0.0), row(2, 0.0)], "no rotation"),
+            (
+                vec![row(0, 1.0), row(1, -1.0), row(2, 1.0), last],
+                "reflection",
+            ),
+            (
+                vec![row(0, 1.0), row(0, 1.0), row(2, 1.0)],
+                "not a rotation",
+            ),
+            (
+                vec![row(0, 0.0), row(0, 0.0), row(2, 0.0)],
+                "not a rotation",
+            ),
             (
                 vec![row(0, 1.0), row(1, 1.0), row(2, 1.0), row(3, 2.0)],
                 "last row",
@@ -106,7 +119,7 @@ mod tests {
             (vec![row(0, f64::NAN), row(1, 1.0), row(2, 1.0)], "finite"),
             (vec![row(0, 1.0)], "1 rows"),
         ] {
-            let message = motion(&rows).unwrap_err();
+            let message = from_rows(&rows).unwrap_err();
             assert!(message.contains(expected), "{message}");
         }
     }

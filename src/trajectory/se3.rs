@@ -1,26 +1,28 @@
-//! Rigid motions SE(3): the way from one pose to the next.
+//! Interpolation of rigid motions in SE(3).
 
-use super::{Pose, so3};
+use super::pose::Pose;
+use super::so3;
 use nalgebra::{Matrix3, Vector3};
 
-/// Rotations between two poses beyond this have no sure shorter way, radians.
-pub const MOST_TURN_RAD: f64 = 170.0 * std::f64::consts::PI / 180.0;
+/// Largest rotation between two poses that are interpolated, radians; beyond it, the direction of
+/// rotation is ambiguous.
+pub const MAX_ROTATION_RAD: f64 = 170.0 * std::f64::consts::PI / 180.0;
 
 /// The pose on the geodesic of SE(3) from `from` (share 0) to `to` (share 1): the one screw motion
 /// that leads from one to the other, `T(s) = T₀ Exp(s Log(T₀⁻¹ T₁))`.
 ///
-/// With `(φ, ρ) = Log(T)`: `φ = Log(R)`, `ρ = V(φ)⁻¹ t`, and V of [`left_jacobian`]. It is the same
-/// whichever rigid part of the carrier is followed (body or camera) and whether poses or their
-/// inverses are given.
+/// With `(φ, ρ) = Log(T)`: `φ = Log(R)`, `ρ = V(φ)⁻¹ t`, and V of [`left_jacobian`]. The result
+/// does not depend on which rigid part of the carrier is followed (body or camera), nor on whether
+/// poses or their inverses are given.
 ///
-/// Returns `None` where the rotation between the two is more than [`MOST_TURN_RAD`].
+/// Returns `None` if the rotation between the two is more than [`MAX_ROTATION_RAD`].
 ///
 /// Source: Solà, Deray, Atchuthan, "A micro Lie theory for state estimation in robotics", eqs.
 /// 172–174.
 pub fn between(from: &Pose, to: &Pose, share: f64) -> Option<Pose> {
     let step = from.inverse().after(to);
     let phi = so3::log(&step.r_wc);
-    if phi.norm() > MOST_TURN_RAD {
+    if phi.norm() > MAX_ROTATION_RAD {
         return None;
     }
     // V⁻¹ is the inverse of the left Jacobian: the right one's of −φ.
@@ -51,7 +53,7 @@ fn left_jacobian(phi: &Vector3<f64>) -> Matrix3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::spiral;
+    use crate::trajectory::plan::spiral;
     use proptest::prelude::*;
 
     fn pose(a: f64, b: f64, c: f64) -> Pose {
@@ -64,7 +66,8 @@ mod tests {
     proptest! {
         #[test]
         fn it_leads_from_one_to_the_other_whatever_moves_along(
-            a in -0.8f64..0.8, b in -0.8f64..0.8, c in -0.8f64..0.8, d in -0.8f64..0.8, share in 0.0f64..1.0,
+            a in -0.8f64..0.8, b in -0.8f64..0.8, c in -0.8f64..0.8, d in -0.8f64..0.8,
+            share in 0.0f64..1.0,
         ) {
             let (from, to, arm) = (pose(a, b, c), pose(d, a, b), pose(b, c, d));
             let part = between(&from, &to, share).unwrap();
@@ -80,7 +83,7 @@ mod tests {
         }
     }
 
-    /// A carrier that turns and advances evenly moves along a screw.
+    /// A carrier with constant advance and rotation follows a screw motion.
     #[test]
     fn a_spiral_is_met_exactly() {
         let fine = spiral(9, 0.05, 0.2);

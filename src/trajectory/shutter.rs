@@ -1,25 +1,25 @@
-//! Rolling shutter: how the camera moves while the rows of a frame are read, as its neighbours in
-//! time tell.
+//! Rolling shutter: the camera's motion during the readout of a frame, from its neighbours in time.
 
-use super::{Pose, StampedPose};
+use super::pose::Pose;
+use super::stamped_pose::StampedPose;
 use crate::camera::Sweep;
 use nalgebra::Vector6;
 
-/// When the rows of frames are read.
+/// The readout times of the rows of frames.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Shutter {
     /// Time from reading the first row to reading the last, seconds; 0 for a global shutter,
     /// negative if rows are read bottom-up.
     readout_s: f64,
-    /// Rows of a frame.
+    /// Number of rows of a frame.
     rows: u32,
-    /// When the middle row of each frame is read, seconds.
+    /// Time of the middle row of each frame, seconds.
     times_s: Vec<f64>,
 }
 
 impl Shutter {
-    /// Of frames of `rows` rows whose last row is read `readout_s` (seconds) after the first; their
-    /// middle rows' times are those of `trajectory`.
+    /// Creates the readout of frames of `rows` rows whose last row is read `readout_s` (seconds)
+    /// after the first. The times of `trajectory` are those of the middle rows.
     pub fn new(readout_s: f64, rows: u32, trajectory: &[StampedPose]) -> Self {
         Self {
             readout_s,
@@ -33,11 +33,11 @@ impl Shutter {
         self.readout_s
     }
 
-    /// How the camera moves while each of the frames is read: its pose goes smoothly through
+    /// The camera's motion during the readout of each frame, for a smooth trajectory through
     /// `poses`.
     pub fn sweeps(&self, poses: &[Pose]) -> Vec<Sweep> {
         let pose = |k: usize| poses.get(k).copied();
-        let sweep = |k| self.rate(k, pose).times(self.readout_s);
+        let sweep = |k| self.rate(k, pose).scaled(self.readout_s);
         if self.readout_s == 0.0 {
             vec![Sweep::default(); poses.len()]
         } else {
@@ -45,17 +45,17 @@ impl Shutter {
         }
     }
 
-    /// How the camera would move while frame `frame` is read if that took a second from the first
-    /// row to the last; not at all if `pose` does not know the frame or any neighbour.
+    /// The camera's motion per second of readout at frame `frame`; zero if `pose` has no pose of
+    /// the frame or of both neighbours.
     ///
     /// With `ξ₋`, `ξ₊` the tangent vectors ([`Pose::local`]) to the poses before and after, and
     /// `h₋`, `h₊` the times to them, the velocity is that of the parabola through the three,
     ///
     /// `(h₋² ξ₊ − h₊² ξ₋)/(h₋ h₊ (h₋ + h₊))`:
     ///
-    /// for even times the central difference, and so the tangent of the Catmull–Rom spline. At the
-    /// ends of the trajectory the one neighbour must do. Between neighbours the camera must turn by
-    /// less than half a turn.
+    /// for uniform times the central difference, i.e. the tangent of the Catmull–Rom spline. At the
+    /// ends of the trajectory the velocity is that to the only neighbour. Neighbouring poses must
+    /// differ by less than half a turn.
     ///
     /// Source: E. Catmull, R. Rom, "A class of local interpolating splines", Computer Aided
     /// Geometric Design, 1974; A. W. Overhauser, "Analytic definition of curves and surfaces by
@@ -77,7 +77,8 @@ impl Shutter {
             (None, Some((h1, xi1))) => xi1 / h1,
             (None, None) => Vector6::zeros(),
         };
-        // As many rows as a frame has, and so one step between rows more.
+        // The motion covers as many row intervals as the frame has rows: one more than from first
+        // to last.
         let rows = f64::from(self.rows.max(2));
         let moved = velocity * (rows / (rows - 1.0));
         Sweep {
@@ -92,7 +93,8 @@ impl Shutter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::{indexed, so3};
+    use crate::trajectory::so3;
+    use crate::trajectory::stamped_pose::indexed;
     use nalgebra::Vector3;
 
     /// A screw motion: constant velocity in the camera's own coordinates for the turn, in the
@@ -124,7 +126,7 @@ mod tests {
         }
     }
 
-    /// The velocity of a motion that speeds up is that of the moment.
+    /// The velocity of an accelerated motion is the instantaneous one.
     #[test]
     fn a_motion_that_speeds_up_is_followed() {
         let at = |time_s: f64| StampedPose {
@@ -149,7 +151,7 @@ mod tests {
         assert!(alone[0].is_none());
     }
 
-    /// Read bottom-up, the first row is the last.
+    /// With a bottom-up readout the first row is read last.
     #[test]
     fn a_negative_time_turns_the_sweep_around() {
         let trajectory = stamped(&[0.0, 0.4, 0.9]);

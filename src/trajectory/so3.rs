@@ -1,4 +1,4 @@
-//! Rotation group SO(3): the two maps the estimator needs beyond nalgebra.
+//! The rotation group SO(3): exponential and logarithm, and their Jacobian.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 

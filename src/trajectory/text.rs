@@ -1,14 +1,15 @@
-//! What all text formats are made of: lines, numbers, quaternions, times that increase.
+//! Elements of all text formats: lines, numbers, quaternions and increasing times.
 
-use super::{PoseEntry, PoseError};
+use super::error::PoseError;
+use super::pose_entry::PoseEntry;
 use nalgebra::{Quaternion, UnitQuaternion};
 use std::collections::HashSet;
 use std::path::Path;
 
-/// The text of a file, without the byte order mark that some editors begin it with.
+/// Reads a text file and removes its byte order mark.
 ///
 /// # Errors
-/// An unreadable file, or one that is no text.
+/// An unreadable file, or one that is not UTF-8 text.
 pub(crate) fn read(path: &Path) -> Result<String, PoseError> {
     let bytes = std::fs::read(path).map_err(|source| PoseError::Read {
         path: path.to_owned(),
@@ -17,15 +18,15 @@ pub(crate) fn read(path: &Path) -> Result<String, PoseError> {
     let text = String::from_utf8(bytes)
         .ok()
         .filter(|text| !text.contains('\0'))
-        .ok_or_else(|| PoseError::file(path, "is no text (UTF-8)"))?;
+        .ok_or_else(|| PoseError::file(path, "is not UTF-8 text"))?;
     match text.strip_prefix('\u{feff}') {
         Some(rest) => Ok(rest.to_owned()),
         None => Ok(text),
     }
 }
 
-/// The lines that say something, with their 1-based numbers: neither blank nor a comment that
-/// begins with `#`.
+/// The lines with content and their 1-based numbers; blank lines and comments that begin with `#`
+/// are skipped.
 pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     text.lines()
         .enumerate()
@@ -33,8 +34,8 @@ pub(crate) fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
-/// The pose of each line that says something; `parse_line` is given the line and the time of the
-/// pose before.
+/// Parses the pose of each line with content; `parse_line` receives the line and the time of the
+/// previous pose.
 pub(super) fn stamped_lines(
     path: &Path,
     text: &str,
@@ -49,7 +50,7 @@ pub(super) fn stamped_lines(
     Ok(entries)
 }
 
-/// A finite number; `form` says what the line should look like.
+/// Parses a finite number; `form` describes the line for the error message.
 pub(crate) fn number(word: &str, form: &str) -> Result<f64, String> {
     match word.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
@@ -60,13 +61,13 @@ pub(crate) fn number(word: &str, form: &str) -> Result<f64, String> {
     }
 }
 
-/// A finite number of a table that is not one of poses.
+/// Parses a finite number of a table other than a pose file.
 pub(crate) fn finite(word: &str) -> Result<f64, String> {
     let value = word.parse::<f64>().ok().filter(|value| value.is_finite());
-    value.ok_or_else(|| format!("`{word}` is no finite number"))
+    value.ok_or_else(|| format!("`{word}` is not a finite number"))
 }
 
-/// Exactly N numbers with blanks between; `form` says what they are.
+/// Parses exactly N blank-separated numbers; `form` describes them for the error message.
 pub(crate) fn numbers<const N: usize>(line: &str, form: &str) -> Result<[f64; N], String> {
     let values = line
         .split_whitespace()
@@ -76,9 +77,10 @@ pub(crate) fn numbers<const N: usize>(line: &str, form: &str) -> Result<[f64; N]
     <[f64; N]>::try_from(values).map_err(|_| format!("{count} columns where `{form}` has {N}"))
 }
 
-/// The rotation of a quaternion; `order` is that of its numbers in the file.
+/// The rotation of a quaternion; `order` is the order of its numbers in the file, for the error
+/// message.
 ///
-/// Up to 1 % off unit length is taken for rounding and put right.
+/// A deviation of up to 1 % from unit length is treated as rounding and normalised.
 pub(crate) fn rotation([w, x, y, z]: [f64; 4], order: &str) -> Result<UnitQuaternion<f64>, String> {
     let quaternion = Quaternion::new(w, x, y, z);
     let norm = quaternion.norm();
@@ -92,8 +94,8 @@ pub(crate) fn rotation([w, x, y, z]: [f64; 4], order: &str) -> Result<UnitQuater
             "the quaternion has length {norm:.4}, not 1; the order is {order}"
         ));
     }
-    // One that is of unit length to rounding stays to the bit, so that what is written and read
-    // again is the same.
+    // A quaternion of unit length to rounding stays bit for bit, so that writing and reading is
+    // lossless.
     if (norm - 1.0).abs() <= 4.0 * f64::EPSILON {
         return Ok(UnitQuaternion::new_unchecked(quaternion));
     }
@@ -101,7 +103,7 @@ pub(crate) fn rotation([w, x, y, z]: [f64; 4], order: &str) -> Result<UnitQuater
 }
 
 /// Checks that times increase.
-pub(crate) fn after(time_s: f64, last_s: Option<f64>) -> Result<(), String> {
+pub(crate) fn check_increasing(time_s: f64, last_s: Option<f64>) -> Result<(), String> {
     match last_s {
         Some(last) if time_s == last => Err(format!(
             "duplicate timestamp {time_s}: every pose needs a time of its own"
@@ -113,7 +115,7 @@ pub(crate) fn after(time_s: f64, last_s: Option<f64>) -> Result<(), String> {
     }
 }
 
-/// Frames' names that were met, each of which may come once.
+/// The set of frame names read so far, to reject duplicates.
 #[derive(Default)]
 pub(crate) struct Names(HashSet<String>);
 

@@ -1,10 +1,10 @@
-//! Times as text: seconds, or nanoseconds in whole numbers.
+//! Times in text: seconds, or nanoseconds as whole numbers.
 
-/// A whole number of so many digits is nanoseconds: those since 1970 have 19 from 2001 on, and no
-/// clock counts so many seconds.
-pub(crate) const LEAST_NANOSECOND_DIGITS: usize = 16;
+/// Smallest number of digits of a whole number that is read as nanoseconds: nanoseconds since 1970
+/// have 19 digits from 2001 on, and no clock counts that many seconds.
+pub(crate) const MIN_NANOSECOND_DIGITS: usize = 16;
 
-/// Seconds of a whole number of nanoseconds.
+/// Converts a whole number of nanoseconds to seconds.
 ///
 /// A double holds times since 1970 to a quarter of a microsecond.
 pub(crate) fn from_nanoseconds(word: &str) -> Result<f64, String> {
@@ -18,19 +18,19 @@ pub(crate) fn from_nanoseconds(word: &str) -> Result<f64, String> {
     Ok(seconds as f64 + rest as f64 * 1e-9)
 }
 
-/// Seconds of a number: whole numbers of 16 digits and more are nanoseconds, everything else is
-/// seconds. `None` for what is no finite number.
+/// Converts a number to seconds: whole numbers of 16 digits and more are nanoseconds, everything
+/// else is seconds. `None` if it is not a finite number.
 pub(crate) fn from_word(word: &str) -> Option<f64> {
     let is_whole = !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit());
-    if is_whole && word.len() >= LEAST_NANOSECOND_DIGITS {
+    if is_whole && word.len() >= MIN_NANOSECOND_DIGITS {
         return from_nanoseconds(word).ok();
     }
     word.parse::<f64>().ok().filter(|time_s| time_s.is_finite())
 }
 
-/// The time that a file's name (without its extension) tells: its last number, if that has a
-/// decimal point (seconds), ten digits (seconds since 1970) or 16 and more (nanoseconds). Other
-/// numbers are taken for counters.
+/// The time in a file's name (without its extension): its last number, if that has a decimal point
+/// (seconds), ten digits (seconds since 1970) or 16 and more (nanoseconds). Other numbers are
+/// treated as counters.
 pub(crate) fn from_name(stem: &str) -> Option<f64> {
     let is_part = |c: char| c.is_ascii_digit() || c == '.';
     let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
@@ -38,9 +38,8 @@ pub(crate) fn from_name(stem: &str) -> Option<f64> {
         at + stem[at..].chars().next().map_or(1, char::len_utf8)
     });
     let word = stem[begin..end].trim_start_matches('.');
-    let tells_time =
-        word.contains('.') || word.len() == 10 || word.len() >= LEAST_NANOSECOND_DIGITS;
-    tells_time.then(|| from_word(word)).flatten()
+    let is_time = word.contains('.') || word.len() == 10 || word.len() >= MIN_NANOSECOND_DIGITS;
+    is_time.then(|| from_word(word)).flatten()
 }
 
 #[cfg(test)]

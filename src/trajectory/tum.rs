@@ -1,9 +1,13 @@
-//! TUM: `time tx ty tz qx qy qz qw` a line, seconds and metres, camera-to-world.
+//! TUM: lines `time tx ty tz qx qy qz qw`, seconds and metres, camera-to-world.
 //!
-//! Written with eight columns, single spaces and no trailing space, which is what `evo` accepts.
-//! The program's own format.
+//! The program's own format. It is written with eight columns, single spaces and no trailing space,
+//! as `evo` requires.
 
-use super::{Pose, PoseEntry, PoseError, PoseFormat, StampedPose, Trajectory, read_poses, text};
+use super::error::PoseError;
+use super::pose::Pose;
+use super::pose_entry::PoseEntry;
+use super::stamped_pose::{StampedPose, Trajectory};
+use super::text;
 use nalgebra::Vector3;
 use std::fmt::Write;
 use std::path::Path;
@@ -17,7 +21,15 @@ pub(super) const FORM: &str = "time tx ty tz qx qy qz qw";
 /// quaternion of length zero (or farther than 1 % from unit length); times that do not increase; no
 /// pose at all.
 pub fn read(path: &Path) -> Result<Trajectory, PoseError> {
-    Ok(read_poses(path, Some(PoseFormat::Tum))?.trajectory())
+    let entries = parse(path, &text::read(path)?)?;
+    if entries.is_empty() {
+        return Err(PoseError::file(path, "holds no poses"));
+    }
+    let stamped = |entry: PoseEntry| StampedPose {
+        time_s: entry.time_s.unwrap_or_default(),
+        pose: entry.pose,
+    };
+    Ok(entries.into_iter().map(stamped).collect())
 }
 
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError> {
@@ -26,7 +38,7 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<PoseEntry>, PoseError
 
 fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {
     let [time_s, tx, ty, tz, qx, qy, qz, qw] = text::numbers(line, FORM)?;
-    text::after(time_s, last_s)?;
+    text::check_increasing(time_s, last_s)?;
     let rotation = text::rotation([qw, qx, qy, qz], "qx qy qz qw")?;
     Ok(PoseEntry {
         name: None,
@@ -35,7 +47,7 @@ fn parse_line(line: &str, last_s: Option<f64>) -> Result<PoseEntry, String> {
     })
 }
 
-/// The text of a TUM file; every number with the digits that restore it exactly.
+/// Formats a TUM file; every number has the digits that restore it exactly.
 pub fn format(trajectory: &[StampedPose]) -> String {
     let mut text = String::new();
     for StampedPose { time_s, pose } in trajectory {

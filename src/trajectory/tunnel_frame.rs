@@ -1,26 +1,28 @@
-//! Where the tunnel's axis lies in the world of the poses.
+//! The tunnel's frame in the world of the poses.
 
-use super::{Pose, PoseError, mount, text};
+use super::error::PoseError;
+use super::pose::Pose;
+use super::{mount, text};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A tunnel's axis: a point of it, where chainage is 0, and its direction, in which chainage grows.
+/// A tunnel's axis: the point of chainage 0 and the direction of increasing chainage.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TunnelAxis {
-    /// A point of the axis, metres.
+    /// The point of chainage 0, metres.
     pub point_m: [f64; 3],
-    /// Its direction, of any length.
+    /// Direction of the axis, of any length.
     pub axis: [f64; 3],
-    /// The direction in which θ is 0, as far as it is perpendicular to the axis; without it the
-    /// world's z, or its x for an axis along z.
+    /// The direction of θ = 0, projected perpendicular to the axis. The default is the world's z,
+    /// or its x for an axis along z.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub theta_zero: Option<[f64; 3]>,
 }
 
-/// Directions closer together than this have no plane between them, as the sine of their angle.
-const LEAST_SINE: f64 = 1e-3;
+/// Smallest sine of the angle between two directions that span a plane.
+const MIN_SINE: f64 = 1e-3;
 
 impl TunnelAxis {
     /// The tunnel's frame, `x_world = T x_tunnel`: y along the axis, z towards θ = 0, x = y × z.
@@ -47,7 +49,7 @@ impl TunnelAxis {
             None => Vector3::x(),
         };
         let z = (towards - y * towards.dot(&y))
-            .try_normalize(LEAST_SINE)
+            .try_normalize(MIN_SINE)
             .ok_or("theta_zero is the axis's own direction; it must point away from it")?;
         let r = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[y.cross(&z), y, z]));
         Ok(Pose::new(UnitQuaternion::from_rotation_matrix(&r), point))
@@ -56,9 +58,9 @@ impl TunnelAxis {
 
 /// Reads the tunnel's frame in the world of the poses, `x_world = T x_tunnel`.
 ///
-/// The file is either a 4 × 4 matrix of text, a row a line, whose columns are the tunnel's x, y
+/// The file is either a 4 × 4 matrix of text, one row per line, whose columns are the tunnel's x, y
 /// (the axis) and z (θ = 0) and its origin in the world; or JSON:
-/// `{"point_m": [x, y, z], "axis": [x, y, z]}` and, if wanted, `"theta_zero": [x, y, z]`.
+/// `{"point_m": [x, y, z], "axis": [x, y, z]}` and optionally `"theta_zero": [x, y, z]`.
 ///
 /// # Errors
 /// An unreadable file; a matrix that is no rigid motion; JSON with other keys, or without

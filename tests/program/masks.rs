@@ -66,7 +66,7 @@ fn behind_its_mask_a_shaft_costs_no_more_than_the_wall_it_hides() {
         .frames
         .mask()
         .unwrap()
-        .share();
+        .masked_fraction();
     assert!((share - 0.09).abs() < 0.005, "{share}");
     let [(clean, clean_px), (masked, masked_px), (bare, bare_px)] =
         [&clean, &masked, &bare].map(|survey| refined(survey));

@@ -512,7 +512,7 @@ fn convert_replaces_nothing_it_should_not() {
     ];
     let message = fail(&arguments, 3);
     assert!(
-        message.contains("axis: its first three columns are no rotation"),
+        message.contains("axis: its first three columns are not a rotation"),
         "{message}"
     );
 }

@@ -151,7 +151,7 @@ fn shapes_and_lines_that_cannot_be_are_refused() {
             with_line("0 0 0\n0 4 0\n2 5 0\n4 4 0\n4 0 0\n"),
             vec!["tighter than the tunnel"],
         ),
-        (with_line(&circling(0.3)), vec!["runs into itself"]),
+        (with_line(&circling(0.3)), vec!["intersects itself"]),
     ] {
         for word in words {
             assert!(message.contains(word), "{message}");

@@ -76,7 +76,7 @@ impl Simulated {
         for (pose, picture) in self.scene.truth().iter().zip(&self.pictures) {
             let x_c = pose.to_camera(&frame.x_w);
             let pixel = camera.project(&x_c);
-            let Some(pixel) = pixel.filter(|pixel| camera.sees(pixel, 0.0)) else {
+            let Some(pixel) = pixel.filter(|pixel| camera.is_in_image(pixel, 0.0)) else {
                 continue;
             };
             let [value, ..] = picture.at(pixel.x as f32, pixel.y as f32, kernel);

@@ -342,7 +342,7 @@ fn what_is_wrong_with_a_video_is_said() {
         std::fs::write(&toml, &sound_toml).unwrap();
     };
     std::fs::write(survey.join("a.mkv"), &sound[..sound.len() / 2]).unwrap();
-    refine(&["a.mkv", "cut off", "copy it anew"]);
+    refine(&["a.mkv", "cut off", "copy it again"]);
     std::fs::write(survey.join("a.mkv"), "no video").unwrap();
     refine(&["a.mkv", "no video"]);
     let frames = survey.join("frames/%06d.png");
@@ -356,7 +356,7 @@ fn what_is_wrong_with_a_video_is_said() {
     refine(&["b.mp4/0000", "the video is damaged"]);
     std::fs::write(&entangled, &damaged[..length / 2]).unwrap();
     edit(&toml, "a.mkv", "b.mp4");
-    refine(&["b.mp4", "cut off before its end", "copy it anew"]);
+    refine(&["b.mp4", "cut off before its end", "copy it again"]);
     edit(&toml, "a.mkv", "sound.mkv");
     refine(&["sound.mkv", "no video stream"]);
     edit(&toml, "a.mkv", "gone.mkv");

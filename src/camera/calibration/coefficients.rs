@@ -1,20 +1,25 @@
-//! Lists of distortion coefficients, in the orders of other programs.
+//! Lists of distortion coefficients in the order of OpenCV.
 
-use super::Fault;
-use crate::camera::{BrownCoefficients, BrownConrady, KannalaBrandt, Lens};
+use super::error::ParseError;
+use crate::camera::brown_conrady::{BrownCoefficients, BrownConrady};
+use crate::camera::kannala_brandt::KannalaBrandt;
+use crate::camera::lens::Lens;
 
-/// OpenCV's `k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [τx τy]]]]`, of which the last six must be 0.
-pub fn brown_conrady(d: &[f64]) -> Result<Lens, Fault> {
+/// Reads OpenCV's `k1 k2 p1 p2 [k3 [k4 k5 k6 [s1 s2 s3 s4 [τx τy]]]]`, of which the last six must
+/// be 0.
+pub fn brown_conrady(d: &[f64]) -> Result<Lens, ParseError> {
     if !matches!(d.len(), 0 | 2 | 4 | 5 | 8 | 12 | 14) {
-        return Err(Fault::new(format!(
-            "there are {} distortion coefficients; OpenCV's model has 4, 5 or 8 (k1 k2 p1 p2 k3 k4 k5 k6)",
+        return Err(ParseError::new(format!(
+            "there are {} distortion coefficients; OpenCV's model has 4, 5 or 8 (k1 k2 p1 p2 k3 \
+             k4 k5 k6)",
             d.len()
         )));
     }
     finite(d)?;
     if d.iter().skip(8).any(|c| *c != 0.0) {
-        return Err(Fault::new(
-            "a thin prism or a tilted sensor (coefficients 9 to 14) is not supported; calibrate with 8 coefficients",
+        return Err(ParseError::new(
+            "a thin prism or a tilted sensor (coefficients 9 to 14) is not supported; calibrate \
+             with 8 coefficients",
         ));
     }
     let at = |k: usize| d.get(k).copied().unwrap_or(0.0);
@@ -24,10 +29,10 @@ pub fn brown_conrady(d: &[f64]) -> Result<Lens, Fault> {
     })))
 }
 
-/// `k1 k2 k3 k4` of a fisheye; missing ones at the end are 0.
-pub fn kannala_brandt(d: &[f64]) -> Result<Lens, Fault> {
+/// Reads `k1 k2 k3 k4` of a fisheye; missing ones at the end are 0.
+pub fn kannala_brandt(d: &[f64]) -> Result<Lens, ParseError> {
     if d.len() > 4 {
-        return Err(Fault::new(format!(
+        return Err(ParseError::new(format!(
             "there are {} distortion coefficients; a fisheye (equidistant, Kannala–Brandt) has 4",
             d.len()
         )));
@@ -38,10 +43,10 @@ pub fn kannala_brandt(d: &[f64]) -> Result<Lens, Fault> {
     Ok(Lens::KannalaBrandt(KannalaBrandt::new(k)))
 }
 
-fn finite(d: &[f64]) -> Result<(), Fault> {
+fn finite(d: &[f64]) -> Result<(), ParseError> {
     match d.iter().position(|c| !c.is_finite()) {
         None => Ok(()),
-        Some(k) => Err(Fault::new(format!(
+        Some(k) => Err(ParseError::new(format!(
             "distortion coefficient {} is {}; it must be a number",
             k + 1,
             d[k]

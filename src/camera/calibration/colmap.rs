@@ -1,15 +1,18 @@
-//! COLMAP's cameras.txt.
+//! COLMAP's `cameras.txt`.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
-use super::{Fault, choose};
-use crate::camera::{Camera, Lens, Sweep};
+use super::error::ParseError;
+use super::selection::select_camera;
+use crate::camera::lens::Lens;
+use crate::camera::projection::Camera;
+use crate::camera::sweep::Sweep;
 
-/// Makes a lens of its coefficients.
-type ReadLens = fn(&[f64]) -> Result<Lens, Fault>;
+/// Creates a lens from its coefficients.
+type ReadLens = fn(&[f64]) -> Result<Lens, ParseError>;
 
-/// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixels are counted from the corner of the first
-/// and converted.
-pub fn read(text: &str, name: Option<&str>) -> Result<Camera, Fault> {
+/// Reads `CAMERA_ID MODEL WIDTH HEIGHT PARAMS…`; pixel coordinates are counted from the corner of
+/// the first pixel and converted.
+pub fn read(text: &str, name: Option<&str>) -> Result<Camera, ParseError> {
     let lines = text.lines().enumerate();
     let cameras: Vec<_> = lines
         .map(|(k, line)| (k + 1, line.trim()))
@@ -23,8 +26,8 @@ pub fn read(text: &str, name: Option<&str>) -> Result<Camera, Fault> {
             (id, (number, line))
         })
         .collect();
-    let (number, line) = choose(cameras, name)?;
-    camera(line).map_err(|what| Fault::at(number, what))
+    let (number, line) = select_camera(cameras, name)?;
+    camera(line).map_err(|what| ParseError::at(number, what))
 }
 
 fn camera(line: &str) -> Result<Camera, String> {
@@ -34,22 +37,17 @@ fn camera(line: &str) -> Result<Camera, String> {
     };
     let size = |word: &str| {
         word.parse::<u32>()
-            .map_err(|_| format!("{word:?} is no number of pixels"))
+            .map_err(|_| format!("{word:?} is not a number of pixels"))
     };
     let (width, height) = (size(width)?, size(height)?);
     let params: Vec<f64> = params
         .iter()
         .map(|word| match word.parse::<f64>() {
             Ok(value) if value.is_finite() => Ok(value),
-            _ => Err(format!("{word:?} is no number")),
+            _ => Err(format!("{word:?} is not a number")),
         })
         .collect::<Result<_, String>>()?;
-    let fail = |count: usize| {
-        format!(
-            "{model} has {count} parameters, and here are {}",
-            params.len()
-        )
-    };
+    let fail = |count: usize| format!("{model} has {count} parameters, not {}", params.len());
     // Focal lengths and principal point, and how many coefficients follow.
     let (central, rest, lens): (_, _, ReadLens) = match *model {
         "SIMPLE_PINHOLE" => (3, 0, brown_conrady),
@@ -63,8 +61,10 @@ fn camera(line: &str) -> Result<Camera, String> {
         "OPENCV_FISHEYE" => (4, 4, kannala_brandt),
         _ => {
             return Err(format!(
-                "the camera model {model} is not supported; known are SIMPLE_PINHOLE, PINHOLE, SIMPLE_RADIAL, RADIAL, OPENCV, \
-                 FULL_OPENCV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE (`colmap model_converter` and \
+                "the camera model {model} is not supported; known are SIMPLE_PINHOLE, PINHOLE, \
+                 SIMPLE_RADIAL, RADIAL, OPENCV, \
+                 FULL_OPENCV, SIMPLE_RADIAL_FISHEYE, RADIAL_FISHEYE and OPENCV_FISHEYE (`colmap \
+                 model_converter` and \
                  `colmap image_undistorter` make one)"
             ));
         }
@@ -84,7 +84,7 @@ fn camera(line: &str) -> Result<Camera, String> {
         fy,
         cx: cx - 0.5,
         cy: cy - 0.5,
-        lens: lens(&params[central..]).map_err(|fault| fault.what)?,
+        lens: lens(&params[central..]).map_err(|error| error.what)?,
         sweep: Sweep::default(),
     })
 }

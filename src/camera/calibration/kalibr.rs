@@ -1,12 +1,15 @@
-//! Kalibr's camchain.
+//! Kalibr's camchain files.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
-use super::tree::{numbers, word};
-use super::{Fault, choose};
-use crate::camera::{Camera, Lens, Sweep};
+use super::error::ParseError;
+use super::selection::select_camera;
+use super::value_tree::{numbers, text_entry};
+use crate::camera::lens::Lens;
+use crate::camera::projection::Camera;
+use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
-/// True of a tree with `cam0`, `cam1`, …
+/// True for a file with entries `cam0`, `cam1`, …
 pub fn is_camchain(tree: &Value) -> bool {
     cameras(tree).next().is_some()
 }
@@ -23,21 +26,22 @@ fn cameras(tree: &Value) -> impl Iterator<Item = (String, &Value)> {
 
 /// Reads `camera_model: pinhole`, `intrinsics: [fx, fy, cx, cy]`, `distortion_model`,
 /// `distortion_coeffs` and `resolution`.
-pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
-    let camera = choose(cameras(tree).collect(), name)?;
-    let model = word(camera, "camera_model").unwrap_or("pinhole");
+pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
+    let camera = select_camera(cameras(tree).collect(), name)?;
+    let model = text_entry(camera, "camera_model").unwrap_or("pinhole");
     if model != "pinhole" {
-        return Err(Fault::new(format!(
-            "the camera model {model:?} is not supported; calibrate with pinhole-radtan or pinhole-equi"
+        return Err(ParseError::new(format!(
+            "the camera model {model:?} is not supported; calibrate with pinhole-radtan or \
+             pinhole-equi"
         )));
     }
     let list = |name: &str| match camera.get(name) {
         Some(value) => numbers(value, name),
-        None => Err(Fault::new(format!("the entry `{name}` is missing"))),
+        None => Err(ParseError::new(format!("the entry `{name}` is missing"))),
     };
     let intrinsics = list("intrinsics")?;
     let [fx, fy, cx, cy] = intrinsics[..] else {
-        return Err(Fault::new(format!(
+        return Err(ParseError::new(format!(
             "`intrinsics` has {} numbers; a pinhole has fx, fy, cx, cy",
             intrinsics.len()
         )));
@@ -46,15 +50,20 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
     let whole = |value: f64| value.fract() == 0.0 && (1.0..=1e6).contains(&value);
     let (width, height) = match resolution[..] {
         [width, height] if whole(width) && whole(height) => (width as u32, height as u32),
-        _ => return Err(Fault::new("`resolution` must be [width, height] in pixels")),
+        _ => {
+            return Err(ParseError::new(
+                "`resolution` must be [width, height] in pixels",
+            ));
+        }
     };
-    let lens = match word(camera, "distortion_model") {
+    let lens = match text_entry(camera, "distortion_model") {
         None | Some("none") => Lens::default(),
         Some("radtan") => brown_conrady(&list("distortion_coeffs")?)?,
         Some("equidistant" | "equi") => kannala_brandt(&list("distortion_coeffs")?)?,
         Some(other) => {
-            return Err(Fault::new(format!(
-                "the distortion model {other:?} is not supported; known are radtan, equidistant and none"
+            return Err(ParseError::new(format!(
+                "the distortion model {other:?} is not supported; known are radtan, equidistant \
+                 and none"
             )));
         }
     };

@@ -1,22 +1,25 @@
-//! The camera in nerfstudio's transforms.json.
+//! The camera in nerfstudio's `transforms.json`.
 
 use super::coefficients::{brown_conrady, kannala_brandt};
-use super::tree::{number, pixels, word};
-use super::{Fault, choose};
-use crate::camera::{Camera, Lens, Sweep};
+use super::error::ParseError;
+use super::selection::select_camera;
+use super::value_tree::{number, pixels, text_entry};
+use crate::camera::lens::Lens;
+use crate::camera::projection::Camera;
+use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
-/// True of a tree with `fl_x`, or with `frames`.
+/// True for a file with `fl_x` or `frames`.
 pub fn is_transforms(tree: &Value) -> bool {
     ["fl_x", "frames", "camera_angle_x"]
         .iter()
         .any(|name| tree.get(name).is_some())
 }
 
-/// Reads `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`, `camera_model` and the coefficients, which stand at
-/// the top or, if every frame has its own, in each frame (then `name` is a frame's `file_path`).
-/// Pixels are counted from the corner of the first and converted.
-pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
+/// Reads `fl_x`, `fl_y`, `cx`, `cy`, `w`, `h`, `camera_model` and the coefficients, given at the
+/// top level or, if every frame has its own, in each frame (then `name` is a frame's `file_path`).
+/// Pixel coordinates are counted from the corner of the first pixel and converted.
+pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, ParseError> {
     if tree.get("fl_x").is_some() {
         return camera(tree, tree);
     }
@@ -26,16 +29,16 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
         .flatten()
         .filter(|frame| frame.get("fl_x").is_some())
         .map(|frame| {
-            let path = word(frame, "file_path").unwrap_or("?");
+            let path = text_entry(frame, "file_path").unwrap_or("?");
             (path.to_owned(), frame)
         })
         .collect();
     if own.is_empty() {
-        return Err(Fault::new(
+        return Err(ParseError::new(
             "there is no `fl_x`; the focal lengths in pixels must be given as fl_x and fl_y",
         ));
     }
-    // The same camera in every frame is one.
+    // Identical cameras of all frames count as one.
     let (_, first) = &own[0];
     let intrinsics = [
         "fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "k4", "p1", "p2",
@@ -48,10 +51,10 @@ pub fn read(tree: &Value, name: Option<&str>) -> Result<Camera, Fault> {
     if own.iter().all(|(_, frame)| alike(frame)) {
         return camera(first, tree);
     }
-    camera(choose(own, name)?, tree)
+    camera(select_camera(own, name)?, tree)
 }
 
-fn camera(own: &Value, tree: &Value) -> Result<Camera, Fault> {
+fn camera(own: &Value, tree: &Value) -> Result<Camera, ParseError> {
     let coefficient = |name: &str| match own.get(name) {
         None => Ok(0.0),
         Some(_) => number(own, &[name]),
@@ -62,21 +65,23 @@ fn camera(own: &Value, tree: &Value) -> Result<Camera, Fault> {
         coefficient("k3")?,
         coefficient("k4")?,
     ];
-    let model = word(own, "camera_model").or_else(|| word(tree, "camera_model"));
+    let model = text_entry(own, "camera_model").or_else(|| text_entry(tree, "camera_model"));
     let lens = match model.unwrap_or("OPENCV") {
         "OPENCV_FISHEYE" => kannala_brandt(&[k1, k2, k3, k4])?,
         "PINHOLE" | "SIMPLE_PINHOLE" => Lens::default(),
         "OPENCV" | "SIMPLE_RADIAL" | "RADIAL" => {
             if k4 != 0.0 {
-                return Err(Fault::new(
-                    "k4 is the eighth power of the radius in nerfstudio's model and is not supported; it must be 0",
+                return Err(ParseError::new(
+                    "k4 is the eighth power of the radius in nerfstudio's model and is not \
+                     supported; it must be 0",
                 ));
             }
             brown_conrady(&[k1, k2, coefficient("p1")?, coefficient("p2")?, k3])?
         }
         other => {
-            return Err(Fault::new(format!(
-                "the camera model {other} is not supported; known are PINHOLE, OPENCV and OPENCV_FISHEYE"
+            return Err(ParseError::new(format!(
+                "the camera model {other} is not supported; known are PINHOLE, OPENCV and \
+                 OPENCV_FISHEYE"
             )));
         }
     };

@@ -1,9 +1,11 @@
-//! OpenCV's YAML, and ROS's camera_info, which is alike.
+//! OpenCV's YAML and ROS's `camera_info`, which share a structure.
 
-use super::Fault;
 use super::coefficients::{brown_conrady, kannala_brandt};
-use super::tree::{entry, numbers, pixels, word};
-use crate::camera::{Camera, Lens, Sweep};
+use super::error::ParseError;
+use super::value_tree::{entry, numbers, pixels, text_entry};
+use crate::camera::lens::Lens;
+use crate::camera::projection::Camera;
+use crate::camera::sweep::Sweep;
 use serde_json::Value;
 
 const MATRIX: [&str; 6] = [
@@ -26,39 +28,39 @@ const DISTORTION: [&str; 7] = [
 const WIDTH: [&str; 3] = ["image_width", "width", "image_Width"];
 const HEIGHT: [&str; 3] = ["image_height", "height", "image_Height"];
 
-/// Reads `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height` (or what else
-/// these are called).
+/// Reads `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height` (or their
+/// other common names).
 ///
-/// ROS names the lens in `distortion_model`; OpenCV's own files have a fisheye if `fisheye_model`
+/// ROS names the lens model in `distortion_model`; OpenCV's files hold a fisheye if `fisheye_model`
 /// is 1.
-pub fn read(tree: &Value) -> Result<Camera, Fault> {
+pub fn read(tree: &Value) -> Result<Camera, ParseError> {
     let matrix = entry(tree, &MATRIX).ok_or_else(|| {
-        Fault::new(
-            "no `camera_matrix`: this is no calibration of OpenCV, ROS or Kalibr that is known here",
+        ParseError::new(
+            "no `camera_matrix`: this is not a known calibration file of OpenCV, ROS or Kalibr",
         )
     })?;
     let k = numbers(matrix, "camera_matrix")?;
     let [fx, skew, cx, _, fy, cy, ..] = k[..] else {
-        return Err(Fault::new(format!(
+        return Err(ParseError::new(format!(
             "`camera_matrix` has {} numbers; it must have 3 × 3",
             k.len()
         )));
     };
     if k.len() != 9 {
-        return Err(Fault::new(format!(
+        return Err(ParseError::new(format!(
             "`camera_matrix` has {} numbers; it must have 3 × 3",
             k.len()
         )));
     }
     if skew != 0.0 {
-        return Err(Fault::new(format!(
+        return Err(ParseError::new(format!(
             "`camera_matrix` has a skew of {skew}; cameras with skew are not supported"
         )));
     }
     let size = |names: &[&str]| {
-        pixels(tree, names).map_err(|fault| {
-            let what = fault.what + "; add the frames' size as image_width and image_height";
-            Fault::new(what)
+        pixels(tree, names).map_err(|error| {
+            let what = error.what + "; add the frames' size as image_width and image_height";
+            ParseError::new(what)
         })
     };
     let (width, height) = (size(&WIDTH)?, size(&HEIGHT)?);
@@ -68,14 +70,15 @@ pub fn read(tree: &Value) -> Result<Camera, Fault> {
     };
     let fisheye = entry(tree, &["fisheye_model", "fisheye"])
         .is_some_and(|flag| flag.as_f64() == Some(1.0) || flag.as_bool() == Some(true));
-    let lens = match word(tree, "distortion_model") {
+    let lens = match text_entry(tree, "distortion_model") {
         _ if fisheye => kannala_brandt(&d)?,
         None | Some("plumb_bob" | "rational_polynomial" | "radtan" | "") => brown_conrady(&d)?,
         Some("equidistant" | "fisheye") => kannala_brandt(&d)?,
         Some("none") => Lens::default(),
         Some(other) => {
-            return Err(Fault::new(format!(
-                "the distortion model {other:?} is not supported; known are plumb_bob, rational_polynomial and equidistant"
+            return Err(ParseError::new(format!(
+                "the distortion model {other:?} is not supported; known are plumb_bob, \
+                 rational_polynomial and equidistant"
             )));
         }
     };

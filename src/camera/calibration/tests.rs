@@ -1,5 +1,9 @@
 use super::*;
-use crate::camera::{BrownCoefficients, BrownConrady, KannalaBrandt, Lens, Sweep};
+use crate::camera::brown_conrady::{BrownCoefficients, BrownConrady};
+use crate::camera::kannala_brandt::KannalaBrandt;
+use crate::camera::lens::Lens;
+use crate::camera::projection::Camera;
+use crate::camera::sweep::Sweep;
 
 fn read_as(name: &str, text: &str) -> Result<Camera, CalibrationError> {
     read_camera(name, text, None)
@@ -45,12 +49,13 @@ fn our_own_file_restores_every_camera_exactly() {
 
 #[test]
 fn half_pixel_centres_are_converted() {
-    let text = r#"{"model":"pinhole","width": 40, "height": 20,"fx":3,"fy":3,"cx":2,"cy":1,"pixel_centre":"half"}"#;
+    let text = r#"{"model":"pinhole","width":40,"height":20,
+        "fx":3,"fy":3,"cx":2,"cy":1,"pixel_centre":"half"}"#;
     let camera = read_as("camera.json", text).unwrap();
     assert_eq!((camera.cx, camera.cy), (1.5, 0.5));
 }
 
-/// What `cv2.FileStorage` and OpenCV's calibration sample write.
+/// A file as `cv2.FileStorage` and OpenCV's calibration sample write it.
 const OPENCV: &str = "%YAML:1.0
 ---
 calibration_time: \"Mon 02 Nov 2026\"
@@ -99,28 +104,36 @@ fn files_of_other_programs_are_the_same_camera() {
     );
     let ros = |model: &str, d: &str| {
         format!(
-            "image_width: 640\nimage_height: 480\ncamera_name: front\ncamera_matrix:\n  rows: 3\n  cols: 3\n  data: [415, 0, 318, \
-             0, 417, 241, 0, 0, 1]\ndistortion_model: {model}\ndistortion_coefficients:\n  rows: 1\n  cols: 5\n  data: [{d}]\n\
+            "image_width: 640\nimage_height: 480\ncamera_name: front\ncamera_matrix:\n  rows: 3\n \
+              cols: 3\n  data: [415, 0, 318, \
+             0, 417, 241, 0, 0, 1]\ndistortion_model: {model}\ndistortion_coefficients:\n  rows: \
+             1\n  cols: 5\n  data: [{d}]\n\
              rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
         )
     };
-    let ros_message = "header: {stamp: {sec: 1, nanosec: 2}, frame_id: cam}\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\n\
-                       d: [-0.3, 0.1, 0.001, -0.002, -0.02]\nk: [415.0, 0.0, 318.0, 0.0, 417.0, 241.0, 0.0, 0.0, 1.0]\n";
+    let ros_message = "header: {stamp: {sec: 1, nanosec: 2}, frame_id: cam}\nheight: 480\nwidth: \
+                       640\ndistortion_model: plumb_bob\n\
+                       d: [-0.3, 0.1, 0.001, -0.002, -0.02]\nk: [415.0, 0.0, 318.0, 0.0, 417.0, \
+                       241.0, 0.0, 0.0, 1.0]\n";
     let kalibr = |model: &str, d: &str| {
         format!(
-            "cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n  distortion_coeffs: [{d}]\n  distortion_model: {model}\n  \
-             intrinsics: [415.0, 417.0, 318.0, 241.0]\n  resolution: [640, 480]\n  rostopic: /cam0/image_raw\n  T_cam_imu:\n  - [1.0, 0.0, \
+            "cam0:\n  cam_overlaps: []\n  camera_model: pinhole\n  distortion_coeffs: [{d}]\n  \
+             distortion_model: {model}\n  \
+             intrinsics: [415.0, 417.0, 318.0, 241.0]\n  resolution: [640, 480]\n  rostopic: \
+             /cam0/image_raw\n  T_cam_imu:\n  - [1.0, 0.0, \
              0.0, 0.0]\n"
         )
     };
     let colmap = |model: &str| {
         format!(
-            "# Camera list with one line of data per camera:\r\n#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\r\n7 {model}\r\n"
+            "# Camera list with one line of data per camera:\r\n#   CAMERA_ID, MODEL, WIDTH, \
+             HEIGHT, PARAMS[]\r\n7 {model}\r\n"
         )
     };
     let nerf = |model: &str, rest: &str| {
         format!(
-            r#"{{"camera_model": "{model}", "fl_x": 415, "fl_y": 417, "cx": 318.5, "cy": 241.5, "w": 640, "h": 480, {rest}, "frames": []}}"#
+            r#"{{"camera_model": "{model}", "fl_x": 415, "fl_y": 417, "cx": 318.5, "cy": 241.5,
+                "w": 640, "h": 480, {rest}, "frames": []}}"#
         )
     };
     let files: Vec<(&str, String, Camera)> = vec![
@@ -220,7 +233,8 @@ fn one_of_several_cameras_is_chosen_by_name() {
 fn bad_files_say_where_and_what() {
     let own = |rest: &str| {
         format!(
-            r#"{{"model":"pinhole","width": 40, "height": 20,"fx":30,"fy":30,"cx":20,"cy":10{rest}}}"#
+            r#"{{"model":"pinhole","width": 40, "height": 20,
+                "fx":30,"fy":30,"cx":20,"cy":10{rest}}}"#
         )
     };
     let files: Vec<(&str, String, &str)> = vec![
@@ -272,7 +286,7 @@ fn bad_files_say_where_and_what() {
         (
             "c.yml",
             OPENCV.replace(", -2.0e-02 ]", " "),
-            "no valid YAML",
+            "not valid YAML",
         ),
         (
             "c.yml",
@@ -305,7 +319,7 @@ fn bad_files_say_where_and_what() {
         (
             "c.txt",
             "1 PINHOLE 640 480 415 417 318 x\n".to_owned(),
-            "\"x\" is no number",
+            "\"x\" is not a number",
         ),
         (
             "c.json",
@@ -326,5 +340,5 @@ fn bad_files_say_where_and_what() {
     let path = dir.path().join("c.yml");
     std::fs::write(&path, [0xff, 0xfe, 0x00]).unwrap();
     let message = read_calibration(&path, None).unwrap_err().to_string();
-    assert!(message.contains("no text"), "{message}");
+    assert!(message.contains("not a text file"), "{message}");
 }

@@ -126,7 +126,7 @@ impl Squares {
         self.rotation += trace(0);
         self.translation += trace(3);
         let (mut wall, mut points) = (0.0, 0.0);
-        for ray_c in camera.probes() {
+        for ray_c in camera.corner_and_centre_rays() {
             let ray = pose.r_wc * ray_c;
             if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
                 let a = wall_jacobian(pose, &surface.frame(hit.wall));

@@ -1,15 +1,15 @@
-//! One run of `ffmpeg` through a video.
+//! A sequential decoder of a video: one `ffmpeg` process.
 
-use super::{Video, missing};
+use super::info::{VideoInfo, start_error};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 
-/// Lines of what `ffmpeg` complains about that are told.
-const TOLD: usize = 2;
+/// Largest number of `ffmpeg`'s error lines in an error message.
+const MAX_REPORTED_LINES: usize = 2;
 
-/// A running `ffmpeg` that has still to deliver picture `next` and those after it.
+/// A running `ffmpeg` whose next picture is `next`.
 #[derive(Debug)]
 pub struct Decoder {
     next: usize,
@@ -17,19 +17,19 @@ pub struct Decoder {
     pictures: ChildStdout,
     /// The time of each picture, as a fraction of a second, in their order.
     times: Receiver<[i128; 2]>,
-    /// Returns what `ffmpeg` has complained about.
+    /// Returns the errors reported by `ffmpeg`.
     listener: Option<JoinHandle<Vec<String>>>,
 }
 
 impl Decoder {
-    /// Starts at a picture: at its time, half the way to the one before, so that no rounding tells
-    /// them apart wrongly.
+    /// Starts decoding at a picture. The start time lies halfway to the previous picture, so that
+    /// rounding cannot select the wrong one.
     ///
     /// # Errors
     /// `ffmpeg` is missing.
-    pub fn start(video: &Video, picture: usize) -> Result<Self, String> {
+    pub fn start(video: &VideoInfo, picture: usize) -> Result<Self, String> {
         let mut command = Command::new("ffmpeg");
-        // Levels tell complaints from the rest; showinfo reports at `info`.
+        // Log levels separate errors from the rest; showinfo reports at `info`.
         command.args([
             "-hide_banner",
             "-nostdin",
@@ -37,7 +37,7 @@ impl Decoder {
             "-loglevel",
             "level+info",
         ]);
-        // Not one damaged picture is made up for.
+        // Damaged pictures are not concealed.
         command.args(["-xerror", "-threads", "2", "-copyts"]);
         if let Some(before) = picture.checked_sub(1) {
             let [a, b] = [before, picture].map(|k| video.moments[k].ticks as f64);
@@ -48,10 +48,18 @@ impl Decoder {
         command.args(["-map", "0:v:0", "-fps_mode", "passthrough"]);
         command.args(["-vf", "showinfo=checksum=0"]);
         command.args(["-sws_flags", "bitexact+accurate_rnd+full_chroma_int"]);
-        command.args(["-f", "rawvideo", "-pix_fmt", video.format.pixels(), "-"]);
+        command.args([
+            "-f",
+            "rawvideo",
+            "-pix_fmt",
+            video.layout.ffmpeg_name(),
+            "-",
+        ]);
         command.stdin(Stdio::null());
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
-        let mut child = command.spawn().map_err(|error| missing("ffmpeg", &error))?;
+        let mut child = command
+            .spawn()
+            .map_err(|error| start_error("ffmpeg", &error))?;
         let (Some(pictures), Some(log)) = (child.stdout.take(), child.stderr.take()) else {
             return Err("ffmpeg has no output".to_owned());
         };
@@ -66,17 +74,17 @@ impl Decoder {
         })
     }
 
-    /// The picture that comes next.
+    /// Index of the next picture.
     pub fn next(&self) -> usize {
         self.next
     }
 
-    /// Goes on to a picture, which must not lie behind, and returns its pixels.
+    /// Decodes up to a picture, which must not lie behind, and returns its pixels.
     ///
     /// # Errors
-    /// The video ends before, is damaged, or has no picture of that time.
-    pub fn advance(&mut self, video: &Video, picture: usize) -> Result<Vec<u8>, String> {
-        let mut bytes = vec![0; video.format.bytes()];
+    /// The video ends earlier, is damaged, or has no picture at that time.
+    pub fn advance(&mut self, video: &VideoInfo, picture: usize) -> Result<Vec<u8>, String> {
+        let mut bytes = vec![0; video.layout.bytes()];
         loop {
             let read = self.pictures.read_exact(&mut bytes);
             let time = read.ok().and_then(|()| self.times.recv().ok());
@@ -87,7 +95,7 @@ impl Decoder {
             let [num, den] = video.tick_s.map(i128::from);
             if count * den != expected * num * of_a_second {
                 return Err(format!(
-                    "the video is damaged: picture {} should be at {:.6} s, but what decodes there is at {:.6} s; make the video anew: ffmpeg -i {} -c:v \
+                    "the video is damaged: picture {} should be at {:.6} s, but the decoded picture is at {:.6} s; re-encode the video: ffmpeg -i {} -c:v \
                      libx264 -crf 12 new.mp4",
                     self.next,
                     video.time_s(self.next),
@@ -102,8 +110,8 @@ impl Decoder {
         }
     }
 
-    /// Why no more pictures come.
-    fn ended(&mut self, video: &Video) -> String {
+    /// The error message of a decoder that has ended.
+    fn ended(&mut self, video: &VideoInfo) -> String {
         let _ = self.child.kill();
         let _ = self.child.wait();
         let complaints = self
@@ -111,27 +119,27 @@ impl Decoder {
             .take()
             .and_then(|listener| listener.join().ok());
         let complaints = complaints.unwrap_or_default();
-        let said = match complaints.len().saturating_sub(TOLD) {
+        let said = match complaints.len().saturating_sub(MAX_REPORTED_LINES) {
             _ if complaints.is_empty() => String::new(),
             from => format!(" ({})", complaints[from..].join("; ")),
         };
         format!(
             "the video is damaged or cut off: it decodes up to picture {} of {}{said}",
             self.next,
-            video.pictures()
+            video.moments.len()
         )
     }
 }
 
 impl Drop for Decoder {
     fn drop(&mut self) {
-        // One that has ended already cannot be killed.
+        // Fails if the process has already ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// Reads what `ffmpeg` says to the end: sends the pictures' times, and returns the complaints.
+/// Reads the log of `ffmpeg` to its end: sends the pictures' times and returns the errors.
 fn listen(log: impl BufRead, times: &Sender<[i128; 2]>) -> Vec<String> {
     let mut complaints = Vec::new();
     let mut tick_s = [1, 1];
@@ -141,7 +149,7 @@ fn listen(log: impl BufRead, times: &Sender<[i128; 2]>) -> Vec<String> {
             tick_s = found;
         } else if let Some(ticks) = after(&line, " pts:").and_then(|word| word.parse::<i128>().ok())
         {
-            // Whoever asked may be gone.
+            // The receiver may have been dropped.
             let _ = times.send([ticks * tick_s[0], tick_s[1]]);
         } else if let Some((_, what)) = line.split_once("[error] ").or(line.split_once("[fatal] "))
         {

@@ -1,22 +1,12 @@
-//! What `ffprobe` says of a video.
+//! Reading of a video's properties with `ffprobe`.
 
-use super::{Format, Video, missing};
+use super::info::{Moment, PixelLayout, VideoInfo, start_error};
 use image::ColorType;
 use serde::Deserialize;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
 
-/// When a picture is shown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Moment {
-    /// Its time in ticks of the stream.
-    pub ticks: i64,
-    /// Whether decoding may begin with it.
-    pub key: bool,
-}
-
-/// `ffprobe -of json`.
+/// The output of `ffprobe -of json`.
 #[derive(Deserialize)]
 struct Probed {
     #[serde(default)]
@@ -48,14 +38,14 @@ struct SideData {
     rotation: Option<f64>,
 }
 
-/// What `ffprobe` calls files that end too early.
-const CUT_OFF: [&str; 3] = ["prematurely", "partial file", "truncat"];
+/// Words by which `ffprobe` reports truncated files.
+const TRUNCATION_WORDS: [&str; 3] = ["prematurely", "partial file", "truncat"];
 
-/// Looks into the video at `path`.
+/// Reads the properties of the video at `path`.
 ///
 /// # Errors
-/// See [`Video::open`].
-pub fn probe(path: &Path) -> Result<Video, String> {
+/// See [`super::Video::open`].
+pub fn probe(path: &Path) -> Result<VideoInfo, String> {
     let mut command = Command::new("ffprobe");
     command.args([
         "-v",
@@ -73,9 +63,9 @@ pub fn probe(path: &Path) -> Result<Video, String> {
         .arg(path)
         .stdin(Stdio::null())
         .output()
-        .map_err(|error| missing("ffprobe", &error))?;
+        .map_err(|error| start_error("ffprobe", &error))?;
     let said = String::from_utf8_lossy(&output.stderr);
-    // It begins with the file's own name at times, or with the address of a structure.
+    // A line may begin with the file's name or the address of a structure.
     let complaint = said.lines().last().map(|line| {
         let line = line.rsplit("] ").next().unwrap_or(line);
         let name = format!("{}: ", path.display());
@@ -84,29 +74,29 @@ pub fn probe(path: &Path) -> Result<Video, String> {
     if !output.status.success() {
         let why = complaint.unwrap_or_else(|| "ffprobe cannot read it".to_owned());
         let remedy = if path.exists() {
-            "it is no video, or damaged, or was cut off before its end was written: copy it anew"
+            "it is not a video, is damaged, or was cut off before its end was written: copy it again"
         } else {
             "frames.video is relative to survey.toml"
         };
         return Err(format!("{why}; {remedy}"));
     }
-    if CUT_OFF.iter().any(|sign| said.contains(sign)) {
+    if TRUNCATION_WORDS.iter().any(|sign| said.contains(sign)) {
         return Err(format!(
-            "the video is cut off ({}): copy it anew, or keep what there is with ffmpeg -i {} -c copy whole.mkv",
+            "the video is cut off ({}): copy it again, or recover its intact part with ffmpeg -i {} -c copy whole.mkv",
             complaint.unwrap_or_default(),
             path.display()
         ));
     }
     let probed: Probed = serde_json::from_slice(&output.stdout)
-        .map_err(|error| format!("ffprobe says what cannot be understood: {error}"))?;
+        .map_err(|error| format!("the output of ffprobe cannot be parsed: {error}"))?;
     let video = of(path, probed)?;
-    Ok(Video {
+    Ok(VideoInfo {
         warning: complaint.map(|said| format!("{}: ffprobe says: {said}", path.display())),
         ..video
     })
 }
 
-fn of(path: &Path, probed: Probed) -> Result<Video, String> {
+fn of(path: &Path, probed: Probed) -> Result<VideoInfo, String> {
     let stream = probed.streams.first().ok_or("has no video stream")?;
     let (Some(width), Some(height), Some(pixels), Some(time_base)) = (
         stream.width,
@@ -130,13 +120,13 @@ fn of(path: &Path, probed: Probed) -> Result<Video, String> {
         90.0 | 270.0 => (height, width),
         _ => {
             return Err(format!(
-                "is to be shown turned by {rotation}°, which is no right angle"
+                "is to be shown turned by {rotation}°, which is not a multiple of 90°"
             ));
         }
     };
     let mut moments = Vec::with_capacity(probed.packets.len());
     for packet in &probed.packets {
-        // What is cut away at the beginning is in the file, but not shown.
+        // Discarded packets at the beginning are in the file, but not displayed.
         if packet.flags.contains('D') {
             continue;
         }
@@ -145,7 +135,7 @@ fn of(path: &Path, probed: Probed) -> Result<Video, String> {
             key: packet.flags.starts_with('K'),
         });
     }
-    // Packets come in the order of decoding.
+    // Packets are in decoding order.
     moments.sort_unstable_by_key(|moment| moment.ticks);
     if moments
         .windows(2)
@@ -156,29 +146,28 @@ fn of(path: &Path, probed: Probed) -> Result<Video, String> {
     if moments.is_empty() {
         return Err("holds no pictures; it was cut off or is still being written".to_owned());
     }
-    Ok(Video {
+    Ok(VideoInfo {
         path: path.to_owned(),
-        format: Format {
+        layout: PixelLayout {
             width,
             height,
             colour: colour(pixels),
         },
         moments,
-        tick_s: fraction(time_base).ok_or("has a clock without ticks")?,
+        tick_s: fraction(time_base).ok_or("has no valid time base")?,
         rotation_deg: rotation as i32,
         warning: None,
-        idle: Mutex::default(),
     })
 }
 
 fn untimed(path: &Path) -> String {
     format!(
-        "does not say when each picture is shown; give them times of their own with ffmpeg -i {} -c:v libx264 -crf 12 timed.mp4",
+        "has pictures without times; add times with ffmpeg -i {} -c:v libx264 -crf 12 timed.mp4",
         path.display()
     )
 }
 
-/// Grey or colour, and how deep: names of more than 8 bits say in which order the bytes are.
+/// The colour type of a pixel format; names of formats with more than 8 bits end in the byte order.
 fn colour(pixels: &str) -> ColorType {
     let grey = pixels.starts_with("gray") || pixels.starts_with("ya");
     let deep = pixels.ends_with("le") || pixels.ends_with("be");
@@ -200,7 +189,7 @@ fn fraction(text: &str) -> Option<[i64; 2]> {
 mod tests {
     use super::*;
 
-    fn probed(json: &str) -> Result<Video, String> {
+    fn probed(json: &str) -> Result<VideoInfo, String> {
         of(Path::new("a.mp4"), serde_json::from_str(json).unwrap())
     }
 
@@ -214,10 +203,13 @@ mod tests {
                  "streams": [{{{STREAM}, "side_data_list": [{{}}, {{"rotation": -90}}]}}]}}"#
         );
         let video = probed(&json).unwrap();
-        let times: Vec<f64> = (0..video.pictures()).map(|k| video.time_s(k)).collect();
+        let times: Vec<f64> = (0..video.moments.len()).map(|k| video.time_s(k)).collect();
         assert_eq!(times, [0.0, 20.0 / 600.0, 0.1]);
-        assert_eq!((video.size(), video.rotation_deg()), ((48, 64), 270));
-        assert_eq!(video.colour(), ColorType::Rgb16);
+        assert_eq!(
+            (video.layout.width, video.layout.height, video.rotation_deg),
+            (48, 64, 270)
+        );
+        assert_eq!(video.layout.colour, ColorType::Rgb16);
     }
 
     #[test]
@@ -241,7 +233,7 @@ mod tests {
                 format!(
                     r#"{{{packets}, "streams": [{{{STREAM}, "side_data_list": [{{"rotation": 30}}]}}]}}"#
                 ),
-                "no right angle",
+                "not a multiple of 90°",
             ),
             (
                 format!(r#"{{"packets": [{{"flags": "K_"}}], "streams": [{{{STREAM}}}]}}"#),

@@ -17,7 +17,7 @@ pub(crate) fn sync_files(files: &[PathBuf]) -> io::Result<()> {
     })?;
     let mut folders: Vec<&Path> = files
         .iter()
-        .map(|path| crate::persist::atomic::beside(path))
+        .map(|path| crate::persist::atomic::parent_folder(path))
         .collect();
     folders.sort_unstable();
     folders.dedup();

@@ -1,7 +1,10 @@
 //! Folders that appear as a whole, and folders for a while.
 
-use super::{WriteError, beside, create_folder, durable};
-use crate::persist::atomic::temporary::{self, ASIDE, TemporaryFolder};
+use super::durable;
+use super::error::WriteError;
+use super::file::create_folder;
+use super::parent::parent_folder;
+use super::temporary::{self, REPLACED_NAME, TemporaryFolder};
 use std::path::{Path, PathBuf};
 
 /// A folder that is being filled under another name beside its final one.
@@ -20,7 +23,7 @@ impl StagedFolder {
     /// holds the folder the program works in.
     pub fn begin(target: &Path) -> Result<Self, WriteError> {
         check_replaceable(target)?;
-        let parent = beside(target);
+        let parent = parent_folder(target);
         create_folder(parent)?;
         let temporary =
             temporary::folder_in(parent).map_err(|source| WriteError::new(target, source))?;
@@ -36,7 +39,7 @@ impl StagedFolder {
     ///
     /// # Errors
     /// As [`StagedFolder::begin`].
-    pub fn kept(target: &Path, folder: &Path) -> Result<Self, WriteError> {
+    pub fn adopt(target: &Path, folder: &Path) -> Result<Self, WriteError> {
         check_replaceable(target)?;
         Ok(Self {
             folder: folder.to_owned(),
@@ -60,7 +63,7 @@ impl StagedFolder {
         {
             use std::os::unix::fs::PermissionsExt;
             // A temporary folder is private; the finished one is as its parent.
-            let mode = std::fs::metadata(beside(&self.target))
+            let mode = std::fs::metadata(parent_folder(&self.target))
                 .map_err(fail)?
                 .permissions()
                 .mode();
@@ -71,13 +74,14 @@ impl StagedFolder {
         // The old folder steps aside first and goes only when the new one is in place.
         let mut old = None;
         if self.target.exists() {
-            let aside = temporary::folder_in(beside(&self.target)).map_err(fail)?;
-            std::fs::rename(&self.target, aside.folder.path().join(ASIDE)).map_err(fail)?;
+            let aside = temporary::folder_in(parent_folder(&self.target)).map_err(fail)?;
+            std::fs::rename(&self.target, aside.folder.path().join(REPLACED_NAME)).map_err(fail)?;
             old = Some(aside);
         }
         if let Err(error) = std::fs::rename(&self.folder, &self.target) {
             if let Some(aside) = &old {
-                std::fs::rename(aside.folder.path().join(ASIDE), &self.target).map_err(fail)?;
+                std::fs::rename(aside.folder.path().join(REPLACED_NAME), &self.target)
+                    .map_err(fail)?;
             }
             return Err(fail(error));
         }
@@ -85,11 +89,11 @@ impl StagedFolder {
             // It is no longer temporary.
             let _ = folder.keep();
         }
-        durable::sync_folder(beside(&self.target));
+        durable::sync_folder(parent_folder(&self.target));
         if let Some(aside) = old {
             let aside = aside.folder.path();
             // From now on it may be tidied away.
-            std::fs::rename(aside.join(ASIDE), aside.join("replaced")).map_err(fail)?;
+            std::fs::rename(aside.join(REPLACED_NAME), aside.join("replaced")).map_err(fail)?;
         }
         Ok(())
     }
@@ -142,7 +146,7 @@ impl ScratchFolder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::persist::atomic::write_text;
+    use crate::persist::atomic::file::write_text;
 
     #[test]
     fn a_staged_folder_appears_whole_or_not_at_all() {

@@ -14,23 +14,25 @@ const PREFIX: &str = ".tunnelstitch-";
 
 /// Name, in a temporary folder, of a result that steps aside for its successor. Such a folder is
 /// never tidied away: it may hold the only copy.
-pub(super) const ASIDE: &str = "old";
+pub(super) const REPLACED_NAME: &str = "old";
 
 /// Temporary names in use.
-static UNFINISHED: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+static UNFINISHED_PATHS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// Folders in which this process has tidied.
-static TIDIED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+static CLEANED_FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Times that a folder is removed before it is left to the system.
-const REMOVALS: usize = 20;
+const MAX_REMOVAL_ATTEMPTS: usize = 20;
 
 /// A temporary name on the list of unfinished ones for as long as this lives.
 struct Listed(PathBuf);
 
 impl Listed {
     fn new(path: &Path) -> Self {
-        let mut list = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut list = UNFINISHED_PATHS
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         list.push(path.to_owned());
         Self(path.to_owned())
     }
@@ -38,7 +40,9 @@ impl Listed {
 
 impl Drop for Listed {
     fn drop(&mut self) {
-        let mut list = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut list = UNFINISHED_PATHS
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         list.retain(|path| *path != self.0);
     }
 }
@@ -47,10 +51,12 @@ impl Drop for Listed {
 /// outside: the writers are not told and must not go on, so the list stays locked until the process
 /// ends.
 pub fn remove_unfinished() {
-    let list = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    let list = UNFINISHED_PATHS
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner);
     for path in list.iter() {
         // A writer that was about to make a file in a folder may still do so while it is removed.
-        for _ in 0..REMOVALS {
+        for _ in 0..MAX_REMOVAL_ATTEMPTS {
             // Nobody is left to tell if the system refuses.
             let _ = remove(path);
             if !path.exists() {
@@ -64,7 +70,9 @@ pub fn remove_unfinished() {
 
 /// Whether `path` is, or lies in, something unfinished of this process.
 pub(super) fn is_unfinished(path: &Path) -> bool {
-    let list = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    let list = UNFINISHED_PATHS
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner);
     list.iter().any(|unfinished| path.starts_with(unfinished))
 }
 
@@ -82,7 +90,7 @@ pub(super) struct TemporaryFile {
 /// # Errors
 /// Whatever the system says.
 pub(super) fn file_in(folder: &Path) -> io::Result<TemporaryFile> {
-    tidy(folder);
+    remove_abandoned(folder);
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(".part");
     #[cfg(unix)]
@@ -93,7 +101,7 @@ pub(super) fn file_in(folder: &Path) -> io::Result<TemporaryFile> {
     }
     loop {
         let (file, path) = builder.tempfile_in(folder)?.into_parts();
-        if hold(&file, &path) {
+        if lock_new(&file, &path) {
             let _listed = Listed::new(&path);
             return Ok(TemporaryFile {
                 file,
@@ -117,12 +125,15 @@ pub(super) struct TemporaryFolder {
 /// # Errors
 /// Whatever the system says.
 pub(super) fn folder_in(parent: &Path) -> io::Result<TemporaryFolder> {
-    tidy(parent);
+    remove_abandoned(parent);
     loop {
         let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(parent)?;
         // Some systems do not open folders; there, nobody takes it for left behind either.
         let lock = File::open(folder.path()).ok();
-        if lock.as_ref().is_none_or(|lock| hold(lock, folder.path())) {
+        if lock
+            .as_ref()
+            .is_none_or(|lock| lock_new(lock, folder.path()))
+        {
             return Ok(TemporaryFolder {
                 _listed: Listed::new(folder.path()),
                 _lock: lock,
@@ -134,7 +145,7 @@ pub(super) fn folder_in(parent: &Path) -> io::Result<TemporaryFolder> {
 
 /// Locks a temporary name that was just made; false if somebody has taken it for left behind in the
 /// meantime.
-fn hold(file: &File, path: &Path) -> bool {
+fn lock_new(file: &File, path: &Path) -> bool {
     match file.try_lock() {
         Ok(()) => path.exists(),
         Err(TryLockError::WouldBlock) => false,
@@ -144,8 +155,10 @@ fn hold(file: &File, path: &Path) -> bool {
 }
 
 /// Removes what killed programs have left in `folder`, once in the life of this process.
-fn tidy(folder: &Path) {
-    let mut tidied = TIDIED.lock().unwrap_or_else(PoisonError::into_inner);
+fn remove_abandoned(folder: &Path) {
+    let mut tidied = CLEANED_FOLDERS
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner);
     if !tidied.insert(folder.to_owned()) {
         return;
     }
@@ -153,7 +166,7 @@ fn tidy(folder: &Path) {
     let is_ours = |name: &std::ffi::OsStr| name.as_encoded_bytes().starts_with(PREFIX.as_bytes());
     for entry in entries.filter(|entry| is_ours(&entry.file_name())) {
         let path = entry.path();
-        if let Some(_locked) = left_behind(&path) {
+        if let Some(_locked) = lock_if_abandoned(&path) {
             // It is in nobody's way if the system refuses.
             let _ = remove(&path);
         }
@@ -161,9 +174,9 @@ fn tidy(folder: &Path) {
 }
 
 /// The lock of a temporary file or folder that nobody works on.
-fn left_behind(path: &Path) -> Option<File> {
+fn lock_if_abandoned(path: &Path) -> Option<File> {
     let kind = path.symlink_metadata().ok()?.file_type();
-    if !(kind.is_file() || kind.is_dir()) || path.join(ASIDE).exists() {
+    if !(kind.is_file() || kind.is_dir()) || path.join(REPLACED_NAME).exists() {
         return None;
     }
     let file = File::open(path).ok()?;
@@ -190,7 +203,7 @@ mod tests {
         folder(".tunnelstitch-dead", "half.png");
         std::fs::write(path(".tunnelstitch-alive.part"), "half").unwrap();
         folder(".tunnelstitch-alive", "half.png");
-        folder(".tunnelstitch-aside", ASIDE);
+        folder(".tunnelstitch-aside", REPLACED_NAME);
         std::fs::write(path("result.tif"), "whole").unwrap();
         // As another process would hold them.
         let names = [".tunnelstitch-alive.part", ".tunnelstitch-alive"];
@@ -211,8 +224,8 @@ mod tests {
     fn what_is_being_written_is_nobody_elses() {
         let dir = tempfile::tempdir().unwrap();
         let (file, folder) = (file_in(dir.path()).unwrap(), folder_in(dir.path()).unwrap());
-        assert!(left_behind(&file.path).is_none());
-        assert!(left_behind(folder.folder.path()).is_none());
+        assert!(lock_if_abandoned(&file.path).is_none());
+        assert!(lock_if_abandoned(folder.folder.path()).is_none());
         assert!(is_unfinished(&folder.folder.path().join("a/b.png")));
     }
 }

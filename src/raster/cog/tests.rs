@@ -1,5 +1,5 @@
 use super::*;
-use crate::raster::Reduce;
+use crate::raster::spec::Reduce;
 use crate::raster::test_picture::{grey_alpha, pixel, tiles};
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
@@ -99,7 +99,7 @@ fn deflate_gives_back_the_pixels() {
         for (index, tile) in tiles.into_iter().enumerate() {
             let (column, row) = (index as u32 % columns, index as u32 / columns);
             let [width, height] = spec.extent(0, column, row);
-            let (left, top) = (column as usize * EDGE, row as usize * EDGE);
+            let (left, top) = (column as usize * TILE_EDGE_PX, row as usize * TILE_EDGE_PX);
             let expected: Vec<u8> = (0..height)
                 .flat_map(|y| (0..width).map(move |x| (x, y)))
                 .flat_map(|(x, y)| pixel(&spec, left + x, top + y))
@@ -119,7 +119,7 @@ fn overviews_are_the_reduced_picture() {
     let overview = decoded(&file, 1)[3].clone().unwrap();
     let [width, _] = spec.extent(1, 1, 1);
     for (x, y) in [(0, 0), (17, 200), (width - 1, 300)] {
-        let (left, top) = (2 * (EDGE + x), 2 * (EDGE + y));
+        let (left, top) = (2 * (TILE_EDGE_PX + x), 2 * (TILE_EDGE_PX + y));
         let places = [(0, 0), (1, 0), (0, 1), (1, 1)];
         let sum: u32 = places
             .map(|(dx, dy)| u32::from(pixel(&spec, left + dx, top + dy)[0]))

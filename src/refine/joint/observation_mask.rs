@@ -3,7 +3,7 @@
 use crate::refine::samples::visibility::Visibility;
 use crate::refine::tiles::grid::{TILE, TileId, WallGrid};
 use crate::super_resolve::Region;
-use crate::surface::Patches;
+use crate::surface::WallRegions;
 use std::ops::Range;
 
 /// Who sees what of the tiles of a region.
@@ -34,7 +34,7 @@ impl ObservationMask {
     /// not compared: otherwise frames would be drawn to where the wall is known better, away from
     /// the borders of what they show of it.
     pub fn new(
-        ignored: &Patches,
+        ignored: &WallRegions,
         grid: &WallGrid,
         visibility: &Visibility,
         block: &Range<usize>,
@@ -45,7 +45,7 @@ impl ObservationMask {
         let compared = observations.all.clone();
         for tile in observations.tiles() {
             let id = around(grid, tile);
-            if visibility.tile(id).is_none() && ignored.meet(&grid.area(id)) {
+            if visibility.tile(id).is_none() && ignored.intersects(&grid.area(id)) {
                 continue;
             }
             for (n, frame) in frames.iter().enumerate() {
@@ -187,7 +187,14 @@ mod tests {
         let sights_of = |visibility: &Visibility, block: &Range<usize>| {
             let region = region_of(&grid, &visibility.tiles[block.clone()]);
             let frames = visibility.frames(block);
-            ObservationMask::new(&Patches::NONE, &grid, visibility, block, &frames, &region)
+            ObservationMask::new(
+                &WallRegions::NONE,
+                &grid,
+                visibility,
+                block,
+                &frames,
+                &region,
+            )
         };
         let (mut partly, mut compared) = (0, 0);
         for block in &all.blocks {

@@ -6,7 +6,7 @@ use crate::refine::model::prior::{Prior, predict};
 use crate::refine::parameters::calibration::{Calibration, Kappa};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::tiles::interpolation::Interpolation;
-use crate::surface::{Patches, Surface};
+use crate::surface::{Surface, WallRegions};
 use crate::trajectory::{Pose, Shutter};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -53,7 +53,7 @@ pub struct EstimationContext<'a> {
     /// The tunnel.
     pub surface: &'a dyn Surface,
     /// Parts of the wall by which frames are not compared.
-    pub ignored: &'a Patches,
+    pub ignored: &'a WallRegions,
     /// The camera at full size, as far as it is known by now, at rest.
     pub camera: Camera,
     /// When the rows of the frames are read.
@@ -93,7 +93,7 @@ impl EstimationContext<'_> {
         if readout_s == 0.0 {
             Sweep::default()
         } else {
-            self.sweep_rate(frame, run, estimates).times(readout_s)
+            self.sweep_rate(frame, run, estimates).scaled(readout_s)
         }
     }
 

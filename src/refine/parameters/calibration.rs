@@ -137,8 +137,8 @@ impl Calibration {
         let [k1, k2] = camera.lens.k1_k2();
         camera.lens = camera.lens.with_k1_k2(k1 + kappa[3], k2 + kappa[4]);
         // Without a change of the lens, and so usually, nothing is to be asked.
-        let shows =
-            camera.lens == self.given.lens || camera.shown_share() >= self.given.shown_share();
+        let shows = camera.lens == self.given.lens
+            || camera.visible_fraction() >= self.given.visible_fraction();
         shows.then_some(camera)
     }
 

@@ -1,7 +1,7 @@
 //! A look at the samples before a solve: the noise, and what is not wall.
 
 use crate::frames::noise_at_level;
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::refine::joint::joint_block::{JointBlock, WallModel};
 use crate::refine::joint::stiffness::Probe;
 use crate::refine::model::context::{FrameWindow, Sampling};
@@ -39,7 +39,7 @@ impl Problem<'_> {
         let counted = self.at_tiles(
             SCALE_TILES,
             |(histogram, spectrum): &mut (NoiseHistogram, TextureSpectrum), look| {
-                wide(
+                dispatch_simd(
                     #[inline(always)]
                     || {
                         look.work
@@ -184,7 +184,7 @@ impl Problem<'_> {
     /// Nothing found yet, and what misfit is usual.
     fn no_foreign(&self) -> Result<OutlierMask, ProblemError> {
         let found = self.at_tiles(SCALE_TILES, |misfits: &mut Vec<Misfit>, look| {
-            wide(
+            dispatch_simd(
                 #[inline(always)]
                 || look.work.misfit(look.points, look.seen(), &self.noise),
             );

@@ -121,11 +121,11 @@ impl<'a> Problem<'a> {
                     return Ok(None);
                 }
                 let pose = estimate.pose;
-                let sweep = rates[frame - participants.start].times(readout_s);
+                let sweep = rates[frame - participants.start].scaled(readout_s);
                 Ok(Some(PosedFrame {
                     pose,
                     sweep,
-                    footprint: footprint(scene, &camera.sweeping(&sweep), frame, &pose)?,
+                    footprint: footprint(scene, &camera.with_sweep(&sweep), frame, &pose)?,
                     active: active.contains(&frame),
                 }))
             })
@@ -282,8 +282,8 @@ impl<'a> Problem<'a> {
     /// The camera at full size with the motion of a participant's.
     pub fn camera_of(&self, participant: usize) -> Camera {
         let readout_s = self.scene.calibration.readout_s(&self.scene.kappa);
-        let sweep = self.rates[participant].times(readout_s);
-        self.scene.camera.sweeping(&sweep)
+        let sweep = self.rates[participant].scaled(readout_s);
+        self.scene.camera.with_sweep(&sweep)
     }
 
     /// The frames of a stretch at the given estimates of all participants, seen by `camera` (of the
@@ -302,7 +302,7 @@ impl<'a> Problem<'a> {
             .map(|(k, picture)| {
                 SampledFrame::new(
                     picture.level(self.sampling.level),
-                    camera.sweeping(&self.rates[*k].times(readout_s)),
+                    camera.with_sweep(&self.rates[*k].scaled(readout_s)),
                     &estimates[*k],
                 )
                 .interpolated(self.sampling.interpolation)
@@ -512,7 +512,7 @@ impl<'a> Problem<'a> {
     /// How many freedoms of the poses the tie of the gauge takes.
     pub fn tied_freedoms(&self) -> usize {
         match self.held_frames() {
-            0 => self.scene.surface.gauge().freedoms(),
+            0 => self.scene.surface.gauge().degrees_of_freedom(),
             _ => 0,
         }
     }
@@ -553,7 +553,7 @@ impl<'a> Problem<'a> {
     ) -> f64 {
         let xi: nalgebra::Vector6<f64> = step.fixed_rows::<6>(0).into();
         let pose = &estimate.pose;
-        (self.camera.probes().into_iter())
+        (self.camera.corner_and_centre_rays().into_iter())
             .filter_map(|ray_c| {
                 let ray = pose.r_wc * ray_c;
                 let hit = self.scene.surface.hit(&pose.t_wc, &ray).ok()?;

@@ -1,7 +1,7 @@
 //! Sums over the tiles of one block of the wall.
 
 use crate::camera::Camera;
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::refine::problem::block_sums::{BlockSums, TileSums};
 use crate::refine::problem::observer_column::Column;
 use crate::refine::problem::photometric_problem::Problem;
@@ -85,7 +85,7 @@ impl Problem<'_> {
         } else {
             for tile in tiles {
                 let points = points_of(tile, &mut scratch);
-                wide(
+                dispatch_simd(
                     #[inline(always)]
                     || {
                         let seen = visibility.observers(tile).iter().map(|o| o.seen(views));
@@ -95,7 +95,7 @@ impl Problem<'_> {
                 add(tile, &points, &work.found);
             }
         }
-        wide(
+        dispatch_simd(
             #[inline(always)]
             || {
                 for tile in &summed {

@@ -43,7 +43,7 @@ pub fn footprints(
     let estimates = tracked.estimates.par_iter().enumerate();
     estimates
         .map(|(k, estimate)| {
-            let camera = scene.camera.sweeping(&tracked.sweep(scene, k));
+            let camera = scene.camera.with_sweep(&tracked.sweep(scene, k));
             footprint(scene, &camera, k, &estimate.pose)
         })
         .collect()

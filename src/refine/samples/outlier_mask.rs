@@ -15,7 +15,7 @@
 //! Decided once before a solve, not step by step: the observations stay the same while the poses
 //! move.
 
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::refine::samples::observer_marks::ObserverMarks;
 use crate::refine::samples::visibility::{Tile, Visibility};
 use crate::refine::tiles::frame_samples::SampledFrame;
@@ -111,7 +111,7 @@ impl OutlierMask {
             for tile in tiles {
                 let points = TilePoints::new(&self.grid, surface, tile.id, &mut scratch);
                 let observers = visibility.observers(tile);
-                wide(
+                dispatch_simd(
                     #[inline(always)]
                     || work.misfit(&points, observers.iter().map(|o| o.seen(views)), noise),
                 );

@@ -1,6 +1,6 @@
 //! Where single wall points appear in a frame.
 
-use crate::camera::{Bend, Camera, SingleLens};
+use crate::camera::{Camera, LensF32, ProjectF32};
 use crate::frames::GreyImage;
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Vector3};
@@ -11,7 +11,7 @@ pub struct Sampler {
     centre: Vector3<f32>,
     focal: (f32, f32),
     principal: (f32, f32),
-    lens: SingleLens,
+    lens: LensF32,
     limit: (f32, f32),
     width: usize,
 }
@@ -36,7 +36,7 @@ impl Sampler {
             centre: pose.to_camera(origin).cast(),
             focal: (camera.fx as f32, camera.fy as f32),
             principal: (camera.cx as f32, camera.cy as f32),
-            lens: SingleLens::new(camera),
+            lens: LensF32::new(camera),
             limit: ((camera.width - 1) as f32, (camera.height - 1) as f32),
             width: camera.width as usize,
         }
@@ -50,7 +50,7 @@ impl Sampler {
             |row: usize| r[(row, 0)] * point[0] + r[(row, 1)] * point[1] + r[(row, 2)] * point[2];
         let (x, y) = (self.centre.x + dot(0), self.centre.y + dot(1));
         let z = self.centre.z + dot(2);
-        let (p, q, shown) = self.lens.bend(x, y, z);
+        let (p, q, shown) = self.lens.project_f32(x, y, z);
         let u = self.focal.0 * p + self.principal.0;
         let v = self.focal.1 * q + self.principal.1;
         if !(shown && u >= 0.0 && v >= 0.0 && u < self.limit.0 && v < self.limit.1) {
@@ -97,7 +97,7 @@ mod tests {
         let mut camera = Camera::from_vertical_fov(64, 48, 1.0);
         camera.lens = Lens::radial(-0.1, 0.02);
         seen_where_projected(&camera);
-        seen_where_projected(&camera.sweeping(&Sweep {
+        seen_where_projected(&camera.with_sweep(&Sweep {
             omega_rad: Vector3::new(0.01, 0.03, -0.01),
             nu_m: Vector3::new(0.001, -0.002, 0.001),
         }));
@@ -124,7 +124,7 @@ mod tests {
             let point = offset.cast::<f32>().into();
             let pixel = camera.project(&pose.to_camera(&(origin + offset)));
             let Some(spot) = sampler.at(&point) else {
-                let inside = pixel.is_some_and(|p| camera.sees(&p, 0.001));
+                let inside = pixel.is_some_and(|p| camera.is_in_image(&p, 0.001));
                 assert!(!inside, "{pixel:?}");
                 continue;
             };

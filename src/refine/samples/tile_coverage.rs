@@ -99,7 +99,7 @@ impl<'a> Coverage<'a> {
         placed: Vec<Option<PosedFrame>>,
     ) -> Result<Self, FrameError> {
         let mut coverage = Self {
-            stretches: stretches(&grid, &placed, pictures.frames.room()),
+            stretches: stretches(&grid, &placed, pictures.frames.pyramid_capacity()),
             surface,
             grid,
             camera,
@@ -195,7 +195,7 @@ impl<'a> Coverage<'a> {
             .zip(&placed)
             .map(|(picture, placed)| {
                 let picture = picture.level(self.pictures.level);
-                let camera = self.camera.sweeping(&placed.sweep);
+                let camera = self.camera.with_sweep(&placed.sweep);
                 SampledFrame::new(picture, camera, &FrameEstimate::at(placed.pose))
             })
             .collect();

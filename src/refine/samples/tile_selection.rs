@@ -17,7 +17,7 @@
 //! not bias the solve, being as likely to have either sign; it makes tiles look more alike than
 //! they are, so that more of them are kept.
 
-use crate::numerics::simd_dispatch::wide;
+use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::refine::samples::visibility::{Tile, Visibility};
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{TilePoints, WallGrid};
@@ -66,7 +66,7 @@ fn squares(
                 return [0.0; 2];
             };
             let view = &views[nearest.frame as usize];
-            let squares = wide(
+            let squares = dispatch_simd(
                 #[inline(always)]
                 || slope_squares(&points, view, nearest.shade),
             );

@@ -1,12 +1,12 @@
 //! Which frames see which tiles of the wall.
 
 use crate::camera::{Camera, Sweep};
-use crate::frames::{HalvedMask, Shading};
+use crate::frames::{PyramidMask, Shading};
 use crate::refine::samples::observer_marks::ObserverMarks;
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, SIDE, TileId, WallGrid};
 use crate::refine::tiles::tile::Seen;
-use crate::surface::{Footprint, Patches, Surface};
+use crate::surface::{Footprint, Surface, WallRegions};
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
@@ -75,16 +75,16 @@ pub struct PosedFrame {
 #[derive(Clone, Debug)]
 pub struct Hidden<'a> {
     /// Parts of the wall.
-    pub ignored: &'a Patches,
+    pub ignored: &'a WallRegions,
     /// Which pixels show the wall, at the frames' level; all if there is none.
-    pub mask: Option<HalvedMask>,
+    pub mask: Option<PyramidMask>,
 }
 
 #[cfg(test)]
 impl Hidden<'_> {
     /// Nothing.
     pub const NOTHING: Hidden<'static> = Hidden {
-        ignored: &Patches::NONE,
+        ignored: &WallRegions::NONE,
         mask: None,
     };
 }
@@ -129,7 +129,7 @@ impl Visibility {
             .zip(&fields)
             .enumerate()
             .map(|(k, (frame, field))| {
-                let camera = &camera.sweeping(&frame.sweep);
+                let camera = &camera.with_sweep(&frame.sweep);
                 let mut tiles = Vec::new();
                 let mask = hidden.mask.as_ref();
                 for tile in cells.of(field) {
@@ -317,7 +317,7 @@ impl<'g> Cells<'g> {
         &self,
         surface: &dyn Surface,
         fields: &[Field],
-        ignored: &Patches,
+        ignored: &WallRegions,
     ) -> Vec<Option<[Vector3<f64>; 4]>> {
         let mut wanted = vec![false; self.count()];
         for tile in fields.iter().flat_map(|field| self.of(field)) {
@@ -327,7 +327,7 @@ impl<'g> Cells<'g> {
             .par_iter()
             .enumerate()
             .map_init(Vec::new, |scratch, (k, wanted)| {
-                if !*wanted || ignored.meet(&self.grid.area(self.id(k))) {
+                if !*wanted || ignored.intersects(&self.grid.area(self.id(k))) {
                     return None;
                 }
                 self.grid.corners(surface, self.id(k), scratch);
@@ -371,14 +371,14 @@ struct TileProjection {
 fn project_tile(
     grid: &WallGrid,
     camera: &Camera,
-    mask: Option<&HalvedMask>,
+    mask: Option<&PyramidMask>,
     pose: &Pose,
     corners: &[Vector3<f64>; 4],
 ) -> Option<TileProjection> {
     let pixel = |x_w: &Vector3<f64>| {
         camera
             .project(&pose.to_camera(x_w))
-            .filter(|pixel| camera.sees(pixel, MARGIN_PX))
+            .filter(|pixel| camera.is_in_image(pixel, MARGIN_PX))
     };
     let (a, b) = (pixel(&corners[0])?, pixel(&corners[1])?);
     let (c, d) = (pixel(&corners[2])?, pixel(&corners[3])?);

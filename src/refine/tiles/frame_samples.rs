@@ -1,6 +1,6 @@
 //! Sampling a frame at the wall samples of a tile.
 
-use crate::camera::{Bend, Camera, SingleLens, Sweep};
+use crate::camera::{Camera, LensF32, ProjectF32, Sweep};
 use crate::frames::GreyImage;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::tiles::grid::{Plane, TilePoints, ZERO};
@@ -23,7 +23,7 @@ pub struct SampledFrame<'a> {
     camera: Camera,
     /// `fx, fy, cx, cy`.
     intrinsics: [f32; 4],
-    lens: SingleLens,
+    lens: LensF32,
     pose: Pose,
     r_cw: Matrix3<f32>,
     gain: f32,
@@ -39,7 +39,7 @@ impl<'a> SampledFrame<'a> {
             image,
             camera,
             intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy].map(|v| v as f32),
-            lens: SingleLens::new(&camera),
+            lens: LensF32::new(&camera),
             pose: estimate.pose,
             r_cw: r_wc.matrix().transpose().cast(),
             gain: estimate.log_gain.exp() as f32,
@@ -122,17 +122,23 @@ impl<'a> SampledFrame<'a> {
     #[inline(always)]
     pub fn sample(&self, points: &TilePoints, shade: f32, values: &mut Plane) {
         match self.lens {
-            SingleLens::Straight(lens) => self.sample_through(lens, points, shade, values),
-            SingleLens::Brown(lens) => self.sample_through(lens, points, shade, values),
-            SingleLens::Fisheye(lens) => self.sample_through(lens, points, shade, values),
-            SingleLens::RollingStraight(lens) => self.sample_through(lens, points, shade, values),
-            SingleLens::RollingBrown(lens) => self.sample_through(lens, points, shade, values),
-            SingleLens::RollingFisheye(lens) => self.sample_through(lens, points, shade, values),
+            LensF32::Pinhole(lens) => self.sample_through(lens, points, shade, values),
+            LensF32::BrownConrady(lens) => self.sample_through(lens, points, shade, values),
+            LensF32::KannalaBrandt(lens) => self.sample_through(lens, points, shade, values),
+            LensF32::RollingPinhole(lens) => self.sample_through(lens, points, shade, values),
+            LensF32::RollingBrownConrady(lens) => self.sample_through(lens, points, shade, values),
+            LensF32::RollingKannalaBrandt(lens) => self.sample_through(lens, points, shade, values),
         }
     }
 
     #[inline(always)]
-    fn sample_through(&self, lens: impl Bend, points: &TilePoints, shade: f32, values: &mut Plane) {
+    fn sample_through(
+        &self,
+        lens: impl ProjectF32,
+        points: &TilePoints,
+        shade: f32,
+        values: &mut Plane,
+    ) {
         let c: Vector3<f32> = self.pose.to_camera(&points.centre.x_w).cast();
         let r = &self.r_cw;
         let [fx, fy, cx, cy] = self.intrinsics;
@@ -151,7 +157,7 @@ impl<'a> SampledFrame<'a> {
             let x = c.x + r[(0, 0)] * dx + r[(0, 1)] * dy + r[(0, 2)] * dz;
             let y = c.y + r[(1, 0)] * dx + r[(1, 1)] * dy + r[(1, 2)] * dz;
             let z = c.z + r[(2, 0)] * dx + r[(2, 1)] * dy + r[(2, 2)] * dz;
-            let (p, q, _) = lens.bend(x, y, z);
+            let (p, q, _) = lens.project_f32(x, y, z);
             let (u, v) = (fx * p + cx, fy * q + cy);
             // `max` first: a NaN (a sample behind the camera) becomes the first pixel.
             let x0 = (u - 0.5).max(first).min(last_u) + INTEGER;
@@ -271,7 +277,7 @@ mod tests {
                 }
                 let camera = calibration.camera(&kappa).unwrap();
                 let readout_s = if k == LENS { amount } else { 0.0 };
-                wall_of(&camera.sweeping(&rate.times(readout_s)), &pixel)
+                wall_of(&camera.with_sweep(&rate.scaled(readout_s)), &pixel)
             };
             let (plus, minus) = (moved(step), moved(-step));
             let s = (plus.s_m - minus.s_m) / (2.0 * step);
@@ -291,7 +297,7 @@ mod tests {
         for lens in [Lens::radial(-0.1, 0.02), Lens::KannalaBrandt(fisheye)] {
             let camera = Camera { lens, ..straight };
             sampled_where_projected(camera);
-            sampled_where_projected(camera.sweeping(&Sweep {
+            sampled_where_projected(camera.with_sweep(&Sweep {
                 omega_rad: Vector3::new(0.01, 0.03, -0.01),
                 nu_m: Vector3::new(0.001, -0.002, 0.001),
             }));

@@ -1,7 +1,9 @@
 //! The wall around a frame as the frames already placed show it.
 
 use crate::camera::{Camera, Sweep};
-use crate::frames::{GreyImage, LocalContrast, Pyramid, local_contrast, noise_at_level, usual};
+use crate::frames::{
+    GreyImage, LocalContrast, Pyramid, local_contrast, mask_outliers, noise_at_level,
+};
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
@@ -108,7 +110,7 @@ impl UnwrappedFrame {
     ) -> Result<Self, ProblemError> {
         let picture = scene.frames.get(frame)?;
         Ok(Self {
-            camera: scene.camera.at_level(level).sweeping(sweep),
+            camera: scene.camera.at_level(level).with_sweep(sweep),
             local: picture.contrast(level),
             level,
             picture,
@@ -117,7 +119,7 @@ impl UnwrappedFrame {
 
     /// Frame `frame`, its camera moving by `sweep`, with its contrast over no more than `window`
     /// pixels to each side: fine detail only. `all`: of all that it shows, or of the usual alone
-    /// ([`usual`]).
+    /// ([`mask_outliers`]).
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
@@ -134,10 +136,10 @@ impl UnwrappedFrame {
         let local = if all {
             local_contrast(image, window)
         } else {
-            local_contrast(&usual(image), window)
+            local_contrast(&mask_outliers(image), window)
         };
         Ok(Self {
-            camera: scene.camera.at_level(level).sweeping(sweep),
+            camera: scene.camera.at_level(level).with_sweep(sweep),
             local: Arc::new(local),
             level,
             picture,
@@ -390,7 +392,7 @@ impl ReferenceMosaic {
             .enumerate()
             .map(|(k, point)| {
                 let (mut sum, mut seen) = ([0.0f32; 3], 0.0f32);
-                if scene.ignored.hold(&lattice.wall(k)) {
+                if scene.ignored.contains(&lattice.wall(k)) {
                     return [f32::NAN; 3];
                 }
                 for (cone, sampler, inverse_gain, bias) in &samplers {

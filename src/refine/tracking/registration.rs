@@ -308,7 +308,7 @@ fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
 /// How far apart two poses put the frame on the wall: the mean over its middle and corners, metres.
 pub fn separation_m(scene: &EstimationContext, a: &Pose, b: &Pose) -> f64 {
     let perimeter = scene.surface.perimeter_m();
-    (scene.camera.probes().iter())
+    (scene.camera.corner_and_centre_rays().iter())
         .filter_map(|ray_c| {
             let look = |pose: &Pose| {
                 let ray = pose.r_wc * ray_c;

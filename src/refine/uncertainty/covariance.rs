@@ -68,7 +68,7 @@ pub struct FrameSigma {
     #[serde(deserialize_with = "nan_if_null")]
     pub translation_m: f64,
     /// Position on the wall of what the frame shows: root mean square over the picture
-    /// ([`Camera::rays_across`]), metres.
+    /// ([`Camera::grid_rays`]), metres.
     #[serde(deserialize_with = "nan_if_null")]
     pub wall_m: f64,
     /// The same in pixels of the frame at its middle, as [`crate::evaluate::WallError`] counts
@@ -267,7 +267,7 @@ pub fn frame_sigma(
             .sum::<f64>()
     };
     let (mut wall, mut points) = (0.0, 0.0);
-    for ray_c in camera.rays_across() {
+    for ray_c in camera.grid_rays() {
         let ray = pose.r_wc * ray_c;
         if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
             let a = wall_jacobian(pose, &surface.frame(hit.wall));

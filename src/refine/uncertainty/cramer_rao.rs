@@ -189,7 +189,7 @@ fn finer_camera(camera: &Camera) -> Camera {
         height: FINER * (camera.height - 1) + 1,
         cx: scale * camera.cx,
         cy: scale * camera.cy,
-        ..camera.finer(FINER)
+        ..camera.upsampled(FINER)
     }
 }
 

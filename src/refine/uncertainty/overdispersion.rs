@@ -119,7 +119,7 @@ pub fn overdispersed(
 mod tests {
     use super::*;
 
-    /// Patches that all pull at random, each by its own noise, are no overdispersion; those that pull by
+    /// WallRegions that all pull at random, each by its own noise, are no overdispersion; those that pull by
     /// half a pixel more are half a pixel.
     #[test]
     fn strain_is_what_patches_are_off_by_beyond_noise() {

@@ -25,7 +25,7 @@ use crate::refine::tracking::reference_mosaic::{ReferenceMosaic, UnwrappedFrame}
 use crate::refine::tracking::registration::{
     LEAST_UNEXPLAINED, MOST_DEVIATION, Neighbours, UNEXPLAINED, near, unexplained,
 };
-use crate::surface::{Footprint, Gauge, GaugeMotion, free_part};
+use crate::surface::{Footprint, Gauge, GaugeMotion, gauge_component};
 use crate::trajectory::{JitterModel, Pose};
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -233,7 +233,7 @@ fn repeats_of(
         return Ok(Vec::new());
     };
     let most = most_unexplained(here);
-    let motion = |shift_m: [f64; 2]| free_part(scene.surface, &pose, &shift_m.into());
+    let motion = |shift_m: [f64; 2]| gauge_component(scene.surface, &pose, &shift_m.into());
     let moved = |shift_m: [f64; 2]| motion(shift_m).1.apply(&pose);
     let spacing = wall.lattice.spacing_m;
     let mut found = Vec::new();

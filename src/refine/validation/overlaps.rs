@@ -47,7 +47,7 @@ impl Overlaps {
                 if !(run.contains(&k) && rejection.is_none()) {
                     Ok(None)
                 } else {
-                    let camera = camera.sweeping(&tracked.sweep(scene, k));
+                    let camera = camera.with_sweep(&tracked.sweep(scene, k));
                     footprint(scene, &camera, k, &estimate.pose).map(Some)
                 }
             })

@@ -106,7 +106,7 @@ pub fn align_pairs(
                 let look = |k: usize| Look {
                     scene,
                     level,
-                    camera: camera.sweeping(&tracked.sweep(scene, k)),
+                    camera: camera.with_sweep(&tracked.sweep(scene, k)),
                     picture: &pictures[&k],
                     pose: &tracked.estimates[k].pose,
                 };
@@ -167,7 +167,7 @@ struct Sample {
 struct Template {
     origin: Vector3<f64>,
     samples: Vec<Sample>,
-    /// Patches that they are counted by.
+    /// WallRegions that they are counted by.
     patches: usize,
     /// A pixel of the level on the wall, metres.
     pixel_size_m: f64,
@@ -199,7 +199,7 @@ impl Template {
         for row in 0..lattice.rows {
             for column in 0..lattice.columns {
                 let wall = lattice.wall(row * lattice.columns + column);
-                if scene.ignored.hold(&wall) {
+                if scene.ignored.contains(&wall) {
                     continue;
                 }
                 let frame = scene.surface.frame(wall);

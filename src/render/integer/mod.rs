@@ -40,7 +40,7 @@ macro_rules! by_taps {
     };
     ($number:literal, $simd:ident, $taps:ident, $work:expr) => {{
         const $taps: usize = $number;
-        simd_dispatch::avx2(
+        simd_dispatch::dispatch_avx2(
             #[inline(always)]
             |$simd| $work,
         )
@@ -91,7 +91,7 @@ pub fn pixels<const C: usize>(kernel: &Kernel, sums: &[[i32; 4]], pixels: &mut [
     let mut more = [rounding(kernel.taps()); 4];
     more[C] = 255 << bits;
     #[cfg(target_arch = "x86_64")]
-    if simd_dispatch::avx2(
+    if simd_dispatch::dispatch_avx2(
         #[inline(always)]
         |simd| avx2::pixels::<C>(simd, sums, &more, bits, pixels),
     ) {

@@ -1,24 +1,24 @@
 //! The ellipse.
 
-use super::{OutlineHit, OutlinePoint, Section, forward_root};
-use crate::surface::SurfaceError;
+use super::outline::{OutlineHit, OutlinePoint, Section, forward_root};
+use crate::surface::error::{SurfaceError, check_size};
 use nalgebra::Vector2;
 use std::f64::consts::TAU;
 
 /// An ellipse `(a sin φ, b cos φ)` with its axes along x and z.
 ///
-/// Its length `s(φ) = ∫ √(a² cos² φ + b² sin² φ) dφ` has no closed form: it is added up by
-/// Gauss–Legendre quadrature and turned round by Newton's method, to the last bits.
+/// Its length `s(φ) = ∫ √(a² cos² φ + b² sin² φ) dφ` has no closed form: it is integrated by
+/// Gauss–Legendre quadrature and inverted by Newton's method, to rounding.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ellipse {
     a_m: f64,
     b_m: f64,
-    /// `s(φ)` at [`CELLS`] + 1 even steps of φ once around, metres.
+    /// `s(φ)` at [`TABLE_CELLS`] + 1 uniform steps of φ once around, metres.
     lengths_m: Vec<f64>,
 }
 
-/// Steps of φ: within one, five points of quadrature are exact.
-const CELLS: usize = 512;
+/// Cells of φ; within one cell, quadrature with five points is exact to rounding.
+const TABLE_CELLS: usize = 512;
 /// Nodes and weights of Gauss–Legendre quadrature on `[0, 1]`.
 const QUADRATURE: [(f64, f64); 5] = [
     (0.046_910_077_030_668, 0.118_463_442_528_095),
@@ -29,20 +29,20 @@ const QUADRATURE: [(f64, f64); 5] = [
 ];
 
 impl Ellipse {
-    /// An ellipse of the given width (along x) and height (along z), metres.
+    /// Creates an ellipse of the given width (along x) and height (along z), metres.
     ///
     /// # Errors
     /// [`SurfaceError::Size`] unless both are positive and finite.
     pub fn new(width_m: f64, height_m: f64) -> Result<Self, SurfaceError> {
-        super::super::check_size("width_m", width_m)?;
-        super::super::check_size("height_m", height_m)?;
+        check_size("width_m", width_m)?;
+        check_size("height_m", height_m)?;
         let mut ellipse = Self {
             a_m: 0.5 * width_m,
             b_m: 0.5 * height_m,
             lengths_m: vec![0.0],
         };
         let mut length_m = 0.0;
-        for k in 0..CELLS {
+        for k in 0..TABLE_CELLS {
             length_m += ellipse.length(phi(k), phi(k + 1));
             ellipse.lengths_m.push(length_m);
         }
@@ -55,7 +55,7 @@ impl Ellipse {
         (self.a_m * cos).hypot(self.b_m * sin)
     }
 
-    /// The length between two φ no farther apart than a cell, metres.
+    /// The length between two φ at most one cell apart, metres.
     fn length(&self, from: f64, to: f64) -> f64 {
         let wide = to - from;
         let terms = QUADRATURE.iter();
@@ -67,18 +67,18 @@ impl Ellipse {
 
     fn s_of(&self, phi_rad: f64) -> f64 {
         let phi_rad = phi_rad.rem_euclid(TAU);
-        let cell = ((phi_rad / TAU * CELLS as f64) as usize).min(CELLS - 1);
+        let cell = ((phi_rad / TAU * TABLE_CELLS as f64) as usize).min(TABLE_CELLS - 1);
         self.lengths_m[cell] + self.length(phi(cell), phi_rad)
     }
 
     fn phi_of(&self, s_m: f64) -> f64 {
         let s_m = s_m.rem_euclid(self.perimeter_m());
         let cell = self.lengths_m.partition_point(|length| *length <= s_m);
-        let cell = cell.clamp(1, CELLS) - 1;
+        let cell = cell.clamp(1, TABLE_CELLS) - 1;
         let mut phi_rad = phi(cell);
         let left_m = s_m - self.lengths_m[cell];
-        // The speed changes by parts in a thousand within a cell: every step gains three digits at
-        // the least.
+        // The speed changes by parts in a thousand within a cell, so every step gains at least
+        // three digits.
         for _ in 0..6 {
             let ahead_m = left_m - self.length(phi(cell), phi_rad);
             phi_rad += ahead_m / self.speed(phi_rad);
@@ -88,12 +88,12 @@ impl Ellipse {
 }
 
 fn phi(cell: usize) -> f64 {
-    TAU * cell as f64 / CELLS as f64
+    TAU * cell as f64 / TABLE_CELLS as f64
 }
 
 impl Section for Ellipse {
     fn perimeter_m(&self) -> f64 {
-        self.lengths_m[CELLS]
+        self.lengths_m[TABLE_CELLS]
     }
 
     fn at(&self, s_m: f64) -> OutlinePoint {
@@ -104,7 +104,7 @@ impl Section for Ellipse {
         }
     }
 
-    /// The circle of radius 1 in the plane shrunk by a and b.
+    /// Intersects the unit circle in the plane scaled by 1/a and 1/b.
     fn hit(&self, from: &Vector2<f64>, d: &Vector2<f64>) -> OutlineHit {
         let shrink = |v: &Vector2<f64>| Vector2::new(v.x / self.a_m, v.y / self.b_m);
         let (start, along) = (shrink(from), shrink(d));
@@ -134,7 +134,7 @@ impl Section for Ellipse {
 mod tests {
     use super::*;
 
-    /// Ramanujan's second approximation is good to 10⁻⁹ and better for such ellipses.
+    /// Ramanujan's second approximation is accurate to 10⁻⁹ for such ellipses.
     #[test]
     fn the_perimeter_is_ramanujans() {
         for (width, height) in [(4.0, 3.0), (2.0, 5.0), (6.0, 6.0)] {

@@ -1,6 +1,9 @@
 use super::*;
-use crate::surface::section::{Ellipse, Pieces, Round};
-use crate::surface::{CentrePoint, Circle, free_part, wall_jacobian};
+use crate::surface::centreline::CentrePoint;
+use crate::surface::circle::Circle;
+use crate::surface::displacement::wall_jacobian;
+use crate::surface::gauge_component;
+use crate::surface::section::{CircleOutline, Ellipse, PiecewiseOutline};
 use crate::trajectory::{Pose, so3};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -41,7 +44,11 @@ fn helix() -> Swept {
         let (sin, cos) = (TAU * t).sin_cos();
         [30.0 * cos, 20.0 * t, 30.0 * sin]
     };
-    tunnel(Box::new(Round { radius_m: 3.0 }), 3.0, &along(120, point))
+    tunnel(
+        Box::new(CircleOutline { radius_m: 3.0 }),
+        3.0,
+        &along(120, point),
+    )
 }
 
 fn s_curve() -> Swept {
@@ -60,14 +67,14 @@ fn funnel() -> Swept {
         [0.0, 20.0, 1.0, 2.0],
         [0.5, 30.0, 1.0, 2.0],
     ];
-    tunnel(Box::new(Round { radius_m: 3.0 }), 3.0, &points)
+    tunnel(Box::new(CircleOutline { radius_m: 3.0 }), 3.0, &points)
 }
 
 fn tunnels() -> Vec<Swept> {
     vec![
-        bend(Box::new(Round { radius_m: 3.0 })),
-        bend(Box::new(Pieces::rectangle(4.0, 3.0).unwrap())),
-        bend(Box::new(Pieces::horseshoe(5.0, 4.0).unwrap())),
+        bend(Box::new(CircleOutline { radius_m: 3.0 })),
+        bend(Box::new(PiecewiseOutline::rectangle(4.0, 3.0).unwrap())),
+        bend(Box::new(PiecewiseOutline::horseshoe(5.0, 4.0).unwrap())),
         helix(),
         s_curve(),
         funnel(),
@@ -77,10 +84,11 @@ fn tunnels() -> Vec<Swept> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
 
-    /// A ray from inside towards a point of the wall nearby meets it there.
+    /// A ray from inside towards a nearby wall point intersects the wall there.
     #[test]
     fn rays_meet_the_wall_they_are_sent_to(
-        which in 0usize..6, place in 0.05f64..0.95, ahead in -3.0f64..3.0, around in 0.0f64..1.0, towards in 0.0f64..1.0, share in 0.0f64..0.9,
+        which in 0usize..6, place in 0.05f64..0.95, ahead in -3.0f64..3.0, around in 0.0f64..1.0,
+        towards in 0.0f64..1.0, share in 0.0f64..0.9,
     ) {
         let tunnel = &tunnels()[which];
         let h_m = place * tunnel.line().length_m();
@@ -90,7 +98,7 @@ proptest! {
         let target = wall(towards, h_m + ahead);
         let d = target.x_w - from;
         let normal = target.e_s.cross(&target.e_h).normalize();
-        // Not where the ray grazes the wall.
+        // Grazing rays are excluded.
         prop_assume!(d.dot(&normal).abs() > 0.05 * d.norm());
         prop_assert!((tunnel.chainage_m(&from) - h_m).abs() < 1e-6);
         let hit = tunnel.hit(&from, &(d * 0.37)).unwrap();
@@ -101,7 +109,9 @@ proptest! {
     }
 
     #[test]
-    fn the_frame_holds_the_derivatives_of_the_point(which in 0usize..6, place in 0.0f64..1.0, around in 0.0f64..1.0) {
+    fn the_frame_holds_the_derivatives_of_the_point(
+        which in 0usize..6, place in 0.0f64..1.0, around in 0.0f64..1.0,
+    ) {
         let tunnel = &tunnels()[which];
         let (s, h) = (around * tunnel.perimeter_m(), place * tunnel.line().length_m());
         let point = |s_m, h_m| tunnel.frame(WallPoint { s_m, h_m });
@@ -112,14 +122,14 @@ proptest! {
         let e_s = (point(s + step, h).x_w - point(s - step, h).x_w) / (2.0 * step);
         let e_h = (point(s, h + step).x_w - point(s, h - step).x_w) / (2.0 * step);
         prop_assert!((e_s - frame.e_s).norm() < 1e-6);
-        // Frames turn by steps from node to node.
+        // Frames rotate in steps from node to node.
         prop_assert!((e_h - frame.e_h).norm() < 1e-4, "{e_h} {frame:?}");
     }
 }
 
 #[test]
 fn a_straight_line_along_y_is_the_straight_tunnel() {
-    let section = Box::new(Round { radius_m: 3.0 });
+    let section = Box::new(CircleOutline { radius_m: 3.0 });
     let swept = tunnel(
         section,
         3.0,
@@ -143,14 +153,14 @@ fn a_straight_line_along_y_is_the_straight_tunnel() {
 
 #[test]
 fn a_bend_is_as_long_as_its_arc_and_turns_about_its_own_axis() {
-    let bend = bend(Box::new(Round { radius_m: 3.0 }));
+    let bend = bend(Box::new(CircleOutline { radius_m: 3.0 }));
     assert!((bend.line().length_m() - 0.2 * TAU * 60.0).abs() < 1e-4);
     let gauge = bend.gauge();
     assert!(gauge.turn && !gauge.shift, "{gauge:?}");
     assert!((gauge.axis.direction.z.abs() - 1.0).abs() < 1e-6);
     assert!((gauge.axis.point.x - 60.0).abs() < 1e-2 && gauge.axis.point.y.abs() < 1e-2);
     assert!(gauge.pitch_m.abs() < 1e-2);
-    // It moves every wall point along the tunnel, as far as its distance from the axis says.
+    // It moves every wall point along the tunnel, in proportion to its distance from the axis.
     let t = bend.line().at(30.0);
     let pose = Pose::new(t.frame * so3::exp(&Vector3::new(0.1, 0.4, 0.0)), t.point);
     let hit = bend.hit(&pose.t_wc, &(pose.r_wc * Vector3::z())).unwrap();
@@ -173,7 +183,7 @@ fn a_helix_is_a_screw_and_other_lines_are_nothing() {
     }
 }
 
-/// Radii given close to each other make no steps, and the wall is as smooth as they are.
+/// Radii given at close points make no steps in the wall.
 #[test]
 fn radii_between_points_are_on_the_way_from_one_to_the_next() {
     let radius_m = |y: f64| 3.0 + 0.5 * (0.4 * y).sin();
@@ -181,7 +191,7 @@ fn radii_between_points_are_on_the_way_from_one_to_the_next() {
         .map(|k| 0.5 * f64::from(k))
         .map(|y| [0.0, y, 0.0, radius_m(y)])
         .collect();
-    let tunnel = tunnel(Box::new(Round { radius_m: 3.0 }), 3.0, &points);
+    let tunnel = tunnel(Box::new(CircleOutline { radius_m: 3.0 }), 3.0, &points);
     for k in 100..1900 {
         let y = 0.01 * f64::from(k);
         let at = tunnel.line().at(y);
@@ -193,12 +203,12 @@ fn radii_between_points_are_on_the_way_from_one_to_the_next() {
     }
 }
 
-/// A straight tunnel whose radius changes may be turned, but not shifted: rotations tell the turn
-/// of cameras on the axis.
+/// A straight tunnel of varying radius has a free rotation, but no free translation; rotations
+/// determine the rotation of cameras on the axis.
 #[test]
 fn a_funnel_turns_about_its_axis() {
     let funnel = tunnel(
-        Box::new(Round { radius_m: 3.0 }),
+        Box::new(CircleOutline { radius_m: 3.0 }),
         3.0,
         &[[0.0, 0.0, 0.0, 3.0], [0.0, 10.0, 0.0, 2.0]],
     );
@@ -213,8 +223,8 @@ fn a_funnel_turns_about_its_axis() {
     for (pose, truth) in back.apply_all(&turned).iter().zip(&truth) {
         assert!(truth.local(pose).norm() < 1e-6);
     }
-    // Around, as it may be turned; not along.
-    let (made_m, _) = free_part(&funnel, &truth[1], &nalgebra::Vector2::new(0.2, 0.1));
+    // The rotation about the axis is free, the translation along it is not.
+    let (made_m, _) = gauge_component(&funnel, &truth[1], &nalgebra::Vector2::new(0.2, 0.1));
     assert!(
         (made_m.x - 0.2).abs() < 1e-6 && made_m.y.abs() < 1e-6,
         "{made_m}"
@@ -233,18 +243,18 @@ fn impossible_lines_are_refused_with_the_reason() {
             .collect();
         Centreline::through(&points, 3.0, 3.0).map(|_| ())
     };
-    let told = |result: Result<(), SurfaceError>, what: &str| {
+    let assert_refused = |result: Result<(), SurfaceError>, what: &str| {
         let error = result.unwrap_err().to_string();
         assert!(error.contains(what), "{error}");
     };
-    told(line(&[], None), "no points");
-    told(line(&[[0.0; 3]], None), "two or more");
-    told(
+    assert_refused(line(&[], None), "no points");
+    assert_refused(line(&[[0.0; 3]], None), "two or more");
+    assert_refused(
         line(&[[0.0; 3], [0.0; 3], [0.0, 5.0, 0.0]], None),
         "points 1 and 2",
     );
-    told(line(&[[0.0; 3], [f64::NAN; 3]], None), "points 1 and 2");
-    told(
+    assert_refused(line(&[[0.0; 3], [f64::NAN; 3]], None), "points 1 and 2");
+    assert_refused(
         line(&[[0.0; 3], [0.0, 9.0, 0.0]], Some(-1.0)),
         "radius at point 1",
     );
@@ -255,16 +265,16 @@ fn impossible_lines_are_refused_with_the_reason() {
         [4.0, 10.0, 0.0],
         [4.0, 0.0, 0.0],
     ];
-    told(line(&hairpin, None), "tighter than the tunnel");
-    told(line(&[[0.0; 3], [0.0, 1e9, 0.0]], None), "too long");
+    assert_refused(line(&hairpin, None), "tighter than the tunnel");
+    assert_refused(line(&[[0.0; 3], [0.0, 1e9, 0.0]], None), "too long");
     // Turns of 12 m radius; the tunnel is 6 m wide.
     let turns = |rise_m: f64, count: i32| -> Vec<[f64; 3]> {
         let angles = (0..20 * count).map(|k| f64::from(k) * TAU / 20.0);
         let point = |a: f64| [12.0 * a.cos(), 12.0 * a.sin(), rise_m * a / TAU];
         angles.map(point).collect()
     };
-    told(line(&turns(5.9, 3), None), "runs into itself");
-    told(line(&turns(-2.0, 2), None), "runs into itself");
+    assert_refused(line(&turns(5.9, 3), None), "intersects itself");
+    assert_refused(line(&turns(-2.0, 2), None), "intersects itself");
     line(&turns(6.2, 40), None).unwrap();
     line(&turns(4.2, 3), Some(2.0)).unwrap();
 }

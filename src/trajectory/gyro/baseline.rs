@@ -1,123 +1,128 @@
-//! From a log to one pose a frame.
+//! Integration of a gyroscope's log to one pose per frame.
 
-use super::clock::Turned;
-use super::{
-    ClockMatch, GyroLog, Rates, Rest, RotationNoise, Turning, angle_from_gravity_rad,
-    axis_in_camera,
-};
+use super::clock_offset::ClockMatch;
+use super::clock_offset::Turned;
+use super::gcsv::GyroLog;
+use super::gravity::{angle_from_gravity_rad, axis_in_camera};
+use super::integration::IntegratedRotation;
+use super::noise::RotationNoise;
+use super::rates::AngularRates;
+use super::stationary::StationaryInterval;
 use crate::numerics::median::upper_median;
-use crate::trajectory::{Mounting, Pose, PoseError, StampedPose, Station, Trajectory};
+use crate::trajectory::error::PoseError;
+use crate::trajectory::plan::{Mounting, Station};
+use crate::trajectory::pose::Pose;
+use crate::trajectory::stamped_pose::{StampedPose, Trajectory};
 use nalgebra::{Matrix3, Vector3};
 
-/// What is known of the frames: when they were taken, where the carrier was meant to stand, and how
-/// the camera sits on it.
+/// Times, planned stations and camera mounting of the frames.
 #[derive(Clone, Copy, Debug)]
-pub struct Frames<'a> {
-    /// Their times, seconds, which increase.
+pub struct FrameStations<'a> {
+    /// Times of the frames, seconds, increasing.
     pub times_s: &'a [f64],
-    /// As many stations.
+    /// Planned stations, one per frame.
     pub stations: &'a [Station],
-    /// The mounting.
+    /// The mounting of the camera on the carrier.
     pub mounting: Mounting,
 }
 
-/// Where the sensor rested.
+/// Selection of the interval at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum RestChoice {
-    /// The best stretch of so many seconds.
+pub enum StationaryChoice {
+    /// Search for the best interval of this length, seconds.
     Find(f64),
-    /// From and to, seconds of the log's clock.
+    /// Begin and end, seconds of the log's clock.
     Given([f64; 2]),
 }
 
-/// The log's time minus the frames'.
+/// The offset of the log's clock: its time minus the frames'.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Clock {
-    /// Seconds.
-    Offset(f64),
-    /// Whatever within this range, seconds, makes rates agree best with the stations'.
+pub enum ClockOffset {
+    /// A known offset, seconds.
+    Given(f64),
+    /// The offset within this range, seconds, at which the rates correlate best with the stations'.
     Match([f64; 2]),
 }
 
-/// What the first attitude is told by.
+/// Source of the first attitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-pub enum Start {
-    /// The first frame's station.
+pub enum InitialAttitude {
+    /// The station of the first frame.
     Station,
-    /// The angle about the axis by gravity while the sensor rests, with the tunnel's bottom at this
-    /// θ, radians; the carrier lies along the tunnel at the first frame.
+    /// The direction of gravity while the sensor is at rest gives the angle about the axis; the
+    /// carrier is assumed to lie along the tunnel at the first frame.
     Gravity {
-        /// θ of the bottom.
+        /// θ of the tunnel's bottom, radians.
         down_rad: f64,
     },
 }
 
-/// How a log is integrated.
+/// Options of the integration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GyroOptions {
-    /// Where the sensor rested.
-    pub rest: RestChoice,
-    /// The bias in the camera's axes, rad/s, instead of the mean rate at rest; taken for exact.
+    /// The interval at rest.
+    pub rest: StationaryChoice,
+    /// The bias in the camera's axes, rad/s, instead of the mean rate at rest; assumed exact.
     pub bias_rad_s: Option<Vector3<f64>>,
     /// The noise density, rad/√s, instead of that at rest.
     pub density_rad_sqrt_s: Option<f64>,
-    /// 1-σ of the sensor's scale, as a share.
+    /// 1-σ of the sensor's scale factor, relative.
     pub scale_sigma: f64,
-    /// By how much the carrier turned about the axis from the first frame to the last, radians: the
-    /// bias about the axis is changed so that it did.
+    /// Known rotation about the axis from the first frame to the last, radians; the bias about the
+    /// axis is corrected to match it.
     pub total_turn_rad: Option<f64>,
-    /// How the clocks stand.
-    pub clock: Clock,
-    /// The first attitude.
-    pub start: Start,
+    /// The offset between the clocks.
+    pub clock: ClockOffset,
+    /// Source of the first attitude.
+    pub start: InitialAttitude,
 }
 
-/// What a log tells.
+/// Poses and noise from a gyroscope's log.
 #[derive(Clone, Debug)]
 pub struct GyroBaseline {
-    /// A pose a frame: its rotation from the log, its place from the station.
+    /// One pose per frame, with the rotation from the log and the position from the station.
     pub trajectory: Trajectory,
-    /// Where the sensor rested, if that was asked for or found.
-    pub rest: Option<Rest>,
-    /// The bias that was taken off, rad/s in the camera's axes.
+    /// The interval at rest, if one was given or found.
+    pub rest: Option<StationaryInterval>,
+    /// The subtracted bias, rad/s in the camera's axes.
     pub bias_rad_s: Vector3<f64>,
     /// The log's time minus the frames', seconds.
     pub offset_s: f64,
-    /// How well rates agree there, if the offset was looked for.
+    /// The correlation at the offset, if it was estimated.
     pub clock: Option<ClockMatch>,
-    /// What makes the rotations err.
+    /// The noise of the rotations.
     pub noise: RotationNoise,
     /// 1-σ about each axis of the median step from frame to frame, radians.
     pub step_sigma_rad: f64,
-    /// The angle turned about the carrier's axis from the first frame to the last, radians.
+    /// Rotation about the carrier's axis from the first frame to the last, radians.
     pub turned_rad: f64,
-    /// What is possible but suspicious.
+    /// Warnings about suspicious data.
     pub warnings: Vec<String>,
 }
 
-/// Steps of the log beyond so many median ones are gaps.
-const GAP: f64 = 5.0;
+/// A step of the log longer than this many median steps is a gap.
+const MIN_GAP_STEPS: f64 = 5.0;
 
-/// Integrates a log whose axes `to_camera` turns into the camera's.
+/// Integrates a log; `to_camera` maps its axes to the camera's.
 ///
 /// # Errors
-/// [`PoseError::File`] of the log: no rest where the bias, the density or gravity is wanted of it;
-/// clocks that cannot be matched; frames that the log does not cover; no accelerations, or gravity
-/// along the axis, where it is to tell the angle.
+/// [`PoseError::File`] of the log: no interval at rest although bias, density or gravity are needed
+/// from it; clocks that cannot be matched; frames that the log does not cover; no accelerations, or
+/// gravity along the axis, although gravity is to give the angle.
 pub fn baseline_from_gyro(
     log: &GyroLog,
     to_camera: &Matrix3<f64>,
-    frames: &Frames,
+    frames: &FrameStations,
     options: &GyroOptions,
 ) -> Result<GyroBaseline, PoseError> {
     let fail = |what: String| PoseError::file(&log.path, what);
     let rates = log.rates(to_camera);
     let found = match options.rest {
-        RestChoice::Find(length_s) => Rest::find(&rates, length_s),
-        RestChoice::Given(span_s) => Rest::of(&rates, span_s),
+        StationaryChoice::Find(length_s) => StationaryInterval::find(&rates, length_s),
+        StationaryChoice::Given(span_s) => StationaryInterval::of(&rates, span_s),
     };
     let rest = found.as_ref().ok().copied();
     let rested = |wanted: &str| {
@@ -137,8 +142,8 @@ pub fn baseline_from_gyro(
     };
     let axis = axis_in_camera(&frames.mounting);
     let (offset_s, clock) = match options.clock {
-        Clock::Offset(offset_s) => (offset_s, None),
-        Clock::Match(range_s) => {
+        ClockOffset::Given(offset_s) => (offset_s, None),
+        ClockOffset::Match(range_s) => {
             let angles: Vec<f64> = frames.stations.iter().map(|s| s.angle_rad).collect();
             let clock = ClockMatch::find(&rates, &axis, frames.times_s, &angles, range_s)
                 .map_err(|what| fail(format!("{what} (--match-plan-s, --time-offset-s)")))?;
@@ -159,7 +164,7 @@ pub fn baseline_from_gyro(
     {
         bias += axis * ((measured_rad - total_rad) / (last_s - first_s));
     }
-    let turning = Turning::new(rates.without(&bias));
+    let turning = IntegratedRotation::new(rates.without(&bias));
     let between = |from_s: f64, to_s: f64| {
         let turn = turning.between(from_s, to_s);
         turn.ok_or_else(|| fail(format!("it does not hold {from_s} s to {to_s} s")))
@@ -173,18 +178,18 @@ pub fn baseline_from_gyro(
         station.carrier().r_wc * mount.r_wc
     };
     let start = match options.start {
-        Start::Station => attitude(frames.stations.first().map_or(0.0, |s| s.angle_rad)),
-        Start::Gravity { down_rad } => {
-            let rest = rested("gravity tells no angle (--down-deg)")?;
+        InitialAttitude::Station => attitude(frames.stations.first().map_or(0.0, |s| s.angle_rad)),
+        InitialAttitude::Gravity { down_rad } => {
+            let rest = rested("gravity gives no angle (--down-deg)")?;
             let up = to_camera * mean_acceleration(log, rest.span_s).map_err(fail)?;
-            // As the first frame's camera would feel it: the carrier lies along the tunnel there,
-            // and perhaps not at the rest.
+            // Gravity in the first frame's camera coordinates: the carrier lies along the tunnel
+            // there, but not necessarily while at rest.
             let middle_s = 0.5 * (rest.span_s[0] + rest.span_s[1]);
             let up = between(first_s, middle_s)? * up;
             let angle_rad =
                 angle_from_gravity_rad(&up, &frames.mounting, down_rad).ok_or_else(|| {
                     fail(
-                        "gravity is along the tunnel's axis and tells no angle (--down-deg)"
+                        "gravity is along the tunnel's axis and gives no angle (--down-deg)"
                             .to_owned(),
                     )
                 })?;
@@ -221,8 +226,8 @@ pub fn baseline_from_gyro(
     })
 }
 
-/// The frames' times by the log's clock, all of which the log must cover.
-fn covered(rates: &Rates, times_s: &[f64], offset_s: f64) -> Result<Vec<f64>, String> {
+/// The frames' times on the log's clock; an error if the log does not cover all of them.
+fn covered(rates: &AngularRates, times_s: &[f64], offset_s: f64) -> Result<Vec<f64>, String> {
     let [first_s, last_s] = rates.span_s();
     let at = |(frame, time_s): (usize, &f64)| {
         let at_s = time_s + offset_s;
@@ -230,7 +235,8 @@ fn covered(rates: &Rates, times_s: &[f64], offset_s: f64) -> Result<Vec<f64>, St
             Ok(at_s)
         } else {
             Err(format!(
-                "frame {frame} at {time_s} s is at {at_s:.3} s of the log, which goes from {first_s:.3} s to {last_s:.3} s; \
+                "frame {frame} at {time_s} s is at {at_s:.3} s of the log, which goes from \
+                 {first_s:.3} s to {last_s:.3} s; \
              give the log's time minus the frames' (--time-offset-s)"
             ))
         }
@@ -238,7 +244,7 @@ fn covered(rates: &Rates, times_s: &[f64], offset_s: f64) -> Result<Vec<f64>, St
     times_s.iter().enumerate().map(at).collect()
 }
 
-/// The mean acceleration in the sensor's axes over a stretch, multiples of g.
+/// The mean acceleration in the sensor's axes over an interval, multiples of g.
 fn mean_acceleration(log: &GyroLog, span_s: [f64; 2]) -> Result<Vector3<f64>, String> {
     let within = log
         .samples
@@ -246,12 +252,12 @@ fn mean_acceleration(log: &GyroLog, span_s: [f64; 2]) -> Result<Vector3<f64>, St
         .filter(|sample| (span_s[0]..=span_s[1]).contains(&sample.time_s));
     let felt: Vec<Vector3<f64>> = within.filter_map(|sample| sample.acceleration_g).collect();
     match felt.len() {
-        0 => Err("it has no accelerations, so gravity tells no angle (--down-deg)".to_owned()),
+        0 => Err("it has no accelerations, so gravity gives no angle (--down-deg)".to_owned()),
         count => Ok(felt.iter().sum::<Vector3<f64>>() / count as f64),
     }
 }
 
-/// What is said of the median step, by time and by angle.
+/// The uncertainty of the median step in time and angle.
 fn step_sigma_rad(noise: &RotationNoise, trajectory: &[StampedPose]) -> f64 {
     let median = |of: fn(&StampedPose, &StampedPose) -> f64| {
         let values = trajectory.windows(2).map(|p| of(&p[0], &p[1]));
@@ -263,17 +269,18 @@ fn step_sigma_rad(noise: &RotationNoise, trajectory: &[StampedPose]) -> f64 {
     )
 }
 
-/// A warning of the longest step between samples while frames were taken, if it is a gap.
-fn gaps(rates: &Rates, span_s: [f64; 2]) -> Option<String> {
+/// A warning about the longest step between samples during the frames, if it is a gap.
+fn gaps(rates: &AngularRates, span_s: [f64; 2]) -> Option<String> {
     let median_s = rates.steps_s()[0];
     let steps = rates.times_s().windows(2).filter_map(|pair| match pair {
         [from, to] if *to >= span_s[0] && *from <= span_s[1] => Some((to - from, *from)),
         _ => None,
     });
     let (longest_s, at_s) = steps.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    (longest_s > GAP * median_s).then(|| {
+    (longest_s > MIN_GAP_STEPS * median_s).then(|| {
         format!(
-            "the log has a gap of {longest_s:.3} s after {at_s:.3} s, where it usually has a sample each {median_s:.4} s; \
+            "the log has a gap of {longest_s:.3} s after {at_s:.3} s, where it usually has a \
+             sample each {median_s:.4} s; \
              the rate is taken to change evenly there"
         )
     })
@@ -282,7 +289,7 @@ fn gaps(rates: &Rates, span_s: [f64; 2]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::gyro::GyroSample;
+    use crate::trajectory::gyro::gcsv::GyroSample;
     use crate::trajectory::so3;
 
     /// A sensor without noise, with a bias of 0.01 rad/s about every axis: three seconds at rest,
@@ -305,13 +312,13 @@ mod tests {
     }
 
     const OPTIONS: GyroOptions = GyroOptions {
-        rest: RestChoice::Find(2.0),
+        rest: StationaryChoice::Find(2.0),
         bias_rad_s: None,
         density_rad_sqrt_s: None,
         scale_sigma: 0.0,
         total_turn_rad: None,
-        clock: Clock::Offset(3.5),
-        start: Start::Station,
+        clock: ClockOffset::Given(3.5),
+        start: InitialAttitude::Station,
     };
 
     fn baseline(log: &GyroLog, options: &GyroOptions) -> Result<GyroBaseline, PoseError> {
@@ -322,7 +329,7 @@ mod tests {
             offset_m: [0.1, 0.0],
         };
         let stations: Vec<Station> = times_s.iter().map(station).collect();
-        let frames = Frames {
+        let frames = FrameStations {
             times_s: &times_s,
             stations: &stations,
             mounting: Mounting {
@@ -361,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_are_told_of() {
+    fn gaps_are_reported() {
         let found = baseline(&log(true, true), &OPTIONS).unwrap();
         let warning = &found.warnings[0];
         assert!(
@@ -373,7 +380,7 @@ mod tests {
     #[test]
     fn what_gravity_cannot_tell_is_refused() {
         let options = GyroOptions {
-            start: Start::Gravity { down_rad: 0.0 },
+            start: InitialAttitude::Gravity { down_rad: 0.0 },
             ..OPTIONS
         };
         for (accelerations, expected) in [
@@ -384,7 +391,7 @@ mod tests {
             assert!(error.to_string().contains(expected), "{error}");
         }
         let beyond = GyroOptions {
-            clock: Clock::Offset(4.5),
+            clock: ClockOffset::Given(4.5),
             ..OPTIONS
         };
         let error = baseline(&log(false, true), &beyond)

@@ -1,8 +1,9 @@
-//! Whether integrated rotations are as far off as they are said to be: logs as files, with bias and
-//! noise, read back.
+//! Consistency of the stated and the actual errors of integrated rotations, for log files with bias
+//! and noise.
 
 use super::*;
 use crate::trajectory::so3;
+use nalgebra::{UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use std::fmt::Write;
@@ -20,7 +21,7 @@ fn truth(t: f64) -> UnitQuaternion<f64> {
     so3::exp(&(Vector3::y() * turned)) * so3::exp(&sway)
 }
 
-/// The log of that motion by a sensor that sits in the camera as `orientation` says.
+/// The log of that motion by a sensor with the given orientation in the camera.
 fn log(orientation: &str, bias: Vector3<f64>, sigma: f64, seed: u64) -> String {
     let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -29,7 +30,8 @@ fn log(orientation: &str, bias: Vector3<f64>, sigma: f64, seed: u64) -> String {
         .to_camera()
         .transpose();
     let mut text = format!(
-        "GYROFLOW IMU LOG\nversion,1.3\norientation,{orientation}\ntscale,0.0001\ngscale,0.00001\nt,gx,gy,gz\n"
+        "GYROFLOW IMU \
+         LOG\nversion,1.3\norientation,{orientation}\ntscale,0.0001\ngscale,0.00001\nt,gx,gy,gz\n"
     );
     let half = 1e-4;
     for k in 0..((REST_S + STEPS as f64) * HZ) as usize + 2 {
@@ -42,8 +44,7 @@ fn log(orientation: &str, bias: Vector3<f64>, sigma: f64, seed: u64) -> String {
     text
 }
 
-/// Errors of the steps from second to second and of the whole, over what they are said to be
-/// (squared, over three axes).
+/// Normalised squared errors (over three axes) of the steps from second to second and of the whole.
 fn normalised(orientation: &str, seed: u64) -> (f64, f64) {
     let bias = Vector3::new(0.012, -0.02, 0.007);
     let dir = tempfile::tempdir().unwrap();
@@ -51,14 +52,14 @@ fn normalised(orientation: &str, seed: u64) -> (f64, f64) {
     std::fs::write(&path, log(orientation, bias, 0.02, seed)).unwrap();
     let log = GyroLog::read(&path).unwrap();
     let rates = log.rates(&log.orientation.unwrap().to_camera());
-    let rest = Rest::find(&rates, 2.5).unwrap();
+    let rest = StationaryInterval::find(&rates, 2.5).unwrap();
     assert!(rest.span_s[1] < REST_S + 0.2, "{rest:?}");
     let noise = RotationNoise {
         density_rad_sqrt_s: rest.density_rad_sqrt_s,
         bias_sigma_rad_s: rest.density_rad_sqrt_s / rest.length_s().sqrt(),
         scale_sigma: 0.0,
     };
-    let turning = Turning::new(rates.without(&rest.bias_rad_s));
+    let turning = IntegratedRotation::new(rates.without(&rest.bias_rad_s));
     let error = |from: f64, to: f64| {
         let found = turning.between(from, to).unwrap();
         let expected = truth(from).inverse() * truth(to);
@@ -70,8 +71,8 @@ fn normalised(orientation: &str, seed: u64) -> (f64, f64) {
     (steps / STEPS as f64, error(seconds(0), seconds(STEPS)))
 }
 
-/// Whichever way the sensor sits, errors are of the size that is said: for 24 orientations the mean
-/// squares of 480 steps (1440 numbers) and of 24 whole ways (72 numbers).
+/// Errors match their stated size for 24 orientations: the mean squares of 480 steps (1440 numbers)
+/// and of 24 complete logs (72 numbers).
 #[test]
 fn errors_are_what_they_are_said_to_be() {
     let words: Vec<String> = ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"]

@@ -1,4 +1,4 @@
-//! Gyroflow's gyro log, `.gcsv`: text, `key,value` lines, then a table
+//! Gyroflow's gyroscope log, `.gcsv`: a text of `key,value` lines, then a table
 //! `t,gx,gy,gz[,ax,ay,az[,mx,my,mz]]`.
 //!
 //! `t · tscale` is seconds, `gx · gscale` rad/s, `ax · ascale` multiples of g; all in the sensor's
@@ -6,15 +6,17 @@
 //!
 //! Source: <https://docs.gyroflow.xyz/app/technical-details/gcsv-format>.
 
-use super::{Orientation, Rates};
-use crate::trajectory::{PoseError, text};
+use super::orientation::Orientation;
+use super::rates::AngularRates;
+use crate::trajectory::error::PoseError;
+use crate::trajectory::text;
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// What the first line says, one or the other.
+/// The two possible first lines.
 const TITLES: [&str; 2] = ["GYROFLOW IMU LOG", "CAMERA IMU LOG"];
-/// The table's columns; the first 4, 7 or all of them.
+/// The table's columns, of which the first 4, 7 or all are present.
 const COLUMNS: [&str; 10] = ["t", "gx", "gy", "gz", "ax", "ay", "az", "mx", "my", "mz"];
 
 /// One line of a log, in the sensor's axes.
@@ -22,40 +24,40 @@ const COLUMNS: [&str; 10] = ["t", "gx", "gy", "gz", "ax", "ay", "az", "mx", "my"
 pub struct GyroSample {
     /// Seconds of the log's clock.
     pub time_s: f64,
-    /// Rates of turn by the right-hand rule, rad/s.
+    /// Angular rates by the right-hand rule, rad/s.
     pub rate_rad_s: Vector3<f64>,
-    /// Acceleration that is felt, multiples of g: at rest it points up.
+    /// Specific force, multiples of g; at rest it points up.
     pub acceleration_g: Option<Vector3<f64>>,
 }
 
-/// Which way a rolling shutter goes.
+/// The readout direction of a rolling shutter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReadoutDirection {
-    /// The first row first.
+    /// From the first row to the last.
     TopToBottom,
-    /// The last row first.
+    /// From the last row to the first.
     BottomToTop,
-    /// Column by column, which no part of this program knows.
+    /// Column by column, which this program does not support.
     Sideways,
 }
 
-/// How the camera reads its frames.
+/// The readout of a rolling shutter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Readout {
-    /// From the first row to the last, milliseconds.
+    /// Time from the first row to the last, milliseconds.
     pub time_ms: f64,
-    /// Which of them is first.
+    /// The readout direction.
     pub direction: ReadoutDirection,
 }
 
-/// A gyro's log: two samples at the least, their times increasing.
+/// A gyroscope's log with at least two samples of increasing times.
 #[derive(Clone, Debug)]
 pub struct GyroLog {
     /// The file.
     pub path: PathBuf,
-    /// How the sensor sits in the camera, if the file says so.
+    /// Orientation of the sensor in the camera, if given.
     pub orientation: Option<Orientation>,
-    /// The camera's rolling shutter, if the file tells of it.
+    /// Readout of the camera's rolling shutter, if given.
     pub readout: Option<Readout>,
     /// The samples.
     pub samples: Vec<GyroSample>,
@@ -66,7 +68,7 @@ pub struct GyroLog {
 struct Header<'a>(HashMap<String, (usize, &'a str)>);
 
 impl Header<'_> {
-    /// The number that a key stands for, with its line.
+    /// The number of a key.
     fn number(&self, path: &Path, key: &str) -> Result<Option<f64>, PoseError> {
         let parse = |(line, value): &(usize, &str)| {
             text::finite(value)
@@ -75,7 +77,7 @@ impl Header<'_> {
         self.0.get(key).map(parse).transpose()
     }
 
-    /// The number that a sensor's values are multiplied by.
+    /// The scale factor of a sensor's values.
     fn scale(&self, path: &Path, key: &str, what: &str) -> Result<f64, PoseError> {
         match self.number(path, key)? {
             Some(scale) if scale > 0.0 => Ok(scale),
@@ -133,7 +135,8 @@ impl GyroLog {
                     path,
                     number,
                     format!(
-                        "`{found}` where a gcsv log begins with `{}`; Gyroflow converts others to it",
+                        "`{found}` where a gcsv log begins with `{}`; Gyroflow converts others to \
+                         it",
                         TITLES[0]
                     ),
                 ));
@@ -184,7 +187,7 @@ impl GyroLog {
         if samples.len() < 2 {
             return Err(PoseError::file(
                 path,
-                format!("{} samples; two are the least", samples.len()),
+                format!("{} samples; at least two are needed", samples.len()),
             ));
         }
         Ok(Self {
@@ -195,10 +198,10 @@ impl GyroLog {
         })
     }
 
-    /// The rates in other axes, of which `to_camera` makes the camera's.
-    pub fn rates(&self, to_camera: &Matrix3<f64>) -> Rates {
+    /// The rates in camera coordinates; `to_camera` maps the sensor's axes to the camera's.
+    pub fn rates(&self, to_camera: &Matrix3<f64>) -> AngularRates {
         let samples = self.samples.iter();
-        Rates::new(
+        AngularRates::new(
             samples.clone().map(|sample| sample.time_s).collect(),
             samples
                 .map(|sample| to_camera * sample.rate_rad_s)
@@ -207,14 +210,14 @@ impl GyroLog {
     }
 }
 
-/// What raw numbers are multiplied by.
+/// Scale factors of the raw numbers.
 struct Scales {
     seconds: f64,
     rad_s: f64,
     g: f64,
 }
 
-/// How many columns the table's first line names.
+/// The number of columns named in the table's first line.
 fn columns(line: &str) -> Result<usize, String> {
     let names: Vec<String> = line
         .split(',')
@@ -245,7 +248,8 @@ fn sample(
         .collect::<Result<Vec<f64>, String>>()?;
     if values.len() != columns {
         return Err(format!(
-            "{} columns where the table's first line names {columns}; if the log was cut off, delete this line",
+            "{} columns where the table's first line names {columns}; if the log was cut off, \
+             delete this line",
             values.len()
         ));
     }
@@ -258,7 +262,8 @@ fn sample(
         && time_s <= last_s
     {
         return Err(format!(
-            "time {time_s} s after {last_s} s: times must increase; sort the table, and leave one of samples of the same time"
+            "time {time_s} s after {last_s} s: times must increase; sort the table, and leave one \
+             of samples of the same time"
         ));
     }
     Ok(GyroSample {
@@ -279,7 +284,7 @@ mod tests {
         GyroLog::read(&path)
     }
 
-    /// The documentation's own example.
+    /// The example of the format's documentation.
     const EXAMPLE: &str = "GYROFLOW IMU LOG\nversion,1.3\nid,custom_logger_name\norientation,YxZ\n\
         note,development, test\nfwversion,FIRMWARE_0.1.0\ntimestamp,1644159993\nvendor,potatocam\n\
         videofilename,videofilename.mp4\nlensprofile,potatocam/potatocam_mark1_prime_7_5mm_4k\nlens_info,wide\n\
@@ -304,7 +309,8 @@ mod tests {
 
     #[test]
     fn gyro_alone_magnetometers_line_ends_and_the_neutral_title_are_fine() {
-        let plain = "\u{feff}CAMERA IMU LOG\r\nversion,1.0\r\ntscale,1e-6\r\ngscale,1\r\nt,gx,gy,gz\r\n\
+        let plain = "\u{feff}CAMERA IMU \
+                     LOG\r\nversion,1.0\r\ntscale,1e-6\r\ngscale,1\r\nt,gx,gy,gz\r\n\
             0, 0.1,0.2,0.3\r\n1000,1,2,3\r\n\r\n";
         let log = read(plain).unwrap();
         assert_eq!(log.samples[1].time_s, 0.001);
@@ -337,9 +343,11 @@ mod tests {
             ("GYROFLOW IMU LOG\norientation,XXZ\ntscale,1\ngscale,1\nt,gx,gy,gz\n".to_owned(), ":2: `XXZ`"),
             ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,ax,ay,az\n".to_owned(), ":4: columns"),
             ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,gx,gy,gz,ax\n".to_owned(), ":4: columns"),
-            ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,gx,gy,gz,ax,ay,az\n".to_owned(), "no `ascale`"),
+            ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,gx,gy,gz,ax,ay,az\n".to_owned(), "no \
+                                                                                        `ascale`"),
             (
-                "GYROFLOW IMU LOG\nframe_readout_time,1\nframe_readout_direction,7\ntscale,1\ngscale,1\nt,gx,gy,gz\n"
+                "GYROFLOW IMU \
+                 LOG\nframe_readout_time,1\nframe_readout_direction,7\ntscale,1\ngscale,1\nt,gx,gy,gz\n"
                     .to_owned(),
                 ":3: frame_readout_direction is `7`",
             ),

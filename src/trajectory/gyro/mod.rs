@@ -1,89 +1,34 @@
-//! Rotations from a gyro's log.
+//! Rotations from a gyroscope's log.
 //!
-//! A [`GyroLog`] is the file; an [`Orientation`] or a calibrated mount turns its rates into the
-//! camera's axes ([`Rates`]). A stretch at rest ([`Rest`]) tells the bias, the noise density and
-//! which way is up; [`Turning`] integrates what is left to rotations at the frames' times;
-//! [`ClockMatch`] finds how the log's clock stands to that of a plan; [`RotationNoise`] says how
-//! far the rotations may be off. [`baseline_from_gyro`] is all of it, from the log to one pose a
-//! frame.
+//! A [`GyroLog`] is the file; an [`Orientation`] or a calibrated mount converts its rates to the
+//! camera's axes ([`AngularRates`]). An interval at rest ([`StationaryInterval`]) gives the bias,
+//! the noise density and the direction of gravity; [`IntegratedRotation`] integrates the rates to
+//! rotations at the frames' times; [`ClockMatch`] estimates the offset between the log's clock and
+//! that of a plan; [`RotationNoise`] is the uncertainty of the rotations. [`baseline_from_gyro`]
+//! combines these steps, from the log to one pose per frame.
 
 mod baseline;
-mod clock;
+mod clock_offset;
 mod gcsv;
+mod gravity;
+mod integration;
 mod noise;
 mod orientation;
 mod rates;
-mod rest;
-mod turning;
+mod stationary;
 
 #[cfg(test)]
 mod consistency_tests;
 
 pub use baseline::{
-    Clock, Frames, GyroBaseline, GyroOptions, RestChoice, Start, baseline_from_gyro,
+    ClockOffset, FrameStations, GyroBaseline, GyroOptions, InitialAttitude, StationaryChoice,
+    baseline_from_gyro,
 };
-pub use clock::ClockMatch;
+pub use clock_offset::ClockMatch;
 pub use gcsv::{GyroLog, GyroSample, Readout, ReadoutDirection};
+pub use gravity::{angle_from_gravity_rad, axis_in_camera};
+pub use integration::IntegratedRotation;
 pub use noise::RotationNoise;
 pub use orientation::Orientation;
-pub use rates::Rates;
-pub use rest::{MOST_BIAS_RAD_S, Rest};
-pub use turning::Turning;
-
-use super::Mounting;
-use nalgebra::{UnitQuaternion, Vector3};
-
-/// The carrier's attitude angle θ about the tunnel's axis, told by gravity: the carrier's y axis is
-/// taken to lie along the tunnel's, as the plan has it, and the tunnel's bottom at `down_rad`.
-///
-/// `up_c` is the acceleration at rest in the camera's axes. With `u = R_mount up_c`, θ makes
-/// `R_y(θ) u`, seen along the axis, point away from the bottom:
-/// `θ = atan2(−sin d, −cos d) − atan2(u_x, u_z)`.
-///
-/// Returns `None` where gravity is within 10° of the axis, along which it tells nothing.
-pub fn angle_from_gravity_rad(
-    up_c: &Vector3<f64>,
-    mounting: &Mounting,
-    down_rad: f64,
-) -> Option<f64> {
-    let up = mounting.camera_in_carrier().r_wc * up_c.try_normalize(1e-9)?;
-    let across = up.x.hypot(up.z);
-    (across > 10f64.to_radians().sin())
-        .then(|| (-down_rad.sin()).atan2(-down_rad.cos()) - up.x.atan2(up.z))
-}
-
-/// The carrier's axis of the turn in the camera's axes: `R_mountᵀ y`.
-pub fn axis_in_camera(mounting: &Mounting) -> Vector3<f64> {
-    let r: UnitQuaternion<f64> = mounting.camera_in_carrier().r_wc;
-    r.inverse() * Vector3::y()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::trajectory::Station;
-    use std::f64::consts::TAU;
-
-    #[test]
-    fn gravity_tells_the_angle_about_the_axis() {
-        let mounting = Mounting {
-            tilt_rad: 0.2,
-            roll_rad: -0.4,
-            arm_m: 0.1,
-        };
-        for (angle_rad, down_rad) in [(0.3, 0.0), (-2.0, 1.0), (4.0, -3.0)] {
-            let station = Station {
-                angle_rad,
-                ..Station::default()
-            };
-            let camera = station.carrier().after(&mounting.camera_in_carrier());
-            let up = Vector3::new(-f64::sin(down_rad), 0.0, -f64::cos(down_rad));
-            let up_c = camera.r_wc.inverse() * up * 0.98;
-            let found = angle_from_gravity_rad(&up_c, &mounting, down_rad).unwrap();
-            let off = (found - angle_rad).rem_euclid(TAU);
-            assert!(off.min(TAU - off) < 1e-9, "{found} {angle_rad}");
-        }
-        let along = Mounting::default();
-        assert!(angle_from_gravity_rad(&Vector3::new(0.0, 1.0, 0.1), &along, 0.0).is_none());
-    }
-}
+pub use rates::AngularRates;
+pub use stationary::{MAX_BIAS_RAD_S, StationaryInterval};

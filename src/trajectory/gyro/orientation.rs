@@ -1,20 +1,19 @@
-//! How a sensor sits in its camera, as Gyroflow writes it.
+//! Orientation of a sensor in its camera, in Gyroflow's notation.
 
 use nalgebra::Matrix3;
 
-/// An IMU orientation of Gyroflow, as `YxZ`: which of the sensor's axes, in capitals, or against
-/// which, in small letters, lies along each of Gyroflow's own: up, left, and backwards out of the
-/// picture. `YxZ` stands for a sensor with x right, y up and z backwards.
+/// An IMU orientation of Gyroflow, such as `YxZ`: the sensor's axes that lie along Gyroflow's axes
+/// up, left, and backwards out of the image; small letters denote opposite directions. `YxZ` stands
+/// for a sensor with x right, y up and z backwards.
 ///
-/// There are 48. Half of them are mirrors, of sensors whose axes are left-handed; each axis still
-/// has its rate by the right-hand rule, so rates are taken axis by axis all the same, as Gyroflow
-/// does.
+/// There are 48. Half of them are reflections, of sensors with left-handed axes; each axis still
+/// has its rate by the right-hand rule, so rates are mapped axis by axis, as in Gyroflow.
 ///
 /// Source: Gyroflow's documentation of the gcsv format and the way its integrators and its
 /// `frame_transform` use the axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orientation {
-    /// Sensor to Gyroflow's axes.
+    /// Rotation from the sensor's to Gyroflow's axes.
     to_own: Matrix3<f64>,
 }
 
@@ -26,7 +25,8 @@ impl Orientation {
     pub fn parse(text: &str) -> Result<Self, String> {
         let fail = || {
             format!(
-                "`{text}` is no orientation; it must be three letters as YxZ, each of x, y and z once, in capitals or not"
+                "`{text}` is not an orientation; it must be three letters such as YxZ, each of x, \
+                 y and z once, in capitals or not"
             )
         };
         let letters: Vec<char> = text.chars().collect();
@@ -52,14 +52,14 @@ impl Orientation {
         }
     }
 
-    /// From the sensor's axes to the camera's (x right, y down, z forward): `(−y, −x, −z)` of
-    /// Gyroflow's.
+    /// The matrix from the sensor's axes to the camera's (x right, y down, z forward):
+    /// `(−y, −x, −z)` of Gyroflow's.
     pub fn to_camera(&self) -> Matrix3<f64> {
         let own_to_camera = Matrix3::new(0.0, -1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, -1.0);
         own_to_camera * self.to_own
     }
 
-    /// Whether the sensor's axes are left-handed.
+    /// True if the sensor's axes are left-handed.
     pub fn is_mirror(&self) -> bool {
         self.to_own.determinant() < 0.0
     }
@@ -99,7 +99,7 @@ mod tests {
         }
     }
 
-    /// A sensor with x right, y up, z backwards: what the documentation's figure shows.
+    /// The documentation's figure: a sensor with x right, y up, z backwards.
     #[test]
     fn the_documented_orientation_is_that_of_opengl() {
         let to_camera = Orientation::parse("YxZ").unwrap().to_camera();

@@ -1,31 +1,30 @@
-//! Rates of turn over time.
+//! Angular rates over time.
 
 use nalgebra::Vector3;
 
-/// Rates of turn in the camera's axes, rad/s, at times that increase; between them they change
-/// evenly.
+/// Angular rates in camera coordinates, rad/s, at increasing times, interpolated linearly.
 #[derive(Clone, Debug)]
-pub struct Rates {
+pub struct AngularRates {
     times_s: Vec<f64>,
     rates: Vec<Vector3<f64>>,
 }
 
-impl Rates {
-    /// Rates at times, as many as each other.
+impl AngularRates {
+    /// Creates rates from as many times.
     ///
     /// # Panics
-    /// If they are not.
+    /// If their numbers differ.
     pub fn new(times_s: Vec<f64>, rates: Vec<Vector3<f64>>) -> Self {
         assert_eq!(times_s.len(), rates.len(), "a rate for each time");
         Self { times_s, rates }
     }
 
-    /// When, seconds.
+    /// Times, seconds.
     pub fn times_s(&self) -> &[f64] {
         &self.times_s
     }
 
-    /// How fast, rad/s.
+    /// Angular rates, rad/s.
     pub fn rates(&self) -> &[Vector3<f64>] {
         &self.rates
     }
@@ -44,7 +43,7 @@ impl Rates {
         [median, steps.last().copied()].map(|step| step.unwrap_or(f64::NAN))
     }
 
-    /// The same without a bias, rad/s.
+    /// The rates with a bias, rad/s, subtracted.
     pub fn without(&self, bias: &Vector3<f64>) -> Self {
         Self {
             times_s: self.times_s.clone(),

@@ -1,15 +1,15 @@
-//! The plan: what the carrier was told to do.
+//! Motion plans of the carrier.
 //!
-//! A [`Station`] is where the carrier stands while a frame is taken. Stations come from even motion
-//! ([`Steady`]) or from a table ([`PlanTable`]); a [`Mounting`] says how the camera sits on the
-//! carrier, and makes poses of stations.
+//! A [`Station`] is the carrier's planned position and rotation at a frame. Stations come from
+//! uniform motion ([`UniformMotion`]) or from a table ([`PlanTable`]); the [`Mounting`] of the
+//! camera on the carrier converts stations to poses.
 
 mod mounting;
 mod station;
-mod steady;
 mod table;
+mod uniform_motion;
 
 pub use mounting::Mounting;
 pub use station::{Station, spiral};
-pub use steady::{Rate, Steady};
 pub use table::PlanTable;
+pub use uniform_motion::{Rate, UniformMotion};

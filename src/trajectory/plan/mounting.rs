@@ -1,24 +1,25 @@
-//! How the camera sits on the carrier.
+//! The mounting of the camera on the carrier.
 
-use crate::trajectory::{Pose, so3};
+use crate::trajectory::pose::Pose;
+use crate::trajectory::so3;
 use nalgebra::Vector3;
 
-/// How the camera sits on a carrier that turns about the tunnel's axis. All zero: the lens on the
-/// axis, looking straight at the wall, the picture's right towards larger θ and its lower edge
+/// The mounting of the camera on a carrier that rotates about the tunnel's axis. All zero: the lens
+/// on the axis, looking straight at the wall, the image's right towards larger θ and its lower edge
 /// towards larger chainage.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mounting {
-    /// How far it looks ahead, towards larger chainage, radians.
+    /// Tilt of the optical axis towards larger chainage, radians.
     pub tilt_rad: f64,
-    /// How far it is turned clockwise about its line of sight, radians: by a quarter turn, the
-    /// picture's right is towards larger chainage.
+    /// Clockwise rotation about the optical axis, radians: after a quarter turn, the image's right
+    /// points towards larger chainage.
     pub roll_rad: f64,
-    /// The lens's distance from the axis of the turn, towards where the carrier points, metres.
+    /// Distance of the lens from the axis of rotation in the carrier's direction, metres.
     pub arm_m: f64,
 }
 
 impl Mounting {
-    /// The camera in the carrier, `x_carrier = T x_camera`: `R = R_x(−tilt) R_z(roll)`,
+    /// The pose of the camera in the carrier, `x_carrier = T x_camera`: `R = R_x(−tilt) R_z(roll)`,
     /// `t = (0, 0, arm)`.
     pub fn camera_in_carrier(&self) -> Pose {
         let tilt = so3::exp(&Vector3::new(-self.tilt_rad, 0.0, 0.0));
@@ -30,7 +31,7 @@ impl Mounting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::Station;
+    use crate::trajectory::plan::station::Station;
     use std::f64::consts::FRAC_PI_2;
 
     #[test]

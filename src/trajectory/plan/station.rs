@@ -1,24 +1,25 @@
-//! Where the carrier stands.
+//! Planned stations of the carrier.
 
-use crate::trajectory::{Pose, so3};
+use crate::trajectory::pose::Pose;
+use crate::trajectory::so3;
 use nalgebra::Vector3;
 
-/// Where the carrier stands, and how far it is turned about the tunnel's axis.
+/// The carrier's planned position, and its rotation about the tunnel's axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Station {
-    /// Along the axis, metres.
+    /// Chainage, metres.
     pub chainage_m: f64,
     /// Angle θ of the carrier's z axis about the tunnel's, radians; not confined to one turn.
     pub angle_rad: f64,
-    /// Off the axis along the world's x and z, metres.
+    /// Offset from the axis along the world's x and z, metres.
     pub offset_m: [f64; 2],
 }
 
 impl Station {
-    /// The carrier in the tunnel: its y axis along the tunnel's, its z axis towards θ.
+    /// The pose of the carrier in the tunnel: its y axis along the tunnel's, its z axis towards θ.
     ///
-    /// `R = [[c, 0, s], [0, 1, 0], [−s, 0, c]]` with `c, s` of the angle: a positive turn moves the
-    /// view towards larger θ.
+    /// `R = [[c, 0, s], [0, 1, 0], [−s, 0, c]]` with `c, s` of the angle: a positive rotation moves
+    /// the view towards larger θ.
     pub fn carrier(&self) -> Pose {
         let [x_m, z_m] = self.offset_m;
         Pose::new(
@@ -27,8 +28,7 @@ impl Station {
         )
     }
 
-    /// The station a share of the way to another: every number on its own, so that whole turns
-    /// count.
+    /// Interpolates linearly to another station, each number separately, so that full turns count.
     pub fn towards(&self, other: &Self, share: f64) -> Self {
         let between = |from: f64, to: f64| from + share * (to - from);
         Self {
@@ -39,8 +39,8 @@ impl Station {
     }
 }
 
-/// `count` poses on the axis of the tunnel: step k stands at chainage `k · advance_m` (metres),
-/// turned by `k · turn_rad` about the axis. The camera is the carrier.
+/// A spiral of `count` poses on the axis of the tunnel: pose k is at chainage `k · advance_m`
+/// (metres), rotated by `k · turn_rad` about the axis. The camera coincides with the carrier.
 pub fn spiral(count: usize, advance_m: f64, turn_rad: f64) -> Vec<Pose> {
     let station = |k: usize| Station {
         chainage_m: k as f64 * advance_m,

@@ -1,35 +1,36 @@
-//! A plan as a table: `frame,chainage_m,angle_deg` or `time_s,chainage_m,angle_deg`, and `x_m,z_m`
-//! if wanted.
+//! Plan tables: `frame,chainage_m,angle_deg` or `time_s,chainage_m,angle_deg`, and optionally
+//! `x_m,z_m`.
 //!
-//! Columns are found by their names, in any order; others are left alone. Frames count from 0.
-//! Between rows all numbers change evenly, angles as they are given: from 350 to 370 the carrier
+//! Columns are found by name, in any order; others are ignored. Frames count from 0. Between rows
+//! all numbers are interpolated linearly, angles as they are given: from 350 to 370 the carrier
 //! turns by 20°, from 350 to 10 by 340° backwards.
 
-use super::Station;
+use super::station::Station;
 use crate::trajectory::csv::{separator, split};
-use crate::trajectory::{PoseError, text};
+use crate::trajectory::error::PoseError;
+use crate::trajectory::text;
 use csv::StringRecord;
 use std::path::{Path, PathBuf};
 
-const FORM: &str = "frame (or time_s), chainage_m, angle_deg, and x_m and z_m if wanted";
+const FORM: &str = "frame (or time_s), chainage_m, angle_deg, and optionally x_m and z_m";
 
-/// What the rows are ordered by.
+/// The key of the rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Key {
     Frame,
     Time,
 }
 
-/// A plan as a table of stations.
+/// A table of stations.
 #[derive(Clone, Debug)]
 pub struct PlanTable {
     path: PathBuf,
     key: Key,
-    /// Frame or time (seconds), which increases, and the station.
+    /// Frame or time (seconds), increasing, and station.
     rows: Vec<(f64, Station)>,
 }
 
-/// Where the columns are.
+/// Indices of the columns.
 struct Columns {
     key: usize,
     chainage_m: usize,
@@ -57,7 +58,8 @@ impl Columns {
             }
             (Some(_), Some(_)) => {
                 return Err(
-                    "has both `frame` and `time_s`; leave the one that the rows go by".to_owned(),
+                    "has both `frame` and `time_s`; leave only the one that orders the rows"
+                        .to_owned(),
                 );
             }
         };
@@ -140,12 +142,12 @@ impl PlanTable {
         })
     }
 
-    /// Whether the frames' times are needed, rather than their places.
+    /// True if the table's key is time, not the frame's index.
     pub fn is_by_time(&self) -> bool {
         self.key == Key::Time
     }
 
-    /// Where the carrier stands at frames taken at these times, seconds.
+    /// The stations at the frames' times, seconds.
     ///
     /// # Errors
     /// A frame before the first row or after the last.
@@ -161,7 +163,8 @@ impl PlanTable {
                 PoseError::file(
                     &self.path,
                     format!(
-                        "{what} lies beyond its rows, which go from {} to {}; nothing is extrapolated",
+                        "{what} lies beyond its rows, which go from {} to {}; nothing is \
+                         extrapolated",
                         key(first),
                         key(last)
                     ),

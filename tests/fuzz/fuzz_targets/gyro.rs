@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 use nalgebra::{Matrix3, Vector3};
 use tunnelstitch::trajectory::gyro::{
-    Clock, Frames, GyroLog, GyroOptions, RestChoice, Start, baseline_from_gyro,
+    ClockOffset, FrameStations, GyroLog, GyroOptions, StationaryChoice, InitialAttitude, baseline_from_gyro,
 };
 use tunnelstitch::trajectory::{Mounting, Station};
 use tunnelstitch_fuzz::file;
@@ -27,7 +27,7 @@ fuzz_target!(|data: &[u8]| {
         angle_rad,
         offset_m: [0.0; 2],
     });
-    let frames = Frames {
+    let frames = FrameStations {
         times_s: &times_s,
         stations: &stations,
         mounting: Mounting::default(),
@@ -35,20 +35,20 @@ fuzz_target!(|data: &[u8]| {
     let bit = |k: u32| first >> k & 1 == 1;
     let options = GyroOptions {
         rest: match bit(0) {
-            true => RestChoice::Find(0.05),
-            false => RestChoice::Given([start_s, start_s + 0.1]),
+            true => StationaryChoice::Find(0.05),
+            false => StationaryChoice::Given([start_s, start_s + 0.1]),
         },
         bias_rad_s: bit(1).then(Vector3::zeros),
         density_rad_sqrt_s: bit(2).then_some(1e-4),
         scale_sigma: 0.01,
         total_turn_rad: bit(3).then_some(1.0),
         clock: match bit(4) {
-            true => Clock::Match([-0.1, 0.1]),
-            false => Clock::Offset(0.0),
+            true => ClockOffset::Match([-0.1, 0.1]),
+            false => ClockOffset::Given(0.0),
         },
         start: match bit(5) {
-            true => Start::Gravity { down_rad: 3.0 },
-            false => Start::Station,
+            true => InitialAttitude::Gravity { down_rad: 3.0 },
+            false => InitialAttitude::Station,
         },
     };
     if let Ok(baseline) = baseline_from_gyro(&log, &to_camera, &frames, &options) {

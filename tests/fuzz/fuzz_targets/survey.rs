@@ -10,6 +10,6 @@ fuzz_target!(|data: &[u8]| {
     std::fs::write(&path, data).unwrap();
     if let Ok(survey) = Survey::open(&path) {
         assert_eq!(survey.initial.len(), survey.frames.len());
-        let _ = survey.readings(2);
+        let _ = survey.pose_convention_variants(2);
     }
 });

@@ -1,0 +1,100 @@
+//! Reading and validation of calibration files.
+
+use super::error::{CalibrationError, ParseError};
+use super::{colmap, kalibr, native, nerfstudio, opencv, value_tree};
+use crate::camera::projection::Camera;
+use std::path::Path;
+
+/// Smallest width and height of an image, pixels.
+const MIN_IMAGE_SIDE_PX: u32 = 16;
+/// Smallest visible fraction of the image; below it, the coefficients are assumed to be wrong.
+const MIN_VISIBLE_FRACTION: f64 = 0.5;
+
+/// Reads a calibration file of any supported format (see the table in the module's documentation).
+/// `name` selects the camera if the file holds several (`cam1`, a COLMAP id).
+///
+/// # Errors
+/// An unreadable file; an unknown, missing or impossible entry, with its line where it is known; a
+/// lens model that is not supported; several cameras and no name.
+pub fn read_calibration(path: &Path, name: Option<&str>) -> Result<Camera, CalibrationError> {
+    let content = |error: ParseError| CalibrationError::Content {
+        path: path.to_owned(),
+        line: error.line,
+        what: error.what,
+    };
+    let bytes = std::fs::read(path).map_err(|source| CalibrationError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let text = String::from_utf8(bytes).map_err(|_| {
+        content(ParseError::new(
+            "this is not a text file; give the calibration file itself",
+        ))
+    })?;
+    let extension = path.extension().unwrap_or_default().to_string_lossy();
+    parse(
+        text.trim_start_matches('\u{feff}'),
+        &extension.to_lowercase(),
+        name,
+    )
+    .and_then(validate)
+    .map_err(content)
+}
+
+fn parse(text: &str, extension: &str, name: Option<&str>) -> Result<Camera, ParseError> {
+    match extension {
+        "yaml" | "yml" => {
+            let tree = value_tree::parse_yaml(text)?;
+            if kalibr::is_camchain(&tree) {
+                kalibr::read(&tree, name)
+            } else {
+                opencv::read(&tree)
+            }
+        }
+        "txt" => colmap::read(text, name),
+        "toml" => native::read_toml(text),
+        "xml" => Err(ParseError::new(
+            "OpenCV's XML is not supported; save the calibration as YAML (a name that ends in \
+             .yml)",
+        )),
+        _ => match value_tree::parse_json(text) {
+            Ok(tree) if nerfstudio::is_transforms(&tree) => nerfstudio::read(&tree, name),
+            _ => native::read_json(text),
+        },
+    }
+}
+
+/// Rejects impossible camera parameters.
+fn validate(camera: Camera) -> Result<Camera, ParseError> {
+    if camera.width < MIN_IMAGE_SIDE_PX || camera.height < MIN_IMAGE_SIDE_PX {
+        return Err(ParseError::new(format!(
+            "width and height are {} × {}; they must be the frames' size in pixels, at least \
+             {MIN_IMAGE_SIDE_PX} each",
+            camera.width, camera.height
+        )));
+    }
+    for (name, value) in [("fx", camera.fx), ("fy", camera.fy)] {
+        if !(value.is_finite() && value > 0.0) {
+            return Err(ParseError::new(format!(
+                "{name} is {value}; a focal length in pixels is positive"
+            )));
+        }
+    }
+    for (name, value) in [("cx", camera.cx), ("cy", camera.cy)] {
+        if !value.is_finite() {
+            return Err(ParseError::new(format!(
+                "{name} is {value}; it must be a number"
+            )));
+        }
+    }
+    let shown = camera.visible_fraction();
+    if shown < MIN_VISIBLE_FRACTION {
+        return Err(ParseError::new(format!(
+            "the distortion folds the picture back on itself: only {:.0} % of it is shown; check \
+             its coefficients and their \
+             order, and that fx and fy are in pixels",
+            100.0 * shown
+        )));
+    }
+    Ok(camera)
+}

@@ -1,0 +1,204 @@
+//! Decoding of frames.
+
+use super::error::FrameError;
+use super::frame_file::FrameFile;
+use image::{
+    ColorType, DynamicImage, GrayImage, ImageDecoder, ImageError, ImageReader, ImageResult,
+    RgbImage,
+};
+use std::cell::RefCell;
+use std::fs::File;
+use std::io::{BufRead, Cursor, Read, Seek};
+use std::path::Path;
+
+impl FrameFile {
+    /// Width and height, pixels, from the file's header.
+    ///
+    /// # Errors
+    /// A missing or unknown file.
+    pub fn size(&self) -> Result<(u32, u32), FrameError> {
+        match &self.video {
+            Some((video, _)) => Ok(video.size()),
+            None => Ok(self.header()?.dimensions()),
+        }
+    }
+
+    /// The decoder of a picture file after reading its header.
+    fn header(&self) -> Result<impl ImageDecoder, FrameError> {
+        ImageReader::open(&self.path)
+            .map_err(ImageError::from)
+            .and_then(decoder)
+            .map_err(|error| self.decode_error(error.to_string()))
+    }
+}
+
+/// Decodes a frame and checks its size.
+///
+/// # Errors
+/// A missing, truncated or unknown file; a size other than `(width, height)`.
+pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicImage, FrameError> {
+    let check = |found: (u32, u32)| {
+        if found == (width, height) {
+            Ok(())
+        } else {
+            Err(FrameError::Size {
+                index: file.index,
+                path: file.path.clone(),
+                width: found.0,
+                height: found.1,
+                expected_width: width,
+                expected_height: height,
+            })
+        }
+    };
+    let fail = |what: String| file.decode_error(what);
+    if let Some((video, picture)) = &file.video {
+        check(video.size())?;
+        return video.decode(*picture).map_err(fail);
+    }
+    let bytes = Content::of(&file.path).map_err(|error| fail(error.to_string()))?;
+    if bytes.as_ref().starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(bytes.as_ref()) {
+        return Err(fail("the JPEG file is truncated".to_owned()));
+    }
+    if let Some(picture) = plain_tiff(bytes.as_ref(), width, height) {
+        return Ok(picture);
+    }
+    let decoder =
+        decoder(ImageReader::new(Cursor::new(bytes))).map_err(|error| fail(error.to_string()))?;
+    // Checked before allocating the memory that the header claims.
+    check(decoder.dimensions())?;
+    DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))
+}
+
+/// Decodes an uncompressed TIFF file of this size with 8 bits per channel; None for any other or
+/// damaged file. The general decoder makes two intermediate copies.
+fn plain_tiff(bytes: &[u8], width: u32, height: u32) -> Option<DynamicImage> {
+    let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).ok()?;
+    if decoder.dimensions().ok()? != (width, height) {
+        return None;
+    }
+    let (colour, layout) = (
+        decoder.colortype().ok()?,
+        decoder.image_buffer_layout().ok()?,
+    );
+    let channels = match colour {
+        tiff::ColorType::Gray(8) => 1,
+        tiff::ColorType::RGB(8) => 3,
+        _ => return None,
+    };
+    let size = width as usize * height as usize * channels;
+    let unsigned = layout.sample_format == tiff::tags::SampleFormat::Uint;
+    if !unsigned || layout.planes != 1 || layout.complete_len != size {
+        return None;
+    }
+    let mut samples = vec![0; size];
+    decoder.read_image_bytes(&mut samples).ok()?;
+    match channels {
+        1 => GrayImage::from_raw(width, height, samples).map(Into::into),
+        _ => RgbImage::from_raw(width, height, samples).map(Into::into),
+    }
+}
+
+/// The content of a file. Its buffer is reused for the thread's next file, because allocating
+/// zeroed memory costs as much as reading.
+struct Content(Vec<u8>);
+
+thread_local! {
+    static ROOM: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
+}
+
+impl Content {
+    fn of(path: &Path) -> std::io::Result<Self> {
+        let mut content = Self(ROOM.take());
+        content.0.clear();
+        File::open(path)?.read_to_end(&mut content.0)?;
+        Ok(content)
+    }
+}
+
+impl AsRef<[u8]> for Content {
+    fn as_ref(&self) -> &[u8] {
+        &self.0
+    }
+}
+
+impl Drop for Content {
+    fn drop(&mut self) {
+        // The buffer is dropped if the thread is ending.
+        let _ = ROOM.try_with(|room| room.replace(std::mem::take(&mut self.0)));
+    }
+}
+
+/// The colour type of a frame's pixels, from the file's header.
+///
+/// # Errors
+/// A missing or unknown file.
+pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
+    if let Some((video, _)) = &file.video {
+        return Ok(video.colour());
+    }
+    Ok(file.header()?.color_type())
+}
+
+/// The decoder for the content of a file, after reading its header.
+fn decoder<R: BufRead + Seek + 'static>(reader: ImageReader<R>) -> ImageResult<impl ImageDecoder> {
+    reader.with_guessed_format()?.into_decoder()
+}
+
+/// True if a JPEG file contains its end-of-image marker; the decoder silently fills missing parts
+/// with grey. Padding after the marker is allowed.
+fn jpeg_is_complete(bytes: &[u8]) -> bool {
+    let end = bytes.len().saturating_sub(4096);
+    bytes[end..].windows(2).any(|pair| pair == [0xff, 0xd9])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::mask::Mask;
+
+    /// The beginning of a PNG file whose header claims 60000 × 60000 pixels.
+    const BOAST: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\xea`\0\0\xea`\x08\0\0\0\0\xa5\xb9*\x9e\0\0\0\x09IDATx\x9cc\0\0\0\x01\0\x01^\xff}\xf9";
+
+    #[test]
+    fn no_room_is_made_for_what_only_a_header_claims() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("boast.png");
+        std::fs::write(&path, BOAST).unwrap();
+        let frame = FrameFile::picture(0, path.clone());
+        assert_eq!(frame.size().unwrap(), (60000, 60000));
+        let refused = load_colour(&frame, 32, 24).unwrap_err();
+        assert!(matches!(refused, FrameError::Size { .. }), "{refused}");
+        let refused = Mask::read(&path, 32, 24).unwrap_err().to_string();
+        assert!(refused.contains("60000 × 60000 px"), "{refused}");
+    }
+
+    /// The fast path and the general decoder agree for plain, other and truncated TIFF files.
+    #[test]
+    fn tiff_files_are_the_pictures_they_are() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frame.tif");
+        let value = |x: u32, y: u32, c: u32| (37 * x + 11 * y + 101 * c) as u8;
+        let grey = GrayImage::from_fn(32, 24, |x, y| image::Luma([value(x, y, 0)]));
+        let colour =
+            RgbImage::from_fn(32, 24, |x, y| image::Rgb([0, 1, 2].map(|c| value(x, y, c))));
+        let deep = DynamicImage::from(grey.clone()).to_luma16();
+        let pictures = [
+            (grey.into(), true),
+            (colour.into(), true),
+            (deep.into(), false),
+        ];
+        for (picture, plain) in pictures {
+            let picture: DynamicImage = picture;
+            picture.save(&path).unwrap();
+            let bytes = std::fs::read(&path).unwrap();
+            assert_eq!(plain_tiff(&bytes, 32, 24).is_some(), plain);
+            assert!(plain_tiff(&bytes, 24, 32).is_none());
+            let frame = FrameFile::picture(0, path.clone());
+            assert_eq!(load_colour(&frame, 32, 24).unwrap(), picture);
+            std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+            let refused = load_colour(&frame, 32, 24).unwrap_err();
+            assert!(matches!(refused, FrameError::Decode { .. }), "{refused}");
+        }
+    }
+}

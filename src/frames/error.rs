@@ -1,0 +1,70 @@
+//! Errors of frames.
+
+use std::path::PathBuf;
+
+/// An error of a frame, a video or a mask.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrameError {
+    /// The pattern in survey.toml is malformed.
+    #[error("frames.images = \"{pattern}\": {what}")]
+    Pattern {
+        /// The pattern.
+        pattern: String,
+        /// The problem.
+        what: String,
+    },
+    /// The pattern matches nothing.
+    #[error(
+        "frames.images = \"{pattern}\" matches no file; the pattern is relative to survey.toml"
+    )]
+    NoFrames {
+        /// The pattern.
+        pattern: String,
+    },
+    /// A frame is unreadable or damaged.
+    #[error("frame {index} ({}): {what}; restore the file, or remove the frame and its pose", path.display())]
+    Decode {
+        /// Index of the frame in the survey.
+        index: usize,
+        /// The file.
+        path: PathBuf,
+        /// The error of the decoder.
+        what: String,
+    },
+    /// A video cannot be read.
+    #[error("{}: {what}", path.display())]
+    Video {
+        /// The file.
+        path: PathBuf,
+        /// The problem and the remedy.
+        what: String,
+    },
+    /// A mask is unreadable or invalid.
+    #[error("{}: {what}", path.display())]
+    Mask {
+        /// The file.
+        path: PathBuf,
+        /// The problem and the remedy.
+        what: String,
+    },
+    /// A frame's size differs from the calibration's.
+    #[error(
+        "frame {index} ({}): {width} × {height} px, but the calibration is for {expected_width} × {expected_height} px",
+        path.display()
+    )]
+    Size {
+        /// Index of the frame in the survey.
+        index: usize,
+        /// The file.
+        path: PathBuf,
+        /// Width found.
+        width: u32,
+        /// Height found.
+        height: u32,
+        /// Width of the calibration.
+        expected_width: u32,
+        /// Height of the calibration.
+        expected_height: u32,
+    },
+}

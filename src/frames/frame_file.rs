@@ -1,0 +1,103 @@
+//! Frames as files or as pictures of a video.
+
+use super::error::FrameError;
+use super::video::Video;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A frame in a file of its own or in a video.
+#[derive(Clone, Debug)]
+pub struct FrameFile {
+    /// Index of the frame in the survey.
+    pub index: usize,
+    /// Path of the picture, or the video's path followed by the picture's number:
+    /// `survey.mp4/000012`.
+    pub path: PathBuf,
+    /// The video that contains it, and the index of the picture.
+    pub(super) video: Option<(Arc<Video>, usize)>,
+}
+
+impl FrameFile {
+    /// A frame with a file of its own.
+    pub fn picture(index: usize, path: PathBuf) -> Self {
+        Self {
+            index,
+            path,
+            video: None,
+        }
+    }
+
+    /// A picture of a video, numbered from 0.
+    pub fn in_video(index: usize, video: &Arc<Video>, picture: usize) -> Self {
+        Self {
+            index,
+            path: video.path().join(format!("{picture:06}")),
+            video: Some((Arc::clone(video), picture)),
+        }
+    }
+
+    /// The file that contains the frame.
+    pub fn file(&self) -> &Path {
+        match &self.video {
+            Some((video, _)) => video.path(),
+            None => &self.path,
+        }
+    }
+
+    /// True if the frame is in a video.
+    pub fn is_in_video(&self) -> bool {
+        self.video.is_some()
+    }
+
+    /// The error of a frame that cannot be decoded.
+    pub(super) fn decode_error(&self, what: String) -> FrameError {
+        FrameError::Decode {
+            index: self.index,
+            path: self.path.clone(),
+            what,
+        }
+    }
+
+    /// The file name of the picture.
+    pub fn name(&self) -> String {
+        let name = self.path.file_name().unwrap_or_default();
+        name.to_string_lossy().into_owned()
+    }
+}
+
+/// Lists the files that match `pattern` (glob syntax, relative to `folder`), sorted by name,
+/// without the mask.
+///
+/// # Errors
+/// A malformed pattern, an unreadable folder, no match.
+pub fn list_frames(
+    folder: &Path,
+    pattern: &str,
+    mask: Option<&Path>,
+) -> Result<Vec<FrameFile>, FrameError> {
+    let fail = |what: String| FrameError::Pattern {
+        pattern: pattern.to_owned(),
+        what,
+    };
+    let escaped = glob::Pattern::escape(&folder.to_string_lossy());
+    let full = Path::new(&escaped).join(pattern);
+    let found = glob::glob(&full.to_string_lossy()).map_err(|error| fail(error.to_string()))?;
+    let mut paths = Vec::new();
+    for path in found {
+        let path = path.map_err(|error| fail(error.to_string()))?;
+        if !path.is_dir() && Some(path.as_path()) != mask {
+            paths.push(path);
+        }
+    }
+    paths.sort();
+    if paths.is_empty() {
+        return Err(FrameError::NoFrames {
+            pattern: pattern.to_owned(),
+        });
+    }
+    Ok(paths
+        .into_iter()
+        .enumerate()
+        .map(|(index, path)| FrameFile::picture(index, path))
+        .collect())
+}

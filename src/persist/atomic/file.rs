@@ -1,0 +1,89 @@
+//! Files that are complete or absent.
+
+use super::error::WriteError;
+use super::parent::parent_folder;
+use super::{durable, temporary};
+use std::io::Write;
+use std::path::Path;
+
+/// Writes `path` through `fill`; nothing appears under that name unless everything was written.
+///
+/// # Errors
+/// Whatever the system says about the folder, the writing or the renaming.
+pub fn write(
+    path: &Path,
+    fill: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
+) -> Result<(), WriteError> {
+    let fail = |source| WriteError::new(path, source);
+    let temporary = temporary::file_in(parent_folder(path)).map_err(fail)?;
+    let mut writer = std::io::BufWriter::new(temporary.file);
+    fill(&mut writer).map_err(fail)?;
+    let file = writer
+        .into_inner()
+        .map_err(|error| fail(error.into_error()))?;
+    // What is in a folder that is not finished goes to the disk with the folder.
+    let is_final = !temporary::is_unfinished(path);
+    if is_final {
+        file.sync_all().map_err(fail)?;
+    }
+    let renamed = temporary.path.persist(path);
+    renamed.map_err(|error| fail(error.error))?;
+    // Until now it was locked.
+    drop(file);
+    if is_final {
+        durable::sync_folder(parent_folder(path));
+    }
+    Ok(())
+}
+
+/// Writes a text file; see [`write()`].
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_text(path: &Path, text: &str) -> Result<(), WriteError> {
+    write(path, |writer| writer.write_all(text.as_bytes()))
+}
+
+/// Removes a file, if it is there.
+///
+/// # Errors
+/// Whatever the system says.
+pub fn remove_file(path: &Path) -> Result<(), WriteError> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(WriteError::new(path, error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Makes a folder and those above it.
+///
+/// # Errors
+/// Whatever the system says; a file in its place.
+pub fn create_folder(path: &Path) -> Result<(), WriteError> {
+    if path.is_file() {
+        let what = std::io::Error::other("it is a file, and a folder is needed");
+        return Err(WriteError::new(path, what));
+    }
+    std::fs::create_dir_all(path).map_err(|source| WriteError::new(path, source))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_no_litter() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        write_text(&path, "old").unwrap();
+        let failed = write(&path, |writer| {
+            writer.write_all(b"new")?;
+            Err(std::io::Error::other("disk full"))
+        });
+        assert!(failed.unwrap_err().to_string().contains("disk full"));
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,70 @@
+//! Errors of tunnel shapes: impossible sizes, and rays or cameras that do not fit the tunnel.
+
+/// An error of a tunnel's shape, or of a ray or camera in it.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    /// The camera's centre is not inside the tunnel.
+    #[error(
+        "the camera is {distance_m:.3} m off the axis, outside the tunnel (the wall is at \
+         {wall_m:.3} m)"
+    )]
+    CameraOutside {
+        /// Distance of the camera from the axis, metres.
+        distance_m: f64,
+        /// Distance of the wall from the axis in that direction, metres.
+        wall_m: f64,
+    },
+    /// The ray runs along the axis and never meets the wall.
+    #[error("the ray runs along the tunnel's axis and meets no wall")]
+    Parallel,
+    /// The vanishing point of the axis lies within the image.
+    #[error(
+        "the image contains the vanishing point of the tunnel's axis, so that its view has no \
+             end"
+    )]
+    LooksAlongTheAxis,
+    /// The image's centre lies outside the lens's field of view.
+    #[error(
+        "the image's centre is outside the lens's field of view; check the principal point and \
+         max_angle_deg"
+    )]
+    NotShown,
+    /// The ray or the camera's position is not a number.
+    #[error("the camera's position or viewing direction is not finite")]
+    NotFinite,
+    /// A size of the section is impossible.
+    #[error("{name} is {size_m} m; it must be a positive number of metres")]
+    Size {
+        /// Name of the size in `survey.toml`.
+        name: &'static str,
+        /// The size given, metres.
+        size_m: f64,
+    },
+    /// A horseshoe without walls.
+    #[error(
+        "a horseshoe {width_m} m wide and {height_m} m high has no floor; its height must be more \
+         than half its width"
+    )]
+    NoWalls {
+        /// Width, metres.
+        width_m: f64,
+        /// Height, metres.
+        height_m: f64,
+    },
+    /// A centreline that no tunnel can follow.
+    #[error("the centreline: {what}")]
+    Centreline {
+        /// The problem.
+        what: String,
+    },
+}
+
+/// Rejects a size that is not positive and finite.
+pub(super) fn check_size(name: &'static str, size_m: f64) -> Result<(), SurfaceError> {
+    if size_m.is_finite() && size_m > 0.0 {
+        Ok(())
+    } else {
+        Err(SurfaceError::Size { name, size_m })
+    }
+}

@@ -1,0 +1,191 @@
+//! When the frames were taken.
+
+use super::error::SurveyError;
+use crate::frames::FrameFile;
+use crate::trajectory::{PoseError, text, times};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Reads the frames' times, seconds, one per frame.
+///
+/// One line a frame: its time alone, in the order of the frames' names (KITTI's `times.txt`); or
+/// time and name in either order (TUM's `rgb.txt`, EuRoC's `data.csv`), with blanks or a comma
+/// between. Whole numbers of 16 digits and more are nanoseconds, all else is seconds. Lines of
+/// files that are no frames of the survey are passed over.
+///
+/// # Errors
+/// An unreadable file, a line of another form, a frame without a time, two times of one frame.
+pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, SurveyError> {
+    let lines = read_lines(path)?;
+    let file = |what: String| SurveyError::from(PoseError::file(path, what));
+    if lines.iter().all(|line| line.name.is_none()) {
+        return if lines.len() == frames.len() {
+            Ok(lines.iter().map(|line| line.time_s).collect())
+        } else {
+            Err(file(format!(
+                "{} times for {} frames; every frame needs one, in the order of the frames' names, or with its name beside it",
+                lines.len(),
+                frames.len()
+            )))
+        };
+    }
+    let mut by_name: HashMap<&str, f64> = HashMap::new();
+    for line in &lines {
+        let Some(name) = &line.name else {
+            return Err(file("some lines have a name and some do not".to_owned()));
+        };
+        if by_name.insert(base_name(name), line.time_s).is_some() {
+            let what = format!("a second time of {name}");
+            return Err(PoseError::line(path, line.number, what).into());
+        }
+    }
+    let of_frame = |frame: &FrameFile| {
+        by_name.get(frame.name().as_str()).copied().ok_or_else(|| {
+            file(format!(
+                "no time of frame {} ({})",
+                frame.index,
+                frame.name()
+            ))
+        })
+    };
+    frames.iter().map(of_frame).collect()
+}
+
+/// Reads times of frames that are not at hand, seconds: all lines, in their order.
+///
+/// # Errors
+/// An unreadable file, a line of another form.
+pub fn read_frame_times(path: &Path) -> Result<Vec<f64>, SurveyError> {
+    let lines = read_lines(path)?;
+    Ok(lines.into_iter().map(|line| line.time_s).collect())
+}
+
+/// A line of a list of times.
+struct Line {
+    number: usize,
+    time_s: f64,
+    name: Option<String>,
+}
+
+fn read_lines(path: &Path) -> Result<Vec<Line>, SurveyError> {
+    let text = text::read(path)?;
+    let mut lines = Vec::new();
+    for (number, line) in text::lines(&text) {
+        let fail = |what: String| PoseError::line(path, number, what);
+        let words: Vec<&str> = line
+            .split(|c: char| c == ',' || c.is_whitespace())
+            .filter(|word| !word.is_empty())
+            .collect();
+        let (time, name) = match words.as_slice() {
+            [time] => (*time, None),
+            [first, second] if times::from_word(first).is_some() => (*first, Some(*second)),
+            [first, second] => (*second, Some(*first)),
+            _ => {
+                return Err(fail(format!(
+                    "{} columns where a line is `time`, `time name` or `name time`",
+                    words.len()
+                ))
+                .into());
+            }
+        };
+        let time_s = times::from_word(time).ok_or_else(|| {
+            fail(format!(
+                "`{time}` is no time; seconds, or whole nanoseconds"
+            ))
+        })?;
+        lines.push(Line {
+            number,
+            time_s,
+            name: name.map(str::to_owned),
+        });
+    }
+    Ok(lines)
+}
+
+/// The times that the frames' names tell, if all of them do.
+///
+/// # Errors
+/// The first frame whose name does not.
+pub(super) fn from_names(frames: &[FrameFile]) -> Result<Vec<f64>, SurveyError> {
+    let of_frame = |frame: &FrameFile| {
+        let stem = frame.path.file_stem().unwrap_or_default().to_string_lossy();
+        times::from_name(&stem).ok_or_else(|| SurveyError::FrameTime {
+            frame: frame.index,
+            file: frame.path.clone(),
+        })
+    };
+    frames.iter().map(of_frame).collect()
+}
+
+/// A path's last part, whatever separates its parts.
+fn base_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frames(names: &[&str]) -> Vec<FrameFile> {
+        let frame = |(index, name): (usize, &&str)| {
+            FrameFile::picture(index, Path::new("survey/frames").join(name))
+        };
+        names.iter().enumerate().map(frame).collect()
+    }
+
+    fn read_text(text: &str) -> Result<Vec<f64>, SurveyError> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("times.txt");
+        std::fs::write(&path, text).unwrap();
+        read(&path, &frames(&["a.png", "b.png"]))
+    }
+
+    #[test]
+    fn all_usual_lists_of_times_are_read() {
+        for text in [
+            "1.5\n2.5\n",
+            "# rgb\r\n1.5 rgb/a.png\r\n2.5 rgb/b.png\r\n",
+            "b.png 2.5\na.png 1.5\nelsewhere.png 9\n",
+            "#timestamp [ns],filename\n2500000000000000,b.png\n1500000000000000,a.png\n",
+        ] {
+            let expected = if text.contains("ns") {
+                [1.5e6, 2.5e6]
+            } else {
+                [1.5, 2.5]
+            };
+            assert_eq!(read_text(text).unwrap(), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn bad_lists_say_what_is_wrong() {
+        for (text, expected) in [
+            ("", "0 times for 2 frames"),
+            ("1\n2\n3\n", "3 times for 2 frames"),
+            ("1\nx\n", ":2: `x` is no time"),
+            ("1\nnan\n", ":2: `nan` is no time"),
+            ("1 a.png\n2 a.png\n", ":2: a second time of a.png"),
+            ("1 a.png\n", "no time of frame 1 (b.png)"),
+            ("1 a.png\n2\n", "some lines have a name"),
+            ("1 a.png 3\n", ":1: 3 columns"),
+        ] {
+            let message = read_text(text).unwrap_err().to_string();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_counter_is_no_time() {
+        assert_eq!(
+            from_names(&frames(&["1.25.png", "1.5.png"])).unwrap(),
+            [1.25, 1.5]
+        );
+        let message = from_names(&frames(&["000001.png"]))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("frame 0") && message.contains("frames.times"),
+            "{message}"
+        );
+    }
+}

@@ -1,0 +1,78 @@
+//! Fewer frames than a video has pictures, by how far the view turns.
+
+use super::associate::Associate;
+use super::error::SurveyError;
+use super::open::Survey;
+use crate::trajectory::{Pose, poses_of};
+use std::path::Path;
+
+impl Survey {
+    /// Leaves out frames until the view turns by `step_deg` from one to the next, as the initial
+    /// poses say.
+    ///
+    /// # Errors
+    /// An impossible step; poses that are not tied by time, so that those of fewer frames could not
+    /// be told.
+    pub(super) fn select_keyframes(
+        &mut self,
+        step_deg: f64,
+        toml_path: &Path,
+    ) -> Result<(), SurveyError> {
+        let fail = |what: String| {
+            Err(SurveyError::Value {
+                path: toml_path.to_owned(),
+                what,
+            })
+        };
+        if !(step_deg > 0.0 && step_deg <= 180.0) {
+            return fail(format!(
+                "frames.angle_step_deg is {step_deg}; it must be above 0 and up to 180 degrees"
+            ));
+        }
+        let section = &self.file.poses;
+        if section.associate != Some(Associate::Time) {
+            return fail(
+                "frames.angle_step_deg needs poses.associate = \"time\": which pictures are frames is told by their poses".to_owned(),
+            );
+        }
+        let (all, _) = self.read_as(section, &self.folder.join(&section.initial))?;
+        let kept = keyframe_indices(&poses_of(&all), step_deg.to_radians());
+        self.frames = self.frames.only(&kept);
+        if let Some(times_s) = &mut self.times_s {
+            *times_s = kept.iter().map(|k| times_s[*k]).collect();
+        }
+        Ok(())
+    }
+}
+
+/// The first pose, and each that is turned from the one before it in the list by `step_rad` or
+/// more, but for rounding.
+fn keyframe_indices(poses: &[Pose], step_rad: f64) -> Vec<usize> {
+    const ANGLE_TOLERANCE_RAD: f64 = 1e-6;
+    let mut kept: Vec<usize> = Vec::new();
+    for (k, pose) in poses.iter().enumerate() {
+        let last = kept.last().map(|last| &poses[*last]);
+        if last.is_none_or(|last| last.r_wc.angle_to(&pose.r_wc) >= step_rad - ANGLE_TOLERANCE_RAD)
+        {
+            kept.push(k);
+        }
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trajectory::spiral;
+
+    #[test]
+    fn views_are_as_far_apart_as_asked() {
+        let poses = spiral(20, 0.01, 4f64.to_radians());
+        let kept = |step_deg: f64| keyframe_indices(&poses, step_deg.to_radians());
+        assert_eq!(kept(12.0), [0, 3, 6, 9, 12, 15, 18]);
+        assert_eq!(kept(30.0), [0, 8, 16]);
+        assert_eq!(kept(1.0).len(), 20);
+        // A carrier that stands still adds nothing.
+        assert_eq!(keyframe_indices(&[poses[0]; 5], 0.1), [0]);
+    }
+}

@@ -1,0 +1,135 @@
+//! From a file of poses to one pose of the tunnel per frame.
+
+use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by_order, by_time};
+use super::error::SurveyError;
+use super::frame_times;
+use super::poses_section::PosesSection;
+use crate::frames::FrameFile;
+use crate::trajectory::{
+    Convention, Pose, PoseFormat, StampedPose, Trajectory, read_camera_in_body, read_poses,
+    read_tunnel_frame,
+};
+use std::path::Path;
+
+/// How files of poses are read: a [`PosesSection`] with the files it names.
+pub(super) struct PoseReader<'a> {
+    section: &'a PosesSection,
+    camera_in_body: Option<Pose>,
+    tunnel_in_world: Option<Pose>,
+    frames: &'a [FrameFile],
+    times_s: Option<&'a [f64]>,
+}
+
+/// The poses of a file, one per frame.
+pub(super) struct InterpretedPoses {
+    /// As the file has them.
+    pub given: Trajectory,
+    /// What they mean.
+    pub convention: Convention,
+}
+
+impl InterpretedPoses {
+    /// The poses in the tunnel.
+    pub fn trajectory(&self) -> Trajectory {
+        let in_tunnel = |stamped: &StampedPose| StampedPose {
+            time_s: stamped.time_s,
+            pose: self.convention.to_tunnel(&stamped.pose),
+        };
+        self.given.iter().map(in_tunnel).collect()
+    }
+
+    /// The poses in the tunnel if they meant something else.
+    pub fn poses_in(&self, convention: &Convention) -> Vec<Pose> {
+        let given = self.given.iter();
+        given
+            .map(|stamped| convention.to_tunnel(&stamped.pose))
+            .collect()
+    }
+}
+
+impl<'a> PoseReader<'a> {
+    /// Reads what the section names, relative to `folder`. `times_s`: the frames' times, if a file
+    /// tells them.
+    ///
+    /// # Errors
+    /// A mount or a tunnel's frame that cannot be read.
+    pub fn new(
+        section: &'a PosesSection,
+        folder: &Path,
+        frames: &'a [FrameFile],
+        times_s: Option<&'a [f64]>,
+    ) -> Result<Self, SurveyError> {
+        let mount = section.body_to_camera.as_ref();
+        let tunnel = section.tunnel_frame.as_ref();
+        Ok(Self {
+            section,
+            camera_in_body: mount
+                .map(|file| read_camera_in_body(&folder.join(file)))
+                .transpose()?,
+            tunnel_in_world: tunnel
+                .map(|file| read_tunnel_frame(&folder.join(file)))
+                .transpose()?,
+            frames,
+            times_s,
+        })
+    }
+
+    /// Reads a file of poses and ties them to the frames.
+    ///
+    /// # Errors
+    /// A malformed file; poses of a body without its mount; frames and poses that do not pair up;
+    /// frames whose times do not increase.
+    pub fn read(&self, path: &Path) -> Result<InterpretedPoses, SurveyError> {
+        let file = read_poses(path, self.section.format)?;
+        let mut convention = Convention::of(file.format);
+        convention.direction = self.section.convention.unwrap_or(convention.direction);
+        convention.axes = self.section.camera_axes.unwrap_or(convention.axes);
+        convention.camera_in_body = self.camera_in_body;
+        convention.tunnel_in_world = self.tunnel_in_world;
+        if file.format == PoseFormat::Euroc && convention.camera_in_body.is_none() {
+            return Err(SurveyError::Association {
+                path: file.path,
+                what: "holds the poses of a body (IMU), as EuRoC's files do; say how the camera is mounted with \
+                       --body-to-camera FILE (poses.body_to_camera in survey.toml): its sensor.yaml, or a 4 × 4 matrix"
+                    .to_owned(),
+            });
+        }
+        let (frames, times_s) = (self.frames, self.times_s);
+        let default = if file.has_names() {
+            Associate::Name
+        } else {
+            Associate::Order
+        };
+        let given = match self.section.associate.unwrap_or(default) {
+            Associate::Order => by_order(&file, frames, times_s)?,
+            Associate::Name => by_name(&file, frames, times_s)?,
+            Associate::Time => {
+                let how = TimeAssociation {
+                    tolerance_s: self.section.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S),
+                    interpolate: self.section.interpolate.unwrap_or(false),
+                };
+                match times_s {
+                    Some(times_s) => by_time(&file, frames, times_s, how)?,
+                    None => by_time(&file, frames, &frame_times::from_names(frames)?, how)?,
+                }
+            }
+        };
+        for (pair, frame) in given.windows(2).zip(frames.iter().skip(1)) {
+            if let [before, stamped] = pair
+                && stamped.time_s <= before.time_s
+            {
+                return Err(SurveyError::Association {
+                    path: file.path,
+                    what: format!(
+                        "frame {} ({}) has time {} s, and the one before it {} s; frames are sorted by their names, which must be the order of their times",
+                        frame.index,
+                        frame.path.display(),
+                        stamped.time_s,
+                        before.time_s
+                    ),
+                });
+            }
+        }
+        Ok(InterpretedPoses { given, convention })
+    }
+}

@@ -1,0 +1,51 @@
+//! Detection of a pose file's format from its content.
+
+use super::error::PoseError;
+use super::format::PoseFormat;
+use super::{colmap, csv, euroc, kitti, text, tum};
+use std::path::Path;
+
+/// Detects the format of a pose file from its content.
+///
+/// # Errors
+/// A text in none of the formats.
+pub(super) fn detect_format(path: &Path, text: &str) -> Result<PoseFormat, PoseError> {
+    if text.trim_start().starts_with('{') {
+        return Ok(PoseFormat::Nerfstudio);
+    }
+    let Some((number, line)) = text::lines(text).next() else {
+        // Only comments.
+        return Err(PoseError::file(path, "holds no poses"));
+    };
+    if csv::is_header(line) {
+        return Ok(PoseFormat::Csv);
+    }
+    if euroc::is_line(line) {
+        return Ok(PoseFormat::Euroc);
+    }
+    if colmap::is_line(line) {
+        return Ok(PoseFormat::Colmap);
+    }
+    let words: Vec<&str> = line.split_whitespace().collect();
+    let numbers = words
+        .iter()
+        .filter(|word| word.parse::<f64>().is_ok())
+        .count();
+    match (numbers, words.len()) {
+        // A line of a wrong length is reported by the parser of the nearest format.
+        (12, 12) => Ok(PoseFormat::Kitti),
+        (most, all) if most >= 5 && all <= 9 => Ok(PoseFormat::Tum),
+        _ => Err(PoseError::line(
+            path,
+            number,
+            format!(
+                "neither of TUM (`{}`), KITTI (`{}`), CSV (`{}` named in the first line), COLMAP, \
+                 nerfstudio nor EuRoC; \
+                 if it is one of them, name it with --pose-format (poses.format in survey.toml)",
+                tum::FORM,
+                kitti::FORM,
+                csv::FORM
+            ),
+        )),
+    }
+}
