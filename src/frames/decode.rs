@@ -1,7 +1,7 @@
 //! Decoding of frames.
 
 use super::error::FrameError;
-use super::frame_file::FrameFile;
+use super::frame_file::{FrameFile, FrameSource};
 use image::{
     ColorType, DynamicImage, GrayImage, ImageDecoder, ImageError, ImageReader, ImageResult,
     RgbImage,
@@ -17,9 +17,10 @@ impl FrameFile {
     /// # Errors
     /// A missing or unknown file.
     pub fn size(&self) -> Result<(u32, u32), FrameError> {
-        match &self.video {
-            Some((video, _)) => Ok(video.size()),
-            None => Ok(self.header()?.dimensions()),
+        match &self.source {
+            FrameSource::Video(video, _) => Ok(video.size()),
+            FrameSource::Memory(picture) => Ok((picture.width(), picture.height())),
+            FrameSource::File => Ok(self.header()?.dimensions()),
         }
     }
 
@@ -52,9 +53,16 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
         }
     };
     let fail = |what: String| file.decode_error(what);
-    if let Some((video, picture)) = &file.video {
-        check(video.size())?;
-        return video.decode(*picture).map_err(fail);
+    match &file.source {
+        FrameSource::Video(video, picture) => {
+            check(video.size())?;
+            return video.decode(*picture).map_err(fail);
+        }
+        FrameSource::Memory(picture) => {
+            check((picture.width(), picture.height()))?;
+            return Ok(DynamicImage::clone(picture));
+        }
+        FrameSource::File => {}
     }
     let bytes = Content::of(&file.path).map_err(|error| fail(error.to_string()))?;
     if bytes.as_ref().starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(bytes.as_ref()) {
@@ -134,10 +142,11 @@ impl Drop for Content {
 /// # Errors
 /// A missing or unknown file.
 pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
-    if let Some((video, _)) = &file.video {
-        return Ok(video.colour());
+    match &file.source {
+        FrameSource::Video(video, _) => Ok(video.colour()),
+        FrameSource::Memory(picture) => Ok(picture.color()),
+        FrameSource::File => Ok(file.header()?.color_type()),
     }
-    Ok(file.header()?.color_type())
 }
 
 /// The decoder for the content of a file, after reading its header.

@@ -1,20 +1,32 @@
-//! Frames as files or as pictures of a video.
+//! Frames as files, as pictures of a video, or in memory.
 
 use super::error::FrameError;
 use super::video::Video;
+use image::DynamicImage;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A frame in a file of its own or in a video.
+/// The place that a frame's pixels come from.
+#[derive(Clone, Debug)]
+pub(super) enum FrameSource {
+    /// A file of its own, [`FrameFile::path`].
+    File,
+    /// A video, and the index of the picture.
+    Video(Arc<Video>, usize),
+    /// A picture in memory.
+    Memory(Arc<DynamicImage>),
+}
+
+/// A frame in a file of its own, in a video, or in memory.
 #[derive(Clone, Debug)]
 pub struct FrameFile {
     /// Index of the frame in the survey.
     pub index: usize,
     /// Path of the picture, or the video's path followed by the picture's number:
-    /// `survey.mp4/000012`.
+    /// `survey.mp4/000012`; a name only, for a picture in memory.
     pub path: PathBuf,
-    /// The video that contains it, and the index of the picture.
-    pub(super) video: Option<(Arc<Video>, usize)>,
+    /// Its pixels.
+    pub(super) source: FrameSource,
 }
 
 impl FrameFile {
@@ -23,7 +35,7 @@ impl FrameFile {
         Self {
             index,
             path,
-            video: None,
+            source: FrameSource::File,
         }
     }
 
@@ -32,21 +44,30 @@ impl FrameFile {
         Self {
             index,
             path: video.path().join(format!("{picture:06}")),
-            video: Some((Arc::clone(video), picture)),
+            source: FrameSource::Video(Arc::clone(video), picture),
+        }
+    }
+
+    /// A picture in memory, grey or colour of 8 or 16 bits; messages call it by its index.
+    pub fn in_memory(index: usize, picture: DynamicImage) -> Self {
+        Self {
+            index,
+            path: PathBuf::from(format!("frame-{index:06}")),
+            source: FrameSource::Memory(Arc::new(picture)),
         }
     }
 
     /// The file that contains the frame.
     pub fn file(&self) -> &Path {
-        match &self.video {
-            Some((video, _)) => video.path(),
-            None => &self.path,
+        match &self.source {
+            FrameSource::Video(video, _) => video.path(),
+            FrameSource::File | FrameSource::Memory(_) => &self.path,
         }
     }
 
     /// True if the frame is in a video.
     pub fn is_in_video(&self) -> bool {
-        self.video.is_some()
+        matches!(self.source, FrameSource::Video(..))
     }
 
     /// The error of a frame that cannot be decoded.

@@ -2,6 +2,7 @@
 
 use super::frame_file::FrameFile;
 use super::mask::Mask;
+use image::DynamicImage;
 use std::ops::Deref;
 use std::sync::Arc;
 
@@ -19,6 +20,13 @@ impl FrameSet {
             files,
             mask: mask.map(Arc::new),
         }
+    }
+
+    /// Frames that are pictures in memory.
+    pub fn in_memory(pictures: impl IntoIterator<Item = DynamicImage>) -> Self {
+        let numbered = pictures.into_iter().enumerate();
+        let files = numbered.map(|(index, picture)| FrameFile::in_memory(index, picture));
+        Self::new(files.collect(), None)
     }
 
     /// The common mask.

@@ -11,6 +11,14 @@ pub enum RefineError {
         "the survey has a single frame; refinement compares frames that overlap on the wall, so it needs two or more"
     )]
     SingleFrame,
+    /// Frames and poses do not correspond.
+    #[error("{frames} frames, but {poses} initial poses; give one pose for each frame, in order")]
+    PoseCount {
+        /// Number of frames.
+        frames: usize,
+        /// Number of initial poses.
+        poses: usize,
+    },
     /// Nothing overlaps.
     #[error(
         "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, whether the mask or tunnel.ignore leaves anything, or take frames closer together"

@@ -32,10 +32,14 @@ impl<'a> Setup<'a> {
     /// Prepares a refinement.
     ///
     /// # Errors
-    /// [`RefineError::SingleFrame`], [`RefineError::OnlyRound`].
+    /// [`RefineError::SingleFrame`], [`RefineError::PoseCount`], [`RefineError::OnlyRound`].
     pub fn new(input: RefineInput<'a>, options: &'a RefineOptions) -> Result<Self, RefineError> {
         if input.frames.len() < 2 {
             return Err(RefineError::SingleFrame);
+        }
+        let (frames, poses) = (input.frames.len(), input.initial.len());
+        if frames != poses {
+            return Err(RefineError::PoseCount { frames, poses });
         }
         let coarsest = options.coarsest_level(input.camera.shorter_side());
         let frames = FrameCache::new(

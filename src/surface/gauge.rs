@@ -67,6 +67,14 @@ impl Gauge {
         }
     }
 
+    /// The gauge of a surface of revolution about the world's y axis that is no cylinder.
+    pub fn revolved() -> Self {
+        Self {
+            turn: true,
+            ..Self::default()
+        }
+    }
+
     /// Number of gauge freedoms.
     pub fn degrees_of_freedom(&self) -> usize {
         usize::from(self.turn) + usize::from(self.shift)
