@@ -1,12 +1,12 @@
-//! Settings of the estimator.
+//! Options of a refinement.
 
 use crate::survey::CalibrationGroup;
 
-/// How to refine. The defaults suit most surveys; the noise model of the poses comes from the
-/// survey.
+/// Options of a refinement. The defaults suit most surveys; the noise model of the poses comes with
+/// the input.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct RefineOptions {
-    /// What to estimate besides the poses; if None, what the survey asks for.
+    /// Shared parameters to estimate besides the poses; if None, those that the input asks for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrate: Option<Vec<CalibrationGroup>>,
     /// 1-σ of the logarithm of a frame's gain around 0 (0.3 is about ±30 %).
@@ -18,30 +18,29 @@ pub struct RefineOptions {
     /// Pyramid levels that tracking and windows use, from the coarsest; the global solve starts
     /// where they end.
     pub tracking_levels: usize,
-    /// Frames placed between two solves of the sliding window.
+    /// Frames registered between two solves of the sliding window.
     pub window_stride: usize,
     /// Wall samples per pixel along each axis in the last solve (but for a joint one).
     pub final_density: f64,
-    /// Wall samples per pixel along each axis where, before the last solve, the frames are searched
-    /// for what is not wall; if None, the samples of that solve. (Before a joint one two a pixel,
-    /// whatever this says.)
+    /// Wall samples per pixel along each axis at which the outlier mask of the last solve is found; if
+    /// None, those of that solve. (A joint solve always uses two a pixel.)
     pub outlier_mask_density: Option<f64>,
-    /// Share of the information that the global solves before it use, below the level where
-    /// tracking ends: they look at the parts of the wall that tell most.
+    /// Share of the information that the global solves before the last use, below the level where
+    /// tracking ends: they compare the most informative tiles, 0 to 1.
     pub intermediate_information: f64,
-    /// Look for each frame over the whole prior before it is refined; otherwise it starts where the
-    /// prior expects it.
+    /// Search each frame over the whole prior by correlation before it is refined; otherwise it
+    /// starts at the predicted pose.
     pub search: bool,
     /// Solve sliding windows while tracking.
     pub windows: bool,
     /// Solve once more, for the wall at a third of a pixel jointly with the poses, instead of
-    /// taking what the frames show between their pixels for it: on walls with sharp edges errors
-    /// about a third smaller, in ten to twenty times the time. Where the wall is so smooth that
-    /// there is nothing between the pixels, that is found out and the solve left out.
+    /// interpolating between the frames' pixels: on walls with sharp edges errors are about a third
+    /// smaller, in ten to twenty times the time. The solve is skipped where the wall is too smooth to
+    /// gain from it.
     pub joint: bool,
-    /// Memory for decoded frames, bytes. Frames that do not fit are decoded anew when needed.
+    /// Memory for decoded frames, bytes. Frames that do not fit are decoded again when needed.
     pub cache_bytes: usize,
-    /// Steps of a global solve per level, at the most.
+    /// Largest number of steps of a global solve.
     pub max_iterations: u64,
     /// The last global solve ends when no wall point moves by more than this in a step, pixels, ...
     pub step_tolerance_px: f64,
@@ -74,9 +73,9 @@ impl Default for RefineOptions {
 }
 
 impl RefineOptions {
-    /// For speed: the last solve ends with the first step shorter than a tenth of a pixel or twice
-    /// the uncertainty, most often its first. Gauss–Newton leaves a few hundredths of such a step.
-    /// What is not wall is looked for more coarsely.
+    /// Options for speed: the last solve ends with the first step shorter than a tenth of a pixel or
+    /// twice the uncertainty, most often its first. Gauss–Newton leaves a few hundredths of such a
+    /// step. The outlier mask is found at coarser samples.
     pub fn fast() -> Self {
         Self {
             final_density: 1.5,

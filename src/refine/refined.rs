@@ -4,14 +4,14 @@ use crate::refine::report::RefineReport;
 use crate::refine::uncertainty::covariance::Covariances;
 use crate::trajectory::Trajectory;
 
-/// Result of a refinement.
+/// The result of a refinement.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Refined {
     /// Refined poses with the times of the initial ones.
     pub trajectory: Trajectory,
-    /// What was done and how sure it is.
+    /// The report: solves, verdict and uncertainty of every frame.
     pub report: RefineReport,
-    /// How sure it is, in full.
+    /// Covariances of the poses.
     pub covariances: Covariances,
 }

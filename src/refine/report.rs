@@ -1,4 +1,4 @@
-//! `refine.json`: what the estimator did and how sure it is.
+//! `refine.json`: the report of a refinement.
 
 use crate::refine::solver::solve_record::SolveRecord;
 use crate::refine::uncertainty::covariance::FrameSigma;
@@ -7,12 +7,12 @@ use crate::refine::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::trajectory::Pose;
 use serde::{Deserialize, Serialize};
 
-/// What a frame's refined pose rests on.
+/// The basis of a frame's refined pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum FrameFlag {
-    /// Its pixels.
+    /// The pixels of the frame.
     Photometric,
     /// The prior alone: the pixels do not determine it.
     Prior,
@@ -46,9 +46,9 @@ pub struct FrameReport {
     pub index: usize,
     /// Name of its file.
     pub file: String,
-    /// What its pose rests on.
+    /// The basis of its pose.
     pub flag: FrameFlag,
-    /// Why, if it rests on the prior.
+    /// The rejection reason, if the pose rests on the prior.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
     /// The other pose, if two are possible.
@@ -67,8 +67,9 @@ pub struct FrameReport {
     pub bias: f64,
     /// 1-σ relative to the first frame.
     pub sigma: FrameSigma,
-    /// What patches of it are off by against the others, beyond noise: root mean square, pixels.
-    /// Much of it speaks of a wrong camera, radius or shape.
+    /// Overdispersion: displacement of the frame's patches against the others beyond noise, root mean
+    /// square, pixels. Much of it indicates a wrong camera, radius or shape. (Called `strain_px` until
+    /// version 0.1; both names are read.)
     #[serde(default, alias = "strain_px")]
     pub overdispersion_px: f64,
 }
@@ -81,7 +82,7 @@ pub struct LevelReport {
     pub level: usize,
     /// Wall samples per pixel along each axis.
     pub samples_per_pixel: f64,
-    /// Share of the wall that was looked at, the most informative.
+    /// Share of the wall that was compared, the most informative.
     pub share_of_wall: f64,
     /// True if the wall was solved for jointly with the poses.
     #[serde(default)]
@@ -114,13 +115,13 @@ pub struct RefineReport {
     /// The covariance over the inverse of the normal matrix, c of [`crate::refine::uncertainty::covariance`]: above 1
     /// where residuals err together, below where they cancel.
     pub variance_factor: f64,
-    /// The readout time that the frames want, as far as they can tell.
+    /// The rolling-shutter test: the readout time that fits the frames best, where they determine it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rolling_shutter: Option<ReadoutEstimate>,
     /// Self-calibration, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,
-    /// Why the last solve stopped, in words.
+    /// The reason for which the last solve stopped, in words.
     pub stopped_because: String,
     /// Time by stage.
     pub timings: Vec<StageTime>,

@@ -119,23 +119,43 @@ pub mod joint {
 
 /// Thresholds of `solver/gauss_newton.rs, solve_record.rs`.
 pub mod gauss_newton {
-    // gauss_newton: begin
+    use std::ops::RangeInclusive;
 
-    // gauss_newton: end
+    /// Share of the slope along a step, `δᵀ g`, that a step must remove if it does not lower the
+    /// cost. Higher: fewer steps count as good. Chosen by: the strong Wolfe condition.
+    pub const MIN_SLOPE_REDUCTION: f64 = 0.5;
+    /// Share of the cost by which it may rise along a good step. Higher: more steps count as good.
+    /// Chosen by: on sharp bricks the cost varies by up to 0.9 % while the whole survey moves along
+    /// its gauge, which changes nothing.
+    pub const MAX_COST_RISE: f64 = 0.01;
+    /// First damping λ after a rejected step. Higher: the first damped step is shorter. Chosen by:
+    /// unknown.
+    pub const MIN_DAMPING: f64 = 1e-4;
+    /// Factor from one damping to the next. Higher: fewer, coarser dampings are tried. Chosen by:
+    /// Marquardt's original choice.
+    pub const DAMPING_FACTOR: f64 = 10.0;
+    /// Dampings tried before a step is given up. Higher: longer search for a step. Chosen by: unknown.
+    pub const MAX_DAMPING_ITERATIONS: usize = 8;
+    /// Plausible curvatures of a solve; others belong to solves that were still far from their end.
+    /// Wider: curvatures of such solves count, too. Chosen by: unknown.
+    pub const PLAUSIBLE_CURVATURES: RangeInclusive<f64> = 0.6..=1.2;
 }
 
 /// Thresholds of `solver/stopping.rs`.
 pub mod stopping {
-    // stopping: begin
-
-    // stopping: end
+    /// Step at which a solve that another one follows ends, pixels of its level. Higher: fewer steps.
+    /// Chosen by: unknown.
+    pub const INTERMEDIATE_STEP_PX: f64 = 0.01;
+    /// Step at which a solve that another one follows ends, multiples of the uncertainty. Higher:
+    /// fewer steps. Chosen by: unknown.
+    pub const INTERMEDIATE_STEP_SIGMA: f64 = 2.0;
 }
 
 /// Thresholds of `solver/neighbourhood.rs`.
 pub mod neighbourhood {
-    // neighbourhood: begin
-
-    // neighbourhood: end
+    /// Frames on either side of a changed one that are solved again. Higher: more of the trajectory
+    /// adapts, in more time. Chosen by: a wrong frame bends its neighbours over a few turns.
+    pub const MAX_CHANGED_DISTANCE: usize = 64;
 }
 
 /// Thresholds of `validation/overlaps.rs`.
@@ -210,7 +230,19 @@ pub mod pose_convention_search {
 
 /// Thresholds of `stages/assess.rs, validate_pairs.rs`.
 pub mod assessment {
-    // assessment: begin
-
-    // assessment: end
+    /// Share of a frame's pixels that must overlap other frames for its pose to count as photometric,
+    /// 0 to 1. Higher: fewer frames are photometric. Chosen by: unknown.
+    pub const MIN_PIXEL_SHARE: f64 = 0.02;
+    /// Largest step left of a photometric pose, pixels on the wall. Higher: more frames are
+    /// photometric. Chosen by: as [`MAX_SIGMA_PX`].
+    pub const MAX_STEP_PX: f64 = 0.25;
+    /// Largest step left of a photometric pose, multiples of σ, if that is more. Higher: more frames
+    /// are photometric. Chosen by: 2 σ.
+    pub const MAX_STEP_SIGMA: f64 = 2.0;
+    /// Largest 1-σ on the wall of a photometric pose, pixels. Higher: more frames are photometric.
+    /// Chosen by: twice that is half a pixel.
+    pub const MAX_SIGMA_PX: f64 = 0.25;
+    /// Pairwise comparisons of all frames, with rejected frames registered again between two, at the
+    /// most. Higher: more attempts, in more time. Chosen by: unknown.
+    pub const MAX_PAIR_ITERATIONS: usize = 3;
 }

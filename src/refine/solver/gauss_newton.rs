@@ -11,20 +11,10 @@ use crate::refine::problem::linearisation::Linearisation;
 use crate::refine::problem::photometric_problem::Problem;
 use crate::refine::solver::solve_record::{SolveRecord, StepRecord};
 use crate::refine::solver::stopping::{StopReason, Stopping};
+use crate::refine::thresholds::gauss_newton::{
+    DAMPING_FACTOR, MAX_COST_RISE, MAX_DAMPING_ITERATIONS, MIN_DAMPING, MIN_SLOPE_REDUCTION,
+};
 use serde::{Deserialize, Serialize};
-
-/// Share of the slope along a step, `δᵀ g`, that a step must remove if it does not lower the cost.
-/// Higher: fewer steps count as good.
-const MIN_SLOPE_REDUCTION: f64 = 0.5;
-/// Share of the cost by which it may rise along a good step. Higher: more steps count as good. On sharp bricks it rises and falls by
-/// up to 0.9 % while the whole survey moves along its gauge, which changes nothing.
-const MAX_COST_RISE: f64 = 0.01;
-/// First damping λ after a rejected step, ...
-const MIN_DAMPING: f64 = 1e-4;
-/// ... and the factor from one damping to the next.
-const DAMPING_FACTOR: f64 = 10.0;
-/// Dampings tried before a step is given up.
-const MAX_DAMPING_ITERATIONS: usize = 8;
 
 /// The unknowns of a solve: estimates of the active frames, and the shared parameters κ.
 pub type Unknowns = (Vec<FrameEstimate>, Kappa);

@@ -1,9 +1,8 @@
-//! What is solved again when few of many frames have changed: their neighbourhood, with all else
-//! held.
+//! Solves around few changed frames, with all others held.
 //!
-//! A wrong frame bends its neighbours over a few turns; a survey may have hundreds. So what a
-//! doubted frame makes to be solved does not grow with the length of the survey. What it has bent
-//! farther off is left to the next solve of all.
+//! A wrong frame bends its neighbours over a few turns; a survey may have hundreds. The effort of
+//! rejecting a frame therefore does not grow with the length of the survey. What it has bent farther
+//! away is left to the next solve of all frames.
 
 use crate::refine::model::context::{EstimationContext, Sampling};
 use crate::refine::model::frame_states::FrameStates;
@@ -14,43 +13,41 @@ use crate::refine::problem::photometric_problem::Problem;
 use crate::refine::samples::footprints::{FARTHEST, footprints};
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
+use crate::refine::thresholds::neighbourhood::MAX_CHANGED_DISTANCE;
 use std::ops::{Range, RangeInclusive};
 
-/// Frames on either side of a changed one that are solved again.
-const REACH: usize = 64;
-
-/// A run of frames that are solved again.
+/// A range of frames that are solved again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Neighbourhood {
-    /// The frames.
+    /// The frames that are estimated.
     pub active: Range<usize>,
-    /// They and those on either side that may share wall with them.
+    /// These frames, and those on either side that may share wall with them.
     pub participants: Range<usize>,
 }
 
 impl Neighbourhood {
-    /// Those of the frames that are inliers now and were not `before`, or the other way round, or
-    /// stand elsewhere.
+    /// Neighbourhoods of the frames that have changed since `before`: inliers that were rejected,
+    /// rejected ones that were inliers, and inliers with another pose.
     ///
     /// # Errors
     /// [`ProblemError::Placement`].
     pub fn of_changes(
-        scene: &EstimationContext,
+        context: &EstimationContext,
         before: &FrameStates,
         now: &FrameStates,
     ) -> Result<Vec<Self>, ProblemError> {
-        let runs = around(&changes(before, now), now.estimates.len());
-        if runs.is_empty() {
+        let ranges = around(&changes(before, now), now.estimates.len());
+        if ranges.is_empty() {
             return Ok(Vec::new());
         }
-        let footprints = footprints(scene, now)?;
-        let perimeter = scene.surface.perimeter_m();
-        let shares = |k: &usize, run: &Range<usize>| {
+        let footprints = footprints(context, now)?;
+        let perimeter = context.surface.perimeter_m();
+        let shares = |k: &usize, range: &Range<usize>| {
             let own = &footprints[*k];
-            let mut others = footprints[run.clone()].iter();
+            let mut others = footprints[range.clone()].iter();
             others.any(|other| other.overlaps(own, perimeter))
         };
-        let widened = runs.into_iter().map(|active| {
+        let widened = ranges.into_iter().map(|active| {
             let earlier = active.start.saturating_sub(FARTHEST)..active.start;
             let later = active.end..(active.end + FARTHEST).min(footprints.len());
             let first = earlier.clone().find(|k| shares(k, &active));
@@ -67,39 +64,39 @@ impl Neighbourhood {
     }
 
     /// All frames.
-    pub fn of_all(tracked: &FrameStates) -> Self {
-        let all = 0..tracked.estimates.len();
+    pub fn of_all(frames: &FrameStates) -> Self {
+        let all = 0..frames.estimates.len();
         Self {
             active: all.clone(),
             participants: all,
         }
     }
 
-    /// Solves the inliers frames at some pyramid levels, coarse to fine, each close enough for the
-    /// next; returns how each frame took part in the last.
+    /// Solves the inliers at the given pyramid levels, coarse to fine, each close enough for the next;
+    /// returns the share of every frame in the last solve.
     ///
     /// # Errors
     /// [`ProblemError`].
     pub fn solve(
         &self,
-        scene: &EstimationContext,
+        context: &EstimationContext,
         options: &RefineOptions,
         levels: RangeInclusive<usize>,
-        tracked: &mut FrameStates,
+        frames: &mut FrameStates,
     ) -> Result<Vec<FrameShare>, ProblemError> {
         let mut shares = Vec::new();
         for level in levels.rev() {
-            let members = tracked.window_of(self.participants.clone(), self.active.clone());
-            let problem = Problem::new(scene, Sampling::of(level), members)?;
+            let window = frames.window_of(self.participants.clone(), self.active.clone());
+            let problem = Problem::new(context, Sampling::of(level), window)?;
             let solution = solve(problem, Stopping::intermediate(options, level))?;
-            tracked.estimates[self.active.clone()].copy_from_slice(&solution.estimates);
+            frames.estimates[self.active.clone()].copy_from_slice(&solution.estimates);
             shares = solution.linearisation.frames;
         }
         Ok(shares)
     }
 }
 
-/// The frames whose belief or, of those inliers, whose pose has changed.
+/// Frames that have become inliers or rejected, and inliers whose pose has changed.
 pub fn changes(before: &FrameStates, now: &FrameStates) -> Vec<usize> {
     let changed = |k: &usize| {
         let (was, is) = (
@@ -111,18 +108,21 @@ pub fn changes(before: &FrameStates, now: &FrameStates) -> Vec<usize> {
     (0..now.estimates.len()).filter(changed).collect()
 }
 
-/// Runs of frames that reach [`REACH`] to either side of those given, ascending; joined where they
-/// touch.
+/// Ranges that reach [`MAX_CHANGED_DISTANCE`] to either side of the given frames, ascending; joined
+/// where they touch.
 fn around(frames: &[usize], count: usize) -> Vec<Range<usize>> {
-    let mut runs: Vec<Range<usize>> = Vec::new();
+    let mut ranges: Vec<Range<usize>> = Vec::new();
     for k in frames {
-        let (start, end) = (k.saturating_sub(REACH), (k + REACH + 1).min(count));
-        match runs.last_mut().filter(|run| start <= run.end) {
-            Some(run) => run.end = end,
-            None => runs.push(start..end),
+        let (start, end) = (
+            k.saturating_sub(MAX_CHANGED_DISTANCE),
+            (k + MAX_CHANGED_DISTANCE + 1).min(count),
+        );
+        match ranges.last_mut().filter(|range| start <= range.end) {
+            Some(range) => range.end = end,
+            None => ranges.push(start..end),
         }
     }
-    runs
+    ranges
 }
 
 #[cfg(test)]
@@ -133,10 +133,20 @@ mod tests {
     fn neighbourhoods_are_joined_where_they_touch_and_end_with_the_survey() {
         assert_eq!(around(&[], 9), []);
         assert_eq!(around(&[3], 9), vec![0..9; 1]);
-        let reach = 2 * REACH + 1;
+        let reach = 2 * MAX_CHANGED_DISTANCE + 1;
         assert_eq!(
-            around(&[REACH, REACH + reach, 5 * reach], 5 * reach + 2),
-            [0..2 * reach, 5 * reach - REACH..5 * reach + 2]
+            around(
+                &[
+                    MAX_CHANGED_DISTANCE,
+                    MAX_CHANGED_DISTANCE + reach,
+                    5 * reach
+                ],
+                5 * reach + 2
+            ),
+            [
+                0..2 * reach,
+                5 * reach - MAX_CHANGED_DISTANCE..5 * reach + 2
+            ]
         );
     }
 }

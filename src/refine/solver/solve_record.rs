@@ -1,8 +1,8 @@
 //! The course of a solve: its steps, costs, and the curvature that they show.
 
 use crate::refine::solver::stopping::StopReason;
+use crate::refine::thresholds::gauss_newton::PLAUSIBLE_CURVATURES;
 use serde::{Deserialize, Serialize};
-use std::ops::RangeInclusive;
 
 /// One step of a solve.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -44,8 +44,6 @@ pub struct SolveRecord {
 
 /// Curvature for Gaussian residuals and slopes without error: the mean of `ψ'` over that of `ω` with [`crate::refine::tiles::residual_weighting::Loss`].
 const GAUSSIAN_CURVATURE: f64 = 0.89;
-/// Plausible curvatures; others are those of a solve that was still far from its end.
-const PLAUSIBLE_CURVATURES: RangeInclusive<f64> = 0.6..=1.2;
 
 impl SolveRecord {
     /// Derivative of the gradient over the normal matrix: the mean over all steps that show it, by the squares of their lengths ([`crate::refine::uncertainty::covariance`]).

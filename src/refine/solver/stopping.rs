@@ -1,12 +1,8 @@
 //! Stopping rules of a solve, and the reasons for which it stops.
 
 use crate::refine::options::RefineOptions;
+use crate::refine::thresholds::stopping::{INTERMEDIATE_STEP_PX, INTERMEDIATE_STEP_SIGMA};
 use serde::{Deserialize, Serialize};
-
-/// All solves but the last end with a step shorter than this, pixels of their level, ...
-const INTERMEDIATE_STEP_PX: f64 = 0.01;
-/// ... or shorter than this share of the uncertainty.
-const INTERMEDIATE_STEP_SIGMA: f64 = 2.0;
 
 /// Stopping rule of a solve.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

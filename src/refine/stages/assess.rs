@@ -16,6 +16,9 @@ use crate::refine::setup::Setup;
 use crate::refine::solver::gauss_newton::Solution;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::{Estimation, PipelineState};
+use crate::refine::thresholds::assessment::{
+    MAX_SIGMA_PX, MAX_STEP_PX, MAX_STEP_SIGMA, MIN_PIXEL_SHARE,
+};
 use crate::refine::tracking::registration::separation_m;
 use crate::refine::uncertainty::covariance::FrameSigma;
 use crate::refine::uncertainty::observability::CalibrationReport;
@@ -25,16 +28,6 @@ use crate::refine::validation::inconsistent_frames::{find_disagreement, find_inc
 use crate::refine::validation::pairwise_lucas_kanade::align_pairs;
 use crate::surface::GaugeMotion;
 use crate::trajectory::{StampedPose, Trajectory};
-
-/// Share of a frame's pixels that must overlap other frames for its pose to count as photometric.
-const MIN_PIXEL_SHARE: f64 = 0.02;
-/// Largest step left of a pose that counts as photometric, pixels on the wall, ...
-const MAX_STEP_PX: f64 = 0.25;
-/// ... or multiples of σ, if that is more.
-const MAX_STEP_SIGMA: f64 = 2.0;
-/// Largest 1-σ on the wall of a pose that counts as photometric, pixels: twice that is half a
-/// pixel.
-const MAX_SIGMA_PX: f64 = 0.25;
 
 /// Runs the stage on the last full-size solve.
 ///

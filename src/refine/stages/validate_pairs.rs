@@ -6,13 +6,11 @@ use crate::refine::setup::Setup;
 use crate::refine::solver::neighbourhood::Neighbourhood;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::Estimation;
+use crate::refine::thresholds::assessment::MAX_PAIR_ITERATIONS;
 use crate::refine::tracking::track::register_rejected;
 use crate::refine::validation::pairwise_ncc::{
     compute_pairwise_ncc, find_blurred_frames, find_contradictions,
 };
-
-/// Comparisons, with rejected frames registered again between two, at the most.
-const MAX_ITERATIONS: usize = 3;
 
 /// Runs the stage at the finest level of tracking.
 ///
@@ -28,12 +26,14 @@ pub fn run<'a>(
     let (count, options) = (setup.count(), setup.options);
     let (coarsest, finest) = (setup.coarsest_level(), setup.handover_level());
     let frames = &mut state.frames;
-    session.progress.start("check", MAX_ITERATIONS);
-    for iteration in 0..MAX_ITERATIONS {
+    session.progress.start("check", MAX_PAIR_ITERATIONS);
+    for iteration in 0..MAX_PAIR_ITERATIONS {
         let pairs = compute_pairwise_ncc(&context, finest, frames, &(0..count))?;
         frames.reject(find_contradictions(&pairs, count));
         frames.reject(find_blurred_frames(&pairs, count));
-        if iteration + 1 == MAX_ITERATIONS || register_rejected(&context, options, frames)? == 0 {
+        if iteration + 1 == MAX_PAIR_ITERATIONS
+            || register_rejected(&context, options, frames)? == 0
+        {
             break;
         }
         Neighbourhood::of_all(frames).solve(&context, options, finest..=coarsest, frames)?;
