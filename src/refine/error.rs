@@ -2,7 +2,7 @@
 
 use crate::refine::model::problem_error::ProblemError;
 
-/// Why a survey cannot be refined.
+/// A reason why frames cannot be refined.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RefineError {
@@ -29,7 +29,7 @@ pub enum RefineError {
         "{unknown} can be estimated of a straight round tunnel only; leave it out of --calibrate and [calibrate] unknowns"
     )]
     OnlyRound {
-        /// What was to be estimated.
+        /// The parameter that was to be estimated.
         unknown: &'static str,
     },
     /// The equations.

@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 /// Refines the poses of frames: a [`RefineInput`], or a [`Survey`](crate::survey::Survey) that converts into one.
 ///
-/// The same input gives the same bytes whatever the number of threads.
+/// Equal input gives equal bytes, whatever the number of threads.
 ///
 /// # Errors
 /// [`RefineError`].

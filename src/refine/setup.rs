@@ -15,14 +15,14 @@ use crate::trajectory::{Pose, poses_of};
 pub struct Setup<'a> {
     /// Frames, poses, camera and tunnel.
     pub input: RefineInput<'a>,
-    /// How to refine.
+    /// The options.
     pub options: &'a RefineOptions,
     /// The frames' grey pyramids.
     pub frames: FrameCache,
     /// Noise of the initial poses and exposures.
     pub prior: Prior,
-    /// The same widened by what the shared parameters may still be off, for registering frames before
-    /// they are estimated.
+    /// The prior widened by the uncertainty of the shared parameters, for registering frames before
+    /// these are estimated.
     pub tracking_prior: Prior,
     /// The shared parameters that are estimated, and their priors.
     pub calibration: Calibration,

@@ -40,7 +40,7 @@ pub fn solve<'a>(problem: Problem<'a>, stopping: Stopping) -> Result<Solution<'a
 /// Solves `problem` from where an earlier solve of it was, observed.
 ///
 /// # Errors
-/// As [`solve`], and those of [`Observation::keep`].
+/// The errors of [`solve`], and those of [`Observation::keep`].
 pub fn resume<'a>(
     problem: Problem<'a>,
     stopping: Stopping,

@@ -47,19 +47,20 @@ pub struct SolveState {
 
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
 ///
-/// λ starts at 0 and rises when a step is none for the better; such a step is never taken. It is
-/// for the better if it lowers the robust cost on the same wall samples; or, within a pixel, if it
-/// leaves less than half of the slope along it ([`MIN_SLOPE_REDUCTION`]) and the cost as it was but
-/// for its [`MAX_COST_RISE`]. What is sought is where the gradient is zero, and that is not quite the
-/// derivative of the cost: it takes the slopes of the fused texture ([`crate::refine::tiles::tile`]), so it is
-/// smooth, whereas the cost of sharp edges depends on where between pixels samples happen to fall.
-/// Along weak directions, in which all frames move together by half a pixel and hardly against each
-/// other, that outweighs what there is to gain, and a solve that asked for a lower cost would be
-/// stuck.
+/// λ starts at 0 and rises after a bad step, which is never taken. A step is good if it lowers the
+/// robust cost on the same wall samples, or if, within a pixel, it removes at least half of the slope
+/// along it ([`MIN_SLOPE_REDUCTION`]) and hardly raises the cost ([`MAX_COST_RISE`]).
 ///
-/// Frames that a step would bring where they cannot be ([`Problem::is_feasible`]) stay where they are.
-/// Only the last step, undamped and shorter than the tolerance, is taken on trust: cost and
-/// equations are those before it.
+/// The second rule is needed because the solve seeks a zero of the gradient, and the gradient is not
+/// quite the derivative of the cost: it uses the slopes of the fused texture
+/// ([`crate::refine::tiles::tile`]) and is smooth, whereas the cost of sharp edges depends on where
+/// samples fall between pixels. Along weak directions, in which all frames move together and hardly
+/// against each other, that roughness exceeds the gain, and a solve that asked for a lower cost would
+/// get stuck.
+///
+/// Frames that a step would make infeasible ([`Problem::is_feasible`]) keep their estimates. The last
+/// step, undamped and shorter than the tolerance, is not judged: cost and equations are those before
+/// it.
 ///
 /// Source: P. Wolfe, "Convergence conditions for ascent methods", SIAM Review 11(2), 1969 (the
 /// slope along a step).

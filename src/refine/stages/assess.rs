@@ -175,8 +175,8 @@ fn trajectory(
     poses.collect()
 }
 
-/// How far an undamped step of the poses would still move each frame, for want of steps or of
-/// descent, pixels on the wall.
+/// Movement of each frame, pixels on the wall, in the undamped step that is left where the solve ended
+/// for want of iterations or of descent.
 ///
 /// # Errors
 /// [`ProblemError::Factor`].

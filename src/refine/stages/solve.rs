@@ -237,7 +237,7 @@ fn find_unobservable(
     ))
 }
 
-/// Whether another solve is certain to follow; a joint one may turn out to be needless.
+/// True if another solve is certain to follow; a joint one may turn out to be needless.
 fn has_solve_ahead(state: &PipelineState) -> bool {
     let mut ahead = state.stages.iter().skip(1);
     ahead.any(|stage| matches!(stage, Stage::Solve(plan) if !plan.sampling.joint))
