@@ -2,7 +2,6 @@
 
 use crate::camera::Camera;
 use crate::frames::GreyImage;
-use crate::render::{FrameStack, Picture};
 use crate::surface::{Circle, Surface, WallPoint};
 use crate::trajectory::{Pose, so3, spiral};
 use nalgebra::Vector3;
@@ -64,15 +63,6 @@ impl TestWall {
     /// The frames: the texture at each pixel centre's wall point.
     pub fn frames(&self) -> Vec<GreyImage> {
         self.poses.iter().map(|pose| self.frame(pose)).collect()
-    }
-
-    /// The frames as pictures of whole grey levels.
-    pub fn stack(&self) -> FrameStack {
-        let pictures = self.frames().into_iter().map(|frame| {
-            let data: Vec<u8> = frame.data().iter().map(|v| v.round() as u8).collect();
-            Picture::new(frame.width(), frame.height(), 1, data)
-        });
-        FrameStack::from_pictures(self.camera, pictures.collect())
     }
 
     fn frame(&self, pose: &Pose) -> GreyImage {

@@ -58,6 +58,7 @@ pub fn image_metrics(first: &Panorama, second: &Panorama) -> Result<ImageMetrics
 mod tests {
     use super::*;
     use crate::progress::Silent;
+    use crate::render::test_pictures::pictures;
     use crate::render::{Canvas, FrameStack, Mode, Picture, RenderOptions, place, render};
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Shutter;
@@ -107,8 +108,8 @@ mod tests {
     fn different_canvases_are_refused() {
         let wall = TestWall::one(waves);
         let error = image_metrics(
-            &panorama(&wall, wall.stack(), 50.0),
-            &panorama(&wall, wall.stack(), 40.0),
+            &panorama(&wall, pictures(&wall), 50.0),
+            &panorama(&wall, pictures(&wall), 40.0),
         );
         assert!(matches!(error, Err(EvaluateError::Canvas { .. })));
     }

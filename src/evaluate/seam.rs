@@ -236,6 +236,7 @@ impl Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::test_pictures::pictures;
     use crate::render::{Picture, place};
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Shutter;
@@ -243,7 +244,7 @@ mod tests {
     #[test]
     fn true_poses_leave_rounding_noise_and_wrong_ones_much_more() {
         let wall = TestWall::ring(waves);
-        let stack = wall.stack();
+        let stack = pictures(&wall);
         let residual = |poses: &[crate::trajectory::Pose]| {
             let placements = place(&wall.circle, &wall.camera, poses, &Shutter::default()).unwrap();
             let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
@@ -286,7 +287,7 @@ mod tests {
         wrong[4].t_wc.y += 0.05;
         let placements = place(&wall.circle, &wall.camera, &wrong, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
-        let map = SeamMap::new(&wall.circle, &wall.stack(), &placements, &canvas);
+        let map = SeamMap::new(&wall.circle, &pictures(&wall), &placements, &canvas);
         let [around, along] = map.size();
         let (residuals, frames) = (map.rms_grey(), map.frames());
         assert_eq!(

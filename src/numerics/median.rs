@@ -7,3 +7,13 @@ pub(crate) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
 }
+
+/// The median; the mean of the middle two of an even number. NaN of none.
+pub fn median(values: &mut [f32]) -> f32 {
+    let n = values.len();
+    if n == 0 {
+        return f32::NAN;
+    }
+    values.sort_unstable_by(f32::total_cmp);
+    0.5 * (values[(n - 1) / 2] + values[n / 2])
+}

@@ -1,0 +1,66 @@
+//! What undoes the light in a frame, over a patch of the chart.
+
+use crate::render::warp::patches::SCALE;
+
+/// The factor `1/(a V)` of [`crate::render::sampling::exposure`] over a patch: quadratic in each of the patch's
+/// coordinates `x, y ∈ [−1, 1]`, through its values at −1, 0 and 1. Light changes so slowly that
+/// nothing is lost.
+#[derive(Clone, Copy, Debug)]
+pub struct Light([[f32; 3]; 3]);
+
+impl Light {
+    /// From the factors at −1, 0 and 1 along x, for y at −1, 0 and 1.
+    pub fn through(at: [[f32; 3]; 3]) -> Self {
+        let along_x = at.map(quadratic);
+        let mut c = [[0.0; 3]; 3];
+        for k in 0..3 {
+            let along_y = quadratic(along_x.map(|row| row[k]));
+            for l in 0..3 {
+                c[l][k] = along_y[l];
+            }
+        }
+        Self(c)
+    }
+
+    /// The same factor everywhere.
+    pub fn even(factor: f32) -> Self {
+        Self([[factor, 0.0, 0.0], [0.0; 3], [0.0; 3]])
+    }
+
+    /// Along a row of the patch, by powers of x.
+    #[inline(always)]
+    pub fn row(&self, row: usize) -> [f32; 3] {
+        let y = row as f32 * SCALE - 1.0;
+        let Self([a, b, c]) = self;
+        [0, 1, 2].map(|k| (c[k] * y + b[k]) * y + a[k])
+    }
+}
+
+/// From values at −1, 0 and 1 to coefficients, the lowest first.
+fn quadratic([before, middle, after]: [f32; 3]) -> [f32; 3] {
+    [
+        middle,
+        0.5 * (after - before),
+        0.5 * (after + before) - middle,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quadratics_are_found_as_they_are() {
+        let truth = |x: f32, y: f32| (1.0 + 0.3 * x - 0.2 * x * x) * (2.0 - 0.5 * y + 0.1 * y * y);
+        let nodes = [-1.0, 0.0, 1.0];
+        let light = Light::through(nodes.map(|y| nodes.map(|x| truth(x, y))));
+        for row in 0..32 {
+            let [a, b, c] = light.row(row);
+            let y = row as f32 / 16.0 - 1.0;
+            for x in [-1.0, -0.3, 0.4, 0.9] {
+                assert!(((c * x + b) * x + a - truth(x, y)).abs() < 1e-5);
+            }
+        }
+        assert_eq!(Light::even(1.5).row(9), [1.5, 0.0, 0.0]);
+    }
+}

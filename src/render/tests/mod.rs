@@ -1,0 +1,4 @@
+//! Rendering as a whole, on walls whose geometry and texture are known everywhere.
+
+mod panorama;
+mod projection;
