@@ -58,7 +58,7 @@ pub fn image_metrics(first: &Panorama, second: &Panorama) -> Result<ImageMetrics
 mod tests {
     use super::*;
     use crate::progress::Silent;
-    use crate::render::test_pictures::pictures;
+    use crate::render::tests::pictures::pictures;
     use crate::render::{Canvas, FrameStack, Mode, Picture, RenderOptions, place, render};
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Shutter;

@@ -236,7 +236,7 @@ impl Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::test_pictures::pictures;
+    use crate::render::tests::pictures::pictures;
     use crate::render::{Picture, place};
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Shutter;

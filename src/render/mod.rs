@@ -46,9 +46,7 @@ pub(crate) mod sampling;
 pub(crate) mod warp;
 
 #[cfg(test)]
-pub(crate) mod test_pictures;
-#[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use crate::numerics::kernel::{Interpolation, Kernel};
 pub use compositing::band::{Band, Target};

@@ -9,6 +9,9 @@ use nalgebra::Vector3;
 /// one of its rows in the first-level cache.
 pub(crate) const EDGE: u32 = 128;
 
+/// Most columns of a tile.
+pub const TILE_COLUMNS: usize = EDGE as usize;
+
 /// Rows of a band: those of a raster's tiles.
 pub const BAND_ROWS: u32 = crate::raster::EDGE as u32;
 

@@ -1,8 +1,7 @@
 //! A decoded picture and its values between the pixels.
 
-use super::fixed_point::PADDING;
 use super::pixel_format::{PixelFormat, luma};
-use super::sample::{Sample, Samples};
+use super::sample::{PADDING, Sample, Samples};
 use crate::frames::HalvedMask;
 use crate::numerics::kernel::Kernel;
 use crate::numerics::simd_dispatch::wide;

@@ -7,14 +7,14 @@ use super::sample::{Sample, Samples};
 use crate::numerics::kernel::Kernel;
 use crate::numerics::rounding::whole;
 use crate::numerics::simd_dispatch::wide;
-use crate::render::layout::tiles::EDGE;
+use crate::render::layout::tiles::TILE_COLUMNS;
 use crate::render::warp::local_polynomial::Chart;
 use crate::render::warp::patches::{EIGHT, PATCH};
 use crate::render::warp::projection::{Look, Points};
 use std::ops::Range;
 
 /// Most points of a run: all that is known of a run stays in the first-level cache.
-pub const RUN: usize = EDGE as usize;
+pub const RUN: usize = TILE_COLUMNS;
 
 /// Where a run of points appears in a frame, and the values there: colour in the first three of
 /// four lanes, grey in the first.

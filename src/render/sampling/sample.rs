@@ -44,6 +44,9 @@ macro_rules! sample {
 
 sample!(u8, |rows| Some(rows); u16, |_| None);
 
+/// Samples that pictures have beyond their own at the end: several are read at once.
+pub const PADDING: usize = 16;
+
 /// Samples of one kind, row-major, channels interleaved.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Samples {

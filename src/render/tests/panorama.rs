@@ -13,7 +13,7 @@ use crate::render::output::stitch::{on_the_axis, render};
 use crate::render::sampling::picture_cache::FrameStack;
 use crate::render::sampling::pixel_format::PixelFormat;
 use crate::render::sampling::sample::Samples;
-use crate::render::test_pictures::{changed_pictures, pictures};
+use crate::render::tests::pictures::{changed_pictures, pictures};
 use crate::test_wall::{self, TestWall};
 use crate::trajectory::Shutter;
 

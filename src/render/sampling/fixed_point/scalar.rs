@@ -1,6 +1,6 @@
 //! One place at a time.
 
-use super::{Places, Source};
+use super::inputs::{Places, Source};
 use crate::numerics::kernel::Kernel;
 
 pub fn sums<const C: usize>(

@@ -1,8 +1,8 @@
 //! Frames of the test wall as pictures of 8 bits.
 
-use super::sampling::picture::Picture;
-use super::sampling::picture_cache::FrameStack;
 use crate::frames::GreyImage;
+use crate::render::sampling::picture::Picture;
+use crate::render::sampling::picture_cache::FrameStack;
 use crate::test_wall::TestWall;
 
 /// The frames of a wall as 8-bit pictures.

@@ -1,11 +1,11 @@
 //! Eight grey pixels under four taps or six whose samples lie near one another: picked out of a few
 //! rows of sixteen.
 //!
-//! The numbers are those of [`avx2::greys`](crate::render::sampling::fixed_point::avx2::greys), to the bit: samples and rows that
+//! The numbers are those of [`super::grey::greys`], to the bit: samples and rows that
 //! a pixel has no part in weigh nothing.
 
-use super::Source;
-use super::avx2::{Eight, cut_pair};
+use super::super::inputs::Source;
+use super::lanes::{Eight, cut_pair};
 use crate::numerics::kernel::Kernel;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
