@@ -59,11 +59,11 @@ mod tests {
     use super::*;
     use crate::progress::Silent;
     use crate::render::tests::pictures::pictures;
-    use crate::render::{Canvas, FrameStack, Mode, Picture, RenderOptions, place, render};
+    use crate::render::{Canvas, Mode, Picture, PictureCache, RenderOptions, place, render};
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Shutter;
 
-    fn panorama(wall: &TestWall, mut stack: FrameStack, ppm: f64) -> Panorama {
+    fn panorama(wall: &TestWall, mut stack: PictureCache, ppm: f64) -> Panorama {
         let placements =
             place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, ppm).unwrap();
@@ -90,7 +90,7 @@ mod tests {
             let picture = Picture::new(w, h, 1, vec![value; w * h]);
             panorama(
                 &wall,
-                FrameStack::from_pictures(wall.camera, vec![picture]),
+                PictureCache::from_pictures(wall.camera, vec![picture]),
                 50.0,
             )
         };

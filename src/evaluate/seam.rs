@@ -1,6 +1,6 @@
 //! How well the frames agree where they overlap, without any truth.
 
-use crate::render::{Canvas, EDGE, FrameStack, Interpolation, Kernel, Placement, Tile, tiles};
+use crate::render::{Canvas, EDGE, Interpolation, Kernel, PictureCache, Placement, Tile, tiles};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -54,7 +54,7 @@ impl SeamMap {
     /// bilinearly, luma of colour.
     pub fn new(
         surface: &dyn Surface,
-        frames: &FrameStack,
+        frames: &PictureCache,
         placements: &[Placement],
         canvas: &Canvas,
     ) -> Self {
@@ -138,7 +138,7 @@ impl SeamMap {
 /// two frames overlap.
 pub fn seam_residual(
     surface: &dyn Surface,
-    frames: &FrameStack,
+    frames: &PictureCache,
     placements: &[Placement],
     canvas: &Canvas,
 ) -> Option<SeamResidual> {
@@ -148,7 +148,7 @@ pub fn seam_residual(
 /// What the frames show of the points of a tile.
 fn look(
     surface: &dyn Surface,
-    frames: &FrameStack,
+    frames: &PictureCache,
     placements: &[Placement],
     grid: &Canvas,
     tile: &Tile,
@@ -268,7 +268,7 @@ mod tests {
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
         let of = |values: &[u8]| {
             let pictures: Vec<Picture> = values.iter().map(|value| flat(*value)).collect();
-            let stack = FrameStack::from_pictures(wall.camera, pictures);
+            let stack = PictureCache::from_pictures(wall.camera, pictures);
             seam_residual(&wall.circle, &stack, &placements[..values.len()], &canvas)
         };
         assert!((of(&[100, 106]).unwrap().rms_grey - 6.0).abs() < 1e-4);

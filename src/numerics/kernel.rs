@@ -1,10 +1,10 @@
-//! Interpolation: the weights of the pixels around a point.
+//! Interpolation kernels: weights of the pixels around a point.
 
-use super::rounding::WHOLE;
+use super::rounding::ROUNDING_OFFSET;
 use super::signal::sinc;
 use serde::Serialize;
 
-/// How values between pixel centres are found.
+/// Interpolation between pixel centres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -22,7 +22,7 @@ pub enum Interpolation {
 }
 
 impl Interpolation {
-    /// How far the kernel reaches to either side, pixels.
+    /// Reach of the kernel to either side, pixels.
     pub(crate) fn reach(self) -> f64 {
         match self {
             Self::Nearest => 0.5,
@@ -50,29 +50,30 @@ impl Interpolation {
     }
 }
 
-/// Steps from one pixel to the next for which weights are tabulated: 1/1024 px off at the most.
+/// Tabulated positions from one pixel to the next: at most 1/1024 px off. A higher value is more
+/// exact and takes more memory.
 const PHASES: usize = 512;
-/// The bits that hold a phase.
+/// Bits that hold a phase.
 const PHASE_BITS: u32 = 2 * PHASES as u32 - 1;
 
-/// The weights of an interpolation along one axis, tabulated, and stretched where the picture is
-/// finer than the canvas so that no pixel is left out (anti-aliasing).
+/// Tabulated weights of an interpolation along one axis, stretched where the picture is finer than
+/// the canvas so that no pixel is left out (anti-aliasing).
 #[derive(Clone, Debug)]
 pub struct Kernel {
     taps: usize,
     /// `PHASES + 1` rows of `taps` weights; each row's sum is 1.
     weights: Vec<f32>,
-    /// The same in units of 2⁻¹⁴, rows filled up to [`Kernel::row_of`] with nothing, for the sake
-    /// of vectors.
+    /// Weights in units of 2⁻¹⁴, rows padded with zeros to [`Kernel::padded_taps`] weights for
+    /// vectors.
     integers: Vec<i16>,
 }
 
-/// One, as a whole number.
+/// One in units of the whole-numbered weights.
 const ONE: f64 = 16384.0;
 
 impl Kernel {
-    /// The kernel of an interpolation, `stretch` (at least 1) times as wide as for a picture that
-    /// is looked at pixel by pixel.
+    /// Tabulates an interpolation, `stretch` (at least 1) times as wide as for a picture that is
+    /// sampled at its own resolution.
     ///
     /// Taps are 1 or an even number. Weights are `k((x − t)/stretch)` normalised to a sum of 1, x
     /// the pixels and t the point. The nearest pixel is never stretched: it is for pictures that
@@ -88,15 +89,15 @@ impl Kernel {
         let half = (interpolation.reach() * stretch.max(1.0) - 1e-9).ceil() as usize;
         let taps = 2 * half;
         let mut weights = Vec::with_capacity((PHASES + 1) * taps);
-        let mut integers = Vec::with_capacity((PHASES + 1) * Self::row_of(taps));
+        let mut integers = Vec::with_capacity((PHASES + 1) * Self::padded_taps(taps));
         for phase in 0..=PHASES {
             let t = (half - 1) as f64 + phase as f64 / PHASES as f64;
             let row = (0..taps).map(|x| interpolation.weight((x as f64 - t) / stretch.max(1.0)));
             let row: Vec<f64> = row.collect();
             let sum: f64 = row.iter().sum();
             weights.extend(row.iter().map(|w| (w / sum) as f32));
-            integers.extend(whole_weights(&row, sum));
-            integers.resize((phase + 1) * Self::row_of(taps), 0);
+            integers.extend(integer_weights(&row, sum));
+            integers.resize((phase + 1) * Self::padded_taps(taps), 0);
         }
         Self {
             taps,
@@ -105,31 +106,32 @@ impl Kernel {
         }
     }
 
-    /// The phases that a pixel is divided into in the table.
+    /// Tabulated phases of a pixel.
     pub const PHASES: f32 = PHASES as f32;
 
-    /// Pixels that count along each axis.
+    /// Number of weighted pixels along each axis.
     pub fn taps(&self) -> usize {
         self.taps
     }
 
-    /// How far from the point a pixel that counts may be along each axis, pixels.
+    /// Largest distance of a weighted pixel from the point along each axis, pixels.
     pub fn reach_px(&self) -> f32 {
         0.5 * self.taps as f32
     }
 
-    /// Pixels among them before the point's own.
-    pub fn before(&self) -> usize {
-        Self::before_of(self.taps)
+    /// Number of taps before the point's own pixel.
+    pub fn taps_before(&self) -> usize {
+        Self::taps_before_of(self.taps)
     }
 
-    /// The same of any kernel with so many taps.
+    /// Taps before the point's own pixel of any kernel with that many taps.
     #[inline(always)]
-    pub const fn before_of(taps: usize) -> usize {
+    pub const fn taps_before_of(taps: usize) -> usize {
         (taps - 1) / 2
     }
 
-    /// What is added to a coordinate before it is cut to its own pixel: ½ for the nearest one, else 0.
+    /// Offset of a coordinate before it is truncated to its own pixel: ½ for the nearest one, else
+    /// 0.
     pub fn rounding(&self) -> f32 {
         if self.taps == 1 { 0.5 } else { 0.0 }
     }
@@ -140,19 +142,19 @@ impl Kernel {
         Self::phase_of(t, Self::PHASES)
     }
 
-    /// The same of a pixel divided into `phases` (at most as many as are tabulated).
+    /// Phase of the fraction `t` where a pixel is divided into `phases` (at most as many as are
+    /// tabulated).
     #[inline(always)]
     pub fn phase_of(t: f32, phases: f32) -> i32 {
-        ((t * phases + WHOLE).to_bits() & PHASE_BITS) as i32
+        ((t * phases + ROUNDING_OFFSET).to_bits() & PHASE_BITS) as i32
     }
 
-    /// The phases that a pixel is divided into for whole-numbered weights: 128 for two taps, which
-    /// need no table.
+    /// Phases of a pixel for whole-numbered weights: 128 for two taps, which need no table.
     pub fn integer_phases(&self) -> f32 {
         Self::integer_phases_of(self.taps)
     }
 
-    /// The same of any kernel with so many taps.
+    /// Phases of a pixel for whole-numbered weights of any kernel with that many taps.
     #[inline(always)]
     pub const fn integer_phases_of(taps: usize) -> f32 {
         match taps {
@@ -161,34 +163,34 @@ impl Kernel {
         }
     }
 
-    /// Numbers of a row of [`Kernel::all_integers`] for so many taps: a multiple of 4.
+    /// Length of a row of [`Kernel::all_integer_weights`] for that many taps: a multiple of 4.
     #[inline(always)]
-    pub const fn row_of(taps: usize) -> usize {
+    pub const fn padded_taps(taps: usize) -> usize {
         taps.next_multiple_of(4)
     }
 
-    /// The weights of all phases, one row of them after the other, in units of 2⁻¹⁴.
+    /// Weights of all phases, row after row, in units of 2⁻¹⁴.
     #[inline(always)]
-    pub fn all_integers(&self) -> &[i16] {
+    pub fn all_integer_weights(&self) -> &[i16] {
         &self.integers
     }
 
-    /// The weights of a phase in units of 2⁻¹⁴; their sum is one exactly.
+    /// Weights of a phase in units of 2⁻¹⁴; their sum is exactly one.
     #[inline(always)]
-    pub fn integers(&self, phase: usize) -> &[i16] {
-        &self.integers[phase * Self::row_of(self.taps)..][..self.taps]
+    pub fn integer_weights_at(&self, phase: usize) -> &[i16] {
+        &self.integers[phase * Self::padded_taps(self.taps)..][..self.taps]
     }
 
-    /// The weights of a phase.
+    /// Weights of a phase.
     #[inline(always)]
     pub fn at(&self, phase: usize) -> &[f32] {
         &self.weights[phase * self.taps..][..self.taps]
     }
 }
 
-/// Weights whose sum is `sum`, in units of 2⁻¹⁴: what rounding has changed of the sum goes to the
+/// Converts weights whose sum is `sum` to units of 2⁻¹⁴; the rounding error of the sum goes to the
 /// largest.
-fn whole_weights(row: &[f64], sum: f64) -> Vec<i16> {
+fn integer_weights(row: &[f64], sum: f64) -> Vec<i16> {
     let mut whole: Vec<i16> = row.iter().map(|w| (w / sum * ONE).round() as i16).collect();
     let off = ONE as i16 - whole.iter().sum::<i16>();
     if let Some(largest) = whole.iter_mut().max() {
@@ -221,7 +223,7 @@ mod tests {
             }
             let kernel = Kernel::new(interpolation, 1.0);
             for (k, w) in kernel.at(0).iter().enumerate() {
-                let own = if k == kernel.before() { 1.0 } else { 0.0 };
+                let own = if k == kernel.taps_before() { 1.0 } else { 0.0 };
                 assert!((w - own).abs() < 1e-6, "{interpolation:?}");
             }
         }
@@ -241,7 +243,8 @@ mod tests {
                 let row = kernel.at(0);
                 let sum = |f: fn(f64) -> f64| -> f64 {
                     let part = |(x, w): (usize, &f32)| {
-                        f64::from(*w) * f(2.0 * PI * (x as f64 - kernel.before() as f64) / wave_px)
+                        f64::from(*w)
+                            * f(2.0 * PI * (x as f64 - kernel.taps_before() as f64) / wave_px)
                     };
                     row.iter().enumerate().map(part).sum()
                 };

@@ -1,4 +1,4 @@
-//! The median of numbers some of which may be unknown.
+//! Medians.
 
 /// The middle one of those numbers that are finite (the upper one of the middle two), if there are
 /// any.
@@ -8,7 +8,7 @@ pub(crate) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-/// The median; the mean of the middle two of an even number. NaN of none.
+/// Median; the mean of the middle two of an even number, NaN of none. The values are sorted.
 pub fn median(values: &mut [f32]) -> f32 {
     let n = values.len();
     if n == 0 {

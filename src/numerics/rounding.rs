@@ -1,21 +1,22 @@
-//! Rounding of small numbers in single precision without casts, as vectors do it well.
+//! Rounding of small numbers in single precision without casts, for vector code.
 
 /// 2²³: added to a number from 0 to 2²³, it leaves the nearest whole number (of two equally near
-/// the even one) in the last bits of the sum. Unlike a cast, this is what vectors do well.
-pub const WHOLE: f32 = 8_388_608.0;
+/// the even one) in the last bits of the sum. Compilers turn this into vector code; casts they do
+/// not.
+pub const ROUNDING_OFFSET: f32 = 8_388_608.0;
 
-/// A number from 0 to 2²² cut to the whole number below it, and what was cut off; anything for
-/// other numbers.
+/// Splits a number from 0 to 2²² into the whole number below it and the fraction; the result for
+/// other numbers has no meaning.
 #[inline(always)]
-pub fn whole(value: f32) -> (i32, f32) {
-    let nearest = (value + WHOLE) - WHOLE;
+pub fn floor_and_fraction(value: f32) -> (i32, f32) {
+    let nearest = (value + ROUNDING_OFFSET) - ROUNDING_OFFSET;
     let below = if nearest > value {
         nearest - 1.0
     } else {
         nearest
     };
     (
-        ((below + WHOLE).to_bits() & 0x7f_ffff) as i32,
+        ((below + ROUNDING_OFFSET).to_bits() & 0x7f_ffff) as i32,
         value - below,
     )
 }
@@ -32,7 +33,7 @@ mod tests {
             (1.0, 1, 0.0),
             (4095.5, 4095, 0.5),
         ] {
-            assert_eq!(whole(value), (below, rest));
+            assert_eq!(floor_and_fraction(value), (below, rest));
         }
     }
 }

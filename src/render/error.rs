@@ -1,10 +1,10 @@
-//! Why a panorama cannot be drawn.
+//! Errors of drawing a panorama.
 
 use crate::frames::FrameError;
 use crate::raster::RasterError;
 use crate::surface::SurfaceError;
 
-/// Why a panorama cannot be drawn.
+/// Error of drawing a panorama.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {

@@ -2,19 +2,26 @@
 //!
 //! ```text
 //! poses ─ place ──> footprints ─ Canvas::covering ──────────────────> canvas ─┐
-//! files ─ Thumbnails ─ Exposure::solve ─> exposure ─ Seams::find ───> seams ──┼─ Scene::draw ──> tiles
-//!     └── FrameStack::hold, band by band ───────────────────────────> frames ─┘
+//! files ─ Thumbnails ─ Exposure::solve ─> exposure ─ Seams::find ───> seams ──┼─ TileRenderer::draw ──> bands
+//!     └── PictureCache::load, band by band ─────────────────────────> frames ─┘
 //! ```
 //!
-//! [`stitch()`] does all of it. Every canvas pixel is taken back to its wall point, from there into
-//! the frame that shows it best ([`Mode`] has other ways), and the frame's exposure is undone. The
-//! same function draws the initial, the refined and the true poses, so pictures differ by their
-//! poses only.
+//! [`stitch()`] does all of it. Every canvas pixel is mapped to its wall point, from there into the
+//! frame that shows it best ([`Mode`] has other ways), and the frame's exposure is undone. Initial,
+//! refined and true poses are drawn by the same function, so pictures differ by their poses only.
 //!
-//! [`sightings`] goes the other way: from a point of the wall to the frames and pixels that show
-//! it.
+//! [`sightings`] is the opposite direction: from a point of the wall to the frames and pixels that
+//! show it. [`cylinder`] stands alone: the cylindrical projection of one single photo.
 //!
-//! [`cylinder`] is the odd one out: the cylindrical projection of one single photo.
+//! Each folder builds on those above it:
+//!
+//! | subject | folder |
+//! | --- | --- |
+//! | pixels of the panorama on the wall, and the frames that see them | [`layout`] |
+//! | mapping of a tile's pixels into a frame | [`warp`] |
+//! | pictures, values between pixels, exposure | [`sampling`] |
+//! | seams, blending, super-resolution: tiles' pixels from several frames | [`compositing`] |
+//! | panoramas, files, previews, maps, and the memory they need | [`output`] |
 //!
 //! # Example
 //!
@@ -69,6 +76,6 @@ pub(crate) use output::stitch::check_memory;
 pub use output::stitch::{LaidOut, Stitch, StitchOptions, lay_out, on_the_axis, render, stitch};
 pub use sampling::exposure::{Exposure, FrameExposure};
 pub use sampling::picture::Picture;
-pub use sampling::picture_cache::{FrameStack, level_for};
+pub use sampling::picture_cache::{PictureCache, level_for};
 pub use sampling::pixel_format::PixelFormat;
 pub use sampling::sample::{Sample, Samples};

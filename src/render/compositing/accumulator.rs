@@ -1,33 +1,34 @@
-//! A row of a tile, added up from what frames show.
+//! Weighted sums along a row of a tile.
 
 use crate::numerics::simd_dispatch::wide;
 use crate::render::layout::placement::NO_FRAME;
-use crate::render::sampling::point_batch::{RUN, Run};
+use crate::render::layout::tiles::TILE_COLUMNS;
+use crate::render::sampling::point_batch::PointBatch;
 use crate::render::sampling::sample::Sample;
 use std::ops::Range;
 
-/// Weighted sums of values, column by column.
-pub struct Row {
-    sums: [[f32; 4]; RUN],
-    weights: [f32; RUN],
-    /// The largest weight so far, and whose it is.
-    largest: [f32; RUN],
-    sources: [u32; RUN],
+/// Accumulator of weighted values, column by column.
+pub struct RowAccumulator {
+    sums: [[f32; 4]; TILE_COLUMNS],
+    weights: [f32; TILE_COLUMNS],
+    /// Largest weight so far, and the frame that has it.
+    largest: [f32; TILE_COLUMNS],
+    sources: [u32; TILE_COLUMNS],
 }
 
-impl Default for Row {
+impl Default for RowAccumulator {
     fn default() -> Self {
         Self {
-            sums: [[0.0; 4]; RUN],
-            weights: [0.0; RUN],
-            largest: [0.0; RUN],
-            sources: [NO_FRAME; RUN],
+            sums: [[0.0; 4]; TILE_COLUMNS],
+            weights: [0.0; TILE_COLUMNS],
+            largest: [0.0; TILE_COLUMNS],
+            sources: [NO_FRAME; TILE_COLUMNS],
         }
     }
 }
 
-impl Row {
-    /// Forgets some columns.
+impl RowAccumulator {
+    /// Clears some columns.
     pub fn clear(&mut self, columns: Range<usize>) {
         self.sums[columns.clone()].fill([0.0; 4]);
         self.weights[columns.clone()].fill(0.0);
@@ -35,22 +36,22 @@ impl Row {
         self.sources[columns].fill(NO_FRAME);
     }
 
-    /// The frame that weighs most in each column.
-    pub fn sources(&self) -> &[u32; RUN] {
+    /// Frame of the largest weight in each column.
+    pub fn sources(&self) -> &[u32; TILE_COLUMNS] {
         &self.sources
     }
 
-    /// The same, to be changed.
-    pub fn sources_mut(&mut self) -> &mut [u32; RUN] {
+    /// Frame of the largest weight in each column, to be changed.
+    pub fn sources_mut(&mut self) -> &mut [u32; TILE_COLUMNS] {
         &mut self.sources
     }
 
-    /// Whether one of some columns shows no frame yet.
+    /// True if one of some columns shows no frame yet.
     pub fn has_holes(&self, columns: Range<usize>) -> bool {
         self.sources[columns].contains(&NO_FRAME)
     }
 
-    /// Adds to a column.
+    /// Adds a weighted value to a column.
     #[inline(always)]
     pub fn add(&mut self, k: usize, value: &[f32; 4], w: f32) {
         let sum = &mut self.sums[k];
@@ -58,10 +59,10 @@ impl Row {
         self.weights[k] += w;
     }
 
-    /// Columns that show nothing but a frame.
-    pub fn set(&mut self, run: &Run, frame: usize, columns: Range<usize>) {
-        self.sums[columns.clone()].copy_from_slice(&run.values()[columns.clone()]);
-        let seen = run.seen()[columns.clone()].iter();
+    /// Sets columns that show one frame alone.
+    pub fn set(&mut self, batch: &PointBatch, frame: usize, columns: Range<usize>) {
+        self.sums[columns.clone()].copy_from_slice(&batch.values()[columns.clone()]);
+        let seen = batch.seen()[columns.clone()].iter();
         let columns = self.weights[columns.clone()]
             .iter_mut()
             .zip(&mut self.sources[columns]);
@@ -71,12 +72,12 @@ impl Row {
         }
     }
 
-    /// Columns from `from` that show a frame with some weight.
-    pub fn mix(&mut self, run: &Run, frame: usize, from: usize, weights: &[f32]) {
+    /// Adds a frame with its weights to columns from `from` on.
+    pub fn mix(&mut self, batch: &PointBatch, frame: usize, from: usize, weights: &[f32]) {
         for (k, w) in weights.iter().enumerate() {
             let k = from + k;
-            if run.seen()[k] && *w > 0.0 {
-                self.add(k, &run.values()[k], *w);
+            if batch.seen()[k] && *w > 0.0 {
+                self.add(k, &batch.values()[k], *w);
                 if *w > self.largest[k] {
                     self.largest[k] = *w;
                     self.sources[k] = frame as u32;
@@ -85,19 +86,19 @@ impl Row {
         }
     }
 
-    /// Columns that show nothing yet.
-    pub fn fill(&mut self, run: &Run, frame: usize, columns: Range<usize>) {
+    /// Sets those columns that show nothing yet to a frame's values.
+    pub fn fill(&mut self, batch: &PointBatch, frame: usize, columns: Range<usize>) {
         for k in columns {
-            if self.weights[k] == 0.0 && run.seen()[k] {
-                self.sums[k] = run.values()[k];
+            if self.weights[k] == 0.0 && batch.seen()[k] {
+                self.sums[k] = batch.values()[k];
                 self.weights[k] = 1.0;
                 self.sources[k] = frame as u32;
             }
         }
     }
 
-    /// The pixels of some columns, `C` channels and alpha: means, with corrections (`L` lanes, of
-    /// all columns) added.
+    /// Writes the pixels of some columns, `C` channels and alpha: weighted means plus corrections
+    /// (`L` lanes, of all columns).
     pub fn put<T: Sample, const C: usize, const L: usize>(
         &self,
         columns: Range<usize>,

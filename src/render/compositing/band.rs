@@ -1,4 +1,4 @@
-//! The panorama as it is drawn: band by band, and who takes it.
+//! Bands of the panorama, and the trait of those that receive them.
 
 use crate::numerics::simd_dispatch::wide;
 use crate::render::error::RenderError;
@@ -17,32 +17,32 @@ pub struct Band {
     pub row: u32,
     /// Number of rows.
     pub rows: u32,
-    /// What the pixels are.
+    /// Channels and depth.
     pub format: PixelFormat,
-    /// The pixels, row-major over all columns, alpha last: full where some frame sees the wall, 0
-    /// in holes.
+    /// Pixels, row-major over all columns, alpha last: full where some frame sees the wall, 0 in
+    /// holes.
     pub samples: Samples,
-    /// The frame that each pixel shows most of; [`NO_FRAME`] in holes and where frames are mixed
-    /// everywhere. Empty unless some target asks for it ([`Target::wants_sources`]).
+    /// Frame that each pixel shows most of; [`NO_FRAME`] in holes and where frames are mixed
+    /// everywhere. Empty unless some target needs it ([`Target::wants_sources`]).
     pub sources: Vec<u32>,
 }
 
-/// Takes bands, from the first row of the canvas to the last.
+/// Receives bands, from the first row of the canvas to the last.
 pub trait Target: Send {
-    /// Takes the next band.
+    /// Receives the next band.
     ///
     /// # Errors
     /// What the system says.
     fn put(&mut self, canvas: &Canvas, band: &Band) -> Result<(), RenderError>;
 
-    /// Whether it needs [`Band::sources`].
+    /// True if it needs [`Band::sources`].
     fn wants_sources(&self) -> bool {
         false
     }
 }
 
 impl Band {
-    /// A band without rows, with sources or without.
+    /// Makes a band without rows, with sources or without.
     pub(crate) fn empty(canvas: &Canvas, format: PixelFormat, sources: bool) -> Self {
         let most = canvas.columns as usize * BAND_ROWS.min(canvas.rows) as usize;
         let count = most * (format.channels + 1);
@@ -59,7 +59,7 @@ impl Band {
         }
     }
 
-    /// Makes it the band of other rows, in which all tiles are still to be drawn.
+    /// Starts the band of other rows, whose tiles are all still to be drawn.
     pub(crate) fn begin(&mut self, canvas: &Canvas, row: u32, rows: u32) {
         (self.row, self.rows) = (row, rows);
         let pixels = canvas.columns as usize * rows as usize;
@@ -73,30 +73,30 @@ impl Band {
         }
     }
 
-    /// The places of all its tiles, `tiles` row by row of tiles.
-    pub(crate) fn places(&mut self, canvas: &Canvas, tiles: &[Tile]) -> Vec<Place<'_>> {
+    /// Splits it into the pixels of its tiles; `tiles`: row by row of tiles.
+    pub(crate) fn tile_pixels(&mut self, canvas: &Canvas, tiles: &[Tile]) -> Vec<TilePixels<'_>> {
         let columns = canvas.columns as usize;
         let step = self.format.channels + 1;
-        let sources = cut(&mut self.sources, columns, 1, tiles);
-        let pixels: Vec<Rows> = match &mut self.samples {
+        let sources = split_into_tiles(&mut self.sources, columns, 1, tiles);
+        let pixels: Vec<PixelRows> = match &mut self.samples {
             Samples::Eight(samples) => {
-                let pixels = cut(samples, columns, step, tiles).into_iter();
-                pixels.map(Rows::Eight).collect()
+                let pixels = split_into_tiles(samples, columns, step, tiles).into_iter();
+                pixels.map(PixelRows::Eight).collect()
             }
             Samples::Sixteen(samples) => {
-                let pixels = cut(samples, columns, step, tiles).into_iter();
-                pixels.map(Rows::Sixteen).collect()
+                let pixels = split_into_tiles(samples, columns, step, tiles).into_iter();
+                pixels.map(PixelRows::Sixteen).collect()
             }
         };
         let places = pixels.into_iter().zip(sources);
         places
-            .map(|(pixels, sources)| Place { pixels, sources })
+            .map(|(pixels, sources)| TilePixels { pixels, sources })
             .collect()
     }
 
-    /// One channel of a region, grey levels of 255; NaN in holes. Rows beyond the band's are those
-    /// next to them.
-    pub(crate) fn region(&self, canvas: &Canvas, region: &Region, channel: usize) -> Vec<f32> {
+    /// Reads one channel of a region, grey levels of 255; NaN in holes. Rows beyond the band repeat
+    /// its first or last one.
+    pub(crate) fn read_region(&self, canvas: &Canvas, region: &Region, channel: usize) -> Vec<f32> {
         let step = self.format.channels + 1;
         let columns = i64::from(canvas.columns);
         let last = i64::from(self.row + self.rows) - 1;
@@ -107,16 +107,16 @@ impl Band {
                 let column = (region.column + column).rem_euclid(columns);
                 let pixel = (row * columns + column) as usize * step;
                 values.push(match &self.samples {
-                    Samples::Eight(samples) => grey(&samples[pixel..][..step], channel),
-                    Samples::Sixteen(samples) => grey(&samples[pixel..][..step], channel),
+                    Samples::Eight(samples) => read_grey(&samples[pixel..][..step], channel),
+                    Samples::Sixteen(samples) => read_grey(&samples[pixel..][..step], channel),
                 });
             }
         }
         values
     }
 
-    /// Puts one channel of a tile into its place, grey levels of 255; NaN changes nothing.
-    pub(crate) fn put_channel(
+    /// Writes one channel of a tile, grey levels of 255; NaN leaves a pixel unchanged.
+    pub(crate) fn write_channel(
         &mut self,
         canvas: &Canvas,
         tile: &Tile,
@@ -133,27 +133,27 @@ impl Band {
             let pixel = row * canvas.columns as usize + tile.column as usize + column;
             match &mut self.samples {
                 Samples::Eight(samples) => {
-                    put(&mut samples[pixel * step..][..step], channel, *value)
+                    write_grey(&mut samples[pixel * step..][..step], channel, *value)
                 }
                 Samples::Sixteen(samples) => {
-                    put(&mut samples[pixel * step..][..step], channel, *value);
+                    write_grey(&mut samples[pixel * step..][..step], channel, *value);
                 }
             }
         }
     }
 
-    /// Whether each pixel is covered.
+    /// True for each pixel that some frame sees.
     pub fn covered(&self) -> Vec<bool> {
         match (&self.samples, self.format.channels) {
-            (Samples::Eight(samples), 1) => alpha::<_, 2>(samples),
-            (Samples::Eight(samples), _) => alpha::<_, 4>(samples),
-            (Samples::Sixteen(samples), 1) => alpha::<_, 2>(samples),
-            (Samples::Sixteen(samples), _) => alpha::<_, 4>(samples),
+            (Samples::Eight(samples), 1) => covered_pixels::<_, 2>(samples),
+            (Samples::Eight(samples), _) => covered_pixels::<_, 4>(samples),
+            (Samples::Sixteen(samples), 1) => covered_pixels::<_, 2>(samples),
+            (Samples::Sixteen(samples), _) => covered_pixels::<_, 4>(samples),
         }
     }
 }
 
-fn grey<T: Sample>(pixel: &[T], channel: usize) -> f32 {
+fn read_grey<T: Sample>(pixel: &[T], channel: usize) -> f32 {
     let covered = pixel[pixel.len() - 1] != T::default();
     if covered {
         pixel[channel].value() * (255.0 / T::WHITE)
@@ -162,15 +162,16 @@ fn grey<T: Sample>(pixel: &[T], channel: usize) -> f32 {
     }
 }
 
-/// Covered pixels only: a frame's edge runs through some that it does not quite show.
-fn put<T: Sample>(pixel: &mut [T], channel: usize, grey: f32) {
+/// Writes a covered pixel; others stay, as a frame's edge runs through some that it does not quite
+/// show.
+fn write_grey<T: Sample>(pixel: &mut [T], channel: usize, grey: f32) {
     if pixel[pixel.len() - 1] != T::default() {
         pixel[channel] = T::nearest(grey * (T::WHITE / 255.0));
     }
 }
 
-/// Which pixels of `N` samples have an alpha.
-fn alpha<T: Sample, const N: usize>(samples: &[T]) -> Vec<bool> {
+/// True for each pixel of `N` samples that has an alpha.
+fn covered_pixels<T: Sample, const N: usize>(samples: &[T]) -> Vec<bool> {
     let pixels = samples.as_chunks::<N>().0;
     wide(
         #[inline(always)]
@@ -181,31 +182,31 @@ fn alpha<T: Sample, const N: usize>(samples: &[T]) -> Vec<bool> {
     )
 }
 
-/// Where a tile is drawn.
-pub struct Place<'a> {
-    /// Its pixels, alpha last: full where some frame sees the wall, 0 in holes.
-    pub(crate) pixels: Rows<'a>,
-    /// The frame that each pixel shows most of, [`NO_FRAME`] in holes and where frames are mixed
-    /// all over; row by row, or no rows if nobody asks.
+/// Pixels of a tile within its band.
+pub struct TilePixels<'a> {
+    /// Pixels, alpha last: full where some frame sees the wall, 0 in holes.
+    pub(crate) pixels: PixelRows<'a>,
+    /// Frame that each pixel shows most of, [`NO_FRAME`] in holes and where frames are mixed
+    /// everywhere; row by row, or no rows if no target needs it.
     pub(crate) sources: Vec<&'a mut [u32]>,
 }
 
 /// Rows of samples.
-pub(crate) enum Rows<'a> {
+pub(crate) enum PixelRows<'a> {
     /// 8 bits.
     Eight(Vec<&'a mut [u8]>),
     /// 16 bits.
     Sixteen(Vec<&'a mut [u16]>),
 }
 
-/// Cuts rows of `columns` pixels of `step` numbers into those of tiles.
-fn cut<'a, T>(
+/// Splits rows of `columns` pixels of `step` numbers into those of tiles.
+fn split_into_tiles<'a, T>(
     all: &'a mut [T],
     columns: usize,
     step: usize,
     tiles: &[Tile],
 ) -> Vec<Vec<&'a mut [T]>> {
-    let mut cut: Vec<Vec<&mut [T]>> = tiles
+    let mut split_into_tiles: Vec<Vec<&mut [T]>> = tiles
         .iter()
         .map(|tile| Vec::with_capacity(tile.rows as usize))
         .collect();
@@ -218,10 +219,10 @@ fn cut<'a, T>(
             for (k, tile) in across.iter().enumerate() {
                 let own;
                 (own, rest) = rest.split_at_mut(tile.columns as usize * step);
-                cut[first + k].push(own);
+                split_into_tiles[first + k].push(own);
             }
         }
         first += across.len();
     }
-    cut
+    split_into_tiles
 }

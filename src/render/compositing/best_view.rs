@@ -1,65 +1,68 @@
-//! One frame at each place of a tile, and how one passes into the next.
+//! Tiles drawn from the best frame at each place, with transitions from frame to frame.
 //!
-//! A tile is drawn in strips between two rows of the seams' nodes. What lies inside all frames that
-//! share it is drawn a block at a time, patch by patch of the frames' charts; at the frames'
-//! borders and round holes, row by row. (A patch at once where one frame is alone would be slower:
-//! so many rows are far apart in the frame and in the panorama.)
+//! A tile is drawn in strips between two rows of the seams' nodes. Blocks that lie inside all
+//! frames that share them are drawn patch by patch of the frames' warps; at the frames' borders and
+//! around holes, tiles are drawn row by row. (Whole patches at once where one frame is alone would
+//! be slower: that many rows are far apart in the frame and in the panorama.)
 
-use super::accumulator::Row;
-use super::seam_grid::{Across, Between, strips};
+use super::accumulator::RowAccumulator;
+use super::frame_shares::{FrameShare, FrameShares};
+use super::seam_grid::{ColumnCells, RowPosition, strips};
 use super::seams::Seams;
-use super::shares::{Share, Shares};
 use crate::numerics::simd_dispatch::prefetch_rows;
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::NO_FRAME;
+use crate::render::layout::tiles::TILE_COLUMNS;
 use crate::render::layout::tiles::Tile;
-use crate::render::sampling::fixed_point::{self, LitBlock, PARTS, Part};
-use crate::render::sampling::frame_view::View;
-use crate::render::sampling::point_batch::{RUN, Run};
+use crate::render::sampling::fixed_point::{self, BlendPart, BlendedBlock, MAX_BLEND_PARTS};
+use crate::render::sampling::frame_view::FrameView;
+use crate::render::sampling::point_batch::PointBatch;
 use crate::render::sampling::sample::Sample;
-use crate::render::warp::patches::{EIGHT, PATCH, cut, of_patch, pieces};
-use crate::render::warp::projection::Points;
+use crate::render::warp::patches::{
+    LANES, PATCH_EDGE, split_at_multiples, split_at_patches, within_patch,
+};
+use crate::render::warp::projection::LocalPoints;
 use arrayvec::ArrayVec;
 use std::ops::Range;
 
-/// What drawing needs for a while.
+/// Buffers that are used again for the next tile.
 #[derive(Default)]
-pub struct Scratch {
-    shares: Shares,
-    /// Of each row of a row of patches, [`RUN`] columns each.
+pub struct BestViewBuffers {
+    shares: FrameShares,
+    /// Corrections of each row of a row of patches, [`TILE_COLUMNS`] columns each.
     corrections: Vec<f32>,
-    /// How far each row of a strip lies between the nodes.
+    /// Position of each row of a strip between the nodes.
     down: Vec<f32>,
 }
 
-/// A tile about to be drawn from views, in the order of their frames, along seams; `C`: channels,
-/// `L`: lanes of a correction.
-pub struct BestView<'a, const C: usize, const L: usize> {
+/// Renderer of a tile from views, in the order of their frames, along seams; `C`: channels, `L`:
+/// lanes of a correction.
+pub struct BestViewRenderer<'a, const C: usize, const L: usize> {
     seams: &'a Seams,
-    views: &'a [View<'a>],
-    /// The tile's points, if some view is rough.
-    points: &'a Points,
-    across: Across,
-    /// Of each row.
-    down: Vec<Between>,
-    /// Whether every pixel is one frame's as it is.
+    views: &'a [FrameView<'a>],
+    /// Wall points of the tile, if some view needs exact projection.
+    points: &'a LocalPoints,
+    across: ColumnCells,
+    /// Position of each row between the nodes.
+    down: Vec<RowPosition>,
+    /// True if every pixel is copied from one frame, without exposure undone or frames mixed.
     copies: bool,
 }
 
-impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
+impl<'a, const C: usize, const L: usize> BestViewRenderer<'a, C, L> {
     pub fn new(
         seams: &'a Seams,
         (canvas, tile): (&Canvas, &Tile),
-        views: &'a [View<'a>],
-        points: &'a Points,
+        views: &'a [FrameView<'a>],
+        points: &'a LocalPoints,
     ) -> Self {
         Self {
             seams,
             views,
             points,
-            across: seams.across(canvas, tile),
-            down: seams.down(canvas, tile),
-            copies: seams.are_hard() && views.iter().all(View::copies),
+            across: seams.column_cells(canvas, tile),
+            down: seams.row_positions(canvas, tile),
+            copies: seams.are_hard() && views.iter().all(FrameView::can_copy),
         }
     }
 
@@ -68,47 +71,49 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         &self,
         pixels: &mut [&mut [T]],
         sources: &mut [&mut [u32]],
-        run: &mut Run,
-        sums: &mut Row,
-        scratch: &mut Scratch,
+        batch: &mut PointBatch,
+        sums: &mut RowAccumulator,
+        buffers: &mut BestViewBuffers,
     ) {
         let all = self.across.len();
-        // Of each patch of a row of them, the frame that it shows alone.
-        let mut alone = ArrayVec::<Option<usize>, { RUN / PATCH }>::new();
+        // The only frame of each patch of a row of them, if there is one.
+        let mut alone = ArrayVec::<Option<usize>, { TILE_COLUMNS / PATCH_EDGE }>::new();
         for strip in strips(&self.down) {
             let next = strip.end..(strip.end + strip.len()).min(pixels.len());
             if let Some(next) = T::bytes(&mut pixels[next]) {
                 prefetch_rows(next);
             }
-            if strip.start.is_multiple_of(PATCH) {
-                let end = (strip.start + PATCH).min(self.down.len());
+            if strip.start.is_multiple_of(PATCH_EDGE) {
+                let end = (strip.start + PATCH_EDGE).min(self.down.len());
                 let rows = strip.start..end;
-                self.correct(&rows, &mut scratch.corrections);
+                self.correct(&rows, &mut buffers.corrections);
                 let ends = [&self.down[rows.start], &self.down[rows.end - 1]];
-                let only = |columns| self.seams.only(&self.across, &columns, ends);
-                alone = pieces(0..all).map(only).collect();
+                let only = |columns| self.seams.sole_frame(&self.across, &columns, ends);
+                alone = split_at_patches(0..all).map(only).collect();
             }
-            let Scratch {
+            let BestViewBuffers {
                 shares,
                 corrections,
                 down,
-            } = &mut *scratch;
+            } = &mut *buffers;
             let corrections = corrections.as_chunks::<L>().0;
-            let corrections = corrections.get(strip.start % PATCH * RUN..).unwrap_or(&[]);
+            let corrections = corrections
+                .get(strip.start % PATCH_EDGE * TILE_COLUMNS..)
+                .unwrap_or(&[]);
             let drawn = self.blocks(&strip, pixels, sources, (shares, down), corrections, &alone);
             let drawn = self.holes(&strip, pixels, sources, drawn);
-            let mut corrections = corrections.chunks_exact(RUN);
+            let mut corrections = corrections.chunks_exact(TILE_COLUMNS);
             for row in strip {
-                let corrections = corrections.next().unwrap_or(&[[0.0; L]; RUN]);
+                let corrections = corrections.next().unwrap_or(&[[0.0; L]; TILE_COLUMNS]);
                 for open in drawn.open(all) {
                     self.seams
-                        .shares(&self.across, open.clone(), &self.down[row], shares);
+                        .frame_shares(&self.across, open.clone(), &self.down[row], shares);
                     match T::bytes(&mut pixels[row..row + 1]) {
                         Some([pixels]) if self.copies => {
-                            self.copy(row, open.clone(), shares, run, sums, pixels);
+                            self.copy(row, open.clone(), shares, batch, sums, pixels);
                         }
                         _ => {
-                            self.mix(row, open.clone(), shares, run, sums);
+                            self.mix(row, open.clone(), shares, batch, sums);
                             let pixels = &mut pixels[row][open.start * (C + 1)..open.end * (C + 1)];
                             sums.put::<T, C, L>(open.clone(), corrections, pixels);
                         }
@@ -121,14 +126,18 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         }
     }
 
-    fn view(&self, frame: usize) -> Option<&View<'a>> {
+    fn view(&self, frame: usize) -> Option<&FrameView<'a>> {
         let at = self.views.binary_search_by_key(&frame, |view| view.frame);
         Some(&self.views[at.ok()?])
     }
 
-    /// The views but the one that some columns are given to alone, if one is.
-    fn others(&self, shares: &Shares, columns: &Range<usize>) -> impl Iterator<Item = &View<'a>> {
-        let alone = shares.alone(columns);
+    /// Views except that of the frame that has some columns alone, if one has.
+    fn others(
+        &self,
+        shares: &FrameShares,
+        columns: &Range<usize>,
+    ) -> impl Iterator<Item = &FrameView<'a>> {
+        let alone = shares.sole_frame(columns);
         let views = self.views.iter();
         views.filter(move |view| Some(view.frame) != alone)
     }
@@ -138,22 +147,25 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         if self.copies {
             return;
         }
-        corrections.resize(rows.len() * RUN * L, 0.0);
-        let corrections = corrections.as_chunks_mut::<L>().0.chunks_exact_mut(RUN);
+        corrections.resize(rows.len() * TILE_COLUMNS * L, 0.0);
+        let corrections = corrections
+            .as_chunks_mut::<L>()
+            .0
+            .chunks_exact_mut(TILE_COLUMNS);
         for (row, found) in self.down[rows.clone()].iter().zip(corrections) {
             let found = &mut found[..self.across.len()];
             self.seams.corrections(&self.across, row, found);
         }
     }
 
-    /// Draws what lies inside all frames that show it; which columns these are. `alone`: the frames
-    /// of those patches that show only one.
+    /// Draws the columns that lie inside all frames that show them, and returns these columns.
+    /// `alone`: the frames of those patches that show only one.
     fn blocks<T: Sample>(
         &self,
         strip: &Range<usize>,
         pixels: &mut [&mut [T]],
         sources: &mut [&mut [u32]],
-        (shares, down): (&mut Shares, &mut Vec<f32>),
+        (shares, down): (&mut FrameShares, &mut Vec<f32>),
         corrections: &[[f32; L]],
         alone: &[Option<usize>],
     ) -> Columns {
@@ -162,15 +174,16 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
             return drawn;
         };
         down.clear();
-        down.extend(self.down[strip.clone()].iter().map(Between::t));
+        down.extend(self.down[strip.clone()].iter().map(RowPosition::t));
         let first = &self.down[strip.start];
-        for (columns, alone) in pieces(0..self.across.len()).zip(alone) {
-            shares.only(*alone, columns.clone());
+        for (columns, alone) in split_at_patches(0..self.across.len()).zip(alone) {
+            shares.set_sole(*alone, columns.clone());
             if alone.is_none() {
-                self.seams.shares(&self.across, columns, first, shares);
+                self.seams
+                    .frame_shares(&self.across, columns, first, shares);
             }
             for cell in shares.by_cells() {
-                // Who shows most is found pixel by pixel.
+                // The frame of the largest weight is found pixel by pixel.
                 if cell.len() > 1 && !sources.is_empty() {
                     continue;
                 }
@@ -184,8 +197,8 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
                 };
                 let all = cell[0].from..cell[0].to;
                 // Next to a frame's border, as much of it as lies inside.
-                if !draw(all.clone()) && all.len() > EIGHT {
-                    for eight in cut::<EIGHT>(all) {
+                if !draw(all.clone()) && all.len() > LANES {
+                    for eight in split_at_multiples::<LANES>(all) {
                         draw(eight);
                     }
                 }
@@ -194,8 +207,8 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         drawn
     }
 
-    /// Clears what no frame shows, as far as that is plain for eight columns at once; the columns
-    /// that are done, those in `drawn` among them.
+    /// Clears columns that certainly no frame shows, eight at a time, and returns the columns that
+    /// are done, those in `drawn` among them.
     fn holes<T: Sample>(
         &self,
         strip: &Range<usize>,
@@ -205,7 +218,10 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
     ) -> Columns {
         let mut done = drawn;
         let mut clear = |columns: &Range<usize>| {
-            let hole = self.views.iter().all(|view| view.misses(strip, columns));
+            let hole = self
+                .views
+                .iter()
+                .all(|view| view.is_outside(strip, columns));
             if hole {
                 for pixels in &mut pixels[strip.clone()] {
                     pixels[columns.start * (C + 1)..columns.end * (C + 1)].fill(T::default());
@@ -215,9 +231,9 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
             }
             hole
         };
-        for piece in drawn.open(self.across.len()).flat_map(pieces) {
-            if !clear(&piece) && piece.len() > EIGHT {
-                for eight in cut::<EIGHT>(piece) {
+        for piece in drawn.open(self.across.len()).flat_map(split_at_patches) {
+            if !clear(&piece) && piece.len() > LANES {
+                for eight in split_at_multiples::<LANES>(piece) {
                     clear(&eight);
                 }
             }
@@ -225,13 +241,13 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         done
     }
 
-    /// Draws what frames share in some rows and columns of a patch, or one has alone; false without
-    /// doing it if one does not show all of it.
+    /// Draws the blend of frames in some rows and columns of a patch, or a single frame's; false
+    /// without doing it if one does not show all of it.
     fn block(
         &self,
         rows: &Range<usize>,
         columns: &Range<usize>,
-        shares: &[Share],
+        shares: &[FrameShare],
         down: &[f32],
         corrections: &[[f32; L]],
         pixels: &mut [&mut [u8]],
@@ -241,8 +257,8 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
             let view = self.view(shares[0].frame);
             return view.is_some_and(|view| view.block::<C>(rows.clone(), columns.clone(), pixels));
         }
-        let part = |share: &Share| self.view(share.frame)?.part(rows, columns, share.corners);
-        let mut parts = ArrayVec::<Part, PARTS>::new();
+        let part = |share: &FrameShare| self.view(share.frame)?.part(rows, columns, share.corners);
+        let mut parts = ArrayVec::<BlendPart, MAX_BLEND_PARTS>::new();
         let mut weights = [0.0; 4];
         for share in shares {
             let Some(part) = part(share) else {
@@ -256,56 +272,56 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         if weights != [1.0; 4] {
             return false;
         }
-        let (first, columns) = of_patch(columns);
-        let block = LitBlock {
+        let (first, columns) = within_patch(columns);
+        let block = BlendedBlock {
             parts: &parts,
-            row: rows.start % PATCH,
+            row: rows.start % PATCH_EDGE,
             columns,
             first,
             across: self.across.between(),
             down,
             corrections,
         };
-        fixed_point::lit_block::<C, L>(&block, pixels)
+        fixed_point::draw_blended_block::<C, L>(&block, pixels)
     }
 
-    /// What some columns of a row are, mixed of the frames that share them.
+    /// Mixes the frames that share some columns of a row.
     fn mix(
         &self,
         row: usize,
         columns: Range<usize>,
-        shares: &Shares,
-        run: &mut Run,
-        sums: &mut Row,
+        shares: &FrameShares,
+        batch: &mut PointBatch,
+        sums: &mut RowAccumulator,
     ) {
         let place = (row, self.across.len());
         sums.clear(columns.clone());
         for (share, weights) in shares.iter() {
             if let Some(view) = self.view(share.frame) {
-                view.values(run, self.points, place, share.from..share.to);
+                view.sample_values(batch, self.points, place, share.from..share.to);
                 match weights {
-                    Some(weights) => sums.mix(run, share.frame, share.from, weights),
-                    None => sums.set(run, share.frame, share.from..share.to),
+                    Some(weights) => sums.mix(batch, share.frame, share.from, weights),
+                    None => sums.set(batch, share.frame, share.from..share.to),
                 }
             }
         }
         // At the edge of what is seen: frames that no node of the grid shows.
         if sums.has_holes(columns.clone()) {
             for view in self.others(shares, &columns) {
-                view.values(run, self.points, place, columns.clone());
-                sums.fill(run, view.frame, columns.clone());
+                view.sample_values(batch, self.points, place, columns.clone());
+                sums.fill(batch, view.frame, columns.clone());
             }
         }
     }
 
-    /// The same where every pixel is one frame's as it is; `pixels`: of all the row.
+    /// Copies the frame that each pixel of some columns of a row shows; `pixels`: of all the row.
     fn copy(
         &self,
         row: usize,
         columns: Range<usize>,
-        shares: &Shares,
-        run: &mut Run,
-        sums: &mut Row,
+        shares: &FrameShares,
+        batch: &mut PointBatch,
+        sums: &mut RowAccumulator,
         pixels: &mut [u8],
     ) {
         let sources = sums.sources_mut();
@@ -316,15 +332,15 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
             let Some(view) = self.view(share.frame) else {
                 continue;
             };
-            for piece in pieces(share.from..share.to) {
+            for piece in split_at_patches(share.from..share.to) {
                 let sources = &mut sources[piece.clone()];
                 if view.block::<C>(row..row + 1, piece.clone(), &mut [&mut *pixels]) {
                     sources.fill(share.frame as u32);
                     continue;
                 }
                 let own = &mut pixels[piece.start * step..piece.end * step];
-                view.copy::<C>(run, self.points, place, piece.clone(), own);
-                let seen = sources.iter_mut().zip(&run.seen()[piece]);
+                view.copy::<C>(batch, self.points, place, piece.clone(), own);
+                let seen = sources.iter_mut().zip(&batch.seen()[piece]);
                 for (source, _) in seen.filter(|(_, seen)| **seen) {
                     *source = share.frame as u32;
                 }
@@ -336,12 +352,12 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
         }
         let sources = &mut sums.sources_mut()[columns.clone()];
         let pixels = &mut pixels[columns.start * step..columns.end * step];
-        let mut other = [0; 4 * RUN];
+        let mut other = [0; 4 * TILE_COLUMNS];
         for view in self.others(shares, &columns) {
             let own = &mut other[..columns.len() * step];
-            view.copy::<C>(run, self.points, place, columns.clone(), own);
+            view.copy::<C>(batch, self.points, place, columns.clone(), own);
             let there = pixels.chunks_exact_mut(step).zip(sources.iter_mut());
-            let found = own.chunks_exact(step).zip(&run.seen()[columns.clone()]);
+            let found = own.chunks_exact(step).zip(&batch.seen()[columns.clone()]);
             for ((pixel, source), (own, seen)) in there.zip(found) {
                 if *source == NO_FRAME && *seen {
                     pixel.copy_from_slice(own);
@@ -352,7 +368,7 @@ impl<'a, const C: usize, const L: usize> BestView<'a, C, L> {
     }
 }
 
-/// Notes the frame that some rows and columns show.
+/// Records the frame that some rows and columns show.
 fn name(frame: u32, rows: &Range<usize>, columns: &Range<usize>, sources: &mut [&mut [u32]]) {
     for row in rows.clone() {
         if let Some(sources) = sources.get_mut(row) {
@@ -361,20 +377,20 @@ fn name(frame: u32, rows: &Range<usize>, columns: &Range<usize>, sources: &mut [
     }
 }
 
-/// Some columns of a tile, a bit each.
+/// Set of columns of a tile, a bit each.
 #[derive(Clone, Copy, Default)]
 struct Columns(u128);
 
-const _: () = assert!(RUN == u128::BITS as usize);
+const _: () = assert!(TILE_COLUMNS == u128::BITS as usize);
 
 impl Columns {
     fn add(&mut self, columns: Range<usize>) {
         if !columns.is_empty() {
-            self.0 |= (u128::MAX >> (RUN - columns.len())) << columns.start;
+            self.0 |= (u128::MAX >> (TILE_COLUMNS - columns.len())) << columns.start;
         }
     }
 
-    /// The others among the first `count`, run by run.
+    /// Ranges of the columns that are missing among the first `count`.
     fn open(self, count: usize) -> impl Iterator<Item = Range<usize>> {
         let mut to = 0;
         std::iter::from_fn(move || {

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | options | [`options`] |
 //! | frame of each node of a grid, light levelled out between them | [`seam_grid`], [`seam_selection`], [`multi_band_blending`] |
-//! | both together, and the parts that frames have in a row | [`seams`], [`shares`] |
+//! | both together, and the parts that frames have in a row | [`seams`], [`frame_shares`] |
 //! | weighted sums along a row | [`accumulator`] |
 //! | tile drawn from the best frame, from the mean or from the median | [`best_view`], [`tile_renderer`] |
 //! | wall solved from all frames, finer than any of them | [`super_resolution`] |
@@ -13,11 +13,11 @@
 pub mod accumulator;
 pub mod band;
 pub mod best_view;
+pub mod frame_shares;
 pub mod multi_band_blending;
 pub mod options;
 pub mod seam_grid;
 pub mod seam_selection;
 pub mod seams;
-pub mod shares;
 pub mod super_resolution;
 pub mod tile_renderer;

@@ -1,8 +1,8 @@
-//! Light levelled out over seams: multi-band blending of what exposure has left.
+//! Multi-band blending of differences of light between frames that exposure has left.
 //!
-//! Let L be the composite of the frames along their seams and `D_i = I_i − L` what frame i shows
-//! otherwise, at the nodes of the grid (zero where the frame sees nothing). With `M_i` the mask of
-//! the nodes given to frame i, Gaussian pyramids `G_k M_i` and Laplacian pyramids `Λ_k D_i`, the
+//! Let L be the composite of the frames along their seams and `D_i = I_i − L` the difference of
+//! frame i to it, at the nodes of the grid (zero where the frame sees nothing). With `M_i` the mask
+//! of the nodes given to frame i, Gaussian pyramids `G_k M_i` and Laplacian pyramids `Λ_k D_i`, the
 //! correction is the collapsed pyramid of
 //!
 //! `Σ_i G_k M_i Λ_k D_i / Σ_i G_k M_i`.
@@ -17,26 +17,26 @@
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::{NO_FRAME, Placement};
 use crate::render::sampling::exposure::Exposure;
-use crate::render::sampling::point_batch::{RUN, Run};
+use crate::render::sampling::point_batch::{MAX_BATCH_POINTS, PointBatch};
 use crate::render::sampling::thumbnails::Thumbnails;
-use crate::render::warp::projection::Points;
+use crate::render::warp::projection::LocalPoints;
 use crate::surface::Surface;
 use rayon::prelude::*;
 
-/// Bands; the coarsest grid's nodes are `2^(BANDS − 1)` as far apart. The grid has a multiple of as
-/// many columns.
-pub const BANDS: usize = 4;
+/// Bands of the pyramid; the coarsest grid's nodes are `2^(PYRAMID_BANDS − 1)` as far apart. The
+/// grid has a multiple of that many columns. More bands blend light over longer distances.
+pub const PYRAMID_BANDS: usize = 4;
 /// Distance of the coarsest grid's nodes, in nodes of the finest.
-pub const COARSEST: u32 = 1 << (BANDS - 1);
-/// What is more different than this (grey levels of 255) is no light: something has moved, or
-/// glints.
-const MOST: f32 = 20.0;
-/// A weight that is nothing but rounding.
-const LEAST_WEIGHT: f32 = 1e-4;
-/// Frames worked on at once.
-const RUN_OF_FRAMES: usize = 64;
+pub const COARSEST_SPACING: u32 = 1 << (PYRAMID_BANDS - 1);
+/// Largest difference that is blended, grey levels of 255: beyond it something has moved or glints.
+/// A higher value blends stronger differences of light and lets moved things bleed over seams.
+const MAX_DIFFERENCE: f32 = 20.0;
+/// Smallest weight that is not rounding noise.
+const MIN_WEIGHT: f32 = 1e-4;
+/// Frames that are processed at once. A higher value uses more threads and more memory.
+const FRAMES_AT_ONCE: usize = 64;
 
-/// A window of the grid around the nodes of one frame, its edges multiples of [`COARSEST`].
+/// A window of the grid around the nodes of one frame, its edges multiples of [`COARSEST_SPACING`].
 #[derive(Clone, Copy, Debug)]
 struct Window {
     /// First column, below zero across θ = 0.
@@ -56,8 +56,8 @@ struct Layer {
     values: Vec<f32>,
 }
 
-/// What is to be added to the composite at each node, `channels` numbers, in units of the frames'
-/// samples (`white`: their full scale).
+/// Computes the corrections that are added to the composite at each node, `channels` numbers, in
+/// units of the frames' samples (`white`: their full scale).
 pub fn corrections(
     surface: &dyn Surface,
     thumbnails: &Thumbnails,
@@ -69,17 +69,17 @@ pub fn corrections(
 ) -> Vec<f32> {
     let channels = thumbnails.channels();
     let windows = windows(grid, labels, placements.len());
-    let sight = |frame: usize, window: &Window| {
-        shown(
+    let sampled = |frame: usize, window: &Window| {
+        sample_frame(
             surface, thumbnails, exposure, placements, grid, frame, window,
         )
     };
     // The composite.
     let mut composite = vec![0.0f32; labels.len() * channels];
-    for run in windows.chunks(RUN_OF_FRAMES) {
-        let layers: Vec<Layer> = run
+    for chunk in windows.chunks(FRAMES_AT_ONCE) {
+        let layers: Vec<Layer> = chunk
             .par_iter()
-            .map(|(frame, window)| sight(*frame, window))
+            .map(|(frame, window)| sampled(*frame, window))
             .collect();
         let columns = grid.columns as usize;
         let rows = composite.par_chunks_exact_mut(columns * channels);
@@ -87,7 +87,7 @@ pub fn corrections(
         rows.zip(labels)
             .enumerate()
             .for_each(|(row, (own, labels))| {
-                for ((frame, window), layer) in run.iter().zip(&layers) {
+                for ((frame, window), layer) in chunk.iter().zip(&layers) {
                     let Some(values) = window.row(0, row, layer) else {
                         continue;
                     };
@@ -101,20 +101,20 @@ pub fn corrections(
                 }
             });
     }
-    let mut bands: Vec<Layer> = (0..BANDS)
+    let mut bands: Vec<Layer> = (0..PYRAMID_BANDS)
         .map(|band| {
             let (columns, rows) = (
                 grid.columns as usize >> band,
-                (grid.rows as usize).next_multiple_of(COARSEST as usize) >> band,
+                (grid.rows as usize).next_multiple_of(COARSEST_SPACING as usize) >> band,
             );
             Layer::zeros(columns, rows, channels + 1)
         })
         .collect();
-    for run in windows.chunks(RUN_OF_FRAMES) {
-        let parts: Vec<Vec<Layer>> = run
+    for chunk in windows.chunks(FRAMES_AT_ONCE) {
+        let parts: Vec<Vec<Layer>> = chunk
             .par_iter()
             .map(|(frame, window)| {
-                let mut different = sight(*frame, window);
+                let mut different = sampled(*frame, window);
                 let mut mask = Layer::zeros(window.columns, window.rows, 1);
                 // Outside the grid nothing differs.
                 let mut within = vec![false; mask.values.len()];
@@ -126,11 +126,12 @@ pub fn corrections(
                         let value = &mut different.values[at * channels + c];
                         let off = *value - composite[node * channels + c];
                         // NaN where the frame sees nothing.
-                        *value = if given && off.abs() <= MOST / 255.0 * f32::from(u16::MAX) {
-                            off
-                        } else {
-                            0.0
-                        };
+                        *value =
+                            if given && off.abs() <= MAX_DIFFERENCE / 255.0 * f32::from(u16::MAX) {
+                                off
+                            } else {
+                                0.0
+                            };
                     }
                 });
                 for (at, within) in within.iter().enumerate() {
@@ -145,7 +146,7 @@ pub fn corrections(
             let (columns, channels) = (sum.columns, sum.channels);
             let rows = sum.values.par_chunks_exact_mut(columns * channels);
             rows.enumerate().for_each(|(row, own)| {
-                for ((_, window), part) in run.iter().zip(&parts) {
+                for ((_, window), part) in chunk.iter().zip(&parts) {
                     let values = window.row(band, row, &part[band]).unwrap_or_default();
                     for (column, value) in window
                         .around(band, columns)
@@ -179,13 +180,14 @@ pub fn corrections(
     blend.values
 }
 
-/// The bands of `different`, weighted by the mask's pyramid, and as a last channel the weights;
+/// Bands of `different`, weighted by the mask's pyramid, and the weights as a last channel;
 /// `around`: the window closes around the tunnel.
 fn weighted_bands(different: Layer, mask: Layer, around: bool) -> Vec<Layer> {
-    let mut bands = Vec::with_capacity(BANDS);
+    let mut bands = Vec::with_capacity(PYRAMID_BANDS);
     let (mut fine, mut mask) = (different, mask);
-    for band in 0..BANDS {
-        let coarse = (band + 1 < BANDS).then(|| (fine.reduced(around), mask.reduced(around)));
+    for band in 0..PYRAMID_BANDS {
+        let coarse =
+            (band + 1 < PYRAMID_BANDS).then(|| (fine.reduced(around), mask.reduced(around)));
         let mut detail = fine;
         if let Some((coarse, _)) = &coarse {
             let smooth = coarse.expanded(around);
@@ -202,7 +204,7 @@ fn weighted_bands(different: Layer, mask: Layer, around: bool) -> Vec<Layer> {
     bands
 }
 
-/// The windows of all frames that have nodes: around these, and as far beyond as the coarsest band
+/// Windows of all frames that have nodes: around these, and as far beyond as the coarsest band
 /// reaches.
 fn windows(grid: &Canvas, labels: &[u32], frames: usize) -> Vec<(usize, Window)> {
     let columns = grid.columns as usize;
@@ -220,7 +222,7 @@ fn windows(grid: &Canvas, labels: &[u32], frames: usize) -> Vec<(usize, Window)>
         bounds[2] = bounds[2].max(near);
         bounds[4] = bounds[4].max(row);
     }
-    let (edge, reach) = (i64::from(COARSEST), 2 * i64::from(COARSEST));
+    let (edge, reach) = (i64::from(COARSEST_SPACING), 2 * i64::from(COARSEST_SPACING));
     let window = |[_, left, right, top, bottom]: [i64; 5]| {
         let down = |at: i64| at.div_euclid(edge) * edge;
         let up = |at: i64| (at.div_euclid(edge) + 1) * edge;
@@ -273,8 +275,8 @@ impl Window {
     }
 }
 
-/// What a frame shows in a window, exposure undone; NaN where it shows nothing.
-fn shown(
+/// Samples a frame in a window, exposure undone; NaN where it shows nothing.
+fn sample_frame(
     surface: &dyn Surface,
     thumbnails: &Thumbnails,
     exposure: &Exposure,
@@ -293,20 +295,20 @@ fn shown(
         .collect();
     let mut points = Vec::new();
     surface.lattice(&s_m, &h_m, &mut points);
-    let points = Points::new(&points);
+    let points = LocalPoints::new(&points);
     let view = thumbnails.view(frame, &placements[frame], &points);
     let response = exposure.of(frame);
     let count = window.columns * window.rows;
     let mut values = Vec::with_capacity(count * channels);
-    let mut run = Run::default();
+    let mut batch = PointBatch::default();
     // Row by row: along a run the light changes little by little.
     for row in 0..window.rows {
-        for column in (0..window.columns).step_by(RUN) {
-            let length = RUN.min(window.columns - column);
+        for column in (0..window.columns).step_by(MAX_BATCH_POINTS) {
+            let length = MAX_BATCH_POINTS.min(window.columns - column);
             let start = row * window.columns + column;
-            view.look_at(&mut run, start, length);
-            response.undo(&mut run, 0..length);
-            for (value, seen) in run.values()[..length].iter().zip(run.seen()) {
+            view.look_at(&mut batch, start, length);
+            response.undo(&mut batch, 0..length);
+            for (value, seen) in batch.values()[..length].iter().zip(batch.seen()) {
                 match seen {
                     true => values.extend_from_slice(&value[..channels]),
                     false => values.extend_from_slice(&[f32::NAN; 4][..channels]),
@@ -322,8 +324,8 @@ fn shown(
     }
 }
 
-/// Fills in what a row of so many nodes has before the first and after the last: around the tunnel,
-/// or the same again.
+/// Pads a row of that many nodes before the first and after the last: with the other end around the
+/// tunnel, or by repetition.
 fn pad(row: &mut [f32], columns: usize, channels: usize, around: bool) {
     let (first, last) = if around { (columns, 1) } else { (1, columns) };
     row.copy_within(first * channels..(first + 1) * channels, 0);
@@ -343,7 +345,7 @@ impl Layer {
         }
     }
 
-    /// Each node times its weight, and the weight as one channel more.
+    /// Multiplies each node by its weight, and appends the weight as a channel.
     fn weighted(&self, weights: &Self) -> Self {
         let mut all = Self::zeros(self.columns, self.rows, self.channels + 1);
         let nodes = self.values.chunks_exact(self.channels).zip(&weights.values);
@@ -356,14 +358,14 @@ impl Layer {
         all
     }
 
-    /// Each node by its last channel, which is its weight.
+    /// Divides each node by its last channel, which is its weight.
     fn normalised(&self) -> Self {
         let channels = self.channels - 1;
         let mut all = Self::zeros(self.columns, self.rows, channels);
         let nodes = self.values.chunks_exact(self.channels);
         for (own, node) in all.values.chunks_exact_mut(channels).zip(nodes) {
             let w = node[channels];
-            let scale = if w > LEAST_WEIGHT { 1.0 / w } else { 0.0 };
+            let scale = if w > MIN_WEIGHT { 1.0 / w } else { 0.0 };
             for (own, value) in own.iter_mut().zip(node) {
                 *own = value * scale;
             }
@@ -371,8 +373,8 @@ impl Layer {
         all
     }
 
-    /// Half as many nodes each way, at the middles of 2 × 2: weights (1, 3, 3, 1)/8 along each
-    /// axis; `around`: the last column is followed by the first, else the border is repeated.
+    /// Halves the nodes each way, to the middles of 2 × 2: weights (1, 3, 3, 1)/8 along each axis;
+    /// `around`: the last column is followed by the first, else the border is repeated.
     fn reduced(&self, around: bool) -> Self {
         const WEIGHTS: [f32; 4] = [0.125, 0.375, 0.375, 0.125];
         let (columns, rows, c) = (self.columns / 2, self.rows / 2, self.channels);
@@ -399,10 +401,10 @@ impl Layer {
         half
     }
 
-    /// Twice as many nodes each way, bilinear; `around`: the last column is followed by the first,
+    /// Doubles the nodes each way, bilinear; `around`: the last column is followed by the first,
     /// else the border is repeated.
     fn expanded(&self, around: bool) -> Self {
-        /// Of the node's own parent, and of the other one next to it.
+        /// Weights of the node's own parent, and of the other one next to it.
         const WEIGHTS: [f32; 2] = [0.75, 0.25];
         let (columns, rows, c) = (2 * self.columns, 2 * self.rows, self.channels);
         let mut double = Self::zeros(columns, rows, c);

@@ -3,32 +3,31 @@
 use crate::numerics::kernel::Interpolation;
 use serde::Serialize;
 
-/// Which frames a pixel of the panorama shows.
+/// Choice of the frames that a pixel of the panorama shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Mode {
-    /// The frame that shows the wall best there; frames change along seams where they agree.
+    /// Best frame at each place; frames change along seams where they agree.
     #[default]
     BestView,
-    /// The mean of all frames, weighted by `tent(u) tent(v)`: 1 in the middle of a frame, 0 at its
+    /// Mean of all frames, weighted by `tent(u) tent(v)`: 1 in the middle of a frame, 0 at its
     /// edge.
     Average,
-    /// The median of all frames: what most of them show.
+    /// Median of all frames: what most of them show.
     Median,
 }
 
-/// How frames become a panorama.
+/// Options of drawing a panorama.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RenderOptions {
-    /// How frames are sampled between their pixels.
+    /// Interpolation of frames between their pixels.
     pub interpolation: Interpolation,
-    /// Which frames a pixel shows.
+    /// Choice of the frames that a pixel shows.
     pub mode: Mode,
-    /// Whether exposure is undone and light levelled out over seams; else frames keep the values
-    /// they have.
+    /// True if exposure is undone and light is blended over seams; else frames keep their values.
     pub blend: bool,
-    /// Whether the wall is solved from all frames, finer than any of them
+    /// True if the wall is solved from all frames, finer than any of them
     /// ([`crate::super_resolve`]); exposure must be undone for it.
     pub super_resolve: bool,
 }
@@ -45,7 +44,7 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// Whether small pictures of all frames are needed before the first tile is drawn.
+    /// True if thumbnails of all frames are needed before the first tile is drawn.
     pub(crate) fn needs_thumbnails(&self) -> bool {
         self.blend || self.mode == Mode::BestView
     }

@@ -1,13 +1,14 @@
-//! Which frame shows which part of the panorama, and how one passes into the next.
+//! Frames that show each part of the panorama, and transitions between them.
 //!
-//! A grid of nodes, some eight pixels apart (sixteen and more where there would be too many), lies
-//! over the canvas. Each node is given to one frame ([`crate::render::compositing::seam_selection`]); between nodes the frames
-//! pass into each other with the bilinear weights of their nodes. What they still differ by in
-//! light over longer distances is levelled out by a correction given at the nodes
-//! ([`crate::render::compositing::multi_band_blending`]).
+//! A grid of nodes, eight pixels apart (sixteen and more where there would be too many), lies over
+//! the canvas. Each node is given to one frame ([`super::seam_selection`]); between nodes the
+//! frames are mixed with the bilinear weights of their nodes. Remaining differences of light over
+//! longer distances are removed by a correction at the nodes ([`super::multi_band_blending`]).
 
-use super::seam_grid::{Across, Between, Cell, across, column_of, grid, row_of};
-use super::shares::{Share, Shares};
+use super::frame_shares::{FrameShare, FrameShares};
+use super::seam_grid::{
+    ColumnCell, ColumnCells, RowPosition, column_cells, column_position, grid, row_position,
+};
 use super::{multi_band_blending, seam_selection};
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::{NO_FRAME, Placement};
@@ -18,21 +19,21 @@ use crate::surface::Surface;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Which frame shows what.
+/// Frame and correction of each node of the grid.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Seams {
     grid: Canvas,
-    /// The frame of each node, row-major; [`NO_FRAME`] where none sees the wall.
+    /// Frame of each node, row-major; [`NO_FRAME`] where none sees the wall.
     labels: Vec<u32>,
-    /// What is added to the frames' values at each node, `channels` numbers; nothing at all where
-    /// frames stay as they are.
+    /// Corrections that are added to the frames' values at each node, `channels` numbers; empty
+    /// where frames keep their values.
     corrections: Vec<f32>,
     channels: usize,
 }
 
 impl Seams {
-    /// Finds the best frame for each node of the grid over `canvas`, by thumbnails whose exposure
-    /// is undone; with `blend`, also the correction. `white`: full scale of the frames.
+    /// Selects the frame of each node of the grid over `canvas`, by thumbnails whose exposure is
+    /// undone; with `blend`, also the correction. `white`: full scale of the frames.
     pub(crate) fn find(
         surface: &dyn Surface,
         thumbnails: &Thumbnails,
@@ -42,7 +43,8 @@ impl Seams {
         blend: Option<f32>,
     ) -> Self {
         let grid = grid(canvas);
-        let labels = seam_selection::best(surface, thumbnails, exposure, placements, &grid);
+        let labels =
+            seam_selection::select_frames(surface, thumbnails, exposure, placements, &grid);
         let channels = thumbnails.channels();
         let corrections = match blend {
             Some(white) => multi_band_blending::corrections(
@@ -58,18 +60,18 @@ impl Seams {
         }
     }
 
-    /// The frame of each node, row-major.
+    /// Frame of each node, row-major.
     pub fn labels(&self) -> &[u32] {
         &self.labels
     }
 
-    /// Memory of the grid while it is made, bytes a node.
+    /// Memory of the grid while it is computed, bytes a node.
     pub(crate) fn bytes_per_node(channels: usize) -> u64 {
         // Labels; composite, corrections and those of the coarser grids.
         (4 + 4 * (channels + 3 * (channels + 1))) as u64
     }
 
-    /// True if frames stay as they are: every pixel is one frame's.
+    /// True if frames keep their values: every pixel is one frame's.
     pub fn are_hard(&self) -> bool {
         self.corrections.is_empty()
     }
@@ -78,13 +80,13 @@ impl Seams {
         self.labels[row * self.grid.columns as usize + column]
     }
 
-    /// The frames that a tile may be drawn from, in their order.
+    /// Frames that a tile may be drawn from, in their order.
     pub(crate) fn frames_of(&self, canvas: &Canvas, tile: &Tile) -> Vec<usize> {
-        let first = row_of(&self.grid, canvas, tile.row).before;
-        let last = row_of(&self.grid, canvas, tile.row + tile.rows - 1).after;
+        let first = row_position(&self.grid, canvas, tile.row).before;
+        let last = row_position(&self.grid, canvas, tile.row + tile.rows - 1).after;
         // Nodes follow each other; around the tunnel the first comes after the last.
         let count = self.grid.columns as usize;
-        let node = |column: u32| column_of(&self.grid, canvas, column).0;
+        let node = |column: u32| column_position(&self.grid, canvas, column).0;
         let across = (node(tile.column)..=node(tile.column + tile.columns - 1) + 1)
             .map(|node| node.rem_euclid(count as i64) as usize);
         let across: Vec<usize> = across.take(count).collect();
@@ -101,7 +103,7 @@ impl Seams {
                 }
             }
         }
-        // Where some node is seen by none, its surroundings may be, by any frame around.
+        // Around a node that no frame sees, any frame may see some pixels.
         if open {
             frames.extend(&tile.frames);
         }
@@ -110,24 +112,24 @@ impl Seams {
         frames
     }
 
-    /// Where the columns of a tile lie between the nodes.
-    pub(crate) fn across(&self, canvas: &Canvas, tile: &Tile) -> Across {
-        across(&self.grid, canvas, tile)
+    /// Finds the columns of a tile between the nodes.
+    pub(crate) fn column_cells(&self, canvas: &Canvas, tile: &Tile) -> ColumnCells {
+        column_cells(&self.grid, canvas, tile)
     }
 
-    /// Where the rows of a tile lie between the rows of nodes.
-    pub(crate) fn down(&self, canvas: &Canvas, tile: &Tile) -> Vec<Between> {
+    /// Finds the nodes around each row of a tile.
+    pub(crate) fn row_positions(&self, canvas: &Canvas, tile: &Tile) -> Vec<RowPosition> {
         let rows = tile.row..tile.row + tile.rows;
-        rows.map(|row| row_of(&self.grid, canvas, row)).collect()
+        rows.map(|row| row_position(&self.grid, canvas, row))
+            .collect()
     }
 
-    /// The frame that some columns from a row to another are of; None if there are several, or
-    /// none.
-    pub(crate) fn only(
+    /// Frame of some columns from a row to another; None if there are several, or none.
+    pub(crate) fn sole_frame(
         &self,
-        across: &Across,
+        across: &ColumnCells,
         columns: &Range<usize>,
-        [first, last]: [&Between; 2],
+        [first, last]: [&RowPosition; 2],
     ) -> Option<usize> {
         let cells = across.cells.iter();
         let cells = cells.skip_while(|cell| cell.columns.end <= columns.start);
@@ -147,19 +149,19 @@ impl Seams {
         Some(only? as usize)
     }
 
-    /// What some columns of a row are made of. Between the same nodes nothing changes from row to
-    /// row where no frames meet.
+    /// Finds the shares of frames in some columns of a row. Between the same nodes they do not
+    /// change from row to row where no frames meet.
     ///
     /// Without blending each pixel is one frame's, the one with the largest weight.
-    pub(crate) fn shares(
+    pub(crate) fn frame_shares(
         &self,
-        across: &Across,
+        across: &ColumnCells,
         columns: Range<usize>,
-        row: &Between,
-        shares: &mut Shares,
+        row: &RowPosition,
+        shares: &mut FrameShares,
     ) {
         shares.clear();
-        let outside = |cell: &&Cell| cell.columns.end <= columns.start;
+        let outside = |cell: &&ColumnCell| cell.columns.end <= columns.start;
         for cell in across.cells.iter().skip_while(outside) {
             let (from, to) = (
                 cell.columns.start.max(columns.start),
@@ -175,21 +177,22 @@ impl Seams {
                 self.frame(row.after, cell.after),
             ];
             if corners.iter().any(|frame| *frame != corners[0]) {
-                self.mixed(&corners, &across.t[from..to], row, from, shares);
+                self.mix_cell(&corners, &across.t[from..to], row, from, shares);
             } else if corners[0] != NO_FRAME {
-                shares.whole(corners[0] as usize, from, to);
+                shares.add_whole(corners[0] as usize, from, to);
             }
         }
     }
 
-    /// A cell with different frames at its corners: its columns from `from` on, at `along`.
-    fn mixed(
+    /// Adds the shares of a cell with different frames at its corners: its columns from `from` on,
+    /// at positions `along`.
+    fn mix_cell(
         &self,
         corners: &[u32; 4],
         along: &[f32],
-        row: &Between,
+        row: &RowPosition,
         from: usize,
-        shares: &mut Shares,
+        shares: &mut FrameShares,
     ) {
         let mut frames = *corners;
         frames.sort_unstable();
@@ -212,7 +215,7 @@ impl Seams {
                         best = (*frame, own);
                     }
                 }
-                shares.whole(best.0 as usize, from + column, from + column + 1);
+                shares.add_whole(best.0 as usize, from + column, from + column + 1);
             }
             return;
         }
@@ -225,7 +228,7 @@ impl Seams {
             shares
                 .weights
                 .extend(along.iter().map(|s| weight(*s, *frame)));
-            shares.list.push(Share {
+            shares.list.push(FrameShare {
                 frame: *frame as usize,
                 from,
                 to: from + along.len(),
@@ -235,12 +238,12 @@ impl Seams {
         }
     }
 
-    /// What is added to the values along a row, at each of its columns: nothing in lanes beyond the
+    /// Interpolates the corrections along a row, at each of its columns; zero in lanes beyond the
     /// channels.
     pub(crate) fn corrections<const L: usize>(
         &self,
-        across: &Across,
-        row: &Between,
+        across: &ColumnCells,
+        row: &RowPosition,
         found: &mut [[f32; L]],
     ) {
         if self.are_hard() {

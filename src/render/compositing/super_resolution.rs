@@ -1,4 +1,4 @@
-//! The panorama finer than any frame: bands drawn as ever and then solved anew from all frames
+//! Bands finer than any frame: drawn as usual and then solved from all frames
 //! ([`crate::super_resolve`]).
 
 use super::band::Band;
@@ -8,38 +8,39 @@ use crate::render::layout::placement::Placement;
 use crate::render::layout::tiles::Tile;
 use crate::render::sampling::exposure::{Exposure, Response};
 use crate::render::sampling::picture::Picture;
-use crate::render::sampling::picture_cache::FrameStack;
+use crate::render::sampling::picture_cache::PictureCache;
 use crate::render::sampling::sample::{Sample, Samples};
 use crate::super_resolve::{Footprints, MARGIN, Reading, Region, View};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// Variance of rounding to whole numbers.
-const ROUNDING: f64 = 1.0 / 12.0;
+/// Variance of rounding to whole grey levels.
+const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
 
-/// Noise is at least this, grey levels: rounding to 8 bits gives 0.29.
-const LEAST_NOISE: f32 = 0.2;
+/// Smallest 1-σ of a frame's noise, grey levels: rounding to 8 bits gives 0.29. A higher value
+/// trusts clean frames less.
+const MIN_NOISE_SIGMA: f32 = 0.2;
 
-/// What frames read of the evenly lit wall, as long as it is needed.
+/// Readings of the evenly lit wall by frames, as long as they are needed.
 #[derive(Default)]
-pub struct Readings {
-    frames: BTreeMap<usize, Frame>,
+pub struct FrameReadings {
+    frames: BTreeMap<usize, CorrectedFrame>,
 }
 
-struct Frame {
+struct CorrectedFrame {
     /// Grey levels of 255 for each channel; NaN where clipped or masked.
     channels: Vec<Vec<f32>>,
     /// 1-σ of their noise.
     noise: f32,
 }
 
-impl Readings {
+impl FrameReadings {
     /// Bytes a sample of a frame.
     pub const SAMPLE_BYTES: u64 = 4;
 
-    /// Keeps those of `frames`, which must be held, and no others.
-    pub fn keep(&mut self, stack: &FrameStack, exposure: &Exposure, frames: &[usize]) {
+    /// Keeps the readings of `frames`, which must be in memory, and no others.
+    pub fn keep(&mut self, cache: &PictureCache, exposure: &Exposure, frames: &[usize]) {
         self.frames
             .retain(|frame, _| frames.binary_search(frame).is_ok());
         let missing: Vec<usize> = frames
@@ -47,19 +48,24 @@ impl Readings {
             .copied()
             .filter(|frame| !self.frames.contains_key(frame))
             .collect();
-        let read: Vec<Option<(usize, Frame)>> = missing
+        let read: Vec<Option<(usize, CorrectedFrame)>> = missing
             .into_par_iter()
-            .map(|frame| Some((frame, Frame::of(stack.picture(frame)?, exposure.of(frame)))))
+            .map(|frame| {
+                Some((
+                    frame,
+                    CorrectedFrame::of(cache.picture(frame)?, exposure.of(frame)),
+                ))
+            })
             .collect();
         self.frames.extend(read.into_iter().flatten());
     }
 
-    /// Solves a drawn band anew: its pixels that some frame sees become those of the wall that
-    /// explains all frames.
+    /// Solves a drawn band from all frames: pixels that some frame sees become those of the wall
+    /// that explains all frames best.
     pub fn resolve(
         &self,
         surface: &dyn Surface,
-        stack: &FrameStack,
+        cache: &PictureCache,
         placements: &[Placement],
         canvas: &Canvas,
         tiles: &[Tile],
@@ -67,20 +73,20 @@ impl Readings {
     ) {
         let solved: Vec<Vec<Vec<f32>>> = tiles
             .par_iter()
-            .map(|tile| self.tile(surface, stack, placements, canvas, tile, band))
+            .map(|tile| self.tile(surface, cache, placements, canvas, tile, band))
             .collect();
         for (tile, channels) in tiles.iter().zip(solved) {
             for (c, values) in channels.iter().enumerate() {
-                band.put_channel(canvas, tile, c, values);
+                band.write_channel(canvas, tile, c, values);
             }
         }
     }
 
-    /// The values of a tile, one vector a channel.
+    /// Solves a tile; one vector a channel.
     fn tile(
         &self,
         surface: &dyn Surface,
-        stack: &FrameStack,
+        cache: &PictureCache,
         placements: &[Placement],
         canvas: &Canvas,
         tile: &Tile,
@@ -94,7 +100,7 @@ impl Readings {
             columns: tile.columns as usize + 2 * across,
             rows: tile.rows as usize + 2 * MARGIN,
         };
-        let seen: Vec<(&usize, &Frame)> = tile
+        let seen: Vec<(&usize, &CorrectedFrame)> = tile
             .frames
             .iter()
             .filter_map(|frame| Some((frame, self.frames.get(frame)?)))
@@ -102,7 +108,7 @@ impl Readings {
         let views: Vec<View> = seen
             .iter()
             .map(|(frame, _)| View {
-                camera: placements[**frame].camera(stack.camera()),
+                camera: placements[**frame].camera(cache.camera()),
                 pose: &placements[**frame].pose,
             })
             .collect();
@@ -114,7 +120,7 @@ impl Readings {
                     .enumerate()
                     .map(|(view, (_, frame))| frame.readings(footprints.pixels(view), c))
                     .collect();
-                let start = band.region(canvas, &region, c);
+                let start = band.read_region(canvas, &region, c);
                 let solved = footprints.super_resolve(&readings, &start).values;
                 let rows = solved.chunks_exact(region.columns).skip(MARGIN);
                 rows.take(tile.rows as usize)
@@ -126,7 +132,7 @@ impl Readings {
     }
 }
 
-impl Frame {
+impl CorrectedFrame {
     fn of(picture: &Picture, response: Response) -> Self {
         let channels = match picture.samples() {
             Samples::Eight(samples) => channels(picture, samples, response),
@@ -138,15 +144,15 @@ impl Frame {
         });
         let noise = noise.fold(0.0, f64::max);
         Self {
-            noise: (noise * noise + ROUNDING).sqrt() as f32,
+            noise: (noise * noise + ROUNDING_VARIANCE).sqrt() as f32,
             channels,
         }
     }
 
-    /// What some pixels read in a channel.
+    /// Readings of some pixels in a channel.
     fn readings(&self, pixels: &[u32], channel: usize) -> Vec<Reading> {
         let values = &self.channels[channel];
-        let inverse_sigma = 1.0 / self.noise.max(LEAST_NOISE);
+        let inverse_sigma = 1.0 / self.noise.max(MIN_NOISE_SIGMA);
         let reading = |pixel: &u32| match values[*pixel as usize] {
             value if value.is_finite() => Reading {
                 value,

@@ -1,4 +1,4 @@
-//! The grid of the panorama on the unrolled wall.
+//! Grid of the panorama on the unrolled wall.
 
 use super::placement::Placement;
 use crate::render::error::RenderError;
@@ -7,7 +7,7 @@ use crate::surface::{Footprint, Surface, WallPoint};
 use image::DynamicImage;
 use serde::{Deserialize, Serialize};
 
-/// How the panorama lies in its picture file.
+/// Orientation of the panorama in its picture file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Layout {
@@ -20,7 +20,7 @@ pub enum Layout {
 }
 
 impl Layout {
-    /// Turns a picture that lies as [`Layout::ThetaRight`].
+    /// Turns a picture from [`Layout::ThetaRight`] into this layout.
     pub fn turn(self, image: DynamicImage) -> DynamicImage {
         match self {
             Self::ThetaRight => image,
@@ -29,7 +29,8 @@ impl Layout {
         }
     }
 
-    /// Where column and row of a canvas lie in the picture: x and y (integers are pixels' centres).
+    /// Position in the picture, x and y, of a column and row of a canvas (integers are pixels'
+    /// centres).
     pub fn to_picture(self, canvas: &Canvas, [column, row]: [f64; 2]) -> [f64; 2] {
         match self {
             Self::ThetaRight => [column, row],
@@ -37,7 +38,8 @@ impl Layout {
         }
     }
 
-    /// The inverse of [`Layout::to_picture`].
+    /// Column and row of a canvas at a position in the picture: the inverse of
+    /// [`Layout::to_picture`].
     pub fn from_picture(self, canvas: &Canvas, [x, y]: [f64; 2]) -> [f64; 2] {
         match self {
             Self::ThetaRight => [x, y],
@@ -77,15 +79,15 @@ pub struct Canvas {
     pub h_start_m: f64,
 }
 
-/// Most pixels of a panorama: beyond this, units or poses are wrong rather than the ambition.
-const LIMIT_PX: f64 = 1e12;
-/// Most pixels of a side.
-const LIMIT_SIDE: f64 = i32::MAX as f64;
+/// Largest number of pixels of a panorama: beyond it, units or poses are wrong.
+const MAX_PIXELS: f64 = 1e12;
+/// Largest side of a panorama, pixels.
+const MAX_SIDE_PX: f64 = i32::MAX as f64;
 
 impl Canvas {
-    /// The canvas that holds every footprint at about `px_per_metre`: the resolution is changed by
-    /// less than half a column over the whole perimeter, so that the perimeter is a whole number of
-    /// columns.
+    /// Lays out the canvas that holds every footprint at about `px_per_metre`: the resolution is
+    /// changed by less than half a column over the whole perimeter, so that the perimeter is a
+    /// whole number of columns.
     ///
     /// # Errors
     /// [`RenderError::Resolution`], [`RenderError::TooManyPixels`], [`RenderError::Count`] without
@@ -120,11 +122,11 @@ impl Canvas {
         let px_per_metre = columns / perimeter_m;
         // A row that would hold less than a thousandth of a pixel is rounding noise.
         let rows = ((h_max - h_min) * px_per_metre - 1e-3).ceil().max(1.0);
-        if columns * rows > LIMIT_PX || columns.max(rows) > LIMIT_SIDE {
+        if columns * rows > MAX_PIXELS || columns.max(rows) > MAX_SIDE_PX {
             return Err(RenderError::TooManyPixels {
                 columns,
                 rows,
-                limit_px: LIMIT_PX,
+                limit_px: MAX_PIXELS,
                 perimeter_m,
                 chainage_m: h_max - h_min,
                 px_per_metre,
@@ -140,7 +142,7 @@ impl Canvas {
         })
     }
 
-    /// [`Canvas::covering`] the footprints of placed frames.
+    /// Lays out the canvas that holds the footprints of placed frames, as [`Canvas::covering`].
     ///
     /// # Errors
     /// As [`Canvas::covering`].
@@ -153,7 +155,7 @@ impl Canvas {
         Self::covering(surface, footprints, px_per_metre)
     }
 
-    /// The pixels as a lattice that goes on beyond the first row and the last.
+    /// Lattice of the pixels, which continues beyond the first row and the last.
     pub fn lattice(&self) -> Lattice {
         Lattice {
             columns: i64::from(self.columns),
@@ -196,7 +198,7 @@ impl Canvas {
         self.columns as usize * self.rows as usize
     }
 
-    /// The same stretch of wall with at most about `pixels` pixels.
+    /// Canvas of the same stretch of wall with at most about `pixels` pixels.
     pub fn coarser(&self, pixels: usize) -> Self {
         let shrink = (self.pixels() as f64 / pixels.max(1) as f64)
             .sqrt()
@@ -204,8 +206,8 @@ impl Canvas {
         self.with_columns((f64::from(self.columns) / shrink).round().max(1.0))
     }
 
-    /// The same stretch of wall with pixels `step` times as large, about: a multiple of `multiple`
-    /// columns.
+    /// Canvas of the same stretch of wall with pixels about `step` times as large: a multiple of
+    /// `multiple` columns.
     pub fn grid(&self, step: f64, multiple: u32) -> Self {
         let columns = f64::from(self.columns) / step / f64::from(multiple);
         self.with_columns(columns.round().max(1.0) * f64::from(multiple))

@@ -1,4 +1,4 @@
-//! Where the frames lie on the unrolled wall.
+//! Places of the frames on the unrolled wall.
 
 use crate::camera::{Camera, Sweep};
 use crate::render::error::RenderError;

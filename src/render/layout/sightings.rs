@@ -1,4 +1,4 @@
-//! From a point of the wall to the frames that show it.
+//! Frames and pixels that show a point of the wall.
 
 use super::placement::Placement;
 use crate::camera::Camera;
@@ -25,11 +25,11 @@ pub struct Sighting {
     pub obliqueness_deg: f64,
 }
 
-/// How far beyond the outermost pixel centres a frame still shows, pixels: what going to the wall
-/// and back rounds.
+/// Margin beyond the outermost pixel centres within which a frame still shows a point, pixels:
+/// rounding on the way to the wall and back.
 const ROUNDING_PX: f64 = 1e-6;
 
-/// Resolution at a wall point, pixels per metre, along the direction in which it is least: the
+/// Resolution at a wall point, pixels per metre, along the direction in which it is lowest: the
 /// smaller singular value of `∂(u, v)/∂(s, h) = ∂π/∂x_c R_wcᵀ (e_s, e_h)`.
 fn least_stretch(camera: &Camera, pose: &Pose, point: &WallFrame) -> f64 {
     let jacobian = camera.project_jacobian(&pose.to_camera(&point.x_w));
@@ -38,7 +38,8 @@ fn least_stretch(camera: &Camera, pose: &Pose, point: &WallFrame) -> f64 {
     stretch.singular_values().min()
 }
 
-/// The same if the frame shows the point.
+/// Resolution at a wall point, pixels per metre, along the direction in which it is lowest; None if
+/// the frame does not show it.
 pub(crate) fn px_per_metre(camera: &Camera, pose: &Pose, point: &WallFrame) -> Option<f64> {
     let pixel = camera.project(&pose.to_camera(&point.x_w))?;
     camera
@@ -46,8 +47,8 @@ pub(crate) fn px_per_metre(camera: &Camera, pose: &Pose, point: &WallFrame) -> O
         .then(|| least_stretch(camera, pose, point))
 }
 
-/// The frames that show `wall`, the one with the highest resolution there first; what `mask` hides
-/// shows nothing.
+/// Finds the frames that show `wall`, the one with the highest resolution there first; what `mask`
+/// hides shows nothing.
 pub fn sightings(
     surface: &dyn Surface,
     camera: &Camera,

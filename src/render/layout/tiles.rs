@@ -1,4 +1,4 @@
-//! The canvas in small squares, each with the frames that may see it.
+//! Squares of the canvas, each with the frames that may see it.
 
 use super::canvas::Canvas;
 use super::placement::Placement;
@@ -12,7 +12,7 @@ pub(crate) const EDGE: u32 = 128;
 /// Most columns of a tile.
 pub const TILE_COLUMNS: usize = EDGE as usize;
 
-/// Rows of a band: those of a raster's tiles.
+/// Rows of a band: those of a raster file's tiles.
 pub const BAND_ROWS: u32 = crate::raster::EDGE as u32;
 
 /// A rectangle of the canvas.
@@ -49,7 +49,7 @@ impl Tile {
         points
     }
 
-    /// The same, in `points`.
+    /// Writes the pixels' wall points into `points`, row-major, metres.
     pub fn points_into(
         &self,
         surface: &dyn Surface,
@@ -64,8 +64,8 @@ impl Tile {
     }
 }
 
-/// The tiles of a canvas, `edge` pixels (at most [`EDGE`]) wide and high, in bands from the first
-/// row to the last, each band from the first column to the last.
+/// Cuts a canvas into tiles, `edge` pixels (at most [`EDGE`]) wide and high, in bands from the
+/// first row to the last, each band from the first column to the last.
 pub(crate) fn tiles(
     surface: &dyn Surface,
     canvas: &Canvas,
@@ -78,7 +78,7 @@ pub(crate) fn tiles(
         .collect()
 }
 
-/// The tiles of the band that begins at `row`.
+/// Cuts the band that begins at `row` into tiles.
 pub(crate) fn tiles_at(
     surface: &dyn Surface,
     canvas: &Canvas,

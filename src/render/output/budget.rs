@@ -1,15 +1,15 @@
-//! What a panorama takes of the memory, known before the first frame is read.
+//! Memory of a panorama, computed before the first frame is read.
 
 use super::memory;
 use crate::render::compositing::options::RenderOptions;
 use crate::render::compositing::seam_grid;
 use crate::render::compositing::seams::Seams;
-use crate::render::compositing::super_resolution::Readings;
+use crate::render::compositing::super_resolution::FrameReadings;
 use crate::render::error::RenderError;
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::Placement;
 use crate::render::layout::tiles::BAND_ROWS;
-use crate::render::sampling::picture_cache::FrameStack;
+use crate::render::sampling::picture_cache::PictureCache;
 use crate::render::sampling::thumbnails::Thumbnails;
 use crate::surface::Surface;
 use serde::Serialize;
@@ -25,33 +25,33 @@ pub struct Budget {
     pub grid_step_px: f64,
     /// The band being drawn and written.
     pub band: u64,
-    /// What the output holds until it is finished.
+    /// Memory of the output until it is finished.
     pub output: u64,
     /// Frames being decoded.
     pub decoding: u64,
-    /// What frames read of the wall, where it is solved from all of them.
+    /// Readings of frames, where the wall is solved from all of them.
     pub readings: u64,
-    /// Frames of one band, the least that must be held.
+    /// Frames of one band, which must be in memory at least.
     pub frames_least: u64,
     /// Room for frames.
     pub room: u64,
 }
 
-/// Copies of a band: the one that is drawn, the one before it, the tiles of this that are written,
-/// and what becomes of them.
-const COPIES: u64 = 5;
-/// Copies of a frame while it is decoded: the file, the decoder's picture, and what it is turned
-/// into.
-const DECODING: u64 = 4;
+/// Copies of a band: the one being drawn, the one before, its tiles being written, and their
+/// compressed form.
+const BAND_COPIES: u64 = 5;
+/// Copies of a frame while it is decoded: file, decoder's picture, converted picture.
+const DECODING_COPIES: u64 = 4;
 
-/// Memory of one tile that is solved, bytes.
-const SOLVING: u64 = 32 << 20;
+/// Memory of one tile while it is solved, bytes.
+const SOLVER_BYTES: u64 = 32 << 20;
 
 impl Budget {
-    /// Bands whose frames are kept in view of what is to come.
+    /// Bands ahead whose frames are kept if there is room.
     pub const BANDS_AHEAD: usize = 8;
 
-    /// The memory for drawing `canvas` within `limit` bytes, of which the output holds `output`.
+    /// Computes the memory for drawing `canvas` within `limit` bytes, of which the output holds
+    /// `output`.
     ///
     /// # Errors
     /// [`RenderError::Memory`] if even the least is more than the limit, or than the system has
@@ -59,7 +59,7 @@ impl Budget {
     pub fn new(
         surface: &dyn Surface,
         canvas: &Canvas,
-        frames: &FrameStack,
+        frames: &PictureCache,
         placements: &[Placement],
         options: &RenderOptions,
         output: u64,
@@ -76,23 +76,23 @@ impl Budget {
         }
         let rows = BAND_ROWS.min(canvas.rows);
         let pixel = format.pixel_bytes(true) as u64 + 4;
-        let band = COPIES * u64::from(rows) * u64::from(canvas.columns) * pixel;
+        let band = BAND_COPIES * u64::from(rows) * u64::from(canvas.columns) * pixel;
         let threads = rayon::current_num_threads() as u64;
-        let decoding = DECODING * threads * frames.full_frame_bytes();
-        let most = most_in_a_band(canvas, placements) as u64;
+        let decoding = DECODING_COPIES * threads * frames.full_frame_bytes();
+        let most = max_frames_in_a_band(canvas, placements) as u64;
         let frames_least = most * frames.frame_bytes();
         let readings = if options.super_resolve {
             let samples = frames.frame_bytes() / format.sample_bytes() as u64;
-            most * samples * Readings::SAMPLE_BYTES + threads * SOLVING
+            most * samples * FrameReadings::SAMPLE_BYTES + threads * SOLVER_BYTES
         } else {
             0
         };
         let fixed = thumbnails + grid + band + output + decoding + readings;
         let needed = fixed + frames_least;
-        memory::check(canvas, frames, needed, Some(limit))?;
+        memory::check_available(canvas, frames, needed, Some(limit))?;
         // With the frames of one band none is decoded twice while bands are drawn; with more, some
         // are not even once more than for their thumbnails.
-        let room = if frames.is_packed() {
+        let room = if frames.is_compressed() {
             limit - fixed
         } else {
             frames_least
@@ -100,7 +100,7 @@ impl Budget {
         Ok(Self {
             thumbnails,
             grid,
-            grid_step_px: seam_grid::step_px(canvas),
+            grid_step_px: seam_grid::node_spacing_px(canvas),
             band,
             output,
             decoding,
@@ -110,7 +110,7 @@ impl Budget {
         })
     }
 
-    /// The most that is used at any time, with `frames` bytes of frames in all.
+    /// Largest memory at any time, with `frames` bytes of frames in all.
     pub fn most(&self, frames: u64) -> u64 {
         self.thumbnails
             + self.grid
@@ -122,8 +122,8 @@ impl Budget {
     }
 }
 
-/// Frames that meet the same band, at most.
-fn most_in_a_band(canvas: &Canvas, placements: &[Placement]) -> usize {
+/// Largest number of frames that meet the same band.
+fn max_frames_in_a_band(canvas: &Canvas, placements: &[Placement]) -> usize {
     let band_m = f64::from(BAND_ROWS) / canvas.px_per_metre;
     let band = |h_m: f64| ((h_m - canvas.h_start_m) / band_m).floor();
     let count = canvas.rows.div_ceil(BAND_ROWS) as usize;

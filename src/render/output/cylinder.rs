@@ -1,4 +1,4 @@
-//! The cylindrical projection of one photo.
+//! Cylindrical projection of one photo.
 
 use crate::camera::Camera;
 use crate::numerics::kernel::{Interpolation, Kernel};
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// A photo on the unit cylinder around its camera, unrolled.
 #[derive(Clone, Debug)]
 pub struct CylinderPicture {
-    /// The picture, with alpha 0 outside the photo.
+    /// Picture, with alpha 0 outside the photo.
     pub image: DynamicImage,
     /// `û` of the first column and `v̂` of the first row, pixels: where the crop begins.
     pub origin_px: [i64; 2],
@@ -55,8 +55,8 @@ pub fn project(photo: &Picture, camera: &Camera, interpolation: Interpolation) -
     }
 }
 
-/// The box around all pixels that are not transparent: its first column and row, width and height;
-/// all of the picture if there are none.
+/// Box around all pixels that are not transparent: first column and row, width and height; all of
+/// the picture if there are none.
 fn covered(image: &DynamicImage) -> [u32; 4] {
     let (mut from, mut to) = ([u32::MAX; 2], [0; 2]);
     for (x, y, pixel) in image.to_luma_alpha8().enumerate_pixels() {
@@ -72,7 +72,7 @@ fn covered(image: &DynamicImage) -> [u32; 4] {
     }
 }
 
-/// Pixel of the photo → pixel of the unrolled cylinder; `None` where the lens shows nothing.
+/// Maps a pixel of the photo to the unrolled cylinder; `None` where the lens shows nothing.
 pub fn to_cylinder(camera: &Camera, u: f64, v: f64) -> Option<[f64; 2]> {
     let ray = camera.ray(u, v)?;
     let theta = ray.x.atan2(ray.z);
@@ -80,7 +80,7 @@ pub fn to_cylinder(camera: &Camera, u: f64, v: f64) -> Option<[f64; 2]> {
     Some([camera.fx * theta + camera.cx, camera.fy * h + camera.cy])
 }
 
-/// Pixel of the unrolled cylinder → pixel of the photo; `None` where the lens shows nothing, behind
+/// Maps a pixel of the unrolled cylinder to the photo; `None` where the lens shows nothing, behind
 /// a pinhole for one.
 pub fn from_cylinder(camera: &Camera, u_hat: f64, v_hat: f64) -> Option<[f64; 2]> {
     let theta = (u_hat - camera.cx) / camera.fx;
@@ -93,10 +93,11 @@ pub fn from_cylinder(camera: &Camera, u_hat: f64, v_hat: f64) -> Option<[f64; 2]
     Some([pixel.x, pixel.y])
 }
 
-/// Points of each of a photo's edges that are asked where they lie on the cylinder.
+/// Points along each of a photo's edges that are mapped to find the cylinder's extent. A higher
+/// value is more exact for lenses with strong distortion.
 const STEPS_PER_EDGE: usize = 64;
 
-/// Least and greatest û, least and greatest v̂ of the photo's pixel centres.
+/// Smallest and largest û, smallest and largest v̂ of the photo's pixel centres.
 ///
 /// They lie on the photo's border: û and v̂ are smooth and one-to-one.
 fn extent(camera: &Camera) -> [f64; 4] {

@@ -1,4 +1,4 @@
-//! Where no frame sees the wall.
+//! Wall that no frame sees.
 
 use crate::render::compositing::band::{Band, Target};
 use crate::render::error::RenderError;
@@ -6,12 +6,13 @@ use crate::render::layout::canvas::Canvas;
 use crate::surface::Surface;
 use serde::{Deserialize, Serialize};
 
-/// Edge of a cell, canvas pixels, unless the canvas is so large that there would be too many.
-const CELL_PX: u32 = 8;
-/// The most cells.
-const CELLS: u64 = 8 << 20;
+/// Edge of a cell, canvas pixels, unless there would be too many cells.
+const CELL_EDGE_PX: u32 = 8;
+/// Largest number of cells. A higher value finds smaller gaps in long panoramas and needs more
+/// memory.
+const MAX_CELLS: u64 = 8 << 20;
 
-/// A stretch of wall that no frame shows: what hangs together, in a box.
+/// A connected part of the wall that no frame shows, in a box.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Gap {
@@ -23,16 +24,16 @@ pub struct Gap {
     pub angle_from_deg: f64,
     /// To; beyond 360 across θ = 0, and 360 more than the beginning all around.
     pub angle_to_deg: f64,
-    /// The gap itself, square metres.
+    /// Area of the gap, square metres.
     pub area_m2: f64,
-    /// It reaches the panorama's first or last row: beyond it nothing was to be seen anyway.
+    /// True if it reaches the panorama's first or last row, beyond which no frame was expected.
     pub at_the_end: bool,
 }
 
 /// Edge of a canvas' cells, pixels.
 fn cell(canvas: &Canvas) -> u32 {
-    let mut cell = CELL_PX;
-    while cells(canvas, cell) > CELLS {
+    let mut cell = CELL_EDGE_PX;
+    while cells(canvas, cell) > MAX_CELLS {
         cell *= 2;
     }
     cell
@@ -43,7 +44,7 @@ fn cells(canvas: &Canvas, cell: u32) -> u64 {
     u64::from(canvas.columns.div_ceil(cell)) * u64::from(canvas.rows.div_ceil(cell))
 }
 
-/// Adds up what is covered, in cells.
+/// Coverage of the canvas, counted in cells.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Coverage {
     canvas: Canvas,
@@ -56,7 +57,7 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Nothing has been seen of the canvas yet.
+    /// Makes a coverage of which nothing has been seen yet.
     pub fn new(canvas: &Canvas) -> Self {
         let cell = cell(canvas);
         let (columns, rows) = (canvas.columns.div_ceil(cell), canvas.rows.div_ceil(cell));
@@ -70,8 +71,7 @@ impl Coverage {
         }
     }
 
-    /// Memory for a canvas, bytes: the cells, which of them have been looked at, and a way through
-    /// all of them.
+    /// Memory for a canvas, bytes: the cells, a visited flag each, and a queue of all of them.
     pub fn bytes(canvas: &Canvas) -> u64 {
         21 * cells(canvas, cell(canvas))
     }
@@ -81,7 +81,7 @@ impl Coverage {
         self.covered as f64 / self.canvas.pixels() as f64
     }
 
-    /// The gaps, from the first chainage to the last.
+    /// Finds the gaps, from the first chainage to the last.
     pub fn gaps(&self, surface: &dyn Surface) -> Vec<Gap> {
         let mut seen = vec![false; self.holes.len()];
         let mut gaps = Vec::new();
@@ -93,7 +93,7 @@ impl Coverage {
         gaps
     }
 
-    /// The cells with holes that hang together with `start`.
+    /// Finds the gap of the cells with holes that are connected with `start`.
     fn gap(&self, surface: &dyn Surface, start: usize, seen: &mut [bool]) -> Gap {
         let around = self.columns as i64;
         // Columns are counted on across θ = 0.
@@ -159,7 +159,7 @@ impl Target for Coverage {
     }
 }
 
-/// Gaps as CSV, one a line.
+/// Formats gaps as CSV, one a line.
 pub fn gaps_csv(gaps: &[Gap]) -> String {
     let mut text =
         "chainage_from_m,chainage_to_m,angle_from_deg,angle_to_deg,area_m2,at_the_end\n".to_owned();

@@ -1,4 +1,4 @@
-//! How fine and how sure the panorama is, place by place.
+//! Maps of resolution and uncertainty over the panorama.
 
 use super::raster_target::georeference;
 use crate::camera::Camera;
@@ -14,7 +14,7 @@ use nalgebra::{Matrix2, Matrix6};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// One number for each node of a grid; NaN where there is none.
+/// Map of one number for each node of a grid; NaN where there is none.
 #[derive(Clone, Debug)]
 pub struct Map {
     grid: Canvas,
@@ -22,8 +22,8 @@ pub struct Map {
 }
 
 impl Map {
-    /// Millimetres of wall per pixel of the frame that is shown, along the direction in which they
-    /// are most.
+    /// Maps the resolution: millimetres of wall per pixel of the frame that is shown, along the
+    /// direction in which they are most.
     ///
     /// `labels`: the frames of the grid's nodes; without them, the frame that is finest there.
     pub fn resolution(
@@ -43,9 +43,9 @@ impl Map {
         )
     }
 
-    /// 1-σ of where the wall point that is shown really lies, millimetres, along the direction in
-    /// which it is largest: `√λ_max(A Σ Aᵀ)` with the covariance Σ of the frame's pose and
-    /// `A = ∂(s, h)/∂ξ` ([`wall_jacobian`]).
+    /// Maps the uncertainty: 1-σ of the true position of the wall point that is shown, millimetres,
+    /// along the direction in which it is largest: `√λ_max(A Σ Aᵀ)` with the covariance Σ of the
+    /// frame's pose and `A = ∂(s, h)/∂ξ` ([`wall_jacobian`]).
     pub fn uncertainty(
         surface: &dyn Surface,
         camera: &Camera,
@@ -117,12 +117,12 @@ impl Map {
         }
     }
 
-    /// The values, row-major as [`Layout::ThetaRight`].
+    /// Values, row-major as [`Layout::ThetaRight`].
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
-    /// Writes it as Cloud-Optimised GeoTIFF of single precision.
+    /// Writes the map as Cloud-Optimised GeoTIFF of single precision.
     ///
     /// # Errors
     /// As [`CogWriter`].
@@ -168,7 +168,7 @@ impl Map {
     }
 }
 
-/// The frame of the highest resolution; of equals the first.
+/// Frame of the highest resolution; of equals the first.
 fn finest(frames: &[usize], fine: &impl Fn(usize) -> Option<f64>) -> Option<usize> {
     let mut best: Option<(usize, f64)> = None;
     for frame in frames {

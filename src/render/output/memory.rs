@@ -1,23 +1,23 @@
-//! How much memory is free, and whether it is enough.
+//! Free memory, and whether it suffices.
 
 use crate::render::error::RenderError;
 use crate::render::layout::canvas::Canvas;
-use crate::render::sampling::picture_cache::FrameStack;
+use crate::render::sampling::picture_cache::PictureCache;
 
-/// Memory that can be had without swapping, bytes, where the system tells (Linux).
+/// Memory that is available without swapping, bytes, where the system reports it (Linux).
 pub fn available_bytes() -> Option<u64> {
     let text = std::fs::read_to_string("/proc/meminfo").ok()?;
-    parse(&text)
+    parse_meminfo(&text)
 }
 
-/// Checks that drawing `canvas` from `frames` with `needed` bytes stays within what is `available`,
-/// if that is known.
+/// Checks that drawing `canvas` from `frames` with `needed` bytes stays within `available`, if that
+/// is known.
 ///
 /// # Errors
 /// [`RenderError::Memory`].
-pub fn check(
+pub fn check_available(
     canvas: &Canvas,
-    frames: &FrameStack,
+    frames: &PictureCache,
     needed: u64,
     available: Option<u64>,
 ) -> Result<(), RenderError> {
@@ -33,7 +33,7 @@ pub fn check(
     }
 }
 
-fn parse(meminfo: &str) -> Option<u64> {
+fn parse_meminfo(meminfo: &str) -> Option<u64> {
     let line = meminfo
         .lines()
         .find_map(|line| line.strip_prefix("MemAvailable:"))?;
@@ -49,8 +49,8 @@ mod tests {
     #[test]
     fn the_available_line_is_read() {
         let text = "MemTotal:       16 kB\nMemAvailable:   12 kB\n";
-        assert_eq!(parse(text), Some(12 * 1024));
-        assert_eq!(parse("nothing"), None);
+        assert_eq!(parse_meminfo(text), Some(12 * 1024));
+        assert_eq!(parse_meminfo("nothing"), None);
     }
 
     #[test]
@@ -61,10 +61,10 @@ mod tests {
             px_per_metre: 100.0,
             h_start_m: 0.0,
         };
-        let frames = FrameStack::from_pictures(Camera::from_vertical_fov(2, 2, 1.0), vec![]);
-        assert!(check(&canvas, &frames, 500_000_000, Some(500_000_000)).is_ok());
-        assert!(check(&canvas, &frames, 500_000_001, None).is_ok());
-        let message = check(&canvas, &frames, 500_000_001, Some(500_000_000))
+        let frames = PictureCache::from_pictures(Camera::from_vertical_fov(2, 2, 1.0), vec![]);
+        assert!(check_available(&canvas, &frames, 500_000_000, Some(500_000_000)).is_ok());
+        assert!(check_available(&canvas, &frames, 500_000_001, None).is_ok());
+        let message = check_available(&canvas, &frames, 500_000_001, Some(500_000_000))
             .unwrap_err()
             .to_string();
         assert!(message.contains("10000 × 10000 px") && message.contains("--px-per-metre"));

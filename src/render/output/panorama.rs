@@ -1,4 +1,4 @@
-//! The finished panorama.
+//! Panorama in memory.
 
 use crate::frames::GreyImage;
 use crate::render::compositing::band::{Band, Target};
@@ -20,7 +20,7 @@ pub struct Panorama {
 }
 
 impl Panorama {
-    /// A panorama that is one hole.
+    /// Makes a panorama without any covered pixel.
     pub fn empty(canvas: Canvas, format: PixelFormat) -> Self {
         let count = canvas.pixels() * (format.channels + 1);
         Self {
@@ -39,7 +39,7 @@ impl Panorama {
         self.samples.bytes() as u64
     }
 
-    /// Its place on the wall.
+    /// Canvas on the wall.
     pub fn canvas(&self) -> &Canvas {
         &self.canvas
     }
@@ -68,7 +68,7 @@ impl Panorama {
         (GreyImage::new(width, height, grey), covered)
     }
 
-    /// The picture to be written: grey or red-green-blue, with alpha.
+    /// Converts to a picture: grey or red-green-blue, with alpha.
     pub fn into_image(self, layout: Layout) -> DynamicImage {
         let size = [self.canvas.columns, self.canvas.rows];
         layout.turn(self.samples.into_image(size, self.format.channels))

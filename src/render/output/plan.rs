@@ -1,4 +1,4 @@
-//! From what is settled before the first tile is drawn to the bands of the panorama.
+//! Drawing of a panorama, band by band, with exposures and seams found before.
 
 use super::budget::Budget;
 use crate::progress::Progress;
@@ -6,34 +6,34 @@ use crate::render::compositing::band::{Band, Target};
 use crate::render::compositing::options::{Mode, RenderOptions};
 use crate::render::compositing::seam_grid;
 use crate::render::compositing::seams::Seams;
-use crate::render::compositing::super_resolution::Readings;
-use crate::render::compositing::tile_renderer::{Composition, Scene, Scratch};
+use crate::render::compositing::super_resolution::FrameReadings;
+use crate::render::compositing::tile_renderer::{Composition, TileBuffers, TileRenderer};
 use crate::render::error::RenderError;
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::Placement;
 use crate::render::layout::tiles::{BAND_ROWS, EDGE, Tile, tiles_at};
 use crate::render::sampling::exposure::Exposure;
-use crate::render::sampling::frame_view::Kernels;
-use crate::render::sampling::picture_cache::FrameStack;
+use crate::render::sampling::frame_view::StretchedKernels;
+use crate::render::sampling::picture_cache::PictureCache;
 use crate::render::sampling::thumbnails::Thumbnails;
 use crate::surface::Surface;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// What is settled before the first tile is drawn.
+/// Exposures and seams, found before the first tile is drawn.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Settled {
     exposure: Exposure,
     seams: Option<Seams>,
 }
 
-/// A panorama about to be drawn.
+/// A panorama that is ready to be drawn.
 pub struct Plan<'a> {
     surface: &'a dyn Surface,
     placements: &'a [Placement],
     canvas: Canvas,
     mode: Mode,
-    kernels: Kernels,
+    kernels: StretchedKernels,
     settled: Settled,
     super_resolve: bool,
 }
@@ -46,7 +46,7 @@ impl Settled {
     /// decoded.
     pub(crate) fn find(
         surface: &dyn Surface,
-        frames: &FrameStack,
+        frames: &PictureCache,
         placements: &[Placement],
         canvas: &Canvas,
         options: &RenderOptions,
@@ -90,13 +90,13 @@ impl Settled {
 }
 
 impl<'a> Plan<'a> {
-    /// Settles what is to be settled.
+    /// Finds exposures and seams.
     ///
     /// # Errors
     /// As [`Settled::find`].
     pub fn new(
         surface: &'a dyn Surface,
-        frames: &FrameStack,
+        frames: &PictureCache,
         placements: &'a [Placement],
         canvas: &Canvas,
         options: &RenderOptions,
@@ -106,7 +106,7 @@ impl<'a> Plan<'a> {
         Ok(Self::with(surface, placements, canvas, options, settled))
     }
 
-    /// With all that settled.
+    /// Plans with exposures and seams that were found before.
     pub fn with(
         surface: &'a dyn Surface,
         placements: &'a [Placement],
@@ -119,7 +119,7 @@ impl<'a> Plan<'a> {
             placements,
             canvas: *canvas,
             mode: options.mode,
-            kernels: Kernels::new(options.interpolation),
+            kernels: StretchedKernels::new(options.interpolation),
             settled,
             super_resolve: options.super_resolve,
         }
@@ -135,34 +135,34 @@ impl<'a> Plan<'a> {
         self.surface
     }
 
-    /// Where the frames lie.
+    /// Places of the frames.
     pub fn placements(&self) -> &[Placement] {
         self.placements
     }
 
-    /// The grid of the seams, or the one they would have.
+    /// Grid of the seams, or the one they would have.
     pub fn grid(&self) -> Canvas {
         seam_grid::grid(&self.canvas)
     }
 
-    /// The exposure that is undone.
+    /// Exposure that is undone.
     pub fn exposure(&self) -> &Exposure {
         &self.settled.exposure
     }
 
-    /// Which frames are shown where, if one is shown at each place.
+    /// Frames that are shown at each place, if one is.
     pub fn seams(&self) -> Option<&Seams> {
         self.settled.seams.as_ref()
     }
 
     /// Draws all bands into `targets`. The bytes do not depend on the number of threads, nor on the
-    /// memory that frames may take (`room` bytes, and at least those of one band).
+    /// memory for frames (`room` bytes, and at least those of one band).
     ///
     /// # Errors
     /// A frame that cannot be decoded; what the targets say.
     pub fn draw(
         &self,
-        frames: &mut FrameStack,
+        frames: &mut PictureCache,
         room: u64,
         targets: &mut [&mut dyn Target],
         progress: &dyn Progress,
@@ -170,14 +170,14 @@ impl<'a> Plan<'a> {
         self.draw_from(0, frames, room, targets, progress)
     }
 
-    /// The same without the `first` bands, which the targets have had.
+    /// Draws all bands but the `first` ones, which the targets have received before.
     ///
     /// # Errors
     /// As [`Plan::draw`].
     pub fn draw_from(
         &self,
         first: usize,
-        frames: &mut FrameStack,
+        frames: &mut PictureCache,
         room: u64,
         targets: &mut [&mut dyn Target],
         progress: &dyn Progress,
@@ -202,7 +202,7 @@ impl<'a> Plan<'a> {
             }
             Ok::<_, RenderError>(())
         };
-        let mut readings = Readings::default();
+        let mut readings = FrameReadings::default();
         for (k, row) in starts.iter().enumerate().skip(first) {
             let later: Vec<usize> = needs[k + 1..]
                 .iter()
@@ -210,7 +210,7 @@ impl<'a> Plan<'a> {
                 .flatten()
                 .copied()
                 .collect();
-            frames.hold(&needs[k], &later, room)?;
+            frames.load(&needs[k], &later, room)?;
             let tiles = self.tiles(*row);
             let draw = || {
                 self.fill(&mut band, frames, *row, &tiles);
@@ -229,7 +229,7 @@ impl<'a> Plan<'a> {
         Ok(())
     }
 
-    /// The tiles of the band that begins at `row`.
+    /// Tiles of the band that begins at `row`.
     fn tiles(&self, row: u32) -> Vec<Tile> {
         let end = (row + BAND_ROWS).min(self.canvas.rows);
         (row..end)
@@ -238,13 +238,13 @@ impl<'a> Plan<'a> {
             .collect()
     }
 
-    fn needed(&self, frames: &FrameStack, tiles: &[Tile]) -> Vec<usize> {
-        let scene = self.scene(frames);
+    fn needed(&self, frames: &PictureCache, tiles: &[Tile]) -> Vec<usize> {
+        let renderer = self.renderer(frames);
         let of_tile = |tile: &Tile| {
             if self.super_resolve {
                 tile.frames.clone()
             } else {
-                scene.needed(tile)
+                renderer.needed(tile)
             }
         };
         let mut needed: Vec<usize> = tiles.iter().flat_map(of_tile).collect();
@@ -253,22 +253,25 @@ impl<'a> Plan<'a> {
         needed
     }
 
-    fn fill(&self, band: &mut Band, frames: &FrameStack, row: u32, tiles: &[Tile]) {
-        let scene = self.scene(frames);
+    fn fill(&self, band: &mut Band, frames: &PictureCache, row: u32, tiles: &[Tile]) {
+        let renderer = self.renderer(frames);
         band.begin(&self.canvas, row, BAND_ROWS.min(self.canvas.rows - row));
-        let places = band.places(&self.canvas, tiles);
-        (tiles.par_iter().zip(places)).for_each_init(Scratch::default, |scratch, (tile, place)| {
-            scene.draw(tile, place, scratch);
-        });
+        let places = band.tile_pixels(&self.canvas, tiles);
+        (tiles.par_iter().zip(places)).for_each_init(
+            TileBuffers::default,
+            |buffers, (tile, place)| {
+                renderer.draw(tile, place, buffers);
+            },
+        );
     }
 
-    fn scene<'b>(&'b self, frames: &'b FrameStack) -> Scene<'b> {
+    fn renderer<'b>(&'b self, frames: &'b PictureCache) -> TileRenderer<'b> {
         let composition = match (self.mode, &self.settled.seams) {
             (Mode::BestView, Some(seams)) => Composition::Seams(seams),
             (Mode::Median, _) => Composition::Median,
             _ => Composition::Average,
         };
-        Scene {
+        TileRenderer {
             surface: self.surface,
             frames,
             placements: self.placements,

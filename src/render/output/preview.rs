@@ -10,22 +10,22 @@ use image::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Longest side of the preview, pixels.
-const LONGEST: u32 = 4096;
+/// Largest side of the preview, pixels.
+const MAX_SIDE_PX: u32 = 4096;
 /// Space for the axes, pixels.
-const MARGIN: u32 = 96;
+const MARGIN_PX: u32 = 96;
 /// Scale of the letters.
-const SCALE: u32 = 2;
+const TEXT_SCALE: u32 = 2;
 /// Length of a tick, pixels.
-const TICK: u32 = 10;
-/// Ticks along the chainage are no nearer to one another than this, pixels.
-const APART: f64 = 150.0;
+const TICK_PX: u32 = 10;
+/// Smallest distance of ticks along the chainage, pixels.
+const MIN_TICK_DISTANCE_PX: f64 = 150.0;
 const PAPER: Rgb<u8> = Rgb([255; 3]);
 const INK: Rgb<u8> = Rgb([20; 3]);
-/// Where no frame sees the wall.
+/// Colour of wall that no frame sees.
 const HOLE: Rgb<u8> = Rgb([205, 215, 235]);
 
-/// Adds up the panorama, small.
+/// Preview that bands are added to.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Preview {
     canvas: Canvas,
@@ -40,7 +40,7 @@ pub struct Preview {
 /// Canvas pixels along each side of one of the preview's.
 fn shrink(canvas: &Canvas) -> u32 {
     let longest = canvas.columns.max(canvas.rows);
-    longest.div_ceil(LONGEST - 2 * MARGIN)
+    longest.div_ceil(MAX_SIDE_PX - 2 * MARGIN_PX)
 }
 
 impl Preview {
@@ -50,7 +50,7 @@ impl Preview {
         pixels * (size_of::<[f32; 4]>() as u64 + 3)
     }
 
-    /// Nothing has been drawn yet.
+    /// Makes a preview of which nothing has been drawn yet.
     pub fn new(canvas: &Canvas) -> Self {
         let shrink = shrink(canvas);
         let columns = canvas.columns.div_ceil(shrink) as usize;
@@ -64,7 +64,7 @@ impl Preview {
         }
     }
 
-    /// The picture, at most 4096 px long, with chainage in metres along one side and clock
+    /// Draws the picture, at most 4096 px long, with chainage in metres along one side and clock
     /// positions along the other, twelve o'clock at θ = `twelve_at_deg`.
     pub fn picture(&self, surface: &dyn Surface, layout: Layout, twelve_at_deg: f64) -> RgbImage {
         let size = [self.columns as u32, self.rows as u32];
@@ -72,7 +72,7 @@ impl Preview {
             Layout::ThetaRight => size,
             Layout::ChainageRight => [size[1], size[0]],
         };
-        let mut image = RgbImage::from_pixel(width + 2 * MARGIN, height + 2 * MARGIN, PAPER);
+        let mut image = RgbImage::from_pixel(width + 2 * MARGIN_PX, height + 2 * MARGIN_PX, PAPER);
         for row in 0..self.rows {
             for column in 0..self.columns {
                 let [red, green, blue, n] = self.sums[row * self.columns + column];
@@ -85,7 +85,7 @@ impl Preview {
                     Layout::ThetaRight => (column, row),
                     Layout::ChainageRight => (row, self.columns - 1 - column),
                 };
-                image.put_pixel(MARGIN + x as u32, MARGIN + y as u32, colour);
+                image.put_pixel(MARGIN_PX + x as u32, MARGIN_PX + y as u32, colour);
             }
         }
         let pixels = f64::from(self.shrink);
@@ -117,10 +117,10 @@ impl Preview {
         image
     }
 
-    /// Round chainages, and how they are written.
+    /// Round chainages and their labels.
     fn chainages(&self) -> Vec<(f64, String)> {
         let [start_m, end_m] = self.canvas.chainage_m();
-        let least_m = APART * f64::from(self.shrink) / self.canvas.px_per_metre;
+        let least_m = MIN_TICK_DISTANCE_PX * f64::from(self.shrink) / self.canvas.px_per_metre;
         let power = 10f64.powf(least_m.log10().floor());
         let step_m = [1.0, 2.0, 5.0, 10.0]
             .map(|factor| factor * power)
@@ -139,17 +139,17 @@ impl Preview {
     }
 }
 
-/// A tick on both sides of the picture with its text: above and below if `across`, else left and
-/// right.
+/// Draws a tick on both sides of the picture with its text: above and below if `across`, else left
+/// and right.
 fn axis(image: &mut RgbImage, across: bool, at: f64, text: &str) {
     let (width, height) = image.dimensions();
-    let at = MARGIN + at.max(0.0) as u32;
-    let half = bitmap_text::width(text, SCALE) / 2;
-    for k in 0..TICK {
+    let at = MARGIN_PX + at.max(0.0) as u32;
+    let half = bitmap_text::width(text, TEXT_SCALE) / 2;
+    for k in 0..TICK_PX {
         let ends = if across {
-            [[at, MARGIN - 1 - k], [at, height - MARGIN + k]]
+            [[at, MARGIN_PX - 1 - k], [at, height - MARGIN_PX + k]]
         } else {
-            [[MARGIN - 1 - k, at], [width - MARGIN + k, at]]
+            [[MARGIN_PX - 1 - k, at], [width - MARGIN_PX + k, at]]
         };
         for [x, y] in ends {
             if let Some(pixel) = image.get_pixel_mut_checked(x, y) {
@@ -157,22 +157,22 @@ fn axis(image: &mut RgbImage, across: bool, at: f64, text: &str) {
             }
         }
     }
-    let letter = LETTER * SCALE;
+    let letter = LETTER * TEXT_SCALE;
     let places = if across {
         let x = at.saturating_sub(half);
         [
-            [x, MARGIN - TICK - letter - 4],
-            [x, height - MARGIN + TICK + 4],
+            [x, MARGIN_PX - TICK_PX - letter - 4],
+            [x, height - MARGIN_PX + TICK_PX + 4],
         ]
     } else {
         let y = at.saturating_sub(letter / 2);
         [
-            [(MARGIN - TICK).saturating_sub(2 * half + 4), y],
-            [width - MARGIN + TICK + 4, y],
+            [(MARGIN_PX - TICK_PX).saturating_sub(2 * half + 4), y],
+            [width - MARGIN_PX + TICK_PX + 4, y],
         ]
     };
     for place in places {
-        bitmap_text::draw(image, place, text, SCALE, INK);
+        bitmap_text::draw(image, place, text, TEXT_SCALE, INK);
     }
 }
 
@@ -238,14 +238,15 @@ mod tests {
         }
         for layout in [Layout::ThetaRight, Layout::ChainageRight] {
             let picture = preview.picture(&Circle::new(1000.0 / 100.0 / TAU).unwrap(), layout, 0.0);
-            assert!(picture.width().max(picture.height()) <= LONGEST);
+            assert!(picture.width().max(picture.height()) <= MAX_SIDE_PX);
             let at = |share_around: f64, share_along: f64| {
                 let [x, y] = match layout {
                     Layout::ThetaRight => [share_around, share_along],
                     Layout::ChainageRight => [share_along, 1.0 - share_around],
                 };
-                let inner =
-                    |share: f64, side: u32| MARGIN + (share * f64::from(side - 2 * MARGIN)) as u32;
+                let inner = |share: f64, side: u32| {
+                    MARGIN_PX + (share * f64::from(side - 2 * MARGIN_PX)) as u32
+                };
                 picture
                     .get_pixel(inner(x, picture.width()), inner(y, picture.height()))
                     .0

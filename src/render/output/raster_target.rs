@@ -1,4 +1,4 @@
-//! Bands cut into the tiles of a raster file.
+//! Raster files that bands are written to, tile by tile.
 
 use crate::persist::atomic::WriteError;
 use crate::raster::{
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// What of a band goes into the file.
+/// Layer of a band that is written to a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RasterLayer {
@@ -24,11 +24,11 @@ pub enum RasterLayer {
     Panorama,
     /// 255 where some frame sees the wall, else 0.
     Coverage,
-    /// The index of the frame that each pixel shows; the largest number of 32 bits where none is.
+    /// Index of the frame that each pixel shows; the largest number of 32 bits where none is.
     Frames,
 }
 
-/// How far a raster file has come.
+/// State of a raster file that is being written.
 #[derive(Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub enum RasterState<'a> {
@@ -38,16 +38,16 @@ pub enum RasterState<'a> {
     Dzi(DziState<'a>),
 }
 
-/// What a raster file goes on from.
+/// State of a raster file from which writing is resumed.
 #[derive(Debug)]
 pub struct Kept<'a> {
-    /// The file of its packed tiles, or the folder of Deep Zoom's. It stays whatever happens.
+    /// File of its compressed tiles, or the folder of Deep Zoom's. It stays in any case.
     pub place: PathBuf,
-    /// How far it has come, if it has begun.
+    /// State, if writing has begun.
     pub state: Option<RasterState<'a>>,
 }
 
-/// A raster file that is fed bands.
+/// Target that writes a raster file.
 pub struct RasterTarget {
     layer: RasterLayer,
     layout: Layout,
@@ -61,8 +61,8 @@ enum Writer {
 }
 
 impl RasterTarget {
-    /// A Cloud-Optimised GeoTIFF. Its axes are metres: arc length and chainage, as the layout has
-    /// them.
+    /// Writes a Cloud-Optimised GeoTIFF. Its axes are metres: arc length and chainage, in the
+    /// layout's order.
     ///
     /// # Errors
     /// As [`CogWriter::kept`].
@@ -84,7 +84,7 @@ impl RasterTarget {
         Ok(Self::new(layer, layout, &spec, Writer::Cog(writer)))
     }
 
-    /// A Deep Zoom picture of the panorama.
+    /// Writes a Deep Zoom picture of the panorama.
     ///
     /// # Errors
     /// As [`DziWriter::kept`].
@@ -106,7 +106,7 @@ impl RasterTarget {
         Ok(Self::new(layer, layout, &spec, Writer::Dzi(writer)))
     }
 
-    /// How far it has come.
+    /// State from which writing can be resumed.
     ///
     /// # Errors
     /// Whatever the system says.
@@ -126,7 +126,7 @@ impl RasterTarget {
         }
     }
 
-    /// Memory that such a file holds until it is finished, bytes.
+    /// Memory of such a file until it is finished, bytes.
     pub fn pending_bytes(
         canvas: &Canvas,
         format: PixelFormat,
@@ -140,7 +140,7 @@ impl RasterTarget {
         spec(canvas, format, layout, layer).pending_bytes(order)
     }
 
-    /// Gives the file its name.
+    /// Completes the file and gives it its name.
     ///
     /// # Errors
     /// As [`CogWriter::finish`] and [`DziWriter::finish`].
@@ -151,7 +151,7 @@ impl RasterTarget {
         }
     }
 
-    /// The tile that begins at `first` around the section, in a band of `rows` rows.
+    /// Cuts the tile that begins at `first` around the section from a band.
     fn tile(&self, canvas: &Canvas, band: &Band, pixels: &[u8], place: usize) -> RasterTile {
         let p = self.pixel_bytes;
         let columns = canvas.columns as usize;
@@ -255,7 +255,7 @@ fn spec(canvas: &Canvas, format: PixelFormat, layout: Layout, layer: RasterLayer
     }
 }
 
-/// Arc length and chainage in metres, along the axes that the layout gives them.
+/// Georeference of arc length and chainage in metres, along the axes of the layout.
 pub(crate) fn georeference(canvas: &Canvas, layout: Layout) -> Georeference {
     let step_m = 1.0 / canvas.px_per_metre;
     let around_m = f64::from(canvas.columns) * step_m;

@@ -1,4 +1,4 @@
-//! Frames and poses in, panorama out.
+//! Stitching: from frames and poses to the panorama.
 
 use super::budget::Budget;
 use super::memory;
@@ -12,26 +12,27 @@ use crate::render::compositing::options::RenderOptions;
 use crate::render::error::RenderError;
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::{Placement, native_px_per_metre, place};
-use crate::render::sampling::picture_cache::{FrameStack, level_for};
+use crate::render::sampling::picture_cache::{PictureCache, level_for};
 use crate::surface::Surface;
 use crate::trajectory::{Pose, Shutter};
 
-/// How a panorama is drawn from frames on disk.
+/// Options of stitching frames on disk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StitchOptions {
     /// Resolution, pixels per metre; without it the frames' own at the wall, or twice that with
     /// [`RenderOptions::super_resolve`].
     pub px_per_metre: Option<f64>,
-    /// Treats every camera as standing on the axis; see [`on_the_axis`].
+    /// Treats every camera as if it stood on the axis; see [`on_the_axis`].
     pub ignore_offset: bool,
-    /// How frames become a panorama.
+    /// Options of drawing.
     pub render: RenderOptions,
     /// Memory that may be used, bytes.
     pub memory: u64,
 }
 
-/// How much finer than the frames a wall is that is solved from all of them.
-const FINER: f64 = 2.0;
+/// Resolution of a wall that is solved from all frames, in units of the frames' own. A higher value
+/// is slower and gains little.
+const SUPER_RESOLVE_SCALE: f64 = 2.0;
 
 impl Default for StitchOptions {
     fn default() -> Self {
@@ -44,9 +45,8 @@ impl Default for StitchOptions {
     }
 }
 
-/// The poses with `t_x = t_z = 0`: chainage and rotation kept, the distance from the axis
-/// forgotten. What a panorama looks like that does not account for the camera's position (bricks
-/// seem to zoom).
+/// Moves the poses to the axis, `t_x = t_z = 0`, with chainage and rotation kept: for a panorama
+/// that does not account for the camera's position (bricks seem to zoom).
 pub fn on_the_axis(poses: &[Pose]) -> Vec<Pose> {
     poses
         .iter()
@@ -62,9 +62,9 @@ pub fn on_the_axis(poses: &[Pose]) -> Vec<Pose> {
 /// Frames laid out on a canvas that holds all they see.
 #[derive(Clone, Debug)]
 pub struct LaidOut {
-    /// Every frame's place.
+    /// Place of every frame.
     pub placements: Vec<Placement>,
-    /// The frames' own resolution at the wall, pixels per metre ([`native_px_per_metre`]).
+    /// Resolution of the frames at the wall, pixels per metre ([`native_px_per_metre`]).
     pub native_px_per_metre: f64,
     /// The canvas.
     pub canvas: Canvas,
@@ -97,14 +97,14 @@ pub fn lay_out(
 /// Frames on disk, laid out to be drawn.
 pub struct Stitch<'a> {
     surface: &'a dyn Surface,
-    frames: FrameStack,
+    frames: PictureCache,
     laid_out: LaidOut,
     options: StitchOptions,
 }
 
 impl<'a> Stitch<'a> {
     /// Places the frames for given poses, their rows read by `shutter`, lays out the canvas and
-    /// looks at the frames' headers. Frames are to be halved where the canvas is coarser than half
+    /// reads the frames' headers. Frames are to be halved where the canvas is coarser than half
     /// their resolution.
     ///
     /// # Errors
@@ -131,7 +131,7 @@ impl<'a> Stitch<'a> {
             poses
         };
         let finer = if options.render.super_resolve {
-            FINER
+            SUPER_RESOLVE_SCALE
         } else {
             1.0
         };
@@ -140,7 +140,7 @@ impl<'a> Stitch<'a> {
         let level = level_for(camera, laid_out.native_px_per_metre, canvas.px_per_metre);
         Ok(Self {
             surface,
-            frames: FrameStack::open(files, camera, level)?,
+            frames: PictureCache::open(files, camera, level)?,
             laid_out,
             options: *options,
         })
@@ -152,11 +152,11 @@ impl<'a> Stitch<'a> {
     }
 
     /// The frames.
-    pub fn frames(&self) -> &FrameStack {
+    pub fn frames(&self) -> &PictureCache {
         &self.frames
     }
 
-    /// The memory that drawing takes if the output holds `output` bytes of it.
+    /// Computes the memory that drawing needs if the output holds `output` bytes of it.
     ///
     /// # Errors
     /// [`RenderError::Memory`] if the least that is needed is more than may be used.
@@ -172,7 +172,8 @@ impl<'a> Stitch<'a> {
         )
     }
 
-    /// Finds exposures and seams, within a budget. As many frames as there is room for are kept.
+    /// Finds exposures and seams, within a budget. As many frames as there is room for stay in
+    /// memory.
     ///
     /// # Errors
     /// A frame that cannot be decoded.
@@ -186,7 +187,7 @@ impl<'a> Stitch<'a> {
         let start = |frame: &usize| self.laid_out.placements[*frame].footprint.h_min_m;
         first.sort_by(|a, b| start(a).total_cmp(&start(b)));
         first.truncate((budget.room / self.frames.frame_bytes().max(1)) as usize);
-        self.frames.hold_early(&first, progress)?;
+        self.frames.prefetch(&first, progress)?;
         Settled::find(
             self.surface,
             &self.frames,
@@ -197,8 +198,8 @@ impl<'a> Stitch<'a> {
         )
     }
 
-    /// What is to be drawn with that settled, and the frames.
-    pub fn plan(&mut self, settled: Settled) -> (Plan<'_>, &mut FrameStack) {
+    /// Plan for drawing with these exposures and seams, and the frames.
+    pub fn plan(&mut self, settled: Settled) -> (Plan<'_>, &mut PictureCache) {
         let plan = Plan::with(
             self.surface,
             &self.laid_out.placements,
@@ -232,13 +233,13 @@ pub fn stitch(
     Ok(panorama)
 }
 
-/// Draws the canvas from placed frames that are held.
+/// Draws the canvas from placed frames in memory.
 ///
 /// # Errors
 /// [`RenderError::Count`] unless there is one placement per frame.
 pub fn render(
     surface: &dyn Surface,
-    frames: &mut FrameStack,
+    frames: &mut PictureCache,
     placements: &[Placement],
     canvas: &Canvas,
     options: &RenderOptions,
@@ -259,9 +260,9 @@ pub fn render(
 pub(crate) fn check_memory(
     canvas: &Canvas,
     copies: u64,
-    frames: &FrameStack,
+    frames: &PictureCache,
 ) -> Result<(), RenderError> {
     let picture = canvas.pixels() as u64 * frames.format().pixel_bytes(true) as u64;
     let needed = frames.frame_bytes() * frames.len() as u64 + picture * copies;
-    memory::check(canvas, frames, needed, memory::available_bytes())
+    memory::check_available(canvas, frames, needed, memory::available_bytes())
 }

@@ -19,16 +19,16 @@
 //! Astrophysical Journal Supplement 128, 2000; for panoramas D. B. Goldman, "Vignette and exposure
 //! calibration and compensation", PAMI 32(12), 2010.
 
-use super::patch_light::Light;
+use super::patch_light::PatchLight as Light;
 use super::photometric_samples::{Glimpse, glimpses};
-use super::point_batch::Run;
+use super::point_batch::PointBatch as Run;
 use super::sample::Sample;
 use super::thumbnails::Thumbnails;
 use crate::frames::{Agreement, MAD_TO_SIGMA, SHADING_TERMS, Shading};
 use crate::numerics::simd_dispatch::wide;
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::Placement;
-use crate::render::warp::patches::SCALE;
+use crate::render::warp::patches::PATCH_SCALE as SCALE;
 use crate::surface::Surface;
 use faer::Side;
 use faer::prelude::Solve;

@@ -1,11 +1,11 @@
-//! Samples under a kernel in single precision: 16-bit pictures, and the nearest pixel of any.
+//! Sums under a kernel in single precision: pictures of 16 bits, and the nearest pixel of any.
 
 use super::sample::Sample;
 
-/// The grey value under a kernel that begins with the first sample: down the columns first, side by
+/// Grey value under a kernel that begins with the first sample; columns are summed first, side by
 /// side.
 ///
-/// Arrays of fixed size, here and in [`colour`], are what the compiler makes vectors of.
+/// Compilers vectorise arrays of fixed size, here and in [`colour`].
 #[inline(always)]
 pub fn grey<T: Sample, const N: usize>(
     samples: &[T],
@@ -26,8 +26,8 @@ pub fn grey<T: Sample, const N: usize>(
     value
 }
 
-/// The colour under a kernel that begins with the first sample. Pixels are read four samples wide;
-/// the fourth lane is the neighbour's and means nothing.
+/// Colour under a kernel that begins with the first sample. Pixels are read four samples wide; the
+/// fourth lane belongs to the neighbour and is ignored.
 #[inline(always)]
 pub fn colour<T: Sample, const N: usize>(
     samples: &[T],

@@ -1,15 +1,15 @@
-//! What undoes the light in a frame, over a patch of the chart.
+//! Factor that undoes gain and shading over a patch.
 
-use crate::render::warp::patches::SCALE;
+use crate::render::warp::patches::PATCH_SCALE;
 
-/// The factor `1/(a V)` of [`crate::render::sampling::exposure`] over a patch: quadratic in each of the patch's
-/// coordinates `x, y ∈ [−1, 1]`, through its values at −1, 0 and 1. Light changes so slowly that
-/// nothing is lost.
+/// Factor `1/(a V)` of [`super::exposure`] over a patch: quadratic in each of the patch's
+/// coordinates `x, y ∈ [−1, 1]`, through its values at −1, 0 and 1. Shading changes so slowly that
+/// this is exact enough.
 #[derive(Clone, Copy, Debug)]
-pub struct Light([[f32; 3]; 3]);
+pub struct PatchLight([[f32; 3]; 3]);
 
-impl Light {
-    /// From the factors at −1, 0 and 1 along x, for y at −1, 0 and 1.
+impl PatchLight {
+    /// Fits the factors at −1, 0 and 1 along x, for y at −1, 0 and 1.
     pub fn through(at: [[f32; 3]; 3]) -> Self {
         let along_x = at.map(quadratic);
         let mut c = [[0.0; 3]; 3];
@@ -22,21 +22,21 @@ impl Light {
         Self(c)
     }
 
-    /// The same factor everywhere.
+    /// Constant factor.
     pub fn even(factor: f32) -> Self {
         Self([[factor, 0.0, 0.0], [0.0; 3], [0.0; 3]])
     }
 
-    /// Along a row of the patch, by powers of x.
+    /// Factor along a row of the patch, by powers of x.
     #[inline(always)]
     pub fn row(&self, row: usize) -> [f32; 3] {
-        let y = row as f32 * SCALE - 1.0;
+        let y = row as f32 * PATCH_SCALE - 1.0;
         let Self([a, b, c]) = self;
         [0, 1, 2].map(|k| (c[k] * y + b[k]) * y + a[k])
     }
 }
 
-/// From values at −1, 0 and 1 to coefficients, the lowest first.
+/// Coefficients of a quadratic, the lowest power first, from its values at −1, 0 and 1.
 fn quadratic([before, middle, after]: [f32; 3]) -> [f32; 3] {
     [
         middle,
@@ -53,7 +53,7 @@ mod tests {
     fn quadratics_are_found_as_they_are() {
         let truth = |x: f32, y: f32| (1.0 + 0.3 * x - 0.2 * x * x) * (2.0 - 0.5 * y + 0.1 * y * y);
         let nodes = [-1.0, 0.0, 1.0];
-        let light = Light::through(nodes.map(|y| nodes.map(|x| truth(x, y))));
+        let light = PatchLight::through(nodes.map(|y| nodes.map(|x| truth(x, y))));
         for row in 0..32 {
             let [a, b, c] = light.row(row);
             let y = row as f32 / 16.0 - 1.0;
@@ -61,6 +61,6 @@ mod tests {
                 assert!(((c * x + b) * x + a - truth(x, y)).abs() < 1e-5);
             }
         }
-        assert_eq!(Light::even(1.5).row(9), [1.5, 0.0, 0.0]);
+        assert_eq!(PatchLight::even(1.5).row(9), [1.5, 0.0, 0.0]);
     }
 }

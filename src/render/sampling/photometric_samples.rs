@@ -1,12 +1,12 @@
 //! What the frames show of single points of the wall.
 
-use super::point_batch::Run;
+use super::point_batch::PointBatch as Run;
 use super::thumbnails::Thumbnails;
 use crate::frames::{SHADING_TERMS, shading_terms};
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::Placement;
 use crate::render::layout::tiles::{EDGE, Tile, tiles};
-use crate::render::warp::projection::Points;
+use crate::render::warp::projection::LocalPoints as Points;
 use crate::surface::Surface;
 use nalgebra::Vector2;
 use rayon::prelude::*;

@@ -15,14 +15,14 @@ pub struct Picture {
     width: usize,
     height: usize,
     channels: usize,
-    /// [`PADDING`] samples more than there are: pixels are read several at once.
+    /// Samples and [`PADDING`] zeros: several are read at once.
     samples: Samples,
-    /// Which pixels show the wall; all if there is none.
+    /// Pixels that show the wall; all if there is no mask.
     mask: Option<HalvedMask>,
 }
 
 impl Picture {
-    /// A picture from its samples.
+    /// Makes a picture of its samples.
     ///
     /// # Panics
     /// If `channels` is neither 1 nor 3 or there are not `width · height · channels` samples.
@@ -47,12 +47,12 @@ impl Picture {
         }
     }
 
-    /// The picture of which only what `mask` says shows the wall.
+    /// Masks the picture: only the pixels that `mask` leaves show the wall.
     pub fn masked(self, mask: Option<HalvedMask>) -> Self {
         Self { mask, ..self }
     }
 
-    /// Which pixels show the wall; all if there is none.
+    /// Pixels that show the wall; all if there is no mask.
     pub(crate) fn mask(&self) -> Option<&HalvedMask> {
         self.mask.as_ref()
     }
@@ -64,7 +64,7 @@ impl Picture {
         mask.is_none_or(|mask| mask.is_clear(u, v, kernel.reach_px()))
     }
 
-    /// A decoded file in the format that [`PixelFormat::of`] says; transparency is ignored.
+    /// Converts a decoded file to the format of [`PixelFormat::of`]; transparency is ignored.
     pub fn from_decoded(decoded: DynamicImage) -> Self {
         let (width, height) = (decoded.width() as usize, decoded.height() as usize);
         let format = PixelFormat::of(decoded.color());
@@ -87,7 +87,7 @@ impl Picture {
         self.height
     }
 
-    /// What the pixels are.
+    /// Channels and depth.
     pub fn format(&self) -> PixelFormat {
         PixelFormat {
             channels: self.channels,
@@ -95,13 +95,13 @@ impl Picture {
         }
     }
 
-    /// The samples, and [`PADDING`] more at the end.
+    /// Samples, and [`PADDING`] zeros at the end.
     pub(crate) fn samples(&self) -> &Samples {
         &self.samples
     }
 
-    /// The same picture in a format that holds at least as much: grey becomes colour, and 8 bits
-    /// become 16 (65535 = 255 · 257).
+    /// Converts to a format that holds at least as much: grey becomes colour, and 8 bits become 16
+    /// (65535 = 255 · 257).
     pub fn widened(self, format: PixelFormat) -> Self {
         let (width, height) = (self.width, self.height);
         let copies = if format.channels > self.channels {
@@ -131,7 +131,7 @@ impl Picture {
         widened.masked(mask)
     }
 
-    /// Half the size: the mean of 2 × 2 pixels; an odd last row or column is dropped (see
+    /// Halves the size by the mean of 2 × 2 pixels; an odd last row or column is dropped (see
     /// [`crate::camera::Camera::at_level`]).
     pub fn halved(&self) -> Self {
         let size = (self.width / 2, self.height / 2);
@@ -143,7 +143,7 @@ impl Picture {
         half.masked(self.mask.as_ref().map(|mask| mask.halved(1)))
     }
 
-    /// The means of `2^level × 2^level` pixels, 16 bits deep; odd rows and columns at the end are
+    /// Averages `2^level × 2^level` pixels to one of 16 bits; odd rows and columns at the end are
     /// dropped.
     pub(crate) fn thumbnail(&self, level: usize) -> Self {
         let (width, height) = (self.width >> level, self.height >> level);
@@ -204,8 +204,8 @@ impl Picture {
         data
     }
 
-    /// The value at pixel `(u, v)`, which must lie within the outermost pixel centres. Pixels
-    /// beyond the border repeat the outermost one. A grey picture has it in all three channels.
+    /// Value at pixel `(u, v)`, which must lie within the outermost pixel centres. Pixels beyond
+    /// the border repeat the outermost one. A grey picture has it in all three channels.
     pub fn at(&self, u: f32, v: f32, kernel: &Kernel) -> [f32; 3] {
         let weights = |t: f32| {
             let t = t + kernel.rounding();
@@ -216,10 +216,10 @@ impl Picture {
         let pixel = |at: i64, size: usize| at.clamp(0, size as i64 - 1) as usize;
         let mut value = [0.0; 3];
         for (j, w_y) in w_y.iter().enumerate() {
-            let row = pixel(y + j as i64 - kernel.before() as i64, self.height) * self.width;
+            let row = pixel(y + j as i64 - kernel.taps_before() as i64, self.height) * self.width;
             let mut sum = [0.0; 3];
             for (k, w_x) in w_x.iter().enumerate() {
-                let column = pixel(x + k as i64 - kernel.before() as i64, self.width);
+                let column = pixel(x + k as i64 - kernel.taps_before() as i64, self.width);
                 let first = (row + column) * self.channels;
                 for (c, sum) in sum.iter_mut().enumerate() {
                     let sample = first + c.min(self.channels - 1);
@@ -237,7 +237,7 @@ impl Picture {
         value
     }
 
-    /// The grey value at a pixel, 0 to 255, bilinear: Rec. 709 luma of colour pictures.
+    /// Grey value at a pixel, 0 to 255, bilinear: Rec. 709 luma of colour pictures.
     pub fn grey(&self, pixel: &Vector2<f64>, bilinear: &Kernel) -> f32 {
         let value = self.at(pixel.x as f32, pixel.y as f32, bilinear);
         luma(value) * (255.0 / self.format().white())

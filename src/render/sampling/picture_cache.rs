@@ -1,4 +1,4 @@
-//! The frames of a survey, as many in memory as are needed.
+//! Frames of a survey, as many in memory as are needed.
 
 use super::picture::Picture;
 use super::pixel_format::PixelFormat;
@@ -8,28 +8,28 @@ use crate::progress::Progress;
 use crate::render::error::RenderError;
 use rayon::prelude::*;
 
-/// The frames of a survey, all in the same format, with the camera that took them.
+/// Cache of a survey's frames, all in one format, with the camera that took them.
 ///
-/// Frames are decoded when [`FrameStack::hold`] asks for them and stay until there is no room: a
-/// frame that is decoded again is the same frame.
+/// Frames are decoded by [`PictureCache::load`] and stay until there is no room. A frame that is
+/// decoded again is identical.
 #[derive(Clone, Debug)]
-pub struct FrameStack {
+pub struct PictureCache {
     camera: Camera,
     format: PixelFormat,
     files: FrameSet,
     /// Width and height of the files' pictures.
     full_size: [u32; 2],
     level: usize,
-    packed: bool,
+    compressed: bool,
     pictures: Vec<Option<Picture>>,
 }
 
-/// Files of no more than this share of their pictures' bytes are packed.
-const PACKED: f64 = 0.9;
+/// Largest share of their pictures' bytes at which files count as compressed.
+const MAX_COMPRESSED_SHARE: f64 = 0.9;
 
-/// How many times frames of resolution `native` may be halved before they are coarser than a canvas
-/// of `px_per_metre`: a canvas much coarser than the frames would otherwise pick single pixels out
-/// of them.
+/// Halvings of frames of resolution `native_px_per_metre` before they are coarser than a canvas of
+/// `px_per_metre`: a canvas much coarser than the frames would otherwise pick single pixels out of
+/// them.
 pub fn level_for(camera: &Camera, native_px_per_metre: f64, px_per_metre: f64) -> usize {
     let mut level = 0;
     while native_px_per_metre * 0.5f64.powi(level as i32 + 1) >= px_per_metre
@@ -40,9 +40,9 @@ pub fn level_for(camera: &Camera, native_px_per_metre: f64, px_per_metre: f64) -
     level
 }
 
-impl FrameStack {
-    /// Frames on disk, to be halved `level` times. None is decoded yet; their headers tell the
-    /// format: colour if any frame has colour, 16 bits if any has.
+impl PictureCache {
+    /// Opens frames on disk, to be halved `level` times. None is decoded yet; their headers give
+    /// the format: colour if any frame has colour, 16 bits if any has.
     ///
     /// # Errors
     /// A frame that is missing or is no picture; the first in the order of the files.
@@ -58,20 +58,20 @@ impl FrameStack {
         for found in formats {
             format = format.and(found?);
         }
-        let mut stack = Self {
+        let mut cache = Self {
             camera: camera.at_level(level),
             format,
             files: files.clone(),
             full_size: [camera.width, camera.height],
             level,
-            packed: false,
+            compressed: false,
             pictures: vec![None; files.len()],
         };
-        stack.packed = stack.has_packed_files();
-        Ok(stack)
+        cache.compressed = cache.has_compressed_files();
+        Ok(cache)
     }
 
-    fn has_packed_files(&self) -> bool {
+    fn has_compressed_files(&self) -> bool {
         let bytes = |file: &FrameFile| {
             if file.is_in_video() {
                 0
@@ -81,10 +81,10 @@ impl FrameStack {
         };
         let files: u64 = self.files.iter().map(bytes).sum();
         let pictures = self.full_frame_bytes() * self.len() as u64;
-        files as f64 <= PACKED * pictures as f64
+        files as f64 <= MAX_COMPRESSED_SHARE * pictures as f64
     }
 
-    /// Frames that are in memory already, with the camera that took them.
+    /// Wraps frames that are in memory already, with the camera that took them.
     ///
     /// # Panics
     /// If a picture is not as large as the camera's.
@@ -105,19 +105,19 @@ impl FrameStack {
             files: FrameSet::default(),
             full_size: [camera.width, camera.height],
             level: 0,
-            packed: false,
+            compressed: false,
             pictures: widened.collect(),
         }
     }
 
-    /// Decodes those of `frames` that are not there yet (in parallel). Others stay while all take
-    /// no more than `room` bytes; those go first that come last in `later`, the frames in the order
-    /// in which they will be needed again.
+    /// Decodes those of `frames` that are not in memory yet (in parallel). Others stay while all
+    /// take no more than `room` bytes; those that come last in `later`, the frames in the order in
+    /// which they are needed again, are evicted first.
     ///
     /// # Errors
     /// A frame that is missing, damaged or of another size than the calibration's; the first of
     /// them.
-    pub fn hold(
+    pub fn load(
         &mut self,
         frames: &[usize],
         later: &[usize],
@@ -128,7 +128,7 @@ impl FrameStack {
             .copied()
             .filter(|frame| self.pictures[*frame].is_none())
             .collect();
-        self.make_room(frames, later, room, missing.len());
+        self.evict(frames, later, room, missing.len());
         let decoded: Vec<Result<Picture, RenderError>> = missing
             .par_iter()
             .map(|frame| self.decode(*frame))
@@ -139,7 +139,7 @@ impl FrameStack {
         Ok(())
     }
 
-    fn make_room(&mut self, frames: &[usize], later: &[usize], room: u64, coming: usize) {
+    fn evict(&mut self, frames: &[usize], later: &[usize], room: u64, coming: usize) {
         let most = (room / self.frame_bytes().max(1)) as usize;
         let mut keep = vec![false; self.pictures.len()];
         let held = self.pictures.iter().filter(|p| p.is_some()).count();
@@ -186,36 +186,36 @@ impl FrameStack {
     /// Decodes all frames.
     ///
     /// # Errors
-    /// As [`FrameStack::hold`].
-    pub fn hold_all(&mut self, progress: &dyn Progress) -> Result<(), RenderError> {
+    /// As [`PictureCache::load`].
+    pub fn load_all(&mut self, progress: &dyn Progress) -> Result<(), RenderError> {
         let all: Vec<usize> = (0..self.len()).collect();
-        self.hold_early(&all, progress)
+        self.prefetch(&all, progress)
     }
 
     /// Decodes `frames`, before they are needed.
     ///
     /// # Errors
-    /// As [`FrameStack::hold`].
-    pub fn hold_early(
+    /// As [`PictureCache::load`].
+    pub fn prefetch(
         &mut self,
         frames: &[usize],
         progress: &dyn Progress,
     ) -> Result<(), RenderError> {
         progress.start("frames", frames.len());
-        for run in frames.chunks(8 * rayon::current_num_threads().max(1)) {
-            self.hold(run, &[], u64::MAX)?;
-            progress.advance(run.len());
+        for chunk in frames.chunks(8 * rayon::current_num_threads().max(1)) {
+            self.load(chunk, &[], u64::MAX)?;
+            progress.advance(chunk.len());
         }
         progress.finish();
         Ok(())
     }
 
-    /// The camera of the pictures as they are held (halved as they are).
+    /// Camera of the pictures in memory (halved as they are).
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// The picture of a frame, if it is held.
+    /// Picture of a frame, if it is in memory.
     pub fn picture(&self, frame: usize) -> Option<&Picture> {
         self.pictures[frame].as_ref()
     }
@@ -230,18 +230,18 @@ impl FrameStack {
         self.pictures.is_empty()
     }
 
-    /// Whether files are smaller than their pictures, so that decoding a frame takes more than
-    /// reading it: worth the memory that it takes to do it once only.
-    pub fn is_packed(&self) -> bool {
-        self.packed
+    /// True if files are smaller than their pictures, so that decoding a frame takes more time than
+    /// reading it and keeping frames is worth the memory.
+    pub fn is_compressed(&self) -> bool {
+        self.compressed
     }
 
-    /// What the pixels are.
+    /// Channels and depth of all frames.
     pub fn format(&self) -> PixelFormat {
         self.format
     }
 
-    /// Memory of one frame as its file has it, bytes.
+    /// Memory of one frame at its file's size, bytes.
     pub fn full_frame_bytes(&self) -> u64 {
         let [width, height] = self.full_size.map(u64::from);
         width * height * self.format.pixel_bytes(false) as u64
@@ -278,10 +278,10 @@ mod tests {
         let camera = Camera::from_vertical_fov(2, 2, 1.0);
         let grey = Picture::new(2, 2, 1, vec![7u8; 4]);
         let colour = Picture::new(2, 2, 3, vec![9u8; 12]);
-        let stack = FrameStack::from_pictures(camera, vec![grey, colour]);
-        assert_eq!(stack.format().channels, 3);
+        let cache = PictureCache::from_pictures(camera, vec![grey, colour]);
+        assert_eq!(cache.format().channels, 3);
         assert_eq!(
-            stack.picture(0),
+            cache.picture(0),
             Some(&Picture::new(2, 2, 3, vec![7u8; 12]))
         );
     }
@@ -298,34 +298,34 @@ mod tests {
             })
             .collect();
         let camera = Camera::from_vertical_fov(16, 16, 1.0);
-        let mut stack = FrameStack::open(&files.into(), &camera, 0).unwrap();
-        let held = |stack: &FrameStack| -> Vec<usize> {
-            (0..4).filter(|k| stack.picture(*k).is_some()).collect()
+        let mut cache = PictureCache::open(&files.into(), &camera, 0).unwrap();
+        let held = |cache: &PictureCache| -> Vec<usize> {
+            (0..4).filter(|k| cache.picture(*k).is_some()).collect()
         };
-        let room = 3 * stack.frame_bytes();
-        stack.hold(&[0, 1, 2], &[3, 2, 0], room).unwrap();
-        assert_eq!(held(&stack), [0, 1, 2]);
+        let room = 3 * cache.frame_bytes();
+        cache.load(&[0, 1, 2], &[3, 2, 0], room).unwrap();
+        assert_eq!(held(&cache), [0, 1, 2]);
         // 1 is not needed any more, 2 sooner than 0.
-        stack.hold(&[3], &[2, 0], room).unwrap();
-        assert_eq!(held(&stack), [0, 2, 3]);
-        stack.hold(&[1], &[3, 2, 0], room).unwrap();
-        assert_eq!(held(&stack), [1, 2, 3]);
-        let before = stack.picture(2).cloned();
-        stack.hold(&[0, 1, 3], &[], 0).unwrap();
-        assert_eq!(held(&stack), [0, 1, 3]);
-        assert_eq!(stack.decode(2).ok(), before);
+        cache.load(&[3], &[2, 0], room).unwrap();
+        assert_eq!(held(&cache), [0, 2, 3]);
+        cache.load(&[1], &[3, 2, 0], room).unwrap();
+        assert_eq!(held(&cache), [1, 2, 3]);
+        let before = cache.picture(2).cloned();
+        cache.load(&[0, 1, 3], &[], 0).unwrap();
+        assert_eq!(held(&cache), [0, 1, 3]);
+        assert_eq!(cache.decode(2).ok(), before);
     }
 
     #[test]
     fn files_as_large_as_their_pictures_are_not_packed() {
         let folder = tempfile::tempdir().unwrap();
         let camera = Camera::from_vertical_fov(64, 64, 1.0);
-        for (name, packed) in [("frame.png", true), ("frame.tif", false)] {
+        for (name, compressed) in [("frame.png", true), ("frame.tif", false)] {
             let path = folder.path().join(name);
             image::GrayImage::new(64, 64).save(&path).unwrap();
             let files = vec![FrameFile::picture(0, path)].into();
-            let stack = FrameStack::open(&files, &camera, 0).unwrap();
-            assert_eq!(stack.is_packed(), packed, "{name}");
+            let cache = PictureCache::open(&files, &camera, 0).unwrap();
+            assert_eq!(cache.is_compressed(), compressed, "{name}");
         }
     }
 }

@@ -1,10 +1,10 @@
-//! What the pixels of a picture are: channels and depth.
+//! Channels and depth of pictures.
 
 use super::sample::Sample;
 use image::ColorType;
 use serde::{Deserialize, Serialize};
 
-/// What the pixels of a picture are.
+/// Channels and depth of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PixelFormat {
     /// 1 (grey) or 3 (red, green, blue).
@@ -14,8 +14,8 @@ pub struct PixelFormat {
 }
 
 impl PixelFormat {
-    /// How pictures of a file's colour type are held: grey stays grey and everything else becomes
-    /// colour, 16 bits stay 16 and everything else becomes 8.
+    /// Format in which pictures of a file's colour type are held: grey stays grey and everything
+    /// else becomes colour, 16 bits stay 16 and everything else becomes 8.
     pub fn of(colour: ColorType) -> Self {
         Self {
             channels: if colour.has_color() { 3 } else { 1 },
@@ -26,7 +26,7 @@ impl PixelFormat {
         }
     }
 
-    /// The least format that holds both.
+    /// Smallest format that holds both.
     pub fn and(self, other: Self) -> Self {
         Self {
             channels: self.channels.max(other.channels),
@@ -39,7 +39,7 @@ impl PixelFormat {
         if self.deep { u16::WHITE } else { u8::WHITE }
     }
 
-    /// The grey value, 0 to 255, of values side by side: Rec. 709 luma of colour.
+    /// Grey value, 0 to 255, of values side by side: Rec. 709 luma of colour.
     pub fn grey(self, [first, second, third, _]: [f32; 4]) -> f32 {
         let value = match self.channels {
             1 => first,

@@ -1,6 +1,6 @@
-//! The numbers that pictures are made of.
+//! Samples of pictures: 8 and 16 bits.
 
-use crate::numerics::rounding::WHOLE;
+use crate::numerics::rounding::ROUNDING_OFFSET;
 use image::{DynamicImage, ImageBuffer};
 use serde::{Deserialize, Serialize};
 
@@ -9,13 +9,14 @@ pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + '
     /// Full scale.
     const WHITE: f32;
 
-    /// As a number from 0 to [`Sample::WHITE`].
+    /// Converts to a number from 0 to [`Sample::WHITE`].
     fn value(self) -> f32;
 
-    /// The nearest sample; numbers beyond the scale become its end (a cubic overshoots at edges).
+    /// Rounds to the nearest sample; numbers beyond the scale become its end (a cubic overshoots at
+    /// edges).
     fn nearest(value: f32) -> Self;
 
-    /// Rows of samples as rows of bytes, if that is what they are.
+    /// Rows of samples as rows of bytes, if they are bytes.
     fn bytes<'a, 'b>(rows: &'a mut [&'b mut [Self]]) -> Option<&'a mut [&'b mut [u8]]>;
 }
 
@@ -31,7 +32,7 @@ macro_rules! sample {
 
             #[inline(always)]
             fn nearest(value: f32) -> Self {
-                (value.clamp(0.0, Self::WHITE) + WHOLE).to_bits() as Self
+                (value.clamp(0.0, Self::WHITE) + ROUNDING_OFFSET).to_bits() as Self
             }
 
             fn bytes<'a, 'b>(rows: &'a mut [&'b mut [Self]]) -> Option<&'a mut [&'b mut [u8]]> {
@@ -44,7 +45,7 @@ macro_rules! sample {
 
 sample!(u8, |rows| Some(rows); u16, |_| None);
 
-/// Samples that pictures have beyond their own at the end: several are read at once.
+/// Zeros at the end of a picture's samples: several samples are read at once.
 pub const PADDING: usize = 16;
 
 /// Samples of one kind, row-major, channels interleaved.
@@ -57,7 +58,7 @@ pub enum Samples {
 }
 
 impl Samples {
-    /// How many there are.
+    /// Number of samples.
     pub fn len(&self) -> usize {
         match self {
             Self::Eight(samples) => samples.len(),
@@ -65,13 +66,13 @@ impl Samples {
         }
     }
 
-    /// True if there are none.
+    /// True without samples.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The picture of `width × height` pixels that they are: grey (one channel) or red-green-blue,
-    /// each pixel's alpha last. An empty one if there are too few.
+    /// Converts to a picture of `width × height` pixels: grey (one channel) or red-green-blue, each
+    /// pixel's alpha last. It is empty if there are too few samples.
     pub(crate) fn into_image(self, [width, height]: [u32; 2], channels: usize) -> DynamicImage {
         match (self, channels) {
             (Self::Eight(samples), 1) => {

@@ -1,16 +1,16 @@
-//! All frames, small: enough to find out how they were exposed and where they agree.
+//! Small pictures of all frames, for exposure and seams.
 
 use super::picture::Picture;
-use super::picture_cache::FrameStack;
+use super::picture_cache::PictureCache;
 use super::pixel_format::PixelFormat;
-use super::point_batch::Run;
+use super::point_batch::PointBatch;
 use crate::camera::Camera;
 use crate::numerics::kernel::{Interpolation, Kernel};
 use crate::progress::Progress;
 use crate::render::error::RenderError;
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::{Placement, native_px_per_metre};
-use crate::render::warp::projection::{Look, Points};
+use crate::render::warp::projection::{LocalPoints, LocalProjection};
 use crate::surface::Surface;
 use rayon::prelude::*;
 
@@ -25,15 +25,15 @@ pub struct Thumbnails {
 }
 
 impl Thumbnails {
-    /// Thumbnails whose pixels are means of `2^level × 2^level` pixels of the frames.
+    /// Makes thumbnails whose pixels are means of `2^level × 2^level` pixels of the frames.
     ///
-    /// Frames that are not held are decoded and let go again.
+    /// Frames that are not in memory are decoded and dropped again.
     ///
     /// # Errors
     /// A frame that is missing, damaged or of another size than the calibration's; the first of
     /// them.
     pub fn of(
-        frames: &FrameStack,
+        frames: &PictureCache,
         level: usize,
         progress: &dyn Progress,
     ) -> Result<Self, RenderError> {
@@ -60,13 +60,13 @@ impl Thumbnails {
         })
     }
 
-    /// The level at which frames, as they are held, are about as fine as `grid`.
+    /// Level at which frames, as they are held, are about as fine as `grid`.
     ///
     /// # Errors
     /// As [`native_px_per_metre`].
     pub fn level(
         surface: &dyn Surface,
-        frames: &FrameStack,
+        frames: &PictureCache,
         placements: &[Placement],
         grid: &Canvas,
     ) -> Result<usize, RenderError> {
@@ -105,13 +105,13 @@ impl Thumbnails {
         self.scale
     }
 
-    /// The coordinate on a frame of one on its thumbnail: `2^l t + (2^l − 1)/2`.
+    /// Coordinate on a frame of one on its thumbnail: `2^l t + (2^l − 1)/2`.
     #[inline(always)]
     pub fn full(&self, t: f32) -> f32 {
         self.scale * t + 0.5 * (self.scale - 1.0)
     }
 
-    /// What the pixels are.
+    /// Channels and depth.
     pub fn format(&self) -> PixelFormat {
         PixelFormat {
             channels: self.channels(),
@@ -119,15 +119,15 @@ impl Thumbnails {
         }
     }
 
-    /// The thumbnail of a frame, ready to be looked at from `points`.
+    /// Prepares the thumbnail of a frame for sampling at `points`.
     pub fn view<'a>(
         &'a self,
         frame: usize,
         placement: &Placement,
-        points: &'a Points,
+        points: &'a LocalPoints,
     ) -> ThumbnailView<'a> {
         ThumbnailView {
-            look: Look::new(
+            projection: LocalProjection::new(
                 &placement.camera(&self.camera),
                 &placement.pose,
                 &points.origin,
@@ -139,19 +139,19 @@ impl Thumbnails {
     }
 }
 
-/// A thumbnail, ready to be looked at from points of the wall.
+/// A thumbnail, prepared for sampling at points of the wall.
 pub struct ThumbnailView<'a> {
-    look: Look,
+    projection: LocalProjection,
     picture: &'a Picture,
     bilinear: &'a Kernel,
-    points: &'a Points,
+    points: &'a LocalPoints,
 }
 
 impl ThumbnailView<'_> {
-    /// Looks at `count` of the points from index `start`: where they appear, and the values there,
+    /// Samples `count` of the points from index `start`: their pixels, and the values there,
     /// bilinear.
-    pub fn look_at(&self, run: &mut Run, start: usize, count: usize) {
-        run.project(&self.look, self.points, start, count);
-        run.sample(self.picture, self.bilinear, 0..count);
+    pub fn look_at(&self, batch: &mut PointBatch, start: usize, count: usize) {
+        batch.project(&self.projection, self.points, start, count);
+        batch.sample(self.picture, self.bilinear, 0..count);
     }
 }

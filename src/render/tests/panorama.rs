@@ -10,7 +10,7 @@ use crate::render::layout::placement::{NO_FRAME, place};
 use crate::render::output::panorama::Panorama;
 use crate::render::output::plan::Plan;
 use crate::render::output::stitch::{on_the_axis, render};
-use crate::render::sampling::picture_cache::FrameStack;
+use crate::render::sampling::picture_cache::PictureCache;
 use crate::render::sampling::pixel_format::PixelFormat;
 use crate::render::sampling::sample::Samples;
 use crate::render::tests::pictures::{changed_pictures, pictures};
@@ -31,13 +31,13 @@ const BEST: RenderOptions = RenderOptions {
     ..PLAIN
 };
 
-fn draw(wall: &TestWall, mut stack: FrameStack, ppm: f64, options: &RenderOptions) -> Panorama {
+fn draw(wall: &TestWall, mut cache: PictureCache, ppm: f64, options: &RenderOptions) -> Panorama {
     let placements = place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, ppm).unwrap();
     let progress = &Silent;
     render(
         &wall.circle,
-        &mut stack,
+        &mut cache,
         &placements,
         &canvas,
         options,
@@ -122,15 +122,15 @@ fn every_mode_covers_what_the_frames_see() {
 fn gains_and_a_headlight_are_undone() {
     let wall = TestWall::ring(test_wall::waves);
     let (w, h) = (f64::from(wall.camera.width), f64::from(wall.camera.height));
-    let stack = changed_pictures(&wall, |k, u, v, value| {
+    let cache = changed_pictures(&wall, |k, u, v, value| {
         let gain = 1.0 + 0.25 * (2.3 * k as f64).sin();
         let (x, y) = (2.0 * u as f64 / w - 1.0, 2.0 * v as f64 / h - 1.0);
         let lamp = 1.0 - 0.25 * (x * x + y * y);
         (f64::from(value) * gain * lamp).min(255.0) as f32
     });
-    let raw = draw(&wall, stack.clone(), 60.0, &PLAIN);
+    let raw = draw(&wall, cache.clone(), 60.0, &PLAIN);
     let (before, ..) = difference(&raw, wall.perimeter_m());
-    let lit = draw(&wall, stack, 60.0, &BEST);
+    let lit = draw(&wall, cache, 60.0, &BEST);
     // A common factor cannot be known.
     let (grey, covered) = lit.grey();
     let canvas = *lit.canvas();
@@ -162,13 +162,13 @@ fn gains_and_a_headlight_are_undone() {
 fn what_one_frame_alone_shows_is_left_out_where_others_see_the_wall() {
     let wall = TestWall::ring(test_wall::waves);
     // Something dark before the wall in frames that overlap at least two others there.
-    let stack = changed_pictures(&wall, |k, u, v, value| {
+    let cache = changed_pictures(&wall, |k, u, v, value| {
         let off = (u as f64 - 80.0).hypot(v as f64 - 60.0);
         if k == 6 && off < 12.0 { 5.0 } else { value }
     });
     let with = |options| {
         difference(
-            &draw(&wall, stack.clone(), 60.0, options),
+            &draw(&wall, cache.clone(), 60.0, options),
             wall.perimeter_m(),
         )
         .0
@@ -188,7 +188,7 @@ fn what_one_frame_alone_shows_is_left_out_where_others_see_the_wall() {
 /// that it is said to be from.
 #[test]
 fn raw_pixels_are_those_of_the_frames() {
-    struct Check<'a>(&'a TestWall, &'a FrameStack, usize);
+    struct Check<'a>(&'a TestWall, &'a PictureCache, usize);
     impl Target for Check<'_> {
         fn wants_sources(&self) -> bool {
             true
@@ -227,11 +227,11 @@ fn raw_pixels_are_those_of_the_frames() {
         }
     }
     let wall = TestWall::ring(test_wall::waves);
-    let mut stack = changed_pictures(&wall, |k, u, v, value| {
+    let mut cache = changed_pictures(&wall, |k, u, v, value| {
         // Different light and noise in every frame.
         0.8 * value + (2 * k) as f32 + ((7 * u + 13 * v + 5 * k) % 11) as f32
     });
-    let frames = stack.clone();
+    let frames = cache.clone();
     let placements = place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, 70.0).unwrap();
     let options = RenderOptions {
@@ -241,7 +241,7 @@ fn raw_pixels_are_those_of_the_frames() {
     };
     let plan = Plan::new(
         &wall.circle,
-        &stack,
+        &cache,
         &placements,
         &canvas,
         &options,
@@ -249,7 +249,7 @@ fn raw_pixels_are_those_of_the_frames() {
     )
     .unwrap();
     let mut check = Check(&wall, &frames, 0);
-    plan.draw(&mut stack, u64::MAX, &mut [&mut check], &Silent)
+    plan.draw(&mut cache, u64::MAX, &mut [&mut check], &Silent)
         .unwrap();
     assert!(check.2 * 2 > canvas.pixels(), "{} pixels", check.2);
 }
@@ -327,11 +327,11 @@ fn colour_and_depth_change_nothing_in_grey() {
         (1, true, image::ColorType::La16),
         (3, true, image::ColorType::Rgba16),
     ] {
-        let stack = pictures(&wall);
+        let cache = pictures(&wall);
         let format = PixelFormat { channels, deep };
-        let wide = (0..stack.len()).map(|k| stack.picture(k).unwrap().clone().widened(format));
-        let stack = FrameStack::from_pictures(wall.camera, wide.collect());
-        let drawn = draw(&wall, stack, 40.0, &PLAIN).into_image(Layout::ThetaRight);
+        let wide = (0..cache.len()).map(|k| cache.picture(k).unwrap().clone().widened(format));
+        let cache = PictureCache::from_pictures(wall.camera, wide.collect());
+        let drawn = draw(&wall, cache, 40.0, &PLAIN).into_image(Layout::ThetaRight);
         assert_eq!(drawn.color(), colour);
         let pairs = grey
             .to_rgba16()
@@ -349,7 +349,7 @@ fn colour_and_depth_change_nothing_in_grey() {
 #[test]
 fn what_is_finer_than_the_canvas_becomes_grey() {
     let wall = TestWall::ring(|_, _| 0.0);
-    let stack = changed_pictures(
+    let cache = changed_pictures(
         &wall,
         |_, u, v, _| if (u + v) % 2 == 0 { 100.0 } else { 200.0 },
     );
@@ -357,7 +357,7 @@ fn what_is_finer_than_the_canvas_becomes_grey() {
         mode: Mode::BestView,
         ..PLAIN
     };
-    let panorama = draw(&wall, stack, 62.0, &options);
+    let panorama = draw(&wall, cache, 62.0, &options);
     let (grey, covered) = panorama.grey();
     let seen = grey
         .data()
@@ -378,11 +378,11 @@ fn little_memory_changes_nothing_but_the_time() {
     use crate::frames::{FrameFile, FrameSet};
     let wall = TestWall::ring(test_wall::waves);
     let folder = tempfile::tempdir().unwrap();
-    let stack = pictures(&wall);
-    let files: Vec<FrameFile> = (0..stack.len())
+    let cache = pictures(&wall);
+    let files: Vec<FrameFile> = (0..cache.len())
         .map(|index| {
             let path = folder.path().join(format!("{index:03}.png"));
-            let Samples::Eight(samples) = stack.picture(index).unwrap().samples() else {
+            let Samples::Eight(samples) = cache.picture(index).unwrap().samples() else {
                 panic!("8 bits");
             };
             let (width, height) = (wall.camera.width, wall.camera.height);
@@ -396,7 +396,7 @@ fn little_memory_changes_nothing_but_the_time() {
     let placements = place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, 700.0).unwrap();
     let draw = |room| {
-        let mut frames = FrameStack::open(&files, &wall.camera, 0).unwrap();
+        let mut frames = PictureCache::open(&files, &wall.camera, 0).unwrap();
         let plan = Plan::new(&wall.circle, &frames, &placements, &canvas, &BEST, &Silent);
         let plan = plan.unwrap();
         let mut panorama = Panorama::empty(canvas, frames.format());

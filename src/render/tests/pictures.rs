@@ -2,11 +2,11 @@
 
 use crate::frames::GreyImage;
 use crate::render::sampling::picture::Picture;
-use crate::render::sampling::picture_cache::FrameStack;
+use crate::render::sampling::picture_cache::PictureCache;
 use crate::test_wall::TestWall;
 
 /// The frames of a wall as 8-bit pictures.
-pub fn pictures(wall: &TestWall) -> FrameStack {
+pub fn pictures(wall: &TestWall) -> PictureCache {
     changed_pictures(wall, |_, _, _, value| value)
 }
 
@@ -14,7 +14,7 @@ pub fn pictures(wall: &TestWall) -> FrameStack {
 pub fn changed_pictures(
     wall: &TestWall,
     change: impl Fn(usize, usize, usize, f32) -> f32,
-) -> FrameStack {
+) -> PictureCache {
     let picture = |(k, frame): (usize, GreyImage)| {
         let width = frame.width();
         let value = |(at, v): (usize, &f32)| change(k, at % width, at / width, *v).round() as u8;
@@ -22,5 +22,5 @@ pub fn changed_pictures(
         Picture::new(width, frame.height(), 1, data)
     };
     let pictures = wall.frames().into_iter().enumerate().map(picture);
-    FrameStack::from_pictures(wall.camera, pictures.collect())
+    PictureCache::from_pictures(wall.camera, pictures.collect())
 }

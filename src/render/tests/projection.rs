@@ -4,11 +4,11 @@ use crate::camera::{Camera, KannalaBrandt, Lens, Sweep};
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::{Placement, place};
 use crate::render::layout::tiles::tiles;
-use crate::render::sampling::point_batch::Run;
-use crate::render::warp::control_points::Lattice;
-use crate::render::warp::local_polynomial::{Chart, Projected};
-use crate::render::warp::patches::PATCH;
-use crate::render::warp::projection::{Look, Points};
+use crate::render::sampling::point_batch::PointBatch;
+use crate::render::warp::control_points::ControlPoints;
+use crate::render::warp::local_polynomial::{LocalPolynomialWarp, ProjectedControlPoints};
+use crate::render::warp::patches::PATCH_EDGE;
+use crate::render::warp::projection::{LocalPoints, LocalProjection};
 use crate::surface::Circle;
 use crate::trajectory::{Shutter, spiral};
 
@@ -46,8 +46,9 @@ fn charts_project_as_cameras_do() {
             ..placements[1]
         };
         let canvas = Canvas::of_placements(&circle, &placements, camera.fx / 3.0).unwrap();
-        let (mut lattice, mut projected) = (Lattice::default(), Projected::default());
-        let (mut run, mut points) = (Run::default(), Points::default());
+        let (mut control_points, mut projected) =
+            (ControlPoints::default(), ProjectedControlPoints::default());
+        let (mut batch, mut points) = (PointBatch::default(), LocalPoints::default());
         let (mut seen, mut smooth, mut all) = (0, 0, 0);
         let all_tiles = tiles(&circle, &canvas, &placements, 128);
         for tile in all_tiles
@@ -55,35 +56,39 @@ fn charts_project_as_cameras_do() {
             .flatten()
             .filter(|tile| tile.frames.contains(&1))
         {
-            lattice.set(&circle, &canvas, tile);
-            let look = Look::new(&camera, &placement.pose, &lattice.points().origin);
-            let chart = Chart::new(&look, &lattice, &mut projected);
-            smooth += (0..chart.len())
-                .filter(|k| chart.lines(*k).is_some())
+            control_points.set(&circle, &canvas, tile);
+            let projection =
+                LocalProjection::new(&camera, &placement.pose, &control_points.points().origin);
+            let warp = LocalPolynomialWarp::new(&projection, &control_points, &mut projected);
+            smooth += (0..warp.len())
+                .filter(|k| warp.coefficients(*k).is_some())
                 .count();
-            let across = tile.columns.div_ceil(PATCH as u32) as usize;
-            let corner = |k: usize| (k / across * PATCH, k % across * PATCH);
-            all += (0..chart.len())
+            let across = tile.columns.div_ceil(PATCH_EDGE as u32) as usize;
+            let corner = |k: usize| (k / across * PATCH_EDGE, k % across * PATCH_EDGE);
+            all += (0..warp.len())
                 .map(corner)
-                .filter(|(row, column)| !chart.is_outside_at(*row, *column))
+                .filter(|(row, column)| !warp.is_outside_at(*row, *column))
                 .count();
             let exact = tile.points(&circle, &canvas);
             points.set(&exact);
             let width = tile.columns as usize;
             for row in 0..tile.rows as usize {
-                run.locate(&chart, &look, &points, (row, width), 0..width);
+                batch.locate(&warp, &projection, &points, (row, width), 0..width);
                 for k in 0..width {
                     let x_c = placement.pose.to_camera(&exact[row * width + k]);
                     let pixel = camera.project(&x_c);
                     let there = pixel.is_some_and(|pixel| camera.sees(&pixel, 0.0));
-                    let (u, v) = (f64::from(run.pixels().0[k]), f64::from(run.pixels().1[k]));
+                    let (u, v) = (
+                        f64::from(batch.pixels().0[k]),
+                        f64::from(batch.pixels().1[k]),
+                    );
                     let Some(pixel) = pixel.filter(|pixel| camera.sees(pixel, -1.0)) else {
-                        assert!(!run.seen()[k]);
+                        assert!(!batch.seen()[k]);
                         continue;
                     };
                     // At the very border rounding decides.
                     if camera.sees(&pixel, 2e-3) || !camera.sees(&pixel, -2e-3) {
-                        assert_eq!(run.seen()[k], there, "{camera:?} {pixel}");
+                        assert_eq!(batch.seen()[k], there, "{camera:?} {pixel}");
                     }
                     if there {
                         let off = (u - pixel.x).hypot(v - pixel.y);

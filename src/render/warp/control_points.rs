@@ -1,39 +1,44 @@
 //! The points of a tile through which a local polynomial warp is fitted.
 
-use super::patches::PATCH;
-use super::projection::Points;
+use super::patches::PATCH_EDGE;
+use super::projection::LocalPoints;
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::tiles::Tile;
 use crate::surface::Surface;
 use nalgebra::Vector3;
 use std::f64::consts::SQRT_2;
 
-/// Points of a patch along each side, the last of which are the next one's first; those at 0 are
-/// checked, the others fitted.
-pub const POINTS: [f64; 5] = [-1.0, 1.0 - SQRT_2, 0.0, SQRT_2 - 1.0, 1.0];
-/// Points from patch to patch.
-pub const STEP: usize = POINTS.len() - 1;
+/// Coordinates of a patch's control points along each axis; the last are the next patch's first.
+/// The polynomial is checked at 0 and fitted at the others.
+pub const PATCH_POINTS: [f64; 5] = [-1.0, 1.0 - SQRT_2, 0.0, SQRT_2 - 1.0, 1.0];
+/// Control points from one patch to the next.
+pub const POINTS_PER_PATCH: usize = PATCH_POINTS.len() - 1;
 
-/// The points of a tile whose projections tell all others'.
+/// Control points of all patches of a tile.
 #[derive(Debug, Default)]
-pub struct Lattice {
+pub struct ControlPoints {
     exact: Vec<Vector3<f64>>,
-    points: Points,
-    /// Patches across and down.
+    points: LocalPoints,
+    /// Number of patches across and down.
     pub patches: [usize; 2],
 }
 
-impl Lattice {
-    /// Puts the points of another tile in their place.
+impl ControlPoints {
+    /// Replaces the points by those of another tile.
     pub(crate) fn set(&mut self, surface: &dyn Surface, canvas: &Canvas, tile: &Tile) {
         let along = |first: u32, count: u32| {
-            let patches = (count as usize).div_ceil(PATCH);
+            let patches = (count as usize).div_ceil(PATCH_EDGE);
             let at = move |k: usize| {
-                let half = 0.5 * PATCH as f64;
-                let (patch, point) = (k / STEP, k % STEP);
-                f64::from(first) + (2 * patch) as f64 * half + half * (1.0 + POINTS[point])
+                let half = 0.5 * PATCH_EDGE as f64;
+                let (patch, point) = (k / POINTS_PER_PATCH, k % POINTS_PER_PATCH);
+                f64::from(first) + (2 * patch) as f64 * half + half * (1.0 + PATCH_POINTS[point])
             };
-            (patches, (0..=patches * STEP).map(at).collect::<Vec<f64>>())
+            (
+                patches,
+                (0..=patches * POINTS_PER_PATCH)
+                    .map(at)
+                    .collect::<Vec<f64>>(),
+            )
         };
         let (across, columns) = along(tile.column, tile.columns);
         let (down, rows) = along(tile.row, tile.rows);
@@ -47,12 +52,12 @@ impl Lattice {
         self.patches = [across, down];
     }
 
-    /// The points; the first is the tile's first pixel.
-    pub fn points(&self) -> &Points {
+    /// The points, row-major; the first is the tile's first pixel.
+    pub fn points(&self) -> &LocalPoints {
         &self.points
     }
 
     pub fn columns(&self) -> usize {
-        self.patches[0] * STEP + 1
+        self.patches[0] * POINTS_PER_PATCH + 1
     }
 }

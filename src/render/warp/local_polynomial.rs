@@ -1,4 +1,4 @@
-//! Where the pixels of a tile appear in a frame: polynomials, patch by patch.
+//! Mapping of a tile's pixels into a frame by polynomials, patch by patch.
 //!
 //! From the wall to a frame everything is smooth: surface, pose, lens, a camera that moves while it
 //! reads its rows. Over a patch of 32 × 32 canvas pixels, u and v are cubic in each of the patch's
@@ -9,62 +9,69 @@
 //! through the exact projections of 4 × 4 points at ±1 and ±(√2 − 1). There the error of an
 //! interpolated cubic is the same on the border as in the middle, `0.17/4! ∂⁴u` to first order; in
 //! between, at 0, it is measured against the exact projection of nine points more. A patch where
-//! that finds more than [`MOST_OFF_PX`] is projected point by point.
+//! that finds more than [`MAX_RESIDUAL_PX`] is projected point by point.
 
-use super::control_points::{Lattice, POINTS, STEP};
-use super::patches::{EIGHT, PATCH, SCALE};
-use super::projection::Look;
+use super::control_points::{ControlPoints, PATCH_POINTS, POINTS_PER_PATCH};
+use super::patches::{LANES, PATCH_EDGE, PATCH_SCALE};
+use super::projection::LocalProjection;
 use std::f64::consts::SQRT_2;
 use std::ops::Range;
 
-/// Error of a polynomial at the most, pixels of the frame.
-const MOST_OFF_PX: f32 = 1e-3;
-/// Farther than this outside the frame, pixels, everywhere: nothing in between is inside.
-const OUTSIDE_PX: f32 = 2.0;
+/// Largest error of a polynomial, pixels of the frame. A higher value is faster, as fewer patches
+/// are projected point by point, and less exact.
+const MAX_RESIDUAL_PX: f32 = 1e-3;
+/// Margin around the frame, pixels: a patch whose control points all lie beyond the same side of it
+/// by more is not in the frame.
+const OUTSIDE_MARGIN_PX: f32 = 2.0;
 
-/// Powers of x with u's coefficients, then with v's: side by side, they are one vector.
-pub type Lanes = [f32; 8];
+/// Coefficients of u by powers of x, then those of v: side by side, they are one vector.
+pub type PatchCoefficients = [f32; 8];
 
 #[derive(Clone, Copy, Debug)]
-enum Patch {
-    /// By powers of y.
-    Smooth([Lanes; 4]),
+enum PatchWarp {
+    /// Polynomials by powers of y.
+    Polynomial([PatchCoefficients; 4]),
     /// No pixel of it lies in the frame.
     Outside,
-    /// To be projected point by point.
-    Rough,
+    /// Projected point by point.
+    Exact,
 }
 
-/// Where the pixels of a tile appear in a frame.
+/// Mapping of a tile's pixels into a frame: one pair of bicubic polynomials a patch.
 #[derive(Debug)]
-pub struct Chart {
-    /// Patches across.
+pub struct LocalPolynomialWarp {
+    /// Number of patches across.
     across: usize,
-    patches: Vec<Patch>,
+    patches: Vec<PatchWarp>,
 }
 
-/// Where the lattice's points appear, and whether the lens shows them.
+/// Projections of a tile's control points, and which of them the lens shows; buffers that are used
+/// again for the next tile.
 #[derive(Debug, Default)]
-pub struct Projected {
+pub struct ProjectedControlPoints {
     u: Vec<f32>,
     v: Vec<f32>,
     shown: Vec<bool>,
 }
 
-impl Chart {
-    /// The chart of a tile for a frame that is looked at by `look`.
-    pub fn new(look: &Look, lattice: &Lattice, projected: &mut Projected) -> Self {
-        let count = lattice.points().len();
-        let Projected { u, v, shown } = projected;
+impl LocalPolynomialWarp {
+    /// Fits the polynomials of a tile for a frame with the given `projection`.
+    pub fn new(
+        projection: &LocalProjection,
+        control_points: &ControlPoints,
+        projected: &mut ProjectedControlPoints,
+    ) -> Self {
+        let count = control_points.points().len();
+        let ProjectedControlPoints { u, v, shown } = projected;
         u.resize(count, 0.0);
         v.resize(count, 0.0);
         shown.resize(count, false);
-        look.project_all(lattice.points(), 0, (u, v, shown));
-        let [across, down] = lattice.patches;
-        let columns = lattice.columns();
-        let limit = look.limit();
+        projection.project_all(control_points.points(), 0, (u, v, shown));
+        let [across, down] = control_points.patches;
+        let columns = control_points.columns();
+        let limit = projection.limit();
         let patches = (0..across * down).map(|patch| {
-            let first = (patch / across * columns + patch % across) * STEP;
+            let first = (patch / across * columns + patch % across) * POINTS_PER_PATCH;
             let mut all_shown = true;
             let (mut u_all, mut v_all) = ([[0.0; 5]; 5], [[0.0; 5]; 5]);
             for row in 0..5 {
@@ -74,12 +81,12 @@ impl Chart {
                 all_shown &= shown[at..at + 5].iter().all(|shown| *shown);
             }
             if !all_shown {
-                return Patch::Rough;
+                return PatchWarp::Exact;
             }
             if outside(&u_all, limit[0]) || outside(&v_all, limit[1]) {
-                return Patch::Outside;
+                return PatchWarp::Outside;
             }
-            Self::fit(&u_all, &v_all)
+            Self::fit_both(&u_all, &v_all)
         });
         Self {
             across,
@@ -87,8 +94,8 @@ impl Chart {
         }
     }
 
-    fn fit(u: &[[f32; 5]; 5], v: &[[f32; 5]; 5]) -> Patch {
-        let (u, v) = (coefficients(u), coefficients(v));
+    fn fit_both(u: &[[f32; 5]; 5], v: &[[f32; 5]; 5]) -> PatchWarp {
+        let (u, v) = (fit_patch(u), fit_patch(v));
         match (u, v) {
             (Some(u), Some(v)) => {
                 let mut lines = [[0.0; 8]; 4];
@@ -96,23 +103,26 @@ impl Chart {
                     line[..4].copy_from_slice(u);
                     line[4..].copy_from_slice(v);
                 }
-                Patch::Smooth(lines)
+                PatchWarp::Polynomial(lines)
             }
-            _ => Patch::Rough,
+            _ => PatchWarp::Exact,
         }
     }
 
-    /// Where these rows and columns of a smooth patch lie, to be sure: between these, along u and
-    /// along v.
+    /// Bounds of u and of v over some rows and columns of a patch.
     ///
     /// Around the middle `(x, y)` of `2a × 2b`: `|Δu| ≤ a max|∂u/∂x| + b max|∂u/∂y|`, and as all
     /// powers of x and y are at most 1, `|∂u/∂x| ≤ Σ k |c_kl|`, `|∂u/∂y| ≤ Σ l |c_kl|`.
-    pub fn range(lines: &[Lanes; 4], rows: Range<usize>, columns: Range<usize>) -> [[f32; 2]; 2] {
+    pub fn pixel_bounds(
+        lines: &[PatchCoefficients; 4],
+        rows: Range<usize>,
+        columns: Range<usize>,
+    ) -> [[f32; 2]; 2] {
         let along = |range: Range<usize>| {
             let (first, last) = (range.start as f32, range.end as f32 - 1.0);
             (
-                0.5 * (first + last) * SCALE - 1.0,
-                0.5 * (last - first) * SCALE,
+                0.5 * (first + last) * PATCH_SCALE - 1.0,
+                0.5 * (last - first) * PATCH_SCALE,
             )
         };
         let ((x, a), (y, b)) = (along(columns), along(rows));
@@ -131,10 +141,10 @@ impl Chart {
         ]
     }
 
-    /// The patch of a pixel of the tile.
+    /// Index of the patch that a pixel of the tile lies in.
     #[inline(always)]
-    pub fn patch(&self, row: usize, column: usize) -> usize {
-        row / PATCH * self.across + column / PATCH
+    pub fn patch_index(&self, row: usize, column: usize) -> usize {
+        row / PATCH_EDGE * self.across + column / PATCH_EDGE
     }
 
     /// Number of patches.
@@ -142,13 +152,13 @@ impl Chart {
         self.patches.len()
     }
 
-    /// How far u and v move from one canvas pixel to the next in the middle of a smooth patch,
-    /// along its row and along its column.
-    pub fn steps(&self, patch: usize) -> Option<[[f32; 2]; 2]> {
+    /// Change of u and v from one canvas pixel to the next in the middle of a patch with
+    /// polynomials, along its row and along its column.
+    pub fn pixel_steps(&self, patch: usize) -> Option<[[f32; 2]; 2]> {
         match &self.patches[patch] {
-            Patch::Smooth(c) => Some([
-                [SCALE * c[0][1], SCALE * c[0][5]],
-                [SCALE * c[1][0], SCALE * c[1][4]],
+            PatchWarp::Polynomial(c) => Some([
+                [PATCH_SCALE * c[0][1], PATCH_SCALE * c[0][5]],
+                [PATCH_SCALE * c[1][0], PATCH_SCALE * c[1][4]],
             ]),
             _ => None,
         }
@@ -158,32 +168,35 @@ impl Chart {
     pub fn is_outside(&self) -> bool {
         self.patches
             .iter()
-            .all(|patch| matches!(patch, Patch::Outside))
+            .all(|patch| matches!(patch, PatchWarp::Outside))
     }
 
-    /// True if no pixel of the patch that a pixel of the tile lies in lies in the frame.
+    /// True if the patch around a pixel of the tile has no pixel in the frame.
     pub fn is_outside_at(&self, row: usize, column: usize) -> bool {
-        matches!(self.patches[self.patch(row, column)], Patch::Outside)
+        matches!(
+            self.patches[self.patch_index(row, column)],
+            PatchWarp::Outside
+        )
     }
 
     /// True if some pixels must be projected one by one.
-    pub fn is_rough(&self) -> bool {
+    pub fn needs_exact_projection(&self) -> bool {
         self.patches
             .iter()
-            .any(|patch| matches!(patch, Patch::Rough))
+            .any(|patch| matches!(patch, PatchWarp::Exact))
     }
 
-    /// Where the pixels of a smooth patch appear, by powers of y.
-    pub fn lines(&self, patch: usize) -> Option<&[Lanes; 4]> {
+    /// Polynomials of a patch by powers of y, if it has them.
+    pub fn coefficients(&self, patch: usize) -> Option<&[PatchCoefficients; 4]> {
         match &self.patches[patch] {
-            Patch::Smooth(c) => Some(c),
+            PatchWarp::Polynomial(c) => Some(c),
             _ => None,
         }
     }
 
-    /// Where a point of a smooth patch appears.
+    /// Pixel of the frame at a point of a patch with polynomials.
     #[inline]
-    pub fn pixel(lines: &[Lanes; 4], x: f32, y: f32) -> [f32; 2] {
+    pub fn pixel(lines: &[PatchCoefficients; 4], x: f32, y: f32) -> [f32; 2] {
         let c = Self::at(lines, y);
         [
             ((c[3] * x + c[2]) * x + c[1]) * x + c[0],
@@ -191,17 +204,17 @@ impl Chart {
         ]
     }
 
-    /// Where the pixels of a row of a smooth patch appear, by powers of x; `row`: of the tile.
+    /// Polynomials along a row of the tile within a patch, by powers of x.
     #[inline(always)]
-    fn line(&self, row: usize, patch: usize) -> Option<Lanes> {
-        let Patch::Smooth(c) = &self.patches[patch] else {
+    fn row_coefficients(&self, row: usize, patch: usize) -> Option<PatchCoefficients> {
+        let PatchWarp::Polynomial(c) = &self.patches[patch] else {
             return None;
         };
-        Some(Self::at(c, (row % PATCH) as f32 * SCALE - 1.0))
+        Some(Self::at(c, (row % PATCH_EDGE) as f32 * PATCH_SCALE - 1.0))
     }
 
     #[inline(always)]
-    fn at(c: &[Lanes; 4], y: f32) -> Lanes {
+    fn at(c: &[PatchCoefficients; 4], y: f32) -> PatchCoefficients {
         let mut at = c[3];
         for c in [&c[2], &c[1], &c[0]] {
             for k in 0..at.len() {
@@ -211,45 +224,45 @@ impl Chart {
         at
     }
 
-    /// Finds where the pixels of the tile's `row` appear, eight of them (of u and v) from column 8
-    /// times `eight` on. False if they are to be projected one by one.
+    /// Finds u and v of eight pixels of the tile's `row`, from column 8 times `eight` on. False if
+    /// they are to be projected point by point.
     #[inline(always)]
-    pub fn eight(
+    pub fn locate_eight(
         &self,
         row: usize,
         eight: usize,
-        u: &mut [f32; EIGHT],
-        v: &mut [f32; EIGHT],
+        u: &mut [f32; LANES],
+        v: &mut [f32; LANES],
     ) -> bool {
-        let patch = self.patch(row, eight * EIGHT);
-        if let Some(at) = self.line(row, patch) {
-            let first = eight * EIGHT % PATCH;
-            for k in 0..EIGHT {
-                let x = (first + k) as f32 * SCALE - 1.0;
+        let patch = self.patch_index(row, eight * LANES);
+        if let Some(at) = self.row_coefficients(row, patch) {
+            let first = eight * LANES % PATCH_EDGE;
+            for k in 0..LANES {
+                let x = (first + k) as f32 * PATCH_SCALE - 1.0;
                 u[k] = ((at[3] * x + at[2]) * x + at[1]) * x + at[0];
                 v[k] = ((at[7] * x + at[6]) * x + at[5]) * x + at[4];
             }
             return true;
         }
-        u.fill(-OUTSIDE_PX);
-        v.fill(-OUTSIDE_PX);
-        matches!(self.patches[patch], Patch::Outside)
+        u.fill(-OUTSIDE_MARGIN_PX);
+        v.fill(-OUTSIDE_MARGIN_PX);
+        matches!(self.patches[patch], PatchWarp::Outside)
     }
 }
 
-/// True if all lie on the same side outside `0 … limit`.
+/// True if all values lie beyond the same end of `0 … limit`.
 fn outside(at: &[[f32; 5]; 5], limit: f32) -> bool {
     let all = || at.as_flattened().iter();
-    all().all(|at| *at < -OUTSIDE_PX) || all().all(|at| *at > limit + OUTSIDE_PX)
+    all().all(|at| *at < -OUTSIDE_MARGIN_PX) || all().all(|at| *at > limit + OUTSIDE_MARGIN_PX)
 }
 
-/// From values at ±1 and ±(√2 − 1) to the coefficients of the cubic, the lowest first.
+/// Coefficients of a cubic, the lowest power first, from its values at ±1 and ±(√2 − 1).
 ///
 /// With `a = √2 − 1`, the even part of the values `e_1 = (p(1) + p(−1))/2`, `e_a` likewise:
 /// `c_2 = (e_1 − e_a)/(1 − a²)`, `c_0 = e_1 − c_2`; odd parts over their place:
 /// `o_1 = (p(1) − p(−1))/2`, `o_a = (p(a) − p(−a))/2a`, `c_3 = (o_1 − o_a)/(1 − a²)`,
 /// `c_1 = o_1 − c_3`.
-fn cubic([p, q, r, s]: [f32; 4]) -> [f32; 4] {
+fn fit_cubic([p, q, r, s]: [f32; 4]) -> [f32; 4] {
     const A: f32 = SQRT_2 as f32 - 1.0;
     const INVERSE: f32 = 1.0 / (1.0 - A * A);
     let (even_1, even_a) = (0.5 * (s + p), 0.5 * (r + q));
@@ -259,19 +272,20 @@ fn cubic([p, q, r, s]: [f32; 4]) -> [f32; 4] {
     [even_1 - c_2, odd_1 - c_3, c_2, c_3]
 }
 
-/// The coefficients of a patch, `[l][k]` that of `x^k y^l`; None if they do not fit in between.
-fn coefficients(at: &[[f32; 5]; 5]) -> Option<[[f32; 4]; 4]> {
+/// Coefficients of a patch, `[l][k]` that of `x^k y^l`; None if the polynomial is too far off at
+/// the points between those it is fitted to.
+fn fit_patch(at: &[[f32; 5]; 5]) -> Option<[[f32; 4]; 4]> {
     // Small numbers round less.
     let middle = at[2][2];
     let mut along_x = [[0.0; 4]; 4];
     for (along_x, row) in along_x.iter_mut().zip([0, 1, 3, 4]) {
         let [p, q, _, r, s] = at[row];
-        *along_x = cubic([p - middle, q - middle, r - middle, s - middle]);
+        *along_x = fit_cubic([p - middle, q - middle, r - middle, s - middle]);
     }
     let mut c = [[0.0; 4]; 4];
     for k in 0..4 {
         let [p, q, r, s] = along_x;
-        let along_y = cubic([p[k], q[k], r[k], s[k]]);
+        let along_y = fit_cubic([p[k], q[k], r[k], s[k]]);
         for l in 0..4 {
             c[l][k] = along_y[l];
         }
@@ -280,14 +294,14 @@ fn coefficients(at: &[[f32; 5]; 5]) -> Option<[[f32; 4]; 4]> {
         let at = |k: usize| ((c[3][k] * y + c[2][k]) * y + c[1][k]) * y + c[0][k];
         ((at(3) * x + at(2)) * x + at(1)) * x + at(0)
     };
-    for (row, y) in POINTS.iter().enumerate() {
-        for (column, x) in POINTS.iter().enumerate() {
+    for (row, y) in PATCH_POINTS.iter().enumerate() {
+        for (column, x) in PATCH_POINTS.iter().enumerate() {
             if row != 2 && column != 2 {
                 continue;
             }
             let off = value(*x as f32, *y as f32) - (at[row][column] - middle);
             // NaN does not fit, either.
-            if off.is_nan() || off.abs() > MOST_OFF_PX {
+            if off.is_nan() || off.abs() > MAX_RESIDUAL_PX {
                 return None;
             }
         }

@@ -2,27 +2,30 @@
 
 use std::ops::Range;
 
-/// Pixels of the canvas along each side of a patch.
-pub const PATCH: usize = 32;
-/// Pixels of a row that are looked at together.
-pub const EIGHT: usize = 8;
-/// From pixels to the patch's coordinates.
-pub const SCALE: f32 = 2.0 / PATCH as f32;
+/// Edge of a patch, canvas pixels. Larger patches are faster where the polynomial still fits, and
+/// fit in fewer places.
+pub const PATCH_EDGE: usize = 32;
+/// Pixels of a row that are processed together: the lanes of a vector.
+pub const LANES: usize = 8;
+/// Step of a patch's coordinate from one pixel to the next.
+pub const PATCH_SCALE: f32 = 2.0 / PATCH_EDGE as f32;
 
-/// Where the patch of some rows or columns of a tile, all in one patch, begins, and which of its
-/// own they are.
-pub fn of_patch(all: &Range<usize>) -> (usize, Range<usize>) {
-    let first = all.start - all.start % PATCH;
+/// First row or column of the patch that a range of rows or columns of a tile lies in (all in one
+/// patch), and the range within that patch.
+pub fn within_patch(all: &Range<usize>) -> (usize, Range<usize>) {
+    let first = all.start - all.start % PATCH_EDGE;
     (first, all.start - first..all.end - first)
 }
 
-/// Columns of a row, patch by patch.
-pub fn pieces(columns: Range<usize>) -> impl Iterator<Item = Range<usize>> {
-    cut::<PATCH>(columns)
+/// Cuts columns of a row at the patches' borders.
+pub fn split_at_patches(columns: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    split_at_multiples::<PATCH_EDGE>(columns)
 }
 
-/// Columns of a row, cut at multiples of `N`.
-pub fn cut<const N: usize>(columns: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+/// Cuts columns of a row at multiples of `N`.
+pub fn split_at_multiples<const N: usize>(
+    columns: Range<usize>,
+) -> impl Iterator<Item = Range<usize>> {
     let mut from = columns.start;
     std::iter::from_fn(move || {
         let to = columns.end.min((from / N + 1) * N);

@@ -1,26 +1,26 @@
-//! From wall points into a frame.
+//! Projection of wall points into a frame, in single precision.
 
 use crate::camera::{Bend, Camera, SingleLens};
 use crate::numerics::simd_dispatch::wide;
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Vector3};
 
-/// Where points appear, u and v, and whether the lens shows them.
-pub type Pixels<'a> = (&'a mut [f32], &'a mut [f32], &'a mut [bool]);
+/// Pixel coordinates u and v of points, and which of the points the lens shows.
+pub type ProjectedPixels<'a> = (&'a mut [f32], &'a mut [f32], &'a mut [bool]);
 
 /// Wall points in single precision, relative to an origin near them: coordinates are exact to 10⁻⁷
 /// of the patch's size.
 #[derive(Debug, Default)]
-pub struct Points {
-    /// The origin in the world, metres.
+pub struct LocalPoints {
+    /// Origin in the world, metres.
     pub origin: Vector3<f64>,
     x: Vec<f32>,
     y: Vec<f32>,
     z: Vec<f32>,
 }
 
-impl Points {
-    /// The points, in order, relative to the first.
+impl LocalPoints {
+    /// Converts points, in their order, relative to the first.
     pub fn new(points: &[Vector3<f64>]) -> Self {
         let mut all = Self::default();
         all.set(points);
@@ -32,7 +32,7 @@ impl Points {
         self.x.len()
     }
 
-    /// Puts other points in their place.
+    /// Replaces the points by others.
     pub fn set(&mut self, points: &[Vector3<f64>]) {
         let origin = points.first().copied().unwrap_or_default();
         self.origin = origin;
@@ -48,13 +48,13 @@ impl Points {
     }
 }
 
-/// A camera at a pose, ready to look at wall points relative to an origin:
+/// Projection of a camera at a pose for wall points relative to an origin:
 /// `x_c = R_wcᵀ x + R_wcᵀ (origin − t_wc)`, then the lens and `u = fx x + cx`, `v = fy y + cy`
 /// ([`Camera::project`]).
 ///
-/// Single precision: to about 10⁻⁴ px.
+/// It is exact to about 10⁻⁴ px.
 #[derive(Clone, Copy, Debug)]
-pub struct Look {
+pub struct LocalProjection {
     r_cw: [[f32; 3]; 3],
     centre: [f32; 3],
     focal: [f32; 2],
@@ -63,8 +63,8 @@ pub struct Look {
     limit: [f32; 2],
 }
 
-impl Look {
-    /// The camera at `pose`, for points relative to `origin`.
+impl LocalProjection {
+    /// Prepares the camera at `pose` for points relative to `origin`.
     pub fn new(camera: &Camera, pose: &Pose, origin: &Vector3<f64>) -> Self {
         let r_wc = pose.r_wc.to_rotation_matrix();
         let r_cw: Matrix3<f32> = r_wc.matrix().transpose().cast();
@@ -78,21 +78,21 @@ impl Look {
         }
     }
 
-    /// The outermost pixel centres: the last of each axis; the first are 0.
+    /// Coordinates of the last pixel centre along each axis; the first are 0.
     #[inline(always)]
     pub fn limit(&self) -> [f32; 2] {
         self.limit
     }
 
-    /// The pixel of one of the points, wherever it lies.
-    pub fn pixel(&self, points: &Points, at: usize) -> [f32; 2] {
+    /// Pixel of one of the points, within the picture or not.
+    pub fn pixel(&self, points: &LocalPoints, at: usize) -> [f32; 2] {
         let (u, v, _) = self.project(self.lens, [points.x[at], points.y[at], points.z[at]]);
         [u, v]
     }
 
-    /// Finds the pixels of the points from index `start` on, as many as `u`, `v` and `shown` (by
-    /// the lens, within the picture or not) hold.
-    pub fn project_all(&self, points: &Points, start: usize, (u, v, shown): Pixels) {
+    /// Projects the points from index `start` on, as many as `u`, `v` and `shown` hold; `shown`: by
+    /// the lens, within the picture or not.
+    pub fn project_all(&self, points: &LocalPoints, start: usize, (u, v, shown): ProjectedPixels) {
         match self.lens {
             SingleLens::Straight(lens) => self.project_through(lens, points, start, u, v, shown),
             SingleLens::Brown(lens) => self.project_through(lens, points, start, u, v, shown),
@@ -112,7 +112,7 @@ impl Look {
     fn project_through(
         &self,
         lens: impl Bend,
-        points: &Points,
+        points: &LocalPoints,
         start: usize,
         u: &mut [f32],
         v: &mut [f32],
@@ -135,7 +135,7 @@ impl Look {
         );
     }
 
-    /// Where a point appears, and whether the lens shows it.
+    /// Pixel coordinates of a point, and whether the lens shows it.
     #[inline(always)]
     fn project(&self, lens: impl Bend, [x, y, z]: [f32; 3]) -> (f32, f32, bool) {
         let [a, b, c]: [f32; 3] = std::array::from_fn(|row| {

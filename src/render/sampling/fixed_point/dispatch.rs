@@ -1,17 +1,20 @@
-//! Choice of the code: vectors where the processor has them, else plain loops, made for the number of
-//! the kernel's taps.
+//! Choice of the code, compiled for the number of the kernel's taps: vectors where the processor
+//! has them, else plain loops.
 
 #[cfg(target_arch = "x86_64")]
 use super::avx2;
 use super::format::{bits, rounding};
-use super::inputs::{Block, LitBlock, PARTS, Part, Patch, Places, Source};
+use super::inputs::{
+    BlendPart, BlendedBlock, KernelPositions, MAX_BLEND_PARTS, PatchBlock, PictureSamples,
+    SampledPatch,
+};
 use super::scalar;
 use crate::numerics::kernel::Kernel;
 #[cfg(target_arch = "x86_64")]
 use crate::numerics::simd_dispatch;
 use std::ops::Range;
 
-/// Does the work with code made for the kernel's taps; 0 stands for any other number of them.
+/// Runs the code compiled for the kernel's taps; 0 stands for any other number of them.
 #[cfg(target_arch = "x86_64")]
 macro_rules! by_taps {
     ($kernel:expr, |$simd:ident, $taps:ident| $work:expr) => {
@@ -32,41 +35,41 @@ macro_rules! by_taps {
     }};
 }
 
-/// Sums at each place, one lane a channel: colour in the first three, grey in the first. `C`: 1 or
-/// 3 channels.
-pub fn sums<const C: usize>(
-    source: Source,
+/// Sums the samples under each kernel, one lane a channel: colour in the first three, grey in the
+/// first. `C`: 1 or 3 channels.
+pub fn sum_samples<const C: usize>(
+    source: PictureSamples,
     kernel: &Kernel,
-    places: Places,
+    places: KernelPositions,
     sums: &mut [[i32; 4]],
 ) {
     #[cfg(target_arch = "x86_64")]
-    if by_taps!(kernel, |simd, TAPS| avx2::sums::sums::<C, TAPS>(
+    if by_taps!(kernel, |simd, TAPS| avx2::sums::sum_samples::<C, TAPS>(
         simd, source, kernel, places, sums
     )) {
         return;
     }
-    scalar::sums::<C>(source, kernel, places, sums);
+    scalar::sum_samples::<C>(source, kernel, places, sums);
 }
 
-/// The nearest 8-bit samples of sums, alpha last and full.
-pub fn pixels<const C: usize>(kernel: &Kernel, sums: &[[i32; 4]], pixels: &mut [u8]) {
+/// Rounds sums to 8-bit samples, alpha last and full.
+pub fn write_pixels<const C: usize>(kernel: &Kernel, sums: &[[i32; 4]], pixels: &mut [u8]) {
     let bits = bits(kernel.taps());
     let mut more = [rounding(kernel.taps()); 4];
     more[C] = 255 << bits;
     #[cfg(target_arch = "x86_64")]
     if simd_dispatch::avx2(
         #[inline(always)]
-        |simd| avx2::pixels::pixels::<C>(simd, sums, &more, bits, pixels),
+        |simd| avx2::pixels::write_pixels::<C>(simd, sums, &more, bits, pixels),
     ) {
         return;
     }
-    scalar::pixels::<C>(sums, &more, bits, pixels);
+    scalar::write_pixels::<C>(sums, &more, bits, pixels);
 }
 
-/// Draws a block into rows of a tile, alpha last and full: the bytes nearest to the sums. False
-/// without doing it where the processor lacks the vectors for it.
-pub fn block<const C: usize>(block: &Block, pixels: &mut [&mut [u8]]) -> bool {
+/// Draws a block of one frame into rows of a tile, alpha last and full. False without doing it
+/// where the processor lacks the vectors for it.
+pub fn draw_block<const C: usize>(block: &PatchBlock, pixels: &mut [&mut [u8]]) -> bool {
     #[cfg(target_arch = "x86_64")]
     return by_taps!(
         block.patch.kernel,
@@ -76,18 +79,18 @@ pub fn block<const C: usize>(block: &Block, pixels: &mut [&mut [u8]]) -> bool {
     false
 }
 
-/// Draws a block with light undone and corrections added. False without doing it where the
-/// processor lacks the vectors for it, or kernels have different taps.
-pub fn lit_block<const C: usize, const L: usize>(
-    block: &LitBlock<L>,
+/// Draws a block of one or several frames, exposure undone and corrections added. False without
+/// doing it where the processor lacks the vectors for it, or kernels have different taps.
+pub fn draw_blended_block<const C: usize, const L: usize>(
+    block: &BlendedBlock<L>,
     pixels: &mut [&mut [u8]],
 ) -> bool {
     let Some((one, others)) = block.parts.split_first() else {
         return false;
     };
     let taps = one.patch.kernel.taps();
-    let odd = |part: &Part| part.patch.kernel.taps() != taps;
-    if others.iter().any(odd) || others.len() >= PARTS {
+    let odd = |part: &BlendPart| part.patch.kernel.taps() != taps;
+    if others.iter().any(odd) || others.len() >= MAX_BLEND_PARTS {
         return false;
     }
     #[cfg(target_arch = "x86_64")]
@@ -100,16 +103,19 @@ pub fn lit_block<const C: usize, const L: usize>(
     false
 }
 
-/// The values in some columns of a row of a patch, in the lanes of [`sums`]; `values`: of all the
-/// patch, those around `columns` are anything.
-pub fn values<const C: usize>(
-    patch: &Patch,
+/// Samples some columns of a row of a patch, in the lanes of [`sum_samples`]; `values`: of all the
+/// patch, those beside `columns` have no meaning afterwards.
+pub fn sample_values<const C: usize>(
+    patch: &SampledPatch,
     row: usize,
     columns: Range<usize>,
     values: &mut [[f32; 4]],
 ) -> bool {
     #[cfg(target_arch = "x86_64")]
-    return by_taps!(patch.kernel, |simd, TAPS| avx2::block::values::<C, TAPS>(
+    return by_taps!(patch.kernel, |simd, TAPS| avx2::block::sample_values::<
+        C,
+        TAPS,
+    >(
         simd,
         patch,
         row,

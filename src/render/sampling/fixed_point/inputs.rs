@@ -1,89 +1,92 @@
-//! What is sampled: points, and blocks of a patch in one frame or in several.
+//! Inputs of sampling: points, and blocks of a patch in one frame or in several.
 
-use super::super::patch_light::Light;
+use super::super::patch_light::PatchLight;
 use crate::numerics::kernel::Kernel;
-use crate::render::warp::local_polynomial::Lanes;
-use crate::render::warp::patches::{EIGHT, PATCH};
+use crate::render::warp::local_polynomial::PatchCoefficients;
+use crate::render::warp::patches::{LANES, PATCH_EDGE};
 use std::ops::Range;
 
-/// What the kernel needs to know of a picture.
+/// Samples of a picture.
 #[derive(Clone, Copy)]
-pub struct Source<'a> {
-    /// Row-major, channels interleaved; [`PADDING`](super::super::sample::PADDING) more at the end than there are.
+pub struct PictureSamples<'a> {
+    /// Samples, row-major, channels interleaved, with [`PADDING`](super::super::sample::PADDING)
+    /// zeros at the end.
     pub samples: &'a [u8],
-    /// Samples of a row.
+    /// Samples a row.
     pub stride: usize,
 }
 
-/// Where the kernel lies for each point.
+/// Positions of the kernel for a batch of points.
 #[derive(Clone, Copy)]
-pub struct Places<'a> {
+pub struct KernelPositions<'a> {
     /// Index of the first sample under the kernel; all of it must lie within the picture.
     pub first: &'a [u32],
     /// Phases along u and v.
     pub phases: [&'a [i32]; 2],
 }
 
-/// A patch of the chart that lies inside a frame, kernels and all.
+/// A patch of the warp that lies inside a frame, with all of its kernels.
 #[derive(Clone, Copy)]
-pub struct Patch<'a> {
+pub struct SampledPatch<'a> {
     /// The frame.
-    pub source: Source<'a>,
+    pub source: PictureSamples<'a>,
     /// The kernel, of two taps at least.
     pub kernel: &'a Kernel,
-    /// Where its pixels appear, by powers of y.
-    pub lines: &'a [Lanes; 4],
+    /// Pixels of the frame by polynomials, by powers of y.
+    pub lines: &'a [PatchCoefficients; 4],
 }
 
-/// The columns of a patch that are looked at for the sake of these: whole eights.
+/// Columns of a patch that are processed for a range of them: whole groups of eight.
 pub fn reach(columns: &Range<usize>) -> Range<usize> {
-    let start = columns.start.min(PATCH - EIGHT);
-    start..columns.end.max(start + EIGHT)
+    let start = columns.start.min(PATCH_EDGE - LANES);
+    start..columns.end.max(start + LANES)
 }
 
-/// Some columns of a patch, from one of its rows on.
-pub struct Block<'a> {
+/// Some columns of a patch, from one of its rows on, in one frame.
+pub struct PatchBlock<'a> {
     /// The patch.
-    pub patch: Patch<'a>,
-    /// Its first row that is meant.
+    pub patch: SampledPatch<'a>,
+    /// First row, of the patch.
     pub row: usize,
-    /// The columns, of the patch.
+    /// Columns, of the patch.
     pub columns: Range<usize>,
     /// Column of the tile where the patch begins.
     pub first: usize,
 }
 
-/// The most parts of a block: one for each corner of a cell.
-pub const PARTS: usize = 4;
+/// Most parts of a block: one for each corner of a cell.
+pub const MAX_BLEND_PARTS: usize = 4;
 
-/// What a frame has in a block: `(value − bias) light`, with some weight.
-pub struct Part<'a> {
+/// Part of a frame in a block: `(value − bias) light`, with some weight.
+pub struct BlendPart<'a> {
     /// The frame's patch.
-    pub patch: Patch<'a>,
-    /// What is taken away.
+    pub patch: SampledPatch<'a>,
+    /// Bias that is subtracted.
     pub bias: f32,
-    /// What is multiplied by; None for 1.
-    pub light: Option<Light>,
+    /// Factor; None for 1.
+    pub light: Option<PatchLight>,
     /// Weights at the corners of a cell between four nodes, bilinear in between: the upper two,
     /// then the lower two.
     pub corners: [f32; 4],
 }
 
-/// Some rows and columns of a patch, the mean of parts with corrections added.
-pub struct LitBlock<'a, const L: usize> {
-    /// The parts, [`PARTS`] at the most, in the order of their frames; their kernels have equally
-    /// many taps. One alone weighs 1 everywhere.
-    pub parts: &'a [Part<'a>],
+/// Some rows and columns of a patch: the mean of parts with corrections added.
+pub struct BlendedBlock<'a, const L: usize> {
+    /// Parts, at most [`MAX_BLEND_PARTS`], in the order of their frames; their kernels have equally
+    /// many taps. A single part weighs 1 everywhere.
+    pub parts: &'a [BlendPart<'a>],
     /// The first row, of the patch.
     pub row: usize,
-    /// The columns, of the patch.
+    /// Columns, of the patch.
     pub columns: Range<usize>,
     /// Column of the tile where the patch begins.
     pub first: usize,
-    /// How far each of the tile's columns lies between the nodes, [`crate::render::sampling::point_batch::RUN`] of them.
+    /// Position of each of the tile's columns between the nodes,
+    /// [`TILE_COLUMNS`](crate::render::layout::tiles::TILE_COLUMNS) of them.
     pub across: &'a [f32],
-    /// How far each of the rows lies between the nodes.
+    /// Position of each of the rows between the nodes.
     pub down: &'a [f32],
-    /// What is added, in all columns of each of the rows, [`crate::render::sampling::point_batch::RUN`] a row.
+    /// Corrections that are added, in all columns of each of the rows,
+    /// [`TILE_COLUMNS`](crate::render::layout::tiles::TILE_COLUMNS) a row.
     pub corrections: &'a [[f32; L]],
 }

@@ -3,13 +3,14 @@
 //! Two taps along each axis: with the phases s, t in 1/128 px, `Σ = Σ_ij w_i(s) w_j(t) I_ij` with
 //! `w = (128 − s, s)`, exact, in units of 2⁻¹⁴.
 //!
-//! More: weights in units of 2⁻¹⁴ ([`Kernel::integers`]). Rows are summed first, the first and the
-//! last two of every four taps by themselves (a, b); these are cut to units of 2⁻⁶ and then summed
-//! down the columns: `Σ = Σ_j w_j (⌊a_j/2⁸⌋ + ⌊b_j/2⁸⌋)`, in units of 2⁻²⁰. What cutting takes
-//! away, half a unit of a and of b each in the mean, is given back at the end.
+//! More taps: weights in units of 2⁻¹⁴ ([`crate::numerics::kernel::Kernel::integer_weights_at`]).
+//! Rows are summed first, the first and the last two of every four taps separately (a, b); these
+//! sums are truncated to units of 2⁻⁶ and then summed down the columns:
+//! `Σ = Σ_j w_j (⌊a_j/2⁸⌋ + ⌊b_j/2⁸⌋)`, in units of 2⁻²⁰. The mean loss by truncation, half a unit
+//! of a and of b each, is added at the end.
 //!
-//! The same numbers come out of vectors (AVX2) and of the plain loops of [`scalar`], to the bit:
-//! nothing is rounded but by the cut.
+//! Vectors (AVX2) and the plain loops of [`scalar`] give identical numbers: nothing is rounded
+//! except by the truncation.
 //!
 //! | subject | file |
 //! | --- | --- |
@@ -27,6 +28,9 @@ mod scalar;
 #[cfg(test)]
 mod tests;
 
-pub use dispatch::{block, lit_block, pixels, sums, values};
+pub use dispatch::{draw_blended_block, draw_block, sample_values, sum_samples, write_pixels};
 pub use format::{missing, scale};
-pub use inputs::{Block, LitBlock, PARTS, Part, Patch, Places, Source, reach};
+pub use inputs::{
+    BlendPart, BlendedBlock, KernelPositions, MAX_BLEND_PARTS, PatchBlock, PictureSamples,
+    SampledPatch, reach,
+};

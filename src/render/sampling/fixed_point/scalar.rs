@@ -1,12 +1,12 @@
-//! One place at a time.
+//! Sums and pixels one at a time: the reference for the vectors.
 
-use super::inputs::{Places, Source};
+use super::inputs::{KernelPositions, PictureSamples};
 use crate::numerics::kernel::Kernel;
 
-pub fn sums<const C: usize>(
-    source: Source,
+pub fn sum_samples<const C: usize>(
+    source: PictureSamples,
     kernel: &Kernel,
-    places: Places,
+    places: KernelPositions,
     sums: &mut [[i32; 4]],
 ) {
     for (k, sum) in sums.iter_mut().enumerate() {
@@ -22,7 +22,7 @@ pub fn sums<const C: usize>(
                         + t * ((128 - s) * at(0, 1) + s * at(1, 1))
                 }
                 _ => {
-                    let [w_x, w_y] = phases.map(|phase| kernel.integers(phase as usize));
+                    let [w_x, w_y] = phases.map(|phase| kernel.integer_weights_at(phase as usize));
                     cut_sum(w_x, w_y, at)
                 }
             };
@@ -30,8 +30,13 @@ pub fn sums<const C: usize>(
     }
 }
 
-/// Lanes up to the `C`th, with `more` and without their last `bits`.
-pub fn pixels<const C: usize>(sums: &[[i32; 4]], more: &[i32; 4], bits: u32, pixels: &mut [u8]) {
+/// Adds `more` to the lanes up to the `C`th and cuts off the last `bits`.
+pub fn write_pixels<const C: usize>(
+    sums: &[[i32; 4]],
+    more: &[i32; 4],
+    bits: u32,
+    pixels: &mut [u8],
+) {
     for (sum, pixel) in sums.iter().zip(pixels.chunks_exact_mut(C + 1)) {
         for (c, sample) in pixel.iter_mut().enumerate() {
             *sample = ((sum[c] + more[c]) >> bits).clamp(0, 255) as u8;

@@ -1,16 +1,18 @@
 //! Vectors against plain loops, and both against single precision.
 
-use super::dispatch::{block, lit_block, pixels, sums};
+use super::dispatch::{draw_blended_block, draw_block, sum_samples, write_pixels};
 use super::format::{bits, missing, scale};
-use super::inputs::{Block, LitBlock, Part, Patch, Places, Source};
+use super::inputs::{
+    BlendPart, BlendedBlock, KernelPositions, PatchBlock, PictureSamples, SampledPatch,
+};
 use super::scalar;
 use crate::numerics::kernel::{Interpolation, Kernel};
-use crate::render::layout::tiles::TILE_COLUMNS as RUN;
-use crate::render::sampling::patch_light::Light;
+use crate::render::layout::tiles::TILE_COLUMNS;
+use crate::render::sampling::patch_light::PatchLight;
 use crate::render::sampling::picture::Picture;
 use crate::render::sampling::sample::{Sample, Samples};
-use crate::render::warp::local_polynomial::Chart;
-use crate::render::warp::patches::{PATCH, SCALE};
+use crate::render::warp::local_polynomial::LocalPolynomialWarp;
+use crate::render::warp::patches::{PATCH_EDGE, PATCH_SCALE};
 
 const KERNELS: [(Interpolation, f64); 7] = [
     (Interpolation::Bilinear, 1.0),
@@ -51,7 +53,7 @@ fn check<const C: usize>(interpolation: Interpolation, stretch: f64) {
     let Samples::Eight(samples) = picture.samples() else {
         panic!("8 bits");
     };
-    let source = Source {
+    let source = PictureSamples {
         samples,
         stride: SIZE * C,
     };
@@ -60,17 +62,20 @@ fn check<const C: usize>(interpolation: Interpolation, stretch: f64) {
     let across: Vec<i32> = coordinates().map(|(u, _)| phase(u)).collect();
     let down: Vec<i32> = coordinates().map(|(_, v)| phase(v)).collect();
     let first = coordinates().map(|(u, v)| {
-        let (x, y) = (u as usize - kernel.before(), v as usize - kernel.before());
+        let (x, y) = (
+            u as usize - kernel.taps_before(),
+            v as usize - kernel.taps_before(),
+        );
         ((y * SIZE + x) * C) as u32
     });
     let first: Vec<u32> = first.collect();
-    let places = Places {
+    let places = KernelPositions {
         first: &first,
         phases: [&across, &down],
     };
     let (mut fast, mut slow) = (vec![[7; 4]; first.len()], vec![[9; 4]; first.len()]);
-    sums::<C>(source, &kernel, places, &mut fast);
-    scalar::sums::<C>(source, &kernel, places, &mut slow);
+    sum_samples::<C>(source, &kernel, places, &mut fast);
+    scalar::sum_samples::<C>(source, &kernel, places, &mut slow);
     assert_eq!(fast, slow, "{interpolation:?} {stretch}");
     let (bits_of, half) = (
         bits(kernel.taps()),
@@ -79,8 +84,8 @@ fn check<const C: usize>(interpolation: Interpolation, stretch: f64) {
     let mut more = [half; 4];
     more[C] = 255 << bits_of;
     let mut bytes = [vec![1; (C + 1) * fast.len()], vec![2; (C + 1) * fast.len()]];
-    pixels::<C>(&kernel, &fast, &mut bytes[0]);
-    scalar::pixels::<C>(&fast, &more, bits_of, &mut bytes[1]);
+    write_pixels::<C>(&kernel, &fast, &mut bytes[0]);
+    scalar::write_pixels::<C>(&fast, &more, bits_of, &mut bytes[1]);
     assert_eq!(bytes[0], bytes[1]);
     // Against single precision at the same phases, and where phases are 1/1024 px off at the
     // most.
@@ -118,54 +123,56 @@ fn check_blocks<const C: usize, const L: usize>(interpolation: Interpolation, st
         panic!("8 bits");
     };
     let stride = SIZE * C;
-    let source = Source { samples, stride };
+    let source = PictureSamples { samples, stride };
     let lines = [
         [31.3, 12.7, -1.9, 0.7, 30.1, -3.2, 1.3, 0.4],
         [1.1, 0.2, -0.3, 0.1, 11.4, 0.3, 0.1, -0.1],
         [0.4, 0.0, 0.1, 0.0, -0.3, 0.2, 0.0, 0.0],
         [0.1; 8],
     ];
-    let patch = Patch {
+    let patch = SampledPatch {
         source,
         kernel: &kernel,
         lines: &lines,
     };
     let mut shifted = lines;
     (shifted[0][0], shifted[0][4]) = (33.7, 28.9);
-    let other = Patch {
+    let other = SampledPatch {
         lines: &shifted,
         ..patch
     };
-    let across: Vec<f32> = (0..RUN).map(|k| (k % 8) as f32 / 8.0 + 0.01).collect();
+    let across: Vec<f32> = (0..TILE_COLUMNS)
+        .map(|k| (k % 8) as f32 / 8.0 + 0.01)
+        .collect();
     let down: Vec<f32> = (0..8).map(|k| k as f32 / 8.0 + 0.03).collect();
-    let light = Light::through([[1.1, 1.0, 0.9], [1.3, 1.2, 1.1], [1.0, 0.7, 0.8]]);
+    let light = PatchLight::through([[1.1, 1.0, 0.9], [1.3, 1.2, 1.1], [1.0, 0.7, 0.8]]);
     let bias = 3.25;
-    let corrections: Vec<[f32; L]> = (0..RUN * 8)
+    let corrections: Vec<[f32; L]> = (0..TILE_COLUMNS * 8)
         .map(|k| std::array::from_fn(|c| (k % 37) as f32 * 0.3 - 5.0 + c as f32))
         .collect();
     // The patch begins at the tile's column 64.
     let (tile_first, step) = (64, C + 1);
     for (row, columns) in [
-        (0, 0..PATCH),
+        (0, 0..PATCH_EDGE),
         (7, 0..3),
         (13, 5..14),
-        (24, 27..PATCH),
+        (24, 27..PATCH_EDGE),
         (9, 3..30),
     ] {
-        let block_of = Block {
+        let block_of = PatchBlock {
             patch,
             row,
             columns: columns.clone(),
             first: tile_first,
         };
-        let mut drawn = vec![vec![7; RUN * step]; 8];
+        let mut drawn = vec![vec![7; TILE_COLUMNS * step]; 8];
         let mut rows: Vec<&mut [u8]> = drawn.iter_mut().map(|row| &mut row[..]).collect();
-        if !block::<C>(&block_of, &mut rows) {
+        if !draw_block::<C>(&block_of, &mut rows) {
             return;
         }
-        let mut lit = vec![vec![7; RUN * step]; 8];
+        let mut lit = vec![vec![7; TILE_COLUMNS * step]; 8];
         let mut rows: Vec<&mut [u8]> = lit.iter_mut().map(|row| &mut row[..]).collect();
-        let part = |patch, corners| Part {
+        let part = |patch, corners| BlendPart {
             patch,
             bias,
             light: Some(light),
@@ -175,7 +182,7 @@ fn check_blocks<const C: usize, const L: usize>(interpolation: Interpolation, st
             part(patch, [1.0, 0.0, 0.0, 1.0]),
             part(other, [0.0, 1.0, 1.0, 0.0]),
         ];
-        let lit_of = |parts| LitBlock::<L> {
+        let lit_of = |parts| BlendedBlock::<L> {
             parts,
             row,
             columns: columns.clone(),
@@ -184,24 +191,24 @@ fn check_blocks<const C: usize, const L: usize>(interpolation: Interpolation, st
             down: &down,
             corrections: &corrections,
         };
-        assert!(lit_block::<C, L>(&lit_of(&parts[..1]), &mut rows));
-        let mut mixed = vec![vec![7; RUN * step]; 8];
+        assert!(draw_blended_block::<C, L>(&lit_of(&parts[..1]), &mut rows));
+        let mut mixed = vec![vec![7; TILE_COLUMNS * step]; 8];
         let mut rows: Vec<&mut [u8]> = mixed.iter_mut().map(|row| &mut row[..]).collect();
-        assert!(lit_block::<C, L>(&lit_of(&parts), &mut rows));
+        assert!(draw_blended_block::<C, L>(&lit_of(&parts), &mut rows));
         for n in 0..8 {
             let slow = slow_sums::<C>(&patch, row + n);
             let slow_other = slow_sums::<C>(&other, row + n);
-            let mut bytes = vec![0; PATCH * step];
-            pixels::<C>(&kernel, &slow, &mut bytes);
-            let mut expected = vec![7; RUN * step];
+            let mut bytes = vec![0; PATCH_EDGE * step];
+            write_pixels::<C>(&kernel, &slow, &mut bytes);
+            let mut expected = vec![7; TILE_COLUMNS * step];
             let own = columns.start * step..columns.end * step;
             expected[tile_first * step..][own.clone()].copy_from_slice(&bytes[own]);
             assert_eq!(
                 drawn[n], expected,
                 "{interpolation:?} {stretch} {columns:?}"
             );
-            let mut values = vec![[0.0; 4]; PATCH];
-            assert!(super::values::<C>(
+            let mut values = vec![[0.0; 4]; PATCH_EDGE];
+            assert!(super::sample_values::<C>(
                 &patch,
                 row + n,
                 columns.clone(),
@@ -213,9 +220,9 @@ fn check_blocks<const C: usize, const L: usize>(interpolation: Interpolation, st
                     let value =
                         (slow[k][channel] + missing(kernel.taps())) as f32 * scale(kernel.taps());
                     assert_eq!(values[k][channel], value, "{interpolation:?} {stretch}");
-                    let x = k as f32 * SCALE - 1.0;
+                    let x = k as f32 * PATCH_SCALE - 1.0;
                     let undone = |value: f32| (value - bias) * ((c * x + b) * x + a);
-                    let more = corrections[n * RUN + tile_first + k][channel];
+                    let more = corrections[n * TILE_COLUMNS + tile_first + k][channel];
                     let even = undone(value) + more;
                     // Crosswise: the second is half of all in the middle, nothing at two
                     // corners.
@@ -236,23 +243,23 @@ fn check_blocks<const C: usize, const L: usize>(interpolation: Interpolation, st
     }
 }
 
-fn slow_sums<const C: usize>(patch: &Patch, row: usize) -> Vec<[i32; 4]> {
+fn slow_sums<const C: usize>(patch: &SampledPatch, row: usize) -> Vec<[i32; 4]> {
     let (kernel, stride) = (patch.kernel, patch.source.stride);
     let (mut first, mut across, mut down) = (Vec::new(), Vec::new(), Vec::new());
-    for k in 0..PATCH {
-        let at = |k: usize| k as f32 * SCALE - 1.0;
-        let [u, v] = Chart::pixel(patch.lines, at(k), at(row));
-        let corner = |t: f32| t as usize - kernel.before();
+    for k in 0..PATCH_EDGE {
+        let at = |k: usize| k as f32 * PATCH_SCALE - 1.0;
+        let [u, v] = LocalPolynomialWarp::pixel(patch.lines, at(k), at(row));
+        let corner = |t: f32| t as usize - kernel.taps_before();
         first.push((corner(v) * stride + corner(u) * C) as u32);
         across.push(Kernel::phase_of(u.fract(), kernel.integer_phases()));
         down.push(Kernel::phase_of(v.fract(), kernel.integer_phases()));
     }
-    let places = Places {
+    let places = KernelPositions {
         first: &first,
         phases: [&across, &down],
     };
-    let mut slow = vec![[0; 4]; PATCH];
-    scalar::sums::<C>(patch.source, kernel, places, &mut slow);
+    let mut slow = vec![[0; 4]; PATCH_EDGE];
+    scalar::sum_samples::<C>(patch.source, kernel, places, &mut slow);
     slow
 }
 

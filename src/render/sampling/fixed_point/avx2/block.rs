@@ -1,41 +1,44 @@
-//! Rows of a patch of the chart, from where they appear in a frame to the bytes of the panorama,
-//! without a stop between.
+//! Blocks of one frame: from the polynomials of a patch to the bytes of the panorama in one pass.
 //!
-//! The numbers are those of [`crate::render::sampling::point_batch::Run`], to the bit.
+//! The numbers are identical to those of [`crate::render::sampling::point_batch::PointBatch`].
 
 use super::super::format::{missing, scale};
-use super::super::inputs::{Block, Patch};
-use super::patch_sums::{colours, greys, numbers};
-use super::pixels::{colour_bytes, grey_bytes, put};
-use super::positions::{EIGHTS, NOWHERE, eights, place};
-use crate::render::warp::patches::EIGHT;
+use super::super::inputs::{PatchBlock, SampledPatch};
+use super::patch_sums::{colour_sums, grey_sums, to_floats};
+use super::pixels::{colour_bytes, grey_bytes, store_pixels};
+use super::positions::{EMPTY_GROUP, PATCH_GROUPS, column_groups, find_positions};
+use crate::render::warp::patches::LANES;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::ops::Range;
 
-/// See [`fn@crate::render::sampling::fixed_point::block`].
+/// Draws a block of one frame into rows of a tile; see [`super::super::draw_block`].
 #[inline(always)]
-pub fn draw<const C: usize, const TAPS: usize>(simd: V3, block: &Block, pixels: &mut [&mut [u8]]) {
+pub fn draw<const C: usize, const TAPS: usize>(
+    simd: V3,
+    block: &PatchBlock,
+    pixels: &mut [&mut [u8]],
+) {
     let patch = &block.patch;
-    let columns = eights(simd, &block.columns);
-    let mut places = [NOWHERE; EIGHTS];
+    let columns = column_groups(simd, &block.columns);
+    let mut places = [EMPTY_GROUP; PATCH_GROUPS];
     for (n, pixels) in pixels.iter_mut().enumerate() {
-        place::<C, TAPS>(simd, patch, block.row + n, &columns, &mut places);
+        find_positions::<C, TAPS>(simd, patch, block.row + n, &columns, &mut places);
         for (columns, places) in columns.iter().zip(&places) {
             let eight = match C {
-                3 => colour_bytes::<TAPS>(simd, colours::<TAPS>(simd, patch, places)),
-                _ => grey_bytes::<TAPS>(simd, greys::<TAPS>(simd, patch, places)),
+                3 => colour_bytes::<TAPS>(simd, colour_sums::<TAPS>(simd, patch, places)),
+                _ => grey_bytes::<TAPS>(simd, grey_sums::<TAPS>(simd, patch, places)),
             };
-            put::<C>(simd, eight, columns, block.first, pixels);
+            store_pixels::<C>(simd, eight, columns, block.first, pixels);
         }
     }
 }
 
-/// See [`crate::render::sampling::fixed_point::values`].
+/// Samples some columns of a row of a patch; see [`super::super::sample_values`].
 #[inline(always)]
-pub fn values<const C: usize, const TAPS: usize>(
+pub fn sample_values<const C: usize, const TAPS: usize>(
     simd: V3,
-    patch: &Patch,
+    patch: &SampledPatch,
     row: usize,
     columns: Range<usize>,
     values: &mut [[f32; 4]],
@@ -43,20 +46,20 @@ pub fn values<const C: usize, const TAPS: usize>(
     let avx = simd.avx;
     let missing = avx._mm256_set1_epi32(missing(TAPS));
     let scale = avx._mm256_set1_ps(scale(TAPS));
-    let columns = eights(simd, &columns);
-    let mut places = [NOWHERE; EIGHTS];
-    place::<C, TAPS>(simd, patch, row, &columns, &mut places);
+    let columns = column_groups(simd, &columns);
+    let mut places = [EMPTY_GROUP; PATCH_GROUPS];
+    find_positions::<C, TAPS>(simd, patch, row, &columns, &mut places);
     for (columns, places) in columns.iter().zip(&places) {
-        let own = &mut values[columns.first..columns.first + EIGHT];
+        let own = &mut values[columns.first..columns.first + LANES];
         if C == 3 {
-            let [a, b, c, d] = colours::<TAPS>(simd, patch, places);
-            [own[0], own[4]] = cast(numbers(simd, a, missing, scale));
-            [own[1], own[5]] = cast(numbers(simd, b, missing, scale));
-            [own[2], own[6]] = cast(numbers(simd, c, missing, scale));
-            [own[3], own[7]] = cast(numbers(simd, d, missing, scale));
+            let [a, b, c, d] = colour_sums::<TAPS>(simd, patch, places);
+            [own[0], own[4]] = cast(to_floats(simd, a, missing, scale));
+            [own[1], own[5]] = cast(to_floats(simd, b, missing, scale));
+            [own[2], own[6]] = cast(to_floats(simd, c, missing, scale));
+            [own[3], own[7]] = cast(to_floats(simd, d, missing, scale));
         } else {
-            let sums = greys::<TAPS>(simd, patch, places);
-            let all: [f32; EIGHT] = cast(numbers(simd, sums, missing, scale));
+            let sums = grey_sums::<TAPS>(simd, patch, places);
+            let all: [f32; LANES] = cast(to_floats(simd, sums, missing, scale));
             for (own, value) in own.iter_mut().zip(all) {
                 *own = [value, 0.0, 0.0, 0.0];
             }

@@ -1,19 +1,20 @@
 //! Sums of pixels in colour.
 
-use super::super::inputs::Source;
-use super::lanes::{Eight, NO, cut_pair, pair, read, rest, sum_of_halves, two_rows};
+use super::super::inputs::PictureSamples;
+use super::lanes::{
+    Eight, ZERO_BYTE, complement, read, sum_of_halves, truncated_pair, two_rows, weight_pairs,
+};
 use super::weights::{four, taps, weights};
 use crate::numerics::kernel::Kernel;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::{__m128i, __m256i};
 
-/// The sums of eight pixels in colour: of the k-th and the k + 4th in the halves of the k-th
-/// vector.
+/// Sums of eight pixels in colour: of the k-th and the k + 4th in the halves of the k-th vector.
 #[inline(always)]
-pub fn colours<const TAPS: usize>(
+pub fn colour_sums<const TAPS: usize>(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     kernel: &Kernel,
     first: &Eight<u32>,
     phases: [Eight<i32>; 2],
@@ -29,11 +30,11 @@ pub fn colours<const TAPS: usize>(
     [a, b, c, d]
 }
 
-/// The sums of pixels `k` and `k + 4`.
+/// Sums of pixels `k` and `k + 4`.
 #[inline(always)]
 fn both_colours<const TAPS: usize>(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     kernel: &Kernel,
     first: &Eight<u32>,
     phases: [Eight<i32>; 2],
@@ -44,11 +45,11 @@ fn both_colours<const TAPS: usize>(
     simd.avx._mm256_set_m128i(upper, lower)
 }
 
-/// The sums of pixel `k`.
+/// Sums of pixel `k`.
 #[inline(always)]
 fn one_colour<const TAPS: usize>(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     kernel: &Kernel,
     first: &Eight<u32>,
     phases: [Eight<i32>; 2],
@@ -67,9 +68,12 @@ fn two_sixteens(simd: V3, row: &[u8], a: u32, b: u32) -> __m256i {
 }
 
 /// Two pixels side by side, channel by channel: (r, r′, g, g′, b, b′).
-const SIDE_BY_SIDE: [i8; 16] = [0, NO, 3, NO, 1, NO, 4, NO, 2, NO, 5, NO, NO, NO, NO, NO];
+const SIDE_BY_SIDE: [i8; 16] = [
+    0, ZERO_BYTE, 3, ZERO_BYTE, 1, ZERO_BYTE, 4, ZERO_BYTE, 2, ZERO_BYTE, 5, ZERO_BYTE, ZERO_BYTE,
+    ZERO_BYTE, ZERO_BYTE, ZERO_BYTE,
+];
 
-/// The sums of the two pixels at `a` and `b`, with their rows' weights.
+/// Sums of the two pixels at `a` and `b`, with their rows' weights.
 #[inline(always)]
 fn two_colours(
     simd: V3,
@@ -93,15 +97,15 @@ fn two_colours(
 #[inline(always)]
 fn bilinear_colour(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     first: &Eight<u32>,
     s: __m256i,
     t: __m256i,
 ) -> [__m256i; 4] {
     let avx2 = simd.avx2;
     let rows = two_rows(source);
-    let across = pair(simd, s);
-    let upper = avx2._mm256_mullo_epi32(across, rest(simd, t));
+    let across = weight_pairs(simd, s);
+    let upper = avx2._mm256_mullo_epi32(across, complement(simd, t));
     let lower = avx2._mm256_mullo_epi32(across, t);
     let (w, x) = (
         avx2._mm256_shuffle_epi32::<0x00>(upper),
@@ -129,7 +133,10 @@ fn bilinear_colour(
 /// Pixels 0 and 1 side by side in the lower half, 2 and 3 in the upper one.
 const TWO_BY_TWO: [[i8; 16]; 2] = [
     SIDE_BY_SIDE,
-    [6, NO, 9, NO, 7, NO, 10, NO, 8, NO, 11, NO, NO, NO, NO, NO],
+    [
+        6, ZERO_BYTE, 9, ZERO_BYTE, 7, ZERO_BYTE, 10, ZERO_BYTE, 8, ZERO_BYTE, 11, ZERO_BYTE,
+        ZERO_BYTE, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE,
+    ],
 ];
 
 /// The first two of four weights in the lower half, the last two in the upper one.
@@ -138,7 +145,7 @@ const HALVES: [[i8; 16]; 2] = [
     [4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7, 4, 5, 6, 7],
 ];
 
-/// The sums of a row that begins at `at`: a in the lower half, b in the upper one.
+/// Sums of a row that begins at `at`: a in the lower half, b in the upper one.
 #[inline(always)]
 fn colour_row(simd: V3, samples: &[u8], at: usize, w_x: &[i16], blocks: usize) -> __m256i {
     let avx2 = simd.avx2;
@@ -153,11 +160,11 @@ fn colour_row(simd: V3, samples: &[u8], at: usize, w_x: &[i16], blocks: usize) -
     sum
 }
 
-/// The sums of a pixel; `blocks`: quarters of the taps.
+/// Sums of a pixel; `blocks`: quarters of the taps.
 #[inline(always)]
 fn colour(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     (w_x, w_y): (&[i16], &[i16]),
     mut at: usize,
     blocks: usize,
@@ -168,7 +175,7 @@ fn colour(
         let upper = colour_row(simd, source.samples, at, w_x, blocks);
         let lower = colour_row(simd, source.samples, at + source.stride, w_x, blocks);
         at += 2 * source.stride;
-        let two = cut_pair(simd, upper, lower);
+        let two = truncated_pair(simd, upper, lower);
         let w = avx._mm256_set1_epi32(cast(*w_y));
         total = avx2._mm256_add_epi32(total, avx2._mm256_madd_epi16(two, w));
     }

@@ -1,18 +1,20 @@
 //! Sums of grey pixels.
 
-use super::super::inputs::Source;
-use super::lanes::{Eight, NO, cut_pair, pair, read, rest, sum_of_halves, two_rows};
+use super::super::inputs::PictureSamples;
+use super::lanes::{
+    Eight, ZERO_BYTE, complement, read, sum_of_halves, truncated_pair, two_rows, weight_pairs,
+};
 use super::weights::{four_of, taps, weights};
 use crate::numerics::kernel::Kernel;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::{__m128i, __m256i};
 
-/// The sums of eight grey pixels.
+/// Sums of eight grey pixels.
 #[inline(always)]
-pub fn greys<const TAPS: usize>(
+pub fn grey_sums<const TAPS: usize>(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     kernel: &Kernel,
     first: &Eight<u32>,
     phases: [Eight<i32>; 2],
@@ -29,11 +31,11 @@ pub fn greys<const TAPS: usize>(
     simd.avx._mm256_set_m128i(upper, lower)
 }
 
-/// The sums of grey pixels `k` to `k + 3`.
+/// Sums of grey pixels `k` to `k + 3`.
 #[inline(always)]
 fn four_greys<const TAPS: usize>(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     kernel: &Kernel,
     first: &Eight<u32>,
     phases: [Eight<i32>; 2],
@@ -51,7 +53,7 @@ fn four_greys<const TAPS: usize>(
 #[inline(always)]
 fn one_grey<const TAPS: usize>(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     kernel: &Kernel,
     first: &Eight<u32>,
     phases: [Eight<i32>; 2],
@@ -82,10 +84,16 @@ fn two_of_both([upper, lower]: [&[u8]; 2], at: u32) -> i32 {
 }
 
 #[inline(always)]
-fn bilinear_grey(simd: V3, source: Source, first: &Eight<u32>, s: __m256i, t: __m256i) -> __m256i {
+fn bilinear_grey(
+    simd: V3,
+    source: PictureSamples,
+    first: &Eight<u32>,
+    s: __m256i,
+    t: __m256i,
+) -> __m256i {
     let (avx, avx2) = (simd.avx, simd.avx2);
-    let down = pair(simd, t);
-    let left = avx2._mm256_mullo_epi32(down, rest(simd, s));
+    let down = weight_pairs(simd, t);
+    let left = avx2._mm256_mullo_epi32(down, complement(simd, s));
     let right = avx2._mm256_mullo_epi32(down, s);
     let rows = two_rows(source);
     let four = avx._mm256_set_m128i(
@@ -104,8 +112,8 @@ fn bilinear_grey(simd: V3, source: Source, first: &Eight<u32>, s: __m256i, t: __
 
 /// Four rows of samples, as many of each.
 #[inline(always)]
-fn four_rows(source: Source<'_>) -> [&[u8]; 4] {
-    let Source { samples, stride } = source;
+fn four_rows(source: PictureSamples<'_>) -> [&[u8]; 4] {
+    let PictureSamples { samples, stride } = source;
     let count = samples.len().saturating_sub(3 * stride);
     [
         &samples[..count],
@@ -115,7 +123,7 @@ fn four_rows(source: Source<'_>) -> [&[u8]; 4] {
     ]
 }
 
-/// The samples under four taps of a row for pixels `k` to `k + 3`, times their weights: a and b of
+/// Samples under four taps of a row for pixels `k` to `k + 3`, times their weights: a and b of
 /// each.
 #[inline(always)]
 fn four_across(simd: V3, row: &[u8], first: &Eight<u32>, k: usize, w_x: __m256i) -> __m256i {
@@ -141,7 +149,7 @@ fn four_by_four(
     k: usize,
 ) -> __m256i {
     let (avx, avx2) = (simd.avx, simd.avx2);
-    let w = kernel.all_integers().as_chunks::<4>().0;
+    let w = kernel.all_integer_weights().as_chunks::<4>().0;
     let of = |phase: i32| -> i64 { cast(w[phase as usize]) };
     let w_x = avx._mm256_set_epi64x(of(s[k + 3]), of(s[k + 2]), of(s[k + 1]), of(s[k]));
     let w_y = avx._mm256_set_epi64x(of(t[k + 3]), of(t[k + 2]), of(t[k + 1]), of(t[k]));
@@ -150,16 +158,22 @@ fn four_by_four(
     let c = four_across(simd, rows[2], first, k, w_x);
     let d = four_across(simd, rows[3], first, k, w_x);
     avx2._mm256_add_epi32(
-        avx2._mm256_madd_epi16(cut_pair(simd, a, b), avx2._mm256_shuffle_epi32::<0xa0>(w_y)),
-        avx2._mm256_madd_epi16(cut_pair(simd, c, d), avx2._mm256_shuffle_epi32::<0xf5>(w_y)),
+        avx2._mm256_madd_epi16(
+            truncated_pair(simd, a, b),
+            avx2._mm256_shuffle_epi32::<0xa0>(w_y),
+        ),
+        avx2._mm256_madd_epi16(
+            truncated_pair(simd, c, d),
+            avx2._mm256_shuffle_epi32::<0xf5>(w_y),
+        ),
     )
 }
 
-/// The sums of eight grey pixels under four taps.
+/// Sums of eight grey pixels under four taps.
 #[inline(always)]
 fn bicubic_grey(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     kernel: &Kernel,
     first: &Eight<u32>,
     phases: [Eight<i32>; 2],
@@ -174,8 +188,14 @@ fn bicubic_grey(
 
 /// Two weights: the first twice in the lower half, the second in the upper one.
 const ROW_BY_ROW: [[i8; 16]; 2] = [
-    [0, 1, NO, NO, 0, 1, NO, NO, NO, NO, NO, NO, NO, NO, NO, NO],
-    [2, 3, NO, NO, 2, 3, NO, NO, NO, NO, NO, NO, NO, NO, NO, NO],
+    [
+        0, 1, ZERO_BYTE, ZERO_BYTE, 0, 1, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE,
+        ZERO_BYTE, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE,
+    ],
+    [
+        2, 3, ZERO_BYTE, ZERO_BYTE, 2, 3, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE,
+        ZERO_BYTE, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE, ZERO_BYTE,
+    ],
 ];
 
 /// Numbers whose sum is that of a pixel under eight taps and more, `blocks` times eight at the
@@ -183,7 +203,7 @@ const ROW_BY_ROW: [[i8; 16]; 2] = [
 #[inline(always)]
 fn wide_grey(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     (w_x, w_y): (&[i16], &[i16]),
     mut at: usize,
     blocks: usize,

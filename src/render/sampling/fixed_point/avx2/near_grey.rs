@@ -1,30 +1,30 @@
-//! Eight grey pixels under four taps or six whose samples lie near one another: picked out of a few
-//! rows of sixteen.
+//! Sums of eight grey pixels under four taps or six whose samples lie near one another: picked out
+//! of a few rows of sixteen.
 //!
-//! The numbers are those of [`super::grey::greys`], to the bit: samples and rows that
-//! a pixel has no part in weigh nothing.
+//! The numbers are identical to those of [`super::grey::grey_sums`]: samples and rows that a pixel
+//! has no part in have weight zero.
 
-use super::super::inputs::Source;
-use super::lanes::{Eight, cut_pair};
+use super::super::inputs::PictureSamples;
+use super::lanes::{Eight, truncated_pair};
 use crate::numerics::kernel::Kernel;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::{__m128i, __m256i};
 
-/// Samples of a row.
-const WIDE: usize = 16;
-/// How many rows below the uppermost kernels may begin.
-const DOWN: usize = 2;
+/// Samples that are read of a row.
+const ROW_SAMPLES: usize = 16;
+/// Most rows by which one kernel may begin below another.
+const MAX_ROWS_DOWN: usize = 2;
 
-/// In an order of bytes: nothing, even if up to 127 is added.
-const NO: i8 = i8::MIN;
+/// Index of a byte shuffle that gives zero, even if up to 127 is added.
+const ZERO_BYTE: i8 = i8::MIN;
 
-/// The sums of eight pixels whose kernels begin in these columns and rows; None if they lie too far
+/// Sums of eight pixels whose kernels begin in these columns and rows; None if they lie too far
 /// apart, or too near to the end of the picture, or have other taps.
 #[inline(always)]
-pub fn greys<const TAPS: usize>(
+pub fn grey_sums<const TAPS: usize>(
     simd: V3,
-    source: Source,
+    source: PictureSamples,
     kernel: &Kernel,
     [left, top]: [__m256i; 2],
     phases: [Eight<i32>; 2],
@@ -42,30 +42,30 @@ pub fn greys<const TAPS: usize>(
     let across = avx2._mm256_sub_epi32(left, cast([a, a, a, a, b, b, b, b]));
     let down = avx2._mm256_sub_epi32(top, avx._mm256_set1_epi32(row));
     let near = avx2._mm256_and_si256(
-        is_within(simd, across, WIDE - TAPS),
-        is_within(simd, down, DOWN),
+        is_within(simd, across, ROW_SAMPLES - TAPS),
+        is_within(simd, down, MAX_ROWS_DOWN),
     );
     if avx2._mm256_movemask_epi8(near) != -1 {
         return None;
     }
     let level = avx._mm256_testz_si256(down, down) == 1;
-    let rows = Rows {
+    let rows = SampleRows {
         source,
         firsts: firsts.map(|column| row as usize * source.stride + column as usize),
-        pairs: (TAPS + if level { 0 } else { DOWN }) / 2,
+        pairs: (TAPS + if level { 0 } else { MAX_ROWS_DOWN }) / 2,
     };
     let last = firsts[0].max(firsts[1]) as usize + row as usize * source.stride;
-    if last + (2 * rows.pairs - 1) * source.stride + WIDE > source.samples.len() {
+    if last + (2 * rows.pairs - 1) * source.stride + ROW_SAMPLES > source.samples.len() {
         return None;
     }
     let sums = match TAPS {
-        4 => four::greys(simd, &rows, kernel, across, down, phases),
-        _ => six::greys(simd, &rows, kernel, across, down, phases),
+        4 => four::grey_sums(simd, &rows, kernel, across, down, phases),
+        _ => six::grey_sums(simd, &rows, kernel, across, down, phases),
     };
     Some(sums)
 }
 
-/// Where numbers are from 0 to `most`.
+/// Mask of the numbers from 0 to `most`.
 #[inline(always)]
 fn is_within(simd: V3, numbers: __m256i, most: usize) -> __m256i {
     let avx2 = simd.avx2;
@@ -74,21 +74,21 @@ fn is_within(simd: V3, numbers: __m256i, most: usize) -> __m256i {
 }
 
 /// Rows of sixteen samples in which those of the first four pixels and of the last four are.
-struct Rows<'a> {
-    source: Source<'a>,
-    /// Where the first row begins.
+struct SampleRows<'a> {
+    source: PictureSamples<'a>,
+    /// First samples of the first row.
     firsts: [usize; 2],
     /// Pairs of rows.
     pairs: usize,
 }
 
-impl Rows<'_> {
-    /// The samples of a row, twice.
+impl SampleRows<'_> {
+    /// Samples of a row, in both halves.
     #[inline(always)]
-    fn twice(&self, simd: V3, half: usize, row: usize) -> __m256i {
+    fn row_twice(&self, simd: V3, half: usize, row: usize) -> __m256i {
         let at = self.firsts[half] + row * self.source.stride;
-        let mut samples = [0; WIDE];
-        samples.copy_from_slice(&self.source.samples[at..at + WIDE]);
+        let mut samples = [0; ROW_SAMPLES];
+        samples.copy_from_slice(&self.source.samples[at..at + ROW_SAMPLES]);
         simd.avx2._mm256_broadcastsi128_si256(cast(samples))
     }
 }
@@ -100,11 +100,14 @@ mod four {
     /// The lowest byte of the first of two numbers eight times, then that of the second.
     const FIRST_BYTES: [i8; 16] = [0, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 4, 4, 4, 4, 4];
     /// Four samples from there on, each as a number of 16 bits.
-    const SAMPLES: [i8; 16] = [0, NO, 1, NO, 2, NO, 3, NO, 0, NO, 1, NO, 2, NO, 3, NO];
+    const SAMPLES: [i8; 16] = [
+        0, ZERO_BYTE, 1, ZERO_BYTE, 2, ZERO_BYTE, 3, ZERO_BYTE, 0, ZERO_BYTE, 1, ZERO_BYTE, 2,
+        ZERO_BYTE, 3, ZERO_BYTE,
+    ];
 
     /// Four pixels.
     struct Four {
-        /// Which samples of a row they take, as numbers of 16 bits.
+        /// Samples of a row that they take, as numbers of 16 bits.
         order: __m256i,
         w_x: __m256i,
         /// Weights of each pair of rows, for each pixel twice.
@@ -112,9 +115,9 @@ mod four {
     }
 
     #[inline(always)]
-    pub fn greys(
+    pub fn grey_sums(
         simd: V3,
-        rows: &Rows,
+        rows: &SampleRows,
         kernel: &Kernel,
         across: __m256i,
         down: __m256i,
@@ -137,8 +140,8 @@ mod four {
         );
         let mut sums = [avx._mm256_setzero_si256(); 2];
         for pair in 0..rows.pairs {
-            let first = rows.twice(simd, 0, 2 * pair);
-            let next = rows.twice(simd, 0, 2 * pair + 1);
+            let first = rows.row_twice(simd, 0, 2 * pair);
+            let next = rows.row_twice(simd, 0, 2 * pair + 1);
             sums[0] = avx2._mm256_add_epi32(sums[0], lower.pair(simd, pair, first, next));
             sums[1] = avx2._mm256_add_epi32(sums[1], upper.pair(simd, pair, first, next));
         }
@@ -168,7 +171,7 @@ mod four {
             }
         }
 
-        /// What two rows give: two numbers for each pixel.
+        /// Sums two rows: two numbers for each pixel.
         #[inline(always)]
         fn pair(&self, simd: V3, pair: usize, first: __m256i, next: __m256i) -> __m256i {
             let avx2 = simd.avx2;
@@ -176,14 +179,14 @@ mod four {
             let next = avx2._mm256_shuffle_epi8(next, self.order);
             let first = avx2._mm256_madd_epi16(first, self.w_x);
             let next = avx2._mm256_madd_epi16(next, self.w_x);
-            avx2._mm256_madd_epi16(cut_pair(simd, first, next), self.w_y[pair])
+            avx2._mm256_madd_epi16(truncated_pair(simd, first, next), self.w_y[pair])
         }
     }
 
     /// The weights of pixels `k` to `k + 3`.
     #[inline(always)]
     fn weights(simd: V3, kernel: &Kernel, phases: Eight<i32>, k: usize) -> __m256i {
-        let all = kernel.all_integers().as_chunks::<4>().0;
+        let all = kernel.all_integer_weights().as_chunks::<4>().0;
         simd.avx._mm256_set_epi64x(
             cast(all[phases[k + 3] as usize]),
             cast(all[phases[k + 2] as usize]),
@@ -199,13 +202,16 @@ mod six {
 
     /// Eight samples, each as a number of 16 bits. Those beyond the sixteenth, any others instead,
     /// weigh nothing.
-    const SAMPLES: [i8; 16] = [0, NO, 1, NO, 2, NO, 3, NO, 4, NO, 5, NO, 6, NO, 7, NO];
+    const SAMPLES: [i8; 16] = [
+        0, ZERO_BYTE, 1, ZERO_BYTE, 2, ZERO_BYTE, 3, ZERO_BYTE, 4, ZERO_BYTE, 5, ZERO_BYTE, 6,
+        ZERO_BYTE, 7, ZERO_BYTE,
+    ];
     /// All bytes in their order.
     const BYTES: [i8; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
 
     /// Two pixels side by side.
     struct Two {
-        /// Which samples of a row they take, as numbers of 16 bits.
+        /// Samples of a row that they take, as numbers of 16 bits.
         order: __m256i,
         w_x: __m256i,
         /// Weights of the rows.
@@ -220,9 +226,9 @@ mod six {
     }
 
     #[inline(always)]
-    pub fn greys(
+    pub fn grey_sums(
         simd: V3,
-        rows: &Rows,
+        rows: &SampleRows,
         kernel: &Kernel,
         across: __m256i,
         down: __m256i,
@@ -304,12 +310,12 @@ mod six {
             }
         }
 
-        /// What two rows give: two numbers for each pixel.
+        /// Sums two rows: two numbers for each pixel.
         #[inline(always)]
-        fn pair(&self, simd: V3, rows: &Rows, half: usize, pair: usize) -> __m256i {
-            let first = self.row(simd, rows.twice(simd, half, 2 * pair));
-            let next = self.row(simd, rows.twice(simd, half, 2 * pair + 1));
-            let cut = cut_pair(simd, first, next);
+        fn pair(&self, simd: V3, rows: &SampleRows, half: usize, pair: usize) -> __m256i {
+            let first = self.row(simd, rows.row_twice(simd, half, 2 * pair));
+            let next = self.row(simd, rows.row_twice(simd, half, 2 * pair + 1));
+            let cut = truncated_pair(simd, first, next);
             simd.avx2._mm256_madd_epi16(cut, self.w_y[pair])
         }
 
@@ -331,7 +337,7 @@ mod six {
     /// The weights of two phases.
     #[inline(always)]
     fn weights(simd: V3, kernel: &Kernel, first: i32, next: i32) -> __m256i {
-        let all = kernel.all_integers().as_chunks::<8>().0;
+        let all = kernel.all_integer_weights().as_chunks::<8>().0;
         simd.avx
             ._mm256_set_m128i(cast(all[next as usize]), cast(all[first as usize]))
     }

@@ -1,99 +1,100 @@
-//! Where the kernels of a row of a patch lie.
+//! Positions of the kernels of a row of a patch.
 
-use super::super::inputs::{Patch, reach};
+use super::super::inputs::{SampledPatch, reach};
 use super::lanes::Eight;
 use super::weights::taps;
 use crate::numerics::kernel::Kernel;
 use crate::numerics::simd_dispatch;
-use crate::render::warp::local_polynomial::Lanes;
-use crate::render::warp::patches::{EIGHT, PATCH, SCALE};
+use crate::render::warp::local_polynomial::PatchCoefficients;
+use crate::render::warp::patches::{LANES, PATCH_EDGE, PATCH_SCALE};
 use arrayvec::ArrayVec;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::{__m256, __m256i};
 use std::ops::Range;
 
-/// Eights of columns of a patch.
-pub const EIGHTS: usize = PATCH / EIGHT;
+/// Groups of eight columns of a patch.
+pub const PATCH_GROUPS: usize = PATCH_EDGE / LANES;
 
 /// Eight columns of a patch.
-pub struct Columns {
+pub struct ColumnGroup {
     /// The first of them.
     pub first: usize,
-    /// Those that are meant.
+    /// Those that are drawn.
     pub own: Range<usize>,
     /// The patch's coordinates.
-    pub x: [f32; EIGHT],
+    pub x: [f32; LANES],
 }
 
-/// Columns of a patch, eight at a time. Where eight do not fit any more, some are done again.
+/// Divides columns of a patch into groups of eight. Where eight do not fit any more, some are
+/// processed again.
 #[inline(always)]
-pub fn eights(simd: V3, columns: &Range<usize>) -> ArrayVec<Columns, EIGHTS> {
+pub fn column_groups(simd: V3, columns: &Range<usize>) -> ArrayVec<ColumnGroup, PATCH_GROUPS> {
     let Range { start, end } = *columns;
-    let last = reach(columns).end - EIGHT;
+    let last = reach(columns).end - LANES;
     let mut all = ArrayVec::new();
-    for from in (start..end).step_by(EIGHT) {
+    for from in (start..end).step_by(LANES) {
         let first = from.min(last);
-        all.push(Columns {
+        all.push(ColumnGroup {
             first,
-            own: first.max(start)..(first + EIGHT).min(end),
-            x: cast(x_of(simd, first)),
+            own: first.max(start)..(first + LANES).min(end),
+            x: cast(patch_x(simd, first)),
         });
     }
     all
 }
 
-/// The patch's coordinates of eight columns.
+/// Coordinates of eight columns in the patch.
 #[inline(always)]
-fn x_of(simd: V3, first: usize) -> __m256 {
+fn patch_x(simd: V3, first: usize) -> __m256 {
     let avx = simd.avx;
     let steps: __m256 = cast([0.0f32, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
     let column = avx._mm256_add_ps(steps, avx._mm256_set1_ps(first as f32));
     avx._mm256_sub_ps(
-        avx._mm256_mul_ps(column, avx._mm256_set1_ps(SCALE)),
+        avx._mm256_mul_ps(column, avx._mm256_set1_ps(PATCH_SCALE)),
         avx._mm256_set1_ps(1.0),
     )
 }
 
-/// Where eight kernels lie: aligned, as what crosses lines of the cache must reach it before it can
-/// be read again.
+/// Positions of eight kernels, aligned: a store that crosses lines of the cache delays the next
+/// read of it.
 #[derive(Clone, Copy)]
 #[repr(align(64))]
-pub struct Eights {
-    /// Columns and rows in which they begin.
+pub struct KernelGroup {
+    /// Columns and rows where they begin.
     pub corner: [Eight<i32>; 2],
-    /// The samples with which they begin.
+    /// Samples where they begin.
     pub first: Eight<u32>,
-    /// Their phases along u and v.
+    /// Phases along u and v.
     pub phases: [Eight<i32>; 2],
 }
 
-pub const NOWHERE: Eights = Eights {
-    corner: [[0; EIGHT]; 2],
-    first: [0; EIGHT],
-    phases: [[0; EIGHT]; 2],
+pub const EMPTY_GROUP: KernelGroup = KernelGroup {
+    corner: [[0; LANES]; 2],
+    first: [0; LANES],
+    phases: [[0; LANES]; 2],
 };
 
-/// Where the kernels of a row lie: of all its columns before the first is looked up, or each would
-/// wait for its own.
+/// Finds the positions of a row's kernels: of all its columns before the first is sampled, or each
+/// would wait for its own.
 #[inline(always)]
-pub fn place<const C: usize, const TAPS: usize>(
+pub fn find_positions<const C: usize, const TAPS: usize>(
     simd: V3,
-    patch: &Patch,
+    patch: &SampledPatch,
     row: usize,
-    columns: &[Columns],
-    places: &mut [Eights; EIGHTS],
+    columns: &[ColumnGroup],
+    places: &mut [KernelGroup; PATCH_GROUPS],
 ) {
     let (avx, avx2) = (simd.avx, simd.avx2);
     let taps = taps::<TAPS>(patch.kernel);
     let phases = Kernel::integer_phases_of(taps);
-    let before = avx._mm256_set1_epi32(Kernel::before_of(taps) as i32);
+    let before = avx._mm256_set1_epi32(Kernel::taps_before_of(taps) as i32);
     let stride = avx._mm256_set1_epi32(patch.source.stride as i32);
-    let line = line(simd, patch.lines, row);
+    let line = row_coefficients(simd, patch.lines, row);
     for (k, (columns, place)) in columns.iter().zip(places).enumerate() {
         let x: __m256 = cast(columns.x);
-        let (left, s) = whole(simd, polynomial(simd, x, &line[..4]), phases);
-        let (top, t) = whole(simd, polynomial(simd, x, &line[4..]), phases);
+        let (left, s) = floor_and_phase(simd, evaluate_polynomial(simd, x, &line[..4]), phases);
+        let (top, t) = floor_and_phase(simd, evaluate_polynomial(simd, x, &line[4..]), phases);
         let left = avx2._mm256_sub_epi32(left, before);
         let top = avx2._mm256_sub_epi32(top, before);
         let sample = match C {
@@ -101,7 +102,7 @@ pub fn place<const C: usize, const TAPS: usize>(
             _ => avx2._mm256_add_epi32(left, avx2._mm256_add_epi32(left, left)),
         };
         let first = avx2._mm256_add_epi32(avx2._mm256_mullo_epi32(top, stride), sample);
-        *place = Eights {
+        *place = KernelGroup {
             corner: [cast(left), cast(top)],
             first: cast(first),
             phases: [cast(s), cast(t)],
@@ -115,11 +116,11 @@ pub fn place<const C: usize, const TAPS: usize>(
     }
 }
 
-/// Where the pixels of a row of a patch appear, by powers of x.
+/// Polynomials along a row of a patch, by powers of x.
 #[inline(always)]
-fn line(simd: V3, lines: &[Lanes; 4], row: usize) -> Lanes {
+fn row_coefficients(simd: V3, lines: &[PatchCoefficients; 4], row: usize) -> PatchCoefficients {
     let avx = simd.avx;
-    let y = avx._mm256_set1_ps(row as f32 * SCALE - 1.0);
+    let y = avx._mm256_set1_ps(row as f32 * PATCH_SCALE - 1.0);
     let mut at: __m256 = cast(lines[3]);
     for c in [lines[2], lines[1], lines[0]] {
         at = avx._mm256_add_ps(avx._mm256_mul_ps(at, y), cast(c));
@@ -128,7 +129,7 @@ fn line(simd: V3, lines: &[Lanes; 4], row: usize) -> Lanes {
 }
 
 #[inline(always)]
-pub fn polynomial(simd: V3, x: __m256, c: &[f32]) -> __m256 {
+pub fn evaluate_polynomial(simd: V3, x: __m256, c: &[f32]) -> __m256 {
     let avx = simd.avx;
     let (last, rest) = c.split_last().unwrap_or((&0.0, &[]));
     let mut value = avx._mm256_set1_ps(*last);
@@ -138,9 +139,9 @@ pub fn polynomial(simd: V3, x: __m256, c: &[f32]) -> __m256 {
     value
 }
 
-/// Numbers from 0 on cut to the whole numbers below them, and the phases of what was cut off.
+/// Splits numbers from 0 on into the whole numbers below them and the phases of the fractions.
 #[inline(always)]
-fn whole(simd: V3, value: __m256, phases: f32) -> (__m256i, __m256i) {
+fn floor_and_phase(simd: V3, value: __m256, phases: f32) -> (__m256i, __m256i) {
     let avx = simd.avx;
     let below = avx._mm256_cvttps_epi32(value);
     let rest = avx._mm256_sub_ps(value, avx._mm256_cvtepi32_ps(below));

@@ -6,7 +6,7 @@ use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::__m256i;
 
-/// The kernel's taps, known beforehand or not (0).
+/// Taps of the kernel, known at compile time or not (0).
 #[inline(always)]
 pub fn taps<const TAPS: usize>(kernel: &Kernel) -> usize {
     match TAPS {
@@ -15,7 +15,7 @@ pub fn taps<const TAPS: usize>(kernel: &Kernel) -> usize {
     }
 }
 
-/// The weights along u and v of pixel `k`, those along u filled up with nothing.
+/// Weights along u and v of pixel `k`, those along u padded with zeros.
 #[inline(always)]
 pub fn weights<const TAPS: usize>(
     kernel: &Kernel,
@@ -23,12 +23,12 @@ pub fn weights<const TAPS: usize>(
     k: usize,
 ) -> (&[i16], &[i16]) {
     let taps = taps::<TAPS>(kernel);
-    let row = Kernel::row_of(taps);
-    let of = |phase: i32| &kernel.all_integers()[phase as usize * row..][..row];
+    let row = Kernel::padded_taps(taps);
+    let of = |phase: i32| &kernel.all_integer_weights()[phase as usize * row..][..row];
     (of(s[k]), &of(t[k])[..taps])
 }
 
-/// The four weights from `at`; nothing beyond the last.
+/// Four weights from `at`; zeros beyond the last.
 #[inline(always)]
 pub fn four_of(weights: &[i16], at: usize) -> i64 {
     if at >= weights.len() {
@@ -38,7 +38,7 @@ pub fn four_of(weights: &[i16], at: usize) -> i64 {
     cast([w[0], w[1], w[2], w[3]])
 }
 
-/// The same, over and over.
+/// Four weights from `at`, repeated in all lanes.
 #[inline(always)]
 pub fn four(simd: V3, weights: &[i16], at: usize) -> __m256i {
     simd.avx._mm256_set1_epi64x(four_of(weights, at))
