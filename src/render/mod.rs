@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! poses ─ place ──> footprints ─ Canvas::covering ──────────────────> canvas ─┐
-//! files ─ Thumbnails ─ Exposure::solve ─> exposure ─ Seams::find ───> seams ──┼─ TileRenderer::draw ──> bands
+//! files ─ Thumbnails ─ Exposure::solve ─> exposure ─ Seams::find ───> seams ──┼─ TileRenderer ─> bands
 //!     └── PictureCache::load, band by band ─────────────────────────> frames ─┘
 //! ```
 //!

@@ -32,7 +32,7 @@ pub trait Target: Send {
     /// Receives the next band.
     ///
     /// # Errors
-    /// What the system says.
+    /// An error of the target, such as one of the file system.
     fn put(&mut self, canvas: &Canvas, band: &Band) -> Result<(), RenderError>;
 
     /// True if it needs [`Band::sources`].

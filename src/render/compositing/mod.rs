@@ -3,10 +3,11 @@
 //! | subject | file |
 //! | --- | --- |
 //! | options | [`options`] |
-//! | frame of each node of a grid, light levelled out between them | [`seam_grid`], [`seam_selection`], [`multi_band_blending`] |
-//! | both together, and the parts that frames have in a row | [`seams`], [`frame_shares`] |
+//! | grid of nodes, and the frame of each | [`seam_grid`], [`seam_selection`] |
+//! | differences of light between frames | [`multi_band_blending`] |
+//! | all of it together, and shares of frames in a row | [`seams`], [`frame_shares`] |
 //! | weighted sums along a row | [`accumulator`] |
-//! | tile drawn from the best frame, from the mean or from the median | [`best_view`], [`tile_renderer`] |
+//! | tile drawn from the best frame, the mean or the median | [`best_view`], [`tile_renderer`] |
 //! | wall solved from all frames, finer than any of them | [`super_resolution`] |
 //! | rows of tiles as they are handed on | [`band`] |
 

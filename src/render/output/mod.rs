@@ -5,7 +5,8 @@
 //! | frames and poses to a panorama | [`stitch`] |
 //! | bands drawn one after the other | [`plan`] |
 //! | memory needed and free | [`budget`], [`memory`] |
-//! | panorama in memory, in a raster file, small with axes | [`panorama`], [`raster_target`], [`preview`] |
+//! | panorama in memory | [`panorama`] |
+//! | panorama in a raster file, and small with axes | [`raster_target`], [`preview`] |
 //! | wall that no frame shows | [`gaps`] |
 //! | resolution and uncertainty over the wall | [`maps`] |
 //! | one photo on a cylinder around its camera | [`cylinder`] |

@@ -109,7 +109,7 @@ impl RasterTarget {
     /// State from which writing can be resumed.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// An error of the file system.
     pub fn state(&self) -> Result<RasterState<'_>, WriteError> {
         Ok(match &self.writer {
             Writer::Cog(writer) => RasterState::Cog(writer.state()?),

@@ -6,7 +6,8 @@
 //! | decoded picture | [`picture`] |
 //! | frames of a survey, as many in memory as are needed | [`picture_cache`] |
 //! | up to 128 points: where a frame shows them, and its values there | [`point_batch`] |
-//! | sums under a kernel in whole numbers and in single precision | [`fixed_point`], [`floating_point`] |
+//! | sums under a kernel in whole numbers | [`fixed_point`] |
+//! | sums under a kernel in single precision | [`floating_point`] |
 //! | small pictures of all frames | [`thumbnails`] |
 //! | gains, biases and shading | [`photometric_samples`], [`exposure`], [`patch_light`] |
 //! | one frame over one tile, sampled with its exposure undone | [`frame_view`] |

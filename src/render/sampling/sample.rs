@@ -36,7 +36,9 @@ macro_rules! sample {
             }
 
             fn bytes<'a, 'b>(rows: &'a mut [&'b mut [Self]]) -> Option<&'a mut [&'b mut [u8]]> {
-                let bytes: for<'c, 'd> fn(&'c mut [&'d mut [Self]]) -> Option<&'c mut [&'d mut [u8]]> = $bytes;
+                let bytes: for<'c, 'd> fn(
+                    &'c mut [&'d mut [Self]],
+                ) -> Option<&'c mut [&'d mut [u8]]> = $bytes;
                 bytes(rows)
             }
         })*

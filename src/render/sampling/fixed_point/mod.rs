@@ -14,7 +14,7 @@
 //!
 //! | subject | file |
 //! | --- | --- |
-//! | units of weights and sums | [`format`] |
+//! | units of weights and sums | [`mod@format`] |
 //! | what is sampled: points, rows of a patch, blocks of one or several frames | [`inputs`] |
 //! | choice of the code for the processor and the kernel | [`dispatch`] |
 //! | plain loops, and vectors | [`scalar`], [`avx2`] |

@@ -4,11 +4,12 @@
 //! | --- | --- |
 //! | reading and summing | [`lanes`] |
 //! | weights of a pixel | [`weights`] |
-//! | sums under the kernel, of grey and of coloured pixels anywhere | [`grey`], [`colour`], [`sums`] |
+//! | sums under the kernel anywhere, of grey pixels and in colour | [`grey`], [`colour`], [`sums`] |
 //! | sums of grey pixels near one another | [`near_grey`] |
 //! | sums as pixels | [`pixels`] |
 //! | where the kernels of a row of a patch lie, and their sums | [`positions`], [`patch_sums`] |
-//! | blocks of a patch: of one frame as it is, of frames with light undone | [`block`], [`blended_block`] |
+//! | blocks of a patch, of one frame as it is | [`block`] |
+//! | blocks of a patch, of frames with exposure undone | [`blended_block`] |
 
 pub mod blended_block;
 pub mod block;
