@@ -48,13 +48,6 @@ fn variants() -> Vec<(&'static str, RefineOptions)> {
     vec![
         ("default", all.clone()),
         (
-            "each frame's own gradient instead of the fused one",
-            RefineOptions {
-                fused_gradient: false,
-                ..all.clone()
-            },
-        ),
-        (
             "no sliding windows",
             RefineOptions {
                 windows: false,

@@ -16,7 +16,7 @@ use std::io::BufRead;
 use tunnelstitch::camera::Camera;
 use tunnelstitch::progress::Silent;
 use tunnelstitch::render::{
-    Band, Canvas, FrameStack, Interpolation, Mode, Picture, Placement, Plan, RenderError,
+    Band, Canvas, Interpolation, Mode, Picture, PictureCache, Placement, Plan, RenderError,
     RenderOptions, Target, place,
 };
 use tunnelstitch::surface::Circle;
@@ -53,7 +53,7 @@ impl Target for Covered {
 
 /// What is measured.
 struct Bench<'a> {
-    frames: FrameStack,
+    frames: PictureCache,
     plans: Vec<(String, Plan<'a>)>,
     /// How many pixels some frame shows.
     covered: usize,
@@ -72,7 +72,7 @@ impl<'a> Bench<'a> {
             .map(|k: usize| ((k * 2_654_435_761) >> 13) as u8)
             .collect();
         let pictures = (0..FRAMES).map(|_| Picture::new(1920, 1080, 3, samples.clone()));
-        let mut frames = FrameStack::from_pictures(*camera, pictures.collect());
+        let mut frames = PictureCache::from_pictures(*camera, pictures.collect());
         let mut plans = Vec::new();
         for interpolation in [
             Interpolation::Bilinear,

@@ -1,9 +1,9 @@
-//! Text in pictures, of the 8 × 8 pixels that home computers had.
+//! Text drawn into pictures with a bitmap font of 8 × 8 pixels.
 
 use font8x8::{BASIC_FONTS, GREEK_FONTS, LATIN_FONTS, UnicodeFonts};
 use image::{Rgb, RgbImage};
 
-/// Side of a letter at scale 1, pixels.
+/// Edge of a letter at scale 1, pixels.
 pub const LETTER: u32 = 8;
 
 /// Width of a text, pixels.

@@ -2,7 +2,6 @@
 
 use crate::camera::Camera;
 use crate::frames::GreyImage;
-use crate::render::{FrameStack, Picture};
 use crate::surface::{Circle, Surface, WallPoint};
 use crate::trajectory::{Pose, so3, spiral};
 use nalgebra::Vector3;
@@ -28,7 +27,7 @@ pub fn waves(wall: WallPoint, perimeter_m: f64) -> f64 {
 }
 
 impl TestWall {
-    /// Fourteen frames once around, off the axis and turned a little each in its own way.
+    /// Makes fourteen frames once around, each off the axis and turned a little differently.
     pub fn ring(texture: Texture) -> Self {
         let poses = spiral(14, 0.03, 30f64.to_radians())
             .into_iter()
@@ -43,7 +42,7 @@ impl TestWall {
         Self::new(poses, texture)
     }
 
-    /// One frame from the origin towards θ = 0.
+    /// Makes one frame from the origin towards θ = 0.
     pub fn one(texture: Texture) -> Self {
         Self::new(vec![Pose::identity()], texture)
     }
@@ -61,18 +60,9 @@ impl TestWall {
         self.circle.perimeter_m()
     }
 
-    /// The frames: the texture at each pixel centre's wall point.
+    /// Draws the frames: the texture at each pixel centre's wall point.
     pub fn frames(&self) -> Vec<GreyImage> {
         self.poses.iter().map(|pose| self.frame(pose)).collect()
-    }
-
-    /// The frames as pictures of whole grey levels.
-    pub fn stack(&self) -> FrameStack {
-        let pictures = self.frames().into_iter().map(|frame| {
-            let data: Vec<u8> = frame.data().iter().map(|v| v.round() as u8).collect();
-            Picture::new(frame.width(), frame.height(), 1, data)
-        });
-        FrameStack::from_pictures(self.camera, pictures.collect())
     }
 
     fn frame(&self, pose: &Pose) -> GreyImage {

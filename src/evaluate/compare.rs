@@ -9,7 +9,7 @@ use crate::camera::Camera;
 use crate::frames::FrameSet;
 use crate::progress::Progress;
 use crate::render::{
-    Canvas, FrameStack, Panorama, Placement, RenderOptions, check_memory, level_for,
+    Canvas, Panorama, PictureCache, Placement, RenderOptions, check_memory, level_for,
     native_px_per_metre, place, render,
 };
 use crate::surface::Surface;
@@ -205,7 +205,7 @@ impl<'a> Candidate<'a> {
     fn draw(
         &self,
         input: &CompareInput,
-        frames: &mut FrameStack,
+        frames: &mut PictureCache,
         canvas: &Canvas,
         progress: &dyn Progress,
     ) -> Result<Drawing, EvaluateError> {
@@ -233,7 +233,7 @@ fn prepare(
     refined: &Candidate,
     truth: Option<&Candidate>,
     progress: &dyn Progress,
-) -> Result<(FrameStack, Canvas), EvaluateError> {
+) -> Result<(PictureCache, Canvas), EvaluateError> {
     let best = truth.unwrap_or(refined);
     let fail = |source| EvaluateError::Render {
         which: best.which,
@@ -252,8 +252,8 @@ fn prepare(
     .map_err(fail)?;
     let level = level_for(input.camera, native, canvas.px_per_metre);
     let copies = 4;
-    let mut frames = FrameStack::open(input.files, input.camera, level).map_err(fail)?;
+    let mut frames = PictureCache::open(input.files, input.camera, level).map_err(fail)?;
     check_memory(&canvas, copies, &frames).map_err(fail)?;
-    frames.hold_all(progress).map_err(fail)?;
+    frames.load_all(progress).map_err(fail)?;
     Ok((frames, canvas))
 }

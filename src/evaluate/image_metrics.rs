@@ -58,11 +58,12 @@ pub fn image_metrics(first: &Panorama, second: &Panorama) -> Result<ImageMetrics
 mod tests {
     use super::*;
     use crate::progress::Silent;
-    use crate::render::{Canvas, FrameStack, Mode, Picture, RenderOptions, place, render};
+    use crate::render::tests::pictures::pictures;
+    use crate::render::{Canvas, Mode, Picture, PictureCache, RenderOptions, place, render};
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Shutter;
 
-    fn panorama(wall: &TestWall, mut stack: FrameStack, ppm: f64) -> Panorama {
+    fn panorama(wall: &TestWall, mut stack: PictureCache, ppm: f64) -> Panorama {
         let placements =
             place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, ppm).unwrap();
@@ -89,7 +90,7 @@ mod tests {
             let picture = Picture::new(w, h, 1, vec![value; w * h]);
             panorama(
                 &wall,
-                FrameStack::from_pictures(wall.camera, vec![picture]),
+                PictureCache::from_pictures(wall.camera, vec![picture]),
                 50.0,
             )
         };
@@ -107,8 +108,8 @@ mod tests {
     fn different_canvases_are_refused() {
         let wall = TestWall::one(waves);
         let error = image_metrics(
-            &panorama(&wall, wall.stack(), 50.0),
-            &panorama(&wall, wall.stack(), 40.0),
+            &panorama(&wall, pictures(&wall), 50.0),
+            &panorama(&wall, pictures(&wall), 40.0),
         );
         assert!(matches!(error, Err(EvaluateError::Canvas { .. })));
     }

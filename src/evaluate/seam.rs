@@ -1,6 +1,6 @@
 //! How well the frames agree where they overlap, without any truth.
 
-use crate::render::{Canvas, EDGE, FrameStack, Interpolation, Kernel, Placement, Tile, tiles};
+use crate::render::{Canvas, EDGE, Interpolation, Kernel, PictureCache, Placement, Tile, tiles};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -54,7 +54,7 @@ impl SeamMap {
     /// bilinearly, luma of colour.
     pub fn new(
         surface: &dyn Surface,
-        frames: &FrameStack,
+        frames: &PictureCache,
         placements: &[Placement],
         canvas: &Canvas,
     ) -> Self {
@@ -138,7 +138,7 @@ impl SeamMap {
 /// two frames overlap.
 pub fn seam_residual(
     surface: &dyn Surface,
-    frames: &FrameStack,
+    frames: &PictureCache,
     placements: &[Placement],
     canvas: &Canvas,
 ) -> Option<SeamResidual> {
@@ -148,7 +148,7 @@ pub fn seam_residual(
 /// What the frames show of the points of a tile.
 fn look(
     surface: &dyn Surface,
-    frames: &FrameStack,
+    frames: &PictureCache,
     placements: &[Placement],
     grid: &Canvas,
     tile: &Tile,
@@ -236,6 +236,7 @@ impl Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::tests::pictures::pictures;
     use crate::render::{Picture, place};
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Shutter;
@@ -243,7 +244,7 @@ mod tests {
     #[test]
     fn true_poses_leave_rounding_noise_and_wrong_ones_much_more() {
         let wall = TestWall::ring(waves);
-        let stack = wall.stack();
+        let stack = pictures(&wall);
         let residual = |poses: &[crate::trajectory::Pose]| {
             let placements = place(&wall.circle, &wall.camera, poses, &Shutter::default()).unwrap();
             let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
@@ -267,7 +268,7 @@ mod tests {
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
         let of = |values: &[u8]| {
             let pictures: Vec<Picture> = values.iter().map(|value| flat(*value)).collect();
-            let stack = FrameStack::from_pictures(wall.camera, pictures);
+            let stack = PictureCache::from_pictures(wall.camera, pictures);
             seam_residual(&wall.circle, &stack, &placements[..values.len()], &canvas)
         };
         assert!((of(&[100, 106]).unwrap().rms_grey - 6.0).abs() < 1e-4);
@@ -286,7 +287,7 @@ mod tests {
         wrong[4].t_wc.y += 0.05;
         let placements = place(&wall.circle, &wall.camera, &wrong, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
-        let map = SeamMap::new(&wall.circle, &wall.stack(), &placements, &canvas);
+        let map = SeamMap::new(&wall.circle, &pictures(&wall), &placements, &canvas);
         let [around, along] = map.size();
         let (residuals, frames) = (map.rms_grey(), map.frames());
         assert_eq!(

@@ -1,4 +1,4 @@
-//! The median of numbers some of which may be unknown.
+//! Medians.
 
 /// The middle one of those numbers that are finite (the upper one of the middle two), if there are
 /// any.
@@ -6,4 +6,14 @@ pub(crate) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
     values.retain(|value| value.is_finite());
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
+}
+
+/// Median; the mean of the middle two of an even number, NaN of none. The values are sorted.
+pub fn median(values: &mut [f32]) -> f32 {
+    let n = values.len();
+    if n == 0 {
+        return f32::NAN;
+    }
+    values.sort_unstable_by(f32::total_cmp);
+    0.5 * (values[(n - 1) / 2] + values[n / 2])
 }

@@ -4,11 +4,15 @@
 //! | tool | file |
 //! | --- | --- |
 //! | median of values some of which may be unknown | [`median`] |
+//! | weights of the pixels around a point | [`kernel`] |
+//! | rounding of small numbers without casts | [`rounding`] |
 //! | sinc and Hann's window | [`signal`] |
 //! | two-dimensional Fourier transforms | [`spectrum`] |
 //! | loops compiled for the widest vectors of the processor | [`simd_dispatch`] |
 
+pub mod kernel;
 pub mod median;
+pub mod rounding;
 pub mod signal;
 pub mod simd_dispatch;
 pub mod spectrum;

@@ -1,21 +1,22 @@
-//! Why a panorama cannot be drawn.
+//! Errors of drawing a panorama.
 
 use crate::frames::FrameError;
 use crate::raster::RasterError;
 use crate::surface::SurfaceError;
 
-/// Why a panorama cannot be drawn.
+/// Error of drawing a panorama.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
     /// Some ray of a frame has no place on the wall.
     #[error(
-        "frame {frame}: {source}; its picture cannot be laid on the wall: check its pose, or remove the frame"
+        "frame {frame}: {source}; its picture cannot be laid on the wall: check its pose, or \
+         remove the frame"
     )]
     Frame {
         /// Index of the frame.
         frame: usize,
-        /// What is wrong.
+        /// Reason.
         source: SurfaceError,
     },
     /// Frames and poses do not pair up.
@@ -34,7 +35,10 @@ pub enum RenderError {
     },
     /// A picture nobody can mean.
     #[error(
-        "the panorama would be {columns:.0} × {rows:.0} px ({:.1} Gpx, at most {:.0} are drawn): {perimeter_m:.3} m around and {chainage_m:.3} m along at {px_per_metre:.1} px per metre; lower --px-per-metre, and check radius_m and the units of the poses. Frame {frame} reaches farthest: it spans {span_m:.3} m of chainage",
+        "the panorama would be {columns:.0} × {rows:.0} px ({:.1} Gpx, at most {:.0} are drawn): \
+         {perimeter_m:.3} m around and {chainage_m:.3} m along at {px_per_metre:.1} px per metre; \
+         lower --px-per-metre, and check radius_m and the units of the poses. Frame {frame} \
+         reaches farthest: it spans {span_m:.3} m of chainage",
         columns * rows / 1e9,
         limit_px / 1e9
     )]
@@ -58,7 +62,9 @@ pub enum RenderError {
     },
     /// A picture for which this machine is too small.
     #[error(
-        "a panorama of {columns} × {rows} px from {frames} frames needs at least {needed_mib} MiB of memory, and {available_mib} MiB may be used; raise --memory if there is more, write .tif (a .png or .jpg is held in memory as a whole), or lower --px-per-metre"
+        "a panorama of {columns} × {rows} px from {frames} frames needs at least {needed_mib} MiB \
+         of memory, and {available_mib} MiB may be used; raise --memory if there is more, write \
+         .tif (a .png or .jpg is held in memory as a whole), or lower --px-per-metre"
     )]
     Memory {
         /// Columns around the section.

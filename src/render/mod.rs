@@ -2,19 +2,26 @@
 //!
 //! ```text
 //! poses ─ place ──> footprints ─ Canvas::covering ──────────────────> canvas ─┐
-//! files ─ Thumbnails ─ Exposure::solve ─> exposure ─ Seams::find ───> seams ──┼─ Scene::draw ──> tiles
-//!     └── FrameStack::hold, band by band ───────────────────────────> frames ─┘
+//! files ─ Thumbnails ─ Exposure::solve ─> exposure ─ Seams::find ───> seams ──┼─ TileRenderer ─> bands
+//!     └── PictureCache::load, band by band ─────────────────────────> frames ─┘
 //! ```
 //!
-//! [`stitch()`] does all of it. Every canvas pixel is taken back to its wall point, from there into
-//! the frame that shows it best ([`Mode`] has other ways), and the frame's exposure is undone. The
-//! same function draws the initial, the refined and the true poses, so pictures differ by their
-//! poses only.
+//! [`stitch()`] does all of it. Every canvas pixel is mapped to its wall point, from there into the
+//! frame that shows it best ([`Mode`] has other ways), and the frame's exposure is undone. Initial,
+//! refined and true poses are drawn by the same function, so pictures differ by their poses only.
 //!
-//! [`sightings`] goes the other way: from a point of the wall to the frames and pixels that show
-//! it.
+//! [`sightings`] is the opposite direction: from a point of the wall to the frames and pixels that
+//! show it. [`cylinder`] stands alone: the cylindrical projection of one single photo.
 //!
-//! [`cylinder`] is the odd one out: the cylindrical projection of one single photo.
+//! Each folder builds on those above it:
+//!
+//! | subject | folder |
+//! | --- | --- |
+//! | pixels of the panorama on the wall, and the frames that see them | [`layout`] |
+//! | mapping of a tile's pixels into a frame | [`warp`] |
+//! | pictures, values between pixels, exposure | [`sampling`] |
+//! | seams, blending, super-resolution: tiles' pixels from several frames | [`compositing`] |
+//! | panoramas, files, previews, maps, and the memory they need | [`output`] |
 //!
 //! # Example
 //!
@@ -38,65 +45,37 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod band;
-mod best_view;
-mod budget;
-mod canvas;
-mod chart;
-pub mod cylinder;
-mod detail;
-mod draw;
+pub(crate) mod compositing;
 mod error;
-mod exposure;
-mod gaps;
-mod glimpses;
-mod integer;
-mod kernel;
-mod labels;
-mod levelling;
-mod light;
-mod locate;
-mod maps;
-mod memory;
-mod panorama;
-mod picture;
-mod placement;
-mod plan;
-mod preview;
-mod raster_target;
-mod row;
-mod run;
-mod sample;
-mod seams;
-mod stack;
-mod stitch;
-mod thumbnails;
-mod tiles;
-mod view;
-mod warp;
+pub(crate) mod layout;
+pub(crate) mod output;
+pub(crate) mod sampling;
+pub(crate) mod warp;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
-pub use band::{Band, Target};
-pub use budget::Budget;
-pub use canvas::{Canvas, Layout};
-pub use draw::{Mode, NO_FRAME};
+pub use crate::numerics::kernel::{Interpolation, Kernel};
+pub use compositing::band::{Band, Target};
+pub use compositing::options::{Mode, RenderOptions};
+pub use compositing::seams::Seams;
 pub use error::RenderError;
-pub use exposure::{Exposure, FrameExposure};
-pub use gaps::{Coverage, Gap, gaps_csv};
-pub use kernel::{Interpolation, Kernel};
-pub use locate::{Sighting, sightings};
-pub use maps::Map;
-pub use panorama::Panorama;
-pub use picture::{Picture, PixelFormat};
-pub use placement::{Placement, native_px_per_metre, place};
-pub use plan::{Plan, RenderOptions, Settled};
-pub use preview::Preview;
-pub use raster_target::{Kept, RasterLayer, RasterState, RasterTarget};
-pub use sample::{Sample, Samples};
-pub use seams::Seams;
-pub use stack::{FrameStack, level_for};
-pub(crate) use stitch::check_memory;
-pub use stitch::{LaidOut, Stitch, StitchOptions, lay_out, on_the_axis, render, stitch};
-pub(crate) use tiles::{EDGE, Tile, tiles};
+pub use layout::canvas::{Canvas, Layout};
+pub use layout::placement::{NO_FRAME, Placement, native_px_per_metre, place};
+pub use layout::sightings::{Sighting, sightings};
+pub(crate) use layout::tiles::{EDGE, Tile, tiles};
+pub use output::budget::Budget;
+pub use output::cylinder;
+pub use output::gaps::{Coverage, Gap, gaps_csv};
+pub use output::maps::Map;
+pub use output::panorama::Panorama;
+pub use output::plan::{Plan, Settled};
+pub use output::preview::Preview;
+pub use output::raster_target::{Kept, RasterLayer, RasterState, RasterTarget};
+pub(crate) use output::stitch::check_memory;
+pub use output::stitch::{LaidOut, Stitch, StitchOptions, lay_out, on_the_axis, render, stitch};
+pub use sampling::exposure::{Exposure, FrameExposure};
+pub use sampling::picture::Picture;
+pub use sampling::picture_cache::{PictureCache, level_for};
+pub use sampling::pixel_format::PixelFormat;
+pub use sampling::sample::{Sample, Samples};

@@ -1,7 +1,7 @@
 //! How finely the panoramas of a report are compared.
 
 use super::ReportError;
-use crate::render::{Canvas, FrameStack, level_for, native_px_per_metre, place};
+use crate::render::{Canvas, PictureCache, level_for, native_px_per_metre, place};
 use crate::survey::Survey;
 use crate::trajectory::Pose;
 
@@ -28,7 +28,7 @@ pub fn resolution(survey: &Survey, poses: &[Pose]) -> Result<Option<f64>, Report
             .map_or(usize::MAX, |canvas| canvas.pixels());
         let level = level_for(camera, native, px_per_metre);
         let one = survey.frames.first(1);
-        let bytes = FrameStack::open(&one, camera, level)?.frame_bytes() * poses.len() as u64;
+        let bytes = PictureCache::open(&one, camera, level)?.frame_bytes() * poses.len() as u64;
         // Frames cannot be halved without end.
         let fits = bytes <= MOST_BYTES || px_per_metre < native / 64.0;
         if (pixels <= MOST_PIXELS && fits) || px_per_metre < 1e-6 * native {

@@ -7,7 +7,7 @@
 //! Source: R. G. Keys, "Cubic convolution interpolation for digital image processing", IEEE
 //! Transactions on Acoustics, Speech, and Signal Processing 29(6), 1981.
 
-use crate::render;
+use crate::numerics::kernel;
 use serde::{Deserialize, Serialize};
 
 /// The kernel K.
@@ -24,10 +24,10 @@ const STEPS: usize = 256;
 
 impl Interpolation {
     /// The one that panoramas are drawn with, which has `K(x)` and how far it reaches.
-    fn kernel(self) -> render::Interpolation {
+    fn kernel(self) -> kernel::Interpolation {
         match self {
-            Self::Bilinear => render::Interpolation::Bilinear,
-            Self::Bicubic => render::Interpolation::Bicubic,
+            Self::Bilinear => kernel::Interpolation::Bilinear,
+            Self::Bicubic => kernel::Interpolation::Bicubic,
         }
     }
 
@@ -65,7 +65,7 @@ mod tests {
         for k in 0..=10 {
             let f = k as f32 / 10.0;
             for (i, weight) in cubic_weights(f).into_iter().enumerate() {
-                let expected = render::Interpolation::Bicubic.weight(i as f64 - 1.0 - f64::from(f));
+                let expected = kernel::Interpolation::Bicubic.weight(i as f64 - 1.0 - f64::from(f));
                 assert!((f64::from(weight) - expected).abs() < 1e-6, "{f} {i}");
             }
         }
