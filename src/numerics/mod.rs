@@ -1,9 +1,9 @@
-//! Numerical tools that are about no tunnel: medians, window functions, Fourier transforms of
-//! rasters, and loops compiled for the processor at hand.
+//! General numerical tools: medians, window functions, Fourier transforms of rasters, and loops
+//! compiled for the processor at hand.
 //!
 //! | tool | file |
 //! | --- | --- |
-//! | median of values some of which may be unknown | [`median`] |
+//! | median of values of which some may be unknown | [`median`] |
 //! | sinc and Hann's window | [`signal`] |
 //! | two-dimensional Fourier transforms | [`spectrum`] |
 //! | loops compiled for the widest vectors of the processor | [`simd_dispatch`] |

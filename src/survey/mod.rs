@@ -1,4 +1,4 @@
-//! `survey.toml`: what a data set is.
+//! Surveys: data sets described by a `survey.toml`.
 //!
 //! ```toml
 //! [tunnel]

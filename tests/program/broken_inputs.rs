@@ -130,7 +130,7 @@ const ROWS: &[Row] = &[
         ),
         REFINE,
         3,
-        &["survey.toml", "tunnel.ignore, item 1", "the lesser first"],
+        &["survey.toml", "tunnel.ignore, item 1", "the smaller first"],
     ),
     (
         Edit(

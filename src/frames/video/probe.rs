@@ -120,7 +120,7 @@ fn of(path: &Path, probed: Probed) -> Result<VideoInfo, String> {
         90.0 | 270.0 => (height, width),
         _ => {
             return Err(format!(
-                "is to be shown turned by {rotation}°, which is not a multiple of 90°"
+                "is displayed with a rotation of {rotation}°, which is not a multiple of 90°"
             ));
         }
     };
