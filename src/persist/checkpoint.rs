@@ -22,7 +22,8 @@
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("survey");
 //! # let camera = tunnelstitch::camera::Camera::from_vertical_fov(160, 120, 1.0);
-//! # simulate::run(&SimulateOptions { frames: 4, camera, ..SimulateOptions::free() }, &path, false, &Silent)?;
+//! # let options = SimulateOptions { frames: 4, camera, ..SimulateOptions::free() };
+//! # simulate::run(&options, &path, false, &Silent)?;
 //! let survey = Survey::open(&path)?;
 //! let origin = Origin {
 //!     program: "my program 1.0".to_owned(),
@@ -65,7 +66,8 @@ const MIN_SAVE_INTERVAL_RATIO: u32 = 50;
 pub enum CheckpointError {
     /// The checkpoint belongs to another run.
     #[error(
-        "{}: it holds an interrupted run that cannot be resumed: {what}; give --fresh to restart, or another --out",
+        "{}: it holds an interrupted run that cannot be resumed: {what}; give --fresh to restart, \
+         or another --out",
         folder.display()
     )]
     Other {
@@ -83,7 +85,10 @@ pub enum CheckpointError {
         what: String,
     },
     /// Another process uses the checkpoint.
-    #[error("{}: another run is writing the same result; wait for it, or give another --out", folder.display())]
+    #[error(
+        "{}: another run is writing the same result; wait for it, or give another --out",
+        folder.display()
+    )]
     Busy {
         /// The folder.
         folder: PathBuf,

@@ -20,7 +20,8 @@ pub(super) fn check(spec: &RasterSpec, quality: u8) -> Result<(), RasterError> {
     }
     if spec.nodata.is_some() {
         return refuse(
-            "a JPEG's values are not exact, so no value can mark missing data; add an alpha channel",
+            "a JPEG's values are not exact, so no value can mark missing data; add an alpha \
+             channel",
         );
     }
     Ok(())

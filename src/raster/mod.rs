@@ -1,9 +1,9 @@
 //! Tiled output of pictures larger than the memory.
 //!
 //! ```text
-//!                      ┌─ OverviewBuilder: overviews, reduced 2 × 2 on the way ─┐
-//! RasterTile batches ──┤                                                ├──> CogWriter ──> NAME.tif
-//!  in any order        └─ tiles of all levels ──────────────────────────┘    DziWriter ──> NAME.dzi, NAME_files/
+//!                      ┌─ OverviewBuilder ─────┐
+//! RasterTile batches ──┤  2 × 2 downsampling   ├──> CogWriter ──> NAME.tif
+//!  in any order        └─ tiles of all levels ─┘    DziWriter ──> NAME.dzi, NAME_files/
 //! ```
 //!
 //! A [`RasterSpec`] describes the pixels and their *no-data* value; the picture then arrives as

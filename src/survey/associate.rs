@@ -109,7 +109,8 @@ pub(super) fn by_name(
                 match (fitting.next(), fitting.next()) {
                     (Some((_, only)), None) => Ok(*only),
                     _ => Err(fail(format!(
-                        "{} poses could be those of frame {} ({}); names in the file must end the frames' paths",
+                        "{} poses could be those of frame {} ({}); names in the file must end the \
+                         frames' paths",
                         several.len(),
                         frame.index,
                         frame.path.display()
@@ -180,7 +181,8 @@ pub(super) fn by_time(
         };
         if off(nearest) > how.tolerance_s {
             return Err(fail(format!(
-                "the nearest pose is at {} s, {:.6} s away, more than the tolerance of {} s (--time-tolerance-s)",
+                "the nearest pose is at {} s, {:.6} s away, more than the tolerance of {} s \
+                 (--time-tolerance-s)",
                 nearest.time_s,
                 off(nearest),
                 how.tolerance_s
@@ -192,14 +194,16 @@ pub(super) fn by_time(
                 let share = (time_s - last.time_s) / (next.time_s - last.time_s);
                 se3::between(&last.pose, &next.pose, share).ok_or_else(|| {
                     fail(format!(
-                        "the poses at {} s and {} s are turned too far from each other to find the way between them",
+                        "the poses at {} s and {} s are turned too far from each other to find \
+                         the way between them",
                         last.time_s, next.time_s
                     ))
                 })?
             }
             (true, ..) => {
                 return Err(fail(format!(
-                    "lies beyond the poses, the nearest of which is at {} s, and nothing is extrapolated",
+                    "lies beyond the poses, the nearest of which is at {} s, and nothing is \
+                     extrapolated",
                     nearest.time_s
                 )));
             }

@@ -11,7 +11,10 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum SurveyError {
     /// `survey.toml` cannot be read.
-    #[error("{}: cannot read the survey: {source}; a survey is a folder with a survey.toml", path.display())]
+    #[error(
+        "{}: cannot read the survey: {source}; a survey is a folder with a survey.toml",
+        path.display()
+    )]
     Read {
         /// The file.
         path: PathBuf,
@@ -40,7 +43,8 @@ pub enum SurveyError {
     },
     /// The numbers of frames and poses differ.
     #[error(
-        "{}: {poses} poses for {frames} frames; every frame needs exactly one pose, in the order of the frames' names{remedy}",
+        "{}: {poses} poses for {frames} frames; every frame needs exactly one pose, in the order \
+         of the frames' names{remedy}",
         path.display()
     )]
     Count {
@@ -63,7 +67,8 @@ pub enum SurveyError {
     },
     /// A frame's time is needed, but unknown.
     #[error(
-        "frame {frame} ({}): its name contains no time (seconds with a decimal point, or nanoseconds); give a file of times by \
+        "frame {frame} ({}): its name contains no time (seconds with a decimal point, or \
+         nanoseconds); give a file of times by \
          --frame-times FILE (frames.times in survey.toml)",
         file.display()
     )]

@@ -40,7 +40,8 @@ impl FrameList {
         let mut listing = match (&section.images, &section.video, section.every) {
             (Some(_), None, None) if section.angle_step_deg.is_some() => {
                 return fail(
-                    "frames.angle_step_deg goes with frames.video; for pictures, let frames.images match fewer of them",
+                    "frames.angle_step_deg goes with frames.video; for pictures, let \
+                     frames.images match fewer of them",
                 );
             }
             (Some(pattern), None, None) => {
@@ -62,7 +63,8 @@ impl FrameList {
             }
             (Some(_), None, Some(_)) => {
                 return fail(
-                    "frames.every goes with frames.video; for pictures, let frames.images match fewer of them",
+                    "frames.every goes with frames.video; for pictures, let frames.images match \
+                     fewer of them",
                 );
             }
             (None, None, _) => {

@@ -23,7 +23,8 @@ pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, Survey
             Ok(lines.iter().map(|line| line.time_s).collect())
         } else {
             Err(file(format!(
-                "{} times for {} frames; every frame needs one, in the order of the frames' names, or with its name beside it",
+                "{} times for {} frames; every frame needs one, in the order of the frames' \
+                 names, or with its name beside it",
                 lines.len(),
                 frames.len()
             )))

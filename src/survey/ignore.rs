@@ -35,7 +35,8 @@ impl IgnoreSection {
                 ..
             } if !(from.abs() <= MAX_ANGLE_DEG && to.abs() <= MAX_ANGLE_DEG) || from == to => {
                 Err(format!(
-                    "theta_deg is [{from}, {to}]; it must be two different angles in degrees, from and to in the direction in which θ grows"
+                    "theta_deg is [{from}, {to}]; it must be two different angles in degrees, \
+                     from and to in the direction in which θ grows"
                 ))
             }
             Self {

@@ -31,7 +31,9 @@ impl Survey {
         let section = &self.file.poses;
         if section.associate != Some(Associate::Time) {
             return fail(
-                "frames.angle_step_deg needs poses.associate = \"time\": the poses determine which pictures are frames".to_owned(),
+                "frames.angle_step_deg needs poses.associate = \"time\": the poses determine \
+                 which pictures are frames"
+                    .to_owned(),
             );
         }
         let (all, _) = self.read_as(section, &self.folder.join(&section.initial))?;

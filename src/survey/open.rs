@@ -93,7 +93,8 @@ impl Survey {
             .all(|s| (1e-9..=10.0 * file.tunnel.nominal_m()).contains(s))
         {
             return Err(value(format!(
-                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times the radius (half the width)",
+                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times \
+                 the radius (half the width)",
                 prior.translation_sigma_m
             )));
         }
@@ -118,8 +119,10 @@ impl Survey {
             && file.camera.readout_ms.is_some()
         {
             return Err(value(format!(
-                "camera.readout_ms goes from row to row, but {} is displayed with a rotation of {}°, so that its rows are not the rows that the sensor \
-                 reads at once; extract the pictures with ffmpeg -noautorotate and calibrate for these, or remove readout_ms",
+                "camera.readout_ms goes from row to row, but {} is displayed with a rotation of \
+                 {}°, so that its rows are not the rows that the sensor \
+                 reads at once; extract the pictures with ffmpeg -noautorotate and calibrate for \
+                 these, or remove readout_ms",
                 video.path().display(),
                 video.rotation_deg()
             )));
@@ -257,7 +260,8 @@ impl Survey {
             Ok(())
         } else {
             Err(format!(
-                "camera.readout_ms is {readout_ms}; it must be a number of milliseconds and no more than the {shortest_ms:.3} ms between \
+                "camera.readout_ms is {readout_ms}; it must be a number of milliseconds and no \
+                 more than the {shortest_ms:.3} ms between \
                  the times of the nearest two poses in {}",
                 self.file.poses.initial.display()
             ))

@@ -89,8 +89,10 @@ impl<'a> PoseReader<'a> {
         if file.format == PoseFormat::Euroc && convention.camera_in_body.is_none() {
             return Err(SurveyError::Association {
                 path: file.path,
-                what: "holds the poses of a body (IMU), as EuRoC's files do; say how the camera is mounted with \
-                       --body-to-camera FILE (poses.body_to_camera in survey.toml): its sensor.yaml, or a 4 × 4 matrix"
+                what: "holds the poses of a body (IMU), as EuRoC's files do; say how the camera \
+                       is mounted with \
+                       --body-to-camera FILE (poses.body_to_camera in survey.toml): its \
+                       sensor.yaml, or a 4 × 4 matrix"
                     .to_owned(),
             });
         }
@@ -121,7 +123,8 @@ impl<'a> PoseReader<'a> {
                 return Err(SurveyError::Association {
                     path: file.path,
                     what: format!(
-                        "frame {} ({}) has time {} s, and the one before it {} s; frames are sorted by their names, which must be the order of their times",
+                        "frame {} ({}) has time {} s, and the one before it {} s; frames are \
+                         sorted by their names, which must be the order of their times",
                         frame.index,
                         frame.path.display(),
                         stamped.time_s,

@@ -365,10 +365,12 @@ pub(super) fn validate_poses(
             source,
             remedy: match other {
                 Some(other) => format!(
-                    "{} of {} cameras are; they would all be inside and look at the wall with {other}",
+                    "{} of {} cameras are; they would all be inside and look at the wall with \
+                     {other}",
                     stand.outside, stand.frames
                 ),
-                None => "check radius_m and the poses' origin, units and convention (--pose-convention, --tunnel-frame)"
+                None => "check radius_m and the poses' origin, units and convention \
+                         (--pose-convention, --tunnel-frame)"
                     .to_owned(),
             },
         });
@@ -379,7 +381,8 @@ pub(super) fn validate_poses(
         return Err(SurveyError::Association {
             path: path.to_owned(),
             what: format!(
-                "{} of {} cameras look along the tunnel's axis; they would look at the wall with {other}",
+                "{} of {} cameras look along the tunnel's axis; they would look at the wall with \
+                 {other}",
                 stand.axial, stand.frames
             ),
         });
@@ -389,7 +392,8 @@ pub(super) fn validate_poses(
             format!("; they would go along it with {other}")
         });
         return Ok(vec![format!(
-            "{}: the cameras move or turn across the tunnel, not along its axis (the world's y){likely}",
+            "{}: the cameras move or turn across the tunnel, not along its axis (the world's \
+             y){likely}",
             path.display()
         )]);
     }
