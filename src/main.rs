@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // A panic, in whatever thread, is a bug and ends the program with its code.
+    // A panic in any thread is a bug and ends the program with the exit code of bugs.
     std::panic::set_hook(Box::new(|panic| {
         tunnelstitch::persist::remove_unfinished();
         eprintln!("bug in tunnelstitch {}: {panic}", env!("CARGO_PKG_VERSION"));

@@ -1,19 +1,19 @@
-//! News of long work, for whoever wants to show it.
+//! Progress reports of long computations.
 
-/// Receives the progress of long work. The library calls it from any thread; the program draws
+/// A receiver of progress reports. The library calls it from any thread; the program draws progress
 /// bars.
 pub trait Progress: Send + Sync {
-    /// A stage of `total` equal parts begins; it replaces the one before.
+    /// Begins a stage of `total` equal parts, which replaces the previous one.
     fn start(&self, stage: &str, total: usize);
-    /// `parts` more parts of the stage are done.
+    /// Reports that `parts` more parts of the stage are done.
     fn advance(&self, parts: usize);
-    /// A few words on what the stage is at.
+    /// Reports the current state of the stage in a few words.
     fn detail(&self, text: &str);
-    /// The stage is over.
+    /// Ends the stage.
     fn finish(&self);
 }
 
-/// Says nothing.
+/// A receiver that ignores all reports.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 

@@ -23,7 +23,10 @@ pub enum FrameError {
         pattern: String,
     },
     /// A frame is unreadable or damaged.
-    #[error("frame {index} ({}): {what}; restore the file, or remove the frame and its pose", path.display())]
+    #[error(
+        "frame {index} ({}): {what}; restore the file, or remove the frame and its pose",
+        path.display()
+    )]
     Decode {
         /// Index of the frame in the survey.
         index: usize,
@@ -50,7 +53,8 @@ pub enum FrameError {
     },
     /// A frame's size differs from the calibration's.
     #[error(
-        "frame {index} ({}): {width} × {height} px, but the calibration is for {expected_width} × {expected_height} px",
+        "frame {index} ({}): {width} × {height} px, but the calibration is for {expected_width} × \
+         {expected_height} px",
         path.display()
     )]
     Size {

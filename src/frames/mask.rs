@@ -54,14 +54,16 @@ impl Mask {
         let found = decoder.dimensions();
         if found != (width, height) {
             return Err(fail(format!(
-                "{} × {} px, but the frames have {width} × {height} px; a mask is an image of the frames' size",
+                "{} × {} px, but the frames have {width} × {height} px; a mask is an image of the \
+                 frames' size",
                 found.0, found.1
             )));
         }
         let picture = DynamicImage::from_decoder(decoder).map_err(undecodable)?;
         if picture.to_rgba8().pixels().any(|pixel| pixel.0[3] != 255) {
             return Err(fail(
-                "has transparent pixels; save it without transparency, black where the wall is hidden and white elsewhere"
+                "has transparent pixels; save it without transparency, black where the wall is \
+                 hidden and white elsewhere"
                     .to_owned(),
             ));
         }
@@ -77,7 +79,8 @@ impl Mask {
         let share = odd.count() as f64 / grey.len() as f64;
         if share > MAX_UNDECIDED_FRACTION {
             return Err(fail(format!(
-                "{:.0} % of its pixels are neither black nor white; a mask is black where the frames never show the wall and white \
+                "{:.0} % of its pixels are neither black nor white; a mask is black where the \
+                 frames never show the wall and white \
                  elsewhere",
                 100.0 * share
             )));
@@ -88,7 +91,8 @@ impl Mask {
             .collect();
         if !wall.contains(&true) {
             return Err(fail(
-                "is black all over, so that no pixel would show the wall; black is what does not, and white the wall: invert it"
+                "is black all over, so that no pixel would show the wall; black is what does not, \
+                 and white the wall: invert it"
                     .to_owned(),
             ));
         }

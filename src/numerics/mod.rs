@@ -1,9 +1,9 @@
-//! Numerical tools that are about no tunnel: medians, window functions, Fourier transforms of
-//! rasters, and loops compiled for the processor at hand.
+//! General numerical tools: medians, window functions, Fourier transforms of rasters, and loops
+//! compiled for the processor at hand.
 //!
 //! | tool | file |
 //! | --- | --- |
-//! | median of values some of which may be unknown | [`median`] |
+//! | median of values of which some may be unknown | [`median`] |
 //! | weights of the pixels around a point | [`kernel`] |
 //! | rounding of small numbers without casts | [`rounding`] |
 //! | sinc and Hann's window | [`signal`] |

@@ -1,8 +1,8 @@
-//! The functions that spectra are computed with.
+//! Window and kernel functions of spectral analysis.
 
 use std::f64::consts::PI;
 
-/// `sin πx / πx`: what averaging over a width of 1 leaves of the frequency x.
+/// `sin πx / πx`: the frequency response at x of averaging over a width of 1.
 pub(crate) fn sinc(x: f64) -> f64 {
     if x == 0.0 {
         1.0
@@ -11,7 +11,7 @@ pub(crate) fn sinc(x: f64) -> f64 {
     }
 }
 
-/// Hann's window at the k-th of n evenly spaced samples.
+/// Hann window at the k-th of n uniformly spaced samples.
 pub(crate) fn hann(k: usize, n: usize) -> f64 {
     0.5 - 0.5 * (2.0 * PI * (k as f64 + 0.5) / n as f64).cos()
 }

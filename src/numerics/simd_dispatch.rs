@@ -1,13 +1,13 @@
-//! Loops compiled for the widest vectors of the processor that runs them.
+//! Run-time dispatch of loops to the widest vector instructions of the processor.
 
 use pulp::{Arch, Simd, WithSimd};
 
-/// Does `work` with the code compiled for this processor's vector instructions.
+/// Runs `work` with code compiled for this processor's vector instructions.
 ///
-/// Write it as `dispatch_simd(#[inline(always)] || …)`, and mark what it calls `#[inline(always)]`
-/// as well: only what is inlined is compiled anew. The numbers are the same on every processor:
-/// vectors change neither the order of operations nor their rounding, and nothing is contracted to
-/// a fused multiply–add.
+/// Call it as `dispatch_simd(#[inline(always)] || …)`, and mark the called functions
+/// `#[inline(always)]`: only inlined code is compiled for the instructions. The numbers are the
+/// same on every processor: vectors change neither the order of operations nor their rounding, and
+/// nothing is contracted to a fused multiply–add.
 #[inline(always)]
 pub fn dispatch_simd<R>(work: impl FnMut() -> R) -> R {
     Arch::new().dispatch(Work(work))
@@ -24,11 +24,11 @@ impl<R, F: FnMut() -> R> WithSimd for Work<F> {
     }
 }
 
-/// Does `work` with the code compiled for AVX2, which it is handed; false without doing it where
-/// the processor has none.
+/// Runs `work` with code compiled for AVX2 and returns true; returns false without running it if
+/// the processor lacks AVX2.
 ///
-/// Write it as [`dispatch_simd`]. What is not inlined is neither fast nor wrong: no closures, no
-/// `map` of arrays in loops.
+/// Call it like [`dispatch_simd`]. Code that is not inlined is correct but slow: use no closures
+/// and no `map` of arrays in loops.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub fn dispatch_avx2(work: impl FnMut(pulp::x86::V3)) -> bool {
@@ -39,7 +39,7 @@ pub fn dispatch_avx2(work: impl FnMut(pulp::x86::V3)) -> bool {
     true
 }
 
-/// Asks for a sample that will be needed soon.
+/// Prefetches a sample for reading.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub fn prefetch(simd: pulp::x86::V3, samples: &[u8], at: usize) {
@@ -48,9 +48,9 @@ pub fn prefetch(simd: pulp::x86::V3, samples: &[u8], at: usize) {
     simd.sse._mm_prefetch::<_MM_HINT_T0>(pointer.cast());
 }
 
-/// Asks for rows that will be written soon.
+/// Prefetches rows for writing.
 pub fn prefetch_rows(rows: &[&mut [u8]]) {
-    /// Bytes that come at once.
+    /// Size of a cache line, bytes.
     #[cfg(target_arch = "x86_64")]
     const CACHE_LINE_BYTES: usize = 64;
     #[cfg(target_arch = "x86_64")]

@@ -21,8 +21,8 @@ pub struct Transform {
 }
 
 impl Transform {
-    /// For rasters of at least `columns × rows`, rounded up to sizes that transform fast
-    /// (`2^a 3^b 5^c`).
+    /// Creates transforms for rasters of at least `columns × rows`, rounded up to sizes that
+    /// transform fast (`2^a 3^b 5^c`).
     pub fn at_least(columns: usize, rows: usize) -> Self {
         let (columns, rows) = (fast_size(columns), fast_size(rows));
         let mut real = RealFftPlanner::new();
@@ -41,21 +41,21 @@ impl Transform {
         self.columns / 2 + 1
     }
 
-    /// The spectrum of a raster, row-major; it is used up.
+    /// Transforms a raster, row-major, to its half spectrum.
     pub fn forward(&self, mut raster: Vec<f32>) -> Spectrum {
         let width = self.width();
         let mut spectrum = vec![Complex::default(); width * self.rows];
         let rows = raster.chunks_exact_mut(self.columns);
         for (row, out) in rows.zip(spectrum.chunks_exact_mut(width)) {
-            // The lengths are those of the plan.
+            // The lengths match the plan.
             let _ = self.forward.process(row, out);
         }
         self.along_columns(&mut spectrum, self.down.as_ref());
         spectrum
     }
 
-    /// The correlation `C(d) = Σ_x a(x) b(x + d)` (cyclic) of two rasters, from their spectra:
-    /// `Ā B` back.
+    /// The correlation `C(d) = Σ_x a(x) b(x + d)` (cyclic) of two rasters from their spectra: the
+    /// inverse transform of `Ā B`.
     pub fn correlate(&self, a: &Spectrum, b: &Spectrum) -> Vec<f32> {
         let width = self.width();
         let mut product: Spectrum = a.iter().zip(b).map(|(a, b)| a.conj() * b).collect();
@@ -63,7 +63,7 @@ impl Transform {
         let mut raster = vec![0.0; self.columns * self.rows];
         let rows = product.chunks_exact_mut(width);
         for (row, out) in rows.zip(raster.chunks_exact_mut(self.columns)) {
-            // These are real but for rounding, and the plan insists.
+            // These are real up to rounding, as the plan requires.
             row[0].im = 0.0;
             if self.columns.is_multiple_of(2) {
                 row[width - 1].im = 0.0;
@@ -92,7 +92,7 @@ impl Transform {
     }
 }
 
-/// The next size with no prime factor above 5.
+/// The smallest size from `least` on without prime factors above 5.
 fn fast_size(least: usize) -> usize {
     (least.max(4)..)
         .find(|n| {

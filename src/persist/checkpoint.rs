@@ -1,14 +1,13 @@
-//! Where a long run keeps what it has done, so that it can go on after it was interrupted, killed
-//! or out of disk.
+//! Checkpoints of long runs, to resume them after an interruption, a crash or a full disk.
 //!
-//! A checkpoint is a folder `NAME.unfinished` beside the result, or in it, with files that are each
-//! replaced as a whole: `origin`, what run it is of, and states. Beside them lies whatever the run
-//! adds to as it goes, of which a state says how much counts. It belongs to one run, of the same
-//! version of the program with the same options and inputs ([`Origin`]), and is refused to any
-//! other. It goes when the run ends.
+//! A checkpoint is a folder `NAME.unfinished` beside the result, or in it, with atomically replaced
+//! files: `origin`, which identifies the run, and states. It may also hold files to which the run
+//! appends; a state records their valid length. A checkpoint belongs to one run: the same version
+//! of the program with the same options and inputs ([`Origin`]); any other run is refused. It is
+//! removed when the run ends.
 //!
-//! A state is CBOR (RFC 8949), in which every number comes back with all its bits, and then the
-//! BLAKE3 hash of that.
+//! A state is stored as CBOR (RFC 8949), which restores every number bit for bit, followed by its
+//! BLAKE3 hash.
 //!
 //! # Example
 //!
@@ -23,7 +22,8 @@
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("survey");
 //! # let camera = tunnelstitch::camera::Camera::from_vertical_fov(160, 120, 1.0);
-//! # simulate::run(&SimulateOptions { frames: 4, camera, ..SimulateOptions::free() }, &path, false, &Silent)?;
+//! # let options = SimulateOptions { frames: 4, camera, ..SimulateOptions::free() };
+//! # simulate::run(&options, &path, false, &Silent)?;
 //! let survey = Survey::open(&path)?;
 //! let origin = Origin {
 //!     program: "my program 1.0".to_owned(),
@@ -47,68 +47,72 @@ use std::io::{self, BufWriter, ErrorKind, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Name of the file that says what run it is.
+/// Name of the file that identifies the run.
 const ORIGIN_FILE: &str = "origin";
-/// Extension of the files with states.
+/// Extension of state files.
 const STATE_EXTENSION: &str = "state";
-/// Name of the file that the run holds locked.
+/// Name of the lock file.
 const LOCK_FILE: &str = "lock";
-/// Bytes that are hashed at once.
+/// Buffer size of the hasher, bytes.
 const HASH_BUFFER_BYTES: usize = 1 << 17;
-/// Time between two states, at the least ...
+/// Shortest time between two states.
 const MIN_SAVE_INTERVAL: Duration = Duration::from_millis(250);
-/// ... and in multiples of the time that keeping the last one took.
+/// Shortest time between two states, as a multiple of the duration of the last save.
 const MIN_SAVE_INTERVAL_RATIO: u32 = 50;
 
-/// Why a run cannot be continued, or not be kept.
+/// An error of resuming or saving a run.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CheckpointError {
-    /// It is another run's.
+    /// The checkpoint belongs to another run.
     #[error(
-        "{}: an interrupted run is kept there that cannot be continued: {what}; give --fresh to begin anew, or another --out",
+        "{}: it holds an interrupted run that cannot be resumed: {what}; give --fresh to restart, \
+         or another --out",
         folder.display()
     )]
     Other {
         /// The folder.
         folder: PathBuf,
-        /// What is different.
+        /// The difference.
         what: String,
     },
-    /// It is not what was written.
-    #[error("{}: the interrupted run kept there is damaged ({what}); give --fresh to begin anew", folder.display())]
+    /// The checkpoint is corrupt.
+    #[error("{}: the interrupted run in it is corrupt ({what}); give --fresh to restart", folder.display())]
     Damaged {
         /// The folder.
         folder: PathBuf,
-        /// What is wrong.
+        /// The problem.
         what: String,
     },
-    /// Another process works on it.
-    #[error("{}: another run is writing the same result; wait for it, or give another --out", folder.display())]
+    /// Another process uses the checkpoint.
+    #[error(
+        "{}: another run is writing the same result; wait for it, or give another --out",
+        folder.display()
+    )]
     Busy {
         /// The folder.
         folder: PathBuf,
     },
-    /// The system.
+    /// An error of the operating system.
     #[error(transparent)]
     Write(#[from] WriteError),
 }
 
-/// What a run is made of: everything that its result depends on.
+/// The identity of a run: everything that its result depends on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Origin {
     /// Name and version of the program.
     pub program: String,
     /// The effective options.
     pub options: String,
-    /// `survey.toml` with what flags have changed of it.
+    /// `survey.toml` with the changes by flags.
     pub survey: String,
     /// Hashes of the inputs.
     pub inputs: Vec<Input>,
 }
 
 impl Origin {
-    /// What is different in another run, in words.
+    /// Describes the difference to another run.
     fn difference(&self, other: &Self) -> Option<String> {
         if self.program != other.program {
             return Some(format!(
@@ -117,46 +121,43 @@ impl Origin {
             ));
         }
         if self.options != other.options {
-            return Some("its options were others".to_owned());
+            return Some("its options differ".to_owned());
         }
         if self.survey != other.survey {
-            return Some(
-                "its survey.toml, or a flag that stands for something in it, was another"
-                    .to_owned(),
-            );
+            return Some("its survey.toml, or a flag that overrides it, differs".to_owned());
         }
         if self.inputs.len() != other.inputs.len() {
-            return Some("it had other inputs".to_owned());
+            return Some("its inputs differ".to_owned());
         }
-        // The same files may be named from another folder.
+        // The files may be named relative to another folder.
         let mut pairs = self.inputs.iter().zip(&other.inputs);
         let pair = pairs.find(|(own, other)| own.blake3 != other.blake3);
         pair.map(|(own, _)| format!("{} has changed since", own.path.display()))
     }
 }
 
-/// The checkpoint of one run, which holds it locked.
+/// The checkpoint of one run, locked during its lifetime.
 #[derive(Debug)]
 pub struct Checkpoint {
     folder: PathBuf,
-    /// Folders elsewhere that belong to it.
+    /// Folders outside that belong to the checkpoint.
     others: Vec<PathBuf>,
     begun: bool,
-    /// When the last state was kept, ...
+    /// Time of the last save.
     kept: Instant,
-    /// ... and how long until the next is due.
+    /// Duration until the next save is due.
     wait: Duration,
-    /// When the one at hand was found due.
+    /// Time at which the current save became due.
     due: Option<Instant>,
     _lock: File,
 }
 
 impl Checkpoint {
-    /// The checkpoint in `folder`, made if missing; what is kept there is dropped if the run is to
-    /// begin anew (`fresh`).
+    /// Opens or creates the checkpoint in `folder`; `fresh` discards its content to restart the
+    /// run.
     ///
     /// # Errors
-    /// Another run's checkpoint, a damaged one, one in use; whatever the system says.
+    /// A checkpoint of another run, a corrupt one, or one in use; an error of the operating system.
     pub fn open(folder: &Path, origin: &Origin, fresh: bool) -> Result<Self, CheckpointError> {
         atomic::create_folder(folder)?;
         let mut checkpoint = Self {
@@ -172,7 +173,7 @@ impl Checkpoint {
         if checkpoint.begun {
             let what = match checkpoint.read::<Origin>(ORIGIN_FILE)? {
                 Some(kept) => kept.difference(origin),
-                None => Some("it does not say what run it is".to_owned()),
+                None => Some("its origin is missing".to_owned()),
             };
             if let Some(what) = what {
                 let folder = checkpoint.folder;
@@ -185,7 +186,7 @@ impl Checkpoint {
         Ok(checkpoint)
     }
 
-    /// The files of the checkpoint, but the lock; the states first.
+    /// The files of the checkpoint except the lock, states first.
     fn kept_files(&self) -> Result<Vec<PathBuf>, WriteError> {
         let entries = std::fs::read_dir(&self.folder)
             .and_then(|entries| entries.map(|entry| Ok(entry?.path())).collect());
@@ -196,23 +197,23 @@ impl Checkpoint {
         Ok(paths)
     }
 
-    /// Removes what is kept. A run killed meanwhile leaves no state without what says which run it
-    /// is of.
+    /// Removes the content, states first, so that a run killed meanwhile leaves no state without
+    /// its origin.
     fn clear(&self) -> Result<(), WriteError> {
         let kept = self.kept_files()?;
         kept.iter().try_for_each(|path| atomic::remove_file(path))
     }
 
-    /// The file `name` of the checkpoint, for what is added to as the run goes.
+    /// The path of the file `name` of the checkpoint, to which the run appends.
     pub fn file(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// A folder beside `target`, for what must lie on the same disk. It goes with the checkpoint;
-    /// if it has gone without it, the run begins anew. To be asked for before any state.
+    /// A folder beside `target`, for data on the same disk. It is removed with the checkpoint; if
+    /// it is missing, the run restarts. Must be called before any state is read.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// An error of the operating system.
     pub fn folder_beside(&mut self, target: &Path) -> Result<PathBuf, WriteError> {
         let folder = folder_of(target);
         if self.begun && !folder.is_dir() {
@@ -229,24 +230,24 @@ impl Checkpoint {
         Ok(folder)
     }
 
-    /// Whether it goes on from what was kept.
+    /// True if the run resumes from saved states.
     pub fn is_begun(&self) -> bool {
         self.begun
     }
 
-    /// The state `name`, if it was kept.
+    /// Loads the state `name`, if it was saved.
     ///
     /// # Errors
-    /// [`CheckpointError::Damaged`] if it is not what was written, or no `S`.
+    /// [`CheckpointError::Damaged`] if it is corrupt or not an `S`.
     pub fn state<S: DeserializeOwned>(&self, name: &str) -> Result<Option<S>, CheckpointError> {
         self.read(&format!("{name}.{STATE_EXTENSION}"))
     }
 
-    /// Keeps the state `name` in place of the one before. How long that takes, since it was found
-    /// due, spaces the next.
+    /// Saves the state `name`, replacing the previous one. The duration, from when it became due,
+    /// determines when the next is due.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// An error of the operating system.
     pub fn keep<S: Serialize>(&mut self, name: &str, state: &S) -> Result<(), WriteError> {
         let since = self.due.take().unwrap_or_else(Instant::now);
         self.write(&format!("{name}.{STATE_EXTENSION}"), state)?;
@@ -255,7 +256,7 @@ impl Checkpoint {
         Ok(())
     }
 
-    /// Whether it is time for another state.
+    /// True if the next state is due.
     pub fn is_due(&mut self) -> bool {
         let due = self.kept.elapsed() >= self.wait;
         self.due = due.then(Instant::now);
@@ -275,7 +276,7 @@ impl Checkpoint {
         };
         let content = match bytes.split_last_chunk() {
             Some((content, hash)) if blake3::hash(content) == blake3::Hash::from(*hash) => content,
-            _ => return Err(damaged("it is not what was written".to_owned())),
+            _ => return Err(damaged("its hash does not match".to_owned())),
         };
         let state = ciborium::from_reader(content);
         state.map(Some).map_err(|error| damaged(error.to_string()))
@@ -287,7 +288,7 @@ impl Checkpoint {
                 writer,
                 hasher: blake3::Hasher::new(),
             };
-            // A number at a time is a slow way to hash.
+            // Buffered, because hashing number by number is slow.
             let mut hashing = BufWriter::with_capacity(HASH_BUFFER_BYTES, hashing);
             ciborium::into_writer(state, &mut hashing).map_err(io::Error::other)?;
             let Hashing { writer, hasher } =
@@ -296,10 +297,10 @@ impl Checkpoint {
         })
     }
 
-    /// Removes all that is kept: the run has ended.
+    /// Removes the checkpoint at the end of the run.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// An error of the operating system.
     pub fn finish(self) -> Result<(), WriteError> {
         self.clear()?;
         let folders = self.others.iter().chain([&self.folder]);
@@ -314,7 +315,7 @@ fn is_state(path: &Path) -> bool {
     path.extension() == Some(STATE_EXTENSION.as_ref())
 }
 
-/// Hashes all that is written.
+/// A writer that hashes its data.
 struct Hashing<'a, W> {
     writer: &'a mut W,
     hasher: blake3::Hasher,
@@ -332,15 +333,14 @@ impl<W: Write> Write for Hashing<'_, W> {
     }
 }
 
-/// The folder in which an interrupted run that makes `result` is kept: its name with `.unfinished`
-/// added.
+/// The checkpoint folder of the run that produces `result`: its name with `.unfinished` appended.
 pub fn folder_of(result: &Path) -> PathBuf {
     let mut name = result.as_os_str().to_owned();
     name.push(".unfinished");
     name.into()
 }
 
-/// Locks the folder for as long as the file lives, or the process.
+/// Locks the folder until the file is dropped or the process ends.
 fn lock(folder: &Path) -> Result<File, CheckpointError> {
     let path = folder.join(LOCK_FILE);
     let fail = |source| WriteError::new(&path, source);
@@ -350,7 +350,7 @@ fn lock(folder: &Path) -> Result<File, CheckpointError> {
         Err(TryLockError::WouldBlock) => Err(CheckpointError::Busy {
             folder: folder.to_owned(),
         }),
-        // Some file systems have no locks; the run goes without.
+        // Some file systems have no locks; the run continues without.
         Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => Ok(file),
         Err(TryLockError::Error(error)) => Err(fail(error).into()),
     }
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_killed_while_it_clears_up_can_be_begun_anew() {
+    fn a_run_killed_while_it_clears_up_can_be_restarted() {
         let dir = tempfile::tempdir().unwrap();
         let mut checkpoint = Checkpoint::open(dir.path(), &origin(), false).unwrap();
         for state in ["a", "b", "z"] {
@@ -439,7 +439,7 @@ mod tests {
         refused(|o| o.options.push('!'), "options");
         refused(|o| o.survey.push('!'), "survey.toml");
         refused(|o| o.inputs[1].blake3.push('1'), "b has changed");
-        refused(|o| o.inputs.truncate(1), "other inputs");
+        refused(|o| o.inputs.truncate(1), "inputs differ");
         let other = Origin {
             options: String::new(),
             ..origin()
@@ -467,7 +467,7 @@ mod tests {
         }
         std::fs::write(&path, &sound).unwrap();
         assert_eq!(checkpoint.state("a").unwrap(), Some(vec![1, 2, 3]));
-        // What is whole may still be something else.
+        // An intact state may still be of another type.
         checkpoint.keep("a", &"text").unwrap();
         assert!(damaged(checkpoint.state("a")));
     }

@@ -1,5 +1,5 @@
-//! Results that survive a crash: files that are complete or absent, checkpoints of long runs, and the
-//! provenance of a result.
+//! Results that survive a crash: files that are complete or absent, checkpoints of long runs, and
+//! the provenance of a result.
 //!
 //! | subject | file |
 //! | --- | --- |

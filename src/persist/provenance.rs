@@ -1,4 +1,4 @@
-//! What a result was made from: hashes of the files that went into it.
+//! Provenance of results: hashes of the input files.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -10,16 +10,16 @@ use std::path::{Path, PathBuf};
 pub struct HashError {
     /// The file.
     pub path: PathBuf,
-    /// What the system said.
+    /// The error of the operating system.
     pub source: std::io::Error,
 }
 
-/// An input and the BLAKE3 hash of what is in it.
+/// An input and the BLAKE3 hash of its content.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Input {
-    /// The file as it was named, or the folder of the frames.
+    /// The file as named by the user, or the folder of the frames.
     pub path: PathBuf,
-    /// How many files, where they are frames or a folder.
+    /// Number of files, for frames or a folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub files: Option<usize>,
     /// Hexadecimal BLAKE3: of the file, or of several files' names and hashes in their order.
@@ -37,8 +37,8 @@ fn hash_file(path: &Path) -> Result<blake3::Hash, HashError> {
     Ok(hasher.finalize())
 }
 
-/// One hash over the names (without folders) and hashes of files, in order; several are read at
-/// once.
+/// Combines the names (without folders) and hashes of files, in order, to one hash; files are read
+/// in parallel.
 fn hash_files(paths: &[&Path]) -> Result<blake3::Hash, HashError> {
     let hashes: Vec<blake3::Hash> = paths
         .par_iter()
@@ -47,7 +47,8 @@ fn hash_files(paths: &[&Path]) -> Result<blake3::Hash, HashError> {
     let mut all = blake3::Hasher::new();
     for (path, hash) in paths.iter().zip(&hashes) {
         let name = path.file_name().unwrap_or_default();
-        // Names have no zero in them, and hashes are of one length: no two lists run together.
+        // Names contain no zero byte and hashes have a fixed length, so different lists cannot
+        // collide by concatenation.
         all.update(name.as_encoded_bytes()).update(&[0]);
         all.update(hash.as_bytes());
     }

@@ -1,5 +1,4 @@
-//! Cloud-Optimised GeoTIFF: one file of which any window at any resolution is read without the
-//! rest.
+//! Cloud-Optimised GeoTIFF: a file from which any window at any resolution can be read separately.
 
 use super::compression::Compression;
 use super::compression::Packed;
@@ -16,32 +15,32 @@ use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes a picture as Cloud-Optimised GeoTIFF (BigTIFF, tiles of [`TILE_EDGE_PX`] pixels, overviews down
+/// A writer of Cloud-Optimised GeoTIFF (BigTIFF, tiles of [`TILE_EDGE_PX`] pixels, overviews down
 /// to one tile).
 ///
-/// Packed tiles wait in a temporary file beside the target and are copied into it by
-/// [`CogWriter::finish`], smallest overview first, so for that time twice the size of the file is
-/// needed on the disk. Tiles with nothing in them take no room.
+/// Compressed tiles are spooled to a temporary file beside the target and copied into it by
+/// [`CogWriter::finish`], smallest overview first, so that twice the size of the file is needed on
+/// disk for that time. Empty tiles take no space.
 pub struct CogWriter {
     spec: RasterSpec,
     compression: Compression,
     target: PathBuf,
     pyramid: OverviewBuilder,
     spool: Spool,
-    /// The tiles of every level, row by row.
+    /// Tiles of every level, row by row.
     stored: Vec<Vec<Option<Stored>>>,
 }
 
-/// How far a [`CogWriter`] has come whose tiles wait in a file that stays.
+/// The state of a resumable [`CogWriter`].
 #[derive(Debug, Serialize, Deserialize)]
 pub struct CogState<'a> {
     waiting: Cow<'a, Waiting>,
     stored: Cow<'a, [Vec<Option<Stored>>]>,
-    /// Bytes of the file.
+    /// Size of the spool file, bytes.
     end: u64,
 }
 
-/// Places of the tiles of a level in the file and their bytes; 0 if there is nothing in them.
+/// Offsets and sizes of the tiles of a level in the file; 0 for empty tiles.
 #[derive(Debug, Default)]
 struct Places {
     offsets: Vec<u64>,
@@ -49,7 +48,7 @@ struct Places {
 }
 
 impl Places {
-    /// Adds a tile behind its leader at `at`, and moves on behind its trailer.
+    /// Adds a tile after its leader at `at`, and advances `at` past its trailer.
     fn push(&mut self, at: &mut u64, bytes: u32) {
         self.bytes.push(bytes);
         if bytes == 0 {
@@ -61,15 +60,15 @@ impl Places {
     }
 }
 
-/// Bytes of a tile's leader, and of its trailer.
+/// Size of a tile's leader and of its trailer, bytes.
 const TILE_FRAME_BYTES: u64 = 4;
 
 impl CogWriter {
-    /// Begins the file that will be `target`.
+    /// Begins the file `target`.
     ///
     /// # Errors
-    /// [`RasterError::Unsupported`] for a raster that contradicts itself or that `compression`
-    /// cannot hold; whatever the system says about the temporary file.
+    /// [`RasterError::Unsupported`] for an inconsistent raster or one that `compression` does not
+    /// support; an error of the operating system about the temporary file.
     pub fn begin(
         target: &Path,
         spec: RasterSpec,
@@ -80,11 +79,11 @@ impl CogWriter {
         })
     }
 
-    /// Begins it, or goes on from `state`, with the packed tiles in the file `tiles`, which stays
-    /// whatever happens.
+    /// Begins the file `target`, or resumes from `state`, with the compressed tiles in the file
+    /// `tiles`, which is kept in any case.
     ///
     /// # Errors
-    /// As [`CogWriter::begin`]; fewer tiles in the file than the state tells of.
+    /// The errors of [`CogWriter::begin`]; fewer tiles in the file than in the state.
     pub fn begin_resumable(
         target: &Path,
         spec: RasterSpec,
@@ -127,10 +126,10 @@ impl CogWriter {
         })
     }
 
-    /// How far it has come; all of that is on the disk.
+    /// The current state; all of its tiles are synchronised to disk.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// An error of the operating system.
     pub fn state(&self) -> Result<CogState<'_>, WriteError> {
         let end = self.spool.synced();
         Ok(CogState {
@@ -140,12 +139,11 @@ impl CogWriter {
         })
     }
 
-    /// Takes tiles of full resolution, each of the picture once, in any order. It is given up if
-    /// this fails.
+    /// Adds tiles of full resolution, in any order. The file is abandoned if this fails.
     ///
     /// # Errors
-    /// [`RasterError::Tile`] for one that is no part of the picture, came twice or is of the wrong
-    /// size; whatever the system says.
+    /// [`RasterError::Tile`] for one outside the picture, a duplicate or one of the wrong size; an
+    /// error of the operating system.
     pub fn add(&mut self, batch: Vec<RasterTile>) -> Result<(), RasterError> {
         let fail = |source| WriteError::new(&self.target, source);
         let (spec, compression) = (self.spec, self.compression);
@@ -165,7 +163,7 @@ impl CogWriter {
     /// Writes the file; a file of that name is replaced.
     ///
     /// # Errors
-    /// [`RasterError::Incomplete`]; whatever the system says.
+    /// [`RasterError::Incomplete`]; an error of the operating system.
     pub fn finish(mut self) -> Result<(), RasterError> {
         let tiles = self.spec.tiles(self.stored.len());
         let levels: Vec<Vec<Stored>> = (self.stored.iter())
@@ -190,16 +188,16 @@ impl CogWriter {
         Ok(())
     }
 
-    /// All before the first tile.
+    /// The part of the file before the first tile.
     fn head(&self, levels: &[Vec<Stored>]) -> Vec<u8> {
         let ghost = ghost(self.compression.masks(&self.spec));
-        // The first time for its length only.
+        // The first pass determines the length only.
         let length = directory::encode(&ghost, &self.directories(levels, 0)).len();
         directory::encode(&ghost, &self.directories(levels, length as u64))
     }
 
     /// The directories of all levels, full resolution first, each before that of its mask; `at` is
-    /// where the first tile begins.
+    /// the offset of the first tile.
     fn directories(&self, levels: &[Vec<Stored>], mut at: u64) -> Vec<Directory> {
         let mut directories = Vec::new();
         for (level, tiles) in levels.iter().enumerate().rev() {
@@ -275,7 +273,7 @@ impl CogWriter {
         tags
     }
 
-    /// The tags of pictures and masks alike.
+    /// The tags common to pictures and masks.
     fn common_tags(
         &self,
         level: usize,
@@ -317,7 +315,7 @@ const UNSIGNED: u16 = 1;
 const IEEE_FLOAT: u16 = 3;
 const UNASSOCIATED_ALPHA: u16 = 2;
 
-/// What GDAL's readers may rely on.
+/// The layout metadata for GDAL's readers.
 fn ghost(masked: bool) -> String {
     let mut text = "LAYOUT=IFDS_BEFORE_DATA\n\
                     BLOCK_ORDER=ROW_MAJOR\n\
@@ -334,8 +332,8 @@ fn ghost(masked: bool) -> String {
     )
 }
 
-/// A tile between its leader, the number of its bytes, and its trailer, the last four of them;
-/// nothing if it is empty.
+/// Writes a tile between its leader (its size) and its trailer (its last four bytes); writes
+/// nothing for an empty tile.
 fn write_block(writer: &mut impl Write, block: &[u8]) -> io::Result<()> {
     let Some(last) = block.last_chunk::<{ TILE_FRAME_BYTES as usize }>() else {
         return Ok(());
@@ -345,8 +343,8 @@ fn write_block(writer: &mut impl Write, block: &[u8]) -> io::Result<()> {
     writer.write_all(last)
 }
 
-/// Where the picture lies: a plane of metres that belongs to no map of the world. The matrix says
-/// it for axes of any direction.
+/// The georeference: a plane in metres without a geographic coordinate system. The matrix supports
+/// axes of any direction.
 fn geo_tags(georeference: &Georeference) -> [(u16, Values); 2] {
     let Georeference {
         origin_m: [x, y],

@@ -1,4 +1,4 @@
-//! How the tiles of a [`CogWriter`](super::CogWriter) are packed.
+//! Compression of the tiles of a [`CogWriter`](super::CogWriter).
 
 use super::error::RasterError;
 use super::overviews::LevelTile;
@@ -6,31 +6,31 @@ use super::spec::{Nodata, RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
 use super::{deflate, jpeg};
 use std::io;
 
-/// How the tiles of a [`CogWriter`](super::CogWriter) are packed.
+/// The compression of the tiles of a [`CogWriter`](super::CogWriter).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Compression {
-    /// Without loss.
+    /// Lossless.
     Deflate,
-    /// With loss: [`SampleType::U8`] only. An alpha becomes a mask of one bit beside the picture,
-    /// without loss.
+    /// Lossy, for [`SampleType::U8`] only. An alpha channel becomes a lossless one-bit mask beside
+    /// the picture.
     Jpeg {
         /// 1 to 100.
         quality: u8,
     },
 }
 
-/// A packed tile.
+/// A compressed tile.
 #[derive(Debug, Default)]
 pub(super) struct Packed {
-    /// Its picture; empty if there is nothing in the tile.
+    /// The compressed picture; empty for an empty tile.
     pub(super) image: Vec<u8>,
-    /// Which of its pixels are something; empty if the picture says so itself, or there is nothing.
+    /// The compressed mask; empty if the picture has no separate mask or the tile is empty.
     pub(super) mask: Vec<u8>,
 }
 
 impl Compression {
-    /// Refuses what this cannot pack.
+    /// Rejects rasters that the compression does not support.
     pub(super) fn check(self, spec: &RasterSpec) -> Result<(), RasterError> {
         match self {
             Self::Deflate => Ok(()),
@@ -38,12 +38,12 @@ impl Compression {
         }
     }
 
-    /// Whether the alpha of such pictures is a mask beside it.
+    /// True if the alpha of such pictures is stored as a separate mask.
     pub(super) fn masks(self, spec: &RasterSpec) -> bool {
         matches!(self, Self::Jpeg { .. }) && spec.alpha
     }
 
-    /// Packs a tile.
+    /// Compresses a tile.
     pub(super) fn pack(self, spec: &RasterSpec, level_tile: &LevelTile) -> io::Result<Packed> {
         let LevelTile { level, tile } = level_tile;
         let RasterTile {
@@ -70,7 +70,7 @@ impl Compression {
     }
 }
 
-/// Whether a tile is, within `extent`, what readers take for a tile that is not there.
+/// True if a tile equals, within `extent`, the value that readers assume for a missing tile.
 fn is_nothing(spec: &RasterSpec, pixels: &[u8], [width, height]: [usize; 2]) -> bool {
     let bytes = spec.pixel_bytes();
     let mut rows = pixels

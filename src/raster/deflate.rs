@@ -1,12 +1,12 @@
-//! Tiles without loss: a predictor, then deflate.
+//! Lossless compression of tiles: a predictor, then deflate.
 
 use super::downsample::{Sample, is_full};
 use super::spec::{RasterSpec, SampleType, TILE_EDGE_PX};
 
-/// Effort of [`miniz_oxide`], of 10.
+/// Compression level of [`miniz_oxide`], of 10.
 const DEFLATE_LEVEL: u8 = 1;
 
-/// How a TIFF's tag 317 calls what [`deflate`] does first.
+/// The value of TIFF tag 317 for the predictor of [`deflate`].
 pub(super) fn predictor(samples: SampleType) -> u16 {
     match samples {
         SampleType::F32 => 3,
@@ -14,10 +14,10 @@ pub(super) fn predictor(samples: SampleType) -> u16 {
     }
 }
 
-/// The pixels of a tile as differences along the rows, little-endian, as a zlib stream.
+/// Compresses the pixels of a tile: horizontal differences, little-endian, as a zlib stream.
 ///
-/// Differences of 8 bits go through a code of fixed lengths that was made for them and is several
-/// times as fast; for wider samples it is no good, and they go through one that finds repetitions.
+/// Differences of 8 bits use a specialised Huffman code, several times as fast; wider samples need
+/// an encoder that finds repetitions.
 pub(super) fn deflate(spec: &RasterSpec, pixels: &[u8]) -> Vec<u8> {
     let n = spec.samples_per_pixel();
     match spec.samples {
@@ -32,8 +32,8 @@ fn deflate_repetitions(bytes: &[u8]) -> Vec<u8> {
     miniz_oxide::deflate::compress_to_vec_zlib(bytes, DEFLATE_LEVEL)
 }
 
-/// One bit per pixel of 8-bit samples, the highest first, that says whether its last sample, alpha,
-/// is more than 0; as a zlib stream.
+/// Compresses the mask of 8-bit samples as a zlib stream: one bit per pixel, the highest first, set
+/// if alpha is more than 0.
 pub(super) fn deflate_mask(spec: &RasterSpec, pixels: &[u8]) -> Vec<u8> {
     deflate_repetitions(&match spec.channels {
         1 => mask::<2>(pixels),
@@ -46,7 +46,7 @@ fn mask<const N: usize>(pixels: &[u8]) -> Vec<u8> {
     let (pixels, _) = pixels.as_chunks::<N>();
     let mut bits = Vec::with_capacity(pixels.len() / 8);
     for row in pixels.chunks_exact(TILE_EDGE_PX) {
-        // Most rows are.
+        // Most rows are full.
         if is_full(row) {
             bits.resize(bits.len() + TILE_EDGE_PX / 8, u8::MAX);
             continue;
@@ -71,7 +71,7 @@ fn u32_difference(sample: u32, before: u32) -> [u8; 4] {
     sample.wrapping_sub(before).to_le_bytes()
 }
 
-/// Every sample less the same of the pixel on its left, where there is one.
+/// Horizontal differences: every sample minus that of the pixel on its left, if any.
 fn differences<S: Sample, const B: usize>(
     pixels: &[u8],
     samples_per_pixel: usize,
@@ -99,8 +99,8 @@ fn differences<S: Sample, const B: usize>(
     predicted
 }
 
-/// The predictor of floating point of TIFF's technical note 3: the bytes of a row, those of most
-/// weight of all its numbers first, and of these the differences.
+/// The floating-point predictor of TIFF's technical note 3: the bytes of a row grouped by
+/// significance, highest first, then differences.
 fn byte_planes(pixels: &[u8], samples_per_pixel: usize) -> Vec<u8> {
     let mut predicted = vec![0; pixels.len()];
     let row_bytes = TILE_EDGE_PX * samples_per_pixel * f32::BYTES;

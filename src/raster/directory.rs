@@ -1,4 +1,4 @@
-//! The head of a BigTIFF file: what is in it and where.
+//! The header and the directories of a BigTIFF file.
 
 /// The values of a tag.
 #[derive(Clone, Debug, PartialEq)]
@@ -12,7 +12,7 @@ pub(super) enum Values {
 }
 
 impl Values {
-    /// The format's number for the type, how many values there are, and their bytes.
+    /// The code of the type, the number of values, and their bytes.
     fn encode(&self) -> (u16, usize, Vec<u8>) {
         fn bytes<T, const N: usize>(values: &[T], of: impl Fn(&T) -> [u8; N]) -> Vec<u8> {
             values.iter().flat_map(of).collect()
@@ -58,16 +58,16 @@ pub(super) mod tag {
     pub(in super::super) const GDAL_NODATA: u16 = 42113;
 }
 
-/// Tags and their values, in the order of the numbers.
+/// Tags and their values, in ascending order of the tags.
 pub(super) type Directory = Vec<(u16, Values)>;
 
-/// Most bytes of values that stand in the directory itself.
+/// Largest size of values stored in the directory itself, bytes.
 const MAX_INLINE_BYTES: usize = 8;
 
-/// Header, `ghost` area and directories of a BigTIFF file. The places of the tiles come after all
-/// else: whoever reads a part of the file has all directories at once.
+/// Encodes the header, the `ghost` area and the directories of a BigTIFF file. The tile offsets
+/// come last, so that the first part of the file contains all directories.
 ///
-/// Its length depends on how many values there are, and not on the values.
+/// The length depends on the number of values only.
 pub(super) fn encode(ghost: &str, directories: &[Directory]) -> Vec<u8> {
     let mut out = b"II\x2b\0\x08\0\0\0".to_vec();
     let mut link = out.len();
@@ -113,7 +113,7 @@ pub(super) fn encode(ghost: &str, directories: &[Directory]) -> Vec<u8> {
     out
 }
 
-/// Fills up to a multiple of eight bytes.
+/// Pads to a multiple of eight bytes.
 fn align(out: &mut Vec<u8>) {
     out.resize(out.len().next_multiple_of(8), 0);
 }

@@ -1,4 +1,4 @@
-//! Overviews: 2 × 2 pixels become one.
+//! Downsampling for overviews: 2 × 2 pixels become one.
 
 use super::spec::{RasterSpec, Reduce, SampleType, TILE_EDGE_PX};
 use crate::numerics::simd_dispatch::dispatch_simd;
@@ -6,8 +6,8 @@ use crate::numerics::simd_dispatch::dispatch_simd;
 /// Columns and rows of a reduced tile.
 pub(super) const HALF_EDGE_PX: usize = TILE_EDGE_PX / 2;
 
-/// A tile reduced to [`HALF_EDGE_PX`] × [`HALF_EDGE_PX`] pixels; `extent` are its columns and rows within the
-/// picture, and what lies beyond counts for nothing and becomes 0.
+/// Downsamples a tile to [`HALF_EDGE_PX`] × [`HALF_EDGE_PX`] pixels; `extent` are its columns and
+/// rows within the picture. Pixels beyond are ignored and become 0.
 pub(super) fn reduce(spec: &RasterSpec, pixels: &[u8], extent: [usize; 2]) -> Vec<u8> {
     match spec.samples {
         SampleType::U8 => of_type::<u8>(spec, pixels, extent),
@@ -17,25 +17,25 @@ pub(super) fn reduce(spec: &RasterSpec, pixels: &[u8], extent: [usize; 2]) -> Ve
     }
 }
 
-/// A number of a pixel.
+/// The numeric type of a sample.
 pub(super) trait Sample: Copy {
-    /// Its bytes.
+    /// Size, bytes.
     const BYTES: usize;
-    /// What alpha is where there is something.
+    /// The alpha of an opaque pixel.
     const OPAQUE: Self;
-    /// From as many bytes as it has.
+    /// Reads a sample from its bytes.
     fn read(bytes: &[u8]) -> Self;
-    /// Into as many bytes as it has.
+    /// Writes a sample to its bytes.
     fn write(self, bytes: &mut [u8]);
-    /// Whether it is nothing, of itself or because it is the number `nothing`.
+    /// True for NaN or the no-data value `nothing`.
     fn is_nothing(self, nothing: Option<u32>) -> bool;
-    /// The mean of the `count` values that are `there`, at least one.
+    /// The mean of the `count` valid values (`there`), at least one.
     fn mean(values: [Self; 4], there: [bool; 4], count: u32) -> Self;
-    /// The value of what is nothing.
+    /// The sample of no data.
     fn nothing(number: u32) -> Self;
 }
 
-/// A whole number as a [`Sample`]; `$sum` holds four of them.
+/// Implements [`Sample`] for an integer type; the sum of four values fits into `$sum`.
 macro_rules! whole_number {
     ($type:ty, $sum:ty) => {
         impl Sample for $type {
@@ -60,8 +60,8 @@ macro_rules! whole_number {
                 let sum: $sum = (0..4)
                     .map(|i| <$sum>::from(values[i]) * <$sum>::from(there[i]))
                     .sum();
-                // To the nearest, halves up. Constants are divided by faster; the mean fits where
-                // its parts did.
+                // Rounded to the nearest, halves up. Division by constants is faster; the mean fits
+                // into the type of its values.
                 (match count {
                     1 => sum,
                     2 => sum.div_ceil(2),
@@ -117,7 +117,7 @@ fn of_type<S: Sample>(spec: &RasterSpec, pixels: &[u8], extent: [usize; 2]) -> V
     }
 }
 
-/// [`reduce`] for pixels of `N` samples.
+/// Implements [`reduce`] for pixels of `N` samples.
 fn of_pixel<S: Sample, const N: usize>(
     spec: &RasterSpec,
     pixels: &[u8],
@@ -189,7 +189,7 @@ fn of_pixel<S: Sample, const N: usize>(
     reduced
 }
 
-/// Whether pixels of `N` bytes are all there, by their alpha.
+/// True if all pixels of `N` bytes are opaque.
 pub(super) fn is_full<const N: usize>(pixels: &[[u8; N]]) -> bool {
     let mut least = u8::MAX;
     dispatch_simd(
@@ -203,7 +203,7 @@ pub(super) fn is_full<const N: usize>(pixels: &[[u8; N]]) -> bool {
     least > 0
 }
 
-/// Two rows of pixels of `N` bytes, all of them there, reduced.
+/// Downsamples two rows of opaque pixels of `N` bytes.
 fn means<const N: usize>(upper: &[u8], lower: &[u8], out: &mut [u8]) {
     let (upper, _) = upper.as_chunks::<N>().0.as_chunks::<2>();
     let (lower, _) = lower.as_chunks::<N>().0.as_chunks::<2>();
@@ -222,7 +222,7 @@ fn means<const N: usize>(upper: &[u8], lower: &[u8], out: &mut [u8]) {
     );
 }
 
-/// What the values that are `there` become; nothing if none is.
+/// Reduces the valid values (`there`); None if there are none.
 fn one_of<S: Sample>(reduce: Reduce, values: [S; 4], there: [bool; 4]) -> Option<S> {
     match reduce {
         Reduce::Mean => {
@@ -239,7 +239,7 @@ mod tests {
     use crate::raster::spec::Nodata;
     use crate::raster::test_picture::grey_alpha;
 
-    /// The upper left 2 × 2 pixels, reduced with `extent`.
+    /// Downsamples the upper left 2 × 2 pixels with `extent`.
     fn corner<T: Sample, const N: usize>(
         spec: &RasterSpec,
         four: [[T; N]; 4],

@@ -1,5 +1,4 @@
-//! Deep Zoom: a folder of small pictures that a viewer in the browser reads without a server's
-//! help.
+//! Deep Zoom: a folder of small pictures for viewers in the browser, without a special server.
 
 use super::error::RasterError;
 use super::jpeg;
@@ -19,18 +18,18 @@ use std::sync::{Mutex, PoisonError};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DziFormat {
-    /// With loss; what is nothing is black.
+    /// Lossy; no data is black.
     Jpeg {
         /// 1 to 100.
         quality: u8,
     },
-    /// Without loss, alpha included.
+    /// Lossless, with alpha.
     Png,
 }
 
-/// Writes a picture as Deep Zoom: `NAME.dzi` and the folder `NAME_files/LEVEL/COLUMN_ROW.jpg` or
-/// `.png`, from one pixel at level 0 to full resolution, in tiles of [`TILE_EDGE_PX`] pixels without
-/// overlap. 8-bit samples only.
+/// A writer of Deep Zoom pictures: `NAME.dzi` and the folder `NAME_files/LEVEL/COLUMN_ROW.jpg` or
+/// `.png`, from one pixel at level 0 to full resolution, in tiles of [`TILE_EDGE_PX`] pixels
+/// without overlap. 8-bit samples only.
 pub struct DziWriter {
     spec: RasterSpec,
     format: DziFormat,
@@ -40,11 +39,11 @@ pub struct DziWriter {
     folder: StagedFolder,
     /// Tiles written.
     written: u64,
-    /// Those of them that may not be on the disk yet.
+    /// Tiles that may not be synchronised to disk yet.
     unsynced: Mutex<Vec<PathBuf>>,
 }
 
-/// How far a [`DziWriter`] has come whose tiles wait in a folder that stays.
+/// The state of a resumable [`DziWriter`].
 #[derive(Debug, Serialize, Deserialize)]
 pub struct DziState<'a> {
     waiting: Cow<'a, Waiting>,
@@ -52,23 +51,22 @@ pub struct DziState<'a> {
 }
 
 impl DziWriter {
-    /// Begins the picture that will be `target`, a name that ends in `.dzi`, and the folder beside
-    /// it.
+    /// Begins the picture `target`, a name that ends in `.dzi`, and the folder beside it.
     ///
     /// # Errors
-    /// [`RasterError::Unsupported`] for another name, or a raster that contradicts itself or has no
-    /// samples of 8 bits; whatever the system says.
+    /// [`RasterError::Unsupported`] for another name, or an inconsistent raster or one without
+    /// samples of 8 bits; an error of the operating system.
     pub fn begin(target: &Path, spec: RasterSpec, format: DziFormat) -> Result<Self, RasterError> {
         Self::with(target, spec, format, || {
             StagedFolder::begin(&files_folder(target))
         })
     }
 
-    /// Begins it, or goes on from `state`, with the tiles in `folder` on the same disk, which stays
-    /// whatever happens.
+    /// Begins the picture `target`, or resumes from `state`, with the tiles in `folder` on the same
+    /// disk, which is kept in any case.
     ///
     /// # Errors
-    /// As [`DziWriter::begin`].
+    /// The errors of [`DziWriter::begin`].
     pub fn begin_resumable(
         target: &Path,
         spec: RasterSpec,
@@ -86,10 +84,10 @@ impl DziWriter {
         Ok(writer)
     }
 
-    /// How far it has come; all of that is on the disk.
+    /// The current state; all of its tiles are synchronised to disk.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// An error of the operating system.
     pub fn state(&self) -> Result<DziState<'_>, WriteError> {
         let fail = |source| WriteError::new(self.folder.path(), source);
         let mut unsynced = self.unsynced.lock().unwrap_or_else(PoisonError::into_inner);
@@ -143,12 +141,11 @@ impl DziWriter {
         })
     }
 
-    /// Takes tiles of full resolution, each of the picture once, in any order. It is given up if
-    /// this fails.
+    /// Adds tiles of full resolution, in any order. The picture is abandoned if this fails.
     ///
     /// # Errors
-    /// [`RasterError::Tile`] for one that is no part of the picture, came twice or is of the wrong
-    /// size; whatever the system says.
+    /// [`RasterError::Tile`] for one outside the picture, a duplicate or one of the wrong size; an
+    /// error of the operating system.
     pub fn add(&mut self, batch: Vec<RasterTile>) -> Result<(), RasterError> {
         let complete = self.pyramid.add(batch)?;
         let written: Vec<PathBuf> = complete
@@ -163,28 +160,28 @@ impl DziWriter {
         Ok(())
     }
 
-    /// Gives the folder its name and then writes the `.dzi`; what had those names is replaced.
+    /// Renames the folder and then writes the `.dzi`; existing ones are replaced.
     ///
     /// # Errors
-    /// [`RasterError::Incomplete`]; whatever the system says.
+    /// [`RasterError::Incomplete`]; an error of the operating system.
     pub fn finish(self) -> Result<(), RasterError> {
         let tiles = self.spec.tiles(self.levels);
         let missing = tiles - self.written;
         if missing > 0 {
             return Err(RasterError::Incomplete { missing, tiles });
         }
-        // An old description would go with the new folder for a moment.
+        // An old description must not refer to the new folder.
         atomic::remove_file(&self.target)?;
         self.folder.finish()?;
         let description = description(&self.spec, self.format);
         atomic::write_text(&self.target, &description).inspect_err(|_| {
-            // The error at hand says more than a failure of this.
+            // The first error is more informative than a failure of the removal.
             let _ = std::fs::remove_dir_all(files_folder(&self.target));
         })?;
         Ok(())
     }
 
-    /// Writes a tile, as much of it as is within the picture; its name.
+    /// Writes the part of a tile within the picture and returns its name.
     fn write(&self, LevelTile { level, tile }: &LevelTile) -> Result<PathBuf, WriteError> {
         let RasterTile {
             column,
@@ -192,7 +189,7 @@ impl DziWriter {
             pixels,
         } = tile;
         let extent = self.spec.extent(*level, *column, *row);
-        // Deep Zoom counts from the smallest.
+        // Deep Zoom counts levels from the smallest.
         let level = self.levels - 1 - level;
         let name = format!("{level}/{column}_{row}.{}", self.format.extension());
         let path = self.folder.path().join(name);
@@ -238,7 +235,7 @@ fn description(spec: &RasterSpec, format: DziFormat) -> String {
     )
 }
 
-/// The upper left `extent` of a tile.
+/// Encodes the upper left `extent` of a tile.
 fn encode_png(spec: &RasterSpec, pixels: &[u8], extent: [usize; 2]) -> io::Result<Vec<u8>> {
     let [width, height] = extent;
     let bytes = spec.pixel_bytes();

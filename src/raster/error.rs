@@ -1,25 +1,25 @@
-//! Why a raster cannot be written.
+//! Errors of raster output.
 
 use crate::persist::atomic::WriteError;
 
-/// Why a raster cannot be written.
+/// An error of raster output.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RasterError {
-    /// The file cannot hold pictures of this kind.
+    /// The format does not support pictures of this kind.
     #[error("{0}")]
     Unsupported(&'static str),
-    /// A tile that is no part of the picture, came twice or is of the wrong size.
+    /// A tile outside the picture, a duplicate or one of the wrong size.
     #[error("tile {column}, {row}: {what}")]
     Tile {
         /// Column in the grid of tiles.
         column: u32,
         /// Row in the grid of tiles.
         row: u32,
-        /// What is wrong with it.
+        /// The problem.
         what: &'static str,
     },
-    /// The picture was to be finished and is not whole.
+    /// The picture was finished before all tiles arrived.
     #[error("{missing} of {tiles} tiles of the picture are missing")]
     Incomplete {
         /// Tiles, overviews included, that were not written.
@@ -27,7 +27,7 @@ pub enum RasterError {
         /// Tiles of the picture, overviews included.
         tiles: u64,
     },
-    /// What the system said.
+    /// An error of the operating system.
     #[error(transparent)]
     Write(#[from] WriteError),
 }

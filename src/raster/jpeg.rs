@@ -1,4 +1,4 @@
-//! Tiles with loss.
+//! Lossy compression of tiles.
 
 use super::error::RasterError;
 use super::spec::{RasterSpec, SampleType, TILE_EDGE_PX};
@@ -6,10 +6,10 @@ use crate::numerics::simd_dispatch::dispatch_simd;
 use jpeg_encoder::{ColorType, Encoder, EncodingError, ImageBuffer, JpegColorType, SamplingFactor};
 use std::io;
 
-/// Columns and rows of pixels that share their colour, but not their brightness.
+/// Subsampling factor of the chroma.
 pub(super) const SUBSAMPLING: u16 = 2;
 
-/// Refuses what cannot be a JPEG.
+/// Rejects rasters that JPEG does not support.
 pub(super) fn check(spec: &RasterSpec, quality: u8) -> Result<(), RasterError> {
     let refuse = |what| Err(RasterError::Unsupported(what));
     if !(1..=100).contains(&quality) {
@@ -20,14 +20,15 @@ pub(super) fn check(spec: &RasterSpec, quality: u8) -> Result<(), RasterError> {
     }
     if spec.nodata.is_some() {
         return refuse(
-            "a JPEG's values are not exact, so none can stand for nothing; give it an alpha",
+            "a JPEG's values are not exact, so no value can mark missing data; add an alpha \
+             channel",
         );
     }
     Ok(())
 }
 
-/// The upper left `size` (columns, rows) of a tile without its alpha. What lies beyond `extent`
-/// repeats the last column and row, so that no false edge is there to be drawn.
+/// Encodes the upper left `size` (columns, rows) of a tile without its alpha. Pixels beyond
+/// `extent` repeat the last column and row, to avoid an artificial edge.
 pub(super) fn encode(
     spec: &RasterSpec,
     pixels: &[u8],
@@ -55,20 +56,20 @@ pub(super) fn encode(
     compress(&visible, size, 3, quality)
 }
 
-/// What of a tile is drawn.
+/// The encoded part of a tile.
 struct Rows<'a> {
     pixels: &'a [u8],
-    /// Of a pixel.
+    /// Bytes of a pixel.
     bytes: usize,
-    /// Columns and rows that are there.
+    /// Valid columns and rows.
     extent: [usize; 2],
-    /// Columns and rows to be drawn.
+    /// Columns and rows to encode.
     size: [usize; 2],
 }
 
 impl Rows<'_> {
-    /// Adds the first `C` bytes of every pixel of a row; those of the last one again for the pixels
-    /// that are not there.
+    /// Appends the first `C` bytes of every pixel of a row, and repeats those of the last one for
+    /// missing pixels.
     fn push<const C: usize>(&self, y: usize, out: &mut Vec<u8>) {
         let start = y.min(self.extent[1] - 1) * TILE_EDGE_PX * self.bytes;
         let there = self.extent[0].min(self.size[0]);
@@ -87,7 +88,7 @@ impl Rows<'_> {
     }
 }
 
-/// The first `C` of the `B` bytes of every pixel.
+/// Copies the first `C` of the `B` bytes of every pixel.
 fn first_of<const B: usize, const C: usize>(row: &[u8], out: &mut [u8]) {
     dispatch_simd(
         #[inline(always)]
@@ -100,7 +101,7 @@ fn first_of<const B: usize, const C: usize>(row: &[u8], out: &mut [u8]) {
     );
 }
 
-/// As grey: the first byte of every pixel.
+/// Copies the grey value: the first byte of every pixel.
 impl ImageBuffer for Rows<'_> {
     fn get_jpeg_color_type(&self) -> JpegColorType {
         JpegColorType::Luma
@@ -119,7 +120,7 @@ impl ImageBuffer for Rows<'_> {
     }
 }
 
-/// A picture of one channel or three, 8 bits, of at most 65535 columns and rows.
+/// Compresses a picture of one channel or three, 8 bits, of at most 65535 columns and rows.
 pub(crate) fn compress(
     pixels: &[u8],
     [width, height]: [usize; 2],
@@ -135,7 +136,7 @@ pub(crate) fn compress(
     })
 }
 
-/// What an encoder makes of `bytes` bytes.
+/// Runs an encoder of `bytes` bytes.
 fn packed(
     bytes: usize,
     quality: u8,

@@ -1,19 +1,18 @@
-//! Pictures too large for memory, written tile by tile.
+//! Tiled output of pictures larger than the memory.
 //!
 //! ```text
-//!                      ┌─ OverviewBuilder: overviews, reduced 2 × 2 on the way ─┐
-//! RasterTile batches ──┤                                                ├──> CogWriter ──> NAME.tif
-//!  in any order        └─ tiles of all levels ──────────────────────────┘    DziWriter ──> NAME.dzi, NAME_files/
+//!                      ┌─ OverviewBuilder ─────┐
+//! RasterTile batches ──┤  2 × 2 downsampling   ├──> CogWriter ──> NAME.tif
+//!  in any order        └─ tiles of all levels ─┘    DziWriter ──> NAME.dzi, NAME_files/
 //! ```
 //!
-//! A [`RasterSpec`] says what a pixel is and what *nothing* looks like in it; the picture then
-//! arrives as squares of [`TILE_EDGE_PX`] pixels, each exactly once. A batch is reduced and compressed on
-//! all threads of the current rayon pool. The files do not depend on the order of the tiles, how
-//! they were batched, or the number of threads, to the byte.
+//! A [`RasterSpec`] describes the pixels and their *no-data* value; the picture then arrives as
+//! squares of [`TILE_EDGE_PX`] pixels, each exactly once. A batch is reduced and compressed on all
+//! threads of the current rayon pool. The files do not depend on the order of the tiles, the
+//! batches, or the number of threads, to the byte.
 //!
-//! What is held in memory is the batch and the overview tiles that wait for a part of theirs:
-//! [`RasterSpec::pending_bytes`]. Tiles that arrive along the shorter side of the picture keep that
-//! small.
+//! The memory holds the batch and the incomplete overview tiles: [`RasterSpec::pending_bytes`].
+//! Tiles that arrive along the shorter side of the picture keep their number small.
 //!
 //! # Example
 //!

@@ -1,4 +1,5 @@
-//! Overviews on the way: a tile of one is complete once all tiles under it have arrived.
+//! Incremental construction of overviews: an overview tile is complete once all tiles below it have
+//! arrived.
 
 use super::downsample::{HALF_EDGE_PX, reduce};
 use super::error::RasterError;
@@ -7,16 +8,16 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
-/// A complete tile of some level.
+/// A complete tile of a level.
 #[derive(Debug)]
 pub(crate) struct LevelTile {
-    /// 0 is full resolution; every level halves the one before.
+    /// The level; 0 is full resolution, and every level halves the previous one.
     pub(crate) level: usize,
     /// The tile.
     pub(crate) tile: RasterTile,
 }
 
-/// The overviews of a picture that is arriving.
+/// A builder of the overviews of a picture whose tiles arrive in any order.
 #[derive(Debug)]
 pub(crate) struct OverviewBuilder {
     spec: RasterSpec,
@@ -24,25 +25,25 @@ pub(crate) struct OverviewBuilder {
     waiting: Waiting,
 }
 
-/// How far a picture has arrived.
+/// The arrived tiles and the incomplete overview tiles of a picture.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Waiting {
-    /// Tiles of full resolution that are there, row by row.
+    /// Flags of the arrived tiles of full resolution, row by row.
     arrived: Vec<bool>,
-    /// The overview tiles that wait for a part of theirs, by level, column and row.
+    /// Incomplete overview tiles, by level, column and row.
     pending: HashMap<(usize, u32, u32), Pending>,
 }
 
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Pending {
-    /// Tiles under it that are still to come.
+    /// Number of missing tiles below it.
     missing: u32,
     #[serde(with = "serde_bytes")]
     pixels: Vec<u8>,
 }
 
 impl OverviewBuilder {
-    /// A pyramid of `levels` levels, full resolution included.
+    /// Creates a builder of `levels` levels, full resolution included.
     pub(crate) fn new(spec: RasterSpec, levels: usize) -> Result<Self, RasterError> {
         spec.check()?;
         Ok(Self {
@@ -55,21 +56,21 @@ impl OverviewBuilder {
         })
     }
 
-    /// How far the picture has arrived.
+    /// The state of the picture.
     pub(super) fn waiting(&self) -> &Waiting {
         &self.waiting
     }
 
-    /// Goes on from where a pyramid of the same picture was.
+    /// Resumes from the state of a picture of the same specification.
     pub(super) fn go_on(&mut self, waiting: Waiting) {
         self.waiting = waiting;
     }
 
-    /// Takes tiles of full resolution and hands on all that are complete by that: these, and
-    /// overview tiles.
+    /// Adds tiles of full resolution and returns all tiles that become complete: these and overview
+    /// tiles.
     ///
     /// # Errors
-    /// [`RasterError::Tile`]; the batch is lost then, and the picture will not be whole.
+    /// [`RasterError::Tile`]; the batch is lost, and the picture remains incomplete.
     pub(crate) fn add(&mut self, batch: Vec<RasterTile>) -> Result<Vec<LevelTile>, RasterError> {
         for tile in &batch {
             self.take(tile)?;
@@ -84,7 +85,7 @@ impl OverviewBuilder {
         Ok(complete)
     }
 
-    /// Notes that a tile of full resolution is there.
+    /// Marks a tile of full resolution as arrived.
     fn take(&mut self, tile: &RasterTile) -> Result<(), RasterError> {
         let &RasterTile { column, row, .. } = tile;
         let refuse = |what| Err(RasterError::Tile { column, row, what });
@@ -102,7 +103,8 @@ impl OverviewBuilder {
         Ok(())
     }
 
-    /// Reduces tiles into those of `level`, one above; those that are complete by that.
+    /// Downsamples tiles into those of the next level `level` and returns those that become
+    /// complete.
     fn reduce_into(&mut self, level: usize, tiles: &[RasterTile]) -> Vec<RasterTile> {
         if level >= self.levels {
             return Vec::new();
@@ -149,7 +151,7 @@ impl OverviewBuilder {
     }
 }
 
-/// Tiles under an overview tile that exist: up to four, fewer at the right and lower border.
+/// Number of tiles below an overview tile: up to four, fewer at the right and lower border.
 fn parts(spec: &RasterSpec, level: usize, column: u32, row: u32) -> u32 {
     let [columns, rows] = spec.grid(level - 1);
     (columns - 2 * column).min(2) * (rows - 2 * row).min(2)

@@ -1,11 +1,11 @@
-//! What a raster is: its size, its pixels and its place.
+//! Specification of a raster: size, pixels and georeference.
 
 use super::error::RasterError;
 
 /// Columns and rows of a tile, pixels.
 pub const TILE_EDGE_PX: usize = 512;
 
-/// The numbers that pixels are made of.
+/// The numeric type of the samples of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum SampleType {
@@ -15,7 +15,7 @@ pub enum SampleType {
     U16,
     /// Whole numbers of 32 bits.
     U32,
-    /// Single precision; NaN is nothing.
+    /// Single precision; NaN is no data.
     F32,
 }
 
@@ -29,7 +29,7 @@ impl SampleType {
         }
     }
 
-    /// The largest whole number; nothing for [`SampleType::F32`].
+    /// The largest whole number; None for [`SampleType::F32`].
     pub(super) fn max(self) -> Option<u32> {
         match self {
             Self::U8 => Some(u8::MAX.into()),
@@ -40,17 +40,17 @@ impl SampleType {
     }
 }
 
-/// What becomes of 2 × 2 pixels in an overview.
+/// The reduction of 2 × 2 pixels to one in an overview.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Reduce {
-    /// The mean of those that are not nothing.
+    /// The mean of the valid pixels.
     Mean,
-    /// The first, row by row, that is not nothing: for labels, of which there is no mean.
+    /// The first valid pixel, row by row: for labels, which cannot be averaged.
     First,
 }
 
-/// The whole number that stands for nothing.
+/// The no-data value of whole numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Nodata {
@@ -60,38 +60,38 @@ pub enum Nodata {
     Max,
 }
 
-/// Where the picture lies in a plane of metres; its axes are those of the plane.
+/// The position of the picture in a plane in metres, aligned with its axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Georeference {
     /// x and y of the upper left corner of the first pixel, metres.
     pub origin_m: [f64; 2],
-    /// What a column to the right adds to x and a row down to y, metres; negative where the
-    /// coordinate falls.
+    /// Size of a pixel: the change of x per column to the right and of y per row down, metres;
+    /// negative for a decreasing coordinate.
     pub step_m: [f64; 2],
 }
 
-/// What a raster is.
+/// The specification of a raster.
 ///
-/// A pixel is its channels and then, if there is one, its alpha, in native byte order. *Nothing* is
-/// an alpha of 0, NaN, or the number that [`RasterSpec::nodata`] names; where there is an alpha it
-/// is either 0 or the largest number, and the channels of a pixel that is nothing are 0.
+/// A pixel is its channels and then, if there is one, its alpha, in native byte order. *No data* is
+/// an alpha of 0, NaN, or the value of [`RasterSpec::nodata`]. Alpha is either 0 or the largest
+/// number; the channels of a no-data pixel with alpha are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RasterSpec {
     /// Columns, pixels; at least 1.
     pub width: u32,
     /// Rows, pixels; at least 1.
     pub height: u32,
-    /// What a pixel is made of.
+    /// The type of the samples.
     pub samples: SampleType,
-    /// 1, grey or a quantity, or 3, red, green and blue.
+    /// Number of channels: 1 (grey or a quantity) or 3 (red, green, blue).
     pub channels: u8,
-    /// Whether an alpha follows the channels; [`SampleType::U8`] and [`SampleType::U16`] only.
+    /// True if an alpha follows the channels; [`SampleType::U8`] and [`SampleType::U16`] only.
     pub alpha: bool,
-    /// The number for nothing in whole numbers without alpha.
+    /// The no-data value of whole numbers without alpha.
     pub nodata: Option<Nodata>,
-    /// How overviews are made.
+    /// The reduction of overviews.
     pub reduce: Reduce,
-    /// Where the picture lies.
+    /// The georeference.
     pub georeference: Option<Georeference>,
 }
 
@@ -102,25 +102,24 @@ pub struct RasterTile {
     pub column: u32,
     /// Row in the grid of tiles, from the top.
     pub row: u32,
-    /// Its pixels, row by row; what lies beyond the right and lower border of the picture is there
-    /// and 0.
+    /// Its pixels, row by row; pixels beyond the right and lower border of the picture are 0.
     pub pixels: Vec<u8>,
 }
 
-/// How tiles arrive.
+/// The order in which tiles arrive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TileOrder {
-    /// All of the upper row, then the next.
+    /// Row by row.
     Rows,
-    /// All of the left column, then the next.
+    /// Column by column.
     Columns,
 }
 
 impl RasterSpec {
-    /// Most bytes of overview tiles that wait for a part of theirs while tiles arrive in `order`.
+    /// Largest size of the incomplete overview tiles while tiles arrive in `order`, bytes.
     ///
-    /// Each level holds at most a row (or column) of its tiles. Besides there is what
-    /// [`CogWriter::add`] was given: the batch itself, a quarter of it as the batch is reduced, and
+    /// Each level holds at most a row (or column) of its tiles. The batch given to
+    /// [`CogWriter::add`] adds to it: the batch itself, a quarter of it during downsampling, and
     /// its compressed form.
     ///
     /// [`CogWriter::add`]: super::CogWriter::add
@@ -163,13 +162,13 @@ impl RasterSpec {
             .map(|side| side.div_ceil(TILE_EDGE_PX as u32))
     }
 
-    /// Tiles of `level`.
+    /// Number of tiles of `level`.
     pub(super) fn tiles_of(&self, level: usize) -> usize {
         let [columns, rows] = self.grid(level);
         columns as usize * rows as usize
     }
 
-    /// Tiles of the first `levels` levels.
+    /// Number of tiles of the first `levels` levels.
     pub(super) fn tiles(&self, levels: usize) -> u64 {
         (0..levels).map(|level| self.tiles_of(level) as u64).sum()
     }
@@ -203,8 +202,7 @@ impl RasterSpec {
         .count()
     }
 
-    /// The number that a sample without value has where there is no alpha and it is no NaN; 0
-    /// otherwise.
+    /// The no-data value without alpha and of whole numbers; 0 otherwise.
     pub(super) fn nothing(&self) -> u32 {
         match self.nodata {
             Some(Nodata::Max) => self.samples.max().unwrap_or_default(),
@@ -212,7 +210,7 @@ impl RasterSpec {
         }
     }
 
-    /// Refuses what contradicts itself.
+    /// Rejects inconsistent specifications.
     pub(super) fn check(&self) -> Result<(), RasterError> {
         let refuse = |what| Err(RasterError::Unsupported(what));
         if self.width == 0 || self.height == 0 {
@@ -230,7 +228,7 @@ impl RasterSpec {
         }
         if self.nodata.is_some() && (self.alpha || self.samples == SampleType::F32) {
             return refuse(
-                "a picture with alpha or of floating point needs no other number for nothing",
+                "a picture with alpha or of floating point needs no other no-data value",
             );
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! Packed tiles on disk until their order is known.
+//! A spool file of compressed tiles.
 
 use super::compression::Packed;
 use crate::persist::atomic::{ScratchFolder, WriteError, parent_folder};
@@ -7,11 +7,11 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
-/// Packed tiles in the order of their arrival, in a file.
+/// A file of compressed tiles in the order of their arrival.
 pub(super) struct Spool {
     file: File,
     end: u64,
-    /// Goes with the file when this is dropped or the program is interrupted.
+    /// The folder of a temporary file, removed when dropped or when the program is interrupted.
     _folder: Option<ScratchFolder>,
 }
 
@@ -19,14 +19,14 @@ pub(super) struct Spool {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Stored {
     offset: u64,
-    /// Bytes of the picture; 0 if there is nothing in the tile.
+    /// Size of the picture, bytes; 0 for an empty tile.
     pub(super) image: u32,
-    /// Bytes of the mask, which follows it.
+    /// Size of the mask, which follows it, bytes.
     pub(super) mask: u32,
 }
 
 impl Spool {
-    /// An empty one beside `target`, for a while.
+    /// Creates an empty temporary spool beside `target`.
     pub(super) fn temporary_beside(target: &Path) -> Result<Self, WriteError> {
         let folder = ScratchFolder::inside(parent_folder(target))?;
         let path = folder.path().join("tiles");
@@ -43,14 +43,14 @@ impl Spool {
         })
     }
 
-    /// The one in the file `path`, which stays, as far as `end`; what is beyond is dropped.
+    /// Opens the spool file `path`, which is kept, and truncates it to `end`.
     pub(super) fn reopen(path: &Path, end: u64) -> Result<Self, WriteError> {
         let fail = |source| WriteError::new(path, source);
         let mut options = File::options();
         let options = options.read(true).write(true).create(true).truncate(false);
         let mut file = options.open(path).map_err(fail)?;
         if file.metadata().map_err(fail)?.len() < end {
-            let what = "tiles of the interrupted run are missing; give --fresh to begin anew";
+            let what = "tiles of the interrupted run are missing; give --fresh to restart";
             return Err(fail(io::Error::other(what)));
         }
         file.set_len(end).map_err(fail)?;
@@ -62,7 +62,7 @@ impl Spool {
         })
     }
 
-    /// Bytes so far, all of them on the disk.
+    /// Synchronises the file to disk and returns its size, bytes.
     pub(super) fn synced(&self) -> io::Result<u64> {
         self.file.sync_data()?;
         Ok(self.end)
@@ -75,7 +75,7 @@ impl Spool {
             self.file.write_all(part)?;
             self.end += part.len() as u64;
         }
-        // A packed tile is not much larger than its pixels: 4 MiB at most.
+        // A compressed tile is not much larger than its pixels: at most 4 MiB.
         Ok(Stored {
             offset,
             image: packed.image.len() as u32,
@@ -83,7 +83,7 @@ impl Spool {
         })
     }
 
-    /// Reads a tile into `packed`.
+    /// Reads a tile to `packed`.
     pub(super) fn read(&mut self, stored: &Stored, packed: &mut Packed) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(stored.offset))?;
         for (part, bytes) in [

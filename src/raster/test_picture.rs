@@ -1,8 +1,8 @@
-//! Pictures for the tests of rasters.
+//! Pictures for tests of raster output.
 
 use super::spec::{RasterSpec, RasterTile, Reduce, SampleType, TILE_EDGE_PX};
 
-/// 8-bit grey with alpha, overviews by the mean.
+/// Specification of 8-bit grey with alpha and mean overviews.
 pub(super) fn grey_alpha(width: u32, height: u32) -> RasterSpec {
     RasterSpec {
         width,
@@ -16,7 +16,7 @@ pub(super) fn grey_alpha(width: u32, height: u32) -> RasterSpec {
     }
 }
 
-/// The bytes of a pixel of [`tiles`]: slopes, and a hole on the upper left.
+/// The bytes of a pixel of [`tiles`]: ramps, with a hole at the upper left.
 pub(super) fn pixel(spec: &RasterSpec, x: usize, y: usize) -> Vec<u8> {
     let hole = x < 700 && y < 600 + x / 3;
     let value = |k: usize| ((x + 2 * y + 300 * k) % 997 + 10) as f64 / 1024.0;

@@ -1,4 +1,4 @@
-//! Which pose belongs to which frame.
+//! Association of poses with frames.
 
 use super::error::SurveyError;
 use crate::frames::FrameFile;
@@ -7,36 +7,36 @@ use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// What ties poses to frames.
+/// The criterion by which poses are associated with frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Associate {
-    /// The first pose belongs to the first frame, and so on: as many poses as frames.
+    /// By order: the first pose belongs to the first frame and so on, with as many poses as frames.
     Order,
-    /// The frame's name in the file of poses.
+    /// By the frame's name in the file of poses.
     Name,
-    /// The frame's time.
+    /// By the frame's time.
     Time,
 }
 
-/// The pose nearest in time may be this far from its frame, unless said otherwise; `evo`'s own.
+/// Default tolerance between the times of a frame and its pose, seconds; the default of `evo`.
 pub const TIME_TOLERANCE_S: f64 = 0.01;
 
-/// How poses are found by time.
+/// Parameters of the association by time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TimeAssociation {
-    /// The nearest pose may be this far from the frame, seconds.
+    /// Largest difference between the times of a frame and its pose, seconds.
     pub tolerance_s: f64,
-    /// Whether a frame between two poses takes the one on the way between them.
+    /// True to interpolate between the two neighbouring poses.
     pub interpolate: bool,
 }
 
-/// One pose per frame, in the convention of the file, each as many as there are frames. Where the
-/// file has times they stay; else the frames' own, if known, or their places in the list.
+/// Associates poses by order, in the convention of the file. The times are the file's, else the
+/// frames', else the indices.
 ///
 /// # Errors
-/// Another number of poses than of frames.
+/// Different numbers of poses and frames.
 pub(super) fn by_order(
     file: &PoseFile,
     frames: &[FrameFile],
@@ -48,9 +48,9 @@ pub(super) fn by_order(
             poses: file.entries.len(),
             frames: frames.len(),
             remedy: if file.has_names() {
-                "; or tie them by name (--associate name)"
+                "; or associate them by name (--associate name)"
             } else if file.has_times() {
-                "; or tie them by time (--associate time)"
+                "; or associate them by time (--associate time)"
             } else {
                 ""
             },
@@ -64,8 +64,8 @@ pub(super) fn by_order(
         .collect())
 }
 
-/// The pose of each frame's name: the whole path as the file of poses has it, or its end. Poses of
-/// other files are left alone.
+/// Associates poses by name: the name in the file of poses must equal the frame's path or its end.
+/// Poses of other files are ignored.
 ///
 /// # Errors
 /// A file without names; a frame without a pose, or with several.
@@ -81,7 +81,10 @@ pub(super) fn by_name(
     let mut named: HashMap<String, Vec<(&Path, &PoseEntry)>> = HashMap::new();
     for entry in &file.entries {
         let path = Path::new(entry.name.as_deref().ok_or_else(|| {
-            fail("has no names of frames; tie its poses by --associate order or time".to_owned())
+            fail(
+                "has no names of frames; associate its poses by --associate order or time"
+                    .to_owned(),
+            )
         })?);
         let base = path.file_name().unwrap_or_default().to_string_lossy();
         named
@@ -98,7 +101,7 @@ pub(super) fn by_name(
                 frame.path.display()
             ))),
             [(_, only)] => Ok(*only),
-            // Several folders hold files of that name: the parts of the path decide.
+            // Several folders contain files of that name: compare the path's components.
             several => {
                 let mut fitting = several
                     .iter()
@@ -106,7 +109,8 @@ pub(super) fn by_name(
                 match (fitting.next(), fitting.next()) {
                     (Some((_, only)), None) => Ok(*only),
                     _ => Err(fail(format!(
-                        "{} poses could be those of frame {} ({}); names in the file must end the frames' paths",
+                        "{} poses could be those of frame {} ({}); names in the file must end the \
+                         frames' paths",
                         several.len(),
                         frame.index,
                         frame.path.display()
@@ -119,7 +123,7 @@ pub(super) fn by_name(
     frames.iter().map(of_frame).collect()
 }
 
-/// A path without what only says where it begins.
+/// A path without its root and `.` components.
 fn relative(path: &Path) -> &Path {
     path.strip_prefix("./").unwrap_or(path)
 }
@@ -132,13 +136,13 @@ fn stamped(entry: &PoseEntry, frame: usize, times_s: Option<&[f64]>) -> StampedP
     }
 }
 
-/// The pose of each frame's time: the nearest, or the one on the way between its neighbours
-/// ([`se3::between`]). Never one from beyond the first or last pose by extrapolation.
+/// Associates poses by time: the nearest pose, or the interpolation between its neighbours
+/// ([`se3::between`]). There is no extrapolation beyond the first and the last pose.
 ///
 /// # Errors
 /// A file without times; a frame whose nearest pose is farther than the tolerance; with
-/// interpolation, one before the first pose or after the last, or between two that are turned too
-/// far.
+/// interpolation, a frame before the first pose or after the last, or between two poses whose
+/// rotations differ too much.
 pub(super) fn by_time(
     file: &PoseFile,
     frames: &[FrameFile],
@@ -151,7 +155,7 @@ pub(super) fn by_time(
     };
     if !file.has_times() {
         return Err(fail(
-            "has no times; tie its poses by --associate order or name".to_owned(),
+            "has no times; associate its poses by --associate order or name".to_owned(),
         ));
     }
     let all = file.trajectory();
@@ -177,7 +181,8 @@ pub(super) fn by_time(
         };
         if off(nearest) > how.tolerance_s {
             return Err(fail(format!(
-                "the nearest pose is at {} s, {:.6} s away, more than the tolerance of {} s (--time-tolerance-s)",
+                "the nearest pose is at {} s, {:.6} s away, more than the tolerance of {} s \
+                 (--time-tolerance-s)",
                 nearest.time_s,
                 off(nearest),
                 how.tolerance_s
@@ -189,14 +194,16 @@ pub(super) fn by_time(
                 let share = (time_s - last.time_s) / (next.time_s - last.time_s);
                 se3::between(&last.pose, &next.pose, share).ok_or_else(|| {
                     fail(format!(
-                        "the poses at {} s and {} s are turned too far from each other to find the way between them",
+                        "the poses at {} s and {} s are turned too far from each other to find \
+                         the way between them",
                         last.time_s, next.time_s
                     ))
                 })?
             }
             (true, ..) => {
                 return Err(fail(format!(
-                    "lies beyond the poses, the nearest of which is at {} s, and nothing is extrapolated",
+                    "lies beyond the poses, the nearest of which is at {} s, and nothing is \
+                     extrapolated",
                     nearest.time_s
                 )));
             }
@@ -216,7 +223,7 @@ mod tests {
         paths.iter().enumerate().map(frame).collect()
     }
 
-    /// Poses k of a spiral at the times 10 + k, called by these names.
+    /// Poses k of a spiral at the times 10 + k, with these names.
     fn file(names: &[&str]) -> PoseFile {
         let poses = spiral(names.len(), 0.1, 0.5);
         let entry = |(k, name): (usize, &&str)| PoseEntry {

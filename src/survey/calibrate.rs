@@ -1,13 +1,13 @@
-//! `[calibrate]`: what all frames share and `refine` can estimate.
+//! `[calibrate]`: parameters shared by all frames that `refine` can estimate.
 
 use serde::{Deserialize, Serialize};
 
-/// Something that all frames share and `refine` can estimate.
+/// A group of shared parameters that `refine` can estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum CalibrationGroup {
-    /// Focal length; fx and fy grow alike.
+    /// Focal length; fx and fy scale together.
     Focal,
     /// Principal point.
     Centre,
@@ -15,12 +15,12 @@ pub enum CalibrationGroup {
     Distortion,
     /// The tunnel's radius.
     Radius,
-    /// Where the frame of the initial poses has the tunnel's axis: two tilts and two offsets.
+    /// The tunnel's axis in the frame of the initial poses: two tilts and two offsets.
     Axis,
 }
 
 impl CalibrationGroup {
-    /// All there are.
+    /// All groups.
     pub const ALL: [Self; 5] = [
         Self::Focal,
         Self::Centre,
@@ -30,13 +30,12 @@ impl CalibrationGroup {
     ];
 }
 
-/// `[calibrate]`: what is estimated besides the poses, and how far off the given values may be
-/// (1-σ).
+/// `[calibrate]`: the shared parameters to estimate, and the 1-σ of their given values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 #[non_exhaustive]
 pub struct CalibrateSection {
-    /// What is estimated, unless the command line says otherwise.
+    /// The groups to estimate, unless the command line overrides them.
     pub unknowns: Vec<CalibrationGroup>,
     /// Focal length, percent.
     pub focal_sigma_percent: f64,
@@ -70,8 +69,8 @@ impl Default for CalibrateSection {
 }
 
 impl CalibrateSection {
-    /// What is wrong with the numbers, if anything.
-    pub(super) fn fault(&self) -> Option<String> {
+    /// Checks the numbers.
+    pub(super) fn validate(&self) -> Result<(), String> {
         let sigmas = [
             ("focal_sigma_percent", self.focal_sigma_percent, 30.0),
             ("centre_sigma_percent", self.centre_sigma_percent, 30.0),
@@ -84,8 +83,11 @@ impl CalibrateSection {
         let wrong = sigmas
             .iter()
             .find(|(_, value, most)| !(1e-9..=*most).contains(value));
-        wrong.map(|(name, value, most)| {
-            format!("calibrate.{name} is {value}; it must be more than 0 and no more than {most}")
-        })
+        match wrong {
+            None => Ok(()),
+            Some((name, value, most)) => Err(format!(
+                "calibrate.{name} is {value}; it must be more than 0 and no more than {most}"
+            )),
+        }
     }
 }

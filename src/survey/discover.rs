@@ -1,4 +1,4 @@
-//! What a folder holds that a survey can be made of.
+//! Search of a folder for the parts of a survey.
 
 use super::file::SURVEY_FILE;
 use crate::camera::{Camera, read_calibration};
@@ -7,26 +7,26 @@ use crate::trajectory::{PoseFile, read_poses};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Folders below the one that is looked into.
+/// Levels of folders below the searched one.
 const MAX_DEPTH: usize = 3;
-/// Larger files hold no calibration, ...
+/// Larger files are not tried as calibrations.
 const MAX_CALIBRATION_BYTES: u64 = 4 << 20;
-/// ... and no poses.
+/// Larger files are not tried as poses.
 const MAX_POSES_BYTES: u64 = 256 << 20;
-/// Endings of pictures.
+/// Extensions of pictures.
 const PICTURE_EXTENSIONS: [&str; 6] = ["jpg", "jpeg", "png", "tif", "tiff", "webp"];
 
-/// Endings of videos.
+/// Extensions of videos.
 const VIDEO_EXTENSIONS: [&str; 7] = ["mp4", "mov", "m4v", "mkv", "avi", "webm", "mts"];
 
-/// Pictures of one folder and ending.
+/// The pictures of one folder with one extension.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PictureGroup {
-    /// Glob pattern, relative to the folder that was looked into.
+    /// Glob pattern, relative to the searched folder.
     pub pattern: String,
-    /// How many.
+    /// Number of pictures.
     pub count: usize,
-    /// Width and height of the first, pixels, if it can be read.
+    /// Width and height of the first picture, pixels, if readable.
     pub size: Option<(u32, u32)>,
 }
 
@@ -34,37 +34,37 @@ pub struct PictureGroup {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct VideoChoice {
-    /// The file, relative to the folder that was looked into.
+    /// The file, relative to the searched folder.
     pub path: PathBuf,
-    /// Every so many-th of its pictures is a frame.
+    /// Sampling interval of the frames, pictures.
     pub every: usize,
-    /// How many frames that makes.
+    /// Number of frames.
     pub count: usize,
     /// Width and height, pixels.
     pub size: (u32, u32),
 }
 
-/// What was found; all paths are relative to the folder.
+/// The parts of a survey found in a folder; all paths are relative to the folder.
 #[derive(Clone, Debug, Default)]
 #[non_exhaustive]
 pub struct Discovery {
-    /// A picture called mask.
+    /// A picture named `mask`.
     pub mask: Option<PathBuf>,
-    /// Videos.
+    /// The videos.
     pub videos: Vec<PathBuf>,
-    /// The one that the frames are in, if one was chosen ([`Discovery::choose_video`]).
+    /// The video of the frames, if one was chosen ([`Discovery::choose_video`]).
     pub video: Option<VideoChoice>,
     /// Groups of pictures, the largest first.
     pub pictures: Vec<PictureGroup>,
-    /// Calibrations, those that fit the frames first: the video's, or the first group of pictures.
+    /// Calibrations, those with the frames' size first.
     pub calibrations: Vec<(PathBuf, Camera)>,
-    /// Files of poses; first those with as many poses as there are frames, and of these what is not
-    /// called true.
+    /// Pose files; first those with as many poses as frames, and among these first those not named
+    /// as ground truth.
     pub poses: Vec<(PathBuf, PoseFile)>,
 }
 
 impl Discovery {
-    /// Looks into `folder` and three levels of folders below; hidden ones are left out.
+    /// Searches `folder` and three levels of folders below it, without hidden ones.
     ///
     /// # Errors
     /// A folder that cannot be read.
@@ -130,11 +130,11 @@ impl Discovery {
         Ok(found)
     }
 
-    /// Takes every `every`-th picture of a video, relative to the `folder` that was looked into,
-    /// for the frames.
+    /// Selects every `every`-th picture of a video as the frames; the path is relative to the
+    /// searched `folder`.
     ///
     /// # Errors
-    /// As [`Video::open`].
+    /// The errors of [`Video::open`].
     pub fn choose_video(
         &mut self,
         folder: &Path,
@@ -152,7 +152,7 @@ impl Discovery {
         Ok(())
     }
 
-    /// Number of frames, and their size if it is known, pixels.
+    /// Number of frames, and their size if known, pixels.
     pub fn frames(&self) -> (usize, Option<(u32, u32)>) {
         let pictures = self.pictures.first();
         match &self.video {
@@ -177,18 +177,18 @@ impl Discovery {
         });
     }
 
-    /// The poses to begin with: the first that are not called true.
+    /// The initial poses: the first file not named as ground truth.
     pub fn initial(&self) -> Option<&(PathBuf, PoseFile)> {
         self.poses.iter().find(|(path, _)| !is_truth(path))
     }
 
-    /// The true poses, if any file is called so.
+    /// The ground truth, if a file is named so.
     pub fn truth(&self) -> Option<&(PathBuf, PoseFile)> {
         self.poses.iter().find(|(path, _)| is_truth(path))
     }
 }
 
-/// Whether a file's name says that it holds the truth.
+/// True if a file's name denotes ground truth.
 fn is_truth(path: &Path) -> bool {
     let name = path
         .file_stem()
@@ -210,7 +210,7 @@ fn walk(root: &Path, inner: &Path, depth: usize, files: &mut Vec<PathBuf>) -> st
         if kind.is_file() {
             files.push(path);
         } else if kind.is_dir() && depth > 0 {
-            // A folder that may not be read is none of ours.
+            // Unreadable folders are skipped.
             let _ = walk(root, &path, depth - 1, files);
         }
     }

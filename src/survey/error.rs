@@ -1,4 +1,4 @@
-//! Why a survey cannot be used.
+//! Errors of surveys.
 
 use crate::camera::CalibrationError;
 use crate::frames::FrameError;
@@ -6,16 +6,19 @@ use crate::surface::SurfaceError;
 use crate::trajectory::PoseError;
 use std::path::PathBuf;
 
-/// Why a survey cannot be used.
+/// An error of a survey.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SurveyError {
     /// `survey.toml` cannot be read.
-    #[error("{}: cannot read the survey: {source}; a survey is a folder with a survey.toml", path.display())]
+    #[error(
+        "{}: cannot read the survey: {source}; a survey is a folder with a survey.toml",
+        path.display()
+    )]
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// `survey.toml` is malformed or has an unknown key.
@@ -27,7 +30,7 @@ pub enum SurveyError {
         line: usize,
         /// 1-based column.
         column: usize,
-        /// What the parser said.
+        /// The error of the parser.
         what: String,
     },
     /// A value is impossible.
@@ -35,12 +38,13 @@ pub enum SurveyError {
     Value {
         /// The file.
         path: PathBuf,
-        /// Which, and what it should be.
+        /// The value and its valid range.
         what: String,
     },
-    /// Frames and poses do not pair up.
+    /// The numbers of frames and poses differ.
     #[error(
-        "{}: {poses} poses for {frames} frames; every frame needs exactly one pose, in the order of the frames' names{remedy}",
+        "{}: {poses} poses for {frames} frames; every frame needs exactly one pose, in the order \
+         of the frames' names{remedy}",
         path.display()
     )]
     Count {
@@ -50,20 +54,21 @@ pub enum SurveyError {
         poses: usize,
         /// Frames found.
         frames: usize,
-        /// What else could be done.
+        /// Another remedy.
         remedy: &'static str,
     },
-    /// Poses cannot be tied to frames, or not be understood.
+    /// Poses cannot be associated with frames, or their convention is unknown.
     #[error("{}: {what}", path.display())]
     Association {
         /// The pose file.
         path: PathBuf,
-        /// What is wrong, and the remedy.
+        /// The problem and the remedy.
         what: String,
     },
-    /// A frame's time is needed and not known.
+    /// A frame's time is needed, but unknown.
     #[error(
-        "frame {frame} ({}): its name tells no time (seconds with a decimal point, or nanoseconds); give a file of times by \
+        "frame {frame} ({}): its name contains no time (seconds with a decimal point, or \
+         nanoseconds); give a file of times by \
          --frame-times FILE (frames.times in survey.toml)",
         file.display()
     )]
@@ -73,28 +78,28 @@ pub enum SurveyError {
         /// The frame.
         file: PathBuf,
     },
-    /// A pose does not go with the tunnel.
+    /// A pose is impossible in the tunnel.
     #[error("{}: frame {frame}: {source}; {remedy}", path.display())]
     Placement {
         /// The pose file.
         path: PathBuf,
         /// Index of the frame.
         frame: usize,
-        /// What is wrong.
+        /// The problem.
         source: SurfaceError,
-        /// What might be.
+        /// A probable cause.
         remedy: String,
     },
-    /// The tunnel's own size.
+    /// An error of the tunnel's shape.
     #[error(transparent)]
     Surface(#[from] SurfaceError),
-    /// Calibration.
+    /// An error of the calibration.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// Frames.
+    /// An error of the frames.
     #[error(transparent)]
     Frames(#[from] FrameError),
-    /// Poses, times, or a rigid motion.
+    /// An error of poses, times, or a rigid motion.
     #[error(transparent)]
     Poses(#[from] PoseError),
 }

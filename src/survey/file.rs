@@ -1,4 +1,4 @@
-//! `survey.toml` as written.
+//! The content of `survey.toml`.
 
 use super::calibrate::CalibrateSection;
 use super::error::SurveyError;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file that describes a survey.
 pub const SURVEY_FILE: &str = "survey.toml";
 
-/// `survey.toml` as written.
+/// The content of `survey.toml`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -31,14 +31,14 @@ pub struct SurveyFile {
     /// Self-calibration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibrate: Option<CalibrateSection>,
-    /// Options of the program's commands, a table each: what their long flags say, with
-    /// underscores. The program gives them to the command; the library reads over them.
+    /// Options of the program's commands, one table per command, named like the long flags with
+    /// underscores. The program applies them; the library ignores them.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub options: BTreeMap<String, toml::Table>,
 }
 
 impl SurveyFile {
-    /// All files that it names, as written, but for the frames: a pattern, or a video.
+    /// All paths in the file, except those of the frames.
     pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
         let poses = &mut self.poses;
         [
@@ -63,7 +63,7 @@ impl SurveyFile {
 pub struct CameraSection {
     /// Calibration file.
     pub file: PathBuf,
-    /// Which camera, if the file has several.
+    /// Name of the camera, if the file has several.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
     /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds of
@@ -81,20 +81,21 @@ pub struct FramesSection {
     /// Glob pattern of the frames, if they are files of their own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub images: Option<String>,
-    /// The video that they are in, if they are not.
+    /// The video that contains the frames.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub video: Option<PathBuf>,
-    /// Of the video every so many-th picture is a frame, from the first on; without it every one.
+    /// Sampling interval: every so many-th picture of the video is a frame, from the first on;
+    /// every picture by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub every: Option<usize>,
-    /// Of these, only as many as it takes for the view to turn by so much from one to the next,
-    /// degrees, by the initial poses, which must be tied by time.
+    /// Keyframe selection: rotation between consecutive frames by the initial poses, degrees; the
+    /// poses must be associated by time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub angle_step_deg: Option<f64>,
-    /// The frames' times, where they are not in their names.
+    /// A file of the frames' times, if they are not in the names.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub times: Option<PathBuf>,
-    /// A picture of the frames' size, black where they never show the wall; see
+    /// An image of the frames' size, black where they never show the wall; see
     /// [`crate::frames::Mask`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mask: Option<PathBuf>,
@@ -105,7 +106,7 @@ pub struct FramesSection {
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct PriorSection {
-    /// How errors of consecutive poses hang together.
+    /// Correlation of the errors of consecutive poses.
     pub model: JitterModel,
     /// 1-σ about each axis, degrees.
     pub rotation_sigma_deg: f64,
@@ -114,7 +115,7 @@ pub struct PriorSection {
 }
 
 impl Default for PriorSection {
-    /// The paper's experiment: 2° and (2, 2, 3) cm a step, accumulating.
+    /// The paper's experiment: 2° and (2, 2, 3) cm per step, accumulating.
     fn default() -> Self {
         Self {
             model: JitterModel::RandomWalk,

@@ -1,4 +1,4 @@
-//! From `[frames]` to the frames.
+//! Listing of the frames that `[frames]` names.
 
 use super::error::SurveyError;
 use super::file::FramesSection;
@@ -7,20 +7,20 @@ use crate::frames::{self, FrameFile, Video};
 use std::path::Path;
 use std::sync::Arc;
 
-/// The frames that a section names.
+/// The frames that a `[frames]` section names.
 pub(super) struct FrameList {
     /// The frames, sorted by name or time.
     pub frames: Vec<FrameFile>,
-    /// Their times, seconds, where a file or a video tells them.
+    /// Times of the frames, seconds, if given by a file or a video.
     pub times_s: Option<Vec<f64>>,
-    /// The video that they are in, if they are.
+    /// The video that contains the frames, if any.
     pub video: Option<Arc<Video>>,
 }
 
 impl FrameList {
     /// Finds the frames that the section of the survey at `toml_path` names, relative to its
-    /// `folder`. `frame_times`: a file of their times, instead of the survey's. A mask that lies
-    /// among the frames is none of them.
+    /// `folder`. `frame_times`: a file of their times, instead of the survey's. A mask in the same
+    /// folder is not a frame.
     ///
     /// # Errors
     /// Neither pictures nor a video, or both; a malformed pattern, no frames, a video that cannot
@@ -40,7 +40,8 @@ impl FrameList {
         let mut listing = match (&section.images, &section.video, section.every) {
             (Some(_), None, None) if section.angle_step_deg.is_some() => {
                 return fail(
-                    "frames.angle_step_deg goes with frames.video; for pictures, let frames.images match fewer of them",
+                    "frames.angle_step_deg goes with frames.video; for pictures, let \
+                     frames.images match fewer of them",
                 );
             }
             (Some(pattern), None, None) => {
@@ -62,7 +63,8 @@ impl FrameList {
             }
             (Some(_), None, Some(_)) => {
                 return fail(
-                    "frames.every goes with frames.video; for pictures, let frames.images match fewer of them",
+                    "frames.every goes with frames.video; for pictures, let frames.images match \
+                     fewer of them",
                 );
             }
             (None, None, _) => {

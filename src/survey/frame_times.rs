@@ -1,4 +1,4 @@
-//! When the frames were taken.
+//! Times of the frames.
 
 use super::error::SurveyError;
 use crate::frames::FrameFile;
@@ -8,10 +8,10 @@ use std::path::Path;
 
 /// Reads the frames' times, seconds, one per frame.
 ///
-/// One line a frame: its time alone, in the order of the frames' names (KITTI's `times.txt`); or
+/// One line per frame: its time alone, in the order of the frames' names (KITTI's `times.txt`); or
 /// time and name in either order (TUM's `rgb.txt`, EuRoC's `data.csv`), with blanks or a comma
 /// between. Whole numbers of 16 digits and more are nanoseconds, all else is seconds. Lines of
-/// files that are no frames of the survey are passed over.
+/// files that are not frames of the survey are ignored.
 ///
 /// # Errors
 /// An unreadable file, a line of another form, a frame without a time, two times of one frame.
@@ -23,7 +23,8 @@ pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, Survey
             Ok(lines.iter().map(|line| line.time_s).collect())
         } else {
             Err(file(format!(
-                "{} times for {} frames; every frame needs one, in the order of the frames' names, or with its name beside it",
+                "{} times for {} frames; every frame needs one, in the order of the frames' \
+                 names, or with its name beside it",
                 lines.len(),
                 frames.len()
             )))
@@ -51,7 +52,7 @@ pub(super) fn read(path: &Path, frames: &[FrameFile]) -> Result<Vec<f64>, Survey
     frames.iter().map(of_frame).collect()
 }
 
-/// Reads times of frames that are not at hand, seconds: all lines, in their order.
+/// Reads the times of all lines of a file, in order, seconds.
 ///
 /// # Errors
 /// An unreadable file, a line of another form.
@@ -60,7 +61,7 @@ pub fn read_frame_times(path: &Path) -> Result<Vec<f64>, SurveyError> {
     Ok(lines.into_iter().map(|line| line.time_s).collect())
 }
 
-/// A line of a list of times.
+/// A line of a file of times.
 struct Line {
     number: usize,
     time_s: f64,
@@ -90,7 +91,7 @@ fn read_lines(path: &Path) -> Result<Vec<Line>, SurveyError> {
         };
         let time_s = times::from_word(time).ok_or_else(|| {
             fail(format!(
-                "`{time}` is no time; seconds, or whole nanoseconds"
+                "`{time}` is not a time; give seconds, or whole nanoseconds"
             ))
         })?;
         lines.push(Line {
@@ -102,10 +103,10 @@ fn read_lines(path: &Path) -> Result<Vec<Line>, SurveyError> {
     Ok(lines)
 }
 
-/// The times that the frames' names tell, if all of them do.
+/// Reads the times from the frames' names.
 ///
 /// # Errors
-/// The first frame whose name does not.
+/// The first frame whose name contains no time.
 pub(super) fn from_names(frames: &[FrameFile]) -> Result<Vec<f64>, SurveyError> {
     let of_frame = |frame: &FrameFile| {
         let stem = frame.path.file_stem().unwrap_or_default().to_string_lossy();
@@ -117,7 +118,7 @@ pub(super) fn from_names(frames: &[FrameFile]) -> Result<Vec<f64>, SurveyError> 
     frames.iter().map(of_frame).collect()
 }
 
-/// A path's last part, whatever separates its parts.
+/// The last component of a path with `/` or `\` as separators.
 fn base_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
@@ -162,8 +163,8 @@ mod tests {
         for (text, expected) in [
             ("", "0 times for 2 frames"),
             ("1\n2\n3\n", "3 times for 2 frames"),
-            ("1\nx\n", ":2: `x` is no time"),
-            ("1\nnan\n", ":2: `nan` is no time"),
+            ("1\nx\n", ":2: `x` is not a time"),
+            ("1\nnan\n", ":2: `nan` is not a time"),
             ("1 a.png\n2 a.png\n", ":2: a second time of a.png"),
             ("1 a.png\n", "no time of frame 1 (b.png)"),
             ("1 a.png\n2\n", "some lines have a name"),

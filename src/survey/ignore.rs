@@ -1,9 +1,9 @@
-//! `[tunnel] ignore`: parts of the wall by which frames are not compared.
+//! `[tunnel] ignore`: regions of the wall that are excluded from the comparison of frames.
 
 use crate::surface::{Surface, WallRegions};
 use serde::{Deserialize, Serialize};
 
-/// A part of the wall; what is left out goes all the way.
+/// A region of the wall; a missing bound does not limit it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
@@ -17,51 +17,52 @@ pub struct IgnoreSection {
     pub chainage_m: Option<[f64; 2]>,
 }
 
-/// Angles beyond are a mistake, degrees.
+/// Largest plausible angle, degrees.
 const MAX_ANGLE_DEG: f64 = 720.0;
 
 impl IgnoreSection {
-    /// What is wrong with it, if anything.
-    fn fault(&self) -> Option<String> {
+    /// Checks the bounds.
+    fn validate(&self) -> Result<(), String> {
         match self {
             Self {
                 theta_deg: None,
                 chainage_m: None,
-            } => Some(
+            } => Err(
                 "says neither theta_deg nor chainage_m, which would be all of the wall".to_owned(),
             ),
             Self {
                 theta_deg: Some([from, to]),
                 ..
             } if !(from.abs() <= MAX_ANGLE_DEG && to.abs() <= MAX_ANGLE_DEG) || from == to => {
-                Some(format!(
-                    "theta_deg is [{from}, {to}]; it must be two different angles in degrees, from and to in the direction in which θ grows"
+                Err(format!(
+                    "theta_deg is [{from}, {to}]; it must be two different angles in degrees, \
+                     from and to in the direction in which θ grows"
                 ))
             }
             Self {
                 chainage_m: Some([from, to]),
                 ..
-            } if !(from.is_finite() && to.is_finite() && from < to) => Some(format!(
-                "chainage_m is [{from}, {to}]; it must be two numbers of metres, the lesser first"
+            } if !(from.is_finite() && to.is_finite() && from < to) => Err(format!(
+                "chainage_m is [{from}, {to}]; it must be two numbers of metres, the smaller first"
             )),
-            _ => None,
+            _ => Ok(()),
         }
     }
 }
 
-/// The parts of the wall of `surface`.
+/// Converts the sections to regions of the wall of `surface`.
 ///
 /// # Errors
-/// What is wrong with the first that is no part of the wall.
+/// The problem of the first invalid section.
 pub(super) fn wall_regions(
     sections: &[IgnoreSection],
     surface: &dyn Surface,
 ) -> Result<WallRegions, String> {
     let mut patches = WallRegions::default();
     for (k, section) in sections.iter().enumerate() {
-        if let Some(fault) = section.fault() {
-            return Err(format!("tunnel.ignore, item {}: {fault}", k + 1));
-        }
+        section
+            .validate()
+            .map_err(|what| format!("tunnel.ignore, item {}: {what}", k + 1))?;
         let theta_rad = section.theta_deg.map(|theta| theta.map(f64::to_radians));
         patches.add(surface, theta_rad, section.chainage_m);
     }
@@ -86,16 +87,16 @@ mod tests {
                 "[{ chainage_m = [1, 2] }, { chainage_m = [5, 2] }]",
                 Some("item 2: chainage_m is [5, 2]"),
             ),
-            ("[{ chainage_m = [0, inf] }]", Some("the lesser first")),
+            ("[{ chainage_m = [0, inf] }]", Some("the smaller first")),
         ] {
             let table: toml::Table = format!("ignore = {text}").parse().unwrap();
             let sections: Vec<IgnoreSection> = table["ignore"].clone().try_into().unwrap();
-            let fault = wall_regions(&sections, &circle).err();
+            let error = wall_regions(&sections, &circle).err();
             match expected {
-                None => assert_eq!(fault, None),
+                None => assert_eq!(error, None),
                 Some(expected) => assert!(
-                    fault.as_deref().unwrap_or("").contains(expected),
-                    "{fault:?}"
+                    error.as_deref().unwrap_or("").contains(expected),
+                    "{error:?}"
                 ),
             }
         }

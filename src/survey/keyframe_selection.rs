@@ -1,4 +1,4 @@
-//! Fewer frames than a video has pictures, by how far the view turns.
+//! Keyframe selection: subsampling of a video by the rotation of the view.
 
 use super::associate::Associate;
 use super::error::SurveyError;
@@ -7,12 +7,11 @@ use crate::trajectory::{Pose, poses_of};
 use std::path::Path;
 
 impl Survey {
-    /// Leaves out frames until the view turns by `step_deg` from one to the next, as the initial
-    /// poses say.
+    /// Keeps frames whose view is rotated by `step_deg` against the previous kept frame, by the
+    /// initial poses.
     ///
     /// # Errors
-    /// An impossible step; poses that are not tied by time, so that those of fewer frames could not
-    /// be told.
+    /// An impossible step; poses that are not associated by time, as the selection requires.
     pub(super) fn select_keyframes(
         &mut self,
         step_deg: f64,
@@ -32,7 +31,9 @@ impl Survey {
         let section = &self.file.poses;
         if section.associate != Some(Associate::Time) {
             return fail(
-                "frames.angle_step_deg needs poses.associate = \"time\": which pictures are frames is told by their poses".to_owned(),
+                "frames.angle_step_deg needs poses.associate = \"time\": the poses determine \
+                 which pictures are frames"
+                    .to_owned(),
             );
         }
         let (all, _) = self.read_as(section, &self.folder.join(&section.initial))?;
@@ -45,8 +46,8 @@ impl Survey {
     }
 }
 
-/// The first pose, and each that is turned from the one before it in the list by `step_rad` or
-/// more, but for rounding.
+/// Indices of the first pose and of each pose rotated by at least `step_rad` (to rounding) against
+/// the previous selected one.
 fn keyframe_indices(poses: &[Pose], step_rad: f64) -> Vec<usize> {
     const ANGLE_TOLERANCE_RAD: f64 = 1e-6;
     let mut kept: Vec<usize> = Vec::new();

@@ -1,12 +1,13 @@
-//! `survey.toml`: what a data set is.
+//! Surveys: data sets described by a `survey.toml`.
 //!
 //! ```toml
 //! [tunnel]
-//! shape = "circle"            # with radius_m; or "ellipse", "box", "horseshoe" with width_m and height_m
+//! shape = "circle"            # with radius_m; "ellipse", "box" or "horseshoe" with
+//!                             # width_m and height_m
 //! radius_m = 3.0
-//! centreline = "curve.txt"    # optional: of a tunnel that is not straight, `x y z [radius]` a line
-//! ignore = [                  # optional: parts of the wall by which refine does not compare frames
-//!     { theta_deg = [150, 210], chainage_m = [2.0, 5.5] },   # either may be left out: all around, all along
+//! centreline = "curve.txt"    # optional, for curved tunnels: lines `x y z [radius]`
+//! ignore = [                  # optional: regions of the wall that refine excludes
+//!     { theta_deg = [150, 210], chainage_m = [2.0, 5.5] }, # either is optional
 //! ]
 //!
 //! [camera]
@@ -15,32 +16,32 @@
 //!
 //! [frames]
 //! images = "frames/*.jpg"     # sorted by name; or
-//! # video = "survey.mp4"      # pictures of a video, read by ffmpeg, with the times it says
-//! # every = 5                 # every fifth picture of it
-//! # angle_step_deg = 15.0     # of these, those between which the view turns by so much; needs `associate = "time"`
-//! times = "times.txt"         # optional: `time`, `time name` or `name time` a line; else from the names
-//! mask = "mask.png"           # optional: a picture of their size, black where they never show the wall
+//! # video = "survey.mp4"      # pictures of a video, read by ffmpeg, with its times
+//! # every = 5                 # sampling interval, pictures
+//! # angle_step_deg = 15.0     # keyframes by rotation of the view; needs associate = "time"
+//! times = "times.txt"         # optional: lines `time`, `time name` or `name time`
+//! mask = "mask.png"           # optional: an image, black where the wall is hidden
 //!
 //! [poses]
-//! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC, told by the content
-//! truth = "groundtruth.tum"   # optional: only for comparison; all below holds for both
-//! format = "tum"              # optional, as all below: the format, where the content does not tell
-//! convention = "c2w"          # or "w2c"; each format has its own
-//! camera_axes = "opencv"      # or "opengl"; each format has its own
-//! body_to_camera = "cam.yaml" # where the poses are a body's; see `trajectory::read_camera_in_body`
-//! tunnel_frame = "axis.json"  # where the axis is not their world's y; see `trajectory::read_tunnel_frame`
-//! associate = "time"          # or "name", the default where the file has names, or "order"
-//! time_tolerance_s = 0.01     # the nearest pose may be this far off; the default
-//! interpolate = true          # between two poses; the default is the nearer one
+//! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC, detected from the content
+//! truth = "groundtruth.tum"   # optional: for comparison; all keys below apply to both
+//! format = "tum"              # optional, like all below: overrides the detection
+//! convention = "c2w"          # or "w2c"; the default depends on the format
+//! camera_axes = "opencv"      # or "opengl"; the default depends on the format
+//! body_to_camera = "cam.yaml" # for poses of a body (`trajectory::read_camera_in_body`)
+//! tunnel_frame = "axis.json"  # for another axis than y (`trajectory::read_tunnel_frame`)
+//! associate = "time"          # or "name" (default if the file has names), or "order"
+//! time_tolerance_s = 0.01     # largest difference of times; the default
+//! interpolate = true          # by default the nearer pose is taken
 //!
-//! [prior]                     # optional: how far off the initial poses may be
+//! [prior]                     # optional: noise of the initial poses
 //! model = "random-walk"       # or "independent"
 //! rotation_sigma_deg = 2.0
 //! translation_sigma_m = [0.02, 0.02, 0.03]
 //!
-//! [calibrate]                 # optional: what refine estimates besides the poses, around the values given
+//! [calibrate]                 # optional: self-calibration by refine
 //! unknowns = ["focal", "centre", "distortion", "radius", "axis"]
-//! focal_sigma_percent = 2.0   # 1-σ of the values given; these are the defaults
+//! focal_sigma_percent = 2.0   # 1-σ of the given values; these are the defaults
 //! centre_sigma_percent = 1.0  # of the frames' width
 //! k1_sigma = 0.05
 //! k2_sigma = 0.05

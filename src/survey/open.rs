@@ -1,7 +1,6 @@
-//! A survey, opened and checked.
+//! Opening and validation of surveys.
 
 use super::associate::TIME_TOLERANCE_S;
-use super::calibrate::CalibrateSection;
 use super::error::SurveyError;
 use super::file::read_survey_file;
 use super::file::{SURVEY_FILE, SurveyFile};
@@ -15,30 +14,30 @@ use crate::surface::{Surface, WallRegions};
 use crate::trajectory::{Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of};
 use std::path::{Path, PathBuf};
 
-/// A survey, read and checked: everything but the pixels.
+/// A survey, read and validated, except the pixels.
 #[derive(Debug)]
 pub struct Survey {
     /// The folder of `survey.toml`.
     pub folder: PathBuf,
-    /// `survey.toml` as written.
+    /// The content of `survey.toml`.
     pub file: SurveyFile,
     /// The camera.
     pub camera: Camera,
     /// The tunnel.
     pub surface: Box<dyn Surface>,
-    /// Parts of the wall by which frames are not compared.
+    /// Regions of the wall that are excluded from the comparison of frames.
     pub ignored: WallRegions,
-    /// The frames, sorted by name, with what none of them shows.
+    /// The frames, sorted by name, with their common mask.
     pub frames: FrameSet,
     /// The initial poses, one per frame.
     pub initial: Trajectory,
-    /// The true poses, one per frame, where known.
+    /// The true poses, one per frame, if known.
     pub truth: Option<Trajectory>,
     /// Noise model of the initial poses.
     pub prior: Jitter,
-    /// What is possible but suspicious, and what might be meant.
+    /// Warnings about suspicious data, with a probable cause.
     pub warnings: Vec<String>,
-    /// The frames' times, seconds, where a file or a video tells them.
+    /// The frames' times, seconds, if given by a file or a video.
     pub(super) times_s: Option<Vec<f64>>,
     /// See [`Survey::own_files`].
     own_files: Vec<PathBuf>,
@@ -48,12 +47,12 @@ impl Survey {
     /// Reads a survey: `path` is its folder or its `survey.toml`.
     ///
     /// # Errors
-    /// Everything that can be wrong before a pixel is read; see [`SurveyError`].
+    /// All errors that can be detected before a pixel is read; see [`SurveyError`].
     pub fn open(path: &Path) -> Result<Self, SurveyError> {
         Self::open_with(path, |_| ())
     }
 
-    /// Reads survey.toml (or the one in the folder `path`), and nothing else.
+    /// Reads only survey.toml (or the one in the folder `path`).
     ///
     /// # Errors
     /// A missing or malformed file.
@@ -61,10 +60,10 @@ impl Survey {
         read_survey_file(&toml_path(path))
     }
 
-    /// The same with something else in its `survey.toml` than is written there.
+    /// Opens a survey with modified content of its `survey.toml`.
     ///
     /// # Errors
-    /// As [`Survey::open`].
+    /// The errors of [`Survey::open`].
     pub fn open_with(
         path: &Path,
         change: impl FnOnce(&mut SurveyFile),
@@ -94,12 +93,13 @@ impl Survey {
             .all(|s| (1e-9..=10.0 * file.tunnel.nominal_m()).contains(s))
         {
             return Err(value(format!(
-                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times the radius (half the width)",
+                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times \
+                 the radius (half the width)",
                 prior.translation_sigma_m
             )));
         }
-        if let Some(fault) = file.calibrate.as_ref().and_then(CalibrateSection::fault) {
-            return Err(value(fault));
+        if let Some(calibrate) = &file.calibrate {
+            calibrate.validate().map_err(value)?;
         }
         let tolerance_s = file.poses.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S);
         if !(0.0..=1e6).contains(&tolerance_s) {
@@ -119,8 +119,10 @@ impl Survey {
             && file.camera.readout_ms.is_some()
         {
             return Err(value(format!(
-                "camera.readout_ms goes from row to row, but {} is to be shown turned by {}°, so that its rows are not what the sensor \
-                 reads at once; turn the pictures back with ffmpeg -noautorotate and calibrate for these, or leave readout_ms out",
+                "camera.readout_ms goes from row to row, but {} is displayed with a rotation of \
+                 {}°, so that its rows are not the rows that the sensor \
+                 reads at once; extract the pictures with ffmpeg -noautorotate and calibrate for \
+                 these, or remove readout_ms",
                 video.path().display(),
                 video.rotation_deg()
             )));
@@ -164,9 +166,7 @@ impl Survey {
                 .filter_map(|video| video.warning().map(str::to_owned)),
         );
         (survey.initial, survey.truth, survey.warnings) = (initial, truth, warnings);
-        if let Some(fault) = survey.readout_fault() {
-            return Err(value(fault));
-        }
+        survey.validate_readout().map_err(value)?;
         Ok(survey)
     }
 
@@ -174,12 +174,13 @@ impl Survey {
     /// own convention, and checks it against the frames and the tunnel.
     ///
     /// # Errors
-    /// A malformed file, poses that cannot be tied to the frames, a camera outside the tunnel.
+    /// A malformed file, poses that cannot be associated with the frames, a camera outside the
+    /// tunnel.
     pub fn read_poses(&self, path: &Path) -> Result<Trajectory, SurveyError> {
         Ok(self.read_as(&PosesSection::of(path), path)?.0)
     }
 
-    /// Reads a file of poses as a section says; its warnings beside it.
+    /// Reads a file of poses with the options of a section; also returns warnings.
     pub(super) fn read_as(
         &self,
         section: &PosesSection,
@@ -196,12 +197,12 @@ impl Survey {
         Ok((trajectory, warning))
     }
 
-    /// The first frames of the survey with their initial poses as they are read, and in every other
-    /// convention that leaves all cameras inside, each with the flags that stand for it (none for
-    /// the first; the fewer, the earlier).
+    /// The first frames of the survey with their initial poses in the given convention, and in
+    /// every other convention that leaves all cameras inside, each with its flags (none for the
+    /// first), in order of the number of flags.
     ///
     /// # Errors
-    /// As [`Survey::open`], should the file have changed since.
+    /// The errors of [`Survey::open`], if the file has changed since.
     pub fn pose_convention_variants(
         &self,
         most_frames: usize,
@@ -239,32 +240,35 @@ impl Survey {
         std::iter::once(given).chain(possible).map(survey).collect()
     }
 
-    /// The files besides the frames that the survey is made of, whether or not something else was
-    /// read in their place.
+    /// The files of the survey except the frames, even if others were read in their place.
     pub fn own_files(&self) -> &[PathBuf] {
         &self.own_files
     }
 
-    /// What is wrong with the readout time, if anything: no row of a frame can be read after the
-    /// next frame's.
-    fn readout_fault(&self) -> Option<String> {
-        let readout_ms = self.file.camera.readout_ms?;
+    /// Checks the readout time: it cannot be longer than the time between frames.
+    fn validate_readout(&self) -> Result<(), String> {
+        let Some(readout_ms) = self.file.camera.readout_ms else {
+            return Ok(());
+        };
         let steps = self
             .initial
             .windows(2)
             .map(|pair| pair[1].time_s - pair[0].time_s);
         let shortest_ms = 1e3 * steps.fold(f64::INFINITY, f64::min);
         let possible = readout_ms.is_finite() && readout_ms.abs() <= shortest_ms;
-        (!possible).then(|| {
-            format!(
-                "camera.readout_ms is {readout_ms}; it must be a number of milliseconds and no more than the {shortest_ms:.3} ms between \
+        if possible {
+            Ok(())
+        } else {
+            Err(format!(
+                "camera.readout_ms is {readout_ms}; it must be a number of milliseconds and no \
+                 more than the {shortest_ms:.3} ms between \
                  the times of the nearest two poses in {}",
                 self.file.poses.initial.display()
-            )
-        })
+            ))
+        }
     }
 
-    /// When the rows of the frames are read, by the times of the initial poses.
+    /// The readout times of the frames' rows, from the times of the initial poses.
     pub fn shutter(&self) -> Shutter {
         let readout_s = 1e-3 * self.file.camera.readout_ms.unwrap_or_default();
         Shutter::new(readout_s, self.camera.height, &self.initial)
@@ -284,7 +288,7 @@ pub(super) fn folder_of(toml_path: &Path) -> PathBuf {
     }
 }
 
-/// `survey.toml`, of which `path` is the folder or the name.
+/// The path of `survey.toml` for a folder or for the file itself.
 pub(crate) fn toml_path(path: &Path) -> PathBuf {
     if path.is_dir() {
         path.join(SURVEY_FILE)

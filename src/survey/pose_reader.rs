@@ -1,4 +1,4 @@
-//! From a file of poses to one pose of the tunnel per frame.
+//! Reading of a pose file to one pose per frame in the tunnel's frame.
 
 use super::associate::{Associate, TIME_TOLERANCE_S, TimeAssociation, by_name, by_order, by_time};
 use super::error::SurveyError;
@@ -11,7 +11,7 @@ use crate::trajectory::{
 };
 use std::path::Path;
 
-/// How files of poses are read: a [`PosesSection`] with the files it names.
+/// A reader of pose files with the options of a [`PosesSection`].
 pub(super) struct PoseReader<'a> {
     section: &'a PosesSection,
     camera_in_body: Option<Pose>,
@@ -20,16 +20,16 @@ pub(super) struct PoseReader<'a> {
     times_s: Option<&'a [f64]>,
 }
 
-/// The poses of a file, one per frame.
+/// The poses of a file, one per frame, with their convention.
 pub(super) struct InterpretedPoses {
-    /// As the file has them.
+    /// The poses in the file's convention.
     pub given: Trajectory,
-    /// What they mean.
+    /// The convention.
     pub convention: Convention,
 }
 
 impl InterpretedPoses {
-    /// The poses in the tunnel.
+    /// The poses in the tunnel's frame.
     pub fn trajectory(&self) -> Trajectory {
         let in_tunnel = |stamped: &StampedPose| StampedPose {
             time_s: stamped.time_s,
@@ -38,7 +38,7 @@ impl InterpretedPoses {
         self.given.iter().map(in_tunnel).collect()
     }
 
-    /// The poses in the tunnel if they meant something else.
+    /// The poses in the tunnel's frame, interpreted in another convention.
     pub fn poses_in(&self, convention: &Convention) -> Vec<Pose> {
         let given = self.given.iter();
         given
@@ -48,8 +48,8 @@ impl InterpretedPoses {
 }
 
 impl<'a> PoseReader<'a> {
-    /// Reads what the section names, relative to `folder`. `times_s`: the frames' times, if a file
-    /// tells them.
+    /// Reads the files that the section names, relative to `folder`. `times_s`: the frames' times,
+    /// if given by a file.
     ///
     /// # Errors
     /// A mount or a tunnel's frame that cannot be read.
@@ -74,11 +74,11 @@ impl<'a> PoseReader<'a> {
         })
     }
 
-    /// Reads a file of poses and ties them to the frames.
+    /// Reads a file of poses and associates them with the frames.
     ///
     /// # Errors
-    /// A malformed file; poses of a body without its mount; frames and poses that do not pair up;
-    /// frames whose times do not increase.
+    /// A malformed file; poses of a body without its mount; frames and poses that cannot be
+    /// associated; frames whose times do not increase.
     pub fn read(&self, path: &Path) -> Result<InterpretedPoses, SurveyError> {
         let file = read_poses(path, self.section.format)?;
         let mut convention = Convention::of(file.format);
@@ -89,8 +89,10 @@ impl<'a> PoseReader<'a> {
         if file.format == PoseFormat::Euroc && convention.camera_in_body.is_none() {
             return Err(SurveyError::Association {
                 path: file.path,
-                what: "holds the poses of a body (IMU), as EuRoC's files do; say how the camera is mounted with \
-                       --body-to-camera FILE (poses.body_to_camera in survey.toml): its sensor.yaml, or a 4 × 4 matrix"
+                what: "holds the poses of a body (IMU), as EuRoC's files do; say how the camera \
+                       is mounted with \
+                       --body-to-camera FILE (poses.body_to_camera in survey.toml): its \
+                       sensor.yaml, or a 4 × 4 matrix"
                     .to_owned(),
             });
         }
@@ -121,7 +123,8 @@ impl<'a> PoseReader<'a> {
                 return Err(SurveyError::Association {
                     path: file.path,
                     what: format!(
-                        "frame {} ({}) has time {} s, and the one before it {} s; frames are sorted by their names, which must be the order of their times",
+                        "frame {} ({}) has time {} s, and the one before it {} s; frames are \
+                         sorted by their names, which must be the order of their times",
                         frame.index,
                         frame.path.display(),
                         stamped.time_s,

@@ -1,9 +1,9 @@
-//! Whether poses make sense in the tunnel, and which other reading of them would.
+//! Validation of poses against the tunnel, and a search for the convention that was meant.
 //!
-//! A wrong convention puts cameras outside, has them look along the axis, or has them move and turn
-//! along another direction. Where that is so, the other readings are tried, the simplest first, and
-//! the one that makes sense is named with its flag. A reading that leaves all cameras inside and
-//! looking at the wall cannot be told from a right one here: only the pictures can
+//! A wrong convention places cameras outside, makes them look along the axis, or makes them move
+//! and rotate along another direction. In these cases other conventions are tried, the simplest
+//! first, and the plausible one is named with its flag. A wrong convention that leaves all cameras
+//! inside and looking at the wall can only be detected from the images
 //! ([`Survey::pose_convention_variants`](crate::survey::Survey::pose_convention_variants)).
 
 use super::error::SurveyError;
@@ -14,26 +14,27 @@ use crate::trajectory::{Convention, Pose, TunnelAxis, so3};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
 
-/// Fewer frames show no convention.
+/// Smallest number of frames from which a convention is judged.
 const MIN_FRAMES: usize = 4;
-/// Share of frames that must be outside or look along the axis before another reading is looked
-/// for: single ones are wrong poses.
+/// Fraction of frames outside or looking along the axis from which on another convention is
+/// searched; fewer are outliers.
 const MAX_WRONG_FRACTION: f64 = 0.34;
-/// Share of frames that may look along the axis in a reading that makes sense: poses err.
+/// Largest fraction of frames that look along the axis in a plausible convention, because poses are
+/// noisy.
 const MAX_AXIAL_FRACTION: f64 = 0.05;
-/// Motion and turning farther than this from the axis go another way: twice the 30° to which a
-/// carrier that sways by 6° a frame and steers back ([`Jitter`](crate::trajectory::Jitter)) leans.
-/// Another axis of the world is 90° off.
+/// Angle from the axis at which motion and rotation are along another direction: twice the 30° of a
+/// carrier that sways by 6° per frame and steers back ([`Jitter`](crate::trajectory::Jitter)).
+/// Other axes of the world are 90° off.
 const MIN_ASKEW_ANGLE_RAD: f64 = std::f64::consts::FRAC_PI_3;
-/// Motion and turning within this of the axis go along it.
+/// Angle from the axis within which motion and rotation are along it.
 const MAX_ALIGNED_ANGLE_RAD: f64 = std::f64::consts::FRAC_PI_6;
 
-/// How poses stand in the tunnel.
+/// Statistics of poses in the tunnel.
 struct PoseSummary {
     frames: usize,
     outside: usize,
     axial: usize,
-    /// Of poses in the tunnel's frame.
+    /// Computes the statistics of poses in the tunnel's frame.
     course: MotionDirections,
 }
 
@@ -73,7 +74,7 @@ impl PoseSummary {
             && along(&self.course.turning)
     }
 
-    /// Nothing is impossible, but the camera moves and turns across the tunnel.
+    /// True if no pose is impossible, but the camera moves and rotates across the tunnel.
     fn is_suspicious(&self) -> bool {
         let askew = |direction: &Option<Vector3<f64>>| direction.is_some_and(|d| is_askew(&d));
         let (motion, turning) = (askew(&self.course.motion), askew(&self.course.turning));
@@ -87,7 +88,7 @@ fn is_askew(direction: &Vector3<f64>) -> bool {
     direction.y.abs() < MIN_ASKEW_ANGLE_RAD.cos()
 }
 
-/// Whether the picture holds a vanishing point of the axis.
+/// True if the image contains a vanishing point of the axis.
 fn looks_along_the_axis(camera: &Camera, pose: &Pose) -> bool {
     [Vector3::y(), -Vector3::y()].iter().any(|along| {
         let direction = pose.r_wc.inverse_transform_vector(along);
@@ -97,26 +98,25 @@ fn looks_along_the_axis(camera: &Camera, pose: &Pose) -> bool {
     })
 }
 
-/// The directions in which a trajectory goes, if it has any; unit vectors.
+/// The principal directions of a trajectory, as far as they are defined; unit vectors.
 struct MotionDirections {
-    /// The line along which the cameras lie, towards the last.
+    /// Direction of the line through the cameras, towards the last.
     motion: Option<Vector3<f64>>,
-    /// Whether they turn at all.
+    /// True if the cameras rotate.
     turns: bool,
-    /// The axis about which they turn.
+    /// Axis of the rotation.
     turning: Option<Vector3<f64>>,
-    /// Mean of the cameras' places, metres.
+    /// Mean of the camera centres, metres.
     middle: Vector3<f64>,
 }
 
-/// Share of the spread that the line of motion must hold: five times as long as wide.
+/// Smallest fraction of the variance along the line of motion: five times as long as wide.
 const MIN_LINE_FRACTION: f64 = 25.0 / 26.0;
-/// Share of all turning that must be about one axis.
+/// Smallest fraction of the rotation about a single axis.
 const MIN_AXIS_FRACTION: f64 = 0.75;
-/// Turning from frame to frame below this is the carrier's swaying, root mean square.
+/// Smallest root-mean-square rotation from frame to frame; less is swaying of the carrier.
 const MIN_ROTATION_RAD: f64 = 0.05;
-/// Motion below this, in all, is none, metres. Cameras lie inside tunnels of a larger radius in any
-/// case.
+/// Smallest total motion, metres; any tunnel has a larger radius.
 const MIN_MOTION_M: f64 = 1e-6;
 
 impl MotionDirections {
@@ -163,10 +163,10 @@ fn main_direction(moments: &Matrix3<f64>, share: f64) -> Option<Vector3<f64>> {
         .then(|| eigen.eigenvectors.column(largest).into_owned())
 }
 
-/// Another reading of the same file.
+/// Another convention for a file.
 struct ConventionChange {
     convention: Convention,
-    /// What would have to be said for it, one after the other.
+    /// The flags that select it.
     flags: Vec<String>,
 }
 
@@ -176,7 +176,7 @@ impl ConventionChange {
     }
 }
 
-/// All other readings.
+/// All other conventions of direction, camera axes and mount.
 fn convention_changes(reading: &InterpretedPoses) -> Vec<ConventionChange> {
     let given = reading.convention;
     let mut found = Vec::new();
@@ -223,14 +223,14 @@ fn convention_changes(reading: &InterpretedPoses) -> Vec<ConventionChange> {
     found
 }
 
-/// A reading with the tunnel's axis elsewhere.
+/// Variants of a convention with the tunnel's axis in another direction.
 fn with_other_axes(
     reading: &InterpretedPoses,
     convention: &Convention,
     flags: &[String],
 ) -> Vec<ConventionChange> {
     let along = |axis: TunnelAxis| {
-        // The frame is that of the numbers as they are printed.
+        // The frame is computed from the printed numbers.
         let frame = axis.frame().ok()?;
         let json = serde_json::to_string(&axis).ok()?;
         let flag =
@@ -249,8 +249,8 @@ fn with_other_axes(
         .collect()
 }
 
-/// The reading that makes sense with the fewest changes, and of several the one with the shortest
-/// path: a wrong reading swings the cameras about with their errors.
+/// The plausible convention with the fewest changes, and among several the one with the shortest
+/// path, because a wrong convention amplifies the errors of the poses.
 fn remedy(surface: &dyn Surface, camera: &Camera, reading: &InterpretedPoses) -> Option<String> {
     let mut best: Option<(usize, f64, ConventionChange)> = None;
     for other in convention_changes(reading) {
@@ -269,18 +269,17 @@ fn remedy(surface: &dyn Surface, camera: &Camera, reading: &InterpretedPoses) ->
     best.map(|(.., other)| other.remedy())
 }
 
-/// Paths that differ by less than this share are equally long.
+/// Relative difference below which paths count as equally long.
 const PATH_TIE_RATIO: f64 = 1e-3;
 
-/// Length of the way from camera to camera, metres.
+/// Length of the path through the camera centres, metres.
 fn path_m(poses: &[Pose]) -> f64 {
     let ways = poses.iter().zip(poses.iter().skip(1));
     ways.map(|(before, after)| (after.t_wc - before.t_wc).norm())
         .sum()
 }
 
-/// Axes that the poses of a reading might go along: those of their world, then the line of their
-/// motion, then the axis of their turning.
+/// Candidate tunnel axes: those of the world, then the line of motion, then the axis of rotation.
 fn axes_of(reading: &InterpretedPoses, convention: &Convention) -> Vec<TunnelAxis> {
     let poses: Vec<Pose> = reading
         .given
@@ -314,8 +313,8 @@ fn axes_of(reading: &InterpretedPoses, convention: &Convention) -> Vec<TunnelAxi
         .collect()
 }
 
-/// The readings with the tunnel's axis where it is that leave all cameras inside: what only
-/// pictures can tell apart.
+/// The conventions with the given tunnel axis that leave all cameras inside; only images can
+/// distinguish them.
 pub(super) fn feasible_conventions(
     surface: &dyn Surface,
     reading: &InterpretedPoses,
@@ -339,12 +338,10 @@ pub(super) fn feasible_conventions(
         .collect()
 }
 
-/// Checks the poses of a file against the tunnel; returns warnings where they are possible but
-/// suspicious.
+/// Validates the poses of a file against the tunnel; returns warnings about suspicious poses.
 ///
 /// # Errors
-/// A camera outside; most cameras looking along the axis, where another reading makes sense of
-/// them.
+/// A camera outside; most cameras looking along the axis, if another convention is plausible.
 pub(super) fn validate_poses(
     surface: &dyn Surface,
     camera: &Camera,
@@ -368,10 +365,12 @@ pub(super) fn validate_poses(
             source,
             remedy: match other {
                 Some(other) => format!(
-                    "{} of {} cameras are; they would all be inside and look at the wall with {other}",
+                    "{} of {} cameras are; they would all be inside and look at the wall with \
+                     {other}",
                     stand.outside, stand.frames
                 ),
-                None => "check radius_m and the poses' origin, units and convention (--pose-convention, --tunnel-frame)"
+                None => "check radius_m and the poses' origin, units and convention \
+                         (--pose-convention, --tunnel-frame)"
                     .to_owned(),
             },
         });
@@ -382,7 +381,8 @@ pub(super) fn validate_poses(
         return Err(SurveyError::Association {
             path: path.to_owned(),
             what: format!(
-                "{} of {} cameras look along the tunnel's axis; they would look at the wall with {other}",
+                "{} of {} cameras look along the tunnel's axis; they would look at the wall with \
+                 {other}",
                 stand.axial, stand.frames
             ),
         });
@@ -392,7 +392,8 @@ pub(super) fn validate_poses(
             format!("; they would go along it with {other}")
         });
         return Ok(vec![format!(
-            "{}: the cameras move or turn across the tunnel, not along its axis (the world's y){likely}",
+            "{}: the cameras move or turn across the tunnel, not along its axis (the world's \
+             y){likely}",
             path.display()
         )]);
     }

@@ -1,52 +1,52 @@
-//! `[poses]`: which files, and how they are to be read.
+//! `[poses]`: the pose files and their convention.
 
 use super::associate::Associate;
 use crate::trajectory::{CameraAxes, Direction, PoseFormat};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// `[poses]`. What is not given is told by the files' content and their formats' own conventions.
+/// `[poses]`. Defaults are detected from the files' content or given by the conventions of their
+/// formats.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct PosesSection {
-    /// The poses to be refined.
+    /// The initial poses.
     pub initial: PathBuf,
-    /// The true poses, where they are known: only ever used for comparison. Read as the initial
-    /// ones.
+    /// The true poses, if known; used for comparison only and read like the initial ones.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truth: Option<PathBuf>,
     /// The files' format.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub format: Option<PoseFormat>,
-    /// Which way the poses lead.
+    /// The direction of the poses.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub convention: Option<Direction>,
-    /// How the camera's axes lie.
+    /// The camera's axes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_axes: Option<CameraAxes>,
     /// The motion from the body whose poses the files hold to the camera; see
     /// [`read_camera_in_body`](crate::trajectory::read_camera_in_body).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_to_camera: Option<PathBuf>,
-    /// Where the tunnel's axis lies in the poses' world; see
+    /// The tunnel's frame in the poses' world; see
     /// [`read_tunnel_frame`](crate::trajectory::read_tunnel_frame).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tunnel_frame: Option<PathBuf>,
-    /// What ties poses to frames: without it their names, if the file has any, else their order.
+    /// The criterion that associates poses with frames; by default their names, if the file has
+    /// any, else their order.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub associate: Option<Associate>,
-    /// The pose nearest in time may be this far from its frame, seconds.
+    /// Largest difference between the times of a frame and its pose, seconds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_tolerance_s: Option<f64>,
-    /// Whether a frame between two poses takes the one on the way between them, rather than the
-    /// nearer one.
+    /// True to interpolate between the two neighbouring poses, rather than take the nearer one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interpolate: Option<bool>,
 }
 
 impl PosesSection {
-    /// A section that says nothing but where the initial poses are.
+    /// A section with only the path of the initial poses.
     pub fn of(initial: impl Into<PathBuf>) -> Self {
         Self {
             initial: initial.into(),

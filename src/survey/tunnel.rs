@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 #[serde(rename_all = "lowercase")]
 #[non_exhaustive]
 pub enum Shape {
-    /// A circle: `radius_m`.
+    /// A circle of radius `radius_m`.
     Circle,
     /// An ellipse with its axes along x and z: `width_m`, `height_m`.
     Ellipse,
@@ -25,12 +25,12 @@ pub enum Shape {
     Horseshoe,
 }
 
-/// `[tunnel]`. Width is along x, height along z, twelve o'clock being +z.
+/// `[tunnel]`. Width is along x, height along z; twelve o'clock is +z.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct TunnelSection {
-    /// Its section.
+    /// The shape of the section.
     pub shape: Shape,
     /// Radius of a circle, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -41,11 +41,11 @@ pub struct TunnelSection {
     /// Height of any other section, metres.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_m: Option<f64>,
-    /// A file of the line along its middle, if it is not the world's y axis; see
-    /// [`read_centreline`].
+    /// A file of the centreline, if it is not the world's y axis; see [`read_centreline`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centreline: Option<PathBuf>,
-    /// Parts of the wall by which frames are not compared: water, plants, what moves.
+    /// Regions of the wall that are excluded from the comparison of frames: water, plants, moving
+    /// objects.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub ignore: Vec<IgnoreSection>,
 }
@@ -70,16 +70,16 @@ impl TunnelSection {
             .unwrap_or_default()
     }
 
-    /// Whether it is straight and round, so that its radius and axis may be estimated.
+    /// True for a straight round tunnel, whose radius and axis can be estimated.
     pub fn is_straight_and_round(&self) -> bool {
         self.shape == Shape::Circle && self.centreline.is_none()
     }
 
-    /// The tunnel, with the files that it names in `folder`. `toml` is where it is written.
+    /// Creates the tunnel; paths are relative to `folder`, and errors name the file `toml`.
     ///
     /// # Errors
     /// A size that is missing, impossible or of another shape; a centreline that cannot be read or
-    /// that no tunnel follows.
+    /// that no tunnel can follow.
     pub fn surface(&self, toml: &Path, folder: &Path) -> Result<Box<dyn Surface>, SurveyError> {
         let value = |what: String| SurveyError::Value {
             path: toml.to_owned(),
@@ -88,7 +88,7 @@ impl TunnelSection {
         let section = self.section().map_err(value)?;
         let Some(centreline) = &self.centreline else {
             return Ok(match (self.shape, self.radius_m) {
-                // The fastest of them.
+                // The fastest shape.
                 (Shape::Circle, Some(radius_m)) => {
                     Box::new(Circle::new(radius_m).map_err(|error| value(error.to_string()))?)
                 }
@@ -102,7 +102,7 @@ impl TunnelSection {
         Ok(Box::new(Swept::new(section, line)))
     }
 
-    /// Its section; else what is wrong with its sizes.
+    /// Creates the section, or returns the problem of its sizes.
     pub(crate) fn section(&self) -> Result<Box<dyn Section>, String> {
         let named = [
             ("radius_m", self.radius_m, self.shape == Shape::Circle),
@@ -136,9 +136,9 @@ impl TunnelSection {
     }
 }
 
-/// Reads the line along the middle of a tunnel: `x y z [radius]` a line, metres, in the world of
-/// the poses; what follows a `#` is passed over. A radius (half the width, where the section is no
-/// circle) holds at that point and changes smoothly to the next one's.
+/// Reads a centreline: lines `x y z [radius]`, metres, in the world of the poses; text after a `#`
+/// is ignored. A radius (half the width, if the section is not a circle) holds at its point and
+/// changes smoothly to that of the next.
 ///
 /// # Errors
 /// An unreadable file, a line of another form.

@@ -1,4 +1,4 @@
-//! The frames of a survey that has no poses yet.
+//! The frames of a survey without poses.
 
 use super::error::SurveyError;
 use super::file::read_survey_file;
@@ -8,13 +8,13 @@ use super::open::{folder_of, toml_path};
 use crate::frames::FrameFile;
 use std::path::Path;
 
-/// The frames of a survey, and when they were taken, before anything is known of their poses.
+/// The frames of a survey and their times, before poses are known.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct UnposedFrames {
     /// The frames, sorted by name.
     pub frames: Vec<FrameFile>,
-    /// Their times, seconds, where a file, a video or all names tell them.
+    /// Times of the frames, seconds, if given by a file, a video or all names.
     pub times_s: Option<Vec<f64>>,
 }
 

@@ -3,7 +3,7 @@
 use crate::support::{edit, fail, first_frames, text};
 use std::path::Path;
 
-/// Damages a copy of the first three frames and returns what `refine` says of it.
+/// Damages a copy of the first three frames and returns the message of `refine`.
 fn refine_after(damage: impl FnOnce(&Path)) -> String {
     let survey = first_frames(3);
     damage(survey.path());
@@ -160,7 +160,7 @@ fn frames_without_any_overlap() {
 #[test]
 fn an_output_folder_that_cannot_be_made() {
     let survey = first_frames(3);
-    // A file stands where the folder should go.
+    // A file exists in place of the folder.
     let out = survey.path().join("camera.json/out");
     let message = fail(&["refine", text(survey.path()), "--out", text(&out)], 3);
     assert_says(&message, &["camera.json", "cannot write"]);

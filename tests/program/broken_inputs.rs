@@ -4,17 +4,17 @@
 use crate::support::{self, first_frames, text, tunnelstitch};
 use std::path::Path;
 
-/// What is done to a survey of three frames.
+/// A modification of a survey of three frames.
 enum Damage {
-    /// A file gets other content.
+    /// Replaces the content of a file.
     Write(&'static str, &'static [u8]),
-    /// The first occurrence of a text in a file becomes another.
+    /// Replaces the first occurrence of a text in a file.
     Edit(&'static str, &'static str, &'static str),
-    /// A file loses its second half.
+    /// Truncates a file to its first half.
     Halve(&'static str),
-    /// A file goes.
+    /// Removes a file.
     Remove(&'static str),
-    /// A file is written, and another text edited.
+    /// Writes a file and replaces a text in another.
     WriteAndEdit(
         &'static str,
         &'static [u8],
@@ -22,14 +22,14 @@ enum Damage {
         &'static str,
         &'static str,
     ),
-    /// Nothing.
+    /// No modification.
     None,
 }
 
 use Damage::{Edit, Halve, None, Remove, Write, WriteAndEdit};
 
-/// Damage, command line (`S` is the survey, `O` a name for outputs), exit code, and what the
-/// message must hold.
+/// Modification, command line (`S` is the survey, `O` a name for outputs), exit code, and required
+/// parts of the message.
 type Row = (Damage, &'static str, i32, &'static [&'static str]);
 
 const TOML: &str = "survey.toml";
@@ -130,7 +130,7 @@ const ROWS: &[Row] = &[
         ),
         REFINE,
         3,
-        &["survey.toml", "tunnel.ignore, item 1", "the lesser first"],
+        &["survey.toml", "tunnel.ignore, item 1", "the smaller first"],
     ),
     (
         Edit(
@@ -743,7 +743,8 @@ fn every_broken_input_is_named_and_leaves_nothing_behind() {
             || panicked
         {
             wrong.push(format!(
-                "row {number}, {command}: exit {:?} for {code}, missing {missing:?}, left {left:?}: {message}",
+                "row {number}, {command}: exit {:?} for {code}, missing {missing:?}, left \
+                 {left:?}: {message}",
                 output.status.code()
             ));
         }

@@ -1,5 +1,5 @@
-//! Initial poses from a gyro's log, through the program: a simulated survey, a log made from its
-//! true rotations, refinement.
+//! Initial poses from a gyroscope's log, through the program: a simulated survey, a log of its true
+//! rotations, refinement.
 
 use crate::support::{fail, simulate, succeed, text, tunnelstitch};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -12,14 +12,14 @@ use tunnelstitch::survey::Survey;
 use tunnelstitch::trajectory::{Pose, poses_of, tum};
 
 const HZ: f64 = 200.0;
-/// At rest for so long before the first frame, and after the last.
+/// Duration at rest before the first frame and after the last.
 const REST_S: f64 = 4.0;
 /// Noise of a sample: 20 mdeg/s/√Hz.
 const NOISE_DEG_S: f64 = 0.28;
 const BIAS_DEG_S: [f64; 3] = [0.6, -1.1, 0.3];
 
-/// The log of a sensor with x right, y up and z backwards (`YxZ`) that turns from pose to pose, one
-/// a second.
+/// The log of a sensor with x right, y up and z backwards (`YxZ`) that rotates from pose to pose,
+/// one per second.
 ///
 /// The tunnel's bottom is at θ = 180°, and the first camera looks up, along z.
 fn gcsv(truth: &[Pose], title: &str) -> String {
@@ -71,8 +71,8 @@ fn simulated(survey: &Path) -> Vec<Pose> {
     poses_of(&tum::read(&survey.join("groundtruth.tum")).unwrap())
 }
 
-/// Simulate, log, integrate, refine: the gyro's poses are far better than the plan's, are as far
-/// off as is said, and refinement ends below a tenth of a pixel.
+/// The gyroscope's poses are far better than the plan's, their errors match the stated ones, and
+/// refinement ends below a tenth of a pixel.
 #[test]
 fn a_gyros_log_makes_poses_that_refine() {
     let dir = tempfile::tempdir().unwrap();
@@ -107,7 +107,7 @@ fn a_gyros_log_makes_poses_that_refine() {
     assert!(said.contains("readout_ms = -12.5"), "{said}");
     assert!(said.contains("200.0 a second"), "{said}");
 
-    // Steps err by what the prior says.
+    // The errors of steps match the prior.
     let poses = poses_of(&tum::read(&baseline).unwrap());
     let lines = std::fs::read_to_string(&lines).unwrap();
     let sections: toml::Table = lines.parse().unwrap();
@@ -129,11 +129,11 @@ fn a_gyros_log_makes_poses_that_refine() {
     assert!((0.6..1.4).contains(&ratio), "{ratio}, said {sigma}");
     let plan = poses_of(&tum::read(&survey.join("baseline.tum")).unwrap());
     assert!(step_error(&poses) < 0.05 * step_error(&plan));
-    // Gravity tells the first angle, to the noise of the way from the rest.
+    // Gravity gives the first angle, to the noise of the rotation since rest.
     assert!(poses[0].r_wc.angle_to(&truth[0].r_wc) < 0.01);
 
-    // So does a rest after the last frame, where the carrier is tilted; the bias is known to
-    // 0.011°/s there, 0.3° until the first.
+    // A rest after the last frame, with a tilted carrier, works too; the bias is known to 0.011°/s
+    // there, 0.3° until the first.
     let late = dir.path().join("late.tum");
     succeed(&[
         "gyro",
@@ -176,11 +176,11 @@ fn a_gyros_log_makes_poses_that_refine() {
     );
 }
 
-/// A table with a stop tells how the clocks stand, and where the carrier is.
+/// A plan with a stop determines the offset of the clocks.
 #[test]
 fn the_clock_is_found_by_the_plan() {
     let dir = tempfile::tempdir().unwrap();
-    // Turns of 5 to 33° a frame.
+    // Rotations of 5 to 33° per frame.
     let turns: Vec<f64> = (0..30)
         .scan(0.0, |angle: &mut f64, k: u32| {
             let now = *angle;
@@ -226,13 +226,13 @@ fn the_clock_is_found_by_the_plan() {
         .unwrap();
     assert!((offset_s - REST_S).abs() < 0.003, "{said}");
     let poses = poses_of(&tum::read(&out).unwrap());
-    // Two seconds of rest tell the bias to 0.28°/s / √400, which is 0.4° about each axis after 29
-    // s: three times that.
+    // Two seconds of rest determine the bias to 0.28°/s / √400, which is 0.4° about each axis after
+    // 29 s: three times that.
     let sigma = (29.0 * NOISE_DEG_S / 20.0).to_radians() * 3f64.sqrt();
     assert!(poses[29].r_wc.angle_to(&truth[29].r_wc) < 3.0 * sigma);
     assert!((poses[29].t_wc.y - 1.45).abs() < 1e-9);
 
-    // The same sensor by a matrix from its axes to the camera's, and looked upon in a mirror.
+    // The sensor given by a matrix from its axes to the camera's, and a reflected one.
     let mount = dir.path().join("mount.txt");
     std::fs::write(&mount, "1 0 0 0\n0 -1 0 0\n0 0 -1 0\n0 0 0 1\n").unwrap();
     let with = |more: &[&str]| {

@@ -1,4 +1,5 @@
-//! Every lens through the program: simulated, refined, stitched, and judged against the true poses.
+//! Every lens model through the program: simulated, refined, stitched, and compared with the true
+//! poses.
 
 use crate::support::{fail, simulate, succeed, text};
 
@@ -13,7 +14,7 @@ fn repaired(camera: &str, file: &str) -> serde_json::Value {
     std::fs::write(&file, camera).unwrap();
     let size = ["--frames", "24", "--supersample", "4"];
     simulate(&survey, &[&size[..], &["--camera", text(&file)]].concat());
-    // What was given is what the survey has.
+    // The survey has the given camera.
     let own = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
     let given = tunnelstitch::camera::read_calibration(&file, None).unwrap();
     assert_eq!(own, given);
@@ -37,8 +38,8 @@ fn assert_repaired(report: &serde_json::Value) {
     let wall_px = |which: &str| report[which]["wall"]["px"]["rms"].as_f64().unwrap();
     assert!(wall_px("baseline") > 10.0, "{report}");
     assert!(wall_px("refined") < 0.05, "{report}");
-    // The warp shows what the simulator drew: the same wall from all frames, and nearly that of the
-    // true poses.
+    // The warp agrees with the simulator: the frames show the same wall, nearly that of the true
+    // poses.
     assert!(
         report["refined"]["image"]["psnr_db"].as_f64().unwrap() > 35.0,
         "{report}"
@@ -55,7 +56,8 @@ fn a_fisheye_is_repaired() {
 
 #[test]
 fn a_lens_with_tangential_distortion_is_repaired() {
-    let camera = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.001, -0.002]\n  distortion_model: radtan\n  \
+    let camera = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.28, 0.07, 0.001, \
+                  -0.002]\n  distortion_model: radtan\n  \
                   intrinsics: [207.5, 208.0, 161.5, 118.2]\n  resolution: [320, 240]\n";
     assert_repaired(&repaired(camera, "camchain.yaml"));
 }

@@ -1,4 +1,4 @@
-//! What never shows the wall, and wall that is not to be compared: through the program.
+//! Masks and ignored regions of the wall, through the program.
 
 use crate::support::{edit, fail, simulate, succeed, text};
 use image::GrayImage;
@@ -9,7 +9,7 @@ use tunnelstitch::evaluate::wall_error;
 use tunnelstitch::survey::Survey;
 use tunnelstitch::trajectory::{Pose, poses_of};
 
-/// Percent of a frame's width that the shaft takes.
+/// Width of the shaft, percent of a frame's width.
 const SHAFT: &str = "12";
 
 /// A brick tunnel in small frames, by default two turns of it.
@@ -28,7 +28,7 @@ fn without_its_mask(survey: &Path) {
     edit(&survey.join("survey.toml"), "mask = \"mask.png\"\n", "");
 }
 
-/// Refines a survey; `refine.json`, and how far off the poses still are on the wall, pixels.
+/// Refines a survey; returns `refine.json` and the error on the wall, pixels.
 fn refined(survey: &Path) -> (Value, f64) {
     let out = survey.join("refined");
     let json = succeed(&[
@@ -46,7 +46,7 @@ fn refined(survey: &Path) -> (Value, f64) {
     (serde_json::from_str(&json).unwrap(), error.px.rms)
 }
 
-/// The frames' mean 1-σ on the wall, pixels, and how many are not sure.
+/// The frames' mean 1-σ on the wall, pixels, and the number of uncertain frames.
 fn certainty(report: &Value) -> (f64, u64) {
     let frames = report["frames"].as_array().unwrap();
     let sigma = |frame: &Value| frame["sigma"]["wall_px"].as_f64().unwrap();
@@ -73,10 +73,11 @@ fn behind_its_mask_a_shaft_costs_no_more_than_the_wall_it_hides() {
     let (clean_sigma, none) = certainty(&clean);
     let (masked_sigma, unsure) = certainty(&masked);
     println!(
-        "wall error {clean_px:.4} px, with shaft and mask {masked_px:.4} px; 1-σ {clean_sigma:.4}, {masked_sigma:.4} px"
+        "wall error {clean_px:.4} px, with shaft and mask {masked_px:.4} px; 1-σ \
+         {clean_sigma:.4}, {masked_sigma:.4} px"
     );
     assert_eq!((none, unsure), (0, 0));
-    // As 1/√n; tiles at the shaft's edge are lost, too.
+    // Scales as 1/√n; tiles at the shaft's edge are lost, too.
     let most = (1.0 - 1.5 * share).powf(-0.5);
     assert!(
         masked_sigma < most * clean_sigma,
@@ -85,7 +86,7 @@ fn behind_its_mask_a_shaft_costs_no_more_than_the_wall_it_hides() {
     for (error, sigma) in [(clean_px, clean_sigma), (masked_px, masked_sigma)] {
         assert!(error < 1.5 * sigma, "{error} {sigma}");
     }
-    // Nobody has told it of the shaft: it is not sure, or it is right.
+    // Without the mask, a frame is either correct or marked uncertain.
     let (bare_sigma, unsure) = certainty(&bare);
     assert!(
         unsure > 0 || bare_px < 1.5 * bare_sigma,
@@ -161,7 +162,7 @@ fn panoramas_show_the_wall_and_nothing_of_the_shaft() {
             large > 1e-2,
             "{how:?}: the shaft shows without its mask, {large}"
         );
-        // Where no other frame sees the wall there is a hole.
+        // A hole where no other frame sees the wall.
         let holes =
             |picture: &image::GrayAlphaImage| picture.pixels().filter(|p| p.0[1] == 0).count();
         assert!(holes(&shaft) > holes(&clean));
@@ -203,7 +204,7 @@ fn a_masked_pixel_shows_no_point() {
         left_out += gone.len();
     }
     assert!(left_out > 3, "{left_out}");
-    // Asked for the shaft itself.
+    // A request for the shaft itself.
     edit(
         &survey.join("survey.toml"),
         "[poses]",
@@ -260,7 +261,7 @@ fn a_mask_is_recognised_reported_recorded_and_kept() {
     assert_eq!(calibrated.ignored, Survey::open(&survey).unwrap().ignored);
 }
 
-/// Water along the invert: every frame shows it elsewhere.
+/// Water along the invert, at a different place in every frame.
 #[test]
 fn wall_that_moves_is_ignored_if_it_is_said_to() {
     let dir = tempfile::tempdir().unwrap();

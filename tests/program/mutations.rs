@@ -1,5 +1,4 @@
-//! Sound files with random damage: every parser answers, with an error or with something finite,
-//! and none panics.
+//! Valid files with random damage: every parser returns an error or finite values, and none panics.
 
 use proptest::prelude::*;
 use std::path::Path;
@@ -12,23 +11,32 @@ const TUM: &str =
 const KITTI: &str = "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0.5 0 1 0 0.25 0 0 1 0\n";
 const CSV: &str =
     "time,name,tx,ty,tz,qx,qy,qz,qw\n0,a.jpg,0,0,0,0,0,0,1\n1,b.jpg,0,0.1,0,0,0.26,0,0.97\n";
-const EUROC: &str = "#timestamp [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z\n1000000000,0,0,0,1,0,0,0\n1100000000,0,0,0,1,0,0,0\n";
+const EUROC: &str = "#timestamp \
+                     [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z\n1000000000,0,0,0,1,0,0,0\n1100000000,0,0,0,1,0,0,0\n";
 const COLMAP: &str =
     "# Image list\n1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0.5 0 1 b.jpg\n1.5 2.5 -1\n";
 const NERF: &str = r#"{"fl_x": 400, "fl_y": 400, "cx": 320, "cy": 240, "w": 640, "h": 480, "k1": -0.1, "camera_model": "OPENCV",
  "frames": [{"file_path": "a.jpg", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}"#;
 const OWN: &str = r#"{"model": "kannala-brandt", "width": 640, "height": 480, "fx": 300, "fy": 300, "cx": 320, "cy": 240, "k1": -0.01}"#;
-const OPENCV: &str = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   \
-                      data: [415., 0., 318., 0., 417., 241., 0., 0., 1.]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   \
+const OPENCV: &str = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: \
+                      !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   \
+                      data: [415., 0., 318., 0., 417., 241., 0., 0., \
+                      1.]\ndistortion_coefficients: !!opencv-matrix\n   rows: 1\n   cols: 5\n   \
                       dt: d\n   data: [-0.3, 0.1, 0.001, -0.002, -0.02]\n";
-const KALIBR: &str = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.3, 0.1, 0.001, -0.002]\n  distortion_model: radtan\n  \
-                      intrinsics: [415, 417, 318, 241]\n  resolution: [640, 480]\n  T_cam_imu:\n  - [1, 0, 0, 0]\n  - [0, 1, 0, 0]\n  - [0, 0, 1, 0]\n  \
+const KALIBR: &str = "cam0:\n  camera_model: pinhole\n  distortion_coeffs: [-0.3, 0.1, 0.001, \
+                      -0.002]\n  distortion_model: radtan\n  \
+                      intrinsics: [415, 417, 318, 241]\n  resolution: [640, 480]\n  T_cam_imu:\n  \
+                      - [1, 0, 0, 0]\n  - [0, 1, 0, 0]\n  - [0, 0, 1, 0]\n  \
                       - [0, 0, 0, 1]\n";
 const CAMERAS: &str =
     "# cameras\n1 FULL_OPENCV 640 480 415 417 318 241 4.1 2.0 -0.0004 0.0006 0.1 4.4 3.1 0.45\n";
 const AXIS: &str = r#"{"point_m": [0, 0, 0], "axis": [1, 0, 0], "theta_zero": [0, 0, 1]}"#;
-const SURVEY: &str = "[tunnel]\nshape = \"circle\"\nradius_m = 3.0\nignore = [{ theta_deg = [150, 210], chainage_m = [2.0, 5.5] }]\n[camera]\nfile = \"camera.json\"\n[frames]\nimages = \"*.jpg\"\n[poses]\n\
-                      initial = \"baseline.tum\"\n[prior]\nmodel = \"random-walk\"\nrotation_sigma_deg = 2.0\ntranslation_sigma_m = [0.02, 0.02, 0.03]\n\
+const SURVEY: &str = "[tunnel]\nshape = \"circle\"\nradius_m = 3.0\nignore = [{ theta_deg = [150, \
+                      210], chainage_m = [2.0, 5.5] }]\n[camera]\nfile = \
+                      \"camera.json\"\n[frames]\nimages = \"*.jpg\"\n[poses]\n\
+                      initial = \"baseline.tum\"\n[prior]\nmodel = \
+                      \"random-walk\"\nrotation_sigma_deg = 2.0\ntranslation_sigma_m = [0.02, \
+                      0.02, 0.03]\n\
                       [options.stitch]\nmode = \"average\"\n";
 
 const SAMPLES: [(&str, &str); 12] = [

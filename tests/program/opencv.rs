@@ -1,9 +1,9 @@
-//! The camera models against numbers that OpenCV made (`fixtures/opencv/make.py`).
+//! The camera models against reference values of OpenCV (`fixtures/opencv/make.py`).
 
 use nalgebra::Vector3;
 use tunnelstitch::camera::{BrownCoefficients, BrownConrady, Camera, KannalaBrandt, Lens, Sweep};
 
-/// The lens of a name in `make.py`.
+/// The lens with a given name in `make.py`.
 fn lens(model: &str) -> Lens {
     let brown = |k, p| Lens::BrownConrady(BrownConrady::new(BrownCoefficients { k, p }));
     match model {

@@ -16,7 +16,8 @@ fn assert_same(a: &[StampedPose], b: &[StampedPose]) {
     }
 }
 
-/// The fixture's own baseline, in three ways; the lines for survey.toml make a survey of it.
+/// The fixture's baseline, specified in three ways; the printed lines for survey.toml complete a
+/// survey.
 #[test]
 fn the_fixtures_plan_is_written_in_every_way() {
     let survey = first_frames(8);
@@ -60,7 +61,7 @@ fn the_fixtures_plan_is_written_in_every_way() {
     ]);
     assert_same(&read(&out), &baseline);
 
-    // The lines are sections of survey.toml as they are.
+    // The lines are valid sections of survey.toml.
     let toml = survey.path().join("survey.toml");
     let all = std::fs::read_to_string(&toml).unwrap();
     let before = all.split("[poses]").next().unwrap().to_owned();
@@ -108,7 +109,7 @@ fn what_is_missing_is_asked_for() {
         assert!(message.contains(expected), "{message}");
         assert!(!out.exists());
     }
-    // Times out of order.
+    // Times in the wrong order.
     let times = survey.path().join("times.txt");
     std::fs::write(&times, "1\n3\n2\n").unwrap();
     edit(

@@ -6,7 +6,7 @@ use tunnelstitch::trajectory::{
     CameraAxes, Pose, StampedPose, Trajectory, TunnelAxis, poses_of, se3, so3, tum,
 };
 
-/// The formats that are written, and names for what is in them.
+/// The writable formats and their file names.
 const FORMATS: [(&str, &str); 5] = [
     ("tum", "out.tum"),
     ("kitti", "out.txt"),
@@ -29,7 +29,7 @@ fn convert(survey: &Path, poses: &str, to: &str, out: &Path, more: &[&str]) {
     succeed(&[&arguments, more].concat());
 }
 
-/// The poses that the program reads from a file.
+/// Reads the poses of a file through the program.
 fn read_by_the_program(survey: &Path, file: &Path, more: &[&str]) -> Trajectory {
     let out = survey.join("read.tum");
     convert(survey, text(file), "tum", &out, more);
@@ -89,7 +89,7 @@ fn every_format_gives_the_same_panorama() {
         assert_same(&named, &truth, 1e-9);
         assert!(panorama(dir, text(&file), &[]) == expected, "{format}");
     }
-    // And as the survey's own poses.
+    // Also as the survey's own poses.
     edit(&dir.join("survey.toml"), "groundtruth.tum", "sparse");
     edit(&dir.join("survey.toml"), "baseline.tum", "transforms.json");
     for poses in ["truth", "initial"] {
@@ -97,7 +97,7 @@ fn every_format_gives_the_same_panorama() {
     }
 }
 
-/// Names tie poses to frames in whatever order they stand, and leave those of other frames alone.
+/// Names associate poses with frames in any order, and poses of other frames are ignored.
 #[test]
 fn names_in_another_order_change_nothing() {
     let survey = first_frames(5);
@@ -136,7 +136,7 @@ fn names_in_another_order_change_nothing() {
     assert!(!out.exists());
 }
 
-/// Gives the frames names that tell when they were taken, nanoseconds.
+/// Renames the frames to their times, nanoseconds.
 fn rename_by_time(dir: &Path, times_ns: &[u64]) {
     for (k, time_ns) in times_ns.iter().enumerate() {
         let from = dir.join(format!("frames/{k:06}.jpg"));
@@ -144,8 +144,8 @@ fn rename_by_time(dir: &Path, times_ns: &[u64]) {
     }
 }
 
-/// EuRoC's poses of a body in another world, more often than there are frames: tied by time,
-/// mounted, and moved into the tunnel.
+/// EuRoC's poses of a body in another world at a higher rate than the frames: associated by time,
+/// mounted, and transformed to the tunnel's frame.
 #[test]
 fn a_bodys_poses_in_another_world_are_found_by_time() {
     let survey = first_frames(4);
@@ -162,7 +162,7 @@ fn a_bodys_poses_in_another_world_are_found_by_time() {
     };
     let world = axis.frame().unwrap();
     let body = |pose: &Pose| world.after(pose).after(&camera_in_body.inverse());
-    // A frame every 200 ms; the body's poses 80 ms before each and 40 ms after, on the way to the
+    // A frame every 200 ms; the body's poses 80 ms before each and 40 ms after, interpolated to the
     // neighbours.
     let begin_ns = 1_403_636_580_000_000_000u64;
     let frame_ns: Vec<u64> = (0..4).map(|k| begin_ns + k * 200_000_000).collect();
@@ -231,13 +231,14 @@ fn a_bodys_poses_in_another_world_are_found_by_time() {
     assert_same(&found, &truth, 3e-6);
     assert_eq!(found[1].time_s, 1403636580.2);
 
-    // The same from survey.toml.
+    // With options from survey.toml.
     let toml = dir.join("survey.toml");
     edit(&toml, "truth = \"groundtruth.tum\"", "");
     edit(
         &toml,
         "initial = \"baseline.tum\"",
-        "initial = \"data.csv\"\nbody_to_camera = \"sensor.yaml\"\ntunnel_frame = \"axis.json\"\nassociate = \"time\"\n\
+        "initial = \"data.csv\"\nbody_to_camera = \"sensor.yaml\"\ntunnel_frame = \
+         \"axis.json\"\nassociate = \"time\"\n\
          time_tolerance_s = 0.05\ninterpolate = true",
     );
     let out = dir.join("initial.tum");
@@ -247,7 +248,7 @@ fn a_bodys_poses_in_another_world_are_found_by_time() {
         std::fs::read(dir.join("read.tum")).unwrap()
     );
 
-    // Too far in time, beyond the poses, without the mount: named.
+    // Errors: too far in time, beyond the poses, without the mount.
     let arguments = ["convert", text(dir), "--to", "tum", "--out", text(&out)];
     let message = fail(
         &[&arguments[..], &["--time-tolerance-s", "0.02"]].concat(),
@@ -269,7 +270,7 @@ fn a_bodys_poses_in_another_world_are_found_by_time() {
     );
 }
 
-/// Times from a list tie TUM poses to frames that are only numbered.
+/// Times from a list associate TUM poses with frames that have only numbers.
 #[test]
 fn a_list_of_times_ties_poses_to_numbered_frames() {
     let survey = first_frames(4);
@@ -312,8 +313,8 @@ fn a_list_of_times_ties_poses_to_numbered_frames() {
     );
 }
 
-/// Poses of other conventions are refused with the flag that mends them, and with it they are
-/// right.
+/// Poses of other conventions are refused with the flag that corrects them, and are correct with
+/// it.
 #[test]
 fn wrong_conventions_are_named_with_their_flags() {
     let survey = first_frames(24);
@@ -346,7 +347,7 @@ fn wrong_conventions_are_named_with_their_flags() {
     let read = read_by_the_program(dir, &poses, &["--pose-convention", "w2c"]);
     assert_same(&read, &mapped(&truth, |pose| far.after(pose)), 1e-9);
 
-    // The tunnel along the world's x: what the message tells mends it.
+    // The tunnel along the world's x: the message's remedy corrects it.
     write_tum(&poses, mapped(&truth, |pose| x_frame.after(pose)));
     let message = fail(&stitch, 3);
     let told = message.split("with the FILE ").nth(1).expect(&message);
@@ -354,12 +355,12 @@ fn wrong_conventions_are_named_with_their_flags() {
     std::fs::write(&axis, told).unwrap();
     succeed(&[&stitch[..], &["--tunnel-frame", text(&axis)]].concat());
 
-    // OpenGL's axes: the flag undoes them.
+    // OpenGL's axes are corrected by the flag.
     write_tum(&poses, mapped(&truth, |pose| CameraAxes::OpenGl.turn(pose)));
     let read = read_by_the_program(dir, &poses, &["--camera-axes", "opengl"]);
     assert_same(&read, &truth, 1e-12);
 
-    // The same flags for the survey's own poses, over its survey.toml.
+    // The flags override survey.toml for the survey's own poses.
     write_tum(
         &dir.join("baseline.tum"),
         mapped(&truth, |pose| far.after(pose).inverse()),
@@ -387,8 +388,8 @@ fn wrong_conventions_are_named_with_their_flags() {
     );
 }
 
-/// Planned poses on the axis look at the wall however they are read: the pictures tell, and each
-/// flag that is named mends it.
+/// Planned poses on the axis look at the wall in every convention: the images decide, and each
+/// named flag corrects it.
 #[test]
 fn what_only_pictures_can_tell_is_named_by_refine() {
     let survey = first_frames(14);
@@ -416,8 +417,8 @@ fn what_only_pictures_can_tell_is_named_by_refine() {
     }
 }
 
-/// `refine` takes poses of any format and writes the same, to the byte, as from TUM; `compare`
-/// reads what `convert` writes.
+/// `refine` accepts poses of any format with the same result, to the byte, as from TUM; `compare`
+/// reads the output of `convert`.
 #[test]
 fn refine_and_compare_take_any_format() {
     let survey = first_frames(6);
@@ -466,7 +467,7 @@ fn refine_and_compare_take_any_format() {
     assert!(from_tum[0] <= from_tum[1] * (1.0 + 1e-6));
 }
 
-/// Nothing of the survey and nothing else is replaced.
+/// Neither the survey nor other files are replaced.
 #[test]
 fn convert_replaces_nothing_it_should_not() {
     let survey = first_frames(3);
@@ -496,7 +497,7 @@ fn convert_replaces_nothing_it_should_not() {
     for _ in 0..2 {
         convert(dir, "initial", "colmap", &model, &[]);
     }
-    // The model's three, and the record.
+    // The model's three files and the record.
     assert_eq!(support::entries(&model), 4);
     std::fs::write(dir.join("axis"), "1 0 0 0\n0 2 0 0\n0 0 1 0\n0 0 0 1\n").unwrap();
     let (axis, out) = (dir.join("axis"), dir.join("o.tum"));

@@ -1,5 +1,5 @@
-//! Rolling shutter through the program: rows read over 20 ms while the camera turns at 90 degrees a
-//! second.
+//! Rolling shutter through the program: rows read over 20 ms while the camera rotates at 90 degrees
+//! per second.
 
 use crate::support::{self, edit, fail, json, succeed, text, tunnelstitch};
 use serde_json::Value;
@@ -9,12 +9,12 @@ const READOUT: &str = "readout_ms = 20.0\n";
 
 fn simulate(out: &Path, more: &[&str]) {
     let size = ["--turns", "2", "--size", "320x240", "--noise", "1"];
-    // A turn of 12 frames in 4 s.
+    // 12 frames of one turn in 4 s.
     let speed = ["--interval-s", "0.33333333"];
     support::simulate(out, &[&size[..], &speed, more].concat());
 }
 
-/// Refines a survey; returns what was found of the rows, and what was warned of.
+/// Refines a survey; returns the result of the rolling-shutter test and the warnings.
 fn refine(survey: &Path, out: &Path) -> (Value, String) {
     let output = tunnelstitch(&["refine", text(survey), "--out", text(out)]);
     let warned = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -64,12 +64,11 @@ fn rows_get_their_own_poses_and_where_they_do_not_the_program_says_so() {
     assert_eq!(rows["systematic"], true);
     let off_ms = (number(&rows, "/estimate_ms") - 20.0).abs();
     assert!(off_ms < 4.0 * number(&rows, "/sigma_ms"), "{rows}");
-    // 1.8 degrees at 207 px a radian.
+    // 1.8 degrees at 207 px per radian.
     let shift_px = number(&rows, "/shift_px");
     assert!((shift_px - 6.5).abs() < 0.5, "{rows}");
 
-    // The pictures themselves: true poses agree as well as the noise allows with the rows' own
-    // poses, and only so.
+    // With true poses the images agree up to noise only if every row has its own pose.
     let ignored = compare(&survey, &out, &compared);
     let seam = |of: &Value| number(of, "/truth/seam/rms_grey");
     assert!(seam(&ignored) > 1.5 * seam(&given));
@@ -98,7 +97,7 @@ fn rows_may_be_read_bottom_up_and_each_frame_may_err_by_itself() {
     assert_eq!(number(&rows, "/given_ms"), -20.0);
     let compared = compare(&survey, &out, &path("compared"));
     assert!(number(&compared, "/refined/wall/px/rms") <= 0.1);
-    // The wrong way round.
+    // The wrong readout direction.
     edit(
         &survey.join("survey.toml"),
         "readout_ms = -20.0",
@@ -121,7 +120,7 @@ fn a_global_shutter_is_not_suspected() {
     assert_eq!(rows["systematic"], false);
 }
 
-/// From a pixel to the wall and back to the same pixel of the same frame.
+/// A pixel mapped to the wall and back gives the same pixel of the same frame.
 #[test]
 fn locating_minds_the_rows() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Tunnels that are not round or not straight, from the simulator, which has equations of its own,
+//! Tunnels that are not round or not straight, from the simulator, which has independent equations,
 //! to the panorama.
 
 use crate::support::{fail, json, simulate, succeed, text};
@@ -48,7 +48,7 @@ fn bend() -> String {
     (-6..66).map(point).collect()
 }
 
-/// Turns of 10 m radius that rise by so much a radian.
+/// Turns of 10 m radius with a given rise per radian.
 fn circling(pitch_m: f64) -> String {
     let point = |k: i32| {
         let angle = 0.2 * f64::from(k);
@@ -58,15 +58,14 @@ fn circling(pitch_m: f64) -> String {
     (0..50).map(point).collect()
 }
 
-/// How far a tunnel is turned about its own line shows in the bend alone, and a short one tells
-/// little of it: the poses are as exact as they are said to be.
+/// The rotation about a tunnel's centreline is observable in the bend only, and weakly in a short
+/// one: the errors match the stated uncertainty.
 #[test]
 fn a_tight_bend_is_refined_as_exactly_as_is_said() {
     a_narrow_tunnel_is_refined_as_exactly_as_is_said(&bend(), "24");
 }
 
-/// Nothing of a line that bends to and fro, in a tunnel that widens and narrows, may be moved
-/// without a picture that tells.
+/// A winding line in a tunnel of varying width has no gauge freedom.
 #[test]
 fn a_winding_tunnel_of_changing_radius_is_refined_as_exactly_as_is_said() {
     let point = |k: i32| {
@@ -101,8 +100,7 @@ fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str, frames: &str) 
     exact_as_said(dir.path(), refined, initial);
 }
 
-/// The wall error, pixels, is no more than three of its own 1-σ as `refine` tells it, and that is
-/// little.
+/// The wall error, pixels, is at most three times the 1-σ of `refine`, which is small.
 fn exact_as_said(folder: &Path, refined: f64, initial: f64) {
     let json = json(&folder.join("refined/refine.json"));
     let frames = json["frames"].as_array().unwrap();

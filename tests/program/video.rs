@@ -1,4 +1,4 @@
-//! Frames out of a video, through the program. Needs `ffmpeg` and `ffprobe`.
+//! Frames from a video, through the program. Needs `ffmpeg` and `ffprobe`.
 
 use crate::support::{blender_survey, edit, fail, simulate, succeed, text};
 use serde_json::Value;
@@ -9,7 +9,7 @@ use tunnelstitch::frames::Video;
 use tunnelstitch::survey::Survey;
 use tunnelstitch::trajectory::poses_of;
 
-/// Runs ffmpeg; what it writes to standard output.
+/// Runs ffmpeg and returns its standard output.
 fn ffmpeg(arguments: &[&str]) -> Vec<u8> {
     let output = Command::new("ffmpeg")
         .args(["-v", "error", "-nostdin", "-y"])
@@ -21,7 +21,7 @@ fn ffmpeg(arguments: &[&str]) -> Vec<u8> {
     output.stdout
 }
 
-/// A video of numbered pictures, one a second.
+/// Creates a video of numbered pictures, one per second.
 fn video_of(pattern: &Path, video: &Path, codec: &[&str]) {
     let mut arguments = vec!["-framerate", "1", "-i", text(pattern)];
     arguments.extend(codec);
@@ -30,7 +30,7 @@ fn video_of(pattern: &Path, video: &Path, codec: &[&str]) {
 }
 
 const LOSSLESS: [&str; 4] = ["-c:v", "ffv1", "-pix_fmt", "gray"];
-/// Pictures that hang together over a dozen others, forwards and backwards, and across the key
+/// Encoder options with references over a dozen pictures, forwards and backwards, and across key
 /// pictures.
 const ENTANGLED: [&str; 12] = [
     "-c:v",
@@ -55,7 +55,7 @@ fn simulated(folder: &Path) -> PathBuf {
     out
 }
 
-/// Makes a video of a survey's frames and has the survey read it; the frames go.
+/// Replaces a survey's frames by a video of them.
 fn into_video(survey: &Path, name: &str, codec: &[&str]) {
     let frames = survey.join("frames");
     video_of(&frames.join("%06d.png"), &survey.join(name), codec);
@@ -67,8 +67,7 @@ fn into_video(survey: &Path, name: &str, codec: &[&str]) {
     );
 }
 
-/// In whatever order they are asked for, by however many at once, pictures are those that come in
-/// sequence.
+/// Pictures requested in any order, by any number of threads, equal those decoded in sequence.
 #[test]
 fn every_picture_is_the_one_asked_for() {
     let dir = tempfile::tempdir().unwrap();
@@ -133,7 +132,7 @@ fn every_picture_is_the_one_asked_for() {
     }
 }
 
-/// The refined poses, and how far off they still are on the wall, pixels.
+/// The refined poses and their error on the wall, pixels.
 fn refined(survey: &Path) -> (String, f64) {
     let out = survey.join("refined");
     succeed(&["refine", text(survey), "--out", text(&out), "--quiet"]);
@@ -154,7 +153,7 @@ fn a_video_refines_as_its_pictures_do() {
     let (expected, error_px) = refined(&survey);
     into_video(&survey, "lossless.mkv", &LOSSLESS);
     assert_eq!(refined(&survey).0, expected);
-    // Tied by the video's times as well.
+    // Associated by the video's times as well.
     edit(&toml, "[poses]", "[poses]\nassociate = \"time\"");
     assert_eq!(refined(&survey).0, expected);
     let run = std::fs::read_to_string(survey.join("refined/run.toml")).unwrap();
@@ -267,7 +266,7 @@ fn every_command_takes_a_video() {
     assert_eq!(check["frames"], 12);
     let step_deg = |check: &Value| check["poses"]["step_deg"].as_f64().unwrap();
     assert!((step_deg(&check) - 60.0).abs() < 0.01, "{check}");
-    // The same by the angle.
+    // Keyframes by the angle.
     edit(
         &survey.join("survey.toml"),
         "every = 2",
@@ -290,7 +289,7 @@ fn pictures_are_turned_as_players_show_them() {
         &upright,
         &ENTANGLED,
     );
-    // Older and newer versions say it differently.
+    // The message depends on the version.
     let copy = ["-i", text(&upright), "-c", "copy"];
     let old = ["-metadata:s:v:0", "rotate=90", text(&turned)];
     ffmpeg(&[&copy[..], &old].concat());

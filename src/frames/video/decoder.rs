@@ -95,7 +95,8 @@ impl Decoder {
             let [num, den] = video.tick_s.map(i128::from);
             if count * den != expected * num * of_a_second {
                 return Err(format!(
-                    "the video is damaged: picture {} should be at {:.6} s, but the decoded picture is at {:.6} s; re-encode the video: ffmpeg -i {} -c:v \
+                    "the video is damaged: picture {} should be at {:.6} s, but the decoded \
+                     picture is at {:.6} s; re-encode the video: ffmpeg -i {} -c:v \
                      libx264 -crf 12 new.mp4",
                     self.next,
                     video.time_s(self.next),
@@ -178,10 +179,13 @@ mod tests {
     #[test]
     fn times_and_complaints_are_picked_out_of_the_log() {
         let log = "[info] Input #0, mov\n\
-                   [Parsed_showinfo_0 @ 0x55] [info] config in time_base: 1/10240, frame_rate: 10/1\n\
+                   [Parsed_showinfo_0 @ 0x55] [info] config in time_base: 1/10240, frame_rate: \
+                   10/1\n\
                    [Parsed_showinfo_0 @ 0x55] [info] config out time_base: 0/0, frame_rate: 0/0\n\
-                   [Parsed_showinfo_0 @ 0x55] [info] n:   0 pts:  35840 pts_time:3.5     pos:  1639136 fmt:gray\n\
-                   [Parsed_showinfo_0 @ 0x55] [info] n:   1 pts:-12 pts_time:3.6     pos:  1639136 fmt:gray\n\
+                   [Parsed_showinfo_0 @ 0x55] [info] n:   0 pts:  35840 pts_time:3.5     pos:  \
+                   1639136 fmt:gray\n\
+                   [Parsed_showinfo_0 @ 0x55] [info] n:   1 pts:-12 pts_time:3.6     pos:  \
+                   1639136 fmt:gray\n\
                    [h264 @ 0x56] [error] error while decoding MB 3 4\n\
                    [fatal] corrupt decoded frame in stream 0\n";
         let (sender, times) = channel();

@@ -91,7 +91,8 @@ impl PixelLayout {
 pub fn start_error(program: &str, error: &std::io::Error) -> String {
     match error.kind() {
         std::io::ErrorKind::NotFound => format!(
-            "videos are read by the program {program}, which is not installed; install ffmpeg (apt install ffmpeg, brew install ffmpeg, \
+            "videos are read by the program {program}, which is not installed; install ffmpeg \
+             (apt install ffmpeg, brew install ffmpeg, \
              winget install ffmpeg), or extract the pictures elsewhere and set frames.images"
         ),
         _ => format!("cannot start {program}: {error}"),

@@ -74,7 +74,8 @@ pub fn probe(path: &Path) -> Result<VideoInfo, String> {
     if !output.status.success() {
         let why = complaint.unwrap_or_else(|| "ffprobe cannot read it".to_owned());
         let remedy = if path.exists() {
-            "it is not a video, is damaged, or was cut off before its end was written: copy it again"
+            "it is not a video, is damaged, or was cut off before its end was written: copy it \
+             again"
         } else {
             "frames.video is relative to survey.toml"
         };
@@ -82,7 +83,8 @@ pub fn probe(path: &Path) -> Result<VideoInfo, String> {
     }
     if TRUNCATION_WORDS.iter().any(|sign| said.contains(sign)) {
         return Err(format!(
-            "the video is cut off ({}): copy it again, or recover its intact part with ffmpeg -i {} -c copy whole.mkv",
+            "the video is cut off ({}): copy it again, or recover its intact part with ffmpeg -i \
+             {} -c copy whole.mkv",
             complaint.unwrap_or_default(),
             path.display()
         ));
@@ -108,7 +110,8 @@ fn of(path: &Path, probed: Probed) -> Result<VideoInfo, String> {
     };
     if let Some(order @ ("tt" | "bb" | "tb" | "bt")) = stream.field_order.as_deref() {
         return Err(format!(
-            "is interlaced (field order {order}): its odd and even rows are of different times; make it progressive with ffmpeg -i {} \
+            "is interlaced (field order {order}): its odd and even rows are of different times; \
+             make it progressive with ffmpeg -i {} \
              -vf bwdif -c:v libx264 -crf 12 progressive.mp4",
             path.display()
         ));
@@ -120,7 +123,7 @@ fn of(path: &Path, probed: Probed) -> Result<VideoInfo, String> {
         90.0 | 270.0 => (height, width),
         _ => {
             return Err(format!(
-                "is to be shown turned by {rotation}°, which is not a multiple of 90°"
+                "is displayed with a rotation of {rotation}°, which is not a multiple of 90°"
             ));
         }
     };

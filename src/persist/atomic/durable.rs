@@ -1,18 +1,18 @@
-//! What is to outlast a power failure.
+//! Synchronisation of files and folders to disk, to survive power failures.
 
 use rayon::prelude::*;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Puts what is in files on the disk, and that they are there.
+/// Synchronises files and their folder entries to disk.
 ///
 /// # Errors
-/// Whatever the system says of a file.
+/// An error of the operating system about a file.
 pub(crate) fn sync_files(files: &[PathBuf]) -> io::Result<()> {
-    // Several at a time share what a disk does for one.
+    // Concurrent requests share the disk's flush.
     files.par_iter().try_for_each(|path| {
-        // Some systems ask for one that may be written.
+        // Some systems require write access.
         File::options().write(true).open(path)?.sync_all()
     })?;
     let mut folders: Vec<&Path> = files
@@ -25,10 +25,10 @@ pub(crate) fn sync_files(files: &[PathBuf]) -> io::Result<()> {
     Ok(())
 }
 
-/// The same for all that is in a folder.
+/// Synchronises all files of a folder to disk.
 ///
 /// # Errors
-/// Whatever the system says.
+/// An error of the operating system.
 pub(super) fn sync_tree(folder: &Path) -> io::Result<()> {
     let mut files = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -46,10 +46,10 @@ pub(super) fn sync_tree(folder: &Path) -> io::Result<()> {
     sync_files(&files)
 }
 
-/// Puts on the disk which files are in a folder, where the system can.
+/// Synchronises the entries of a folder to disk, if the file system supports it.
 pub(super) fn sync_folder(folder: &Path) {
     if let Ok(folder) = File::open(folder) {
-        // Not all file systems do; what is in the files is safe already.
+        // Not all file systems support it; the content of the files is on disk already.
         let _ = folder.sync_all();
     }
 }

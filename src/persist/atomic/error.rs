@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 pub struct WriteError {
     /// The file or folder.
     pub path: PathBuf,
-    /// What the system said.
+    /// The error of the operating system.
     pub source: std::io::Error,
 }
 
 impl WriteError {
-    /// An error about `path`.
+    /// Creates an error about `path`.
     pub fn new(path: &Path, source: std::io::Error) -> Self {
         Self {
             path: path.to_owned(),

@@ -6,10 +6,10 @@ use super::{durable, temporary};
 use std::io::Write;
 use std::path::Path;
 
-/// Writes `path` through `fill`; nothing appears under that name unless everything was written.
+/// Writes the file `path` atomically; `fill` writes its content.
 ///
 /// # Errors
-/// Whatever the system says about the folder, the writing or the renaming.
+/// An error of the operating system about the folder, writing or renaming.
 pub fn write(
     path: &Path,
     fill: impl FnOnce(&mut std::io::BufWriter<std::fs::File>) -> std::io::Result<()>,
@@ -21,14 +21,14 @@ pub fn write(
     let file = writer
         .into_inner()
         .map_err(|error| fail(error.into_error()))?;
-    // What is in a folder that is not finished goes to the disk with the folder.
+    // Files in an unfinished folder are synchronised together with the folder.
     let is_final = !temporary::is_unfinished(path);
     if is_final {
         file.sync_all().map_err(fail)?;
     }
     let renamed = temporary.path.persist(path);
     renamed.map_err(|error| fail(error.error))?;
-    // Until now it was locked.
+    // Releases the lock.
     drop(file);
     if is_final {
         durable::sync_folder(parent_folder(path));
@@ -36,18 +36,18 @@ pub fn write(
     Ok(())
 }
 
-/// Writes a text file; see [`write()`].
+/// Writes a text file atomically; see [`write()`].
 ///
 /// # Errors
-/// As [`write()`].
+/// The errors of [`write()`].
 pub fn write_text(path: &Path, text: &str) -> Result<(), WriteError> {
     write(path, |writer| writer.write_all(text.as_bytes()))
 }
 
-/// Removes a file, if it is there.
+/// Removes a file, if it exists.
 ///
 /// # Errors
-/// Whatever the system says.
+/// An error of the operating system.
 pub fn remove_file(path: &Path) -> Result<(), WriteError> {
     match std::fs::remove_file(path) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -57,10 +57,10 @@ pub fn remove_file(path: &Path) -> Result<(), WriteError> {
     }
 }
 
-/// Makes a folder and those above it.
+/// Creates a folder and its parents.
 ///
 /// # Errors
-/// Whatever the system says; a file in its place.
+/// An error of the operating system; a file of that name.
 pub fn create_folder(path: &Path) -> Result<(), WriteError> {
     if path.is_file() {
         let what = std::io::Error::other("it is a file, and a folder is needed");

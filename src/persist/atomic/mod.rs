@@ -1,11 +1,10 @@
-//! Files and folders that are complete or absent: written under a temporary name beside the target,
-//! put on the disk, then renamed. So neither a killed program nor a power failure leaves half of
-//! one.
+//! Atomic files and folders: written under a temporary name beside the target, synchronised to
+//! disk, then renamed. Neither a killed program nor a power failure leaves a partial result.
 //!
-//! What is unfinished is removed when writing fails, and by [`remove_unfinished`] when the program
-//! is interrupted. What a killed program has left in a folder is removed by the next that writes
-//! into it: a temporary name is locked for as long as its writer lives, and one that is not locked
-//! is nobody's.
+//! Unfinished files are removed when writing fails, and by [`remove_unfinished`] when the program
+//! is interrupted. Files abandoned by a killed program are removed by the next program that writes
+//! into the folder: a temporary file is locked as long as its writer lives, and an unlocked one is
+//! abandoned.
 
 mod durable;
 mod error;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// The folder that holds `path`.
+/// The parent folder of `path`.
 pub(crate) fn parent_folder(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

@@ -1,4 +1,4 @@
-//! Folders that appear as a whole, and folders for a while.
+//! Staged folders, which appear as a whole, and scratch folders.
 
 use super::durable;
 use super::error::WriteError;
@@ -7,20 +7,20 @@ use super::parent::parent_folder;
 use super::temporary::{self, REPLACED_NAME, TemporaryFolder};
 use std::path::{Path, PathBuf};
 
-/// A folder that is being filled under another name beside its final one.
+/// A folder that is filled under a temporary name beside its final one.
 pub struct StagedFolder {
     folder: PathBuf,
-    /// Unless it stays whatever happens.
+    /// The temporary folder; None if the folder is kept in any case.
     temporary: Option<TemporaryFolder>,
     target: PathBuf,
 }
 
 impl StagedFolder {
-    /// Begins the folder that will be `target`; the folders above it are made if missing.
+    /// Begins the folder `target`; missing parent folders are created.
     ///
     /// # Errors
-    /// Whatever the system says; a target without a name of its own (`.`, `..`, `/`), or one that
-    /// holds the folder the program works in.
+    /// An error of the operating system; a target without a name of its own (`.`, `..`, `/`), or
+    /// one that contains the working directory.
     pub fn begin(target: &Path) -> Result<Self, WriteError> {
         check_replaceable(target)?;
         let parent = parent_folder(target);
@@ -34,11 +34,11 @@ impl StagedFolder {
         })
     }
 
-    /// The folder that will be `target`, with what is in `folder` on the same disk already, which
-    /// stays whatever happens.
+    /// Continues the folder `target` from the existing `folder` on the same disk, which is kept in
+    /// any case.
     ///
     /// # Errors
-    /// As [`StagedFolder::begin`].
+    /// The errors of [`StagedFolder::begin`].
     pub fn adopt(target: &Path, folder: &Path) -> Result<Self, WriteError> {
         check_replaceable(target)?;
         Ok(Self {
@@ -48,21 +48,21 @@ impl StagedFolder {
         })
     }
 
-    /// Where to write for now.
+    /// The folder to write to.
     pub fn path(&self) -> &Path {
         &self.folder
     }
 
-    /// Gives the folder its final name; a folder of that name is replaced.
+    /// Renames the folder to its final name; a folder of that name is replaced.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// An error of the operating system.
     pub fn finish(self) -> Result<(), WriteError> {
         let fail = |source| WriteError::new(&self.target, source);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt;
-            // A temporary folder is private; the finished one is as its parent.
+            // A temporary folder is private; the finished one gets the permissions of its parent.
             let mode = std::fs::metadata(parent_folder(&self.target))
                 .map_err(fail)?
                 .permissions()
@@ -71,7 +71,7 @@ impl StagedFolder {
             std::fs::set_permissions(&self.folder, mode).map_err(fail)?;
         }
         durable::sync_tree(&self.folder).map_err(fail)?;
-        // The old folder steps aside first and goes only when the new one is in place.
+        // The old folder is renamed first and removed only when the new one is in place.
         let mut old = None;
         if self.target.exists() {
             let aside = temporary::folder_in(parent_folder(&self.target)).map_err(fail)?;
@@ -86,20 +86,20 @@ impl StagedFolder {
             return Err(fail(error));
         }
         if let Some(TemporaryFolder { folder, .. }) = self.temporary {
-            // It is no longer temporary.
+            // The folder is no longer temporary.
             let _ = folder.keep();
         }
         durable::sync_folder(parent_folder(&self.target));
         if let Some(aside) = old {
             let aside = aside.folder.path();
-            // From now on it may be tidied away.
+            // From now on it may be removed as abandoned.
             std::fs::rename(aside.join(REPLACED_NAME), aside.join("replaced")).map_err(fail)?;
         }
         Ok(())
     }
 }
 
-/// Refuses a folder that cannot be replaced as a whole.
+/// Rejects a folder that cannot be replaced as a whole.
 fn check_replaceable(target: &Path) -> Result<(), WriteError> {
     let refuse = |what: &str| Err(WriteError::new(target, std::io::Error::other(what)));
     let named = target
@@ -121,15 +121,14 @@ fn check_replaceable(target: &Path) -> Result<(), WriteError> {
     Ok(())
 }
 
-/// A folder for what is needed for a while; it goes with all that is in it when this is dropped or
-/// the program is interrupted.
+/// A scratch folder, removed with its content when dropped or when the program is interrupted.
 pub struct ScratchFolder(TemporaryFolder);
 
 impl ScratchFolder {
-    /// Makes one inside `parent`.
+    /// Creates a scratch folder inside `parent`.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// An error of the operating system.
     pub fn inside(parent: &Path) -> Result<Self, WriteError> {
         let folder = temporary::folder_in(parent);
         folder
@@ -137,7 +136,7 @@ impl ScratchFolder {
             .map_err(|source| WriteError::new(parent, source))
     }
 
-    /// Where it is.
+    /// The path of the folder.
     pub fn path(&self) -> &Path {
         self.0.folder.path()
     }

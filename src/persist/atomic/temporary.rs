@@ -1,5 +1,5 @@
-//! Temporary names: listed and locked while they are in use, and tidied away when a killed program
-//! has left them.
+//! Temporary files and folders: listed and locked while in use, and removed if a killed program has
+//! abandoned them.
 
 use std::collections::BTreeSet;
 use std::fs::{File, TryLockError};
@@ -9,23 +9,23 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 use tempfile::{TempDir, TempPath};
 
-/// Beginning of temporary names.
+/// Prefix of temporary names.
 const PREFIX: &str = ".tunnelstitch-";
 
-/// Name, in a temporary folder, of a result that steps aside for its successor. Such a folder is
-/// never tidied away: it may hold the only copy.
+/// Name, in a temporary folder, of a result that is being replaced. Such a folder is never removed
+/// as abandoned: it may hold the only copy.
 pub(super) const REPLACED_NAME: &str = "old";
 
-/// Temporary names in use.
+/// Temporary paths in use.
 static UNFINISHED_PATHS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// Folders in which this process has tidied.
+/// Folders from which this process has removed abandoned files.
 static CLEANED_FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
-/// Times that a folder is removed before it is left to the system.
+/// Largest number of attempts to remove a folder.
 const MAX_REMOVAL_ATTEMPTS: usize = 20;
 
-/// A temporary name on the list of unfinished ones for as long as this lives.
+/// Guard of an entry in the list of temporary paths.
 struct Listed(PathBuf);
 
 impl Listed {
@@ -47,17 +47,17 @@ impl Drop for Listed {
     }
 }
 
-/// Removes every file and folder that is being written. For a program about to be ended from
-/// outside: the writers are not told and must not go on, so the list stays locked until the process
-/// ends.
+/// Removes every file and folder that is being written, for a program that is about to be
+/// terminated. The writers are not notified and must not continue, so the list stays locked until
+/// the process ends.
 pub fn remove_unfinished() {
     let list = UNFINISHED_PATHS
         .lock()
         .unwrap_or_else(PoisonError::into_inner);
     for path in list.iter() {
-        // A writer that was about to make a file in a folder may still do so while it is removed.
+        // A writer may still create a file in a folder while it is being removed.
         for _ in 0..MAX_REMOVAL_ATTEMPTS {
-            // Nobody is left to tell if the system refuses.
+            // An error cannot be reported at this point.
             let _ = remove(path);
             if !path.exists() {
                 break;
@@ -68,7 +68,7 @@ pub fn remove_unfinished() {
     std::mem::forget(list);
 }
 
-/// Whether `path` is, or lies in, something unfinished of this process.
+/// True if `path` is, or lies in, a temporary path of this process.
 pub(super) fn is_unfinished(path: &Path) -> bool {
     let list = UNFINISHED_PATHS
         .lock()
@@ -76,19 +76,19 @@ pub(super) fn is_unfinished(path: &Path) -> bool {
     list.iter().any(|unfinished| path.starts_with(unfinished))
 }
 
-/// A file with a temporary name, locked while it is open.
+/// A temporary file, locked while open.
 pub(super) struct TemporaryFile {
     /// The file.
     pub file: File,
-    /// Its name; it goes with this, unless it is given another.
+    /// Its path; the file is removed on drop, unless it is renamed.
     pub path: TempPath,
     _listed: Listed,
 }
 
-/// Makes one in `folder`.
+/// Creates a temporary file in `folder`.
 ///
 /// # Errors
-/// Whatever the system says.
+/// An error of the operating system.
 pub(super) fn file_in(folder: &Path) -> io::Result<TemporaryFile> {
     remove_abandoned(folder);
     let mut builder = tempfile::Builder::new();
@@ -96,7 +96,7 @@ pub(super) fn file_in(folder: &Path) -> io::Result<TemporaryFile> {
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // Those of a plain new file; the system applies the process's umask.
+        // The permissions of a new file; the system applies the process's umask.
         builder.permissions(std::fs::Permissions::from_mode(0o666));
     }
     loop {
@@ -112,23 +112,23 @@ pub(super) fn file_in(folder: &Path) -> io::Result<TemporaryFile> {
     }
 }
 
-/// A folder with a temporary name, locked while this lives.
+/// A temporary folder, locked during its lifetime.
 pub(super) struct TemporaryFolder {
-    /// The folder; it goes with this, unless it is kept.
+    /// The folder; it is removed on drop, unless it is kept.
     pub folder: TempDir,
     _listed: Listed,
     _lock: Option<File>,
 }
 
-/// Makes one in `parent`.
+/// Creates a temporary folder in `parent`.
 ///
 /// # Errors
-/// Whatever the system says.
+/// An error of the operating system.
 pub(super) fn folder_in(parent: &Path) -> io::Result<TemporaryFolder> {
     remove_abandoned(parent);
     loop {
         let folder = tempfile::Builder::new().prefix(PREFIX).tempdir_in(parent)?;
-        // Some systems do not open folders; there, nobody takes it for left behind either.
+        // Some systems cannot open folders; there, folders are never removed as abandoned either.
         let lock = File::open(folder.path()).ok();
         if lock
             .as_ref()
@@ -143,18 +143,18 @@ pub(super) fn folder_in(parent: &Path) -> io::Result<TemporaryFolder> {
     }
 }
 
-/// Locks a temporary name that was just made; false if somebody has taken it for left behind in the
+/// Locks a new temporary file; false if another process has removed it as abandoned in the
 /// meantime.
 fn lock_new(file: &File, path: &Path) -> bool {
     match file.try_lock() {
         Ok(()) => path.exists(),
         Err(TryLockError::WouldBlock) => false,
-        // Some file systems have no locks; there, nothing is tidied away.
+        // Some file systems have no locks; there, nothing is removed as abandoned.
         Err(TryLockError::Error(_)) => true,
     }
 }
 
-/// Removes what killed programs have left in `folder`, once in the life of this process.
+/// Removes files abandoned in `folder` by killed programs, once per process.
 fn remove_abandoned(folder: &Path) {
     let mut tidied = CLEANED_FOLDERS
         .lock()
@@ -167,13 +167,13 @@ fn remove_abandoned(folder: &Path) {
     for entry in entries.filter(|entry| is_ours(&entry.file_name())) {
         let path = entry.path();
         if let Some(_locked) = lock_if_abandoned(&path) {
-            // It is in nobody's way if the system refuses.
+            // A failure is harmless.
             let _ = remove(&path);
         }
     }
 }
 
-/// The lock of a temporary file or folder that nobody works on.
+/// Locks a temporary file or folder if it is abandoned.
 fn lock_if_abandoned(path: &Path) -> Option<File> {
     let kind = path.symlink_metadata().ok()?.file_type();
     if !(kind.is_file() || kind.is_dir()) || path.join(REPLACED_NAME).exists() {
@@ -205,7 +205,7 @@ mod tests {
         folder(".tunnelstitch-alive", "half.png");
         folder(".tunnelstitch-aside", REPLACED_NAME);
         std::fs::write(path("result.tif"), "whole").unwrap();
-        // As another process would hold them.
+        // Locked like by another process.
         let names = [".tunnelstitch-alive.part", ".tunnelstitch-alive"];
         let locks = names.map(|name| File::open(path(name)).unwrap());
         locks.iter().for_each(|lock| lock.lock().unwrap());

@@ -28,8 +28,8 @@ fn in_order(tile: &RasterTile) -> u64 {
     u64::from(tile.row) << 32 | u64::from(tile.column)
 }
 
-/// The bytes of the tiles of a level as another's decoder has them, its borders cut off; nothing
-/// where there is no tile.
+/// The bytes of the tiles of a level, decoded by an independent decoder and cropped to the picture;
+/// None for empty tiles.
 fn decoded(file: &[u8], directory: usize) -> Vec<Option<Vec<u8>>> {
     let mut decoder = Decoder::new(io::Cursor::new(file))
         .unwrap()
@@ -58,7 +58,7 @@ fn decoded(file: &[u8], directory: usize) -> Vec<Option<Vec<u8>>> {
         .collect()
 }
 
-/// All kinds of pictures without loss.
+/// Specifications of all lossless kinds of pictures.
 fn specs() -> Vec<RasterSpec> {
     let grey = grey_alpha(1300, 1700);
     let plain = RasterSpec {

@@ -1,4 +1,4 @@
-//! Sound surveys raise no alarm, and wrong conventions are named.
+//! Correct surveys cause no warnings, and wrong conventions are named.
 
 use super::*;
 use crate::surface::Circle;
@@ -9,7 +9,7 @@ use rand::SeedableRng;
 
 const RADIUS_M: f64 = 3.0;
 
-/// What the check says of poses in the convention of `given`.
+/// Validates poses in the convention of `given`.
 fn verdict(poses: &[Pose], given: Convention) -> Result<Vec<String>, String> {
     let reading = InterpretedPoses {
         given: indexed(poses.iter().copied()),
@@ -26,8 +26,8 @@ fn tum() -> Convention {
     Convention::of(PoseFormat::Tum)
 }
 
-/// A camera that revolves `offset_m` off the axis, with errors of 2° and (2, 2, 3) cm times `times`
-/// a step.
+/// A camera that revolves `offset_m` off the axis, with errors of `times` · (2°, (2, 2, 3) cm) per
+/// step.
 fn flight(
     frames: usize,
     advance_m: f64,
@@ -49,8 +49,8 @@ fn flight(
     jitter.apply(&plan, &mut rand_chacha::ChaCha8Rng::seed_from_u64(seed))
 }
 
-/// Rings that hardly advance, on the axis and off it, few frames and many, poses that err by six
-/// times as much.
+/// Rings with little advance, on and off the axis, with few and many frames and up to six times the
+/// noise.
 #[test]
 fn sound_surveys_raise_no_alarm() {
     for seed in 0..40 {
@@ -184,7 +184,7 @@ fn an_inverted_mount_is_named() {
     );
 }
 
-/// Few wrong poses are wrong poses, and no convention.
+/// A few wrong poses do not indicate a wrong convention.
 #[test]
 fn one_camera_outside_is_no_convention() {
     let mut poses = flight(24, 0.1, 0.0, JitterModel::RandomWalk, 1.0, 3);
@@ -196,8 +196,8 @@ fn one_camera_outside_is_no_convention() {
     );
 }
 
-/// On the axis of a short tunnel OpenGL's axes look at the opposite wall: nothing in the poses is
-/// wrong.
+/// On the axis of a short tunnel, a camera with OpenGL's axes looks at the opposite wall: the poses
+/// are valid.
 #[test]
 fn what_only_pictures_can_tell_raises_no_alarm() {
     let poses: Vec<Pose> = spiral(48, 0.1, 30f64.to_radians())

@@ -1,4 +1,4 @@
-//! Calibration files of every kind; the first byte chooses the ending of the name.
+//! Calibration files of every kind; the first byte selects the extension.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -15,7 +15,7 @@ fuzz_target!(|data: &[u8]| {
     let (_folder, path) = file(&format!("camera.{ending}"), content);
     let _ = read_calibration(&path, Some("cam0"));
     if let Ok(camera) = read_calibration(&path, None) {
-        // What is read is a camera that can be used and written.
+        // A camera that was read can be used and written.
         let _ = camera.border(4, 0.5);
         let _ = ColmapCamera::of(&camera).cameras_txt();
         let (_folder, own) = file("own.json", format_calibration(&camera).as_bytes());

@@ -1,4 +1,4 @@
-//! Points of a tunnel's centreline, of each shape; the first byte chooses.
+//! Points of a tunnel's centreline; the first byte selects the shape.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

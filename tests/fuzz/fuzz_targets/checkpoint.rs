@@ -1,13 +1,13 @@
-//! What an interrupted run has kept: with the hash that belongs to it, so that what the bytes mean
-//! is read; and if the first byte is odd, as it is.
+//! States of an interrupted run, with a valid hash so that their content is parsed; without, if the
+//! first byte is odd.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tunnelstitch::persist::checkpoint::{Checkpoint, Origin};
 use tunnelstitch::frames::Shading;
+use tunnelstitch::persist::checkpoint::{Checkpoint, Origin};
 use tunnelstitch::refine::{FrameReport, LevelReport};
 
-/// Of what states are made.
+/// The types that states consist of.
 type State = (
     Option<Shading>,
     Vec<LevelReport>,

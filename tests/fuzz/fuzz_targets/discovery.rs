@@ -1,4 +1,4 @@
-//! A folder that `init` looks into; the first byte chooses what the file is called.
+//! A folder searched by `init`; the first byte selects the name of the file.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

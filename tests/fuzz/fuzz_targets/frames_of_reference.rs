@@ -1,4 +1,4 @@
-//! Mounts of cameras and frames of tunnels.
+//! Camera mounts and tunnel frames.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,10 +1,11 @@
-//! A gyro's log, integrated; the first byte chooses how.
+//! A gyroscope's log, integrated; the first byte selects the options.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
 use nalgebra::{Matrix3, Vector3};
 use tunnelstitch::trajectory::gyro::{
-    ClockOffset, FrameStations, GyroLog, GyroOptions, StationaryChoice, InitialAttitude, baseline_from_gyro,
+    ClockOffset, FrameStations, GyroLog, GyroOptions, InitialAttitude, StationaryChoice,
+    baseline_from_gyro,
 };
 use tunnelstitch::trajectory::{Mounting, Station};
 use tunnelstitch_fuzz::file;

@@ -8,7 +8,7 @@ use tunnelstitch_fuzz::file;
 fuzz_target!(|data: &[u8]| {
     let (folder, _path) = file(MARKS_GEOJSON, data);
     if let Ok(mut marks) = Marks::open(folder.path()) {
-        // What is read can be written and is read again.
+        // Marks that were read can be written and read again.
         marks.remove("none").unwrap();
         let again = Marks::open(folder.path()).unwrap();
         assert_eq!(again.geojson().unwrap(), marks.geojson().unwrap());

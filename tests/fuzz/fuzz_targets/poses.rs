@@ -1,5 +1,5 @@
-//! Files of poses; the first byte chooses the format, told by the content or said, and what ties
-//! them to frames.
+//! Files of poses; the first byte selects the format, detected or given, and the association with
+//! frames.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! refine.json and covariance.csv (what follows a zero byte) as the report reads and draws them.
+//! refine.json and covariance.csv (after a zero byte) as read and drawn by the report.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -58,7 +58,7 @@ fuzz_target!(|data: &[u8]| {
     }
     request.extend_from_slice(rest);
     let mut stream = TcpStream::connect(format!("127.0.0.1:{}", port())).unwrap();
-    // The server may have answered and gone before all is sent.
+    // The server may answer and close the connection before everything is sent.
     let _ = stream.write_all(&request);
     let _ = stream.shutdown(Shutdown::Write);
     let mut answer = Vec::new();

@@ -1,5 +1,4 @@
-//! runs.jsonl, the runs that a sweep has done. The one run that it asks for is refused by the
-//! simulator at once.
+//! runs.jsonl, the completed runs of a sweep. The simulator refuses the only requested run at once.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

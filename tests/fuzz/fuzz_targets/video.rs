@@ -1,5 +1,5 @@
-//! What ffprobe says of a video. `tests/fuzz/stand_in` must come first in PATH: its ffprobe says
-//! what the file holds.
+//! Output of ffprobe. `tests/fuzz/stand_in` must come first in PATH: its ffprobe prints the content
+//! of the file.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

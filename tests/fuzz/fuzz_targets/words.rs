@@ -1,4 +1,4 @@
-//! Options that are small languages of their own.
+//! Options with a syntax of their own.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -15,7 +15,7 @@ fuzz_target!(|text: &str| {
         assert_eq!(bad.to_string().parse::<BadFrames>().unwrap(), bad);
         let options = SimulateOptions {
             frames: 4,
-            // Refused, once the frames have been looked at.
+            // Refused after the frames have been read.
             noise_grey: -1.0,
             bad_frames: bad,
             ..SimulateOptions::free()

@@ -1,5 +1,4 @@
-//! What the targets share: files of what the fuzzer thinks up, and a small survey to read them
-//! with.
+//! Helpers of the targets: files with the fuzzer's content, and a small survey to read them with.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -8,7 +7,7 @@ use tunnelstitch::camera::Camera;
 use tunnelstitch::progress::Silent;
 use tunnelstitch::simulate::{self, SimulateOptions};
 
-/// A file in a folder of its own, which goes with the latter.
+/// A file in a temporary folder of its own.
 pub fn file(name: &str, content: &[u8]) -> (TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -19,8 +18,7 @@ pub fn file(name: &str, content: &[u8]) -> (TempDir, PathBuf) {
 /// Frames of the small survey.
 pub const FRAMES: usize = 4;
 
-/// Files of the small survey that its survey.toml may name, besides those that the simulator
-/// writes.
+/// Files of the small survey that its survey.toml may name, in addition to those of the simulator.
 const OTHERS: [(&str, &str); 4] = [
     ("times.txt", "0\n1\n2\n3\n"),
     ("curve.txt", "0 -50 0\n0 0 0 3.1\n1 50 0\n"),
