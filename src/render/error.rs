@@ -1,6 +1,7 @@
 //! Why a panorama cannot be drawn.
 
 use crate::frames::FrameError;
+use crate::persist::checkpoint::CheckpointError;
 use crate::raster::RasterError;
 use crate::surface::SurfaceError;
 
@@ -78,4 +79,7 @@ pub enum RenderError {
     /// A frame's file.
     #[error(transparent)]
     Frames(#[from] FrameError),
+    /// The checkpoint of an interrupted run.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
 }

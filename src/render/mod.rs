@@ -59,6 +59,7 @@ mod locate;
 mod maps;
 mod memory;
 mod panorama;
+mod panorama_files;
 mod picture;
 mod placement;
 mod plan;
@@ -73,6 +74,7 @@ mod stitch;
 mod thumbnails;
 mod tiles;
 mod view;
+mod wall_point;
 mod warp;
 
 #[cfg(test)]
@@ -89,6 +91,7 @@ pub use kernel::{Interpolation, Kernel};
 pub use locate::{Sighting, sightings};
 pub use maps::Map;
 pub use panorama::Panorama;
+pub use panorama_files::{CheckpointedFiles, PanoramaFileOptions, PanoramaFiles};
 pub use picture::{Picture, PixelFormat};
 pub use placement::{Placement, native_px_per_metre, place};
 pub use plan::{Plan, RenderOptions, Settled};
@@ -100,3 +103,4 @@ pub use stack::{FrameStack, level_for};
 pub(crate) use stitch::check_memory;
 pub use stitch::{LaidOut, Stitch, StitchOptions, lay_out, on_the_axis, render, stitch};
 pub(crate) use tiles::{EDGE, Tile, tiles};
+pub use wall_point::{FramePixelError, wall_point_of_pixel};

@@ -67,16 +67,20 @@
 
 mod associate;
 mod calibrate;
+mod calibrated;
 mod discover;
 mod error;
 mod file;
 mod footage;
+mod frame_paths;
+mod frame_times;
 mod ignore;
 mod listing;
 mod open;
 mod plausible;
 mod poses;
 mod reader;
+mod template;
 mod thinning;
 mod times;
 mod tunnel;
@@ -87,6 +91,7 @@ pub use discover::{Discovery, PictureGroup, VideoChoice};
 pub use error::SurveyError;
 pub use file::{CameraSection, FramesSection, PriorSection, SURVEY_FILE, SurveyFile};
 pub use footage::Footage;
+pub use frame_times::FrameTimes;
 pub use ignore::IgnoreSection;
 pub use open::Survey;
 pub(crate) use open::toml_path;

@@ -51,7 +51,9 @@ fn killed(arguments: &[&str], takes: Duration, seed: u64) {
         child.kill().unwrap();
         let output = child.wait_with_output().unwrap();
         kills += usize::from(!output.status.success());
-        resumed += usize::from(String::from_utf8_lossy(&output.stdout).contains("going on"));
+        resumed += usize::from(
+            String::from_utf8_lossy(&output.stdout).contains("continuing the interrupted run"),
+        );
         if kills >= KILLS && resumed > 0 {
             break;
         }
@@ -215,7 +217,7 @@ fn an_interrupted_run_goes_on_and_another_is_refused() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(message.contains("the same command goes on"), "{message}");
+    assert!(message.contains("the same command continues"), "{message}");
     assert!(kept.is_dir());
 
     let other = start(&[&arguments[..], &["--max-iterations", "3"]].concat());
@@ -237,8 +239,8 @@ fn an_interrupted_run_goes_on_and_another_is_refused() {
     std::fs::write(&frame, original).unwrap();
 
     let said = succeed(&arguments);
-    assert!(said.contains("going on"), "{said}");
+    assert!(said.contains("continuing the interrupted run"), "{said}");
     assert!(!kept.exists());
     let again = succeed(&[&arguments[..], &["--fresh"]].concat());
-    assert!(!again.contains("going on"), "{again}");
+    assert!(!again.contains("continuing the interrupted run"), "{again}");
 }

@@ -310,7 +310,7 @@ fn impossible_surveys_are_refused_with_the_reason() {
     refuse(&["--radius-m", "300", "--size", "64x48"], 2, "memory");
     refuse(&["--fov-deg", "200"], 2, "--fov-deg must lie");
     refuse(&["--frames", "0"], 2, "--frames");
-    refuse(&["--translation-sigma-m", "1,2"], 2, "three numbers");
+    refuse(&["--translation-sigma-m", "1,2"], 2, "3 numbers");
     refuse(&["--translation-sigma-m", "9,9,9"], 3, "off the axis");
     refuse(&["--texture", "no-such.png"], 3, "no-such.png");
     refuse(&["--texture", "a.png", "--wall", "brick"], 2, "--wall");

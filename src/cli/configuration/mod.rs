@@ -1,0 +1,12 @@
+//! Options of a command from all their sources, in this order: a flag on the command line, else a
+//! variable `TUNNELSTITCH_<COMMAND>_<OPTION>`, else `[options.<command>]` of `survey.toml`, else the
+//! default.
+
+mod option;
+mod parse;
+mod survey_options;
+mod variables;
+
+pub use option::{EffectiveOption, options_table};
+pub use parse::{options_of_command, parse};
+pub use variables::{CONFIGURABLE, with_variables};
