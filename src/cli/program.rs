@@ -76,7 +76,7 @@ pub fn run() -> Result<(), Failure> {
     let record = RunRecord {
         command: parsed.command,
         arguments: command_line(),
-        options: parsed.options,
+        options: configuration::options_table(&parsed.options),
     };
     if let Some(threads) = cli.global.threads {
         rayon::ThreadPoolBuilder::new()

@@ -1,6 +1,7 @@
 //! A survey's file with a refined calibration.
 
-use super::{Survey, SurveyFile};
+use super::file::SurveyFile;
+use super::open::Survey;
 use std::path::Path;
 
 impl Survey {

@@ -1,6 +1,6 @@
 //! Paths of a survey's frames for other programs.
 
-use super::Survey;
+use super::open::Survey;
 use std::path::{Path, PathBuf};
 
 impl Survey {

@@ -1,6 +1,6 @@
 //! Times of the frames of a survey that has no poses yet.
 
-use super::SurveyError;
+use super::error::SurveyError;
 
 /// Times of frames, strictly increasing.
 #[derive(Clone, Debug, PartialEq)]

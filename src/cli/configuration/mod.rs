@@ -7,6 +7,8 @@ mod parse;
 mod survey_options;
 mod variables;
 
-pub use option::{EffectiveOption, options_table};
+#[cfg(test)]
+pub use option::EffectiveOption;
+pub use option::options_table;
 pub use parse::{options_of_command, parse};
 pub use variables::{CONFIGURABLE, with_variables};

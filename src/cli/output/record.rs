@@ -2,7 +2,6 @@
 
 use super::failure::Failure;
 use crate::PROGRAM;
-use crate::cli::configuration::{EffectiveOption, options_table};
 use crate::persist::atomic;
 use crate::persist::provenance::{self, HashError, Input};
 use crate::survey::Survey;
@@ -16,8 +15,8 @@ pub struct RunRecord {
     pub command: String,
     /// The command line, with the program's name instead of its path.
     pub arguments: Vec<String>,
-    /// Every option of the command.
-    pub options: Vec<EffectiveOption>,
+    /// Every option of the command that has a value.
+    pub options: toml::Table,
 }
 
 /// `run.toml`. Its options may be copied into `survey.toml`.
@@ -26,7 +25,7 @@ struct RunFile<'a> {
     schema_version: u32,
     program: &'static str,
     arguments: &'a [String],
-    options: BTreeMap<&'a str, toml::Table>,
+    options: BTreeMap<&'a str, &'a toml::Table>,
     inputs: &'a [Input],
 }
 
@@ -49,7 +48,7 @@ impl RunRecord {
             schema_version: SCHEMA_VERSION,
             program: PROGRAM,
             arguments: &self.arguments,
-            options: BTreeMap::from([(self.command.as_str(), options_table(&self.options))]),
+            options: BTreeMap::from([(self.command.as_str(), &self.options)]),
             inputs,
         })
         .map_err(|error| Failure::bug(error.to_string()))?;
