@@ -1,41 +1,42 @@
-//! A line chart as inline SVG, coloured by the page's style sheet.
+//! Line charts as inline SVG, coloured by the style sheet of the page.
 
 use super::decimate::decimate;
 use super::quantity::{fixed, significant};
 use super::ticks;
 use maud::{Markup, html};
 
-/// Size of the drawing, its own units: about pixels where a chart is as wide as a phone.
+/// Width and height of the drawing in its own units, about CSS pixels on a phone.
 const SIZE: [f64; 2] = [380.0, 214.0];
-/// Left, right, upper and lower edge of the plot in it.
+/// Left, right, upper and lower edge of the plot in the drawing.
 const PLOT: [f64; 4] = [48.0, 372.0, 8.0, 172.0];
-/// Share of the values' span that is left free above and below.
-const AIR: f64 = 0.07;
-/// Flagged frames up to so many have lines as high as the plot; more have short ones, which hide
-/// nothing.
-const MOST_LINES: usize = 24;
-const SHORT_LINE: f64 = 7.0;
-/// Curves of no more points than this show them.
-const MOST_DOTS: usize = 30;
+/// Margin above and below the values, share of their range.
+const MARGIN: f64 = 0.07;
+/// Largest number of flagged frames whose marks are as high as the plot; more have short marks,
+/// which hide nothing.
+const MAX_TALL_MARKS: usize = 24;
+/// Height of a short mark, units of the drawing.
+const SHORT_MARK: f64 = 7.0;
+/// Largest number of points that a curve shows as dots.
+const MAX_DOTS: usize = 30;
 
-/// What a curve is, which says how it looks.
+/// Meaning of a curve, which decides its appearance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Style {
+pub enum CurveStyle {
     /// Initial poses.
-    Planned,
+    Initial,
     /// Refined poses.
     Refined,
     /// True poses.
     Truth,
-    /// The n-th of some that have an order, as pyramid levels.
+    /// The n-th curve of an ordered set, as pyramid levels.
     Ordered(usize),
 }
 
-impl Style {
-    /// Class of the style sheet.
+impl CurveStyle {
+    /// Class in the style sheet.
     pub fn class(self) -> String {
         match self {
-            Self::Planned => "planned".to_owned(),
+            Self::Initial => "initial".to_owned(),
             Self::Refined => "refined".to_owned(),
             Self::Truth => "truth".to_owned(),
             Self::Ordered(k) => format!("ordered-{}", k % 6),
@@ -43,13 +44,13 @@ impl Style {
     }
 }
 
-/// One curve.
+/// A curve of a chart.
 #[derive(Clone, Debug)]
 pub struct Series {
     /// Its name.
     pub name: String,
-    /// Its look.
-    pub style: Style,
+    /// Its appearance.
+    pub style: CurveStyle,
     /// Its points, along the curve.
     pub points: Vec<[f64; 2]>,
     /// 1-σ of each point; empty if there is none.
@@ -58,7 +59,7 @@ pub struct Series {
 
 impl Series {
     /// A curve without uncertainty.
-    pub fn new(name: &str, style: Style, points: Vec<[f64; 2]>) -> Self {
+    pub fn new(name: &str, style: CurveStyle, points: Vec<[f64; 2]>) -> Self {
         Self {
             name: name.to_owned(),
             style,
@@ -67,7 +68,7 @@ impl Series {
         }
     }
 
-    /// The same curve with the 1-σ of its points, where they have one.
+    /// Adds the 1-σ of the points that have one.
     pub fn with_sigma(mut self, sigma: impl Iterator<Item = Option<f64>>) -> Self {
         let sigma: Vec<f64> = sigma.map(|sigma| sigma.unwrap_or(f64::NAN)).collect();
         if sigma.iter().any(|sigma| sigma.is_finite()) {
@@ -76,8 +77,8 @@ impl Series {
         self
     }
 
-    /// The edges of its band of ±1-σ.
-    fn band(&self) -> [Vec<[f64; 2]>; 2] {
+    /// Upper and lower edge of the band of ±1-σ.
+    fn band_edges(&self) -> [Vec<[f64; 2]>; 2] {
         let edge = |sign: f64| {
             let points = self.points.iter().zip(&self.sigma);
             points.map(|([x, y], s)| [*x, y + sign * s]).collect()
@@ -86,32 +87,32 @@ impl Series {
     }
 }
 
-/// What a chart's horizontal axis counts.
+/// Horizontal axis of a chart.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Its name with the unit.
     pub name: String,
-    /// Its ends.
+    /// Its range.
     pub range: [f64; 2],
-    /// Whether there is nothing between whole numbers.
+    /// Whether all values are integers.
     pub whole: bool,
 }
 
-/// How a chart's vertical axis runs.
+/// Scale of a chart's vertical axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Vertical {
-    /// Over the values.
+    /// Linear over the values.
     Linear,
-    /// From zero to the highest value.
+    /// Linear from zero to the highest value.
     FromZero,
-    /// Over the values, which are positive, in equal ratios.
+    /// Logarithmic over the values, which are positive.
     Logarithmic,
 }
 
 /// A line chart.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// What is shown.
+    /// Title.
     pub title: String,
     /// Unit of the values; empty for pure numbers.
     pub unit: String,
@@ -121,18 +122,18 @@ pub struct Chart {
     pub vertical: Vertical,
     /// The curves.
     pub series: Vec<Series>,
-    /// Places of flagged frames along the axis.
+    /// Abscissae of flagged frames.
     pub marks: Vec<f64>,
 }
 
-/// From values to the drawing.
-struct Frame {
+/// Mapping from values to the drawing.
+struct PlotScale {
     x: [f64; 2],
     y: [f64; 2],
     logarithmic: bool,
 }
 
-impl Frame {
+impl PlotScale {
     fn x(&self, value: f64) -> f64 {
         let [left, right, ..] = PLOT;
         left + (value - self.x[0]) / (self.x[1] - self.x[0]) * (right - left)
@@ -140,12 +141,12 @@ impl Frame {
 
     fn y(&self, value: f64) -> f64 {
         let [_, _, top, bottom] = PLOT;
-        let place = |v: f64| if self.logarithmic { v.ln() } else { v };
-        let share = (place(value) - place(self.y[0])) / (place(self.y[1]) - place(self.y[0]));
+        let axis = |v: f64| if self.logarithmic { v.ln() } else { v };
+        let share = (axis(value) - axis(self.y[0])) / (axis(self.y[1]) - axis(self.y[0]));
         bottom - share * (bottom - top)
     }
 
-    /// Points of an SVG polyline. Far beyond the plot nothing is seen.
+    /// Points of an SVG polyline, clamped far outside of the plot.
     fn polyline(&self, points: &[[f64; 2]]) -> String {
         let pair = |[x, y]: &[f64; 2]| {
             let y = self.y(*y).clamp(-1e4, 1e4);
@@ -156,7 +157,8 @@ impl Frame {
 }
 
 impl Chart {
-    fn frame(&self) -> Frame {
+    /// Scale that shows all values and the part of the bands near them.
+    fn scale(&self) -> PlotScale {
         let logarithmic = self.vertical == Vertical::Logarithmic;
         let shown = |v: &f64| v.is_finite() && (!logarithmic || *v > 0.0);
         let values: Vec<f64> = self
@@ -167,8 +169,11 @@ impl Chart {
             .collect();
         let low = values.iter().copied().fold(f64::INFINITY, f64::min);
         let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Bands belong to the picture as long as they do not make the curve flat.
-        let edges = self.series.iter().flat_map(|series| series.band().concat());
+        // A band extends the range only as long as the curve keeps its visible height.
+        let edges = self
+            .series
+            .iter()
+            .flat_map(|series| series.band_edges().concat());
         let near = |v: &f64| *v > low - (high - low) && *v < high + (high - low);
         let edges: Vec<f64> = edges.map(|p| p[1]).filter(shown).filter(near).collect();
         let low = edges.iter().copied().fold(low, f64::min);
@@ -177,11 +182,11 @@ impl Chart {
             Vertical::Logarithmic if values.is_empty() => [0.1, 10.0],
             _ if values.is_empty() => [0.0, 1.0],
             Vertical::Logarithmic => {
-                let air = (high / low).powf(AIR).max(1.2);
-                [low / air, high * air]
+                let margin = (high / low).powf(MARGIN).max(1.2);
+                [low / margin, high * margin]
             }
-            Vertical::FromZero if high > 0.0 => [0.0, high * (1.0 + AIR)],
-            _ if high > low => [low - AIR * (high - low), high + AIR * (high - low)],
+            Vertical::FromZero if high > 0.0 => [0.0, high * (1.0 + MARGIN)],
+            _ if high > low => [low - MARGIN * (high - low), high + MARGIN * (high - low)],
             _ => [
                 low - 0.5 * low.abs().max(1e-3),
                 high + 0.5 * high.abs().max(1e-3),
@@ -191,11 +196,11 @@ impl Chart {
             [from, to] if to != from => [from, to],
             [from, _] => [from - 0.5, from + 0.5],
         };
-        Frame { x, y, logarithmic }
+        PlotScale { x, y, logarithmic }
     }
 
-    /// What is shown, in words, for those who do not see it.
-    fn words(&self) -> String {
+    /// Description for screen readers.
+    fn description(&self) -> String {
         let curves: Vec<String> = self
             .series
             .iter()
@@ -220,18 +225,18 @@ impl Chart {
         )
     }
 
-    /// The chart with its title.
+    /// Draws the chart with its title.
     pub fn draw(&self) -> Markup {
-        let frame = self.frame();
+        let scale = self.scale();
         let [left, right, top, bottom] = PLOT;
         let (width, height) = (right - left, bottom - top);
         let columns = width as usize;
-        let y_ticks = if frame.logarithmic {
-            ticks::logarithmic(frame.y[0], frame.y[1], 6)
+        let y_ticks = if scale.logarithmic {
+            ticks::logarithmic(scale.y[0], scale.y[1], 6)
         } else {
-            ticks::linear(frame.y[0], frame.y[1], 5)
+            ticks::linear(scale.y[0], scale.y[1], 5)
         };
-        let (from, to) = (frame.x[0].min(frame.x[1]), frame.x[0].max(frame.x[1]));
+        let (from, to) = (scale.x[0].min(scale.x[1]), scale.x[0].max(scale.x[1]));
         let mut x_ticks = ticks::linear(from, to, 6);
         if self.along.whole {
             x_ticks.retain(|(value, _)| value.fract() == 0.0);
@@ -242,36 +247,36 @@ impl Chart {
         let mut marks: Vec<i64> = self
             .marks
             .iter()
-            .map(|x| frame.x(*x).round() as i64)
+            .map(|x| scale.x(*x).round() as i64)
             .collect();
         marks.sort_unstable();
         marks.dedup();
-        let foot = if marks.len() > MOST_LINES {
-            top + SHORT_LINE
+        let foot = if marks.len() > MAX_TALL_MARKS {
+            top + SHORT_MARK
         } else {
             bottom
         };
-        let shown = |point: &[f64; 2]| !frame.logarithmic || point[1] > 0.0;
+        let shown = |point: &[f64; 2]| !scale.logarithmic || point[1] > 0.0;
         html! {
             figure.chart {
                 figcaption {
                     span { (self.title) @if !self.unit.is_empty() { " " span.unit { "(" (self.unit) ")" } } }
                     output.reading aria-hidden="true" {}
                 }
-                svg role="img" aria-label=(self.words())
+                svg role="img" aria-label=(self.description())
                     viewBox=(format!("0 0 {} {}", SIZE[0], SIZE[1]))
                     data-plot=(format!("{left} {right} {top} {bottom}"))
-                    data-x=(format!("{} {}", frame.x[0], frame.x[1]))
-                    data-y=(format!("{} {}", frame.y[0], frame.y[1]))
-                    data-log=[frame.logarithmic.then_some("1")]
+                    data-x=(format!("{} {}", scale.x[0], scale.x[1]))
+                    data-y=(format!("{} {}", scale.y[0], scale.y[1]))
+                    data-log=[scale.logarithmic.then_some("1")]
                 {
                     @for (value, text) in &y_ticks {
-                        @let y = format!("{:.1}", frame.y(*value));
+                        @let y = format!("{:.1}", scale.y(*value));
                         line.grid x1=(left) x2=(right) y1=(y) y2=(y) {}
                         text.tick x=(left - 6.0) y=(y) dy="0.32em" text-anchor="end" { (text) }
                     }
                     @for (value, text) in &x_ticks {
-                        @let x = format!("{:.1}", frame.x(*value));
+                        @let x = format!("{:.1}", scale.x(*value));
                         line.stub x1=(x) x2=(x) y1=(bottom) y2=(bottom + 4.0) {}
                         text.tick x=(x) y=(bottom + 16.0) text-anchor="middle" { (text) }
                     }
@@ -284,21 +289,21 @@ impl Chart {
                         }
                         @for series in &self.series {
                             @if !series.sigma.is_empty() {
-                                @let [upper, lower] = series.band().map(|edge| decimate(&edge, frame.x, columns));
+                                @let [upper, lower] = series.band_edges().map(|edge| decimate(&edge, scale.x, columns));
                                 @let outline: Vec<[f64; 2]> = upper.into_iter().chain(lower.into_iter().rev()).collect();
-                                polygon.(format!("band {}", series.style.class())) points=(frame.polyline(&outline)) {}
+                                polygon.(format!("band {}", series.style.class())) points=(scale.polyline(&outline)) {}
                             }
                         }
                         @for series in &self.series {
                             @let points: Vec<[f64; 2]> = series.points.iter().copied().filter(shown).collect();
-                            @let points = decimate(&points, frame.x, columns);
+                            @let points = decimate(&points, scale.x, columns);
                             polyline.(format!("curve {}", series.style.class()))
-                                data-name=(series.name) points=(frame.polyline(&points)) {}
-                            @if points.len() <= MOST_DOTS && !matches!(series.style, Style::Planned | Style::Truth) {
+                                data-name=(series.name) points=(scale.polyline(&points)) {}
+                            @if points.len() <= MAX_DOTS && !matches!(series.style, CurveStyle::Initial | CurveStyle::Truth) {
                                 @for point in &points {
                                     circle.(format!("dot {}", series.style.class())) r="2.2"
-                                        cx=(format!("{:.1}", frame.x(point[0])))
-                                        cy=(format!("{:.1}", frame.y(point[1]))) {}
+                                        cx=(format!("{:.1}", scale.x(point[0])))
+                                        cy=(format!("{:.1}", scale.y(point[1]))) {}
                                 }
                             }
                         }
@@ -310,17 +315,17 @@ impl Chart {
     }
 }
 
-/// Something in a chart that is no curve.
+/// Element of a chart besides its curves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Extra {
+pub enum ChartElement {
     /// The band of ±1-σ.
     Band,
-    /// The line of a flagged frame.
+    /// Mark of a flagged frame.
     Mark,
 }
 
-/// Names and looks of curves and of what else there is, for several charts.
-pub fn legend(entries: &[(&str, Style)], extras: &[Extra]) -> Markup {
+/// Legend of curves and other elements, for several charts.
+pub fn legend(entries: &[(&str, CurveStyle)], elements: &[ChartElement]) -> Markup {
     html! {
         p.legend {
             @for (name, style) in entries {
@@ -331,17 +336,17 @@ pub fn legend(entries: &[(&str, Style)], extras: &[Extra]) -> Markup {
                     (name)
                 }
             }
-            @for extra in extras {
+            @for element in elements {
                 span.key {
                     svg viewBox="0 0 28 10" aria-hidden="true" {
-                        @match extra {
-                            Extra::Band => { rect.band.refined x="1" y="0" width="26" height="10" {} }
-                            Extra::Mark => { line.mark x1="14" x2="14" y1="-1" y2="11" {} }
+                        @match element {
+                            ChartElement::Band => { rect.band.refined x="1" y="0" width="26" height="10" {} }
+                            ChartElement::Mark => { line.mark x1="14" x2="14" y1="-1" y2="11" {} }
                         }
                     }
-                    @match extra {
-                        Extra::Band => { "±1-σ" }
-                        Extra::Mark => { "flagged frame" }
+                    @match element {
+                        ChartElement::Band => { "±1-σ" }
+                        ChartElement::Mark => { "flagged frame" }
                     }
                 }
             }
@@ -363,7 +368,7 @@ mod tests {
                 whole: false,
             },
             vertical,
-            series: vec![Series::new("refined & more", Style::Refined, points)],
+            series: vec![Series::new("refined & more", CurveStyle::Refined, points)],
             marks: vec![5.0],
         }
     }

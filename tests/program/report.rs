@@ -188,7 +188,7 @@ fn the_page_says_what_the_numbers_say() {
         .and_then(|r| r.frames[7].reason.clone());
     let reason = reason.expect("a black frame is flagged");
     for words in [
-        "23 of 24 frames repaired, 1 flagged",
+        "23 of 24 frames refined, 1 flagged",
         "Frame 7",
         "000007.png",
         &reason[1..],
@@ -373,7 +373,7 @@ fn nothing_sticks_out_and_everything_works() {
         );
         let reading = found["reading"].as_str().unwrap();
         assert!(
-            ["planned", "refined", "true"]
+            ["initial", "refined", "true"]
                 .iter()
                 .all(|name| reading.contains(name)),
             "{found}"

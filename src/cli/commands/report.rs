@@ -52,7 +52,7 @@ pub fn run(
     let refined = RefinedFiles::read(&survey, &arguments.refined)?;
     let px_per_metre = match arguments.px_per_metre {
         Some(px_per_metre) => Some(px_per_metre),
-        None => report::resolution(&survey, &refined.poses)?,
+        None => report::choose_resolution(&survey, &refined.poses)?,
     };
     let (comparison, drawings) = &compare_survey(
         &survey,

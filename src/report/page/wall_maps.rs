@@ -1,20 +1,22 @@
-//! Where on the wall frames agree, how many see it, and how each frame fits.
+//! Section about residuals and overlap on the wall, and about each frame's photometric fit.
 
-use super::trajectory::marks_key;
-use super::{View, data_uri};
+use super::page_data::{PageData, data_uri};
+use super::trajectory::mark_entry;
 use crate::refine::FrameReport;
-use crate::report::chart::{Chart, Series, Style, Vertical, legend};
-use crate::report::heat::{self, Scale};
+use crate::report::chart::{Chart, CurveStyle, Series, Vertical, legend};
+use crate::report::error::ReportError;
+use crate::report::heat_map::{self, ColourScale};
+use crate::report::model::WallMaps;
 use crate::report::quantity::short;
-use crate::report::{ReportError, WallMaps, ticks};
+use crate::report::ticks;
 use maud::{Markup, html};
 
-/// The section.
+/// Draws the section.
 ///
 /// # Errors
 /// [`ReportError::Encode`].
-pub fn section(view: &View) -> Result<Markup, ReportError> {
-    let maps = &view.report.wall;
+pub fn section(data: &PageData) -> Result<Markup, ReportError> {
+    let maps = &data.report.wall;
     let residual = residual_scale(maps);
     let frames: Vec<Option<f64>> = maps
         .refined_frames
@@ -22,41 +24,42 @@ pub fn section(view: &View) -> Result<Markup, ReportError> {
         .map(|n| (*n > 0.0).then_some(*n))
         .collect();
     let most = maps.refined_frames.iter().copied().fold(1.0, f64::max);
-    let overlap = Scale {
+    let overlap = ColourScale {
         range: [0.0, most],
         logarithmic: false,
     };
     Ok(html! {
-        p { "The same stretch of wall in " (maps.around) " × " (maps.along)
-            " cells, chainage to the right, the clock upwards. The residual is the root mean square difference of two frames "
-            "at the same place of the wall, in grey levels of 255: noise and light where the poses are right, much more where they are not." }
+        p { "The wall in " (maps.around) " × " (maps.along)
+            " cells, chainage to the right, clock position upwards. The residual is the root mean square difference of two "
+            "frames at a point of the wall, in grey levels of 255. With correct poses it is the sensor noise and the change of "
+            "light; pose errors make it much larger." }
         (strip("Residual, baseline", maps, &maps.baseline_grey, &residual)?)
         (strip("Residual, refined", maps, &maps.refined_grey, &residual)?)
         @if let Some(truth) = &maps.true_grey {
             (strip("Residual, true poses", maps, truth, &residual)?)
         }
-        (scale("grey levels, equal steps of colour are equal ratios; blank: no two frames overlap", &residual))
+        (scale_legend("grey levels, logarithmic; blank: no two frames overlap", &residual))
         (strip("Overlap, refined", maps, &frames, &overlap)?)
-        (scale("frames that see a place; blank: none", &overlap))
-        @if let Some(refinement) = &view.report.refinement {
+        (scale_legend("number of frames that see the wall; blank: none", &overlap))
+        @if let Some(refinement) = &data.report.refinement {
             h3 { "Frame by frame" }
-            p { "Frames that were compared with others in the last solve." }
-            (legend(&[("frame", Style::Refined)], &marks_key(view)))
+            p { "Frames that overlap others in the last solve." }
+            (legend(&[("frame", CurveStyle::Refined)], &mark_entry(data)))
             div.charts {
                 @for (title, unit, value) in [
-                    ("Residual against the wall", "grey", (|f| f.residual) as fn(&FrameReport) -> f64),
-                    ("Pixels rejected as outliers", "%", |f| 100.0 * (1.0 - f.inlier_share)),
-                    ("Wall samples compared", "thousands", |f| 1e-3 * f.points as f64),
+                    ("Residual", "grey", (|f| f.residual) as fn(&FrameReport) -> f64),
+                    ("Outliers", "%", |f| 100.0 * (1.0 - f.inlier_share)),
+                    ("Samples of the wall", "thousands", |f| 1e-3 * f.points as f64),
                     ("Gain", "", |f| f.gain),
                     ("Bias", "grey", |f| f.bias),
                 ] {
                     (Chart {
                         title: title.to_owned(),
                         unit: unit.to_owned(),
-                        along: view.axis(),
+                        along: data.axis(),
                         vertical: match title { "Gain" | "Bias" => Vertical::Linear, _ => Vertical::FromZero },
-                        series: vec![Series::new("frame", Style::Refined, view.points(|k| refinement.frames.get(k).filter(|f| f.points > 0).map(value)))],
-                        marks: view.marks(),
+                        series: vec![Series::new("frame", CurveStyle::Refined, data.points(|k| refinement.frames.get(k).filter(|f| f.points > 0).map(value)))],
+                        marks: data.marks(),
                     }.draw())
                 }
             }
@@ -64,8 +67,8 @@ pub fn section(view: &View) -> Result<Markup, ReportError> {
     })
 }
 
-/// From the lowest to the highest residual, but for the extreme hundredth at either end.
-fn residual_scale(maps: &WallMaps) -> Scale {
+/// Scale from the 1st to the 99th percentile of the residuals.
+fn residual_scale(maps: &WallMaps) -> ColourScale {
     let of_truth = maps.true_grey.iter().flatten();
     let all = maps
         .baseline_grey
@@ -79,20 +82,20 @@ fn residual_scale(maps: &WallMaps) -> Scale {
         values.get((share * last as f64) as usize).copied()
     };
     let (low, high) = (at(0.01).unwrap_or(1.0), at(0.99).unwrap_or(10.0));
-    Scale {
+    ColourScale {
         range: [low, high.max(1.5 * low)],
         logarithmic: true,
     }
 }
 
-/// One map with its axes.
+/// A map with its axes.
 fn strip(
     title: &str,
     maps: &WallMaps,
     values: &[Option<f64>],
-    scale: &Scale,
+    scale: &ColourScale,
 ) -> Result<Markup, ReportError> {
-    let png = heat::png(title, [maps.around, maps.along], values, scale)?;
+    let png = heat_map::png(title, [maps.around, maps.along], values, scale)?;
     let [from_m, to_m] = maps.chainage_m;
     let mut known: Vec<f64> = values.iter().copied().flatten().collect();
     known.sort_unstable_by(f64::total_cmp);
@@ -119,13 +122,13 @@ fn strip(
     })
 }
 
-/// What the colours mean.
-fn scale(words: &str, scale: &Scale) -> Markup {
+/// Legend of a colour scale.
+fn scale_legend(words: &str, scale: &ColourScale) -> Markup {
     let [low, high] = scale.range;
     html! {
         p.scale {
             span { (short(low)) }
-            span.bar style=(format!("background:{}", heat::gradient())) {}
+            span.bar style=(format!("background:{}", heat_map::gradient())) {}
             span { (short(high)) }
             span.words { (words) }
         }

@@ -1,6 +1,6 @@
-//! What `refine` has left in its folder.
+//! Files that `refine` has written.
 
-use super::ReportError;
+use super::error::ReportError;
 use crate::refine::{FrameReport, LevelReport, StageTime, read_covariances};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
@@ -9,26 +9,26 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 
-/// `refine.json`, as far as the report needs it; in `report.json` with the same names and numbers.
+/// Part of `refine.json` that the report needs; `report.json` has it with the same names.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Refinement {
-    /// Name and version of the program that refined.
+    /// Name and version of the refining program.
     pub program: String,
-    /// The command line that did.
+    /// Its command line.
     pub command: Vec<String>,
     /// The effective options, by name.
     pub options: Map<String, Value>,
-    /// `survey.toml` as it was then.
+    /// `survey.toml` at that time.
     pub survey_file: Map<String, Value>,
-    /// Global solves, coarse to fine, with every step.
+    /// Global solves, coarse to fine, with all steps.
     pub levels: Vec<LevelReport>,
     /// Frames in order.
     pub frames: Vec<FrameReport>,
     /// Frames whose pose rests on the prior.
     pub frames_on_prior: usize,
-    /// The covariance over that of independent noise; null where there is none.
+    /// Ratio of the covariance to that of independent noise; null if there is none.
     pub variance_factor: Option<f64>,
-    /// Self-calibration, if it was asked for.
+    /// Self-calibration, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<Calibration>,
     /// Why the last solve stopped, in words.
@@ -40,51 +40,52 @@ pub struct Refinement {
 /// Self-calibration, as in `refine.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Calibration {
-    /// What was to be estimated.
+    /// Estimated parameters.
     pub unknowns: Vec<CalibratedUnknown>,
-    /// The tunnel's radius that belongs to the poses, metres.
+    /// Radius of the tunnel that belongs to the poses, metres.
     pub radius_m: f64,
     /// The camera that belongs to the poses.
     pub camera: Value,
 }
 
-/// One unknown of the self-calibration.
+/// A parameter of the self-calibration.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct CalibratedUnknown {
     /// Its name.
     pub name: String,
     /// Its unit: `px`, `m`, `deg`, or `1`.
     pub unit: String,
-    /// The value given.
+    /// The given value.
     pub initial: f64,
     /// The estimate.
     pub estimate: f64,
     /// 1-σ of the estimate, if there is one.
     pub sigma: Option<f64>,
-    /// 1-σ of the value given.
+    /// 1-σ of the given value.
     pub prior_sigma: f64,
-    /// Whether the data observe it.
+    /// Whether the frames determine it.
     pub observed: bool,
-    /// Why not.
+    /// Reason why it is not observable.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
 }
 
-/// Names of what lies beside refined poses.
+/// Name of refine's report beside the poses.
 const REFINEMENT: &str = "refine.json";
+/// Name of the covariances beside the poses.
 const COVARIANCES: &str = "covariance.csv";
 
-/// Refined poses, and what lies beside them.
+/// Refined poses, and the files beside them.
 #[derive(Debug)]
 pub struct RefinedFiles {
     /// The file of the poses.
     pub path: PathBuf,
     /// The poses.
     pub poses: Vec<Pose>,
-    /// `refine.json`, if it is there.
+    /// `refine.json`, if it exists.
     pub refinement: Option<Refinement>,
-    /// The poses' covariances ([`crate::refine::Covariances::frames`]), if `covariance.csv` is
-    /// there.
+    /// Covariances of the poses ([`crate::refine::Covariances::frames`]), if `covariance.csv`
+    /// exists.
     pub covariances: Option<Vec<Matrix6<f64>>>,
 }
 
@@ -106,7 +107,7 @@ impl RefinedFiles {
             });
         }
         let poses = poses_of(&survey.read_poses(&poses_path)?);
-        // Other poses than refine's own may lie beside its files, which say nothing of them.
+        // The files beside belong to poses.tum only, not to other poses in the folder.
         let beside = |name: &str| {
             let own = poses_path.file_name().is_some_and(|own| own == "poses.tum");
             let path = poses_path.with_file_name(name);

@@ -1,11 +1,11 @@
-//! Maps of the wall in colours.
+//! Maps of the wall as heat maps.
 
-use super::ReportError;
-use super::pictures::encoded;
+use super::error::ReportError;
+use super::pictures::encode_picture;
 use image::codecs::png::PngEncoder;
 use image::{Rgba, RgbaImage};
 
-/// Cividis at eight places: as bright to those who see few colours as to all others.
+/// Eight nodes of the colour map cividis, which is uniform for colour-blind readers, too.
 ///
 /// Source: J. R. Nuñez, C. R. Anderton, R. S. Renslow, "Optimizing colormaps with consideration for
 /// color vision deficiency", PLOS ONE 13(7), 2018.
@@ -20,17 +20,17 @@ const CIVIDIS: [[u8; 3]; 8] = [
     [254, 232, 56],
 ];
 
-/// How values become colours.
+/// Mapping from values to the colour map.
 #[derive(Clone, Copy, Debug)]
-pub struct Scale {
-    /// What the darkest and the brightest colour stand for.
+pub struct ColourScale {
+    /// Values of the darkest and the brightest colour.
     pub range: [f64; 2],
-    /// Whether equal steps of colour are equal ratios.
+    /// Whether the scale is logarithmic.
     pub logarithmic: bool,
 }
 
-impl Scale {
-    /// Where a value lies between the ends, 0 to 1.
+impl ColourScale {
+    /// Position of a value on the scale, clamped to 0–1.
     pub fn share(&self, value: f64) -> f64 {
         let [low, high] = self.range;
         let share = if self.logarithmic {
@@ -46,11 +46,11 @@ impl Scale {
     }
 }
 
-/// The colour at a share of the scale, 0 to 1.
+/// Colour at a position on the scale, 0–1.
 pub fn colour(share: f64) -> [u8; 3] {
-    let place = share.clamp(0.0, 1.0) * (CIVIDIS.len() - 1) as f64;
-    let below = (place.floor() as usize).min(CIVIDIS.len() - 2);
-    let part = place - below as f64;
+    let position = share.clamp(0.0, 1.0) * (CIVIDIS.len() - 1) as f64;
+    let below = (position.floor() as usize).min(CIVIDIS.len() - 2);
+    let part = position - below as f64;
     let mix = |c: usize| {
         let (a, b) = (
             f64::from(CIVIDIS[below][c]),
@@ -70,10 +70,10 @@ pub fn gradient() -> String {
     format!("linear-gradient(to right, {})", stops.join(", "))
 }
 
-/// A map as a PNG file, a pixel a cell: chainage to the right, θ up; what has no value is
+/// Encodes a map as PNG, one pixel per cell: chainage to the right, θ up; cells without a value are
 /// transparent.
 ///
-/// `values` hold a row for each of the `along` stretches of the axis, `around` cells each.
+/// `values` has `along` rows of `around` cells.
 ///
 /// # Errors
 /// [`ReportError::Encode`].
@@ -81,7 +81,7 @@ pub fn png(
     name: &str,
     [around, along]: [usize; 2],
     values: &[Option<f64>],
-    scale: &Scale,
+    scale: &ColourScale,
 ) -> Result<Vec<u8>, ReportError> {
     let image = RgbaImage::from_fn(along as u32, around as u32, |x, y| {
         let at = x as usize * around + (around - 1 - y as usize);
@@ -93,7 +93,7 @@ pub fn png(
             None => Rgba([0; 4]),
         }
     });
-    encoded(name, |bytes| {
+    encode_picture(name, |bytes| {
         image.write_with_encoder(PngEncoder::new(bytes))
     })
 }
@@ -115,7 +115,7 @@ mod tests {
 
     #[test]
     fn a_map_lies_with_the_chainage_to_the_right_and_the_angle_up() {
-        let scale = Scale {
+        let scale = ColourScale {
             range: [1.0, 100.0],
             logarithmic: true,
         };
