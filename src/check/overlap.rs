@@ -26,7 +26,8 @@ pub struct OverlapCheck {
     pub least_neighbours: f64,
     /// First frame of the neighbours with the smallest overlap.
     pub least_after: usize,
-    /// Share of a frame that the best frame of another turn also shows, 0–1; 0 without loop closure.
+    /// Share of a frame that the best frame of another turn also shows, 0–1; 0 without loop
+    /// closure.
     pub turns: f64,
     /// Shorter side of the rectangle on the unrolled wall that neighbours share, masked parts
     /// included, metres.
@@ -95,7 +96,7 @@ impl<'a> OverlapMeter<'a> {
     }
 }
 
-/// Whether the lens covers a pixel and the mask does not hide it.
+/// True if the lens covers a pixel and the mask does not hide it.
 fn shows_wall(survey: &Survey, pixel: &Vector2<f64>) -> bool {
     let mask = survey.frames.mask();
     survey.camera.sees(pixel, 0.0)

@@ -16,7 +16,7 @@ pub struct PosesCheck {
     pub step_deg: f64,
     /// Largest distance of a camera from the axis, metres.
     pub off_axis_m: f64,
-    /// Whether true poses are known.
+    /// True if true poses are known.
     pub truth: bool,
 }
 

@@ -70,8 +70,8 @@ fn large_jitter(check: &Check) -> Option<String> {
     (jitter.share_of_overlap > MAX_JITTER).then(|| {
         format!(
             "according to [prior], neighbouring frames are displaced by {:.0} px (1-σ), {} % of \
-             their overlap; convergence is tested for up to {} %: give better poses, smaller sigmas \
-             if the poses are better, or more overlap",
+             their overlap; convergence is tested for up to {} %: give better poses, smaller \
+             sigmas if the poses are better, or more overlap",
             jitter.sigma_px,
             percent(jitter.share_of_overlap),
             percent(MAX_JITTER)

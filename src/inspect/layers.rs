@@ -18,7 +18,7 @@ pub struct TextureOptions {
     /// Pixels per metre of wall; the drawn resolution is the next higher one at which the levels of
     /// detail close around the section. `None`: the frames' own resolution at the wall.
     pub px_per_metre: Option<f64>,
-    /// How frames are combined.
+    /// Combination of overlapping frames.
     pub render: RenderOptions,
     /// Quality of JPEG, 1–100.
     pub quality: u8,
@@ -40,7 +40,7 @@ pub struct PosedLayer {
 /// Lays out a panorama whose levels of detail close around the section.
 ///
 /// # Errors
-/// As [`Stitch::new`].
+/// The errors of [`Stitch::new`].
 pub(super) fn lay_out_texture<'a>(
     survey: &'a Survey,
     poses: &[Pose],

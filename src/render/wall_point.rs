@@ -6,7 +6,7 @@ use crate::render::Placement;
 use crate::surface::{Surface, SurfaceError, WallPoint};
 use nalgebra::Vector2;
 
-/// Why a pixel of a frame shows no point of the wall.
+/// Error of a frame's pixel that shows no point of the wall.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FramePixelError {

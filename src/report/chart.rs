@@ -94,7 +94,7 @@ pub struct Axis {
     pub name: String,
     /// Its range.
     pub range: [f64; 2],
-    /// Whether all values are integers.
+    /// True if all values are integers.
     pub whole: bool,
 }
 
@@ -230,39 +230,9 @@ impl Chart {
         let scale = self.scale();
         let [left, right, top, bottom] = PLOT;
         let (width, height) = (right - left, bottom - top);
-        let columns = width as usize;
-        let y_ticks = if scale.logarithmic {
-            ticks::logarithmic(scale.y[0], scale.y[1], 6)
-        } else {
-            ticks::linear(scale.y[0], scale.y[1], 5)
-        };
-        let (from, to) = (scale.x[0].min(scale.x[1]), scale.x[0].max(scale.x[1]));
-        let mut x_ticks = ticks::linear(from, to, 6);
-        if self.along.whole {
-            x_ticks.retain(|(value, _)| value.fract() == 0.0);
-            for (value, text) in &mut x_ticks {
-                *text = fixed(*value, 0);
-            }
-        }
-        let mut marks: Vec<i64> = self
-            .marks
-            .iter()
-            .map(|x| scale.x(*x).round() as i64)
-            .collect();
-        marks.sort_unstable();
-        marks.dedup();
-        let foot = if marks.len() > MAX_TALL_MARKS {
-            top + SHORT_MARK
-        } else {
-            bottom
-        };
-        let shown = |point: &[f64; 2]| !scale.logarithmic || point[1] > 0.0;
         html! {
             figure.chart {
-                figcaption {
-                    span { (self.title) @if !self.unit.is_empty() { " " span.unit { "(" (self.unit) ")" } } }
-                    output.reading aria-hidden="true" {}
-                }
+                (self.caption())
                 svg role="img" aria-label=(self.description())
                     viewBox=(format!("0 0 {} {}", SIZE[0], SIZE[1]))
                     data-plot=(format!("{left} {right} {top} {bottom}"))
@@ -270,46 +240,126 @@ impl Chart {
                     data-y=(format!("{} {}", scale.y[0], scale.y[1]))
                     data-log=[scale.logarithmic.then_some("1")]
                 {
-                    @for (value, text) in &y_ticks {
-                        @let y = format!("{:.1}", scale.y(*value));
-                        line.grid x1=(left) x2=(right) y1=(y) y2=(y) {}
-                        text.tick x=(left - 6.0) y=(y) dy="0.32em" text-anchor="end" { (text) }
-                    }
-                    @for (value, text) in &x_ticks {
-                        @let x = format!("{:.1}", scale.x(*value));
-                        line.stub x1=(x) x2=(x) y1=(bottom) y2=(bottom + 4.0) {}
-                        text.tick x=(x) y=(bottom + 16.0) text-anchor="middle" { (text) }
-                    }
-                    text.axis x=(0.5 * (left + right)) y=(SIZE[1] - 6.0) text-anchor="middle" { (self.along.name) }
+                    (vertical_axis(&scale))
+                    (self.horizontal_axis(&scale))
                     svg x=(left) y=(top) width=(width) height=(height)
                         viewBox=(format!("{left} {top} {width} {height}"))
                     {
-                        @for x in &marks {
-                            line.mark x1=(x) x2=(x) y1=(top) y2=(foot) {}
-                        }
+                        (self.marks(&scale))
                         @for series in &self.series {
-                            @if !series.sigma.is_empty() {
-                                @let [upper, lower] = series.band_edges().map(|edge| decimate(&edge, scale.x, columns));
-                                @let outline: Vec<[f64; 2]> = upper.into_iter().chain(lower.into_iter().rev()).collect();
-                                polygon.(format!("band {}", series.style.class())) points=(scale.polyline(&outline)) {}
-                            }
+                            @if !series.sigma.is_empty() { (band(series, &scale)) }
                         }
-                        @for series in &self.series {
-                            @let points: Vec<[f64; 2]> = series.points.iter().copied().filter(shown).collect();
-                            @let points = decimate(&points, scale.x, columns);
-                            polyline.(format!("curve {}", series.style.class()))
-                                data-name=(series.name) points=(scale.polyline(&points)) {}
-                            @if points.len() <= MAX_DOTS && !matches!(series.style, CurveStyle::Initial | CurveStyle::Truth) {
-                                @for point in &points {
-                                    circle.(format!("dot {}", series.style.class())) r="2.2"
-                                        cx=(format!("{:.1}", scale.x(point[0])))
-                                        cy=(format!("{:.1}", scale.y(point[1]))) {}
-                                }
-                            }
-                        }
+                        @for series in &self.series { (curve(series, &scale)) }
                     }
                     line.base x1=(left) x2=(right) y1=(bottom) y2=(bottom) {}
                 }
+            }
+        }
+    }
+
+    /// Title, unit, and the place of the values at the pointer.
+    fn caption(&self) -> Markup {
+        html! {
+            figcaption {
+                span {
+                    (self.title)
+                    @if !self.unit.is_empty() { " " span.unit { "(" (self.unit) ")" } }
+                }
+                output.reading aria-hidden="true" {}
+            }
+        }
+    }
+
+    fn horizontal_axis(&self, scale: &PlotScale) -> Markup {
+        let [left, right, _, bottom] = PLOT;
+        let (from, to) = (scale.x[0].min(scale.x[1]), scale.x[0].max(scale.x[1]));
+        let mut ticks = ticks::linear(from, to, 6);
+        if self.along.whole {
+            ticks.retain(|(value, _)| value.fract() == 0.0);
+            for (value, text) in &mut ticks {
+                *text = fixed(*value, 0);
+            }
+        }
+        let (middle, foot) = (0.5 * (left + right), SIZE[1] - 6.0);
+        html! {
+            @for (value, text) in &ticks {
+                @let x = format!("{:.1}", scale.x(*value));
+                line.stub x1=(x) x2=(x) y1=(bottom) y2=(bottom + 4.0) {}
+                text.tick x=(x) y=(bottom + 16.0) text-anchor="middle" { (text) }
+            }
+            text.axis x=(middle) y=(foot) text-anchor="middle" { (self.along.name) }
+        }
+    }
+
+    /// Marks of flagged frames.
+    fn marks(&self, scale: &PlotScale) -> Markup {
+        let [_, _, top, bottom] = PLOT;
+        let rounded = |x: &f64| scale.x(*x).round() as i64;
+        let mut marks: Vec<i64> = self.marks.iter().map(rounded).collect();
+        marks.sort_unstable();
+        marks.dedup();
+        let foot = if marks.len() > MAX_TALL_MARKS {
+            top + SHORT_MARK
+        } else {
+            bottom
+        };
+        html! {
+            @for x in &marks {
+                line.mark x1=(x) x2=(x) y1=(top) y2=(foot) {}
+            }
+        }
+    }
+}
+
+fn vertical_axis(scale: &PlotScale) -> Markup {
+    let [left, right, ..] = PLOT;
+    let ticks = if scale.logarithmic {
+        ticks::logarithmic(scale.y[0], scale.y[1], 6)
+    } else {
+        ticks::linear(scale.y[0], scale.y[1], 5)
+    };
+    html! {
+        @for (value, text) in &ticks {
+            @let y = format!("{:.1}", scale.y(*value));
+            line.grid x1=(left) x2=(right) y1=(y) y2=(y) {}
+            text.tick x=(left - 6.0) y=(y) dy="0.32em" text-anchor="end" { (text) }
+        }
+    }
+}
+
+/// Width of the plot, pixel columns.
+fn plot_columns() -> usize {
+    let [left, right, ..] = PLOT;
+    (right - left) as usize
+}
+
+/// Band of ±1-σ of a curve.
+fn band(series: &Series, scale: &PlotScale) -> Markup {
+    let edges = series.band_edges();
+    let [upper, lower] = edges.map(|edge| decimate(&edge, scale.x, plot_columns()));
+    let outline: Vec<[f64; 2]> = upper.into_iter().chain(lower.into_iter().rev()).collect();
+    let points = scale.polyline(&outline);
+    html! {
+        polygon.(format!("band {}", series.style.class())) points=(points) {}
+    }
+}
+
+/// A curve, with dots if it has few points.
+fn curve(series: &Series, scale: &PlotScale) -> Markup {
+    let is_shown = |point: &[f64; 2]| !scale.logarithmic || point[1] > 0.0;
+    let points = series.points.iter().copied();
+    let points: Vec<[f64; 2]> = points.filter(is_shown).collect();
+    let points = decimate(&points, scale.x, plot_columns());
+    let is_reference = matches!(series.style, CurveStyle::Initial | CurveStyle::Truth);
+    let class = series.style.class();
+    html! {
+        polyline.(format!("curve {class}"))
+            data-name=(series.name) points=(scale.polyline(&points)) {}
+        @if points.len() <= MAX_DOTS && !is_reference {
+            @for [x, y] in &points {
+                circle.(format!("dot {class}")) r="2.2"
+                    cx=(format!("{:.1}", scale.x(*x)))
+                    cy=(format!("{:.1}", scale.y(*y))) {}
             }
         }
     }
@@ -340,7 +390,9 @@ pub fn legend(entries: &[(&str, CurveStyle)], elements: &[ChartElement]) -> Mark
                 span.key {
                     svg viewBox="0 0 28 10" aria-hidden="true" {
                         @match element {
-                            ChartElement::Band => { rect.band.refined x="1" y="0" width="26" height="10" {} }
+                            ChartElement::Band => {
+                                rect.band.refined x="1" y="0" width="26" height="10" {}
+                            }
                             ChartElement::Mark => { line.mark x1="14" x2="14" y1="-1" y2="11" {} }
                         }
                     }

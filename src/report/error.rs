@@ -6,7 +6,7 @@ use crate::render::RenderError;
 use crate::survey::SurveyError;
 use std::path::PathBuf;
 
-/// Why a report cannot be made.
+/// Error of a report.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
@@ -24,7 +24,7 @@ pub enum ReportError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// `refine.json` is malformed, or of another version.
@@ -39,13 +39,13 @@ pub enum ReportError {
         line: usize,
         /// 1-based column.
         column: usize,
-        /// What the parser said.
+        /// Error of the parser.
         what: String,
     },
     /// `refine.json` is of another survey.
     #[error(
-        "{}: has {found} frames, but the survey has {frames}; give the folder that refine has written \
-         for this survey",
+        "{}: has {found} frames, but the survey has {frames}; give the folder that refine has \
+         written for this survey",
         path.display()
     )]
     Count {
@@ -61,7 +61,7 @@ pub enum ReportError {
     Encode {
         /// Its name.
         name: String,
-        /// What the encoder said.
+        /// Error of the encoder.
         source: image::ImageError,
     },
     /// The survey or its poses.

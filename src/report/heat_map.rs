@@ -25,7 +25,7 @@ const CIVIDIS: [[u8; 3]; 8] = [
 pub struct ColourScale {
     /// Values of the darkest and the brightest colour.
     pub range: [f64; 2],
-    /// Whether the scale is logarithmic.
+    /// True if the scale is logarithmic.
     pub logarithmic: bool,
 }
 

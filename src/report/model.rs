@@ -61,7 +61,7 @@ pub struct SurveyFacts {
     pub frame_size_px: [u32; 2],
     /// Length of the section's outline, metres.
     pub perimeter_m: f64,
-    /// Whether true poses are known.
+    /// True if true poses are known.
     pub truth: bool,
     /// Current content of `survey.toml`.
     pub file: serde_json::Map<String, serde_json::Value>,

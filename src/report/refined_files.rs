@@ -31,7 +31,7 @@ pub struct Refinement {
     /// Self-calibration, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<Calibration>,
-    /// Why the last solve stopped, in words.
+    /// Stop reason of the last solve.
     pub stopped_because: String,
     /// Time by stage.
     pub timings: Vec<StageTime>,
@@ -63,7 +63,7 @@ pub struct CalibratedUnknown {
     pub sigma: Option<f64>,
     /// 1-σ of the given value.
     pub prior_sigma: f64,
-    /// Whether the frames determine it.
+    /// True if the frames determine it.
     pub observed: bool,
     /// Reason why it is not observable.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -110,7 +110,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn there_are_neither_none_nor_too_many(low in -1e4f64..1e4, span in 1e-6f64..1e6, wanted in 3usize..9) {
+        fn there_are_neither_none_nor_too_many(
+            low in -1e4f64..1e4,
+            span in 1e-6f64..1e6,
+            wanted in 3usize..9,
+        ) {
             let ticks = linear(low, low + span, wanted);
             prop_assert!(!ticks.is_empty() && ticks.len() <= wanted + 2, "{:?}", ticks);
             for (value, _) in &ticks {

@@ -7,7 +7,7 @@ use super::error::SurveyError;
 pub struct FrameTimes {
     /// Seconds if a clock is known, else the frames' indices.
     pub times_s: Vec<f64>,
-    /// Whether the times are seconds.
+    /// True if the times are seconds.
     pub is_clock: bool,
 }
 

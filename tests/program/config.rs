@@ -179,7 +179,8 @@ fn every_result_has_a_record() {
         // Again, over it.
         (&format!("{simulate} --force"), "survey/run.toml", None),
         (
-            "converge --rotation-deg 1 --jitter independent --seeds 1 --frames 2 --size 32x24 --out D/sweep",
+            "converge --rotation-deg 1 --jitter independent --seeds 1 --frames 2 --size 32x24 \
+             --out D/sweep",
             "sweep/run.toml",
             None,
         ),

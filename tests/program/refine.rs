@@ -174,7 +174,8 @@ fn uneven_light_glints_and_moving_things_do_no_harm() {
 /// steeper than the wall.
 #[test]
 fn hard_light_does_no_harm_on_a_faint_wall() {
-    let light = "--frames 24 --wall concrete --gain-percent 30 --lamp-corner 0.4 --specular-percent 3 --seed 2";
+    let light = "--frames 24 --wall concrete --gain-percent 30 --lamp-corner 0.4 \
+                 --specular-percent 3 --seed 2";
     let dir = repaired(&light.split_whitespace().collect::<Vec<_>>());
     let out = dir.path().join("out");
     let px = believed_wall_px(&dir.path().join("survey"), &out);

@@ -309,13 +309,19 @@ fn it_looks_right_wide_and_narrow_light_and_dark() {
 /// A script that tells the page around what a user would see, and what happens when it is used.
 const PROBE: &str = r##"<script>
 const slider = document.querySelector(".wiper input");
-const after = () => parseFloat(getComputedStyle(document.querySelector(".wipe .after")).clipPath.split(" ").pop());
+const after = () => {
+  const style = getComputedStyle(document.querySelector(".wipe .after"));
+  return parseFloat(style.clipPath.split(" ").pop());
+};
 const before = after();
 slider.value = 90;
 slider.dispatchEvent(new Event("input"));
 const chart = document.querySelector("#trajectory .chart > svg");
 const box = chart.getBoundingClientRect();
-chart.dispatchEvent(new PointerEvent("pointermove", { clientX: box.left + 0.5 * box.width, clientY: box.top + 9 }));
+chart.dispatchEvent(new PointerEvent("pointermove", {
+  clientX: box.left + 0.5 * box.width,
+  clientY: box.top + 9,
+}));
 const root = document.documentElement;
 parent.postMessage(JSON.stringify({
   width: innerWidth,
@@ -324,9 +330,11 @@ parent.postMessage(JSON.stringify({
   pictures: document.images.length,
   broken: [...document.images].filter((image) => !image.naturalWidth).length,
   charts: document.querySelectorAll(".chart > svg").length,
-  flat: [...document.querySelectorAll(".chart > svg, .strip img, .pano img")].filter((e) => e.getBoundingClientRect().height < 40).length,
+  flat: [...document.querySelectorAll(".chart > svg, .strip img, .pano img")]
+    .filter((e) => e.getBoundingClientRect().height < 40).length,
   reading: chart.parentElement.querySelector("output").textContent,
-  tiny: [...document.querySelectorAll("p, td, th, .tick")].filter((e) => parseFloat(getComputedStyle(e).fontSize) < 10).length,
+  tiny: [...document.querySelectorAll("p, td, th, .tick")]
+    .filter((e) => parseFloat(getComputedStyle(e).fontSize) < 10).length,
   errors: window.errors,
 }), "*");
 </script></body>"##;

@@ -305,7 +305,8 @@ fn figures() {
             let best_view = psnr_db(&drawn, |d| d.best_view);
             let super_resolved = psnr_db(&drawn, |d| d.super_resolved);
             println!(
-                "{:<9} {noise_grey:>5} {frames:>6} {views:>5.1} {best_view:>7.2} dB {super_resolved:>12.2} dB {:>5.2} dB {:>6.1}",
+                "{:<9} {noise_grey:>5} {frames:>6} {views:>5.1} {best_view:>7.2} dB \
+                 {super_resolved:>12.2} dB {:>5.2} dB {:>6.1}",
                 format!("{wall:?}"),
                 super_resolved - best_view,
                 1e6 * seconds / drawn.len() as f64,

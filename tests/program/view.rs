@@ -60,7 +60,8 @@ impl Running {
     fn ask(&self, line: &str, headers: &str, body: &str) -> (u16, String) {
         let length = body.len();
         self.send(&format!(
-            "{line} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\nContent-Length: {length}\r\n{headers}\r\n{body}",
+            "{line} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\
+             Content-Length: {length}\r\n{headers}\r\n{body}",
             self.port
         ))
     }
@@ -88,8 +89,10 @@ const JSON: &str = "Content-Type: application/json\r\n";
 
 fn mark(id: &str) -> String {
     format!(
-        r#"{{"type":"Feature","id":"{id}","geometry":{{"type":"Point","coordinates":[1.5,2.0]}},"properties":{{"class":"BAB","severity":3,
-        "note":"","chainage_m":2.0,"clock":"4:30","theta_deg":135.0,"x_m":1.0,"y_m":2.0,"z_m":0.0,"layer":"truth","created":""}}}}"#
+        r#"{{"type":"Feature","id":"{id}",
+        "geometry":{{"type":"Point","coordinates":[1.5,2.0]}},
+        "properties":{{"class":"BAB","severity":3,"note":"","chainage_m":2.0,"clock":"4:30",
+        "theta_deg":135.0,"x_m":1.0,"y_m":2.0,"z_m":0.0,"layer":"truth","created":""}}}}"#
     )
 }
 

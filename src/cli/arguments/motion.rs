@@ -100,7 +100,7 @@ impl MotionArguments {
         self.table.as_ref()
     }
 
-    /// Whether any motion is given.
+    /// True if any motion is given.
     pub fn is_given(&self) -> bool {
         self.table.is_some() || self.advance_m.is_some() || self.advance_m_per_s.is_some()
     }

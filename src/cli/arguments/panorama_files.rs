@@ -133,7 +133,7 @@ impl OutputArguments {
         record::path_beside(&self.out)
     }
 
-    /// Whether maps are written.
+    /// True if maps are written.
     pub fn has_maps(&self) -> bool {
         self.maps.is_some()
     }

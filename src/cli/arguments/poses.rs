@@ -30,8 +30,7 @@ pub struct PoseReadingArguments {
     /// tunnel's frame (y along the axis) to the world.
     #[arg(long, value_name = "FILE")]
     tunnel_frame: Option<PathBuf>,
-    /// How poses are associated with frames [default: by name if the file has names, else by
-    /// order].
+    /// Association of poses with frames [default: by name if the file has names, else by order].
     #[arg(long, value_enum, value_name = "HOW")]
     associate: Option<AssociateArgument>,
     /// File with the times of the frames, one a line: `time`, `time name` or `name time`, in

@@ -26,7 +26,7 @@ pub struct PictureArguments {
     pub interpolation: InterpolationArgument,
 }
 
-/// How overlapping frames are combined.
+/// Combination of overlapping frames.
 #[derive(Debug, clap::Args)]
 pub struct BlendArguments {
     /// Which of the frames that see a point of the wall give its pixel.

@@ -38,7 +38,7 @@ impl ResumeArguments {
     /// interrupted or fails temporarily.
     ///
     /// # Errors
-    /// Those of the checkpoint and of `work`.
+    /// Errors of the checkpoint and of `work`.
     pub fn run<T>(
         &self,
         result: &Path,

@@ -23,7 +23,8 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  \
     tunnelstitch converge --out sweep\n      \
     the whole sweep: 5 rotation sigmas, both noise models, 20 seeds\n  \
-    tunnelstitch converge --rotation-deg 2,6 --seeds 3 --frames 12 --size 320x240 --out quick\n      \
+    tunnelstitch converge --rotation-deg 2,6 --seeds 3 --frames 12 --size 320x240 \
+    --out quick\n      \
     a quick test; call it again with --seeds 10 for 7 more runs of each cell\n  \
     tunnelstitch converge --rotation-deg 2,4,8 --translation-scale 0.5,1,2,4 \
     --jitter random-walk --out grid\n      \
@@ -31,7 +32,8 @@ use std::path::PathBuf;
     tunnelstitch converge --turn-deg 20,30,45 --wall brick,concrete,tiled-brick \
     --rotation-deg 4 --out walls\n      \
     overlap against texture\n  \
-    tunnelstitch converge --efficiency --wall brick,concrete --frames 60 --seeds 10 --out limit\n      \
+    tunnelstitch converge --efficiency --wall brick,concrete --frames 60 --seeds 10 \
+    --out limit\n      \
     efficiency against the Cramér–Rao bound, and consistency of the stated uncertainty")]
 pub struct ConvergeArguments {
     /// Compare the errors with the Cramér–Rao bound and with the stated covariances instead. The
@@ -81,10 +83,20 @@ pub struct ConvergeArguments {
     #[arg(long, value_enum, value_delimiter = ',', default_value = "brick")]
     wall: Vec<WallArgument>,
     /// Runs per cell: seeds 1 to N.
-    #[arg(long, value_name = "N", default_value_t = ConvergeOptions::default().seeds, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = ConvergeOptions::default().seeds,
+        value_parser = clap::value_parser!(u64).range(1..=1000)
+    )]
     seeds: u64,
     /// Number of frames of each survey.
-    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(2..))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 24,
+        value_parser = clap::value_parser!(u32).range(2..)
+    )]
     frames: u32,
     /// Width and height of the frames, pixels.
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = picture_size)]

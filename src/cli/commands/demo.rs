@@ -18,8 +18,8 @@ use std::time::Instant;
 /// Runs all steps: simulates a survey with pose errors, refines the poses, compares and reports.
 ///
 /// In the survey a rotating camera flies through a brick tunnel: ten turns of twelve frames; each
-/// step deviates from the plan by 2° and a few centimetres (1-σ). An earlier demo in the same folder
-/// is replaced.
+/// step deviates from the plan by 2° and a few centimetres (1-σ). An earlier demo in the same
+/// folder is replaced.
 #[derive(Debug, clap::Args)]
 #[command(
     after_help = "Examples:\n  tunnelstitch demo\n  tunnelstitch demo --turns 2 --out small-demo"
@@ -29,7 +29,12 @@ pub struct DemoArguments {
     #[arg(long, short, value_name = "DIR", default_value = "tunnelstitch-demo")]
     out: PathBuf,
     /// Number of turns of the camera, twelve frames each.
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 10,
+        value_parser = clap::value_parser!(u16).range(1..=1000)
+    )]
     turns: u16,
     /// Random seed of wall, jitter and noise.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -131,9 +136,9 @@ pub fn run(
          tunnelstitch report {survey_path} --refined {refined_path} --out {report_path}\n\n\
          {:.0} s in total. Results:\n  \
          {report_path}/report.html       all results on one page; report.json has its numbers\n  \
-         {compare_path}/before-after.png  extract of the panorama: initial poses above, refined below\n  \
-         {compare_path}/refined.png       the panorama; baseline.png and truth.png are beside it\n  \
-         {refined_path}/poses.tum         the refined trajectory; refine.json has its uncertainty",
+         {compare_path}/before-after.png  extract: initial poses above, refined below\n  \
+         {compare_path}/refined.png       the panorama; baseline.png and truth.png beside it\n  \
+         {refined_path}/poses.tum         the refined poses; refine.json has their uncertainty",
         since.elapsed().as_secs_f64()
     ));
     Ok(())

@@ -67,8 +67,8 @@ pub struct GyroArguments {
     sensor: SensorArguments,
     #[command(flatten)]
     motion: MotionArguments,
-    /// θ of the tunnel's bottom, degrees: takes the first angle from gravity while the sensor rests,
-    /// instead of from --start-angle-deg or the table.
+    /// θ of the tunnel's bottom, degrees: takes the first angle from gravity while the sensor
+    /// rests, instead of from --start-angle-deg or the table.
     #[arg(
         long,
         value_name = "DEG",

@@ -22,7 +22,13 @@ pub struct ProjectArguments {
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
     /// Vertical field of view of the photo, degrees.
-    #[arg(long, value_name = "DEG", default_value_t = 60.0, value_parser = field_of_view, conflicts_with_all = ["focal_px", "camera"])]
+    #[arg(
+        long,
+        value_name = "DEG",
+        default_value_t = 60.0,
+        value_parser = field_of_view,
+        conflicts_with_all = ["focal_px", "camera"]
+    )]
     fov_deg: f64,
     /// Focal length of the photo, pixels, instead of --fov-deg.
     #[arg(long, value_name = "F", value_parser = positive, conflicts_with = "camera")]

@@ -37,9 +37,10 @@ pub struct RefineArguments {
     /// its first: faster, slightly less accurate.
     #[arg(long)]
     fast: bool,
-    /// Solve once more for the poses jointly with the wall's texture at a third of a pixel. On walls
-    /// with sharp edges, as bricks, it removes about a third of the error and takes ten to twenty
-    /// times as long. A wall that is smooth over a pixel gains nothing and is refined without it.
+    /// Solve once more for the poses jointly with the wall's texture at a third of a pixel. On
+    /// walls with sharp edges, as bricks, it removes about a third of the error and takes ten to
+    /// twenty times as long. A wall that is smooth over a pixel gains nothing and is refined
+    /// without it.
     #[arg(long, conflicts_with = "fast")]
     joint: bool,
     /// Self-calibration: also estimate these parameters, separated by commas. The section calibrate

@@ -19,7 +19,8 @@ use std::path::{Path, PathBuf};
     draws refined, initial and true poses, and prints the address\n  \
     tunnelstitch view refined\n      \
     the same, from a folder of refine\n  \
-    tunnelstitch export my-survey --poses refined/poses.tum --web walk; tunnelstitch view walk\n      \
+    tunnelstitch export my-survey --poses refined/poses.tum --web walk; \
+    tunnelstitch view walk\n      \
     draws once, shows often; without the frames")]
 pub struct ViewArguments {
     /// Folder of the survey, or its survey.toml; or a folder that `refine` or `export --web` has

@@ -1,5 +1,5 @@
-//! Options of a command from all their sources, in this order: a flag on the command line, else a
-//! variable `TUNNELSTITCH_<COMMAND>_<OPTION>`, else `[options.<command>]` of `survey.toml`, else the
+//! Options of a command from all their sources, in this order: a flag on the command line, a
+//! variable `TUNNELSTITCH_<COMMAND>_<OPTION>`, `[options.<command>]` of `survey.toml`, the
 //! default.
 
 mod option;

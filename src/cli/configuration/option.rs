@@ -9,7 +9,7 @@ pub struct EffectiveOption {
     pub name: String,
     /// Its values; none if it is not set.
     pub values: Vec<String>,
-    /// Whether it is a flag without a value.
+    /// True if it is a flag without a value.
     pub is_switch: bool,
     /// Source of its value.
     pub source: OptionSource,
@@ -61,7 +61,7 @@ impl EffectiveOption {
     }
 }
 
-/// Whether a value of a switch in an environment variable means false, as clap reads it.
+/// True if a value of a switch in an environment variable means false, as clap reads it.
 fn is_false(value: &str) -> bool {
     matches!(value, "" | "false" | "0" | "no" | "n" | "f" | "off")
 }

@@ -125,7 +125,7 @@ fn effective_options(
 /// Lists the options of the command `name` for a survey, as if it were run without flags.
 ///
 /// # Errors
-/// As [`parse`].
+/// The errors of [`parse`].
 pub fn options_of_command(
     command: &Command,
     name: &str,

@@ -102,7 +102,7 @@ fn check_sections(file: &SurveyFile) -> Result<(), String> {
     }
 }
 
-/// Whether a flag or a variable sets the option.
+/// True if a flag or a variable sets the option.
 fn is_given(matches: &ArgMatches, arg: &clap::Arg) -> bool {
     matches!(
         matches.value_source(arg.get_id().as_str()),

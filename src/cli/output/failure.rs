@@ -19,8 +19,8 @@ use std::io::ErrorKind;
 
 /// An error as the user sees it: one text with the remedy, and an exit code.
 ///
-/// Exit codes: 0 success, 1 a bug in this program, 2 wrong usage, 3 bad input, 4 a quality gate that
-/// is not met, 75 a temporary failure such as a full disk.
+/// Exit codes: 0 success, 1 a bug in this program, 2 wrong usage, 3 bad input, 4 a quality gate
+/// that is not met, 75 a temporary failure such as a full disk.
 #[derive(Debug)]
 pub struct Failure {
     /// Text to print.
@@ -62,7 +62,7 @@ impl Failure {
         }
     }
 
-    /// Whether the same command may succeed later.
+    /// True if the same command may succeed later.
     pub fn is_temporary(&self) -> bool {
         self.code == 75
     }

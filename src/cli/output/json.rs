@@ -17,7 +17,7 @@ pub fn print(value: &impl Serialize) -> Result<(), Failure> {
 /// Prints a text that is JSON already.
 ///
 /// # Errors
-/// As [`print()`].
+/// The errors of [`print()`].
 pub fn print_text(text: &str) -> Result<(), Failure> {
     match std::io::stdout().write_all(text.as_bytes()) {
         // A closed pipe (`| head`) is not an error.

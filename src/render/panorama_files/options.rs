@@ -52,12 +52,12 @@ impl PanoramaFileOptions {
         bytes + Coverage::bytes(canvas)
     }
 
-    /// Whether the panorama is a GeoTIFF, which is written as it is drawn.
+    /// True if the panorama is a GeoTIFF, which is written as it is drawn.
     pub fn is_tiff(&self) -> bool {
         matches!(PictureFormat::of(&self.out), Ok(PictureFormat::Tiff))
     }
 
-    /// Whether the panorama is a JPEG file.
+    /// True if the panorama is a JPEG file.
     pub fn is_jpeg(&self) -> bool {
         matches!(PictureFormat::of(&self.out), Ok(PictureFormat::Jpeg { .. }))
     }

@@ -16,10 +16,13 @@ pub fn section(data: &PageData) -> Option<Markup> {
         .map(|(k, name)| (name.as_str(), CurveStyle::Ordered(k)))
         .collect();
     Some(html! {
-        p { "The global solves, from coarse to fine, each with a few damped Gauss–Newton steps over all frames. The cost is \
-            robust. It can be compared within a solve only, since each solve has its own samples of the wall. The cost after a \
-            last step is not computed, so a solve of one step has no curve. The last solve stopped: "
-            (refinement.stopped_because) "." }
+        p {
+            "The global solves, from coarse to fine, each with a few damped Gauss–Newton steps \
+             over all frames. The cost is robust. It can be compared within a solve only, since \
+             each solve has its own samples of the wall. The cost after a last step is not computed, so \
+             a solve of one step has no curve. The last solve stopped: "
+            (refinement.stopped_because) "."
+        }
         (legend(&entries, &[]))
         div.charts {
             @for (k, (level, name)) in levels.iter().zip(&names).enumerate() {
@@ -106,9 +109,13 @@ fn table(levels: &[LevelReport], names: &[String]) -> Markup {
             table.solves {
                 caption { "The global solves" }
                 thead { tr {
-                    th scope="col" { "Solve" } th.number scope="col" { "Steps" } th.number scope="col" { "Observations" }
+                    th scope="col" { "Solve" }
+                    th.number scope="col" { "Steps" }
+                    th.number scope="col" { "Observations" }
                     th.number scope="col" { "Cost: start" } th.number scope="col" { "end" }
-                    th.number scope="col" { "Last step (px)" } th.number scope="col" { "Noise (grey)" } th scope="col" { "Stopped by" }
+                    th.number scope="col" { "Last step (px)" }
+                    th.number scope="col" { "Noise (grey)" }
+                    th scope="col" { "Stopped by" }
                 } }
                 tbody {
                     @for (level, name) in levels.iter().zip(names) {

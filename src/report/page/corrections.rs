@@ -12,12 +12,18 @@ pub fn section(data: &PageData) -> Markup {
     let has_sigma = has_sigma(data);
     let elements = band_and_marks(data);
     html! {
-        p { "Difference between the initial and the refined pose of each frame"
-            @if has_sigma { ", with its 1-σ relative to the first frame from the covariance of all poses. The charts below \
-                show the 1-σ on a logarithmic scale" } "." }
+        p {
+            "Difference between the initial and the refined pose of each frame"
+            @if has_sigma {
+                ", with its 1-σ relative to the first frame from the covariance of all poses. The \
+                 charts below show the 1-σ on a logarithmic scale"
+            }
+            "."
+        }
         (legend(&[("correction", CurveStyle::Refined)], &elements))
         div.charts {
-            (corrected(data, "Rotation", "°", |f| f.correction_angle_deg, |f| f.sigma_rotation_deg.map(norm)))
+            (corrected(data, "Rotation", "°", |f| f.correction_angle_deg,
+                |f| f.sigma_rotation_deg.map(norm)))
             (corrected(data, "Translation", "mm", |f| 1e3 * f.correction_distance_m,
                 |f| f.sigma_translation_m.map(|sigma| 1e3 * norm(sigma))))
             (step(data))
@@ -26,11 +32,13 @@ pub fn section(data: &PageData) -> Markup {
             h3 { "1-σ of the refined poses" }
             p { "Relative to the first frame." }
             div.charts {
-                (sigma(data, "1-σ of the rotation about an axis", "°", |k| frames.get(k)?.sigma_rotation_deg.map(rms)))
+                (sigma(data, "1-σ of the rotation about an axis", "°",
+                    |k| frames.get(k)?.sigma_rotation_deg.map(rms)))
                 (sigma(data, "1-σ of the translation along an axis", "mm",
                     |k| frames.get(k)?.sigma_translation_m.map(|s| 1e3 * rms(s))))
                 @if let Some(refinement) = &data.report.refinement {
-                    (sigma(data, "1-σ on the wall", "px", |k| refinement.frames.get(k).map(|f| f.sigma.wall_px)))
+                    (sigma(data, "1-σ on the wall", "px",
+                        |k| refinement.frames.get(k).map(|f| f.sigma.wall_px)))
                 }
             }
         }

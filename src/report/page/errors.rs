@@ -13,7 +13,7 @@ pub fn section(data: &PageData) -> Option<Markup> {
     let [before, after] = [&comparison.baseline, &comparison.refined];
     let (initial, refined) = (before.trajectory.as_ref()?, after.trajectory.as_ref()?);
     let (wall_before, wall_after) = (before.wall.as_ref()?, after.wall.as_ref()?);
-    let chart = |title: &str, unit: &str, before: &[f64], after: &[f64], factor: f64| {
+    let chart = |title: &str, unit: &str, factor: f64, [before, after]: [&[f64]; 2]| {
         let curve = |name: &str, style: CurveStyle, values: &[f64]| {
             let points = data.points(|k| values.get(k).map(|v| factor * v));
             Series::new(name, style, points)
@@ -31,14 +31,23 @@ pub fn section(data: &PageData) -> Option<Markup> {
         }
         .draw()
     };
+    let curves = [
+        ("initial", CurveStyle::Initial),
+        ("refined", CurveStyle::Refined),
+    ];
+    let rotation_deg = [initial, refined].map(|error| &error.frame_rotation_deg[..]);
+    let translation_m = [initial, refined].map(|error| &error.frame_translation_m[..]);
+    let wall_px = [wall_before, wall_after].map(|error| &error.frame_rms_px[..]);
     Some(html! {
-        p { "Errors of each frame against the true poses, after alignment by the gauge of the tunnel (rotation about the axis \
-            and shift along it). The scale is logarithmic." }
-        (legend(&[("initial", CurveStyle::Initial), ("refined", CurveStyle::Refined)], &mark_entry(data)))
+        p {
+            "Errors of each frame against the true poses, after alignment by the gauge of the \
+             tunnel (rotation about the axis and shift along it). The scale is logarithmic."
+        }
+        (legend(&curves, &mark_entry(data)))
         div.charts {
-            (chart("Rotation error", "°", &initial.frame_rotation_deg, &refined.frame_rotation_deg, 1.0))
-            (chart("Translation error", "mm", &initial.frame_translation_m, &refined.frame_translation_m, 1e3))
-            (chart("Error on the wall, RMS of the frame", "px", &wall_before.frame_rms_px, &wall_after.frame_rms_px, 1.0))
+            (chart("Rotation error", "°", 1.0, rotation_deg))
+            (chart("Translation error", "mm", 1e3, translation_m))
+            (chart("Error on the wall, RMS of the frame", "px", 1.0, wall_px))
         }
         (table(data.report))
     })

@@ -20,13 +20,19 @@ pub fn section(data: &PageData) -> Option<Markup> {
         @if flagged.is_empty() {
             p { "None: all frames are photometric, so their poses rest on their pixels." }
         } @else {
-            p { "The poses of these " (count(flagged.len())) " frames rest on the prior or are ambiguous."
-                @if !others.is_empty() { " The first " (shown.len()) " are shown with their pictures." } }
+            p {
+                "The poses of these " (count(flagged.len()))
+                " frames rest on the prior or are ambiguous."
+                @if !others.is_empty() {
+                    " The first " (shown.len()) " are shown with their pictures."
+                }
+            }
             ol.frames {
                 @for thumbnail in shown {
                     @if let Some(frame) = frame(&thumbnail.frame) {
                         li {
-                            img src=(data.jpeg(&thumbnail.file)) width=(thumbnail.width) height=(thumbnail.height)
+                            img src=(data.jpeg(&thumbnail.file))
+                                width=(thumbnail.width) height=(thumbnail.height)
                                 alt=(format!("Frame {}", thumbnail.frame));
                             div {
                                 h3 { "Frame " (frame.index) " " (badge(frame.flag)) }
@@ -42,17 +48,29 @@ pub fn section(data: &PageData) -> Option<Markup> {
                 div.wide {
                     table {
                         caption { "Flagged frames without a picture" }
-                        thead { tr { th.number scope="col" { "Frame" } th scope="col" { "File" } th scope="col" { "Rests on" } th scope="col" { "Reason" } } }
+                        thead { tr {
+                            th.number scope="col" { "Frame" }
+                            th scope="col" { "File" }
+                            th scope="col" { "Flag" }
+                            th scope="col" { "Rejection reason" }
+                        } }
                         tbody {
                             @for frame in others.iter().take(MAX_LISTED_FRAMES).filter_map(frame) {
-                                tr { td.number { (frame.index) } td { (frame.file) } td { (badge(frame.flag)) }
-                                    td { (frame.reason.as_deref().unwrap_or("–")) } }
+                                tr {
+                                    td.number { (frame.index) }
+                                    td { (frame.file) }
+                                    td { (badge(frame.flag)) }
+                                    td { (frame.reason.as_deref().unwrap_or("–")) }
+                                }
                             }
                         }
                     }
                 }
                 @if others.len() > MAX_LISTED_FRAMES {
-                    p { "And " (count(others.len() - MAX_LISTED_FRAMES)) " more, all of them in " code { "report.json" } "." }
+                    p {
+                        "And " (count(others.len() - MAX_LISTED_FRAMES)) " more, all of them in "
+                        code { "report.json" } "."
+                    }
                 }
             }
         }

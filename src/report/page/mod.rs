@@ -1,7 +1,7 @@
 //! `report.html`: the report as one page that needs no other files.
 //!
-//! There is one file per section. A section formats a part of [`Report`](super::Report) and computes
-//! nothing else. Without scripts everything is visible; with scripts the panoramas lie over each
+//! There is one file per section. A section formats a part of [`Report`](super::Report). Without
+//! scripts everything is visible; with scripts the panoramas lie over each
 //! other and charts show the values at the pointer.
 
 mod convergence;

@@ -26,15 +26,24 @@ pub fn section(data: &PageData) -> Markup {
         ),
     };
     html! {
-        p { "The unrolled wall, seen from inside, drawn from the same frames with the initial (baseline) and the refined poses. " (orientation)
-            " Twelve o'clock is at θ\u{a0}=\u{a0}0. Resolution: " (short(strips.px_per_metre)) " pixels per metre." }
+        p {
+            "The unrolled wall, seen from inside, drawn from the same frames with the initial \
+             (baseline) and the refined poses. "
+            (orientation)
+            " Twelve o'clock is at θ\u{a0}=\u{a0}0. Resolution: " (short(strips.px_per_metre))
+            " pixels per metre."
+        }
         figure.(format!("pano wipe {direction}")) style=(aspect(&strips.refined)) {
             div.wiper {
                 span aria-hidden="true" { "baseline" }
-                input type="range" min="0" max="100" value="50" step="0.5" aria-label="Share of the picture that shows the baseline";
+                input type="range" min="0" max="100" value="50" step="0.5"
+                    aria-label="Share of the picture that shows the baseline";
                 span aria-hidden="true" { "refined" }
             }
-            (picture(data, &[("Baseline", "before", &strips.baseline), ("Refined", "after", &strips.refined)]))
+            (picture(data, &[
+                ("Baseline", "before", &strips.baseline),
+                ("Refined", "after", &strips.refined),
+            ]))
             figcaption { "Baseline above, refined poses below." }
         }
         @if let Some(truth) = &strips.truth {
@@ -102,7 +111,9 @@ fn picture(data: &PageData, layers: &[(&str, &str, &Vec<Strip>)]) -> Markup {
                 // Without scripts the layers lie below each other, each with its own ruler.
                 @for k in 0..layers.len() {
                     div.ruler.again[k > 0] {
-                        @for (share, text) in &side { span style=(format!("top:{share:.2}%")) { (text) } }
+                        @for (share, text) in &side {
+                            span style=(format!("top:{share:.2}%")) { (text) }
+                        }
                     }
                 }
             }
@@ -111,8 +122,10 @@ fn picture(data: &PageData, layers: &[(&str, &str, &Vec<Strip>)]) -> Markup {
                     @for (name, class, strips) in layers {
                         div.(format!("layer {class}")) {
                             @for (k, strip) in strips.iter().enumerate() {
-                                img src=(data.jpeg(&strip.file)) width=(strip.width) height=(strip.height)
-                                    style=(format!("width:{:.4}%", 100.0 * f64::from(strip.width) / width))
+                                @let percent = 100.0 * f64::from(strip.width) / width;
+                                img src=(data.jpeg(&strip.file))
+                                    width=(strip.width) height=(strip.height)
+                                    style=(format!("width:{percent:.4}%"))
                                     alt=(alt(name, k, strips.len(), [from_m, to_m]));
                             }
                             span.badge { (name) }
@@ -121,7 +134,9 @@ fn picture(data: &PageData, layers: &[(&str, &str, &Vec<Strip>)]) -> Markup {
                     div.divider aria-hidden="true" {}
                 }
                 div.below aria-hidden="true" {
-                    @for (share, text) in &below { span.(edge(*share)) style=(format!("left:{share:.2}%")) { (text) } }
+                    @for (share, text) in &below {
+                        span.(edge(*share)) style=(format!("left:{share:.2}%")) { (text) }
+                    }
                 }
             }
         }

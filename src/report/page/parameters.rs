@@ -2,6 +2,7 @@
 
 use super::page_data::PageData;
 use crate::report::quantity::{maybe, short};
+use crate::report::refined_files::{CalibratedUnknown, Calibration};
 use maud::{Markup, html};
 use serde_json::{Map, Value};
 
@@ -25,6 +26,8 @@ pub fn section(data: &PageData) -> Markup {
     flatten("", &report.survey.file, &mut survey);
     let mut camera = Vec::new();
     flatten("", &report.survey.camera, &mut camera);
+    let refinement = report.refinement.as_ref();
+    let calibration = refinement.and_then(|refinement| refinement.calibration.as_ref());
     html! {
         div.tables {
             (table("Survey (survey.toml)", &survey))
@@ -45,26 +48,53 @@ pub fn section(data: &PageData) -> Markup {
                 }
             }
         }
-        @if let Some(calibration) = report.refinement.as_ref().and_then(|r| r.calibration.as_ref()) {
-            div.wide {
-                table {
-                    caption { "Self-calibration" }
-                    thead { tr { th scope="col" { "Parameter" } th scope="col" { "Unit" } th.number scope="col" { "Given" }
-                        th.number scope="col" { "Estimate" } th.number scope="col" { "1-σ" } th.number scope="col" { "Prior 1-σ" }
-                        th scope="col" { "Observable" } } }
-                    tbody {
-                        @for unknown in &calibration.unknowns {
-                            tr {
-                                th scope="row" { (unknown.name) }
-                                td { (if unknown.unit == "1" { "" } else { unknown.unit.as_str() }) }
-                                td.number { (format!("{:.5}", unknown.initial)) }
-                                td.number { (format!("{:.5}", unknown.estimate)) }
-                                td.number { (maybe(unknown.sigma)) }
-                                td.number { (short(unknown.prior_sigma)) }
-                                td { @if unknown.observed { "yes" } @else { "no: " (unknown.reason.as_deref().unwrap_or("no reason is given")) } }
-                            }
-                        }
-                    }
+        @if let Some(calibration) = calibration { (calibration_table(calibration)) }
+    }
+}
+
+/// Table of the parameters of the self-calibration.
+fn calibration_table(calibration: &Calibration) -> Markup {
+    html! {
+        div.wide {
+            table {
+                caption { "Self-calibration" }
+                thead { tr {
+                    th scope="col" { "Parameter" }
+                    th scope="col" { "Unit" }
+                    th.number scope="col" { "Given" }
+                    th.number scope="col" { "Estimate" }
+                    th.number scope="col" { "1-σ" }
+                    th.number scope="col" { "Prior 1-σ" }
+                    th scope="col" { "Observable" }
+                } }
+                tbody {
+                    @for parameter in &calibration.unknowns { (calibration_row(parameter)) }
+                }
+            }
+        }
+    }
+}
+
+fn calibration_row(parameter: &CalibratedUnknown) -> Markup {
+    let unit = if parameter.unit == "1" {
+        ""
+    } else {
+        parameter.unit.as_str()
+    };
+    let reason = parameter.reason.as_deref();
+    html! {
+        tr {
+            th scope="row" { (parameter.name) }
+            td { (unit) }
+            td.number { (format!("{:.5}", parameter.initial)) }
+            td.number { (format!("{:.5}", parameter.estimate)) }
+            td.number { (maybe(parameter.sigma)) }
+            td.number { (short(parameter.prior_sigma)) }
+            td {
+                @if parameter.observed {
+                    "yes"
+                } @else {
+                    "no: " (reason.unwrap_or("no reason is given"))
                 }
             }
         }
@@ -74,7 +104,10 @@ pub fn section(data: &PageData) -> Markup {
 /// Draws the section of command lines.
 pub fn commands(data: &PageData) -> Markup {
     html! {
-        p { "The same input gives the same poses to the last bit, independent of the number of threads." }
+        p {
+            "The same input gives the same poses to the last bit, independent of the number of \
+             threads."
+        }
         pre tabindex="0" { code {
             @for line in &data.report.commands { (shell(line)) "\n" }
         } }

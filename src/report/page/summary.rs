@@ -1,7 +1,8 @@
 //! Headline and key figures of the result.
 
 use super::page_data::PageData;
-use crate::report::model::Report;
+use crate::evaluate::Scores;
+use crate::report::model::{Report, ResultSummary};
 use crate::report::quantity::{count, length_unit, maybe, short};
 use maud::{Markup, html};
 
@@ -42,45 +43,77 @@ fn headline(report: &Report) -> (&'static str, String) {
 /// Draws the key figures and the notes.
 pub fn section(data: &PageData) -> Markup {
     let report = data.report;
-    let (summary, comparison) = (&report.summary, &report.comparison);
-    let [before, after] = [&comparison.baseline, &comparison.refined];
-    let wall = before.wall.as_ref().zip(after.wall.as_ref());
-    let seam = |scores: &crate::evaluate::Scores| scores.seam.map(|seam| seam.rms_grey);
+    let summary = &report.summary;
     html! {
         section.summary aria-label="Summary" {
             dl.tiles {
                 @if let Some(flagged) = summary.flagged {
-                    (tile("Frames refined", &count(report.frames.len() - flagged), &format!("of {}", count(report.frames.len())),
-                        &match flagged { 0 => "none flagged".to_owned(), n => format!("{} flagged", count(n)) }))
+                    (frames_tile(report.frames.len(), flagged))
                 }
-                (tile("Typical correction", &format!("{}°", short(summary.correction_rotation_deg)), "",
-                    &format!("and {}; median of all frames", length(summary.correction_translation_m))))
-                @if let Some(sigma) = summary.sigma_wall_mm {
-                    (tile("1-σ on the wall", &length(1e-3 * sigma), "",
-                        &format!("{} px; median of refined frames", maybe(summary.sigma_wall_px))))
+                (correction_tile(summary))
+                @if let Some(sigma_mm) = summary.sigma_wall_mm {
+                    (sigma_tile(sigma_mm, summary.sigma_wall_px))
                 }
-                @if let Some((before, after)) = wall {
-                    @let (mm, px, of) = match (summary.error_wall_mm, summary.error_wall_px, summary.flagged) {
-                        (Some(mm), Some(px), Some(flagged)) if flagged > 0 =>
-                            (mm, px, format!(" of the refined frames; {} of all", length(1e-3 * after.mm.rms))),
-                        _ => (after.mm.rms, after.px.rms, String::new()),
-                    };
-                    (tile("Error on the wall", &length(1e-3 * mm), "",
-                        &format!("{} px RMS{of}; was {}", short(px), length(1e-3 * before.mm.rms))))
-                }
-                @if let (Some(from), Some(to)) = (seam(before), seam(after)) {
-                    (tile("Seam residual", &short(to), "grey",
-                        &match comparison.truth.as_ref().and_then(seam) {
-                            Some(best) => format!("was {}; true poses {}", short(from), short(best)),
-                            None => format!("was {}; difference of overlapping frames", short(from)),
-                        }))
-                }
+                @if let Some(tile) = error_tile(report) { (tile) }
+                @if let Some(tile) = seam_tile(report) { (tile) }
             }
             @for note in &report.notes {
                 p.note { (note) }
             }
         }
     }
+}
+
+fn frames_tile(frames: usize, flagged: usize) -> Markup {
+    let more = match flagged {
+        0 => "none flagged".to_owned(),
+        n => format!("{} flagged", count(n)),
+    };
+    let of = format!("of {}", count(frames));
+    tile("Frames refined", &count(frames - flagged), &of, &more)
+}
+
+fn correction_tile(summary: &ResultSummary) -> Markup {
+    let rotation = format!("{}°", short(summary.correction_rotation_deg));
+    let translation = length(summary.correction_translation_m);
+    let more = format!("and {translation}; median of all frames");
+    tile("Typical correction", &rotation, "", &more)
+}
+
+fn sigma_tile(sigma_mm: f64, sigma_px: Option<f64>) -> Markup {
+    let more = format!("{} px; median of refined frames", maybe(sigma_px));
+    tile("1-σ on the wall", &length(1e-3 * sigma_mm), "", &more)
+}
+
+/// Error of the refined poses on the wall; `None` without true poses.
+fn error_tile(report: &Report) -> Option<Markup> {
+    let (summary, comparison) = (&report.summary, &report.comparison);
+    let before = comparison.baseline.wall.as_ref()?;
+    let after = comparison.refined.wall.as_ref()?;
+    let of_refined_frames = summary.error_wall_mm.zip(summary.error_wall_px);
+    let (mm, px, of) = match (of_refined_frames, summary.flagged) {
+        (Some((mm, px)), Some(flagged)) if flagged > 0 => {
+            let all = length(1e-3 * after.mm.rms);
+            (mm, px, format!(" of the refined frames; {all} of all"))
+        }
+        _ => (after.mm.rms, after.px.rms, String::new()),
+    };
+    let initial = length(1e-3 * before.mm.rms);
+    let more = format!("{} px RMS{of}; initially {initial}", short(px));
+    Some(tile("Error on the wall", &length(1e-3 * mm), "", &more))
+}
+
+/// Seam residual before and after; `None` if no two frames overlap.
+fn seam_tile(report: &Report) -> Option<Markup> {
+    let comparison = &report.comparison;
+    let residual = |scores: &Scores| scores.seam.map(|seam| seam.rms_grey);
+    let before = short(residual(&comparison.baseline)?);
+    let after = short(residual(&comparison.refined)?);
+    let more = match comparison.truth.as_ref().and_then(residual) {
+        Some(truth) => format!("initially {before}; true poses {}", short(truth)),
+        None => format!("initially {before}; difference of overlapping frames"),
+    };
+    Some(tile("Seam residual", &after, "grey", &more))
 }
 
 /// A length with a suitable unit.

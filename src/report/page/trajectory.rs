@@ -8,7 +8,6 @@ use maud::{Markup, html};
 
 /// Draws the section.
 pub fn section(data: &PageData) -> Markup {
-    let frames = &data.report.frames;
     let known = data.report.survey.truth;
     let mut entries = vec![
         ("initial", CurveStyle::Initial),
@@ -19,30 +18,28 @@ pub fn section(data: &PageData) -> Markup {
     }
     let elements = band_and_marks(data);
     html! {
-        p { "Positions of the camera in the world frame: y is the tunnel's axis (the chainage), x and z are "
-            "perpendicular to it. For y and for the rotations about the camera's axes (x right, y down, z forward) "
-            "the chart shows the difference from the initial poses."
-            @if known { " The true poses are aligned with the refined ones by the gauge of the tunnel: a rotation \
-                about the axis and a shift along it, which the frames cannot determine." } }
+        p {
+            "Positions of the camera in the world frame: y is the tunnel's axis (the chainage), x \
+             and z are perpendicular to it. For y and for the rotations about the camera's axes (x \
+             right, y down, z forward) the chart shows the difference from the initial poses."
+            @if known {
+                " The true poses are aligned with the refined ones by the gauge of the tunnel: a \
+                 rotation about the axis and a shift along it, which the frames cannot determine."
+            }
+        }
         (legend(&entries, &elements))
         div.charts {
             (position(data, "Position x", 0, |_| 0.0))
             (position(data, "Position y, minus initial", 1, |f| f.initial_m[1]))
             (position(data, "Position z", 2, |_| 0.0))
             @for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                (chart(data, format!("Rotation about {name}, minus initial"), "°", 1.0,
-                    [
-                        Some(data.points(|_| Some(0.0))),
-                        Some(data.points(|k| frames.get(k).map(|f| f.correction_rotation_deg[axis]))),
-                        known.then(|| data.points(|k| frames.get(k)?.true_rotation_deg.map(|r| r[axis]))),
-                    ],
-                    &|f| f.sigma_rotation_deg.map(|sigma| sigma[axis])))
+                (rotation(data, format!("Rotation about {name}, minus initial"), axis))
             }
         }
     }
 }
 
-/// Whether the 1-σ of the poses are known.
+/// True if the 1-σ of the poses are known.
 pub fn has_sigma(data: &PageData) -> bool {
     let frames = &data.report.frames;
     frames
@@ -67,6 +64,20 @@ pub fn mark_entry(data: &PageData) -> Vec<ChartElement> {
 
 /// A position of a frame, if it is known, metres.
 type PositionOf<'p> = &'p dyn Fn(&FrameRow) -> Option<[f64; 3]>;
+
+/// Chart of the rotations about one axis of the camera, minus the initial ones.
+fn rotation(data: &PageData, title: String, axis: usize) -> Markup {
+    let frames = &data.report.frames;
+    let refined = |k: usize| Some(frames.get(k)?.correction_rotation_deg[axis]);
+    let truth = |k: usize| Some(frames.get(k)?.true_rotation_deg?[axis]);
+    let curves = [
+        Some(data.points(|_| Some(0.0))),
+        Some(data.points(refined)),
+        data.report.survey.truth.then(|| data.points(truth)),
+    ];
+    let sigma = |f: &FrameRow| f.sigma_rotation_deg.map(|sigma| sigma[axis]);
+    chart(data, title, "°", 1.0, curves, &sigma)
+}
 
 /// Chart of the positions along one axis, minus `offset_m`.
 fn position(data: &PageData, title: &str, axis: usize, offset_m: fn(&FrameRow) -> f64) -> Markup {

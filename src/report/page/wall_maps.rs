@@ -29,10 +29,13 @@ pub fn section(data: &PageData) -> Result<Markup, ReportError> {
         logarithmic: false,
     };
     Ok(html! {
-        p { "The wall in " (maps.around) " × " (maps.along)
-            " cells, chainage to the right, clock position upwards. The residual is the root mean square difference of two "
-            "frames at a point of the wall, in grey levels of 255. With correct poses it is the sensor noise and the change of "
-            "light; pose errors make it much larger." }
+        p {
+            "The wall in " (maps.around) " × " (maps.along)
+            " cells, chainage to the right, clock position upwards. The residual is the root mean \
+             square difference of two frames at a point of the wall, in grey levels of 255. With \
+             correct poses it is the sensor noise and the change of light; pose errors make it \
+             much larger."
+        }
         (strip("Residual, baseline", maps, &maps.baseline_grey, &residual)?)
         (strip("Residual, refined", maps, &maps.refined_grey, &residual)?)
         @if let Some(truth) = &maps.true_grey {
@@ -42,29 +45,75 @@ pub fn section(data: &PageData) -> Result<Markup, ReportError> {
         (strip("Overlap, refined", maps, &frames, &overlap)?)
         (scale_legend("number of frames that see the wall; blank: none", &overlap))
         @if let Some(refinement) = &data.report.refinement {
-            h3 { "Frame by frame" }
+            h3 { "Photometric fit of the frames" }
             p { "Frames that overlap others in the last solve." }
             (legend(&[("frame", CurveStyle::Refined)], &mark_entry(data)))
             div.charts {
-                @for (title, unit, value) in [
-                    ("Residual", "grey", (|f| f.residual) as fn(&FrameReport) -> f64),
-                    ("Outliers", "%", |f| 100.0 * (1.0 - f.inlier_share)),
-                    ("Samples of the wall", "thousands", |f| 1e-3 * f.points as f64),
-                    ("Gain", "", |f| f.gain),
-                    ("Bias", "grey", |f| f.bias),
-                ] {
-                    (Chart {
-                        title: title.to_owned(),
-                        unit: unit.to_owned(),
-                        along: data.axis(),
-                        vertical: match title { "Gain" | "Bias" => Vertical::Linear, _ => Vertical::FromZero },
-                        series: vec![Series::new("frame", CurveStyle::Refined, data.points(|k| refinement.frames.get(k).filter(|f| f.points > 0).map(value)))],
-                        marks: data.marks(),
-                    }.draw())
-                }
+                @for quantity in QUANTITIES { (frame_chart(data, &refinement.frames, quantity)) }
             }
         }
     })
+}
+
+/// A quantity of the photometric fit of a frame.
+struct FrameQuantity {
+    title: &'static str,
+    unit: &'static str,
+    vertical: Vertical,
+    value: fn(&FrameReport) -> f64,
+}
+
+/// Quantities that have a chart.
+const QUANTITIES: [FrameQuantity; 5] = [
+    FrameQuantity {
+        title: "Residual",
+        unit: "grey",
+        vertical: Vertical::FromZero,
+        value: |frame| frame.residual,
+    },
+    FrameQuantity {
+        title: "Outliers",
+        unit: "%",
+        vertical: Vertical::FromZero,
+        value: |frame| 100.0 * (1.0 - frame.inlier_share),
+    },
+    FrameQuantity {
+        title: "Samples of the wall",
+        unit: "thousands",
+        vertical: Vertical::FromZero,
+        value: |frame| 1e-3 * frame.points as f64,
+    },
+    FrameQuantity {
+        title: "Gain",
+        unit: "",
+        vertical: Vertical::Linear,
+        value: |frame| frame.gain,
+    },
+    FrameQuantity {
+        title: "Bias",
+        unit: "grey",
+        vertical: Vertical::Linear,
+        value: |frame| frame.bias,
+    },
+];
+
+/// Chart of a quantity over the frames that overlap others.
+fn frame_chart(data: &PageData, frames: &[FrameReport], quantity: FrameQuantity) -> Markup {
+    let has_samples = |frame: &&FrameReport| frame.points > 0;
+    let value = |k: usize| frames.get(k).filter(has_samples).map(quantity.value);
+    Chart {
+        title: quantity.title.to_owned(),
+        unit: quantity.unit.to_owned(),
+        along: data.axis(),
+        vertical: quantity.vertical,
+        series: vec![Series::new(
+            "frame",
+            CurveStyle::Refined,
+            data.points(value),
+        )],
+        marks: data.marks(),
+    }
+    .draw()
 }
 
 /// Scale from the 1st to the 99th percentile of the residuals.
@@ -106,16 +155,21 @@ fn strip(
     };
     Ok(html! {
         figure.strip {
-            figcaption { span { (title) } @if let Some(middle) = middle { span.reading { "median " (short(middle)) } } }
+            figcaption {
+                span { (title) }
+                @if let Some(middle) = middle { span.reading { "median " (short(middle)) } }
+            }
             div.side aria-hidden="true" {
                 @for (top, text) in [(0, "12"), (25, "9"), (50, "6"), (75, "3"), (100, "12")] {
                     span style=(format!("top:{top}%")) { (text) }
                 }
             }
-            img src=(data_uri("image/png", &png)) alt=(words) width=(maps.along) height=(maps.around);
+            img src=(data_uri("image/png", &png)) alt=(words)
+                width=(maps.along) height=(maps.around);
             div.below aria-hidden="true" {
                 @for (h_m, text) in ticks::linear(from_m, to_m, 6) {
-                    span style=(format!("left:{:.2}%", 100.0 * (h_m - from_m) / (to_m - from_m))) { (text) " m" }
+                    @let left = 100.0 * (h_m - from_m) / (to_m - from_m);
+                    span style=(format!("left:{left:.2}%")) { (text) " m" }
                 }
             }
         }
