@@ -1,5 +1,4 @@
-//! The report of a survey with a black frame: its numbers, its page, and how that looks in a
-//! browser.
+//! The report of a survey with a black frame: its numbers, its page, and the page in a browser.
 
 use crate::support::{
     self,
@@ -161,9 +160,9 @@ fn its_frames_are_those_of_the_poses_and_covariances() {
     }
 }
 
-/// The page is made of report.json and the pictures beside it, and of nothing else.
+/// The page can be made from report.json and the pictures beside it alone.
 #[test]
-fn the_page_says_what_the_numbers_say() {
+fn the_page_shows_the_numbers() {
     let work = work();
     let numbers = std::fs::read_to_string(work.report.join("report.json")).unwrap();
     let report: Report = serde_json::from_str(&numbers).unwrap();
@@ -306,7 +305,8 @@ fn it_looks_right_wide_and_narrow_light_and_dark() {
     }
 }
 
-/// A script that tells the page around what a user would see, and what happens when it is used.
+/// A script that reports the visible state of the page, and its reaction to the pointer, to the
+/// surrounding page.
 const PROBE: &str = r##"<script>
 const slider = document.querySelector(".wiper input");
 const after = () => {
