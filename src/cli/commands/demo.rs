@@ -4,7 +4,7 @@ use super::compare::write_comparison;
 use super::refine::{print_summary, refine_into};
 use super::report::report_into;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
-use crate::evaluate::compare_survey;
+use crate::evaluate::{Comparison, compare_survey};
 use crate::persist::atomic;
 use crate::refine::RefineOptions;
 use crate::render::{Interpolation, Layout};
@@ -44,6 +44,14 @@ pub struct DemoArguments {
     json: bool,
 }
 
+/// Folders of the demo's steps.
+struct DemoFolders {
+    survey: PathBuf,
+    refined: PathBuf,
+    compared: PathBuf,
+    report: PathBuf,
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -59,15 +67,15 @@ pub fn run(
             terminal.say(text);
         }
     };
-    let [survey_folder, refined_folder, compare_folder, report_folder] =
-        ["survey", "refined", "compare", "report"].map(|name| arguments.out.join(name));
-    let (survey_path, refined_path, compare_path, report_path) = (
-        survey_folder.display(),
-        refined_folder.display(),
-        compare_folder.display(),
-        report_folder.display(),
-    );
-
+    let folder = |name: &str| arguments.out.join(name);
+    let folders = DemoFolders {
+        survey: folder("survey"),
+        refined: folder("refined"),
+        compared: folder("compare"),
+        report: folder("report"),
+    };
+    let (survey_path, refined_path) = (folders.survey.display(), folders.refined.display());
+    let compare_path = folders.compared.display();
     let options = SimulateOptions {
         frames: 12 * usize::from(arguments.turns),
         seed: arguments.seed,
@@ -77,60 +85,29 @@ pub fn run(
         "tunnelstitch simulate free --turns {} --seed {} --out {survey_path}",
         arguments.turns, arguments.seed
     ));
-    simulate::run(&options, &survey_folder, true, terminal.as_ref())?;
+    simulate::run(&options, &folders.survey, true, terminal.as_ref())?;
 
     say(format!(
         "\ntunnelstitch refine {survey_path} --out {refined_path}"
     ));
-    let refine_options = RefineOptions::default();
-    let survey = Survey::open(&survey_folder)?;
-    let (refined, _) = refine_into(
-        &survey,
-        &refine_options,
-        &refined_folder,
-        record,
-        None,
-        terminal,
-    )?;
+    let survey = Survey::open(&folders.survey)?;
+    let options = RefineOptions::default();
+    let (refined, _) = refine_into(&survey, &options, &folders.refined, record, None, terminal)?;
     if !arguments.json {
         print_summary(&refined, terminal);
     }
 
-    let poses = refined_folder.join("poses.tum");
+    let poses = folders.refined.join("poses.tum");
     say(format!(
         "\ntunnelstitch compare {survey_path} --refined {} --out {compare_path}",
         poses.display()
     ));
-    let refined = RefinedFiles::read(&survey, &refined_folder)?;
-    atomic::create_folder(&compare_folder)?;
-    let (comparison, drawings) = compare_survey(
-        &survey,
-        &refined.poses,
-        None,
-        Interpolation::default(),
-        terminal.as_ref(),
-    )?;
-    let sources = Sources {
-        survey: &survey,
-        refined,
-        comparison: &comparison,
-        drawings: &drawings,
-        command: record.arguments.clone(),
-    };
-    report_into(sources, &report_folder, terminal)?;
-    let json = write_comparison(
-        &survey,
-        &poses,
-        Layout::default(),
-        &comparison,
-        drawings,
-        &compare_folder,
-        terminal,
-    )?;
+    let (comparison, json) = compare_and_report(&survey, &folders, record, terminal)?;
     record.write(&arguments.out.join(RUN_FILE), &[])?;
     if arguments.json {
         return json::print_text(&json);
     }
+    let report_path = folders.report.display();
     say(format!(
         "{comparison}\n\n\
          tunnelstitch report {survey_path} --refined {refined_path} --out {report_path}\n\n\
@@ -142,4 +119,42 @@ pub fn run(
         since.elapsed().as_secs_f64()
     ));
     Ok(())
+}
+
+/// Compares initial, refined and true poses and writes the report; returns the comparison and the
+/// text of compare.json.
+fn compare_and_report(
+    survey: &Survey,
+    folders: &DemoFolders,
+    record: &RunRecord,
+    terminal: &Terminal,
+) -> Result<(Comparison, String), Failure> {
+    let refined = RefinedFiles::read(survey, &folders.refined)?;
+    let poses = refined.path.clone();
+    atomic::create_folder(&folders.compared)?;
+    let (comparison, drawings) = compare_survey(
+        survey,
+        &refined.poses,
+        None,
+        Interpolation::default(),
+        terminal,
+    )?;
+    let sources = Sources {
+        survey,
+        refined,
+        comparison: &comparison,
+        drawings: &drawings,
+        command: record.arguments.clone(),
+    };
+    report_into(sources, &folders.report, terminal)?;
+    let json = write_comparison(
+        survey,
+        &poses,
+        Layout::default(),
+        &comparison,
+        drawings,
+        &folders.compared,
+        terminal,
+    )?;
+    Ok((comparison, json))
 }
