@@ -1,6 +1,6 @@
-//! How much wall frames share, by their initial poses.
+//! Overlap of the frames on the wall according to their initial poses.
 
-use super::median;
+use super::statistics::median_or_zero;
 use crate::surface::{Footprint, shortest_arc};
 use crate::survey::Survey;
 use crate::trajectory::Pose;
@@ -8,35 +8,36 @@ use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Frames whose overlap with all others is looked at.
-const ASKED: usize = 200;
-/// Columns and rows of pixels of a frame that are looked for in others.
-const PIXELS: [usize; 2] = [20, 15];
-/// Frames nearer than this in the sequence are neighbours, not another turn.
-const SAME_TURN: usize = 3;
+/// Largest number of frames whose overlap with other turns is measured.
+const MAX_MEASURED_FRAMES: usize = 200;
+/// Columns and rows of pixels of a frame that are projected into others.
+const GRID_PIXELS: [usize; 2] = [20, 15];
+/// Largest distance in the sequence between frames of one turn; others belong to another turn.
+const MAX_NEIGHBOUR_DISTANCE: usize = 3;
 
-/// What frames share and are compared by; medians over the frames. What the mask hides or the
-/// survey ignores is shared with none.
+/// Overlap of frames, medians over the frames. Pixels that the mask hides and ignored parts of the
+/// wall do not count.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[non_exhaustive]
 pub struct OverlapCheck {
-    /// Share of a frame that the next one shows, too.
+    /// Share of a frame that the next one also shows, 0–1.
     pub neighbours: f64,
-    /// The least of these.
+    /// Smallest overlap of neighbours, 0–1.
     pub least_neighbours: f64,
-    /// The frame after which it is.
+    /// First frame of the neighbours with the smallest overlap.
     pub least_after: usize,
-    /// Share of a frame that the best frame of another turn shows, too; 0 if no turn is closed.
+    /// Share of a frame that the best frame of another turn also shows, 0–1; 0 without loop
+    /// closure.
     pub turns: f64,
-    /// The shorter side of the box on the unrolled wall that neighbours share, masked or not,
-    /// metres.
+    /// Shorter side of the rectangle on the unrolled wall that neighbours share, masked parts
+    /// included, metres.
     pub neighbours_width_m: f64,
-    /// Frames that look along the tunnel's axis and could not be asked.
+    /// Number of frames that look along the tunnel's axis and are not measured.
     pub along_the_axis: usize,
 }
 
-/// Sides of the box that two footprints share, metres.
-fn shared(a: &Footprint, b: &Footprint, perimeter_m: f64) -> [f64; 2] {
+/// Sides of the rectangle that two footprints share, metres.
+fn shared_sides(a: &Footprint, b: &Footprint, perimeter_m: f64) -> [f64; 2] {
     let middle = |f: &Footprint| 0.5 * (f.s_min_m + f.s_max_m);
     let apart = shortest_arc(middle(b) - middle(a), perimeter_m);
     let width = |f: &Footprint| f.s_max_m - f.s_min_m;
@@ -46,17 +47,17 @@ fn shared(a: &Footprint, b: &Footprint, perimeter_m: f64) -> [f64; 2] {
     [s.max(0.0), h.max(0.0)]
 }
 
-/// Pixels of a frame, spread evenly, by which it is compared with others.
-struct Asked<'a> {
+/// Measures overlaps by a regular grid of pixels that are projected from frame to frame.
+struct OverlapMeter<'a> {
     survey: &'a Survey,
     poses: &'a [Pose],
     pixels: Vec<[f64; 2]>,
 }
 
-impl<'a> Asked<'a> {
-    fn of(survey: &'a Survey, poses: &'a [Pose]) -> Self {
+impl<'a> OverlapMeter<'a> {
+    fn new(survey: &'a Survey, poses: &'a [Pose]) -> Self {
         let camera = &survey.camera;
-        let [columns, rows] = PIXELS;
+        let [columns, rows] = GRID_PIXELS;
         let middle =
             |k: usize, of: usize, px: u32| (k as f64 + 0.5) / of as f64 * f64::from(px) - 0.5;
         let pixel = |k: usize| {
@@ -68,13 +69,13 @@ impl<'a> Asked<'a> {
             survey,
             poses,
             pixels: pixels
-                .filter(|pixel| shows(survey, &Vector2::from(*pixel)))
+                .filter(|pixel| shows_wall(survey, &Vector2::from(*pixel)))
                 .collect(),
         }
     }
 
-    /// Where they meet wall that is not ignored, world coordinates, metres.
-    fn points(&self, frame: usize) -> Vec<Vector3<f64>> {
+    /// Wall points of a frame's pixels that are not ignored, world coordinates, metres.
+    fn wall_points(&self, frame: usize) -> Vec<Vector3<f64>> {
         let (survey, pose) = (self.survey, &self.poses[frame]);
         let hits = self.pixels.iter().filter_map(|[u, v]| {
             let ray = pose.r_wc * survey.camera.ray(*u, *v)?;
@@ -84,26 +85,27 @@ impl<'a> Asked<'a> {
         hits.collect()
     }
 
-    /// Share of a frame that these points are, which it shows, and which another shows, too.
-    fn share(&self, points: &[Vector3<f64>], other: usize) -> f64 {
-        let sees = |x_w: &&Vector3<f64>| {
+    /// Share of a frame's pixels whose wall points the frame `other` also shows.
+    fn shared_share(&self, points: &[Vector3<f64>], other: usize) -> f64 {
+        let is_shown = |x_w: &&Vector3<f64>| {
             let x_c = self.poses[other].to_camera(x_w);
             let pixel = self.survey.camera.project(&x_c);
-            pixel.is_some_and(|pixel| shows(self.survey, &pixel))
+            pixel.is_some_and(|pixel| shows_wall(self.survey, &pixel))
         };
-        points.iter().filter(sees).count() as f64 / (PIXELS[0] * PIXELS[1]) as f64
+        points.iter().filter(is_shown).count() as f64 / (GRID_PIXELS[0] * GRID_PIXELS[1]) as f64
     }
 }
 
-/// Whether a pixel of a frame shows wall.
-fn shows(survey: &Survey, pixel: &Vector2<f64>) -> bool {
+/// True if the lens covers a pixel and the mask does not hide it.
+fn shows_wall(survey: &Survey, pixel: &Vector2<f64>) -> bool {
     let mask = survey.frames.mask();
     survey.camera.is_in_image(pixel, 0.0)
         && mask.is_none_or(|mask| mask.is_clear(pixel.x as f32, pixel.y as f32, 0.0))
 }
 
 impl OverlapCheck {
-    /// Asks neighbours, and up to [`ASKED`] frames for others that see the same wall.
+    /// Measures the overlap of all neighbours, and of up to [`MAX_MEASURED_FRAMES`] frames with
+    /// other turns.
     pub(super) fn of(survey: &Survey, poses: &[Pose]) -> Self {
         let surface = survey.surface.as_ref();
         let perimeter_m = surface.perimeter_m();
@@ -111,33 +113,34 @@ impl OverlapCheck {
             .iter()
             .map(|pose| Footprint::trace(surface, &survey.camera, pose).ok())
             .collect();
-        let asked = Asked::of(survey, poses);
+        let meter = OverlapMeter::new(survey, poses);
         let sides = |a: usize, b: usize| {
             let (a, b) = (footprints[a].as_ref()?, footprints[b].as_ref()?);
-            Some(shared(a, b, perimeter_m))
+            Some(shared_sides(a, b, perimeter_m))
         };
         let meet = |a: usize, b: usize| sides(a, b).is_some_and(|[s, h]| s > 0.0 && h > 0.0);
         let shares: Vec<f64> = (1..poses.len())
             .into_par_iter()
-            .map(|k| asked.share(&asked.points(k - 1), k))
+            .map(|k| meter.shared_share(&meter.wall_points(k - 1), k))
             .collect();
         let least = shares.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
-        let step = poses.len().div_ceil(ASKED).max(1);
+        let step = poses.len().div_ceil(MAX_MEASURED_FRAMES).max(1);
         let others = |k: usize| {
-            let others = (0..poses.len()).filter(|other| other.abs_diff(k) > SAME_TURN);
-            let points = asked.points(k);
+            let others =
+                (0..poses.len()).filter(|other| other.abs_diff(k) > MAX_NEIGHBOUR_DISTANCE);
+            let points = meter.wall_points(k);
             let shares = others
                 .filter(|other| meet(k, *other))
-                .map(|other| asked.share(&points, other));
+                .map(|other| meter.shared_share(&points, other));
             shares.fold(0.0, f64::max)
         };
         let widths = (1..poses.len()).filter_map(|k| sides(k - 1, k));
         Self {
-            neighbours: median(shares.iter().copied()),
+            neighbours: median_or_zero(shares.iter().copied()),
             least_neighbours: least.map_or(0.0, |(_, share)| *share),
             least_after: least.map_or(0, |(k, _)| k),
-            turns: median((0..poses.len()).step_by(step).map(others)),
-            neighbours_width_m: median(widths.map(|[s, h]| s.min(h))),
+            turns: median_or_zero((0..poses.len()).step_by(step).map(others)),
+            neighbours_width_m: median_or_zero(widths.map(|[s, h]| s.min(h))),
             along_the_axis: footprints.iter().filter(|f| f.is_none()).count(),
         }
     }

@@ -1,57 +1,57 @@
-//! What the pictures are like.
+//! Exposure, noise and texture of a dozen frames.
 
-use super::median;
+use super::statistics::median_or_zero;
 use crate::frames::{FrameFile, GreyImage, StoredFrame, noise_sigma};
 use crate::survey::Survey;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Frames that are decoded.
-const DECODED: usize = 12;
-/// Variance of the difference of neighbours in a half-size picture over that of a pixel's noise:
-/// halving filters with `[1 3 3 1]/8` along each axis, so that along one axis the variance is
-/// `20/64`, and `6/64` of it is shared by neighbours.
-const HALVED_NOISE: f64 = 2.0 * (20.0 - 6.0) * 20.0 / (64.0 * 64.0);
-/// Faults that are listed.
-const LISTED: usize = 5;
+/// Largest number of frames that are decoded.
+const MAX_DECODED_FRAMES: usize = 12;
+/// Variance of the difference of neighbours in a half-size image, relative to the noise variance of
+/// a pixel. Halving filters with `[1 3 3 1]/8` along each axis: along one axis the variance is
+/// `20/64`, and the covariance of neighbours `6/64`.
+const HALVED_NOISE_FACTOR: f64 = 2.0 * (20.0 - 6.0) * 20.0 / (64.0 * 64.0);
+/// Largest number of faults that are listed.
+const MAX_LISTED_FAULTS: usize = 5;
 
-/// Medians over a dozen frames.
+/// Exposure, noise and texture, medians over a dozen frames.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 #[non_exhaustive]
 pub struct PictureCheck {
-    /// How many were decoded.
+    /// Number of decoded frames.
     pub decoded: usize,
-    /// Mean grey level of 255.
+    /// Mean grey level, 0–255.
     pub grey: f64,
-    /// Share of pixels that are full white or black, of those that the mask does not hide.
+    /// Share of saturated pixels (black or white) among those that the mask does not hide, 0–1.
     pub clipped: f64,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise_grey: f64,
-    /// Texture: RMS slope at half size without the noise's part, grey levels per pixel of full
-    /// size.
+    /// Texture: RMS gradient at half size without the contribution of the noise, grey levels per
+    /// full-size pixel.
     pub slope_grey_per_px: f64,
-    /// 1-σ to which all pixels of one frame can place it on a wall that is known: `σ/(slope √n)`,
-    /// pixels. What can be reached is a few times that.
+    /// 1-σ of a frame's registration against a known wall by all of its `n` pixels:
+    /// `σ/(gradient √n)`, pixels. The refinement reaches a few times that.
     pub sigma_px: f64,
 }
 
 impl PictureCheck {
-    /// Decodes a dozen frames and measures all others by their headers; faults beside it.
+    /// Decodes a dozen frames and reads the headers of all; also returns the faults.
     pub(super) fn of(survey: &Survey) -> (Self, Vec<String>) {
         let (width, height) = (survey.camera.width, survey.camera.height);
         let mut faults: Vec<String> = survey
             .frames
             .par_iter()
-            .filter_map(|file| fault(file, [width, height]))
+            .filter_map(|file| header_fault(file, [width, height]))
             .collect();
-        if faults.len() > LISTED {
-            let more = faults.len() - LISTED;
-            faults.truncate(LISTED);
-            faults.push(format!("and {more} frames more are like that"));
+        if faults.len() > MAX_LISTED_FAULTS {
+            let more = faults.len() - MAX_LISTED_FAULTS;
+            faults.truncate(MAX_LISTED_FAULTS);
+            faults.push(format!("and {more} more frames have such faults"));
         }
-        let step = survey.frames.len().div_ceil(DECODED).max(1);
-        let asked: Vec<&FrameFile> = survey.frames.iter().step_by(step).collect();
-        let decoded: Vec<Result<GreyImage, String>> = asked
+        let step = survey.frames.len().div_ceil(MAX_DECODED_FRAMES).max(1);
+        let sampled: Vec<&FrameFile> = survey.frames.iter().step_by(step).collect();
+        let decoded: Vec<Result<GreyImage, String>> = sampled
             .par_iter()
             .map(|file| match StoredFrame::decode(file, width, height) {
                 Ok(frame) => {
@@ -76,7 +76,7 @@ impl PictureCheck {
                 Err(_) => {}
             }
         }
-        let of = |value: fn(&Self) -> f64| median(pictures.iter().map(value));
+        let of = |value: fn(&Self) -> f64| median_or_zero(pictures.iter().map(value));
         let check = Self {
             decoded: pictures.len(),
             grey: of(|p| p.grey),
@@ -89,8 +89,8 @@ impl PictureCheck {
     }
 }
 
-/// What the header of a frame's file says is wrong with it.
-fn fault(file: &FrameFile, size: [u32; 2]) -> Option<String> {
+/// Fault of a frame that its file's header shows.
+fn header_fault(file: &FrameFile, size: [u32; 2]) -> Option<String> {
     let name = format!("frame {} ({})", file.index, file.path.display());
     match file.size() {
         Err(error) => Some(error.to_string()),
@@ -102,7 +102,7 @@ fn fault(file: &FrameFile, size: [u32; 2]) -> Option<String> {
     }
 }
 
-/// Measures a picture of whose pixels a share is `hidden`, and has no value therefore.
+/// Measures an image; the mask hides a share `hidden` of its pixels, whose values are NaN.
 fn measure(picture: &GreyImage, hidden: f64) -> PictureCheck {
     let pixels = ((1.0 - hidden) * picture.data().len() as f64).max(1.0);
     let (mut sum, mut known) = (0.0, 0.0);
@@ -111,7 +111,7 @@ fn measure(picture: &GreyImage, hidden: f64) -> PictureCheck {
         known += 1.0;
     }
     let noise_grey = noise_sigma(picture).unwrap_or(0.0);
-    let noise_slope = HALVED_NOISE * noise_grey.powi(2);
+    let noise_slope = HALVED_NOISE_FACTOR * noise_grey.powi(2);
     let half = picture.halved();
     let (mut squares, mut count) = (0.0, 0.0);
     for y in 0..half.height().saturating_sub(1) {

@@ -2,6 +2,7 @@
 
 use crate::persist::atomic::WriteError;
 use crate::raster::RasterError;
+use crate::render::RenderError;
 use std::path::PathBuf;
 
 /// Why a tunnel cannot be exported or shown.
@@ -58,4 +59,15 @@ pub enum InspectError {
     /// What the system said.
     #[error(transparent)]
     Write(#[from] WriteError),
+    /// The panorama of the textures cannot be drawn.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// A file of the page has no JSON, which is a bug.
+    #[error("cannot make JSON of {name}: {source}")]
+    Json {
+        /// Name of the file.
+        name: &'static str,
+        /// Error of the encoder.
+        source: serde_json::Error,
+    },
 }

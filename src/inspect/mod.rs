@@ -30,7 +30,9 @@
 
 mod cut;
 mod error;
+mod export;
 mod glb;
+mod layers;
 mod manifest;
 mod marks;
 mod mesh;
@@ -42,6 +44,8 @@ mod tileset;
 mod viewer;
 
 pub use error::InspectError;
+pub use export::{ExportFiles, export_page, export_wall};
+pub use layers::{PosedLayer, TextureOptions, draw_layers, place_originals};
 pub use manifest::{Layer, MANIFEST, Manifest, MapPlace, WALL, WallPoints};
 pub use marks::{Geometry, MARKS_CSV, MARKS_GEOJSON, Mark, Marks, Properties};
 pub use mesh::{Lines, Mesh, Patch};

@@ -1,6 +1,7 @@
 //! Errors of drawing a panorama.
 
 use crate::frames::FrameError;
+use crate::persist::checkpoint::CheckpointError;
 use crate::raster::RasterError;
 use crate::surface::SurfaceError;
 
@@ -84,4 +85,7 @@ pub enum RenderError {
     /// A frame's file.
     #[error(transparent)]
     Frames(#[from] FrameError),
+    /// The checkpoint of an interrupted run.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
 }

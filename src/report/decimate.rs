@@ -1,8 +1,8 @@
-//! Fewer points that look the same.
+//! Decimation of curves without visible change.
 
-/// The points of a curve that are seen when it is drawn in `columns` pixel columns over
-/// `[low, high]`: of each column the first, the lowest, the highest and the last, in their order.
-/// Points must be in the order of the curve; those that are no numbers are dropped.
+/// Decimates a curve that is drawn in `columns` pixel columns over `[low, high]`: keeps the first,
+/// the lowest, the highest and the last point of each column in their order. Points must be in the
+/// order of the curve; points with NaN or infinity are dropped.
 pub fn decimate(points: &[[f64; 2]], [low, high]: [f64; 2], columns: usize) -> Vec<[f64; 2]> {
     let finite = |point: &&[f64; 2]| point[0].is_finite() && point[1].is_finite();
     let points: Vec<[f64; 2]> = points.iter().filter(finite).copied().collect();

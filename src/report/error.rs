@@ -1,4 +1,4 @@
-//! What can be wrong with what a report is made of.
+//! Errors of a report's sources.
 
 use crate::frames::FrameError;
 use crate::refine::CovarianceError;
@@ -6,11 +6,11 @@ use crate::render::RenderError;
 use crate::survey::SurveyError;
 use std::path::PathBuf;
 
-/// Why there is no report.
+/// Error of a report.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
-    /// Nothing that refine has written lies there.
+    /// The folder has no refined poses.
     #[error(
         "{}: holds no poses.tum; --refined is the folder that refine has written, or a TUM file",
         path.display()
@@ -24,11 +24,14 @@ pub enum ReportError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// `refine.json` is not what this version writes.
-    #[error("{}:{line}:{column}: {what}; refine the survey again with this version", path.display())]
+    /// `refine.json` is malformed, or of another version.
+    #[error(
+        "{}:{line}:{column}: {what}; refine the survey again with this version",
+        path.display()
+    )]
     Parse {
         /// The file.
         path: PathBuf,
@@ -36,12 +39,13 @@ pub enum ReportError {
         line: usize,
         /// 1-based column.
         column: usize,
-        /// What the parser said.
+        /// Error of the parser.
         what: String,
     },
     /// `refine.json` is of another survey.
     #[error(
-        "{}: is of {found} frames, but the survey has {frames}; give the folder that refine has written for this survey",
+        "{}: has {found} frames, but the survey has {frames}; give the folder that refine has \
+         written for this survey",
         path.display()
     )]
     Count {
@@ -57,7 +61,7 @@ pub enum ReportError {
     Encode {
         /// Its name.
         name: String,
-        /// What the encoder said.
+        /// Error of the encoder.
         source: image::ImageError,
     },
     /// The survey or its poses.
@@ -69,7 +73,7 @@ pub enum ReportError {
     /// Frames.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// Where the frames lie on the wall.
+    /// Placement of the frames on the wall.
     #[error(transparent)]
     Render(#[from] RenderError),
 }

@@ -1,9 +1,11 @@
-//! From the sources to the numbers of the report.
+//! Computes the numbers of the report from its sources.
 
-use super::ReportError;
-use super::model::{Abscissa, FrameRow, Report, SCHEMA_VERSION, SurveyFacts, Verdict, WallMaps};
+use super::error::ReportError;
+use super::model::{
+    Abscissa, FrameRow, Report, ResultSummary, SCHEMA_VERSION, SurveyFacts, WallMaps,
+};
 use super::pictures::{Pictures, panoramas, thumbnails};
-use super::refined::{RefinedFiles, Refinement};
+use super::refined_files::{RefinedFiles, Refinement};
 use crate::PROGRAM;
 use crate::evaluate::{Comparison, Drawings, SeamMap, WallError};
 use crate::numerics::median::upper_median;
@@ -15,22 +17,22 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use std::path::Path;
 
-/// What a report is made of.
+/// Sources of a report.
 #[derive(Debug)]
 pub struct Sources<'a> {
     /// The survey.
     pub survey: &'a Survey,
     /// Its refined poses.
     pub refined: RefinedFiles,
-    /// Initial against refined poses.
+    /// Comparison of initial and refined poses.
     pub comparison: &'a Comparison,
     /// The panoramas of the comparison.
     pub drawings: &'a Drawings,
-    /// The command line that makes the report.
+    /// Command line of the report.
     pub command: Vec<String>,
 }
 
-/// The report and its pictures.
+/// Computes the report and its pictures.
 ///
 /// # Errors
 /// A flagged frame that cannot be read; a picture that cannot be encoded.
@@ -60,7 +62,7 @@ pub fn gather(sources: Sources) -> Result<(Report, Pictures), ReportError> {
         program: PROGRAM.to_owned(),
         commands,
         survey: survey_facts(survey, &refined.path),
-        verdict: verdict(&frames, refined.refinement.as_ref(), comparison),
+        summary: summarise(&frames, refined.refinement.as_ref(), comparison),
         abscissa: abscissa(&frames),
         frames,
         notes: notes(survey, &refined, comparison),
@@ -73,7 +75,7 @@ pub fn gather(sources: Sources) -> Result<(Report, Pictures), ReportError> {
     Ok((report, pictures))
 }
 
-/// The frames whose poses do not rest on their pixels.
+/// Indices of frames that are not photometric.
 fn flagged(refinement: &Refinement) -> impl Iterator<Item = usize> {
     let frames = refinement.frames.iter().enumerate();
     frames
@@ -107,6 +109,7 @@ fn object(value: &impl Serialize) -> Map<String, Value> {
     }
 }
 
+/// Lists the poses of every frame.
 fn frame_rows(survey: &Survey, refined: &RefinedFiles) -> Vec<FrameRow> {
     let truth = survey.truth.as_deref().map(|truth| {
         let truth = poses_of(truth);
@@ -116,9 +119,9 @@ fn frame_rows(survey: &Survey, refined: &RefinedFiles) -> Vec<FrameRow> {
     let rows = survey.frames.iter().zip(&survey.initial).enumerate();
     rows.zip(&refined.poses)
         .map(|((k, (file, initial)), pose)| {
-            let planned = &initial.pose;
+            let initial_pose = &initial.pose;
             let truth = truth.as_ref().and_then(|truth| truth.get(k));
-            let correction = rotation_deg(planned, pose);
+            let correction = rotation_deg(initial_pose, pose);
             let covariance = refined.covariances.as_ref().and_then(|all| all.get(k));
             let sigma = |first: usize| -> Option<[f64; 3]> {
                 let sigma = [0, 1, 2]
@@ -132,13 +135,13 @@ fn frame_rows(survey: &Survey, refined: &RefinedFiles) -> Vec<FrameRow> {
                 index: k,
                 file: file.name(),
                 time_s: initial.time_s,
-                planned_m: planned.t_wc.into(),
+                initial_m: initial_pose.t_wc.into(),
                 refined_m: pose.t_wc.into(),
                 true_m: truth.map(|pose| pose.t_wc.into()),
                 correction_rotation_deg: correction.into(),
-                true_rotation_deg: truth.map(|pose| rotation_deg(planned, pose).into()),
+                true_rotation_deg: truth.map(|pose| rotation_deg(initial_pose, pose).into()),
                 correction_angle_deg: correction.norm(),
-                correction_distance_m: (pose.t_wc - planned.t_wc).norm(),
+                correction_distance_m: (pose.t_wc - initial_pose.t_wc).norm(),
                 sigma_rotation_deg: sigma(0).map(|sigma| sigma.map(f64::to_degrees)),
                 sigma_translation_m: sigma(3),
             }
@@ -146,11 +149,12 @@ fn frame_rows(survey: &Survey, refined: &RefinedFiles) -> Vec<FrameRow> {
         .collect()
 }
 
-/// The rotation vector from one pose to another, about the camera's axes, degrees.
+/// Rotation vector between two poses, about the camera's axes, degrees.
 fn rotation_deg(from: &Pose, to: &Pose) -> Vector3<f64> {
     from.local(to).fixed_rows::<3>(0).map(f64::to_degrees)
 }
 
+/// Chooses the chainage if it is monotonic, else the frame's index.
 fn abscissa(frames: &[FrameRow]) -> Abscissa {
     let chainages: Vec<f64> = frames.iter().map(|frame| frame.refined_m[1]).collect();
     let ahead = chainages.windows(2).all(|pair| pair[0] <= pair[1]);
@@ -163,21 +167,22 @@ fn abscissa(frames: &[FrameRow]) -> Abscissa {
     }
 }
 
-fn verdict(
+/// Computes the key figures.
+fn summarise(
     frames: &[FrameRow],
     refinement: Option<&Refinement>,
     comparison: &Comparison,
-) -> Verdict {
+) -> ResultSummary {
     let sigma = |pick: fn(&crate::refine::FrameSigma) -> f64| {
         let frames = refinement?.frames.iter();
-        let sure = frames.filter(|frame| frame.flag == FrameFlag::Photometric);
-        upper_median(sure.map(|frame| pick(&frame.sigma)).collect())
+        let photometric = frames.filter(|frame| frame.flag == FrameFlag::Photometric);
+        upper_median(photometric.map(|frame| pick(&frame.sigma)).collect())
     };
     let wall = comparison.refined.wall.as_ref();
     let error = |pick: fn(&WallError) -> &[f64]| {
         let of_frames = refinement?.frames.iter().zip(pick(wall?));
-        let sure = of_frames.filter(|(frame, _)| frame.flag == FrameFlag::Photometric);
-        let squares: Vec<f64> = sure.map(|(_, rms)| rms * rms).collect();
+        let photometric = of_frames.filter(|(frame, _)| frame.flag == FrameFlag::Photometric);
+        let squares: Vec<f64> = photometric.map(|(_, rms)| rms * rms).collect();
         let mean = squares.iter().sum::<f64>() / squares.len() as f64;
         (!squares.is_empty()).then(|| mean.sqrt())
     };
@@ -185,8 +190,8 @@ fn verdict(
     let of_frames = |pick: fn(&FrameRow) -> f64| {
         upper_median(frames.iter().map(pick).collect()).unwrap_or_default()
     };
-    Verdict {
-        repaired: flagged.map(|flagged| frames.len() - flagged),
+    ResultSummary {
+        photometric: flagged.map(|flagged| frames.len() - flagged),
         flagged,
         correction_rotation_deg: of_frames(|frame| frame.correction_angle_deg),
         correction_translation_m: of_frames(|frame| frame.correction_distance_m),
@@ -197,12 +202,13 @@ fn verdict(
     }
 }
 
+/// Rounds the maps of the comparison.
 fn wall_maps(drawings: &Drawings) -> WallMaps {
     let map = &drawings.refined.seams;
     let residual = |map: &SeamMap| -> Vec<Option<f64>> {
         map.rms_grey()
             .iter()
-            .map(|value| value.map(cents))
+            .map(|value| value.map(rounded))
             .collect()
     };
     let [around, along] = map.size();
@@ -213,22 +219,23 @@ fn wall_maps(drawings: &Drawings) -> WallMaps {
         baseline_grey: residual(&drawings.baseline.seams),
         refined_grey: residual(map),
         true_grey: drawings.truth.as_ref().map(|truth| residual(&truth.seams)),
-        refined_frames: map.frames().into_iter().map(cents).collect(),
+        refined_frames: map.frames().into_iter().map(rounded).collect(),
     }
 }
 
-/// Maps are for the eye: two digits after the point.
-fn cents(value: f64) -> f64 {
+/// Rounds to two decimals, which are enough for the maps.
+fn rounded(value: f64) -> f64 {
     (100.0 * value).round() / 100.0
 }
 
+/// Lists the limitations of the report.
 fn notes(survey: &Survey, refined: &RefinedFiles, comparison: &Comparison) -> Vec<String> {
     let mut notes = Vec::new();
-    let lies = |name: &str| format!("{} lies beside the refined poses", name);
+    let is_beside = |name: &str| format!("{name} is beside the refined poses");
     match &refined.refinement {
         None => notes.push(format!(
-            "No {}, so nothing is known of how they were found: which frames are sure, residuals, costs and options.",
-            lies("refine.json")
+            "No {}, so flags, residuals, costs and options are not known.",
+            is_beside("refine.json")
         )),
         Some(refinement) => {
             if let Some(calibration) = &refinement.calibration
@@ -236,8 +243,9 @@ fn notes(survey: &Survey, refined: &RefinedFiles, comparison: &Comparison) -> Ve
                     || calibration.camera != Value::Object(object(&survey.camera)))
             {
                 notes.push(
-                    "The poses were refined together with the calibration, but this report uses the calibration as it was \
-                     given. Make the report of the folder that refine has written: it is a survey with the refined one."
+                    "The poses were refined together with the calibration, but this report uses \
+                     the given calibration. Make the report of the folder that refine has written: \
+                     it is a survey with the refined calibration."
                         .to_owned(),
                 );
             }
@@ -245,13 +253,15 @@ fn notes(survey: &Survey, refined: &RefinedFiles, comparison: &Comparison) -> Ve
     }
     if refined.covariances.is_none() {
         notes.push(format!(
-            "No {}, so there are no bands of uncertainty.",
-            lies("covariance.csv")
+            "No {}, so the uncertainty is not known.",
+            is_beside("covariance.csv")
         ));
     }
     if survey.truth.is_none() {
         notes.push(
-            "True poses are not known: errors are not, either. The seam residual says how well the frames agree.".to_owned(),
+            "True poses are not known, so errors cannot be computed. The seam residual shows how \
+             well the frames agree."
+                .to_owned(),
         );
     }
     if comparison.refined.seam.is_none() {
@@ -269,7 +279,7 @@ mod tests {
             index,
             file: String::new(),
             time_s: index as f64,
-            planned_m: [0.0; 3],
+            initial_m: [0.0; 3],
             refined_m: [0.0, h_m, 0.0],
             true_m: None,
             correction_rotation_deg: [0.0; 3],
@@ -294,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn the_median_leaves_out_what_is_no_number() {
+    fn the_median_ignores_nan() {
         assert_eq!(upper_median(vec![3.0, f64::NAN, 1.0, 2.0]), Some(2.0));
         assert_eq!(upper_median(vec![f64::NAN]), None);
     }

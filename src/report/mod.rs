@@ -2,44 +2,45 @@
 //!
 //! ```text
 //! survey, poses ────────┐
-//! refine.json ─ Refined ┼─ gather ──> Report ──> report.json
+//! files of refine ──────┼─ gather ──> Report ──> report.json
 //! comparison, drawings ─┘        └──> pictures ──┤
 //!                                                └─ page ──> report.html
 //! ```
 //!
-//! All that the page says is in [`Report`], which is `report.json`; the pictures lie beside it
-//! under the names that it gives, and are inside the page, which needs no other file and no
-//! network.
+//! [`Report`] holds everything that the page shows, and is written as `report.json`. The pictures
+//! are written beside it under the names in the report, and are also embedded in the page, which
+//! needs no other file and no network.
 //!
-//! | what | where |
+//! | module | content |
 //! | --- | --- |
-//! | the numbers | [`model`], made by [`gather()`] |
-//! | what refine has left | [`refined`] |
-//! | panoramas cut into strips, thumbnails | [`pictures`], at the [`resolution()`] of the comparison |
-//! | line charts | [`chart`], with [`decimate`], [`ticks`] and [`quantity`] |
-//! | maps of the wall | [`heat`] |
-//! | the page | [`page()`] |
+//! | [`model`] | numbers of the report, computed by [`gather()`] |
+//! | [`refined_files`] | files that refine has written |
+//! | [`pictures`] | strips of the panoramas, thumbnails |
+//! | [`resolution`] | resolution of the compared panoramas |
+//! | [`chart`] | line charts, with [`decimate`], [`ticks`] and [`quantity`] |
+//! | [`heat_map`] | maps of the wall |
+//! | [`page`](mod@page) | the page |
 
 mod chart;
 mod decimate;
 mod error;
 mod gather;
-mod heat;
+mod heat_map;
 mod model;
 mod page;
 mod pictures;
 mod quantity;
-mod refined;
+mod refined_files;
 mod resolution;
 mod ticks;
 
 pub use error::ReportError;
 pub use gather::{Sources, gather};
 pub use model::{
-    Abscissa, FrameRow, PanoramaStrips, Report, SCHEMA_VERSION, Strip, SurveyFacts, Thumbnail,
-    Verdict, WallMaps,
+    Abscissa, FrameRow, PanoramaStrips, Report, ResultSummary, SCHEMA_VERSION, Strip, SurveyFacts,
+    Thumbnail, WallMaps,
 };
 pub use page::page;
 pub use pictures::{PICTURES, Pictures};
-pub use refined::{CalibratedUnknown, Calibration, RefinedFiles, Refinement};
-pub use resolution::resolution;
+pub use refined_files::{CalibratedUnknown, Calibration, RefinedFiles, Refinement};
+pub use resolution::choose_resolution;

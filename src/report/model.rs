@@ -1,19 +1,18 @@
-//! `report.json`.
+//! Content of `report.json`.
 //!
-//! Lengths are metres, angles degrees, grey values those of an 8-bit picture; names say so. Numbers
-//! that do not exist (no truth, no covariance) are null or missing. Lists of frames are in the
-//! order of the survey.
+//! Names end with the unit: metres, degrees, 8-bit grey levels. Numbers that do not exist (no true
+//! poses, no covariance) are null or missing. Lists of frames are in the order of the survey.
 
-use super::refined::Refinement;
+use super::refined_files::Refinement;
 use crate::evaluate::Comparison;
 use crate::render::Layout;
 use serde::{Deserialize, Serialize};
 
-/// Version of the schema of `report.json`. It grows when a name, a unit or a meaning changes, not
-/// when something is added.
+/// Version of the schema of `report.json`. It increases when a name, a unit or a meaning changes,
+/// not when something is added.
 pub const SCHEMA_VERSION: u32 = 1;
 
-/// All that the page says.
+/// Content of `report.json` and of the page.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Report {
@@ -21,32 +20,32 @@ pub struct Report {
     pub schema_version: u32,
     /// Name and version of the program.
     pub program: String,
-    /// The command lines that led here, in their order: that of refine, if known, and that of the
-    /// report.
+    /// Command lines of refine, if known, and of the report, in this order.
     pub commands: Vec<Vec<String>>,
-    /// What was surveyed.
+    /// The survey.
     pub survey: SurveyFacts,
-    /// The result in a few numbers.
-    pub verdict: Verdict,
-    /// What the charts' frames are spread along.
+    /// Key figures of the result.
+    #[serde(rename = "verdict")]
+    pub summary: ResultSummary,
+    /// Abscissa of frames in charts.
     pub abscissa: Abscissa,
-    /// The poses, frame by frame.
+    /// Poses of every frame.
     pub frames: Vec<FrameRow>,
     /// Initial against refined poses, as in `compare.json`.
     pub comparison: Comparison,
-    /// The pictures of the unrolled wall.
+    /// Pictures of the unrolled wall.
     pub panoramas: PanoramaStrips,
-    /// Where on the wall frames agree, and how many see it.
+    /// Residuals and overlap on the wall.
     pub wall: WallMaps,
-    /// Small pictures of flagged frames, the first of them.
+    /// Thumbnails of the first flagged frames.
     pub thumbnails: Vec<Thumbnail>,
-    /// What refine says; null for poses from elsewhere.
+    /// Report of refine; null for poses of another program.
     pub refinement: Option<Refinement>,
-    /// What a reader must know of the sources.
+    /// Limitations of the report by its sources.
     pub notes: Vec<String>,
 }
 
-/// What was surveyed.
+/// Data of the survey.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SurveyFacts {
@@ -62,52 +61,53 @@ pub struct SurveyFacts {
     pub frame_size_px: [u32; 2],
     /// Length of the section's outline, metres.
     pub perimeter_m: f64,
-    /// Whether true poses are known.
+    /// True if true poses are known.
     pub truth: bool,
-    /// `survey.toml` as it is now.
+    /// Current content of `survey.toml`.
     pub file: serde_json::Map<String, serde_json::Value>,
     /// The camera.
     pub camera: serde_json::Map<String, serde_json::Value>,
 }
 
-/// The result in a few numbers; residuals and errors against the truth are in
+/// Key figures of the result; residuals and errors against the true poses are in
 /// [`Report::comparison`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub struct Verdict {
-    /// Frames whose pose rests on their pixels; null if refine's report is missing.
-    pub repaired: Option<usize>,
-    /// Frames whose pose rests on the prior, or that fit two places.
+pub struct ResultSummary {
+    /// Number of frames whose pose rests on their pixels; null if refine's report is missing.
+    #[serde(rename = "repaired")]
+    pub photometric: Option<usize>,
+    /// Number of frames whose pose rests on the prior or is ambiguous.
     pub flagged: Option<usize>,
-    /// Median angle by which a frame was turned, degrees.
+    /// Median rotation angle between initial and refined pose, degrees.
     pub correction_rotation_deg: f64,
-    /// Median distance by which a frame was moved, metres.
+    /// Median distance between initial and refined position, metres.
     pub correction_translation_m: f64,
-    /// Median 1-σ of the repaired frames on the wall, millimetres.
+    /// Median 1-σ of the photometric frames on the wall, millimetres.
     pub sigma_wall_mm: Option<f64>,
-    /// The same in pixels of the frames.
+    /// Median 1-σ of the photometric frames on the wall, pixels of the frames.
     pub sigma_wall_px: Option<f64>,
-    /// Root mean square error of the repaired frames on the wall, millimetres; null without truth.
-    /// That of all frames is in [`Report::comparison`].
+    /// Root mean square error of the photometric frames on the wall, millimetres; null without true
+    /// poses. The error of all frames is in [`Report::comparison`].
     pub error_wall_mm: Option<f64>,
-    /// The same in pixels of the frames.
+    /// Root mean square error of the photometric frames on the wall, pixels of the frames.
     pub error_wall_px: Option<f64>,
 }
 
-/// What frames are spread along in charts.
+/// Abscissa of frames in charts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Abscissa {
-    /// The chainage of the refined poses, which never turns back.
+    /// Chainage of the refined poses, which is monotonic.
     Chainage,
-    /// The number of the frame: the camera stood still, or went back and forth.
+    /// Index of the frame: the camera stood still, or moved back and forth.
     Frame,
 }
 
-/// The poses of one frame. Initial and refined ones are as in their files; the true one is moved
-/// along the tunnel's gauge (turn about the axis, shift along it) so that all true poses lie as
-/// close to the refined ones as they go.
+/// Poses of one frame. Initial and refined poses are those of their files. The true poses are
+/// aligned with the refined ones by the gauge of the tunnel (rotation about the axis, shift along
+/// it).
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct FrameRow {
@@ -118,8 +118,9 @@ pub struct FrameRow {
     /// Time, seconds.
     pub time_s: f64,
     /// Position of the initial pose.
-    pub planned_m: [f64; 3],
-    /// Position of the refined pose; the second is its chainage.
+    #[serde(rename = "planned_m")]
+    pub initial_m: [f64; 3],
+    /// Position of the refined pose; the second coordinate is its chainage.
     pub refined_m: [f64; 3],
     /// Position of the true pose.
     pub true_m: Option<[f64; 3]>,
@@ -137,24 +138,24 @@ pub struct FrameRow {
     pub sigma_translation_m: Option<[f64; 3]>,
 }
 
-/// Panoramas of the same stretch of wall, cut where they are long.
+/// Panoramas of the same part of the wall, long ones cut into strips.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PanoramaStrips {
-    /// How they lie.
+    /// Orientation of the strips.
     pub layout: Layout,
     /// Resolution of the strips, pixels per metre.
     pub px_per_metre: f64,
     /// Chainage of their beginning and end.
     pub chainage_m: [f64; 2],
-    /// From the initial poses, in the order of the chainage.
+    /// Panorama of the initial poses, in the order of the chainage.
     pub baseline: Vec<Strip>,
-    /// From the refined poses.
+    /// Panorama of the refined poses.
     pub refined: Vec<Strip>,
-    /// From the true poses.
+    /// Panorama of the true poses.
     pub truth: Option<Vec<Strip>>,
 }
 
-/// A picture of a stretch of the wall.
+/// Picture of a part of the wall.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Strip {
     /// Its file in `report_pictures`.
@@ -165,28 +166,28 @@ pub struct Strip {
     pub height: u32,
 }
 
-/// Measures of the wall, cell by cell. Lists hold a row for each stretch of the axis, from θ = 0
-/// on.
+/// Maps of the wall. Lists are row-major: a row for each cell along the axis, which begins at
+/// θ = 0.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct WallMaps {
-    /// Cells around the section.
+    /// Number of cells around the section.
     pub around: usize,
-    /// Cells along the axis.
+    /// Number of cells along the axis.
     pub along: usize,
     /// Chainage of the first cell's beginning and of the last one's end.
     pub chainage_m: [f64; 2],
     /// Root mean square difference of two frames with the initial poses, grey levels; null where no
-    /// two overlap.
+    /// two frames overlap.
     pub baseline_grey: Vec<Option<f64>>,
-    /// With the refined poses.
+    /// Root mean square difference with the refined poses, grey levels.
     pub refined_grey: Vec<Option<f64>>,
-    /// With the true poses.
+    /// Root mean square difference with the true poses, grey levels.
     pub true_grey: Option<Vec<Option<f64>>>,
-    /// Frames that see a point of the cell with the refined poses, on average.
+    /// Mean number of frames that see a point of the cell with the refined poses.
     pub refined_frames: Vec<f64>,
 }
 
-/// A small picture of a flagged frame.
+/// Thumbnail of a flagged frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Thumbnail {
     /// Index of the frame.

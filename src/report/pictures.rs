@@ -1,6 +1,6 @@
-//! The pictures of a report: panoramas, cut where they are long, and thumbnails of frames.
+//! Pictures of a report: strips of the panoramas and thumbnails of frames.
 
-use super::ReportError;
+use super::error::ReportError;
 use super::model::{PanoramaStrips, Strip, Thumbnail};
 use crate::evaluate::{Drawing, Drawings};
 use crate::frames::load_colour;
@@ -17,21 +17,21 @@ pub const PICTURES: &str = "report_pictures";
 /// JPEG files by their names in [`PICTURES`].
 pub type Pictures = BTreeMap<String, Vec<u8>>;
 
-/// Most pixels of a panorama.
-const PANORAMA_PIXELS: f64 = 4e6;
-/// Longest side of a strip, pixels.
-const LONGEST: u32 = 4096;
-/// Most flagged frames that are shown.
-const MOST_THUMBNAILS: usize = 24;
+/// Largest number of pixels of a panorama.
+const MAX_PANORAMA_PIXELS: f64 = 4e6;
+/// Largest side of a strip, pixels.
+const MAX_STRIP_PX: u32 = 4096;
+/// Largest number of thumbnails.
+const MAX_THUMBNAILS: usize = 24;
 /// Width of a thumbnail, pixels.
-const THUMBNAIL: u32 = 320;
-/// Where no frame sees the wall.
-const HOLE: Rgb<u8> = Rgb([158, 170, 194]);
-/// Quality of panoramas and of thumbnails.
+const THUMBNAIL_WIDTH_PX: u32 = 320;
+/// Colour where no frame sees the wall.
+const HOLE_COLOUR: Rgb<u8> = Rgb([158, 170, 194]);
+/// JPEG quality of panoramas and of thumbnails.
 const QUALITY: [u8; 2] = [82, 75];
 
-/// The panoramas as strips; what is longer than it is wide lies with the chainage to the right, in
-/// pieces.
+/// Cuts the panoramas into strips. A panorama that is longer than wide is turned, with the chainage
+/// to the right.
 ///
 /// # Errors
 /// [`ReportError::Encode`].
@@ -46,14 +46,14 @@ pub fn panoramas(
         Layout::ThetaRight
     };
     let pixels = canvas.pixels() as f64;
-    let mut scale = (PANORAMA_PIXELS / pixels).sqrt().min(1.0);
-    // One that lies across is one piece.
+    let mut scale = (MAX_PANORAMA_PIXELS / pixels).sqrt().min(1.0);
+    // A panorama that is not turned is a single strip.
     if layout == Layout::ThetaRight {
-        scale = scale.min(f64::from(LONGEST) / f64::from(canvas.columns));
+        scale = scale.min(f64::from(MAX_STRIP_PX) / f64::from(canvas.columns));
     }
     let mut strips = |which: &str, drawing: &Drawing| {
         let image = drawing.panorama.clone().into_image(layout);
-        cut(which, &shrunk(&opaque(&image), scale), pictures)
+        cut(which, &shrink(&fill_holes(&image), scale), pictures)
     };
     Ok(PanoramaStrips {
         layout,
@@ -68,18 +68,19 @@ pub fn panoramas(
     })
 }
 
-/// The picture with its holes coloured.
-fn opaque(image: &DynamicImage) -> RgbImage {
+/// Fills the holes of a picture with a colour.
+fn fill_holes(image: &DynamicImage) -> RgbImage {
     let source = image.to_rgba8();
     RgbImage::from_fn(source.width(), source.height(), |x, y| {
         match source.get_pixel(x, y).0 {
-            [.., 0] => HOLE,
+            [.., 0] => HOLE_COLOUR,
             [red, green, blue, _] => Rgb([red, green, blue]),
         }
     })
 }
 
-fn shrunk(image: &RgbImage, scale: f64) -> RgbImage {
+/// Scales a picture down; scales of 1 and more keep it.
+fn shrink(image: &RgbImage, scale: f64) -> RgbImage {
     let side = |length: u32| ((f64::from(length) * scale).round() as u32).max(1);
     if scale < 1.0 {
         let (width, height) = (side(image.width()), side(image.height()));
@@ -89,10 +90,10 @@ fn shrunk(image: &RgbImage, scale: f64) -> RgbImage {
     }
 }
 
-/// Cuts a picture into pieces of nearly the same width, none wider than [`LONGEST`].
+/// Cuts a picture into strips of nearly equal width, none wider than [`MAX_STRIP_PX`].
 fn cut(which: &str, image: &RgbImage, pictures: &mut Pictures) -> Result<Vec<Strip>, ReportError> {
     let (width, height) = image.dimensions();
-    let pieces = width.div_ceil(LONGEST).max(1);
+    let pieces = width.div_ceil(MAX_STRIP_PX).max(1);
     let edge = |k: u32| (u64::from(width) * u64::from(k) / u64::from(pieces)) as u32;
     let mut strips = Vec::new();
     for k in 0..pieces {
@@ -112,7 +113,7 @@ fn cut(which: &str, image: &RgbImage, pictures: &mut Pictures) -> Result<Vec<Str
     Ok(strips)
 }
 
-/// Thumbnails of the first of the `flagged` frames.
+/// Makes thumbnails of the first `flagged` frames.
 ///
 /// # Errors
 /// A frame that cannot be read or encoded.
@@ -122,12 +123,12 @@ pub fn thumbnails(
     pictures: &mut Pictures,
 ) -> Result<Vec<Thumbnail>, ReportError> {
     let (width, height) = (survey.camera.width, survey.camera.height);
-    let scale = (f64::from(THUMBNAIL) / f64::from(width)).min(1.0);
-    let shown = flagged.iter().take(MOST_THUMBNAILS);
+    let scale = (f64::from(THUMBNAIL_WIDTH_PX) / f64::from(width)).min(1.0);
+    let shown = flagged.iter().take(MAX_THUMBNAILS);
     shown
         .filter_map(|frame| Some((*frame, survey.frames.get(*frame)?)))
         .map(|(frame, source)| {
-            let picture = shrunk(&load_colour(source, width, height)?.to_rgb8(), scale);
+            let picture = shrink(&load_colour(source, width, height)?.to_rgb8(), scale);
             let file = format!("frame-{frame:06}.jpg");
             pictures.insert(file.clone(), jpeg(&file, &picture, QUALITY[1])?);
             Ok(Thumbnail {
@@ -140,14 +141,15 @@ pub fn thumbnails(
         .collect()
 }
 
+/// Encodes a picture as JPEG.
 fn jpeg(name: &str, image: &RgbImage, quality: u8) -> Result<Vec<u8>, ReportError> {
-    encoded(name, |bytes| {
+    encode_picture(name, |bytes| {
         image.write_with_encoder(JpegEncoder::new_with_quality(bytes, quality))
     })
 }
 
-/// The bytes that an encoder writes of the picture `name`.
-pub(super) fn encoded(
+/// Encodes the picture `name`.
+pub(super) fn encode_picture(
     name: &str,
     encode: impl FnOnce(&mut Vec<u8>) -> ImageResult<()>,
 ) -> Result<Vec<u8>, ReportError> {
@@ -175,7 +177,7 @@ mod tests {
         assert_eq!(pictures.len(), 3);
         let mut left = 0;
         for strip in &strips {
-            assert!(strip.width <= LONGEST && strip.height == 40);
+            assert!(strip.width <= MAX_STRIP_PX && strip.height == 40);
             let decoded = image::load_from_memory(&pictures[&strip.file]).unwrap();
             let middle = decoded.to_rgb8().get_pixel(strip.width / 2, 20).0[0];
             let expected = (left + strip.width / 2) / 40;
@@ -189,10 +191,10 @@ mod tests {
     fn holes_are_coloured_and_shrinking_keeps_the_proportions() {
         let mut image = image::GrayAlphaImage::from_pixel(400, 100, image::LumaA([40, 255]));
         image.put_pixel(3, 3, image::LumaA([0, 0]));
-        let picture = opaque(&image.into());
-        assert_eq!(*picture.get_pixel(3, 3), HOLE);
+        let picture = fill_holes(&image.into());
+        assert_eq!(*picture.get_pixel(3, 3), HOLE_COLOUR);
         assert_eq!(picture.get_pixel(9, 9).0, [40; 3]);
-        assert_eq!(shrunk(&picture, 0.25).dimensions(), (100, 25));
-        assert_eq!(shrunk(&picture, 1.0), picture);
+        assert_eq!(shrink(&picture, 0.25).dimensions(), (100, 25));
+        assert_eq!(shrink(&picture, 1.0), picture);
     }
 }

@@ -1,7 +1,7 @@
-//! Numbers as people read them.
+//! Numbers as text for readers.
 
-/// A number with about `digits` significant digits, without an exponent, with a true minus sign; a
-/// dash for none.
+/// Formats a number with about `digits` significant digits, without exponent, with a true minus
+/// sign; NaN and infinity are a dash.
 pub fn significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return "–".to_owned();
@@ -14,22 +14,22 @@ pub fn significant(value: f64, digits: i32) -> String {
     minus(format!("{value:.decimals$}"))
 }
 
-/// A number with so many decimals.
+/// Formats a number with `decimals` decimals.
 pub fn fixed(value: f64, decimals: usize) -> String {
     minus(format!("{value:.decimals$}"))
 }
 
-/// Three significant digits.
+/// Formats a number with three significant digits.
 pub fn short(value: f64) -> String {
     significant(value, 3)
 }
 
-/// The same of a number that may be missing.
+/// Formats a number that may be missing with three significant digits.
 pub fn maybe(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), short)
 }
 
-/// A count with thin spaces between thousands.
+/// Formats a count with thin spaces between thousands.
 pub fn count(value: usize) -> String {
     let digits = value.to_string();
     let mut text = String::new();
@@ -50,9 +50,9 @@ fn minus(text: String) -> String {
     }
 }
 
-/// A unit of length that suits values up to `most_m`, and what metres are multiplied by.
-pub fn length_unit(most_m: f64) -> (&'static str, f64) {
-    match most_m {
+/// Unit of length for values up to `max_m`, and the factor from metres to it.
+pub fn length_unit(max_m: f64) -> (&'static str, f64) {
+    match max_m {
         m if m >= 1.0 => ("m", 1.0),
         _ => ("mm", 1e3),
     }

@@ -1,24 +1,24 @@
-//! Round numbers along an axis.
+//! Round numbers for the ticks of an axis.
 
 use super::quantity::fixed;
 
-/// About `wanted` (three or more) round values in `[low, high]` with how they are written:
-/// multiples of 1, 2 or 5 times a power of ten.
+/// About `wanted` (three or more) round values in `[low, high]` with their texts: multiples of 1, 2
+/// or 5 times a power of ten.
 pub fn linear(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {
         return vec![(low, super::quantity::short(low))];
     }
-    // With fewer, there may be no round value between the ends at all.
-    let least = span / wanted.max(3) as f64;
-    let power = 10f64.powf(least.log10().floor());
+    // With fewer than three there may be no round value in the range.
+    let min_step = span / wanted.max(3) as f64;
+    let power = 10f64.powf(min_step.log10().floor());
     let step = [1.0, 2.0, 5.0]
         .map(|factor| factor * power)
         .into_iter()
-        .find(|step| *step >= 0.999 * least)
+        .find(|step| *step >= 0.999 * min_step)
         .unwrap_or(10.0 * power);
     let decimals = (-(step * 1.001).log10().floor()).max(0.0) as usize;
-    // A hair more, for ends that are round themselves.
+    // The tolerance includes ends that are round themselves.
     let first = (low / step - 1e-9).ceil() as i64;
     let last = (high / step + 1e-9).floor() as i64;
     (first..=last)
@@ -29,8 +29,8 @@ pub fn linear(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
         .collect()
 }
 
-/// Powers of ten in `[low, high]` (both positive), about `wanted` of them; within less than two
-/// decades 1, 2 and 5 times them, too, and within less than one whatever is round.
+/// About `wanted` powers of ten in `[low, high]` (both positive). Below two decades also 2 and 5
+/// times the powers, below one decade the values of [`linear`].
 pub fn logarithmic(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
     if !(low > 0.0 && high > low && high.is_finite()) {
         return Vec::new();
@@ -56,7 +56,7 @@ pub fn logarithmic(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
     }
 }
 
-/// Ordinary digits where they are short, else `10` with an exponent.
+/// Formats a power of ten with plain digits if they are short, else with an exponent.
 fn power_text(value: f64) -> String {
     if (1e-4..1e5).contains(&value) {
         super::quantity::significant(value, 1)
@@ -110,7 +110,11 @@ mod tests {
 
     proptest! {
         #[test]
-        fn there_are_neither_none_nor_too_many(low in -1e4f64..1e4, span in 1e-6f64..1e6, wanted in 3usize..9) {
+        fn there_are_neither_none_nor_too_many(
+            low in -1e4f64..1e4,
+            span in 1e-6f64..1e6,
+            wanted in 3usize..9,
+        ) {
             let ticks = linear(low, low + span, wanted);
             prop_assert!(!ticks.is_empty() && ticks.len() <= wanted + 2, "{:?}", ticks);
             for (value, _) in &ticks {

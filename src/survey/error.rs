@@ -78,6 +78,22 @@ pub enum SurveyError {
         /// The frame.
         file: PathBuf,
     },
+    /// There is no frame.
+    #[error("there is no frame")]
+    NoFrame,
+    /// Times of the frames do not increase.
+    #[error(
+        "frame {frame} has time {time_s} s, and the one before it {previous_s} s; times must \
+         increase in the order of the frames"
+    )]
+    FrameTimeOrder {
+        /// Index of the later frame.
+        frame: usize,
+        /// Its time, seconds.
+        time_s: f64,
+        /// Time of the frame before it, seconds.
+        previous_s: f64,
+    },
     /// A pose is impossible in the tunnel.
     #[error("{}: frame {frame}: {source}; {remedy}", path.display())]
     Placement {

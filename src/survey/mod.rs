@@ -68,10 +68,13 @@
 
 mod associate;
 mod calibrate;
+mod calibrated;
+mod capture_times;
 mod discover;
 mod error;
 mod file;
 mod frame_list;
+mod frame_paths;
 mod frame_times;
 mod ignore;
 mod keyframe_selection;
@@ -79,11 +82,13 @@ mod open;
 mod pose_reader;
 mod pose_validation;
 mod poses_section;
+mod template;
 mod tunnel;
 mod unposed_frames;
 
 pub use associate::{Associate, TIME_TOLERANCE_S};
 pub use calibrate::{CalibrateSection, CalibrationGroup};
+pub use capture_times::FrameTimes;
 pub use discover::{Discovery, PictureGroup, VideoChoice};
 pub use error::SurveyError;
 pub use file::{CameraSection, FramesSection, PriorSection, SURVEY_FILE, SurveyFile};

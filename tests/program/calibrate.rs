@@ -67,7 +67,7 @@ fn a_wrong_focal_length_is_found_and_the_result_is_a_survey() {
     succeed(&[&arguments[..], &more].concat());
 }
 
-/// Everything wrong at once: what is observed is right, and what is not says why.
+/// Everything wrong at once: observable parameters are right, the others have a reason.
 #[test]
 fn everything_wrong_at_once_is_found_or_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -109,14 +109,14 @@ fn everything_wrong_at_once_is_found_or_refused() {
     ] {
         assert_honest(&unknown(name), 0.0);
     }
-    // Steps of centimetres cannot tell the radius to half a percent.
+    // Steps of centimetres cannot determine the radius to half a percent.
     assert_eq!(unknown("radius")["observed"], false);
 }
 
-/// Initial poses that are sure in metres, in a frame that has the axis tilted and shifted, tell the
-/// radius and the axis.
+/// Initial poses that are accurate in metres, in a frame with a tilted and shifted axis, determine
+/// the radius and the axis.
 #[test]
-fn sure_positions_tell_radius_and_axis() {
+fn accurate_positions_determine_radius_and_axis() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     let noise = ["--translation-sigma-m", "0.004,0.004,0.004"];
@@ -158,7 +158,7 @@ fn sure_positions_tell_radius_and_axis() {
     assert_honest(&unknown("axis_tilt_z"), 0.0);
 }
 
-/// Two frames say little: nothing may be wrong and called observed.
+/// Two frames determine little: no wrong parameter may count as observable.
 #[test]
 fn two_frames_are_honest() {
     let dir = tempfile::tempdir().unwrap();

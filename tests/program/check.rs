@@ -27,13 +27,13 @@ fn a_folder_becomes_a_survey_and_is_sound() {
         report["pictures"]["sigma_px"].as_f64().unwrap() < 0.01,
         "{report}"
     );
-    // What is there is not replaced.
+    // An existing file is not replaced.
     let message = fail(&["init", text(survey.path())], 3);
     assert!(message.contains("--force"), "{message}");
 }
 
 #[test]
-fn what_is_missing_is_said_and_left_to_be_filled_in() {
+fn missing_files_are_reported_and_left_to_be_filled_in() {
     let survey = first_frames(3);
     for name in ["survey.toml", "camera.json"] {
         std::fs::remove_file(survey.path().join(name)).unwrap();
@@ -64,7 +64,7 @@ fn every_frame_that_does_not_fit_is_named() {
         "{message}"
     );
     assert!(message.contains("frame 4"), "{message}");
-    // What opening a survey refuses, `check` says in the same words.
+    // `check` reports a survey that cannot be opened with the message of opening it.
     edit(
         &survey.path().join("survey.toml"),
         "radius_m = 3",

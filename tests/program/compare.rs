@@ -48,7 +48,7 @@ fn the_fixture_is_repaired_to_the_accuracy_promised() {
     assert!(compared.join("before-after.png").is_file());
 }
 
-/// The initial poses are no refinement: the gate must say so, with everything written.
+/// The initial poses miss the quality gate, which is reported after all files are written.
 #[test]
 fn a_gate_that_is_not_met_has_its_own_exit_code() {
     let survey = first_frames(12);

@@ -1,4 +1,4 @@
-//! Where options come from, and the record beside every result.
+//! Sources of options, and the record beside every result.
 
 use crate::support::{fail, first_frames, succeed, text};
 use std::path::Path;
@@ -43,7 +43,7 @@ fn flags_come_before_variables_before_the_survey_before_defaults() {
     assert_eq!(px_per_metre(&[], &[]), 20.0);
     assert_eq!(px_per_metre(&variable, &[]), 30.0);
     assert_eq!(px_per_metre(&variable, &["--px-per-metre", "40"]), 40.0);
-    // `config` says the same.
+    // `config` shows the same options.
     let shown = with(
         &variable,
         &["config", text(survey.path()), "stitch", "--json"],
@@ -59,7 +59,7 @@ fn flags_come_before_variables_before_the_survey_before_defaults() {
     assert_eq!(option("interpolation")["source"], "default");
 }
 
-/// What is printed is a survey.toml, with the same effect.
+/// The output of `config` is a survey.toml with the same effect.
 #[test]
 fn the_configuration_shown_may_be_put_into_the_survey() {
     let survey = survey("\n[options.stitch]\nmode = \"median\"\n");
@@ -135,7 +135,7 @@ fn a_panorama_can_be_made_again_from_its_record() {
     );
 }
 
-/// What a command cannot do without may be in the survey, and what all commands have, too.
+/// The survey may hold required options and global ones.
 #[test]
 fn every_command_takes_options_from_its_survey() {
     let survey =
@@ -149,8 +149,7 @@ fn every_command_takes_options_from_its_survey() {
     let shown = succeed(&["config", text(survey.path()), "convert"]);
     assert!(shown.contains("to = \"kitti\"    # survey.toml"), "{shown}");
     assert!(shown.contains("quiet = true    # survey.toml"), "{shown}");
-    // All of it may be put into the survey: nothing that is so in any case keeps another option
-    // out.
+    // All of it may be put into the survey: defaults conflict with no other option.
     let all = succeed(&["config", text(survey.path())]);
     std::fs::write(survey.path().join("survey.toml"), all).unwrap();
     let table = survey.path().join("plan.csv");
@@ -164,7 +163,7 @@ fn every_command_takes_options_from_its_survey() {
         text(&out),
     ];
     succeed(&plan);
-    // What is missing still is.
+    // Missing options are still required.
     let message = fail(&["stitch", text(survey.path())], 2);
     assert!(message.contains("--out"), "{message}");
 }
@@ -176,10 +175,11 @@ fn every_result_has_a_record() {
     let simulate = "simulate free --frames 3 --size 64x48 --supersample 1 --seed 7 --out D/survey";
     for (arguments, record, input) in [
         (simulate, "survey/run.toml", None),
-        // Again, over it.
+        // Again, replacing the output.
         (&format!("{simulate} --force"), "survey/run.toml", None),
         (
-            "converge --rotation-deg 1 --jitter independent --seeds 1 --frames 2 --size 32x24 --out D/sweep",
+            "converge --rotation-deg 1 --jitter independent --seeds 1 --frames 2 --size 32x24 \
+             --out D/sweep",
             "sweep/run.toml",
             None,
         ),
@@ -198,7 +198,7 @@ fn every_result_has_a_record() {
             "model/run.toml",
             Some("baseline.tum"),
         ),
-        // Again, over it.
+        // Again, replacing the output.
         (
             "convert D/survey --to colmap --out D/model",
             "model/run.toml",
@@ -260,7 +260,7 @@ fn every_result_has_a_record() {
 }
 
 #[test]
-fn the_report_reads_poses_as_it_is_told() {
+fn the_report_reads_poses_according_to_its_flags() {
     let survey = survey("");
     let (poses, out) = (
         survey.path().join("groundtruth.tum"),

@@ -1,4 +1,4 @@
-//! Convergence tests through the program, as small as they get.
+//! Small convergence tests through the program.
 
 use crate::support::{json, succeed, text};
 
@@ -15,7 +15,7 @@ fn a_sweep_is_written_resumed_and_drawn() {
     };
     let first = sweep("2");
     assert_eq!(first.lines().count(), 2);
-    // Nothing is done twice, not even timed again; one seed more is one line more.
+    // Finished runs are not repeated; one more seed adds one line.
     assert_eq!(sweep("2"), first);
     let more = sweep("3");
     assert!(more.starts_with(&first) && more.lines().count() == 3);
@@ -37,11 +37,11 @@ fn the_efficiency_is_measured_against_the_bound() {
     succeed(&arguments);
     let table = json(&out.join("efficiency.json"));
     let number = |name: &str| table[0][name].as_f64().unwrap();
-    // One survey scatters; far below the bound or far above would be a mistake in one of the two.
+    // A single survey scatters; errors far from the bound would be a mistake in one of the two.
     for kind in ["rotation", "translation", "wall", "pose"] {
         let ratio = table[0]["ratio"][kind].as_f64().unwrap();
         assert!((0.4..3.0).contains(&ratio), "{kind}: {table}");
-        // What must be learned from the pixels first is known less well.
+        // An unknown texture leaves more uncertainty.
         let unknown = table[0]["unknown_texture_ratio"][kind].as_f64().unwrap();
         assert!(
             (0.5 * ratio..0.98 * ratio).contains(&unknown),

@@ -105,7 +105,7 @@ fn a_gyros_log_makes_poses_that_refine() {
         text(&baseline),
     ]);
     assert!(said.contains("readout_ms = -12.5"), "{said}");
-    assert!(said.contains("200.0 a second"), "{said}");
+    assert!(said.contains("200.0 per second"), "{said}");
 
     // The errors of steps match the prior.
     let poses = poses_of(&tum::read(&baseline).unwrap());
@@ -260,7 +260,7 @@ fn the_clock_is_found_by_the_plan() {
     }
     let (mirrored, warned) = with(&["--orientation", "yxZ"]);
     assert!(
-        warned.contains("is a mirror") && warned.contains("stay where it is"),
+        warned.contains("is a reflection") && warned.contains("assumed to stay in place"),
         "{warned}"
     );
     assert!(mirrored[29].r_wc.angle_to(&by_word[29].r_wc) > 0.1);

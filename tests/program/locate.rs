@@ -1,4 +1,4 @@
-//! From the panorama to the frames and back, through the program.
+//! Points of panorama, wall and frames, converted by the program.
 
 use crate::support::{fail, first_frames, succeed, text};
 use image::GenericImageView;
@@ -23,8 +23,7 @@ fn near(a: [f64; 2], b: [f64; 2], tolerance: f64) -> bool {
     (a[0] - b[0]).abs() < tolerance && (a[1] - b[1]).abs() < tolerance
 }
 
-/// A pixel of the panorama, its place on the wall, and the pixel of a frame that shows it all lead
-/// to each other.
+/// A pixel of the panorama, its wall point and the pixel of a frame convert into each other.
 #[test]
 fn every_way_leads_to_the_same_point() {
     let survey = first_frames(6);
@@ -73,7 +72,7 @@ fn every_way_leads_to_the_same_point() {
     }
 }
 
-/// A frame shows what it is asked about, up to its outermost pixels.
+/// The answer for a frame's pixel includes this frame, up to its outermost pixels.
 #[test]
 fn a_frame_is_in_its_own_answer() {
     let survey = first_frames(2);
@@ -96,8 +95,8 @@ fn between(picture: &image::RgbImage, [u, v]: [f64; 2], channel: usize) -> f64 {
     row(y) * (1.0 - fy) + row(y + 1) * fy
 }
 
-/// What the picture shows at a pixel, the frames show at theirs. The frames are those of another
-/// program.
+/// The frames show the panorama's colours at the located pixels. Another program has rendered the
+/// frames.
 #[test]
 fn the_frames_show_there_what_the_panorama_shows() {
     let survey = first_frames(4);

@@ -1,5 +1,4 @@
-//! The program as its users meet it: run from outside, on files, and judged by what it prints and
-//! writes.
+//! Tests that run the program on files and check its output.
 
 mod bad_input;
 mod broken_inputs;

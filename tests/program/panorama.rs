@@ -1,5 +1,4 @@
-//! Panoramas through the program: what they look like, and that they depend on nothing but the
-//! input.
+//! Panoramas through the program: their pictures, and that they depend on the input only.
 
 use crate::support::{self, blender_survey, fail, first_frames, succeed, text};
 use image::{DynamicImage, GenericImageView};
@@ -248,7 +247,7 @@ fn simulate(folder: &Path, more: &[&str]) {
     support::simulate(folder, &[&size, more].concat());
 }
 
-/// Gain ±30 % and a headlight undone, against the same wall evenly lit and without noise.
+/// Correction of a gain of ±30 % and of a lamp, against a wall with uniform light and no noise.
 #[test]
 fn light_and_exposure_are_undone() {
     let dir = tempfile::tempdir().unwrap();
@@ -288,8 +287,8 @@ fn light_and_exposure_are_undone() {
     }
 }
 
-/// Over more than one band, with tiles that no frame meets: who draws maps keeps account of frames,
-/// who does not must leave the same holes.
+/// Over several bands, with tiles that no frame covers: panoramas with maps record the frames,
+/// those without must have the same holes.
 #[test]
 fn the_panorama_is_the_same_with_maps_and_without() {
     let dir = tempfile::tempdir().unwrap();
@@ -345,7 +344,7 @@ fn maps_lie_beside_the_panorama() {
 /// Ctrl-C while it is drawn: its exit code, and nothing half-written.
 #[cfg(unix)]
 #[test]
-fn an_interrupted_panorama_leaves_only_what_it_can_go_on_from() {
+fn an_interrupted_panorama_leaves_only_its_checkpoint() {
     let survey = first_frames(48);
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("p.tif");

@@ -84,8 +84,8 @@ fn what_is_missing_is_asked_for() {
     std::fs::write(&timed, "time_s,chainage_m,angle_deg\n0,0,0\n9,0.7,20\n").unwrap();
     let folder = text(survey.path());
     for (arguments, code, expected) in [
-        (vec!["--advance-m", "0.1"], 2, "how many frames"),
-        (vec![folder], 2, "what is the plan"),
+        (vec!["--advance-m", "0.1"], 2, "number of frames is unknown"),
+        (vec![folder], 2, "no motion is given"),
         (
             vec![folder, "--frames", "4", "--advance-m", "1"],
             2,

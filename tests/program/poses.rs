@@ -491,7 +491,7 @@ fn convert_replaces_nothing_it_should_not() {
     let other = dir.join("other");
     std::fs::create_dir(&other).unwrap();
     std::fs::write(other.join("notes.md"), "x").unwrap();
-    assert!(to("colmap", &other).contains("holds more than"));
+    assert!(to("colmap", &other).contains("holds other files than"));
     assert!(other.join("notes.md").is_file());
     let model = dir.join("model");
     for _ in 0..2 {

@@ -28,7 +28,7 @@ fn the_fixture_is_repaired_and_any_number_of_threads_gives_the_same_bytes() {
     let poses = std::fs::read(one.join("poses.tum")).unwrap();
     assert_eq!(poses, std::fs::read(two.join("poses.tum")).unwrap());
 
-    // What evo reads: eight columns, single spaces, no space at the end.
+    // The format that evo reads: eight columns, single spaces, no trailing space.
     let poses = String::from_utf8(poses).unwrap();
     assert_eq!(poses.lines().count(), 48);
     for line in poses.lines() {
@@ -67,7 +67,7 @@ fn refine_simulated(options: &[&str]) -> (serde_json::Value, String) {
     (json(&out.join("refine.json")), warned)
 }
 
-/// A wall without texture tells nothing, and the report must say so.
+/// A wall without texture determines no pose, so no frame is photometric.
 #[test]
 fn a_flat_wall_is_never_called_photometric() {
     let dir = tempfile::tempdir().unwrap();
@@ -102,7 +102,7 @@ fn faint_walls_and_odd_frames_are_refined_without_an_error() {
     refine_simulated(&["--frames", "3", "--size", "400x16", "--fov-deg", "4"]);
 }
 
-/// World-to-camera poses are a mistake anybody makes once: it must be said.
+/// World-to-camera poses are a common mistake: the pose convention search names it.
 #[test]
 fn poses_in_the_wrong_direction_are_warned_of() {
     let survey = first_frames(12);
@@ -129,9 +129,9 @@ fn poses_in_the_wrong_direction_are_warned_of() {
     );
 }
 
-/// Root mean square wall error of a refined survey's believed frames, pixels, with the gauge fixed
-/// by them.
-fn believed_wall_px(survey: &Path, out: &Path) -> f64 {
+/// Root mean square wall error of a refined survey's photometric frames, pixels, with the gauge
+/// fixed by them.
+fn photometric_wall_px(survey: &Path, out: &Path) -> f64 {
     let survey = tunnelstitch::survey::Survey::open(survey).unwrap();
     let report = json(&out.join("refine.json"));
     let believed = |k: usize| report["frames"][k]["flag"] == "photometric";
@@ -151,7 +151,7 @@ fn believed_wall_px(survey: &Path, out: &Path) -> f64 {
 }
 
 /// Simulates and refines; returns the folder with `survey` and `out`.
-fn repaired(options: &[&str]) -> tempfile::TempDir {
+fn simulate_and_refine(options: &[&str]) -> tempfile::TempDir {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     simulate(&survey, options);
@@ -159,36 +159,37 @@ fn repaired(options: &[&str]) -> tempfile::TempDir {
     dir
 }
 
-/// Gain ±30 %, a lamp that falls to 40 % at the corners, glints on 3 % of the wall, things before
-/// it, 16 bits.
+/// Gain ±30 %, a lamp that falls to 40 % at the corners, specular highlights on 3 % of the wall,
+/// moving objects, 16 bits.
 #[test]
-fn uneven_light_glints_and_moving_things_do_no_harm() {
+fn uneven_light_highlights_and_moving_objects_do_no_harm() {
     let light = "--frames 30 --size 480x360 --gain-percent 30 --bias-grey 5 --lamp-corner 0.4 \
                  --specular-percent 3 --moving 2 --bits 16 --seed 4";
-    let dir = repaired(&light.split_whitespace().collect::<Vec<_>>());
-    let px = believed_wall_px(&dir.path().join("survey"), &dir.path().join("out"));
+    let dir = simulate_and_refine(&light.split_whitespace().collect::<Vec<_>>());
+    let px = photometric_wall_px(&dir.path().join("survey"), &dir.path().join("out"));
     assert!(px < 0.15, "{px}");
 }
 
-/// The same light on concrete, whose contrast is 3 to 4 grey levels: what the light leaves is
-/// steeper than the wall.
+/// A lamp and highlights on concrete with a contrast of 3 to 4 grey levels: the residual light has
+/// larger gradients than the wall.
 #[test]
 fn hard_light_does_no_harm_on_a_faint_wall() {
-    let light = "--frames 24 --wall concrete --gain-percent 30 --lamp-corner 0.4 --specular-percent 3 --seed 2";
-    let dir = repaired(&light.split_whitespace().collect::<Vec<_>>());
+    let light = "--frames 24 --wall concrete --gain-percent 30 --lamp-corner 0.4 \
+                 --specular-percent 3 --seed 2";
+    let dir = simulate_and_refine(&light.split_whitespace().collect::<Vec<_>>());
     let out = dir.path().join("out");
-    let px = believed_wall_px(&dir.path().join("survey"), &out);
+    let px = photometric_wall_px(&dir.path().join("survey"), &out);
     assert!(px < 0.15, "{px}");
     let report = json(&out.join("refine.json"));
     assert_eq!(report["frames_on_prior"], 0);
 }
 
-/// Bad frames are named with the reason, and the others are as exact as without them.
+/// Faulty frames are rejected with the reason, and the others are as accurate as without them.
 #[test]
-fn bad_frames_are_flagged_and_the_rest_stays_exact() {
+fn faulty_frames_are_flagged_and_the_others_stay_accurate() {
     let bad = "5:black,9:blurred,12:occluded,15:repeated,20-22:missing";
     let options = ["--frames", "30", "--size", "480x360", "--seed", "6"];
-    let dir = repaired(&[&options[..], &["--bad-frames", bad]].concat());
+    let dir = simulate_and_refine(&[&options[..], &["--bad-frames", bad]].concat());
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     let report = json(&out.join("refine.json"));
     let flagged: Vec<u64> = report["frames"]
@@ -205,7 +206,7 @@ fn bad_frames_are_flagged_and_the_rest_stays_exact() {
             .unwrap()
             .contains("frame 14")
     );
-    let px = believed_wall_px(&survey, &out);
+    let px = photometric_wall_px(&survey, &out);
     assert!(px < 0.03, "{px}");
 
     // A covariance for every frame and every pair of neighbours.
@@ -213,7 +214,7 @@ fn bad_frames_are_flagged_and_the_rest_stays_exact() {
     assert_eq!(table.lines().count(), 1 + 27 + 26);
 }
 
-/// One initial pose is 20° off: that frame stays there, is named, and the others do not suffer.
+/// One initial pose is 20° off: this frame keeps it and is flagged, and the others stay accurate.
 #[test]
 fn a_wrong_prior_costs_one_frame() {
     let dir = tempfile::tempdir().unwrap();
@@ -235,19 +236,19 @@ fn a_wrong_prior_costs_one_frame() {
         };
         assert_eq!(frame["flag"], expected, "{frame}");
     }
-    let px = believed_wall_px(&survey, &out);
+    let px = photometric_wall_px(&survey, &out);
     assert!(px < 0.05, "{px}");
 }
 
-/// On a wall that repeats every 0.45 m, with steps of 6° and 9 cm: no frame is a tile off and
-/// called sure, and one that the prior leaves undecided has both poses.
+/// Perceptual aliasing on a wall that repeats every 0.45 m, with steps of 6° and 9 cm: no frame
+/// that is a tile off is photometric, and an ambiguous frame has both poses.
 #[test]
 fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
     let options = "--wall tiled-brick --frames 24 --size 320x240 --seed 2 \
                    --rotation-sigma-deg 6 --translation-sigma-m 0.06,0.06,0.09";
-    let dir = repaired(&options.split_whitespace().collect::<Vec<_>>());
+    let dir = simulate_and_refine(&options.split_whitespace().collect::<Vec<_>>());
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    let px = believed_wall_px(&survey, &out);
+    let px = photometric_wall_px(&survey, &out);
     assert!(px < 0.3, "{px}");
     let report = json(&out.join("refine.json"));
     let frames = report["frames"].as_array().unwrap();
@@ -258,26 +259,26 @@ fn on_a_wall_that_repeats_no_frame_is_silently_wrong() {
     }
 }
 
-/// Where a turn closes on little overlap, the wall's coarse levels would bend it to the next tile,
-/// and every pair of frames would fit.
+/// A turn that closes with little overlap could converge to the next tile on the coarse levels,
+/// with every pair of frames consistent.
 #[test]
 fn a_turn_closes_on_the_right_tile() {
     let options = "--wall tiled-brick --frames 60 --size 480x360 --seed 2 --jitter random-walk \
                    --rotation-sigma-deg 2 --translation-sigma-m 0.02,0.02,0.03";
-    let dir = repaired(&options.split_whitespace().collect::<Vec<_>>());
+    let dir = simulate_and_refine(&options.split_whitespace().collect::<Vec<_>>());
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     let report = json(&out.join("refine.json"));
     let frames = report["frames"].as_array().unwrap();
     let believed = frames.iter().filter(|f| f["flag"] == "photometric");
     assert_eq!(believed.count(), 60);
-    let px = believed_wall_px(&survey, &out);
+    let px = photometric_wall_px(&survey, &out);
     assert!(px < 0.05, "{px}");
 }
 
-/// A focal length 1 % off leaves errors that no pose takes away: no frame is called sure, and the
-/// reason is named.
+/// A focal length 1 % off leaves errors that no pose explains (overdispersion): no frame is
+/// photometric, and the reason is named.
 #[test]
-fn a_wrong_camera_strains_the_frames() {
+fn a_wrong_camera_causes_overdispersion() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
     simulate(&survey, &["--frames", "12", "--seed", "1"]);
@@ -301,10 +302,10 @@ fn a_wrong_camera_strains_the_frames() {
     }
 }
 
-/// Sharp bricks: with the wall solved for, at least a quarter of the error goes, and the
-/// uncertainty stated goes with it.
+/// Sharp bricks: joint estimation of the wall removes at least a quarter of the error, and the
+/// stated uncertainty decreases with it.
 #[test]
-fn solving_for_the_wall_makes_bricks_more_exact() {
+fn joint_estimation_of_the_wall_improves_bricks() {
     let dir = tempfile::tempdir().unwrap();
     let survey = dir.path().join("survey");
     simulate(
@@ -318,16 +319,16 @@ fn solving_for_the_wall_makes_bricks_more_exact() {
         succeed(&arguments);
         let report = json(&out.join("refine.json"));
         let sigma = report["frames"][8]["sigma"]["wall_px"].as_f64().unwrap();
-        (believed_wall_px(&survey, &out), sigma)
+        (photometric_wall_px(&survey, &out), sigma)
     };
     let (plain, joint) = (refined("plain", &[]), refined("joint", &["--joint"]));
     assert!(joint.0 < 0.75 * plain.0, "{} after {}", joint.0, plain.0);
     assert!((0.3..3.0).contains(&(joint.0 / joint.1)), "{joint:?}");
 }
 
-/// Concrete is smooth over a pixel: there is nothing to be solved for, and nothing is changed.
+/// Concrete is smooth over a pixel: joint estimation has nothing to gain and changes nothing.
 #[test]
-fn a_smooth_wall_is_refined_as_without_solving_for_it() {
+fn a_smooth_wall_is_refined_without_joint_estimation() {
     let dir = tempfile::tempdir().unwrap();
     let survey = dir.path().join("survey");
     let concrete = ["--wall", "concrete", "--frames", "12", "--size", "320x240"];
@@ -338,7 +339,7 @@ fn a_smooth_wall_is_refined_as_without_solving_for_it() {
         (succeed(&[&arguments[..], options].concat()), out)
     };
     let ((_, plain), (said, joint)) = (refined("plain", &[]), refined("joint", &["--joint"]));
-    assert!(said.contains("as without --joint"), "{said}");
+    assert!(said.contains("refined without --joint"), "{said}");
     for file in ["poses.tum", "covariance.csv"] {
         let [plain, joint] = [&plain, &joint].map(|out| std::fs::read(out.join(file)).unwrap());
         assert!(plain == joint, "{file} is different");

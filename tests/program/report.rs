@@ -1,5 +1,4 @@
-//! The report of a survey with a black frame: its numbers, its page, and how that looks in a
-//! browser.
+//! The report of a survey with a black frame: its numbers, its page, and the page in a browser.
 
 use crate::support::{
     self,
@@ -161,9 +160,9 @@ fn its_frames_are_those_of_the_poses_and_covariances() {
     }
 }
 
-/// The page is made of report.json and the pictures beside it, and of nothing else.
+/// The page can be made from report.json and the pictures beside it alone.
 #[test]
-fn the_page_says_what_the_numbers_say() {
+fn the_page_shows_the_numbers() {
     let work = work();
     let numbers = std::fs::read_to_string(work.report.join("report.json")).unwrap();
     let report: Report = serde_json::from_str(&numbers).unwrap();
@@ -188,7 +187,7 @@ fn the_page_says_what_the_numbers_say() {
         .and_then(|r| r.frames[7].reason.clone());
     let reason = reason.expect("a black frame is flagged");
     for words in [
-        "23 of 24 frames repaired, 1 flagged",
+        "23 of 24 frames refined, 1 flagged",
         "Frame 7",
         "000007.png",
         &reason[1..],
@@ -306,16 +305,23 @@ fn it_looks_right_wide_and_narrow_light_and_dark() {
     }
 }
 
-/// A script that tells the page around what a user would see, and what happens when it is used.
+/// A script that reports the visible state of the page, and its reaction to the pointer, to the
+/// surrounding page.
 const PROBE: &str = r##"<script>
 const slider = document.querySelector(".wiper input");
-const after = () => parseFloat(getComputedStyle(document.querySelector(".wipe .after")).clipPath.split(" ").pop());
+const after = () => {
+  const style = getComputedStyle(document.querySelector(".wipe .after"));
+  return parseFloat(style.clipPath.split(" ").pop());
+};
 const before = after();
 slider.value = 90;
 slider.dispatchEvent(new Event("input"));
 const chart = document.querySelector("#trajectory .chart > svg");
 const box = chart.getBoundingClientRect();
-chart.dispatchEvent(new PointerEvent("pointermove", { clientX: box.left + 0.5 * box.width, clientY: box.top + 9 }));
+chart.dispatchEvent(new PointerEvent("pointermove", {
+  clientX: box.left + 0.5 * box.width,
+  clientY: box.top + 9,
+}));
 const root = document.documentElement;
 parent.postMessage(JSON.stringify({
   width: innerWidth,
@@ -324,9 +330,11 @@ parent.postMessage(JSON.stringify({
   pictures: document.images.length,
   broken: [...document.images].filter((image) => !image.naturalWidth).length,
   charts: document.querySelectorAll(".chart > svg").length,
-  flat: [...document.querySelectorAll(".chart > svg, .strip img, .pano img")].filter((e) => e.getBoundingClientRect().height < 40).length,
+  flat: [...document.querySelectorAll(".chart > svg, .strip img, .pano img")]
+    .filter((e) => e.getBoundingClientRect().height < 40).length,
   reading: chart.parentElement.querySelector("output").textContent,
-  tiny: [...document.querySelectorAll("p, td, th, .tick")].filter((e) => parseFloat(getComputedStyle(e).fontSize) < 10).length,
+  tiny: [...document.querySelectorAll("p, td, th, .tick")]
+    .filter((e) => parseFloat(getComputedStyle(e).fontSize) < 10).length,
   errors: window.errors,
 }), "*");
 </script></body>"##;
@@ -373,7 +381,7 @@ fn nothing_sticks_out_and_everything_works() {
         );
         let reading = found["reading"].as_str().unwrap();
         assert!(
-            ["planned", "refined", "true"]
+            ["initial", "refined", "true"]
                 .iter()
                 .all(|name| reading.contains(name)),
             "{found}"

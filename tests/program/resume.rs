@@ -1,4 +1,4 @@
-//! Runs that are killed and go on.
+//! Runs that are killed and continued.
 
 use crate::support::{succeed, text};
 use rand::{Rng, SeedableRng};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Times that each command is killed at the least.
+/// Smallest number of times that each command is killed.
 const KILLS: usize = 4;
 
 /// A simulated survey.
@@ -36,22 +36,24 @@ fn start(arguments: &[&str]) -> Child {
         .unwrap()
 }
 
-/// Starts the command and kills it at random moments, at least until one run has gone on with what
-/// another one left, and then lets it end.
+/// Starts the command and kills it at random moments, at least until one run has continued another
+/// one, and then lets it end.
 fn killed(arguments: &[&str], takes: Duration, seed: u64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (mut kills, mut resumed) = (0, 0);
     for run in 0.. {
         assert!(
             run < 10 * KILLS,
-            "of {run} runs {kills} were killed and {resumed} had gone on with what was there"
+            "of {run} runs {kills} were killed and {resumed} had continued"
         );
         let mut child = start(arguments);
         std::thread::sleep(takes.mul_f64(rng.random_range(0.1..0.8)));
         child.kill().unwrap();
         let output = child.wait_with_output().unwrap();
         kills += usize::from(!output.status.success());
-        resumed += usize::from(String::from_utf8_lossy(&output.stdout).contains("going on"));
+        resumed += usize::from(
+            String::from_utf8_lossy(&output.stdout).contains("continuing the interrupted run"),
+        );
         if kills >= KILLS && resumed > 0 {
             break;
         }
@@ -74,8 +76,8 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Checks that two folders hold the same files with the same bytes, as `tell` reads them.
-fn assert_same(left: &Path, right: &Path, tell: impl Fn(&Path) -> Vec<u8>) {
+/// Checks that two folders hold the same files with the same bytes, as `content` reads them.
+fn assert_same(left: &Path, right: &Path, content: impl Fn(&Path) -> Vec<u8>) {
     let names = |folder: &Path| -> Vec<PathBuf> {
         let inside = files(folder).into_iter();
         // What writers that were killed have left is gone, too.
@@ -84,13 +86,12 @@ fn assert_same(left: &Path, right: &Path, tell: impl Fn(&Path) -> Vec<u8>) {
     };
     assert_eq!(names(left), names(right));
     for name in names(left) {
-        let same = tell(&left.join(&name)) == tell(&right.join(&name));
+        let same = content(&left.join(&name)) == content(&right.join(&name));
         assert!(same, "{} is different", name.display());
     }
 }
 
-/// The bytes of a file; of refine.json and run.toml without what tells of the run and not of the
-/// result.
+/// The bytes of a file; refine.json and run.toml without the parts that describe the run.
 fn result(path: &Path) -> Vec<u8> {
     let bytes = std::fs::read(path).unwrap();
     match path.file_name().and_then(|name| name.to_str()) {
@@ -116,7 +117,7 @@ fn result(path: &Path) -> Vec<u8> {
     }
 }
 
-/// Refines a survey in one go and with kills, and compares the results.
+/// Refines a survey without interruption and with kills, and compares the results.
 fn refine_with_kills(survey: &Path, folder: &Path, options: &[&str]) {
     let (whole, broken) = (folder.join("whole"), folder.join("broken"));
     let refine = |out| [&["refine", text(survey), "--out", text(out)], options].concat();
@@ -134,7 +135,7 @@ fn refine_ends_with_the_same_bytes_however_often_it_is_killed() {
 }
 
 #[test]
-fn so_does_refine_jointly_with_the_wall() {
+fn joint_refine_ends_with_the_same_bytes_however_often_it_is_killed() {
     let dir = tempfile::tempdir().unwrap();
     let survey = survey(dir.path(), 5);
     refine_with_kills(&survey, dir.path(), &["--joint"]);
@@ -194,7 +195,7 @@ fn wait_for_a_state(child: &mut Child, folder: &Path) {
 }
 
 #[test]
-fn an_interrupted_run_goes_on_and_another_is_refused() {
+fn an_interrupted_run_continues_and_another_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let survey = survey(dir.path(), 12);
     let out = dir.path().join("refined");
@@ -215,7 +216,7 @@ fn an_interrupted_run_goes_on_and_another_is_refused() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(message.contains("the same command goes on"), "{message}");
+    assert!(message.contains("the same command continues"), "{message}");
     assert!(kept.is_dir());
 
     let other = start(&[&arguments[..], &["--max-iterations", "3"]].concat());
@@ -237,8 +238,8 @@ fn an_interrupted_run_goes_on_and_another_is_refused() {
     std::fs::write(&frame, original).unwrap();
 
     let said = succeed(&arguments);
-    assert!(said.contains("going on"), "{said}");
+    assert!(said.contains("continuing the interrupted run"), "{said}");
     assert!(!kept.exists());
     let again = succeed(&[&arguments[..], &["--fresh"]].concat());
-    assert!(!again.contains("going on"), "{again}");
+    assert!(!again.contains("continuing the interrupted run"), "{again}");
 }

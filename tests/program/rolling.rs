@@ -42,7 +42,7 @@ fn number(value: &Value, pointer: &str) -> f64 {
     found.unwrap_or_else(|| panic!("no {pointer} in {value}"))
 }
 
-const WARNING: &str = "a systematic residual along the rows";
+const WARNING: &str = "the same systematic residual along the rows";
 
 #[test]
 fn rows_get_their_own_poses_and_where_they_do_not_the_program_says_so() {

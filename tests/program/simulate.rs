@@ -23,7 +23,7 @@ fn simulate_with(out: &Path, more: &[&str]) -> String {
     succeed(&arguments)
 }
 
-/// All files of a folder and of its folders with their contents, by name; but for the record, which
+/// All files of a folder and of its folders with their contents, by name, except the record, which
 /// names the folder.
 fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found = Vec::new();
@@ -122,10 +122,10 @@ fn a_texture_papers_the_wall() {
     assert!(frame.iter().all(|value| *value == 180));
 }
 
-/// A record of a survey with nothing special holds nothing special: what was simulated before stays
-/// as it was.
+/// The record of a survey without degradations does not mention them, so earlier simulations stay
+/// the same.
 #[test]
-fn hardships_are_recorded_and_reproducible() {
+fn degradations_are_recorded_and_reproducible() {
     let dir = tempfile::tempdir().unwrap();
     let survey = |name: &str, more: &[&str]| {
         let out = dir.path().join(name);
@@ -137,7 +137,7 @@ fn hardships_are_recorded_and_reproducible() {
         let record: serde_json::Value = serde_json::from_slice(&file.unwrap().1).unwrap();
         record["options"].clone()
     };
-    let hardships: [(&[&str], &str, serde_json::Value); 6] = [
+    let degradations: [(&[&str], &str, serde_json::Value); 6] = [
         (&["--gain-percent", "20"], "gain_percent", 20.0.into()),
         (&["--bias-grey", "6"], "bias_grey", 6.0.into()),
         (&["--lamp-corner", "0.4"], "lamp_corner", 0.4.into()),
@@ -154,13 +154,13 @@ fn hardships_are_recorded_and_reproducible() {
         let file = files.iter().find(|(name, _)| name == "frames/000002.png");
         file.unwrap().1.clone()
     };
-    for (arguments, key, value) in &hardships {
+    for (arguments, key, value) in &degradations {
         assert!(record(&plain).get(key).is_none(), "{key}");
         let hard = survey(&format!("one-{key}"), arguments);
         assert_eq!(record(&hard)[key], *value, "{key}");
         assert!(frame(&hard) != frame(&plain), "{key}");
     }
-    let mut all: Vec<&str> = hardships
+    let mut all: Vec<&str> = degradations
         .iter()
         .flat_map(|(more, ..)| *more)
         .copied()
@@ -219,7 +219,7 @@ fn bad_frames_go_into_the_survey_and_missing_ones_out_of_it() {
         let times: Vec<f64> = poses.iter().map(|stamped| stamped.time_s).collect();
         assert_eq!(times, [0.0, 1.0, 2.0, 3.0, 7.0]);
     }
-    // The poses go on where the picture stays.
+    // The poses advance where the picture is repeated.
     assert!(survey.initial[1].pose != survey.initial[2].pose);
     // And are those of the survey without bad frames.
     let good = dir.path().join("good");
@@ -310,7 +310,7 @@ fn impossible_surveys_are_refused_with_the_reason() {
     refuse(&["--radius-m", "300", "--size", "64x48"], 2, "memory");
     refuse(&["--fov-deg", "200"], 2, "--fov-deg must lie");
     refuse(&["--frames", "0"], 2, "--frames");
-    refuse(&["--translation-sigma-m", "1,2"], 2, "three numbers");
+    refuse(&["--translation-sigma-m", "1,2"], 2, "3 numbers");
     refuse(&["--translation-sigma-m", "9,9,9"], 3, "off the axis");
     refuse(&["--texture", "no-such.png"], 3, "no-such.png");
     refuse(&["--texture", "a.png", "--wall", "brick"], 2, "--wall");

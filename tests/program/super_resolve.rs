@@ -26,7 +26,7 @@ struct Simulated {
     bicubic: Kernel,
 }
 
-/// What is drawn of a fine pixel, and what there is.
+/// Estimated and true value of a fine pixel.
 #[derive(Clone, Copy)]
 struct Drawn {
     wall: WallPoint,
@@ -235,7 +235,7 @@ fn small(wall: Wall, noise_grey: f64) -> SimulateOptions {
     }
 }
 
-/// Things that move hide the wall from the best view, and from no other.
+/// Moving objects hide the wall in the best view only.
 #[test]
 fn super_resolved_walls_are_two_decibels_closer_to_the_truth_than_the_best_view() {
     for (wall, noise_grey, moving, least_db) in [
@@ -305,7 +305,8 @@ fn figures() {
             let best_view = psnr_db(&drawn, |d| d.best_view);
             let super_resolved = psnr_db(&drawn, |d| d.super_resolved);
             println!(
-                "{:<9} {noise_grey:>5} {frames:>6} {views:>5.1} {best_view:>7.2} dB {super_resolved:>12.2} dB {:>5.2} dB {:>6.1}",
+                "{:<9} {noise_grey:>5} {frames:>6} {views:>5.1} {best_view:>7.2} dB \
+                 {super_resolved:>12.2} dB {:>5.2} dB {:>6.1}",
                 format!("{wall:?}"),
                 super_resolved - best_view,
                 1e6 * seconds / drawn.len() as f64,

@@ -56,11 +56,12 @@ impl Running {
         (status, body)
     }
 
-    /// The same with the host that is right.
+    /// Sends a request with the correct host.
     fn ask(&self, line: &str, headers: &str, body: &str) -> (u16, String) {
         let length = body.len();
         self.send(&format!(
-            "{line} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\nContent-Length: {length}\r\n{headers}\r\n{body}",
+            "{line} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\nConnection: close\r\n\
+             Content-Length: {length}\r\n{headers}\r\n{body}",
             self.port
         ))
     }
@@ -74,7 +75,7 @@ impl Drop for Running {
     }
 }
 
-/// Whether the page was built in; where the environment says CI, it must be.
+/// True if the page was built in; in CI it must be.
 fn has_viewer() -> bool {
     let bundled = Viewer::bundled();
     assert!(
@@ -88,8 +89,10 @@ const JSON: &str = "Content-Type: application/json\r\n";
 
 fn mark(id: &str) -> String {
     format!(
-        r#"{{"type":"Feature","id":"{id}","geometry":{{"type":"Point","coordinates":[1.5,2.0]}},"properties":{{"class":"BAB","severity":3,
-        "note":"","chainage_m":2.0,"clock":"4:30","theta_deg":135.0,"x_m":1.0,"y_m":2.0,"z_m":0.0,"layer":"truth","created":""}}}}"#
+        r#"{{"type":"Feature","id":"{id}",
+        "geometry":{{"type":"Point","coordinates":[1.5,2.0]}},
+        "properties":{{"class":"BAB","severity":3,"note":"","chainage_m":2.0,"clock":"4:30",
+        "theta_deg":135.0,"x_m":1.0,"y_m":2.0,"z_m":0.0,"layer":"truth","created":""}}}}"#
     )
 }
 
@@ -386,7 +389,7 @@ fn an_inspector_walks_measures_marks_and_comes_back() {
         );
     }
 
-    // The server is gone without a word; another finds the marks.
+    // The server is killed; another one finds the marks.
     drop(server);
     let server = Running::start(&[&given[..], &["--layers", "refined"]].concat());
     let again = run(&browser, &modules, "again", &server.address(), &picture);
@@ -408,7 +411,7 @@ fn an_inspector_walks_measures_marks_and_comes_back() {
     let alone = run(&browser, &modules, "static", text(&site), &picture);
     assert_eq!(alone["frames"], false);
     a_tablet_will_do(&alone);
-    // What the page saves is what the server would have written, to the byte.
+    // The page saves the same bytes as the server.
     let [geojson, csv] = ["geojson", "csv"].map(|kind| alone[kind].as_str().unwrap());
     std::fs::write(site.join("marks.geojson"), geojson).unwrap();
     let kept: Value = serde_json::from_str(geojson).unwrap();

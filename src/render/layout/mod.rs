@@ -11,3 +11,4 @@ pub mod canvas;
 pub mod placement;
 pub mod sightings;
 pub mod tiles;
+pub mod wall_point;

@@ -17,6 +17,7 @@ pub mod gaps;
 pub mod maps;
 pub mod memory;
 pub mod panorama;
+pub mod panorama_files;
 pub mod plan;
 pub mod preview;
 pub mod raster_target;

@@ -1,24 +1,28 @@
-//! How the global solves came to rest.
+//! Section about the convergence of the global solves.
 
-use super::View;
+use super::page_data::PageData;
 use crate::refine::{LevelReport, StopReason};
-use crate::report::chart::{Axis, Chart, Series, Style, Vertical, legend};
+use crate::report::chart::{Axis, Chart, CurveStyle, Series, Vertical, legend};
 use crate::report::quantity::{count, short, significant};
 use maud::{Markup, html};
 
-/// The section; `None` without refine's report.
-pub fn section(view: &View) -> Option<Markup> {
-    let refinement = view.report.refinement.as_ref()?;
+/// Draws the section; `None` without refine's report.
+pub fn section(data: &PageData) -> Option<Markup> {
+    let refinement = data.report.refinement.as_ref()?;
     let levels = &refinement.levels;
     let names: Vec<String> = levels.iter().map(name).collect();
     let entries = names.iter().enumerate();
-    let entries: Vec<(&str, Style)> = entries
-        .map(|(k, name)| (name.as_str(), Style::Ordered(k)))
+    let entries: Vec<(&str, CurveStyle)> = entries
+        .map(|(k, name)| (name.as_str(), CurveStyle::Ordered(k)))
         .collect();
     Some(html! {
-        p { "The global solves, from coarse to fine, each a few damped Gauss–Newton steps over all frames. The cost is robust \
-            and compares only within a solve, for each has its own samples of the wall; it is not computed after a last step, so a solve of one step has no curve. The last solve ended because "
-            (refinement.stopped_because) "." }
+        p {
+            "The global solves, from coarse to fine, each with a few damped Gauss–Newton steps \
+             over all frames. The cost is robust. It can be compared within a solve only, since \
+             each solve has its own samples of the wall. The cost after a last step is not computed, so \
+             a solve of one step has no curve. The last solve stopped: "
+            (refinement.stopped_because) "."
+        }
         (legend(&entries, &[]))
         div.charts {
             @for (k, (level, name)) in levels.iter().zip(&names).enumerate() {
@@ -30,6 +34,7 @@ pub fn section(view: &View) -> Option<Markup> {
     })
 }
 
+/// Name of a solve: pyramid level, density of samples, share of the wall.
 fn name(level: &LevelReport) -> String {
     let mut name = format!("level {}", level.level);
     if level.samples_per_pixel != 1.0 {
@@ -47,7 +52,7 @@ fn name(level: &LevelReport) -> String {
     name
 }
 
-/// Cost per observation before the first and after each step of one solve.
+/// Chart of the cost per observation before the first and after each step of one solve.
 fn cost_chart(level: &LevelReport, name: &str, k: usize) -> Markup {
     let observations = level.solve.observations.max(1) as f64;
     let after = level.solve.steps.iter().map(|step| step.cost);
@@ -63,20 +68,24 @@ fn cost_chart(level: &LevelReport, name: &str, k: usize) -> Markup {
             whole: true,
         },
         vertical: Vertical::Linear,
-        series: vec![Series::new("cost", Style::Ordered(k), points.collect())],
+        series: vec![Series::new(
+            "cost",
+            CurveStyle::Ordered(k),
+            points.collect(),
+        )],
         marks: Vec::new(),
     }
     .draw()
 }
 
-/// Movement of the wall in every step of all solves.
+/// Chart of the largest displacement on the wall in every step of all solves.
 fn step_chart(levels: &[LevelReport], names: &[String]) -> Markup {
     let mut done = 0;
     let mut series = Vec::new();
     for (k, (level, name)) in levels.iter().zip(names).enumerate() {
         let points = (done + 1..).zip(&level.solve.steps);
         let points = points.map(|(at, step): (usize, _)| [at as f64, step.step_px]);
-        series.push(Series::new(name, Style::Ordered(k), points.collect()));
+        series.push(Series::new(name, CurveStyle::Ordered(k), points.collect()));
         done += level.solve.steps.len();
     }
     Chart {
@@ -100,9 +109,13 @@ fn table(levels: &[LevelReport], names: &[String]) -> Markup {
             table.solves {
                 caption { "The global solves" }
                 thead { tr {
-                    th scope="col" { "Solve" } th.number scope="col" { "Steps" } th.number scope="col" { "Observations" }
+                    th scope="col" { "Solve" }
+                    th.number scope="col" { "Steps" }
+                    th.number scope="col" { "Observations" }
                     th.number scope="col" { "Cost: start" } th.number scope="col" { "end" }
-                    th.number scope="col" { "Last step (px)" } th.number scope="col" { "Noise (grey)" } th scope="col" { "Stopped by" }
+                    th.number scope="col" { "Last step (px)" }
+                    th.number scope="col" { "Noise (grey)" }
+                    th scope="col" { "Stopped by" }
                 } }
                 tbody {
                     @for (level, name) in levels.iter().zip(names) {
@@ -115,7 +128,7 @@ fn table(levels: &[LevelReport], names: &[String]) -> Markup {
                             td.number { (count(solve.cost_end.round() as usize)) }
                             td.number { (short(solve.last_step_px)) }
                             td.number { (short(solve.sigma)) }
-                            td { (words(solve.stop)) }
+                            td { (stop_text(solve.stop)) }
                         }
                     }
                 }
@@ -124,11 +137,11 @@ fn table(levels: &[LevelReport], names: &[String]) -> Markup {
     }
 }
 
-fn words(stop: StopReason) -> &'static str {
+fn stop_text(stop: StopReason) -> &'static str {
     match stop {
-        StopReason::StepBelowTolerance => "a step below the tolerance",
-        StopReason::StepBelowUncertainty => "a step within the uncertainty",
+        StopReason::StepBelowTolerance => "step below the tolerance",
+        StopReason::StepBelowUncertainty => "step below the uncertainty",
         StopReason::NoFurtherDescent => "no further descent",
-        StopReason::MaxIterations => "the number of steps",
+        StopReason::MaxIterations => "number of steps",
     }
 }

@@ -1,46 +1,55 @@
-//! How far the poses are from the true ones, where these are known.
+//! Section about the errors against the true poses.
 
-use super::View;
-use super::trajectory::marks_key;
-use crate::report::Report;
-use crate::report::chart::{Chart, Series, Style, Vertical, legend};
+use super::page_data::PageData;
+use super::trajectory::mark_entry;
+use crate::report::chart::{Chart, CurveStyle, Series, Vertical, legend};
+use crate::report::model::Report;
 use crate::report::quantity::{fixed, short};
 use maud::{Markup, html};
 
-/// The section; `None` without truth.
-pub fn section(view: &View) -> Option<Markup> {
-    let comparison = &view.report.comparison;
+/// Draws the section; `None` without true poses.
+pub fn section(data: &PageData) -> Option<Markup> {
+    let comparison = &data.report.comparison;
     let [before, after] = [&comparison.baseline, &comparison.refined];
-    let (turned, now) = (before.trajectory.as_ref()?, after.trajectory.as_ref()?);
+    let (initial, refined) = (before.trajectory.as_ref()?, after.trajectory.as_ref()?);
     let (wall_before, wall_after) = (before.wall.as_ref()?, after.wall.as_ref()?);
-    let chart = |title: &str, unit: &str, before: &[f64], after: &[f64], factor: f64| {
-        let curve = |name: &str, style: Style, values: &[f64]| {
-            let points = view.points(|k| values.get(k).map(|v| factor * v));
+    let chart = |title: &str, unit: &str, factor: f64, [before, after]: [&[f64]; 2]| {
+        let curve = |name: &str, style: CurveStyle, values: &[f64]| {
+            let points = data.points(|k| values.get(k).map(|v| factor * v));
             Series::new(name, style, points)
         };
         Chart {
             title: title.to_owned(),
             unit: unit.to_owned(),
-            along: view.axis(),
+            along: data.axis(),
             vertical: Vertical::Logarithmic,
             series: vec![
-                curve("planned", Style::Planned, before),
-                curve("refined", Style::Refined, after),
+                curve("initial", CurveStyle::Initial, before),
+                curve("refined", CurveStyle::Refined, after),
             ],
-            marks: view.marks(),
+            marks: data.marks(),
         }
         .draw()
     };
+    let curves = [
+        ("initial", CurveStyle::Initial),
+        ("refined", CurveStyle::Refined),
+    ];
+    let rotation_deg = [initial, refined].map(|error| &error.frame_rotation_deg[..]);
+    let translation_m = [initial, refined].map(|error| &error.frame_translation_m[..]);
+    let wall_px = [wall_before, wall_after].map(|error| &error.frame_rms_px[..]);
     Some(html! {
-        p { "Frame by frame against the true poses, after the turn about the axis and the shift along it that no picture can \
-            tell. Mind the logarithmic scale." }
-        (legend(&[("planned", Style::Planned), ("refined", Style::Refined)], &marks_key(view)))
-        div.charts {
-            (chart("Rotation error", "°", &turned.frame_rotation_deg, &now.frame_rotation_deg, 1.0))
-            (chart("Translation error", "mm", &turned.frame_translation_m, &now.frame_translation_m, 1e3))
-            (chart("Error on the wall, RMS of the frame", "px", &wall_before.frame_rms_px, &wall_after.frame_rms_px, 1.0))
+        p {
+            "Errors of each frame against the true poses, after alignment by the gauge of the \
+             tunnel (rotation about the axis and shift along it). The scale is logarithmic."
         }
-        (table(view.report))
+        (legend(&curves, &mark_entry(data)))
+        div.charts {
+            (chart("Rotation error", "°", 1.0, rotation_deg))
+            (chart("Translation error", "mm", 1e3, translation_m))
+            (chart("Error on the wall, RMS of the frame", "px", 1.0, wall_px))
+        }
+        (table(data.report))
     })
 }
 
@@ -53,8 +62,8 @@ fn table(report: &Report) -> Markup {
         div.wide {
             table {
                 caption {
-                    "Initial and refined poses compared"
-                    @if report.survey.truth { " with the true ones" }
+                    "Comparison of initial and refined poses"
+                    @if report.survey.truth { " with the true poses" }
                     ", over chainage " (fixed(from_m, 2)) " to "
                     (fixed(to_m, 2)) " m at "
                     (short(comparison.canvas.px_per_metre)) " pixels per metre"

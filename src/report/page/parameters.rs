@@ -1,13 +1,14 @@
-//! Everything that was set, how long it took, and how to do it again.
+//! Sections about parameters, run time and command lines.
 
-use super::View;
+use super::page_data::PageData;
 use crate::report::quantity::{maybe, short};
+use crate::report::refined_files::{CalibratedUnknown, Calibration};
 use maud::{Markup, html};
 use serde_json::{Map, Value};
 
-/// The section of parameters.
-pub fn section(view: &View) -> Markup {
-    let report = view.report;
+/// Draws the section of parameters.
+pub fn section(data: &PageData) -> Markup {
+    let report = data.report;
     let [width, height] = report.survey.frame_size_px;
     let perimeter = short(report.survey.perimeter_m);
     let mut survey = vec![
@@ -25,6 +26,8 @@ pub fn section(view: &View) -> Markup {
     flatten("", &report.survey.file, &mut survey);
     let mut camera = Vec::new();
     flatten("", &report.survey.camera, &mut camera);
+    let refinement = report.refinement.as_ref();
+    let calibration = refinement.and_then(|refinement| refinement.calibration.as_ref());
     html! {
         div.tables {
             (table("Survey (survey.toml)", &survey))
@@ -32,56 +35,86 @@ pub fn section(view: &View) -> Markup {
             @if let Some(refinement) = &report.refinement {
                 @let mut options = Vec::new();
                 @let () = flatten("", &refinement.options, &mut options);
-                (table("Options of refine in effect", &options))
+                (table("Options of refine", &options))
                 @let timings: Vec<(String, String)> = refinement.timings.iter()
                     .map(|lap| (lap.stage.clone(), format!("{} s", short(lap.seconds)))).collect();
-                (table("Time of refine", &timings))
+                (table("Run time of refine", &timings))
                 @if let Some(factor) = refinement.variance_factor {
                     @let more = [
                         ("variance factor".to_owned(), short(factor)),
-                        ("refined by".to_owned(), refinement.program.clone()),
+                        ("program".to_owned(), refinement.program.clone()),
                     ];
                     (table("Estimate", &more))
                 }
             }
         }
-        @if let Some(calibration) = report.refinement.as_ref().and_then(|r| r.calibration.as_ref()) {
-            div.wide {
-                table {
-                    caption { "Self-calibration" }
-                    thead { tr { th scope="col" { "Unknown" } th scope="col" { "Unit" } th.number scope="col" { "Given" }
-                        th.number scope="col" { "Estimate" } th.number scope="col" { "1-σ" } th.number scope="col" { "Prior 1-σ" }
-                        th scope="col" { "Observed" } } }
-                    tbody {
-                        @for unknown in &calibration.unknowns {
-                            tr {
-                                th scope="row" { (unknown.name) }
-                                td { (if unknown.unit == "1" { "" } else { unknown.unit.as_str() }) }
-                                td.number { (format!("{:.5}", unknown.initial)) }
-                                td.number { (format!("{:.5}", unknown.estimate)) }
-                                td.number { (maybe(unknown.sigma)) }
-                                td.number { (short(unknown.prior_sigma)) }
-                                td { @if unknown.observed { "yes" } @else { "no: " (unknown.reason.as_deref().unwrap_or("no reason is given")) } }
-                            }
-                        }
-                    }
+        @if let Some(calibration) = calibration { (calibration_table(calibration)) }
+    }
+}
+
+/// Table of the parameters of the self-calibration.
+fn calibration_table(calibration: &Calibration) -> Markup {
+    html! {
+        div.wide {
+            table {
+                caption { "Self-calibration" }
+                thead { tr {
+                    th scope="col" { "Parameter" }
+                    th scope="col" { "Unit" }
+                    th.number scope="col" { "Given" }
+                    th.number scope="col" { "Estimate" }
+                    th.number scope="col" { "1-σ" }
+                    th.number scope="col" { "Prior 1-σ" }
+                    th scope="col" { "Observable" }
+                } }
+                tbody {
+                    @for parameter in &calibration.unknowns { (calibration_row(parameter)) }
                 }
             }
         }
     }
 }
 
-/// The command lines.
-pub fn repeat(view: &View) -> Markup {
+fn calibration_row(parameter: &CalibratedUnknown) -> Markup {
+    let unit = if parameter.unit == "1" {
+        ""
+    } else {
+        parameter.unit.as_str()
+    };
+    let reason = parameter.reason.as_deref();
     html! {
-        p { "The same input gives the same poses, to the last bit, whatever the number of threads." }
+        tr {
+            th scope="row" { (parameter.name) }
+            td { (unit) }
+            td.number { (format!("{:.5}", parameter.initial)) }
+            td.number { (format!("{:.5}", parameter.estimate)) }
+            td.number { (maybe(parameter.sigma)) }
+            td.number { (short(parameter.prior_sigma)) }
+            td {
+                @if parameter.observed {
+                    "yes"
+                } @else {
+                    "no: " (reason.unwrap_or("no reason is given"))
+                }
+            }
+        }
+    }
+}
+
+/// Draws the section of command lines.
+pub fn commands(data: &PageData) -> Markup {
+    html! {
+        p {
+            "The same input gives the same poses to the last bit, independent of the number of \
+             threads."
+        }
         pre tabindex="0" { code {
-            @for line in &view.report.commands { (shell(line)) "\n" }
+            @for line in &data.report.commands { (shell(line)) "\n" }
         } }
     }
 }
 
-/// A command line as a shell takes it.
+/// A command line, quoted for a shell.
 fn shell(line: &[String]) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./=,:+@%".contains(c);
     let quoted = line.iter().map(|argument| {
@@ -94,7 +127,7 @@ fn shell(line: &[String]) -> String {
     quoted.collect::<Vec<_>>().join(" ")
 }
 
-/// Names with dots between and values as text.
+/// Flattens nested objects into rows of dotted names and values as text.
 fn flatten(prefix: &str, object: &Map<String, Value>, rows: &mut Vec<(String, String)>) {
     for (key, value) in object {
         let name = match prefix {
@@ -114,6 +147,7 @@ fn flatten(prefix: &str, object: &Map<String, Value>, rows: &mut Vec<(String, St
     }
 }
 
+/// A value as text.
 fn plain(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
@@ -123,6 +157,7 @@ fn plain(value: &Value) -> String {
     }
 }
 
+/// Table of names and values.
 fn table(caption: &str, rows: &[(String, String)]) -> Markup {
     html! {
         table.pairs {
@@ -162,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_shell_would_take_apart_is_quoted() {
+    fn special_characters_of_a_shell_are_quoted() {
         let line = ["tunnelstitch", "refine", "my survey", "it's", "--out=r"].map(str::to_owned);
         assert_eq!(
             shell(&line),

@@ -1,114 +1,129 @@
-//! Where the camera was: planned, refined, true.
+//! Section about the trajectory: initial, refined and true poses.
 
-use super::View;
-use crate::report::FrameRow;
-use crate::report::chart::{Chart, Extra, Series, Style, Vertical, legend};
+use super::page_data::PageData;
+use crate::report::chart::{Chart, ChartElement, CurveStyle, Series, Vertical, legend};
+use crate::report::model::FrameRow;
 use crate::report::quantity::length_unit;
 use maud::{Markup, html};
 
-/// The section.
-pub fn section(view: &View) -> Markup {
-    let frames = &view.report.frames;
-    let known = view.report.survey.truth;
-    let mut entries = vec![("planned", Style::Planned), ("refined", Style::Refined)];
+/// Draws the section.
+pub fn section(data: &PageData) -> Markup {
+    let known = data.report.survey.truth;
+    let mut entries = vec![
+        ("initial", CurveStyle::Initial),
+        ("refined", CurveStyle::Refined),
+    ];
     if known {
-        entries.push(("true", Style::Truth));
+        entries.push(("true", CurveStyle::Truth));
     }
-    let extras = band_and_marks(view);
+    let elements = band_and_marks(data);
     html! {
-        p { "Positions of the camera, metres of the world: the tunnel's axis is y, the chainage; x and z lie across. "
-            "Of y, whose size hides everything else, the difference from the plan is shown; so it is of the rotations, "
-            "about the camera's own axes (x to the right, y down, z ahead)."
-            @if known { " The true poses are turned about the tunnel's axis and shifted along it to lie as close to the \
-                refined ones as they go, for no picture of a round tunnel can tell these two." } }
-        (legend(&entries, &extras))
+        p {
+            "Positions of the camera in the world frame: y is the tunnel's axis (the chainage), x \
+             and z are perpendicular to it. For y and for the rotations about the camera's axes (x \
+             right, y down, z forward) the chart shows the difference from the initial poses."
+            @if known {
+                " The true poses are aligned with the refined ones by the gauge of the tunnel: a \
+                 rotation about the axis and a shift along it, which the frames cannot determine."
+            }
+        }
+        (legend(&entries, &elements))
         div.charts {
-            (position(view, "Position x", 0, |_| 0.0))
-            (position(view, "Position y, less the plan", 1, |f| f.planned_m[1]))
-            (position(view, "Position z", 2, |_| 0.0))
+            (position(data, "Position x", 0, |_| 0.0))
+            (position(data, "Position y, minus initial", 1, |f| f.initial_m[1]))
+            (position(data, "Position z", 2, |_| 0.0))
             @for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-                (chart(view, format!("Rotation about {name}, less the plan"), "°", 1.0,
-                    [
-                        Some(view.points(|_| Some(0.0))),
-                        Some(view.points(|k| frames.get(k).map(|f| f.correction_rotation_deg[axis]))),
-                        known.then(|| view.points(|k| frames.get(k)?.true_rotation_deg.map(|r| r[axis]))),
-                    ],
-                    &|f| f.sigma_rotation_deg.map(|sigma| sigma[axis])))
+                (rotation(data, format!("Rotation about {name}, minus initial"), axis))
             }
         }
     }
 }
 
-/// Whether 1-σ of the poses are known.
-pub fn is_sure(view: &View) -> bool {
-    let frames = &view.report.frames;
+/// True if the 1-σ of the poses are known.
+pub fn has_sigma(data: &PageData) -> bool {
+    let frames = &data.report.frames;
     frames
         .iter()
         .any(|frame| frame.sigma_rotation_deg.is_some())
 }
 
-/// Bands of 1-σ and vertical lines, as far as there are any.
-pub fn band_and_marks(view: &View) -> Vec<Extra> {
-    let band = is_sure(view).then_some(Extra::Band);
-    band.into_iter().chain(marks_key(view)).collect()
+/// Legend entries of the bands of 1-σ and of the marks, if there are any.
+pub fn band_and_marks(data: &PageData) -> Vec<ChartElement> {
+    let band = has_sigma(data).then_some(ChartElement::Band);
+    band.into_iter().chain(mark_entry(data)).collect()
 }
 
-/// The vertical lines, if there are any.
-pub fn marks_key(view: &View) -> Vec<Extra> {
-    if view.marks().is_empty() {
+/// Legend entry of the marks, if there are any.
+pub fn mark_entry(data: &PageData) -> Vec<ChartElement> {
+    if data.marks().is_empty() {
         Vec::new()
     } else {
-        vec![Extra::Mark]
+        vec![ChartElement::Mark]
     }
 }
 
-type Pick<'p> = &'p dyn Fn(&FrameRow) -> Option<[f64; 3]>;
+/// A position of a frame, if it is known, metres.
+type PositionOf<'p> = &'p dyn Fn(&FrameRow) -> Option<[f64; 3]>;
 
-/// Positions along one axis, less something.
-fn position(view: &View, title: &str, axis: usize, less: fn(&FrameRow) -> f64) -> Markup {
-    let frames = &view.report.frames;
-    let picks: [Pick; 3] = [&|f| Some(f.planned_m), &|f| Some(f.refined_m), &|f| {
+/// Chart of the rotations about one axis of the camera, minus the initial ones.
+fn rotation(data: &PageData, title: String, axis: usize) -> Markup {
+    let frames = &data.report.frames;
+    let refined = |k: usize| Some(frames.get(k)?.correction_rotation_deg[axis]);
+    let truth = |k: usize| Some(frames.get(k)?.true_rotation_deg?[axis]);
+    let curves = [
+        Some(data.points(|_| Some(0.0))),
+        Some(data.points(refined)),
+        data.report.survey.truth.then(|| data.points(truth)),
+    ];
+    let sigma = |f: &FrameRow| f.sigma_rotation_deg.map(|sigma| sigma[axis]);
+    chart(data, title, "°", 1.0, curves, &sigma)
+}
+
+/// Chart of the positions along one axis, minus `offset_m`.
+fn position(data: &PageData, title: &str, axis: usize, offset_m: fn(&FrameRow) -> f64) -> Markup {
+    let frames = &data.report.frames;
+    let picks: [PositionOf; 3] = [&|f| Some(f.initial_m), &|f| Some(f.refined_m), &|f| {
         f.true_m
     }];
     let curves = picks.map(|pick| {
-        view.points(|k| {
+        data.points(|k| {
             let frame = frames.get(k)?;
-            Some(pick(frame)?[axis] - less(frame))
+            Some(pick(frame)?[axis] - offset_m(frame))
         })
     });
-    let most = curves.iter().flatten().map(|point| point[1].abs());
-    let (unit, factor) = length_unit(most.fold(0.0, f64::max));
+    let magnitudes = curves.iter().flatten().map(|point| point[1].abs());
+    let (unit, factor) = length_unit(magnitudes.fold(0.0, f64::max));
     let curves = curves.map(|curve| (!curve.is_empty()).then_some(curve));
     let sigma = |f: &FrameRow| f.sigma_translation_m.map(|sigma| factor * sigma[axis]);
-    chart(view, title.to_owned(), unit, factor, curves, &sigma)
+    chart(data, title.to_owned(), unit, factor, curves, &sigma)
 }
 
-/// Planned, refined and true values times `factor`; `sigma` of the refined ones.
+/// Chart of initial, refined and true values times `factor`, with the `sigma` of the refined ones.
 fn chart(
-    view: &View,
+    data: &PageData,
     title: String,
     unit: &str,
     factor: f64,
-    [planned, refined, truth]: [Option<Vec<[f64; 2]>>; 3],
+    [initial, refined, truth]: [Option<Vec<[f64; 2]>>; 3],
     sigma: &dyn Fn(&FrameRow) -> Option<f64>,
 ) -> Markup {
-    let series = |name: &str, style: Style, points: Option<Vec<[f64; 2]>>| {
+    let series = |name: &str, style: CurveStyle, points: Option<Vec<[f64; 2]>>| {
         let points = points?.into_iter().map(|[x, y]| [x, factor * y]);
         Some(Series::new(name, style, points.collect()))
     };
-    let refined = series("refined", Style::Refined, refined);
+    let refined = series("refined", CurveStyle::Refined, refined);
     let series = [
-        series("planned", Style::Planned, planned),
-        refined.map(|refined| refined.with_sigma(view.report.frames.iter().map(sigma))),
-        series("true", Style::Truth, truth),
+        series("initial", CurveStyle::Initial, initial),
+        refined.map(|refined| refined.with_sigma(data.report.frames.iter().map(sigma))),
+        series("true", CurveStyle::Truth, truth),
     ];
     Chart {
         title,
         unit: unit.to_owned(),
-        along: view.axis(),
+        along: data.axis(),
         vertical: Vertical::Linear,
         series: series.into_iter().flatten().collect(),
-        marks: view.marks(),
+        marks: data.marks(),
     }
     .draw()
 }

@@ -27,12 +27,12 @@ pub fn find() -> Option<PathBuf> {
     found
 }
 
-/// How a page is looked at.
+/// Window and colour scheme of a screenshot.
 #[derive(Clone, Copy, Debug)]
 pub struct Look {
     /// Width and height of the window.
     pub size: [u32; 2],
-    /// Whether the system is dark.
+    /// True for the dark colour scheme.
     pub dark: bool,
 }
 

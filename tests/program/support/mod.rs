@@ -1,4 +1,4 @@
-//! What the integration tests share: the fixture, copies of its first frames, and running the
+//! Helpers of the integration tests: the fixture, copies of its first frames, and running the
 //! program.
 
 pub mod chromium;
@@ -67,13 +67,13 @@ pub fn fail(arguments: &[&str], code: i32) -> String {
     message
 }
 
-/// Simulates a survey into `out`; `options`: what differs from the defaults.
+/// Simulates a survey into `out`; `options` are added to the defaults.
 pub fn simulate(out: &Path, options: &[&str]) -> String {
     let start = ["simulate", "free", "--quiet", "--out", text(out)];
     succeed(&[&start, options].concat())
 }
 
-/// What a JSON file holds.
+/// Content of a JSON file.
 pub fn json(path: &Path) -> serde_json::Value {
     serde_json::from_str(&std::fs::read_to_string(path).expect("a JSON file")).expect("JSON")
 }

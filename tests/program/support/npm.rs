@@ -13,7 +13,8 @@ pub fn find() -> Option<PathBuf> {
         return Some(modules);
     }
     let what = format!(
-        "no gltf-validator and playwright-core: copy src/inspect/web/package*.json to {0} and run `npm ci --prefix {0}`",
+        "no gltf-validator and playwright-core: copy src/inspect/web/package*.json to {0} and run \
+         `npm ci --prefix {0}`",
         target.join("npm").display()
     );
     assert!(std::env::var_os("CI").is_none(), "{what}");

@@ -1,0 +1,39 @@
+//! Result of the check of a survey.
+
+use super::effort::Effort;
+use super::jitter::JitterCheck;
+use super::masks::MaskCheck;
+use super::overlap::OverlapCheck;
+use super::pictures::PictureCheck;
+use super::poses::PosesCheck;
+use serde::Serialize;
+
+/// Result of the check of a survey.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct Check {
+    /// Number of frames.
+    pub frames: usize,
+    /// Width and height of the frames according to the calibration, pixels.
+    pub size_px: [u32; 2],
+    /// Share of the image that the lens covers, 0–1.
+    pub shown_share: f64,
+    /// Parts of image and wall that are left out.
+    pub masks: MaskCheck,
+    /// Positions and steps of the initial poses.
+    pub poses: PosesCheck,
+    /// Overlap of neighbours and of turns.
+    pub overlap: OverlapCheck,
+    /// Median resolution of the frames at the wall, pixels per metre.
+    pub px_per_metre: f64,
+    /// Expected errors of the initial poses.
+    pub jitter: JitterCheck,
+    /// Exposure, noise and texture of the frames.
+    pub pictures: PictureCheck,
+    /// Time and memory that refining and stitching need.
+    pub effort: Effort,
+    /// Faults that make `refine` or `stitch` fail, each with its remedy.
+    pub faults: Vec<String>,
+    /// Conditions that need attention, each with its remedy.
+    pub warnings: Vec<String>,
+}

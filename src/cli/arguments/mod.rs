@@ -1,0 +1,36 @@
+//! Arguments that commands share, one group a file.
+//!
+//! | file | arguments |
+//! | --- | --- |
+//! | [`numbers`] | parsers of numbers, sizes and lists |
+//! | [`poses`] | which poses are used, and how they are read |
+//! | [`tunnel`] | section and centreline |
+//! | [`frame_times`] | number and times of the frames |
+//! | [`motion`] | motion of the carrier, and how the camera is mounted on it |
+//! | [`rendering`] | canvas, interpolation and blending of panoramas |
+//! | [`panorama_files`] | files of a panorama and their formats |
+//! | [`textures`] | textures and layers of the viewer |
+//! | [`simulation`] | degradations of a simulated survey, its wall and its jitter |
+//! | [`resume`] | continuing an interrupted run |
+
+mod frame_times;
+mod motion;
+mod numbers;
+mod panorama_files;
+mod poses;
+mod rendering;
+pub mod resume;
+mod simulation;
+mod textures;
+mod tunnel;
+
+pub use frame_times::{FrameTimesArguments, clock_times};
+pub use motion::{MotionArguments, MountingArguments};
+pub use numbers::{memory_size, numbers, picture_size, positive};
+pub use panorama_files::OutputArguments;
+pub use poses::{PoseReadingArguments, PosesArguments};
+pub use rendering::{BlendArguments, CanvasArguments, InterpolationArgument, PictureArguments};
+pub use resume::ResumeArguments;
+pub use simulation::{DegradationArguments, JitterArgument, WallArgument};
+pub use textures::{LayerArguments, LayerName, TextureArguments};
+pub use tunnel::TunnelArguments;

@@ -1,0 +1,264 @@
+//! Arguments that select poses and say how they are read.
+
+use crate::cli::output::{Failure, Terminal};
+use crate::survey::{Associate, PosesSection, Survey, SurveyFile};
+use crate::trajectory::{CameraAxes, Direction, PoseFormat, Trajectory};
+use clap::ValueEnum;
+use std::path::{Path, PathBuf};
+
+/// Flags for reading poses; each replaces its key of the section poses in survey.toml.
+#[derive(Clone, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Reading poses (overrides survey.toml)")]
+pub struct PoseReadingArguments {
+    /// Format of the poses [default: detected from the content].
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pose_format: Option<FormatArgument>,
+    /// Direction of the poses: camera to world (c2w) or world to camera (w2c)
+    /// [default: that of the format].
+    #[arg(long, value_enum, value_name = "C2W|W2C")]
+    pose_convention: Option<DirectionArgument>,
+    /// Axes of the camera: opencv (y down, z forward) or opengl (y up, z backwards)
+    /// [default: those of the format].
+    #[arg(long, value_enum, value_name = "AXES")]
+    camera_axes: Option<AxesArgument>,
+    /// Extrinsics between the body (IMU) whose poses these are and the camera: a 4 × 4 matrix,
+    /// EuRoC's sensor.yaml (T_BS), or a camchain of Kalibr (T_cam_imu).
+    #[arg(long, value_name = "FILE")]
+    body_to_camera: Option<PathBuf>,
+    /// Axis of the tunnel in the world frame of the poses: JSON {"point_m": [x, y, z], "axis":
+    /// [x, y, z], "theta_zero": [x, y, z]} (the last is optional), or a 4 × 4 matrix from the
+    /// tunnel's frame (y along the axis) to the world.
+    #[arg(long, value_name = "FILE")]
+    tunnel_frame: Option<PathBuf>,
+    /// Association of poses with frames [default: by name if the file has names, else by order].
+    #[arg(long, value_enum, value_name = "HOW")]
+    associate: Option<AssociateArgument>,
+    /// File with the times of the frames, one a line: `time`, `time name` or `name time`, in
+    /// seconds or whole nanoseconds [default: from the frames' names].
+    #[arg(long, value_name = "FILE")]
+    frame_times: Option<PathBuf>,
+    /// With --associate time: largest time difference between a frame and its nearest pose, seconds
+    /// [default: 0.01].
+    #[arg(long, value_name = "S")]
+    time_tolerance_s: Option<f64>,
+    /// With --associate time: interpolate between the poses before and after a frame instead of
+    /// taking the nearer one.
+    #[arg(long)]
+    interpolate: bool,
+}
+
+/// Names of formats.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum FormatArgument {
+    /// time tx ty tz qx qy qz qw.
+    Tum,
+    /// The twelve numbers of a 3 × 4 matrix.
+    Kitti,
+    /// Columns named in the first line.
+    Csv,
+    /// COLMAP's text model: its folder, or images.txt.
+    Colmap,
+    /// nerfstudio's transforms.json.
+    Nerfstudio,
+    /// EuRoC's csv of a body's poses.
+    Euroc,
+}
+
+/// Names of directions.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum DirectionArgument {
+    /// From camera to world.
+    C2w,
+    /// From world to camera.
+    W2c,
+}
+
+/// Names of camera axes.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum AxesArgument {
+    /// x right, y down, z forward.
+    Opencv,
+    /// x right, y up, z backwards.
+    Opengl,
+}
+
+/// Names of associations.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum AssociateArgument {
+    /// By order: the first pose belongs to the first frame, and so on.
+    Order,
+    /// By the frames' names in the file of poses.
+    Name,
+    /// By the frames' times.
+    Time,
+}
+
+impl From<FormatArgument> for PoseFormat {
+    fn from(format: FormatArgument) -> Self {
+        match format {
+            FormatArgument::Tum => Self::Tum,
+            FormatArgument::Kitti => Self::Kitti,
+            FormatArgument::Csv => Self::Csv,
+            FormatArgument::Colmap => Self::Colmap,
+            FormatArgument::Nerfstudio => Self::Nerfstudio,
+            FormatArgument::Euroc => Self::Euroc,
+        }
+    }
+}
+
+impl From<DirectionArgument> for Direction {
+    fn from(direction: DirectionArgument) -> Self {
+        match direction {
+            DirectionArgument::C2w => Self::CameraToWorld,
+            DirectionArgument::W2c => Self::WorldToCamera,
+        }
+    }
+}
+
+impl From<AxesArgument> for CameraAxes {
+    fn from(axes: AxesArgument) -> Self {
+        match axes {
+            AxesArgument::Opencv => Self::OpenCv,
+            AxesArgument::Opengl => Self::OpenGl,
+        }
+    }
+}
+
+impl From<AssociateArgument> for Associate {
+    fn from(how: AssociateArgument) -> Self {
+        match how {
+            AssociateArgument::Order => Self::Order,
+            AssociateArgument::Name => Self::Name,
+            AssociateArgument::Time => Self::Time,
+        }
+    }
+}
+
+impl PoseReadingArguments {
+    /// Opens a survey, its poses read according to the flags, and prints its warnings.
+    ///
+    /// # Errors
+    /// Everything that can be wrong with the survey.
+    pub fn open(&self, survey: &Path, terminal: &Terminal) -> Result<Survey, Failure> {
+        let survey = self.open_quietly(survey)?;
+        for warning in &survey.warnings {
+            terminal.warn(warning);
+        }
+        Ok(survey)
+    }
+
+    /// Opens a survey, its poses read according to the flags, and prints nothing.
+    ///
+    /// # Errors
+    /// Everything that can be wrong with the survey.
+    pub fn open_quietly(&self, survey: &Path) -> Result<Survey, Failure> {
+        Ok(Survey::open_with(survey, |file| self.apply_to(file))?)
+    }
+
+    /// Writes the flags into a survey's file. Their paths are relative to the working folder, not
+    /// to the survey's.
+    fn apply_to(&self, file: &mut SurveyFile) {
+        let poses = &mut file.poses;
+        replace(&mut poses.format, self.pose_format.map(Into::into));
+        replace(&mut poses.convention, self.pose_convention.map(Into::into));
+        replace(&mut poses.camera_axes, self.camera_axes.map(Into::into));
+        replace(
+            &mut poses.body_to_camera,
+            self.body_to_camera.as_deref().map(absolute),
+        );
+        replace(
+            &mut poses.tunnel_frame,
+            self.tunnel_frame.as_deref().map(absolute),
+        );
+        replace(&mut poses.associate, self.associate.map(Into::into));
+        replace(&mut poses.time_tolerance_s, self.time_tolerance_s);
+        replace(&mut poses.interpolate, self.interpolate.then_some(true));
+        replace(
+            &mut file.frames.times,
+            self.frame_times.as_deref().map(absolute),
+        );
+    }
+}
+
+fn replace<T>(value: &mut Option<T>, other: Option<T>) {
+    if other.is_some() {
+        *value = other;
+    }
+}
+
+/// An absolute path, links not resolved.
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
+}
+
+/// Poses that a command uses.
+#[derive(Clone, Debug, clap::Args)]
+pub struct PosesArguments {
+    /// Poses to use: `initial` and `truth` are those of survey.toml; anything else is a file in any
+    /// supported format, in the tunnel's frame as `refine` and `convert` write it, unless the flags
+    /// below say otherwise.
+    #[arg(
+        id = "poses",
+        long = "poses",
+        default_value = "initial",
+        value_name = "initial|truth|FILE"
+    )]
+    name: String,
+    #[command(flatten)]
+    reading: PoseReadingArguments,
+}
+
+impl PosesArguments {
+    /// Poses of a file that `refine` has written.
+    pub fn from_file(file: &Path) -> Self {
+        Self {
+            name: file.to_string_lossy().into_owned(),
+            reading: PoseReadingArguments::default(),
+        }
+    }
+
+    /// The file, unless the poses are those of survey.toml.
+    pub fn file(&self) -> Option<&Path> {
+        match self.name.as_str() {
+            "initial" | "truth" => None,
+            file => Some(Path::new(file)),
+        }
+    }
+
+    /// Opens a survey and reads the chosen poses.
+    ///
+    /// A file replaces the survey's initial poses; the section poses of survey.toml does not apply
+    /// to it.
+    ///
+    /// # Errors
+    /// Everything that can be wrong with the survey; true poses that the survey does not have; a
+    /// file that does not hold the frames' poses.
+    pub fn open(
+        &self,
+        survey: &Path,
+        terminal: &Terminal,
+    ) -> Result<(Survey, Trajectory), Failure> {
+        if let Some(path) = self.file() {
+            let survey = Survey::open_with(survey, |file| {
+                file.poses = PosesSection::of(absolute(path));
+                self.reading.apply_to(file);
+            })?;
+            for warning in &survey.warnings {
+                terminal.warn(warning);
+            }
+            let poses = survey.initial.clone();
+            return Ok((survey, poses));
+        }
+        let survey = self.reading.open(survey, terminal)?;
+        let poses = match (self.name.as_str(), &survey.truth) {
+            ("truth", Some(truth)) => truth.clone(),
+            ("truth", None) => {
+                return Err(Failure::usage(
+                    "--poses truth: the survey has no poses.truth; use --poses initial or a file",
+                ));
+            }
+            _ => survey.initial.clone(),
+        };
+        Ok((survey, poses))
+    }
+}

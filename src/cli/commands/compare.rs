@@ -1,0 +1,158 @@
+//! `tunnelstitch compare`: compares initial with refined poses.
+
+use crate::PROGRAM;
+use crate::cli::arguments::{PictureArguments, PoseReadingArguments, positive};
+use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
+use crate::evaluate::{Comparison, Drawings, before_after, compare_survey};
+use crate::frames::{PictureFormat, write_picture};
+use crate::persist::atomic;
+use crate::progress::Progress;
+use crate::render::Layout;
+use crate::survey::Survey;
+use crate::trajectory::poses_of;
+use image::DynamicImage;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Compares the survey's initial poses with refined ones, and both with the true ones if known.
+///
+/// Writes baseline.png, refined.png and truth.png (all of the same part of the wall),
+/// before-after.png (an extract of the first above the second) and compare.json.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  \
+    tunnelstitch compare my-survey --refined refined/poses.tum --out compared")]
+pub struct CompareArguments {
+    /// Folder of the survey, or its survey.toml.
+    survey: PathBuf,
+    /// The refined poses in any format, in the tunnel's frame as `refine` and `convert` write them.
+    /// The flags for reading poses apply to those of the survey only; convert poses of another
+    /// convention first.
+    #[arg(long, value_name = "FILE")]
+    refined: PathBuf,
+    /// Folder for the results; created if missing.
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    #[command(flatten)]
+    picture: PictureArguments,
+    /// Print compare.json on standard output instead of the table.
+    #[arg(long)]
+    json: bool,
+    /// Exit with code 4 if the error of the refined poses on the wall (root mean square, pixels) is
+    /// larger than this. Needs true poses.
+    #[arg(long, value_name = "X", value_parser = positive)]
+    max_wall_px: Option<f64>,
+    #[command(flatten)]
+    reading: PoseReadingArguments,
+}
+
+/// `compare.json`.
+#[derive(Serialize)]
+struct ComparisonReport<'a> {
+    program: &'static str,
+    survey: &'a Path,
+    refined_poses: &'a Path,
+    layout: Layout,
+    #[serde(flatten)]
+    comparison: &'a Comparison,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for everything wrong with the survey, the poses or the output, and for a quality
+/// gate that is not met (after everything was written).
+pub fn run(
+    arguments: &CompareArguments,
+    record: &RunRecord,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    let survey = arguments.reading.open(&arguments.survey, terminal)?;
+    if arguments.max_wall_px.is_some() && survey.truth.is_none() {
+        return Err(Failure::usage(
+            "--max-wall-px needs true poses, and the survey has no poses.truth",
+        ));
+    }
+    let refined = poses_of(&survey.read_poses(&arguments.refined)?);
+    atomic::create_folder(&arguments.out)?;
+    let (comparison, drawings) = compare_survey(
+        &survey,
+        &refined,
+        arguments.picture.canvas.px_per_metre,
+        arguments.picture.interpolation.into(),
+        terminal,
+    )?;
+    let json = write_comparison(
+        &survey,
+        &arguments.refined,
+        arguments.picture.canvas.layout.into(),
+        &comparison,
+        drawings,
+        &arguments.out,
+        terminal,
+    )?;
+    let inputs = record::hash_survey(&survey, [arguments.refined.as_path()])?;
+    record.write(&arguments.out.join(RUN_FILE), &inputs)?;
+    if arguments.json {
+        json::print_text(&json)?;
+    } else {
+        terminal.say(comparison.to_string());
+        terminal.say(format!("wrote {}", arguments.out.display()));
+    }
+    check_quality(&comparison, arguments.max_wall_px)
+}
+
+/// Writes the panoramas and compare.json into `out`; returns the text of compare.json.
+///
+/// # Errors
+/// An output that cannot be written.
+pub fn write_comparison(
+    survey: &Survey,
+    refined_file: &Path,
+    layout: Layout,
+    comparison: &Comparison,
+    drawings: Drawings,
+    out: &Path,
+    terminal: &Terminal,
+) -> Result<String, Failure> {
+    let json = json::text(&ComparisonReport {
+        program: PROGRAM,
+        survey: &survey.folder,
+        refined_poses: refined_file,
+        layout,
+        comparison,
+    })?;
+    terminal.start("writing", 4);
+    let write = |name: &str, image: &DynamicImage| -> Result<(), Failure> {
+        write_picture(&out.join(name), image, PictureFormat::Png)?;
+        terminal.advance(1);
+        Ok(())
+    };
+    let baseline = drawings.baseline.panorama.into_image(Layout::ThetaRight);
+    let refined = drawings.refined.panorama.into_image(Layout::ThetaRight);
+    write(
+        "before-after.png",
+        &before_after(&baseline, &refined).into(),
+    )?;
+    write("baseline.png", &layout.turn(baseline))?;
+    write("refined.png", &layout.turn(refined))?;
+    match drawings.truth {
+        Some(truth) => write("truth.png", &truth.panorama.into_image(layout))?,
+        // A picture of an earlier comparison would show other poses.
+        None => atomic::remove_file(&out.join("truth.png"))?,
+    }
+    terminal.finish();
+    atomic::write_text(&out.join("compare.json"), &json)?;
+    Ok(json)
+}
+
+/// Fails if the error of the refined poses on the wall is above the limit.
+fn check_quality(comparison: &Comparison, max_wall_px: Option<f64>) -> Result<(), Failure> {
+    match (max_wall_px, &comparison.refined.wall) {
+        (Some(limit), Some(wall)) if wall.px.rms > limit => Err(Failure::quality(format!(
+            "the error of the refined poses on the wall is {:.4} px (root mean square), more than \
+             --max-wall-px {limit}",
+            wall.px.rms
+        ))),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,156 @@
+//! `tunnelstitch convert`: writes poses in another format.
+
+use crate::camera::ColmapCamera;
+use crate::cli::arguments::PosesArguments;
+use crate::cli::output::{
+    Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, record, refuse_overwriting,
+    survey_files,
+};
+use crate::persist::atomic::{self, StagedFolder, WriteError};
+use crate::trajectory::{StampedPose, colmap, csv, kitti, nerfstudio, tum};
+use clap::ValueEnum;
+use std::path::{Path, PathBuf};
+
+/// Writes poses in another format, in the tunnel's frame and the convention of the format.
+///
+/// There is one pose per frame, in the order of the frames. Paths of the frames are relative to the
+/// survey's folder (csv, colmap) or to the folder of the output (nerfstudio). The output of colmap
+/// and nerfstudio includes the camera.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    tunnelstitch convert survey --poses refined/poses.tum --to colmap --out sparse\n      \
+    for COLMAP, with the survey's folder as its image path\n  \
+    tunnelstitch convert survey --poses vio.tum --pose-convention w2c \
+    --tunnel-frame axis.json --to tum --out in-tunnel.tum\n      \
+    poses of another world frame and convention, for every other command")]
+pub struct ConvertArguments {
+    /// Folder of the survey, or its survey.toml.
+    survey: PathBuf,
+    /// Format of the output.
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    to: OutputFormat,
+    /// The file to write; for colmap a folder, created if missing.
+    #[arg(long, short, value_name = "PATH")]
+    out: PathBuf,
+    #[command(flatten)]
+    poses: PosesArguments,
+}
+
+/// Names of formats that can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum OutputFormat {
+    /// time tx ty tz qx qy qz qw.
+    Tum,
+    /// The twelve numbers of a 3 × 4 matrix.
+    Kitti,
+    /// Named columns.
+    Csv,
+    /// COLMAP's text model: cameras.txt, images.txt and points3D.txt, which is empty.
+    Colmap,
+    /// nerfstudio's transforms.json.
+    Nerfstudio,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for everything wrong with the survey, the poses or the output.
+pub fn run(
+    arguments: &ConvertArguments,
+    record: &RunRecord,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
+    let out = &arguments.out;
+    refuse_overwriting(std::slice::from_ref(out), survey_files(&survey))?;
+    let inputs = record::hash_survey(&survey, arguments.poses.file())?;
+    let has_names = !matches!(arguments.to, OutputFormat::Tum | OutputFormat::Kitti);
+    if let Some(frame) = survey
+        .frames
+        .iter()
+        .find(|frame| frame.is_in_video() && has_names)
+    {
+        terminal.warn(format!(
+            "the frames are pictures of a video, named {} and so on; other programs need them as \
+             files: ffmpeg -i {} -fps_mode passthrough -start_number 0 pictures/%06d.png",
+            frame.path.display(),
+            frame.file().display()
+        ));
+    }
+    let camera = ColmapCamera::of(&survey.camera);
+    let names = || survey.frame_paths_from(&survey.folder);
+    let text = match arguments.to {
+        OutputFormat::Tum => tum::format(&trajectory),
+        OutputFormat::Kitti => kitti::format(&trajectory),
+        OutputFormat::Csv => csv::format(&names(), &trajectory),
+        OutputFormat::Nerfstudio => {
+            let folder = out.parent().unwrap_or(Path::new(""));
+            let keys = camera.nerfstudio().ok_or_else(|| {
+                Failure::input(
+                    "nerfstudio has no lens model with k4 to k6; write colmap, or calibrate with 5 \
+                     coefficients",
+                )
+            })?;
+            nerfstudio::format(keys, &survey.frame_paths_from(folder), &trajectory)
+        }
+        OutputFormat::Colmap => {
+            write_colmap(out, &camera, &names(), &trajectory)?;
+            record.write(&out.join(RUN_FILE), &inputs)?;
+            terminal.say(format!(
+                "wrote {} poses to {}",
+                trajectory.len(),
+                out.display()
+            ));
+            return Ok(());
+        }
+    };
+    create_parent_folder(out)?;
+    atomic::write_text(out, &text)?;
+    record.write(&record::path_beside(out), &inputs)?;
+    terminal.say(format!(
+        "wrote {} poses to {}",
+        trajectory.len(),
+        out.display()
+    ));
+    Ok(())
+}
+
+/// Files of a COLMAP model.
+const MODEL_FILES: [&str; 3] = [
+    colmap::CAMERAS_FILE,
+    colmap::IMAGES_FILE,
+    colmap::POINTS_FILE,
+];
+
+/// Writes a COLMAP model. It replaces an earlier model, but no folder with other files.
+fn write_colmap(
+    out: &Path,
+    camera: &ColmapCamera,
+    names: &[String],
+    trajectory: &[StampedPose],
+) -> Result<(), Failure> {
+    if out.exists() {
+        let entries = std::fs::read_dir(out).map_err(|error| WriteError::new(out, error))?;
+        let is_of_model = |entry: std::io::Result<std::fs::DirEntry>| {
+            let mut names = MODEL_FILES.iter().chain([&RUN_FILE]);
+            entry.is_ok_and(|entry| names.any(|name| entry.file_name() == *name))
+        };
+        if !entries.into_iter().all(is_of_model) {
+            return Err(Failure::usage(format!(
+                "{}: holds other files than {}, so it is not replaced; choose another folder",
+                out.display(),
+                MODEL_FILES.join(", ")
+            )));
+        }
+    }
+    let staged = StagedFolder::begin(out)?;
+    let texts = [
+        camera.cameras_txt(),
+        colmap::format_images(names, trajectory),
+        colmap::format_points().to_owned(),
+    ];
+    for (name, text) in MODEL_FILES.iter().zip(texts) {
+        atomic::write_text(&staged.path().join(name), &text)?;
+    }
+    Ok(staged.finish()?)
+}

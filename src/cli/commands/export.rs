@@ -1,0 +1,198 @@
+//! `tunnelstitch export`: writes the textured wall for 3D programs and for web servers.
+
+use crate::cli::arguments::{LayerArguments, LayerName, PosesArguments, TextureArguments};
+use crate::cli::output::{
+    Failure, RUN_FILE, RunRecord, Terminal, create_parent_folder, json, record,
+};
+use crate::inspect::{ExportFiles, MANIFEST, TILESET, Viewer, export_page, export_wall};
+use crate::render::Canvas;
+use crate::survey::Survey;
+use crate::trajectory::{Trajectory, poses_of};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Writes the wall as a textured 3D mesh in metres, in the tunnel's coordinates.
+///
+/// In glTF y points up, in the tunnel z: (x, y, z) is written as (x, z, −y). Blender and viewers of
+/// 3D Tiles undo this rotation.
+#[derive(Debug, clap::Args)]
+#[command(
+    group = clap::ArgGroup::new("output").required(true).multiple(true),
+    after_help = "Examples:\n  \
+    tunnelstitch export my-survey --poses refined/poses.tum --glb wall.glb\n      \
+    one file, for Blender, Unity, Unreal or a viewer of glTF\n  \
+    tunnelstitch export my-survey --poses refined/poses.tum --3dtiles wall-tiles\n      \
+    kilometres, for Cesium and other programs that stream 3D Tiles\n  \
+    tunnelstitch export my-survey --poses refined/poses.tum --web walk\n      \
+    a page for any web server: python3 -m http.server --directory walk"
+)]
+pub struct ExportArguments {
+    /// Folder of the survey, or its survey.toml.
+    survey: PathBuf,
+    #[command(flatten)]
+    poses: PosesArguments,
+    /// One glTF file (GLB), for short pieces of tunnel.
+    #[arg(long, value_name = "FILE", group = "output", help_heading = "Output")]
+    glb: Option<PathBuf>,
+    /// A folder of OGC 3D Tiles 1.1, for tunnels of any length: tileset.json and tiles in levels of
+    /// detail.
+    #[arg(
+        long = "3dtiles",
+        value_name = "DIR",
+        group = "output",
+        help_heading = "Output"
+    )]
+    tiles: Option<PathBuf>,
+    /// A folder with the viewer and everything it shows, for any web server. Marks stay in the
+    /// browser; `view` keeps them in files.
+    #[arg(long, value_name = "DIR", group = "output", help_heading = "Output")]
+    web: Option<PathBuf>,
+    /// Print a description of the output as JSON.
+    #[arg(long, help_heading = "Output")]
+    json: bool,
+    #[command(flatten)]
+    layers: LayerArguments,
+    #[command(flatten)]
+    textures: TextureArguments,
+}
+
+/// Description of the output.
+#[derive(Serialize)]
+struct ExportReport<'a> {
+    glb: Option<&'a Path>,
+    tiles: Option<&'a Path>,
+    web: Option<&'a Path>,
+    /// Canvas of glb and tiles.
+    canvas: Option<Canvas>,
+    chainage_m: Option<[f64; 2]>,
+    /// Layers of web.
+    layers: Vec<LayerName>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for everything wrong with the survey, the poses or the output.
+pub fn run(
+    arguments: &ExportArguments,
+    record: &RunRecord,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    check_outputs(arguments)?;
+    let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
+    let inputs = record::hash_survey(&survey, arguments.poses.file())?;
+    let files = ExportFiles {
+        glb: arguments.glb.as_deref(),
+        tiles: arguments.tiles.as_deref(),
+    };
+    let canvas = if files.glb.is_some() || files.tiles.is_some() {
+        let (poses, options) = (poses_of(&trajectory), arguments.textures.options());
+        Some(export_wall(&survey, &poses, &options, files, terminal)?)
+    } else {
+        None
+    };
+    let layers = match &arguments.web {
+        Some(folder) => write_page(arguments, folder, (survey, trajectory), terminal)?,
+        None => Vec::new(),
+    };
+    if let Some(glb) = &arguments.glb {
+        record.write(&record::path_beside(glb), &inputs)?;
+    }
+    for folder in arguments.tiles.iter().chain(&arguments.web) {
+        record.write(&folder.join(RUN_FILE), &inputs)?;
+    }
+    let report = ExportReport {
+        glb: files.glb,
+        tiles: files.tiles,
+        web: arguments.web.as_deref(),
+        canvas,
+        chainage_m: canvas.map(|canvas| canvas.chainage_m()),
+        layers,
+    };
+    if arguments.json {
+        json::print(&report)
+    } else {
+        print_summary(&report, terminal);
+        Ok(())
+    }
+}
+
+fn print_summary(report: &ExportReport, terminal: &Terminal) {
+    if let Some(canvas) = report.canvas {
+        let [from_m, to_m] = canvas.chainage_m();
+        for path in [report.glb, report.tiles].into_iter().flatten() {
+            terminal.say(format!(
+                "{}: {} × {} px of wall, {:.2} px per metre, chainage {from_m:.3} to {to_m:.3} m",
+                path.display(),
+                canvas.columns,
+                canvas.rows,
+                canvas.px_per_metre
+            ));
+        }
+    }
+    if let Some(folder) = report.web {
+        let names: Vec<&str> = report.layers.iter().map(|name| name.text()).collect();
+        terminal.say(format!(
+            "{}: {}, for any web server, or `tunnelstitch view {0}`",
+            folder.display(),
+            names.join(", "),
+        ));
+    }
+}
+
+/// Checks the names, and that the program has its viewer, before any work is done.
+fn check_outputs(arguments: &ExportArguments) -> Result<(), Failure> {
+    if let Some(glb) = &arguments.glb {
+        if glb.extension().is_none_or(|extension| extension != "glb") {
+            return Err(Failure::usage(format!(
+                "--glb {}: the name must end in .glb",
+                glb.display()
+            )));
+        }
+        create_parent_folder(glb)?;
+    }
+    for (folder, file) in [(&arguments.tiles, TILESET), (&arguments.web, MANIFEST)] {
+        if let Some(folder) = folder {
+            check_replaceable(folder, file)?;
+        }
+    }
+    if arguments.web.is_some() {
+        Viewer::bundled()?;
+    }
+    Ok(())
+}
+
+/// Refuses a folder whose content would be lost: one that is not empty and is no earlier export,
+/// recognised by `file`.
+fn check_replaceable(folder: &Path, file: &str) -> Result<(), Failure> {
+    let is_empty = std::fs::read_dir(folder).map_or(true, |mut entries| entries.next().is_none());
+    if is_empty || folder.join(file).is_file() {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "{}: holds other files than an earlier export; name another folder",
+        folder.display()
+    )))
+}
+
+/// Writes the page of --web; returns its layers.
+fn write_page(
+    arguments: &ExportArguments,
+    folder: &Path,
+    opened: (Survey, Trajectory),
+    terminal: &Terminal,
+) -> Result<Vec<LayerName>, Failure> {
+    let layers = &arguments.layers;
+    let (survey, selected) = layers.select(&arguments.survey, &arguments.poses, opened)?;
+    let (names, posed): (Vec<_>, Vec<_>) = selected.into_iter().unzip();
+    let options = arguments.textures.options();
+    export_page(
+        &survey,
+        &posed,
+        &options,
+        layers.twelve_at_deg,
+        folder,
+        terminal,
+    )?;
+    Ok(names)
+}

@@ -1,0 +1,155 @@
+//! `tunnelstitch init`: writes a `survey.toml` for the files of a folder.
+
+use crate::cli::arguments::positive;
+use crate::cli::output::{Failure, Terminal};
+use crate::persist::atomic;
+use crate::survey::{Discovery, SURVEY_FILE, Survey};
+use std::path::{Path, PathBuf};
+
+/// Searches a folder for frames, calibration and poses, and writes a commented survey.toml for
+/// them.
+///
+/// The frames are the largest group of pictures in one folder, or those of a video if there are no
+/// pictures. A calibration that fits their size and poses of the same number are preferred. The
+/// command prints what it has recognised and what is missing.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    tunnelstitch init my-survey --radius-m 1.5\n  \
+    tunnelstitch init my-survey --video my-survey/GX010001.MP4 --every 5")]
+pub struct InitArguments {
+    /// The folder.
+    folder: PathBuf,
+    /// Radius of the tunnel, metres; without it survey.toml has a line to be filled in.
+    #[arg(long, value_name = "M", value_parser = positive)]
+    radius_m: Option<f64>,
+    /// Video that holds the frames. ffmpeg decodes it picture by picture; no pictures are stored.
+    #[arg(long, value_name = "FILE")]
+    video: Option<PathBuf>,
+    /// Use every N-th picture of the video as a frame [default: 1].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    every: Option<u32>,
+    /// Replace an existing survey.toml.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A folder that cannot be read or holds no pictures; a survey.toml that exists already.
+pub fn run(arguments: &InitArguments, terminal: &Terminal) -> Result<(), Failure> {
+    let folder = &arguments.folder;
+    let path = folder.join(SURVEY_FILE);
+    if path.exists() && !arguments.force {
+        return Err(Failure::input(format!(
+            "{}: exists already; --force replaces it",
+            path.display()
+        )));
+    }
+    let mut found = Discovery::of(folder)
+        .map_err(|error| Failure::input(format!("{}: {error}", folder.display())))?;
+    choose_frames(arguments, &mut found)?;
+    for line in summary(&found) {
+        terminal.say(line);
+    }
+    atomic::write_text(&path, &found.survey_toml(arguments.radius_m))?;
+    terminal.say(format!("wrote {}", path.display()));
+    match Survey::open(folder) {
+        Ok(_) => terminal.say(format!("next: tunnelstitch check {}", folder.display())),
+        Err(error) => terminal.warn(format!("not ready yet: {error}")),
+    }
+    Ok(())
+}
+
+/// Chooses a video as source of the frames if one is named or there are no pictures.
+fn choose_frames(arguments: &InitArguments, found: &mut Discovery) -> Result<(), Failure> {
+    let folder = &arguments.folder;
+    let video = match &arguments.video {
+        Some(video) => Some(relative_to(folder, video)),
+        None if found.pictures.is_empty() => found.videos.first().cloned(),
+        None => None,
+    };
+    match video {
+        Some(video) => {
+            found.choose_video(folder, &video, arguments.every.unwrap_or(1) as usize)?;
+            Ok(())
+        }
+        None if found.pictures.is_empty() => Err(Failure::input(format!(
+            "{}: holds no pictures (JPEG, PNG, TIFF, WebP) and no video, up to three folders below",
+            folder.display()
+        ))),
+        None if arguments.every.is_some() => Err(Failure::usage(
+            "--every needs a video, but the folder holds pictures: name the video with --video",
+        )),
+        None => Ok(()),
+    }
+}
+
+/// A path as survey.toml in `folder` has it.
+fn relative_to(folder: &Path, path: &Path) -> PathBuf {
+    let relative = folder.canonicalize().ok().and_then(|folder| {
+        let path = path.canonicalize().ok()?;
+        pathdiff::diff_paths(path, folder)
+    });
+    // A missing file is reported when it is opened.
+    relative.unwrap_or_else(|| std::path::absolute(path).unwrap_or_else(|_| path.to_owned()))
+}
+
+/// Lists what was recognised, one line each.
+fn summary(found: &Discovery) -> Vec<String> {
+    let mut lines = Vec::new();
+    let row = |name: &str, text: String| format!("  {name:<16}{text}");
+    if let Some(video) = &found.video {
+        let (width, height) = video.size;
+        let count = match video.every {
+            1 => video.count.to_string(),
+            every => format!("{} of every {every}", video.count),
+        };
+        let path = video.path.display();
+        lines.push(row(
+            "frames",
+            format!("{path} ({count} pictures, {width} × {height} px)"),
+        ));
+    }
+    let chosen = found.video.as_ref().map(|video| &video.path);
+    for video in found.videos.iter().filter(|video| Some(*video) != chosen) {
+        lines.push(row("other video", video.display().to_string()));
+    }
+    for (k, group) in found.pictures.iter().enumerate() {
+        let size = group
+            .size
+            .map_or("unreadable".to_owned(), |(w, h)| format!("{w} × {h} px"));
+        let name = if k == 0 && found.video.is_none() {
+            "frames"
+        } else {
+            "other pictures"
+        };
+        let text = format!("{} ({}, {size})", group.pattern, group.count);
+        lines.push(row(name, text));
+    }
+    if let Some(mask) = &found.mask {
+        lines.push(row("mask", mask.display().to_string()));
+    }
+    for (k, (path, camera)) in found.calibrations.iter().enumerate() {
+        let name = if k == 0 { "calibration" } else { "another" };
+        let (width, height) = (camera.width, camera.height);
+        let text = format!("{} ({width} × {height} px)", path.display());
+        lines.push(row(name, text));
+    }
+    let is_same = |other: Option<&(PathBuf, _)>, path: &Path| other.is_some_and(|(p, _)| p == path);
+    for (path, poses) in &found.poses {
+        let name = if is_same(found.initial(), path) {
+            "initial poses"
+        } else if is_same(found.truth(), path) {
+            "true poses"
+        } else {
+            "other poses"
+        };
+        let (format, count) = (poses.format, poses.entries.len());
+        lines.push(row(
+            name,
+            format!("{} ({format:?}, {count} poses)", path.display()),
+        ));
+    }
+    lines
+}

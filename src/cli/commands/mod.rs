@@ -1,0 +1,20 @@
+//! One file per command: its arguments, the call of the library, and its summary.
+
+pub mod check;
+pub mod compare;
+pub mod config;
+pub mod converge;
+pub mod convert;
+pub mod demo;
+pub mod export;
+pub mod gyro;
+pub mod init;
+pub mod locate;
+pub mod plan;
+pub mod project;
+pub mod refine;
+pub mod report;
+pub mod shell;
+pub mod simulate;
+pub mod stitch;
+pub mod view;

@@ -1,0 +1,452 @@
+//! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
+
+use crate::PROGRAM;
+use crate::camera::format_calibration;
+use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, resume};
+use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
+use crate::persist::atomic;
+use crate::persist::checkpoint::Checkpoint;
+use crate::progress::Progress;
+use crate::refine::{
+    CalibrationReport, FrameFlag, FrameReport, ReadoutEstimate, RefineOptions, RefineReport,
+    Refined, refine_with_checkpoint, search_pose_conventions,
+};
+use crate::survey::{CalibrationGroup, SURVEY_FILE, Survey, SurveyFile};
+use crate::trajectory::tum;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Refines the poses of a survey by photometric bundle adjustment.
+///
+/// Reads SURVEY/survey.toml and writes into DIR: poses.tum (camera to world, for evo and other
+/// programs that read TUM), refine.json (costs, residuals, gains, 1-σ of every frame, timings) and
+/// covariance.csv (6 × 6 covariances of every frame and of neighbours). If the run is interrupted,
+/// the same command continues it.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    tunnelstitch refine my-survey --out refined\n  \
+    tunnelstitch refine my-survey --out refined --calibrate focal,radius")]
+pub struct RefineArguments {
+    /// Folder of the survey, or its survey.toml.
+    survey: PathBuf,
+    /// Folder for the results; created if missing.
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// Stop the last solve at the first step shorter than 0.1 px or twice the uncertainty, usually
+    /// its first: faster, slightly less accurate.
+    #[arg(long)]
+    fast: bool,
+    /// Solve once more for the poses jointly with the wall's texture at a third of a pixel. On
+    /// walls with sharp edges, as bricks, it removes about a third of the error and takes ten to
+    /// twenty times as long. A wall that is smooth over a pixel gains nothing and is refined
+    /// without it.
+    #[arg(long, conflicts_with = "fast")]
+    joint: bool,
+    /// Self-calibration: also estimate these parameters, separated by commas. The section calibrate
+    /// of survey.toml holds the 1-σ of the given values. Writes camera.json and survey.toml into
+    /// DIR, for the other commands.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    calibrate: Option<Vec<CalibrateArgument>>,
+    /// Largest number of Gauss–Newton iterations of each global solve.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = RefineOptions::default().max_iterations,
+        value_parser = clap::value_parser!(u64).range(1..)
+    )]
+    max_iterations: u64,
+    /// Print refine.json on standard output instead of the summary.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    reading: PoseReadingArguments,
+    #[command(flatten)]
+    resume: ResumeArguments,
+}
+
+/// Names of parameters for `--calibrate`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum CalibrateArgument {
+    /// Focal length; a common factor of fx and fy.
+    Focal,
+    /// Principal point.
+    Centre,
+    /// Radial distortion, k1 and k2.
+    Distortion,
+    /// The tunnel's radius.
+    Radius,
+    /// Position and direction of the tunnel's axis in the frame of the initial poses.
+    Axis,
+    /// All of these.
+    All,
+}
+
+impl CalibrateArgument {
+    /// Groups of parameters for the library.
+    fn groups(self) -> Vec<CalibrationGroup> {
+        match self {
+            Self::Focal => vec![CalibrationGroup::Focal],
+            Self::Centre => vec![CalibrationGroup::Centre],
+            Self::Distortion => vec![CalibrationGroup::Distortion],
+            Self::Radius => vec![CalibrationGroup::Radius],
+            Self::Axis => vec![CalibrationGroup::Axis],
+            Self::All => CalibrationGroup::ALL.to_vec(),
+        }
+    }
+}
+
+/// `refine.json`.
+#[derive(Serialize)]
+struct RefineFile<'a> {
+    /// Name and version of the program.
+    program: &'static str,
+    /// The command line.
+    command: &'a [String],
+    /// Path of the survey as given, and the content of its survey.toml.
+    survey: &'a Path,
+    survey_file: &'a SurveyFile,
+    /// The effective options.
+    options: &'a RefineOptions,
+    #[serde(flatten)]
+    report: &'a RefineReport,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, or an output that cannot be written.
+pub fn run(
+    arguments: &RefineArguments,
+    record: &RunRecord,
+    terminal: &Arc<Terminal>,
+) -> Result<(), Failure> {
+    let options = arguments.options();
+    let survey = arguments.reading.open(&arguments.survey, terminal)?;
+    let inputs = record::hash_survey(&survey, None)?;
+    let origin = resume::origin(&survey, &options, inputs.clone())?;
+    let say = |text: &str| {
+        if !arguments.json {
+            terminal.say(text);
+        }
+    };
+    atomic::create_folder(&arguments.out)?;
+    let result = arguments.out.join("refine");
+    let (refined, json) = arguments.resume.run(&result, &origin, say, |checkpoint| {
+        let done = refine_into(
+            &survey,
+            &options,
+            &arguments.out,
+            record,
+            Some(checkpoint),
+            terminal,
+        )?;
+        record.write(&arguments.out.join(RUN_FILE), &inputs)?;
+        Ok(done)
+    })?;
+    if 2 * refined.report.frames_on_prior > survey.frames.len() {
+        warn_of_pose_convention(&survey, terminal)?;
+    }
+    if arguments.json {
+        json::print_text(&json)?;
+    } else {
+        print_summary(&refined, terminal);
+        print_outputs(arguments, &refined.report, terminal);
+    }
+    Ok(())
+}
+
+impl RefineArguments {
+    /// Options for the library.
+    fn options(&self) -> RefineOptions {
+        RefineOptions {
+            max_iterations: self.max_iterations,
+            calibrate: self
+                .calibrate
+                .as_ref()
+                .map(|list| list.iter().flat_map(|group| group.groups()).collect()),
+            joint: self.joint,
+            ..if self.fast {
+                RefineOptions::fast()
+            } else {
+                RefineOptions::default()
+            }
+        }
+    }
+}
+
+/// Searches for a pose convention that the frames agree with, and warns if there is one.
+fn warn_of_pose_convention(survey: &Survey, terminal: &Terminal) -> Result<(), Failure> {
+    terminal.start("conventions", 1);
+    let others = search_pose_conventions(survey);
+    terminal.finish();
+    let others = others?;
+    if !others.is_empty() {
+        terminal.warn(format!(
+            "the frames do not agree with the poses as they are read; they agree with {}",
+            others.join(", or with ")
+        ));
+    }
+    Ok(())
+}
+
+/// Prints the files that were written, and how to continue.
+fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &Terminal) {
+    let is_joint = report.levels.iter().any(|level| level.joint);
+    if arguments.joint && !is_joint {
+        terminal.say(
+            "  refined without --joint: the wall is smooth, so it has no detail below a pixel to \
+             estimate",
+        );
+    }
+    let out = arguments.out.display();
+    let poses = arguments.out.join("poses.tum");
+    terminal.say(format!(
+        "wrote {} and {}",
+        poses.display(),
+        arguments.out.join("refine.json").display()
+    ));
+    if report.calibration.is_some() {
+        terminal.say(format!(
+            "{out} is a survey with the refined calibration: tunnelstitch stitch {out} --poses {} \
+             --out panorama.png",
+            poses.display()
+        ));
+    }
+}
+
+/// Refines a survey, continuing from a checkpoint if there is one, and writes poses.tum,
+/// refine.json and covariance.csv into `out`. Also returns the text of refine.json.
+///
+/// # Errors
+/// Bad input, or an output that cannot be written.
+pub fn refine_into(
+    survey: &Survey,
+    options: &RefineOptions,
+    out: &Path,
+    record: &RunRecord,
+    checkpoint: Option<&mut Checkpoint>,
+    terminal: &Arc<Terminal>,
+) -> Result<(Refined, String), Failure> {
+    atomic::create_folder(out)?;
+    let survey_section = survey.file.calibrate.as_ref();
+    let calibrated = options
+        .calibrate
+        .as_ref()
+        .or(survey_section.map(|section| &section.unknowns));
+    if calibrated.is_some_and(|groups| !groups.is_empty()) {
+        refuse_survey_folder(&survey.folder, out)?;
+    }
+    let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
+    let refined = refine_with_checkpoint(survey, options, checkpoint, &progress)?;
+    let json = json::text(&RefineFile {
+        program: PROGRAM,
+        command: &record.arguments,
+        survey: &survey.folder,
+        survey_file: &survey.file,
+        options,
+        report: &refined.report,
+    })?;
+    atomic::write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
+    atomic::write_text(&out.join("refine.json"), &json)?;
+    let sigmas: Vec<_> = refined
+        .report
+        .frames
+        .iter()
+        .map(|frame| frame.sigma)
+        .collect();
+    atomic::write_text(
+        &out.join("covariance.csv"),
+        &refined.covariances.csv(&sigmas),
+    )?;
+    if let Some(calibration) = &refined.report.calibration {
+        write_calibration(survey, calibration, out)?;
+    }
+    Ok((refined, json))
+}
+
+/// Name of the refined calibration.
+const CAMERA_FILE: &str = "camera.json";
+
+/// Refuses to write the refined calibration over the survey's own.
+fn refuse_survey_folder(survey: &Path, out: &Path) -> Result<(), Failure> {
+    match (survey.canonicalize(), out.canonicalize()) {
+        (Ok(survey), Ok(folder)) if survey == folder => Err(Failure::input(format!(
+            "{}: with --calibrate, --out must not be the survey's own folder, whose {SURVEY_FILE} \
+             would be replaced",
+            out.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Writes the refined calibration, and a `survey.toml` that uses it with the survey's frames and
+/// initial poses.
+fn write_calibration(
+    survey: &Survey,
+    calibration: &CalibrationReport,
+    out: &Path,
+) -> Result<(), Failure> {
+    let file = survey.with_calibration(calibration.radius_m, CAMERA_FILE);
+    let text = toml::to_string(&file).map_err(|error| Failure::bug(error.to_string()))?;
+    let text = format!("# The survey with the calibration that refine has found.\n{text}");
+    let camera = format_calibration(&calibration.camera);
+    atomic::write_text(&out.join(CAMERA_FILE), &camera)?;
+    Ok(atomic::write_text(&out.join(SURVEY_FILE), &text)?)
+}
+
+/// Prints the estimated parameters of the self-calibration.
+fn print_calibration(calibration: &CalibrationReport, terminal: &Terminal) {
+    terminal.say("  calibration              given     estimate          1-σ   (prior 1-σ)");
+    for unknown in &calibration.unknowns {
+        let unit = match unknown.unit {
+            "1" => "",
+            unit => unit,
+        };
+        terminal.say(format!(
+            "  {:<13} {:>3} {:>12.5} {:>12.5} {:>12.5}   ({:.5}){}",
+            unknown.name,
+            unit,
+            unknown.initial,
+            unknown.estimate,
+            unknown.sigma,
+            unknown.prior_sigma,
+            if unknown.observed {
+                ""
+            } else {
+                "   not observable"
+            },
+        ));
+    }
+    for unknown in &calibration.unknowns {
+        if let Some(reason) = &unknown.reason {
+            let name = unknown.name;
+            terminal.warn(format!("  {name} keeps its given value: {reason}"));
+        }
+    }
+}
+
+/// Warning about a residual that grows along the rows, with the remedy.
+fn rolling_shutter_warning(rows: &ReadoutEstimate) -> String {
+    let remedy = if rows.given_ms == 0.0 {
+        format!(
+            "if the camera has a rolling shutter, give [camera] readout_ms = {:.1} in survey.toml",
+            rows.estimate_ms
+        )
+    } else {
+        format!(
+            "not {} ms as given; check [camera] readout_ms and the times of the initial poses",
+            rows.given_ms
+        )
+    };
+    format!(
+        "rolling-shutter test: all frames have the same systematic residual along the rows, \
+         {:.1} px from the first row to the last, equal to a readout time of {:.1} ms (1-σ {:.2}): \
+         {remedy}",
+        rows.shift_px, rows.estimate_ms, rows.sigma_ms
+    )
+}
+
+/// Prints solves, uncertainty, timings and rejected frames of a refinement.
+pub fn print_summary(refined: &Refined, terminal: &Terminal) {
+    let report = &refined.report;
+    terminal.say("  level  steps        cost: start → end      observations  noise (grey)");
+    for level in &report.levels {
+        let solve = &level.solve;
+        terminal.say(format!(
+            "  {:>5}  {:>5}  {:>12.4e} → {:>11.4e}  {:>12}  {:>12.2}{}",
+            level.level,
+            solve.iterations,
+            solve.cost_start,
+            solve.cost_end,
+            solve.observations,
+            solve.sigma,
+            if level.joint {
+                "  jointly with the wall"
+            } else {
+                ""
+            }
+        ));
+    }
+    let mean = |value: &dyn Fn(&FrameReport) -> f64| {
+        report.frames.iter().map(value).sum::<f64>() / report.frames.len() as f64
+    };
+    terminal.say(format!(
+        "  stopped: {}\n  mean 1-σ: rotation {:.4}°, translation {:.2} mm, on the wall {:.2} mm \
+         ({:.3} px)",
+        report.stopped_because,
+        mean(&|f| f.sigma.rotation_deg),
+        1e3 * mean(&|f| f.sigma.translation_m),
+        1e3 * mean(&|f| f.sigma.wall_m),
+        mean(&|f| f.sigma.wall_px),
+    ));
+    if let Some(calibration) = &report.calibration {
+        print_calibration(calibration, terminal);
+    }
+    if let Some(rows) = report.rolling_shutter.filter(|rows| rows.systematic) {
+        terminal.warn(rolling_shutter_warning(&rows));
+    }
+    let seconds: f64 = report.timings.iter().map(|t| t.seconds).sum();
+    let stages: Vec<String> = report
+        .timings
+        .iter()
+        .map(|t| format!("{} {:.2} s", t.stage, t.seconds))
+        .collect();
+    terminal.say(format!("  {seconds:.2} s: {}", stages.join(", ")));
+    if report.frames_on_prior == 0 {
+        let count = report.frames.len();
+        terminal.say(format!(
+            "  all {count} frames are photometric: their poses are refined"
+        ));
+    } else {
+        terminal.warn(format!(
+            "{} of {} frames are rejected, so their poses rest on the prior or are ambiguous:",
+            report.frames_on_prior,
+            report.frames.len()
+        ));
+        if report.frames_on_prior == report.frames.len() {
+            terminal.warn(
+                "  no frame is photometric; possible causes: too few overlapping frames, a wall \
+                 without texture, poses in another convention (--pose-convention, --camera-axes, \
+                 --tunnel-frame), a wrong radius_m, calibration or [prior], or a mask or \
+                 tunnel.ignore that leaves nothing to compare",
+            );
+        }
+        warn_of_rejected_frames(report, terminal);
+    }
+}
+
+/// Largest number of warnings about rejected frames.
+const MAX_REJECTION_WARNINGS: usize = 24;
+
+/// Warns of rejected frames with the reason; consecutive frames with the same reason share a line.
+fn warn_of_rejected_frames(report: &RefineReport, terminal: &Terminal) {
+    let frames = report.frames.iter();
+    let rejected: Vec<(&FrameReport, &str)> = frames
+        .filter(|frame| frame.flag != FrameFlag::Photometric)
+        .filter_map(|frame| Some((frame, frame.reason.as_deref()?)))
+        .collect();
+    let mut runs =
+        rejected.chunk_by(|(a, reason), (b, next)| b.index == a.index + 1 && reason == next);
+    for run in runs.by_ref().take(MAX_REJECTION_WARNINGS) {
+        match run {
+            [] => {}
+            [(frame, reason)] => {
+                terminal.warn(format!(
+                    "  frame {} ({}): {reason}",
+                    frame.index, frame.file
+                ));
+            }
+            [(first, reason), .., (last, _)] => terminal.warn(format!(
+                "  frames {} to {} ({} to {}), each: {reason}",
+                first.index, last.index, first.file, last.file
+            )),
+        }
+    }
+    let left: usize = runs.map(<[_]>::len).sum();
+    if left > 0 {
+        terminal.warn(format!(
+            "  … and {left} more; refine.json has the reason of each"
+        ));
+    }
+}

@@ -1,0 +1,113 @@
+//! `tunnelstitch report`: writes an HTML report of a refined survey.
+
+use crate::cli::arguments::{PoseReadingArguments, positive};
+use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
+use crate::evaluate::compare_survey;
+use crate::persist::atomic::{self, StagedFolder};
+use crate::progress::Progress;
+use crate::render::Interpolation;
+use crate::report::{self, PICTURES, RefinedFiles, Report, Sources};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Writes an HTML report of a refined survey: which poses were corrected, and with what
+/// uncertainty.
+///
+/// Writes report.html (one file that needs no other files and no network), report.json (the same
+/// numbers) and report_pictures/ (the pictures of the page) into DIR.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  tunnelstitch report my-survey --refined refined --out report")]
+pub struct ReportArguments {
+    /// Folder of the survey, or its survey.toml.
+    survey: PathBuf,
+    /// Folder that refine has written, or the poses (TUM) in it. Other poses are accepted, but
+    /// then the page lacks residuals, costs and flags. The flags for reading poses apply to those
+    /// of the survey only.
+    #[arg(long, value_name = "DIR|FILE")]
+    refined: PathBuf,
+    /// Folder for the report; created if missing.
+    #[arg(long, short, value_name = "DIR")]
+    out: PathBuf,
+    /// Resolution at which initial, refined and true poses are compared, pixels per metre of wall
+    /// [default: the frames' own resolution at the wall, less for long surveys].
+    #[arg(long, value_name = "N", value_parser = positive)]
+    px_per_metre: Option<f64>,
+    /// Print report.json on standard output instead of the summary.
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    reading: PoseReadingArguments,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for everything wrong with the survey, the poses, the files of refine, or the output.
+pub fn run(
+    arguments: &ReportArguments,
+    record: &RunRecord,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    let survey = arguments.reading.open(&arguments.survey, terminal)?;
+    let refined = RefinedFiles::read(&survey, &arguments.refined)?;
+    let px_per_metre = match arguments.px_per_metre {
+        Some(px_per_metre) => Some(px_per_metre),
+        None => report::choose_resolution(&survey, &refined.poses)?,
+    };
+    let (comparison, drawings) = &compare_survey(
+        &survey,
+        &refined.poses,
+        px_per_metre,
+        Interpolation::default(),
+        terminal,
+    )?;
+    let files = refined.files();
+    let inputs = record::hash_survey(&survey, files.iter().map(PathBuf::as_path))?;
+    let sources = Sources {
+        survey: &survey,
+        refined,
+        comparison,
+        drawings,
+        command: record.arguments.clone(),
+    };
+    let (report, json) = report_into(sources, &arguments.out, terminal)?;
+    record.write(&arguments.out.join(RUN_FILE), &inputs)?;
+    if arguments.json {
+        return json::print_text(&json);
+    }
+    for note in &report.notes {
+        terminal.say(format!("  {note}"));
+    }
+    terminal.say(format!(
+        "wrote {}",
+        arguments.out.join("report.html").display()
+    ));
+    Ok(())
+}
+
+/// Writes report.html, report.json and report_pictures/ into `out`; returns the report and the text
+/// of report.json.
+///
+/// # Errors
+/// A flagged frame that cannot be read, or an output that cannot be written.
+pub fn report_into(
+    sources: Sources,
+    out: &Path,
+    terminal: &Terminal,
+) -> Result<(Report, String), Failure> {
+    terminal.start("report", 1);
+    let (report, pictures) = report::gather(sources)?;
+    let page = report::page(&report, &pictures)?;
+    let json = json::text(&report)?;
+    atomic::create_folder(out)?;
+    let folder = StagedFolder::begin(&out.join(PICTURES))?;
+    for (name, bytes) in &pictures {
+        let path = folder.path().join(name);
+        atomic::write(&path, |writer| writer.write_all(bytes))?;
+    }
+    folder.finish()?;
+    atomic::write_text(&out.join("report.json"), &json)?;
+    atomic::write_text(&out.join("report.html"), &page)?;
+    terminal.finish();
+    Ok((report, json))
+}

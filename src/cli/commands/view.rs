@@ -1,0 +1,122 @@
+//! `tunnelstitch view`: shows the tunnel in the browser.
+
+use crate::cli::arguments::{LayerArguments, PosesArguments, TextureArguments};
+use crate::cli::output::{Failure, Terminal};
+use crate::inspect::{MANIFEST, Marks, Served, Server, Viewer, draw_layers, place_originals};
+use crate::persist::atomic::ScratchFolder;
+use crate::survey::SURVEY_FILE;
+use std::path::{Path, PathBuf};
+
+/// Shows the tunnel in the browser: move along the wall, measure, mark defects, look at the frames
+/// that show a point.
+///
+/// The page is served on 127.0.0.1, for this machine only, until Ctrl-C. Marks are kept in
+/// marks.geojson and marks.csv beside survey.toml (or in the folder of `export --web`); nothing
+/// else is written.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    tunnelstitch view my-survey --poses refined/poses.tum\n      \
+    draws refined, initial and true poses, and prints the address\n  \
+    tunnelstitch view refined\n      \
+    the same, from a folder of refine\n  \
+    tunnelstitch export my-survey --poses refined/poses.tum --web walk; \
+    tunnelstitch view walk\n      \
+    draws once, shows often; without the frames")]
+pub struct ViewArguments {
+    /// Folder of the survey, or its survey.toml; or a folder that `refine` or `export --web` has
+    /// written.
+    survey: PathBuf,
+    #[command(flatten)]
+    poses: PosesArguments,
+    /// Port to listen on; 0 chooses a free one.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 7770,
+        help_heading = "Server"
+    )]
+    port: u16,
+    #[command(flatten)]
+    layers: LayerArguments,
+    #[command(flatten)]
+    textures: TextureArguments,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] for everything wrong with the survey, the poses, the marks or the port.
+pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure> {
+    let viewer = Viewer::bundled()?;
+    if arguments.survey.join(MANIFEST).is_file() {
+        let served = Served {
+            folder: arguments.survey.clone(),
+            viewer,
+            originals: None,
+            marks: Marks::open(&arguments.survey)?,
+        };
+        return serve(served, arguments.port, terminal);
+    }
+    let (survey, poses) = match refined_folder(&arguments.survey)? {
+        Some(refined) if arguments.poses.file().is_none() => refined,
+        _ => (arguments.survey.clone(), arguments.poses.clone()),
+    };
+    let opened = poses.open(&survey, terminal)?;
+    let (survey, layers) = arguments.layers.select(&survey, &poses, opened)?;
+    let layers: Vec<_> = layers.into_iter().map(|(_, layer)| layer).collect();
+    let marks = Marks::open(&survey.folder)?;
+    let scratch = ScratchFolder::inside(&std::env::temp_dir())?;
+    draw_layers(
+        &survey,
+        &layers,
+        &arguments.textures.options(),
+        arguments.layers.twelve_at_deg,
+        scratch.path(),
+        terminal,
+    )?;
+    let served = Served {
+        folder: scratch.path().to_owned(),
+        viewer,
+        originals: Some(place_originals(survey, layers)?),
+        marks,
+    };
+    serve(served, arguments.port, terminal)
+}
+
+/// Finds the survey and the poses of a folder that `refine` has written; `None` for other folders.
+///
+/// # Errors
+/// A survey that no longer exists.
+fn refined_folder(folder: &Path) -> Result<Option<(PathBuf, PosesArguments)>, Failure> {
+    let report = folder.join("refine.json");
+    let Ok(text) = std::fs::read_to_string(&report) else {
+        return Ok(None);
+    };
+    let value: Option<serde_json::Value> = serde_json::from_str(&text).ok();
+    let named = value
+        .as_ref()
+        .and_then(|value| value["survey"].as_str())
+        .map(PathBuf::from);
+    let own = Some(folder.to_owned()).filter(|folder| folder.join(SURVEY_FILE).is_file());
+    let poses = folder.join("poses.tum");
+    match own.or(named.filter(|survey| survey.exists())) {
+        Some(survey) => Ok(Some((survey, PosesArguments::from_file(&poses)))),
+        None => Err(Failure::usage(format!(
+            "{}: its survey does not exist; use `tunnelstitch view SURVEY --poses {}`",
+            report.display(),
+            poses.display()
+        ))),
+    }
+}
+
+fn serve(served: Served, port: u16, terminal: &Terminal) -> Result<(), Failure> {
+    let folder: &Path = &served.folder.clone();
+    let server = Server::listen(served, port)?;
+    // Programs wait for this line to learn the address.
+    terminal.say(format!("{} (Ctrl-C ends it)", server.address()));
+    server.run();
+    Err(Failure::bug(format!(
+        "{}: the server has ended",
+        folder.display()
+    )))
+}

@@ -1,0 +1,14 @@
+//! Options of a command from all their sources, in this order: a flag on the command line, a
+//! variable `TUNNELSTITCH_<COMMAND>_<OPTION>`, `[options.<command>]` of `survey.toml`, the
+//! default.
+
+mod option;
+mod parse;
+mod survey_options;
+mod variables;
+
+#[cfg(test)]
+pub use option::EffectiveOption;
+pub use option::options_table;
+pub use parse::{options_of_command, parse};
+pub use variables::{CONFIGURABLE, with_variables};

@@ -1,0 +1,15 @@
+//! Output that commands share: texts on the terminal, JSON, failures with their exit codes, and the
+//! record of a run beside its results.
+
+mod failure;
+pub mod json;
+mod paths;
+pub mod record;
+mod suggestion;
+mod terminal;
+
+pub use failure::Failure;
+pub use paths::{create_parent_folder, picture_format, refuse_overwriting, survey_files};
+pub use record::{RUN_FILE, RunRecord};
+pub use suggestion::{Suggestion, SuggestionArguments};
+pub use terminal::Terminal;

@@ -1,0 +1,43 @@
+//! Comparison of a survey's initial poses with refined ones.
+
+use super::compare::{CompareInput, Comparison, Drawings, compare};
+use super::error::EvaluateError;
+use crate::progress::Progress;
+use crate::render::{Interpolation, Mode, RenderOptions};
+use crate::survey::Survey;
+use crate::trajectory::{Pose, poses_of};
+
+/// Compares a survey's initial poses with refined ones, and both with the true ones if they are
+/// known.
+///
+/// The panoramas are averages without blending, so that they differ by the poses only.
+///
+/// # Errors
+/// Poses that cannot be placed on the wall, unreadable frames, too little memory.
+pub fn compare_survey(
+    survey: &Survey,
+    refined: &[Pose],
+    px_per_metre: Option<f64>,
+    interpolation: Interpolation,
+    progress: &dyn Progress,
+) -> Result<(Comparison, Drawings), EvaluateError> {
+    let initial = survey.initial_poses();
+    let truth = survey.truth.as_deref().map(poses_of);
+    let input = CompareInput {
+        surface: survey.surface.as_ref(),
+        camera: &survey.camera,
+        shutter: &survey.shutter(),
+        files: &survey.frames,
+        initial: &initial,
+        refined,
+        truth: truth.as_deref(),
+        px_per_metre,
+        render: RenderOptions {
+            interpolation,
+            mode: Mode::Average,
+            blend: false,
+            super_resolve: false,
+        },
+    };
+    compare(&input, progress)
+}

@@ -1,0 +1,99 @@
+//! Exports of the textured wall: one glTF file, 3D Tiles, and the page.
+
+use super::error::InspectError;
+use super::layers::{PosedLayer, TextureOptions, draw_layers, lay_out_texture};
+use super::marks::{MARKS_CSV, MARKS_GEOJSON};
+use super::single::GlbTarget;
+use super::tiles::TilesFolder;
+use super::viewer::Viewer;
+use crate::persist::atomic::{StagedFolder, WriteError};
+use crate::progress::Progress;
+use crate::render::{Canvas, Target};
+use crate::survey::Survey;
+use crate::trajectory::Pose;
+use std::path::Path;
+
+/// Files of the textured wall, drawn from one panorama.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ExportFiles<'a> {
+    /// A glTF file (GLB).
+    pub glb: Option<&'a Path>,
+    /// A folder of 3D Tiles.
+    pub tiles: Option<&'a Path>,
+}
+
+/// Draws the panorama of `poses` and writes it as textured mesh into `files`; returns its canvas.
+///
+/// # Errors
+/// A frame that cannot be decoded, too little memory, too much wall for one file, and whatever the
+/// system says.
+pub fn export_wall(
+    survey: &Survey,
+    poses: &[Pose],
+    options: &TextureOptions,
+    files: ExportFiles,
+    progress: &dyn Progress,
+) -> Result<Canvas, InspectError> {
+    let surface = survey.surface.as_ref();
+    let mut stitch = lay_out_texture(survey, poses, &survey.shutter(), options)?;
+    let (canvas, format) = (*stitch.canvas(), stitch.frames().format());
+    let quality = options.quality;
+    let mut single = match files.glb {
+        Some(path) => Some(GlbTarget::new(surface, &canvas, format, path, quality)?),
+        None => None,
+    };
+    let mut tiles = match files.tiles {
+        Some(path) => Some(TilesFolder::begin(surface, &canvas, format, path, quality)?),
+        None => None,
+    };
+    let single_bytes = single.as_ref().map_or(0, GlbTarget::most_bytes);
+    let tiles_bytes = tiles
+        .as_mut()
+        .map_or(0, |tiles| tiles.target().most_bytes());
+    let budget = stitch.budget(single_bytes + tiles_bytes)?;
+    let mut targets: Vec<&mut dyn Target> = Vec::new();
+    targets.extend(single.as_mut().map(|single| single as &mut dyn Target));
+    targets.extend(
+        tiles
+            .as_mut()
+            .map(|tiles| tiles.target() as &mut dyn Target),
+    );
+    let settled = stitch.settle(&budget, progress)?;
+    let (plan, frames) = stitch.plan(settled);
+    plan.draw(frames, budget.room, &mut targets, progress)?;
+    if let Some(single) = single {
+        single.finish()?;
+    }
+    if let Some(tiles) = tiles {
+        tiles.finish(&canvas)?;
+    }
+    Ok(canvas)
+}
+
+/// Writes the page with all layers into `folder`, which appears complete or not at all. Marks that
+/// are kept in an earlier page there stay.
+///
+/// # Errors
+/// A frame that cannot be decoded, a program built without its viewer, and whatever the system
+/// says.
+pub fn export_page(
+    survey: &Survey,
+    layers: &[PosedLayer],
+    options: &TextureOptions,
+    twelve_at_deg: f64,
+    folder: &Path,
+    progress: &dyn Progress,
+) -> Result<(), InspectError> {
+    let staged = StagedFolder::begin(folder)?;
+    let place = staged.path();
+    draw_layers(survey, layers, options, twelve_at_deg, place, progress)?;
+    Viewer::bundled()?.write(place)?;
+    for name in [MARKS_GEOJSON, MARKS_CSV] {
+        let old = folder.join(name);
+        if old.is_file() {
+            std::fs::copy(&old, place.join(name))
+                .map_err(|source| WriteError::new(&old, source))?;
+        }
+    }
+    Ok(staged.finish()?)
+}

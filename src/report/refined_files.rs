@@ -1,0 +1,159 @@
+//! Files that `refine` has written.
+
+use super::error::ReportError;
+use crate::refine::{FrameReport, LevelReport, StageTime, read_covariances};
+use crate::survey::Survey;
+use crate::trajectory::{Pose, poses_of};
+use nalgebra::Matrix6;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
+
+/// Part of `refine.json` that the report needs; `report.json` has it with the same names.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Refinement {
+    /// Name and version of the refining program.
+    pub program: String,
+    /// Its command line.
+    pub command: Vec<String>,
+    /// The effective options, by name.
+    pub options: Map<String, Value>,
+    /// `survey.toml` at that time.
+    pub survey_file: Map<String, Value>,
+    /// Global solves, coarse to fine, with all steps.
+    pub levels: Vec<LevelReport>,
+    /// Frames in order.
+    pub frames: Vec<FrameReport>,
+    /// Frames whose pose rests on the prior.
+    pub frames_on_prior: usize,
+    /// Ratio of the covariance to that of independent noise; null if there is none.
+    pub variance_factor: Option<f64>,
+    /// Self-calibration, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<Calibration>,
+    /// Stop reason of the last solve.
+    pub stopped_because: String,
+    /// Time by stage.
+    pub timings: Vec<StageTime>,
+}
+
+/// Self-calibration, as in `refine.json`.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Calibration {
+    /// Estimated parameters.
+    pub unknowns: Vec<CalibratedUnknown>,
+    /// Radius of the tunnel that belongs to the poses, metres.
+    pub radius_m: f64,
+    /// The camera that belongs to the poses.
+    pub camera: Value,
+}
+
+/// A parameter of the self-calibration.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct CalibratedUnknown {
+    /// Its name.
+    pub name: String,
+    /// Its unit: `px`, `m`, `deg`, or `1`.
+    pub unit: String,
+    /// The given value.
+    pub initial: f64,
+    /// The estimate.
+    pub estimate: f64,
+    /// 1-σ of the estimate, if there is one.
+    pub sigma: Option<f64>,
+    /// 1-σ of the given value.
+    pub prior_sigma: f64,
+    /// True if the frames determine it.
+    pub observed: bool,
+    /// Reason why it is not observable.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+/// Name of refine's report beside the poses.
+const REFINEMENT: &str = "refine.json";
+/// Name of the covariances beside the poses.
+const COVARIANCES: &str = "covariance.csv";
+
+/// Refined poses, and the files beside them.
+#[derive(Debug)]
+pub struct RefinedFiles {
+    /// The file of the poses.
+    pub path: PathBuf,
+    /// The poses.
+    pub poses: Vec<Pose>,
+    /// `refine.json`, if it exists.
+    pub refinement: Option<Refinement>,
+    /// Covariances of the poses ([`crate::refine::Covariances::frames`]), if `covariance.csv`
+    /// exists.
+    pub covariances: Option<Vec<Matrix6<f64>>>,
+}
+
+impl RefinedFiles {
+    /// Reads the folder that `refine` has written, or a TUM file and what `refine` has written
+    /// beside it.
+    ///
+    /// # Errors
+    /// [`ReportError`]: no poses, or files of another survey or version.
+    pub fn read(survey: &Survey, path: &Path) -> Result<Self, ReportError> {
+        let poses_path = if path.is_dir() {
+            path.join("poses.tum")
+        } else {
+            path.to_owned()
+        };
+        if path.is_dir() && !poses_path.is_file() {
+            return Err(ReportError::NoPoses {
+                path: path.to_owned(),
+            });
+        }
+        let poses = poses_of(&survey.read_poses(&poses_path)?);
+        // The files beside belong to poses.tum only, not to other poses in the folder.
+        let beside = |name: &str| {
+            let own = poses_path.file_name().is_some_and(|own| own == "poses.tum");
+            let path = poses_path.with_file_name(name);
+            (own && path.is_file()).then_some(path)
+        };
+        let count = survey.frames.len();
+        let refinement = beside(REFINEMENT).map(|path| read_refinement(&path, count));
+        let covariances = beside(COVARIANCES).map(|path| read_covariances(&path, count));
+        Ok(Self {
+            refinement: refinement.transpose()?,
+            covariances: covariances.transpose()?,
+            path: poses_path,
+            poses,
+        })
+    }
+
+    /// The files that were read.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let beside = |name: &str, read: bool| read.then(|| self.path.with_file_name(name));
+        let others = [
+            beside(REFINEMENT, self.refinement.is_some()),
+            beside(COVARIANCES, self.covariances.is_some()),
+        ];
+        let poses = std::iter::once(self.path.clone());
+        poses.chain(others.into_iter().flatten()).collect()
+    }
+}
+
+fn read_refinement(path: &Path, frames: usize) -> Result<Refinement, ReportError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ReportError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let refinement: Refinement =
+        serde_json::from_str(&text).map_err(|error| ReportError::Parse {
+            path: path.to_owned(),
+            line: error.line(),
+            column: error.column(),
+            what: error.to_string(),
+        })?;
+    match refinement.frames.len() {
+        found if found == frames => Ok(refinement),
+        found => Err(ReportError::Count {
+            path: path.to_owned(),
+            found,
+            frames,
+        }),
+    }
+}

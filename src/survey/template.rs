@@ -1,0 +1,126 @@
+//! A commented `survey.toml` for the files of a folder.
+
+use super::discover::Discovery;
+use crate::trajectory::PoseFormat;
+use std::fmt::Write;
+use std::path::Path;
+
+/// Keys of `[poses]` that are only mentioned, and the table `[prior]`.
+const CONVENTIONS_AND_PRIOR: &str = "\
+# convention = \"c2w\"       # or \"w2c\"; each format has its own
+# camera_axes = \"opencv\"   # or \"opengl\"; each format has its own
+# tunnel_frame = \"axis.json\"   # where the tunnel's axis lies, if it is not the poses' y axis
+
+[prior]                     # how far off the initial poses may be, 1-σ
+model = \"random-walk\"       # errors add up from frame to frame; or \"independent\"
+rotation_sigma_deg = 2.0    # about each axis
+translation_sigma_m = [0.02, 0.02, 0.03]
+";
+
+impl Discovery {
+    /// The text of a `survey.toml` for what was found, with comments; without `radius_m` it has a
+    /// line to be filled in.
+    pub fn survey_toml(&self, radius_m: Option<f64>) -> String {
+        let mut text = String::from(
+            "# A survey for tunnelstitch. Paths are relative to this file.\n\n\
+             [tunnel]\nshape = \"circle\"\n",
+        );
+        // Writing into a string cannot fail.
+        let _ = match radius_m {
+            Some(radius_m) => writeln!(text, "radius_m = {radius_m:?}"),
+            None => writeln!(
+                text,
+                "# Measure the tunnel's radius in metres and take away the # of the next line.\n\
+                 # radius_m = 3.0"
+            ),
+        };
+        text += "# ignore = [{ theta_deg = [150, 210], chainage_m = [2.0, 5.5] }]    # water, \
+                 plants: refine ignores this part of the wall\n";
+        text += "\n[camera]\n";
+        let _ = match self.calibrations.first() {
+            Some((path, _)) => writeln!(text, "file = {}", quoted(path)),
+            None => writeln!(
+                text,
+                "# No calibration was found: OpenCV, ROS or Kalibr YAML, COLMAP's cameras.txt, \
+                 nerfstudio's transforms.json, or our camera.json.\n\
+                 file = \"camera.json\""
+            ),
+        };
+        self.write_frames(&mut text);
+        text += "\n[poses]\n";
+        self.write_initial_poses(&mut text);
+        if let Some((path, _)) = self.truth() {
+            let path = quoted(path);
+            let _ = writeln!(text, "truth = {path}      # only ever used to compare");
+        }
+        text += CONVENTIONS_AND_PRIOR;
+        text
+    }
+
+    /// Writes `[frames]`.
+    fn write_frames(&self, text: &mut String) {
+        let pattern = self.pictures.first();
+        let pattern = pattern.map_or("*.jpg", |group| &group.pattern);
+        let _ = match &self.video {
+            Some(video) => writeln!(
+                text,
+                "\n[frames]\nvideo = {}\nevery = {}    # of its pictures; their times are the \
+                 video's",
+                quoted(&video.path),
+                video.every
+            ),
+            None => writeln!(
+                text,
+                "\n[frames]\nimages = {}    # sorted by name",
+                quoted(pattern)
+            ),
+        };
+        let _ = match &self.mask {
+            Some(mask) => writeln!(
+                text,
+                "mask = {}    # black where no frame shows the wall",
+                quoted(mask)
+            ),
+            None => writeln!(
+                text,
+                "# mask = \"mask.png\"    # a picture of the frames' size, black where none of \
+                 them shows the wall"
+            ),
+        };
+    }
+
+    /// Writes the initial poses of `[poses]` and how they are associated with the frames.
+    fn write_initial_poses(&self, text: &mut String) {
+        let (count, _) = self.frames();
+        let Some((path, poses)) = self.initial() else {
+            *text += "# No poses were found: TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC.\n\
+                      initial = \"baseline.tum\"\n";
+            return;
+        };
+        let _ = writeln!(
+            text,
+            "initial = {}    # {} poses for {count} frames",
+            quoted(path),
+            poses.entries.len()
+        );
+        if poses.entries.len() != count && poses.has_times() && !poses.has_names() {
+            *text += if self.video.is_some() {
+                "associate = \"time\"       # by the video's times, or by [frames] times = FILE\n\
+                 interpolate = true\n"
+            } else {
+                "associate = \"time\"       # by the frames' names, or by [frames] times = FILE\n\
+                 # interpolate = true\n"
+            };
+        }
+        if poses.format == PoseFormat::Euroc {
+            *text += "# These are a body's poses: how the camera is mounted (its sensor.yaml, or a \
+                      4 × 4 matrix).\n\
+                      # body_to_camera = \"sensor.yaml\"\n";
+        }
+    }
+}
+
+/// A text as TOML string.
+fn quoted(text: impl AsRef<Path>) -> String {
+    toml::Value::String(text.as_ref().to_string_lossy().into_owned()).to_string()
+}
