@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             frames: frames.unwrap_or(free.frames),
             ..free
         };
-        simulate::run(&options, &path, false, &Silent)?;
+        simulate::write_survey(&options, &path, false, &Silent)?;
         surveys.push(Survey::open(&path)?);
     }
     println!("| | s | wall error RMS px | worst frame px | frames left out |");

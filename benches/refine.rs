@@ -15,7 +15,7 @@ const ROUNDS: usize = 5;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("survey");
-    simulate::run(&SimulateOptions::free(), &path, false, &Silent)?;
+    simulate::write_survey(&SimulateOptions::free(), &path, false, &Silent)?;
     let survey = Survey::open(&path)?;
     println!(
         "{} frames of {} × {} px, {} threads, {ROUNDS} rounds",

@@ -208,7 +208,7 @@ mod tests {
     fn looked_over(options: SimulateOptions) -> Check {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("survey");
-        simulate::run(&options, &path, false, &Silent).unwrap();
+        simulate::write_survey(&options, &path, false, &Silent).unwrap();
         check(&Survey::open(&path).unwrap()).unwrap()
     }
 
@@ -264,7 +264,7 @@ mod tests {
     #[test]
     fn what_is_left_out_is_no_overlap() {
         let dir = tempfile::tempdir().unwrap();
-        simulate::run(&small(), dir.path(), true, &Silent).unwrap();
+        simulate::write_survey(&small(), dir.path(), true, &Silent).unwrap();
         let overlap = |ignore: &str| {
             let opened = Survey::open_with(dir.path(), |file| {
                 let table: toml::Table = format!("ignore = {ignore}").parse().unwrap();

@@ -67,7 +67,7 @@ pub fn run(arguments: &DemoArguments, run: &Run, terminal: &Arc<Terminal>) -> Re
         "tunnelstitch simulate free --turns {} --seed {} --out {survey_path}",
         arguments.turns, arguments.seed
     ));
-    simulate::run(&options, &survey_folder, true, terminal.as_ref())?;
+    simulate::write_survey(&options, &survey_folder, true, terminal.as_ref())?;
 
     say(format!(
         "\ntunnelstitch refine {survey_path} --out {refined_path}"

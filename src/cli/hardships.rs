@@ -1,6 +1,6 @@
 //! What makes a simulated survey harder: light, sensor and bad frames.
 
-use crate::simulate::{BadFrames, Bits, SimulateOptions};
+use crate::simulate::{BadFrames, BitDepth, SimulateOptions};
 use clap::ValueEnum;
 
 /// Options of `tunnelstitch simulate`; without any, light and sensor are ideal but for the noise.
@@ -65,8 +65,8 @@ impl HardshipArguments {
             moving: self.moving,
             shaft_percent: self.shaft_percent,
             bits: match self.bits {
-                BitsArgument::Eight => Bits::Eight,
-                BitsArgument::Sixteen => Bits::Sixteen,
+                BitsArgument::Eight => BitDepth::Eight,
+                BitsArgument::Sixteen => BitDepth::Sixteen,
             },
             bad_frames: self.bad_frames.clone().unwrap_or_default(),
             ..options

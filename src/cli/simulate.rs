@@ -6,7 +6,7 @@ use super::stitch::positive;
 use super::tunnel::TunnelArguments;
 use super::{Failure, Terminal, json};
 use crate::camera::{Camera, Lens, read_calibration};
-use crate::simulate::{self, Light, SimulateOptions, Wall};
+use crate::simulate::{self, Illumination, SimulateOptions, Wall};
 use crate::survey::PriorSection;
 use crate::trajectory::JitterModel;
 use clap::ValueEnum;
@@ -236,8 +236,8 @@ impl SimulateArguments {
             jitter: self.jitter_of(preset.jitter),
             wall,
             light: match self.light {
-                LightArgument::Downward => Light::Downward,
-                LightArgument::Even => Light::Even,
+                LightArgument::Downward => Illumination::Downward,
+                LightArgument::Even => Illumination::Even,
             },
             noise_grey: self.noise,
             supersample: self.supersample,
@@ -295,7 +295,7 @@ pub fn run(arguments: &SimulateArguments, run: &Run, terminal: &Terminal) -> Res
         ));
     }
     let options = arguments.options()?;
-    let simulated = simulate::run(&options, &arguments.out, arguments.force, terminal)?;
+    let simulated = simulate::write_survey(&options, &arguments.out, arguments.force, terminal)?;
     let inputs = [
         &arguments.camera,
         &arguments.texture,
@@ -317,7 +317,7 @@ pub fn run(arguments: &SimulateArguments, run: &Run, terminal: &Terminal) -> Res
     };
     terminal.say(format!(
         "{out}: {} frames of {} × {} px, with true poses\nnext: tunnelstitch {next}",
-        options.frames - options.bad_frames.missing(),
+        options.frames - options.bad_frames.missing_count(),
         options.camera.width,
         options.camera.height
     ));

@@ -23,7 +23,7 @@
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("survey");
 //! # let camera = tunnelstitch::camera::Camera::from_vertical_fov(160, 120, 1.0);
-//! # simulate::run(&SimulateOptions { frames: 4, camera, ..SimulateOptions::free() }, &path, false, &Silent)?;
+//! # simulate::write_survey(&SimulateOptions { frames: 4, camera, ..SimulateOptions::free() }, &path, false, &Silent)?;
 //! let survey = Survey::open(&path)?;
 //! let origin = Origin {
 //!     program: "my program 1.0".to_owned(),

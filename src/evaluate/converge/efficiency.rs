@@ -258,7 +258,7 @@ impl Run {
 fn one(options: &SimulateOptions, joint: bool, out: &Path) -> Result<Run, ConvergeError> {
     let scratch = ScratchFolder::inside(out)?;
     let folder = scratch.path().join("survey");
-    simulate::run(options, &folder, false, &Silent)?;
+    simulate::write_survey(options, &folder, false, &Silent)?;
     let survey = Survey::open(&folder)?;
     let silent: Arc<dyn Progress> = Arc::new(Silent);
     let refining = RefineOptions {

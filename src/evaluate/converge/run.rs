@@ -137,7 +137,7 @@ fn experiment(
 fn fly(survey: &SimulateOptions, out: &Path, record: &mut RunRecord) -> Result<(), ConvergeError> {
     let scratch = ScratchFolder::inside(out)?;
     let folder = scratch.path().join("survey");
-    simulate::run(survey, &folder, false, &Silent)?;
+    simulate::write_survey(survey, &folder, false, &Silent)?;
     let survey = Survey::open(&folder)?;
     let silent: Arc<dyn Progress> = Arc::new(Silent);
     let since = Instant::now();

@@ -1,9 +1,9 @@
-//! Random numbers that depend on a place, or on a purpose and a frame, and nothing else.
+//! Procedural noise: random numbers that depend only on a seed, a position and a frame.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// 64 well-mixed bits of three integers.
+/// Hashes three integers to 64 well-mixed bits.
 ///
 /// Source: the finaliser of SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number
 /// generators", 2014).
@@ -16,39 +16,40 @@ fn hash(seed: u64, i: i64, j: i64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// A uniform number in `[0, 1)` for the lattice point `(i, j)`.
+/// Uniform number in `[0, 1)` of the lattice point `(i, j)`.
 pub(super) fn uniform(seed: u64, i: i64, j: i64) -> f32 {
     (hash(seed, i, j) >> 40) as f32 / (1u64 << 24) as f32
 }
 
-/// A seed for one purpose among many.
-pub(super) fn derived_seed(seed: u64, purpose: i64) -> u64 {
-    hash(seed, purpose, -1)
+/// Derives the seed of an independent random stream.
+pub(super) fn derived_seed(seed: u64, stream: i64) -> u64 {
+    hash(seed, stream, -1)
 }
 
-/// What a simulation's random numbers are for (those of jitter and sensor noise are the seed's own
-/// streams).
+/// Independent random streams of a simulation.
+///
+/// Pose jitter and sensor noise draw from the seed itself.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Purpose {
-    /// The wall.
-    Texture,
+pub(super) enum RandomStream {
+    /// Texture of the wall.
+    WallTexture,
     /// Gain and bias of the frames.
     Exposure,
-    /// Damp patches and their ripple.
-    Damp,
-    /// Things that are not on the wall.
-    Moving,
+    /// Wet patches and the ripples of their water.
+    WetPatches,
+    /// Objects between camera and wall.
+    MovingObjects,
     /// Blur and occlusion of bad frames.
     BadFrames,
 }
 
-impl Purpose {
-    /// The seed for this purpose.
+impl RandomStream {
+    /// Seed of this stream.
     pub fn seed(self, seed: u64) -> u64 {
         derived_seed(seed, self as i64)
     }
 
-    /// The random numbers for this purpose of one frame.
+    /// Random generator of this stream for one frame.
     pub fn rng(self, seed: u64, frame: usize) -> ChaCha8Rng {
         let mut rng = ChaCha8Rng::seed_from_u64(self.seed(seed));
         rng.set_stream(frame as u64);
@@ -56,25 +57,25 @@ impl Purpose {
     }
 }
 
-/// Smooth noise: uniform numbers on a lattice of the wall, interpolated by `3t² − 2t³` along s and
-/// h.
+/// Value noise: uniform numbers on a lattice of the wall, interpolated by `3t² − 2t³`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ValueNoise {
-    /// Which noise.
+    /// Seed of the lattice's numbers.
     pub seed: u64,
-    /// Greatest value, grey levels.
+    /// Maximum absolute value, grey levels.
     pub amplitude: f32,
     /// Size of a lattice cell along s and h, metres.
     pub cell_m: [f64; 2],
-    /// Cells after which the lattice repeats along s: at most once around.
+    /// Period of the lattice along s, cells: at most once around.
     pub period_s: i64,
-    /// Cells after which it repeats along h, if it does.
+    /// Period of the lattice along h, cells, if it repeats.
     pub period_h: Option<i64>,
 }
 
 impl ValueNoise {
-    /// Noise with cells of about `cell_m` that is unique along h and repeats after `repeat_m` along
-    /// s, which must divide the perimeter.
+    /// Noise with cells of about `cell_m` that does not repeat along h.
+    ///
+    /// It repeats after `repeat_m` along s, which must divide the perimeter.
     pub fn unique(seed: u64, amplitude: f32, cell_m: f64, repeat_m: f64) -> Self {
         let period_s = (repeat_m / cell_m).round().max(1.0);
         Self {
@@ -86,7 +87,7 @@ impl ValueNoise {
         }
     }
 
-    /// Noise that repeats along h too, after `repeat_h_m`.
+    /// Makes the noise repeat along h after `repeat_h_m` as well.
     pub fn repeating(self, repeat_h_m: f64) -> Self {
         let period_h = (repeat_h_m / self.cell_m[1]).round().max(1.0);
         Self {
@@ -99,7 +100,7 @@ impl ValueNoise {
     /// Adds the noise at chainage `h_m` to the row of texels at `s = (k + ½) texel_m`.
     pub fn add_to_row(&self, h_m: f64, texel_m: f64, row: &mut [f32]) {
         let y = h_m / self.cell_m[1];
-        let (j, t) = (y.floor() as i64, smooth((y - y.floor()) as f32));
+        let (j, t) = (y.floor() as i64, smoothstep((y - y.floor()) as f32));
         let lattice_row = |j: i64| self.period_h.map_or(j, |period| j.rem_euclid(period));
         let (above, below) = (lattice_row(j), lattice_row(j + 1));
         let nodes: Vec<f32> = (0..=self.period_s)
@@ -115,13 +116,13 @@ impl ValueNoise {
             let cell = x as usize;
             let i = cell % self.period_s as usize;
             let (a, b) = (nodes[i], nodes[i + 1]);
-            *value += a + (b - a) * smooth((x - cell as f64) as f32);
+            *value += a + (b - a) * smoothstep((x - cell as f64) as f32);
         }
     }
 }
 
-/// `3t² − 2t³`.
-fn smooth(t: f32) -> f32 {
+/// Smoothstep, `3t² − 2t³`.
+fn smoothstep(t: f32) -> f32 {
     t * t * (3.0 - 2.0 * t)
 }
 

@@ -1,10 +1,12 @@
-//! Writing a simulated survey.
+//! Writes a simulated survey to a folder.
 
-use super::{Scene, SimulateError, SimulateOptions};
 use crate::camera::format_calibration;
 use crate::frames::{PictureFormat, write_picture};
 use crate::persist::atomic::{self, StagedFolder, WriteError};
 use crate::progress::Progress;
+use crate::simulate::error::SimulateError;
+use crate::simulate::options::SimulateOptions;
+use crate::simulate::scene::Scene;
 use crate::survey::{
     CameraSection, FramesSection, PosesSection, SURVEY_FILE, SurveyFile, TunnelSection,
 };
@@ -14,17 +16,19 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
 
-/// What was written; also `simulation.json`, from which the survey can be made again.
+/// Content of `simulation.json`, from which the survey can be simulated again.
 #[derive(Clone, Debug, Serialize)]
-pub struct Simulated {
+pub struct SimulationRecord {
     /// Name and version of the program.
     pub program: &'static str,
-    /// What was simulated.
+    /// Options of the simulation.
     pub options: SimulateOptions,
 }
 
-/// Writes a survey folder: `survey.toml`, `camera.json`, `frames/000000.png` …, `baseline.tum` (the
-/// plan), `groundtruth.tum` and `simulation.json`; with a shaft before the wall `mask.png`, too.
+/// Simulates a survey and writes its folder.
+///
+/// The folder has `survey.toml`, `camera.json`, `frames/000000.png` …, `baseline.tum` (the plan),
+/// `groundtruth.tum` and `simulation.json`, and `mask.png` if the rig's shaft is visible.
 ///
 /// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier
 /// simulated survey of that name is replaced. The same options give the same bytes, whatever the
@@ -32,20 +36,20 @@ pub struct Simulated {
 ///
 /// # Errors
 /// [`SimulateError`].
-pub fn run(
+pub fn write_survey(
     options: &SimulateOptions,
     out: &Path,
     overwrite: bool,
     progress: &dyn Progress,
-) -> Result<Simulated, SimulateError> {
+) -> Result<SimulationRecord, SimulateError> {
     let scene = Scene::new(options)?;
-    check_target(out, overwrite)?;
-    let simulated = Simulated {
+    check_output_folder(out, overwrite)?;
+    let simulated = SimulationRecord {
         program: crate::PROGRAM,
         options: options.clone(),
     };
     let folder = StagedFolder::begin(out)?;
-    // Whoever reads an error knows the folder by its final name.
+    // Errors name the folder by its final name, not by that of the staging folder.
     let final_name = |error: WriteError| {
         let path = match error.path.strip_prefix(folder.path()) {
             Ok(inside) => out.join(inside),
@@ -53,27 +57,27 @@ pub fn run(
         };
         WriteError::new(&path, error.source)
     };
-    write_texts(&scene, &simulated, folder.path()).map_err(final_name)?;
+    write_text_files(&scene, &simulated, folder.path()).map_err(final_name)?;
     write_mask(&scene, &folder.path().join(MASK_FILE)).map_err(final_name)?;
     write_frames(&scene, &folder.path().join("frames"), progress).map_err(final_name)?;
     folder.finish()?;
     Ok(simulated)
 }
 
-/// What every frame hides of the wall, if anything does.
+/// Mask of the pixels that show the wall; only written if the rig's shaft is visible.
 const MASK_FILE: &str = "mask.png";
 
-/// The line along the middle of a tunnel that is not straight.
+/// Centreline of a curved tunnel.
 const CENTRELINE_FILE: &str = "centreline.txt";
 
-/// The record of a simulation; no other survey has one.
+/// Record of the simulation, by which a simulated survey is recognised.
 const RECORD_FILE: &str = "simulation.json";
 
-/// What a simulated survey consists of.
+/// Files of a simulated survey.
 const FILES: [&str; 9] = [
     SURVEY_FILE,
     RECORD_FILE,
-    // What the program adds.
+    // Written by the command line program.
     "run.toml",
     MASK_FILE,
     CENTRELINE_FILE,
@@ -83,8 +87,8 @@ const FILES: [&str; 9] = [
     "frames",
 ];
 
-/// Refuses to replace what was not simulated.
-fn check_target(out: &Path, overwrite: bool) -> Result<(), SimulateError> {
+/// Refuses to replace anything but a simulated survey.
+fn check_output_folder(out: &Path, overwrite: bool) -> Result<(), SimulateError> {
     let exists = |what| {
         Err(SimulateError::Exists {
             path: out.to_owned(),
@@ -100,7 +104,8 @@ fn check_target(out: &Path, overwrite: bool) -> Result<(), SimulateError> {
     }
     if !is_simulated(out) {
         return exists(
-            "exists and is not just a simulated survey, so it is not replaced; choose another folder",
+            "exists and is not just a simulated survey, so it is not replaced; \
+             choose another folder",
         );
     }
     if !overwrite {
@@ -109,7 +114,7 @@ fn check_target(out: &Path, overwrite: bool) -> Result<(), SimulateError> {
     Ok(())
 }
 
-/// True if a folder holds what [`run`] writes and nothing else.
+/// True if a folder holds only files that [`write_survey`] writes.
 fn is_simulated(folder: &Path) -> bool {
     let Ok(mut entries) = std::fs::read_dir(folder) else {
         return false;
@@ -119,7 +124,11 @@ fn is_simulated(folder: &Path) -> bool {
     ours && folder.join(RECORD_FILE).is_file()
 }
 
-fn write_texts(scene: &Scene, simulated: &Simulated, folder: &Path) -> Result<(), WriteError> {
+fn write_text_files(
+    scene: &Scene,
+    simulated: &SimulationRecord,
+    folder: &Path,
+) -> Result<(), WriteError> {
     let options = &simulated.options;
     let survey = SurveyFile {
         tunnel: TunnelSection {
@@ -182,7 +191,7 @@ fn write_mask(scene: &Scene, path: &Path) -> Result<(), WriteError> {
         return Ok(());
     };
     let (width, height) = (scene.camera().width, scene.camera().height);
-    let wall = shaft.shows_wall();
+    let wall = shaft.wall_mask();
     let mask = GrayImage::from_fn(width, height, |u, v| {
         let shown = wall[v as usize * width as usize + u as usize];
         Luma([if shown { 255 } else { 0 }])
@@ -190,20 +199,21 @@ fn write_mask(scene: &Scene, path: &Path) -> Result<(), WriteError> {
     write_picture(path, &mask.into(), PictureFormat::Png)
 }
 
-/// Renders and writes all frames that are there, each named by its number in the plan, batch by
-/// batch, the frames of a batch in parallel.
+/// Renders and writes all frames that exist, named by their numbers in the plan.
+///
+/// The frames of a batch are rendered in parallel from one raster of the wall.
 fn write_frames(scene: &Scene, folder: &Path, progress: &dyn Progress) -> Result<(), WriteError> {
     atomic::create_folder(folder)?;
     progress.start("simulating", scene.frames().count());
     for batch in scene.batches() {
-        let band = scene.band(batch.h_m);
+        let raster = scene.wall_raster(batch.h_m);
         batch
             .frames
             .into_par_iter()
-            .try_for_each(|(frame, shown)| {
-                let picture = scene.delivered(&band, shown);
+            .try_for_each(|(frame, source)| {
+                let image = scene.digitised_frame(&raster, source);
                 let path = folder.join(format!("{frame:06}.png"));
-                write_picture(&path, &picture, PictureFormat::Png)?;
+                write_picture(&path, &image, PictureFormat::Png)?;
                 progress.advance(1);
                 Ok(())
             })?;

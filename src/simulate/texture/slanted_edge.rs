@@ -1,27 +1,27 @@
-//! A test target for sharpness all over the wall.
+//! Slanted-edge texture: a test target for sharpness.
 
-use super::wall::Texture;
+use crate::simulate::texture::wall_texture::WallTexture;
 use crate::surface::{WallPoint, shortest_arc};
 
-/// Distance from square to square, metres, before it is fitted to the perimeter.
+/// Nominal distance between squares, metres; adjusted to the perimeter along s.
 const PITCH_M: f64 = 0.6;
 /// Side of a square, metres.
 const SIDE_M: f64 = 0.36;
-/// How far squares are turned, degrees.
+/// Rotation of the squares, degrees.
 const SLANT_DEG: f64 = 5.0;
 /// Grey level between squares.
-const GROUND: f32 = 128.0;
-/// Grey levels of squares, in turn.
-const SQUARES: [f32; 2] = [72.0, 184.0];
+const BACKGROUND: f32 = 128.0;
+/// Grey levels of alternating squares.
+const TONES: [f32; 2] = [72.0, 184.0];
 
-/// Squares in rows and columns, dark and bright in turn, each turned by 5°: slanted edges, as ISO
-/// 12233 measures sharpness by.
-pub(super) struct TargetWall {
-    /// Distance from square to square along s, metres.
+/// Alternating dark and bright squares, each rotated by 5°, with the slanted edges by which ISO
+/// 12233 measures sharpness.
+pub(super) struct SlantedEdgeWall {
+    /// Distance between squares along s, metres.
     pitch_s_m: f64,
 }
 
-impl TargetWall {
+impl SlantedEdgeWall {
     /// A wall of the given perimeter (metres).
     pub fn new(perimeter_m: f64) -> Self {
         Self {
@@ -31,18 +31,20 @@ impl TargetWall {
 
     /// Grey level of a square.
     fn tone(column: i64, row: i64) -> f32 {
-        SQUARES[(column + row).rem_euclid(2) as usize]
+        TONES[(column + row).rem_euclid(2) as usize]
     }
 }
 
+/// Number of squares around the section.
 fn squares_around(perimeter_m: f64) -> f64 {
     (perimeter_m / PITCH_M).round().max(1.0)
 }
 
-impl Texture for TargetWall {
-    /// A texel's share of a square as if its sides were the square's: the mean to within a few
-    /// thousandths of the step.
-    fn row(&self, h_m: f64, texel_m: f64, row: &mut [f32]) {
+impl WallTexture for SlantedEdgeWall {
+    /// Fills a row, with each texel's coverage computed as if it were aligned with the square.
+    ///
+    /// The error is a few thousandths of the step between the grey levels.
+    fn fill_row(&self, h_m: f64, texel_m: f64, row: &mut [f32]) {
         let (sin, cos) = SLANT_DEG.to_radians().sin_cos();
         let down = (h_m / PITCH_M).floor();
         let h = h_m - (down + 0.5) * PITCH_M;
@@ -55,26 +57,26 @@ impl Texture for TargetWall {
             let across = (s_m / self.pitch_s_m).floor();
             let s = s_m - (across + 0.5) * self.pitch_s_m;
             let share = inside(cos * s + sin * h) * inside(cos * h - sin * s);
-            *value = GROUND + share * (Self::tone(across as i64, down as i64) - GROUND);
+            *value = BACKGROUND + share * (Self::tone(across as i64, down as i64) - BACKGROUND);
         }
     }
 }
 
-/// A straight edge between two grey levels on the wall of [`super::Wall::Target`].
+/// Straight edge between two grey levels of [`Wall::Target`](crate::simulate::Wall::Target).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlantedEdge {
-    /// Its middle.
+    /// Midpoint of the edge.
     pub middle: WallPoint,
-    /// Unit vector across it along (s, h), out of the square.
+    /// Unit normal along (s, h), pointing out of the square.
     pub normal: [f64; 2],
-    /// How far from its middle it may be looked at along it and across it, metres: nothing else
-    /// lies there.
+    /// Half extents along and across the edge, metres, of the area that shows no other edge.
     pub clear_m: [f64; 2],
 }
 
 impl SlantedEdge {
-    /// The edges of all squares of a wall of the given perimeter whose middles lie between two
-    /// chainages, metres: of each square the right, lower, left and upper one.
+    /// Lists the edges of all squares whose centres lie between two chainages, metres.
+    ///
+    /// The order of a square's edges is right, lower, left, upper.
     pub fn all(perimeter_m: f64, h_m: [f64; 2]) -> Vec<Self> {
         let around = squares_around(perimeter_m);
         let (sin, cos) = SLANT_DEG.to_radians().sin_cos();
@@ -100,8 +102,9 @@ impl SlantedEdge {
         edges
     }
 
-    /// Distance of a wall point from the edge, metres, positive outside of the square, if it lies
-    /// where nothing else does.
+    /// Signed distance of a wall point from the edge, metres, positive outside of the square.
+    ///
+    /// `None` outside of the area that shows no other edge.
     pub fn distance_m(&self, wall: &WallPoint, perimeter_m: f64) -> Option<f64> {
         let s = shortest_arc(wall.s_m - self.middle.s_m, perimeter_m);
         let h = wall.h_m - self.middle.h_m;
@@ -117,9 +120,9 @@ mod tests {
     use std::f64::consts::TAU;
 
     #[test]
-    fn edges_lie_where_the_wall_has_them_and_nothing_else_does() {
+    fn edges_lie_where_the_wall_has_them_and_are_isolated() {
         let perimeter_m = TAU * 3.0;
-        let wall = TargetWall::new(perimeter_m);
+        let wall = SlantedEdgeWall::new(perimeter_m);
         let edges = SlantedEdge::all(perimeter_m, [0.0, 1.2]);
         assert_eq!(edges.len(), 31 * 2 * 4);
         let mut row = vec![0.0; 9000];
@@ -128,7 +131,7 @@ mod tests {
             let mut seen = 0;
             for line in -60..60 {
                 let h_m = edge.middle.h_m + f64::from(line) * texel_m;
-                wall.row(h_m, texel_m, &mut row);
+                wall.fill_row(h_m, texel_m, &mut row);
                 for (k, value) in row.iter().enumerate() {
                     let point = WallPoint {
                         s_m: (k as f64 + 0.5) * texel_m,
@@ -138,7 +141,7 @@ mod tests {
                         continue;
                     };
                     if distance_m.abs() > 1.2 * texel_m {
-                        assert_eq!(*value == GROUND, distance_m > 0.0, "{edge:?} {point:?}");
+                        assert_eq!(*value == BACKGROUND, distance_m > 0.0, "{edge:?} {point:?}");
                         seen += 1;
                     }
                 }

@@ -1,14 +1,14 @@
-//! Concrete walls.
+//! Concrete texture: smooth stains of low contrast.
 
-use super::noise::{ValueNoise, derived_seed};
-use super::wall::Texture;
+use crate::simulate::procedural_noise::{ValueNoise, derived_seed};
+use crate::simulate::texture::wall_texture::WallTexture;
 
 /// Mean grey level.
 const MEAN: f32 = 128.0;
-/// Stains: amplitude in grey levels, and cell in metres.
+/// Stains: amplitude (grey levels) and cell size (metres) of each octave.
 const STAINS: [(f32, f64); 4] = [(5.0, 1.2), (5.0, 0.3), (4.0, 0.060), (4.0, 0.015)];
 
-/// Smooth stains of all sizes, a few grey levels strong, unique over the whole tunnel.
+/// Smooth stains of all sizes, of a few grey levels, that do not repeat along the tunnel.
 pub(super) struct ConcreteWall {
     stains: Vec<ValueNoise>,
 }
@@ -25,8 +25,8 @@ impl ConcreteWall {
     }
 }
 
-impl Texture for ConcreteWall {
-    fn row(&self, h_m: f64, texel_m: f64, row: &mut [f32]) {
+impl WallTexture for ConcreteWall {
+    fn fill_row(&self, h_m: f64, texel_m: f64, row: &mut [f32]) {
         row.fill(MEAN);
         for stain in &self.stains {
             stain.add_to_row(h_m, texel_m, row);
@@ -46,7 +46,7 @@ mod tests {
         let mut values = Vec::new();
         for k in 0..400 {
             let mut row = vec![0.0; 2000];
-            wall.row(f64::from(k) * 0.02, perimeter_m / 2000.0, &mut row);
+            wall.fill_row(f64::from(k) * 0.02, perimeter_m / 2000.0, &mut row);
             values.extend(row.into_iter().map(f64::from));
         }
         let mean = values.iter().sum::<f64>() / values.len() as f64;

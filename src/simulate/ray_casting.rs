@@ -1,59 +1,59 @@
-//! The ray caster.
+//! Rendering of frames by ray casting.
 
-use super::band::{Band, RUN};
-use super::tunnel::{Place, Rays, Tunnel};
 use crate::camera::Camera;
 use crate::frames::GreyImage;
 use crate::numerics::simd_dispatch::wide;
+use crate::simulate::tunnel::{RayCaster, Tunnel, WallHit};
+use crate::simulate::wall_raster::{BATCH_POINTS, WallRaster};
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Cells of a pixel along each axis, at whose corners rays are cast.
+/// Number of cells of a pixel along each axis, at whose corners rays are cast.
 const CELLS: usize = 2;
 
-/// Renders a frame: each pixel is the mean of `n × n` points spread evenly over its square.
+/// Renders a frame whose pixels are the means of `n × n` points spread evenly over their squares.
 ///
-/// Rays are cast through the corners of half pixels; what lies between meets the wall between them,
-/// to within some 10⁻⁴ of a pixel (an eighth of the square of half a pixel times the map's
-/// curvature; more towards the axis's vanishing points).
+/// Rays are cast through the corners of half pixels, and points between them are interpolated on
+/// the wall, to within some 10⁻⁴ of a pixel (an eighth of the square of half a pixel times the
+/// map's curvature; more towards the vanishing points of the axis).
 ///
-/// `pose`: where the camera is when a row is read.
-pub(super) fn cast(
-    band: &Band,
+/// `pose`: the camera's pose while a row is read.
+pub(super) fn cast_rays(
+    raster: &WallRaster,
     tunnel: &Tunnel,
     camera: &Camera,
     pose: impl Fn(f64) -> Pose,
     n: u32,
 ) -> GreyImage {
     let (width, height) = (camera.width as usize, camera.height as usize);
-    let points: Vec<Point> = (0..n).map(|k| Point::new(k, n)).collect();
+    let points: Vec<SubpixelOffset> = (0..n).map(|k| SubpixelOffset::new(k, n)).collect();
     let line = |v: f64| {
         let pose = pose(v);
-        let rays = tunnel.rays(pose.t_wc);
-        cast_line(&rays, camera, &pose, v)
+        let caster = tunnel.caster_at(pose.t_wc);
+        cast_row(&caster, camera, &pose, v)
     };
     let share = 1.0 / (n * n) as f32;
     let mut data = vec![0.0f32; width * height];
     let mut lines = vec![line(-0.5)];
-    let mut between = Places::default();
+    let mut between = WallHits::default();
     for (v, row) in data.chunks_exact_mut(width).enumerate() {
-        // The last line of a row of pixels is the first of the next.
+        // The last line of rays of a pixel row is the first of the next.
         lines.drain(..lines.len() - 1);
         lines.extend((1..=CELLS).map(|k| line(v as f64 - 0.5 + k as f64 / CELLS as f64)));
-        // All of some pixels' points lie close together on the wall.
-        for (n, pixels) in row.chunks_mut(RUN).enumerate() {
-            let first = n * RUN;
+        // Batches of neighbouring pixels, whose points lie close together on the wall.
+        for (n, pixels) in row.chunks_mut(BATCH_POINTS).enumerate() {
+            let first = n * BATCH_POINTS;
             wide(
                 #[inline(always)]
                 || {
                     for down in &points {
                         let ends = [&lines[down.cell], &lines[down.cell + 1]];
-                        between.set(ends, down.share, first..first + pixels.len());
+                        between.interpolate(ends, down.share, first..first + pixels.len());
                         for across in &points {
                             let points = [down, across];
-                            add_points(band, ends, &between, points, first, pixels);
+                            add_points(raster, ends, &between, points, first, pixels);
                         }
                     }
                 },
@@ -64,29 +64,34 @@ pub(super) fn cast(
     GreyImage::new(width, height, data)
 }
 
-/// Adds what is seen at one point of each of some pixels of a row, from column `first` on;
-/// `between`: theirs.
+/// Adds the grey level at one sample point of each pixel of a batch.
+///
+/// The batch starts at column `first`; `between` are the hits at the points' vertical position.
 #[inline(always)]
 fn add_points(
-    band: &Band,
-    [upper, lower]: [&Line; 2],
-    between: &Places,
-    [down, across]: [&Point; 2],
+    raster: &WallRaster,
+    [upper, lower]: [&RayRow; 2],
+    between: &WallHits,
+    [down, across]: [&SubpixelOffset; 2],
     first: usize,
     pixels: &mut [f32],
 ) {
     let (left, right) = (across.cell, across.cell + 1);
     let count = pixels.len();
-    let (mut theta, mut h_m, mut values) = ([0.0; RUN], [0.0; RUN], [0.0; RUN]);
+    let (mut theta, mut h_m, mut values) = (
+        [0.0; BATCH_POINTS],
+        [0.0; BATCH_POINTS],
+        [0.0; BATCH_POINTS],
+    );
     let [a, b] = [left, right].map(|k| &between.thetas(k)[..count]);
     let [p, q] = [left, right].map(|k| &between.chainages(k)[..count]);
     for k in 0..count {
-        let angle = turned(a[k], b[k], across.share);
+        let angle = lerp_angle(a[k], b[k], across.share);
         theta[k] = if angle >= TAU { angle - TAU } else { angle };
         h_m[k] = p[k] + (q[k] - p[k]) * across.share;
     }
     let (theta, h_m) = (&theta[..count], &h_m[..count]);
-    band.look(theta, h_m, &mut values);
+    raster.sample(theta, h_m, &mut values);
     let d = |k: usize| {
         let edge = |corner: usize| {
             let (from, to) = (
@@ -97,65 +102,66 @@ fn add_points(
         };
         edge(left) + (edge(right) - edge(left)) * across.share
     };
-    band.add_glints(theta, h_m, d, &mut values);
+    raster.add_glints(theta, h_m, d, &mut values);
     for (pixel, value) in pixels.iter_mut().zip(&values) {
         *pixel += value;
     }
 }
 
-/// What lies between two angles at some share of the shorter way around; it may come out beyond 2π.
+/// Interpolates between two angles along the shorter arc; the result may exceed 2π.
 #[inline(always)]
-fn turned(from: f64, to: f64, share: f64) -> f64 {
+fn lerp_angle(from: f64, to: f64, share: f64) -> f64 {
     let turn = to - from;
     let more = if turn > 0.5 * TAU { TAU } else { 0.0 };
     let less = if turn < -0.5 * TAU { TAU } else { 0.0 };
     from + more + (turn - more + less) * share
 }
 
-/// Where a point lies in a pixel, along one axis.
-struct Point {
+/// Position of a sample point in a pixel along one axis.
+struct SubpixelOffset {
     cell: usize,
-    /// 0 to 1 within the cell.
+    /// Position within the cell, 0–1.
     share: f64,
 }
 
-impl Point {
-    /// Point `k` of `n`.
+impl SubpixelOffset {
+    /// Position of point `k` of `n`.
     fn new(k: u32, n: u32) -> Self {
-        let place = (f64::from(k) + 0.5) / f64::from(n) * CELLS as f64;
-        let cell = (place as usize).min(CELLS - 1);
+        let position = (f64::from(k) + 0.5) / f64::from(n) * CELLS as f64;
+        let cell = (position as usize).min(CELLS - 1);
         Self {
             cell,
-            share: place - cell as f64,
+            share: position - cell as f64,
         }
     }
 }
 
-/// Where rays through the corners of cells meet the wall: for each of a pixel's [`CELLS`] first
-/// corners along a row a list, in which entry u is that of pixel u. The first list is longer by
-/// one: the last corner of a pixel is the first one of the next.
+/// Wall hits of the rays through the corners of the cells of a pixel row.
+///
+/// There is one list for each of a pixel's first [`CELLS`] corners, with entry u for pixel u. The
+/// first list has one more entry, since a pixel's last corner is the next one's first.
 #[derive(Default)]
-struct Places {
-    /// Places, radians; NaN where the lens shows nothing, and so is all that lies next to it.
+struct WallHits {
+    /// Angles, radians; NaN where the lens shows nothing, which also invalidates neighbours.
     theta: [Vec<f64>; CELLS],
     /// Chainages, metres.
     h_m: [Vec<f64>; CELLS],
 }
 
-impl Places {
-    /// Those of all pixels' corner `k`, up to [`CELLS`].
+impl WallHits {
+    /// Angles at corner `k` (0 to [`CELLS`]) of all pixels.
     fn thetas(&self, k: usize) -> &[f64] {
         &self.theta[k % CELLS][k / CELLS..]
     }
 
-    /// The same of chainages.
+    /// Chainages at corner `k` (0 to [`CELLS`]) of all pixels.
     fn chainages(&self, k: usize) -> &[f64] {
         &self.h_m[k % CELLS][k / CELLS..]
     }
 
-    /// Makes them what lies between those of two lines, of some pixels only.
+    /// Sets the hits of some pixels to an interpolation between two lines of rays.
     #[inline(always)]
-    fn set(&mut self, [upper, lower]: [&Line; 2], share: f64, pixels: Range<usize>) {
+    fn interpolate(&mut self, [upper, lower]: [&RayRow; 2], share: f64, pixels: Range<usize>) {
         for k in 0..CELLS {
             let own = pixels.start..(pixels.end + 1).min(upper.at.theta[k].len());
             let (theta, h_m) = (&mut self.theta[k], &mut self.h_m[k]);
@@ -164,7 +170,7 @@ impl Places {
             let (a, b) = (&upper.at.theta[k], &lower.at.theta[k]);
             let ends = a[own.clone()].iter().zip(&b[own.clone()]);
             for (theta, (a, b)) in theta.iter_mut().zip(ends) {
-                *theta = turned(*a, *b, share);
+                *theta = lerp_angle(*a, *b, share);
             }
             let (p, q) = (&upper.at.h_m[k], &lower.at.h_m[k]);
             let ends = p[own.clone()].iter().zip(&q[own]);
@@ -175,46 +181,46 @@ impl Places {
     }
 }
 
-/// Rays that have been cast through the corners of cells along a line of the picture.
+/// Rays through the corners of cells along a line of the image, with their hits.
 #[derive(Default)]
-struct Line {
-    at: Places,
-    /// Their directions.
+struct RayRow {
+    at: WallHits,
+    /// Directions of the rays.
     d: [Vec<Vector3<f64>>; CELLS],
 }
 
-impl Line {
-    /// The direction through corner `k` of pixel u, up to [`CELLS`].
+impl RayRow {
+    /// Direction through corner `k` (0 to [`CELLS`]) of pixel u.
     fn direction(&self, u: usize, k: usize) -> Vector3<f64> {
         self.d[k % CELLS][u + k / CELLS]
     }
 
-    fn push(&mut self, corner: usize, Place { theta, h_m }: Place, d: Vector3<f64>) {
+    fn push(&mut self, corner: usize, WallHit { theta, h_m }: WallHit, d: Vector3<f64>) {
         self.at.theta[corner % CELLS].push(theta);
         self.at.h_m[corner % CELLS].push(h_m);
         self.d[corner % CELLS].push(d);
     }
 }
 
-/// The rays along a line of the picture at row `v`.
-fn cast_line(rays: &Rays, camera: &Camera, pose: &Pose, v: f64) -> Line {
+/// Casts the rays along the line of the image at row `v`.
+fn cast_row(caster: &RayCaster, camera: &Camera, pose: &Pose, v: f64) -> RayRow {
     let corners = camera.width as usize * CELLS + 1;
     let column = |k: usize| k as f64 / CELLS as f64 - 0.5;
-    let mut line = Line::default();
-    // Without distortion rays move evenly along a row.
+    let mut line = RayRow::default();
+    // Without distortion the directions are linear along a row.
     if let (true, Some(first)) = (camera.lens.is_straight(), camera.ray(0.0, v)) {
         let first = pose.r_wc * first;
         let right = pose.r_wc * Vector3::x() / camera.fx;
         for k in 0..corners {
             let d = first + right * column(k);
-            line.push(k, rays.hit(&d), d);
+            line.push(k, caster.intersect(&d), d);
         }
         return line;
     }
     for k in 0..corners {
         match camera.ray(column(k), v).map(|ray| pose.r_wc * ray) {
-            Some(d) => line.push(k, rays.hit(&d), d),
-            None => line.push(k, Place::NOWHERE, Vector3::repeat(f64::NAN)),
+            Some(d) => line.push(k, caster.intersect(&d), d),
+            None => line.push(k, WallHit::NONE, Vector3::repeat(f64::NAN)),
         }
     }
     line
@@ -224,19 +230,19 @@ fn cast_line(rays: &Rays, camera: &Camera, pose: &Pose, v: f64) -> Line {
 mod tests {
     use super::*;
     use crate::camera::Lens;
-    use crate::simulate::Light;
-    use crate::simulate::wall::Texture;
+    use crate::simulate::options::Illumination;
+    use crate::simulate::texture::wall_texture::WallTexture;
     use crate::trajectory::so3;
 
-    /// A smooth wall.
+    /// A smooth texture.
     struct Waves;
 
     fn waves(theta: f64, h_m: f64) -> f64 {
         128.0 + 60.0 * (9.0 * theta + 2.0 * h_m).sin() + 30.0 * (8.0 * h_m).cos()
     }
 
-    impl Texture for Waves {
-        fn row(&self, h_m: f64, _texel_m: f64, row: &mut [f32]) {
+    impl WallTexture for Waves {
+        fn fill_row(&self, h_m: f64, _texel_m: f64, row: &mut [f32]) {
             let count = row.len() as f64;
             for (k, value) in row.iter_mut().enumerate() {
                 *value = waves(TAU * (k as f64 + 0.5) / count, h_m) as f32;
@@ -248,11 +254,11 @@ mod tests {
     #[test]
     fn a_hit_lies_on_the_wall_and_on_the_ray() {
         let tunnel = Tunnel::Round(2.0);
-        let caster = tunnel.rays(Vector3::new(0.9, 7.0, -1.1));
+        let caster = tunnel.caster_at(Vector3::new(0.9, 7.0, -1.1));
         for k in 0..50 {
             let k = f64::from(k);
             let d = Vector3::new((1.7 * k).sin(), 0.8 * (0.9 * k).cos(), (2.3 * k).cos());
-            let Place { theta, h_m } = caster.hit(&d);
+            let WallHit { theta, h_m } = caster.intersect(&d);
             let x_w = Vector3::new(2.0 * theta.sin(), h_m, 2.0 * theta.cos());
             let along = x_w - caster.t;
             assert!(along.cross(&d).norm() < 1e-5 * along.norm() * d.norm() + 1e-6);
@@ -260,8 +266,8 @@ mod tests {
         }
     }
 
-    /// What lies between rays is where rays of its own would meet the wall, across θ = 0 and
-    /// through a lens, too.
+    /// Interpolated points lie where rays of their own would meet the wall, also across θ = 0 and
+    /// with distortion.
     #[test]
     fn points_between_rays_lie_where_their_own_rays_would() {
         let pose = Pose::new(
@@ -269,23 +275,23 @@ mod tests {
             Vector3::new(0.4, 0.3, -0.2),
         );
         let tunnel = Tunnel::Round(2.0);
-        let caster = tunnel.rays(pose.t_wc);
+        let caster = tunnel.caster_at(pose.t_wc);
         let mut camera = Camera::from_vertical_fov(160, 120, 1.0);
         for k1 in [0.0, -0.08] {
             camera.lens = Lens::radial(k1, 0.0);
             let pixel_m = 2.0 / camera.fy;
             for v in [0.0, 59.0, 119.0] {
-                let lines = [v, v + 0.5].map(|v| cast_line(&caster, &camera, &pose, v));
-                let mut between = Places::default();
-                between.set([&lines[0], &lines[1]], 0.3, 0..camera.width as usize);
+                let lines = [v, v + 0.5].map(|v| cast_row(&caster, &camera, &pose, v));
+                let mut between = WallHits::default();
+                between.interpolate([&lines[0], &lines[1]], 0.3, 0..camera.width as usize);
                 for k in 0..CELLS * camera.width as usize {
                     let (pixel, cell) = (k / CELLS, k % CELLS);
                     let [left, right] = [cell, cell + 1].map(|k| between.thetas(k)[pixel]);
                     let [before, after] = [cell, cell + 1].map(|k| between.chainages(k)[pixel]);
                     let u = 0.5 * (k as f64 + 0.6) - 0.5;
                     let d = pose.r_wc * camera.ray(u, v + 0.15).unwrap();
-                    let Place { theta, h_m } = caster.hit(&d);
-                    let off = turned(left, right, 0.6) - theta;
+                    let WallHit { theta, h_m } = caster.intersect(&d);
+                    let off = lerp_angle(left, right, 0.6) - theta;
                     let off = (off + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
                     assert!(2.0 * off.abs() < 1e-3 * pixel_m, "{u} {v}: {off}");
                     let h_off = before + 0.6 * (after - before) - h_m;
@@ -302,17 +308,24 @@ mod tests {
         let (radius_m, columns) = (2.0, 4000);
         let texel_m = TAU * radius_m / columns as f64;
         let camera = Camera::from_vertical_fov(160, 120, 1.0);
-        let band = Band::paint(&Waves, Light::Even, None, columns, texel_m, [-2.0, 3.0]);
+        let raster = WallRaster::paint(
+            &Waves,
+            Illumination::Even,
+            None,
+            columns,
+            texel_m,
+            [-2.0, 3.0],
+        );
         // The second looks across θ = 0.
         for turn_rad in [0.7, 0.0] {
             let turn = so3::exp(&Vector3::new(0.1, turn_rad, -0.05));
             let pose = Pose::new(turn, Vector3::new(0.4, 0.3, -0.2));
-            shows_the_wall(&band, radius_m, &camera, &pose);
+            shows_the_wall(&raster, radius_m, &camera, &pose);
         }
     }
 
-    fn shows_the_wall(band: &Band, radius_m: f64, camera: &Camera, pose: &Pose) {
-        let frame = cast(band, &Tunnel::Round(radius_m), camera, |_| *pose, 4);
+    fn shows_the_wall(raster: &WallRaster, radius_m: f64, camera: &Camera, pose: &Pose) {
+        let frame = cast_rays(raster, &Tunnel::Round(radius_m), camera, |_| *pose, 4);
         let mut compared = 0;
         for k in 0..160_000 {
             let (theta, h_m) = (

@@ -1,28 +1,27 @@
-//! The carrier's own shaft, in the way in every frame.
+//! Shaft of the camera rig: an occluder at the same pixels of every frame.
 
 use crate::frames::GreyImage;
 use std::f64::consts::TAU;
 
-/// Where the shaft stands at the frame's lower edge and at its tip, and how high the tip is: shares
-/// of the frame's width and height.
+/// Column of the shaft's axis at the frame's lower edge, as a share of the width.
 const FOOT: f64 = 0.42;
+/// Column and row of the shaft's tip, as shares of the width and height.
 const TIP: [f64; 2] = [0.36, 0.25];
-/// Grey level of the shaft's edge, and what its middle has more: a lamp beside the camera shines on
-/// a round bar.
+/// Grey level of the shaft's edge and the difference of its middle: a round bar, lit from the
+/// camera.
 const TONES: [f32; 2] = [18.0, 30.0];
-/// Rings along it: what they add at the most, grey levels, and how far apart they are, as a share
-/// of the width.
+/// Rings along the shaft: maximum added grey levels, and period as a share of the width.
 const RINGS: (f32, f64) = (14.0, 0.45);
 
-/// A dark round bar with rings, before the wall at the same place of every frame.
-pub(super) struct Shaft {
+/// Dark round bar with rings that occludes the wall at the same pixels of every frame.
+pub(super) struct RigShaft {
     width: usize,
     height: usize,
-    /// Half its width, pixels.
+    /// Half the width of the shaft, pixels.
     half_px: f64,
 }
 
-impl Shaft {
+impl RigShaft {
     /// The shaft in frames of `width × height` pixels, `percent` of them wide.
     pub fn new(percent: f64, width: usize, height: usize) -> Self {
         Self {
@@ -32,7 +31,7 @@ impl Shaft {
         }
     }
 
-    /// How far from its axis a pixel is, from −1 at one edge to 1 at the other; None beside it.
+    /// Distance of a pixel from the axis, −1 at one edge to 1 at the other; `None` beside it.
     fn across(&self, u: usize, v: usize) -> Option<f64> {
         let (width, height) = (self.width as f64, self.height as f64);
         let up = 1.0 - v as f64 / height;
@@ -41,15 +40,15 @@ impl Shaft {
         (up <= 1.0 - TIP[1] && across.abs() <= 1.0).then_some(across)
     }
 
-    /// True for each pixel that shows the wall, row-major.
-    pub fn shows_wall(&self) -> Vec<bool> {
+    /// Mask of the pixels that show the wall, row-major.
+    pub fn wall_mask(&self) -> Vec<bool> {
         (0..self.width * self.height)
             .map(|k| self.across(k % self.width, k / self.width).is_none())
             .collect()
     }
 
-    /// The frame with the shaft before the wall.
-    pub fn hide(&self, mut frame: GreyImage) -> GreyImage {
+    /// Draws the shaft over a frame.
+    pub fn occlude(&self, mut frame: GreyImage) -> GreyImage {
         for (k, value) in frame.data_mut().iter_mut().enumerate() {
             let (u, v) = (k % self.width, k / self.width);
             if let Some(across) = self.across(u, v) {
@@ -68,9 +67,9 @@ mod tests {
 
     #[test]
     fn the_mask_is_what_the_shaft_hides() {
-        let shaft = Shaft::new(12.0, 160, 120);
-        let wall = shaft.shows_wall();
-        let frame = shaft.hide(GreyImage::new(160, 120, vec![150.0; 160 * 120]));
+        let shaft = RigShaft::new(12.0, 160, 120);
+        let wall = shaft.wall_mask();
+        let frame = shaft.occlude(GreyImage::new(160, 120, vec![150.0; 160 * 120]));
         let hidden = wall.iter().filter(|wall| !**wall).count() as f64 / wall.len() as f64;
         assert!((hidden - 0.12 * 0.75).abs() < 0.01, "{hidden}");
         for (value, wall) in frame.data().iter().zip(&wall) {

@@ -1,9 +1,9 @@
-//! Brick walls.
+//! Brick texture: bricks in running bond.
 
-use super::noise::{ValueNoise, derived_seed, uniform};
-use super::wall::Texture;
+use crate::simulate::procedural_noise::{ValueNoise, derived_seed, uniform};
+use crate::simulate::texture::wall_texture::WallTexture;
 
-/// Length of a brick with its joint, metres, before it is fitted to the perimeter.
+/// Nominal length of a brick with its joint, metres; adjusted to the perimeter.
 const PITCH_S_M: f64 = 0.225;
 /// Height of a course with its joint, metres.
 const PITCH_H_M: f64 = 0.075;
@@ -11,11 +11,11 @@ const PITCH_H_M: f64 = 0.075;
 const JOINT_M: f64 = 0.010;
 /// Grey level of the mortar.
 const MORTAR: f32 = 200.0;
-/// Grey levels of bricks, from and to.
+/// Range of the bricks' grey levels.
 const TONES: [f32; 2] = [90.0, 170.0];
-/// Grain: amplitude in grey levels, and cell in metres.
+/// Grain: amplitude (grey levels) and cell size (metres) of each octave.
 const GRAIN: [(f32, f64); 3] = [(8.0, 0.050), (8.0, 0.012), (6.0, 0.004)];
-/// Bricks and courses of a repeating tile.
+/// Bricks per course and courses of a repeating tile.
 const TILE: [i64; 2] = [8, 6];
 
 /// Bricks in running bond: every other course is shifted by half a brick.
@@ -23,21 +23,21 @@ pub(super) struct BrickWall {
     seed: u64,
     /// Length of a brick with its joint, metres.
     pitch_s_m: f64,
-    /// Bricks after which tones repeat along s: at most once around.
+    /// Period of the tones along s, bricks: at most once around.
     period_s: i64,
-    /// Courses after which they repeat along h, if they do.
+    /// Period of the tones along h, courses, if they repeat.
     period_h: Option<i64>,
     grain: Vec<ValueNoise>,
 }
 
 impl BrickWall {
-    /// No two bricks alike.
+    /// A wall without repetition: every brick has its own tone.
     pub fn unique(seed: u64, perimeter_m: f64) -> Self {
         let bricks = (perimeter_m / PITCH_S_M).round().max(1.0);
         Self::new(seed, perimeter_m / bricks, bricks as i64, None)
     }
 
-    /// A tile of [`TILE`] bricks over and over.
+    /// A wall of repeated tiles of [`TILE`] bricks.
     pub fn tiled(seed: u64, perimeter_m: f64) -> Self {
         let tile_m = TILE[0] as f64 * PITCH_S_M;
         let tiles = (perimeter_m / tile_m).round().max(1.0);
@@ -65,8 +65,8 @@ impl BrickWall {
     }
 }
 
-impl Texture for BrickWall {
-    fn row(&self, h_m: f64, texel_m: f64, row: &mut [f32]) {
+impl WallTexture for BrickWall {
+    fn fill_row(&self, h_m: f64, texel_m: f64, row: &mut [f32]) {
         let course = (h_m / PITCH_H_M).floor();
         let across = share_of_brick(h_m - course * PITCH_H_M, PITCH_H_M, texel_m);
         let course = course as i64;
@@ -86,8 +86,9 @@ impl Texture for BrickWall {
     }
 }
 
-/// Share of the interval of `width` around `x` that is brick, in a cell of length `pitch` with half
-/// a joint at either end. Exact while `width` is no more than the joint.
+/// Share of the interval of `width` around `x` that is brick, in a cell of length `pitch`.
+///
+/// The cell has half a joint at either end. Exact while `width` does not exceed the joint.
 fn share_of_brick(x: f64, pitch: f64, width: f64) -> f32 {
     let from = (x - 0.5 * width).max(0.5 * JOINT_M);
     let to = (x + 0.5 * width).min(pitch - 0.5 * JOINT_M);
@@ -103,45 +104,45 @@ mod tests {
 
     fn row(wall: &BrickWall, h_m: f64) -> Vec<f32> {
         let mut row = vec![0.0; 6000];
-        wall.row(h_m, PERIMETER_M / 6000.0, &mut row);
+        wall.fill_row(h_m, PERIMETER_M / 6000.0, &mut row);
         row
     }
 
-    fn unlike(a: &[f32], b: &[f32]) -> f64 {
+    fn rms_difference(a: &[f32], b: &[f32]) -> f64 {
         let squares: f64 = a.iter().zip(b).map(|(a, b)| f64::from(a - b).powi(2)).sum();
         (squares / a.len() as f64).sqrt()
     }
 
     #[test]
-    fn no_two_places_are_alike() {
+    fn no_two_patches_are_alike() {
         let wall = BrickWall::unique(1, PERIMETER_M);
         let first = row(&wall, 0.03);
-        // Two courses on the joints lie alike, the bricks do not.
+        // Two courses on, the joints coincide but the tones do not.
         for course in [2.0, 4.0, 6.0, 100.0] {
-            assert!(unlike(&first, &row(&wall, 0.03 + course * PITCH_H_M)) > 15.0);
+            assert!(rms_difference(&first, &row(&wall, 0.03 + course * PITCH_H_M)) > 15.0);
         }
         // 84 bricks around; rotate by any number of them.
         let brick = 6000 / 84;
         for bricks in [1, 8, 42] {
-            let mut turned = first.clone();
-            turned.rotate_left(bricks * brick);
-            assert!(unlike(&first, &turned) > 15.0);
+            let mut rotated = first.clone();
+            rotated.rotate_left(bricks * brick);
+            assert!(rms_difference(&first, &rotated) > 15.0);
         }
-        assert!(unlike(&first, &row(&BrickWall::unique(2, PERIMETER_M), 0.03)) > 15.0);
+        assert!(rms_difference(&first, &row(&BrickWall::unique(2, PERIMETER_M), 0.03)) > 15.0);
     }
 
     #[test]
     fn tiles_repeat_exactly() {
         let wall = BrickWall::tiled(1, PERIMETER_M);
         let first = row(&wall, 0.03);
-        assert!(unlike(&first, &row(&wall, 0.03 + 6.0 * PITCH_H_M)) < 1e-2);
-        assert!(unlike(&first, &row(&wall, 0.03 + 2.0 * PITCH_H_M)) > 15.0);
+        assert!(rms_difference(&first, &row(&wall, 0.03 + 6.0 * PITCH_H_M)) < 1e-2);
+        assert!(rms_difference(&first, &row(&wall, 0.03 + 2.0 * PITCH_H_M)) > 15.0);
         // Ten tiles around.
-        let mut turned = first.clone();
-        turned.rotate_left(600);
-        assert!(unlike(&first, &turned) < 1e-2);
-        turned.rotate_left(75);
-        assert!(unlike(&first, &turned) > 15.0);
+        let mut rotated = first.clone();
+        rotated.rotate_left(600);
+        assert!(rms_difference(&first, &rotated) < 1e-2);
+        rotated.rotate_left(75);
+        assert!(rms_difference(&first, &rotated) > 15.0);
     }
 
     #[test]
