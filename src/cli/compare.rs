@@ -5,7 +5,7 @@ use super::record::{self, RUN_FILE, Run};
 use super::stitch::{PictureArguments, positive};
 use super::{Failure, Terminal, json};
 use crate::PROGRAM;
-use crate::evaluate::{CompareInput, Comparison, Drawings, before_after, compare};
+use crate::evaluate::{CompareInput, ComparedPanoramas, Comparison, compare, draw_before_after};
 use crate::frames::{PictureFormat, write_picture};
 use crate::persist::atomic;
 use crate::progress::Progress;
@@ -111,7 +111,7 @@ pub fn compare_poses(
     px_per_metre: Option<f64>,
     interpolation: Interpolation,
     terminal: &Terminal,
-) -> Result<(Comparison, Drawings), Failure> {
+) -> Result<(Comparison, ComparedPanoramas), Failure> {
     let initial = survey.initial_poses();
     let truth = survey.truth.as_deref().map(poses_of);
     let input = CompareInput {
@@ -143,7 +143,7 @@ pub fn write_comparison(
     refined_file: &Path,
     layout: Layout,
     comparison: &Comparison,
-    drawings: Drawings,
+    drawings: ComparedPanoramas,
     out: &Path,
     terminal: &Terminal,
 ) -> Result<String, Failure> {
@@ -164,7 +164,7 @@ pub fn write_comparison(
     let refined = drawings.refined.panorama.into_image(Layout::ThetaRight);
     write(
         "before-after.png",
-        &before_after(&baseline, &refined).into(),
+        &draw_before_after(&baseline, &refined).into(),
     )?;
     write("baseline.png", &layout.turn(baseline))?;
     write("refined.png", &layout.turn(refined))?;

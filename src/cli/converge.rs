@@ -143,7 +143,7 @@ impl ConvergeArguments {
 /// Impossible options, a log of another sweep, or an output that cannot be written.
 pub fn run(arguments: &ConvergeArguments, run: &Run, terminal: &Terminal) -> Result<(), Failure> {
     if arguments.efficiency {
-        let table = converge::efficiency(
+        let table = converge::measure_efficiency(
             &arguments.options(),
             arguments.joint,
             &arguments.out,
@@ -162,7 +162,7 @@ pub fn run(arguments: &ConvergeArguments, run: &Run, terminal: &Terminal) -> Res
         ));
         return Ok(());
     }
-    let swept = converge::run(
+    let swept = converge::run_sweep(
         &arguments.options(),
         &arguments.out,
         arguments.force,

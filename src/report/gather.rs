@@ -5,7 +5,7 @@ use super::model::{Abscissa, FrameRow, Report, SCHEMA_VERSION, SurveyFacts, Verd
 use super::pictures::{Pictures, panoramas, thumbnails};
 use super::refined::{RefinedFiles, Refinement};
 use crate::PROGRAM;
-use crate::evaluate::{Comparison, Drawings, SeamMap, WallError};
+use crate::evaluate::{ComparedPanoramas, Comparison, SeamMap, WallError};
 use crate::numerics::median::upper_median;
 use crate::refine::FrameFlag;
 use crate::survey::Survey;
@@ -25,7 +25,7 @@ pub struct Sources<'a> {
     /// Initial against refined poses.
     pub comparison: &'a Comparison,
     /// The panoramas of the comparison.
-    pub drawings: &'a Drawings,
+    pub drawings: &'a ComparedPanoramas,
     /// The command line that makes the report.
     pub command: Vec<String>,
 }
@@ -197,7 +197,7 @@ fn verdict(
     }
 }
 
-fn wall_maps(drawings: &Drawings) -> WallMaps {
+fn wall_maps(drawings: &ComparedPanoramas) -> WallMaps {
     let map = &drawings.refined.seams;
     let residual = |map: &SeamMap| -> Vec<Option<f64>> {
         map.rms_grey()

@@ -22,7 +22,7 @@ pub enum SimulateError {
     Texture {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the problem.
         what: String,
     },
     /// A true pose lies outside of the tunnel.

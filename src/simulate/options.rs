@@ -27,7 +27,7 @@ pub enum Wall {
     Texture {
         /// The image file.
         path: PathBuf,
-        /// Its width on the wall, metres; adjusted so that a whole number fits around.
+        /// Width of the image on the wall, metres; adjusted so that a whole number fits around.
         width_m: f64,
     },
 }
@@ -37,7 +37,7 @@ pub enum Wall {
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Illumination {
-    /// From one side, as in the paper: `0.35 + 0.65 (1 + cos θ)/2`, bright at θ = 0.
+    /// Directional, as in the paper: `0.35 + 0.65 (1 + cos θ)/2`, bright at θ = 0.
     Downward,
     /// Uniform.
     Even,

@@ -1,20 +1,20 @@
-//! A list of errors in three numbers.
+//! Summary statistics of errors: root mean square, median and maximum.
 
 use serde::{Deserialize, Serialize};
 
-/// Root mean square, median and greatest of a list of errors, in the errors' own unit.
+/// Root mean square, median and maximum of a list of errors, in the errors' unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Spread {
-    /// `√(Σ e² / n)`.
+pub struct ErrorStatistics {
+    /// Root mean square, `√(Σ e² / n)`.
     pub rms: f64,
-    /// The middle one (the mean of the middle two of an even number).
+    /// Median (the mean of the middle two of an even number).
     pub median: f64,
-    /// The greatest.
+    /// Maximum.
     pub max: f64,
 }
 
-impl Spread {
-    /// The spread of `errors` (not negative); zeros if there are none.
+impl ErrorStatistics {
+    /// Statistics of `errors` (not negative); zeros if there are none.
     pub fn of(errors: &[f64]) -> Self {
         if errors.is_empty() {
             return Self::default();
@@ -34,7 +34,7 @@ impl Spread {
         }
     }
 
-    /// The same errors in another unit.
+    /// Converts the statistics to another unit.
     pub fn scaled(&self, factor: f64) -> Self {
         Self {
             rms: self.rms * factor,
@@ -44,7 +44,7 @@ impl Spread {
     }
 }
 
-/// `√(Σ e² / n)`; zero for an empty list.
+/// Root mean square, `√(Σ e² / n)`; zero for an empty list.
 pub(super) fn root_mean_square(errors: &[f64]) -> f64 {
     let squares: f64 = errors.iter().map(|e| e * e).sum();
     (squares / errors.len().max(1) as f64).sqrt()
@@ -55,11 +55,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_numbers_of_a_list() {
-        let spread = Spread::of(&[4.0, 0.0, 3.0]);
-        assert!((spread.rms - (25.0f64 / 3.0).sqrt()).abs() < 1e-12);
-        assert_eq!((spread.median, spread.max), (3.0, 4.0));
-        assert_eq!(Spread::of(&[1.0, 2.0]).median, 1.5);
-        assert_eq!(Spread::of(&[]), Spread::default());
+    fn statistics_of_a_list() {
+        let statistics = ErrorStatistics::of(&[4.0, 0.0, 3.0]);
+        assert!((statistics.rms - (25.0f64 / 3.0).sqrt()).abs() < 1e-12);
+        assert_eq!((statistics.median, statistics.max), (3.0, 4.0));
+        assert_eq!(ErrorStatistics::of(&[1.0, 2.0]).median, 1.5);
+        assert_eq!(ErrorStatistics::of(&[]), ErrorStatistics::default());
     }
 }

@@ -1,47 +1,49 @@
-//! Wall errors of frames relative to the majority of them.
+//! Wall error with the gauge fixed by the majority of the frames.
 
-use super::GOOD_PX;
 use crate::camera::Camera;
-use crate::evaluate::EvaluateError;
+use crate::evaluate::error::EvaluateError;
 use crate::evaluate::error::check_pairs;
 use crate::evaluate::wall_error::{FrameOffsets, frame_offsets, mean_arc};
 use crate::surface::{Surface, shortest_arc};
 use crate::trajectory::Pose;
 
-/// Wall errors of frames relative to the majority of them.
+/// Root mean square wall error below which a frame is good, pixels.
+pub const GOOD_PX: f64 = 0.5;
+
+/// Wall errors of frames with the gauge fixed by the majority of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MajorityError {
-    /// Root mean square wall error of each frame, pixels of its centre; infinite for a frame whose
-    /// estimated pose has no place on the wall.
+    /// Root mean square wall error of each frame, pixels at its centre.
+    ///
+    /// It is infinite for a frame whose estimated pose does not see the wall.
     pub frame_rms_px: Vec<f64>,
 }
 
 impl MajorityError {
-    /// Number of frames that are good.
-    pub fn good(&self) -> usize {
+    /// Number of frames below [`GOOD_PX`].
+    pub fn good_count(&self) -> usize {
         self.frame_rms_px.iter().filter(|px| **px < GOOD_PX).count()
     }
 
-    /// Of the worst frame, pixels.
+    /// Error of the worst frame, pixels.
     pub fn worst_px(&self) -> f64 {
         self.frame_rms_px.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Of all frames together, pixels.
+    /// Root mean square error of all frames, pixels.
     pub fn rms_px(&self) -> f64 {
-        crate::evaluate::spread::root_mean_square(&self.frame_rms_px)
+        crate::evaluate::error_statistics::root_mean_square(&self.frame_rms_px)
     }
 }
 
-/// Compares where estimated and true poses put the pixels on the wall, with the gauge fixed by the
-/// majority.
+/// Computes wall errors with the gauge fixed by the majority of the frames.
 ///
-/// As [`wall_error()`](crate::evaluate::wall_error()), but for the gauge shift (Δs, Δh): every
-/// frame proposes its own mean, the proposal under which the most frames are good wins (of equals,
-/// that of the least median error), and the shift becomes the mean over the good frames until they
-/// stay the same. No lost frame has a say in it. If the frames fall into two halves, each right in
-/// itself, the larger is right and the other lost. If all frames are good, it is the shift that
-/// `wall_error` takes.
+/// It differs from [`wall_error()`](crate::evaluate::wall_error()) in the gauge shift (Δs, Δh),
+/// which is found by consensus. Every frame proposes its own mean, and the proposal with the most
+/// good frames wins (of equals, that of the least median error). The shift is then the mean over
+/// the good frames, repeated until they stay the same. Lost frames have no influence. If the
+/// frames fall into two parts, each consistent in itself, the larger counts as right and the other
+/// as lost. If all frames are good, the shift equals that of `wall_error`.
 ///
 /// # Errors
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`].
@@ -52,8 +54,8 @@ pub fn majority_error(
     truth: &[Pose],
 ) -> Result<MajorityError, EvaluateError> {
     check_pairs(estimated.len(), truth.len())?;
-    // True poses are inside and look at the wall, or there were no pictures: only an estimate can
-    // be off it.
+    // True poses are inside and look at the wall, or there would be no images. Only an estimated
+    // pose can miss the wall.
     let offsets: Vec<Option<FrameOffsets>> = estimated
         .iter()
         .zip(truth)
@@ -62,14 +64,14 @@ pub fn majority_error(
             frame_offsets(surface, camera, frame, estimate, truth).ok()
         })
         .collect();
-    let frames = Offsets {
+    let frames = AllOffsets {
         surface,
         frames: &offsets,
     };
     let mut best: Option<MajorityError> = None;
     for (proposer, _) in offsets.iter().enumerate().filter(|(_, o)| o.is_some()) {
         let error = frames.errors(frames.shift(|frame| frame == proposer));
-        if best.as_ref().is_none_or(|best| better(&error, best)) {
+        if best.as_ref().is_none_or(|best| is_better(&error, best)) {
             best = Some(error);
         }
     }
@@ -78,13 +80,13 @@ pub fn majority_error(
             frame_rms_px: vec![f64::INFINITY; offsets.len()],
         });
     };
-    // Each round has as many good frames or more, so the rounds end by themselves; a few always do.
+    // The number of good frames never falls, so the iteration ends; a few iterations suffice.
     for _ in 0..offsets.len() {
-        if best.good() == 0 {
+        if best.good_count() == 0 {
             break;
         }
         let error = frames.errors(frames.shift(|frame| best.frame_rms_px[frame] < GOOD_PX));
-        if error.good() < best.good() || error == best {
+        if error.good_count() < best.good_count() || error == best {
             break;
         }
         best = error;
@@ -92,32 +94,32 @@ pub fn majority_error(
     Ok(best)
 }
 
-/// True if more frames are good, or as many and the median is less.
-fn better(a: &MajorityError, b: &MajorityError) -> bool {
+/// True if `a` has more good frames than `b`, or as many and a smaller median.
+fn is_better(a: &MajorityError, b: &MajorityError) -> bool {
     let median = |error: &MajorityError| {
         let mut sorted = error.frame_rms_px.clone();
         sorted.sort_by(f64::total_cmp);
         sorted[sorted.len() / 2]
     };
-    match a.good().cmp(&b.good()) {
+    match a.good_count().cmp(&b.good_count()) {
         std::cmp::Ordering::Equal => median(a) < median(b),
         order => order.is_gt(),
     }
 }
 
-/// All frames' offsets.
-struct Offsets<'a> {
+/// Displacements of all frames.
+struct AllOffsets<'a> {
     surface: &'a dyn Surface,
     frames: &'a [Option<FrameOffsets>],
 }
 
-impl Offsets<'_> {
-    /// Mean (Δs, Δh) of the frames chosen, metres, as far as the gauge leaves it free.
-    fn shift(&self, chosen: impl Fn(usize) -> bool) -> [f64; 2] {
+impl AllOffsets<'_> {
+    /// Mean (Δs, Δh) of the selected frames, metres, as far as the gauge leaves it free.
+    fn shift(&self, is_selected: impl Fn(usize) -> bool) -> [f64; 2] {
         let (mut delta_s, mut delta_h) = (Vec::new(), Vec::new());
         for (frame, offsets) in self.frames.iter().enumerate() {
             if let Some(offsets) = offsets
-                && chosen(frame)
+                && is_selected(frame)
             {
                 delta_s.extend_from_slice(&offsets.delta_s_m);
                 delta_h.extend_from_slice(&offsets.delta_h_m);
@@ -137,7 +139,7 @@ impl Offsets<'_> {
         [shift_s_m, shift_h_m]
     }
 
-    /// Errors after a shift (metres) is removed.
+    /// Errors after removing a shift, metres.
     fn errors(&self, [shift_s_m, shift_h_m]: [f64; 2]) -> MajorityError {
         let perimeter_m = self.surface.perimeter_m();
         let rms_px = |offsets: &FrameOffsets| {
@@ -161,7 +163,7 @@ impl Offsets<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::wall_error;
+    use crate::evaluate::wall_error::wall_error;
     use crate::surface::{Circle, GaugeMotion};
     use crate::trajectory::spiral;
 
@@ -176,18 +178,18 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_frame_does_not_spoil_the_others() {
+    fn a_lost_frame_does_not_affect_the_others() {
         let (circle, camera, truth) = scene();
         let mut estimated = gauge(2.9, -7.0).apply_all(&truth);
         estimated[5].t_wc.y += 1.0;
         estimated[9].t_wc.x = 5.0;
         let error = majority_error(&circle, &camera, &estimated, &truth).unwrap();
-        assert_eq!(error.good(), 22);
+        assert_eq!(error.good_count(), 22);
         assert!(error.frame_rms_px[4] < 1e-6, "{}", error.frame_rms_px[4]);
         let expected = camera.fx / 3.0;
         assert!((error.frame_rms_px[5] - expected).abs() < 1e-6);
         assert_eq!(error.frame_rms_px[9], f64::INFINITY);
-        // Least squares has all frames pay.
+        // A least-squares gauge spreads the error over all frames.
         estimated[9] = gauge(2.9, -7.0).apply(&truth[9]);
         let wall = wall_error(&circle, &camera, &estimated, &truth).unwrap();
         assert!(wall.frame_rms_px[4] > 5.0);
@@ -201,7 +203,7 @@ mod tests {
             *pose = gauge(0.1, 0.3).apply(pose);
         }
         let error = majority_error(&circle, &camera, &estimated, &truth).unwrap();
-        assert_eq!(error.good(), 13);
+        assert_eq!(error.good_count(), 13);
         assert!(error.frame_rms_px[..13].iter().all(|px| *px < 1e-6));
     }
 
@@ -215,7 +217,7 @@ mod tests {
             .collect();
         let error = majority_error(&circle, &camera, &estimated, &truth).unwrap();
         let wall = wall_error(&circle, &camera, &estimated, &truth).unwrap();
-        assert_eq!(error.good(), 24);
+        assert_eq!(error.good_count(), 24);
         for (ours, theirs) in error.frame_rms_px.iter().zip(&wall.frame_rms_px) {
             assert!((ours - theirs).abs() < 1e-9, "{ours} {theirs}");
         }

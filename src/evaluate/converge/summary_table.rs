@@ -1,13 +1,14 @@
-//! converge.txt: the cells as a table.
+//! Text table of a sweep, converge.txt.
 
-use super::cell::jitter_name;
-use super::{CellSummary, Convergence};
+use crate::evaluate::converge::summary::{CellSummary, Convergence};
+use crate::evaluate::converge::sweep_cell::jitter_name;
 use std::fmt;
 
-type Column = (&'static str, fn(&CellSummary) -> String);
+/// Heading of a column and function that formats its value.
+type TableColumn = (&'static str, fn(&CellSummary) -> String);
 
-/// Columns from left to right: heading and value. The first two are words, the others numbers.
-const COLUMNS: [Column; 14] = [
+/// Columns from left to right; the first two are words, the others numbers.
+const COLUMNS: [TableColumn; 14] = [
     ("jitter", |c| jitter_name(c.cell.jitter).to_owned()),
     ("wall", |c| c.cell.wall.name().to_owned()),
     ("turn °", |c| c.cell.turn_deg.to_string()),
@@ -17,7 +18,7 @@ const COLUMNS: [Column; 14] = [
             .cell
             .translation_sigma_m
             .iter()
-            .map(|m| short(100.0 * m))
+            .map(|m| format_short(100.0 * m))
             .collect();
         cm.join(",")
     }),
@@ -29,28 +30,30 @@ const COLUMNS: [Column; 14] = [
     ("refused", |c| c.refused.to_string()),
     ("false", |c| c.false_successes.to_string()),
     ("flagged", |c| c.flagged_frames.to_string()),
-    ("median px", |c| pixels(c.median_worst_frame_px)),
-    ("worst px", |c| pixels(c.worst_frame_px)),
+    ("median px", |c| format_pixels(c.median_worst_frame_px)),
+    ("worst px", |c| format_pixels(c.worst_frame_px)),
     ("redraws", |c| c.redraws.to_string()),
     ("median s", |c| {
         c.median_seconds.map_or_else(missing, |s| format!("{s:.1}"))
     }),
 ];
 
-/// Columns that are aligned to the left.
-const WORDS: usize = 2;
+/// Number of left-aligned columns.
+const WORD_COLUMNS: usize = 2;
 
+/// Text of a missing value.
 fn missing() -> String {
     "–".to_owned()
 }
 
-/// Three digits after the point at the most, no zeros at the end.
-fn short(value: f64) -> String {
+/// Formats a value with at most three digits after the point, without trailing zeros.
+fn format_short(value: f64) -> String {
     let text = format!("{value:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-fn pixels(value: Option<f64>) -> String {
+/// Formats an error in pixels.
+fn format_pixels(value: Option<f64>) -> String {
     match value {
         None => missing(),
         Some(px) if px < 10.0 => format!("{px:.3}"),
@@ -80,7 +83,7 @@ impl fmt::Display for Convergence {
         for row in &rows {
             for (k, (text, &width)) in row.iter().zip(&widths).enumerate() {
                 let gap = if k == 0 { "" } else { "  " };
-                if k < WORDS {
+                if k < WORD_COLUMNS {
                     write!(f, "{gap}{text:<width$}")?
                 } else {
                     write!(f, "{gap}{text:>width$}")?
@@ -90,13 +93,15 @@ impl fmt::Display for Convergence {
         }
         write!(
             f,
-            "success: every frame within {} px of its place on the wall. false: frames called photometric that are\n\
-             not. flagged: frames called unsure. px: the worst frame of a run, median and worst of the runs; – if a\n\
+            "success: every frame within {} px of its place on the wall. \
+             false: frames called photometric that are\n\
+             not. flagged: frames called unsure. \
+             px: the worst frame of a run, median and worst of the runs; – if a\n\
              frame has no place. redraws: surveys that nobody could fly, drawn again.",
             self.good_px
         )?;
-        let unflyable: usize = self.cells.iter().map(|cell| cell.unflyable).sum();
-        match unflyable {
+        let infeasible_seeds: usize = self.cells.iter().map(|cell| cell.infeasible_seeds).sum();
+        match infeasible_seeds {
             0 => Ok(()),
             count => write!(
                 f,
@@ -109,7 +114,7 @@ impl fmt::Display for Convergence {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::converge::ConvergeOptions;
+    use crate::evaluate::converge::options::ConvergeOptions;
     use crate::evaluate::converge::run_record::tests::record;
 
     #[test]

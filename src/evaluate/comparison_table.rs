@@ -1,21 +1,23 @@
-//! A comparison as a table to read.
+//! Text table of a comparison.
 
-use super::{Comparison, Scores, Spread};
+use crate::evaluate::compare::{Comparison, Scores};
+use crate::evaluate::error_statistics::ErrorStatistics;
 use std::fmt;
 
-/// One line of the table.
+/// Line of the table of a comparison.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Row {
-    /// What is measured.
+pub struct ComparisonRow {
+    /// Name of the measure.
     pub measure: &'static str,
     /// Unit of the values; empty for pure numbers.
     pub unit: &'static str,
-    /// Of the initial poses, as text.
+    /// Value of the initial poses, as text.
     pub baseline: Option<String>,
-    /// Of the refined poses, as text.
+    /// Value of the refined poses, as text.
     pub refined: Option<String>,
 }
 
+/// Function that formats a measure of one set of poses.
 type Measure = fn(&Scores) -> Option<String>;
 
 /// Measures in the order of the table: name, unit, value.
@@ -26,19 +28,27 @@ const MEASURES: [(&str, &str, Measure); 16] = [
     ("translation RMSE", "mm", |s| translation(s, |e| e.rms)),
     ("translation median", "mm", |s| translation(s, |e| e.median)),
     ("translation max", "mm", |s| translation(s, |e| e.max)),
-    ("wall error RMS", "mm", |s| number(s.wall.as_ref()?.mm.rms)),
+    ("wall error RMS", "mm", |s| {
+        format_number(s.wall.as_ref()?.mm.rms)
+    }),
     ("wall error median", "mm", |s| {
-        number(s.wall.as_ref()?.mm.median)
+        format_number(s.wall.as_ref()?.mm.median)
     }),
-    ("wall error max", "mm", |s| number(s.wall.as_ref()?.mm.max)),
-    ("wall error RMS", "px", |s| number(s.wall.as_ref()?.px.rms)),
+    ("wall error max", "mm", |s| {
+        format_number(s.wall.as_ref()?.mm.max)
+    }),
+    ("wall error RMS", "px", |s| {
+        format_number(s.wall.as_ref()?.px.rms)
+    }),
     ("wall error median", "px", |s| {
-        number(s.wall.as_ref()?.px.median)
+        format_number(s.wall.as_ref()?.px.median)
     }),
-    ("wall error max", "px", |s| number(s.wall.as_ref()?.px.max)),
+    ("wall error max", "px", |s| {
+        format_number(s.wall.as_ref()?.px.max)
+    }),
     ("worst frame RMS", "px", |s| {
         let wall = s.wall.as_ref()?;
-        let rms = number(wall.worst_frame_rms_px)?;
+        let rms = format_number(wall.worst_frame_rms_px)?;
         Some(format!("{rms} (#{})", wall.worst_frame))
     }),
     ("PSNR", "dB", |s| match s.image?.psnr_db {
@@ -52,16 +62,18 @@ const MEASURES: [(&str, &str, Measure); 16] = [
     }),
 ];
 
-fn rotation(scores: &Scores, pick: fn(&Spread) -> f64) -> Option<String> {
-    number(pick(&scores.trajectory.as_ref()?.rotation_deg))
+/// Formats a statistic of the rotation errors, degrees.
+fn rotation(scores: &Scores, pick: fn(&ErrorStatistics) -> f64) -> Option<String> {
+    format_number(pick(&scores.trajectory.as_ref()?.rotation_deg))
 }
 
-fn translation(scores: &Scores, pick: fn(&Spread) -> f64) -> Option<String> {
-    number(pick(&scores.trajectory.as_ref()?.translation_m.scaled(1e3)))
+/// Formats a statistic of the translation errors, millimetres.
+fn translation(scores: &Scores, pick: fn(&ErrorStatistics) -> f64) -> Option<String> {
+    format_number(pick(&scores.trajectory.as_ref()?.translation_m.scaled(1e3)))
 }
 
-/// Four digits after the point for small values, fewer for large ones.
-fn number(value: f64) -> Option<String> {
+/// Formats a value with four digits after the point if it is small, fewer if it is large.
+fn format_number(value: f64) -> Option<String> {
     Some(match value {
         v if v < 1.0 => format!("{v:.4}"),
         v if v < 100.0 => format!("{v:.2}"),
@@ -70,11 +82,11 @@ fn number(value: f64) -> Option<String> {
 }
 
 impl Comparison {
-    /// The table's lines: those measures that at least one set of poses has.
-    pub fn rows(&self) -> Vec<Row> {
+    /// The lines of the measures that at least one set of poses has.
+    pub fn rows(&self) -> Vec<ComparisonRow> {
         MEASURES
             .iter()
-            .map(|(measure, unit, value)| Row {
+            .map(|(measure, unit, value)| ComparisonRow {
                 measure,
                 unit,
                 baseline: value(&self.baseline),
@@ -118,7 +130,8 @@ impl fmt::Display for Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::{ImageMetrics, SeamResidual};
+    use crate::evaluate::image_metrics::ImageMetrics;
+    use crate::evaluate::seam_residual::SeamResidual;
     use crate::render::Canvas;
 
     fn scores(rms_grey: f64) -> Scores {

@@ -1,11 +1,14 @@
-//! The sweep itself.
+//! Execution of a sweep.
 
-use super::draw::draw;
-use super::log::RunLog;
-use super::{
-    Cell, CellSummary, ConvergeError, ConvergeOptions, Convergence, GOOD_PX, RunRecord,
-    majority_error, map,
-};
+use crate::evaluate::converge::error::ConvergeError;
+use crate::evaluate::converge::feasible_survey::draw_survey;
+use crate::evaluate::converge::majority_error::{GOOD_PX, majority_error};
+use crate::evaluate::converge::options::ConvergeOptions;
+use crate::evaluate::converge::run_log::RunLog;
+use crate::evaluate::converge::run_record::RunRecord;
+use crate::evaluate::converge::success_map::draw_success_map;
+use crate::evaluate::converge::summary::{CellSummary, Convergence};
+use crate::evaluate::converge::sweep_cell::SweepCell;
 use crate::frames::{PictureFormat, write_picture};
 use crate::persist::atomic::{self, ScratchFolder};
 use crate::progress::{Progress, Silent};
@@ -17,47 +20,46 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// What a call did.
+/// Outcome of a call of [`run_sweep`].
 #[derive(Clone, Debug)]
-pub struct Swept {
+pub struct SweepOutcome {
     /// The result of the whole sweep.
     pub result: Convergence,
     /// The text of converge.json.
     pub json: String,
-    /// Runs done by this call.
+    /// Number of runs that this call executed.
     pub done: usize,
-    /// Runs found in the log.
+    /// Number of runs found in the log.
     pub kept: usize,
 }
 
-/// Does all runs of a sweep that `out`/runs.jsonl does not hold yet, each into a line of it, then
-/// writes converge.json, converge.txt and converge.png there. `afresh` drops the runs of earlier
-/// calls.
+/// Executes all runs of a sweep that are not yet in `out`/runs.jsonl, and writes the summaries.
 ///
-/// The runs go seed by seed through all cells, so that an interrupted sweep knows every cell
-/// equally well. Except for times, the result does not depend on interruptions or the number of
-/// threads.
+/// Each run is appended to runs.jsonl; converge.json, converge.txt and converge.png follow at the
+/// end. `discard` removes the runs of earlier calls. The runs go seed by seed through all cells, so
+/// that an interrupted sweep has about as many runs of every cell. Except for durations, the result
+/// does not depend on interruptions or the number of threads.
 ///
 /// # Errors
-/// [`ConvergeError`]. Whatever the error, the runs that are finished are in the log.
-pub fn run(
+/// [`ConvergeError`]. Finished runs are in the log in any case.
+pub fn run_sweep(
     options: &ConvergeOptions,
     out: &Path,
-    afresh: bool,
+    discard: bool,
     progress: &dyn Progress,
-) -> Result<Swept, ConvergeError> {
-    options.check()?;
+) -> Result<SweepOutcome, ConvergeError> {
+    options.validate()?;
     atomic::create_folder(out)?;
-    let mut log = RunLog::open(&out.join("runs.jsonl"), &options.settings(), afresh)?;
+    let mut log = RunLog::open(&out.join("runs.jsonl"), &options.settings(), discard)?;
     let cells = options.cells();
-    let missing: Vec<(&Cell, u64)> = (1..=options.seeds)
+    let missing: Vec<(&SweepCell, u64)> = (1..=options.seeds)
         .flat_map(|seed| cells.iter().map(move |cell| (cell, seed)))
-        .filter(|(cell, seed)| log.run(cell, *seed).is_none())
+        .filter(|(cell, seed)| log.find(cell, *seed).is_none())
         .collect();
     progress.start("experiments", missing.len());
     for (cell, seed) in &missing {
         progress.detail(&format!("{cell}, seed {seed}"));
-        log.append(experiment(options, cell, *seed, out)?)?;
+        log.append(run_experiment(options, cell, *seed, out)?)?;
         progress.advance(1);
     }
     progress.finish();
@@ -66,7 +68,7 @@ pub fn run(
         .iter()
         .map(|cell| {
             let runs: Vec<&RunRecord> = (1..=options.seeds)
-                .filter_map(|seed| log.run(cell, seed))
+                .filter_map(|seed| log.find(cell, seed))
                 .collect();
             CellSummary::of(cell, &runs)
         })
@@ -80,10 +82,10 @@ pub fn run(
     atomic::write_text(&out.join("converge.txt"), &format!("{result}\n"))?;
     write_picture(
         &out.join("converge.png"),
-        &map::draw(&result).into(),
+        &draw_success_map(&result).into(),
         PictureFormat::Png,
     )?;
-    Ok(Swept {
+    Ok(SweepOutcome {
         result,
         json,
         done: missing.len(),
@@ -91,17 +93,17 @@ pub fn run(
     })
 }
 
-/// Draws, simulates, refines and judges one survey. Its files are in a scratch folder inside `out`.
+/// Draws, simulates, refines and evaluates one survey, with its files in a scratch folder in `out`.
 ///
 /// # Errors
-/// [`ConvergeError`]; that the refinement refuses the survey is a result and no error.
-fn experiment(
+/// [`ConvergeError`]; a survey that the refinement refuses is a result, not an error.
+fn run_experiment(
     options: &ConvergeOptions,
-    cell: &Cell,
+    cell: &SweepCell,
     seed: u64,
     out: &Path,
 ) -> Result<RunRecord, ConvergeError> {
-    let drawn = draw(options, cell, seed)?;
+    let drawn = draw_survey(options, cell, seed)?;
     let mut record = RunRecord {
         settings: options.settings(),
         cell: cell.clone(),
@@ -119,7 +121,7 @@ fn experiment(
         seconds: 0.0,
     };
     match &drawn.survey {
-        Some(survey) => fly(survey, out, &mut record)?,
+        Some(survey) => simulate_and_refine(survey, out, &mut record)?,
         None => {
             record.error = Some(format!(
                 "none of {} draws could be flown: the poses leave the tunnel or look along it",
@@ -130,11 +132,15 @@ fn experiment(
     Ok(record)
 }
 
-/// Simulates and refines a survey and records what became of it.
+/// Simulates and refines a survey and records the outcome.
 ///
 /// # Errors
-/// As [`experiment`].
-fn fly(survey: &SimulateOptions, out: &Path, record: &mut RunRecord) -> Result<(), ConvergeError> {
+/// [`ConvergeError`]; a survey that the refinement refuses is a result, not an error.
+fn simulate_and_refine(
+    survey: &SimulateOptions,
+    out: &Path,
+    record: &mut RunRecord,
+) -> Result<(), ConvergeError> {
     let scratch = ScratchFolder::inside(out)?;
     let folder = scratch.path().join("survey");
     simulate::write_survey(survey, &folder, false, &Silent)?;
@@ -144,7 +150,7 @@ fn fly(survey: &SimulateOptions, out: &Path, record: &mut RunRecord) -> Result<(
     let refined = refine(&survey, &RefineOptions::default(), &silent);
     record.seconds = since.elapsed().as_secs_f64();
     match refined {
-        Ok(refined) => judge(&survey, &refined, record),
+        Ok(refined) => record_accuracy(&survey, &refined, record),
         Err(error) => {
             record.error = Some(error.to_string());
             Ok(())
@@ -152,28 +158,35 @@ fn fly(survey: &SimulateOptions, out: &Path, record: &mut RunRecord) -> Result<(
     }
 }
 
-/// Records how good the refined poses are and whether the refinement knew.
+/// Records the accuracy of the refined poses and the reliability of their flags.
 ///
 /// # Errors
 /// [`ConvergeError::Evaluate`] for a survey without true poses, which the simulator never makes.
-fn judge(survey: &Survey, refined: &Refined, record: &mut RunRecord) -> Result<(), ConvergeError> {
+fn record_accuracy(
+    survey: &Survey,
+    refined: &Refined,
+    record: &mut RunRecord,
+) -> Result<(), ConvergeError> {
     let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
     let poses = poses_of(&refined.trajectory);
     let error = majority_error(survey.surface.as_ref(), &survey.camera, &poses, &truth)?;
     let finite = |px: f64| px.is_finite().then_some(px);
-    let sure = |flag: FrameFlag| flag == FrameFlag::Photometric;
+    let is_photometric = |flag: FrameFlag| flag == FrameFlag::Photometric;
     let frames = &refined.report.frames;
     record.refined = true;
     record.worst_frame_px = finite(error.worst_px());
     record.rms_px = finite(error.rms_px());
-    record.good_frames = error.good();
+    record.good_frames = error.good_count();
     record.success = record.good_frames == poses.len();
-    record.flagged_frames = frames.iter().filter(|frame| !sure(frame.flag)).count();
+    record.flagged_frames = frames
+        .iter()
+        .filter(|frame| !is_photometric(frame.flag))
+        .count();
     record.false_successes = frames
         .iter()
         .zip(&error.frame_rms_px)
-        // What is no number is not good.
-        .filter(|(frame, px)| sure(frame.flag) && (px.is_nan() || **px >= GOOD_PX))
+        // NaN does not count as good.
+        .filter(|(frame, px)| is_photometric(frame.flag) && (px.is_nan() || **px >= GOOD_PX))
         .count();
     Ok(())
 }

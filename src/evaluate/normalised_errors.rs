@@ -1,20 +1,20 @@
-//! Is the stated uncertainty true?
+//! Consistency of stated covariances: normalised estimation errors squared (NEES).
 
-use super::EvaluateError;
-use super::error::check_pairs;
+use crate::evaluate::error::EvaluateError;
+use crate::evaluate::error::check_pairs;
 use crate::surface::Surface;
 use crate::trajectory::Pose;
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
 
-/// Errors of poses with the gauge fixed at the first one: steps `ξ` from the estimated to the true
-/// poses ([`Pose::retract`]; rad, m).
+/// Computes pose errors with the gauge fixed at the first pose.
 ///
-/// The estimated poses are moved along the gauge until the first one's error has no part along it,
-/// just as its covariance has none.
+/// Errors are the steps `ξ` from the estimated to the true poses ([`Pose::retract`]; rad, m). The
+/// estimated poses are moved along the gauge until the first error has no component along it, just
+/// as the first covariance has none.
 ///
 /// # Errors
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`].
-pub fn tied_errors(
+pub fn gauge_fixed_errors(
     surface: &dyn Surface,
     estimated: &[Pose],
     truth: &[Pose],
@@ -22,7 +22,7 @@ pub fn tied_errors(
     check_pairs(estimated.len(), truth.len())?;
     let gauge = surface.gauge();
     let mut motion = gauge.align(&estimated[..1], &truth[..1]);
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_GAUGE_ITERATIONS {
         let first = motion.apply(&estimated[0]);
         let error = first.local(&truth[0]);
         let directions = gauge.directions(&first);
@@ -50,16 +50,17 @@ pub fn tied_errors(
         .collect())
 }
 
-/// Steps to the gauge motion; each squares the error.
-const ROUNDS: usize = 5;
+/// Maximum Newton iterations for the gauge motion; each squares the error.
+const MAX_GAUGE_ITERATIONS: usize = 5;
 
-/// Normalised errors squared, `ξᵀ Σ⁻¹ ξ`: 6 on average if the covariances are true, and distributed
-/// as χ² with 6 degrees of freedom. None where the covariance is singular or unknown (as the first
-/// frame's, where the gauge is tied).
+/// Computes the normalised estimation errors squared, `ξᵀ Σ⁻¹ ξ`.
+///
+/// For true covariances they are distributed as χ² with 6 degrees of freedom, with mean 6. `None`
+/// where the covariance is singular or unknown (as that of the first frame, which fixes the gauge).
 ///
 /// Source: Y. Bar-Shalom, X. Li, T. Kirubarajan, "Estimation with Applications to Tracking and
 /// Navigation", 2001, 5.4.
-pub fn normalised_errors(
+pub fn normalised_errors_squared(
     errors: &[Vector6<f64>],
     covariances: &[Matrix6<f64>],
 ) -> Vec<Option<f64>> {
@@ -86,11 +87,11 @@ mod tests {
         let mut estimated = motion.apply_all(&truth);
         let xi = Vector6::new(1e-3, -2e-3, 5e-4, 1e-3, 2e-3, -1e-3);
         estimated[3] = estimated[3].retract(&xi);
-        let errors = tied_errors(&circle, &estimated, &truth).unwrap();
+        let errors = gauge_fixed_errors(&circle, &estimated, &truth).unwrap();
         assert!(errors[0].norm() < 1e-9 && errors[5].norm() < 1e-9);
         assert!((errors[3].fixed_rows::<3>(0) + xi.fixed_rows::<3>(0)).norm() < 1e-5);
         let covariance = vec![Matrix6::identity() * 1e-6; 6];
-        let squares = normalised_errors(&errors, &covariance);
+        let squares = normalised_errors_squared(&errors, &covariance);
         assert!(squares[0].is_none());
         assert!((squares[3].unwrap() / (xi.norm_squared() * 1e6) - 1.0).abs() < 1e-3);
     }

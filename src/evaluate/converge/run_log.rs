@@ -1,17 +1,20 @@
-//! runs.jsonl: the runs that are finished, one a line.
+//! Log of finished runs, runs.jsonl: one run per line.
 
-use super::{Cell, ConvergeError, RunRecord, Settings};
+use crate::evaluate::converge::error::ConvergeError;
+use crate::evaluate::converge::run_record::{RunRecord, Settings};
+use crate::evaluate::converge::sweep_cell::SweepCell;
 use crate::persist::atomic::WriteError;
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// How every line begins.
+/// Start of every line.
 const LINE_START: &[u8] = b"{\"schema_version\":";
 
-/// The log of a sweep, open for more runs. It is never written anew, so that whatever ends the
-/// program leaves the finished runs in it.
+/// Open log of a sweep, to which runs are appended.
+///
+/// It is never rewritten, so that finished runs survive any end of the program.
 #[derive(Debug)]
 pub(super) struct RunLog {
     path: PathBuf,
@@ -20,16 +23,15 @@ pub(super) struct RunLog {
 }
 
 impl RunLog {
-    /// Opens the log, or begins it. `afresh` drops all runs that are in it.
+    /// Opens or creates the log; `discard` removes all its runs.
     ///
-    /// A last line without an end is what a crash leaves of a run; it is dropped, and the run will
-    /// be done again. Runs of cells or seeds that the sweep does not ask for may stand there and
-    /// stay there.
+    /// A last line without a line break is the rest of an interrupted run; it is removed, and the
+    /// run is repeated. Runs of other cells or seeds than the sweep's may be in the log and stay.
     ///
     /// # Errors
-    /// [`ConvergeError::Log`] for runs of other settings, for lines that are no runs, and if
+    /// [`ConvergeError::Log`] for runs of other settings, for lines that are not runs, and if
     /// another program has the log open; [`ConvergeError::Write`].
-    pub fn open(path: &Path, settings: &Settings, afresh: bool) -> Result<Self, ConvergeError> {
+    pub fn open(path: &Path, settings: &Settings, discard: bool) -> Result<Self, ConvergeError> {
         let fail = |source| ConvergeError::from(WriteError::new(path, source));
         let mut file = OpenOptions::new()
             .read(true)
@@ -47,10 +49,10 @@ impl RunLog {
                         .to_owned(),
                 });
             }
-            // Some file systems know no locks.
+            // Some file systems do not support locks.
             Err(TryLockError::Error(_)) => {}
         }
-        if afresh {
+        if discard {
             file.set_len(0).map_err(fail)?;
         }
         let mut bytes = Vec::new();
@@ -60,8 +62,8 @@ impl RunLog {
             .rposition(|byte| *byte == b'\n')
             .map_or(0, |k| k + 1);
         let (lines, rest) = bytes.split_at(end);
-        let runs = read(lines, settings).and_then(|runs| {
-            if begins_a_line(rest) {
+        let runs = parse_runs(lines, settings).and_then(|runs| {
+            if is_line_start(rest) {
                 Ok(runs)
             } else {
                 Err("its end is no run".to_owned())
@@ -82,15 +84,15 @@ impl RunLog {
         })
     }
 
-    /// The finished run of a cell and seed.
-    pub fn run(&self, cell: &Cell, seed: u64) -> Option<&RunRecord> {
+    /// The finished run of a cell and seed, if any.
+    pub fn find(&self, cell: &SweepCell, seed: u64) -> Option<&RunRecord> {
         self.runs.get(&(cell.key(), seed))
     }
 
-    /// Adds a finished run; it is on the disk when this returns.
+    /// Appends a finished run and flushes it to the disk.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// [`WriteError`] if the log cannot be written.
     pub fn append(&mut self, run: RunRecord) -> Result<(), WriteError> {
         let fail = |source| WriteError::new(&self.path, source);
         let mut line =
@@ -103,18 +105,21 @@ impl RunLog {
     }
 }
 
-/// The runs of complete lines; of two of the same cell and seed, the last.
+/// Parses the runs of complete lines; of two runs of the same cell and seed, the last counts.
 ///
 /// # Errors
-/// What is wrong, in words.
-fn read(lines: &[u8], settings: &Settings) -> Result<HashMap<(String, u64), RunRecord>, String> {
+/// A description of the first line that is not a run of this sweep.
+fn parse_runs(
+    lines: &[u8],
+    settings: &Settings,
+) -> Result<HashMap<(String, u64), RunRecord>, String> {
     let mut runs = HashMap::new();
     for (index, line) in lines.split(|byte| *byte == b'\n').enumerate() {
         if line.is_empty() {
             continue;
         }
         let number = index + 1;
-        // The settings first: a line of another version may lack what a run has today.
+        // The settings first, since a line of another version may lack fields of a run.
         let there: Settings = serde_json::from_slice(line)
             .map_err(|error| format!("line {number} is no run: {error}"))?;
         if let Some(difference) = settings.difference(&there) {
@@ -127,8 +132,8 @@ fn read(lines: &[u8], settings: &Settings) -> Result<HashMap<(String, u64), RunR
     Ok(runs)
 }
 
-/// True if `rest` may be the beginning of a line of ours.
-fn begins_a_line(rest: &[u8]) -> bool {
+/// True if `rest` may be the start of a line of the log.
+fn is_line_start(rest: &[u8]) -> bool {
     let common = rest.len().min(LINE_START.len());
     rest[..common] == LINE_START[..common]
 }
@@ -136,7 +141,7 @@ fn begins_a_line(rest: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::converge::ConvergeOptions;
+    use crate::evaluate::converge::options::ConvergeOptions;
     use crate::evaluate::converge::run_record::tests::record;
 
     fn settings() -> Settings {
@@ -148,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_truncated_last_line_is_dropped_and_the_rest_goes_on() {
+    fn a_truncated_last_line_is_removed_and_the_rest_is_kept() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("runs.jsonl");
         let mut log = RunLog::open(&path, &settings(), false).unwrap();
@@ -162,8 +167,8 @@ mod tests {
         for cut in [whole.len() - 1, first_end + 40, first_end + 3, first_end] {
             std::fs::write(&path, &whole[..cut]).unwrap();
             let mut log = RunLog::open(&path, &settings(), false).unwrap();
-            assert_eq!(log.run(&record(0.7, 1).cell, 1), Some(&record(0.7, 1)));
-            assert_eq!(log.run(&record(0.7, 2).cell, 2), None);
+            assert_eq!(log.find(&record(0.7, 1).cell, 1), Some(&record(0.7, 1)));
+            assert_eq!(log.find(&record(0.7, 2).cell, 2), None);
             log.append(record(0.7, 2)).unwrap();
             drop(log);
             assert_eq!(std::fs::read(&path).unwrap(), whole);
@@ -194,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_log_is_not_touched() {
+    fn a_file_that_is_not_a_log_is_not_touched() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("runs.jsonl");
         for text in [

@@ -1,4 +1,4 @@
-//! How well the frames agree where they overlap, without any truth.
+//! Seam residual: photometric consistency of overlapping frames, without truth.
 
 use crate::render::{Canvas, EDGE, FrameStack, Interpolation, Kernel, Placement, Tile, tiles};
 use crate::surface::Surface;
@@ -6,40 +6,40 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Grey differences between frames at the same wall points.
+/// Grey-level differences between frames at common wall points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct SeamResidual {
     /// Root mean square difference of two frames at a wall point, grey levels.
     pub rms_grey: f64,
-    /// Wall points that at least two frames see.
+    /// Number of wall points that at least two frames see.
     pub points: usize,
-    /// Frames that see such a point, on average.
+    /// Mean number of frames that see such a point.
     pub frames_per_point: f64,
 }
 
-/// Wall points looked at, at most about this many.
-const POINTS: usize = 300_000;
+/// Maximum number of sampled wall points, approximately.
+const MAX_POINTS: usize = 300_000;
 
-/// Distance from the outermost pixel centres within which a frame is not asked, pixels.
+/// Border of a frame that is not sampled, pixels from the outermost pixel centres.
 const MARGIN_PX: f64 = 1.0;
 
-/// Cells of the map around the section: half an hour of the clock each.
-const CELLS_AROUND: u32 = 24;
-/// Cells of the map along the axis, at most.
-const CELLS_ALONG: u32 = 480;
-/// Rows of points in a cell, at least.
-const ROWS_PER_CELL: u32 = 4;
+/// Maximum cells of the map around the section: half an hour of clock position each.
+const MAX_CELLS_AROUND: u32 = 24;
+/// Maximum cells of the map along the axis.
+const MAX_CELLS_ALONG: u32 = 480;
+/// Minimum rows of points in a cell.
+const MIN_ROWS_PER_CELL: u32 = 4;
 
-/// How well the frames agree, and how many see the wall, cell by cell of the unrolled wall.
+/// Map of the seam residual and of the number of frames over the unrolled wall.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct SeamMap {
     around: usize,
     along: usize,
     chainage_m: [f64; 2],
-    /// A row per stretch of the axis, from θ = 0 on.
-    cells: Vec<Sums>,
+    /// Sums of the cells, one row per stretch of the axis, from θ = 0 on.
+    cells: Vec<CellSums>,
 }
 
 impl SeamMap {
@@ -47,28 +47,31 @@ impl SeamMap {
     ///
     /// At each point x of a square grid on the wall, the mean square difference over the pairs of
     /// the n frames that see it is `2/(n−1) Σ (I_i(x) − Ī(x))²`; the residual of a part of the wall
-    /// is the root of its mean over the points with n ≥ 2. With true poses what remains is noise,
-    /// light and interpolation.
+    /// is the root of its mean over the points with n ≥ 2. With true poses, noise, illumination and
+    /// interpolation remain.
     ///
-    /// `frames` (those that are held) and `placements` in the same order; pictures sampled
-    /// bilinearly, luma of colour.
+    /// `frames` (those in memory) and `placements` are in the same order; images are sampled
+    /// bilinearly, as luma of colour.
     pub fn new(
         surface: &dyn Surface,
         frames: &FrameStack,
         placements: &[Placement],
         canvas: &Canvas,
     ) -> Self {
-        let grid = canvas.coarser(POINTS);
-        let around = CELLS_AROUND.min(grid.columns);
-        let along = grid.rows.div_ceil(ROWS_PER_CELL).clamp(1, CELLS_ALONG);
+        let grid = canvas.coarser(MAX_POINTS);
+        let around = MAX_CELLS_AROUND.min(grid.columns);
+        let along = grid
+            .rows
+            .div_ceil(MIN_ROWS_PER_CELL)
+            .clamp(1, MAX_CELLS_ALONG);
         let bands = tiles(surface, &grid, placements, EDGE);
         // Collected before they are added: the sum does not depend on the threads.
-        let parts: Vec<BTreeMap<usize, Sums>> = bands
+        let parts: Vec<BTreeMap<usize, CellSums>> = bands
             .par_iter()
             .flatten()
             .map(|tile| {
-                let seen = look(surface, frames, placements, &grid, tile);
-                let mut cells: BTreeMap<usize, Sums> = BTreeMap::new();
+                let seen = sample_frames(surface, frames, placements, &grid, tile);
+                let mut cells: BTreeMap<usize, CellSums> = BTreeMap::new();
                 for (k, seen) in (0..).zip(&seen) {
                     let (row, column) =
                         (tile.row + k / tile.columns, tile.column + k % tile.columns);
@@ -85,7 +88,7 @@ impl SeamMap {
                 cells
             })
             .collect();
-        let mut cells = vec![Sums::default(); (along * around) as usize];
+        let mut cells = vec![CellSums::default(); (along * around) as usize];
         for (cell, sums) in parts.into_iter().flatten() {
             cells[cell].merge(&sums);
         }
@@ -97,9 +100,9 @@ impl SeamMap {
         }
     }
 
-    /// Over all of the wall; `None` if no two frames overlap.
+    /// Residual over the whole wall; `None` if no two frames overlap.
     pub fn residual(&self) -> Option<SeamResidual> {
-        let mut total = Sums::default();
+        let mut total = CellSums::default();
         for cell in &self.cells {
             total.merge(cell);
         }
@@ -111,12 +114,12 @@ impl SeamMap {
         })
     }
 
-    /// Cells around the section and along the axis.
+    /// Number of cells around the section and along the axis.
     pub fn size(&self) -> [usize; 2] {
         [self.around, self.along]
     }
 
-    /// Chainage of the first cell's beginning and of the last one's end, metres.
+    /// Chainage of the start of the first cell and of the end of the last, metres.
     pub fn chainage_m(&self) -> [f64; 2] {
         self.chainage_m
     }
@@ -124,18 +127,19 @@ impl SeamMap {
     /// Root mean square difference of two frames in each cell, grey levels; `None` where no two
     /// overlap. A row per stretch of the axis, from θ = 0 on.
     pub fn rms_grey(&self) -> Vec<Option<f64>> {
-        self.cells.iter().map(Sums::rms_grey).collect()
+        self.cells.iter().map(CellSums::rms_grey).collect()
     }
 
-    /// Frames that see a point of each cell, on average.
+    /// Mean number of frames that see a point, of each cell.
     pub fn frames(&self) -> Vec<f64> {
-        let mean = |cell: &Sums| cell.sightings / cell.all.max(1) as f64;
+        let mean = |cell: &CellSums| cell.observations / cell.all.max(1) as f64;
         self.cells.iter().map(mean).collect()
     }
 }
 
-/// The seam residual of placed frames on the wall of `canvas`, see [`SeamMap::new`]; `None` if no
-/// two frames overlap.
+/// Computes the seam residual of placed frames on the wall of `canvas` ([`SeamMap::new`]).
+///
+/// `None` if no two frames overlap.
 pub fn seam_residual(
     surface: &dyn Surface,
     frames: &FrameStack,
@@ -145,18 +149,18 @@ pub fn seam_residual(
     SeamMap::new(surface, frames, placements, canvas).residual()
 }
 
-/// What the frames show of the points of a tile.
-fn look(
+/// Samples all frames at the points of a tile.
+fn sample_frames(
     surface: &dyn Surface,
     frames: &FrameStack,
     placements: &[Placement],
     grid: &Canvas,
     tile: &Tile,
-) -> Vec<Seen> {
+) -> Vec<RunningVariance> {
     let camera = frames.camera();
     let bilinear = Kernel::new(Interpolation::Bilinear, 1.0);
     let points = tile.points(surface, grid);
-    let mut seen = vec![Seen::default(); points.len()];
+    let mut seen = vec![RunningVariance::default(); points.len()];
     for frame in &tile.frames {
         let Some(picture) = frames.picture(*frame) else {
             continue;
@@ -177,15 +181,15 @@ fn look(
     seen
 }
 
-/// Running count, mean and sum of squares about the mean (Welford).
+/// Running count, mean and sum of squares about the mean (Welford's algorithm).
 #[derive(Clone, Copy, Default)]
-struct Seen {
+struct RunningVariance {
     count: f64,
     mean: f64,
     squares: f64,
 }
 
-impl Seen {
+impl RunningVariance {
     fn add(&mut self, value: f64) {
         self.count += 1.0;
         let delta = value - self.mean;
@@ -196,23 +200,23 @@ impl Seen {
 
 /// Sums over the points of a part of the wall.
 #[derive(Clone, Copy, Debug, Default)]
-struct Sums {
-    /// Of the mean square differences.
+struct CellSums {
+    /// Sum of the mean square differences.
     squares: f64,
-    /// Points that at least two frames see.
+    /// Number of points that at least two frames see.
     points: usize,
-    /// Frames that see those.
+    /// Number of observations of those points.
     frames: f64,
-    /// All points.
+    /// Number of all points.
     all: usize,
-    /// Frames that see any of them.
-    sightings: f64,
+    /// Number of observations of all points.
+    observations: f64,
 }
 
-impl Sums {
-    fn add(&mut self, seen: &Seen) {
+impl CellSums {
+    fn add(&mut self, seen: &RunningVariance) {
         self.all += 1;
-        self.sightings += seen.count;
+        self.observations += seen.count;
         if seen.count >= 2.0 {
             self.squares += 2.0 * seen.squares / (seen.count - 1.0);
             self.points += 1;
@@ -225,7 +229,7 @@ impl Sums {
         self.points += other.points;
         self.frames += other.frames;
         self.all += other.all;
-        self.sightings += other.sightings;
+        self.observations += other.observations;
     }
 
     fn rms_grey(&self) -> Option<f64> {
@@ -278,7 +282,7 @@ mod tests {
         assert_eq!(of(&[100]), None);
     }
 
-    /// The one wrong frame is where the map says so, and what no frame sees is empty.
+    /// The map locates the one wrong frame, and is empty where no frame sees the wall.
     #[test]
     fn the_map_shows_where_frames_disagree() {
         let wall = TestWall::ring(waves);

@@ -1,4 +1,4 @@
-//! One point of the grid.
+//! Cell of a sweep: one point of the grid of noise models, walls and sigmas.
 
 use crate::simulate::{SimulateOptions, Wall};
 use crate::survey::PriorSection;
@@ -6,7 +6,7 @@ use crate::trajectory::JitterModel;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Walls that need no file.
+/// Wall of a sweep; each is one that needs no image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -22,7 +22,7 @@ pub enum SweepWall {
 }
 
 impl SweepWall {
-    /// Its name, as on the command line.
+    /// Name of the wall on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Brick => "brick",
@@ -44,7 +44,7 @@ impl From<SweepWall> for Wall {
     }
 }
 
-/// Name of a noise model, as on the command line.
+/// Name of a noise model on the command line.
 pub(super) fn jitter_name(model: JitterModel) -> &'static str {
     match model {
         JitterModel::RandomWalk => "random-walk",
@@ -52,30 +52,30 @@ pub(super) fn jitter_name(model: JitterModel) -> &'static str {
     }
 }
 
-/// Sigmas of the `free` experiment: what the scale 1 means.
-pub(super) fn unit() -> PriorSection {
+/// Sigmas of the `free` experiment, which are those of scale 1.
+pub(super) fn unit_sigmas() -> PriorSection {
     SimulateOptions::free().jitter.unwrap_or_default()
 }
 
-/// One point of the grid.
+/// Cell of a sweep: one point of the grid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Cell {
-    /// How errors of consecutive poses hang together.
+pub struct SweepCell {
+    /// Correlation of the errors of consecutive poses.
     pub jitter: JitterModel,
-    /// What the wall looks like.
+    /// Appearance of the wall.
     pub wall: SweepWall,
-    /// Turn from frame to frame, degrees: the overlap.
+    /// Turn from frame to frame, degrees, which sets the overlap.
     pub turn_deg: f64,
-    /// 1-σ about each axis, degrees.
+    /// Rotation 1-σ about each axis, degrees.
     pub rotation_sigma_deg: f64,
     /// Multiple of the `free` experiment's translation sigmas.
     pub translation_scale: f64,
-    /// 1-σ along x, y, z, metres: that multiple of them.
+    /// Translation 1-σ along x, y, z, metres.
     pub translation_sigma_m: [f64; 3],
 }
 
-impl Cell {
-    /// A cell; angles in degrees, `translation_scale` a multiple of the `free` experiment's sigmas.
+impl SweepCell {
+    /// A cell with angles in degrees and a multiple of the `free` experiment's translation sigmas.
     pub fn new(
         jitter: JitterModel,
         wall: SweepWall,
@@ -89,11 +89,13 @@ impl Cell {
             turn_deg,
             rotation_sigma_deg,
             translation_scale,
-            translation_sigma_m: unit().translation_sigma_m.map(|m| m * translation_scale),
+            translation_sigma_m: unit_sigmas()
+                .translation_sigma_m
+                .map(|m| m * translation_scale),
         }
     }
 
-    /// The noise of the poses.
+    /// The noise model of the poses.
     pub(super) fn prior(&self) -> PriorSection {
         PriorSection {
             model: self.jitter,
@@ -102,7 +104,7 @@ impl Cell {
         }
     }
 
-    /// What tells cells apart, with a number that went through JSON equal to itself.
+    /// Key that identifies the cell, robust against rounding of its numbers in JSON.
     pub(super) fn key(&self) -> String {
         format!(
             "{} {} {:.9} {:.9} {:.9}",
@@ -115,8 +117,8 @@ impl Cell {
     }
 }
 
-impl fmt::Display for Cell {
-    /// As `random-walk, brick, turn 30°, rotation 4°, translation ×2`.
+impl fmt::Display for SweepCell {
+    /// Formats as `random-walk, brick, turn 30°, rotation 4°, translation ×2`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
