@@ -1,7 +1,7 @@
 //! The grid of the panorama on the unrolled wall.
 
 use super::{Placement, RenderError};
-use crate::super_resolve::Lattice;
+use crate::super_resolve::FineGrid;
 use crate::surface::{Footprint, Surface, WallPoint};
 use image::DynamicImage;
 use serde::{Deserialize, Serialize};
@@ -153,8 +153,8 @@ impl Canvas {
     }
 
     /// The pixels as a lattice that goes on beyond the first row and the last.
-    pub fn lattice(&self) -> Lattice {
-        Lattice {
+    pub fn lattice(&self) -> FineGrid {
+        FineGrid {
             columns: i64::from(self.columns),
             spacing_m: [1.0 / self.px_per_metre; 2],
             start_m: [0.0, self.h_start_m],

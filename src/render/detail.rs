@@ -6,7 +6,7 @@ use super::exposure::{Exposure, Response};
 use super::sample::{Sample, Samples};
 use super::{Canvas, FrameStack, Picture, Placement, Tile};
 use crate::frames::{GreyImage, noise_sigma};
-use crate::super_resolve::{Footprints, MARGIN, Reading, Region, View};
+use crate::super_resolve::{Footprints, MARGIN, PosedCamera, Reading, Region};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -95,9 +95,9 @@ impl Readings {
             .iter()
             .filter_map(|frame| Some((frame, self.frames.get(frame)?)))
             .collect();
-        let views: Vec<View> = seen
+        let views: Vec<PosedCamera> = seen
             .iter()
-            .map(|(frame, _)| View {
+            .map(|(frame, _)| PosedCamera {
                 camera: placements[**frame].camera(stack.camera()),
                 pose: &placements[**frame].pose,
             })

@@ -7,7 +7,7 @@ use tunnelstitch::evaluate::mtf50;
 use tunnelstitch::frames::GreyImage;
 use tunnelstitch::render::{Canvas, Interpolation, Kernel, Picture, native_px_per_metre, place};
 use tunnelstitch::simulate::{Illumination, Scene, SimulateOptions, SlantedEdge, Wall};
-use tunnelstitch::super_resolve::{Footprints, MARGIN, Reading, Region, View};
+use tunnelstitch::super_resolve::{Footprints, MARGIN, PosedCamera, Reading, Region};
 use tunnelstitch::surface::{Circle, Surface, WallPoint};
 use tunnelstitch::survey::TunnelSection;
 use tunnelstitch::trajectory::Shutter;
@@ -115,8 +115,8 @@ impl Simulated {
             .map(|found| found.map_or(f32::NAN, |(_, mean, _)| mean))
             .collect();
         let poses = self.scene.truth().iter();
-        let views: Vec<View> = poses
-            .map(|pose| View {
+        let views: Vec<PosedCamera> = poses
+            .map(|pose| PosedCamera {
                 camera: *self.scene.camera(),
                 pose,
             })

@@ -12,7 +12,7 @@ use crate::refine::robust::NoiseHistogram;
 use crate::refine::tile::{Misfit, Seen, TileWork};
 use crate::refine::view::View;
 use crate::refine::visibility::{Observer, Tile, Visibility};
-use crate::super_resolve::{Evidence, aliased_variance};
+use crate::super_resolve::{RoughnessEvidence, aliased_variance};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -81,7 +81,7 @@ impl Problem<'_> {
         let found = self.at_blocks(|block| block.evidence())?;
         let strengths = found
             .iter()
-            .fold(Evidence::default(), Evidence::merge)
+            .fold(RoughnessEvidence::default(), RoughnessEvidence::merge)
             .strengths();
         let aliased = aliased_variance(&strengths, self.grid.density);
         if aliased < LEAST_ALIASED * self.sigma.powi(2) {
