@@ -182,10 +182,8 @@ fn files(
         Some(path) => Some(TilesFolder::begin(surface, &canvas, format, path, quality)?),
         None => None,
     };
-    let bytes = single.as_ref().map_or(0, GlbTarget::most_bytes)
-        + tiles
-            .as_mut()
-            .map_or(0, |tiles| tiles.target().most_bytes());
+    let bytes = single.as_ref().map_or(0, GlbTarget::max_bytes)
+        + tiles.as_mut().map_or(0, |tiles| tiles.target().max_bytes());
     let budget = stitch.budget(bytes)?;
     let mut targets: Vec<&mut dyn Target> = Vec::new();
     targets.extend(single.as_mut().map(|single| single as &mut dyn Target));

@@ -6,7 +6,7 @@ use super::stitch::{BlendArguments, memory_size, positive};
 use super::{Failure, Terminal};
 use crate::frames::JPEG_QUALITY;
 use crate::inspect::{
-    Layer, MANIFEST, Manifest, TilesTarget, WALL, WallPoints, tiles_px_per_metre,
+    MANIFEST, Manifest, PanoramaLayer, TilesTarget, WALL, WallPoints, tiles_px_per_metre,
 };
 use crate::persist::atomic;
 use crate::render::{RenderOptions, Stitch, StitchOptions};
@@ -201,12 +201,12 @@ impl LayersArguments {
             atomic::create_folder(&place)?;
             let mut tiles = TilesTarget::new(surface, &canvas, format, &place, textures.quality)?;
             let map = tiles.with_map(&canvas)?;
-            let budget = stitch.budget(tiles.most_bytes())?;
+            let budget = stitch.budget(tiles.max_bytes())?;
             let settled = stitch.settle(&budget, terminal)?;
             let (plan, frames) = stitch.plan(settled);
             plan.draw(frames, budget.room, &mut [&mut tiles], terminal)?;
             tiles.finish(&canvas)?;
-            drawn.push(Layer::new(name, &canvas, map, poses));
+            drawn.push(PanoramaLayer::new(name, &canvas, map, poses));
         }
         let names = survey.frames.iter().map(|frame| frame.name()).collect();
         let manifest = Manifest::new(

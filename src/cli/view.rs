@@ -3,7 +3,7 @@
 use super::poses::PosesArgument;
 use super::textured::{LayersArguments, Poses, TextureArguments};
 use super::{Failure, Terminal};
-use crate::inspect::{MANIFEST, Marks, Originals, Served, Server, Viewer};
+use crate::inspect::{MANIFEST, Marks, Server, ServerContent, SourceFrames, Viewer};
 use crate::persist::atomic::ScratchFolder;
 use crate::render::place;
 use crate::survey::{SURVEY_FILE, Survey};
@@ -50,10 +50,10 @@ pub struct ViewArguments {
 pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure> {
     let viewer = Viewer::bundled()?;
     if arguments.survey.join(MANIFEST).is_file() {
-        let served = Served {
+        let served = ServerContent {
             folder: arguments.survey.clone(),
             viewer,
-            originals: None,
+            source_frames: None,
             marks: Marks::open(&arguments.survey)?,
         };
         return serve(served, arguments.port, terminal);
@@ -72,10 +72,10 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
         scratch.path(),
         terminal,
     )?;
-    let served = Served {
+    let served = ServerContent {
         folder: scratch.path().to_owned(),
         viewer,
-        originals: Some(originals(survey, layers)?),
+        source_frames: Some(source_frames(survey, layers)?),
         marks,
     };
     serve(served, arguments.port, terminal)
@@ -105,7 +105,7 @@ fn refined(folder: &Path) -> Result<Option<(PathBuf, PosesArgument)>, Failure> {
 }
 
 /// The frames of the survey, placed by every layer.
-fn originals(survey: Survey, layers: Vec<Poses>) -> Result<Originals, Failure> {
+fn source_frames(survey: Survey, layers: Vec<Poses>) -> Result<SourceFrames, Failure> {
     let mut placements = Vec::new();
     for Poses {
         name,
@@ -116,7 +116,7 @@ fn originals(survey: Survey, layers: Vec<Poses>) -> Result<Originals, Failure> {
         let placed = place(survey.surface.as_ref(), &survey.camera, &poses, &shutter)?;
         placements.push((name.text().to_owned(), placed));
     }
-    Ok(Originals {
+    Ok(SourceFrames {
         surface: survey.surface,
         camera: survey.camera,
         frames: survey.frames,
@@ -124,7 +124,7 @@ fn originals(survey: Survey, layers: Vec<Poses>) -> Result<Originals, Failure> {
     })
 }
 
-fn serve(served: Served, port: u16, terminal: &Terminal) -> Result<(), Failure> {
+fn serve(served: ServerContent, port: u16, terminal: &Terminal) -> Result<(), Failure> {
     let folder: &Path = &served.folder.clone();
     let server = Server::listen(served, port)?;
     // Where nobody sees the summary, programs wait for this line.

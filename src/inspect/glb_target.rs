@@ -1,8 +1,8 @@
-//! The whole wall as one GLB.
+//! Export of the whole wall as one GLB.
 
-use super::InspectError;
-use super::cut::{Cutter, part};
-use super::glb::{Part, glb};
+use crate::inspect::block_cutter::{BlockCutter, build_part};
+use crate::inspect::error::InspectError;
+use crate::inspect::glb::{WallPart, encode_glb};
 use crate::persist::atomic::{self, WriteError};
 use crate::raster::{EDGE, RasterError};
 use crate::render::{Band, Canvas, PixelFormat, RenderError, Target};
@@ -11,27 +11,27 @@ use rayon::prelude::*;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Tiles along the side of a texture: with its border it has no more than 4096 pixels.
-const TILES: usize = (4096 - EDGE) / EDGE;
+/// Tiles along the side of a texture, whose side is at most 4096 pixels with its border.
+const TILES_PER_SIDE: usize = (4096 - EDGE) / EDGE;
 
-/// The largest file: what programs still read as one, and half of what the format can say.
-const LIMIT_BYTES: u64 = 2 << 30;
+/// Maximum size of a file: half of the format's limit, which common programs can still read.
+const MAX_FILE_BYTES: u64 = 2 << 30;
 
-/// Takes bands and writes one GLB: textures of at most 4096 × 4096 px.
+/// Render target that writes one GLB with textures of at most 4096 × 4096 px.
 pub struct GlbTarget<'a> {
     surface: &'a dyn Surface,
     path: PathBuf,
     quality: u8,
-    cutter: Cutter,
-    parts: Vec<Part>,
+    cutter: BlockCutter,
+    parts: Vec<WallPart>,
     bytes: u64,
 }
 
 impl<'a> GlbTarget<'a> {
-    /// Begins the file `path`, its pictures JPEGs of `quality` (1–100).
+    /// A target for the file `path`, with JPEG textures of `quality` (1–100).
     ///
     /// # Errors
-    /// A canvas that is no raster.
+    /// [`RasterError`] for a canvas that cannot be a raster.
     pub fn new(
         surface: &'a dyn Surface,
         canvas: &Canvas,
@@ -43,30 +43,30 @@ impl<'a> GlbTarget<'a> {
             surface,
             path: path.to_owned(),
             quality,
-            cutter: Cutter::single(canvas, format, TILES)?,
+            cutter: BlockCutter::single(canvas, format, TILES_PER_SIDE)?,
             parts: Vec::new(),
             bytes: 0,
         })
     }
 
-    /// Memory that it holds besides the compressed pictures, bytes.
-    pub fn most_bytes(&self) -> u64 {
-        self.cutter.most_bytes()
+    /// Maximum memory besides the compressed textures, bytes.
+    pub fn max_bytes(&self) -> u64 {
+        self.cutter.max_bytes()
     }
 
     /// Writes the file.
     ///
     /// # Errors
-    /// [`InspectError::TooLong`]; whatever the system says.
+    /// [`InspectError::TooLong`]; [`InspectError::Write`].
     pub fn finish(self) -> Result<(), InspectError> {
-        if self.bytes > LIMIT_BYTES {
+        if self.bytes > MAX_FILE_BYTES {
             return Err(InspectError::TooLong {
                 path: self.path,
                 bytes: self.bytes,
-                limit_bytes: LIMIT_BYTES,
+                limit_bytes: MAX_FILE_BYTES,
             });
         }
-        let file = glb(&self.parts);
+        let file = encode_glb(&self.parts);
         atomic::write(&self.path, |writer| writer.write_all(&file))?;
         Ok(())
     }
@@ -78,12 +78,12 @@ impl Target for GlbTarget<'_> {
         let channels = self.cutter.channels();
         let parts = blocks
             .par_iter()
-            .map(|block| part(self.surface, canvas, block, channels, self.quality))
-            .collect::<Result<Vec<Part>, _>>()
+            .map(|block| build_part(self.surface, canvas, block, channels, self.quality))
+            .collect::<Result<Vec<WallPart>, _>>()
             .map_err(|error| RasterError::Write(WriteError::new(&self.path, error)))?;
         self.bytes += parts.iter().map(|part| part.jpeg.len() as u64).sum::<u64>();
-        // What is too long is not kept; `finish` says so.
-        if self.bytes <= LIMIT_BYTES {
+        // Beyond the limit nothing is kept; `finish` reports the error.
+        if self.bytes <= MAX_FILE_BYTES {
             self.parts.extend(parts);
         }
         Ok(())

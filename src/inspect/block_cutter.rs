@@ -1,8 +1,8 @@
-//! From bands of the panorama to textured pieces of the wall, level by level.
+//! Conversion of panorama bands to textured pieces of the wall, level by level.
 
-use super::glb::{Part, Place};
-use super::mesh::{Lines, Mesh, Patch};
-use super::strip::{BORDER, Block, Strip};
+use crate::inspect::glb::{TextureExtent, WallPart};
+use crate::inspect::level_strip::{BORDER, LevelStrip, TextureBlock};
+use crate::inspect::mesh::{GridLines, Mesh, WallRectangle};
 use crate::raster::{
     EDGE, LevelTile, Pyramid, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
     compress_jpeg,
@@ -11,19 +11,18 @@ use crate::render::{Band, Canvas, PixelFormat, Samples};
 use crate::surface::Surface;
 use std::io;
 
-/// The wall is straight between the corners of its triangles within this many pixels of the
-/// texture.
+/// Maximum deviation of the triangles from the wall, pixels of the texture.
 const TOLERANCE_PX: f64 = 0.125;
 
-/// Cuts bands into the blocks of all levels.
-pub(super) struct Cutter {
+/// Cuts bands into the texture blocks of all levels.
+pub(super) struct BlockCutter {
     spec: RasterSpec,
     pyramid: Pyramid,
-    strips: Vec<Strip>,
+    strips: Vec<LevelStrip>,
 }
 
-/// 8 bits a sample, alpha last: what the pictures are made from.
-fn spec(canvas: &Canvas, format: PixelFormat) -> RasterSpec {
+/// Format of the textures' source: 8 bits per sample, alpha last.
+fn raster_spec(canvas: &Canvas, format: PixelFormat) -> RasterSpec {
     RasterSpec {
         width: canvas.columns,
         height: canvas.rows,
@@ -36,30 +35,30 @@ fn spec(canvas: &Canvas, format: PixelFormat) -> RasterSpec {
     }
 }
 
-impl Cutter {
-    /// Cuts all levels of a canvas into blocks of a tile.
+impl BlockCutter {
+    /// A cutter of all levels of a canvas into blocks of one tile.
     ///
     /// # Errors
-    /// A canvas that is no raster.
+    /// [`RasterError`] for a canvas that cannot be a raster.
     pub(super) fn pyramid(canvas: &Canvas, format: PixelFormat) -> Result<Self, RasterError> {
-        let spec = spec(canvas, format);
+        let spec = raster_spec(canvas, format);
         Self::new(spec, spec.levels_to_one_tile(), 1)
     }
 
-    /// Cuts a canvas itself into blocks of `tiles` × `tiles` tiles.
+    /// A cutter of the finest level of a canvas into blocks of `tiles` × `tiles` tiles.
     ///
     /// # Errors
-    /// As [`Cutter::pyramid`].
+    /// [`RasterError`] for a canvas that cannot be a raster.
     pub(super) fn single(
         canvas: &Canvas,
         format: PixelFormat,
         tiles: usize,
     ) -> Result<Self, RasterError> {
-        Self::new(spec(canvas, format), 1, tiles)
+        Self::new(raster_spec(canvas, format), 1, tiles)
     }
 
     fn new(spec: RasterSpec, levels: usize, tiles: usize) -> Result<Self, RasterError> {
-        let strip = |level| Strip::new(spec.size(level), spec.pixel_bytes(), tiles);
+        let strip = |level| LevelStrip::new(spec.size(level), spec.pixel_bytes(), tiles);
         Ok(Self {
             spec,
             pyramid: Pyramid::new(spec, levels)?,
@@ -72,27 +71,27 @@ impl Cutter {
         self.strips.len()
     }
 
-    /// Columns and rows of blocks of a tile at a level.
+    /// Number of columns and rows of one-tile blocks of a level.
     pub(super) fn grid(&self, level: usize) -> [u32; 2] {
         self.spec.grid(level)
     }
 
-    /// Channels of a picture without alpha.
+    /// Number of channels of a texture without alpha.
     pub(super) fn channels(&self) -> usize {
         usize::from(self.spec.channels)
     }
 
-    /// Memory that it holds at the most, bytes.
-    pub(super) fn most_bytes(&self) -> u64 {
-        let strips: u64 = self.strips.iter().map(Strip::most_bytes).sum();
+    /// Maximum memory of the cutter, bytes.
+    pub(super) fn max_bytes(&self) -> u64 {
+        let strips: u64 = self.strips.iter().map(LevelStrip::max_bytes).sum();
         strips + self.spec.pending_bytes(crate::raster::TileOrder::Rows)
     }
 
-    /// Takes the next band; the blocks that are complete by that, with their level.
+    /// Adds the next band; returns the blocks that it completes, with their levels.
     ///
     /// # Errors
-    /// A band that came twice.
-    pub(super) fn add(&mut self, band: &Band) -> Result<Vec<(usize, Block)>, RasterError> {
+    /// [`RasterError`] for a band that was added before.
+    pub(super) fn add(&mut self, band: &Band) -> Result<Vec<(usize, TextureBlock)>, RasterError> {
         let complete = self.pyramid.add(self.tiles(band))?;
         let mut blocks = Vec::new();
         for (level, strip) in self.strips.iter_mut().enumerate() {
@@ -104,7 +103,7 @@ impl Cutter {
         Ok(blocks)
     }
 
-    /// The tiles of a band.
+    /// Divides a band into tiles.
     fn tiles(&self, band: &Band) -> Vec<RasterTile> {
         let (width, bytes) = (self.spec.width as usize, self.spec.pixel_bytes());
         let samples: std::borrow::Cow<[u8]> = match &band.samples {
@@ -131,36 +130,36 @@ impl Cutter {
     }
 }
 
-/// The piece of the wall that a block of a level shows.
+/// Builds the textured mesh of a block of a level.
 ///
 /// # Errors
-/// A picture that cannot be encoded.
-pub(super) fn part(
+/// An [`io::Error`] if the texture cannot be encoded.
+pub(super) fn build_part(
     surface: &dyn Surface,
     canvas: &Canvas,
-    (level, block): &(usize, Block),
+    (level, block): &(usize, TextureBlock),
     channels: usize,
     quality: u8,
-) -> io::Result<Part> {
+) -> io::Result<WallPart> {
     let px_m = 2f64.powi(*level as i32) / canvas.px_per_metre;
     let start_m = [0.0, canvas.h_start_m];
     let end_m = [surface.perimeter_m(), canvas.chainage_m()[1]];
-    // Pixels at the end of an overview stand for less than they would elsewhere.
+    // The last pixels of an overview cover less wall than others.
     let range = |k: usize| {
         let [from, size] = [block.corner[k], block.size[k]].map(|px| px as f64 * px_m);
         [start_m[k] + from, (start_m[k] + from + size).min(end_m[k])]
     };
-    let patch = Patch {
+    let rectangle = WallRectangle {
         s_m: range(0),
         h_m: range(1),
     };
     let border_m = BORDER as f64 * px_m;
-    let lines = Lines::cut(surface, &patch, TOLERANCE_PX * px_m, px_m);
-    Ok(Part {
+    let lines = GridLines::cut(surface, &rectangle, TOLERANCE_PX * px_m, px_m);
+    Ok(WallPart {
         mesh: Mesh::new(surface, &lines),
         jpeg: compress_jpeg(&block.pixels, block.texture_size(), channels, quality)?,
-        place: Place {
-            corner_m: [patch.s_m[0] - border_m, patch.h_m[0] - border_m],
+        extent: TextureExtent {
+            corner_m: [rectangle.s_m[0] - border_m, rectangle.h_m[0] - border_m],
             extent_m: block.texture_size().map(|side| side as f64 * px_m),
         },
     })

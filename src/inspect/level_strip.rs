@@ -1,18 +1,17 @@
-//! One level of the panorama's pyramid, as blocks with a border of their neighbours' pixels.
+//! Blocks of one level of the panorama's pyramid, with a border of their neighbours' pixels.
 //!
-//! A renderer samples between pixels, and beyond a texture's edge there are none: without a border,
-//! a line would show where two textures meet. Around the section the border goes on at the other
-//! side.
+//! A renderer interpolates between pixels. Without a border, a line would be visible where two
+//! textures meet. Around the section the border continues on the other side.
 
 use crate::raster::{EDGE, RasterTile};
 use rayon::prelude::*;
 
-/// Pixels of the border: overviews down to an eighth still have one of their own.
+/// Width of the border, pixels: mipmaps down to an eighth still have one.
 pub(super) const BORDER: usize = 8;
 
-/// A texture: a rectangle of a level and [`BORDER`] pixels around it.
+/// Texture of a rectangle of a level and [`BORDER`] pixels around it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Block {
+pub(super) struct TextureBlock {
     /// Column among the level's blocks.
     pub(super) column: u32,
     /// Row among the level's blocks.
@@ -21,35 +20,35 @@ pub(super) struct Block {
     pub(super) corner: [usize; 2],
     /// Columns and rows, border not counted.
     pub(super) size: [usize; 2],
-    /// All pixels without alpha, the border among them.
+    /// All pixels, including the border, without alpha.
     pub(super) pixels: Vec<u8>,
 }
 
-impl Block {
-    /// Columns and rows of the texture, border and all.
+impl TextureBlock {
+    /// Columns and rows of the texture, including the border.
     pub(super) fn texture_size(&self) -> [usize; 2] {
         self.size.map(|side| side + 2 * BORDER)
     }
 }
 
-/// Rows of a level, from the first that some block still needs to the last that has arrived.
+/// Buffer of a level's rows, from the first that a block still needs to the last that was added.
 #[derive(Debug)]
-pub(super) struct Strip {
+pub(super) struct LevelStrip {
     width: usize,
     height: usize,
     /// Bytes of a pixel; the last is alpha.
     pixel_bytes: usize,
     /// Columns and rows of a block: a multiple of [`EDGE`].
     block: usize,
-    /// The row that `pixels` begins with.
+    /// First row of `pixels`.
     first: usize,
     pixels: Vec<u8>,
     /// The next row of blocks.
     next: usize,
 }
 
-impl Strip {
-    /// A level of `width` × `height` pixels, to be cut into blocks of `tiles` × `tiles` tiles.
+impl LevelStrip {
+    /// A strip of a level of `width` × `height` pixels with blocks of `tiles` × `tiles` tiles.
     pub(super) fn new([width, height]: [u32; 2], pixel_bytes: usize, tiles: usize) -> Self {
         Self {
             width: width as usize,
@@ -62,14 +61,14 @@ impl Strip {
         }
     }
 
-    /// The most bytes that it holds.
-    pub(super) fn most_bytes(&self) -> u64 {
+    /// Maximum memory of the strip, bytes.
+    pub(super) fn max_bytes(&self) -> u64 {
         let rows = (self.block + EDGE + 2 * BORDER).min(self.height);
         (rows * self.width * self.pixel_bytes) as u64
     }
 
-    /// Takes whole rows of tiles and hands out the blocks that are complete by that.
-    pub(super) fn add(&mut self, tiles: &[&RasterTile]) -> Vec<Block> {
+    /// Adds whole rows of tiles and returns the blocks that they complete.
+    pub(super) fn add(&mut self, tiles: &[&RasterTile]) -> Vec<TextureBlock> {
         let stride = self.width * self.pixel_bytes;
         let mut arrived = self.first + self.pixels.len() / stride;
         for tile in tiles {
@@ -103,8 +102,8 @@ impl Strip {
         blocks
     }
 
-    /// The block in a column of the next row.
-    fn cut(&self, column: usize) -> Block {
+    /// Cuts the block in a column of the next row.
+    fn cut(&self, column: usize) -> TextureBlock {
         let corner = [column, self.next].map(|place| place * self.block);
         let size = [
             self.block.min(self.width - corner[0]),
@@ -119,13 +118,13 @@ impl Strip {
                 .min(self.height - 1);
             let line = &self.pixels[(row - self.first) * self.width * self.pixel_bytes..];
             for column in 0..columns {
-                // Once around is added, so that nothing is below zero.
+                // Whole turns are added to keep the column non-negative.
                 let around = BORDER.div_ceil(self.width) * self.width;
                 let column = (corner[0] + column + around - BORDER) % self.width;
                 pixels.extend_from_slice(&line[column * self.pixel_bytes..][..channels]);
             }
         }
-        Block {
+        TextureBlock {
             column: column as u32,
             row: self.next as u32,
             corner,
@@ -162,19 +161,19 @@ mod tests {
         }
     }
 
-    fn blocks(tiles: usize) -> Vec<Block> {
-        let mut strip = Strip::new([WIDTH as u32, HEIGHT as u32], 2, tiles);
+    fn blocks(tiles: usize) -> Vec<TextureBlock> {
+        let mut strip = LevelStrip::new([WIDTH as u32, HEIGHT as u32], 2, tiles);
         let mut blocks = Vec::new();
         for row in 0..3 {
             let row: Vec<RasterTile> = (0..2).map(|column| tile(column, row)).collect();
             blocks.extend(strip.add(&row.iter().collect::<Vec<_>>()));
-            assert!(strip.pixels.len() as u64 <= strip.most_bytes());
+            assert!(strip.pixels.len() as u64 <= strip.max_bytes());
         }
         blocks
     }
 
     #[test]
-    fn every_pixel_is_the_levels_own_and_the_border_goes_around() {
+    fn every_pixel_is_that_of_the_level_and_the_border_wraps() {
         for tiles in [1, 2, 7] {
             let blocks = blocks(tiles);
             let edge = tiles * EDGE;

@@ -1,22 +1,25 @@
-//! Answers and their headers.
+//! HTTP responses and their headers.
 
 use serde::Serialize;
 use std::io::Write;
 
-/// An answer.
+/// HTTP response.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Reply {
+pub(super) struct Response {
     pub(super) status: u16,
     kind: &'static str,
     body: Vec<u8>,
 }
 
-/// Scripts and everything else from here only, and in no frame of another page. three.js decodes
-/// pictures from blobs.
-const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob: data:; \
-                      style-src 'self' 'unsafe-inline'; frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
+/// Content security policy: only own resources, and no embedding in other pages.
+///
+/// three.js decodes images from blobs.
+const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; \
+                      connect-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; \
+                      frame-ancestors 'none'; base-uri 'none'; form-action 'none'";
 
-impl Reply {
+impl Response {
+    /// A successful response of a media type.
     pub(super) fn ok(kind: &'static str, body: Vec<u8>) -> Self {
         Self {
             status: 200,
@@ -25,6 +28,7 @@ impl Reply {
         }
     }
 
+    /// A successful JSON response.
     pub(super) fn json(value: &impl Serialize) -> Self {
         match serde_json::to_vec(value) {
             Ok(body) => Self::ok("application/json", body),
@@ -32,6 +36,7 @@ impl Reply {
         }
     }
 
+    /// An error response with its reason.
     pub(super) fn refuse(status: u16, why: &str) -> Self {
         let body = format!("{why}\n").into_bytes();
         Self {
@@ -41,15 +46,15 @@ impl Reply {
         }
     }
 
+    /// The response for an unknown path.
     pub(super) fn not_found() -> Self {
         Self::refuse(404, "there is nothing of that name")
     }
 
-    /// Writes it as the whole of a connection: one answer, then the end. `body`: whether more than
-    /// its head was asked for.
+    /// Writes the response as the only one of its connection; `body`: the body is written, too.
     ///
     /// # Errors
-    /// A browser that has left.
+    /// An [`std::io::Error`] if the connection is closed.
     pub(super) fn write(&self, stream: &mut impl Write, body: bool) -> std::io::Result<()> {
         let mut head = format!("HTTP/1.1 {} {}\r\n", self.status, reason(self.status));
         let length = self.body.len().to_string();
@@ -61,7 +66,7 @@ impl Reply {
             ("X-Content-Type-Options", "nosniff"),
             ("Cross-Origin-Resource-Policy", "same-origin"),
             ("Referrer-Policy", "no-referrer"),
-            // Tiles of another run may have the same names.
+            // Tiles of other poses may have the same names.
             ("Cache-Control", "no-cache"),
         ] {
             head += &format!("{name}: {value}\r\n");
@@ -75,6 +80,7 @@ impl Reply {
     }
 }
 
+/// Reason phrase of a status.
 fn reason(status: u16) -> &'static str {
     match status {
         200 => "OK",

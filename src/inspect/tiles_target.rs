@@ -1,10 +1,11 @@
-//! The wall as 3D Tiles: a folder that programs stream from.
+//! Export of the wall as 3D Tiles, a folder that programs stream from.
 
-use super::InspectError;
-use super::cut::{Cutter, part};
-use super::glb::{Part, glb};
-use super::strip::Block;
-use super::tileset::{Key, Tree, content_name};
+use crate::inspect::block_cutter::{BlockCutter, build_part};
+use crate::inspect::error::InspectError;
+use crate::inspect::glb::{WallPart, encode_glb};
+use crate::inspect::level_strip::TextureBlock;
+use crate::inspect::manifest::MapImages;
+use crate::inspect::tileset::{TileKey, TileTree, content_name};
 use crate::persist::atomic::{self, StagedFolder, WriteError};
 use crate::raster::RasterError;
 use crate::render::{Band, Canvas, PixelFormat, RenderError, Target};
@@ -14,44 +15,43 @@ use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Takes bands and writes `tileset.json` and `LEVEL/COLUMN_ROW.glb` into a folder: textures of 512
-/// × 512 px and their borders.
+/// Render target that writes `tileset.json` and `LEVEL/COLUMN_ROW.glb` into a folder.
+///
+/// Textures have 512 × 512 px and a border.
 pub struct TilesTarget<'a> {
     surface: &'a dyn Surface,
     folder: PathBuf,
     quality: u8,
-    cutter: Cutter,
-    bounds_m: HashMap<Key, [Vector3<f64>; 2]>,
+    cutter: BlockCutter,
+    bounds_m: HashMap<TileKey, [Vector3<f64>; 2]>,
     map: Option<usize>,
 }
 
-/// Columns of the canvas are a multiple of this, so that overviews go around as exactly as the
-/// canvas does.
-const COLUMNS: f64 = 64.0;
+/// Divisor of the number of columns of a canvas, so that overviews close around the section.
+const COLUMN_MULTIPLE: f64 = 64.0;
 
-/// Columns of the level of which a map is made, at the most.
-const MAP_COLUMNS: u32 = 512;
+/// Maximum columns of the level of the map.
+const MAX_MAP_COLUMNS: u32 = 512;
 
-/// Folder of the map's pictures.
-pub(super) const MAP: &str = "map";
+/// Folder of the map's images.
+pub(super) const MAP_FOLDER: &str = "map";
 
-/// The next resolution from `px_per_metre` on at which the levels of a tunnel meet themselves
-/// around the section.
+/// Smallest resolution of at least `px_per_metre` at which all levels close around the section.
 pub fn tiles_px_per_metre(surface: &dyn Surface, px_per_metre: f64) -> f64 {
     let perimeter_m = surface.perimeter_m();
-    // A resolution of this kind stays as it is, whatever its last digit.
-    let columns = (perimeter_m * px_per_metre / COLUMNS - 1e-6)
+    // The margin keeps a resolution that is already suitable despite rounding.
+    let columns = (perimeter_m * px_per_metre / COLUMN_MULTIPLE - 1e-6)
         .ceil()
         .max(1.0)
-        * COLUMNS;
+        * COLUMN_MULTIPLE;
     columns / perimeter_m
 }
 
 impl<'a> TilesTarget<'a> {
-    /// Begins the tiles in `folder`, which is there; their pictures are JPEGs of `quality` (1–100).
+    /// A target for the existing `folder`, with JPEG textures of `quality` (1–100).
     ///
     /// # Errors
-    /// A canvas that is no raster; whatever the system says.
+    /// [`InspectError::Raster`] for a canvas that cannot be a raster; [`InspectError::Write`].
     pub fn new(
         surface: &'a dyn Surface,
         canvas: &Canvas,
@@ -59,7 +59,7 @@ impl<'a> TilesTarget<'a> {
         folder: &Path,
         quality: u8,
     ) -> Result<Self, InspectError> {
-        let cutter = Cutter::pyramid(canvas, format)?;
+        let cutter = BlockCutter::pyramid(canvas, format)?;
         for level in 0..cutter.levels() {
             atomic::create_folder(&folder.join(level.to_string()))?;
         }
@@ -73,31 +73,30 @@ impl<'a> TilesTarget<'a> {
         })
     }
 
-    /// Also writes the pictures of one level into `map/ROW.jpg`, for [`super::Manifest`]; its place
-    /// in it.
+    /// Also writes the images of one level, `map/ROW.jpg`, and returns their description.
     ///
     /// # Errors
-    /// Whatever the system says.
-    pub fn with_map(&mut self, canvas: &Canvas) -> Result<super::MapPlace, InspectError> {
-        atomic::create_folder(&self.folder.join(MAP))?;
+    /// [`InspectError::Write`].
+    pub fn with_map(&mut self, canvas: &Canvas) -> Result<MapImages, InspectError> {
+        atomic::create_folder(&self.folder.join(MAP_FOLDER))?;
         let last = self.cutter.levels() - 1;
-        let narrow = |level: &usize| canvas.columns >> level <= MAP_COLUMNS;
+        let narrow = |level: &usize| canvas.columns >> level <= MAX_MAP_COLUMNS;
         let level = (0..last).find(narrow).unwrap_or(last);
         self.map = Some(level);
-        Ok(super::MapPlace::new(canvas, level))
+        Ok(MapImages::new(canvas, level))
     }
 
-    /// Memory that it holds at the most, bytes.
-    pub fn most_bytes(&self) -> u64 {
-        self.cutter.most_bytes()
+    /// Maximum memory of the target, bytes.
+    pub fn max_bytes(&self) -> u64 {
+        self.cutter.max_bytes()
     }
 
-    /// Writes the tree.
+    /// Writes the tree of tiles.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// [`InspectError::Write`].
     pub fn finish(self, canvas: &Canvas) -> Result<(), InspectError> {
-        let tree = Tree {
+        let tree = TileTree {
             px_per_metre: canvas.px_per_metre,
             grids: (0..self.cutter.levels())
                 .map(|level| self.cutter.grid(level))
@@ -105,20 +104,21 @@ impl<'a> TilesTarget<'a> {
             bounds_m: &self.bounds_m,
         };
         for (name, file) in tree.files() {
-            write(&self.folder.join(name), file.to_string().as_bytes())?;
+            write_file(&self.folder.join(name), file.to_string().as_bytes())?;
         }
         Ok(())
     }
 
-    fn write(
+    /// Writes the tile of a block; returns its key and bounding box.
+    fn write_tile(
         &self,
         canvas: &Canvas,
-        block: &(usize, Block),
-    ) -> Result<(Key, [Vector3<f64>; 2]), WriteError> {
-        let (level, Block { column, row, .. }) = block;
+        block: &(usize, TextureBlock),
+    ) -> Result<(TileKey, [Vector3<f64>; 2]), WriteError> {
+        let (level, TextureBlock { column, row, .. }) = block;
         let key = (*level, *column, *row);
         let path = self.folder.join(content_name(key));
-        let part = part(
+        let part = build_part(
             self.surface,
             canvas,
             block,
@@ -127,20 +127,20 @@ impl<'a> TilesTarget<'a> {
         )
         .map_err(|error| WriteError::new(&path, error))?;
         if self.map == Some(*level) {
-            write(
-                &self.folder.join(MAP).join(format!("{row}.jpg")),
+            write_file(
+                &self.folder.join(MAP_FOLDER).join(format!("{row}.jpg")),
                 &part.jpeg,
             )?;
         }
         let bounds_m = part.mesh.bounds_m();
-        let parts: [Part; 1] = [part];
-        write(&path, &glb(&parts))?;
+        let parts: [WallPart; 1] = [part];
+        write_file(&path, &encode_glb(&parts))?;
         Ok((key, bounds_m))
     }
 }
 
-/// Writes a file of a folder that is not yet in its place.
-fn write(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
+/// Writes a file of a staged folder.
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), WriteError> {
     std::fs::write(path, bytes).map_err(|source| WriteError::new(path, source))
 }
 
@@ -149,7 +149,7 @@ impl Target for TilesTarget<'_> {
         let blocks = self.cutter.add(band)?;
         let written = blocks
             .par_iter()
-            .map(|block| self.write(canvas, block))
+            .map(|block| self.write_tile(canvas, block))
             .collect::<Result<Vec<_>, WriteError>>()
             .map_err(RasterError::Write)?;
         self.bounds_m.extend(written);
@@ -157,17 +157,17 @@ impl Target for TilesTarget<'_> {
     }
 }
 
-/// A folder of tiles of its own: appears whole or not at all.
+/// Folder of tiles that appears atomically.
 pub struct TilesFolder<'a> {
     staged: StagedFolder,
     target: TilesTarget<'a>,
 }
 
 impl<'a> TilesFolder<'a> {
-    /// Begins `folder`.
+    /// Starts to write `folder`.
     ///
     /// # Errors
-    /// As [`TilesTarget::new`].
+    /// [`InspectError::Raster`] for a canvas that cannot be a raster; [`InspectError::Write`].
     pub fn begin(
         surface: &'a dyn Surface,
         canvas: &Canvas,
@@ -180,15 +180,15 @@ impl<'a> TilesFolder<'a> {
         Ok(Self { staged, target })
     }
 
-    /// What takes the bands.
+    /// The render target.
     pub fn target(&mut self) -> &mut TilesTarget<'a> {
         &mut self.target
     }
 
-    /// Gives the folder its name.
+    /// Writes the tree of tiles and gives the folder its final name.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// [`InspectError::Write`].
     pub fn finish(self, canvas: &Canvas) -> Result<(), InspectError> {
         self.target.finish(canvas)?;
         Ok(self.staged.finish()?)
