@@ -137,9 +137,9 @@ pub(super) fn encode_glb(parts: &[WallPart]) -> Vec<u8> {
         let texture = binary.add_vectors("VEC2", &texture);
         let indices = binary.add_indices(&mesh.triangles);
         let image = binary.add_view(jpeg, None);
-        nodes.push(
-            json!({ "name": format!("wall {k}"), "mesh": k, "translation": to_y_up(&mesh.origin_m) }),
-        );
+        nodes.push(json!({
+            "name": format!("wall {k}"), "mesh": k, "translation": to_y_up(&mesh.origin_m),
+        }));
         meshes.push(json!({
             "name": format!("wall {k}"),
             "primitives": [{

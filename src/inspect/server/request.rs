@@ -41,8 +41,8 @@ impl Request {
                 Ok(_) => {}
             }
         }
-        let mut request =
-            Self::parse(&head).ok_or_else(|| Response::refuse(400, "this is not a valid request"))?;
+        let mut request = Self::parse(&head)
+            .ok_or_else(|| Response::refuse(400, "this is not a valid request"))?;
         let length = match (
             request.header("Content-Length"),
             request.has_header("Content-Length"),
@@ -131,7 +131,10 @@ impl Request {
             .header("Origin")
             .and_then(|origin| origin.strip_prefix("http://"));
         if self.has_header("Origin") && !origin.is_some_and(|host| is_own_host(host, port)) {
-            return Err(Response::refuse(403, "requests from other pages are refused"));
+            return Err(Response::refuse(
+                403,
+                "requests from other pages are refused",
+            ));
         }
         if !self.is_read() && self.header("Content-Type") != Some("application/json") {
             return Err(Response::refuse(
