@@ -1,10 +1,10 @@
-//! `cargo bench --bench ablation [-- FRAMES]`: what each idea of the estimator buys, by leaving out
-//! one at a time.
+//! Ablation study of the estimator, which leaves out one technique at a time:
+//! `cargo bench --bench ablation [-- FRAMES]`.
 //!
-//! The surveys are that of `tunnelstitch demo` (120 frames of 640 × 480 px, or FRAMES of them) with
+//! The surveys are those of `tunnelstitch demo` (120 frames of 640 × 480 px, or FRAMES of them) with
 //! seeds 1 to 3. The table gives time and accuracy, the wall error of the refined poses: the root
-//! mean square over the surveys, and the worst frame of all. Frames left to their prior count as
-//! they are.
+//! mean square over the surveys, and the worst frame of all. Frames that are left at their prior
+//! count as well.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -31,18 +31,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             frames: frames.unwrap_or(free.frames),
             ..free
         };
-        simulate::run(&options, &path, false, &Silent)?;
+        simulate::write_survey(&options, &path, false, &Silent)?;
         surveys.push(Survey::open(&path)?);
     }
     println!("| | s | wall error RMS px | worst frame px | frames left out |");
     println!("| --- | --- | --- | --- | --- |");
     for (name, options) in variants() {
-        row(name, &options, &surveys)?;
+        print_row(name, &options, &surveys)?;
     }
     Ok(())
 }
 
-/// The two modes, and the default without one idea each.
+/// The two modes, and the default mode without one technique each.
 fn variants() -> Vec<(&'static str, RefineOptions)> {
     let all = RefineOptions::default();
     vec![
@@ -82,7 +82,8 @@ fn variants() -> Vec<(&'static str, RefineOptions)> {
     ]
 }
 
-fn row(
+/// Refines all surveys with the given options and prints a row of the table.
+fn print_row(
     name: &str,
     options: &RefineOptions,
     surveys: &[Survey],

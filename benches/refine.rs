@@ -1,8 +1,8 @@
-//! `cargo bench --bench refine`: the estimator stage by stage, on a simulated survey.
+//! Duration of the estimator's stages on a simulated survey: `cargo bench --bench refine`.
 //!
-//! The survey is that of `tunnelstitch demo`: 120 frames of 640 × 480 px. Each round decodes and
-//! refines it anew, in the default mode and with `--fast`; the tables give the median and the range
-//! over the rounds, and frames per second end to end.
+//! The survey is that of `tunnelstitch demo`: 120 frames of 640 × 480 px. Each repetition decodes
+//! and refines it again, in the default mode and with `--fast`; the tables give the median and the range
+//! over the repetitions, and frames per second end to end.
 
 use std::sync::Arc;
 use tunnelstitch::progress::{Progress, Silent};
@@ -10,15 +10,15 @@ use tunnelstitch::refine::{RefineOptions, refine};
 use tunnelstitch::simulate::{self, SimulateOptions};
 use tunnelstitch::survey::Survey;
 
-const ROUNDS: usize = 5;
+const REPETITIONS: usize = 5;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("survey");
-    simulate::run(&SimulateOptions::free(), &path, false, &Silent)?;
+    simulate::write_survey(&SimulateOptions::free(), &path, false, &Silent)?;
     let survey = Survey::open(&path)?;
     println!(
-        "{} frames of {} × {} px, {} threads, {ROUNDS} rounds",
+        "{} frames of {} × {} px, {} threads, {REPETITIONS} rounds",
         survey.frames.len(),
         survey.camera.width,
         survey.camera.height,
@@ -28,6 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     measure(&survey, "refine --fast", &RefineOptions::fast())
 }
 
+/// Measures one mode and prints its table.
 fn measure(
     survey: &Survey,
     name: &str,
@@ -37,7 +38,7 @@ fn measure(
     let mut stages: Vec<String> = Vec::new();
     let mut seconds: Vec<Vec<f64>> = Vec::new();
     let mut totals = Vec::new();
-    for _ in 0..ROUNDS {
+    for _ in 0..REPETITIONS {
         let report = refine(survey, options, &silent)?.report;
         totals.push(report.timings.iter().map(|lap| lap.seconds).sum::<f64>());
         for lap in report.timings {
@@ -56,7 +57,7 @@ fn measure(
     }
     print_row("all", &totals);
     let frames = survey.frames.len() as f64;
-    let [low, median, high] = spread(&totals);
+    let [low, median, high] = min_median_max(&totals);
     println!(
         "{:.1} frames/s ({:.1} to {:.1})",
         frames / median,
@@ -66,13 +67,14 @@ fn measure(
     Ok(())
 }
 
+/// Prints the durations of a stage.
 fn print_row(stage: &str, seconds: &[f64]) {
-    let [low, median, high] = spread(seconds);
+    let [low, median, high] = min_median_max(seconds);
     println!("{stage:<60} {median:>9.3} {low:>9.3} {high:>9.3}");
 }
 
-/// Least, middle and greatest.
-fn spread(values: &[f64]) -> [f64; 3] {
+/// Minimum, median and maximum.
+fn min_median_max(values: &[f64]) -> [f64; 3] {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     [

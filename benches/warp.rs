@@ -1,13 +1,13 @@
-//! `cargo bench --bench warp [-- bilinear] [bicubic] [lanczos3] [copy]`: how fast a frame is laid
-//! on the wall.
+//! Throughput of the warp from frames to the wall:
+//! `cargo bench --bench warp [-- bilinear] [bicubic] [lanczos3] [copy]`.
 //!
-//! RGB frames of 1920 × 1080 px that just meet around a tunnel are drawn at their own resolution
-//! with every interpolation, each pixel from one frame, and pictures of a frame's size are copied.
-//! Nowhere are the frames so much finer than the panorama that kernels are stretched: `remap` of
-//! OpenCV does not stretch them either. Millions of pixels (those that some frame shows) a second
-//! of processor time, median and range over rounds. `-- --ask` measures one round for each of these
-//! names that comes on the standard input and answers with a line: so `benches/opencv_warp.py` runs
-//! this and OpenCV in turn.
+//! RGB frames of 1920 × 1080 px that just meet around a tunnel are rendered at their own resolution
+//! with every interpolation, each pixel from one frame, and images of a frame's size are copied.
+//! The frames are never so much finer than the panorama that kernels are widened, since `remap` of
+//! OpenCV does not widen them either. The result is in millions of covered pixels per second of
+//! processor time, as median and range over the repetitions. `-- --ask` measures one repetition for
+//! each of these names on the standard input and prints a line, so that `benches/opencv_warp.py`
+//! can alternate between this program and OpenCV.
 
 use cpu_time::ProcessTime;
 use std::error::Error;
@@ -22,40 +22,44 @@ use tunnelstitch::render::{
 use tunnelstitch::surface::Circle;
 use tunnelstitch::trajectory::{Shutter, spiral};
 
-const ROUNDS: usize = 7;
+/// Number of repetitions.
+const REPETITIONS: usize = 7;
+/// Name of the copy benchmark.
 const COPY: &str = "copy";
-/// Frames around the tunnel, and all of them.
-const AROUND: usize = 7;
-const FRAMES: usize = 4 * AROUND;
-/// The camera's field of view from top to bottom.
+/// Number of frames around the tunnel.
+const FRAMES_AROUND: usize = 7;
+/// Number of all frames.
+const FRAMES: usize = 4 * FRAMES_AROUND;
+/// Vertical field of view of the camera.
 const FOV_DEG: f64 = 30.0;
+/// Radius of the tunnel, metres.
 const RADIUS_M: f64 = 3.0;
 
-/// Takes the pixels and leaves them where they are.
-struct Nowhere;
+/// Render target that discards the pixels.
+struct NullTarget;
 
-impl Target for Nowhere {
+impl Target for NullTarget {
     fn put(&mut self, _: &Canvas, band: &Band) -> Result<(), RenderError> {
         std::hint::black_box(band);
         Ok(())
     }
 }
 
-/// Counts the pixels that some frame shows.
-struct Covered(usize);
+/// Render target that counts the covered pixels.
+struct CoverageCounter(usize);
 
-impl Target for Covered {
+impl Target for CoverageCounter {
     fn put(&mut self, _: &Canvas, band: &Band) -> Result<(), RenderError> {
         self.0 += band.covered().into_iter().filter(|yes| *yes).count();
         Ok(())
     }
 }
 
-/// What is measured.
+/// Benchmark with its frames and plans.
 struct Bench<'a> {
     frames: PictureCache,
     plans: Vec<(String, Plan<'a>)>,
-    /// How many pixels some frame shows.
+    /// Number of covered pixels.
     covered: usize,
     samples: Vec<u8>,
     copies: Vec<Vec<u8>>,
@@ -88,7 +92,7 @@ impl<'a> Bench<'a> {
             let plan = Plan::new(circle, &frames, placements, canvas, &options, &Silent)?;
             plans.push((format!("{interpolation:?}").to_lowercase(), plan));
         }
-        let mut covered = Covered(0);
+        let mut covered = CoverageCounter(0);
         let (_, first) = &plans[0];
         first.draw(&mut frames, u64::MAX, &mut [&mut covered], &Silent)?;
         Ok(Self {
@@ -100,8 +104,8 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Mpx a second of processor time in one round.
-    fn round(&mut self, what: &str) -> Result<f64, Box<dyn Error>> {
+    /// Measures one repetition, Mpx per second of processor time.
+    fn measure(&mut self, what: &str) -> Result<f64, Box<dyn Error>> {
         let since = ProcessTime::now();
         let pixels = if what == COPY {
             for copy in &mut self.copies {
@@ -113,8 +117,8 @@ impl<'a> Bench<'a> {
                 .plans
                 .iter()
                 .find(|(name, _)| name == what)
-                .ok_or_else(|| format!("`{what}` is none of what is measured"))?;
-            plan.draw(&mut self.frames, u64::MAX, &mut [&mut Nowhere], &Silent)?;
+                .ok_or_else(|| format!("`{what}` is not a benchmark"))?;
+            plan.draw(&mut self.frames, u64::MAX, &mut [&mut NullTarget], &Silent)?;
             self.covered
         };
         Ok(pixels as f64 / since.elapsed().as_secs_f64() / 1e6)
@@ -122,37 +126,37 @@ impl<'a> Bench<'a> {
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // Cargo says `--bench` itself.
+    // Cargo adds `--bench`.
     let arguments: Vec<String> = std::env::args()
         .skip(1)
         .filter(|a| a != "--bench")
         .collect();
     let camera = Camera::from_vertical_fov(1920, 1080, FOV_DEG.to_radians());
     let circle = Circle::new(RADIUS_M)?;
-    let advance_m = 2.0 * RADIUS_M * (0.5 * FOV_DEG.to_radians()).tan() / AROUND as f64;
+    let advance_m = 2.0 * RADIUS_M * (0.5 * FOV_DEG.to_radians()).tan() / FRAMES_AROUND as f64;
     let placements = place(
         &circle,
         &camera,
-        &spiral(FRAMES, advance_m, TAU / AROUND as f64),
+        &spiral(FRAMES, advance_m, TAU / FRAMES_AROUND as f64),
         &Shutter::default(),
     )?;
     let canvas = Canvas::of_placements(&circle, &placements, camera.fx / RADIUS_M)?;
     let mut bench = Bench::new(&circle, &camera, &placements, &canvas)?;
     if arguments.iter().any(|argument| argument == "--ask") {
         for what in std::io::stdin().lock().lines() {
-            println!("{}", bench.round(&what?)?);
+            println!("{}", bench.measure(&what?)?);
         }
         return Ok(());
     }
     let all = bench.plans.iter().map(|(name, _)| name.clone());
     let all: Vec<String> = all.chain([COPY.to_owned()]).collect();
     for what in if arguments.is_empty() { all } else { arguments } {
-        let mut speeds = [0.0; ROUNDS];
+        let mut speeds = [0.0; REPETITIONS];
         for speed in &mut speeds {
-            *speed = bench.round(&what)?;
+            *speed = bench.measure(&what)?;
         }
         speeds.sort_by(f64::total_cmp);
-        let (low, median, high) = (speeds[0], speeds[ROUNDS / 2], speeds[ROUNDS - 1]);
+        let (low, median, high) = (speeds[0], speeds[REPETITIONS / 2], speeds[REPETITIONS - 1]);
         println!("{what:>10}  {median:>8.1} Mpx/s  ({low:.1} to {high:.1})");
     }
     Ok(())

@@ -44,7 +44,7 @@
 //!     camera: Camera::from_vertical_fov(320, 240, 60f64.to_radians()),
 //!     ..SimulateOptions::free()
 //! };
-//! simulate::run(&options, &path, false, &Silent)?;
+//! simulate::write_survey(&options, &path, false, &Silent)?;
 //!
 //! let survey = Survey::open(&path)?;
 //! let silent: Arc<dyn Progress> = Arc::new(Silent);

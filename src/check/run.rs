@@ -54,7 +54,7 @@ mod tests {
     fn checked(options: SimulateOptions) -> Check {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("survey");
-        simulate::run(&options, &path, false, &Silent).unwrap();
+        simulate::write_survey(&options, &path, false, &Silent).unwrap();
         check(&Survey::open(&path).unwrap()).unwrap()
     }
 
@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn masked_and_ignored_parts_do_not_overlap() {
         let dir = tempfile::tempdir().unwrap();
-        simulate::run(&small(), dir.path(), true, &Silent).unwrap();
+        simulate::write_survey(&small(), dir.path(), true, &Silent).unwrap();
         let overlap = |ignore: &str| {
             let opened = Survey::open_with(dir.path(), |file| {
                 let table: toml::Table = format!("ignore = {ignore}").parse().unwrap();

@@ -1,11 +1,13 @@
-//! Initial against refined poses, by every measure there is.
+//! Comparison of initial and refined poses by all measures.
 
-use super::error::check_pairs;
-use super::{
-    EvaluateError, ImageMetrics, SeamMap, SeamResidual, TrajectoryError, UnalignedError, WallError,
-    image_metrics, trajectory_error, unaligned_error, wall_error,
-};
 use crate::camera::Camera;
+use crate::evaluate::error::EvaluateError;
+use crate::evaluate::error::check_pairs;
+use crate::evaluate::image_metrics::{ImageMetrics, image_metrics};
+use crate::evaluate::seam_residual::{SeamMap, SeamResidual};
+use crate::evaluate::trajectory_error::{TrajectoryError, trajectory_error};
+use crate::evaluate::unaligned_error::{UnalignedError, unaligned_error};
+use crate::evaluate::wall_error::{WallError, wall_error};
 use crate::frames::FrameSet;
 use crate::progress::Progress;
 use crate::render::{
@@ -16,7 +18,7 @@ use crate::surface::Surface;
 use crate::trajectory::{Pose, Shutter};
 use serde::{Deserialize, Serialize};
 
-/// What is compared.
+/// Input of a comparison.
 #[derive(Clone, Copy, Debug)]
 pub struct CompareInput<'a> {
     /// The tunnel.
@@ -29,105 +31,104 @@ pub struct CompareInput<'a> {
     pub initial: &'a [Pose],
     /// Poses after refinement, one per frame.
     pub refined: &'a [Pose],
-    /// When the rows of frames are read.
+    /// Readout times of the frames' rows.
     pub shutter: &'a Shutter,
     /// True poses, one per frame, where known.
     pub truth: Option<&'a [Pose]>,
-    /// Resolution of the panoramas, pixels per metre; without it the frames' own at the wall.
+    /// Resolution of the panoramas, pixels per metre; by default that of the frames on the wall.
     pub px_per_metre: Option<f64>,
-    /// How frames become panoramas.
+    /// Options of the panoramas.
     pub render: RenderOptions,
 }
 
-/// What the comparison found.
+/// Result of a comparison.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Comparison {
     /// Number of frames.
     pub frames: usize,
-    /// The stretch of wall that all panoramas show.
+    /// Canvas of all panoramas.
     pub canvas: Canvas,
-    /// The initial poses.
+    /// Scores of the initial poses.
     pub baseline: Scores,
-    /// The refined poses.
+    /// Scores of the refined poses.
     pub refined: Scores,
-    /// The true poses, where known: what could be reached.
+    /// Scores of the true poses, if known: the achievable optimum.
     pub truth: Option<Scores>,
 }
 
-/// Measures of one set of poses; those that need the truth are missing without it.
+/// Measures of one set of poses; those against the truth are `None` without it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Scores {
     /// Share of the canvas that some frame sees, 0–1.
     pub coverage: f64,
-    /// Disagreement of the frames where they overlap; `None` if no two do.
+    /// Difference of overlapping frames; `None` if no two overlap.
     pub seam: Option<SeamResidual>,
     /// Errors of the poses.
     pub trajectory: Option<TrajectoryError>,
-    /// Errors of the poses as they stand, to be compared with `evo`.
+    /// Errors of the poses without alignment, as `evo` computes them.
     pub unaligned: Option<UnalignedError>,
     /// Errors on the wall.
     pub wall: Option<WallError>,
-    /// Likeness to the panorama of the true poses.
+    /// Similarity to the panorama of the true poses.
     pub image: Option<ImageMetrics>,
 }
 
-/// What the frames make of the wall with one set of poses.
+/// Panorama of one set of poses, with its seam residuals.
 #[derive(Clone, Debug)]
-pub struct Drawing {
+pub struct ComparedPanorama {
     /// The panorama.
     pub panorama: Panorama,
-    /// Where the frames agree.
+    /// Seam residuals over the wall.
     pub seams: SeamMap,
 }
 
-/// The drawings of a comparison, all on one canvas.
+/// Panoramas of a comparison, all on one canvas.
 #[derive(Clone, Debug)]
-pub struct Drawings {
-    /// From the initial poses.
-    pub baseline: Drawing,
-    /// From the refined poses.
-    pub refined: Drawing,
-    /// From the true poses, where known.
-    pub truth: Option<Drawing>,
+pub struct ComparedPanoramas {
+    /// Panorama of the initial poses.
+    pub baseline: ComparedPanorama,
+    /// Panorama of the refined poses.
+    pub refined: ComparedPanorama,
+    /// Panorama of the true poses, if known.
+    pub truth: Option<ComparedPanorama>,
 }
 
-/// Compares initial with refined poses, and both with the true ones where they are known.
+/// Compares initial with refined poses, and both with the true poses if they are known.
 ///
-/// With truth, both are first moved along the tunnel's [gauge](crate::surface::Gauge) onto it, so
-/// that the panoramas lie over each other. All panoramas share one canvas, which holds the
-/// footprints of all.
+/// With truth, both are first aligned to it along the tunnel's [gauge](crate::surface::Gauge), so
+/// that the panoramas coincide. All panoramas share one canvas, which holds all footprints.
 ///
 /// # Errors
-/// [`EvaluateError::Count`]; [`EvaluateError::Frame`] and [`EvaluateError::Render`] for poses that
-/// cannot be laid on the wall, and for unreadable frames.
+/// [`EvaluateError::Count`]; [`EvaluateError::Frame`] and [`EvaluateError::Render`] for poses whose
+/// frames miss the wall, and for unreadable frames.
 pub fn compare(
     input: &CompareInput,
     progress: &dyn Progress,
-) -> Result<(Comparison, Drawings), EvaluateError> {
+) -> Result<(Comparison, ComparedPanoramas), EvaluateError> {
     for poses in [Some(input.initial), Some(input.refined), input.truth] {
         check_pairs(
             poses.map_or(input.files.len(), <[Pose]>::len),
             input.files.len(),
         )?;
     }
-    let baseline = Candidate::new("initial", input, input.initial)?;
-    let refined = Candidate::new("refined", input, input.refined)?;
+    let baseline = PlacedPoses::new("initial", input, input.initial)?;
+    let refined = PlacedPoses::new("refined", input, input.refined)?;
     let truth = match input.truth {
-        Some(poses) => Some(Candidate::new("true", input, poses)?),
+        Some(poses) => Some(PlacedPoses::new("true", input, poses)?),
         None => None,
     };
     let (mut frames, canvas) = prepare(input, &baseline, &refined, truth.as_ref(), progress)?;
 
-    let true_drawing = match &truth {
-        Some(truth) => Some(truth.draw(input, &mut frames, &canvas, progress)?),
+    let true_panorama = match &truth {
+        Some(truth) => Some(truth.render(input, &mut frames, &canvas, progress)?),
         None => None,
     };
-    let mut score = |candidate: &Candidate| -> Result<(Scores, Drawing), EvaluateError> {
-        let drawing = candidate.draw(input, &mut frames, &canvas, progress)?;
-        let mut scores = Scores::without_truth(&drawing);
-        if let (Some(poses), Some(truth)) = (input.truth, &true_drawing) {
+    let mut score = |candidate: &PlacedPoses| -> Result<(Scores, ComparedPanorama), EvaluateError> {
+        let compared = candidate.render(input, &mut frames, &canvas, progress)?;
+        let mut scores = Scores::without_truth(&compared);
+        if let (Some(poses), Some(truth)) = (input.truth, &true_panorama) {
             scores.trajectory = Some(trajectory_error(
                 input.surface.gauge(),
                 candidate.given,
@@ -136,34 +137,34 @@ pub fn compare(
             scores.unaligned = Some(unaligned_error(candidate.given, poses)?);
             let wall = wall_error(input.surface, input.camera, candidate.given, poses)?;
             scores.wall = Some(wall);
-            scores.image = Some(image_metrics(&drawing.panorama, &truth.panorama)?);
+            scores.image = Some(image_metrics(&compared.panorama, &truth.panorama)?);
         }
-        Ok((scores, drawing))
+        Ok((scores, compared))
     };
-    let (baseline_scores, baseline_drawing) = score(&baseline)?;
-    let (refined_scores, refined_drawing) = score(&refined)?;
+    let (baseline_scores, baseline_panorama) = score(&baseline)?;
+    let (refined_scores, refined_panorama) = score(&refined)?;
     Ok((
         Comparison {
             frames: input.files.len(),
             canvas,
             baseline: baseline_scores,
             refined: refined_scores,
-            truth: true_drawing.as_ref().map(Scores::without_truth),
+            truth: true_panorama.as_ref().map(Scores::without_truth),
         },
-        Drawings {
-            baseline: baseline_drawing,
-            refined: refined_drawing,
-            truth: true_drawing,
+        ComparedPanoramas {
+            baseline: baseline_panorama,
+            refined: refined_panorama,
+            truth: true_panorama,
         },
     ))
 }
 
 impl Scores {
-    /// The measures that need no truth.
-    fn without_truth(drawing: &Drawing) -> Self {
+    /// The measures without truth.
+    fn without_truth(compared: &ComparedPanorama) -> Self {
         Self {
-            coverage: drawing.panorama.coverage(),
-            seam: drawing.seams.residual(),
+            coverage: compared.panorama.coverage(),
+            seam: compared.seams.residual(),
             trajectory: None,
             unaligned: None,
             wall: None,
@@ -172,15 +173,15 @@ impl Scores {
     }
 }
 
-/// One set of poses, laid on the wall.
-struct Candidate<'a> {
+/// One set of poses with the placements of its frames on the wall.
+struct PlacedPoses<'a> {
     which: &'static str,
     given: &'a [Pose],
-    /// Where the frames lie once the poses are in the truth's gauge.
+    /// Placements of the frames after alignment to the truth's gauge.
     placements: Vec<Placement>,
 }
 
-impl<'a> Candidate<'a> {
+impl<'a> PlacedPoses<'a> {
     fn new(
         which: &'static str,
         input: &CompareInput,
@@ -202,13 +203,13 @@ impl<'a> Candidate<'a> {
         })
     }
 
-    fn draw(
+    fn render(
         &self,
         input: &CompareInput,
         frames: &mut PictureCache,
         canvas: &Canvas,
         progress: &dyn Progress,
-    ) -> Result<Drawing, EvaluateError> {
+    ) -> Result<ComparedPanorama, EvaluateError> {
         let panorama = render(
             input.surface,
             frames,
@@ -222,16 +223,16 @@ impl<'a> Candidate<'a> {
             source,
         })?;
         let seams = SeamMap::new(input.surface, frames, &self.placements, canvas);
-        Ok(Drawing { panorama, seams })
+        Ok(ComparedPanorama { panorama, seams })
     }
 }
 
-/// The frames in memory and the canvas that holds all footprints.
+/// Loads the frames and computes the canvas that holds all footprints.
 fn prepare(
     input: &CompareInput,
-    baseline: &Candidate,
-    refined: &Candidate,
-    truth: Option<&Candidate>,
+    baseline: &PlacedPoses,
+    refined: &PlacedPoses,
+    truth: Option<&PlacedPoses>,
     progress: &dyn Progress,
 ) -> Result<(PictureCache, Canvas), EvaluateError> {
     let best = truth.unwrap_or(refined);

@@ -1,21 +1,21 @@
-//! Why an evaluation is impossible.
+//! Errors of an evaluation.
 
 use crate::render::RenderError;
 use crate::surface::SurfaceError;
 
-/// Why an evaluation is impossible.
+/// Reason why an evaluation is impossible.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvaluateError {
     /// Two trajectories cannot be compared frame by frame.
     #[error("{estimated} poses are to be compared with {others}; each needs one pose per frame")]
     Count {
-        /// Poses judged.
+        /// Number of evaluated poses.
         estimated: usize,
-        /// Poses, or frames, to judge them by.
+        /// Number of reference poses, or of frames.
         others: usize,
     },
-    /// There is no pose at all.
+    /// There are no poses.
     #[error("no poses to evaluate")]
     Empty,
     /// A ray of a frame meets no wall.
@@ -25,11 +25,14 @@ pub enum EvaluateError {
         frame: usize,
         /// "estimated" or "true".
         which: &'static str,
-        /// What is wrong.
+        /// Underlying error.
         source: SurfaceError,
     },
     /// Two panoramas lie on different canvases.
-    #[error("the panoramas are {}×{} and {}×{} px; only equal canvases can be compared", first[0], first[1], second[0], second[1])]
+    #[error(
+        "the panoramas are {}×{} and {}×{} px; only equal canvases can be compared",
+        first[0], first[1], second[0], second[1]
+    )]
     Canvas {
         /// Columns and rows of the first.
         first: [usize; 2],
@@ -41,7 +44,7 @@ pub enum EvaluateError {
     Render {
         /// "initial", "refined" or "true".
         which: &'static str,
-        /// What is wrong.
+        /// Underlying error.
         source: RenderError,
     },
 }

@@ -1,24 +1,26 @@
-//! How like another panorama a panorama is.
+//! Similarity of two panoramas: PSNR and SSIM.
 
-use super::{EvaluateError, ssim::sum_of_ssim};
+use crate::evaluate::error::EvaluateError;
+use crate::evaluate::ssim::sum_of_ssim;
 use crate::render::Panorama;
 use serde::{Deserialize, Serialize};
 
-/// Likeness of two panoramas on the pixels that both cover.
+/// Similarity of two panoramas over the pixels that both cover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ImageMetrics {
-    /// Peak signal-to-noise ratio `10 log₁₀(255² / MSE)`, decibels; `None` if the pictures are
-    /// equal or nowhere covered by both.
+    /// Peak signal-to-noise ratio `10 log₁₀(255² / MSE)`, decibels; `None` if the panoramas are
+    /// equal or have no pixel in common.
     pub psnr_db: Option<f64>,
     /// Mean structural similarity, at most 1; `None` if no 11 × 11 window is covered by both.
     pub ssim: Option<f64>,
-    /// Pixels that both cover.
+    /// Number of pixels that both cover.
     pub pixels: usize,
 }
 
-/// Compares two panoramas of the same canvas by their grey values (luma of colour), on the pixels
-/// that both cover; SSIM counts only windows that are covered entirely.
+/// Compares two panoramas of one canvas by their grey values (luma of colour).
+///
+/// Only pixels that both cover count; SSIM counts only windows that are covered entirely.
 ///
 /// # Errors
 /// [`EvaluateError::Canvas`] if the canvases differ in size.
@@ -83,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_pictures_are_alike_and_brighter_ones_have_the_psnr_of_the_difference() {
+    fn equal_panoramas_are_similar_and_brighter_ones_have_the_psnr_of_the_difference() {
         let wall = TestWall::one(waves);
         let flat = |value: u8| {
             let (w, h) = (wall.camera.width as usize, wall.camera.height as usize);

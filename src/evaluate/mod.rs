@@ -1,17 +1,17 @@
-//! How far poses and pictures are from the truth, and from agreeing with each other.
+//! Accuracy of poses and panoramas: errors against the truth, and consistency without it.
 //!
-//! | question | answer |
+//! | measure | function |
 //! | --- | --- |
-//! | how far off are the poses? | [`trajectory_error()`], after removing the gauge |
-//! | and as they stand, as `evo` measures? | [`unaligned_error()`] |
-//! | how far off is each pixel on the wall? | [`wall_error()`] |
-//! | how like the true panorama is this one? | [`image_metrics()`] |
-//! | how fine is the detail that a panorama shows? | [`mtf50`] |
-//! | how well do the frames agree, without any truth? | [`seam_residual`], place by place [`SeamMap`] |
-//! | is the stated uncertainty true? | [`normalised_errors`] |
-//! | how much noise can the refinement take? | [`converge`] |
+//! | pose errors after removing the gauge | [`trajectory_error()`] |
+//! | pose errors without alignment, as `evo` measures | [`unaligned_error()`] |
+//! | displacement of each pixel on the wall | [`wall_error()`] |
+//! | similarity to the true panorama | [`image_metrics()`] |
+//! | sharpness of a panorama | [`mtf50`] |
+//! | consistency of the frames, without truth | [`seam_residual()`], as a map [`SeamMap`] |
+//! | consistency of the stated covariances | [`normalised_errors_squared`] |
+//! | noise of the initial poses that the refinement tolerates | [`converge`] |
 //!
-//! [`compare()`] asks all of it for initial and refined poses at once.
+//! [`compare()`] computes the measures for initial and refined poses.
 //!
 //! # Example
 //!
@@ -31,30 +31,30 @@
 
 mod before_after;
 mod compare;
+mod comparison_table;
 pub mod converge;
 mod error;
+mod error_statistics;
 mod image_metrics;
 mod mtf;
-mod seam;
-mod spread;
+mod normalised_errors;
+mod seam_residual;
 mod ssim;
 mod survey;
-mod table;
 mod trajectory_error;
 mod unaligned_error;
-mod uncertainty;
 mod wall_error;
 
-pub use before_after::before_after;
-pub use compare::{CompareInput, Comparison, Drawing, Drawings, Scores, compare};
+pub use before_after::draw_before_after;
+pub use compare::{CompareInput, ComparedPanorama, ComparedPanoramas, Comparison, Scores, compare};
+pub use comparison_table::ComparisonRow;
 pub use error::EvaluateError;
+pub use error_statistics::ErrorStatistics;
 pub use image_metrics::{ImageMetrics, image_metrics};
 pub use mtf::mtf50;
-pub use seam::{SeamMap, SeamResidual, seam_residual};
-pub use spread::Spread;
+pub use normalised_errors::{gauge_fixed_errors, normalised_errors_squared};
+pub use seam_residual::{SeamMap, SeamResidual, seam_residual};
 pub use survey::compare_survey;
-pub use table::Row;
 pub use trajectory_error::{TrajectoryError, trajectory_error};
 pub use unaligned_error::{UnalignedError, unaligned_error};
-pub use uncertainty::{normalised_errors, tied_errors};
 pub use wall_error::{WallError, wall_error};

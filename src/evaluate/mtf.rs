@@ -1,21 +1,22 @@
-//! How fine the detail is that a picture shows, from a slanted edge.
+//! Sharpness of an image from a slanted edge: modulation transfer function.
 
 use crate::numerics::signal::{hann, sinc};
 use realfft::RealFftPlanner;
 
-/// Bins of the edge's profile over the width of one of the picture's pixels.
+/// Bins of the edge's profile per pixel of the image.
 const OVERSAMPLING: f64 = 4.0;
 
-/// The frequency, cycles per metre, at which a picture's contrast falls to half: its MTF50.
+/// Computes the MTF50, the frequency (cycles per metre) at which an image's contrast is halved.
 ///
 /// `samples` are pixels around a straight edge, each with its distance from the edge (metres) and
-/// its value; `pixel_m` is the picture's pixel, metres. The edge is slanted, so that its pixels'
-/// distances take all values: their mean over bins of a quarter of a pixel is the edge's profile
+/// its value; `pixel_m` is the size of a pixel, metres. The edge is slanted, so that the pixels'
+/// distances are dense. Their mean over bins of a quarter of a pixel is the edge spread function
 /// (ESF), the difference of neighbouring bins the line spread function (LSF), and the modulus of
-/// its Fourier transform the modulation transfer function (MTF), relative to that at frequency 0
-/// and less what the differences take. A Hann window keeps the noise of the outer bins away; the
-/// samples should reach fifteen times as far to either side as the edge is blurred (1-σ), for it
-/// makes wider ones look sharper. `None` where bins are empty, or if it does not fall to half.
+/// its Fourier transform the modulation transfer function (MTF), normalised at frequency 0 and
+/// corrected for the response of the differences. A Hann window suppresses the noise of the outer
+/// bins. The samples should extend to fifteen times the blur's 1-σ on either side, because the
+/// window makes wider blurs look sharper. `None` if a bin is empty, or if the MTF does not fall to
+/// a half.
 ///
 /// Source: ISO 12233:2017, annex D (edge-based spatial frequency response).
 pub fn mtf50(samples: impl IntoIterator<Item = (f64, f64)>, pixel_m: f64) -> Option<f64> {
@@ -24,15 +25,15 @@ pub fn mtf50(samples: impl IntoIterator<Item = (f64, f64)>, pixel_m: f64) -> Opt
     let plan = RealFftPlanner::<f32>::new().plan_fft_forward(n);
     let mut spectrum = plan.make_output_vec();
     plan.process(&mut lsf, &mut spectrum).ok()?;
-    let still = f64::from(spectrum.first()?.norm());
+    let at_zero = f64::from(spectrum.first()?.norm());
     let per_bin = OVERSAMPLING / (n as f64 * pixel_m);
     let mut last = 1.0;
     for (k, value) in spectrum.iter().enumerate().skip(1) {
-        // A central difference over two bins, and a bin's mean: sinc(2f) and sinc(f), f in cycles a
-        // bin.
+        // Responses of the central difference over two bins and of the mean over a bin: sinc(2f)
+        // and sinc(f), f in cycles per bin.
         let f = k as f64 / n as f64;
-        let taken = sinc(2.0 * f) * sinc(f);
-        let mtf = f64::from(value.norm()) / (still * taken);
+        let response = sinc(2.0 * f) * sinc(f);
+        let mtf = f64::from(value.norm()) / (at_zero * response);
         if f > 0.4 || !mtf.is_finite() {
             return None;
         }
@@ -44,8 +45,7 @@ pub fn mtf50(samples: impl IntoIterator<Item = (f64, f64)>, pixel_m: f64) -> Opt
     None
 }
 
-/// The mean of the samples in each bin of `bin_m` from the least distance to the greatest; `None`
-/// if one is empty.
+/// Edge spread function: the mean of the samples in each bin of `bin_m`; `None` if one is empty.
 fn edge_spread(samples: impl IntoIterator<Item = (f64, f64)>, bin_m: f64) -> Option<Vec<f64>> {
     let samples: Vec<(i64, f64)> = samples
         .into_iter()
@@ -59,7 +59,7 @@ fn edge_spread(samples: impl IntoIterator<Item = (f64, f64)>, bin_m: f64) -> Opt
         *sum += value;
         *count += 1.0;
     }
-    // The outermost bins are cut off.
+    // The outermost bins are incomplete.
     let inner = sums.get(1..sums.len() - 1)?;
     inner
         .iter()
@@ -67,7 +67,7 @@ fn edge_spread(samples: impl IntoIterator<Item = (f64, f64)>, bin_m: f64) -> Opt
         .collect()
 }
 
-/// Central differences under a Hann window.
+/// Line spread function: central differences under a Hann window.
 fn line_spread(esf: &[f64]) -> Vec<f32> {
     let n = esf.len().saturating_sub(2);
     let differences = esf.windows(3).map(|bins| bins[2] - bins[0]);
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn too_few_pixels_have_none() {
+    fn too_few_pixels_have_no_mtf() {
         assert_eq!(mtf50([], PIXEL_M), None);
         assert_eq!(mtf50([(0.0, 1.0), (0.05, 2.0)], PIXEL_M), None);
     }

@@ -4,16 +4,16 @@ use image::{ImageBuffer, Luma};
 use imageproc::filter::separable_filter_equal;
 use rayon::prelude::*;
 
-/// Half the edge of the 11 × 11 window.
+/// Half the side of the 11 × 11 window, pixels.
 const RADIUS: usize = 5;
 
 /// Standard deviation of the window's Gaussian, pixels.
 const SIGMA: f32 = 1.5;
 
-/// Rows handled at once, to bound the memory of the filtered copies.
-const BAND: usize = 256;
+/// Number of rows processed at a time, which bounds the memory of the filtered copies.
+const BAND_ROWS: usize = 256;
 
-/// Sum of SSIM over the pixels whose whole window is in `valid`, and their number.
+/// Sums SSIM over the pixels whose whole window is in `valid`; returns the sum and their number.
 ///
 /// `SSIM = (2 μ_a μ_b + C1)(2 σ_ab + C2) / ((μ_a² + μ_b² + C1)(σ_a² + σ_b² + C2))` with means,
 /// variances and covariance under an 11 × 11 Gaussian of σ = 1.5 px, `C1 = (0.01 L)²`,
@@ -26,14 +26,14 @@ pub(super) fn sum_of_ssim(a: &[f32], b: &[f32], valid: &[bool], width: usize) ->
     if width <= 2 * RADIUS || height <= 2 * RADIUS {
         return (0.0, 0);
     }
-    let starts: Vec<usize> = (RADIUS..height - RADIUS).step_by(BAND).collect();
+    let starts: Vec<usize> = (RADIUS..height - RADIUS).step_by(BAND_ROWS).collect();
     // Collected before they are added: the sum does not depend on the threads.
     let parts: Vec<(f64, usize)> = starts
         .par_iter()
         .map(|start| {
-            let end = (start + BAND).min(height - RADIUS);
+            let end = (start + BAND_ROWS).min(height - RADIUS);
             let rows = (start - RADIUS) * width..(end + RADIUS) * width;
-            band(&a[rows.clone()], &b[rows.clone()], &valid[rows], width)
+            sum_over_band(&a[rows.clone()], &b[rows.clone()], &valid[rows], width)
         })
         .collect();
     parts
@@ -41,8 +41,8 @@ pub(super) fn sum_of_ssim(a: &[f32], b: &[f32], valid: &[bool], width: usize) ->
         .fold((0.0, 0), |sum, part| (sum.0 + part.0, sum.1 + part.1))
 }
 
-/// The rows of a band but for the outermost [`RADIUS`] on either side.
-fn band(a: &[f32], b: &[f32], valid: &[bool], width: usize) -> (f64, usize) {
+/// Sums SSIM over the rows of a band, except the outermost [`RADIUS`] on either side.
+fn sum_over_band(a: &[f32], b: &[f32], valid: &[bool], width: usize) -> (f64, usize) {
     let height = a.len() / width;
     let blurred = |value: &dyn Fn(usize) -> f32| -> Vec<f32> {
         let data: Vec<f32> = (0..a.len()).map(value).collect();
@@ -76,7 +76,7 @@ fn band(a: &[f32], b: &[f32], valid: &[bool], width: usize) -> (f64, usize) {
     (sum, count)
 }
 
-/// The Gaussian's 11 weights, summing to 1.
+/// The 11 weights of the Gaussian, which sum to 1.
 fn window() -> [f32; 2 * RADIUS + 1] {
     let mut weights = [0.0; 2 * RADIUS + 1];
     for (k, weight) in weights.iter_mut().enumerate() {
@@ -87,7 +87,7 @@ fn window() -> [f32; 2 * RADIUS + 1] {
     weights.map(|weight| weight / sum)
 }
 
-/// True where the whole window is valid; windows that leave the picture are not.
+/// Mask of the pixels whose whole window is valid; windows beyond the border are not.
 fn eroded(valid: &[bool], width: usize) -> Vec<bool> {
     let edge = 2 * RADIUS + 1;
     let height = valid.len() / width;
@@ -125,7 +125,7 @@ mod tests {
             .collect()
     }
 
-    /// The formula with an explicit 11 × 11 sum, two-pass, in f64.
+    /// Evaluates the formula with an explicit 11 × 11 sum, two-pass, in f64.
     fn ssim_at(a: &[f32], b: &[f32], width: usize, x: usize, y: usize) -> f64 {
         let mut samples = Vec::new();
         for j in 0..11 {

@@ -1,6 +1,6 @@
 //! Comparison of a survey's initial poses with refined ones.
 
-use super::compare::{CompareInput, Comparison, Drawings, compare};
+use super::compare::{CompareInput, ComparedPanoramas, Comparison, compare};
 use super::error::EvaluateError;
 use crate::progress::Progress;
 use crate::render::{Interpolation, Mode, RenderOptions};
@@ -20,7 +20,7 @@ pub fn compare_survey(
     px_per_metre: Option<f64>,
     interpolation: Interpolation,
     progress: &dyn Progress,
-) -> Result<(Comparison, Drawings), EvaluateError> {
+) -> Result<(Comparison, ComparedPanoramas), EvaluateError> {
     let initial = survey.initial_poses();
     let truth = survey.truth.as_deref().map(poses_of);
     let input = CompareInput {

@@ -1,30 +1,32 @@
-//! How far poses are from the true ones.
+//! Pose errors after removing the gauge.
 
-use super::error::check_pairs;
-use super::{EvaluateError, Spread};
+use crate::evaluate::error::EvaluateError;
+use crate::evaluate::error::check_pairs;
+use crate::evaluate::error_statistics::ErrorStatistics;
 use crate::surface::{Gauge, GaugeMotion};
 use crate::trajectory::Pose;
 use serde::{Deserialize, Serialize};
 
-/// Pose errors after the tunnel's gauge is removed, and only it: a similarity fit (Umeyama) would
-/// also hide errors that pictures do show, as an offset from the axis or a wrong scale.
+/// Pose errors after removing only the tunnel's gauge.
+///
+/// A similarity fit (Umeyama) would also hide errors that are observable in the images, such as an
+/// offset from the axis or a wrong scale.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct TrajectoryError {
-    /// What was removed.
+    /// Gauge motion that was removed.
     pub gauge: GaugeMotion,
-    /// Angle of `R_trueᵀ R_est`, degrees.
-    pub rotation_deg: Spread,
-    /// `|t_est − t_true|`, metres.
-    pub translation_m: Spread,
-    /// The angle of each frame, degrees.
+    /// Rotation error: angle of `R_trueᵀ R_est`, degrees.
+    pub rotation_deg: ErrorStatistics,
+    /// Translation error: `|t_est − t_true|`, metres.
+    pub translation_m: ErrorStatistics,
+    /// Rotation error of each frame, degrees.
     pub frame_rotation_deg: Vec<f64>,
-    /// The distance of each frame, metres.
+    /// Translation error of each frame, metres.
     pub frame_translation_m: Vec<f64>,
 }
 
-/// Compares poses with the true ones, frame by frame, after moving them along `gauge` as close to
-/// the truth as it goes.
+/// Compares poses with the true ones, frame by frame, after aligning them along `gauge`.
 ///
 /// # Errors
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`].
@@ -43,8 +45,8 @@ pub fn trajectory_error(
     }
     Ok(TrajectoryError {
         gauge: motion,
-        rotation_deg: Spread::of(&frame_rotation_deg),
-        translation_m: Spread::of(&frame_translation_m),
+        rotation_deg: ErrorStatistics::of(&frame_rotation_deg),
+        translation_m: ErrorStatistics::of(&frame_translation_m),
         frame_rotation_deg,
         frame_translation_m,
     })
@@ -65,8 +67,8 @@ mod tests {
         let mut estimated = gauge.apply_all(&truth);
         let error = trajectory_error(both, &estimated, &truth).unwrap();
         assert!(error.rotation_deg.max < 1e-6 && error.translation_m.max < 1e-12);
-        // One frame tilted by 1° about its viewing axis's normal and 10 mm off the axis: neither is
-        // gauge.
+        // One frame is tilted by 1° about a normal of its viewing axis and shifted by 10 mm off the
+        // tunnel's axis; the gauge contains neither.
         estimated[3].r_wc *= so3::exp(&(Vector3::x() * 1f64.to_radians()));
         estimated[3].t_wc.x += 0.010;
         let error = trajectory_error(both, &estimated, &truth).unwrap();

@@ -1,28 +1,28 @@
-//! How far poses are from the true ones as they stand: the errors that `evo` prints.
+//! Pose errors without alignment: the errors that `evo` prints.
 
-use super::error::check_pairs;
-use super::{EvaluateError, Spread};
+use crate::evaluate::error::EvaluateError;
+use crate::evaluate::error::check_pairs;
+use crate::evaluate::error_statistics::ErrorStatistics;
 use crate::trajectory::Pose;
 use serde::{Deserialize, Serialize};
 
-/// Errors of poses without anything removed, not even the gauge: what `evo_ape tum` and
-/// `evo_rpe tum` print for the same two files, without `--align` and with
-/// `--delta 1 --delta_unit f`.
+/// Absolute and relative pose errors without alignment, not even along the gauge.
 ///
-/// The relative errors do not depend on the gauge; the absolute ones do, and mean something only
-/// where it is fixed alike in both.
+/// They equal the output of `evo_ape tum` and `evo_rpe tum` for the two files, without `--align`
+/// and with `--delta 1 --delta_unit f`. Relative errors do not depend on the gauge; absolute ones
+/// do, and are meaningful only if the gauge is fixed equally in both.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct UnalignedError {
-    /// `|t_est − t_true|`, metres (`evo_ape`).
-    pub ape_translation_m: Spread,
-    /// Angle of `R_trueᵀ R_est`, degrees (`evo_ape -r angle_deg`).
-    pub ape_rotation_deg: Spread,
-    /// Translation of `(Q_k⁻¹ Q_k+1)⁻¹ (P_k⁻¹ P_k+1)` with Q the true poses and P the estimated,
-    /// metres (`evo_rpe`); zeros for a single frame.
-    pub rpe_translation_m: Spread,
-    /// Its angle, degrees (`evo_rpe -r angle_deg`).
-    pub rpe_rotation_deg: Spread,
+    /// Absolute translation error `|t_est − t_true|`, metres (`evo_ape`).
+    pub ape_translation_m: ErrorStatistics,
+    /// Absolute rotation error: angle of `R_trueᵀ R_est`, degrees (`evo_ape -r angle_deg`).
+    pub ape_rotation_deg: ErrorStatistics,
+    /// Relative translation error: that of `(Q_k⁻¹ Q_k+1)⁻¹ (P_k⁻¹ P_k+1)` with Q the true poses
+    /// and P the estimated, metres (`evo_rpe`); zeros for a single frame.
+    pub rpe_translation_m: ErrorStatistics,
+    /// Relative rotation error: the angle of that motion, degrees (`evo_rpe -r angle_deg`).
+    pub rpe_rotation_deg: ErrorStatistics,
 }
 
 /// Compares poses with the true ones, frame by frame and step by step.
@@ -34,7 +34,7 @@ pub fn unaligned_error(
     truth: &[Pose],
 ) -> Result<UnalignedError, EvaluateError> {
     check_pairs(estimated.len(), truth.len())?;
-    let offs = estimated
+    let absolute_errors = estimated
         .iter()
         .zip(truth)
         .map(|(p, q)| q.inverse().after(p));
@@ -44,10 +44,10 @@ pub fn unaligned_error(
             .map(|(before, after)| before.inverse().after(after))
             .collect()
     };
-    let step_offs = steps(estimated).into_iter().zip(steps(truth));
-    let (ape_translation_m, ape_rotation_deg) = spreads(offs);
+    let relative_errors = steps(estimated).into_iter().zip(steps(truth));
+    let (ape_translation_m, ape_rotation_deg) = motion_statistics(absolute_errors);
     let (rpe_translation_m, rpe_rotation_deg) =
-        spreads(step_offs.map(|(p, q)| q.inverse().after(&p)));
+        motion_statistics(relative_errors.map(|(p, q)| q.inverse().after(&p)));
     Ok(UnalignedError {
         ape_translation_m,
         ape_rotation_deg,
@@ -56,12 +56,12 @@ pub fn unaligned_error(
     })
 }
 
-/// Lengths in metres and angles in degrees of motions.
-fn spreads(motions: impl Iterator<Item = Pose>) -> (Spread, Spread) {
+/// Computes statistics of the lengths (metres) and angles (degrees) of motions.
+fn motion_statistics(motions: impl Iterator<Item = Pose>) -> (ErrorStatistics, ErrorStatistics) {
     let (lengths, angles): (Vec<f64>, Vec<f64>) = motions
         .map(|motion| (motion.t_wc.norm(), motion.r_wc.angle().to_degrees()))
         .unzip();
-    (Spread::of(&lengths), Spread::of(&angles))
+    (ErrorStatistics::of(&lengths), ErrorStatistics::of(&angles))
 }
 
 #[cfg(test)]

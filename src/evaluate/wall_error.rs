@@ -1,19 +1,23 @@
-//! How far poses put the pixels from where they belong, on the wall.
+//! Displacement of the frames' pixels on the wall.
 
-use super::error::check_pairs;
-use super::{EvaluateError, Spread, spread::root_mean_square};
 use crate::camera::Camera;
+use crate::evaluate::error::EvaluateError;
+use crate::evaluate::error::check_pairs;
+use crate::evaluate::error_statistics::{ErrorStatistics, root_mean_square};
 use crate::surface::{Surface, WallPoint, gauge_component, shortest_arc};
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Distances on the unrolled wall between where the estimated and the true pose put a pixel.
+/// Maximum iterations of the mean of arcs.
+const MAX_MEAN_ITERATIONS: usize = 20;
+
+/// Distances on the unrolled wall between a pixel's projections by the estimated and true poses.
 ///
-/// Over 9 × 7 pixels a frame ([`Camera::grid_rays`]). The mean `Δs` and the mean `Δh` over all
-/// pixels of all frames are removed as far as the tunnel's [gauge](crate::surface::Gauge) leaves
-/// them free: no picture fixes them.
+/// They are computed for 9 × 7 pixels per frame ([`Camera::rays_across`]). The mean `Δs` and the
+/// mean `Δh` over all pixels of all frames are removed as far as the tunnel's
+/// [gauge](crate::surface::Gauge) leaves them free: they are unobservable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct WallError {
@@ -21,24 +25,24 @@ pub struct WallError {
     pub shift_s_m: f64,
     /// Mean `Δh` that was removed, metres.
     pub shift_h_m: f64,
-    /// All pixels, millimetres.
-    pub mm: Spread,
-    /// All pixels, in pixels of the frame at its centre: metres over `distance / f`, both of the
-    /// true pose.
-    pub px: Spread,
+    /// Statistics over all pixels, millimetres.
+    pub mm: ErrorStatistics,
+    /// Statistics over all pixels, in pixels at the frame's centre: metres over `distance / f` of
+    /// the true pose.
+    pub px: ErrorStatistics,
     /// Root mean square of each frame, millimetres.
     pub frame_rms_mm: Vec<f64>,
     /// Root mean square of each frame, pixels.
     pub frame_rms_px: Vec<f64>,
-    /// The frame with the greatest root mean square.
+    /// Index of the frame with the largest root mean square.
     pub worst_frame: usize,
-    /// Its root mean square, millimetres.
+    /// Root mean square of that frame, millimetres.
     pub worst_frame_rms_mm: f64,
-    /// Its root mean square, pixels.
+    /// Root mean square of that frame, pixels.
     pub worst_frame_rms_px: f64,
 }
 
-/// Compares where estimated and true poses put the pixels on the wall.
+/// Compares the projections of pixels onto the wall by estimated and true poses.
 ///
 /// # Errors
 /// [`EvaluateError::Count`], [`EvaluateError::Empty`]; [`EvaluateError::Frame`] if a ray meets no
@@ -88,8 +92,8 @@ pub fn wall_error(
     Ok(WallError {
         shift_s_m,
         shift_h_m,
-        mm: Spread::of(&distances_mm),
-        px: Spread::of(&distances_px),
+        mm: ErrorStatistics::of(&distances_mm),
+        px: ErrorStatistics::of(&distances_px),
         worst_frame,
         worst_frame_rms_mm: frame_rms_mm[worst_frame],
         worst_frame_rms_px: frame_rms_px[worst_frame],
@@ -98,9 +102,9 @@ pub fn wall_error(
     })
 }
 
-/// How far one frame's pixels lie from where they belong on the wall, the gauge still in it.
+/// Displacements of one frame's pixels on the wall, including the gauge.
 pub(super) struct FrameOffsets {
-    /// `Δs` of each pixel of the grid, metres; only its rest by the perimeter means anything.
+    /// `Δs` of each pixel of the grid, metres, modulo the perimeter.
     pub delta_s_m: Vec<f64>,
     /// `Δh` of each pixel, metres.
     pub delta_h_m: Vec<f64>,
@@ -108,7 +112,7 @@ pub(super) struct FrameOffsets {
     pub pixel_m: f64,
 }
 
-/// Lays a frame's grid of pixels on the wall by its estimated and by its true pose.
+/// Projects a frame's grid of pixels onto the wall by its estimated and its true pose.
 ///
 /// # Errors
 /// [`EvaluateError::Frame`] if a ray meets no wall.
@@ -129,7 +133,7 @@ pub(super) fn frame_offsets(
             })
     };
     let (mut delta_s_m, mut delta_h_m) = (Vec::new(), Vec::new());
-    // What the lens does not show has no place on the wall.
+    // Pixels without a ray are left out.
     for ray in camera.grid_rays() {
         let here: WallPoint = hit(estimate, "estimated", &ray)?.wall;
         let there: WallPoint = hit(truth, "true", &ray)?.wall;
@@ -143,8 +147,10 @@ pub(super) fn frame_offsets(
     })
 }
 
-/// The mean of arcs on a circle of perimeter P: the direction of `Σ exp(2πi Δs / P)` first, then
-/// the mean of the shortest arcs around it until it stays.
+/// Computes the mean of arcs on a circle of perimeter P.
+///
+/// It starts from the direction of `Σ exp(2πi Δs / P)` and repeats the mean of the shortest arcs
+/// around it until convergence.
 pub(super) fn mean_arc(arcs_m: &[f64], perimeter_m: f64) -> f64 {
     let (mut sin, mut cos) = (0.0, 0.0);
     for arc in arcs_m {
@@ -153,8 +159,8 @@ pub(super) fn mean_arc(arcs_m: &[f64], perimeter_m: f64) -> f64 {
         cos += c;
     }
     let mut mean = perimeter_m / TAU * sin.atan2(cos);
-    // The arcs across the way change only while the mean moves; a few rounds settle it.
-    for _ in 0..20 {
+    // Only arcs near the antipode change while the mean moves, so a few iterations suffice.
+    for _ in 0..MAX_MEAN_ITERATIONS {
         let step = arcs_m
             .iter()
             .map(|arc| shortest_arc(arc - mean, perimeter_m))

@@ -1,33 +1,34 @@
-//! Why a tunnel cannot be exported or shown.
+//! Errors of export and inspection.
 
 use crate::persist::atomic::WriteError;
 use crate::raster::RasterError;
 use crate::render::RenderError;
 use std::path::PathBuf;
 
-/// Why a tunnel cannot be exported or shown.
+/// Reason why a tunnel cannot be exported or shown.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InspectError {
-    /// Too much wall for one file.
+    /// The wall is too long for one file.
     #[error(
-        "{}: the pictures alone have {} MiB, and one file is to have no more than {} MiB; use --3dtiles, which streams, or lower --px-per-metre",
+        "{}: the pictures alone have {} MiB, and one file is to have no more than {} MiB; \
+         use --3dtiles, which streams, or lower --px-per-metre",
         path.display(), bytes >> 20, limit_bytes >> 20
     )]
     TooLong {
         /// The file.
         path: PathBuf,
-        /// Bytes of its pictures.
+        /// Size of its textures, bytes.
         bytes: u64,
-        /// The most that one file is to have.
+        /// Maximum size of one file, bytes.
         limit_bytes: u64,
     },
-    /// A file of marks that is none, or a mark that cannot be kept.
+    /// A file of marks is invalid, or a mark cannot be saved.
     #[error("{}: {what}; mend the file or move it away", path.display())]
     Marks {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the problem.
         what: String,
     },
     /// The folder to be shown cannot be read.
@@ -35,28 +36,30 @@ pub enum InspectError {
     Folder {
         /// The folder.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the problem.
         what: String,
     },
     /// The server cannot listen.
     #[error(
-        "cannot listen on 127.0.0.1:{port}: {what}; choose another --port, or 0 for any that is free"
+        "cannot listen on 127.0.0.1:{port}: {what}; \
+         choose another --port, or 0 for any that is free"
     )]
     Listen {
         /// The port.
         port: u16,
-        /// What the system said.
+        /// Error message of the system.
         what: String,
     },
     /// The program was built without the page.
     #[error(
-        "this program was built without its viewer, since npm was missing: install Node.js 20 or newer with npm and build it again"
+        "this program was built without its viewer, since npm was missing: \
+         install Node.js 20 or newer with npm and build it again"
     )]
     NoViewer,
-    /// What the raster or the system said.
+    /// The raster cannot be encoded or written.
     #[error(transparent)]
     Raster(#[from] RasterError),
-    /// What the system said.
+    /// An output cannot be written.
     #[error(transparent)]
     Write(#[from] WriteError),
     /// The panorama of the textures cannot be drawn.

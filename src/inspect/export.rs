@@ -1,10 +1,10 @@
 //! Exports of the textured wall: one glTF file, 3D Tiles, and the page.
 
 use super::error::InspectError;
+use super::glb_target::GlbTarget;
 use super::layers::{PosedLayer, TextureOptions, draw_layers, lay_out_texture};
 use super::marks::{MARKS_CSV, MARKS_GEOJSON};
-use super::single::GlbTarget;
-use super::tiles::TilesFolder;
+use super::tiles_target::TilesFolder;
 use super::viewer::Viewer;
 use crate::persist::atomic::{StagedFolder, WriteError};
 use crate::progress::Progress;
@@ -46,10 +46,8 @@ pub fn export_wall(
         Some(path) => Some(TilesFolder::begin(surface, &canvas, format, path, quality)?),
         None => None,
     };
-    let single_bytes = single.as_ref().map_or(0, GlbTarget::most_bytes);
-    let tiles_bytes = tiles
-        .as_mut()
-        .map_or(0, |tiles| tiles.target().most_bytes());
+    let single_bytes = single.as_ref().map_or(0, GlbTarget::max_bytes);
+    let tiles_bytes = tiles.as_mut().map_or(0, |tiles| tiles.target().max_bytes());
     let budget = stitch.budget(single_bytes + tiles_bytes)?;
     let mut targets: Vec<&mut dyn Target> = Vec::new();
     targets.extend(single.as_mut().map(|single| single as &mut dyn Target));

@@ -1,52 +1,54 @@
-//! glTF 2.0 in one binary file (GLB).
+//! Encoding of meshes and textures as binary glTF 2.0 (GLB).
 //!
-//! **Axes.** The world has z up at θ = 0, y along the axis, x to the right of whoever looks along
-//! it. glTF has y up: a world point (x, y, z) is written as (x, z, −y), a rotation. Blender and 3D
-//! Tiles turn it back, so that there coordinates are the world's again.
+//! **Axes.** The world has z up at θ = 0, y along the axis, and x to the right when looking along
+//! it. glTF has y up, so a world point (x, y, z) is written as (x, z, −y), which is a rotation.
+//! Blender and 3D Tiles invert it and show world coordinates.
 //!
-//! Materials are unlit (`KHR_materials_unlit`): the picture is the wall as the camera saw it. Faces
-//! are seen from inside only.
+//! Materials are unlit (`KHR_materials_unlit`), since the texture contains the illumination. Faces
+//! are visible from inside only.
 
-use super::mesh::Mesh;
 use crate::PROGRAM;
+use crate::inspect::mesh::Mesh;
 use crate::surface::WallPoint;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
-/// A mesh and its picture.
+/// Mesh of a piece of the wall with its texture.
 #[derive(Debug)]
-pub(super) struct Part {
-    /// The triangles.
+pub(super) struct WallPart {
+    /// Triangles of the piece.
     pub(super) mesh: Mesh,
-    /// The picture, a JPEG.
+    /// Texture, a JPEG.
     pub(super) jpeg: Vec<u8>,
-    /// Where the picture lies on the wall.
-    pub(super) place: Place,
+    /// Extent of the texture on the wall.
+    pub(super) extent: TextureExtent,
 }
 
-/// Where a picture lies on the wall: texture coordinates (u, v) are at `s = s₀ + u Δs`,
-/// `h = h₀ + v Δh`.
+/// Extent of a texture on the wall.
+///
+/// Texture coordinates (u, v) are at `s = s₀ + u Δs`, `h = h₀ + v Δh`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Place {
+pub(super) struct TextureExtent {
     /// `s₀` and `h₀`, metres.
     pub(super) corner_m: [f64; 2],
     /// `Δs` and `Δh`, metres.
     pub(super) extent_m: [f64; 2],
 }
 
-impl Place {
-    fn texture(&self, wall: &WallPoint) -> [f32; 2] {
+impl TextureExtent {
+    /// Texture coordinates of a wall point.
+    fn texture_coordinates(&self, wall: &WallPoint) -> [f32; 2] {
         let share = |value: f64, k: usize| ((value - self.corner_m[k]) / self.extent_m[k]) as f32;
         [share(wall.s_m, 0), share(wall.h_m, 1)]
     }
 }
 
-/// A vector of the world in glTF's axes.
-fn y_up<T: nalgebra::Scalar + std::ops::Neg<Output = T> + Copy>(x_w: &Vector3<T>) -> [T; 3] {
+/// Converts a world vector to glTF's axes.
+fn to_y_up<T: nalgebra::Scalar + std::ops::Neg<Output = T> + Copy>(x_w: &Vector3<T>) -> [T; 3] {
     [x_w.x, x_w.z, -x_w.y]
 }
 
-// Numbers of the specification.
+// Constants of the glTF specification.
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const ARRAY_BUFFER: u32 = 34962;
@@ -59,7 +61,7 @@ const VERSION: u32 = 2;
 const JSON_CHUNK: &[u8; 4] = b"JSON";
 const BINARY_CHUNK: &[u8; 4] = b"BIN\0";
 
-/// The binary chunk on its way.
+/// Binary chunk under construction, with its buffer views and accessors.
 #[derive(Default)]
 struct Binary {
     bytes: Vec<u8>,
@@ -68,8 +70,8 @@ struct Binary {
 }
 
 impl Binary {
-    /// Adds bytes as a buffer view; its index.
-    fn view(&mut self, bytes: &[u8], target: Option<u32>) -> usize {
+    /// Adds bytes as a buffer view and returns its index.
+    fn add_view(&mut self, bytes: &[u8], target: Option<u32>) -> usize {
         let mut view = json!({
             "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len(),
         });
@@ -82,14 +84,14 @@ impl Binary {
         self.views.len() - 1
     }
 
-    /// Adds vectors of `N` numbers; the index of their accessor.
-    fn vectors<const N: usize>(&mut self, kind: &str, vectors: &[[f32; N]]) -> usize {
+    /// Adds vectors of `N` numbers and returns the index of their accessor.
+    fn add_vectors<const N: usize>(&mut self, kind: &str, vectors: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = vectors
             .iter()
             .flatten()
             .flat_map(|v| v.to_le_bytes())
             .collect();
-        let view = self.view(&bytes, Some(ARRAY_BUFFER));
+        let view = self.add_view(&bytes, Some(ARRAY_BUFFER));
         let end = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
             let each = |k: usize| vectors.iter().map(|v| v[k]).reduce(pick).unwrap_or(0.0);
             (0..N).map(each).collect()
@@ -101,43 +103,50 @@ impl Binary {
         self.accessors.len() - 1
     }
 
-    fn indices(&mut self, triangles: &[[u32; 3]]) -> usize {
+    /// Adds triangle indices and returns the index of their accessor.
+    fn add_indices(&mut self, triangles: &[[u32; 3]]) -> usize {
         let bytes: Vec<u8> = triangles
             .iter()
             .flatten()
             .flat_map(|v| v.to_le_bytes())
             .collect();
-        let view = self.view(&bytes, Some(ELEMENT_ARRAY_BUFFER));
+        let view = self.add_view(&bytes, Some(ELEMENT_ARRAY_BUFFER));
         self.accessors.push(json!({
-            "bufferView": view, "componentType": UNSIGNED_INT, "count": 3 * triangles.len(), "type": "SCALAR",
+            "bufferView": view, "componentType": UNSIGNED_INT,
+            "count": 3 * triangles.len(), "type": "SCALAR",
         }));
         self.accessors.len() - 1
     }
 }
 
-/// A GLB of parts, each a node at its own origin. `extras.wall` of a mesh says where its picture
-/// lies on the wall.
-pub(super) fn glb(parts: &[Part]) -> Vec<u8> {
+/// Encodes parts as a GLB, each a node with its own origin.
+///
+/// `extras.wall` of a mesh is the extent of its texture on the wall.
+pub(super) fn encode_glb(parts: &[WallPart]) -> Vec<u8> {
     let mut binary = Binary::default();
     let (mut nodes, mut meshes, mut materials) = (Vec::new(), Vec::new(), Vec::new());
     let (mut textures, mut images) = (Vec::new(), Vec::new());
-    for (k, Part { mesh, jpeg, place }) in parts.iter().enumerate() {
-        let positions: Vec<[f32; 3]> = mesh.positions_m.iter().map(y_up).collect();
-        let texture: Vec<[f32; 2]> = mesh.wall.iter().map(|wall| place.texture(wall)).collect();
-        let position = binary.vectors("VEC3", &positions);
-        let texture = binary.vectors("VEC2", &texture);
-        let indices = binary.indices(&mesh.triangles);
-        let image = binary.view(jpeg, None);
-        nodes.push(
-            json!({ "name": format!("wall {k}"), "mesh": k, "translation": y_up(&mesh.origin_m) }),
-        );
+    for (k, WallPart { mesh, jpeg, extent }) in parts.iter().enumerate() {
+        let positions: Vec<[f32; 3]> = mesh.positions_m.iter().map(to_y_up).collect();
+        let texture: Vec<[f32; 2]> = mesh
+            .wall
+            .iter()
+            .map(|wall| extent.texture_coordinates(wall))
+            .collect();
+        let position = binary.add_vectors("VEC3", &positions);
+        let texture = binary.add_vectors("VEC2", &texture);
+        let indices = binary.add_indices(&mesh.triangles);
+        let image = binary.add_view(jpeg, None);
+        nodes.push(json!({
+            "name": format!("wall {k}"), "mesh": k, "translation": to_y_up(&mesh.origin_m),
+        }));
         meshes.push(json!({
             "name": format!("wall {k}"),
             "primitives": [{
                 "attributes": { "POSITION": position, "TEXCOORD_0": texture },
                 "indices": indices, "material": k,
             }],
-            "extras": { "wall": { "corner_m": place.corner_m, "extent_m": place.extent_m } },
+            "extras": { "wall": { "corner_m": extent.corner_m, "extent_m": extent.extent_m } },
         }));
         materials.push(json!({
             "name": format!("wall {k}"),
@@ -156,18 +165,20 @@ pub(super) fn glb(parts: &[Part]) -> Vec<u8> {
         "extensionsUsed": ["KHR_materials_unlit"],
         "scene": 0,
         "scenes": [{ "nodes": (0..nodes.len()).collect::<Vec<_>>() }],
-        "nodes": nodes, "meshes": meshes, "materials": materials, "textures": textures, "images": images,
+        "nodes": nodes, "meshes": meshes,
+        "materials": materials, "textures": textures, "images": images,
         "samplers": [{
-            "magFilter": LINEAR, "minFilter": LINEAR_MIPMAP_LINEAR, "wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE,
+            "magFilter": LINEAR, "minFilter": LINEAR_MIPMAP_LINEAR,
+            "wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE,
         }],
         "accessors": binary.accessors, "bufferViews": binary.views,
         "buffers": [{ "byteLength": binary.bytes.len() }],
     });
-    container(json.to_string().into_bytes(), &binary.bytes)
+    assemble(json.to_string().into_bytes(), &binary.bytes)
 }
 
-/// The two chunks behind their header.
-fn container(mut json: Vec<u8>, binary: &[u8]) -> Vec<u8> {
+/// Assembles the header and the two chunks of a GLB.
+fn assemble(mut json: Vec<u8>, binary: &[u8]) -> Vec<u8> {
     json.resize(json.len().next_multiple_of(4), b' ');
     let total = 12 + 8 + json.len() + 8 + binary.len();
     let mut file = Vec::with_capacity(total);

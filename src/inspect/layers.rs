@@ -1,9 +1,9 @@
 //! Layers of the page: panoramas of several trajectories, drawn as textures.
 
 use super::error::InspectError;
-use super::manifest::{Layer, MANIFEST, Manifest, WALL, WallPoints};
-use super::server::Originals;
-use super::tiles::{TilesTarget, tiles_px_per_metre};
+use super::manifest::{MANIFEST, Manifest, PanoramaLayer, WALL, WallPoints};
+use super::server::SourceFrames;
+use super::tiles_target::{TilesTarget, tiles_px_per_metre};
 use crate::persist::atomic;
 use crate::progress::Progress;
 use crate::render::{RenderError, RenderOptions, Stitch, StitchOptions, place};
@@ -94,7 +94,7 @@ fn draw_layer(
     options: &TextureOptions,
     folder: &Path,
     progress: &dyn Progress,
-) -> Result<Layer, InspectError> {
+) -> Result<PanoramaLayer, InspectError> {
     let mut stitch = lay_out_texture(survey, &layer.poses, &layer.shutter, options)?;
     let (canvas, format) = (*stitch.canvas(), stitch.frames().format());
     let place = folder.join(layer.name);
@@ -102,26 +102,29 @@ fn draw_layer(
     let surface = survey.surface.as_ref();
     let mut tiles = TilesTarget::new(surface, &canvas, format, &place, options.quality)?;
     let map = tiles.with_map(&canvas)?;
-    let budget = stitch.budget(tiles.most_bytes())?;
+    let budget = stitch.budget(tiles.max_bytes())?;
     let settled = stitch.settle(&budget, progress)?;
     let (plan, frames) = stitch.plan(settled);
     plan.draw(frames, budget.room, &mut [&mut tiles], progress)?;
     tiles.finish(&canvas)?;
-    Ok(Layer::new(layer.name, &canvas, map, &layer.poses))
+    Ok(PanoramaLayer::new(layer.name, &canvas, map, &layer.poses))
 }
 
 /// Places the frames of a survey with the poses of every layer, for the page's view of the frames.
 ///
 /// # Errors
 /// A frame that cannot be placed on the wall.
-pub fn place_originals(survey: Survey, layers: Vec<PosedLayer>) -> Result<Originals, InspectError> {
+pub fn pose_source_frames(
+    survey: Survey,
+    layers: Vec<PosedLayer>,
+) -> Result<SourceFrames, InspectError> {
     let surface = survey.surface.as_ref();
     let mut placements = Vec::new();
     for layer in layers {
         let placed = place(surface, &survey.camera, &layer.poses, &layer.shutter)?;
         placements.push((layer.name.to_owned(), placed));
     }
-    Ok(Originals {
+    Ok(SourceFrames {
         surface: survey.surface,
         camera: survey.camera,
         frames: survey.frames,

@@ -1,90 +1,87 @@
-//! What the page knows of a tunnel besides its tiles: `tunnel.json` and `wall.json`.
+//! Metadata of the viewer's page besides the tiles: `tunnel.json` and `wall.json`.
 
-use super::mesh::{Lines, Patch};
-use super::strip::BORDER;
-use super::tiles::MAP;
-use super::tileset::TILESET;
 use crate::PROGRAM;
 use crate::camera::Camera;
+use crate::inspect::level_strip::BORDER;
+use crate::inspect::mesh::{GridLines, WallRectangle};
+use crate::inspect::tiles_target::MAP_FOLDER;
+use crate::inspect::tileset::TILESET;
 use crate::render::Canvas;
 use crate::surface::Surface;
 use crate::trajectory::Pose;
 use serde::Serialize;
 
-/// Name of the file that says what a folder shows.
+/// Name of the file with the metadata of a tunnel.
 pub const MANIFEST: &str = "tunnel.json";
-/// Name of the file with points of the wall.
+/// Name of the file with the wall's points.
 pub const WALL: &str = "wall.json";
 
 const SCHEMA_VERSION: u32 = 1;
 
-/// The points of the wall may be this far from the straight lines between them, as a share of the
-/// section's outline: 2 mm in a tunnel of 3 m radius, whose lengths are then right to a
-/// ten-thousandth.
+/// Maximum distance of the wall from the polyline of its points, as a share of the perimeter.
+///
+/// It is 2 mm in a tunnel of 3 m radius; lengths are then accurate to a ten-thousandth.
 const TOLERANCE: f64 = 1e-4;
 
-/// What a folder shows.
+/// Content of `tunnel.json`.
 #[derive(Debug, Serialize)]
 pub struct Manifest {
     schema_version: u32,
     program: &'static str,
     /// Name of the survey.
     pub name: String,
-    /// Length of the section's outline, metres.
+    /// Perimeter of the section, metres.
     pub perimeter_m: f64,
-    /// The angle θ of twelve o'clock, degrees.
+    /// Angle θ of twelve o'clock, degrees.
     pub twelve_at_deg: f64,
-    /// The angles θ of the arc lengths k/N of the perimeter, k from 0 to N, degrees, as seen from
-    /// the axis; never falling.
+    /// Angles θ of the arc lengths k/N of the perimeter, k from 0 to N, degrees, non-decreasing.
     theta_deg: Vec<f64>,
-    /// From and to, metres, over all layers.
+    /// Range of chainage over all layers, metres.
     pub chainage_m: [f64; 2],
     /// Names of the frames.
     pub frames: Vec<String>,
-    /// Directions of the corners of a frame in camera coordinates, of unit length, around the
-    /// picture.
+    /// Unit directions of the corners of a frame in camera coordinates, in order around it.
     pub corners: Vec<[f64; 3]>,
-    /// What there is to be seen, the one to begin with first.
-    pub layers: Vec<Layer>,
+    /// Layers, with the initially shown one first.
+    pub layers: Vec<PanoramaLayer>,
 }
 
-/// A panorama of some poses.
+/// Panorama of one set of poses.
 #[derive(Clone, Debug, Serialize)]
-pub struct Layer {
-    /// Its name and folder.
+pub struct PanoramaLayer {
+    /// Name of the layer and of its folder.
     pub name: String,
-    /// Its tree of tiles.
+    /// Path of the tileset.
     tileset: String,
-    /// Pixels per metre of wall.
+    /// Resolution, pixels per metre.
     px_per_metre: f64,
-    /// From and to, metres.
+    /// Range of chainage, metres.
     pub chainage_m: [f64; 2],
-    /// Its map.
-    map: MapPlace,
+    /// Images of the map.
+    map: MapImages,
     /// Poses of the frames, camera-to-world: position (m) and quaternion, x y z w.
     poses: Vec<[f64; 7]>,
 }
 
-/// The pictures of a map: one level of the tiles' own textures, `folder/ROW.jpg`, θ to the right
-/// and chainage down.
+/// Images of the map, `folder/ROW.jpg`: the textures of one level, θ to the right, chainage down.
 #[derive(Clone, Debug, Serialize)]
-pub struct MapPlace {
+pub struct MapImages {
     folder: String,
     px_per_metre: f64,
-    /// Pixels of the level.
+    /// Width and height of the level, pixels.
     size_px: [u32; 2],
-    /// Rows of a picture, border not counted.
+    /// Rows of an image without its border, pixels.
     rows_px: usize,
-    /// Border of a picture on all sides, pixels.
+    /// Width of an image's border, pixels.
     border_px: usize,
 }
 
-impl MapPlace {
-    /// The map of a level.
+impl MapImages {
+    /// The images of a level.
     pub(super) fn new(canvas: &Canvas, level: usize) -> Self {
         let halved = |side: u32| (0..level).fold(side, |side, _| side.div_ceil(2));
         Self {
-            folder: MAP.to_owned(),
+            folder: MAP_FOLDER.to_owned(),
             px_per_metre: canvas.px_per_metre / 2f64.powi(level as i32),
             size_px: [canvas.columns, canvas.rows].map(halved),
             rows_px: crate::raster::TILE_EDGE_PX,
@@ -93,9 +90,9 @@ impl MapPlace {
     }
 }
 
-impl Layer {
-    /// The layer `name` of a canvas drawn from `poses`.
-    pub fn new(name: &str, canvas: &Canvas, mut map: MapPlace, poses: &[Pose]) -> Self {
+impl PanoramaLayer {
+    /// The layer `name` of a canvas that was rendered from `poses`.
+    pub fn new(name: &str, canvas: &Canvas, mut map: MapImages, poses: &[Pose]) -> Self {
         map.folder = format!("{name}/{}", map.folder);
         let rounded = |value: f64| (value * 1e7).round() / 1e7;
         let numbers = |pose: &Pose| {
@@ -114,14 +111,14 @@ impl Layer {
 }
 
 impl Manifest {
-    /// The manifest of layers, at least one.
+    /// The manifest of at least one layer.
     pub fn new(
         name: String,
         surface: &dyn Surface,
         camera: &Camera,
         frames: Vec<String>,
         twelve_at_deg: f64,
-        layers: Vec<Layer>,
+        layers: Vec<PanoramaLayer>,
     ) -> Self {
         let (right, below) = (
             f64::from(camera.width) - 1.0,
@@ -139,7 +136,7 @@ impl Manifest {
             name,
             perimeter_m: surface.perimeter_m(),
             twelve_at_deg,
-            theta_deg: angles_deg(surface),
+            theta_deg: sample_angles_deg(surface),
             chainage_m,
             frames,
             corners: corners.into_iter().filter_map(direction).collect(),
@@ -148,51 +145,53 @@ impl Manifest {
     }
 }
 
-/// Steps of [`Manifest::theta_deg`] around the section.
-const ANGLES: u32 = 720;
+/// Number of steps of [`Manifest::theta_deg`] around the section.
+const ANGLE_STEPS: u32 = 720;
 
-fn angles_deg(surface: &dyn Surface) -> Vec<f64> {
+/// Samples the angles θ at equal steps of arc length, degrees.
+fn sample_angles_deg(surface: &dyn Surface) -> Vec<f64> {
     let mut last = f64::NEG_INFINITY;
     let angle = |k: u32| {
-        let share = f64::from(k) / f64::from(ANGLES);
+        let share = f64::from(k) / f64::from(ANGLE_STEPS);
         let mut theta_deg = surface
             .angle_rad(share * surface.perimeter_m())
             .to_degrees();
-        // Beyond 360° it goes on; what rounding took is given back.
+        // Angles continue beyond 360°, and rounding must not make them decrease.
         if theta_deg < last - 180.0 {
             theta_deg += 360.0;
         }
         last = last.max(theta_deg);
         (last * 1e6).round() / 1e6
     };
-    (0..=ANGLES).map(angle).collect()
+    (0..=ANGLE_STEPS).map(angle).collect()
 }
 
-/// Points of the wall between which it is nearly straight: the page finds places by them whatever
-/// the tunnel's shape.
+/// Content of `wall.json`: points of the wall between which it is nearly straight.
+///
+/// The page converts between wall and world coordinates by them, for any shape of tunnel.
 #[derive(Debug, Serialize)]
 pub struct WallPoints {
     /// Arc lengths, metres, from 0 to the perimeter.
     s_m: Vec<f64>,
     /// Chainages, metres.
     h_m: Vec<f64>,
-    /// World coordinates, metres, one after the other; s runs fastest, then h.
+    /// World coordinates x, y, z of all points, metres; s varies fastest, then h.
     points_m: Vec<f64>,
 }
 
 impl WallPoints {
-    /// The wall over a range of chainage.
+    /// Samples the wall over a range of chainage, metres.
     pub fn new(surface: &dyn Surface, chainage_m: [f64; 2]) -> Self {
         let perimeter_m = surface.perimeter_m();
-        let patch = Patch {
+        let rectangle = WallRectangle {
             s_m: [0.0, perimeter_m],
             h_m: chainage_m,
         };
         let tolerance_m = TOLERANCE * perimeter_m;
-        let lines = Lines::cut(surface, &patch, tolerance_m, tolerance_m);
+        let lines = GridLines::cut(surface, &rectangle, tolerance_m, tolerance_m);
         let mut points = Vec::new();
         surface.lattice(&lines.s_m, &lines.h_m, &mut points);
-        // Hundredths of the tolerance are enough.
+        // Rounded to a hundredth of the tolerance.
         let step = 10f64.powf((0.01 * tolerance_m).log10().floor());
         let rounded = |value: &f64| (value / step).round() * step;
         Self {
@@ -214,7 +213,7 @@ mod tests {
     #[test]
     fn angles_go_around_once() {
         let circle = Circle::new(3.0).unwrap();
-        let angles = angles_deg(&circle);
+        let angles = sample_angles_deg(&circle);
         for (k, theta_deg) in angles.iter().enumerate() {
             assert!(
                 (theta_deg - 0.5 * k as f64).abs() < 1e-6,

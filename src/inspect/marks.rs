@@ -1,35 +1,35 @@
-//! Defects that the inspector has marked: a GeoJSON file and the same as a table.
+//! Defects marked by the inspector: a GeoJSON file and a CSV table.
 //!
-//! `marks.geojson` is what counts: it is read again. `marks.csv` is written along with it.
-//! Coordinates are those of the unrolled wall in metres, arc length and chainage, as a GeoTIFF of
-//! `stitch` has them, so that both lie on each other in a GIS.
+//! `marks.geojson` is the file that is read again; `marks.csv` is written along with it.
+//! Coordinates are arc length and chainage on the unrolled wall, metres, as in a GeoTIFF of
+//! `stitch`, so that both coincide in a GIS.
 
-use super::InspectError;
+use crate::inspect::error::InspectError;
 use crate::persist::atomic;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Marks of a survey.
+/// Name of the GeoJSON file of a survey's marks.
 pub const MARKS_GEOJSON: &str = "marks.geojson";
-/// The same as a table.
+/// Name of the table of a survey's marks.
 pub const MARKS_CSV: &str = "marks.csv";
 
-/// Most marks of a survey, and characters of a text in them: beyond this, it is not an inspector
-/// who writes.
-const MOST_MARKS: usize = 100_000;
-const MOST_CHARACTERS: usize = 10_000;
+/// Maximum marks of a survey, which no inspector exceeds by hand.
+const MAX_MARKS: usize = 100_000;
+/// Maximum characters of a text in a mark.
+const MAX_CHARACTERS: usize = 10_000;
 
-/// A marked place: a GeoJSON feature.
+/// Mark of a defect, a GeoJSON feature.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Mark {
     #[serde(rename = "type")]
     kind: FeatureKind,
-    /// Its name among the marks: letters, digits, `-`.
+    /// Identifier of the mark: letters, digits, `-`.
     pub id: String,
-    /// A point, or a line between two.
+    /// Point, or line between two points.
     pub geometry: Geometry,
-    /// What was seen.
+    /// Attributes of the defect.
     pub properties: Properties,
 }
 
@@ -38,24 +38,24 @@ enum FeatureKind {
     Feature,
 }
 
-/// Where on the unrolled wall: arc length and chainage, metres.
+/// Position on the unrolled wall: arc length and chainage, metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", content = "coordinates")]
 pub enum Geometry {
-    /// A place.
+    /// A point.
     Point([f64; 2]),
-    /// What was measured, from end to end. Arc lengths may go beyond the perimeter, so that the
-    /// line takes the shorter way.
+    /// A measured line. Arc lengths may exceed the perimeter, so that the line takes the shorter
+    /// way around.
     LineString([[f64; 2]; 2]),
 }
 
-/// What was seen, and where, in an inspector's terms.
+/// Attributes of a defect and its position in an inspector's terms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Properties {
-    /// A code, as those of EN 13508-2 (`BAB` for a crack); any text.
+    /// Defect code, as of EN 13508-2 (`BAB` for a crack), or any text.
     pub class: String,
-    /// 1 (slight) to 5 (severe).
+    /// Severity, 1 (slight) to 5 (severe).
     pub severity: u8,
     /// A remark.
     pub note: String,
@@ -63,18 +63,18 @@ pub struct Properties {
     pub chainage_m: f64,
     /// Clock position, hours and minutes.
     pub clock: String,
-    /// The angle θ, degrees.
+    /// Angle θ, degrees.
     pub theta_deg: f64,
-    /// World coordinates, metres.
+    /// World coordinate x, metres.
     pub x_m: f64,
-    /// See `x_m`.
+    /// World coordinate y, metres.
     pub y_m: f64,
-    /// See `x_m`.
+    /// World coordinate z, metres.
     pub z_m: f64,
-    /// Chainage and clock position of the other end.
+    /// Chainage of the other end, metres.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub end_chainage_m: Option<f64>,
-    /// See `end_chainage_m`.
+    /// Clock position of the other end.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub end_clock: Option<String>,
     /// Length along the wall, metres.
@@ -85,11 +85,11 @@ pub struct Properties {
     pub width_mm: Option<f64>,
     /// The layer in which it was marked.
     pub layer: String,
-    /// When, in the form of RFC 3339.
+    /// Time of creation, RFC 3339.
     pub created: String,
 }
 
-/// The file.
+/// Content of the GeoJSON file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Collection {
@@ -104,8 +104,11 @@ enum CollectionKind {
 }
 
 impl Mark {
-    /// What is wrong with it, if anything.
-    pub fn fault(&self) -> Option<&'static str> {
+    /// Validates the mark.
+    ///
+    /// # Errors
+    /// A description of the first invalid value.
+    pub fn validate(&self) -> Result<(), &'static str> {
         let p = &self.properties;
         let name = |c: char| c.is_ascii_alphanumeric() || c == '-';
         let numbers = [p.chainage_m, p.theta_deg, p.x_m, p.y_m, p.z_m];
@@ -136,18 +139,18 @@ impl Mark {
                 texts
                     .into_iter()
                     .chain(&p.end_clock)
-                    .any(|text| text.chars().count() > MOST_CHARACTERS),
+                    .any(|text| text.chars().count() > MAX_CHARACTERS),
                 "a text of it is too long",
             ),
         ];
-        wrong
-            .iter()
-            .find(|(wrong, _)| *wrong)
-            .map(|(_, what)| *what)
+        match wrong.iter().find(|(wrong, _)| *wrong) {
+            Some((_, what)) => Err(what),
+            None => Ok(()),
+        }
     }
 }
 
-/// The marks of a survey and the files they are kept in.
+/// Marks of a survey and their files.
 #[derive(Debug)]
 pub struct Marks {
     folder: PathBuf,
@@ -155,10 +158,10 @@ pub struct Marks {
 }
 
 impl Marks {
-    /// Reads the marks in `folder`; none if there is no file yet.
+    /// Reads the marks in `folder`; empty without a file.
     ///
     /// # Errors
-    /// [`InspectError::Marks`] for a file that holds anything else.
+    /// [`InspectError::Marks`] for an invalid file.
     pub fn open(folder: &Path) -> Result<Self, InspectError> {
         let path = folder.join(MARKS_GEOJSON);
         let fail = |what: String| InspectError::Marks {
@@ -172,7 +175,7 @@ impl Marks {
                 if let Some((mark, what)) = collection
                     .features
                     .iter()
-                    .find_map(|mark| Some((mark, mark.fault()?)))
+                    .find_map(|mark| Some((mark, mark.validate().err()?)))
                 {
                     return Err(fail(format!("mark {}: {what}", mark.id)));
                 }
@@ -187,10 +190,10 @@ impl Marks {
         })
     }
 
-    /// The marks as GeoJSON.
+    /// Encodes the marks as GeoJSON.
     ///
     /// # Errors
-    /// [`InspectError::Marks`] for what cannot be put into words.
+    /// [`InspectError::Marks`] if they cannot be encoded.
     pub fn geojson(&self) -> Result<String, InspectError> {
         let collection = Collection {
             kind: CollectionKind::FeatureCollection,
@@ -201,13 +204,14 @@ impl Marks {
             .map_err(|error| self.fail(MARKS_GEOJSON, error.to_string()))
     }
 
-    /// Adds a mark, or replaces the one of its name, and writes the files. Where that fails,
-    /// nothing has changed.
+    /// Adds a mark, or replaces the one with its identifier, and writes the files.
+    ///
+    /// If that fails, the marks are unchanged.
     ///
     /// # Errors
-    /// [`InspectError::Marks`] for a mark that is none; whatever the system says.
+    /// [`InspectError::Marks`] for an invalid mark; [`InspectError::Write`].
     pub fn put(&mut self, mark: Mark) -> Result<(), InspectError> {
-        if let Some(what) = mark.fault() {
+        if let Err(what) = mark.validate() {
             return Err(self.fail(MARKS_GEOJSON, what.to_owned()));
         }
         let mut marks = self.marks.clone();
@@ -215,17 +219,17 @@ impl Marks {
             Some(place) => marks[place] = mark,
             None => marks.push(mark),
         }
-        if marks.len() > MOST_MARKS {
-            let what = format!("no more than {MOST_MARKS} marks are kept");
+        if marks.len() > MAX_MARKS {
+            let what = format!("no more than {MAX_MARKS} marks are kept");
             return Err(self.fail(MARKS_GEOJSON, what));
         }
         self.replace(marks)
     }
 
-    /// Removes the mark of a name, if there is one, and writes the files.
+    /// Removes the mark with an identifier, if it exists, and writes the files.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// [`InspectError::Write`].
     pub fn remove(&mut self, id: &str) -> Result<(), InspectError> {
         let others = self.marks.iter().filter(|mark| mark.id != id);
         self.replace(others.cloned().collect())
@@ -242,7 +246,7 @@ impl Marks {
         Ok(atomic::write_text(&self.folder.join(MARKS_CSV), &csv)?)
     }
 
-    /// The marks as a table, in the order of their chainage.
+    /// Encodes the marks as CSV, in order of chainage.
     fn csv(&self) -> Result<String, InspectError> {
         let fail = |error: String| self.fail(MARKS_CSV, error);
         let mut marks: Vec<&Mark> = self.marks.iter().collect();
@@ -318,9 +322,14 @@ mod tests {
 
     fn mark(id: &str, chainage_m: f64) -> Mark {
         let text = format!(
-            r#"{{"type": "Feature", "id": "{id}", "geometry": {{"type": "LineString", "coordinates": [[1.5, {chainage_m}], [1.5, 2.0]]}},
-            "properties": {{"class": "BAB", "severity": 3, "note": "wet, \"open\"", "chainage_m": {chainage_m}, "clock": "4:30",
-            "theta_deg": 135.0, "x_m": 0.1, "y_m": 2.0, "z_m": -1.0, "width_mm": 1.25, "layer": "refined", "created": ""}}}}"#
+            r#"{{"type": "Feature", "id": "{id}",
+            "geometry": {{
+                "type": "LineString", "coordinates": [[1.5, {chainage_m}], [1.5, 2.0]]
+            }},
+            "properties": {{"class": "BAB", "severity": 3, "note": "wet, \"open\"",
+            "chainage_m": {chainage_m}, "clock": "4:30", "theta_deg": 135.0,
+            "x_m": 0.1, "y_m": 2.0, "z_m": -1.0, "width_mm": 1.25,
+            "layer": "refined", "created": ""}}}}"#
         );
         serde_json::from_str(&text).unwrap()
     }
@@ -348,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_mark_is_refused_and_changes_nothing() {
+    fn an_invalid_mark_is_refused_and_changes_nothing() {
         let dir = tempfile::tempdir().unwrap();
         let mut marks = Marks::open(dir.path()).unwrap();
         marks.put(mark("a", 1.0)).unwrap();

@@ -1,81 +1,85 @@
-//! Pieces of the wall as triangles.
+//! Triangulation of rectangles of the unrolled wall.
 //!
-//! A piece is a rectangle of the unrolled wall. It is cut along lines of constant `s` and `h` that
-//! lie as close as the wall is bent there: between two lines no point of the wall is farther than a
-//! tolerance from the straight line between its ends. Nothing but [`Surface::frame`] is asked, so
-//! every shape and every curve is cut the same way; a corner of the section gets lines close to it,
-//! and a straight tunnel none along its length.
+//! A rectangle is divided along lines of constant `s` and `h` whose spacing follows the curvature:
+//! between two lines no point of the wall is farther than a tolerance from the chord. Only
+//! [`Surface::frame`] is evaluated, so that all shapes and curves are treated equally. A corner of
+//! the section gets lines close to it, and a straight tunnel none along its length.
 
 use crate::surface::{Surface, WallPoint};
 use nalgebra::Vector3;
 
-/// A rectangle of the unrolled wall, metres.
+/// Rectangle of the unrolled wall, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Patch {
-    /// From and to, around the section.
+pub struct WallRectangle {
+    /// Range of arc length around the section.
     pub s_m: [f64; 2],
-    /// From and to, along the axis.
+    /// Range of chainage.
     pub h_m: [f64; 2],
 }
 
-/// Lines that cut a patch, metres: increasing, the patch's borders among them.
+/// Grid lines of a rectangle, metres, increasing and including its borders.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Lines {
-    /// Of constant `s`.
+pub struct GridLines {
+    /// Lines of constant `s`.
     pub s_m: Vec<f64>,
-    /// Of constant `h`.
+    /// Lines of constant `h`.
     pub h_m: Vec<f64>,
 }
 
-/// Where deviations are looked for, as a share of the patch.
-const ACROSS: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
-/// Where the wall is compared with the straight line between two of its points.
-const BETWEEN: [f64; 3] = [0.25, 0.5, 0.75];
-/// Halvings of a patch, at the most: a wall that is bent nowhere more than its section's outline
-/// needs far fewer.
-const HALVINGS: u32 = 16;
+/// Positions across the rectangle, as shares, at which deviations are evaluated.
+const CROSS_SHARES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
+/// Positions along a chord, as shares, at which the wall is compared with it.
+const CHORD_SHARES: [f64; 3] = [0.25, 0.5, 0.75];
+/// Maximum halvings of a rectangle; far fewer are needed for realistic curvatures.
+const MAX_HALVINGS: u32 = 16;
 
-impl Lines {
-    /// Lines between which the wall is straight within `tolerance_m`, unless they are `finest_m`
-    /// apart already.
-    pub fn cut(surface: &dyn Surface, patch: &Patch, tolerance_m: f64, finest_m: f64) -> Self {
+impl GridLines {
+    /// Grid lines between which the wall is straight within `tolerance_m`.
+    ///
+    /// Their spacing does not fall below half of `finest_m`.
+    pub fn cut(
+        surface: &dyn Surface,
+        rectangle: &WallRectangle,
+        tolerance_m: f64,
+        finest_m: f64,
+    ) -> Self {
         let point = |s_m, h_m| surface.frame(WallPoint { s_m, h_m }).x_w;
         let at = |[from, to]: [f64; 2], share: f64| from + share * (to - from);
         let limits = (tolerance_m, finest_m);
         Self {
-            s_m: bisect(patch.s_m, limits, &|s_m| {
-                ACROSS.map(|share| point(s_m, at(patch.h_m, share)))
+            s_m: bisect(rectangle.s_m, limits, &|s_m| {
+                CROSS_SHARES.map(|share| point(s_m, at(rectangle.h_m, share)))
             }),
-            h_m: bisect(patch.h_m, limits, &|h_m| {
-                ACROSS.map(|share| point(at(patch.s_m, share), h_m))
+            h_m: bisect(rectangle.h_m, limits, &|h_m| {
+                CROSS_SHARES.map(|share| point(at(rectangle.s_m, share), h_m))
             }),
         }
     }
 }
 
-/// Points of the wall on a line across the patch.
-type Across = [Vector3<f64>; ACROSS.len()];
+/// Wall points on a line across the rectangle.
+type CrossLine = [Vector3<f64>; CROSS_SHARES.len()];
 
-/// Halves the range until the wall is straight between all values.
+/// Bisects the range until the wall is straight between neighbouring values.
 fn bisect(
     range: [f64; 2],
     (tolerance_m, finest_m): (f64, f64),
-    across: &dyn Fn(f64) -> Across,
+    across: &dyn Fn(f64) -> CrossLine,
 ) -> Vec<f64> {
     let [from, to] = range;
     let mut lines = vec![from];
-    // Ranges still to be looked at, the next one last.
+    // Stack of ranges to be examined.
     let mut open = vec![(from, to, 0)];
     while let Some((from, to, halvings)) = open.pop() {
         let (ends, length_m) = ([across(from), across(to)], to - from);
         let straight = || {
-            BETWEEN.iter().all(|share| {
+            CHORD_SHARES.iter().all(|share| {
                 let wall = across(from + share * length_m);
                 let chord = |k: usize| ends[0][k].lerp(&ends[1][k], *share);
                 (0..wall.len()).all(|k| (wall[k] - chord(k)).norm() <= tolerance_m)
             })
         };
-        if halvings == HALVINGS || length_m <= finest_m || straight() {
+        if halvings == MAX_HALVINGS || length_m <= finest_m || straight() {
             lines.push(to);
         } else {
             let middle = 0.5 * (from + to);
@@ -86,22 +90,22 @@ fn bisect(
     lines
 }
 
-/// A patch as triangles.
+/// Triangle mesh of a rectangle of the wall.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
-    /// What the positions are relative to, world, whole metres: exact in single precision, too.
+    /// Origin of the positions in the world, whole metres, which is exact in single precision.
     pub origin_m: Vector3<f64>,
-    /// Positions in the world less the origin, metres; row by row, `s` runs fastest.
+    /// World positions relative to the origin, metres, row by row; `s` varies fastest.
     pub positions_m: Vec<Vector3<f32>>,
-    /// The same on the wall: arc length and chainage, metres.
+    /// Arc length and chainage of the positions, metres.
     pub wall: Vec<WallPoint>,
-    /// Corners of the triangles, counter-clockwise as seen from inside.
+    /// Vertex indices of the triangles, counter-clockwise as seen from inside.
     pub triangles: Vec<[u32; 3]>,
 }
 
 impl Mesh {
-    /// The patch cut at `lines`.
-    pub fn new(surface: &dyn Surface, lines: &Lines) -> Self {
+    /// The mesh with vertices at the intersections of `lines`.
+    pub fn new(surface: &dyn Surface, lines: &GridLines) -> Self {
         let mut points = Vec::new();
         surface.lattice(&lines.s_m, &lines.h_m, &mut points);
         let [low, high] = bounds(&points);
@@ -124,13 +128,14 @@ impl Mesh {
         }
     }
 
-    /// The least and the largest coordinates, world, metres.
+    /// Axis-aligned bounding box in the world, metres: minimum and maximum.
     pub fn bounds_m(&self) -> [Vector3<f64>; 2] {
         let points: Vec<_> = self.positions_m.iter().map(|x| x.cast()).collect();
         bounds(&points).map(|corner| corner + self.origin_m)
     }
 }
 
+/// Axis-aligned bounding box of points: minimum and maximum.
 fn bounds(points: &[Vector3<f64>]) -> [Vector3<f64>; 2] {
     let start = [f64::INFINITY, f64::NEG_INFINITY].map(Vector3::repeat);
     points
@@ -145,7 +150,7 @@ mod tests {
     use crate::surface::{CentrePoint, Centreline, Circle, Prism, Swept};
     use std::f64::consts::TAU;
 
-    const PATCH: Patch = Patch {
+    const RECTANGLE: WallRectangle = WallRectangle {
         s_m: [0.0, 3.0 * TAU],
         h_m: [9_990.0, 10_050.0],
     };
@@ -153,10 +158,10 @@ mod tests {
     #[test]
     fn a_straight_tunnel_is_cut_along_its_length_only() {
         let circle = Circle::new(3.0).unwrap();
-        let lines = Lines::cut(&circle, &PATCH, 1e-3, 0.0);
-        assert_eq!(lines.h_m, PATCH.h_m);
-        // The sagitta of a chord over Δs is Δs²/8r; here each half has twice what is needed at the
-        // most.
+        let lines = GridLines::cut(&circle, &RECTANGLE, 1e-3, 0.0);
+        assert_eq!(lines.h_m, RECTANGLE.h_m);
+        // The sagitta of a chord over Δs is Δs²/8r; bisection makes chords at most twice as fine as
+        // needed.
         let widest = lines.s_m.windows(2).map(|pair| pair[1] - pair[0]);
         let widest = widest.fold(0.0, f64::max);
         let sagitta = widest * widest / (8.0 * 3.0);
@@ -167,7 +172,7 @@ mod tests {
     #[test]
     fn triangles_lie_on_the_wall_and_face_inwards() {
         let circle = Circle::new(3.0).unwrap();
-        let mesh = Mesh::new(&circle, &Lines::cut(&circle, &PATCH, 1e-3, 0.0));
+        let mesh = Mesh::new(&circle, &GridLines::cut(&circle, &RECTANGLE, 1e-3, 0.0));
         assert_eq!(mesh.origin_m, Vector3::new(0.0, 10_020.0, 0.0));
         for (x, wall) in mesh.positions_m.iter().zip(&mesh.wall) {
             let x_w = x.cast::<f64>() + mesh.origin_m;
@@ -183,8 +188,7 @@ mod tests {
         assert!((low.y, high.y) == (9_990.0, 10_050.0) && high.x > 2.99);
     }
 
-    /// A box and a bend of it: between the corners of its triangles the wall is where they are, and
-    /// they face inwards.
+    /// The triangles of a box and of a bent box lie on the wall and face inwards.
     #[test]
     fn corners_and_bends_are_followed() {
         let section = || Box::new(PiecewiseOutline::rectangle(4.0, 3.0).unwrap());
@@ -201,12 +205,12 @@ mod tests {
         let (straight, bent) = (Prism::new(section()), Swept::new(section(), line));
         let surfaces: [(&dyn Surface, usize); 2] = [(&straight, 2), (&bent, 20)];
         for (surface, rows) in surfaces {
-            let patch = Patch {
+            let rectangle = WallRectangle {
                 s_m: [0.0, surface.perimeter_m()],
                 h_m: [5.0, 45.0],
             };
             let tolerance_m = 5e-3;
-            let lines = Lines::cut(surface, &patch, tolerance_m, tolerance_m);
+            let lines = GridLines::cut(surface, &rectangle, tolerance_m, tolerance_m);
             assert!(lines.h_m.len() >= rows && lines.s_m.len() < 80, "{lines:?}");
             let mesh = Mesh::new(surface, &lines);
             for triangle in &mesh.triangles {
@@ -228,7 +232,7 @@ mod tests {
     #[test]
     fn the_finest_step_ends_it() {
         let circle = Circle::new(3.0).unwrap();
-        let lines = Lines::cut(&circle, &PATCH, 0.0, 1.0);
+        let lines = GridLines::cut(&circle, &RECTANGLE, 0.0, 1.0);
         assert!(lines.s_m.len() < 64 && lines.h_m.len() <= 65);
     }
 }

@@ -1,12 +1,12 @@
-//! The tree of a tileset: OGC 3D Tiles 1.1, explicit tiling.
+//! Tree of a tileset: OGC 3D Tiles 1.1, explicit tiling.
 //!
-//! Levels are those of the panorama's pyramid, and a tile has up to four children of half its size
-//! on the wall that replace it. Coordinates are the world's: 3D Tiles has z up as the world has,
-//! and turns glTF's axes by itself.
+//! Levels are those of the panorama's pyramid; a tile has up to four children of half its size
+//! that replace it. Coordinates are those of the world: 3D Tiles has z up, too, and converts glTF's axes.
 //!
-//! **Geometric error.** What a tile lacks is sharpness. Programs refine a tile whose error seems
-//! larger than some 16 pixels, so the error of a tile is [`SCREEN_PX`] of its texture's pixels, in
-//! metres: then a pixel of it fills at most one of the screen. The finest tiles have no error.
+//! **Geometric error.** Coarse tiles lack resolution. Programs refine a tile whose error on the
+//! screen exceeds some 16 pixels, so the error of a tile is [`SCREEN_PX`] pixels of its texture, in
+//! metres: then a pixel of the texture covers at most one of the screen. The finest tiles have
+//! error 0.
 
 use crate::PROGRAM;
 use nalgebra::Vector3;
@@ -16,38 +16,37 @@ use std::collections::HashMap;
 /// The error on the screen at which programs refine by default, pixels.
 pub(super) const SCREEN_PX: f64 = 16.0;
 
-/// Levels of one file: a file has at most 4⁰ + … + 4⁴ tiles, so that a long tunnel streams its
-/// tree, too.
-const LEVELS_A_FILE: usize = 5;
+/// Levels per file, which has at most 4⁰ + … + 4⁴ tiles, so that the tree is streamed as well.
+const LEVELS_PER_FILE: usize = 5;
 
-/// Level (0 is the finest), column and row.
-pub(super) type Key = (usize, u32, u32);
+/// Key of a tile: level (0 is the finest), column and row.
+pub(super) type TileKey = (usize, u32, u32);
 
-/// The tiles that were written.
-pub(super) struct Tree<'a> {
+/// Tree of the written tiles.
+pub(super) struct TileTree<'a> {
     /// Pixels per metre of the finest level.
     pub(super) px_per_metre: f64,
-    /// Columns and rows of tiles, level by level.
+    /// Number of columns and rows of tiles of each level.
     pub(super) grids: Vec<[u32; 2]>,
-    /// The least and largest coordinates of each tile's own triangles, world, metres.
-    pub(super) bounds_m: &'a HashMap<Key, [Vector3<f64>; 2]>,
+    /// Bounding box of each tile's mesh in the world, metres.
+    pub(super) bounds_m: &'a HashMap<TileKey, [Vector3<f64>; 2]>,
 }
 
-/// The name of a tile's content.
-pub(super) fn content_name((level, column, row): Key) -> String {
+/// Name of a tile's content file.
+pub(super) fn content_name((level, column, row): TileKey) -> String {
     format!("{level}/{column}_{row}.glb")
 }
 
-/// The name of the file of the tree below a tile.
-fn file_name((level, column, row): Key) -> String {
+/// Name of the file of the tree below a tile.
+fn file_name((level, column, row): TileKey) -> String {
     format!("{level}_{column}_{row}.json")
 }
 
 /// Name of the file that holds the root of the tree of tiles.
 pub const TILESET: &str = "tileset.json";
 
-impl Tree<'_> {
-    /// All files of the tree, by name.
+impl TileTree<'_> {
+    /// All files of the tree, with their names.
     pub(super) fn files(&self) -> Vec<(String, Value)> {
         let root = (self.grids.len() - 1, 0, 0);
         let mut files = Vec::new();
@@ -56,8 +55,9 @@ impl Tree<'_> {
         files
     }
 
-    fn file(&self, (level, ..): Key, root: Value) -> Value {
-        // What is wrong where nothing is drawn: as much as one level more.
+    /// A file of the tree with the given root.
+    fn file(&self, (level, ..): TileKey, root: Value) -> Value {
+        // Error of the missing root: that of one more level.
         let error_m = self.error_m(level + 1);
         json!({
             "asset": { "version": "1.1", "extras": { "generator": PROGRAM } },
@@ -66,6 +66,7 @@ impl Tree<'_> {
         })
     }
 
+    /// Geometric error of a level, metres.
     fn error_m(&self, level: usize) -> f64 {
         match level {
             0 => 0.0,
@@ -73,16 +74,15 @@ impl Tree<'_> {
         }
     }
 
-    /// A tile and all below it; the least and largest coordinates of all that. Files of deeper
-    /// parts are added to `files`.
-    fn tile(&self, key: Key, files: &mut Vec<(String, Value)>) -> (Value, [Vector3<f64>; 2]) {
+    /// A tile with its subtree, and their bounding box; adds the files of deeper parts to `files`.
+    fn tile(&self, key: TileKey, files: &mut Vec<(String, Value)>) -> (Value, [Vector3<f64>; 2]) {
         let (level, column, row) = key;
         let mut bounds = self.bounds_m.get(&key).copied().unwrap_or_default();
         let mut children = Vec::new();
         for key in self.children(level, column, row) {
             let (child, [low, high]) = self.tile(key, files);
             bounds = [bounds[0].inf(&low), bounds[1].sup(&high)];
-            children.push(self.within_a_file(key, child, files));
+            children.push(self.split_file(key, child, files));
         }
         let mut tile = json!({
             "boundingVolume": { "box": oriented_box(&bounds) },
@@ -96,9 +96,9 @@ impl Tree<'_> {
         (tile, bounds)
     }
 
-    /// The tile itself, or one that stands for the file that it was moved into.
-    fn within_a_file(&self, key: Key, tile: Value, files: &mut Vec<(String, Value)>) -> Value {
-        if key.0 % LEVELS_A_FILE != LEVELS_A_FILE - 1 {
+    /// The tile itself, or a reference to the file into which it is moved.
+    fn split_file(&self, key: TileKey, tile: Value, files: &mut Vec<(String, Value)>) -> Value {
+        if key.0 % LEVELS_PER_FILE != LEVELS_PER_FILE - 1 {
             return tile;
         }
         let reference = json!({
@@ -111,7 +111,8 @@ impl Tree<'_> {
         reference
     }
 
-    fn children(&self, level: usize, column: u32, row: u32) -> impl Iterator<Item = Key> {
+    /// Keys of the children of a tile.
+    fn children(&self, level: usize, column: u32, row: u32) -> impl Iterator<Item = TileKey> {
         let below = level.checked_sub(1);
         let grid = below.map_or([0, 0], |below| self.grids[below]);
         [[0, 0], [1, 0], [0, 1], [1, 1]]
@@ -122,7 +123,7 @@ impl Tree<'_> {
     }
 }
 
-/// Centre and half axes, a little larger than the triangles, whose numbers are rounded.
+/// Oriented box (centre and half axes) with a margin for the rounding of vertices.
 fn oriented_box([low, high]: &[Vector3<f64>; 2]) -> Vec<f64> {
     const MARGIN_M: f64 = 1e-4;
     let (centre, half) = ((low + high) * 0.5, (high - low) * 0.5);

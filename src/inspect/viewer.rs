@@ -1,25 +1,25 @@
-//! The viewer's page, bundled by `build.rs`.
+//! Page of the viewer, bundled by `build.rs`.
 
-use super::InspectError;
+use crate::inspect::error::InspectError;
 use crate::persist::atomic::WriteError;
 use std::path::Path;
 
-/// The page and what belongs to it.
+/// Page of the viewer with its style and script.
 #[derive(Clone, Copy, Debug)]
 pub struct Viewer {
-    /// `index.html`.
+    /// Content of `index.html`.
     pub page: &'static [u8],
-    /// `viewer.css`.
+    /// Content of `viewer.css`.
     pub style: &'static [u8],
-    /// `viewer.js`.
+    /// Content of `viewer.js`.
     pub script: &'static [u8],
 }
 
 impl Viewer {
-    /// The page that this program was built with.
+    /// The page that is embedded in this program.
     ///
     /// # Errors
-    /// [`InspectError::NoViewer`] if npm was missing then.
+    /// [`InspectError::NoViewer`] if npm was missing at build time.
     pub fn bundled() -> Result<Self, InspectError> {
         let script = include_bytes!(concat!(env!("OUT_DIR"), "/viewer.js"));
         if script.is_empty() {
@@ -33,10 +33,10 @@ impl Viewer {
         }
     }
 
-    /// Writes the page into a folder that a web server hands out as it is.
+    /// Writes the page into a folder for a static web server.
     ///
     /// # Errors
-    /// Whatever the system says.
+    /// [`WriteError`] if a file cannot be written.
     pub fn write(&self, folder: &Path) -> Result<(), WriteError> {
         let files: [(&str, &[u8]); 4] = [
             ("index.html", self.page),

@@ -23,7 +23,7 @@
 //! # let path = folder.path().join("survey");
 //! # let camera = tunnelstitch::camera::Camera::from_vertical_fov(160, 120, 1.0);
 //! # let options = SimulateOptions { frames: 4, camera, ..SimulateOptions::free() };
-//! # simulate::run(&options, &path, false, &Silent)?;
+//! # simulate::write_survey(&options, &path, false, &Silent)?;
 //! let survey = Survey::open(&path)?;
 //! let origin = Origin {
 //!     program: "my program 1.0".to_owned(),

@@ -7,7 +7,7 @@ use super::model::{
 use super::pictures::{Pictures, panoramas, thumbnails};
 use super::refined_files::{RefinedFiles, Refinement};
 use crate::PROGRAM;
-use crate::evaluate::{Comparison, Drawings, SeamMap, WallError};
+use crate::evaluate::{ComparedPanoramas, Comparison, SeamMap, WallError};
 use crate::numerics::median::upper_median;
 use crate::refine::FrameFlag;
 use crate::survey::Survey;
@@ -27,7 +27,7 @@ pub struct Sources<'a> {
     /// Comparison of initial and refined poses.
     pub comparison: &'a Comparison,
     /// The panoramas of the comparison.
-    pub drawings: &'a Drawings,
+    pub drawings: &'a ComparedPanoramas,
     /// Command line of the report.
     pub command: Vec<String>,
 }
@@ -203,7 +203,7 @@ fn summarise(
 }
 
 /// Rounds the maps of the comparison.
-fn wall_maps(drawings: &Drawings) -> WallMaps {
+fn wall_maps(drawings: &ComparedPanoramas) -> WallMaps {
     let map = &drawings.refined.seams;
     let residual = |map: &SeamMap| -> Vec<Option<f64>> {
         map.rms_grey()

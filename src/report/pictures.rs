@@ -2,7 +2,7 @@
 
 use super::error::ReportError;
 use super::model::{PanoramaStrips, Strip, Thumbnail};
-use crate::evaluate::{Drawing, Drawings};
+use crate::evaluate::{ComparedPanorama, ComparedPanoramas};
 use crate::frames::load_colour;
 use crate::render::{Canvas, Layout};
 use crate::survey::Survey;
@@ -37,7 +37,7 @@ const QUALITY: [u8; 2] = [82, 75];
 /// [`ReportError::Encode`].
 pub fn panoramas(
     canvas: &Canvas,
-    drawings: &Drawings,
+    drawings: &ComparedPanoramas,
     pictures: &mut Pictures,
 ) -> Result<PanoramaStrips, ReportError> {
     let layout = if canvas.rows > canvas.columns {
@@ -51,7 +51,7 @@ pub fn panoramas(
     if layout == Layout::ThetaRight {
         scale = scale.min(f64::from(MAX_STRIP_PX) / f64::from(canvas.columns));
     }
-    let mut strips = |which: &str, drawing: &Drawing| {
+    let mut strips = |which: &str, drawing: &ComparedPanorama| {
         let image = drawing.panorama.clone().into_image(layout);
         cut(which, &shrink(&fill_holes(&image), scale), pictures)
     };

@@ -1,48 +1,49 @@
-//! Which frames are no good, and why.
+//! Faults of single frames: black, blurred, occluded, repeated or missing.
 
 use serde::{Serialize, Serializer};
 use std::fmt;
 use std::str::FromStr;
 
-/// What is wrong with a frame.
+/// Fault that is injected into a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Fault {
-    /// All zero, but for the sensor's noise.
+pub enum FrameFault {
+    /// All zero, except for the sensor's noise.
     Black,
     /// Motion blur of 15 to 30 pixels.
     Blurred,
-    /// The left half is covered by a dark object with a texture of its own.
+    /// The left half is covered by a dark textured object.
     Occluded,
-    /// The picture of the frame before again, to the bit; the camera has moved on.
+    /// A bit-exact copy of the frame before, although the camera has moved on.
     Repeated,
-    /// Not there at all, and its poses neither.
+    /// Neither an image nor poses exist.
     Missing,
 }
 
-/// The faults by their names.
-const FAULTS: [(&str, Fault); 5] = [
-    ("black", Fault::Black),
-    ("blurred", Fault::Blurred),
-    ("occluded", Fault::Occluded),
-    ("repeated", Fault::Repeated),
-    ("missing", Fault::Missing),
+/// Names of the faults in the text form of a list.
+const FAULT_NAMES: [(&str, FrameFault); 5] = [
+    ("black", FrameFault::Black),
+    ("blurred", FrameFault::Blurred),
+    ("occluded", FrameFault::Occluded),
+    ("repeated", FrameFault::Repeated),
+    ("missing", FrameFault::Missing),
 ];
 
 /// Consecutive frames with the same fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Run {
+struct FaultRange {
     first: usize,
     last: usize,
-    fault: Fault,
+    fault: FrameFault,
 }
 
-/// The bad frames of a survey; all others are good. As a text, and in `simulation.json`:
-/// `5:black,9:blurred,18-20:missing`.
+/// The frames of a survey with a fault; all others are good.
+///
+/// Text form, also in `simulation.json`: `5:black,9:blurred,18-20:missing`.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct BadFrames(Vec<Run>);
+pub struct BadFrames(Vec<FaultRange>);
 
-/// An item of a list of bad frames cannot be used.
+/// Error for an item of a list of bad frames that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("bad frames `{item}`: {what}")]
 pub struct BadFramesError {
@@ -51,29 +52,33 @@ pub struct BadFramesError {
 }
 
 impl BadFrames {
-    /// What is wrong with a frame, if anything.
-    pub fn fault(&self, frame: usize) -> Option<Fault> {
-        self.run(frame).map(|run| run.fault)
+    /// The fault of a frame, or `None` for a good one.
+    pub fn fault(&self, frame: usize) -> Option<FrameFault> {
+        self.range_of(frame).map(|range| range.fault)
     }
 
-    /// Number of frames that are missing.
-    pub fn missing(&self) -> usize {
-        let missing = self.0.iter().filter(|run| run.fault == Fault::Missing);
-        missing.map(|run| run.last - run.first + 1).sum()
+    /// Number of missing frames.
+    pub fn missing_count(&self) -> usize {
+        let missing = self
+            .0
+            .iter()
+            .filter(|range| range.fault == FrameFault::Missing);
+        missing.map(|range| range.last - range.first + 1).sum()
     }
 
-    /// The frame whose picture a frame shows: its own, or of a repeated frame the last one before
-    /// it that is neither repeated nor missing. `None` if the frame is missing or has nothing to
-    /// repeat.
-    pub fn shown(&self, frame: usize) -> Option<usize> {
-        if self.fault(frame) == Some(Fault::Missing) {
+    /// The frame whose image a frame shows.
+    ///
+    /// That is the frame itself, or for a repeated frame the last one before it that is neither
+    /// repeated nor missing. `None` if the frame is missing or has nothing to repeat.
+    pub fn source_frame(&self, frame: usize) -> Option<usize> {
+        if self.fault(frame) == Some(FrameFault::Missing) {
             return None;
         }
         let mut shown = frame;
-        while let Some(run) = self.run(shown)
-            && matches!(run.fault, Fault::Repeated | Fault::Missing)
+        while let Some(range) = self.range_of(shown)
+            && matches!(range.fault, FrameFault::Repeated | FrameFault::Missing)
         {
-            shown = run.first.checked_sub(1)?;
+            shown = range.first.checked_sub(1)?;
         }
         Some(shown)
     }
@@ -81,35 +86,37 @@ impl BadFrames {
     /// Checks the list against the survey's number of frames.
     ///
     /// # Errors
-    /// [`BadFramesError`] for the first item that names a frame beyond the last one or repeats what
-    /// is not there, and when no frame is left.
-    pub(super) fn check(&self, frames: usize) -> Result<(), BadFramesError> {
-        for run in &self.0 {
-            let wrong = if run.last >= frames {
+    /// [`BadFramesError`] for the first item that names a frame beyond the last one or repeats a
+    /// frame that does not exist, and if no frame is left.
+    pub(super) fn validate(&self, frames: usize) -> Result<(), BadFramesError> {
+        for range in &self.0 {
+            let wrong = if range.last >= frames {
                 format!(
                     "the last of {frames} frames is number {}",
                     frames.saturating_sub(1)
                 )
-            } else if run.fault == Fault::Repeated && self.shown(run.first).is_none() {
-                format!("there is no frame before number {} to repeat", run.first)
-            } else if self.missing() == frames {
+            } else if range.fault == FrameFault::Repeated
+                && self.source_frame(range.first).is_none()
+            {
+                format!("there is no frame before number {} to repeat", range.first)
+            } else if self.missing_count() == frames {
                 "no frame would be left".to_owned()
             } else {
                 continue;
             };
-            return Err(run.error(&wrong));
+            return Err(range.error(&wrong));
         }
         Ok(())
     }
 
-    fn run(&self, frame: usize) -> Option<&Run> {
+    fn range_of(&self, frame: usize) -> Option<&FaultRange> {
         self.0
             .iter()
-            .find(|run| (run.first..=run.last).contains(&frame))
+            .find(|range| (range.first..=range.last).contains(&frame))
     }
 }
 
-impl Run {
+impl FaultRange {
     fn error(&self, what: &str) -> BadFramesError {
         BadFramesError {
             item: self.to_string(),
@@ -118,7 +125,7 @@ impl Run {
     }
 }
 
-impl FromStr for Run {
+impl FromStr for FaultRange {
     type Err = String;
 
     fn from_str(item: &str) -> Result<Self, String> {
@@ -129,15 +136,15 @@ impl FromStr for Run {
         let number = |text: &str| {
             let text = text.trim();
             text.parse::<usize>()
-                .map_err(|_| format!("`{text}` is no number of a frame; the first frame is 0"))
+                .map_err(|_| format!("`{text}` is not a frame number; the first frame is 0"))
         };
         let (first, last) = (number(first)?, number(last)?);
         if first > last {
             return Err(format!("{first} comes after {last}"));
         }
         let fault = fault.trim();
-        let names = FAULTS.map(|(name, _)| name).join(", ");
-        let fault = FAULTS
+        let names = FAULT_NAMES.map(|(name, _)| name).join(", ");
+        let fault = FAULT_NAMES
             .iter()
             .find(|(name, _)| *name == fault)
             .map(|(_, fault)| *fault)
@@ -150,39 +157,39 @@ impl FromStr for BadFrames {
     type Err = BadFramesError;
 
     fn from_str(text: &str) -> Result<Self, BadFramesError> {
-        let mut runs: Vec<Run> = Vec::new();
+        let mut ranges: Vec<FaultRange> = Vec::new();
         for item in text.split(',').map(str::trim) {
-            let run: Run = item.parse().map_err(|what| BadFramesError {
+            let range: FaultRange = item.parse().map_err(|what| BadFramesError {
                 item: item.to_owned(),
                 what,
             })?;
-            if let Some(twice) = runs
+            if let Some(twice) = ranges
                 .iter()
-                .find(|other| run.first <= other.last && other.first <= run.last)
+                .find(|other| range.first <= other.last && other.first <= range.last)
             {
-                return Err(run.error(&format!("`{twice}` names a frame of it already")));
+                return Err(range.error(&format!("`{twice}` already names one of its frames")));
             }
-            runs.push(run);
+            ranges.push(range);
         }
-        Ok(Self(runs))
+        Ok(Self(ranges))
     }
 }
 
-impl fmt::Display for Run {
+impl fmt::Display for FaultRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.first)?;
         if self.last != self.first {
             write!(f, "-{}", self.last)?;
         }
-        let name = FAULTS.iter().find(|(_, fault)| *fault == self.fault);
+        let name = FAULT_NAMES.iter().find(|(_, fault)| *fault == self.fault);
         write!(f, ":{}", name.map_or("", |(name, _)| name))
     }
 }
 
 impl fmt::Display for BadFrames {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let runs: Vec<String> = self.0.iter().map(Run::to_string).collect();
-        write!(f, "{}", runs.join(","))
+        let ranges: Vec<String> = self.0.iter().map(FaultRange::to_string).collect();
+        write!(f, "{}", ranges.join(","))
     }
 }
 
@@ -210,14 +217,14 @@ mod tests {
         );
         assert_eq!(serde_json::to_string(&bad).unwrap(), format!("\"{text}\""));
         let fault = |frame| bad.fault(frame);
-        assert_eq!(fault(5), Some(Fault::Black));
+        assert_eq!(fault(5), Some(FrameFault::Black));
         assert_eq!((fault(4), fault(6)), (None, None));
-        assert_eq!(fault(12), Some(Fault::Occluded));
+        assert_eq!(fault(12), Some(FrameFault::Occluded));
         for frame in 18..=20 {
-            assert_eq!(fault(frame), Some(Fault::Missing));
+            assert_eq!(fault(frame), Some(FrameFault::Missing));
         }
-        assert_eq!((bad.missing(), fault(21)), (3, None));
-        bad.check(21).unwrap();
+        assert_eq!((bad.missing_count(), fault(21)), (3, None));
+        bad.validate(21).unwrap();
     }
 
     #[test]
@@ -225,7 +232,7 @@ mod tests {
         let bad: BadFrames = "1-3:repeated,5:missing,6:repeated,8:black,9:repeated"
             .parse()
             .unwrap();
-        let shown: Vec<_> = (0..10).map(|frame| bad.shown(frame)).collect();
+        let shown: Vec<_> = (0..10).map(|frame| bad.source_frame(frame)).collect();
         let expected = [0, 0, 0, 0, 4, 99, 4, 7, 8, 8].map(|k| (k != 99).then_some(k));
         assert_eq!(shown, expected);
     }
@@ -236,8 +243,8 @@ mod tests {
             ("5:black,9:blury", "`9:blury`", "none of black, blurred"),
             ("5:black,9", "`9`", "frame:fault"),
             ("5:black,", "``", "frame:fault"),
-            ("x:black", "`x:black`", "`x` is no number"),
-            ("-3:black", "`-3:black`", "`` is no number"),
+            ("x:black", "`x:black`", "`x` is not a frame number"),
+            ("-3:black", "`-3:black`", "`` is not a frame number"),
             ("20-18:missing", "`20-18:missing`", "20 comes after 18"),
             ("3-6:black,5:missing", "`5:missing`", "`3-6:black`"),
         ] {
@@ -257,7 +264,7 @@ mod tests {
             ("0-4:missing,5-9:missing", "no frame would be left"),
         ] {
             let bad: BadFrames = text.parse().unwrap();
-            let message = bad.check(10).unwrap_err().to_string();
+            let message = bad.validate(10).unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         }
     }

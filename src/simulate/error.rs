@@ -1,33 +1,34 @@
-//! Why a survey cannot be simulated.
+//! Errors of the simulator.
 
-use super::BadFramesError;
 use crate::persist::atomic::WriteError;
+use crate::simulate::bad_frames::BadFramesError;
 use std::path::PathBuf;
 
-/// Why a survey cannot be simulated.
+/// Reason why a survey cannot be simulated.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulateError {
-    /// An option is impossible.
+    /// An option has an impossible value.
     #[error("{what}")]
     Option {
-        /// Which, and what it should be.
+        /// The option and its valid range.
         what: String,
     },
-    /// A bad frame is impossible.
+    /// The list of bad frames is impossible.
     #[error(transparent)]
     BadFrames(#[from] BadFramesError),
-    /// The wall's picture cannot be used.
+    /// The image of the wall's texture cannot be used.
     #[error("{}: cannot use the texture: {what}", path.display())]
     Texture {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Description of the problem.
         what: String,
     },
-    /// A true pose left the tunnel.
+    /// A true pose lies outside of the tunnel.
     #[error(
-        "frame {frame}: the camera would stand {distance_m:.3} m off the axis, in the wall or beyond it; lower the translation sigmas or the number of frames, or take another seed"
+        "frame {frame}: the camera would stand {distance_m:.3} m off the axis, in the wall or \
+         beyond it; lower the translation sigmas or the number of frames, or take another seed"
     )]
     CameraOutside {
         /// Index of the frame.
@@ -35,14 +36,15 @@ pub enum SimulateError {
         /// Distance from the axis, metres.
         distance_m: f64,
     },
-    /// A frame sees wall without end.
+    /// A frame looks along the tunnel and sees an unlimited stretch of wall.
     #[error(
-        "frame {frame} would look along the tunnel, farther than {reach_m:.0} m; lower the field of view or the rotation sigma, or take another seed"
+        "frame {frame} would look along the tunnel, farther than {reach_m:.0} m; lower the field \
+         of view or the rotation sigma, or take another seed"
     )]
     LooksAlongTheAxis {
         /// Index of the frame.
         frame: usize,
-        /// How far the simulated wall reaches from a camera, metres.
+        /// Maximum distance of simulated wall from a camera, metres.
         reach_m: f64,
     },
     /// The output folder is in use.
@@ -50,7 +52,7 @@ pub enum SimulateError {
     Exists {
         /// The folder.
         path: PathBuf,
-        /// Why it is not replaced, and the remedy.
+        /// Reason why it is not replaced, and the remedy.
         what: &'static str,
     },
     /// An output cannot be written.

@@ -1,53 +1,53 @@
-//! Surveys of tunnels that never were: known walls, known poses, known noise.
+//! Simulated surveys: known walls, known poses, known noise.
 //!
 //! ```text
-//! SimulateOptions ─ Scene ──> plan, true poses, wall ─ Band (the wall as a raster) ─ cast ──> frames
+//! SimulateOptions ─ Scene ─> plan, true poses, wall ─ WallRaster ─ cast_rays ─> frames
 //! ```
 //!
-//! What makes a survey harder is off unless asked for, each in a file of its own, in this order:
+//! Every degradation is off by default, has a file of its own, and is applied in this order:
 //!
 //! ```text
-//! wall ─ damp patches and glints ─ moving things ─ lamp ─ exposure ─┬─> Scene::render_exact
-//!                                                                   └─ bad frames ─ sensor ──> frames
+//! wall ─ wet patches ─ moving objects ─ vignetting ─ shaft of the rig ─ exposure ─┐
+//!                            ┌────────────────────────────────────────────────────┘
+//!                            ├─> Scene::render_exact
+//!                            └─ fault injection ─ sensor noise and rounding ─> frames
 //! ```
 //!
-//! Each pixel is the mean of points spread over its square, between rays cast with a ray–wall
-//! intersection of the simulator's own: it shares no warp code with the renderer or the estimator,
-//! so that it can judge them.
+//! Each pixel is the mean of points spread over its square, interpolated between rays that are
+//! intersected with the wall by the simulator's own equations. It shares no warp code with the
+//! renderer or the estimator, so that it can judge them.
 //!
 //! [`SimulateOptions::centred`], [`SimulateOptions::off_centre`] and [`SimulateOptions::free`] are
-//! the three experiments of the paper (arXiv 1806.10278); [`run()`] writes a whole survey folder,
-//! [`Scene`] renders single frames in memory.
+//! the three experiments of the paper (arXiv 1806.10278). [`write_survey`] writes a whole survey
+//! folder; [`Scene`] renders single frames in memory.
 
 mod bad_frames;
-mod band;
-mod brick;
-mod caster;
-mod concrete;
-mod damp;
+mod camera_path;
+mod cross_section;
 mod error;
 mod exposure;
-mod lamp;
-mod moving;
-mod noise;
+mod fault_injection;
+mod moving_objects;
 mod options;
-mod outline;
-mod path;
-mod picture;
-mod run;
+mod procedural_noise;
+mod ray_casting;
+mod rendering;
+mod rig_shaft;
 mod scene;
 mod sensor;
-mod shaft;
-mod spoil;
-mod target;
+mod survey_folder;
+mod texture;
 mod tunnel;
-mod wall;
+mod vignetting;
+mod visible_wall;
+mod wall_raster;
+mod wet_patches;
 
-pub use bad_frames::{BadFrames, BadFramesError, Fault};
+pub use bad_frames::{BadFrames, BadFramesError, FrameFault};
 pub use error::SimulateError;
-pub use exposure::Exposure;
-pub use options::{Light, SimulateOptions, Wall};
-pub use run::{Simulated, run};
+pub use exposure::GainBias;
+pub use options::{Illumination, SimulateOptions, Wall};
 pub use scene::Scene;
-pub use sensor::Bits;
-pub use target::SlantedEdge;
+pub use sensor::BitDepth;
+pub use survey_folder::{SimulationRecord, write_survey};
+pub use texture::slanted_edge::SlantedEdge;

@@ -1,13 +1,15 @@
-//! What to simulate.
+//! Options of a simulated survey.
 
-use super::{BadFrames, Bits, SimulateError};
 use crate::camera::Camera;
+use crate::simulate::bad_frames::BadFrames;
+use crate::simulate::error::SimulateError;
+use crate::simulate::sensor::BitDepth;
 use crate::survey::{PriorSection, TunnelSection};
 use crate::trajectory::JitterModel;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// What the wall looks like. Grey levels of an evenly lit wall.
+/// Appearance of the wall under even light.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -16,38 +18,37 @@ pub enum Wall {
     Brick,
     /// Cast concrete: smooth stains, low contrast.
     Concrete,
-    /// A tile of 8 × 6 bricks that repeats all over the tunnel: pictures of different places look
-    /// alike.
+    /// A tile of 8 × 6 bricks that repeats all over the tunnel: perceptual aliasing.
     TiledBrick,
-    /// Dark and bright squares on mid grey, turned by 5° ([`super::SlantedEdge`]): a test target
-    /// for sharpness.
+    /// Dark and bright squares on mid grey, turned by 5°: a test target for sharpness
+    /// ([`SlantedEdge`](super::SlantedEdge)).
     Target,
-    /// A picture that repeats all over the tunnel.
+    /// An image that repeats all over the tunnel.
     Texture {
-        /// The picture.
+        /// The image file.
         path: PathBuf,
-        /// Its width on the wall, metres; changed a little so that a whole number fits around.
+        /// Width of the image on the wall, metres; adjusted so that a whole number fits around.
         width_m: f64,
     },
 }
 
-/// How the wall is lit.
+/// Illumination of the wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
-pub enum Light {
-    /// From one side, as the paper's: `0.35 + 0.65 (1 + cos θ)/2`, bright at θ = 0, dark at 180°.
+pub enum Illumination {
+    /// Directional, as in the paper: `0.35 + 0.65 (1 + cos θ)/2`, bright at θ = 0.
     Downward,
-    /// The same everywhere.
+    /// Uniform.
     Even,
 }
 
-/// A survey to simulate.
+/// Options of a simulated survey.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SimulateOptions {
     /// Number of frames.
     pub frames: usize,
-    /// The tunnel. Plan and jitter are laid out along it as if it were straight.
+    /// The tunnel; plan and jitter are defined along its axis as if it were straight.
     pub tunnel: TunnelSection,
     /// The camera.
     pub camera: Camera,
@@ -56,65 +57,66 @@ pub struct SimulateOptions {
     /// Turn about the axis from frame to frame, degrees.
     pub turn_deg: f64,
     /// Time from frame to frame, seconds.
-    #[serde(skip_serializing_if = "is_a_second")]
+    #[serde(skip_serializing_if = "is_one_second")]
     pub interval_s: f64,
-    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds;
-    /// negative if rows are read bottom-up, 0 if all are read at once. Poses are those of the
-    /// middle row; between them the camera moves smoothly.
+    /// Rolling-shutter readout time from a frame's first row to its last, milliseconds.
+    ///
+    /// It is negative if rows are read bottom-up, and 0 for a global shutter. Poses are those of
+    /// the middle row; between them the camera moves smoothly.
     #[serde(skip_serializing_if = "is_default")]
     pub readout_ms: f64,
-    /// Where the camera really stands, relative to the plan, metres; the initial poses do not know.
+    /// True position minus planned position, metres; the initial poses do not contain it.
     pub offset_m: [f64; 3],
-    /// Noise on the plan, if any; the initial poses do not know.
+    /// Noise of the true poses about the plan, if any; the initial poses do not contain it.
     pub jitter: Option<PriorSection>,
-    /// What the wall looks like.
+    /// Appearance of the wall.
     pub wall: Wall,
-    /// How it is lit.
-    pub light: Light,
+    /// Illumination of the wall.
+    pub light: Illumination,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise_grey: f64,
-    /// Most that a frame's gain differs from 1, percent: uniform in `1 ± P/100`, each frame on its
-    /// own.
+    /// Half the range P of the frames' gains, percent: independent and uniform in `1 ± P/100`.
     #[serde(skip_serializing_if = "is_default")]
     pub gain_percent: f64,
-    /// Most that a frame's bias differs from 0, grey levels: uniform in ±B, each frame on its own.
+    /// Half the range B of the frames' biases, grey levels: independent and uniform in ±B.
     #[serde(skip_serializing_if = "is_default")]
     pub bias_grey: f64,
-    /// Shading that moves with the camera, if any: the light in the frame's darkest corner, as a
-    /// share (0–1) of that at the brightest spot, which lies a tenth of the frame right of and
-    /// above its middle.
+    /// Vignetting, if any: the light in the darkest corner, as a share (0–1) of that at the
+    /// brightest pixel, which lies a tenth of the frame right of and above its centre.
     #[serde(skip_serializing_if = "is_default")]
     pub lamp_corner: Option<f64>,
-    /// How much of the wall is covered by damp patches in which the camera's lamp glints, percent.
+    /// Share of the wall under wet patches that reflect the camera's lamp specularly, percent.
     #[serde(skip_serializing_if = "is_default")]
     pub specular_percent: f64,
-    /// Things in each frame that are not on the wall, at other places in every frame.
+    /// Number of moving objects before the wall in each frame, at random positions.
     #[serde(skip_serializing_if = "is_default")]
     pub moving: u32,
-    /// Width of the carrier's shaft, which hides the wall at the same place of every frame, percent
-    /// of the frames' width; 0: none. The survey has a mask then.
+    /// Width of the rig's shaft, percent of the frames' width; 0 for none.
+    ///
+    /// The shaft occludes the wall at the same pixels of every frame, and the survey has a mask.
     #[serde(skip_serializing_if = "is_default")]
     pub shaft_percent: f64,
-    /// Bits of a frame's grey values.
+    /// Bit depth of the frames.
     #[serde(skip_serializing_if = "is_default")]
-    pub bits: Bits,
-    /// Frames that are no good.
+    pub bits: BitDepth,
+    /// Frames with injected faults.
     #[serde(skip_serializing_if = "is_default")]
     pub bad_frames: BadFrames,
-    /// Points along each side of a pixel; a pixel is the mean of its square. The wall is painted
-    /// with some three to six texels over the width of a pixel (more where pixels are large), and
-    /// fewer points than that alias.
+    /// Sample points along each side of a pixel, whose value is their mean.
+    ///
+    /// The wall's raster has three to six texels over the width of a pixel (more where pixels are
+    /// large); fewer points than that alias.
     pub supersample: u32,
-    /// Seed of everything that is random.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// True of what was not asked for: the record leaves it out.
-fn is_a_second(value: &f64) -> bool {
+/// True for the default interval, which the record leaves out.
+fn is_one_second(value: &f64) -> bool {
     *value == 1.0
 }
 
-/// The same.
+/// True for a default value, which the record leaves out.
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
@@ -133,7 +135,7 @@ impl SimulateOptions {
             offset_m: [0.0; 3],
             jitter: None,
             wall: Wall::Brick,
-            light: Light::Downward,
+            light: Illumination::Downward,
             noise_grey: 2.0,
             gain_percent: 0.0,
             bias_grey: 0.0,
@@ -141,14 +143,15 @@ impl SimulateOptions {
             specular_percent: 0.0,
             moving: 0,
             shaft_percent: 0.0,
-            bits: Bits::default(),
+            bits: BitDepth::default(),
             bad_frames: BadFrames::default(),
             supersample: 8,
             seed: 1,
         }
     }
 
-    /// The second: the same from (0.5, 0, 0.5) m, while the initial poses claim the axis.
+    /// The paper's second experiment: as [`Self::centred`], but with the camera at (0.5, 0, 0.5) m
+    /// while the initial poses are on the axis.
     pub fn off_centre() -> Self {
         Self {
             offset_m: [0.5, 0.0, 0.5],
@@ -156,8 +159,8 @@ impl SimulateOptions {
         }
     }
 
-    /// The third: ten turns of twelve frames, 0.10 m and 30° a frame, each step 2° and (2, 2, 3) cm
-    /// off.
+    /// The paper's third experiment: ten turns of twelve frames, 0.10 m and 30° per frame, with
+    /// random errors of 2° and (2, 2, 3) cm (1-σ) in each step.
     pub fn free() -> Self {
         Self {
             frames: 120,
@@ -167,16 +170,18 @@ impl SimulateOptions {
         }
     }
 
-    /// The noise model that goes into the survey: the jitter, or for a plan without any, wide
-    /// enough for the camera's offset from it.
+    /// The pose prior that is written into the survey.
+    ///
+    /// It is the jitter's model, or without jitter one wide enough for the camera's offset.
     pub(super) fn prior(&self) -> PriorSection {
-        // A prior of zero width is none.
-        const LEAST: (f64, f64) = (0.01, 1e-4);
+        // A prior must have positive sigmas.
+        const MIN_SIGMA_DEG: f64 = 0.01;
+        const MIN_SIGMA_M: f64 = 1e-4;
         match self.jitter {
             Some(jitter) => PriorSection {
-                rotation_sigma_deg: jitter.rotation_sigma_deg.max(LEAST.0),
+                rotation_sigma_deg: jitter.rotation_sigma_deg.max(MIN_SIGMA_DEG),
                 translation_sigma_m: std::array::from_fn(|k| {
-                    jitter.translation_sigma_m[k].max(LEAST.1) + self.offset_m[k].abs()
+                    jitter.translation_sigma_m[k].max(MIN_SIGMA_M) + self.offset_m[k].abs()
                 }),
                 ..jitter
             },
@@ -188,11 +193,11 @@ impl SimulateOptions {
         }
     }
 
-    /// Checks every value.
+    /// Validates every value.
     ///
     /// # Errors
-    /// [`SimulateError::Option`] with the name of the first that is impossible.
-    pub(super) fn check(&self) -> Result<(), SimulateError> {
+    /// [`SimulateError::Option`] with the name of the first impossible option.
+    pub(super) fn validate(&self) -> Result<(), SimulateError> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let not_negative = |v: f64| v.is_finite() && v >= 0.0;
         let check = |good: bool, what: &str| {
@@ -225,7 +230,7 @@ impl SimulateOptions {
         )?;
         check(
             camera.visible_fraction() > 0.0,
-            "the lens must show some of the picture",
+            "the lens must show some part of the image",
         )?;
         check(
             self.advance_m.abs() <= 1000.0 && self.turn_deg.is_finite(),
@@ -248,7 +253,7 @@ impl SimulateOptions {
         )?;
         check(
             (1e-3 * self.readout_ms).abs() < self.interval_s,
-            "reading out a frame must take less time than passes from frame to frame",
+            "reading out a frame must take less time than the interval between frames",
         )?;
         if let Wall::Texture { width_m, .. } = self.wall {
             check(
@@ -262,7 +267,7 @@ impl SimulateOptions {
         )?;
         check(
             (1..=16).contains(&self.supersample),
-            "1 to 16 points may be looked at along each side of a pixel",
+            "1 to 16 points may be sampled along each side of a pixel",
         )?;
         check(
             (0.0..100.0).contains(&self.gain_percent),
@@ -278,17 +283,17 @@ impl SimulateOptions {
         )?;
         check(
             (0.0..=90.0).contains(&self.specular_percent),
-            "damp patches may cover 0 to 90 percent of the wall",
+            "wet patches may cover 0 to 90 percent of the wall",
         )?;
         check(
             self.moving <= 10_000,
-            "there may be no more than 10000 moving things in a frame",
+            "there may be no more than 10000 moving objects in a frame",
         )?;
         check(
             (0.0..=50.0).contains(&self.shaft_percent),
             "the shaft may be 0 to 50 percent of a frame wide",
         )?;
-        Ok(self.bad_frames.check(self.frames)?)
+        Ok(self.bad_frames.validate(self.frames)?)
     }
 }
 
@@ -298,14 +303,14 @@ mod tests {
     use std::f64::consts::TAU;
 
     #[test]
-    fn presets_are_possible_and_nonsense_is_not() {
+    fn presets_are_valid_and_impossible_options_are_refused() {
         let presets = [
             SimulateOptions::centred(),
             SimulateOptions::off_centre(),
             SimulateOptions::free(),
         ];
         for preset in &presets {
-            preset.check().unwrap();
+            preset.validate().unwrap();
             let prior = preset.prior();
             assert!(prior.rotation_sigma_deg > 0.0);
             assert!(prior.translation_sigma_m.iter().all(|sigma| *sigma > 0.0));
@@ -383,7 +388,7 @@ mod tests {
             },
         ];
         for options in wrong {
-            assert!(options.check().is_err(), "{options:?}");
+            assert!(options.validate().is_err(), "{options:?}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! From light to the numbers of a picture file.
+//! Sensor model: noise, saturation and quantisation.
 
 use crate::frames::GreyImage;
 use image::{DynamicImage, GrayImage, ImageBuffer, Luma};
@@ -6,38 +6,37 @@ use rand::Rng;
 use rand_distr::{Distribution, Normal};
 use serde::Serialize;
 
-/// Bits of a frame's grey values.
+/// Bit depth of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(into = "u8")]
 #[non_exhaustive]
-pub enum Bits {
-    /// 8: a file's values are whole grey levels, 0 to 255.
+pub enum BitDepth {
+    /// 8 bits: values are whole grey levels, 0 to 255.
     #[default]
     Eight,
-    /// 16: a file's values are grey level × 257, 0 to 65535.
+    /// 16 bits: values are grey level × 257, 0 to 65535.
     Sixteen,
 }
 
-impl From<Bits> for u8 {
+impl From<BitDepth> for u8 {
     /// The number of bits.
-    fn from(bits: Bits) -> Self {
+    fn from(bits: BitDepth) -> Self {
         match bits {
-            Bits::Eight => 8,
-            Bits::Sixteen => 16,
+            BitDepth::Eight => 8,
+            BitDepth::Sixteen => 16,
         }
     }
 }
 
-/// Adds white noise of 1-σ `noise_grey` (grey levels), saturates, and rounds to the values that so
-/// many bits know.
-pub(super) fn deliver(
+/// Adds white noise of 1-σ `noise_grey` (grey levels), saturates, and rounds to the bit depth.
+pub(super) fn digitise(
     exact: &GreyImage,
     noise_grey: f64,
-    bits: Bits,
+    bits: BitDepth,
     rng: &mut impl Rng,
 ) -> DynamicImage {
     let (width, height) = (exact.width() as u32, exact.height() as u32);
-    // A checked option: the noise is finite and not negative.
+    // The noise is finite and not negative, as the options are validated.
     let noise = Normal::new(0.0, noise_grey as f32).ok();
     let mut noisy = |u: u32, v: u32| {
         let noise = noise.map_or(0.0, |noise| noise.sample(rng));
@@ -45,10 +44,10 @@ pub(super) fn deliver(
     };
     // The casts saturate.
     match bits {
-        Bits::Eight => {
+        BitDepth::Eight => {
             GrayImage::from_fn(width, height, |u, v| Luma([noisy(u, v).round() as u8])).into()
         }
-        Bits::Sixteen => ImageBuffer::from_fn(width, height, |u, v| {
+        BitDepth::Sixteen => ImageBuffer::from_fn(width, height, |u, v| {
             Luma([(257.0 * noisy(u, v)).round() as u16])
         })
         .into(),
@@ -61,29 +60,32 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    fn delivered(bits: Bits, noise_grey: f64) -> DynamicImage {
+    fn digitised(bits: BitDepth, noise_grey: f64) -> DynamicImage {
         let exact = GreyImage::new(3, 2, vec![-7.0, 0.4, 77.25, 100.5, 254.9, 300.0]);
-        deliver(&exact, noise_grey, bits, &mut ChaCha8Rng::seed_from_u64(1))
+        digitise(&exact, noise_grey, bits, &mut ChaCha8Rng::seed_from_u64(1))
     }
 
     #[test]
     fn values_saturate_and_are_rounded_to_the_bits() {
-        let eight = delivered(Bits::Eight, 0.0);
+        let eight = digitised(BitDepth::Eight, 0.0);
         assert_eq!(
             eight.as_luma8().unwrap().as_raw()[..],
             [0, 0, 77, 101, 255, 255]
         );
-        let sixteen = delivered(Bits::Sixteen, 0.0);
+        let sixteen = digitised(BitDepth::Sixteen, 0.0);
         assert_eq!(
             sixteen.as_luma16().unwrap().as_raw()[..],
             [0, 103, 19853, 25829, 65509, 65535]
         );
     }
 
-    /// Noise is in grey levels with any number of bits, and the same noise.
+    /// Both bit depths have the same noise, in grey levels.
     #[test]
     fn bits_differ_by_the_rounding_only() {
-        let (eight, sixteen) = (delivered(Bits::Eight, 3.0), delivered(Bits::Sixteen, 3.0));
+        let (eight, sixteen) = (
+            digitised(BitDepth::Eight, 3.0),
+            digitised(BitDepth::Sixteen, 3.0),
+        );
         let sixteen = sixteen.as_luma16().unwrap();
         for (fine, coarse) in sixteen.iter().zip(eight.as_luma8().unwrap().iter()) {
             assert!((f64::from(*fine) / 257.0 - f64::from(*coarse)).abs() <= 0.502);

@@ -1,53 +1,54 @@
-//! The simulated tunnel: which place of the wall a ray meets.
+//! Shape of the simulated tunnel and its intersection with rays.
 //!
-//! Round straight tunnels have a closed form; all others are searched for the place where the ray
-//! leaves the inside, by false position. The line along the middle of a curved tunnel is the
-//! survey's, since it is a part of what is given; everything else is this module's own.
+//! A round straight tunnel has a closed form. In all others the ray is marched until it leaves the
+//! inside, and the crossing is found by false position. The centreline of a curved tunnel comes
+//! from [`crate::surface`], since it is an input; everything else is independent of it.
 
-use super::outline::Outline;
-use super::{SimulateError, SimulateOptions};
+use crate::simulate::cross_section::CrossSection;
+use crate::simulate::error::SimulateError;
+use crate::simulate::options::SimulateOptions;
 use crate::surface::Centreline;
 use crate::survey::read_centreline;
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
-/// The tunnel.
+/// Shape of the simulated tunnel.
 pub(super) enum Tunnel {
-    /// Straight and round, of a radius in metres.
+    /// Straight and round, with its radius in metres.
     Round(f64),
-    /// Anything else.
+    /// Any other cross-section or centreline.
     Shaped {
-        /// The section.
-        outline: Outline,
-        /// The line along its middle, if it is not the y axis.
+        /// The cross-section.
+        section: CrossSection,
+        /// The centreline, if it is not the y axis.
         line: Option<Centreline>,
     },
 }
 
-/// A place on the wall.
+/// Point of the wall that a ray meets.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    /// Around the section: 2π once around, from z towards x.
+pub(super) struct WallHit {
+    /// Arc length around the section as an angle: 2π once around, from z towards x.
     pub theta: f64,
     /// Chainage, metres.
     pub h_m: f64,
 }
 
-impl Place {
-    /// Where a ray goes that the lens does not show.
-    pub const NOWHERE: Self = Self {
+impl WallHit {
+    /// Result for a ray that meets no wall.
+    pub const NONE: Self = Self {
         theta: f64::NAN,
         h_m: f64::NAN,
     };
 }
 
-/// Rounds of false position at the most.
-const ROUNDS: usize = 60;
-/// A place is on the wall if it is so close to it, shares of the distance from the axis.
-const CLOSE: f64 = 1e-11;
-/// Steps of a ray at the most.
-const STEPS: usize = 2000;
+/// Maximum iterations of false position.
+const MAX_FALSE_POSITION_ITERATIONS: usize = 60;
+/// Distance from the wall at which false position stops, as a share of that from the axis.
+const WALL_TOLERANCE: f64 = 1e-11;
+/// Maximum steps along a ray, each a third of the section's inner radius.
+const MAX_RAY_STEPS: usize = 2000;
 
 impl Tunnel {
     /// The tunnel of the options.
@@ -64,7 +65,7 @@ impl Tunnel {
         let nominal_m = section.nominal_m();
         let width_m = 2.0 * nominal_m;
         let height_m = section.height_m.unwrap_or(width_m);
-        let outline = Outline::new(section.shape, width_m, height_m);
+        let outline = CrossSection::new(section.shape, width_m, height_m);
         let line = match &section.centreline {
             Some(path) => {
                 let points = read_centreline(path).map_err(|error| fail(error.to_string()))?;
@@ -73,27 +74,30 @@ impl Tunnel {
             }
             None => None,
         };
-        Ok(Self::Shaped { outline, line })
+        Ok(Self::Shaped {
+            section: outline,
+            line,
+        })
     }
 
     /// Length of the section's outline, metres.
     pub fn perimeter_m(&self) -> f64 {
         match self {
             Self::Round(radius_m) => TAU * radius_m,
-            Self::Shaped { outline, .. } => outline.perimeter_m(),
+            Self::Shaped { section, .. } => section.perimeter_m(),
         }
     }
 
-    /// Least distance of the wall from the axis, metres.
+    /// Minimum distance of the wall from the axis, metres.
     pub fn nearest_m(&self) -> f64 {
         match self {
             Self::Round(radius_m) => *radius_m,
-            Self::Shaped { outline, .. } => outline.nearest_m(),
+            Self::Shaped { section, .. } => section.nearest_m(),
         }
     }
 
-    /// A pose in the straight tunnel, carried over to where the tunnel really goes.
-    pub fn bent(&self, pose: &Pose) -> Pose {
+    /// Transfers a pose in the straightened tunnel to the world.
+    pub fn to_world(&self, pose: &Pose) -> Pose {
         let Self::Shaped {
             line: Some(line), ..
         } = self
@@ -105,9 +109,13 @@ impl Tunnel {
         Pose::new(at.frame * pose.r_wc, at.point + at.frame * across)
     }
 
-    /// A point as the section at its chainage sees it, of nominal size: x, chainage, z; the
-    /// chainage is near `h_m`.
-    fn local(line: Option<&Centreline>, point: &Vector3<f64>, h_m: f64) -> Vector3<f64> {
+    /// Coordinates (x, chainage, z) of a world point in the section of nominal size at its
+    /// chainage, which is near `h_m`.
+    fn section_coordinates(
+        line: Option<&Centreline>,
+        point: &Vector3<f64>,
+        h_m: f64,
+    ) -> Vector3<f64> {
         let Some(line) = line else {
             return *point;
         };
@@ -117,19 +125,18 @@ impl Tunnel {
         Vector3::new(arm.x, h_m, arm.z)
     }
 
-    /// How far towards the wall a point is: 0 on the axis, 1 on the wall; and its distance from the
-    /// axis, metres.
-    pub fn outward(&self, point: &Vector3<f64>) -> (f64, f64) {
+    /// Radial position of a point: relative (0 on the axis, 1 on the wall), and in metres.
+    pub fn radial_position(&self, point: &Vector3<f64>) -> (f64, f64) {
         match self {
             Self::Round(radius_m) => {
                 let distance_m = point.x.hypot(point.z);
                 (distance_m / radius_m, distance_m)
             }
-            Self::Shaped { outline, line } => {
+            Self::Shaped { section, line } => {
                 let line = line.as_ref();
                 let h_m = line.map_or(0.0, |line| line.chainage_m(point));
-                let local = Self::local(line, point, h_m);
-                (outline.g(local.x, local.z), local.x.hypot(local.z))
+                let local = Self::section_coordinates(line, point, h_m);
+                (section.g(local.x, local.z), local.x.hypot(local.z))
             }
         }
     }
@@ -144,8 +151,8 @@ impl Tunnel {
         }
     }
 
-    /// The direction of the tunnel at a point.
-    pub fn along(&self, point: &Vector3<f64>) -> Vector3<f64> {
+    /// Unit direction of the axis at a point.
+    pub fn direction_at(&self, point: &Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Shaped {
                 line: Some(line), ..
@@ -154,112 +161,120 @@ impl Tunnel {
         }
     }
 
-    /// Where rays from `t` meet the wall.
-    pub fn rays(&self, t: Vector3<f64>) -> Rays<'_> {
-        Rays {
+    /// The ray caster for a camera at `t`.
+    pub fn caster_at(&self, t: Vector3<f64>) -> RayCaster<'_> {
+        RayCaster {
             tunnel: self,
             h_m: self.chainage_m(&t),
-            along: self.along(&t),
+            along: self.direction_at(&t),
             t,
         }
     }
 }
 
-/// Rays from one place.
-pub(super) struct Rays<'a> {
+/// Intersection of rays from one camera centre with the wall.
+pub(super) struct RayCaster<'a> {
     tunnel: &'a Tunnel,
-    /// Where they start, metres.
+    /// Camera centre, metres.
     pub t: Vector3<f64>,
     h_m: f64,
-    /// The direction of the tunnel there.
+    /// Unit direction of the axis at the camera.
     along: Vector3<f64>,
 }
 
-impl Rays<'_> {
-    /// The place that a ray of direction `d` meets; NaN if it meets none.
+impl RayCaster<'_> {
+    /// Intersects a ray of direction `d` with the wall; NaN if it meets none.
     #[inline]
-    pub fn hit(&self, d: &Vector3<f64>) -> Place {
+    pub fn intersect(&self, d: &Vector3<f64>) -> WallHit {
         match self.tunnel {
-            Tunnel::Round(radius_m) => self.round(*radius_m, d),
-            Tunnel::Shaped { outline, line } => self.search(outline, line.as_ref(), d),
+            Tunnel::Round(radius_m) => self.intersect_round(*radius_m, d),
+            Tunnel::Shaped { section, line } => self.march(section, line.as_ref(), d),
         }
     }
 
-    /// With `d̂ = d_xz/|d_xz|`, the way along it is `−t·d̂ + √(r² − (t × d̂)²)`: from the foot of
-    /// the perpendicular on the axis's side to the circle.
+    /// Intersects a ray with a circular cylinder in closed form.
+    ///
+    /// With `d̂ = d_xz/|d_xz|`, the distance along it is `−t·d̂ + √(r² − (t × d̂)²)`: from the foot
+    /// of the perpendicular from the axis to the circle.
     #[inline]
-    fn round(&self, radius_m: f64, d: &Vector3<f64>) -> Place {
+    fn intersect_round(&self, radius_m: f64, d: &Vector3<f64>) -> WallHit {
         let across = (d.x * d.x + d.z * d.z).sqrt();
         let (dx, dz) = (d.x / across, d.z / across);
         let foot = self.t.x * dx + self.t.z * dz;
         let aside = self.t.x * dz - self.t.z * dx;
         let way = (radius_m * radius_m - aside * aside).sqrt() - foot;
         let theta = (self.t.x + way * dx).atan2(self.t.z + way * dz);
-        Place {
+        WallHit {
             theta: if theta < 0.0 { theta + TAU } else { theta },
             h_m: self.t.y + way / across * d.y,
         }
     }
 
-    fn search(&self, outline: &Outline, line: Option<&Centreline>, d: &Vector3<f64>) -> Place {
+    /// Marches a ray until it leaves the inside, and finds the crossing.
+    fn march(
+        &self,
+        section: &CrossSection,
+        line: Option<&Centreline>,
+        d: &Vector3<f64>,
+    ) -> WallHit {
         let d = d.normalize();
-        let on_ray = |way_m: f64, near_h_m: f64| {
-            let point = Tunnel::local(line, &(self.t + d * way_m), near_h_m);
-            let beyond = outline.g(point.x, point.z) - 1.0;
-            OnRay {
-                way_m,
+        let point_at = |distance_m: f64, near_h_m: f64| {
+            let point = Tunnel::section_coordinates(line, &(self.t + d * distance_m), near_h_m);
+            let beyond = section.g(point.x, point.z) - 1.0;
+            RayPoint {
+                distance_m,
                 point,
                 beyond,
             }
         };
-        let step_m = outline.nearest_m() / 3.0;
-        let mut inside = on_ray(0.0, self.h_m);
+        let step_m = section.nearest_m() / 3.0;
+        let mut inside = point_at(0.0, self.h_m);
         // Chainage grows from step to step about as it did before.
         let mut growth_m = step_m * self.along.dot(&d);
-        for _ in 0..STEPS {
-            let next = on_ray(inside.way_m + step_m, inside.point.y + growth_m);
+        for _ in 0..MAX_RAY_STEPS {
+            let next = point_at(inside.distance_m + step_m, inside.point.y + growth_m);
             if next.beyond >= 0.0 {
-                let wall = closed_in(inside, next, on_ray);
-                return Place {
-                    theta: outline.place(wall.x, wall.z),
+                let wall = find_crossing(inside, next, point_at);
+                return WallHit {
+                    theta: section.angle_of(wall.x, wall.z),
                     h_m: wall.y,
                 };
             }
             growth_m = next.point.y - inside.point.y;
             inside = next;
         }
-        Place::NOWHERE
+        WallHit::NONE
     }
 }
 
-/// A point of a ray.
+/// Point of a ray.
 #[derive(Clone, Copy)]
-struct OnRay {
-    /// Its distance from where the ray starts, metres.
-    way_m: f64,
-    /// As the section at its chainage sees it.
+struct RayPoint {
+    /// Distance from the camera, metres.
+    distance_m: f64,
+    /// Coordinates in the section at its chainage.
     point: Vector3<f64>,
-    /// How far it lies beyond the wall, as a share of the distance from the axis; less than 0
-    /// inside.
+    /// Relative distance beyond the wall; negative inside.
     beyond: f64,
 }
 
-/// Where a ray meets the wall between a point inside and one beyond: the rule of false position as
-/// the Illinois algorithm has it, by which an end that stays counts half.
-fn closed_in(
-    mut inside: OnRay,
-    mut outside: OnRay,
-    on_ray: impl Fn(f64, f64) -> OnRay,
+/// Finds the wall between a point inside and one beyond by the Illinois variant of false position.
+///
+/// The residual of an end that is kept twice is halved.
+fn find_crossing(
+    mut inside: RayPoint,
+    mut outside: RayPoint,
+    point_at: impl Fn(f64, f64) -> RayPoint,
 ) -> Vector3<f64> {
     let mut wall = outside;
     let mut last = None;
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_FALSE_POSITION_ITERATIONS {
         let share = inside.beyond / (inside.beyond - outside.beyond);
-        wall = on_ray(
-            inside.way_m + share * (outside.way_m - inside.way_m),
+        wall = point_at(
+            inside.distance_m + share * (outside.distance_m - inside.distance_m),
             inside.point.y + share * (outside.point.y - inside.point.y),
         );
-        if wall.beyond.abs() < CLOSE {
+        if wall.beyond.abs() < WALL_TOLERANCE {
             break;
         }
         let is_inside = wall.beyond < 0.0;

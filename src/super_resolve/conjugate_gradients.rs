@@ -1,10 +1,9 @@
-//! Conjugate gradients.
+//! Preconditioned conjugate gradients.
 
-/// Brings x closer to the solution of `A x = right` by a number of steps, with the diagonal of A as
-/// preconditioner.
+/// Iterates x towards the solution of `A x = right`, with the diagonal of A as preconditioner.
 ///
-/// `times(x, y)` sets `y = A x` for a symmetric, positive semidefinite A; where the diagonal is 0,
-/// x stays as it is.
+/// `times(x, y)` sets `y = A x` for a symmetric, positive semidefinite A. Where the diagonal is 0,
+/// x is unchanged.
 ///
 /// Source: M. R. Hestenes and E. Stiefel, "Methods of conjugate gradients for solving linear
 /// systems", 1952.
@@ -12,7 +11,7 @@ pub(super) fn conjugate_gradients(
     mut times: impl FnMut(&[f32], &mut [f32]),
     diagonal: &[f32],
     right: &[f32],
-    steps: usize,
+    iterations: usize,
     x: &mut [f32],
 ) {
     let mut product = vec![0.0f32; x.len()];
@@ -24,7 +23,7 @@ pub(super) fn conjugate_gradients(
         .collect();
     let mut direction = vec![0.0f32; x.len()];
     let mut last = f64::INFINITY;
-    for _ in 0..steps {
+    for _ in 0..iterations {
         let weighted = residual.iter().zip(&inverse);
         let rho: f64 = weighted.map(|(r, m)| f64::from(r * r * m)).sum();
         let beta = (rho / last) as f32;
@@ -36,7 +35,7 @@ pub(super) fn conjugate_gradients(
         let both = direction.iter().zip(&product);
         let curvature: f64 = both.map(|(p, q)| f64::from(p * q)).sum();
         let alpha = (rho / curvature) as f32;
-        // Solved, or not a number.
+        // Converged, or not finite.
         if !(rho > 0.0 && curvature > 0.0 && alpha.is_finite()) {
             return;
         }
@@ -54,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_many_steps_as_unknowns_solve_the_system_and_free_ones_stay() {
+    fn as_many_iterations_as_unknowns_solve_the_system_and_free_ones_stay() {
         let matrix = [[4.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 0.0]];
         let times = |x: &[f32], y: &mut [f32]| {
             for (y, row) in y.iter_mut().zip(&matrix) {

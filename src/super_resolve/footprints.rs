@@ -1,40 +1,43 @@
-//! The pixels of all frames that show a region of the wall, each with its footprint as a stencil of
-//! fine pixels.
+//! Footprints of the frames' pixels on a region of the wall, as stencils of fine pixels.
 
-use super::stencils::{REACH, Spot, Stencils};
-use super::{Lattice, Reading, Region};
 use crate::camera::Camera;
+use crate::super_resolve::reading::Reading;
+use crate::super_resolve::region::{FineGrid, Region};
+use crate::super_resolve::stencils::{MAX_STENCIL_WIDTH, PixelFootprint, Stencils};
 use crate::surface::Surface;
 use crate::trajectory::Pose;
 
-/// Points along each side of a region that are projected to find its place in a frame.
-const OUTLINE: usize = 9;
-/// Weight of pixels above which a fine pixel counts as seen: a pixel of two by two gives 0.25.
-const SEEN: f32 = 0.05;
+/// Number of points along each side of a region that are projected into a frame.
+const OUTLINE_POINTS: usize = 9;
+/// Minimum weight of a seen fine pixel; a pixel of 2 × 2 fine pixels has the weight 0.25.
+const MIN_SEEN_WEIGHT: f32 = 0.05;
 
-/// A frame with its place.
+/// Camera with its pose.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
-    /// The camera, with its motion.
+pub struct PosedCamera<'a> {
+    /// The camera, with its motion during readout.
     pub camera: Camera,
-    /// Where it stood.
+    /// Pose of the camera.
     pub pose: &'a Pose,
 }
 
-/// What each pixel of each view reads of the fine pixels of a region: the shares of its square,
-/// projected onto the wall, that lie in each.
+/// Observation matrix W of a region: the share of each pixel's projected square in each fine pixel.
 pub struct Footprints {
     pub(super) region: Region,
     pub(super) views: Vec<Stencils>,
 }
 
 impl Footprints {
-    /// The footprints of the pixels whose footprints lie in the region entirely; of `views` in
-    /// their order.
-    pub fn new(surface: &dyn Surface, lattice: &Lattice, region: Region, views: &[View]) -> Self {
+    /// Computes the footprints of all pixels of `views` that lie entirely in the region.
+    pub fn new(
+        surface: &dyn Surface,
+        grid: &FineGrid,
+        region: Region,
+        views: &[PosedCamera],
+    ) -> Self {
         let stencils = views
             .iter()
-            .map(|view| Stencils::new(&region, spots(surface, lattice, &region, view)));
+            .map(|view| Stencils::new(&region, project_pixels(surface, grid, &region, view)));
         Self {
             region,
             views: stencils.collect(),
@@ -51,20 +54,20 @@ impl Footprints {
         self.len() == 0
     }
 
-    /// The numbers, row-major, of a view's pixels in its frame.
+    /// Row-major indices of a view's pixels in its frame.
     pub fn pixels(&self, view: usize) -> &[u32] {
         &self.views[view].pixels
     }
 
-    /// Where the middles of a view's pixels lie in the region, fine pixels from its first corner.
-    pub fn places(&self, view: usize) -> &[[f32; 2]] {
-        &self.views[view].places
+    /// Centres of a view's pixels in the region, fine pixels from its first corner.
+    pub fn positions(&self, view: usize) -> &[[f32; 2]] {
+        &self.views[view].positions
     }
 
-    /// What a view's pixels read of the fine pixels `x`: `W x`.
+    /// Predicts the readings of a view's pixels from the fine pixels `x`: `W x`.
     ///
     /// # Panics
-    /// If x has not the region's size.
+    /// If x does not have the region's size.
     pub fn read(&self, view: usize, x: &[f32]) -> Vec<f32> {
         assert_eq!(x.len(), self.region.pixels(), "fine pixels");
         let mut read = Vec::new();
@@ -72,7 +75,7 @@ impl Footprints {
         read
     }
 
-    /// `Wᵀ v` with the value v of each reading.
+    /// Computes `Wᵀ v` with a value v of each reading.
     fn spread(&self, readings: &[Vec<Reading>], value: impl Fn(&Reading) -> f32) -> Vec<f32> {
         let mut sum = vec![0.0; self.region.pixels()];
         for (stencils, readings) in self.views.iter().zip(readings) {
@@ -82,16 +85,18 @@ impl Footprints {
         sum
     }
 
-    /// True for every fine pixel that pixels with a value show.
+    /// Mask of the fine pixels that pixels with a value show.
     pub(super) fn seen(&self, readings: &[Vec<Reading>]) -> Vec<bool> {
         let total = self.spread(readings, |r| f32::from(r.inverse_sigma > 0.0));
-        total.into_iter().map(|total| total > SEEN).collect()
+        total
+            .into_iter()
+            .map(|total| total > MIN_SEEN_WEIGHT)
+            .collect()
     }
 
-    /// The mean of what all pixels read, each weighing by its precision and its share of a fine
-    /// pixel; NaN where none does.
+    /// Mean of all readings per fine pixel, weighted by precision and footprint; NaN where unseen.
     ///
-    /// `readings`: of each view's pixels, as [`Footprints::super_resolve`] takes them.
+    /// `readings`: those of each view's pixels, as for [`Footprints::super_resolve`].
     pub fn mean(&self, readings: &[Vec<Reading>]) -> Vec<f32> {
         let precision = |reading: &Reading| reading.inverse_sigma * reading.inverse_sigma;
         let sum = self.spread(readings, |reading| precision(reading) * reading.value);
@@ -103,69 +108,72 @@ impl Footprints {
     }
 }
 
-/// The pixels' places in the region: those whose footprints lie in it entirely and are not too
-/// wide.
-fn spots(surface: &dyn Surface, lattice: &Lattice, region: &Region, view: &View) -> Vec<Spot> {
+/// Computes the footprints of the pixels that lie entirely in the region and are not too wide.
+fn project_pixels(
+    surface: &dyn Surface,
+    grid: &FineGrid,
+    region: &Region,
+    view: &PosedCamera,
+) -> Vec<PixelFootprint> {
     let (camera, pose) = (&view.camera, view.pose);
-    let Some([columns, rows]) = window(surface, lattice, region, view) else {
+    let Some([columns, rows]) = visible_window(surface, grid, region, view) else {
         return Vec::new();
     };
-    let chart = region.chart(lattice);
+    let coordinates = region.coordinates(grid);
     let r_wc = pose.r_wc.to_rotation_matrix();
-    // One more pixel on every side, for differences.
+    // One more pixel on every side, for central differences.
     let wide = (columns[1] - columns[0] + 2) as usize;
-    let mut places: Vec<[f32; 2]> = Vec::with_capacity(wide * (rows[1] - rows[0] + 2) as usize);
+    let mut positions: Vec<[f32; 2]> = Vec::with_capacity(wide * (rows[1] - rows[0] + 2) as usize);
     for v in rows[0] - 1..=rows[1] {
         let start = pose.to_world(&camera.origin(v as f64));
-        places.extend((columns[0] - 1..=columns[1]).map(|u| {
+        positions.extend((columns[0] - 1..=columns[1]).map(|u| {
             let hit = camera
                 .ray(u as f64, v as f64)
                 .and_then(|ray| surface.hit(&start, &(r_wc * ray)).ok());
-            hit.map_or([f32::NAN; 2], |hit| chart.place(&hit.wall))
+            hit.map_or([f32::NAN; 2], |hit| coordinates.of(&hit.wall))
         }));
     }
     let size = [region.columns as f32, region.rows as f32];
-    let mut spots = Vec::new();
+    let mut footprints = Vec::new();
     for v in rows[0]..rows[1] {
         for u in columns[0]..columns[1] {
             let k = (v - rows[0] + 1) as usize * wide + (u - columns[0] + 1) as usize;
             let half = |a: [f32; 2], b: [f32; 2]| [0.5 * (b[0] - a[0]), 0.5 * (b[1] - a[1])];
-            let spot = Spot {
+            let footprint = PixelFootprint {
                 pixel: v as usize * camera.width as usize + u as usize,
-                middle: places[k],
+                middle: positions[k],
                 sides: [
-                    half(places[k - 1], places[k + 1]),
-                    half(places[k - wide], places[k + wide]),
+                    half(positions[k - 1], positions[k + 1]),
+                    half(positions[k - wide], positions[k + wide]),
                 ],
             };
-            // False for what is not a number, too.
+            // Also false for NaN.
             let within = (0..2).all(|axis| {
-                let (middle, reach) = (spot.middle[axis], spot.reach(axis));
+                let (middle, reach) = (footprint.middle[axis], footprint.half_width(axis));
                 middle - reach >= 0.0
                     && middle + reach < size[axis]
-                    && 2.0 * reach < (REACH - 1) as f32
+                    && 2.0 * reach < (MAX_STENCIL_WIDTH - 1) as f32
             });
             if within {
-                spots.push(spot);
+                footprints.push(footprint);
             }
         }
     }
-    spots
+    footprints
 }
 
-/// Columns and rows, each from and to before, of the frame's pixels that may show the region;
-/// `None` if it shows nothing of it.
-fn window(
+/// Range of columns and rows of the frame's pixels that may show the region; `None` if none do.
+fn visible_window(
     surface: &dyn Surface,
-    lattice: &Lattice,
+    grid: &FineGrid,
     region: &Region,
-    view: &View,
+    view: &PosedCamera,
 ) -> Option<[[i64; 2]; 2]> {
     let (mut from, mut to) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for across in 0..OUTLINE {
-        for down in 0..OUTLINE {
-            let share = [across, down].map(|k| k as f64 / (OUTLINE - 1) as f64);
-            let x_w = surface.frame(region.wall(lattice, share)).x_w;
+    for across in 0..OUTLINE_POINTS {
+        for down in 0..OUTLINE_POINTS {
+            let share = [across, down].map(|k| k as f64 / (OUTLINE_POINTS - 1) as f64);
+            let x_w = surface.frame(region.wall(grid, share)).x_w;
             if let Some(pixel) = view.camera.project(&view.pose.to_camera(&x_w)) {
                 for axis in 0..2 {
                     from[axis] = from[axis].min(pixel[axis]);
@@ -174,7 +182,7 @@ fn window(
             }
         }
     }
-    // The outline comes from single points: a pixel and 2 % cover what bulges between them.
+    // The outline is sampled; a margin of a pixel and 2 % covers its curvature between points.
     let range = |axis: usize, size: u32| {
         let margin = 1.0 + 0.02 * (to[axis] - from[axis]);
         let first = (from[axis] - margin).max(0.0).floor() as i64;
@@ -191,12 +199,11 @@ mod tests {
     use crate::test_wall::{TestWall, waves};
     use nalgebra::Vector3;
 
-    /// A region of 60 × 40 fine pixels that the fourth frame of the ring shows, across θ = 0 if
-    /// asked for.
-    fn seen(across: bool) -> (TestWall, Lattice, Footprints, usize) {
+    /// A region of 60 × 40 fine pixels in the centre of a frame, optionally across θ = 0.
+    fn seen(across: bool) -> (TestWall, FineGrid, Footprints, usize) {
         let wall = TestWall::ring(waves);
         let frame = if across { 0 } else { 3 };
-        let lattice = Lattice {
+        let grid = FineGrid {
             columns: 1738,
             spacing_m: [wall.perimeter_m() / 1738.0, 0.009],
             start_m: [0.0, -0.7],
@@ -204,28 +211,28 @@ mod tests {
         let pose = wall.poses[frame];
         let ray = pose.r_wc * Vector3::z();
         let middle = wall.circle.hit(&pose.t_wc, &ray).unwrap().wall;
-        let column = middle.s_m / lattice.spacing_m[0];
-        let row = (middle.h_m - lattice.start_m[1]) / lattice.spacing_m[1];
+        let column = middle.s_m / grid.spacing_m[0];
+        let row = (middle.h_m - grid.start_m[1]) / grid.spacing_m[1];
         let region = Region {
             column: if across { -30 } else { column as i64 - 30 },
             row: row as i64 - 20,
             columns: 60,
             rows: 40,
         };
-        let view = View {
+        let view = PosedCamera {
             camera: wall.camera,
             pose: &pose,
         };
-        let footprints = Footprints::new(&wall.circle, &lattice, region, &[view]);
-        (wall, lattice, footprints, frame)
+        let footprints = Footprints::new(&wall.circle, &grid, region, &[view]);
+        (wall, grid, footprints, frame)
     }
 
-    /// Of a wall that grows evenly, a pixel reads what lies under its middle, but for what a fine
-    /// pixel is even in itself: an eighth of a fine pixel over the pixel's width at the most.
+    /// On a linear ramp, a pixel reads the value under its centre, except for the quantisation by
+    /// constant fine pixels: at most an eighth of a fine pixel over the pixel's width.
     #[test]
-    fn a_footprint_is_centred_where_the_pixel_looks() {
+    fn a_footprint_is_centred_on_the_projected_pixel() {
         for across in [false, true] {
-            let (wall, lattice, footprints, frame) = seen(across);
+            let (wall, grid, footprints, frame) = seen(across);
             let (region, stencils) = (footprints.region, &footprints.views[0]);
             assert!(stencils.len() > 200, "{}", stencils.len());
             let read = |value: &dyn Fn(usize) -> f32| {
@@ -244,11 +251,11 @@ mod tests {
                 let hit = wall
                     .circle
                     .hit(&pose.t_wc, &(pose.r_wc * wall.camera.ray(u, v).unwrap()));
-                let place = region.chart(&lattice).place(&hit.unwrap().wall);
+                let position = region.coordinates(&grid).of(&hit.unwrap().wall);
                 assert!((ones[n] - 1.0).abs() < 1e-5);
                 assert!(
-                    (s[n] - place[0]).abs() < 0.06 && (h[n] - place[1]).abs() < 0.06,
-                    "{place:?}: {} {}",
+                    (s[n] - position[0]).abs() < 0.06 && (h[n] - position[1]).abs() < 0.06,
+                    "{position:?}: {} {}",
                     s[n],
                     h[n]
                 );
@@ -256,7 +263,7 @@ mod tests {
         }
     }
 
-    /// `⟨W x, v⟩ = ⟨x, Wᵀ v⟩`; the normal matrix is `Wᵀ Ω W`, and its diagonal is its own.
+    /// `⟨W x, v⟩ = ⟨x, Wᵀ v⟩`; the normal matrix is `Wᵀ Ω W`, consistent with its diagonal.
     #[test]
     fn spreading_is_the_transpose_of_reading() {
         let (_, _, footprints, _) = seen(false);

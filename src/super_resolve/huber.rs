@@ -1,8 +1,8 @@
-//! Huber's loss.
+//! Huber's loss and a robust standard deviation.
 
 use crate::frames::MAD_TO_SIGMA;
 
-/// Weight of a residual r: 1 up to the limit, `limit/|r|` beyond, where the loss is linear.
+/// Huber's weight of a residual r: 1 up to the limit, `limit/|r|` beyond, where the loss is linear.
 ///
 /// Source: P. J. Huber, "Robust estimation of a location parameter", Annals of Mathematical
 /// Statistics 35(1), 1964.
@@ -14,8 +14,7 @@ pub fn weight(residual: f32, limit: f32) -> f32 {
     }
 }
 
-/// Robust standard deviation of values around 0, from the median of their moduli, as a Gaussian's
-/// σ; 0 of none.
+/// Robust standard deviation of values around 0 from their median absolute value; 0 if empty.
 pub(super) fn sigma(values: impl Iterator<Item = f32>) -> f32 {
     let mut moduli: Vec<f32> = values.map(f32::abs).collect();
     if moduli.is_empty() {
@@ -30,7 +29,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn outliers_pull_no_harder_than_the_limit_and_hardly_widen_sigma() {
+    fn outliers_have_limited_influence_and_hardly_increase_sigma() {
         assert_eq!(weight(-1.5, 2.0), 1.0);
         assert_eq!(-50.0 * weight(-50.0, 2.0), -2.0);
         assert_eq!(weight(0.0, 0.0), 1.0);

@@ -1,26 +1,19 @@
-//! What the frames read of a region.
+//! Observations of a region: pixel readings with robust weights.
 
-use super::footprints::Footprints;
 use crate::numerics::simd_dispatch::dispatch_simd;
+use crate::super_resolve::footprints::Footprints;
+use crate::super_resolve::reading::Reading;
 
-/// What a pixel says of the wall.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Reading {
-    /// Grey levels of the wall, exposure and shading undone; 0 where the pixel says nothing.
-    pub value: f32,
-    /// `1/σ` of its noise; 0 where the pixel says nothing.
-    pub inverse_sigma: f32,
-}
-
-/// Pixels with their values and weights.
+/// Readings of all views with their footprints and weights.
 pub(super) struct Observations<'a> {
     pub footprints: &'a Footprints,
     readings: &'a [Vec<Reading>],
-    /// Precisions with robust weight, view by view.
+    /// Precisions Ω with robust weights, view by view.
     omega: Vec<Vec<f32>>,
 }
 
 impl<'a> Observations<'a> {
+    /// Observations with weights equal to the precisions `1/σ²`.
     pub fn new(footprints: &'a Footprints, readings: &'a [Vec<Reading>]) -> Self {
         let precisions = readings.iter().map(|readings| {
             let squares = readings.iter().map(|r| r.inverse_sigma * r.inverse_sigma);
@@ -33,13 +26,13 @@ impl<'a> Observations<'a> {
         }
     }
 
-    /// Number of pixels with a value.
+    /// Number of valid pixels.
     pub fn count(&self) -> usize {
         let all = self.readings.iter().flatten();
         all.filter(|reading| reading.inverse_sigma > 0.0).count()
     }
 
-    /// `Wᵀ Ω y`.
+    /// Computes the right-hand side `Wᵀ Ω y`.
     pub fn right(&self) -> Vec<f32> {
         let mut right = vec![0.0; self.footprints.region.pixels()];
         for (view, readings) in self.readings.iter().enumerate() {
@@ -72,8 +65,8 @@ impl<'a> Observations<'a> {
         }
     }
 
-    /// Weighs each pixel by what is left of it: `Ω = weight((y − W x)/σ)/σ²`.
-    pub fn weigh(&mut self, residuals: &[Vec<f32>], weight: impl Fn(f32) -> f32) {
+    /// Reweights each pixel by its residual: `Ω = weight((y − W x)/σ)/σ²`.
+    pub fn reweight(&mut self, residuals: &[Vec<f32>], weight: impl Fn(f32) -> f32) {
         let views = self.omega.iter_mut().zip(self.readings);
         for ((omega, readings), residuals) in views.zip(residuals) {
             for ((omega, reading), residual) in omega.iter_mut().zip(readings).zip(residuals) {
@@ -82,7 +75,7 @@ impl<'a> Observations<'a> {
         }
     }
 
-    /// `(y − W x)/σ` view by view; 0 for pixels without a value.
+    /// Computes normalised residuals `(y − W x)/σ` view by view; 0 for invalid pixels.
     pub fn residuals(&self, x: &[f32]) -> Vec<Vec<f32>> {
         let views = self.footprints.views.iter().zip(self.readings);
         views
@@ -97,8 +90,8 @@ impl<'a> Observations<'a> {
             .collect()
     }
 
-    /// The residuals of pixels with a value.
-    pub fn known<'r>(&'r self, residuals: &'r [Vec<f32>]) -> impl Iterator<Item = f32> + 'r {
+    /// The residuals of valid pixels.
+    pub fn valid<'r>(&'r self, residuals: &'r [Vec<f32>]) -> impl Iterator<Item = f32> + 'r {
         let all = self
             .readings
             .iter()

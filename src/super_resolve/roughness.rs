@@ -1,14 +1,16 @@
-//! What is known of a wall before a pixel is seen: how rough it is.
+//! Roughness prior of the wall: weighted differences of fine pixels.
 
-use super::huber;
 use crate::numerics::simd_dispatch::dispatch_simd;
+use crate::super_resolve::huber;
 use std::f64::consts::PI;
 
-/// Fine pixels over which an edge is expected to go on as it is, along the axes.
-const STRAIGHT: usize = 6;
+/// Number of fine pixels over which an edge is expected to continue along an axis.
+const EDGE_LENGTH: usize = 6;
 
-/// Differences of fine pixels: `∂s`, `∂h`, `∂ss`, `∂hh`, `∂sh`, each as (column, row, factor), and
-/// what changes of `∂h` along s and of `∂s` along h over [`STRAIGHT`] fine pixels.
+/// Differences of fine pixels, each as taps (column, row, factor).
+///
+/// They are `∂s`, `∂h`, `∂ss`, `∂hh`, `∂sh`, and the change of `∂h` along s and of `∂s` along h
+/// over [`EDGE_LENGTH`] fine pixels.
 const DIFFERENCES: [&[(usize, usize, f32)]; 7] = [
     &[(0, 0, -1.0), (1, 0, 1.0)],
     &[(0, 0, -1.0), (0, 1, 1.0)],
@@ -17,50 +19,49 @@ const DIFFERENCES: [&[(usize, usize, f32)]; 7] = [
     &[(0, 0, 1.0), (1, 0, -1.0), (0, 1, -1.0), (1, 1, 1.0)],
     &[
         (0, 0, 1.0),
-        (STRAIGHT, 0, -1.0),
+        (EDGE_LENGTH, 0, -1.0),
         (0, 1, -1.0),
-        (STRAIGHT, 1, 1.0),
+        (EDGE_LENGTH, 1, 1.0),
     ],
     &[
         (0, 0, 1.0),
         (1, 0, -1.0),
-        (0, STRAIGHT, -1.0),
-        (1, STRAIGHT, 1.0),
+        (0, EDGE_LENGTH, -1.0),
+        (1, EDGE_LENGTH, 1.0),
     ],
 ];
 /// Number of kinds of differences.
 pub const KINDS: usize = DIFFERENCES.len();
-/// Least weight of a difference.
-const LEAST_WEIGHT: f32 = 1e-4;
-/// Frequencies along each axis at which spectra are looked at.
-const FREQUENCIES: usize = 24;
+/// Minimum weight of a difference.
+const MIN_WEIGHT: f32 = 1e-4;
+/// Number of frequencies along each axis at which spectra are sampled.
+const FREQUENCIES_PER_AXIS: usize = 24;
 
-/// The roughness of a raster, `Σ_i a_i Σ_n w_in (D_i x)_n²`: the negative logarithm (times two) of
-/// a Gaussian prior.
+/// Roughness of a raster, `Σ_i a_i Σ_n w_in (D_i x)_n²`: twice the negative logarithm of a Gaussian
+/// prior.
 ///
-/// Its spectrum is `1/P(f) = Σ_i a_i |D_i(f)|²`: between first differences, the `1/f²` of natural
-/// scenes, second ones, the `1/f⁴` of smooth ones, and mixed ones, of walls whose edges run along
-/// and across the tunnel. Where grain lies over them, what neighbours have in common says little of
-/// an edge, and it takes what is farther along it, too: errors of an edge that hang together along
-/// a course of bricks bend trajectories.
+/// Its spectrum is `1/P(f) = Σ_i a_i |D_i(f)|²`. First differences model the `1/f²` of natural
+/// scenes, second differences the `1/f⁴` of smooth ones, and mixed differences walls with edges
+/// along and across the tunnel. If grain hides an edge from its neighbouring pixels, the long
+/// differences still constrain it: errors that are correlated along a course of bricks would bend
+/// trajectories.
 pub struct Roughness {
     columns: usize,
     rows: usize,
-    /// `a`, grey levels⁻².
+    /// Strengths `a`, grey levels⁻².
     pub strengths: [f64; KINDS],
-    /// `w`, difference by difference, at the first of its fine pixels; 0 where one of them is not
-    /// seen.
+    /// Weights `w` of each kind, at the first fine pixel of a difference; 0 if one is not seen.
     pub weights: [Vec<f32>; KINDS],
-    /// Number of differences of each kind over that of fine pixels, of those that are seen.
+    /// Number of seen differences of each kind over the number of seen fine pixels.
     coverage: [f64; KINDS],
 }
 
 impl Roughness {
-    /// For a raster; differences of what is not `seen` do not count. All strengths are 0.
+    /// Roughness of a raster with strengths 0; differences with unseen fine pixels do not count.
     pub fn new(columns: usize, rows: usize, seen: &[bool]) -> Self {
         let weights = DIFFERENCES.map(|taps| {
             let mut weights = vec![0.0; columns * rows];
-            let [starts_s, starts_h] = starts(columns, rows, taps);
+            let [starts_s, starts_h] = start_counts(columns, rows, taps);
             for row in 0..starts_h {
                 for column in 0..starts_s {
                     let at = row * columns + column;
@@ -84,10 +85,10 @@ impl Roughness {
         }
     }
 
-    /// Sets `out` to `D_i x`, at the first of each difference's pixels.
-    fn differences(&self, kind: usize, x: &[f32], out: &mut [f32]) {
+    /// Sets `out` to `D_i x`, at the first fine pixel of each difference.
+    fn apply_difference(&self, kind: usize, x: &[f32], out: &mut [f32]) {
         let taps = DIFFERENCES[kind];
-        let [columns, rows] = starts(self.columns, self.rows, taps);
+        let [columns, rows] = start_counts(self.columns, self.rows, taps);
         out.fill(0.0);
         dispatch_simd(
             #[inline(always)]
@@ -106,30 +107,31 @@ impl Roughness {
         );
     }
 
-    /// Weighs each difference of x by Huber's loss, beyond `limit` of the robust standard deviation
-    /// of its kind: where the wall has an edge, it may.
-    pub fn weigh(&mut self, x: &[f32], limit: f32) {
+    /// Reweights each difference of x by Huber's loss, which preserves edges.
+    ///
+    /// The loss is linear beyond `limit` robust standard deviations of the kind.
+    pub fn reweight(&mut self, x: &[f32], limit: f32) {
         let mut differences = vec![0.0; x.len()];
         for kind in 0..KINDS {
-            self.differences(kind, x, &mut differences);
+            self.apply_difference(kind, x, &mut differences);
             let weights = &mut self.weights[kind];
             let seen = differences.iter().zip(weights.iter());
             let sigma = huber::sigma(seen.filter(|(_, w)| **w > 0.0).map(|(d, _)| *d));
             for (w, d) in weights.iter_mut().zip(&differences) {
                 if *w > 0.0 {
-                    *w = huber::weight(*d, limit * sigma).max(LEAST_WEIGHT);
+                    *w = huber::weight(*d, limit * sigma).max(MIN_WEIGHT);
                 }
             }
         }
     }
 
-    /// `xᵀ D_iᵀ w_i D_i y` for each kind.
+    /// Computes `xᵀ D_iᵀ w_i D_i y` for each kind.
     pub fn products(&self, x: &[f32], y: &[f32]) -> [f64; KINDS] {
         let mut d_x = vec![0.0; x.len()];
         let mut d_y = vec![0.0; x.len()];
         std::array::from_fn(|kind| {
-            self.differences(kind, x, &mut d_x);
-            self.differences(kind, y, &mut d_y);
+            self.apply_difference(kind, x, &mut d_x);
+            self.apply_difference(kind, y, &mut d_y);
             let both = d_x.iter().zip(&d_y).zip(&self.weights[kind]);
             both.map(|((x, y), w)| f64::from(w * x * y)).sum()
         })
@@ -138,10 +140,10 @@ impl Roughness {
     /// Adds `Σ_i a_i D_iᵀ w_i D_i x` to y; `scratch` has the raster's size.
     pub fn add_to(&self, x: &[f32], scratch: &mut [f32], y: &mut [f32]) {
         for (kind, taps) in DIFFERENCES.iter().enumerate() {
-            self.differences(kind, x, scratch);
+            self.apply_difference(kind, x, scratch);
             let strength = self.strengths[kind] as f32;
             let weights = &self.weights[kind];
-            let [columns, rows] = starts(self.columns, self.rows, taps);
+            let [columns, rows] = start_counts(self.columns, self.rows, taps);
             dispatch_simd(
                 #[inline(always)]
                 || {
@@ -177,56 +179,58 @@ impl Roughness {
         }
     }
 
-    /// The mean over all frequencies of each kind's share of `1/P(f)`. A kind whose differences
-    /// reach beyond what is seen has the less of it.
+    /// Mean over all frequencies of each kind's share of `1/P(f)`, reduced for kinds with unseen
+    /// differences.
     pub fn shares(&self) -> [f64; KINDS] {
         let mut shares = [0.0; KINDS];
         let strengths = std::array::from_fn(|kind| self.coverage[kind] * self.strengths[kind]);
         for omega in frequencies() {
-            let parts = parts(&strengths, omega);
-            let all: f64 = parts.iter().sum();
-            for (share, part) in shares.iter_mut().zip(parts) {
-                *share += part / all.max(f64::MIN_POSITIVE) / (FREQUENCIES * FREQUENCIES) as f64;
+            let terms = spectrum_terms(&strengths, omega);
+            let all: f64 = terms.iter().sum();
+            for (share, part) in shares.iter_mut().zip(terms) {
+                *share += part
+                    / all.max(f64::MIN_POSITIVE)
+                    / (FREQUENCIES_PER_AXIS * FREQUENCIES_PER_AXIS) as f64;
             }
         }
         shares
     }
 }
 
-/// Variance, grey levels², of what a pixel as wide as `width` fine pixels reads of the frequencies
-/// above its own Nyquist frequency along either axis, on a wall of the given strengths:
-/// `E_f[P(f) B(f)²]` over them, with `B(ω) = sin(ω width/2)/(width sin(ω/2))` along each axis. It
-/// passes for something coarser, another thing in each frame (aliasing).
+/// Aliased variance (grey levels²) of a pixel as wide as `width` fine pixels.
+///
+/// It is `E_f[P(f) B(f)²]` over the frequencies above the pixel's Nyquist frequency along either
+/// axis, on a wall of the given strengths, with `B(ω) = sin(ω width/2)/(width sin(ω/2))` along each
+/// axis. Aliased texture appears at lower frequencies, differently in each frame.
 pub fn aliased_variance(strengths: &[f64; KINDS], width: f64) -> f64 {
     let box_mean = |omega: f64| (0.5 * width * omega).sin() / (width * (0.5 * omega).sin());
     let finer = frequencies().filter(|omega| omega.iter().any(|omega| omega * width > PI));
     let variances = finer.map(|omega| {
-        let all: f64 = parts(strengths, omega).iter().sum();
+        let all: f64 = spectrum_terms(strengths, omega).iter().sum();
         let seen = box_mean(omega[0]) * box_mean(omega[1]);
         seen * seen / all.max(f64::MIN_POSITIVE)
     });
-    variances.sum::<f64>() / (FREQUENCIES * FREQUENCIES) as f64
+    variances.sum::<f64>() / (FREQUENCIES_PER_AXIS * FREQUENCIES_PER_AXIS) as f64
 }
 
-/// Angular frequencies spread evenly over a quarter of the spectrum: along s and h, radians per
-/// fine pixel.
+/// Angular frequencies (s, h) spread evenly over a quarter of the spectrum, radians per pixel.
 fn frequencies() -> impl Iterator<Item = [f64; 2]> {
-    let at = |k: usize| ((k as f64 + 0.5) / FREQUENCIES as f64) * PI;
-    (0..FREQUENCIES * FREQUENCIES).map(move |k| [at(k / FREQUENCIES), at(k % FREQUENCIES)])
+    let at = |k: usize| ((k as f64 + 0.5) / FREQUENCIES_PER_AXIS as f64) * PI;
+    (0..FREQUENCIES_PER_AXIS * FREQUENCIES_PER_AXIS)
+        .map(move |k| [at(k / FREQUENCIES_PER_AXIS), at(k % FREQUENCIES_PER_AXIS)])
 }
 
-/// The parts `a_i |D_i(f)|²` of `1/P(f)`.
-fn parts(strengths: &[f64; KINDS], omega: [f64; 2]) -> [f64; KINDS] {
-    // |1 − exp(iωd)|² along s and h, of neighbours and of fine pixels farther apart.
+/// Computes the terms `a_i |D_i(f)|²` of `1/P(f)`.
+fn spectrum_terms(strengths: &[f64; KINDS], omega: [f64; 2]) -> [f64; KINDS] {
+    // |1 − exp(iωd)|² along s and h, for neighbours and for distant fine pixels.
     let squares = |apart: usize| omega.map(|omega| 2.0 - 2.0 * (apart as f64 * omega).cos());
-    let ([s, h], [far_s, far_h]) = (squares(1), squares(STRAIGHT));
+    let ([s, h], [far_s, far_h]) = (squares(1), squares(EDGE_LENGTH));
     let responses = [s, h, s * s, h * h, s * h, far_s * h, s * far_h];
     std::array::from_fn(|kind| strengths[kind] * responses[kind])
 }
 
-/// Number of columns and of rows, the first ones of a raster, in which differences begin; none if
-/// they do not fit into it.
-fn starts(columns: usize, rows: usize, taps: &[(usize, usize, f32)]) -> [usize; 2] {
+/// Number of first columns and rows of a raster in which differences begin; 0 if none fits.
+fn start_counts(columns: usize, rows: usize, taps: &[(usize, usize, f32)]) -> [usize; 2] {
     let reach = |along: fn(&(usize, usize, f32)) -> usize| taps.iter().map(along).max();
     let columns = columns.saturating_sub(reach(|tap| tap.0).unwrap_or(0));
     let rows = rows.saturating_sub(reach(|tap| tap.1).unwrap_or(0));
@@ -279,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn planes_and_edges_along_the_tunnel_are_smooth_to_the_differences_that_say_so() {
+    fn planes_and_edges_along_the_tunnel_have_no_energy_in_their_differences() {
         let rough = roughness();
         let plane: Vec<f32> = (0..63)
             .map(|k| (k % 9) as f32 - 2.0 * (k / 9) as f32)
@@ -293,7 +297,7 @@ mod tests {
         let energies = rough.products(&edge, &edge);
         assert!(energies[0] > 100.0 && energies[4] == 0.0);
         let mut soft = roughness();
-        soft.weigh(&edge, 1.5);
+        soft.reweight(&edge, 1.5);
         assert!(soft.products(&edge, &edge)[0] < 0.01 * energies[0]);
     }
 
@@ -304,8 +308,8 @@ mod tests {
     }
 
     #[test]
-    fn kinds_that_reach_beyond_what_is_seen_have_no_share() {
-        // Five columns are seen, of nine.
+    fn kinds_without_seen_differences_have_no_share() {
+        // Five of nine columns are seen.
         let seen: Vec<bool> = (0..63).map(|k| k % 9 < 5).collect();
         let mut rough = Roughness::new(9, 7, &seen);
         rough.strengths = [1.0; KINDS];
@@ -313,7 +317,7 @@ mod tests {
         assert_eq!(shares[5], 0.0);
         assert!(shares[..5].iter().all(|share| *share > 0.01), "{shares:?}");
         assert!(rough.weights[5].iter().all(|weight| *weight == 0.0));
-        // A raster too narrow for them is no harm.
+        // A raster may be too narrow for the differences.
         let mut narrow = Roughness::new(3, 5, &[true; 15]);
         narrow.strengths = [1.0; KINDS];
         let mut y = vec![0.0; 15];
@@ -321,11 +325,11 @@ mod tests {
         assert_eq!(y, [0.0; 15]);
     }
 
-    /// `|D_i(f)|²`, from the differences themselves.
+    /// The terms equal `|D_i(f)|²`, computed from the taps.
     #[test]
     fn parts_are_the_spectra_of_the_differences() {
         let omega = [0.7, 0.4];
-        for (kind, (part, taps)) in parts(&[1.0; KINDS], omega)
+        for (kind, (part, taps)) in spectrum_terms(&[1.0; KINDS], omega)
             .iter()
             .zip(DIFFERENCES)
             .enumerate()
@@ -340,16 +344,16 @@ mod tests {
         }
     }
 
-    /// A wall whose second differences alone are known, `1/P = a (s + h)²`, has nearly all of its
-    /// power in what pixels can tell; not so one of edges along and across.
+    /// With only second differences, `1/P = a (s + h)²`, nearly all of the power is below the
+    /// Nyquist frequency; not so for a wall with edges along and across.
     #[test]
     fn a_smooth_wall_hardly_aliases() {
         let of = |near: [f64; 5]| {
             let mut strengths = [0.0; KINDS];
             strengths[..5].copy_from_slice(&near);
-            let power =
-                frequencies().map(|omega| 1.0 / parts(&strengths, omega).iter().sum::<f64>());
-            let power = power.sum::<f64>() / (FREQUENCIES * FREQUENCIES) as f64;
+            let power = frequencies()
+                .map(|omega| 1.0 / spectrum_terms(&strengths, omega).iter().sum::<f64>());
+            let power = power.sum::<f64>() / (FREQUENCIES_PER_AXIS * FREQUENCIES_PER_AXIS) as f64;
             aliased_variance(&strengths, 3.0) / power
         };
         let smooth = of([0.0, 0.0, 1.0, 1.0, 2.0]);

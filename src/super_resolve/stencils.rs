@@ -1,46 +1,47 @@
-//! What pixels read of fine pixels, as sparse rows of a matrix.
+//! Stencils: sparse rows of the observation matrix from fine pixels to pixels.
 
-use super::Region;
 use crate::numerics::simd_dispatch::dispatch_simd;
+use crate::super_resolve::region::Region;
 
-/// Fine pixels along the side of a stencil, at the most: a pixel that looks so obliquely that its
-/// footprint is wider tells little of the wall's detail, and is left out.
-pub(super) const REACH: usize = 12;
-/// Parts of a pixel along each side.
-const PARTS: usize = 4;
+/// Maximum fine pixels along a side of a stencil.
+///
+/// Pixels with wider, oblique footprints are left out.
+pub(super) const MAX_STENCIL_WIDTH: usize = 12;
+/// Number of parts of a pixel along each side.
+const PARTS_PER_SIDE: usize = 4;
 
-/// A pixel's middle with the two sides of its parallelogram, fine pixels.
-pub(super) struct Spot {
+/// Footprint of a pixel: centre and sides of its parallelogram, fine pixels.
+pub(super) struct PixelFootprint {
     pub pixel: usize,
     pub middle: [f32; 2],
     pub sides: [[f32; 2]; 2],
 }
 
-impl Spot {
+impl PixelFootprint {
     /// Half the width of the parallelogram along an axis.
-    pub fn reach(&self, axis: usize) -> f32 {
+    pub fn half_width(&self, axis: usize) -> f32 {
         0.5 * (self.sides[0][axis].abs() + self.sides[1][axis].abs())
     }
 
     /// The first fine pixel along an axis.
     fn first(&self, axis: usize) -> f32 {
-        (self.middle[axis] - self.reach(axis)).floor()
+        (self.middle[axis] - self.half_width(axis)).floor()
     }
 
     /// The number of fine pixels along an axis.
     fn span(&self, axis: usize) -> usize {
-        let end = (self.middle[axis] + self.reach(axis)).floor() + 1.0;
+        let end = (self.middle[axis] + self.half_width(axis)).floor() + 1.0;
         (end - self.first(axis)) as usize
     }
 }
 
-/// The stencils of one view's pixels: pixel p reads `Σ_k w_pk x_k` with `w_pk` the share of its
-/// square, projected onto the wall, that lies in fine pixel k.
+/// Stencils of one view's pixels.
 ///
-/// The square is a parallelogram on the wall (the map from pixels to the wall is linear within a
-/// pixel). It is taken in [`PARTS`]² parts, and each part as the upright rectangle of its width and
-/// height around its middle: exact for an upright camera, and of the right area, middle and about
-/// the right width for a turned one.
+/// Pixel p reads `Σ_k w_pk x_k`, with `w_pk` the share of its square, projected onto the wall, that
+/// lies in fine pixel k. The projected square is a parallelogram, as the map from pixels to the
+/// wall is linear within a pixel. It is divided into [`PARTS_PER_SIDE`]² parts, each replaced by
+/// the axis-aligned rectangle of its width and height around its centre. That is exact for an
+/// upright camera; for a rotated one the weight and the centre are exact and the width is close.
 pub(super) struct Stencils {
     /// Fine pixels from one row of the region to the next.
     stride: usize,
@@ -48,54 +49,59 @@ pub(super) struct Stencils {
     width: usize,
     /// Rows of a stencil.
     height: usize,
-    /// First fine pixel of each stencil.
+    /// Index of the first fine pixel of each stencil.
     first: Vec<u32>,
-    /// `w`, stencil by stencil, row by row.
+    /// Weights `w`, stencil by stencil, row by row.
     weights: Vec<f32>,
-    /// The pixels' numbers in their frame, row-major.
+    /// Row-major indices of the pixels in their frame.
     pub pixels: Vec<u32>,
-    /// Where their middles lie in the region, fine pixels from its first corner.
-    pub places: Vec<[f32; 2]>,
+    /// Centres of the pixels in the region, fine pixels from its first corner.
+    pub positions: Vec<[f32; 2]>,
 }
 
 impl Stencils {
-    /// Of pixels at `spots` that lie in the region entirely.
-    pub fn new(region: &Region, mut spots: Vec<Spot>) -> Self {
-        let most = |axis| spots.iter().map(|spot| spot.span(axis)).max();
+    /// Computes the stencils of footprints that lie entirely in the region.
+    pub fn new(region: &Region, mut footprints: Vec<PixelFootprint>) -> Self {
+        let most = |axis| {
+            footprints
+                .iter()
+                .map(|footprint| footprint.span(axis))
+                .max()
+        };
         let width = match most(0).unwrap_or(1) {
             0..=4 => 4,
             5..=6 => 6,
             7..=8 => 8,
-            _ => REACH,
+            _ => MAX_STENCIL_WIDTH,
         };
         let height = most(1).unwrap_or(1);
         if region.columns < width || region.rows < height {
-            spots.clear();
+            footprints.clear();
         }
-        // Stencils are wider than some footprints, and begin earlier where they would end beyond
-        // the region.
-        let corner = |spot: &Spot| {
-            let column = (spot.first(0) as usize).min(region.columns.saturating_sub(width));
-            let row = (spot.first(1) as usize).min(region.rows.saturating_sub(height));
+        // A stencil may be wider than its footprint; it begins earlier if it would end beyond the
+        // region.
+        let corner = |footprint: &PixelFootprint| {
+            let column = (footprint.first(0) as usize).min(region.columns.saturating_sub(width));
+            let row = (footprint.first(1) as usize).min(region.rows.saturating_sub(height));
             [column, row]
         };
-        let mut weights = vec![0.0; spots.len() * width * height];
+        let mut weights = vec![0.0; footprints.len() * width * height];
         dispatch_simd(
             #[inline(always)]
             || {
                 let stencils = weights.chunks_exact_mut(width * height);
-                for (spot, stencil) in spots.iter().zip(stencils) {
+                for (footprint, stencil) in footprints.iter().zip(stencils) {
                     match width {
-                        4 => fill::<4>(spot, corner(spot), stencil),
-                        6 => fill::<6>(spot, corner(spot), stencil),
-                        8 => fill::<8>(spot, corner(spot), stencil),
-                        _ => fill::<REACH>(spot, corner(spot), stencil),
+                        4 => fill::<4>(footprint, corner(footprint), stencil),
+                        6 => fill::<6>(footprint, corner(footprint), stencil),
+                        8 => fill::<8>(footprint, corner(footprint), stencil),
+                        _ => fill::<MAX_STENCIL_WIDTH>(footprint, corner(footprint), stencil),
                     }
                 }
             },
         );
-        let first = spots.iter().map(|spot| {
-            let [column, row] = corner(spot);
+        let first = footprints.iter().map(|footprint| {
+            let [column, row] = corner(footprint);
             (row * region.columns + column) as u32
         });
         Self {
@@ -104,8 +110,14 @@ impl Stencils {
             height,
             first: first.collect(),
             weights,
-            pixels: spots.iter().map(|spot| spot.pixel as u32).collect(),
-            places: spots.iter().map(|spot| spot.middle).collect(),
+            pixels: footprints
+                .iter()
+                .map(|footprint| footprint.pixel as u32)
+                .collect(),
+            positions: footprints
+                .iter()
+                .map(|footprint| footprint.middle)
+                .collect(),
         }
     }
 
@@ -114,14 +126,14 @@ impl Stencils {
         self.first.len()
     }
 
-    /// `Σ_k w_pk x_k` for every pixel p.
+    /// Computes `Σ_k w_pk x_k` for every pixel p.
     #[inline(always)]
     pub fn read(&self, x: &[f32], out: &mut Vec<f32>) {
         match self.width {
             4 => self.read_as::<4>(x, out),
             6 => self.read_as::<6>(x, out),
             8 => self.read_as::<8>(x, out),
-            _ => self.read_as::<REACH>(x, out),
+            _ => self.read_as::<MAX_STENCIL_WIDTH>(x, out),
         }
     }
 
@@ -140,7 +152,7 @@ impl Stencils {
             4 => self.spread_as::<4>(values, y),
             6 => self.spread_as::<6>(values, y),
             8 => self.spread_as::<8>(values, y),
-            _ => self.spread_as::<REACH>(values, y),
+            _ => self.spread_as::<MAX_STENCIL_WIDTH>(values, y),
         }
     }
 
@@ -160,7 +172,7 @@ impl Stencils {
             4 => self.add_normal_as::<4>(omega, x, y),
             6 => self.add_normal_as::<6>(omega, x, y),
             8 => self.add_normal_as::<8>(omega, x, y),
-            _ => self.add_normal_as::<REACH>(omega, x, y),
+            _ => self.add_normal_as::<MAX_STENCIL_WIDTH>(omega, x, y),
         }
     }
 
@@ -210,18 +222,18 @@ impl Stencils {
     }
 }
 
-/// Fills a pixel's stencil (all zeros before), W fine pixels wide, whose first one is `corner`.
+/// Fills a pixel's stencil (initially zero), W fine pixels wide, with its first pixel at `corner`.
 #[inline(always)]
-fn fill<const W: usize>(spot: &Spot, corner: [usize; 2], stencil: &mut [f32]) {
-    let reach_s = (spot.reach(0) / PARTS as f32).max(LEAST_REACH);
-    let reach_h = (spot.reach(1) / PARTS as f32).max(LEAST_REACH);
-    let middle_s = spot.middle[0] - corner[0] as f32;
-    let middle_h = spot.middle[1] - corner[1] as f32;
-    let [[us, uh], [vs, vh]] = spot.sides;
+fn fill<const W: usize>(footprint: &PixelFootprint, corner: [usize; 2], stencil: &mut [f32]) {
+    let reach_s = (footprint.half_width(0) / PARTS_PER_SIDE as f32).max(MIN_HALF_WIDTH);
+    let reach_h = (footprint.half_width(1) / PARTS_PER_SIDE as f32).max(MIN_HALF_WIDTH);
+    let middle_s = footprint.middle[0] - corner[0] as f32;
+    let middle_h = footprint.middle[1] - corner[1] as f32;
+    let [[us, uh], [vs, vh]] = footprint.sides;
     // A part's share of the pixel, over its width and height.
-    let density = 1.0 / ((PARTS * PARTS) as f32 * 4.0 * reach_s * reach_h);
-    for j in 0..PARTS {
-        for i in 0..PARTS {
+    let density = 1.0 / ((PARTS_PER_SIDE * PARTS_PER_SIDE) as f32 * 4.0 * reach_s * reach_h);
+    for j in 0..PARTS_PER_SIDE {
+        for i in 0..PARTS_PER_SIDE {
             let (part_u, part_v) = (middle_of(i), middle_of(j));
             let across = middle_s + part_u * us + part_v * vs;
             let down = middle_h + part_u * uh + part_v * vh;
@@ -239,16 +251,16 @@ fn fill<const W: usize>(spot: &Spot, corner: [usize; 2], stencil: &mut [f32]) {
     }
 }
 
-/// The middle of a part along a side of its pixel, −½ to ½.
+/// Centre of a part along a side of its pixel, −½ to ½.
 #[inline(always)]
 fn middle_of(part: usize) -> f32 {
-    (part as f32 + 0.5) / PARTS as f32 - 0.5
+    (part as f32 + 0.5) / PARTS_PER_SIDE as f32 - 0.5
 }
 
-/// Half the width of a part, at the least, fine pixels: none is a line.
-const LEAST_REACH: f32 = 1e-4;
+/// Minimum half width of a part, fine pixels, so that no part degenerates to a line.
+const MIN_HALF_WIDTH: f32 = 1e-4;
 
-/// How much of an interval lies in a unit cell.
+/// Length of the intersection of an interval with a unit cell.
 #[inline(always)]
 fn overlap(cell: usize, from: f32, to: f32) -> f32 {
     let cell = cell as f32;

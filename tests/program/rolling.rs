@@ -155,7 +155,7 @@ fn a_readout_longer_than_the_time_between_frames_is_refused() {
     ];
     let message = fail(&too_long, 2);
     assert!(
-        message.contains("less time than passes from frame to frame"),
+        message.contains("less time than the interval between frames"),
         "{message}"
     );
     simulate(&survey, &["--readout-ms", "20", "--supersample", "1"]);

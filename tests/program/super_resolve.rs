@@ -6,8 +6,8 @@ use tunnelstitch::camera::Camera;
 use tunnelstitch::evaluate::mtf50;
 use tunnelstitch::frames::GreyImage;
 use tunnelstitch::render::{Canvas, Interpolation, Kernel, Picture, native_px_per_metre, place};
-use tunnelstitch::simulate::{Light, Scene, SimulateOptions, SlantedEdge, Wall};
-use tunnelstitch::super_resolve::{Footprints, MARGIN, Reading, Region, View};
+use tunnelstitch::simulate::{Illumination, Scene, SimulateOptions, SlantedEdge, Wall};
+use tunnelstitch::super_resolve::{Footprints, MARGIN, PosedCamera, Reading, Region};
 use tunnelstitch::surface::{Circle, Surface, WallPoint};
 use tunnelstitch::survey::TunnelSection;
 use tunnelstitch::trajectory::Shutter;
@@ -115,8 +115,8 @@ impl Simulated {
             .map(|found| found.map_or(f32::NAN, |(_, mean, _)| mean))
             .collect();
         let poses = self.scene.truth().iter();
-        let views: Vec<View> = poses
-            .map(|pose| View {
+        let views: Vec<PosedCamera> = poses
+            .map(|pose| PosedCamera {
                 camera: *self.scene.camera(),
                 pose,
             })
@@ -260,7 +260,7 @@ fn super_resolved_walls_are_two_decibels_closer_to_the_truth_than_the_best_view(
 #[test]
 fn slanted_edges_are_sharper() {
     let survey = Simulated::new(&SimulateOptions {
-        light: Light::Even,
+        light: Illumination::Even,
         ..small(Wall::Target, 2.0)
     });
     let (drawn, _) = survey.draw_middle(3, 1);
@@ -293,7 +293,11 @@ fn figures() {
                 frames,
                 wall: wall.clone(),
                 noise_grey,
-                light: if target { Light::Even } else { Light::Downward },
+                light: if target {
+                    Illumination::Even
+                } else {
+                    Illumination::Downward
+                },
                 ..SimulateOptions::free()
             });
             let (drawn, seconds) = if target {

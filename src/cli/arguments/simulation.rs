@@ -1,6 +1,6 @@
 //! Arguments of simulated surveys: degradations, jitter and wall.
 
-use crate::simulate::{BadFrames, Bits, SimulateOptions};
+use crate::simulate::{BadFrames, BitDepth, SimulateOptions};
 use crate::trajectory::JitterModel;
 use clap::ValueEnum;
 
@@ -66,8 +66,8 @@ impl DegradationArguments {
             moving: self.moving,
             shaft_percent: self.shaft_percent,
             bits: match self.bits {
-                BitsArgument::Eight => Bits::Eight,
-                BitsArgument::Sixteen => Bits::Sixteen,
+                BitsArgument::Eight => BitDepth::Eight,
+                BitsArgument::Sixteen => BitDepth::Sixteen,
             },
             bad_frames: self.bad_frames.clone().unwrap_or_default(),
             ..options

@@ -3,7 +3,7 @@
 use crate::PROGRAM;
 use crate::cli::arguments::{PictureArguments, PoseReadingArguments, positive};
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
-use crate::evaluate::{Comparison, Drawings, before_after, compare_survey};
+use crate::evaluate::{ComparedPanoramas, Comparison, compare_survey, draw_before_after};
 use crate::frames::{PictureFormat, write_picture};
 use crate::persist::atomic;
 use crate::progress::Progress;
@@ -110,7 +110,7 @@ pub fn write_comparison(
     refined_file: &Path,
     layout: Layout,
     comparison: &Comparison,
-    drawings: Drawings,
+    drawings: ComparedPanoramas,
     out: &Path,
     terminal: &Terminal,
 ) -> Result<String, Failure> {
@@ -131,7 +131,7 @@ pub fn write_comparison(
     let refined = drawings.refined.panorama.into_image(Layout::ThetaRight);
     write(
         "before-after.png",
-        &before_after(&baseline, &refined).into(),
+        &draw_before_after(&baseline, &refined).into(),
     )?;
     write("baseline.png", &layout.turn(baseline))?;
     write("refined.png", &layout.turn(refined))?;

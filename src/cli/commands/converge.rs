@@ -162,7 +162,7 @@ pub fn run(
     if arguments.efficiency {
         return run_efficiency(arguments, record, terminal);
     }
-    let swept = converge::run(
+    let swept = converge::run_sweep(
         &arguments.options(),
         &arguments.out,
         arguments.force,
@@ -191,7 +191,7 @@ fn run_efficiency(
     record: &RunRecord,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    let table = converge::efficiency(
+    let table = converge::measure_efficiency(
         &arguments.options(),
         arguments.joint,
         &arguments.out,

@@ -85,7 +85,7 @@ pub fn run(
         "tunnelstitch simulate free --turns {} --seed {} --out {survey_path}",
         arguments.turns, arguments.seed
     ));
-    simulate::run(&options, &folders.survey, true, terminal.as_ref())?;
+    simulate::write_survey(&options, &folders.survey, true, terminal.as_ref())?;
 
     say(format!(
         "\ntunnelstitch refine {survey_path} --out {refined_path}"

@@ -6,7 +6,7 @@ use crate::cli::arguments::{
     positive,
 };
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
-use crate::simulate::{self, Light, SimulateOptions, Wall};
+use crate::simulate::{self, Illumination, SimulateOptions, Wall};
 use crate::survey::PriorSection;
 use crate::trajectory::JitterModel;
 use clap::ValueEnum;
@@ -199,8 +199,8 @@ impl SimulateArguments {
             jitter: self.jitter(preset.jitter),
             wall,
             light: match self.light {
-                LightArgument::Downward => Light::Downward,
-                LightArgument::Even => Light::Even,
+                LightArgument::Downward => Illumination::Downward,
+                LightArgument::Even => Illumination::Even,
             },
             noise_grey: self.noise,
             supersample: self.supersample,
@@ -267,7 +267,7 @@ pub fn run(
         ));
     }
     let options = arguments.options()?;
-    let simulated = simulate::run(&options, &arguments.out, arguments.force, terminal)?;
+    let simulated = simulate::write_survey(&options, &arguments.out, arguments.force, terminal)?;
     let inputs = [
         &arguments.camera,
         &arguments.texture,
@@ -289,7 +289,7 @@ pub fn run(
     };
     terminal.say(format!(
         "{out}: {} frames of {} × {} px, with true poses\nnext: tunnelstitch {next}",
-        options.frames - options.bad_frames.missing(),
+        options.frames - options.bad_frames.missing_count(),
         options.camera.width,
         options.camera.height
     ));

@@ -2,7 +2,9 @@
 
 use crate::cli::arguments::{LayerArguments, PosesArguments, TextureArguments};
 use crate::cli::output::{Failure, Terminal};
-use crate::inspect::{MANIFEST, Marks, Served, Server, Viewer, draw_layers, place_originals};
+use crate::inspect::{
+    MANIFEST, Marks, Server, ServerContent, Viewer, draw_layers, pose_source_frames,
+};
 use crate::persist::atomic::ScratchFolder;
 use crate::survey::SURVEY_FILE;
 use std::path::{Path, PathBuf};
@@ -49,10 +51,10 @@ pub struct ViewArguments {
 pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure> {
     let viewer = Viewer::bundled()?;
     if arguments.survey.join(MANIFEST).is_file() {
-        let served = Served {
+        let served = ServerContent {
             folder: arguments.survey.clone(),
             viewer,
-            originals: None,
+            source_frames: None,
             marks: Marks::open(&arguments.survey)?,
         };
         return serve(served, arguments.port, terminal);
@@ -74,10 +76,10 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
         scratch.path(),
         terminal,
     )?;
-    let served = Served {
+    let served = ServerContent {
         folder: scratch.path().to_owned(),
         viewer,
-        originals: Some(place_originals(survey, layers)?),
+        source_frames: Some(pose_source_frames(survey, layers)?),
         marks,
     };
     serve(served, arguments.port, terminal)
@@ -109,7 +111,7 @@ fn refined_folder(folder: &Path) -> Result<Option<(PathBuf, PosesArguments)>, Fa
     }
 }
 
-fn serve(served: Served, port: u16, terminal: &Terminal) -> Result<(), Failure> {
+fn serve(served: ServerContent, port: u16, terminal: &Terminal) -> Result<(), Failure> {
     let folder: &Path = &served.folder.clone();
     let server = Server::listen(served, port)?;
     // Programs wait for this line to learn the address.

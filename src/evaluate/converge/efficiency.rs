@@ -1,10 +1,12 @@
-//! How close the refinement comes to the Cramér–Rao bound, and whether the uncertainty it states is
-//! true.
+//! Efficiency of the refinement: its errors over the Cramér–Rao bound, and the consistency of its
+//! covariances.
 
-use super::draw::draw;
-use super::{Cell, ConvergeError, ConvergeOptions};
 use crate::camera::Camera;
-use crate::evaluate::{normalised_errors, tied_errors};
+use crate::evaluate::converge::error::ConvergeError;
+use crate::evaluate::converge::feasible_survey::draw_survey;
+use crate::evaluate::converge::options::ConvergeOptions;
+use crate::evaluate::converge::sweep_cell::SweepCell;
+use crate::evaluate::normalised_errors::{gauge_fixed_errors, normalised_errors_squared};
 use crate::persist::atomic::{self, ScratchFolder};
 use crate::progress::{Progress, Silent};
 use crate::refine::{
@@ -21,53 +23,54 @@ use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-/// 95 % of χ² with 6 degrees of freedom lie below.
+/// 95 % quantile of χ² with 6 degrees of freedom.
 const CHI_SQUARE_95: f64 = 12.592;
-/// Unknowns of a pose.
-const UNKNOWNS: f64 = 6.0;
-/// Variance that rounding to whole grey levels adds, grey levels².
-const ROUNDING: f64 = 1.0 / 12.0;
+/// Number of unknowns of a pose.
+const POSE_UNKNOWNS: f64 = 6.0;
+/// Variance of rounding to whole grey levels, grey levels².
+const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
 
-/// Root mean squares over all frames but the first, where the gauge is fixed.
+/// Root mean square errors over all frames except the first, which fixes the gauge.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct PoseRms {
     /// Rotation, degrees per axis.
     pub rotation_deg: f64,
     /// Translation, millimetres per axis.
     pub translation_mm: f64,
-    /// Position on the wall of the frame's middle and corners, pixels of the frame.
+    /// Displacement on the wall of the frame's centre and corners, pixels of the frame.
     pub wall_px: f64,
 }
 
-/// Errors over a bound.
+/// Ratios of errors to a bound.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub struct Ratio {
-    /// Of rotations.
+pub struct ErrorRatio {
+    /// Ratio of the rotation errors.
     pub rotation: f64,
-    /// Of translations.
+    /// Ratio of the translation errors.
     pub translation: f64,
-    /// Of positions on the wall.
+    /// Ratio of the displacements on the wall.
     pub wall: f64,
-    /// Of all six unknowns of a pose, each combination by its own bound: `√(mean ξᵀ Σ⁻¹ ξ / 6)`, Σ
-    /// the bound. Unlike the others it is not ruled by the few combinations that are known least,
-    /// so it scatters least from survey to survey.
+    /// Ratio over all six unknowns of a pose, `√(mean ξᵀ Σ⁻¹ ξ / 6)`, with Σ the bound.
+    ///
+    /// It weighs every combination of unknowns by its own bound. The other ratios are dominated by
+    /// the least observable combinations, so this one varies least from survey to survey.
     pub pose: f64,
 }
 
-impl Ratio {
-    /// Of errors over a bound, with the mean of the errors squared over those of the bound.
+impl ErrorRatio {
+    /// The ratios of `error` to `bound`, from the normalised errors squared under that bound.
     fn new(error: &PoseRms, bound: &PoseRms, normalised: &[f64]) -> Self {
         let mean = normalised.iter().sum::<f64>() / normalised.len().max(1) as f64;
         Self {
             rotation: error.rotation_deg / bound.rotation_deg,
             translation: error.translation_mm / bound.translation_mm,
             wall: error.wall_px / bound.wall_px,
-            pose: (mean / UNKNOWNS).sqrt(),
+            pose: (mean / POSE_UNKNOWNS).sqrt(),
         }
     }
 }
 
-impl fmt::Display for Ratio {
+impl fmt::Display for ErrorRatio {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
@@ -77,49 +80,49 @@ impl fmt::Display for Ratio {
     }
 }
 
-/// One cell of the test.
+/// Result of the efficiency test for one cell.
 #[derive(Clone, Debug, Serialize)]
 pub struct Efficiency {
-    /// The noise of the poses, and the wall.
-    pub cell: Cell,
+    /// Noise model of the poses, and wall.
+    pub cell: SweepCell,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise_grey: f64,
-    /// Surveys, each with a wall and a trajectory of its own.
+    /// Number of surveys, each with its own wall and trajectory.
     pub surveys: usize,
-    /// Errors made.
+    /// Errors of the refinement.
     pub error: PoseRms,
-    /// Cramér–Rao bound without the prior, with the slopes of the texture known.
+    /// Cramér–Rao bound without the prior, with known gradients of the texture.
     pub bound: PoseRms,
-    /// The same with the texture unknown but for its spectrum.
+    /// Cramér–Rao bound without the prior, with only the spectrum of the texture known.
     pub unknown_texture_bound: PoseRms,
-    /// Bayesian bound, with it.
+    /// Bayesian Cramér–Rao bound, with the prior.
     pub bayesian_bound: PoseRms,
-    /// Error over bound.
-    pub ratio: Ratio,
-    /// Error over bound with the texture unknown.
-    pub unknown_texture_ratio: Ratio,
-    /// Error over Bayesian bound.
-    pub bayesian_ratio: Ratio,
-    /// Mean normalised error squared of a frame; 6 if the stated covariances are true.
+    /// Ratio of the errors to the bound.
+    pub ratio: ErrorRatio,
+    /// Ratio of the errors to the bound with unknown texture.
+    pub unknown_texture_ratio: ErrorRatio,
+    /// Ratio of the errors to the Bayesian bound.
+    pub bayesian_ratio: ErrorRatio,
+    /// Mean normalised error squared of a frame; 6 if the stated covariances are consistent.
     pub normalised_error: f64,
-    /// Share of frames whose 95 % ellipsoid holds the truth.
+    /// Share of frames whose 95 % confidence ellipsoid contains the truth.
     pub inside_95: f64,
-    /// Mean of the covariances over those of independent noise
+    /// Mean ratio of the covariances to those of independent noise
     /// ([`crate::refine::RefineReport::variance_factor`]).
     pub variance_factor: f64,
 }
 
-/// Mean squares being summed up.
+/// Accumulated mean squares of the frames.
 #[derive(Clone, Copy, Default)]
-struct Squares {
+struct MeanSquares {
     rotation: f64,
     translation: f64,
     wall: f64,
     count: f64,
 }
 
-impl Squares {
-    /// Adds a frame's `E[ξξᵀ]`, expected or made.
+impl MeanSquares {
+    /// Adds a frame's `ξξᵀ`, or its expectation.
     fn add(&mut self, surface: &dyn Surface, camera: &Camera, pose: &Pose, square: &Matrix6<f64>) {
         let trace =
             |first: usize| (0..3).map(|k| square[(first + k, first + k)]).sum::<f64>() / 3.0;
@@ -148,46 +151,46 @@ impl Squares {
     }
 }
 
-/// Runs `options.seeds` surveys of each cell, refined with the wall solved for jointly or not, and
-/// writes efficiency.json and efficiency.txt into `out`.
+/// Measures the efficiency over `options.seeds` surveys of each cell.
 ///
-/// A sensor rounds to whole grey levels; the bounds are for its noise and the rounding's variance,
-/// 1/12, together.
+/// `joint`: the refinement solves for the wall jointly with the poses. efficiency.json and
+/// efficiency.txt are written into `out`. The bounds assume the sensor's noise plus the variance
+/// 1/12 of rounding to whole grey levels.
 ///
 /// # Errors
 /// [`ConvergeError`].
-pub fn efficiency(
+pub fn measure_efficiency(
     options: &ConvergeOptions,
     joint: bool,
     out: &Path,
     progress: &dyn Progress,
 ) -> Result<Vec<Efficiency>, ConvergeError> {
-    options.check()?;
+    options.validate()?;
     atomic::create_folder(out)?;
     let cells = options.cells();
     progress.start("experiments", cells.len() * options.seeds as usize);
     let mut table = Vec::new();
     for cell in &cells {
-        let (mut error, mut bound) = (Squares::default(), Squares::default());
-        let (mut unknown, mut bayesian) = (Squares::default(), Squares::default());
+        let (mut error, mut bound) = (MeanSquares::default(), MeanSquares::default());
+        let (mut unknown, mut bayesian) = (MeanSquares::default(), MeanSquares::default());
         let (mut normalised, mut factors) = (Vec::new(), 0.0);
         let (mut by_bound, mut by_unknown, mut by_bayesian) = (Vec::new(), Vec::new(), Vec::new());
         let mut surveys = 0;
         for seed in 1..=options.seeds {
             progress.detail(&format!("{cell}, seed {seed}"));
-            let Some(survey) = draw(options, cell, seed)?.survey else {
+            let Some(survey) = draw_survey(options, cell, seed)?.survey else {
                 progress.advance(1);
                 continue;
             };
-            let run = one(&survey, joint, out)?;
+            let run = refine_survey(&survey, joint, out)?;
             surveys += 1;
             factors += run.stated.variance_factor;
-            normalised.extend(run.by(&run.stated));
-            by_bound.extend(run.by(&run.bounds.known));
-            by_unknown.extend(run.by(&run.bounds.unknown));
-            by_bayesian.extend(run.by(&run.bounds.bayesian));
+            normalised.extend(run.normalised(&run.stated));
+            by_bound.extend(run.normalised(&run.bounds.known));
+            by_unknown.extend(run.normalised(&run.bounds.unknown));
+            by_bayesian.extend(run.normalised(&run.bounds.bayesian));
             for k in 1..run.truth.len() {
-                let add = |squares: &mut Squares, square: &Matrix6<f64>| {
+                let add = |squares: &mut MeanSquares, square: &Matrix6<f64>| {
                     squares.add(
                         run.survey.surface.as_ref(),
                         &run.survey.camera,
@@ -212,22 +215,22 @@ pub fn efficiency(
             bound: bound.rms(),
             unknown_texture_bound: unknown.rms(),
             bayesian_bound: bayesian.rms(),
-            ratio: Ratio::new(&error.rms(), &bound.rms(), &by_bound),
-            unknown_texture_ratio: Ratio::new(&error.rms(), &unknown.rms(), &by_unknown),
-            bayesian_ratio: Ratio::new(&error.rms(), &bayesian.rms(), &by_bayesian),
+            ratio: ErrorRatio::new(&error.rms(), &bound.rms(), &by_bound),
+            unknown_texture_ratio: ErrorRatio::new(&error.rms(), &unknown.rms(), &by_unknown),
+            bayesian_ratio: ErrorRatio::new(&error.rms(), &bayesian.rms(), &by_bayesian),
             normalised_error: normalised.iter().sum::<f64>() / frames,
             inside_95: inside as f64 / frames,
             variance_factor: factors / surveys.max(1) as f64,
         });
-        // Cell by cell: a test that is broken off leaves those that are done.
-        write(&table, out)?;
+        // After each cell, so that an interrupted test keeps the finished cells.
+        write_files(&table, out)?;
     }
     progress.finish();
     Ok(table)
 }
 
 /// Writes efficiency.json and efficiency.txt.
-fn write(table: &[Efficiency], out: &Path) -> Result<(), ConvergeError> {
+fn write_files(table: &[Efficiency], out: &Path) -> Result<(), ConvergeError> {
     let path = out.join("efficiency.json");
     let json = serde_json::to_string_pretty(table)
         .map_err(|error| atomic::WriteError::new(&path, std::io::Error::other(error)))?
@@ -237,8 +240,8 @@ fn write(table: &[Efficiency], out: &Path) -> Result<(), ConvergeError> {
     Ok(atomic::write_text(&out.join("efficiency.txt"), &text)?)
 }
 
-/// One survey refined.
-struct Run {
+/// Refined survey with its errors and bounds.
+struct RefinedSurvey {
     survey: Survey,
     truth: Vec<Pose>,
     errors: Vec<Vector6<f64>>,
@@ -246,19 +249,23 @@ struct Run {
     stated: Covariances,
 }
 
-impl Run {
-    /// The normalised errors squared of all frames whose covariance is known.
-    fn by(&self, covariances: &Covariances) -> Vec<f64> {
-        let errors = normalised_errors(&self.errors, &covariances.frames);
+impl RefinedSurvey {
+    /// Normalised errors squared of all frames with a covariance.
+    fn normalised(&self, covariances: &Covariances) -> Vec<f64> {
+        let errors = normalised_errors_squared(&self.errors, &covariances.frames);
         errors.into_iter().flatten().collect()
     }
 }
 
-/// Refines one survey and computes its bounds.
-fn one(options: &SimulateOptions, joint: bool, out: &Path) -> Result<Run, ConvergeError> {
+/// Simulates and refines one survey, and computes its errors and bounds.
+fn refine_survey(
+    options: &SimulateOptions,
+    joint: bool,
+    out: &Path,
+) -> Result<RefinedSurvey, ConvergeError> {
     let scratch = ScratchFolder::inside(out)?;
     let folder = scratch.path().join("survey");
-    simulate::run(options, &folder, false, &Silent)?;
+    simulate::write_survey(options, &folder, false, &Silent)?;
     let survey = Survey::open(&folder)?;
     let silent: Arc<dyn Progress> = Arc::new(Silent);
     let refining = RefineOptions {
@@ -268,15 +275,15 @@ fn one(options: &SimulateOptions, joint: bool, out: &Path) -> Result<Run, Conver
     let refined = refine(&survey, &refining, &silent)?;
     let scene = Scene::new(options)?;
     let fine = scene.render_finer(FINER);
-    let noise = (options.noise_grey.powi(2) + ROUNDING).sqrt();
-    let texture = texture_of(&scene, noise);
+    let noise = (options.noise_grey.powi(2) + ROUNDING_VARIANCE).sqrt();
+    let texture = estimate_texture(&scene, noise);
     let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
-    let errors = tied_errors(
+    let errors = gauge_fixed_errors(
         survey.surface.as_ref(),
         &poses_of(&refined.trajectory),
         &truth,
     )?;
-    Ok(Run {
+    Ok(RefinedSurvey {
         bounds: pose_bounds(&survey, &fine, noise, &texture)?,
         stated: refined.covariances,
         truth,
@@ -285,8 +292,8 @@ fn one(options: &SimulateOptions, joint: bool, out: &Path) -> Result<Run, Conver
     })
 }
 
-/// What can be known of the texture of a survey's wall, seen from the middle of the tunnel.
-fn texture_of(scene: &Scene, noise_grey: f64) -> UnknownTexture {
+/// Estimates the spectrum of a wall's texture, as sampled by a frame in the middle of the tunnel.
+fn estimate_texture(scene: &Scene, noise_grey: f64) -> UnknownTexture {
     let columns = (TAU * scene.camera().fy * f64::from(FINER)).round() as usize;
     let finer = FINER as usize;
     let side = UnknownTexture::least_side(finer);
@@ -325,7 +332,8 @@ impl fmt::Display for Efficiency {
         writeln!(f, "{:22} {}", "error / Bayesian bound", self.bayesian_ratio)?;
         write!(
             f,
-            "normalised error squared {:.2} (6 if the covariances are true), {:.1} % inside the 95 % ellipsoid, variance factor {:.2}",
+            "normalised error squared {:.2} (6 if the covariances are true), \
+             {:.1} % inside the 95 % ellipsoid, variance factor {:.2}",
             self.normalised_error,
             100.0 * self.inside_95,
             self.variance_factor

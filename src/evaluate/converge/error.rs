@@ -1,28 +1,30 @@
-//! Why a sweep is impossible.
+//! Errors of a convergence test.
 
-use crate::evaluate::EvaluateError;
+use crate::evaluate::error::EvaluateError;
 use crate::persist::atomic::WriteError;
 use crate::refine::RefineError;
 use crate::simulate::SimulateError;
 use crate::survey::SurveyError;
 use std::path::PathBuf;
 
-/// Why a sweep is impossible. A survey that the refinement refuses is no such error but a result.
+/// Reason why a sweep is impossible.
+///
+/// A survey that the refinement refuses is a result, not an error.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ConvergeError {
-    /// An option is impossible.
+    /// An option has an impossible value.
     #[error("{what}")]
     Option {
-        /// Which, and what it should be.
+        /// The option and its valid range.
         what: String,
     },
     /// The log of an earlier sweep cannot be continued.
     #[error("{}: {what}", path.display())]
     Log {
-        /// The log.
+        /// Path of the log.
         path: PathBuf,
-        /// What is wrong, and the remedy.
+        /// Description of the problem, and the remedy.
         what: String,
     },
     /// A survey cannot be simulated.
@@ -31,10 +33,10 @@ pub enum ConvergeError {
     /// A simulated survey cannot be read.
     #[error(transparent)]
     Survey(#[from] SurveyError),
-    /// A survey whose efficiency is asked for cannot be refined, or bounded.
+    /// A survey of the efficiency test cannot be refined, or its bound cannot be computed.
     #[error(transparent)]
     Refine(#[from] RefineError),
-    /// Poses cannot be judged.
+    /// Poses cannot be evaluated.
     #[error(transparent)]
     Evaluate(#[from] EvaluateError),
     /// An output cannot be written.

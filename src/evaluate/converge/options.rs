@@ -1,8 +1,10 @@
-//! What to sweep.
+//! Options of a sweep.
 
-use super::cell::unit;
-use super::{Cell, ConvergeError, Settings, SweepWall};
 use crate::camera::Camera;
+use crate::evaluate::converge::error::ConvergeError;
+use crate::evaluate::converge::run_record::{SCHEMA_VERSION, Settings};
+use crate::evaluate::converge::sweep_cell::unit_sigmas;
+use crate::evaluate::converge::sweep_cell::{SweepCell, SweepWall};
 use crate::simulate::SimulateOptions;
 use crate::trajectory::JitterModel;
 use serde::Serialize;
@@ -11,24 +13,25 @@ use std::collections::HashSet;
 /// Vertical field of view of the paper's camera: 60°.
 const VERTICAL_FOV_RAD: f64 = std::f64::consts::FRAC_PI_3;
 
-/// How the translation's noise goes with the rotation's.
+/// Relation of the translation noise to the rotation noise.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum TranslationScale {
-    /// In proportion: the `free` experiment's sigmas at its rotation sigma (2°), twice them at
-    /// twice that. One axis of the grid.
+    /// Proportional: the `free` experiment's sigmas at its rotation sigma (2°). The grid has one
+    /// axis.
     Auto,
-    /// Each of these multiples of the `free` experiment's sigmas, with every rotation: two axes.
+    /// Multiples of the `free` experiment's sigmas, each combined with every rotation sigma. The
+    /// grid has two axes.
     Factors(Vec<f64>),
 }
 
-/// A sweep.
+/// Options of a sweep.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ConvergeOptions {
-    /// 1-σ of the rotation about each axis, degrees.
+    /// Rotation 1-σ about each axis, degrees.
     pub rotations_deg: Vec<f64>,
-    /// 1-σ of the translation.
+    /// Translation 1-σ.
     pub translation: TranslationScale,
     /// Noise models.
     pub jitters: Vec<JitterModel>,
@@ -36,9 +39,9 @@ pub struct ConvergeOptions {
     pub turns_deg: Vec<f64>,
     /// Walls.
     pub walls: Vec<SweepWall>,
-    /// Runs of each cell: seeds 1 to this.
+    /// Number of runs of each cell, with the seeds 1 to this number.
     pub seeds: u64,
-    /// Frames of a survey.
+    /// Number of frames of a survey.
     pub frames: usize,
     /// Width of a frame, pixels.
     pub width: u32,
@@ -49,7 +52,7 @@ pub struct ConvergeOptions {
 }
 
 impl Default for ConvergeOptions {
-    /// The command's defaults: 2° to 12°, both noise models, 20 seeds, two turns of twelve frames.
+    /// Defaults of the command: 2° to 12°, both noise models, 20 seeds, two turns of 12 frames.
     fn default() -> Self {
         Self {
             rotations_deg: vec![2.0, 4.0, 6.0, 8.0, 12.0],
@@ -66,12 +69,12 @@ impl Default for ConvergeOptions {
     }
 }
 
-/// Seeds of a cell at the most: from this on, a seed would be the second draw of another.
-pub(super) const MOST_SEEDS: u64 = 1000;
+/// Maximum seeds of a cell; a larger seed would equal that of another's second draw.
+pub(super) const MAX_SEEDS: u64 = 1000;
 
 impl ConvergeOptions {
-    /// The cells: noise models, in them walls, turns, translation scales, and rotations innermost.
-    pub fn cells(&self) -> Vec<Cell> {
+    /// The cells in order of noise model, wall, turn, translation scale and rotation (innermost).
+    pub fn cells(&self) -> Vec<SweepCell> {
         let mut cells = Vec::new();
         for &jitter in &self.jitters {
             for &wall in &self.walls {
@@ -79,7 +82,7 @@ impl ConvergeOptions {
                     for row in 0..self.translation_rows() {
                         for &rotation_deg in &self.rotations_deg {
                             let scale = self.translation_scale(row, rotation_deg);
-                            cells.push(Cell::new(jitter, wall, turn_deg, rotation_deg, scale));
+                            cells.push(SweepCell::new(jitter, wall, turn_deg, rotation_deg, scale));
                         }
                     }
                 }
@@ -88,7 +91,7 @@ impl ConvergeOptions {
         cells
     }
 
-    /// Rows of the grid for one noise model, wall and turn.
+    /// Number of rows of the grid for one noise model, wall and turn.
     pub(super) fn translation_rows(&self) -> usize {
         match &self.translation {
             TranslationScale::Auto => 1,
@@ -98,15 +101,15 @@ impl ConvergeOptions {
 
     fn translation_scale(&self, row: usize, rotation_deg: f64) -> f64 {
         match &self.translation {
-            TranslationScale::Auto => rotation_deg / unit().rotation_sigma_deg,
+            TranslationScale::Auto => rotation_deg / unit_sigmas().rotation_sigma_deg,
             TranslationScale::Factors(factors) => factors[row],
         }
     }
 
-    /// What all runs of the sweep share.
+    /// Settings that all runs of the sweep share.
     pub fn settings(&self) -> Settings {
         Settings {
-            schema_version: super::SCHEMA_VERSION,
+            schema_version: SCHEMA_VERSION,
             program: crate::PROGRAM.to_owned(),
             frames: self.frames,
             width: self.width,
@@ -115,8 +118,8 @@ impl ConvergeOptions {
         }
     }
 
-    /// The survey of a cell by a seed: the `free` experiment with the cell's noise.
-    pub(super) fn survey(&self, cell: &Cell, seed: u64) -> SimulateOptions {
+    /// The survey of a cell and seed: the `free` experiment with the cell's noise.
+    pub(super) fn survey(&self, cell: &SweepCell, seed: u64) -> SimulateOptions {
         SimulateOptions {
             frames: self.frames,
             camera: Camera::from_vertical_fov(self.width, self.height, VERTICAL_FOV_RAD),
@@ -129,11 +132,11 @@ impl ConvergeOptions {
         }
     }
 
-    /// Checks what the simulator does not.
+    /// Validates the options that the simulator does not validate.
     ///
     /// # Errors
-    /// [`ConvergeError::Option`] with what is impossible.
-    pub(super) fn check(&self) -> Result<(), ConvergeError> {
+    /// [`ConvergeError::Option`] with the impossible option.
+    pub(super) fn validate(&self) -> Result<(), ConvergeError> {
         let check = |good: bool, what: &str| {
             if good {
                 Ok(())
@@ -159,7 +162,7 @@ impl ConvergeOptions {
             "a survey to refine needs two frames or more",
         )?;
         check(
-            (1..=MOST_SEEDS).contains(&self.seeds),
+            (1..=MAX_SEEDS).contains(&self.seeds),
             "1 to 1000 seeds can be swept",
         )?;
         let cells = self.cells();
@@ -167,7 +170,7 @@ impl ConvergeOptions {
             !cells.is_empty(),
             "the sweep is empty; each list needs at least one value",
         )?;
-        let keys: HashSet<String> = cells.iter().map(Cell::key).collect();
+        let keys: HashSet<String> = cells.iter().map(SweepCell::key).collect();
         check(
             keys.len() == cells.len(),
             "a value is in its list twice; name each only once",
@@ -195,11 +198,11 @@ mod tests {
         assert_eq!(cells.len(), 12);
         assert_eq!(cells[5].rotation_sigma_deg, 6.0);
         assert_eq!(cells[5].translation_sigma_m, [0.04, 0.04, 0.06]);
-        options.check().unwrap();
+        options.validate().unwrap();
     }
 
     #[test]
-    fn nonsense_is_refused() {
+    fn impossible_options_are_refused() {
         let wrong = [
             ConvergeOptions {
                 rotations_deg: vec![2.0, 2.0],
@@ -223,7 +226,7 @@ mod tests {
             },
         ];
         for options in wrong {
-            assert!(options.check().is_err(), "{options:?}");
+            assert!(options.validate().is_err(), "{options:?}");
         }
     }
 }

@@ -1,16 +1,21 @@
-//! A line of runs.jsonl.
+//! Record of one run, a line of runs.jsonl.
 
-use super::Cell;
+use crate::evaluate::converge::sweep_cell::SweepCell;
 use serde::{Deserialize, Serialize};
 
-/// What all runs of a sweep share; runs of other settings are not put together.
+/// Version of the content of runs.jsonl and converge.json.
+///
+/// It changes when the meaning of a field changes.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// Settings that all runs of a sweep share; runs of different settings are never combined.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
-    /// [`SCHEMA_VERSION`](super::SCHEMA_VERSION) of the line.
+    /// Version of the line, [`SCHEMA_VERSION`].
     pub schema_version: u32,
     /// Name and version of the program.
     pub program: String,
-    /// Frames of a survey.
+    /// Number of frames of a survey.
     pub frames: usize,
     /// Width of a frame, pixels.
     pub width: u32,
@@ -21,13 +26,13 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// The first setting in which `other` differs, in words: "frames is 24 there and 12 here".
+    /// Describes the first setting in which `other` differs: "frames is 24 there and 12 here".
     pub(super) fn difference(&self, other: &Self) -> Option<String> {
         let differ = |what: &str, here: String, there: String| {
             (here != there).then(|| format!("{what} is {there} there and {here} here"))
         };
         let size = |settings: &Self| format!("{}x{}", settings.width, settings.height);
-        // A number that went through JSON may have lost its last digit.
+        // JSON may round the last digit.
         let noise = |settings: &Self| format!("{:.9}", settings.noise_grey);
         differ(
             "the version of the log",
@@ -44,51 +49,50 @@ impl Settings {
 /// One finished run, as a line of runs.jsonl.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunRecord {
-    /// What it shares with all runs of the sweep.
+    /// Settings of the sweep.
     #[serde(flatten)]
     pub settings: Settings,
-    /// Where it lies in the grid.
+    /// Cell of the grid.
     #[serde(flatten)]
-    pub cell: Cell,
-    /// The seed asked for.
+    pub cell: SweepCell,
+    /// Requested seed.
     pub seed: u64,
-    /// The seed of the survey: that one, or the first after it by which the survey could be flown;
-    /// none if there is none, and then nothing was refined.
+    /// Seed of the first feasible draw; `None` if no draw is feasible and nothing was refined.
     pub seed_used: Option<u64>,
-    /// Surveys drawn before that nobody could fly.
+    /// Number of infeasible draws before it.
     pub redraws: u64,
-    /// True if the refinement gave poses.
+    /// True if the refinement returned poses.
     pub refined: bool,
-    /// Why it did not.
+    /// Reason why it did not.
     pub error: Option<String>,
-    /// Whether every frame is good.
+    /// True if every frame is good.
     pub success: bool,
-    /// Greatest root mean square wall error of a frame, pixels; none if a frame has no place on the
-    /// wall.
+    /// Largest root mean square wall error of a frame, pixels; `None` if a frame misses the wall.
     pub worst_frame_px: Option<f64>,
-    /// Root mean square wall error of all frames, pixels; none as above.
+    /// Root mean square wall error of all frames, pixels; `None` if a frame misses the wall.
     pub rms_px: Option<f64>,
-    /// Frames off by less than [`GOOD_PX`](super::GOOD_PX).
+    /// Number of frames with an error below [`GOOD_PX`](super::GOOD_PX).
     pub good_frames: usize,
-    /// Frames that the refinement itself calls unsure: flagged as anything but photometric.
+    /// Number of frames that the refinement flags as anything but photometric.
     pub flagged_frames: usize,
-    /// Frames that the refinement calls photometric and that are not good.
+    /// Number of frames that the refinement flags as photometric although they are not good.
     pub false_successes: usize,
-    /// Time of the refinement, seconds.
+    /// Duration of the refinement, seconds.
     pub seconds: f64,
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::evaluate::converge::{ConvergeOptions, SweepWall};
+    use crate::evaluate::converge::options::ConvergeOptions;
+    use crate::evaluate::converge::sweep_cell::SweepWall;
     use crate::trajectory::JitterModel;
 
-    /// A run of the default sweep that went well.
+    /// A successful run of the default sweep.
     pub fn record(rotation_deg: f64, seed: u64) -> RunRecord {
         RunRecord {
             settings: ConvergeOptions::default().settings(),
-            cell: Cell::new(
+            cell: SweepCell::new(
                 JitterModel::RandomWalk,
                 SweepWall::Brick,
                 30.0,

@@ -1,14 +1,14 @@
-//! Files of the folder, and frames.
+//! Responses with files of the folder and with frames.
 
-use super::reply::Reply;
 use crate::camera::Camera;
 use crate::frames::{FrameFile, load_colour};
+use crate::inspect::server::response::Response;
 use image::ImageFormat;
 use std::io::Cursor;
 use std::path::Path;
 
-/// What a file is by the end of its name; others are not served.
-fn kind(name: &str) -> Option<&'static str> {
+/// Media type by a file's extension; other files are not served.
+fn media_type(name: &str) -> Option<&'static str> {
     match name.rsplit_once('.')?.1 {
         "json" => Some("application/json"),
         "glb" => Some("model/gltf-binary"),
@@ -17,57 +17,58 @@ fn kind(name: &str) -> Option<&'static str> {
     }
 }
 
-/// Whether a part of a path is a plain name: letters, digits, `-`, `_` and dots inside.
+/// True if a part of a path is a plain name: letters, digits, `-`, `_` and dots inside.
 fn is_plain(part: &str) -> bool {
     let letters = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     !part.is_empty() && !part.starts_with('.') && part.chars().all(letters)
 }
 
-/// A file below `folder`, which is given in full.
-pub(super) fn read(folder: &Path, path: &str) -> Reply {
+/// Reads a file below `folder`, which is a canonical path.
+pub(super) fn read_file(folder: &Path, path: &str) -> Response {
     let Some(name) = path
         .strip_prefix('/')
         .filter(|name| name.split('/').all(is_plain))
     else {
-        return Reply::not_found();
+        return Response::not_found();
     };
-    let Some(kind) = kind(name) else {
-        return Reply::not_found();
+    let Some(kind) = media_type(name) else {
+        return Response::not_found();
     };
-    // A link may lead elsewhere.
+    // A symbolic link may lead outside.
     let full = folder
         .join(name)
         .canonicalize()
         .ok()
         .filter(|full| full.starts_with(folder));
     match full.and_then(|full| std::fs::read(full).ok()) {
-        Some(bytes) => Reply::ok(kind, bytes),
-        None => Reply::not_found(),
+        Some(bytes) => Response::ok(kind, bytes),
+        None => Response::not_found(),
     }
 }
 
-/// A frame as every browser shows it: the file itself, or the decoded picture as PNG.
-pub(super) fn picture(frame: &FrameFile, camera: &Camera) -> Reply {
+/// Reads a frame: the file itself if browsers can show it, else the decoded image as PNG.
+pub(super) fn read_frame(frame: &FrameFile, camera: &Camera) -> Response {
     let bytes = std::fs::read(&frame.path).unwrap_or_default();
     let kind = match image::guess_format(&bytes) {
         Ok(ImageFormat::Jpeg) => "image/jpeg",
         Ok(ImageFormat::Png) => "image/png",
         Ok(ImageFormat::WebP) => "image/webp",
-        // Another format, or a picture of a video.
-        _ => return decoded(frame, camera),
+        // Another format, or a frame of a video.
+        _ => return decode_frame(frame, camera),
     };
-    Reply::ok(kind, bytes)
+    Response::ok(kind, bytes)
 }
 
-fn decoded(frame: &FrameFile, camera: &Camera) -> Reply {
+/// Decodes a frame and encodes it as PNG.
+fn decode_frame(frame: &FrameFile, camera: &Camera) -> Response {
     let mut png = Cursor::new(Vec::new());
-    let picture = match load_colour(frame, camera.width, camera.height) {
-        Ok(picture) => picture.into_rgb8(),
-        Err(error) => return Reply::refuse(404, &error.to_string()),
+    let image = match load_colour(frame, camera.width, camera.height) {
+        Ok(image) => image.into_rgb8(),
+        Err(error) => return Response::refuse(404, &error.to_string()),
     };
-    match picture.write_to(&mut png, ImageFormat::Png) {
-        Ok(()) => Reply::ok("image/png", png.into_inner()),
-        Err(error) => Reply::refuse(500, &error.to_string()),
+    match image.write_to(&mut png, ImageFormat::Png) {
+        Ok(()) => Response::ok("image/png", png.into_inner()),
+        Err(error) => Response::refuse(500, &error.to_string()),
     }
 }
 
@@ -85,8 +86,8 @@ mod tests {
         std::fs::write(folder.join("secret.txt"), b"no").unwrap();
         std::fs::write(outer.join("secret.json"), b"no").unwrap();
         assert_eq!(
-            read(&folder, "/refined/0/1_2.glb"),
-            Reply::ok("model/gltf-binary", b"tile".to_vec())
+            read_file(&folder, "/refined/0/1_2.glb"),
+            Response::ok("model/gltf-binary", b"tile".to_vec())
         );
         #[cfg(unix)]
         std::os::unix::fs::symlink(outer.join("secret.json"), folder.join("link.json")).unwrap();
@@ -106,9 +107,9 @@ mod tests {
             "/refined//0/1_2.glb",
             "/refined/0/1_2.glb\0.json",
         ] {
-            assert_eq!(read(&folder, trick).status, 404, "{trick}");
+            assert_eq!(read_file(&folder, trick).status, 404, "{trick}");
         }
         let absolute = format!("/{}", outer.join("secret.json").display());
-        assert_eq!(read(&folder, &absolute).status, 404);
+        assert_eq!(read_file(&folder, &absolute).status, 404);
     }
 }

@@ -29,7 +29,7 @@
 //! its frames by weight, `g_i −= (w̄_i/Σw̄) Σ_j g_j`.
 //!
 //! How rough the wall is, is learned once from blocks spread over all of it; where edges are, anew
-//! each time: they may stand out ([`WallSolve::weigh_edges`]). That is what most is gained by on
+//! each time: they may stand out ([`WallSolve::reweight_edges`]). That is what most is gained by on
 //! bricks, whose wall is not at all Gaussian.
 //!
 //! Fine pixels are even in themselves, and where an edge runs through one, what they make of it
@@ -59,7 +59,8 @@ use crate::refine::tiles::grid::{TILE, TileId, WallGrid, fractions};
 use crate::refine::tiles::residual_weighting::Loss;
 use crate::refine::tiles::tile::{ObserverMoments, SAMPLES, TileMoments};
 use crate::super_resolve::{
-    Evidence, Footprints, KINDS, Lattice, MARGIN, Reading, Region, WallSolve, huber_weight,
+    FineGrid, Footprints, KINDS, MARGIN, Reading, Region, RoughnessEvidence, WallSolve,
+    huber_weight,
 };
 use nalgebra::Vector4;
 use std::ops::Range;
@@ -94,7 +95,7 @@ const PROBE_STEPS: usize = 20;
 /// What is known of a wall before it is solved for.
 #[derive(Clone, Debug)]
 pub struct WallModel {
-    /// How rough it is ([`Evidence::strengths`]).
+    /// How rough it is ([`RoughnessEvidence::strengths`]).
     pub strengths: [f64; KINDS],
     /// How stiffly it holds frames.
     pub stiffness: Stiffness,
@@ -131,7 +132,7 @@ impl<'a> JointBlock<'a> {
         let region = region_of(grid, tiles);
         let shift = fractions(region.column, region.row);
         let spacing_m = [grid.spacing_s_m, grid.spacing_h_m];
-        let lattice = Lattice {
+        let lattice = FineGrid {
             columns: grid.columns * TILE as i64,
             spacing_m,
             start_m: [shift[0] * spacing_m[0], shift[1] * spacing_m[1]],
@@ -143,7 +144,7 @@ impl<'a> JointBlock<'a> {
         let footprints = Footprints::new(scene.surface, &lattice, region, &shown);
         let sigma = sigma as f32;
         let readings = frames.iter().enumerate().map(|(n, frame)| {
-            let pixels = footprints.pixels(n).iter().zip(footprints.places(n));
+            let pixels = footprints.pixels(n).iter().zip(footprints.positions(n));
             let reading = |(pixel, place): (&u32, &[f32; 2])| match observations.of(*place, n).shade
             {
                 0.0 => Reading::default(),
@@ -167,7 +168,7 @@ impl<'a> JointBlock<'a> {
     }
 
     /// How rough the wall is here.
-    pub fn evidence(&self) -> Evidence {
+    pub fn evidence(&self) -> RoughnessEvidence {
         let start = self.footprints.mean(&self.readings);
         let resolved = self.footprints.super_resolve(&self.readings, &start);
         resolved.evidence
@@ -179,8 +180,8 @@ impl<'a> JointBlock<'a> {
         let mut solve = WallSolve::new(&self.footprints, &self.readings, &start, strengths);
         solve.improve(STEPS);
         for round in 0..ROUNDS {
-            solve.weigh_edges();
-            solve.weigh_pixels(|residual| pixel_weight(round, residual));
+            solve.reweight_edges();
+            solve.reweight_pixels(|residual| pixel_weight(round, residual));
             solve.improve(STEPS);
         }
         solve
@@ -210,7 +211,7 @@ impl<'a> JointBlock<'a> {
                 for pixel in pixels {
                     moved[pixel.number] = pixel.features[axis];
                 }
-                let follows = solve.follow(view, &moved, PROBE_STEPS);
+                let follows = solve.response(view, &moved, PROBE_STEPS);
                 for pixel in pixels {
                     let slope = f64::from(pixel.features[axis]);
                     let left = slope - f64::from(follows[pixel.number]);
@@ -234,7 +235,7 @@ impl<'a> JointBlock<'a> {
         let pixels = views.map(|(n, frame)| {
             let [s, h, value] = [&slopes[0], &slopes[1], x].map(|of| self.footprints.read(n, of));
             let gain = self.views[*frame].gain();
-            let places = self.footprints.places(n).iter().zip(&self.readings[n]);
+            let places = self.footprints.positions(n).iter().zip(&self.readings[n]);
             let pixels = places.enumerate().filter_map(|(p, (place, reading))| {
                 let observation = self.observations.of(*place, n);
                 let (tile, observer) = observation.place.filter(|_| reading.inverse_sigma > 0.0)?;

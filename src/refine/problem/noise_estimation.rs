@@ -15,7 +15,7 @@ use crate::refine::tiles::grid::{BLOCK, TilePoints};
 use crate::refine::tiles::interpolation::Interpolation;
 use crate::refine::tiles::residual_weighting::NoiseHistogram;
 use crate::refine::tiles::tile::{Misfit, Seen, TileWork};
-use crate::super_resolve::{Evidence, aliased_variance};
+use crate::super_resolve::{RoughnessEvidence, aliased_variance};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -84,7 +84,7 @@ impl Problem<'_> {
         let found = self.at_blocks(|block| block.evidence())?;
         let strengths = found
             .iter()
-            .fold(Evidence::default(), Evidence::merge)
+            .fold(RoughnessEvidence::default(), RoughnessEvidence::merge)
             .strengths();
         let aliased = aliased_variance(&strengths, self.grid.density);
         if aliased < LEAST_ALIASED * self.sigma.powi(2) {

@@ -57,8 +57,8 @@ impl<'a> SampledFrame<'a> {
     }
 
     /// The frame as its footprints are sought.
-    pub fn placed(&self) -> super_resolve::View<'_> {
-        super_resolve::View {
+    pub fn placed(&self) -> super_resolve::PosedCamera<'_> {
+        super_resolve::PosedCamera {
             camera: self.camera,
             pose: &self.pose,
         }

@@ -58,7 +58,7 @@ struct Choice {
 }
 
 /// What a choice between repeats rests on; the slices are frame by frame.
-struct Evidence<'a> {
+struct RoughnessEvidence<'a> {
     prior: &'a Prior,
     gauge: Gauge,
     /// Which of the prior's frames.
@@ -153,7 +153,7 @@ pub fn resolve_aliases(
     }
     let poses: Vec<Pose> = frames.iter().map(|k| tracked.estimates[*k].pose).collect();
     let radius_m = scene.surface.perimeter_m() / std::f64::consts::TAU;
-    let evidence = Evidence {
+    let evidence = RoughnessEvidence {
         prior: scene.prior,
         gauge: scene.surface.gauge(),
         frames: &frames,
@@ -320,7 +320,7 @@ fn likeliest(
     (best, rival.map(|(_, motion)| motion))
 }
 
-impl Evidence<'_> {
+impl RoughnessEvidence<'_> {
     /// What the prior makes of the repeats, where odds are clear from `clear` on.
     fn choose(&self, clear: f64) -> Choice {
         match self.prior.jitter.model {
@@ -450,7 +450,7 @@ mod tests {
 
     fn choose_of(prior: &Prior, poses: &[Pose], repeats: &[Vec<GaugeMotion>]) -> Choice {
         let frames: Vec<usize> = (0..poses.len()).collect();
-        let evidence = Evidence {
+        let evidence = RoughnessEvidence {
             prior,
             gauge: Gauge::round(),
             frames: &frames,

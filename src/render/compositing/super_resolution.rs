@@ -10,7 +10,7 @@ use crate::render::sampling::exposure::{Exposure, Response};
 use crate::render::sampling::picture::Picture;
 use crate::render::sampling::picture_cache::PictureCache;
 use crate::render::sampling::sample::{Sample, Samples};
-use crate::super_resolve::{Footprints, MARGIN, Reading, Region, View};
+use crate::super_resolve::{Footprints, MARGIN, PosedCamera, Reading, Region};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -105,9 +105,9 @@ impl FrameReadings {
             .iter()
             .filter_map(|frame| Some((frame, self.frames.get(frame)?)))
             .collect();
-        let views: Vec<View> = seen
+        let views: Vec<PosedCamera> = seen
             .iter()
-            .map(|(frame, _)| View {
+            .map(|(frame, _)| PosedCamera {
                 camera: placements[**frame].camera(cache.camera()),
                 pose: &placements[**frame].pose,
             })

@@ -1,4 +1,4 @@
-//! Drawing of the panorama's tiles, row by row.
+//! ComparedPanorama of the panorama's tiles, row by row.
 
 use super::accumulator::RowAccumulator;
 use super::band::{PixelRows, TilePixels};

@@ -2,7 +2,7 @@
 
 use super::placement::Placement;
 use crate::render::error::RenderError;
-use crate::super_resolve::Lattice;
+use crate::super_resolve::FineGrid;
 use crate::surface::{Footprint, Surface, WallPoint};
 use image::DynamicImage;
 use serde::{Deserialize, Serialize};
@@ -155,9 +155,9 @@ impl Canvas {
         Self::covering(surface, footprints, px_per_metre)
     }
 
-    /// Lattice of the pixels, which continues beyond the first row and the last.
-    pub fn lattice(&self) -> Lattice {
-        Lattice {
+    /// FineGrid of the pixels, which continues beyond the first row and the last.
+    pub fn lattice(&self) -> FineGrid {
+        FineGrid {
             columns: i64::from(self.columns),
             spacing_m: [1.0 / self.px_per_metre; 2],
             start_m: [0.0, self.h_start_m],

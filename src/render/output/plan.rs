@@ -1,4 +1,4 @@
-//! Drawing of a panorama, band by band, with exposures and seams found before.
+//! ComparedPanorama of a panorama, band by band, with exposures and seams found before.
 
 use super::budget::Budget;
 use crate::progress::Progress;

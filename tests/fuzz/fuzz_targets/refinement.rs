@@ -3,7 +3,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use std::sync::OnceLock;
-use tunnelstitch::evaluate::{CompareInput, Comparison, Drawings, compare};
+use tunnelstitch::evaluate::{CompareInput, Comparison, ComparedPanoramas, compare};
 use tunnelstitch::progress::Silent;
 use tunnelstitch::render::RenderOptions;
 use tunnelstitch::report::{RefinedFiles, Sources, gather, page};
@@ -13,7 +13,7 @@ use tunnelstitch_fuzz::small_survey;
 struct Compared {
     survey: Survey,
     comparison: Comparison,
-    drawings: Drawings,
+    drawings: ComparedPanoramas,
 }
 
 fn compared() -> &'static Compared {

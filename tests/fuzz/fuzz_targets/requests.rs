@@ -5,7 +5,7 @@ use libfuzzer_sys::fuzz_target;
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::sync::OnceLock;
-use tunnelstitch::inspect::{Marks, Originals, Served, Server, Viewer};
+use tunnelstitch::inspect::{Marks, SourceFrames, ServerContent, Server, Viewer};
 use tunnelstitch::render::place;
 use tunnelstitch::survey::Survey;
 use tunnelstitch_fuzz::small_survey;
@@ -25,7 +25,7 @@ fn port() -> &'static str {
         .unwrap();
         let folder = tempfile::tempdir().unwrap().keep();
         std::fs::write(folder.join("tile.webp"), "tile").unwrap();
-        let served = Served {
+        let served = ServerContent {
             marks: Marks::open(&folder).unwrap(),
             folder,
             viewer: Viewer {
@@ -33,7 +33,7 @@ fn port() -> &'static str {
                 style: b"style",
                 script: b"script",
             },
-            originals: Some(Originals {
+            source_frames: Some(SourceFrames {
                 surface: survey.surface,
                 camera: survey.camera,
                 frames: survey.frames,

@@ -2,7 +2,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tunnelstitch::evaluate::converge::{ConvergeOptions, run};
+use tunnelstitch::evaluate::converge::{ConvergeOptions, run_sweep};
 use tunnelstitch::progress::Silent;
 use tunnelstitch::trajectory::JitterModel;
 use tunnelstitch_fuzz::file;
@@ -19,5 +19,5 @@ fuzz_target!(|data: &[u8]| {
         noise_grey: -1.0,
         ..ConvergeOptions::default()
     };
-    let _ = run(&options, folder.path(), false, &Silent);
+    let _ = run_sweep(&options, folder.path(), false, &Silent);
 });

@@ -4,7 +4,7 @@
 use libfuzzer_sys::fuzz_target;
 use std::path::Path;
 use tunnelstitch::progress::Silent;
-use tunnelstitch::simulate::{BadFrames, SimulateOptions, run};
+use tunnelstitch::simulate::{BadFrames, SimulateOptions, write_survey};
 use tunnelstitch::trajectory::gyro::Orientation;
 
 fuzz_target!(|text: &str| {
@@ -20,6 +20,6 @@ fuzz_target!(|text: &str| {
             bad_frames: bad,
             ..SimulateOptions::free()
         };
-        assert!(run(&options, Path::new("/dev/null/none"), false, &Silent).is_err());
+        assert!(write_survey(&options, Path::new("/dev/null/none"), false, &Silent).is_err());
     }
 });

@@ -41,7 +41,7 @@ pub fn small_survey() -> &'static Path {
             shaft_percent: 12.0,
             ..SimulateOptions::free()
         };
-        simulate::run(&options, folder.path(), true, &Silent).unwrap();
+        simulate::write_survey(&options, folder.path(), true, &Silent).unwrap();
         for (name, content) in OTHERS {
             std::fs::write(folder.path().join(name), content).unwrap();
         }

@@ -1,11 +1,14 @@
-/** The trajectory and what the frames look at: lines in the world. */
-import { BufferGeometry, Color, Float32BufferAttribute, Group, Line, LineBasicMaterial, LineSegments, Quaternion, Vector3 } from "three";
+/** Trajectory and camera frusta as lines in the world. */
+import {
+  BufferGeometry, Color, Float32BufferAttribute, Group, Line, LineBasicMaterial, LineSegments,
+  Quaternion, Vector3,
+} from "three";
 import type { Layer, Tunnel } from "./tunnel";
 
 /** Length of a frustum's edges, as a share of the radius. */
-const LENGTH = 0.12;
-/** More would be a thicket. */
-const MOST = 2000;
+const EDGE_RADII = 0.12;
+/** Maximum number of frusta. */
+const MAX_FRUSTA = 2000;
 
 export function camerasOf(tunnel: Tunnel, layer: Layer, radius: number): Group {
   const group = new Group();
@@ -15,14 +18,14 @@ export function camerasOf(tunnel: Tunnel, layer: Layer, radius: number): Group {
   group.position.copy(origin);
   const path = new BufferGeometry().setFromPoints(centres.map((centre) => centre.clone().sub(origin)));
   group.add(new Line(path, new LineBasicMaterial({ color: new Color("#ffb02e") })));
-  const step = Math.max(1, Math.ceil(layer.poses.length / MOST));
+  const step = Math.max(1, Math.ceil(layer.poses.length / MAX_FRUSTA));
   const ends: number[] = [];
   layer.poses.forEach((pose, k) => {
     if (k % step !== 0) return;
     const turn = new Quaternion(pose[3], pose[4], pose[5], pose[6]);
     const apex = centres[k].clone().sub(origin);
     const corners = tunnel.corners.map((corner) =>
-      new Vector3(...corner).applyQuaternion(turn).multiplyScalar(LENGTH * radius).add(apex),
+      new Vector3(...corner).applyQuaternion(turn).multiplyScalar(EDGE_RADII * radius).add(apex),
     );
     corners.forEach((corner, c) => {
       ends.push(...apex.toArray(), ...corner.toArray());

@@ -1,4 +1,4 @@
-/** Clock positions: θ from twelve o'clock, half a degree a minute. */
+/** Clock positions: the angle θ from twelve o'clock, half a degree per minute. */
 
 export function clockOf(thetaDeg: number, twelveAtDeg: number): string {
   const degrees = (((thetaDeg - twelveAtDeg) % 360) + 360) % 360;
@@ -7,7 +7,7 @@ export function clockOf(thetaDeg: number, twelveAtDeg: number): string {
   return `${hours}:${String(minutes % 60).padStart(2, "0")}`;
 }
 
-/** θ in degrees, or null for what is no clock position. */
+/** Parses a clock position; θ in degrees, or null if it is invalid. */
 export function thetaOf(clock: string, twelveAtDeg: number): number | null {
   const parts = /^(\d{1,2})(?::(\d{2}))?$/.exec(clock.trim());
   if (!parts) return null;
@@ -16,7 +16,7 @@ export function thetaOf(clock: string, twelveAtDeg: number): number | null {
   return (((hours % 12) * 30 + minutes / 2 + twelveAtDeg) % 360 + 360) % 360;
 }
 
-/** A place named by the address: `#h=12.3&clock=4:30`. */
+/** Parses a position in the page's address: `#h=12.3&clock=4:30`. */
 export function placeOf(hash: string): { h: number; clock: string } | null {
   const values = new URLSearchParams(hash.replace(/^#/, ""));
   const h = Number.parseFloat(values.get("h") ?? "");

@@ -1,4 +1,4 @@
-/** Elements of the page. */
+/** Helpers for elements of the page. */
 
 export function byId<T extends HTMLElement | SVGElement>(id: string): T {
   const element = document.getElementById(id);
@@ -6,7 +6,7 @@ export function byId<T extends HTMLElement | SVGElement>(id: string): T {
   return element as unknown as T;
 }
 
-/** A new element with properties and children; texts are texts, never markup. */
+/** Creates an element with properties and children; strings become text, never markup. */
 export function make<K extends keyof HTMLElementTagNameMap>(
   name: K,
   properties: Partial<HTMLElementTagNameMap[K]> = {},

@@ -1,25 +1,25 @@
-/** The wall as tiles of one layer at a time, and the place of the wall under a pixel. */
+/** Tiles of the shown layer, and the wall position under a pixel. */
 import { TilesRenderer } from "3d-tiles-renderer";
 import { Group, Mesh, MeshBasicMaterial, Object3D, PerspectiveCamera, Raycaster, Texture, Vector2, WebGLRenderer } from "three";
 import type { Layer, Tunnel } from "./tunnel";
 import type { WallPlace } from "./wall";
 
-/** Memory for tiles, bytes: what is not in sight goes first when there is more. */
-const MOST_BYTES = 256 * 2 ** 20;
+/** Maximum memory for tiles, bytes; invisible tiles are evicted first. */
+const MAX_BYTES = 256 * 2 ** 20;
 const KEPT_BYTES = 160 * 2 ** 20;
 const MIB = 2 ** 20;
-/** Updates without anything to wait for, until all is there. */
-const SETTLED = 3;
+/** Number of idle updates after which loading is complete. */
+const IDLE_UPDATES = 3;
 
 export class Layers {
   readonly group = new Group();
-  /** Called when there is something new to draw. */
+  /** Called when the view must be redrawn. */
   onChange: () => void = () => {};
   onProblem: (what: string) => void = () => {};
   private shown: TilesRenderer | null = null;
   private layer: Layer;
   private next: TilesRenderer | null = null;
-  /** Layers that wait for tiles, and updates since none did. */
+  /** Tilesets that are loading, and number of updates since the last one finished. */
   private readonly busy = new Set<TilesRenderer>();
   private idle = 0;
   private readonly ray = new Raycaster();
@@ -36,12 +36,12 @@ export class Layers {
     return this.layer;
   }
 
-  /** Shows a layer as soon as enough of it is there; until then the one before. */
+  /** Shows a layer as soon as enough of it is loaded; until then the previous one stays. */
   show(name: string): void {
     this.layer = this.tunnel.layers.find((layer) => layer.name === name) ?? this.tunnel.layers[0];
     if (this.next) this.drop(this.next);
     const tiles = new TilesRenderer(this.layer.tileset);
-    tiles.lruCache.maxBytesSize = MOST_BYTES;
+    tiles.lruCache.maxBytesSize = MAX_BYTES;
     tiles.lruCache.minBytesSize = KEPT_BYTES;
     tiles.setCamera(this.camera);
     tiles.setResolutionFromRenderer(this.camera, this.renderer);
@@ -64,7 +64,7 @@ export class Layers {
     this.onChange();
   }
 
-  /** Loads what is in sight. */
+  /** Loads the visible tiles. */
   update(): void {
     this.camera.updateMatrixWorld();
     for (const tiles of [this.next, this.shown]) {
@@ -82,10 +82,10 @@ export class Layers {
     }
   }
 
-  /** Whether all that is in sight is there. */
+  /** True if all visible tiles are loaded. */
   get complete(): boolean {
-    // What has just come may ask for more.
-    return this.idle >= SETTLED;
+    // Loaded tiles may request others.
+    return this.idle >= IDLE_UPDATES;
   }
 
   private drop(tiles: TilesRenderer): void {
@@ -94,18 +94,18 @@ export class Layers {
     tiles.dispose();
   }
 
-  /** The place of the wall under a point of the view (−1 to 1, up). */
+  /** Wall position under a point of the view (normalised device coordinates, −1 to 1, y up). */
   pick(x: number, y: number): WallPlace | null {
     if (!this.shown) return null;
     this.ray.setFromCamera(new Vector2(x, y), this.camera);
     const hit = this.ray.intersectObject(this.shown.group, true)[0];
-    // Where the tile's picture lies on the wall is written in its mesh.
+    // The mesh stores the extent of its texture on the wall.
     const place = hit?.object.userData.wall as { corner_m: [number, number]; extent_m: [number, number] } | undefined;
     if (!place || !hit.uv) return null;
     return { s: place.corner_m[0] + hit.uv.x * place.extent_m[0], h: place.corner_m[1] + hit.uv.y * place.extent_m[1] };
   }
 
-  /** Memory of all textures that are held, MiB: four bytes a pixel, and a third for overviews. */
+  /** Memory of all loaded textures, MiB: four bytes per pixel, and a third for mipmaps. */
   textureMiB(): number {
     let bytes = 0;
     for (const tiles of [this.shown, this.next]) {

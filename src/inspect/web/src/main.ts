@@ -1,4 +1,4 @@
-/** The page: everything is put together here. */
+/** Main program of the page. */
 import { Group, PerspectiveCamera, Scene, SRGBColorSpace, WebGLRenderer } from "three";
 import { camerasOf, disposeCameras } from "./cameras";
 import { clockOf, placeOf, thetaOf } from "./clock";
@@ -9,13 +9,13 @@ import { LocalStore, type Mark, type Measure, ServerStore, type Store, csv, down
 import { wirePad } from "./pad";
 import { Overlay, type Shape } from "./overlay";
 import { Panel, valueOf } from "./panel";
-import { type Abilities, type Tunnel, type WallPoints, read } from "./tunnel";
+import { type Capabilities, type Tunnel, type WallPoints, read } from "./tunnel";
 import { Walk } from "./walk";
 import { Wall, type WallPlace } from "./wall";
 
 const FIELD_OF_VIEW_DEG = 75;
-/** The address and statistics follow you this often, milliseconds. */
-const SLOWLY_MS = 400;
+/** Interval of updates of the address and the statistics, milliseconds. */
+const STATUS_INTERVAL_MS = 400;
 const TOOLS = ["look", "mark", "length", "width", "frames"] as const;
 type Tool = (typeof TOOLS)[number];
 
@@ -44,14 +44,14 @@ class Page {
   constructor(
     private readonly tunnel: Tunnel,
     points: WallPoints,
-    private readonly abilities: Abilities,
+    private readonly capabilities: Capabilities,
   ) {
     this.wall = new Wall(tunnel, points);
     this.walk = new Walk(this.wall, this.camera, this.view);
     this.layers = new Layers(tunnel, this.camera, this.renderer);
     this.map = new WallMap(byId("map"), byId("whole"), this.wall);
     this.overlay = new Overlay(byId("overlay"), this.wall, this.camera);
-    this.store = abilities.marks ? new ServerStore() : new LocalStore();
+    this.store = capabilities.marks ? new ServerStore() : new LocalStore();
     this.renderer.outputColorSpace = SRGBColorSpace;
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.scene.add(this.layers.group);
@@ -80,7 +80,7 @@ class Page {
     window.addEventListener("keydown", (event) => this.key(event));
     for (const button of document.querySelectorAll<HTMLButtonElement>("[data-tool]")) {
       button.addEventListener("click", () => this.choose(button.dataset.tool as Tool));
-      if (button.dataset.tool === "frames") button.hidden = !this.abilities.frames;
+      if (button.dataset.tool === "frames") button.hidden = !this.capabilities.frames;
     }
     byId("ride").addEventListener("click", () => this.ride());
     wirePad(byId("pad"), this.walk);
@@ -113,17 +113,17 @@ class Page {
       this.drawShapes();
     }
     const loading = this.layers.complete ? "0" : "1";
-    // At once when all is there; else now and then.
+    // Immediately when loading is complete, else at intervals.
     const arrived = loading === "0" && document.body.dataset.loading === "1";
-    if (arrived || now - this.lastSlow > SLOWLY_MS) {
+    if (arrived || now - this.lastSlow > STATUS_INTERVAL_MS) {
       this.lastSlow = now;
-      this.tell();
+      this.updateStatus();
     }
     document.body.dataset.loading = loading;
   }
 
-  /** Where you are, what you see, and what it takes. */
-  private tell(): void {
+  /** Updates position, map, statistics and address. */
+  private updateStatus(): void {
     const { h } = this.walk.station;
     const seen = this.layers.pick(0, 0);
     const at = seen ? `; looking at ${this.where(seen)}` : "";
@@ -147,7 +147,7 @@ class Page {
     return `${place.h.toFixed(3)} m, ${this.clock(place)} o'clock`;
   }
 
-  /** Goes to the place that the address names. */
+  /** Goes to the position in the address. */
   private goTo(hash: string): void {
     const place = placeOf(hash);
     const theta = place && thetaOf(place.clock, this.tunnel.twelve_at_deg);
@@ -195,7 +195,7 @@ class Page {
   }
 
   private lock(): void {
-    // Refused where the browser has no pointer: dragging works there.
+    // Browsers without a pointer refuse; dragging works there.
     void Promise.resolve(this.view.requestPointerLock()).catch(() => {});
   }
 
@@ -214,7 +214,7 @@ class Page {
   }
 
   private choose(tool: Tool): void {
-    if (tool === "frames" && !this.abilities.frames) return;
+    if (tool === "frames" && !this.capabilities.frames) return;
     this.tool = tool;
     [this.begun, this.measured] = [null, null];
     document.body.dataset.tool = tool;
@@ -247,7 +247,7 @@ class Page {
     this.dirty = true;
   }
 
-  /** Shows what was clicked, and the form to keep it. */
+  /** Shows the measurement and the form to save it as a mark. */
   private finish(places: WallPlace[], measure: Measure): void {
     this.measured = { places, label: valueOf(measure), chosen: true };
     const titles = { point: "Mark a defect", length: "Length along the wall", width: "Width of a crack" };
@@ -289,7 +289,7 @@ class Page {
     this.dirty = true;
     if (rows.length === 0) return;
     const row = make("div", { className: "row" }, make("strong", {}, rows.length === 1 ? "1 mark" : `${rows.length} marks`));
-    if (!this.abilities.marks) {
+    if (!this.capabilities.marks) {
       const save = (name: string, file: string, type: string, text: (marks: Mark[]) => string) => {
         const button = make("button", { type: "button", title: `Save as ${file}` }, name);
         button.addEventListener("click", () => download(file, type, text(this.marks)));
@@ -314,12 +314,12 @@ class Page {
 }
 
 async function start(): Promise<void> {
-  const [tunnel, points, abilities] = await Promise.all([
+  const [tunnel, points, capabilities] = await Promise.all([
     read<Tunnel>("tunnel.json"),
     read<WallPoints>("wall.json"),
-    read<Abilities>("server.json"),
+    read<Capabilities>("server.json"),
   ]);
-  await new Page(tunnel, points, abilities).start();
+  await new Page(tunnel, points, capabilities).start();
 }
 
 start().catch((error: Error) => {

@@ -1,12 +1,15 @@
-/** The unrolled wall, chainage to the right and θ up, around where you are; and the whole length below it. */
+/**
+ * Map of the unrolled wall around the camera, chainage to the right and θ up, above a bar of the
+ * whole length.
+ */
 import type { Layer } from "./tunnel";
 import type { Wall, WallPlace } from "./wall";
 
-/** Least distance of two chainages in the map, pixels. */
-const TICK_PX = 60;
-/** Clock positions nearer to an edge are not written, pixels. */
-const CLOCK_PX = 10;
-/** They need so much room, pixels. */
+/** Minimum distance of chainage labels in the map, pixels. */
+const MIN_TICK_PX = 60;
+/** Minimum distance of a clock label from an edge, pixels. */
+const MIN_CLOCK_PX = 10;
+/** Width of the clock labels, pixels. */
 const CLOCK_ROOM_PX = 40;
 
 export interface Pin {
@@ -41,19 +44,19 @@ export class WallMap {
     this.draw();
   }
 
-  /** You are in the section `h`, and look at `seen`. */
+  /** Updates the camera's chainage `h`, the viewed wall position `seen` and the pins. */
   move(h: number, seen: WallPlace | null, pins: Pin[]): void {
     this.eye = { s: 0, h };
     [this.seen, this.pins] = [seen, pins];
     this.draw();
   }
 
-  /** Pixels of the screen per metre. */
+  /** Scale of the map, screen pixels per metre. */
   private get scale(): number {
     return this.canvas.clientHeight / this.wall.perimeter;
   }
 
-  /** Chainage at the left edge: you are in the middle, except at the ends. */
+  /** Chainage at the left edge; the camera is in the centre except at the ends of the tunnel. */
   private get left(): number {
     const [from, to] = this.wall.chainage;
     const span = this.canvas.clientWidth / this.scale;
@@ -95,7 +98,7 @@ export class WallMap {
       const rows = picture.naturalHeight - 2 * map.border_px;
       const columns = picture.naturalWidth - 2 * map.border_px;
       context.save();
-      // Turned counter-clockwise: a column goes up, a row to the right.
+      // Rotated counter-clockwise: columns point up, rows to the right.
       const start = (chainage_m[0] + row * span - left) * scale;
       const [along, across] = [scale / map.px_per_metre, height / map.size_px[0]];
       context.transform(0, -across, along, 0, start, height);
@@ -104,10 +107,10 @@ export class WallMap {
     }
   }
 
-  /** Chainages along the lower edge. */
+  /** Draws chainage labels along the lower edge. */
   private drawScale(context: CanvasRenderingContext2D, left: number, scale: number, width: number, height: number): void {
     const [from, to] = this.wall.chainage;
-    const metres = [1, 2, 5, 10, 20, 50, 100].find((step) => step * scale >= TICK_PX) ?? 200;
+    const metres = [1, 2, 5, 10, 20, 50, 100].find((step) => step * scale >= MIN_TICK_PX) ?? 200;
     context.font = "11px system-ui, sans-serif";
     context.textBaseline = "bottom";
     for (let h = Math.ceil(Math.max(left, from) / metres) * metres; h <= Math.min(to, left + width / scale); h += metres) {
@@ -121,7 +124,7 @@ export class WallMap {
     }
   }
 
-  /** Clock positions beside the wall, or on it where that fills the map. */
+  /** Draws clock labels beside the wall, or on it if it fills the map. */
   private drawClock(context: CanvasRenderingContext2D, left: number, height: number): void {
     const beside = left > CLOCK_ROOM_PX;
     const x = beside ? left - 4 : Math.max(left, 0) + 4;
@@ -132,8 +135,8 @@ export class WallMap {
     context.lineWidth = 3;
     for (const hour of [12, 3, 6, 9]) {
       const y = (1 - this.wall.sAtHour(hour) / this.wall.perimeter) * height;
-      // Not on the seam, which is at both edges.
-      if (y < CLOCK_PX || y > height - CLOCK_PX) continue;
+      // The cut of the section is at both edges.
+      if (y < MIN_CLOCK_PX || y > height - MIN_CLOCK_PX) continue;
       context.strokeText(`${hour}:00`, x, y);
       context.fillText(`${hour}:00`, x, y);
     }
@@ -177,7 +180,7 @@ function dot(context: CanvasRenderingContext2D, [x, y]: [number, number], radius
   context.stroke();
 }
 
-/** The canvas as large as it is shown, cleared; in units of the page's pixels. */
+/** Resizes a canvas to its displayed size and clears it; coordinates are CSS pixels. */
 function fit(canvas: HTMLCanvasElement): [CanvasRenderingContext2D | null, number, number] {
   const [width, height, ratio] = [canvas.clientWidth, canvas.clientHeight, window.devicePixelRatio];
   const [columns, rows] = [Math.round(width * ratio), Math.round(height * ratio)];

@@ -1,4 +1,4 @@
-/** Marks: GeoJSON features on the unrolled wall. A server keeps them; without one, this browser does. */
+/** Marks: GeoJSON features on the unrolled wall, stored by the server or else by this browser. */
 import { clockOf } from "./clock";
 import type { Tunnel } from "./tunnel";
 import type { Wall, WallPlace } from "./wall";
@@ -26,17 +26,17 @@ export interface Mark {
   };
 }
 
-/** What was measured, if anything. */
+/** Measurement of a mark. */
 export type Measure = { kind: "point" } | { kind: "length"; length_m: number } | { kind: "width"; width_mm: number };
 
-/** What the inspector says. */
+/** Inspector's description of a defect. */
 export interface Remark {
   class: string;
   severity: number;
   note: string;
 }
 
-/** The places that a mark lies at, one or two. */
+/** Wall positions of a mark, one or two. */
 export function placesOf(mark: Mark): WallPlace[] {
   const { geometry } = mark;
   const all = geometry.type === "Point" ? [geometry.coordinates] : geometry.coordinates;
@@ -71,12 +71,12 @@ export function newMark(tunnel: Tunnel, wall: Wall, layer: string, places: WallP
   };
 }
 
-/** A name that no other mark has. (`randomUUID` is not there for pages of a web server without TLS.) */
+/** Creates a unique identifier (`randomUUID` is unavailable on pages without TLS). */
 function newId(): string {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-/** Where marks are kept. */
+/** Storage of marks. */
 export interface Store {
   all(): Promise<Mark[]>;
   put(mark: Mark): Promise<void>;
@@ -109,7 +109,7 @@ export class ServerStore implements Store {
   }
 }
 
-/** In this browser, by the page's address. */
+/** Storage in this browser, keyed by the page's address. */
 export class LocalStore implements Store {
   private readonly key = `marks ${location.pathname}`;
 
@@ -127,13 +127,13 @@ export class LocalStore implements Store {
   }
 }
 
-/** The file that the server would have written. */
+/** Encodes marks as GeoJSON, as the server does. */
 export function geojson(marks: Mark[]): string {
   const collection: Collection = { type: "FeatureCollection", features: marks };
   return JSON.stringify(collection, null, 2) + "\n";
 }
 
-/** The table that the server would have written: by chainage, as RFC 4180 quotes. */
+/** Encodes marks as CSV in order of chainage, quoted by RFC 4180, as the server does. */
 export function csv(marks: Mark[]): string {
   const number = (value: number | undefined, digits: number) => value?.toFixed(digits) ?? "";
   const columns: [string, (id: string, p: Mark["properties"]) => string][] = [

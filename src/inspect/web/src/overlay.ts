@@ -1,4 +1,4 @@
-/** Marks and measures drawn over the view. */
+/** Marks and measurements drawn over the view. */
 import { PerspectiveCamera, Vector3 } from "three";
 import type { Wall, WallPlace } from "./wall";
 
@@ -9,10 +9,10 @@ export interface Shape {
 }
 
 const SVG = "http://www.w3.org/2000/svg";
-/** Marks farther away than this are not drawn, radii. */
-const FARTHEST = 30;
-/** Points of a line, so that it follows the wall. */
-const POINTS = 16;
+/** Maximum distance of drawn marks, radii. */
+const MAX_DISTANCE_RADII = 30;
+/** Number of segments by which a line follows the wall. */
+const SEGMENTS = 16;
 
 export class Overlay {
   constructor(
@@ -29,8 +29,8 @@ export class Overlay {
     const drawn: Element[] = [];
     const [first, second] = places;
     if (second) {
-      const line = Array.from({ length: POINTS + 1 }, (_, k) => {
-        const share = k / POINTS;
+      const line = Array.from({ length: SEGMENTS + 1 }, (_, k) => {
+        const share = k / SEGMENTS;
         return this.project({ s: first.s + share * (second.s - first.s), h: first.h + share * (second.h - first.h) });
       });
       for (let k = 1; k < line.length; k++) {
@@ -48,10 +48,10 @@ export class Overlay {
     return drawn;
   }
 
-  /** Where a place is on the screen, if it is before the camera and not far. */
+  /** Screen position of a wall position, or null if it is behind the camera or too far. */
   private project(place: WallPlace): [number, number] | null {
     const x = this.wall.point(place);
-    if (x.distanceTo(this.camera.position) > FARTHEST * this.wall.radius) return null;
+    if (x.distanceTo(this.camera.position) > MAX_DISTANCE_RADII * this.wall.radius) return null;
     const inCamera = x.clone().applyMatrix4(this.camera.matrixWorldInverse);
     if (inCamera.z > -this.camera.near) return null;
     const { x: right, y: up } = new Vector3().copy(inCamera).applyMatrix4(this.camera.projectionMatrix);

@@ -1,4 +1,4 @@
-/** Buttons to move by where there is no keyboard: while one is pressed, its key is held. */
+/** Buttons for moving without a keyboard; a pressed button holds its key. */
 import type { Walk } from "./walk";
 
 export function wirePad(root: HTMLElement, walk: Walk): void {
@@ -8,7 +8,7 @@ export function wirePad(root: HTMLElement, walk: Walk): void {
       button.setPointerCapture(event.pointerId);
       walk.hold(key, true);
     });
-    // However the press ends, the capture is lost.
+    // The capture is lost whenever the press ends.
     button.addEventListener("lostpointercapture", () => walk.hold(key, false));
     button.addEventListener("contextmenu", (event) => event.preventDefault());
   }

@@ -1,9 +1,9 @@
-/** The panel at the side: what was clicked and measured, the form of a mark, and the frames that show a point. */
+/** Side panel: measurements, the form of a mark, and the frames that show a point. */
 import { byId, make } from "./element";
 import type { Measure, Remark } from "./marks";
 import type { WallPlace } from "./wall";
 
-/** A frame that shows a point, as the server tells it. */
+/** Observation of a point in a frame, as sent by the server. */
 interface Sighting {
   frame: number;
   pixel: [number, number];
@@ -12,10 +12,10 @@ interface Sighting {
   obliqueness_deg: number;
 }
 
-/** Frames to choose from. */
-const SHOWN = 12;
-/** Pixels of a frame around the point. */
-const CUT = 240;
+/** Maximum number of listed frames. */
+const MAX_FRAMES = 12;
+/** Side of the cut-out around the point, pixels of the frame. */
+const CUT_PX = 240;
 
 const CLASSES = ["BAB crack", "BAC break", "BAF surface damage", "BAG protruding connection", "BBA roots", "BBB deposits", "BBF infiltration"];
 
@@ -35,7 +35,7 @@ export class Panel {
     this.open("This did not work", make("p", { className: "problem" }, what));
   }
 
-  /** The form of a mark; `save` may fail, and the form stays then. */
+  /** Shows the form of a mark, which stays open if `save` fails. */
   form(title: string, where: string, measure: Measure, save: (remark: Remark) => Promise<void>): void {
     const classes = make("datalist", { id: "classes" }, ...CLASSES.map((text) => make("option", { value: text })));
     const code = make("input", { name: "class", required: true, maxLength: 100, autocomplete: "off" });
@@ -64,13 +64,13 @@ export class Panel {
     code.focus();
   }
 
-  /** The frames that show a place, the sharpest first. */
+  /** Shows the frames that observe a wall position, the sharpest first. */
   async frames(where: string, layer: string, place: WallPlace, names: string[]): Promise<void> {
     const answer = await fetch(`api/sightings?layer=${encodeURIComponent(layer)}&s=${place.s}&h=${place.h}`);
     if (!answer.ok) throw new Error(await answer.text());
-    const found = ((await answer.json()) as Sighting[]).slice(0, SHOWN);
+    const found = ((await answer.json()) as Sighting[]).slice(0, MAX_FRAMES);
     if (found.length === 0) return this.say("Frames", where, "No frame shows this place.");
-    const canvas = make("canvas", { width: CUT, height: CUT });
+    const canvas = make("canvas", { width: CUT_PX, height: CUT_PX });
     const facts = make("p", { id: "sighting" });
     const link = make("a", { target: "_blank", rel: "noopener" }, "whole frame");
     link.style.color = "inherit";
@@ -102,19 +102,19 @@ export function valueOf(measure: Measure): string {
   return measure.kind === "width" ? `${measure.width_mm.toFixed(1)} mm` : "";
 }
 
-/** A frame around a pixel, with a ring where the point is. */
+/** Draws the cut-out of a frame around a pixel, with a ring around the point. */
 function cutOut(canvas: HTMLCanvasElement, address: string, u: number, v: number): void {
   const picture = new Image();
   picture.addEventListener("load", () => {
     const context = canvas.getContext("2d");
     if (!context) return;
-    context.clearRect(0, 0, CUT, CUT);
+    context.clearRect(0, 0, CUT_PX, CUT_PX);
     // The centre of the first pixel is (0, 0).
-    context.drawImage(picture, u + 0.5 - CUT / 2, v + 0.5 - CUT / 2, CUT, CUT, 0, 0, CUT, CUT);
+    context.drawImage(picture, u + 0.5 - CUT_PX / 2, v + 0.5 - CUT_PX / 2, CUT_PX, CUT_PX, 0, 0, CUT_PX, CUT_PX);
     context.strokeStyle = "#ffb02e";
     context.lineWidth = 2;
     context.beginPath();
-    context.arc(CUT / 2, CUT / 2, 9, 0, 2 * Math.PI);
+    context.arc(CUT_PX / 2, CUT_PX / 2, 9, 0, 2 * Math.PI);
     context.stroke();
     canvas.dataset.loaded = address;
   });

@@ -1,6 +1,6 @@
-/** What `tunnel.json`, `wall.json` and `server.json` hold. */
+/** Types of `tunnel.json`, `wall.json` and `server.json`. */
 
-export interface MapPlace {
+export interface MapImages {
   folder: string;
   px_per_metre: number;
   size_px: [number, number];
@@ -13,8 +13,8 @@ export interface Layer {
   tileset: string;
   px_per_metre: number;
   chainage_m: [number, number];
-  map: MapPlace;
-  /** Position (m) and quaternion, x y z w, camera-to-world. */
+  map: MapImages;
+  /** Camera-to-world poses: position (m) and quaternion x, y, z, w. */
   poses: [number, number, number, number, number, number, number][];
 }
 
@@ -22,7 +22,7 @@ export interface Tunnel {
   name: string;
   perimeter_m: number;
   twelve_at_deg: number;
-  /** Angles θ at equal steps of arc length around the section, from 0 to the perimeter; never falling. */
+  /** Angles θ at equal steps of arc length from 0 to the perimeter, non-decreasing. */
   theta_deg: number[];
   chainage_m: [number, number];
   frames: string[];
@@ -36,8 +36,8 @@ export interface WallPoints {
   points_m: number[];
 }
 
-/** What the server can do besides handing out files. */
-export interface Abilities {
+/** Capabilities of the server besides static files. */
+export interface Capabilities {
   marks: boolean;
   frames: boolean;
 }

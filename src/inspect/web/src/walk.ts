@@ -1,20 +1,24 @@
-/** Walking through the tunnel: keys, mouse, wheel, touch, and the ride along the axis. Never through the wall. */
+/**
+ * Camera control by keys, mouse, wheel and touch, and the automatic ride along the axis. The camera
+ * never passes through the wall.
+ */
 import { Matrix4, PerspectiveCamera, Vector3 } from "three";
 import type { Station, Wall, WallPlace } from "./wall";
 
-/** Nearest that the eye comes to the wall, as a share of the radius. */
-const MARGIN = 0.04;
+/** Minimum distance of the camera from the wall, as a share of the radius. */
+const MARGIN_RADII = 0.04;
 const TURN_RAD_PER_PX = 0.003;
 const TURN_RAD_PER_S = 1.2;
-const FASTER = 4;
-/** A press that moves less is a click, pixels: of a mouse, of a finger. */
+/** Speed factor of the shift key. */
+const FAST_FACTOR = 4;
+/** Maximum movement of a click, pixels. */
 const CLICK_PX = { mouse: 4, touch: 12 };
-/** Two fingers twice as far apart: this far ahead, radii. */
-const PINCH = 0.7;
-/** Two fingers moved aside by a pixel: this far aside, radii. */
-const ASIDE = 0.004;
-/** What is looked at first lies this far ahead at the most, radii. */
-const AHEAD = 6;
+/** Forward movement when the distance of two fingers doubles, radii. */
+const PINCH_RADII = 0.7;
+/** Sideways movement per pixel of two fingers, radii. */
+const PAN_RADII = 0.004;
+/** Maximum distance of the initial view target, radii. */
+const MAX_AHEAD_RADII = 6;
 
 const MOVES: Record<string, [number, number, number]> = {
   KeyW: [0, 0, 1], KeyS: [0, 0, -1], KeyA: [-1, 0, 0], KeyD: [1, 0, 0], KeyE: [0, 1, 0], KeyQ: [0, -1, 0],
@@ -24,20 +28,20 @@ const TURNS: Record<string, [number, number]> = {
 };
 
 export class Walk {
-  /** Metres a second. */
+  /** Speed, metres per second. */
   speed: number;
   riding = false;
-  /** Called with where a click was, in pixels of the view. */
+  /** Called with the position of a click, pixels of the view. */
   onClick: (x: number, y: number) => void = () => {};
-  /** Where the eye is. */
+  /** Position of the camera. */
   private readonly eye: Vector3;
-  /** Angles of the view from the axis: to the right and up, radians. */
+  /** View angles relative to the axis, right and up, radians. */
   private yaw = 0;
   private pitch = 0;
   private readonly pressed = new Set<string>();
-  /** Where fingers, or the mouse, press. */
+  /** Positions of pressed fingers or of the mouse. */
   private readonly touches = new Map<number, [number, number]>();
-  /** How far they have moved, pixels. */
+  /** Movement since the press, pixels. */
   private moved = 0;
   private changed = true;
 
@@ -47,14 +51,14 @@ export class Walk {
     private readonly view: HTMLElement,
   ) {
     this.speed = wall.radius * 0.6;
-    camera.near = wall.radius * MARGIN * 0.2;
+    camera.near = wall.radius * MARGIN_RADII * 0.2;
     camera.far = (wall.chainage[1] - wall.chainage[0]) * 2 + wall.radius * 20;
-    // A few steps in, so that there is wall around.
+    // Start inside the tunnel, surrounded by wall.
     const [from, to] = wall.chainage;
     const start = from + Math.min(wall.radius, 0.2 * (to - from));
     this.eye = wall.station(start).centre;
-    // Along the tunnel if it is long; not out of its end.
-    const ahead = Math.min(AHEAD * wall.radius, 0.3 * (to - start));
+    // View along a long tunnel, but not out of its end.
+    const ahead = Math.min(MAX_AHEAD_RADII * wall.radius, 0.3 * (to - start));
     const there = wall.station(start + ahead);
     this.lookFrom(wall.station(start), wall.towards(there, there.right).place);
     this.listen();
@@ -64,14 +68,14 @@ export class Walk {
     return this.wall.stationOf(this.eye);
   }
 
-  /** Distance from the wall in the eye's section, straight away from the axis. */
+  /** Radial distance of the camera from the wall in its section. */
   get clearance(): number {
     const station = this.station;
     const offset = this.eye.clone().sub(station.centre);
     return this.wall.towards(station, offset).distance - offset.length();
   }
 
-  /** Goes to the axis and looks at a place of the wall. */
+  /** Moves to the axis and looks at a wall position. */
   lookAt(place: WallPlace): void {
     const station = this.wall.station(Math.min(Math.max(place.h, this.wall.chainage[0]), this.wall.chainage[1]));
     this.lookFrom(station, place);
@@ -82,7 +86,7 @@ export class Walk {
     this.turnTo(station, this.wall.point(place).sub(this.eye));
   }
 
-  /** Holds a key down, or lets it go. */
+  /** Presses or releases a key. */
   hold(key: string, down: boolean): void {
     if (down) this.pressed.add(key);
     else this.pressed.delete(key);
@@ -93,7 +97,7 @@ export class Walk {
     [this.yaw, this.pitch, this.changed] = [0, 0, true];
   }
 
-  /** Moves for some seconds; whether anything changed. */
+  /** Advances the motion by a time step; returns true if the view changed. */
   update(seconds: number): boolean {
     const station = this.station;
     const [look, right, up] = this.axes(station);
@@ -105,7 +109,7 @@ export class Walk {
       const angles = TURNS[key];
       if (angles) [turn[0], turn[1]] = [turn[0] + angles[0], turn[1] + angles[1]];
     }
-    const fast = this.pressed.has("ShiftLeft") || this.pressed.has("ShiftRight") ? FASTER : 1;
+    const fast = this.pressed.has("ShiftLeft") || this.pressed.has("ShiftRight") ? FAST_FACTOR : 1;
     if (step.lengthSq() > 0) this.go(step.setLength(this.speed * fast * seconds));
     if (turn[0] || turn[1]) this.turn(turn[0] * TURN_RAD_PER_S * seconds, turn[1] * TURN_RAD_PER_S * seconds);
     if (this.riding) this.rideOn(station, this.speed * fast * seconds);
@@ -117,7 +121,7 @@ export class Walk {
 
   private go(step: Vector3): void {
     const next = this.eye.clone().add(step);
-    this.eye.copy(this.wall.inside(next, this.wall.radius * MARGIN));
+    this.eye.copy(this.wall.inside(next, this.wall.radius * MARGIN_RADII));
     this.changed = true;
   }
 
@@ -129,7 +133,7 @@ export class Walk {
     const along = Math.min(metres, left) * (backwards ? -1 : 1);
     const next = this.wall.station(station.h + along);
     const offset = this.eye.clone().sub(station.centre);
-    // The same place in the next section.
+    // Keep the position relative to the section.
     this.eye.copy(next.centre);
     for (const axis of ["up", "right"] as const) this.eye.addScaledVector(next[axis], offset.dot(station[axis]));
     this.go(new Vector3());
@@ -144,12 +148,12 @@ export class Walk {
   private turnTo(station: Station, direction: Vector3): void {
     const [x, y, z] = [direction.dot(station.right), direction.dot(station.up), direction.dot(station.along)];
     this.pitch = Math.atan2(y, Math.hypot(x, z));
-    // Straight up or down: as the wall beside it is looked at.
+    // Straight up or down the yaw is undefined.
     this.yaw = Math.hypot(x, z) > 1e-6 * Math.abs(y) ? Math.atan2(x, z) : Math.PI / 2;
     this.changed = true;
   }
 
-  /** Directions of the view: where it looks, to its right, and up. */
+  /** View axes: forward, right and up. */
   private axes(station: Station): [Vector3, Vector3, Vector3] {
     const [sin, cos] = [Math.sin(this.yaw), Math.cos(this.yaw)];
     const level = station.along.clone().multiplyScalar(cos).addScaledVector(station.right, sin);
@@ -212,11 +216,11 @@ export class Walk {
     if (other) {
       const [look, right, up] = this.axes(this.station);
       const apart = (x: number, y: number) => Math.max(Math.hypot(x - other[0], y - other[1]), 1);
-      const ahead = PINCH * Math.log2(apart(event.clientX, event.clientY) / apart(...before));
-      const step = look.multiplyScalar(ahead).addScaledVector(right, -ASIDE * dx).addScaledVector(up, ASIDE * dy);
+      const ahead = PINCH_RADII * Math.log2(apart(event.clientX, event.clientY) / apart(...before));
+      const step = look.multiplyScalar(ahead).addScaledVector(right, -PAN_RADII * dx).addScaledVector(up, PAN_RADII * dy);
       this.go(step.multiplyScalar(this.wall.radius));
     } else {
-      // The wall follows the hand.
+      // The wall follows the pointer.
       this.turn(-dx * TURN_RAD_PER_PX, dy * TURN_RAD_PER_PX);
     }
   }

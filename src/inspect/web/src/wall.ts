@@ -1,6 +1,6 @@
 /**
- * The tunnel's wall by points of it: where (s, h) is in the world, how far the wall is, how long a line on it is. Knows nothing
- * of the tunnel's shape: between its points the wall is taken to be straight.
+ * Geometry of the wall by interpolation of its points: conversion of (s, h) to the world, distances
+ * to the wall and lengths on it. The shape of the tunnel is not needed.
  */
 import { Vector3 } from "three";
 import type { Tunnel, WallPoints } from "./tunnel";
@@ -10,20 +10,20 @@ export interface WallPlace {
   h: number;
 }
 
-/** Where a point lies in the tunnel. */
+/** Cross-section of the tunnel at a chainage, with its local axes. */
 export interface Station {
   h: number;
   centre: Vector3;
-  /** Along the axis, towards twelve o'clock, and to the right of who looks along the axis; orthonormal. */
+  /** Orthonormal axes: along the tunnel, towards twelve o'clock, and to the right. */
   along: Vector3;
   up: Vector3;
   right: Vector3;
 }
 
-/** Pieces of a line whose length is measured. */
-const PIECES = 256;
-/** Steps to the section that holds a point, at the most. */
-const ROUNDS = 20;
+/** Number of segments by which the length of a line is summed. */
+const LENGTH_SEGMENTS = 256;
+/** Maximum iterations to find the section of a point. */
+const MAX_STATION_ITERATIONS = 20;
 
 export class Wall {
   readonly perimeter: number;
@@ -59,7 +59,7 @@ export class Wall {
     this.radius = this.centres[0].distanceTo(this.corner(0, 0));
   }
 
-  /** The world point of a place; s goes around, h goes on straight beyond the ends. */
+  /** World point of a wall position; s is periodic, h is extrapolated beyond the ends. */
   point({ s, h }: WallPlace): Vector3 {
     const [column, across] = this.cell(this.s, this.around(s));
     const [row, down] = this.cell(this.h, h);
@@ -91,9 +91,9 @@ export class Wall {
       const distance = from.clone().addScaledVector(axis, within).distanceToSquared(x);
       if (distance < best) [best, h] = [distance, this.h[row] + within * (this.h[row + 1] - this.h[row])];
     }
-    // The section that holds it: between the lines, directions change from end to end.
+    // Iterate, since the direction of the axis changes between the lines.
     let station = this.station(h);
-    for (let round = 0; round < ROUNDS; round++) {
+    for (let round = 0; round < MAX_STATION_ITERATIONS; round++) {
       const ahead = x.clone().sub(station.centre).dot(station.along);
       if (Math.abs(ahead) < this.radius * 1e-6) break;
       station = this.station(station.h + ahead);
@@ -101,7 +101,7 @@ export class Wall {
     return station;
   }
 
-  /** The wall that lies from the centre of a section in a direction: its place and its distance. */
+  /** Intersects a ray from the centre of a section with the wall: position and distance. */
   towards(station: Station, direction: Vector3): { place: WallPlace; distance: number } {
     const [x, y] = [direction.dot(station.right), direction.dot(station.up)];
     const flat = (column: number): [number, number] => {
@@ -129,7 +129,7 @@ export class Wall {
     return found;
   }
 
-  /** The point itself, or the nearest towards the centre that keeps its distance from the wall and the ends. */
+  /** Clamps a point towards the centre to keep a distance from the wall and the ends. */
   inside(x: Vector3, margin: number): Vector3 {
     const beyond = this.radius * 0.5;
     let station = this.stationOf(x);
@@ -145,18 +145,18 @@ export class Wall {
     return station.centre.clone().add(offset);
   }
 
-  /** The other end as seen from the first: the shorter way around. */
+  /** Shifts `to` by whole turns so that the line from `from` takes the shorter way around. */
   nearest(from: WallPlace, to: WallPlace): WallPlace {
     const turns = Math.round((to.s - from.s) / this.perimeter);
     return { s: to.s - turns * this.perimeter, h: to.h };
   }
 
-  /** Length of the line along the wall that is straight where the wall is unrolled, the shorter way around, metres. */
+  /** Length on the wall of a line that is straight on the unrolled wall, metres. */
   length(from: WallPlace, to: WallPlace): number {
     const end = this.nearest(from, to);
     let [sum, last] = [0, this.point(from)];
-    for (let k = 1; k <= PIECES; k++) {
-      const share = k / PIECES;
+    for (let k = 1; k <= LENGTH_SEGMENTS; k++) {
+      const share = k / LENGTH_SEGMENTS;
       const next = this.point({ s: from.s + share * (end.s - from.s), h: from.h + share * (end.h - from.h) });
       sum += last.distanceTo(next);
       last = next;
@@ -168,7 +168,7 @@ export class Wall {
     return ((s % this.perimeter) + this.perimeter) % this.perimeter;
   }
 
-  /** The angle θ of an arc length as seen from the axis, degrees. */
+  /** Angle θ of an arc length, degrees. */
   thetaDeg(s: number): number {
     const steps = this.angles.length - 1;
     const at = (this.around(s) / this.perimeter) * steps;
@@ -177,7 +177,7 @@ export class Wall {
     return (from + (at - before) * (to - from)) % 360;
   }
 
-  /** The arc length at an angle θ. */
+  /** Arc length at an angle θ, metres. */
   sAt(thetaDeg: number): number {
     const steps = this.angles.length - 1;
     const theta = this.angles[0] + ((((thetaDeg - this.angles[0]) % 360) + 360) % 360);
@@ -188,7 +188,7 @@ export class Wall {
     return ((after - 1 + Math.min(share, 1)) / steps) * this.perimeter;
   }
 
-  /** The arc length at a full hour of the clock. */
+  /** Arc length at a clock hour, metres. */
   sAtHour(hour: number): number {
     return this.sAt(this.twelveAtDeg + 30 * hour);
   }
@@ -202,7 +202,7 @@ export class Wall {
     return this.centres[after].clone().sub(this.centres[before]).normalize();
   }
 
-  /** The cell of a value among increasing lines, and the share of it that lies before the value. */
+  /** Cell of a value among increasing lines, and the relative position in it. */
   private cell(lines: number[], value: number): [number, number] {
     let [low, high] = [0, lines.length - 1];
     while (high - low > 1) {

@@ -1,0 +1,192 @@
+//! Execution of a sweep.
+
+use crate::evaluate::converge::error::ConvergeError;
+use crate::evaluate::converge::feasible_survey::draw_survey;
+use crate::evaluate::converge::majority_error::{GOOD_PX, majority_error};
+use crate::evaluate::converge::options::ConvergeOptions;
+use crate::evaluate::converge::run_log::RunLog;
+use crate::evaluate::converge::run_record::RunRecord;
+use crate::evaluate::converge::success_map::draw_success_map;
+use crate::evaluate::converge::summary::{CellSummary, Convergence};
+use crate::evaluate::converge::sweep_cell::SweepCell;
+use crate::frames::{PictureFormat, write_picture};
+use crate::persist::atomic::{self, ScratchFolder};
+use crate::progress::{Progress, Silent};
+use crate::refine::{FrameFlag, RefineOptions, Refined, refine};
+use crate::simulate::{self, SimulateOptions};
+use crate::survey::Survey;
+use crate::trajectory::poses_of;
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// Outcome of a call of [`run_sweep`].
+#[derive(Clone, Debug)]
+pub struct SweepOutcome {
+    /// The result of the whole sweep.
+    pub result: Convergence,
+    /// The text of converge.json.
+    pub json: String,
+    /// Number of runs that this call executed.
+    pub done: usize,
+    /// Number of runs found in the log.
+    pub kept: usize,
+}
+
+/// Executes all runs of a sweep that are not yet in `out`/runs.jsonl, and writes the summaries.
+///
+/// Each run is appended to runs.jsonl; converge.json, converge.txt and converge.png follow at the
+/// end. `discard` removes the runs of earlier calls. The runs go seed by seed through all cells, so
+/// that an interrupted sweep has about as many runs of every cell. Except for durations, the result
+/// does not depend on interruptions or the number of threads.
+///
+/// # Errors
+/// [`ConvergeError`]. Finished runs are in the log in any case.
+pub fn run_sweep(
+    options: &ConvergeOptions,
+    out: &Path,
+    discard: bool,
+    progress: &dyn Progress,
+) -> Result<SweepOutcome, ConvergeError> {
+    options.validate()?;
+    atomic::create_folder(out)?;
+    let mut log = RunLog::open(&out.join("runs.jsonl"), &options.settings(), discard)?;
+    let cells = options.cells();
+    let missing: Vec<(&SweepCell, u64)> = (1..=options.seeds)
+        .flat_map(|seed| cells.iter().map(move |cell| (cell, seed)))
+        .filter(|(cell, seed)| log.find(cell, *seed).is_none())
+        .collect();
+    progress.start("experiments", missing.len());
+    for (cell, seed) in &missing {
+        progress.detail(&format!("{cell}, seed {seed}"));
+        log.append(run_experiment(options, cell, *seed, out)?)?;
+        progress.advance(1);
+    }
+    progress.finish();
+
+    let summaries = cells
+        .iter()
+        .map(|cell| {
+            let runs: Vec<&RunRecord> = (1..=options.seeds)
+                .filter_map(|seed| log.find(cell, seed))
+                .collect();
+            CellSummary::of(cell, &runs)
+        })
+        .collect();
+    let result = Convergence::new(options, summaries);
+    let json_path = out.join("converge.json");
+    let json = serde_json::to_string_pretty(&result)
+        .map_err(|error| atomic::WriteError::new(&json_path, std::io::Error::other(error)))?
+        + "\n";
+    atomic::write_text(&json_path, &json)?;
+    atomic::write_text(&out.join("converge.txt"), &format!("{result}\n"))?;
+    write_picture(
+        &out.join("converge.png"),
+        &draw_success_map(&result).into(),
+        PictureFormat::Png,
+    )?;
+    Ok(SweepOutcome {
+        result,
+        json,
+        done: missing.len(),
+        kept: cells.len() * options.seeds as usize - missing.len(),
+    })
+}
+
+/// Draws, simulates, refines and evaluates one survey, with its files in a scratch folder in `out`.
+///
+/// # Errors
+/// [`ConvergeError`]; a survey that the refinement refuses is a result, not an error.
+fn run_experiment(
+    options: &ConvergeOptions,
+    cell: &SweepCell,
+    seed: u64,
+    out: &Path,
+) -> Result<RunRecord, ConvergeError> {
+    let drawn = draw_survey(options, cell, seed)?;
+    let mut record = RunRecord {
+        settings: options.settings(),
+        cell: cell.clone(),
+        seed,
+        seed_used: drawn.survey.as_ref().map(|survey| survey.seed),
+        redraws: drawn.redraws,
+        refined: false,
+        error: None,
+        success: false,
+        worst_frame_px: None,
+        rms_px: None,
+        good_frames: 0,
+        flagged_frames: 0,
+        false_successes: 0,
+        seconds: 0.0,
+    };
+    match &drawn.survey {
+        Some(survey) => simulate_and_refine(survey, out, &mut record)?,
+        None => {
+            record.error = Some(format!(
+                "none of {} draws could be flown: the poses leave the tunnel or look along it",
+                drawn.redraws + 1
+            ));
+        }
+    }
+    Ok(record)
+}
+
+/// Simulates and refines a survey and records the outcome.
+///
+/// # Errors
+/// [`ConvergeError`]; a survey that the refinement refuses is a result, not an error.
+fn simulate_and_refine(
+    survey: &SimulateOptions,
+    out: &Path,
+    record: &mut RunRecord,
+) -> Result<(), ConvergeError> {
+    let scratch = ScratchFolder::inside(out)?;
+    let folder = scratch.path().join("survey");
+    simulate::write_survey(survey, &folder, false, &Silent)?;
+    let survey = Survey::open(&folder)?;
+    let silent: Arc<dyn Progress> = Arc::new(Silent);
+    let since = Instant::now();
+    let refined = refine(&survey, &RefineOptions::default(), &silent);
+    record.seconds = since.elapsed().as_secs_f64();
+    match refined {
+        Ok(refined) => record_accuracy(&survey, &refined, record),
+        Err(error) => {
+            record.error = Some(error.to_string());
+            Ok(())
+        }
+    }
+}
+
+/// Records the accuracy of the refined poses and the reliability of their flags.
+///
+/// # Errors
+/// [`ConvergeError::Evaluate`] for a survey without true poses, which the simulator never makes.
+fn record_accuracy(
+    survey: &Survey,
+    refined: &Refined,
+    record: &mut RunRecord,
+) -> Result<(), ConvergeError> {
+    let truth = poses_of(survey.truth.as_deref().unwrap_or_default());
+    let poses = poses_of(&refined.trajectory);
+    let error = majority_error(survey.surface.as_ref(), &survey.camera, &poses, &truth)?;
+    let finite = |px: f64| px.is_finite().then_some(px);
+    let is_photometric = |flag: FrameFlag| flag == FrameFlag::Photometric;
+    let frames = &refined.report.frames;
+    record.refined = true;
+    record.worst_frame_px = finite(error.worst_px());
+    record.rms_px = finite(error.rms_px());
+    record.good_frames = error.good_count();
+    record.success = record.good_frames == poses.len();
+    record.flagged_frames = frames
+        .iter()
+        .filter(|frame| !is_photometric(frame.flag))
+        .count();
+    record.false_successes = frames
+        .iter()
+        .zip(&error.frame_rms_px)
+        // NaN does not count as good.
+        .filter(|(frame, px)| is_photometric(frame.flag) && (px.is_nan() || **px >= GOOD_PX))
+        .count();
+    Ok(())
+}
