@@ -19,8 +19,8 @@ pub fn section(data: &PageData) -> Option<Markup> {
         p {
             "The global solves, from coarse to fine, each with a few damped Gauss–Newton steps \
              over all frames. The cost is robust. It can be compared within a solve only, since \
-             each solve has its own samples of the wall. The cost after a last step is not computed, so \
-             a solve of one step has no curve. The last solve stopped: "
+             each solve has its own samples of the wall. The cost after a last step is not \
+             computed, so a solve of one step has no curve. The last solve stopped: "
             (refinement.stopped_because) "."
         }
         (legend(&entries, &[]))
