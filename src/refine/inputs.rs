@@ -3,7 +3,7 @@
 use crate::frames::FrameCache;
 use crate::refine::error::RefineError;
 use crate::refine::model::context::EstimationContext;
-use crate::refine::model::prior::{Prior, usual_step_s};
+use crate::refine::model::prior::{Prior, median_step_s};
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::calibration::{Calibration, Kappa};
 use crate::refine::stages::state::PipelineState;
@@ -53,14 +53,14 @@ impl<'a> Inputs<'a> {
         let prior = Prior {
             jitter: survey.prior,
             initial: survey.initial_poses(),
-            usual_step_s: usual_step_s(&times_s),
+            median_step_s: median_step_s(&times_s),
             times_s,
             log_gain_sigma: options.log_gain_sigma,
             bias_sigma: options.bias_sigma,
         };
         let calibration = calibration_of(survey, options, &prior.initial)?;
         let tracking_prior = Prior {
-            jitter: calibration.widened(&prior.jitter, prior.arm_m()),
+            jitter: calibration.widen_jitter(&prior.jitter, prior.lever_arm_m()),
             ..prior.clone()
         };
         Ok(Self {

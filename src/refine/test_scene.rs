@@ -23,7 +23,7 @@ pub fn prior(initial: &[Pose]) -> Prior {
             translation_sigma_m: [0.05; 3],
         },
         times_s: (0..initial.len()).map(|k| k as f64).collect(),
-        usual_step_s: 1.0,
+        median_step_s: 1.0,
         initial: initial.to_vec(),
         log_gain_sigma: 0.3,
         bias_sigma: 10.0,

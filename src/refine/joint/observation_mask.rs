@@ -173,7 +173,7 @@ mod tests {
     use super::*;
     use crate::refine::joint::joint_block::region_of;
     use crate::refine::samples::observer_marks::ObserverMarks;
-    use crate::refine::samples::visibility::Hidden;
+    use crate::refine::samples::visibility::Exclusions;
     use crate::refine::test_scene::placed_spiral;
 
     /// Where a frame shows a tile partly it helps; next to where it shows something else it is not
@@ -181,7 +181,7 @@ mod tests {
     #[test]
     fn frames_are_taken_for_the_wall_up_to_their_borders_but_for_what_is_left_out() {
         let (circle, camera, grid, placed) = placed_spiral(6);
-        let hidden = Hidden::NOTHING;
+        let hidden = Exclusions::NOTHING;
         let rows = -1000..1000;
         let all = Visibility::find(&circle, &grid, &camera, None, &hidden, &placed, &rows);
         let sights_of = |visibility: &Visibility, block: &Range<usize>| {

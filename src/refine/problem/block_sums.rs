@@ -3,7 +3,7 @@
 use crate::refine::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::refine::parameters::frame_estimate::FrameStep;
 use crate::refine::problem::intrinsics_terms::IntrinsicsSums;
-use crate::refine::problem::linearisation::FrameShare;
+use crate::refine::problem::linearisation::FrameContribution;
 use crate::refine::problem::observer_column::Column;
 use crate::refine::tiles::tile::SAMPLES;
 use nalgebra::Matrix4;
@@ -25,7 +25,7 @@ pub struct BlockSums {
     pub cost: f64,
     /// Gradient, a frame after another.
     pub gradient: Vec<FrameStep>,
-    shares: Vec<FrameShare>,
+    shares: Vec<FrameContribution>,
     /// Upper triangle, row by row.
     blocks: Vec<Block>,
     /// The lens's part, if it is estimated.
@@ -39,7 +39,7 @@ impl BlockSums {
             slots,
             cost: 0.0,
             gradient: vec![FrameStep::zeros(); n],
-            shares: vec![FrameShare::default(); n],
+            shares: vec![FrameContribution::default(); n],
             blocks: vec![Block::zeros(); n * (n + 1) / 2],
             lens: calibrates.then(|| IntrinsicsSums::new(n)),
         }
@@ -93,7 +93,7 @@ impl BlockSums {
         pattern: &Pattern,
         normal: &mut NormalEquations,
         scatter: &mut [Block],
-        frames: &mut [FrameShare],
+        frames: &mut [FrameContribution],
     ) {
         for (column, slot) in self.slots.iter().enumerate() {
             normal.gradient[*slot] += self.gradient[column];
@@ -105,7 +105,7 @@ impl BlockSums {
             for row in 0..=column {
                 let block = &self.blocks[self.block_index(row, column)];
                 normal.add_block(pattern, self.slots[row], *slot, block);
-                if let Some(place) = pattern.place(self.slots[row], *slot) {
+                if let Some(place) = pattern.block_index(self.slots[row], *slot) {
                     scatter[place] += self.gradient[row] * self.gradient[column].transpose();
                 }
             }

@@ -1,22 +1,22 @@
 //! What a block of the wall adds to the border of the normal equations ([`crate::refine::linear::bordered_system`]).
 
 use crate::refine::linear::bordered_system::SharedBorder;
-use crate::refine::parameters::calibration::{Kappa, LENS, READOUT};
-use crate::refine::parameters::frame_estimate::{FrameStep, UNKNOWNS};
+use crate::refine::parameters::calibration::{INTRINSIC_PARAMETERS, Kappa, READOUT_INDEX};
+use crate::refine::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::refine::problem::observer_column::Column;
 use nalgebra::{Matrix2x6, Matrix4, Matrix4x2, Matrix6, SMatrix, Vector6};
 
 /// Shared unknowns that pixels see: those of the lens and the readout time.
-const SEEN: usize = LENS + 1;
+const SEEN: usize = INTRINSIC_PARAMETERS + 1;
 /// Their places among all.
-const PLACES: [usize; SEEN] = [0, 1, 2, 3, 4, READOUT];
+const PLACES: [usize; SEEN] = [0, 1, 2, 3, 4, READOUT_INDEX];
 
 /// Sums over the tiles of one block for the unknowns that pixels see, for the few frames that see
 /// it.
 #[derive(Clone, Debug)]
 pub struct IntrinsicsSums {
     /// `H_pκ`, a block a frame.
-    frames: Vec<SMatrix<f64, UNKNOWNS, SEEN>>,
+    frames: Vec<SMatrix<f64, FRAME_PARAMETERS, SEEN>>,
     /// `H_κκ`.
     own: Matrix6<f64>,
     /// `g_κ`.

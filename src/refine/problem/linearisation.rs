@@ -15,7 +15,7 @@ pub struct Linearisation {
     /// whatever the errors are like.
     pub scatter: Vec<Block>,
     /// How each active frame took part.
-    pub frames: Vec<FrameShare>,
+    pub frames: Vec<FrameContribution>,
     /// The shared unknowns' part of the equations, if they are estimated.
     pub border: Option<SharedBorder>,
     /// Their part of the scatter.
@@ -24,7 +24,7 @@ pub struct Linearisation {
 
 /// How a frame took part in a linearisation.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct FrameShare {
+pub struct FrameContribution {
     /// Wall samples it was compared at.
     pub samples: usize,
     /// `Σ q` over those samples: its pixels that were used.

@@ -4,17 +4,18 @@ use crate::frames::noise_at_level;
 use crate::numerics::simd_dispatch::wide;
 use crate::refine::joint::joint_block::{JointBlock, WallModel};
 use crate::refine::joint::stiffness::Probe;
-use crate::refine::model::context::{FrameWindow, Sampling};
+use crate::refine::model::context::FrameWindow;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::samples::outlier_mask::OutlierMask;
+use crate::refine::samples::sampling::Sampling;
 use crate::refine::samples::visibility::{Observer, Tile, Visibility};
 use crate::refine::tiles::denoising::TextureSpectrum;
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, TilePoints};
 use crate::refine::tiles::interpolation::Interpolation;
 use crate::refine::tiles::residual_weighting::NoiseHistogram;
-use crate::refine::tiles::tile::{Misfit, Seen, TileWork};
+use crate::refine::tiles::tile::{Misfit, TileObservation, TileWorkspace};
 use crate::super_resolve::{Evidence, aliased_variance};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -32,11 +33,11 @@ const LEAST_ALIASED: f64 = 0.05;
 /// Factor by which the variance of residuals may be short of the sensor's.
 const MOST_UNDERESTIMATE: f64 = 1.25;
 
-impl Problem<'_> {
+impl PhotometricProblem<'_> {
     /// Reads the noise from the residuals around the plain mean in every few tiles, and what is
     /// typical of the texture.
     pub(super) fn estimate_noise(&mut self) -> Result<(), ProblemError> {
-        let counted = self.at_tiles(
+        let counted = self.gather_from_tiles(
             SCALE_TILES,
             |(histogram, spectrum): &mut (NoiseHistogram, TextureSpectrum), look| {
                 wide(
@@ -142,7 +143,7 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// [`ProblemError`].
-    pub fn without_outliers(mut self, density: Option<f64>) -> Result<Self, ProblemError> {
+    pub fn exclude_outliers(mut self, density: Option<f64>) -> Result<Self, ProblemError> {
         let mut foreign = match density {
             None => self.no_foreign()?,
             Some(density) => {
@@ -183,7 +184,7 @@ impl Problem<'_> {
 
     /// Nothing found yet, and what misfit is usual.
     fn no_foreign(&self) -> Result<OutlierMask, ProblemError> {
-        let found = self.at_tiles(SCALE_TILES, |misfits: &mut Vec<Misfit>, look| {
+        let found = self.gather_from_tiles(SCALE_TILES, |misfits: &mut Vec<Misfit>, look| {
             wide(
                 #[inline(always)]
                 || look.work.misfit(look.points, look.seen(), &self.noise),
@@ -213,7 +214,7 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
-    pub fn at_tiles<T: Default + Send>(
+    pub fn gather_from_tiles<T: Default + Send>(
         &self,
         count: usize,
         work: impl Fn(&mut T, &mut ObservedTile) + Sync,
@@ -228,7 +229,7 @@ impl Problem<'_> {
             let tiles: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
             let runs = tiles.par_chunks(32).map(|tiles| {
                 let mut gathered = T::default();
-                let mut tile_work = TileWork::default();
+                let mut tile_work = TileWorkspace::default();
                 let mut scratch = Vec::new();
                 for tile in tiles {
                     let points =
@@ -253,7 +254,7 @@ impl Problem<'_> {
 /// A tile and those who see it.
 pub struct ObservedTile<'l> {
     /// Room to work in.
-    pub work: &'l mut TileWork,
+    pub work: &'l mut TileWorkspace,
     /// The tile's samples.
     pub points: &'l TilePoints,
     /// The frames that see it.
@@ -267,7 +268,7 @@ pub struct ObservedTile<'l> {
 impl<'l> ObservedTile<'l> {
     /// The observers as the tile's work wants them.
     #[inline(always)]
-    pub fn seen(&self) -> impl Iterator<Item = Seen<'l>> + use<'l> {
+    pub fn seen(&self) -> impl Iterator<Item = TileObservation<'l>> + use<'l> {
         let views = self.views;
         self.observers.iter().map(move |o| o.seen(views))
     }

@@ -5,17 +5,18 @@ use crate::frames::Pyramid;
 use crate::refine::joint::joint_block::WallModel;
 use crate::refine::linear::bordered_system::SharedBorder;
 use crate::refine::linear::normal_equations::{Block, NormalEquations, Pattern};
-use crate::refine::linear::sparse_cholesky::{FactorError, Symbolic};
-use crate::refine::model::context::{EstimationContext, FrameWindow, Sampling};
+use crate::refine::linear::sparse_cholesky::{FactorError, SymbolicFactorisation};
+use crate::refine::model::context::{EstimationContext, FrameWindow};
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::parameters::calibration::{Kappa, LENS, RADIUS};
+use crate::refine::parameters::calibration::{INTRINSIC_PARAMETERS, Kappa, RADIUS_INDEX};
 use crate::refine::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use crate::refine::problem::block_sums::BlockSums;
-use crate::refine::problem::linearisation::{FrameShare, Linearisation};
+use crate::refine::problem::linearisation::{FrameContribution, Linearisation};
 use crate::refine::problem::unknown_texture::UnknownTexture;
 use crate::refine::samples::footprints::footprint;
-use crate::refine::samples::tile_coverage::{Coverage, Pictures};
-use crate::refine::samples::visibility::{Hidden, PosedFrame};
+use crate::refine::samples::sampling::Sampling;
+use crate::refine::samples::tile_coverage::{FrameImages, TileCoverage};
+use crate::refine::samples::visibility::{Exclusions, PosedFrame};
 use crate::refine::tiles::denoising::Denoiser;
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::WallGrid;
@@ -50,10 +51,10 @@ const GAUGE_TIE: f64 = 1e6;
 /// problem was made with, and stays as it is. A step of a frame by ξ changes its neighbours' motion
 /// by `readout/(2 interval) ξ`, a few hundredths, and what is left of that is taken up by the next
 /// solve.
-pub struct Problem<'a> {
+pub struct PhotometricProblem<'a> {
     pub(super) scene: EstimationContext<'a>,
     pub(super) sampling: Sampling,
-    pub(super) pictures: Pictures<'a>,
+    pub(super) pictures: FrameImages<'a>,
     pub(super) camera: Camera,
     pub(super) grid: WallGrid,
     pub(super) participants: Range<usize>,
@@ -61,14 +62,14 @@ pub struct Problem<'a> {
     pub(super) held: Vec<FrameEstimate>,
     /// Motion of each participant's camera if its readout took a second.
     pub(super) rates: Vec<Sweep>,
-    pub(super) coverage: Coverage<'a>,
+    pub(super) coverage: TileCoverage<'a>,
     /// The first active frame that is compared, counted from the first active one: the gauge is
     /// tied there.
     pub(super) tied: Option<usize>,
     /// Number of frames that are compared.
     pub(super) compared: usize,
     pub(super) pattern: Pattern,
-    pub(super) symbolic: Symbolic,
+    pub(super) symbolic: SymbolicFactorisation,
     pub(super) sigma: f64,
     pub(super) noise: NoiseModel,
     /// Takes the noise from the fused texture for its slopes.
@@ -81,7 +82,7 @@ pub struct Problem<'a> {
     pub(super) calibrates: bool,
 }
 
-impl<'a> Problem<'a> {
+impl<'a> PhotometricProblem<'a> {
     /// Chooses the wall samples for the present estimates and estimates the noise from the
     /// residuals there.
     ///
@@ -136,16 +137,16 @@ impl<'a> Problem<'a> {
             pixel_size_m,
             density.max(least_density(camera.height)),
         );
-        let pictures = Pictures {
+        let pictures = FrameImages {
             frames: scene.frames,
             first: participants.start,
             level,
         };
-        let hidden = Hidden {
+        let hidden = Exclusions {
             ignored: scene.ignored,
             mask: scene.frames.mask(&camera),
         };
-        let coverage = Coverage::new(
+        let coverage = TileCoverage::new(
             scene.surface,
             grid,
             camera,
@@ -161,11 +162,12 @@ impl<'a> Problem<'a> {
         let covisible = coverage.pairs.iter();
         let covisible = covisible.filter_map(|(a, b)| slot(a).zip(slot(b)));
         let pattern = Pattern::new(active.len(), covisible.chain(scene.prior.pairs(&active)));
-        let symbolic = Symbolic::new(&pattern).map_err(|source| ProblemError::Factor {
-            first: active.start,
-            last: active.end - 1,
-            source,
-        })?;
+        let symbolic =
+            SymbolicFactorisation::new(&pattern).map_err(|source| ProblemError::Factor {
+                first: active.start,
+                last: active.end - 1,
+                source,
+            })?;
         let mut problem = Self {
             scene: *scene,
             sampling,
@@ -213,7 +215,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The same with the information that is left where the texture is known by its spectrum only.
-    pub fn of_unknown_texture(self, texture: &UnknownTexture) -> Self {
+    pub fn with_unknown_texture(self, texture: &UnknownTexture) -> Self {
         Self {
             unknown_texture: Some(texture.clone()),
             ..self
@@ -223,7 +225,7 @@ impl<'a> Problem<'a> {
     /// The same with the scene's shared unknowns estimated, too; all participants must be active.
     pub fn calibrating(self) -> Self {
         Self {
-            calibrates: self.scene.calibration.any() && self.held_frames() == 0,
+            calibrates: self.scene.calibration.has_free_parameters() && self.held_frames() == 0,
             ..self
         }
     }
@@ -245,7 +247,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The symbolic factorisation of the normal matrix.
-    pub fn symbolic(&self) -> &Symbolic {
+    pub fn symbolic(&self) -> &SymbolicFactorisation {
         &self.symbolic
     }
 
@@ -339,7 +341,7 @@ impl<'a> Problem<'a> {
     /// shared unknowns.
     ///
     /// # Errors
-    /// As [`Problem::linearise_at`].
+    /// As [`PhotometricProblem::linearise_at`].
     pub fn linearise(&self, active: &[FrameEstimate]) -> Result<Linearisation, ProblemError> {
         self.linearise_at(active, &self.scene.kappa)
     }
@@ -359,7 +361,7 @@ impl<'a> Problem<'a> {
     ) -> Result<Linearisation, ProblemError> {
         let estimates = self.with_active(active);
         let mut normal = NormalEquations::zeros(&self.pattern);
-        let mut frames = vec![FrameShare::default(); self.active.len()];
+        let mut frames = vec![FrameContribution::default(); self.active.len()];
         let mut scatter = vec![Block::zeros(); self.pattern.blocks()];
         let mut border = self
             .calibrates
@@ -420,8 +422,8 @@ impl<'a> Problem<'a> {
         }
         cost += self.add_prior(&estimates, kappa, &mut normal, border.as_mut());
         if let Some(border) = &mut border {
-            cost += calibration.prior_cost(kappa) - self.volume() * kappa[RADIUS];
-            border.gradient[RADIUS] -= self.volume();
+            cost += calibration.prior_cost(kappa) - self.volume() * kappa[RADIUS_INDEX];
+            border.gradient[RADIUS_INDEX] -= self.volume();
             border.close(&calibration, kappa);
         }
         if self.held_frames() == 0 {
@@ -445,7 +447,7 @@ impl<'a> Problem<'a> {
     /// the radius. In metres, where the prior is a density, they leave a volume that grows as
     /// `r^(3N − 1)`. Without this term the radius would shrink until the steps had no noise at all.
     fn volume(&self) -> f64 {
-        if self.scene.calibration.free[RADIUS] {
+        if self.scene.calibration.free[RADIUS_INDEX] {
             (3 * self.compared) as f64 - 1.0
         } else {
             0.0
@@ -484,7 +486,7 @@ impl<'a> Problem<'a> {
             &self.participants,
             estimates,
             &self.active,
-            &self.scene.calibration.metric(kappa),
+            &self.scene.calibration.datum(kappa),
             &self.pattern,
             normal,
             border,
@@ -494,9 +496,9 @@ impl<'a> Problem<'a> {
     /// Stiffens the first compared frame against moving along the gauge, where the pixels say
     /// nothing and rounding would otherwise decide. Neither cost nor gradient change: where the
     /// trajectory stands along the gauge is settled in closed form, by
-    /// [`crate::refine::model::prior::Prior::settle_gauge`].
+    /// [`crate::refine::model::prior::Prior::align_gauge`].
     fn tie_gauge(&self, slot: usize, first: &FrameEstimate, normal: &mut NormalEquations) {
-        let Some(place) = self.pattern.place(slot, slot) else {
+        let Some(place) = self.pattern.block_index(slot, slot) else {
             return;
         };
         let pose_block = normal.blocks[place].fixed_view::<6, 6>(0, 0).into_owned();
@@ -510,7 +512,7 @@ impl<'a> Problem<'a> {
     }
 
     /// How many freedoms of the poses the tie of the gauge takes.
-    pub fn tied_freedoms(&self) -> usize {
+    pub fn constrained_gauge_freedoms(&self) -> usize {
         match self.held_frames() {
             0 => self.scene.surface.gauge().freedoms(),
             _ => 0,
@@ -537,7 +539,7 @@ impl<'a> Problem<'a> {
         step: &[FrameStep],
         shared: &Kappa,
     ) -> Vec<f64> {
-        let lens = shared.fixed_rows::<LENS>(0).into_owned();
+        let lens = shared.fixed_rows::<INTRINSIC_PARAMETERS>(0).into_owned();
         active
             .iter()
             .zip(step)
@@ -601,8 +603,8 @@ mod tests {
     use super::*;
     use crate::frames::FrameCache;
     use crate::refine::model::prior::Prior;
-    use crate::refine::parameters::calibration::{Calibration, SHARED};
-    use crate::refine::parameters::frame_estimate::UNKNOWNS;
+    use crate::refine::parameters::calibration::{Calibration, SHARED_PARAMETERS};
+    use crate::refine::parameters::frame_estimate::FRAME_PARAMETERS;
     use crate::refine::test_scene::{prior, scene};
     use crate::refine::tiles::interpolation::Interpolation;
     use crate::test_wall::{TestWall, waves};
@@ -645,10 +647,10 @@ mod tests {
                     bias: bias + 1e3 * off_by * number(k, 10.0),
                 });
             }
-            let prior = prior(&wall.poses);
+            let prior = independent_prior(&wall.poses);
             Self {
                 calibration: Calibration {
-                    free: [true; SHARED],
+                    free: [true; SHARED_PARAMETERS],
                     sigma: Kappa::repeat(1.0),
                     ..Calibration::none(&wall.camera)
                 },
@@ -659,7 +661,7 @@ mod tests {
             }
         }
 
-        fn problem(&self) -> Problem<'_> {
+        fn problem(&self) -> PhotometricProblem<'_> {
             self.problem_with(1.0)
         }
 
@@ -680,14 +682,14 @@ mod tests {
             }
         }
 
-        fn problem_with(&self, information: f64) -> Problem<'_> {
+        fn problem_with(&self, information: f64) -> PhotometricProblem<'_> {
             self.problem_of(Sampling {
                 information,
                 ..self.sampling()
             })
         }
 
-        fn problem_of(&self, sampling: Sampling) -> Problem<'_> {
+        fn problem_of(&self, sampling: Sampling) -> PhotometricProblem<'_> {
             let scene = EstimationContext {
                 calibration: self.calibration,
                 ..scene(&self.wall, &self.frames, &self.prior)
@@ -699,7 +701,7 @@ mod tests {
                 estimates: &self.estimates,
                 compared: Cow::Owned(vec![true; self.estimates.len()]),
             };
-            Problem::new(&scene, sampling, members).unwrap()
+            PhotometricProblem::new(&scene, sampling, members).unwrap()
         }
     }
 
@@ -754,7 +756,7 @@ mod tests {
             let mut foretold = 0.0;
             for i in 0..direction.len() {
                 for j in i..direction.len() {
-                    if let Some(place) = problem.pattern().place(i, j) {
+                    if let Some(place) = problem.pattern().block_index(i, j) {
                         let term = normal.blocks[place][(unknown, unknown)];
                         let twice = if i == j { 1.0 } else { 2.0 };
                         foretold += twice * term * direction[i] * direction[j];
@@ -766,10 +768,10 @@ mod tests {
         }
     }
 
-    fn check_gradient(ring: &Ring, problem: &Problem) {
+    fn check_gradient(ring: &Ring, problem: &PhotometricProblem) {
         let gradient = problem.linearise(&ring.estimates).unwrap().normal.gradient;
         let steps = [2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 1e-3, 0.1];
-        for unknown in 0..UNKNOWNS {
+        for unknown in 0..FRAME_PARAMETERS {
             let (mut error, mut size) = (0.0f64, 0.0f64);
             for frame in 0..ring.estimates.len() {
                 let cost = |amount: f64| {
@@ -794,7 +796,7 @@ mod tests {
     #[test]
     fn the_shared_gradient_is_the_derivative_of_the_cost() {
         let ring = Ring::new(1e-4);
-        let problem = ring.problem().calibrating();
+        let problem = ring.problem().with_shared_parameters();
         let mut kappa = Kappa::zeros();
         kappa
             .fixed_rows_mut::<5>(0)
@@ -825,7 +827,7 @@ mod tests {
         let ring = Ring::new(1e-4);
         let (all, half) = (ring.problem(), ring.problem_with(0.5));
         assert!((0.2..0.5).contains(&half.share_of_wall()));
-        let trace = |problem: &Problem| -> f64 {
+        let trace = |problem: &PhotometricProblem| -> f64 {
             let at = problem.linearise(&ring.estimates).unwrap();
             let poses = at.normal.blocks.iter();
             problem.sigma().powi(2)
@@ -861,7 +863,7 @@ mod tests {
         steps_lead_to_the_truth(&ring, &ring.problem_of(ring.joint()));
     }
 
-    fn steps_lead_to_the_truth(ring: &Ring, problem: &Problem) {
+    fn steps_lead_to_the_truth(ring: &Ring, problem: &PhotometricProblem) {
         let mut estimates = ring.estimates.clone();
         let start = problem.linearise(&estimates).unwrap().cost;
         for _ in 0..6 {

@@ -4,15 +4,15 @@ use crate::camera::Camera;
 use crate::numerics::simd_dispatch::wide;
 use crate::refine::problem::block_sums::{BlockSums, TileSums};
 use crate::refine::problem::observer_column::Column;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::samples::visibility::{Tile, Visibility};
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::TilePoints;
-use crate::refine::tiles::tile::{ResidualWeighting, TileMoments, TileWork};
+use crate::refine::tiles::tile::{ResidualWeighting, TileMoments, TileWorkspace};
 use nalgebra::Matrix2x6;
 use std::ops::Range;
 
-impl Problem<'_> {
+impl PhotometricProblem<'_> {
     /// Sums over the tiles of one block, for the few active frames that see it.
     pub fn sum_block(
         &self,
@@ -32,7 +32,7 @@ impl Problem<'_> {
         let frames = visibility.frames(block).into_iter();
         let slots = frames.filter_map(|k| stretch_slots[k]).collect();
         let mut sums = BlockSums::new(slots, self.calibrates);
-        let mut work = TileWork::default();
+        let mut work = TileWorkspace::default();
         let mut scratch = Vec::new();
         let spacing = (self.grid.spacing_s_m, self.grid.spacing_h_m);
         let weighting = ResidualWeighting {

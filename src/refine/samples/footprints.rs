@@ -9,7 +9,7 @@ use crate::trajectory::Pose;
 use rayon::prelude::*;
 
 /// How far back overlap is looked for, frames.
-pub const FARTHEST: usize = 256;
+pub const MAX_OVERLAP_DISTANCE_FRAMES: usize = 256;
 /// How far along the tunnel a frame is compared, in radii of a circle with the section's perimeter.
 const REACH_RADII: f64 = 6.0;
 

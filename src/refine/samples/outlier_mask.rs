@@ -21,7 +21,7 @@ use crate::refine::samples::visibility::{Tile, Visibility};
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, TileId, TilePoints, WallGrid};
 use crate::refine::tiles::residual_weighting::{NoiseModel, median_and_sigma};
-use crate::refine::tiles::tile::{Misfit, TileWork};
+use crate::refine::tiles::tile::{Misfit, TileWorkspace};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -104,7 +104,7 @@ impl OutlierMask {
     ) {
         let found = visibility.blocks.par_iter().map(|block| {
             let tiles = &visibility.tiles[block.clone()];
-            let mut work = TileWork::default();
+            let mut work = TileWorkspace::default();
             let mut scratch = Vec::new();
             let mut excess = Vec::new();
             let mut around: Vec<Option<Box<Neighbourhood>>> = vec![None; views.len()];
@@ -200,7 +200,7 @@ mod tests {
     use crate::camera::Sweep;
     use crate::frames::GreyImage;
     use crate::refine::parameters::frame_estimate::FrameEstimate;
-    use crate::refine::samples::visibility::{Hidden, PosedFrame};
+    use crate::refine::samples::visibility::{Exclusions, PosedFrame};
     use crate::surface::Footprint;
     use crate::test_wall::{TestWall, waves};
     use rand::SeedableRng;
@@ -253,13 +253,13 @@ mod tests {
             &grid,
             &camera,
             None,
-            &Hidden::NOTHING,
+            &Exclusions::NOTHING,
             &placed,
             &rows,
         );
         let frames: Vec<usize> = (0..views.len()).collect();
         let mut misfits = Vec::new();
-        let mut work = TileWork::default();
+        let mut work = TileWorkspace::default();
         for tile in &visibility.tiles {
             let points = TilePoints::new(&grid, &wall.circle, tile.id, &mut Vec::new());
             let observers = visibility.observers(tile).iter();

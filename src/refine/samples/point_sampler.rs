@@ -6,7 +6,7 @@ use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Vector3};
 
 /// A camera at a pose, ready to look at wall points relative to an origin near them.
-pub struct Sampler {
+pub struct PointSampler {
     r_cw: Matrix3<f32>,
     centre: Vector3<f32>,
     focal: (f32, f32),
@@ -18,7 +18,7 @@ pub struct Sampler {
 
 /// A place between four pixels of a picture.
 #[derive(Clone, Copy, Debug)]
-pub struct Spot {
+pub struct ImagePoint {
     /// The upper left one.
     index: usize,
     width: usize,
@@ -27,7 +27,7 @@ pub struct Spot {
     fv: f32,
 }
 
-impl Sampler {
+impl PointSampler {
     /// The `camera` at `pose`; points will be relative to `origin`.
     pub fn new(camera: &Camera, pose: &Pose, origin: &Vector3<f64>) -> Self {
         let r_wc = pose.r_wc.to_rotation_matrix();
@@ -44,7 +44,7 @@ impl Sampler {
 
     /// Where a wall point (relative to the origin) appears, if it does.
     #[inline]
-    pub fn at(&self, point: &[f32; 3]) -> Option<Spot> {
+    pub fn at(&self, point: &[f32; 3]) -> Option<ImagePoint> {
         let r = &self.r_cw;
         let dot =
             |row: usize| r[(row, 0)] * point[0] + r[(row, 1)] * point[1] + r[(row, 2)] * point[2];
@@ -57,7 +57,7 @@ impl Sampler {
             return None;
         }
         let (x, y) = (u as usize, v as usize);
-        Some(Spot {
+        Some(ImagePoint {
             index: y * self.width + x,
             width: self.width,
             fu: u - x as f32,
@@ -66,7 +66,7 @@ impl Sampler {
     }
 }
 
-impl Spot {
+impl ImagePoint {
     /// The value there in a picture of the camera's size, bilinear; NaN where a pixel has none.
     #[inline]
     pub fn of(&self, image: &GreyImage) -> f32 {
@@ -113,7 +113,7 @@ mod tests {
         let across = GreyImage::new(64, 48, across);
         let down = GreyImage::new(64, 48, down);
         let origin = pose.to_world(&Vector3::new(0.1, -0.1, 2.0));
-        let sampler = Sampler::new(camera, &pose, &origin);
+        let sampler = PointSampler::new(camera, &pose, &origin);
         let mut seen = 0;
         for k in 0..400 {
             let offset = Vector3::new(

@@ -8,7 +8,7 @@ use crate::frames::{FrameCache, FrameError, Pyramid};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::samples::observer_marks::ObserverMarks;
 use crate::refine::samples::tile_selection::most_informative;
-use crate::refine::samples::visibility::{Hidden, PosedFrame, Visibility, rows_of};
+use crate::refine::samples::visibility::{Exclusions, PosedFrame, Visibility, rows_of};
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, WallGrid};
 use crate::surface::Surface;
@@ -37,7 +37,7 @@ struct Stretch {
 
 /// The participants' pictures.
 #[derive(Clone, Copy, Debug)]
-pub struct Pictures<'a> {
+pub struct FrameImages<'a> {
     /// All frames.
     pub frames: &'a FrameCache,
     /// The frame that is the first participant.
@@ -46,7 +46,7 @@ pub struct Pictures<'a> {
     pub level: usize,
 }
 
-impl Pictures<'_> {
+impl FrameImages<'_> {
     /// The pictures of some participants.
     pub fn of(&self, participants: &[usize]) -> Result<Vec<Arc<Pyramid>>, FrameError> {
         let participants = participants.par_iter();
@@ -58,13 +58,13 @@ impl Pictures<'_> {
 
 /// Which frames see which tiles, stretch by stretch.
 #[derive(Debug)]
-pub struct Coverage<'a> {
+pub struct TileCoverage<'a> {
     surface: &'a dyn Surface,
     grid: WallGrid,
     /// Of the level.
     camera: Camera,
-    pictures: Pictures<'a>,
-    hidden: Hidden<'a>,
+    pictures: FrameImages<'a>,
+    hidden: Exclusions<'a>,
     /// Share of the information that the tiles compared hold.
     information: f64,
     /// Where the participants stood when the samples were chosen; None for those that are not
@@ -83,7 +83,7 @@ pub struct Coverage<'a> {
     pub pairs: Vec<(usize, usize)>,
 }
 
-impl<'a> Coverage<'a> {
+impl<'a> TileCoverage<'a> {
     /// Finds the tiles of all participants' frames, and chooses those that hold a share
     /// `information` of what they tell if it is less than 1.
     ///
@@ -93,8 +93,8 @@ impl<'a> Coverage<'a> {
         surface: &'a dyn Surface,
         grid: WallGrid,
         camera: Camera,
-        pictures: Pictures<'a>,
-        hidden: Hidden<'a>,
+        pictures: FrameImages<'a>,
+        hidden: Exclusions<'a>,
         information: f64,
         placed: Vec<Option<PosedFrame>>,
     ) -> Result<Self, FrameError> {

@@ -5,7 +5,7 @@ use crate::frames::{HalvedMask, Shading};
 use crate::refine::samples::observer_marks::ObserverMarks;
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, SIDE, TileId, WallGrid};
-use crate::refine::tiles::tile::Seen;
+use crate::refine::tiles::tile::TileObservation;
 use crate::surface::{Footprint, Patches, Surface};
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
@@ -40,8 +40,8 @@ pub struct Observer {
 impl Observer {
     /// As the work on its tile wants it; `views` are those of the [`Visibility`]'s frames.
     #[inline(always)]
-    pub fn seen<'v>(&self, views: &'v [SampledFrame<'v>]) -> Seen<'v> {
-        Seen {
+    pub fn seen<'v>(&self, views: &'v [SampledFrame<'v>]) -> TileObservation<'v> {
+        TileObservation {
             view: &views[self.frame as usize],
             pixels: self.pixels,
             shade: self.shade,
@@ -73,7 +73,7 @@ pub struct PosedFrame {
 
 /// What of the wall and of the frames is not compared.
 #[derive(Clone, Debug)]
-pub struct Hidden<'a> {
+pub struct Exclusions<'a> {
     /// Parts of the wall.
     pub ignored: &'a Patches,
     /// Which pixels show the wall, at the frames' level; all if there is none.
@@ -81,9 +81,9 @@ pub struct Hidden<'a> {
 }
 
 #[cfg(test)]
-impl Hidden<'_> {
+impl Exclusions<'_> {
     /// Nothing.
-    pub const NOTHING: Hidden<'static> = Hidden {
+    pub const NOTHING: Exclusions<'static> = Exclusions {
         ignored: &Patches::NONE,
         mask: None,
     };
@@ -114,7 +114,7 @@ impl Visibility {
         grid: &WallGrid,
         camera: &Camera,
         shading: Option<&Shading>,
-        hidden: &Hidden,
+        hidden: &Exclusions,
         placed: &[PosedFrame],
         rows: &Range<i64>,
     ) -> Self {
@@ -431,7 +431,7 @@ mod tests {
             &grid,
             &camera,
             None,
-            &Hidden::NOTHING,
+            &Exclusions::NOTHING,
             &placed,
             &everywhere,
         );
@@ -460,7 +460,7 @@ mod tests {
     #[test]
     fn tiles_are_found_by_name_and_what_is_left_out_is_known() {
         let (circle, camera, grid, placed) = placed_spiral(6);
-        let hidden = Hidden::NOTHING;
+        let hidden = Exclusions::NOTHING;
         let rows = -1000..1000;
         let all = Visibility::find(&circle, &grid, &camera, None, &hidden, &placed, &rows);
         for (k, tile) in all.tiles.iter().enumerate() {
@@ -492,7 +492,7 @@ mod tests {
                 &grid,
                 &camera,
                 None,
-                &Hidden::NOTHING,
+                &Exclusions::NOTHING,
                 &placed,
                 &rows,
             )

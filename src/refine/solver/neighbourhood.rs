@@ -5,15 +5,17 @@
 //! doubted frame makes to be solved does not grow with the length of the survey. What it has bent
 //! farther off is left to the next solve of all.
 
-use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
-use crate::refine::problem::linearisation::FrameShare;
-use crate::refine::problem::photometric_problem::Problem;
-use crate::refine::samples::footprints::{FARTHEST, footprints};
+use crate::refine::problem::linearisation::FrameContribution;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
+use crate::refine::samples::footprints::footprints;
+use crate::refine::samples::sampling::Sampling;
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
+use crate::refine::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
 use std::ops::{Range, RangeInclusive};
 
 /// Frames on either side of a changed one that are solved again.
@@ -51,8 +53,9 @@ impl Neighbourhood {
             others.any(|other| other.overlaps(own, perimeter))
         };
         let widened = runs.into_iter().map(|active| {
-            let earlier = active.start.saturating_sub(FARTHEST)..active.start;
-            let later = active.end..(active.end + FARTHEST).min(footprints.len());
+            let earlier = active.start.saturating_sub(MAX_OVERLAP_DISTANCE_FRAMES)..active.start;
+            let later =
+                active.end..(active.end + MAX_OVERLAP_DISTANCE_FRAMES).min(footprints.len());
             let first = earlier.clone().find(|k| shares(k, &active));
             let last = later.clone().rev().find(|k| shares(k, &active));
             // The prior ties the first and the last to their neighbours, wall in common or not.
@@ -86,11 +89,11 @@ impl Neighbourhood {
         options: &RefineOptions,
         levels: RangeInclusive<usize>,
         tracked: &mut FrameStates,
-    ) -> Result<Vec<FrameShare>, ProblemError> {
+    ) -> Result<Vec<FrameContribution>, ProblemError> {
         let mut shares = Vec::new();
         for level in levels.rev() {
             let members = tracked.window_of(self.participants.clone(), self.active.clone());
-            let problem = Problem::new(scene, Sampling::of(level), members)?;
+            let problem = PhotometricProblem::new(scene, Sampling::of(level), members)?;
             let solution = solve(problem, Stopping::intermediate(options, level))?;
             tracked.estimates[self.active.clone()].copy_from_slice(&solution.estimates);
             shares = solution.linearisation.frames;

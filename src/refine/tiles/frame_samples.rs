@@ -222,7 +222,7 @@ impl<'a> SampledFrame<'a> {
 mod tests {
     use super::*;
     use crate::camera::{KannalaBrandt, Lens};
-    use crate::refine::parameters::calibration::{Calibration, Kappa, LENS};
+    use crate::refine::parameters::calibration::{Calibration, INTRINSIC_PARAMETERS, Kappa};
     use crate::refine::tiles::grid::{AREA, SIDE, TileId, WallGrid};
     use crate::surface::{Circle, Surface, WallPoint};
     use crate::trajectory::so3;
@@ -263,14 +263,18 @@ mod tests {
         let pixel = camera.project(&pose.to_camera(&points.centre.x_w)).unwrap();
         let analytic = view.shared_jacobian(&points, &view.wall_jacobian(&points), &camera, &rate);
         let step = 1e-6;
-        for k in 0..=LENS {
+        for k in 0..=INTRINSIC_PARAMETERS {
             let moved = |amount: f64| {
                 let mut kappa = Kappa::zeros();
-                if k < LENS {
+                if k < INTRINSIC_PARAMETERS {
                     kappa[k] = amount;
                 }
                 let camera = calibration.camera(&kappa).unwrap();
-                let readout_s = if k == LENS { amount } else { 0.0 };
+                let readout_s = if k == INTRINSIC_PARAMETERS {
+                    amount
+                } else {
+                    0.0
+                };
                 wall_of(&camera.sweeping(&rate.times(readout_s)), &pixel)
             };
             let (plus, minus) = (moved(step), moved(-step));

@@ -121,7 +121,7 @@ pub struct ResidualWeighting<'a> {
 }
 
 /// A frame that sees a tile.
-pub struct Seen<'a> {
+pub struct TileObservation<'a> {
     /// The frame.
     pub view: &'a SampledFrame<'a>,
     /// Pixels per wall sample, q.
@@ -146,7 +146,7 @@ struct Samples {
 
 /// Room for the work on one tile, reused from tile to tile.
 #[derive(Default)]
-pub struct TileWork {
+pub struct TileWorkspace {
     samples: Vec<Samples>,
     /// True if some frame lacks some value.
     gaps: bool,
@@ -159,10 +159,14 @@ pub struct TileWork {
 }
 
 // Everything here is inlined into its caller, which is compiled for the processor's widest vectors.
-impl TileWork {
+impl TileWorkspace {
     /// Samples all observers.
     #[inline(always)]
-    fn sample<'a>(&mut self, points: &TilePoints, observers: impl Iterator<Item = Seen<'a>>) {
+    fn sample<'a>(
+        &mut self,
+        points: &TilePoints,
+        observers: impl Iterator<Item = TileObservation<'a>>,
+    ) {
         self.samples.clear();
         self.gaps = false;
         for seen in observers {
@@ -300,14 +304,14 @@ impl TileWork {
         texture
     }
 
-    /// Fills [`TileWork::found`] for a tile's observers.
+    /// Fills [`TileWorkspace::found`] for a tile's observers.
     ///
     /// `spacing_m`: distance between samples along s and h.
     #[inline(always)]
     pub fn moments<'a>(
         &mut self,
         points: &TilePoints,
-        observers: impl Iterator<Item = Seen<'a>>,
+        observers: impl Iterator<Item = TileObservation<'a>>,
         spacing_m: (f64, f64),
         weighting: &ResidualWeighting,
     ) {
@@ -381,7 +385,7 @@ impl TileWork {
     pub fn means<'a>(
         &mut self,
         points: &TilePoints,
-        observers: impl Iterator<Item = Seen<'a>>,
+        observers: impl Iterator<Item = TileObservation<'a>>,
     ) -> Vec<f64> {
         self.sample(points, observers);
         let means = self.samples.iter().map(|frame| {
@@ -397,12 +401,12 @@ impl TileWork {
         means.collect()
     }
 
-    /// Fills [`TileWork::misfits`] for a tile's observers.
+    /// Fills [`TileWorkspace::misfits`] for a tile's observers.
     #[inline(always)]
     pub fn misfit<'a>(
         &mut self,
         points: &TilePoints,
-        observers: impl Iterator<Item = Seen<'a>>,
+        observers: impl Iterator<Item = TileObservation<'a>>,
         noise: &NoiseModel,
     ) {
         self.sample(points, observers);
@@ -466,7 +470,7 @@ impl TileWork {
     pub fn count_residuals<'a>(
         &mut self,
         points: &TilePoints,
-        observers: impl Iterator<Item = Seen<'a>>,
+        observers: impl Iterator<Item = TileObservation<'a>>,
         histogram: &mut NoiseHistogram,
         spectrum: &mut TextureSpectrum,
     ) {
@@ -697,13 +701,13 @@ mod tests {
                 })
                 .collect();
             let seen = || {
-                views.iter().map(|view| Seen {
+                views.iter().map(|view| TileObservation {
                     view,
                     pixels: (1.0 / (density * density)) as f32,
                     shade: 1.0,
                 })
             };
-            let mut work = TileWork::default();
+            let mut work = TileWorkspace::default();
             let (mut histogram, mut spectrum) =
                 (NoiseHistogram::default(), TextureSpectrum::default());
             for points in &tiles {

@@ -6,7 +6,7 @@ use crate::refine::model::context::EstimationContext;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::samples::footprints::reach_m;
-use crate::refine::samples::point_sampler::{Sampler, Spot};
+use crate::refine::samples::point_sampler::{ImagePoint, PointSampler};
 use crate::surface::{Footprint, WallPoint, viewing_distance};
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
@@ -158,7 +158,7 @@ impl UnwrappedFrame {
     ) -> UnwrappedSampler<'_> {
         UnwrappedSampler {
             unwrapped: self,
-            sampler: Sampler::new(&self.camera, pose, origin),
+            sampler: PointSampler::new(&self.camera, pose, origin),
             variance: (scene.noise * scene.noise * noise_at_level(self.level)) as f32,
         }
     }
@@ -169,7 +169,7 @@ impl UnwrappedFrame {
         pose: &Pose,
         origin: &Vector3<f64>,
     ) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
-        let sampler = Sampler::new(&self.camera, pose, origin);
+        let sampler = PointSampler::new(&self.camera, pose, origin);
         move |point| sampler.at(point)?.known(&self.local.contrast)
     }
 
@@ -179,7 +179,7 @@ impl UnwrappedFrame {
         pose: &Pose,
         origin: &Vector3<f64>,
     ) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
-        let sampler = Sampler::new(&self.camera, pose, origin);
+        let sampler = PointSampler::new(&self.camera, pose, origin);
         move |point| sampler.at(point)?.known(self.picture())
     }
 
@@ -191,7 +191,7 @@ impl UnwrappedFrame {
 /// A frame on the wall, ready to be looked at.
 pub struct UnwrappedSampler<'a> {
     unwrapped: &'a UnwrappedFrame,
-    sampler: Sampler,
+    sampler: PointSampler,
     /// Variance of a pixel's noise.
     variance: f32,
 }
@@ -228,7 +228,7 @@ impl UnwrappedSampler<'_> {
     }
 
     #[inline]
-    fn noise(&self, spot: &Spot) -> f32 {
+    fn noise(&self, spot: &ImagePoint) -> f32 {
         self.variance * spot.of(&self.unwrapped.local.sensitivity)
     }
 }
