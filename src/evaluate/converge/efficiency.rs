@@ -289,7 +289,7 @@ fn one(options: &SimulateOptions, joint: bool, out: &Path) -> Result<Run, Conver
 fn texture_of(scene: &Scene, noise_grey: f64) -> UnknownTexture {
     let columns = (TAU * scene.camera().fy * f64::from(FINER)).round() as usize;
     let finer = FINER as usize;
-    let side = UnknownTexture::least_side(finer);
+    let side = UnknownTexture::min_side(finer);
     let wall = scene.wall(columns.max(side), 2 * side, 0.0);
     UnknownTexture::of_wall(&wall, finer, noise_grey)
 }

@@ -123,7 +123,7 @@ impl SymmetricUpper for Block {
     }
 }
 
-/// Symbolic factorisation: the rows of the factor's columns below the diagonal. A column has the
+/// SymbolicFactorisation factorisation: the rows of the factor's columns below the diagonal. A column has the
 /// rows of the matrix and those of its children in the elimination tree.
 fn factor_rows(pattern: &Pattern) -> Vec<Vec<usize>> {
     let count = pattern.frames();

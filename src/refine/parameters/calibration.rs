@@ -200,7 +200,7 @@ pub struct Datum {
 
 impl Datum {
     /// Transforms an initial pose to the tunnel, in metres: `R_G R̂`, `R_G (t̂ − p) + p + o`.
-    pub fn to_tunnel(&self, initial: &Pose) -> Pose {
+    pub fn to_tunnel(self, initial: &Pose) -> Pose {
         // In this order the pose stays the same to the last bit without tilt and offset.
         let pivot = self.pivot - self.rotation * self.pivot + self.offset;
         Pose::new(
@@ -210,13 +210,13 @@ impl Datum {
     }
 
     /// Transforms an initial pose to the tunnel of the given radius, in which poses are estimated.
-    pub fn to_nominal_tunnel(&self, initial: &Pose) -> Pose {
+    pub fn to_nominal_tunnel(self, initial: &Pose) -> Pose {
         let in_tunnel = self.to_tunnel(initial);
         Pose::new(in_tunnel.r_wc, in_tunnel.t_wc / self.scale)
     }
 
     /// Scales an estimated pose to metres.
-    pub fn to_metres(&self, pose: &Pose) -> Pose {
+    pub fn to_metres(self, pose: &Pose) -> Pose {
         Pose::new(pose.r_wc, pose.t_wc * self.scale)
     }
 

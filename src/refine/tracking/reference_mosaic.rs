@@ -170,7 +170,7 @@ impl UnwrappedFrame {
         origin: &Vector3<f64>,
     ) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
         let sampler = PointSampler::new(&self.camera, pose, origin);
-        move |point| sampler.at(point)?.known(&self.local.contrast)
+        move |point| sampler.project(point)?.sample_valid(&self.local.contrast)
     }
 
     /// Its grey values, likewise.
@@ -180,7 +180,7 @@ impl UnwrappedFrame {
         origin: &Vector3<f64>,
     ) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
         let sampler = PointSampler::new(&self.camera, pose, origin);
-        move |point| sampler.at(point)?.known(self.picture())
+        move |point| sampler.project(point)?.sample_valid(self.picture())
     }
 
     fn picture(&self) -> &GreyImage {
@@ -201,35 +201,35 @@ impl UnwrappedSampler<'_> {
     /// the frame has a value.
     #[inline]
     pub fn contrast_and_noise(&self, point: &[f32; 3]) -> Option<(f32, f32)> {
-        let spot = self.sampler.at(point)?;
-        let contrast = spot.known(&self.unwrapped.local.contrast)?;
+        let spot = self.sampler.project(point)?;
+        let contrast = spot.sample_valid(&self.unwrapped.local.contrast)?;
         Some((contrast, self.noise(&spot)))
     }
 
     /// Local contrast, the variance of its noise, and the detail in grey levels, likewise.
     #[inline]
     pub fn contrast_and_detail(&self, point: &[f32; 3]) -> Option<(f32, f32, f32)> {
-        let spot = self.sampler.at(point)?;
-        let contrast = spot.known(&self.unwrapped.local.contrast)?;
-        let detail = spot.of(&self.unwrapped.local.detail);
+        let spot = self.sampler.project(point)?;
+        let contrast = spot.sample_valid(&self.unwrapped.local.contrast)?;
+        let detail = spot.sample(&self.unwrapped.local.detail);
         Some((contrast, self.noise(&spot), detail))
     }
 
     /// Local contrast, the variance of its noise, and the grey value, likewise.
     #[inline]
     fn contrast_and_grey(&self, point: &[f32; 3]) -> Option<(f32, f32, f32)> {
-        let spot = self.sampler.at(point)?;
-        let contrast = spot.known(&self.unwrapped.local.contrast)?;
+        let spot = self.sampler.project(point)?;
+        let contrast = spot.sample_valid(&self.unwrapped.local.contrast)?;
         Some((
             contrast,
             self.noise(&spot),
-            spot.of(self.unwrapped.picture()),
+            spot.sample(self.unwrapped.picture()),
         ))
     }
 
     #[inline]
     fn noise(&self, spot: &ImagePoint) -> f32 {
-        self.variance * spot.of(&self.unwrapped.local.sensitivity)
+        self.variance * spot.sample(&self.unwrapped.local.sensitivity)
     }
 }
 

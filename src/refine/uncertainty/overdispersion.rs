@@ -18,7 +18,7 @@ use crate::refine::model::rejection::RejectionReason;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::solver::gauss_newton::Solution;
 use crate::refine::tiles::grid::BLOCK;
-use crate::refine::tiles::tile::SAMPLES;
+use crate::refine::tiles::tile_arrays::SAMPLES;
 use crate::refine::uncertainty::covariance::frame_sigma;
 use nalgebra::Matrix6;
 

@@ -141,7 +141,7 @@ impl Look<'_> {
     fn greys(&self, origin: &Vector3<f64>) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
         let sampler = PointSampler::new(&self.camera, self.pose, origin);
         let image = self.picture.level(self.level);
-        move |point| sampler.at(point)?.known(image)
+        move |point| sampler.project(point)?.sample_valid(image)
     }
 }
 
