@@ -63,8 +63,8 @@ pub fn frame_states(poses: &[Pose]) -> FrameStates {
     }
 }
 
-/// A tunnel of 3 m radius, a camera, the lattice of its pixels, and a spiral of `frames` frames, all
-/// active.
+/// A tunnel of 3 m radius, a camera, the lattice of its pixels, and a spiral of `frames` frames,
+/// all active.
 pub fn posed_spiral(frames: usize) -> (Circle, Camera, WallGrid, Vec<PosedFrame>) {
     let circle = Circle::new(3.0).unwrap();
     let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());

@@ -65,16 +65,18 @@ pub mod footprints {
     /// Largest distance along the tunnel at which a frame is compared, radii of a circle with the
     /// section's perimeter.
     ///
-    /// Higher: frames that look along the tunnel keep more of their oblique wall. Chosen by: unknown.
+    /// Higher: frames that look along the tunnel keep more of their oblique wall. Chosen by:
+    /// unknown.
     pub const MAX_REACH_RADII: f64 = 6.0;
 }
 
 /// Thresholds of `samples/visibility.rs`.
 pub mod visibility {
-    /// Least distance of a tile from the image's border and from masked pixels, pixels: room for the
-    /// steps to come.
+    /// Least distance of a tile from the image's border and from masked pixels, pixels: room for
+    /// the steps to come.
     ///
-    /// Higher: larger steps stay inside the image, but less of its border is used. Chosen by: unknown.
+    /// Higher: larger steps stay inside the image, but less of its border is used. Chosen by:
+    /// unknown.
     pub const MIN_BORDER_DISTANCE_PX: f64 = 1.0;
 
     /// Least area of a sample in a frame over that at the distance the lattice was laid out for.
@@ -87,8 +89,8 @@ pub mod visibility {
 pub mod tile_coverage {
     /// Observations per stretch of the wall.
     ///
-    /// Higher: more work for parallel threads at once, and more memory. Chosen by: unknown (work for all
-    /// threads within little memory).
+    /// Higher: more work for parallel threads at once, and more memory. Chosen by: unknown (work
+    /// for all threads within little memory).
     pub const MAX_STRETCH_OBSERVATIONS: f64 = 1e6;
 
     /// Frames per stretch of the wall, apart from those that reach over from its neighbours.
@@ -105,7 +107,8 @@ pub mod tile_coverage {
 
 /// Thresholds of `samples/outlier_mask.rs`.
 pub mod outlier_mask {
-    /// Excess of a misfit over the typical one, in spreads, from which a frame does not show the wall.
+    /// Excess of a misfit over the typical one, in spreads, from which a frame does not show the
+    /// wall.
     ///
     /// Higher: fewer tiles are excluded. Chosen by: the test
     /// `a_glint_and_its_flanks_are_excluded_and_the_wall_is_not` bounds it; otherwise unknown.
@@ -126,14 +129,14 @@ pub mod outlier_mask {
 pub mod residual_weighting {
     /// Cutoff c of Tukey's biweight, standard deviations of the residual.
     ///
-    /// Higher: less of the information in Gaussian noise is lost (2 % at 6), but outliers exert more
-    /// force. Chosen by: unknown.
+    /// Higher: less of the information in Gaussian noise is lost (2 % at 6), but outliers exert
+    /// more force. Chosen by: unknown.
     pub const TUKEY_CUTOFF_SIGMAS: f32 = 6.0;
 
     /// Least σ of the noise model, grey levels.
     ///
-    /// Higher: fewer residuals are rejected on images without noise. Chosen by: derivation: rounding to
-    /// 8 bits gives 0.29, which the averaging of interpolation lowers.
+    /// Higher: fewer residuals are rejected on images without noise. Chosen by: derivation:
+    /// rounding to 8 bits gives 0.29, which the averaging of interpolation lowers.
     pub const MIN_SIGMA_GREY: f64 = 0.2;
 
     /// Least number of residuals in a gradient bin for it to enter the fit of the noise model.
@@ -146,12 +149,12 @@ pub mod residual_weighting {
 pub mod tile {
     /// Steps of reweighting from the plain mean (or the median) to the robust texture.
     ///
-    /// Higher: the texture is nearer to the minimiser under outliers, at more time per tile. Chosen by:
-    /// unknown (the tests of the gradient against the cost pass with it).
+    /// Higher: the texture is nearer to the minimiser under outliers, at more time per tile. Chosen
+    /// by: unknown (the tests of the gradient against the cost pass with it).
     pub const REWEIGHTING_ITERATIONS: usize = 2;
 
-    /// Number of frames from which on the second smallest gradient sets the variance of a sample instead
-    /// of the smallest.
+    /// Number of frames from which on the second smallest gradient sets the variance of a sample
+    /// instead of the smallest.
     ///
     /// Higher: the variance is lower where few frames observe the wall. Chosen by: unknown.
     pub const MIN_FRAMES_FOR_SECOND_SMALLEST_GRADIENT: usize = 4;
@@ -172,8 +175,8 @@ pub mod photometric_problem {
 
     /// Largest log-gain of a feasible estimate, standard deviations of its prior.
     ///
-    /// Higher: a frame that fits nowhere may lower its cost by a gain near 0, which amplifies rounding.
-    /// Chosen by: unknown.
+    /// Higher: a frame that fits nowhere may lower its cost by a gain near 0, which amplifies
+    /// rounding. Chosen by: unknown.
     pub const MAX_LOG_GAIN_SIGMAS: f64 = 10.0;
 
     /// Stiffness of the gauge constraint at the first compared frame over that of its pixels.
@@ -187,23 +190,25 @@ pub mod photometric_problem {
     /// Higher: better estimates at more time. Chosen by: unknown.
     pub const NOISE_ESTIMATION_TILES: usize = 600;
 
-    /// Number of blocks of tiles that are solved for to estimate roughness and stiffness of the wall.
+    /// Number of blocks of tiles that are solved for to estimate roughness and stiffness of the
+    /// wall.
     ///
     /// Higher: better estimates at more time. Chosen by: unknown.
     pub const WALL_MODEL_BLOCKS: usize = 48;
 
-    /// Least variance that detail finer than pixels adds to a pixel, over the variance of its noise, for
-    /// the wall to be solved for jointly.
+    /// Least variance that detail finer than pixels adds to a pixel, over the variance of its
+    /// noise, for the wall to be solved for jointly.
     ///
-    /// Higher: fewer walls are solved for jointly. Chosen by: derivation: below it, less than a fortieth
-    /// of the error is at stake. On bricks of 30 × 10 pixels the ratio is 1.1, 0.35 and 0.13 with noise
-    /// of 1, 2 and 4 grey levels, on concrete 0.02 with 2.
+    /// Higher: fewer walls are solved for jointly. Chosen by: derivation: below it, less than a
+    /// fortieth of the error is at stake. On bricks of 30 × 10 pixels the ratio is 1.1, 0.35 and
+    /// 0.13 with noise of 1, 2 and 4 grey levels, on concrete 0.02 with 2.
     pub const MIN_ALIASED_VARIANCE_RATIO: f64 = 0.05;
 
-    /// Largest factor by which the variance of the residuals may fall short of the sensor's; beyond, the
-    /// sensor's is taken for fine texture and ignored.
+    /// Largest factor by which the variance of the residuals may fall short of the sensor's;
+    /// beyond, the sensor's is taken for fine texture and ignored.
     ///
-    /// Higher: the noise of single images replaces that of the residuals more often. Chosen by: unknown.
+    /// Higher: the noise of single images replaces that of the residuals more often. Chosen by:
+    /// unknown.
     pub const MAX_NOISE_UNDERESTIMATE: f64 = 1.25;
 
     /// Random frequencies by which the information of an unknown texture is averaged.
@@ -236,8 +241,8 @@ pub mod joint {
 
     /// Largest step that ends the joint solve, standard deviations of the estimates.
     ///
-    /// Higher: fewer of its expensive steps. Chosen by: the step after one of this length is a tenth of
-    /// it.
+    /// Higher: fewer of its expensive steps. Chosen by: the step after one of this length is a
+    /// tenth of it.
     pub const MAX_FINAL_STEP_SIGMA: f64 = 0.3;
 
     /// Conjugate-gradient iterations on the wall between two rounds of reweighting.
@@ -247,8 +252,8 @@ pub mod joint {
 
     /// Rounds of reweighting of edges and pixels.
     ///
-    /// Higher: sharper edges at more time. Chosen by: on bricks with noise of 2 grey levels, two rounds
-    /// make the poses' squared error 14 % larger, and seven 4 % smaller.
+    /// Higher: sharper edges at more time. Chosen by: on bricks with noise of 2 grey levels, two
+    /// rounds make the poses' squared error 14 % larger, and seven 4 % smaller.
     pub const REWEIGHTING_ROUNDS: usize = 4;
 
     /// Width of Huber's loss in the first round of reweighting, standard deviations.
@@ -263,8 +268,8 @@ pub mod joint {
 
     /// Largest number of frames that is distinguished in the stiffness of the wall.
     ///
-    /// Higher: finer classes, each from fewer tiles. Chosen by: on bricks the stiffness is constant from
-    /// five frames on.
+    /// Higher: finer classes, each from fewer tiles. Chosen by: on bricks the stiffness is constant
+    /// from five frames on.
     pub const MAX_STIFFNESS_FRAMES: usize = 12;
 
     /// Least stiffness ratio.

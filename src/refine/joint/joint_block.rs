@@ -3,8 +3,8 @@
 //! [`crate::refine::tiles::tile`] interpolates between a frame's pixels, and takes the mean of all
 //! frames for the wall. For a wall that is smooth over a pixel this is nearly optimal. A sharp edge
 //! is not smooth: every frame samples it at other fractions of a pixel, and the errors of
-//! interpolation mimic displacements of some hundredths of a pixel. In the joint solve the wall is a
-//! vector x of fine pixels, and a frame's pixel p is the mean over its own square on the wall,
+//! interpolation mimic displacements of some hundredths of a pixel. In the joint solve the wall is
+//! a vector x of fine pixels, and a frame's pixel p is the mean over its own square on the wall,
 //! `W_p x`, as in a camera ([`crate::super_resolve`]). Poses and wall minimise
 //!
 //! `J = Σ_p ρ(e_p) + (roughness of x)`,   `e_p = a_i (z_p − W_p x)`,   `z_p = (I_p − b_i)/a_i`.
@@ -27,8 +27,8 @@
 //! other, these forces would add up over all tiles to steps of many σ. Each tile's net force is
 //! therefore removed from its frames by weight, `g_i −= (w̄_i/Σw̄) Σ_j g_j`.
 //!
-//! **Roughness.** The strength of the roughness is estimated once, from blocks spread over the wall.
-//! Edges are found anew in every solve, and the roughness there is reduced
+//! **Roughness.** The strength of the roughness is estimated once, from blocks spread over the
+//! wall. Edges are detected in every solve, and the roughness there is reduced
 //! ([`WallSolve::weigh_edges`]). On bricks, whose texture is far from Gaussian, this is the largest
 //! gain.
 //!
@@ -107,8 +107,8 @@ pub struct JointBlock<'a> {
 }
 
 impl<'a> JointBlock<'a> {
-    /// The block of tiles `block` of a visibility with its frames, whose pixel noise is `sigma` grey
-    /// levels.
+    /// The block of tiles `block` of a visibility with its frames, whose pixel noise is `sigma`
+    /// grey levels.
     pub fn new(
         context: &EstimationContext,
         grid: &WallGrid,
@@ -263,8 +263,8 @@ impl<'a> JointBlock<'a> {
         moments
     }
 
-    /// `∂x/∂s` and `∂x/∂h` by central differences of the fourth order, as the detail that determines
-    /// poses is only a few fine pixels wide. Zero at the region's border.
+    /// `∂x/∂s` and `∂x/∂h` by central differences of the fourth order, as the detail that
+    /// determines poses is only a few fine pixels wide. Zero at the region's border.
     fn slopes(&self, x: &[f32]) -> [Vec<f32>; 2] {
         let (columns, rows) = (self.region.columns, self.region.rows);
         let slope = |step: usize, spacing_m: f64| {

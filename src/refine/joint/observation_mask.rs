@@ -1,5 +1,5 @@
-//! Observation mask: the frames that contribute to the wall of a region, tile by tile, and those that
-//! are compared with it.
+//! Observation mask: the frames that contribute to the wall of a region, tile by tile, and those
+//! that are compared with it.
 
 use crate::refine::samples::visibility::Visibility;
 use crate::refine::tiles::grid::{TILE, TileId, WallGrid};
@@ -34,10 +34,10 @@ pub struct Observation {
 impl ObservationMask {
     /// The observations of a region around a block.
     ///
-    /// A frame contributes to the wall in the tiles in which it is compared and in their neighbours,
-    /// which it observes partly. It is not compared in neighbours of tiles to which it does not
-    /// contribute. Otherwise frames would be attracted to where the wall is known better, away from
-    /// the borders of their footprints.
+    /// A frame contributes to the wall in the tiles in which it is compared and in their
+    /// neighbours, which it observes partly. It is not compared in neighbours of tiles to which it
+    /// does not contribute. Otherwise frames would be attracted to where the wall is known better,
+    /// away from the borders of their footprints.
     pub fn new(
         ignored: &Patches,
         grid: &WallGrid,
@@ -182,8 +182,8 @@ mod tests {
     use crate::refine::samples::visibility::Exclusions;
     use crate::refine::test_scene::posed_spiral;
 
-    /// A frame contributes to tiles that it observes partly, and is not compared next to a tile that it
-    /// is excluded from.
+    /// A frame contributes to tiles that it observes partly, and is not compared next to a tile
+    /// that it is excluded from.
     #[test]
     fn frames_contribute_up_to_their_borders_except_where_excluded() {
         let (circle, camera, grid, posed) = posed_spiral(6);

@@ -1,23 +1,23 @@
 //! Stiffness of the frames against the wall of the joint solve: the reduced second derivative.
 //!
-//! If a frame is displaced by δ along s, its pixels change by `δ W ∂x/∂s` on the fixed wall, and the
-//! wall responds by `δ y`, `y = A⁻¹ Wᵀ Ω W ∂x/∂s`, A the matrix of its normal equations. The change
-//! `δ (W ∂x/∂s − W y)` remains. So the diagonal block of frame i in the second derivative of the cost
-//! with the wall eliminated is
+//! If a frame is displaced by δ along s, its pixels change by `δ W ∂x/∂s` on the fixed wall, and
+//! the wall responds by `δ y`, `y = A⁻¹ Wᵀ Ω W ∂x/∂s`, A the matrix of its normal equations. The
+//! change `δ (W ∂x/∂s − W y)` remains. So the diagonal block of frame i in the second derivative of
+//! the cost with the wall eliminated is
 //!
 //! `K_ii = Σ_p a_i² ω (W ∂x/∂s)_p (W ∂x/∂s − W y)_p`
 //!
-//! over its pixels p. A texture that is the mean of the frames, point by point, responds by the share
-//! `w̄_i/Σw̄`, which gives `K_ii = (w̄_i − w̄_i²/Σw̄) M_ss` ([`crate::refine::tiles::tile`]). A wall
-//! finer than pixels responds more: where few frames observe it, detail between their pixels explains
-//! much of a displacement. The ratio of the stiffness to that of a mean therefore depends on the
-//! number of frames: on bricks with noise of 1 grey level it is 0.69 for two, 0.83 for three and 0.87
-//! for five or more; with noise of 4, which hides such detail, more than 0.95. It is estimated once
-//! for each number of frames, from a few blocks spread over the wall, and the slopes in M are
-//! multiplied by its root.
+//! over its pixels p. A texture that is the mean of the frames, point by point, responds by the
+//! share `w̄_i/Σw̄`, which gives `K_ii = (w̄_i − w̄_i²/Σw̄) M_ss` ([`crate::refine::tiles::tile`]).
+//! A wall finer than pixels responds more: where few frames observe it, detail between their pixels
+//! explains much of a displacement. The ratio of the stiffness to that of a mean therefore depends
+//! on the number of frames: on bricks with noise of 1 grey level it is 0.69 for two, 0.83 for three
+//! and 0.87 for five or more; with noise of 4, which hides such detail, more than 0.95. It is
+//! estimated once for each number of frames, from a few blocks spread over the wall, and the slopes
+//! in M are multiplied by its root.
 //!
-//! Without the ratio the steps of Gauss–Newton would be too short by it, and the estimated variances
-//! of the poses too small.
+//! Without the ratio the steps of Gauss–Newton would be too short by it, and the estimated
+//! variances of the poses too small.
 
 use crate::refine::thresholds::joint::{MAX_STIFFNESS_FRAMES, MIN_STIFFNESS_RATIO};
 use crate::refine::tiles::tile_moments::TileMoments;
@@ -65,8 +65,8 @@ impl StiffnessSums {
         }
     }
 
-    /// The ratios; a number of frames without tiles takes that of the next lower one that has some, or
-    /// else of all tiles together.
+    /// The ratios; a number of frames without tiles takes that of the next lower one that has some,
+    /// or else of all tiles together.
     pub fn stiffness(&self) -> Stiffness {
         let ratio = |joint: f64, by_mean: f64| {
             if by_mean > 0.0 {

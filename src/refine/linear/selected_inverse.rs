@@ -123,8 +123,8 @@ impl SymmetricUpper for Block {
     }
 }
 
-/// SymbolicFactorisation factorisation: the rows of the factor's columns below the diagonal. A column has the
-/// rows of the matrix and those of its children in the elimination tree.
+/// Symbolic factorisation: the rows of the factor's columns below the diagonal. A
+/// column has the rows of the matrix and those of its children in the elimination tree.
 fn factor_rows(pattern: &Pattern) -> Vec<Vec<usize>> {
     let count = pattern.frames();
     let mut rows: Vec<Vec<usize>> = vec![Vec::new(); count];

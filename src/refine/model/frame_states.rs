@@ -27,8 +27,8 @@ impl FrameStates {
         self.window_of(all.clone(), all)
     }
 
-    /// The window of the frames `participants`, of which those `active` are estimated and the others
-    /// held fixed; rejected frames from the prior alone.
+    /// The window of the frames `participants`, of which those `active` are estimated and the
+    /// others held fixed; rejected frames from the prior alone.
     pub fn window_of(&self, participants: Range<usize>, active: Range<usize>) -> FrameWindow<'_> {
         FrameWindow {
             estimates: &self.estimates[participants.clone()],

@@ -1,7 +1,7 @@
 //! Errors of the prior and their Jacobians.
 //!
-//! Errors are 6-vectors `e = (rotation (rad), translation (m))`. The initial poses `R̂, t̂` have been
-//! transformed to the tunnel ([`Datum::to_tunnel`]); estimated positions are multiplied by the
+//! Errors are 6-vectors `e = (rotation (rad), translation (m))`. The initial poses `R̂, t̂` have
+//! been transformed to the tunnel ([`Datum::to_tunnel`]); estimated positions are multiplied by the
 //! datum's scale. Pose steps are those of [`Pose::retract`].
 
 use crate::refine::parameters::calibration::{DATUM_PARAMETERS, Datum};

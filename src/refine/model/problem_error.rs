@@ -22,8 +22,8 @@ pub enum ProblemError {
     },
     /// The normal equations have no solution.
     #[error(
-        "frames {first} to {last}: {source}; check that the poses are camera-to-world, radius_m, the \
-         calibration, and that [prior] is neither absurdly wide nor narrow"
+        "frames {first} to {last}: {source}; check that the poses are camera-to-world, radius_m, \
+         the calibration, and that [prior] is neither absurdly wide nor narrow"
     )]
     Factor {
         /// First estimated frame.

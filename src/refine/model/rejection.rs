@@ -155,8 +155,8 @@ impl fmt::Display for RejectionReason {
             Self::Overdispersed { overdispersion_px } => write!(
                 f,
                 "its residuals are overdispersed (patches of it are off by \
-                 {overdispersion_px:.2} px, or those of most frames are): a wrong camera, radius or \
-                 shape, or a repetitive wall that is closed one period off"
+                 {overdispersion_px:.2} px, or those of most frames are): a wrong camera, radius \
+                 or shape, or a repetitive wall that is closed one period off"
             ),
             Self::Uncertain { wall_px } => write!(
                 f,

@@ -6,17 +6,24 @@
 //!
 //! | parameters | meaning, unit | constrained by |
 //! | --- | --- | --- |
-//! | `ln f, cx, cy, k1, k2` | camera intrinsics: focal length (fx and fy alike, 1), principal point (px), radial distortion (1) | pixels, through the rays ([`crate::camera::Camera::intrinsics_jacobian`]) |
-//! | `ln r` | radius over the given one, 1 | the prior of the poses |
-//! | `τ_x, τ_z, o_x, o_z` | tilt (rad) and offset (m) of the tunnel's axis in the initial poses' frame | the prior of the poses |
-//! | `ρ` | readout time of a frame, s | pixels; free only in the rolling-shutter test ([`crate::refine::uncertainty::rolling_shutter_test`]) |
+//! | `ln f` | focal length, fx and fy alike, over the given one, 1 | pixels, through the rays |
+//! | `cx, cy` | principal point, px | pixels |
+//! | `k1, k2` | radial distortion, 1 | pixels |
+//! | `ln r` | radius over the given one, 1 | prior of the poses |
+//! | `τ_x, τ_z` | tilt of the tunnel's axis in the initial poses' frame, rad | prior of the poses |
+//! | `o_x, o_z` | offset of the tunnel's axis there, m | prior of the poses |
+//! | `ρ` | readout time of a frame, s | pixels |
+//!
+//! The first five are the intrinsics ([`crate::camera::Camera::intrinsics_jacobian`]). The readout
+//! time is free in the rolling-shutter test alone
+//! ([`crate::refine::uncertainty::rolling_shutter_test`]).
 //!
 //! The images do not change if the radius and all positions are scaled together. Poses are
 //! therefore estimated in the tunnel of the given radius, and only the prior, which is in metres,
 //! depends on the scale `exp(ln r)`. The images show the cameras relative to the tunnel, whatever
 //! frame the initial poses are given in, so tilt and offset of that frame enter through the prior
-//! alone as well. (Rotation about the axis and shift along it are the gauge.) These five parameters
-//! are the [`Datum`].
+//! alone as well. (Rotation about the axis and shift along it are the gauge.) These five parameters,
+//! `ln r` to `o_z`, are the [`Datum`].
 //!
 //! Every parameter has a Gaussian prior around 0. A parameter whose posterior is nearly as wide as
 //! its prior is unobservable ([`crate::refine::uncertainty::observability`]).

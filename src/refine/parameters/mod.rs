@@ -1,9 +1,9 @@
 //! Parameters that the estimator adjusts.
 //!
-//! | parameters | per | number | file |
+//! | parameters | frames | number | file |
 //! | --- | --- | --- | --- |
-//! | pose (rotation, translation), log-gain, bias | frame | 8 | [`frame_estimate`] |
-//! | intrinsics, radius, axis of the tunnel, readout time: κ | survey | up to 11 | [`calibration`] |
+//! | pose (rotation, translation), log-gain, bias | each | 8 | [`frame_estimate`] |
+//! | κ: intrinsics, radius, axis of the tunnel, readout time | all | up to 11 | [`calibration`] |
 //!
 //! The wall's texture is a nuisance parameter: it is eliminated
 //! ([`crate::refine::tiles::tile`]).

@@ -1,8 +1,9 @@
 //! Contribution of a block of the wall to the border of the normal equations.
 //!
 //! If the shared parameters κ change by δκ, the pixel of frame i that observes x shows the wall at
-//! `x − C_i δκ`, with `C_i = ∂(s, h)/∂κ` ([`crate::refine::tiles::frame_samples::SampledFrame::shared_jacobian`]): C_i stands beside
-//! the pose's A_i ([`crate::refine::tiles::tile`]). The sums over the bracket
+//! `x − C_i δκ`, with `C_i = ∂(s, h)/∂κ`
+//! ([`crate::refine::tiles::frame_samples::SampledFrame::shared_jacobian`]): C_i stands beside the
+//! pose's A_i ([`crate::refine::tiles::tile`]). The sums over the bracket
 //! `w̄_i δ_ij − w̄_i w̄_j / Σw̄` become differences from the mean `C̄ = Σ w̄ C / Σ w̄`:
 //!
 //! `H_pκ,i = w̄_i B_iᵀ M (C_i − C̄)`, `H_κκ = Σ_i w̄_i (C_i − C̄)ᵀ M (C_i − C̄)`,

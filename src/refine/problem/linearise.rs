@@ -28,8 +28,9 @@ impl PhotometricProblem<'_> {
 
     /// Cost and normal equations at the given estimates of the active frames and shared parameters.
     ///
-    /// The cost is infinite if κ gives no valid camera ([`crate::refine::parameters::calibration::Calibration::camera`]). All sums run in the
-    /// same order, whatever the number of threads.
+    /// The cost is infinite if κ gives no valid camera
+    /// ([`crate::refine::parameters::calibration::Calibration::camera`]). All sums run in the same
+    /// order, whatever the number of threads.
     ///
     /// # Errors
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
@@ -136,8 +137,8 @@ impl PhotometricProblem<'_> {
         }
     }
 
-    /// Derivative `3N − 1` of the logarithm of the volume that the pixels leave to the positions, by
-    /// `ln r`; 0 if the radius is not estimated.
+    /// Derivative `3N − 1` of the logarithm of the volume that the pixels leave to the positions,
+    /// by `ln r`; 0 if the radius is not estimated.
     ///
     /// Pixels determine the 3N − 1 coordinates of N positions (without the one along the axis) in
     /// units of the radius. In metres, where the prior is a density, they leave a volume that grows
@@ -187,8 +188,8 @@ impl PhotometricProblem<'_> {
     /// Stiffens the first compared frame along the gauge, where pixels give no information and
     /// rounding would determine the step.
     ///
-    /// Cost and gradient do not change: the position along the gauge follows in closed form from the
-    /// prior ([`crate::refine::model::prior::Prior::align_gauge`]).
+    /// Cost and gradient do not change: the position along the gauge follows in closed form from
+    /// the prior ([`crate::refine::model::prior::Prior::align_gauge`]).
     fn constrain_gauge(&self, slot: usize, first: &FrameEstimate, normal: &mut NormalEquations) {
         let Some(index) = self.pattern.block_index(slot, slot) else {
             return;
@@ -212,14 +213,15 @@ mod tests {
     use crate::refine::problem::test_ring::{Ring, number};
     use crate::refine::samples::sampling::Sampling;
     use crate::refine::tiles::interpolation::Interpolation;
+    use crate::surface::Surface;
 
     /// Central differences of the cost against the gradient, parameter by parameter.
     ///
     /// The texture is eliminated and the loss robust. Where frames agree except for their small
     /// displacements, the fused texture's gradient is each frame's own, so the two agree up to the
-    /// errors of sampling (1 to 3 %). (The frames have no noise, so the loss is at its narrowest, and
-    /// the residuals must be well inside: at its shoulders S needs more reweighting steps to be the
-    /// minimiser.)
+    /// errors of sampling (1 to 3 %). (The frames have no noise, so the loss is at its narrowest,
+    /// and the residuals must be well inside: at its shoulders S needs more reweighting steps to be
+    /// the minimiser.)
     #[test]
     fn gradient_is_the_derivative_of_the_cost() {
         let ring = Ring::new(1e-4);
@@ -234,8 +236,9 @@ mod tests {
         );
     }
 
-    /// In the joint solve the gradient is not exactly the derivative of the pixels' cost (the prior of
-    /// the wall contributes), but its change along every parameter is that of the normal equations.
+    /// In the joint solve the gradient is not exactly the derivative of the pixels' cost (the prior
+    /// of the wall contributes), but its change along every parameter is that of the normal
+    /// equations.
     #[test]
     fn joint_gradient_changes_as_the_normal_equations_predict() {
         let ring = Ring::new(1e-4);

@@ -1,14 +1,15 @@
 //! The photometric problem over a window of frames at one pyramid level.
 //!
 //! ```text
-//! EstimationContext, Sampling, FrameWindow ─> PhotometricProblem ── noise_estimation (noise, outliers)
-//!                                                    │
-//!                              linearise (estimates, κ)
-//!                                                    │  per block of the wall, in parallel
-//!                        sum_block: tiles ─> ObserverColumn ─> BlockSums, IntrinsicsSums
-//!                                                    │  + prior, gauge constraint
-//!                                                    ▼
-//!                        Linearisation: cost, NormalEquations, scatter, SharedBorder
+//! EstimationContext, Sampling, FrameWindow
+//!      │  noise_estimation: noise, model of the wall, outliers
+//!      ▼
+//! PhotometricProblem
+//!      │  linearise (estimates, κ): per block of the wall, in parallel,
+//!      │  sum_block: tiles ─> ObserverColumn ─> BlockSums, IntrinsicsSums;
+//!      │  then prior and gauge constraint
+//!      ▼
+//! Linearisation: cost, NormalEquations, scatter, SharedBorder
 //! ```
 //!
 //! The objective is that of [`crate::refine::tiles::tile`]. [`step_length`] measures a step on the

@@ -29,8 +29,8 @@ use std::ops::Range;
 const TILES_PER_TASK: usize = 32;
 
 impl PhotometricProblem<'_> {
-    /// Estimates the noise model and the spectrum of the texture from the residuals around the plain
-    /// mean in some tiles spread over the wall.
+    /// Estimates the noise model and the spectrum of the texture from the residuals around the
+    /// plain mean in some tiles spread over the wall.
     pub(super) fn estimate_noise(&mut self) -> Result<(), ProblemError> {
         let counted = self.gather_from_tiles(
             NOISE_ESTIMATION_TILES,
@@ -79,8 +79,8 @@ impl PhotometricProblem<'_> {
         Ok(())
     }
 
-    /// Estimates roughness and stiffness of the wall from blocks spread over all of it; None if it has
-    /// too little detail finer than pixels ([`MIN_ALIASED_VARIANCE_RATIO`]).
+    /// Estimates roughness and stiffness of the wall from blocks spread over all of it; None if it
+    /// has too little detail finer than pixels ([`MIN_ALIASED_VARIANCE_RATIO`]).
     pub(super) fn estimate_wall_model(&self) -> Result<Option<WallModel>, ProblemError> {
         let evidence = self.map_blocks(|block| block.evidence())?;
         let strengths = evidence
@@ -138,8 +138,9 @@ impl PhotometricProblem<'_> {
         )
     }
 
-    /// Excludes the observations that do not show the wall ([`OutlierMask`]), detected in the tiles of
-    /// the problem, or, if a `density` is given, in those of another lattice over all of the wall.
+    /// Excludes the observations that do not show the wall ([`OutlierMask`]), detected in the tiles
+    /// of the problem, or, if a `density` is given, in those of another lattice over all of the
+    /// wall.
     ///
     /// # Errors
     /// [`ProblemError`].
@@ -219,9 +220,9 @@ impl PhotometricProblem<'_> {
         Ok(())
     }
 
-    /// Applies `work` to about `count` tiles spread over all of the wall, or to all tiles if there are
-    /// fewer, at the initial estimates. Returns the results of all chunks of tiles, always in the same
-    /// order.
+    /// Applies `work` to about `count` tiles spread over all of the wall, or to all tiles if there
+    /// are fewer, at the initial estimates. Returns the results of all chunks of tiles, always in
+    /// the same order.
     ///
     /// # Errors
     /// [`ProblemError::Frame`].

@@ -245,8 +245,8 @@ impl<'a> PhotometricProblem<'a> {
         self.coverage.tiles
     }
 
-    /// True if the wall is solved for jointly with the poses: if the sampling requests it and the wall
-    /// has detail finer than pixels.
+    /// True if the wall is solved for jointly with the poses: if the sampling requests it and the
+    /// wall has detail finer than pixels.
     pub fn is_joint(&self) -> bool {
         self.wall_model.is_some()
     }
@@ -277,8 +277,8 @@ impl<'a> PhotometricProblem<'a> {
         self.context.camera.sweeping(&sweep)
     }
 
-    /// The frames of a stretch at the given estimates of all participants, taken by `camera` (of the
-    /// level) with a readout of `readout_s` seconds.
+    /// The frames of a stretch at the given estimates of all participants, taken by `camera` (of
+    /// the level) with a readout of `readout_s` seconds.
     pub(super) fn sampled_frames<'s>(
         &self,
         stretch: usize,

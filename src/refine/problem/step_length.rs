@@ -20,8 +20,8 @@ impl PhotometricProblem<'_> {
         2f64.powi(self.sampling.level as i32)
     }
 
-    /// Motion of the wall in each active frame's image by a step, in pixels of full size: the largest
-    /// over the image's centre and corners. `shared`: step of the shared parameters.
+    /// Motion of the wall in each active frame's image by a step, in pixels of full size: the
+    /// largest over the image's centre and corners. `shared`: step of the shared parameters.
     pub fn wall_step_px(
         &self,
         active: &[FrameEstimate],
@@ -68,6 +68,7 @@ impl PhotometricProblem<'_> {
 mod tests {
     use super::*;
     use crate::refine::problem::test_ring::Ring;
+    use crate::surface::Surface;
 
     #[test]
     fn cameras_outside_and_vanishing_gains_are_infeasible() {

@@ -319,8 +319,8 @@ mod tests {
         }
     }
 
-    /// White noise averaged over a pixel: `P = V sinc² sinc²`, V the variance of the wall's pixels over
-    /// their number in a frame's pixel.
+    /// White noise averaged over a pixel: `P = V sinc² sinc²`, V the variance of the wall's pixels
+    /// over their number in a frame's pixel.
     #[test]
     fn spectrum_is_that_of_the_mean_over_a_pixel() {
         let (finer, sigma) = (4, 12.0);

@@ -168,7 +168,8 @@ impl OutlierMask {
 /// Excesses of a frame, summed over the neighbourhood of each tile of a block.
 #[derive(Clone, Copy, Debug, Default)]
 struct BlockExcess {
-    /// Sum and number over a tile and its eight neighbours; the block has a ring of tiles around it.
+    /// Sum and number over a tile and its eight neighbours; the block has a ring of tiles around
+    /// it.
     cells: [[(f32, f32); BLOCK as usize + 2]; BLOCK as usize + 2],
 }
 
@@ -211,8 +212,8 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     /// A glint in the centre of one frame, 40 grey levels bright and 6 pixels wide: its tiles are
-    /// excluded there and nowhere else, with its flanks, where it is no brighter than the noise; and
-    /// less than 1 % of the wall is.
+    /// excluded there and nowhere else, with its flanks, where it is no brighter than the noise;
+    /// and less than 1 % of the wall is.
     #[test]
     fn a_glint_and_its_flanks_are_excluded_and_the_wall_is_not() {
         const GLINTING: usize = 5;

@@ -12,8 +12,8 @@ pub fn covered_rows(grid: &WallGrid, footprint: &Footprint) -> Range<i64> {
     (footprint.h_min_m / height).floor() as i64..(footprint.h_max_m / height).floor() as i64 + 1
 }
 
-/// Numbering of all tiles in some rows of the lattice, block by block, so that consecutive tiles are
-/// neighbours on the wall.
+/// Numbering of all tiles in some rows of the lattice, block by block, so that consecutive tiles
+/// are neighbours on the wall.
 pub struct TileNumbering<'g> {
     grid: &'g WallGrid,
     /// First row of blocks.

@@ -5,8 +5,8 @@
 //! uses as many of the most informative tiles as hold a given share of the information. They are
 //! selected block by block, so that every frame keeps tiles all over its image, which the six
 //! parameters of its pose need; and in both directions, by the score
-//! `½ (Σ (∂S/∂s)² / Σ_block + Σ (∂S/∂h)² / Σ_block)`. Otherwise the joints between courses of bricks,
-//! longer than those across, would be all that is left.
+//! `½ (Σ (∂S/∂s)² / Σ_block + Σ (∂S/∂h)² / Σ_block)`. Otherwise the joints between courses of
+//! bricks, longer than those across, would be all that is left.
 //!
 //! The last solve uses all tiles. With a share f of the information its error would grow by more
 //! than the factor `1/√f` of independent noise: frames also differ in blur and interpolation, which

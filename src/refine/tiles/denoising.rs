@@ -12,8 +12,8 @@
 //!
 //! `W_kl = max(0, 1 − n_kl/m_kl)`.
 //!
-//! Let `φ̂` be the slopes of the filtered texture. The mean of `φ̂φ̂ᵀ` is that of `φ̂φᵀ` with the true
-//! slopes φ, the derivative of the score; so M needs no correction for noise.
+//! Let `φ̂` be the slopes of the filtered texture. The mean of `φ̂φ̂ᵀ` is that of `φ̂φᵀ` with the
+//! true slopes φ, the derivative of the score; so M needs no correction for noise.
 //!
 //! With `S = Σ q_i a_i² z_i / Σ q_i a_i²`, the noise of `z_i` has the variance `σ²/a_i²` and, along
 //! each axis, the autocorrelation `β(d)/β(0)` of the interpolation kernel at a distance of d pixels
@@ -226,8 +226,8 @@ mod tests {
         );
     }
 
-    /// Ramps in uncorrelated noise: the slopes of the filtered tiles have a smaller error than those
-    /// of the noisy ones, and `φ̂²` is on average `φ̂φ`.
+    /// Ramps in uncorrelated noise: the slopes of the filtered tiles have a smaller error than
+    /// those of the noisy ones, and `φ̂²` is on average `φ̂φ`.
     #[test]
     fn filtered_slopes_are_nearer_to_the_truth_and_their_squares_unbiased() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);

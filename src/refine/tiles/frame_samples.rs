@@ -97,7 +97,8 @@ impl<'a> SampledFrame<'a> {
     /// readout of one second.
     ///
     /// A row that is read at the share u of the readout sees the wall as from the pose moved by
-    /// `(ω u, R ν u)`, with ω and ν proportional to the readout time ρ: `∂(s, h)/∂ρ = A (ω, R ν) u`.
+    /// `(ω u, R ν u)`, with ω and ν proportional to the readout time ρ:
+    /// `∂(s, h)/∂ρ = A (ω, R ν) u`.
     pub fn shared_jacobian(
         &self,
         points: &TilePoints,

@@ -97,9 +97,9 @@ impl WallGrid {
 
     /// The centre of a tile, shifted from the regular position by [`fractions`] of a sample.
     ///
-    /// Walls are periodic along the lattice: courses of bricks run along its rows, so that a regular
-    /// lattice would sample every joint at the same fraction, and interpolation errors would not
-    /// average out.
+    /// Walls are periodic along the lattice: courses of bricks run along its rows, so that a
+    /// regular lattice would sample every joint at the same fraction, and interpolation errors
+    /// would not average out.
     pub fn centre(&self, tile: TileId) -> WallPoint {
         let (width, height) = self.tile_size_m();
         let (column, row) = (tile.column as f64, tile.row as f64);

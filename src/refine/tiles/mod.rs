@@ -10,7 +10,7 @@
 //! | --- | --- |
 //! | [`tile`] | the objective of the estimator; residuals and moments of a tile |
 //! | [`texture`] | mean, median and robust mean of the frames; variance at every sample |
-//! | [`tile_moments`], [`tile_statistics`] | the moments' type; misfits, mean values, residual counts |
+//! | [`tile_moments`], [`tile_statistics`] | moments; misfits, mean values, residual counts |
 //! | [`workspace`], [`tile_arrays`] | values of a tile's frames; sums over a tile |
 //! | [`grid`], [`interpolation`], [`frame_samples`] | lattice of samples; values of a frame there |
 //! | [`residual_weighting`], [`denoising`] | noise model and loss; Wiener filter of the texture |

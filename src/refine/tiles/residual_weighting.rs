@@ -30,11 +30,11 @@ impl NoiseModel {
 /// Tukey's biweight of a residual e with variance v: `ρ = c²/6 (1 − (1 − e²/c²)³)`, weight
 /// `ω = ρ'(e)/e = (1 − e²/c²)²`, both constant beyond `c² = 36 v`.
 ///
-/// A moved object or a wet patch costs `c²/6` and exerts no force at all. (A loss whose weight decays
-/// slowly gives glints on a faint wall, fifty times as steep as its texture, so much weight in the
-/// normal matrix that the steps vanish.) With c at six standard deviations it loses about 2 % of
-/// the information in Gaussian noise. It is a polynomial, so it vectorises. Arguments: `e²` and
-/// `1/v`.
+/// A moved object or a wet patch costs `c²/6` and exerts no force at all. (A loss whose weight
+/// decays slowly gives glints on a faint wall, fifty times as steep as its texture, so much weight
+/// in the normal matrix that the steps vanish.) With c at six standard deviations it loses about 2
+/// % of the information in Gaussian noise. It is a polynomial, so it vectorises. Arguments: `e²`
+/// and `1/v`.
 ///
 /// Source: A. E. Beaton and J. W. Tukey, "The fitting of power series, meaning polynomials,
 /// illustrated on band-spectroscopic data", Technometrics 16(2), 1974.
@@ -75,8 +75,8 @@ pub fn median_and_sigma(values: &mut [f32]) -> (f32, f32) {
     (median, MAD_TO_SIGMA as f32 * deviation)
 }
 
-/// Robust correlation of pairs of values, −1 to 1: `(σ²(x + y) − σ²(x − y))/(σ²(x + y) + σ²(x − y))`
-/// with x and y scaled to robust σ 1.
+/// Robust correlation of pairs of values, −1 to 1:
+/// `(σ²(x + y) − σ²(x − y))/(σ²(x + y) + σ²(x − y))` with x and y scaled to robust σ 1.
 ///
 /// It is the correlation of the majority of the pairs; 0 of values without spread.
 ///

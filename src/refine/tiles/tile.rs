@@ -12,22 +12,24 @@
 //!
 //! over the wall samples x of the selected tiles and the frames i that observe them:
 //!
-//! - **Residual** `e_i = I_i(π(T_i⁻¹ X(x))) − b_i − a_i S(x) = a_i r_i`, grey levels of the frame, with
-//!   the gain `a_i = exp(α_i) V` (V: the camera's shading there), `z_i = (I_i − b_i)/a_i` and
+//! - **Residual** `e_i = I_i(π(T_i⁻¹ X(x))) − b_i − a_i S(x) = a_i r_i`, grey levels of the frame,
+//!   with the gain `a_i = exp(α_i) V` (V: the camera's shading there), `z_i = (I_i − b_i)/a_i` and
 //!   `r_i = z_i − S`. In the frame's own grey levels all frames have equal noise; in those of the
 //!   wall a large gain would hide any residual.
 //! - **Loss** ρ: Tukey's biweight with `c² = 36 v`; `ρ ≈ e²/2` for small e, and constant, `c²/6`,
 //!   beyond c. Its weight is `ω(e) = ρ'(e)/e` ([`crate::refine::tiles::residual_weighting`]).
-//! - **Variance** `v(x) = σ_s² + κ_v g²`, common to all frames, with g the gradient of the texture
-//!   ([`crate::refine::tiles::residual_weighting::NoiseModel`]). `σ_s²` is the variance of an interpolated sample; a pixel has the
-//!   variance `σ² = σ_s²/β(0)²`, β(0) the kernel's autocorrelation along one axis
+//! - **Variance** `v(x) = σ_s² + κ_v g²`, common to all frames, with g the smallest gradient of the
+//!   frames there, or the second smallest of many
+//!   ([`crate::refine::tiles::residual_weighting::NoiseModel`]). `σ_s²` is the variance of an
+//!   interpolated sample; a pixel has the variance `σ² = σ_s²/β(0)²`, β(0) the kernel's
+//!   autocorrelation along one axis
 //!   ([`crate::refine::tiles::interpolation::Interpolation::autocorrelation`]).
 //! - **Variance weighting** `τ(x) = σ_s²/v(x)` in the last solves, else 1. Aliasing makes the
 //!   residuals at edges large; without τ the sharpest edges would dominate.
 //! - **Pixels per sample** `q_i`: the area of a sample in frame i, so that every pixel counts once
-//!   ([`crate::refine::samples::visibility::Observer`]).
-//! - **Gaps**: a sample without a value (clipped pixels) has `ω = 0` and costs `ρ = v/2`, as much as
-//!   plain noise; losing a sample is no gain. Tiles in which a frame does not show the wall are
+//!   ([`crate::refine::samples::observer::Observer`]).
+//! - **Gaps**: a sample without a value (clipped pixels) has `ω = 0` and costs `ρ = v/2`, as much
+//!   as plain noise; losing a sample is no gain. Tiles in which a frame does not show the wall are
 //!   excluded for that frame ([`crate::refine::samples::outlier_mask`]).
 //! - **Prior** of the poses: `ε_k` are the errors of poses or steps, `Σ_k` their variance
 //!   ([`crate::refine::model::prior::Prior`]).
@@ -35,8 +37,9 @@
 //!   volume that pixels leave to the positions of the N compared frames
 //!   ([`crate::refine::problem::photometric_problem::PhotometricProblem::log_volume_slope`]).
 //!
-//! `v`, `τ`, `q`, V and the set of observations stay constant while the poses move, so that the cost
-//! before and after a step is of the same samples.
+//! The noise model, q, V and the set of observations stay constant during a solve, so that the cost
+//! before and after a step is of the same samples. v and τ are computed anew from the frames'
+//! values at every estimate; the derivatives treat them as constant.
 //!
 //! # Elimination of the texture
 //!
@@ -51,8 +54,8 @@
 //!
 //! If frame i moves by ξ, the pixel that observes x shows the wall at `x − A_i ξ`, with
 //! `A_i = ∂(s, h)/∂ξ` ([`crate::surface::wall_jacobian`]). Hence `∂e_i/∂ξ = −a_i ∇Sᵀ A_i`,
-//! `∂e_i/∂α_i = −a_i S` and `∂e_i/∂b_i = −1`. With the features `φ(x) = (∂S/∂s, ∂S/∂h, S, 1)`, common
-//! to all frames,
+//! `∂e_i/∂α_i = −a_i S` and `∂e_i/∂b_i = −1`. With the features `φ(x) = (∂S/∂s, ∂S/∂h, S, 1)`,
+//! common to all frames,
 //!
 //! `∂e_i = −a_i φ(x)ᵀ B_i`,   `B_i = diag(A_i, 1, 1/a_i)`  (4 × 8).
 //!
@@ -63,10 +66,11 @@
 //!
 //! `A_i` is nearly constant within a tile, so that the normal equations need only its moments:
 //!
-//! - `g_i = Σ_x w_i r_i φ` (4): the gradient of E for frame i is `−B_iᵀ g_i / σ²`, summed over tiles;
+//! - `g_i = Σ_x w_i r_i φ` (4): the gradient of E for frame i is `−B_iᵀ g_i / σ²`, summed over
+//!   tiles;
 //! - `w̄_i`: mean of `w_i` over the tile's samples;
-//! - `M = Σ_x p φ φᵀ` (4 × 4), with `p(x)` the bracket `Σ_i w_i − Σ_i w_i²/Σ_i w_i` at x over that of
-//!   the mean weights.
+//! - `M = Σ_x p φ φᵀ` (4 × 4), with `p(x)` the trace of the bracket, `Σ_i w_i − Σ_i w_i²/Σ_i w_i`,
+//!   at x over that of the mean weights.
 //!
 //! Elimination of S leaves the Gauss–Newton matrix
 //!
@@ -75,7 +79,8 @@
 //! Rows of the bracket sum to zero, so a motion of all frames of a tile alike costs nothing: the
 //! gauge directions are exact null vectors of the pixels' part.
 //!
-//! Walls with edges that are sharp against a pixel need more than the mean of the frames:
+//! Walls with edges that are sharp against a pixel need more than the mean of the frames: there the
+//! wall replaces S, and `Σ_x q_i τ ρ` becomes a sum over pixels,
 //! [`crate::refine::joint::joint_block`].
 
 use crate::refine::thresholds::tile::REWEIGHTING_ITERATIONS;
@@ -146,8 +151,8 @@ impl TileWorkspace {
         }
     }
 
-    /// Share p of each sample in the information: the trace of the bracket, `Σ w − Σ w²/Σ w`, at the
-    /// sample over that of the mean weights.
+    /// Share p of each sample in the information: the trace of the bracket, `Σ w − Σ w²/Σ w`, at
+    /// the sample over that of the mean weights.
     ///
     /// Where the loss rejects all frames but one (a glint, say), the texture is that frame's own
     /// and carries no information, however steep it is.

@@ -65,8 +65,8 @@ impl TileWorkspace {
         means.collect()
     }
 
-    /// Counts the residuals from the plain mean of n observers into `histogram`, and the texture, if
-    /// it has no gaps, into `spectrum`.
+    /// Counts the residuals from the plain mean of n observers into `histogram`, and the texture,
+    /// if it has no gaps, into `spectrum`.
     ///
     /// A residual is scaled by `√(n/(n−1))`, as its own value is part of the mean.
     #[inline(always)]
