@@ -4,7 +4,7 @@ use crate::frames::FrameCache;
 use crate::refine::error::RefineError;
 use crate::refine::input::RefineInput;
 use crate::refine::model::context::EstimationContext;
-use crate::refine::model::prior::{Prior, usual_step_s};
+use crate::refine::model::prior::{Prior, median_step_s};
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::calibration::{Calibration, Kappa};
 use crate::refine::stages::state::PipelineState;
@@ -52,14 +52,14 @@ impl<'a> Setup<'a> {
         let prior = Prior {
             jitter: input.prior,
             initial: poses_of(input.initial),
-            usual_step_s: usual_step_s(&times_s),
+            median_step_s: median_step_s(&times_s),
             times_s,
             log_gain_sigma: options.log_gain_sigma,
             bias_sigma: options.bias_sigma,
         };
         let calibration = calibration_of(&input, options, &prior.initial)?;
         let tracking_prior = Prior {
-            jitter: calibration.widened(&prior.jitter, prior.arm_m()),
+            jitter: calibration.widen_jitter(&prior.jitter, prior.lever_arm_m()),
             ..prior.clone()
         };
         Ok(Self {

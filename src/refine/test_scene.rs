@@ -1,4 +1,4 @@
-//! A scene of a [`TestWall`], for tests.
+//! Estimation context, prior and frames on a [`TestWall`], for tests.
 
 use crate::camera::{Camera, Sweep};
 use crate::frames::FrameCache;
@@ -14,8 +14,8 @@ use crate::test_wall::TestWall;
 use crate::trajectory::{Jitter, JitterModel, Pose, Shutter, spiral};
 use std::sync::LazyLock;
 
-/// A frame a second, each off by 0.05 rad and 5 cm by itself.
-pub fn prior(initial: &[Pose]) -> Prior {
+/// Prior of independent poses with 1-σ of 0.05 rad and 5 cm, one frame per second.
+pub fn independent_prior(initial: &[Pose]) -> Prior {
     Prior {
         jitter: Jitter {
             model: JitterModel::Independent,
@@ -23,28 +23,29 @@ pub fn prior(initial: &[Pose]) -> Prior {
             translation_sigma_m: [0.05; 3],
         },
         times_s: (0..initial.len()).map(|k| k as f64).collect(),
-        usual_step_s: 1.0,
+        median_step_s: 1.0,
         initial: initial.to_vec(),
         log_gain_sigma: 0.3,
         bias_sigma: 10.0,
     }
 }
 
-/// All rows at once.
-static NOWHERE: WallRegions = WallRegions::NONE;
-static GLOBAL: LazyLock<Shutter> = LazyLock::new(Shutter::default);
+/// No part of the wall is ignored.
+static NO_PATCHES: WallRegions = WallRegions::NONE;
+/// A global shutter.
+static GLOBAL_SHUTTER: LazyLock<Shutter> = LazyLock::new(Shutter::default);
 
-/// The wall with frames without noise, nothing but poses and exposures unknown.
-pub fn scene<'a>(
+/// Context of noise-free frames of the wall, with poses and exposures unknown alone.
+pub fn test_context<'a>(
     wall: &'a TestWall,
     frames: &'a FrameCache,
     prior: &'a Prior,
 ) -> EstimationContext<'a> {
     EstimationContext {
         surface: &wall.circle,
-        ignored: &NOWHERE,
+        ignored: &NO_PATCHES,
         camera: wall.camera,
-        shutter: &GLOBAL,
+        shutter: &GLOBAL_SHUTTER,
         calibration: Calibration::none(&wall.camera),
         kappa: Kappa::zeros(),
         frames,
@@ -53,8 +54,8 @@ pub fn scene<'a>(
     }
 }
 
-/// Frames at these poses, all inliers.
-pub fn tracked(poses: &[Pose]) -> FrameStates {
+/// States of frames at these poses, all inliers.
+pub fn frame_states(poses: &[Pose]) -> FrameStates {
     FrameStates {
         estimates: poses.iter().map(|pose| FrameEstimate::at(*pose)).collect(),
         rejections: vec![None; poses.len()],
@@ -62,13 +63,13 @@ pub fn tracked(poses: &[Pose]) -> FrameStates {
     }
 }
 
-/// A tunnel of 3 m radius, a camera, the lattice of its pixels there, and a spiral of so many
-/// frames, all to be estimated.
-pub fn placed_spiral(frames: usize) -> (Circle, Camera, WallGrid, Vec<PosedFrame>) {
+/// A tunnel of 3 m radius, a camera, the lattice of its pixels, and a spiral of `frames` frames,
+/// all active.
+pub fn posed_spiral(frames: usize) -> (Circle, Camera, WallGrid, Vec<PosedFrame>) {
     let circle = Circle::new(3.0).unwrap();
     let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
     let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
-    let placed = spiral(frames, 0.1, 30f64.to_radians())
+    let posed = spiral(frames, 0.1, 30f64.to_radians())
         .into_iter()
         .map(|pose| PosedFrame {
             sweep: Sweep::default(),
@@ -76,6 +77,6 @@ pub fn placed_spiral(frames: usize) -> (Circle, Camera, WallGrid, Vec<PosedFrame
             footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),
             active: true,
         });
-    let placed = placed.collect();
-    (circle, camera, grid, placed)
+    let posed = posed.collect();
+    (circle, camera, grid, posed)
 }

@@ -294,7 +294,7 @@ fn a_wrong_camera_causes_overdispersion() {
     for frame in frames {
         assert_ne!(frame["flag"], "photometric", "{frame}");
         let reason = frame["reason"].as_str().unwrap();
-        assert!(reason.contains("under strain"), "{reason}");
+        assert!(reason.contains("overdispersed"), "{reason}");
         assert!(
             frame["overdispersion_px"].as_f64().unwrap() > 0.04,
             "{frame}"

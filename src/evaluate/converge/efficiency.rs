@@ -296,7 +296,7 @@ fn refine_survey(
 fn estimate_texture(scene: &Scene, noise_grey: f64) -> UnknownTexture {
     let columns = (TAU * scene.camera().fy * f64::from(FINER)).round() as usize;
     let finer = FINER as usize;
-    let side = UnknownTexture::least_side(finer);
+    let side = UnknownTexture::min_side(finer);
     let wall = scene.wall(columns.max(side), 2 * side, 0.0);
     UnknownTexture::of_wall(&wall, finer, noise_grey)
 }

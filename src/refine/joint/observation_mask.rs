@@ -1,4 +1,5 @@
-//! Which frames are taken for the wall, tile by tile, and which are compared with it.
+//! Observation mask: the frames that contribute to the wall of a region, tile by tile, and those
+//! that are compared with it.
 
 use crate::refine::samples::visibility::Visibility;
 use crate::refine::tiles::grid::{TILE, TileId, WallGrid};
@@ -6,33 +7,37 @@ use crate::super_resolve::Region;
 use crate::surface::WallRegions;
 use std::ops::Range;
 
-/// Who sees what of the tiles of a region.
+/// Observations of the tiles of a region.
 pub struct ObservationMask {
-    /// Which tiles.
+    /// Columns of tiles; they may continue beyond the seam of the section.
     columns: Range<i64>,
+    /// Rows of tiles.
     rows: Range<i64>,
-    /// Fine pixels from the first tile's corner to the region's.
+    /// Fine pixels from the corner of the first tile to that of the region.
     offset: [f32; 2],
-    /// Row by row, column by column, frame by frame.
-    all: Vec<Observation>,
+    /// Observations, row by row, column by column, frame by frame.
+    observations: Vec<Observation>,
+    /// Number of frames.
     frames: usize,
 }
 
-/// How a frame sees a tile.
+/// Observation of a tile by a frame.
 #[derive(Clone, Copy, Default)]
 pub struct Observation {
-    /// The camera's shading there; 0 if what the frame shows there is not taken for the wall.
+    /// The camera's shading; 0 if the frame does not contribute to the wall there.
     pub shade: f32,
-    /// The tile among those of the block, and the frame among its observers; None where the frame
-    /// helps to find the wall, but is not compared.
-    pub place: Option<(u32, u32)>,
+    /// Index of the tile in the block, and of the frame among its observers; None if the frame
+    /// contributes to the wall but is not compared.
+    pub indices: Option<(u32, u32)>,
 }
 
 impl ObservationMask {
-    /// Besides the tiles in which a frame is compared, it is taken for the wall in those next to
-    /// them, which it sees but partly, and next to tiles in which it does not show the wall it is
-    /// not compared: otherwise frames would be drawn to where the wall is known better, away from
-    /// the borders of what they show of it.
+    /// The observations of a region around a block.
+    ///
+    /// A frame contributes to the wall in the tiles in which it is compared and in their
+    /// neighbours, which it observes partly. It is not compared in neighbours of tiles to which it
+    /// does not contribute. Otherwise frames would be attracted to where the wall is known better,
+    /// away from the borders of their footprints.
     pub fn new(
         ignored: &WallRegions,
         grid: &WallGrid,
@@ -41,38 +46,38 @@ impl ObservationMask {
         frames: &[usize],
         region: &Region,
     ) -> Self {
-        let mut observations = Self::compared(grid, visibility, block, frames, region);
-        let compared = observations.all.clone();
-        for tile in observations.tiles() {
-            let id = around(grid, tile);
+        let mut mask = Self::compared(grid, visibility, block, frames, region);
+        let compared = mask.observations.clone();
+        for tile in mask.tiles() {
+            let id = wrap(grid, tile);
             if visibility.tile(id).is_none() && ignored.intersects(&grid.area(id)) {
                 continue;
             }
             for (n, frame) in frames.iter().enumerate() {
-                if !visibility.leaves_out(id, *frame) {
-                    let shades = observations.next_to(tile).map(|k| compared[k + n].shade);
+                if !visibility.is_excluded(id, *frame) {
+                    let shades = mask.neighbourhood(tile).map(|k| compared[k + n].shade);
                     let shade = shades.fold(0.0, f32::max);
-                    let observation = observations.at(tile, n);
+                    let observation = mask.at(tile, n);
                     if observation.shade == 0.0 {
                         observation.shade = shade;
                     }
                 }
             }
         }
-        for tile in observations.tiles() {
+        for tile in mask.tiles() {
             for n in 0..frames.len() {
-                if observations
-                    .next_to(tile)
-                    .any(|k| observations.all[k + n].shade == 0.0)
+                if mask
+                    .neighbourhood(tile)
+                    .any(|k| mask.observations[k + n].shade == 0.0)
                 {
-                    observations.at(tile, n).place = None;
+                    mask.at(tile, n).indices = None;
                 }
             }
         }
-        observations
+        mask
     }
 
-    /// Only the tiles in which frames are compared.
+    /// The observations of the tiles in which frames are compared, alone.
     fn compared(
         grid: &WallGrid,
         visibility: &Visibility,
@@ -81,36 +86,36 @@ impl ObservationMask {
         region: &Region,
     ) -> Self {
         let side = TILE as i64;
-        // One more pixel: the region may lie up to one later than the tiles.
+        // One more pixel, as the region may be shifted by up to one against the tiles.
         let end = |first: i64, pixels: usize| (first + pixels as i64).div_euclid(side) + 1;
         let columns = region.column.div_euclid(side)..end(region.column, region.columns);
         let rows = region.row.div_euclid(side)..end(region.row, region.rows);
         let tiles = ((columns.end - columns.start) * (rows.end - rows.start)) as usize;
-        let mut observations = Self {
+        let mut mask = Self {
             columns,
             rows,
             offset: [region.column, region.row].map(|pixel| pixel.rem_euclid(side) as f32),
-            all: vec![Observation::default(); tiles * frames.len()],
+            observations: vec![Observation::default(); tiles * frames.len()],
             frames: frames.len(),
         };
-        for tile in observations.tiles() {
-            let Some((index, seen)) = visibility.tile(around(grid, tile)) else {
+        for tile in mask.tiles() {
+            let Some((index, observed)) = visibility.tile(wrap(grid, tile)) else {
                 continue;
             };
-            let own = block.contains(&index);
-            for (n, observer) in visibility.observers(seen).iter().enumerate() {
+            let in_block = block.contains(&index);
+            for (n, observer) in visibility.observers(observed).iter().enumerate() {
                 if let Ok(frame) = frames.binary_search(&(observer.frame as usize)) {
-                    *observations.at(tile, frame) = Observation {
+                    *mask.at(tile, frame) = Observation {
                         shade: observer.shade,
-                        place: own.then(|| ((index - block.start) as u32, n as u32)),
+                        indices: in_block.then(|| ((index - block.start) as u32, n as u32)),
                     };
                 }
             }
         }
-        observations
+        mask
     }
 
-    /// The region's lattice begins these fractions of a fine pixel later than the tiles.
+    /// Shifts the region by these fractions of a fine pixel against the tiles.
     pub fn shifted(mut self, fractions: [f64; 2]) -> Self {
         for (offset, fraction) in self.offset.iter_mut().zip(fractions) {
             *offset += fraction as f32;
@@ -118,7 +123,7 @@ impl ObservationMask {
         self
     }
 
-    /// The region's tiles; columns may go on around the section.
+    /// Tiles of the region; columns may continue beyond the seam of the section.
     fn tiles(&self) -> impl Iterator<Item = TileId> + use<> {
         let columns = self.columns.clone();
         self.rows.clone().flat_map(move |row| {
@@ -127,9 +132,9 @@ impl ObservationMask {
         })
     }
 
-    /// Where the tiles around a tile, as far as they are in the region, and itself begin.
-    fn next_to(&self, tile: TileId) -> impl Iterator<Item = usize> + '_ {
-        let near = |range: &Range<i64>, of: i64| range.start.max(of - 1)..range.end.min(of + 2);
+    /// Indices of the first observations of a tile and of its neighbours within the region.
+    fn neighbourhood(&self, tile: TileId) -> impl Iterator<Item = usize> + '_ {
+        let near = |range: &Range<i64>, k: i64| range.start.max(k - 1)..range.end.min(k + 2);
         let columns = near(&self.columns, tile.column);
         near(&self.rows, tile.row).flat_map(move |row| {
             let columns = columns.clone();
@@ -137,31 +142,32 @@ impl ObservationMask {
         })
     }
 
-    /// Where the frames of a tile begin.
+    /// Index of the first observation of a tile.
     fn start(&self, tile: TileId) -> usize {
         let columns = (self.columns.end - self.columns.start) as usize;
         let (column, row) = (tile.column - self.columns.start, tile.row - self.rows.start);
         (row as usize * columns + column as usize) * self.frames
     }
 
+    /// Observation of a tile by a frame.
     fn at(&mut self, tile: TileId, frame: usize) -> &mut Observation {
         let start = self.start(tile);
-        &mut self.all[start + frame]
+        &mut self.observations[start + frame]
     }
 
-    /// How a frame sees the tile around a place in the region.
-    pub fn of(&self, [x, y]: [f32; 2], frame: usize) -> Observation {
+    /// Observation by a frame of the tile that contains a position in the region, fine pixels.
+    pub fn observation(&self, [x, y]: [f32; 2], frame: usize) -> Observation {
         let tile = |at: f32, offset: f32| ((at + offset) / TILE as f32) as i64;
         let id = TileId {
             column: self.columns.start + tile(x, self.offset[0]),
             row: self.rows.start + tile(y, self.offset[1]),
         };
-        self.all[self.start(id) + frame]
+        self.observations[self.start(id) + frame]
     }
 }
 
-/// The tile of the grid that a region's tile is.
-fn around(grid: &WallGrid, tile: TileId) -> TileId {
+/// Wraps the column of a region's tile to that of the grid.
+fn wrap(grid: &WallGrid, tile: TileId) -> TileId {
     TileId {
         column: tile.column.rem_euclid(grid.columns),
         ..tile
@@ -171,21 +177,21 @@ fn around(grid: &WallGrid, tile: TileId) -> TileId {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::refine::joint::joint_block::region_of;
+    use crate::refine::joint::region::region_around;
     use crate::refine::samples::observer_marks::ObserverMarks;
-    use crate::refine::samples::visibility::Hidden;
-    use crate::refine::test_scene::placed_spiral;
+    use crate::refine::samples::visibility::Exclusions;
+    use crate::refine::test_scene::posed_spiral;
 
-    /// Where a frame shows a tile partly it helps; next to where it shows something else it is not
-    /// compared.
+    /// A frame contributes to tiles that it observes partly, and is not compared next to a tile
+    /// that it is excluded from.
     #[test]
-    fn frames_are_taken_for_the_wall_up_to_their_borders_but_for_what_is_left_out() {
-        let (circle, camera, grid, placed) = placed_spiral(6);
-        let hidden = Hidden::NOTHING;
+    fn frames_contribute_up_to_their_borders_except_where_excluded() {
+        let (circle, camera, grid, posed) = posed_spiral(6);
+        let exclusions = Exclusions::NONE;
         let rows = -1000..1000;
-        let all = Visibility::find(&circle, &grid, &camera, None, &hidden, &placed, &rows);
-        let sights_of = |visibility: &Visibility, block: &Range<usize>| {
-            let region = region_of(&grid, &visibility.tiles[block.clone()]);
+        let all = Visibility::find(&circle, &grid, &camera, None, &exclusions, &posed, &rows);
+        let mask_of = |visibility: &Visibility, block: &Range<usize>| {
+            let region = region_around(&grid, &visibility.tiles[block.clone()]);
             let frames = visibility.frames(block);
             ObservationMask::new(
                 &WallRegions::NONE,
@@ -198,18 +204,19 @@ mod tests {
         };
         let (mut partly, mut compared) = (0, 0);
         for block in &all.blocks {
-            let observations = sights_of(&all, block);
-            for tile in observations.tiles() {
-                let seen = all
-                    .tile(around(&grid, tile))
+            let mask = mask_of(&all, block);
+            for tile in mask.tiles() {
+                let observers = all
+                    .tile(wrap(&grid, tile))
                     .map(|(_, tile)| all.observers(tile));
                 for (n, frame) in all.frames(block).into_iter().enumerate() {
-                    let observation = observations.all[observations.start(tile) + n];
-                    let wholly = seen.is_some_and(|s| s.iter().any(|o| o.frame as usize == frame));
+                    let observation = mask.observations[mask.start(tile) + n];
+                    let wholly =
+                        observers.is_some_and(|s| s.iter().any(|o| o.frame as usize == frame));
                     partly += usize::from(observation.shade > 0.0 && !wholly);
-                    compared += usize::from(observation.place.is_some());
+                    compared += usize::from(observation.indices.is_some());
                     assert!(!wholly || observation.shade == 1.0);
-                    assert!(wholly || observation.place.is_none());
+                    assert!(wholly || observation.indices.is_none());
                 }
             }
         }
@@ -221,20 +228,19 @@ mod tests {
         let frame = all.observers[observers.start].frame as usize;
         let mut marks = ObserverMarks::none(all.observers.len());
         marks.set(observers.start);
-        let without = all.without(&marks);
-        let block = without
+        let reduced = all.exclude(&marks);
+        let block = reduced
             .blocks
             .iter()
-            .find(|block| without.tiles[block.start].id.block() == id.block());
+            .find(|block| reduced.tiles[block.start].id.block() == id.block());
         let block = block.unwrap();
-        let observations = sights_of(&without, block);
-        let n = without.frames(block).binary_search(&frame).unwrap();
-        assert_eq!(observations.all[observations.start(id) + n].shade, 0.0);
-        assert!(observations.next_to(id).count() == 9);
+        let mask = mask_of(&reduced, block);
+        let n = reduced.frames(block).binary_search(&frame).unwrap();
+        assert_eq!(mask.observations[mask.start(id) + n].shade, 0.0);
+        assert!(mask.neighbourhood(id).count() == 9);
         assert!(
-            observations
-                .next_to(id)
-                .all(|k| observations.all[k + n].place.is_none())
+            mask.neighbourhood(id)
+                .all(|k| mask.observations[k + n].indices.is_none())
         );
     }
 }

@@ -1,10 +1,18 @@
 //! Linear algebra of the normal equations.
 //!
 //! ```text
-//! NormalEquations (block-sparse H, gradient g) ─ Symbolic ─> Factor (sparse Cholesky) ─┬─> step δ = −H⁻¹ g
-//! SharedBorder (shared parameters) ── Schur complement ──────────────────────────────────────┤
-//!                                                                                      └─> blocks of H⁻¹
+//! NormalEquations (block-sparse H, gradient g)
+//!    │ SymbolicFactorisation (fill-reducing order, once per pattern)
+//!    ▼
+//! Factor (sparse Cholesky) ──────────────> step δ = −H⁻¹ g
+//!    │
+//!    └─ SharedBorder ─> SchurComplement ─> step of frames and shared parameters
+//!
+//! NormalEquations ─> SelectedInverse ────> blocks of H⁻¹ for the covariances
 //! ```
+//!
+//! Nothing here depends on images or poses, except for the number of parameters
+//! ([`crate::refine::parameters`]).
 
 pub mod bordered_system;
 pub mod normal_equations;

@@ -1,12 +1,12 @@
 //! The normal equations: a symmetric block-sparse matrix and a gradient.
 
-use crate::refine::parameters::frame_estimate::{FrameStep, UNKNOWNS};
+use crate::refine::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use nalgebra::SMatrix;
 
-/// One block of the normal matrix.
-pub type Block = SMatrix<f64, UNKNOWNS, UNKNOWNS>;
+/// One block of the normal matrix: the parameters of one frame by those of another.
+pub type Block = SMatrix<f64, FRAME_PARAMETERS, FRAME_PARAMETERS>;
 
-/// Which blocks of the upper triangle exist: for every block column the ascending rows up to the
+/// Sparsity pattern of the upper triangle: for every block column the ascending rows up to the
 /// diagonal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pattern {
@@ -15,8 +15,8 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of `frames` unknown frames whose `pairs` (any order, repeated or not) interact;
-    /// the diagonal always exists.
+    /// The pattern of `frames` frames of which the `pairs` (any order, repeated or not) share
+    /// residuals; the diagonal always exists.
     pub fn new(frames: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Self {
         let mut rows: Vec<Vec<usize>> = (0..frames).map(|k| vec![k]).collect();
         for (a, b) in pairs {
@@ -48,8 +48,8 @@ impl Pattern {
         &self.rows[column]
     }
 
-    /// Place of block (row, column) among all blocks, if it exists; `row ≤ column`.
-    pub fn place(&self, row: usize, column: usize) -> Option<usize> {
+    /// Index of block (row, column) among all blocks, if it exists; `row ≤ column`.
+    pub fn block_index(&self, row: usize, column: usize) -> Option<usize> {
         let found = self.rows[column].binary_search(&row).ok()?;
         Some(self.starts[column] + found)
     }
@@ -60,7 +60,7 @@ impl Pattern {
 pub struct NormalEquations {
     /// Blocks in the order of the pattern.
     pub blocks: Vec<Block>,
-    /// Gradient of the cost, one step-sized piece a frame.
+    /// Gradient of the cost, one vector per frame.
     pub gradient: Vec<FrameStep>,
 }
 
@@ -75,13 +75,13 @@ impl NormalEquations {
 
     /// Adds to block (row, column) of the matrix, `row ≤ column`, which must exist.
     pub fn add_block(&mut self, pattern: &Pattern, row: usize, column: usize, block: &Block) {
-        let place = pattern.place(row, column);
+        let index = pattern.block_index(row, column);
         debug_assert!(
-            place.is_some(),
+            index.is_some(),
             "block ({row}, {column}) is not in the pattern"
         );
-        if let Some(place) = place {
-            self.blocks[place] += block;
+        if let Some(index) = index {
+            self.blocks[index] += block;
         }
     }
 }
@@ -91,13 +91,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_pattern_holds_pairs_once_and_the_diagonal() {
+    fn pattern_has_each_pair_once_and_the_diagonal() {
         let pattern = Pattern::new(4, [(0, 2), (2, 0), (3, 1), (1, 1)]);
         assert_eq!(pattern.rows(0), [0]);
         assert_eq!(pattern.rows(2), [0, 2]);
         assert_eq!(pattern.rows(3), [1, 3]);
         assert_eq!(pattern.blocks(), 6);
-        assert_eq!(pattern.place(1, 3), Some(4));
-        assert_eq!(pattern.place(0, 3), None);
+        assert_eq!(pattern.block_index(1, 3), Some(4));
+        assert_eq!(pattern.block_index(0, 3), None);
     }
 }

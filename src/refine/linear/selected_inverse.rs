@@ -1,13 +1,13 @@
-//! Blocks of the inverse of the normal matrix where its factor has blocks, without the rest.
+//! Selected inversion: the blocks of `H⁻¹` on the sparsity pattern of the factor of H.
 //!
-//! With `H = L D Lᵀ` (L unit lower triangular in 8 × 8 blocks, in the frames' own order, in which
-//! the matrix is banded), `Z = H⁻¹` obeys `Z = D⁻¹ L⁻¹ + (I − Lᵀ) Z`, so that from the last column
-//! to the first, over the rows R_j of L's column j,
+//! Let `H = L D Lᵀ` with L unit lower triangular in 8 × 8 blocks, in the order of the frames, in
+//! which the matrix is banded. `Z = H⁻¹` obeys `Z = D⁻¹ L⁻¹ + (I − Lᵀ) Z` (Takahashi's equations).
+//! From the last column to the first, with R_j the rows of L's column j below the diagonal,
 //!
 //! `Z_ij = −Σ_{k∈R_j} Z_ik L_kj`  (i ∈ R_j),   `Z_jj = D_j⁻¹ − Σ_{k∈R_j} L_kjᵀ Z_kj`,
 //!
-//! and every `Z_ik` with i, k ∈ R_j is itself among the blocks of the factor. Work and memory grow
-//! with the number of frames, not with its square.
+//! where every `Z_ik` with i, k ∈ R_j lies on the pattern of the factor. Time and memory grow
+//! linearly with the number of frames.
 //!
 //! Source: K. Takahashi, J. Fagan, M. Chin, "Formation of a sparse bus impedance matrix and its
 //! application to short circuit study", 1973.
@@ -15,25 +15,25 @@
 use crate::refine::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::refine::linear::sparse_cholesky::FactorError;
 
-/// Blocks of `H⁻¹`.
+/// Blocks of `H⁻¹` on the pattern of the factor.
 pub struct SelectedInverse {
     /// Rows of every column of L below the diagonal, ascending.
     rows: Vec<Vec<usize>>,
-    /// `Z_ij` for those, in the same order.
+    /// `Z_ij` of these rows, in their order.
     below: Vec<Vec<Block>>,
     /// `Z_jj`.
     diagonal: Vec<Block>,
 }
 
 impl SelectedInverse {
-    /// Factorises the normal matrix and inverts it where the factor has blocks.
+    /// Factorises the normal matrix and computes the blocks of its inverse.
     ///
     /// # Errors
     /// [`FactorError::NotPositiveDefinite`].
     pub fn new(pattern: &Pattern, normal: &NormalEquations) -> Result<Self, FactorError> {
         let count = pattern.frames();
-        let rows = fill(pattern);
-        let place =
+        let rows = factor_rows(pattern);
+        let position =
             |rows: &[Vec<usize>], column: usize, row: usize| rows[column].binary_search(&row).ok();
         // The lower triangle: the transposes of the pattern's upper blocks.
         let mut factor: Vec<Vec<Block>> =
@@ -41,18 +41,18 @@ impl SelectedInverse {
         let mut diagonal = vec![Block::zeros(); count];
         for (column, pivot) in diagonal.iter_mut().enumerate() {
             for &row in pattern.rows(column) {
-                let Some(at) = pattern.place(row, column) else {
+                let Some(at) = pattern.block_index(row, column) else {
                     continue;
                 };
                 let block = &normal.blocks[at];
                 if row == column {
                     *pivot = block.symmetric_upper();
-                } else if let Some(at) = place(&rows, row, column) {
+                } else if let Some(at) = position(&rows, row, column) {
                     factor[row][at] = block.transpose();
                 }
             }
         }
-        // Right-looking: column j, once done, is taken off all later ones it reaches.
+        // Right-looking: each finished column j updates the later columns that it reaches.
         let mut inverse_pivots = Vec::with_capacity(count);
         for j in 0..count {
             let pivot = diagonal[j]
@@ -65,7 +65,7 @@ impl SelectedInverse {
                 let transposed = raw[b].transpose();
                 diagonal[column] -= scaled[b] * transposed;
                 for (a, &row) in rows[j].iter().enumerate().skip(b + 1) {
-                    if let Some(at) = place(&rows, column, row) {
+                    if let Some(at) = position(&rows, column, row) {
                         factor[column][at] -= scaled[a] * transposed;
                     }
                 }
@@ -95,7 +95,7 @@ impl SelectedInverse {
         Ok(inverse)
     }
 
-    /// Block (row, column) of `H⁻¹`, if the factor has one there.
+    /// Block (row, column) of `H⁻¹`, if it lies on the pattern of the factor.
     pub fn block(&self, row: usize, column: usize) -> Option<Block> {
         if row == column {
             return Some(self.diagonal[row]);
@@ -110,7 +110,7 @@ impl SelectedInverse {
     }
 }
 
-/// The upper triangle mirrored below: sums were only kept above.
+/// Mirrors the upper triangle of a block below the diagonal; only the upper one is summed up.
 trait SymmetricUpper {
     fn symmetric_upper(&self) -> Self;
 }
@@ -123,9 +123,9 @@ impl SymmetricUpper for Block {
     }
 }
 
-/// Rows of the factor's columns below the diagonal: those of the matrix, and of every column that
-/// hands its rows on (to the first of them).
-fn fill(pattern: &Pattern) -> Vec<Vec<usize>> {
+/// Symbolic factorisation: the rows of the factor's columns below the diagonal. A
+/// column has the rows of the matrix and those of its children in the elimination tree.
+fn factor_rows(pattern: &Pattern) -> Vec<Vec<usize>> {
     let count = pattern.frames();
     let mut rows: Vec<Vec<usize>> = vec![Vec::new(); count];
     for column in 0..count {
@@ -149,7 +149,7 @@ fn fill(pattern: &Pattern) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::refine::parameters::frame_estimate::UNKNOWNS;
+    use crate::refine::parameters::frame_estimate::FRAME_PARAMETERS;
 
     #[test]
     fn blocks_agree_with_the_dense_inverse() {
@@ -157,7 +157,7 @@ mod tests {
         let pairs = (0..frames).flat_map(|k| [(k, (k + 1).min(10)), (k, (k + 4).min(10))]);
         let pattern = Pattern::new(frames, pairs);
         let mut normal = NormalEquations::zeros(&pattern);
-        let n = frames * UNKNOWNS;
+        let n = frames * FRAME_PARAMETERS;
         let mut dense = nalgebra::DMatrix::zeros(n, n);
         let mut seed = 7u32;
         let mut random = || {
@@ -171,10 +171,12 @@ mod tests {
                     block = block * block.transpose() + Block::identity() * 12.0;
                 }
                 normal.add_block(&pattern, row, column, &block);
-                for r in 0..UNKNOWNS {
-                    for c in 0..UNKNOWNS {
-                        dense[(row * UNKNOWNS + r, column * UNKNOWNS + c)] = block[(r, c)];
-                        dense[(column * UNKNOWNS + c, row * UNKNOWNS + r)] = block[(r, c)];
+                for r in 0..FRAME_PARAMETERS {
+                    for c in 0..FRAME_PARAMETERS {
+                        dense[(row * FRAME_PARAMETERS + r, column * FRAME_PARAMETERS + c)] =
+                            block[(r, c)];
+                        dense[(column * FRAME_PARAMETERS + c, row * FRAME_PARAMETERS + r)] =
+                            block[(r, c)];
                     }
                 }
             }
@@ -184,9 +186,10 @@ mod tests {
         for column in 0..frames {
             for &row in pattern.rows(column) {
                 let block = inverse.block(row, column).unwrap();
-                for r in 0..UNKNOWNS {
-                    for c in 0..UNKNOWNS {
-                        let z = expected[(row * UNKNOWNS + r, column * UNKNOWNS + c)];
+                for r in 0..FRAME_PARAMETERS {
+                    for c in 0..FRAME_PARAMETERS {
+                        let z =
+                            expected[(row * FRAME_PARAMETERS + r, column * FRAME_PARAMETERS + c)];
                         assert!((block[(r, c)] - z).abs() < 1e-12);
                     }
                 }

@@ -1,7 +1,7 @@
 //! Sparse Cholesky factorisation of the normal matrix, by faer.
 
 use crate::refine::linear::normal_equations::{Block, NormalEquations, Pattern};
-use crate::refine::parameters::frame_estimate::{FrameStep, UNKNOWNS};
+use crate::refine::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::sparse::linalg::cholesky::{
     LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
@@ -10,43 +10,48 @@ use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
 use nalgebra::SMatrix;
 
-/// Why the normal equations could not be solved.
+/// Failures of the factorisation of the normal matrix.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum FactorError {
-    /// Not positive definite: some unknown is held by neither pixels nor prior.
+    /// The matrix is not positive definite: neither pixels nor prior constrain some parameter.
     #[error("the normal matrix is not positive definite")]
     NotPositiveDefinite,
-    /// The structure could not be analysed (too large for memory).
+    /// The symbolic analysis failed (the matrix is too large for memory).
     #[error("the normal matrix could not be analysed: {0}")]
     Structure(String),
 }
 
-/// The symbolic factorisation of a pattern: made once, used for every step.
+/// The symbolic factorisation of a pattern: computed once, used for every step.
 ///
-/// faer works sequentially here (`Par::Seq`): faster at these sizes, and its parallel sums would
+/// faer runs sequentially (`Par::Seq`): this is faster at these sizes, and its parallel sums would
 /// depend on the number of threads.
 #[derive(Debug)]
-pub struct Symbolic {
+pub struct SymbolicFactorisation {
     structure: SymbolicSparseColMat<usize>,
     cholesky: SymbolicCholesky<usize>,
 }
 
-impl Symbolic {
-    /// Analyses a pattern: fill-reducing order (approximate minimum degree), elimination tree,
+impl SymbolicFactorisation {
+    /// Analyses a pattern: fill-reducing order (approximate minimum degree), elimination tree and
     /// supernodes.
     ///
     /// # Errors
     /// [`FactorError::Structure`].
     pub fn new(pattern: &Pattern) -> Result<Self, FactorError> {
-        let n = pattern.frames() * UNKNOWNS;
+        let n = pattern.frames() * FRAME_PARAMETERS;
         let mut column_starts = Vec::with_capacity(n + 1);
-        let mut row_indices = Vec::with_capacity(pattern.blocks() * UNKNOWNS * UNKNOWNS);
+        let mut row_indices =
+            Vec::with_capacity(pattern.blocks() * FRAME_PARAMETERS * FRAME_PARAMETERS);
         column_starts.push(0);
         for column in 0..pattern.frames() {
-            for c in 0..UNKNOWNS {
+            for c in 0..FRAME_PARAMETERS {
                 for &row in pattern.rows(column) {
-                    let height = if row == column { c + 1 } else { UNKNOWNS };
-                    row_indices.extend((0..height).map(|r| row * UNKNOWNS + r));
+                    let height = if row == column {
+                        c + 1
+                    } else {
+                        FRAME_PARAMETERS
+                    };
+                    row_indices.extend((0..height).map(|r| row * FRAME_PARAMETERS + r));
                 }
                 column_starts.push(row_indices.len());
             }
@@ -77,17 +82,17 @@ impl Symbolic {
     ) -> Result<Factor<'_>, FactorError> {
         let mut values = Vec::with_capacity(self.structure.row_idx().len());
         for column in 0..pattern.frames() {
-            for c in 0..UNKNOWNS {
+            for c in 0..FRAME_PARAMETERS {
                 for &row in pattern.rows(column) {
-                    let block: &Block = match pattern.place(row, column) {
-                        Some(place) => &normal.blocks[place],
+                    let block: &Block = match pattern.block_index(row, column) {
+                        Some(index) => &normal.blocks[index],
                         None => continue,
                     };
                     if row == column {
                         values.extend((0..c).map(|r| block[(r, c)]));
                         values.push(block[(c, c)] * (1.0 + lambda));
                     } else {
-                        values.extend((0..UNKNOWNS).map(|r| block[(r, c)]));
+                        values.extend((0..FRAME_PARAMETERS).map(|r| block[(r, c)]));
                     }
                 }
             }
@@ -136,12 +141,12 @@ impl Factor<'_> {
         );
     }
 
-    /// `H⁻¹ B` of a matrix B with C columns, given and returned frame by frame.
+    /// Computes `H⁻¹ B` of a matrix B with C columns, given and returned frame by frame.
     pub fn solve<const C: usize>(
         &self,
-        blocks: &[SMatrix<f64, UNKNOWNS, C>],
-    ) -> Vec<SMatrix<f64, UNKNOWNS, C>> {
-        let n = blocks.len() * UNKNOWNS;
+        blocks: &[SMatrix<f64, FRAME_PARAMETERS, C>],
+    ) -> Vec<SMatrix<f64, FRAME_PARAMETERS, C>> {
+        let n = blocks.len() * FRAME_PARAMETERS;
         let mut rhs = Vec::with_capacity(n * C);
         for column in 0..C {
             rhs.extend(
@@ -151,18 +156,19 @@ impl Factor<'_> {
             );
         }
         self.solve_in_place(&mut rhs, C);
-        let value =
-            |frame: usize, row: usize, column: usize| rhs[column * n + frame * UNKNOWNS + row];
+        let value = |frame: usize, row: usize, column: usize| {
+            rhs[column * n + frame * FRAME_PARAMETERS + row]
+        };
         (0..blocks.len())
             .map(|frame| SMatrix::from_fn(|row, column| value(frame, row, column)))
             .collect()
     }
 
-    /// The step `δ` of `H δ = −g`.
+    /// Solves `H δ = −g` for the step δ.
     pub fn step(&self, gradient: &[FrameStep]) -> Vec<FrameStep> {
         let mut rhs: Vec<f64> = gradient.iter().flat_map(|g| g.iter().map(|v| -v)).collect();
         self.solve_in_place(&mut rhs, 1);
-        rhs.chunks_exact(UNKNOWNS)
+        rhs.chunks_exact(FRAME_PARAMETERS)
             .map(FrameStep::from_column_slice)
             .collect()
     }
@@ -178,7 +184,7 @@ mod tests {
         let pairs = (0..frames).flat_map(|k| [(k, (k + 1).min(8)), (k, (k + 4).min(8))]);
         let pattern = Pattern::new(frames, pairs);
         let mut normal = NormalEquations::zeros(&pattern);
-        let n = frames * UNKNOWNS;
+        let n = frames * FRAME_PARAMETERS;
         let mut dense = nalgebra::DMatrix::zeros(n, n);
         let mut seed = 1u32;
         let mut random = || {
@@ -192,10 +198,12 @@ mod tests {
                     block = block * block.transpose() + Block::identity() * 20.0;
                 }
                 normal.add_block(&pattern, row, column, &block);
-                for r in 0..UNKNOWNS {
-                    for c in 0..UNKNOWNS {
-                        dense[(row * UNKNOWNS + r, column * UNKNOWNS + c)] = block[(r, c)];
-                        dense[(column * UNKNOWNS + c, row * UNKNOWNS + r)] = block[(r, c)];
+                for r in 0..FRAME_PARAMETERS {
+                    for c in 0..FRAME_PARAMETERS {
+                        dense[(row * FRAME_PARAMETERS + r, column * FRAME_PARAMETERS + c)] =
+                            block[(r, c)];
+                        dense[(column * FRAME_PARAMETERS + c, row * FRAME_PARAMETERS + r)] =
+                            block[(r, c)];
                     }
                 }
             }
@@ -207,7 +215,7 @@ mod tests {
     #[test]
     fn steps_solve_the_equations() {
         let (pattern, normal, dense) = example();
-        let symbolic = Symbolic::new(&pattern).unwrap();
+        let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
         let factor = symbolic.factorise(&pattern, &normal, 0.0).unwrap();
         let step: Vec<f64> = factor
             .step(&normal.gradient)
@@ -225,11 +233,11 @@ mod tests {
     }
 
     #[test]
-    fn an_indefinite_matrix_is_an_error() {
+    fn indefinite_matrix_is_an_error() {
         let pattern = Pattern::new(1, []);
         let mut normal = NormalEquations::zeros(&pattern);
         normal.add_block(&pattern, 0, 0, &-Block::identity());
-        let symbolic = Symbolic::new(&pattern).unwrap();
+        let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
         assert!(matches!(
             symbolic.factorise(&pattern, &normal, 0.0),
             Err(FactorError::NotPositiveDefinite)

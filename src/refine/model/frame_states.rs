@@ -1,4 +1,4 @@
-//! The state of every frame: its estimate, and the reason if its pixels are rejected.
+//! The state of every frame: its estimate, and a reason if its pixels are rejected.
 
 use crate::camera::Sweep;
 use crate::refine::model::context::{EstimationContext, FrameWindow};
@@ -9,26 +9,26 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// All frames after tracking.
+/// The states of all frames, and the shared parameters.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FrameStates {
-    /// Their estimates.
+    /// Estimate of each frame.
     pub estimates: Vec<FrameEstimate>,
-    /// Why a frame is at its prior, for those that are.
+    /// Reason of each rejected frame; None for inliers. Rejected frames stay at their prior.
     pub rejections: Vec<Option<RejectionReason>>,
-    /// The shared unknowns, as far as windows have found them.
+    /// Current values of the shared parameters.
     pub kappa: Kappa,
 }
 
 impl FrameStates {
-    /// All frames, all to be estimated; those in rejection by the prior alone.
+    /// The window of all frames, all estimated; rejected frames from the prior alone.
     pub fn window(&self) -> FrameWindow<'_> {
         let all = 0..self.estimates.len();
         self.window_of(all.clone(), all)
     }
 
-    /// The frames `participants`, of which those `active` are to be estimated and the others held;
-    /// those in rejection by the prior alone.
+    /// The window of the frames `participants`, of which those `active` are estimated and the
+    /// others held fixed; rejected frames from the prior alone.
     pub fn window_of(&self, participants: Range<usize>, active: Range<usize>) -> FrameWindow<'_> {
         FrameWindow {
             estimates: &self.estimates[participants.clone()],
@@ -38,22 +38,22 @@ impl FrameStates {
         }
     }
 
-    /// How the camera of a frame moves while its rows are read.
-    pub fn sweep(&self, scene: &EstimationContext, frame: usize) -> Sweep {
-        scene.sweep(frame, &(0..self.estimates.len()), &self.estimates)
+    /// Motion of a frame's camera during its readout.
+    pub fn sweep(&self, context: &EstimationContext, frame: usize) -> Sweep {
+        context.sweep(frame, &(0..self.estimates.len()), &self.estimates)
     }
 
-    /// Which frames of a run are inliers.
-    pub fn inliers(&self, run: &Range<usize>) -> Vec<bool> {
-        self.rejections[run.clone()]
+    /// True for the frames of `range` that are inliers.
+    pub fn inliers(&self, range: &Range<usize>) -> Vec<bool> {
+        self.rejections[range.clone()]
             .iter()
             .map(Option::is_none)
             .collect()
     }
 
     /// Rejects frames, each with its reason.
-    pub fn reject(&mut self, found: Vec<(usize, RejectionReason)>) {
-        for (frame, reason) in found {
+    pub fn reject(&mut self, rejected: Vec<(usize, RejectionReason)>) {
+        for (frame, reason) in rejected {
             self.rejections[frame] = Some(reason);
         }
     }

@@ -1,41 +1,42 @@
-//! Reasons why a photometric problem cannot be set up or solved.
+//! Errors of the photometric problem and its solver.
 
 use crate::frames::FrameError;
 use crate::persist::checkpoint::CheckpointError;
 use crate::refine::linear::sparse_cholesky::FactorError;
 use crate::surface::SurfaceError;
 
-/// Why a problem cannot be set up or solved.
+/// Failures of setting up or solving a photometric problem.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProblemError {
-    /// A frame cannot be read any more.
+    /// A frame cannot be read.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// A frame's pose does not go with the tunnel.
+    /// A frame's pose is outside the tunnel, or its camera does not see the wall.
     #[error("frame {frame}: {source}; check the initial poses, radius_m and the calibration")]
     Placement {
         /// The frame.
         frame: usize,
-        /// What is wrong.
+        /// Cause.
         source: SurfaceError,
     },
     /// The normal equations have no solution.
     #[error(
-        "frames {first} to {last}: {source}; check that the poses are camera-to-world, radius_m, the calibration, and that [prior] is neither absurdly wide nor narrow"
+        "frames {first} to {last}: {source}; check that the poses are camera-to-world, radius_m, \
+         the calibration, and that [prior] is neither absurdly wide nor narrow"
     )]
     Factor {
         /// First estimated frame.
         first: usize,
         /// Last estimated frame.
         last: usize,
-        /// What is wrong.
+        /// Cause.
         source: FactorError,
     },
-    /// The iteration broke off for a reason of its own.
+    /// The iteration stopped with an error.
     #[error("the solver stopped: {0}")]
     Solver(String),
-    /// What is done cannot be kept, or not be continued.
+    /// The checkpoint cannot be written, or not be resumed.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
 }

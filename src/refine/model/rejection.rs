@@ -1,71 +1,71 @@
-//! Why a frame's pixels are not inliers.
+//! Reasons to reject a frame's pixels.
 
 use crate::trajectory::Pose;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A reason to leave a frame at its prior.
+/// A reason to reject a frame's pixels and to leave it at its prior.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum RejectionReason {
-    /// Hardly any contrast: black, white, lamp off, lens covered.
+    /// The image has hardly any contrast: black, white, lamp off, lens covered.
     Featureless,
-    /// The same picture as an earlier frame's.
+    /// The image repeats that of an earlier frame.
     Repeated(usize),
-    /// The wall at its pose shows something else.
+    /// The image does not match the wall around its pose.
     NoMatch {
-        /// Correlation of local contrast at best.
+        /// Highest correlation of local contrast.
         correlation: f64,
     },
-    /// It matches the wall at two places.
+    /// The image matches the wall at two places.
     Ambiguous {
-        /// The second one.
+        /// Pose at the second place.
         other: Pose,
-        /// How far apart the two put the frame's middle on the wall, metres.
+        /// Distance on the wall between the image centres at the two poses, metres.
         separation_m: f64,
     },
-    /// It contradicts frames that agree among themselves.
+    /// The image contradicts frames that agree among themselves.
     Contradicts {
         /// One of them.
         frame: usize,
         /// Correlation of local contrast with it.
         correlation: f64,
     },
-    /// Sharp edges of the wall are not sharp in it.
+    /// The image is blurred.
     Blurred {
-        /// Its contrast at the finest detail over that of its neighbours.
+        /// Its contrast at the finest detail over that of its neighbours, 0 to 1.
         share: f64,
     },
-    /// Too much of it disagrees with the others, pixel by pixel.
+    /// Too many pixels disagree with the other frames.
     Disagrees {
-        /// Share of its pixels, 0 to 1.
+        /// Share of disagreeing pixels, 0 to 1.
         share: f64,
     },
-    /// It is displaced against frames that show the same wall.
+    /// The frame is displaced against frames that show the same wall.
     Misaligned {
-        /// By how much, pixels.
+        /// Displacement, pixels.
         error_px: f64,
     },
-    /// Nothing sure ties it, or the group of frames that it agrees with, to the others.
+    /// No reliable pair connects the frame, or the group that it agrees with, to the others.
     Disconnected {
-        /// Frames of that group.
+        /// Number of frames of that group.
         frames: usize,
     },
-    /// The last solve had not come to rest.
+    /// The last solve did not converge.
     NotConverged {
-        /// The step that was left, pixels on the wall.
+        /// The next step, pixels on the wall.
         step_px: f64,
     },
-    /// Nothing or too little in common with others.
+    /// Too little overlap with other frames.
     NoOverlap {
         /// Share of its pixels that others show, 0 to 1.
         share: f64,
     },
-    /// Its patches do not all fit the others at once.
+    /// Residuals of its patches contradict each other beyond noise.
     Overdispersed {
-        /// What they are off by, beyond noise, pixels.
+        /// Displacement of patches beyond noise, pixels.
         overdispersion_px: f64,
     },
-    /// Too little texture to fix its place.
+    /// Too little texture to determine the pose.
     Uncertain {
         /// 1-σ on the wall, pixels.
         wall_px: f64,
@@ -73,7 +73,7 @@ pub enum RejectionReason {
 }
 
 impl RejectionReason {
-    /// True if the frame shows something, but nothing that fits the others.
+    /// True if the image shows a wall that does not fit the other frames.
     pub fn is_misfit(&self) -> bool {
         matches!(
             self,
@@ -84,7 +84,7 @@ impl RejectionReason {
         )
     }
 
-    /// True if another try, with other frames around, may place the frame.
+    /// True if the frame may register successfully among other neighbours.
     pub fn is_retriable(&self) -> bool {
         matches!(
             self,
@@ -105,15 +105,18 @@ impl fmt::Display for RejectionReason {
             Self::Repeated(frame) => write!(f, "it is the same picture as frame {frame}"),
             Self::NoMatch { correlation } => write!(
                 f,
-                "it does not match the wall anywhere near its prior (correlation {correlation:.2} at best)"
+                "it does not match the wall anywhere near its prior \
+                 (correlation {correlation:.2} at best)"
             ),
             Self::Ambiguous { separation_m, .. } => write!(
                 f,
-                "it matches the wall equally well at two places {separation_m:.2} m apart, and the prior does not tell which"
+                "it matches the wall equally well at two places {separation_m:.2} m apart, \
+                 and the prior does not tell which"
             ),
             Self::Contradicts { frame, correlation } => write!(
                 f,
-                "it contradicts frames that agree among themselves (correlation {correlation:.2} with frame {frame})"
+                "it contradicts frames that agree among themselves \
+                 (correlation {correlation:.2} with frame {frame})"
             ),
             Self::Blurred { share } => write!(
                 f,
@@ -130,15 +133,16 @@ impl fmt::Display for RejectionReason {
                 "it is displaced by {error_px:.1} px against frames that show the same wall"
             ),
             Self::Disconnected { frames: 1 } => {
-                write!(f, "nothing sure ties it to the other frames")
+                write!(f, "no reliable pair connects it to the other frames")
             }
             Self::Disconnected { frames } => write!(
                 f,
-                "it is one of {frames} frames that agree with each other but that nothing sure ties to the others"
+                "it is one of {frames} frames that agree with each other, \
+                 but no reliable pair connects them to the others"
             ),
             Self::NotConverged { step_px } => write!(
                 f,
-                "its pose had not come to rest: the next step would move it by {step_px:.1} px"
+                "its pose did not converge: the next step would move it by {step_px:.1} px"
             ),
             Self::NoOverlap { share } if *share == 0.0 => {
                 write!(f, "it overlaps no other frame on the wall")
@@ -150,12 +154,14 @@ impl fmt::Display for RejectionReason {
             ),
             Self::Overdispersed { overdispersion_px } => write!(
                 f,
-                "it fits the others only under overdispersion (patches of it are off by {overdispersion_px:.2} px, or those of most frames are): a wrong \
-                 camera, radius or shape, or a wall that repeats and is closed a period off"
+                "its residuals are overdispersed (patches of it are off by \
+                 {overdispersion_px:.2} px, or those of most frames are): a wrong camera, radius \
+                 or shape, or a repetitive wall that is closed one period off"
             ),
             Self::Uncertain { wall_px } => write!(
                 f,
-                "its place on the wall is uncertain by {wall_px:.1} px: too little texture, or frames that do not match"
+                "its position on the wall is uncertain by {wall_px:.1} px: too little texture, \
+                 or frames that do not match"
             ),
         }
     }

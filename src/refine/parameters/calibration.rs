@@ -1,69 +1,80 @@
-//! Self-calibration: what all frames have in common and nobody has measured well enough.
+//! Self-calibration: the parameters κ that all frames share.
 //!
-//! The shared unknowns are deviations from what was given,
+//! They are deviations from the given values,
+//!
 //! `κ = (ln f, cx, cy, k1, k2, ln r, τ_x, τ_z, o_x, o_z, ρ)`.
 //!
-//! - Focal length (fx and fy alike), principal point and distortion enter through the rays, so
-//!   pixels see them ([`crate::camera::Camera::intrinsics_jacobian`]).
-//! - Pictures stay as they are when the radius and all positions grow together. So poses are
-//!   estimated in the tunnel of the radius given, and the radius is `exp(ln r)` times that: only
-//!   the prior, which is in metres, sees it.
-//! - Pictures show how the cameras stand in the tunnel, whatever frame the initial poses are in. So
-//!   where that frame has the axis is seen by the prior alone, too: two tilts τ and two offsets o
-//!   (turning about the axis and shifting along it are the gauge).
+//! | parameters | meaning, unit | constrained by |
+//! | --- | --- | --- |
+//! | `ln f` | focal length, fx and fy alike, over the given one, 1 | pixels, through the rays |
+//! | `cx, cy` | principal point, px | pixels |
+//! | `k1, k2` | radial distortion, 1 | pixels |
+//! | `ln r` | radius over the given one, 1 | prior of the poses |
+//! | `τ_x, τ_z` | tilt of the tunnel's axis in the initial poses' frame, rad | prior of the poses |
+//! | `o_x, o_z` | offset of the tunnel's axis there, m | prior of the poses |
+//! | `ρ` | readout time of a frame, s | pixels |
 //!
-//! The latter five are [`Metric`]. The last, ρ, is the time from reading a frame's first row to
-//! reading its last; it is free only to ask whether the frames want another one ([`crate::refine::uncertainty::rolling_shutter_test`]).
-//! Every unknown has a Gaussian prior around 0; one that the data leave nearly as uncertain as that
-//! is unobservable ([`crate::refine::uncertainty::observability`]).
+//! The first five are the intrinsics ([`crate::camera::Camera::intrinsics_jacobian`]). The readout
+//! time is free in the rolling-shutter test alone
+//! ([`crate::refine::uncertainty::rolling_shutter_test`]).
+//!
+//! The images do not change if the radius and all positions are scaled together. Poses are
+//! therefore estimated in the tunnel of the given radius, and only the prior, which is in metres,
+//! depends on the scale `exp(ln r)`. The images show the cameras relative to the tunnel, whatever
+//! frame the initial poses are given in, so tilt and offset of that frame enter through the prior
+//! alone as well. (Rotation about the axis and shift along it are the gauge.) These five parameters,
+//! `ln r` to `o_z`, are the [`Datum`].
+//!
+//! Every parameter has a Gaussian prior around 0. A parameter whose posterior is nearly as wide as
+//! its prior is unobservable ([`crate::refine::uncertainty::observability`]).
 
 use crate::camera::Camera;
 use crate::survey::{CalibrateSection, CalibrationGroup};
 use crate::trajectory::{Jitter, JitterModel, Pose, so3};
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 
-/// Number of shared unknowns.
-pub const SHARED: usize = 11;
-/// The first of them belong to the camera.
-pub const LENS: usize = 5;
-/// So many after them belong to [`Metric`].
-pub const METRIC: usize = 5;
-/// Place of the logarithm of the radius among them.
-pub const RADIUS: usize = 5;
-/// Place of the readout time, seconds.
-pub const READOUT: usize = LENS + METRIC;
+/// Number of shared parameters.
+pub const SHARED_PARAMETERS: usize = 11;
+/// Number of intrinsic parameters of the camera; they come first in κ.
+pub const INTRINSIC_PARAMETERS: usize = 5;
+/// Number of datum parameters ([`Datum`]); they follow the intrinsics in κ.
+pub const DATUM_PARAMETERS: usize = 5;
+/// Index of `ln r` in κ.
+pub const RADIUS_INDEX: usize = 5;
+/// Index of the readout time ρ in κ, seconds.
+pub const READOUT_INDEX: usize = INTRINSIC_PARAMETERS + DATUM_PARAMETERS;
 
-/// The shared unknowns κ, or a step of them.
-pub type Kappa = SVector<f64, SHARED>;
+/// The shared parameters κ, or a step of them.
+pub type Kappa = SVector<f64, SHARED_PARAMETERS>;
 
-/// Which shared unknowns are estimated, and around what.
+/// The choice of estimated shared parameters, with their given values and prior.
 #[derive(Clone, Copy, Debug)]
 pub struct Calibration {
     /// The camera as given.
     pub given: Camera,
-    /// Time from reading a frame's first row to reading its last as given, seconds.
+    /// Given time from reading a frame's first row to reading its last, seconds.
     pub readout_s: f64,
     /// Prior 1-σ of κ.
     pub sigma: Kappa,
-    /// Which are estimated; the others stay 0.
-    pub free: [bool; SHARED],
-    /// Chainage about which the axis tilts, metres: the middle of the initial poses.
+    /// True for the parameters that are estimated; the others stay 0.
+    pub free: [bool; SHARED_PARAMETERS],
+    /// Chainage of the pivot of the tilt, metres: the mean of the initial poses.
     pub middle_h_m: f64,
 }
 
 impl Calibration {
-    /// Estimates nothing.
+    /// No shared parameter estimated.
     pub fn none(camera: &Camera) -> Self {
         Self {
             given: *camera,
             readout_s: 0.0,
             sigma: Kappa::repeat(1.0),
-            free: [false; SHARED],
+            free: [false; SHARED_PARAMETERS],
             middle_h_m: 0.0,
         }
     }
 
-    /// Estimates the `groups`, with the prior of `section`.
+    /// The parameters of `groups` estimated, with the prior of `section`.
     pub fn new(
         groups: &[CalibrationGroup],
         section: &CalibrateSection,
@@ -74,7 +85,7 @@ impl Calibration {
         let centre_px = 0.01 * section.centre_sigma_percent * f64::from(camera.width);
         let tilt_rad = section.axis_tilt_sigma_deg.to_radians();
         let offset_m = section.axis_offset_sigma_m;
-        let all = [
+        let parameters = [
             (Focal, 0.01 * section.focal_sigma_percent),
             (Centre, centre_px),
             (Centre, centre_px),
@@ -90,44 +101,52 @@ impl Calibration {
         Self {
             given: *camera,
             readout_s: 0.0,
-            sigma: Kappa::from_fn(|k, _| all.get(k).map_or(1.0, |(_, sigma)| *sigma)),
+            sigma: Kappa::from_fn(|k, _| parameters.get(k).map_or(1.0, |(_, sigma)| *sigma)),
             free: std::array::from_fn(|k| {
-                all.get(k).is_some_and(|(group, _)| groups.contains(group))
+                parameters
+                    .get(k)
+                    .is_some_and(|(group, _)| groups.contains(group))
             }),
             middle_h_m: sum / initial.len().max(1) as f64,
         }
     }
 
-    /// The same, but of the camera alone: a stretch of the survey says too little about the rest.
-    pub fn of_camera(mut self) -> Self {
-        self.free[LENS..].fill(false);
+    /// Restricts the estimated parameters to the intrinsics.
+    ///
+    /// A short part of the survey constrains the datum too little.
+    pub fn intrinsics_only(mut self) -> Self {
+        self.free[INTRINSIC_PARAMETERS..].fill(false);
         self
     }
 
-    /// The noise of the initial poses as long as radius and axis are not known better than given:
-    /// `σ² + δ²`, with δ how far they may carry a pose (or a step, where errors add up) off.
-    /// `arm_m`: length of the longest step, or distance of the farthest pose from the middle.
-    pub fn widened(&self, jitter: &Jitter, arm_m: f64) -> Jitter {
+    /// The noise of the initial poses, widened by the prior uncertainty of the datum: `σ² + δ²`.
+    ///
+    /// δ is the 1-σ displacement of a pose (for a random walk, of a step) by the free datum
+    /// parameters. `lever_arm_m`: length of the longest step, or distance of the farthest pose from
+    /// the pivot, metres ([`crate::refine::model::prior::Prior::lever_arm_m`]).
+    pub fn widen_jitter(&self, jitter: &Jitter, lever_arm_m: f64) -> Jitter {
         let sigma = |k: usize| if self.free[k] { self.sigma[k] } else { 0.0 };
         let tilt = sigma(6).hypot(sigma(7));
-        let (turned, carried) = match jitter.model {
+        let (rotation, offset) = match jitter.model {
             JitterModel::RandomWalk => (0.0, 0.0),
             JitterModel::Independent => (tilt, sigma(8).hypot(sigma(9))),
         };
-        let moved = (arm_m * sigma(RADIUS).hypot(tilt)).hypot(carried);
+        let translation = (lever_arm_m * sigma(RADIUS_INDEX).hypot(tilt)).hypot(offset);
         Jitter {
-            rotation_sigma_rad: jitter.rotation_sigma_rad.hypot(turned),
-            translation_sigma_m: jitter.translation_sigma_m.map(|sigma| sigma.hypot(moved)),
+            rotation_sigma_rad: jitter.rotation_sigma_rad.hypot(rotation),
+            translation_sigma_m: jitter
+                .translation_sigma_m
+                .map(|sigma| sigma.hypot(translation)),
             ..*jitter
         }
     }
 
-    /// True if anything is estimated.
-    pub fn any(&self) -> bool {
+    /// True if any shared parameter is estimated.
+    pub fn has_free_parameters(&self) -> bool {
         self.free.contains(&true)
     }
 
-    /// The camera at κ; None where its lens would fold the picture.
+    /// The camera at κ; None if its distortion is not invertible over the image.
     pub fn camera(&self, kappa: &Kappa) -> Option<Camera> {
         let mut camera = self.given;
         camera.fx *= kappa[0].exp();
@@ -136,89 +155,97 @@ impl Calibration {
         camera.cy += kappa[2];
         let [k1, k2] = camera.lens.k1_k2();
         camera.lens = camera.lens.with_k1_k2(k1 + kappa[3], k2 + kappa[4]);
-        // Without a change of the lens, and so usually, nothing is to be asked.
-        let shows = camera.lens == self.given.lens
+        // The test is needed only if the distortion changes.
+        let is_invertible = camera.lens == self.given.lens
             || camera.visible_fraction() >= self.given.visible_fraction();
-        shows.then_some(camera)
+        is_invertible.then_some(camera)
     }
 
     /// The readout time at κ, seconds.
     pub fn readout_s(&self, kappa: &Kappa) -> f64 {
-        self.readout_s + kappa[READOUT]
+        self.readout_s + kappa[READOUT_INDEX]
     }
 
-    /// How the initial poses lie in the tunnel at κ.
-    pub fn metric(&self, kappa: &Kappa) -> Metric {
+    /// The datum at κ.
+    pub fn datum(&self, kappa: &Kappa) -> Datum {
         let tilt = Vector3::new(kappa[6], 0.0, kappa[7]);
         let pivot = Vector3::new(0.0, self.middle_h_m, 0.0);
-        Metric {
-            scale: kappa[RADIUS].exp(),
-            turn: so3::exp(&tilt),
+        Datum {
+            scale: kappa[RADIUS_INDEX].exp(),
+            rotation: so3::exp(&tilt),
             tilt,
             pivot,
             offset: Vector3::new(kappa[8], 0.0, kappa[9]),
         }
     }
 
-    /// Half the squared distance of κ from its prior, over the free unknowns.
+    /// Negative log-prior of κ, `½ Σ (κ_k/σ_k)²` over the free parameters.
     pub fn prior_cost(&self, kappa: &Kappa) -> f64 {
-        let free = (0..SHARED).filter(|k| self.free[*k]);
+        let free = (0..SHARED_PARAMETERS).filter(|k| self.free[*k]);
         free.map(|k| 0.5 * (kappa[k] / self.sigma[k]).powi(2)).sum()
     }
 }
 
-/// How metres and the initial poses' frame lie to the tunnel in which poses are estimated.
+/// The similarity transform from the initial poses' frame to the tunnel.
+///
+/// A position `t̂` of the initial poses is `R_G (t̂ − p) + p + o` in the tunnel, metres, with the
+/// tilt `R_G = exp(τ)` about the pivot p. An estimated position t, in the tunnel of the given
+/// radius, is `scale · t` metres.
 #[derive(Clone, Copy, Debug)]
-pub struct Metric {
-    /// Metres per estimated metre: the true radius over the one given.
+pub struct Datum {
+    /// The true radius over the given one.
     pub scale: f64,
-    /// Turns the initial poses' frame into the tunnel's, about the pivot.
-    turn: UnitQuaternion<f64>,
-    /// The same as a rotation vector.
+    /// `R_G`.
+    rotation: UnitQuaternion<f64>,
+    /// `τ`, the rotation vector of `R_G`.
     tilt: Vector3<f64>,
+    /// p, metres.
     pivot: Vector3<f64>,
-    /// Added after the turn, metres.
+    /// o, metres.
     offset: Vector3<f64>,
 }
 
-impl Metric {
-    /// An initial pose in the tunnel's frame, metres: `R_G R`, `R_G (t − p) + p + o`.
-    pub fn place(&self, initial: &Pose) -> Pose {
-        // In this order nothing changes, to the last bit, if nothing is tilted and offset.
-        let pivot = self.pivot - self.turn * self.pivot + self.offset;
-        Pose::new(self.turn * initial.r_wc, self.turn * initial.t_wc + pivot)
+impl Datum {
+    /// Transforms an initial pose to the tunnel, in metres: `R_G R̂`, `R_G (t̂ − p) + p + o`.
+    pub fn to_tunnel(self, initial: &Pose) -> Pose {
+        // In this order the pose stays the same to the last bit without tilt and offset.
+        let pivot = self.pivot - self.rotation * self.pivot + self.offset;
+        Pose::new(
+            self.rotation * initial.r_wc,
+            self.rotation * initial.t_wc + pivot,
+        )
     }
 
-    /// The same in the tunnel of the radius given.
-    pub fn place_nominal(&self, initial: &Pose) -> Pose {
-        let placed = self.place(initial);
-        Pose::new(placed.r_wc, placed.t_wc / self.scale)
+    /// Transforms an initial pose to the tunnel of the given radius, in which poses are estimated.
+    pub fn to_nominal_tunnel(self, initial: &Pose) -> Pose {
+        let in_tunnel = self.to_tunnel(initial);
+        Pose::new(in_tunnel.r_wc, in_tunnel.t_wc / self.scale)
     }
 
-    /// An estimated pose in metres.
-    pub fn in_metres(&self, pose: &Pose) -> Pose {
+    /// Scales an estimated pose to metres.
+    pub fn to_metres(self, pose: &Pose) -> Pose {
         Pose::new(pose.r_wc, pose.t_wc * self.scale)
     }
 
-    /// From the pivot, as placed, to a placed initial position, metres.
-    pub fn arm(&self, placed: &Pose) -> Vector3<f64> {
-        placed.t_wc - self.pivot - self.offset
+    /// `R_G (t̂ − p)` of an initial pose that has been transformed to the tunnel, metres.
+    pub fn lever_arm(&self, in_tunnel: &Pose) -> Vector3<f64> {
+        in_tunnel.t_wc - self.pivot - self.offset
     }
 
-    /// `J` with `exp(J δτ) R_G` the turn after a change δτ of the tilt.
+    /// `J` of `exp(τ + δτ) = exp(J δτ) R_G`, the left Jacobian of the tilt.
     pub fn tilt_jacobian(&self) -> Matrix3<f64> {
-        // The left Jacobian is the right one of the opposite rotation; it is singular only at a
-        // whole turn.
+        // The left Jacobian is the right one of the opposite rotation. Its inverse is singular only
+        // at a whole turn.
         so3::right_jacobian_inverse(&-self.tilt)
             .try_inverse()
             .unwrap_or_else(Matrix3::identity)
     }
 
-    /// The tunnel's axis in the initial poses' frame: its point at the middle of the poses, metres,
-    /// and its direction.
+    /// A point (metres) and the direction of the tunnel's axis in the initial poses' frame; the
+    /// point is at the pivot's chainage.
     pub fn axis(&self) -> (Vector3<f64>, Vector3<f64>) {
-        let back = self.turn.inverse();
-        (self.pivot - back * self.offset, back * Vector3::y())
+        let inverse = self.rotation.inverse();
+        (self.pivot - inverse * self.offset, inverse * Vector3::y())
     }
 }
 
@@ -234,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_changes_at_zero_to_the_last_bit() {
+    fn zero_parameters_change_nothing_to_the_last_bit() {
         let calibration = calibration();
         let zero = Kappa::zeros();
         assert_eq!(calibration.camera(&zero), Some(calibration.given));
@@ -242,44 +269,47 @@ mod tests {
             so3::exp(&Vector3::new(0.3, -0.8, 0.1)),
             Vector3::new(0.123, 4.567, -0.891),
         );
-        assert_eq!(calibration.metric(&zero).place(&pose), pose);
-        assert_eq!(calibration.metric(&zero).place_nominal(&pose), pose);
+        assert_eq!(calibration.datum(&zero).to_tunnel(&pose), pose);
+        assert_eq!(calibration.datum(&zero).to_nominal_tunnel(&pose), pose);
     }
 
-    /// Points of the axis as reported are carried onto the tunnel's axis.
+    /// Points of the reported axis are transformed onto the tunnel's axis.
     #[test]
-    fn the_axis_is_where_the_frame_has_it() {
+    fn the_reported_axis_transforms_to_the_tunnel_axis() {
         let mut kappa = Kappa::zeros();
         (kappa[6], kappa[7]) = (0.02, -0.03);
         (kappa[8], kappa[9]) = (0.1, -0.2);
-        let metric = calibration().metric(&kappa);
-        let (point, direction) = metric.axis();
+        let datum = calibration().datum(&kappa);
+        let (point, direction) = datum.axis();
         for along in [-2.0, 0.0, 5.0] {
             let on_axis = Pose::new(UnitQuaternion::identity(), point + direction * along);
-            let placed = metric.place(&on_axis).t_wc;
-            assert!(placed.x.hypot(placed.z) < 1e-12);
-            assert!((placed.y - 4.0 - along).abs() < 1e-12);
+            let in_tunnel = datum.to_tunnel(&on_axis).t_wc;
+            assert!(in_tunnel.x.hypot(in_tunnel.z) < 1e-12);
+            assert!((in_tunnel.y - 4.0 - along).abs() < 1e-12);
         }
     }
 
     #[test]
-    fn noise_is_widened_only_by_what_is_estimated() {
+    fn jitter_is_widened_only_by_free_parameters() {
         let jitter = Jitter {
             model: JitterModel::Independent,
             rotation_sigma_rad: 0.03,
             translation_sigma_m: [0.003; 3],
         };
         let mut calibration = calibration();
-        let same = calibration.widened(&jitter, 5.0);
-        assert_eq!(same, jitter);
-        (calibration.free[RADIUS], calibration.sigma[RADIUS]) = (true, 0.01);
-        let wide = calibration.widened(&jitter, 0.4);
+        let unchanged = calibration.widen_jitter(&jitter, 5.0);
+        assert_eq!(unchanged, jitter);
+        (
+            calibration.free[RADIUS_INDEX],
+            calibration.sigma[RADIUS_INDEX],
+        ) = (true, 0.01);
+        let wide = calibration.widen_jitter(&jitter, 0.4);
         assert!((wide.translation_sigma_m[1] - 0.005).abs() < 1e-12);
         assert_eq!(wide.rotation_sigma_rad, 0.03);
     }
 
     #[test]
-    fn a_lens_that_folds_the_picture_is_no_camera() {
+    fn a_non_invertible_distortion_gives_no_camera() {
         let mut kappa = Kappa::zeros();
         kappa[3] = -2.0;
         assert!(calibration().camera(&kappa).is_none());

@@ -1,18 +1,19 @@
-//! What is estimated of each frame.
+//! Pose and exposure of one frame, and a step of them.
 
 use crate::trajectory::Pose;
 use nalgebra::{SVector, Vector6};
 use serde::{Deserialize, Serialize};
 
-/// Unknowns of a frame: rotation (3), translation (3), log-gain, bias.
-pub const UNKNOWNS: usize = 8;
+/// Number of parameters of a frame: rotation (3), translation (3), log-gain, bias.
+pub const FRAME_PARAMETERS: usize = 8;
 
-/// A step of one frame's unknowns: `(ω, ρ, δα, δβ)` in radians, metres, 1, grey levels.
-pub type FrameStep = SVector<f64, UNKNOWNS>;
+/// A step of one frame's parameters: `(ω, ρ, δα, δβ)` in radians, metres, 1, grey levels.
+pub type FrameStep = SVector<f64, FRAME_PARAMETERS>;
 
 /// Pose and exposure of one frame.
 ///
-/// A grey value `I` of the frame stands for the wall's value `(I − b)/a` with `a = exp(log_gain)`.
+/// A grey value `I` of the frame corresponds to the wall's grey value `(I − b)/a`,
+/// `a = exp(log_gain)`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameEstimate {
     /// Camera-to-world pose.
@@ -33,7 +34,7 @@ impl FrameEstimate {
         }
     }
 
-    /// Moves along a step; see [`Pose::retract`].
+    /// Applies a step: the pose on the manifold ([`Pose::retract`]), the exposure by addition.
     pub fn retract(&self, step: &FrameStep) -> Self {
         let xi: Vector6<f64> = step.fixed_rows::<6>(0).into();
         Self {

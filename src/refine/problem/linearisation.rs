@@ -3,34 +3,35 @@
 use crate::refine::linear::bordered_system::SharedBorder;
 use crate::refine::linear::normal_equations::{Block, NormalEquations};
 
-/// Cost and normal equations at one estimate.
+/// Cost and normal equations at one estimate ([`crate::refine::tiles::tile`]).
 #[derive(Clone, Debug)]
 pub struct Linearisation {
-    /// Robust cost of pixels plus cost of the prior.
+    /// Robust cost of the pixels plus cost of the prior.
     pub cost: f64,
     /// Normal equations over the active frames.
     pub normal: NormalEquations,
     /// Scatter of the scores, in the pattern's order: `Σ_b g_b g_bᵀ` over the blocks b of the wall,
-    /// with g the gradient of the block's cost. It is the variance of the pixels' gradient,
-    /// whatever the errors are like.
+    /// with `g_b` the gradient of the block's cost.
+    ///
+    /// It estimates the variance of the pixels' gradient for any distribution of the errors.
     pub scatter: Vec<Block>,
-    /// How each active frame took part.
-    pub frames: Vec<FrameShare>,
-    /// The shared unknowns' part of the equations, if they are estimated.
+    /// Contribution of each active frame.
+    pub frames: Vec<FrameContribution>,
+    /// Border of the equations, if the shared parameters are estimated.
     pub border: Option<SharedBorder>,
-    /// Their part of the scatter.
+    /// Border of the scatter.
     pub border_scatter: Option<SharedBorder>,
 }
 
-/// How a frame took part in a linearisation.
+/// Contribution of a frame to a linearisation.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct FrameShare {
-    /// Wall samples it was compared at.
+pub struct FrameContribution {
+    /// Number of wall samples at which it was compared.
     pub samples: usize,
-    /// `Σ q` over those samples: its pixels that were used.
+    /// `Σ q` over these samples: the number of its pixels.
     pub pixels: f64,
-    /// `Σ q ω` over them: what the robust loss left.
+    /// `Σ q ω` over these samples: the pixels by robust weight.
     pub inliers: f64,
-    /// `Σ q ω e²`, grey levels².
+    /// `Σ q ω e²` over these samples, grey levels².
     pub square: f64,
 }

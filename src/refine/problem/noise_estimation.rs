@@ -1,99 +1,100 @@
-//! A look at the samples before a solve: the noise, and what is not wall.
+//! Estimates from the samples before a solve: noise, model of the wall, and outliers.
 
 use crate::frames::noise_at_level;
 use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::refine::joint::joint_block::{JointBlock, WallModel};
-use crate::refine::joint::stiffness::Probe;
-use crate::refine::model::context::{FrameWindow, Sampling};
+use crate::refine::joint::stiffness::StiffnessSums;
+use crate::refine::model::context::FrameWindow;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
+use crate::refine::samples::observer::Observer;
 use crate::refine::samples::outlier_mask::OutlierMask;
-use crate::refine::samples::visibility::{Observer, Tile, Visibility};
+use crate::refine::samples::sampling::Sampling;
+use crate::refine::samples::visibility::{Tile, Visibility};
+use crate::refine::thresholds::photometric_problem::{
+    MAX_NOISE_UNDERESTIMATE, MIN_ALIASED_VARIANCE_RATIO, NOISE_ESTIMATION_TILES, WALL_MODEL_BLOCKS,
+};
 use crate::refine::tiles::denoising::TextureSpectrum;
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, TilePoints};
 use crate::refine::tiles::interpolation::Interpolation;
 use crate::refine::tiles::residual_weighting::NoiseHistogram;
-use crate::refine::tiles::tile::{Misfit, Seen, TileWork};
+use crate::refine::tiles::workspace::{Misfit, TileObservation, TileWorkspace};
 use crate::super_resolve::{RoughnessEvidence, aliased_variance};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 
-/// Tiles looked at to estimate the noise.
-const SCALE_TILES: usize = 600;
-/// Blocks of tiles that are solved for to learn what the wall is like.
-const LEARNED_BLOCKS: usize = 48;
-/// What detail finer than pixels adds to the variance of what they read, over the variance of their
-/// noise, at the least, for the wall to be solved for: less than a fortieth of the error is at
-/// stake below. On bricks of 30 × 10 pixels it is 1.1, 0.35 and 0.13 with noise of 1, 2 and 4 grey
-/// levels, on concrete 0.02 with 2.
-const LEAST_ALIASED: f64 = 0.05;
-/// Factor by which the variance of residuals may be short of the sensor's.
-const MOST_UNDERESTIMATE: f64 = 1.25;
+/// Tiles of one piece of parallel work.
+const TILES_PER_TASK: usize = 32;
 
-impl Problem<'_> {
-    /// Reads the noise from the residuals around the plain mean in every few tiles, and what is
-    /// typical of the texture.
+impl PhotometricProblem<'_> {
+    /// Estimates the noise model and the spectrum of the texture from the residuals around the
+    /// plain mean in some tiles spread over the wall.
     pub(super) fn estimate_noise(&mut self) -> Result<(), ProblemError> {
-        let counted = self.at_tiles(
-            SCALE_TILES,
-            |(histogram, spectrum): &mut (NoiseHistogram, TextureSpectrum), look| {
+        let counted = self.gather_from_tiles(
+            NOISE_ESTIMATION_TILES,
+            |(histogram, spectrum): &mut (NoiseHistogram, TextureSpectrum), tile| {
                 dispatch_simd(
                     #[inline(always)]
                     || {
-                        look.work
-                            .count_residuals(look.points, look.seen(), histogram, spectrum)
+                        let observations = tile.observations();
+                        tile.workspace.count_residuals(
+                            tile.points,
+                            observations,
+                            histogram,
+                            spectrum,
+                        );
                     },
                 );
             },
         )?;
         let (mut histogram, mut spectrum) = (NoiseHistogram::default(), TextureSpectrum::default());
-        for (counted, seen) in &counted {
-            histogram = histogram.merge(counted);
-            spectrum = spectrum.merge(seen);
+        for (residuals, textures) in &counted {
+            histogram = histogram.merge(residuals);
+            spectrum = spectrum.merge(textures);
         }
         self.noise = histogram.fit();
-        // Residuals are a little too small, for S has fitted itself to them; single pictures know
-        // the noise better, but take fine texture for noise.
+        // The residuals are a little too small, as S is fitted to them. Single images give a better
+        // estimate, but mistake fine texture for noise.
         let interpolation = self.sampling.interpolation;
         let axis = interpolation.autocorrelation(0.0);
-        let single = self.scene.noise.powi(2)
+        let single = self.context.noise.powi(2)
             * match interpolation {
                 Interpolation::Bilinear => noise_at_level(self.sampling.level),
-                // At full size only.
+                // Used at full size only.
                 Interpolation::Bicubic => axis * axis,
             };
         let fitted = f64::from(self.noise.floor);
-        if single > fitted && single < MOST_UNDERESTIMATE * fitted {
+        if single > fitted && single < MAX_NOISE_UNDERESTIMATE * fitted {
             self.noise.floor = single as f32;
         }
-        // Before the frames are aligned at full size, residuals are mostly misalignment.
+        // At coarser levels the residuals are mostly misalignment.
         if self.sampling.level == 0 && self.active.len() > 1 {
             let floor = f64::from(self.noise.floor);
             self.denoiser = Some(spectrum.denoiser(floor, interpolation));
         }
-        // A sample's variance is that of a pixel times the square of an axis's share.
+        // The variance of a sample is that of a pixel times `β(0)²`.
         self.sigma = f64::from(self.noise.floor).sqrt() / axis;
         Ok(())
     }
 
-    /// Learns how rough the wall is, and how stiffly it holds frames, from blocks spread over all
-    /// of it; `None` if it is so smooth that there is nothing between the pixels to be solved for.
-    pub(super) fn learn_wall(&self) -> Result<Option<WallModel>, ProblemError> {
-        let found = self.at_blocks(|block| block.evidence())?;
-        let strengths = found
+    /// Estimates roughness and stiffness of the wall from blocks spread over all of it; None if it
+    /// has too little detail finer than pixels ([`MIN_ALIASED_VARIANCE_RATIO`]).
+    pub(super) fn estimate_wall_model(&self) -> Result<Option<WallModel>, ProblemError> {
+        let evidence = self.map_blocks(|block| block.evidence())?;
+        let strengths = evidence
             .iter()
             .fold(RoughnessEvidence::default(), RoughnessEvidence::merge)
             .strengths();
         let aliased = aliased_variance(&strengths, self.grid.density);
-        if aliased < LEAST_ALIASED * self.sigma.powi(2) {
+        if aliased < MIN_ALIASED_VARIANCE_RATIO * self.sigma.powi(2) {
             return Ok(None);
         }
-        let found = self.at_blocks(|block| block.stiffness(strengths))?;
-        let stiffness = found
+        let sums = self.map_blocks(|block| block.stiffness_sums(strengths))?;
+        let stiffness = sums
             .iter()
-            .fold(Probe::default(), Probe::merge)
+            .fold(StiffnessSums::default(), StiffnessSums::merge)
             .stiffness();
         Ok(Some(WallModel {
             strengths,
@@ -101,50 +102,51 @@ impl Problem<'_> {
         }))
     }
 
-    /// Works on about [`LEARNED_BLOCKS`] blocks spread over all of the wall.
-    fn at_blocks<T: Send>(
+    /// Applies `work` to about [`WALL_MODEL_BLOCKS`] blocks spread over all of the wall.
+    fn map_blocks<T: Send>(
         &self,
         work: impl Fn(JointBlock) -> T + Sync,
     ) -> Result<Vec<T>, ProblemError> {
         let blocks = self.coverage.tiles / (BLOCK * BLOCK) as usize;
-        let stride = (blocks / LEARNED_BLOCKS).max(1);
-        let mut found = Vec::new();
+        let stride = (blocks / WALL_MODEL_BLOCKS).max(1);
+        let mut results = Vec::new();
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch)?;
-            let pictures = self.pictures.of(self.coverage.frames(stretch))?;
-            let views = self.held_views(stretch, &pictures);
+            let pyramids = self.images.load(self.coverage.frames(stretch))?;
+            let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
             let blocks: Vec<&Range<usize>> = visibility.blocks.iter().step_by(stride).collect();
-            let work = |block| work(self.joint(&visibility, block, &views));
-            found.extend(blocks.into_par_iter().map(work).collect::<Vec<T>>());
+            let work = |block| work(self.joint_block(&visibility, block, &sampled_frames));
+            results.extend(blocks.into_par_iter().map(work).collect::<Vec<T>>());
         }
-        Ok(found)
+        Ok(results)
     }
 
     /// A block of the wall, to be solved for jointly with the poses.
-    pub(super) fn joint<'v>(
+    pub(super) fn joint_block<'v>(
         &self,
         visibility: &'v Visibility,
         block: &Range<usize>,
-        views: &'v [SampledFrame<'v>],
+        sampled_frames: &'v [SampledFrame<'v>],
     ) -> JointBlock<'v> {
         JointBlock::new(
-            &self.scene,
+            &self.context,
             &self.grid,
             visibility,
             block,
-            views,
+            sampled_frames,
             self.sigma,
         )
     }
 
-    /// Leaves out what is in a frame but not on the wall, as its own tiles show it or, if a
-    /// `density` is given, those of another lattice over all of the wall.
+    /// Excludes the observations that do not show the wall ([`OutlierMask`]), detected in the tiles
+    /// of the problem, or, if a `density` is given, in those of another lattice over all of the
+    /// wall.
     ///
     /// # Errors
     /// [`ProblemError`].
-    pub fn without_outliers(mut self, density: Option<f64>) -> Result<Self, ProblemError> {
-        let mut foreign = match density {
-            None => self.no_foreign()?,
+    pub fn exclude_outliers(mut self, density: Option<f64>) -> Result<Self, ProblemError> {
+        let mut mask = match density {
+            None => self.empty_outlier_mask()?,
             Some(density) => {
                 let sampling = Sampling {
                     density,
@@ -152,68 +154,79 @@ impl Problem<'_> {
                     joint: false,
                     ..self.sampling
                 };
-                let members = FrameWindow {
+                let window = FrameWindow {
                     participants: self.participants.clone(),
                     active: self.active.clone(),
-                    estimates: &self.held,
+                    estimates: &self.estimates,
                     compared: Cow::Owned(self.coverage.compared()),
                 };
-                let other = Self::new(&self.scene, sampling, members)?;
-                let mut foreign = other.no_foreign()?;
+                let other = Self::new(&self.context, sampling, window)?;
+                let mut mask = other.empty_outlier_mask()?;
                 for stretch in 0..other.coverage.len() {
                     let visibility = other.coverage.visibility(stretch)?;
-                    other.find_foreign(stretch, &visibility, &mut foreign)?;
+                    other.detect_outliers(stretch, &visibility, &mut mask)?;
                 }
-                foreign
+                mask
             }
         };
-        let mut left_out = Vec::new();
+        let mut excluded = Vec::new();
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch)?;
             if density.is_none() {
-                foreign.forget();
-                self.find_foreign(stretch, &visibility, &mut foreign)?;
+                mask.clear();
+                self.detect_outliers(stretch, &visibility, &mut mask)?;
             }
-            let frames = self.coverage.frames(stretch);
-            left_out.push(foreign.among(&visibility, &self.grid, frames));
+            let participants = self.coverage.frames(stretch);
+            excluded.push(mask.mark(&visibility, &self.grid, participants));
         }
-        self.coverage.leave_out(left_out);
+        self.coverage.exclude(excluded);
         Ok(self)
     }
 
-    /// Nothing found yet, and what misfit is usual.
-    fn no_foreign(&self) -> Result<OutlierMask, ProblemError> {
-        let found = self.at_tiles(SCALE_TILES, |misfits: &mut Vec<Misfit>, look| {
+    /// An outlier mask without outliers, with the typical misfits of the wall.
+    fn empty_outlier_mask(&self) -> Result<OutlierMask, ProblemError> {
+        let gather = |misfits: &mut Vec<Misfit>, tile: &mut ObservedTile| {
             dispatch_simd(
                 #[inline(always)]
-                || look.work.misfit(look.points, look.seen(), &self.noise),
+                || {
+                    let observations = tile.observations();
+                    tile.workspace
+                        .compute_misfits(tile.points, observations, &self.noise);
+                },
             );
-            misfits.append(&mut look.work.misfits);
-        })?;
-        Ok(OutlierMask::new(self.grid, found.concat()))
+            misfits.append(&mut tile.workspace.misfits);
+        };
+        let misfits = self.gather_from_tiles(NOISE_ESTIMATION_TILES, gather)?;
+        Ok(OutlierMask::new(self.grid, misfits.concat()))
     }
 
-    /// Adds what is in a frame but not on the wall in a stretch.
-    fn find_foreign(
+    /// Adds the outliers of a stretch to a mask.
+    fn detect_outliers(
         &self,
         stretch: usize,
         visibility: &Visibility,
-        foreign: &mut OutlierMask,
+        mask: &mut OutlierMask,
     ) -> Result<(), ProblemError> {
-        let frames = self.coverage.frames(stretch);
-        let pictures = self.pictures.of(frames)?;
-        let views = self.held_views(stretch, &pictures);
-        foreign.look(self.scene.surface, visibility, frames, &views, &self.noise);
+        let participants = self.coverage.frames(stretch);
+        let pyramids = self.images.load(participants)?;
+        let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
+        mask.detect(
+            self.context.surface,
+            visibility,
+            participants,
+            &sampled_frames,
+            &self.noise,
+        );
         Ok(())
     }
 
-    /// Works on about `count` tiles spread over all of the wall, or all tiles if there are fewer,
-    /// with the estimates the problem was made with; returns what each run of tiles has gathered,
-    /// always in the same order.
+    /// Applies `work` to about `count` tiles spread over all of the wall, or to all tiles if there
+    /// are fewer, at the initial estimates. Returns the results of all chunks of tiles, always in
+    /// the same order.
     ///
     /// # Errors
     /// [`ProblemError::Frame`].
-    pub fn at_tiles<T: Default + Send>(
+    pub fn gather_from_tiles<T: Default + Send>(
         &self,
         count: usize,
         work: impl Fn(&mut T, &mut ObservedTile) + Sync,
@@ -222,53 +235,55 @@ impl Problem<'_> {
         let mut gathered = Vec::new();
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch)?;
-            let frames = self.coverage.frames(stretch);
-            let pictures = self.pictures.of(frames)?;
-            let views = self.held_views(stretch, &pictures);
+            let participants = self.coverage.frames(stretch);
+            let pyramids = self.images.load(participants)?;
+            let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
             let tiles: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
-            let runs = tiles.par_chunks(32).map(|tiles| {
+            let chunks = tiles.par_chunks(TILES_PER_TASK).map(|tiles| {
                 let mut gathered = T::default();
-                let mut tile_work = TileWork::default();
+                let mut workspace = TileWorkspace::default();
                 let mut scratch = Vec::new();
                 for tile in tiles {
                     let points =
-                        TilePoints::new(&self.grid, self.scene.surface, tile.id, &mut scratch);
-                    let mut look = ObservedTile {
-                        work: &mut tile_work,
+                        TilePoints::new(&self.grid, self.context.surface, tile.id, &mut scratch);
+                    let mut observed_tile = ObservedTile {
+                        workspace: &mut workspace,
                         points: &points,
                         observers: visibility.observers(tile),
-                        views: &views,
-                        frames,
+                        sampled_frames: &sampled_frames,
+                        participants,
                     };
-                    work(&mut gathered, &mut look);
+                    work(&mut gathered, &mut observed_tile);
                 }
                 gathered
             });
-            gathered.extend(runs.collect::<Vec<T>>());
+            gathered.extend(chunks.collect::<Vec<T>>());
         }
         Ok(gathered)
     }
 }
 
-/// A tile and those who see it.
-pub struct ObservedTile<'l> {
-    /// Room to work in.
-    pub work: &'l mut TileWork,
+/// A tile with its observers.
+pub struct ObservedTile<'t> {
+    /// Reusable memory.
+    pub workspace: &'t mut TileWorkspace,
     /// The tile's samples.
-    pub points: &'l TilePoints,
-    /// The frames that see it.
-    pub observers: &'l [Observer],
-    /// The frames of the stretch, and which participants they are.
-    pub views: &'l [SampledFrame<'l>],
-    /// See `views`.
-    pub frames: &'l [usize],
+    pub points: &'t TilePoints,
+    /// The frames that observe it.
+    pub observers: &'t [Observer],
+    /// The frames of the stretch.
+    pub sampled_frames: &'t [SampledFrame<'t>],
+    /// Indices of these frames among the participants.
+    pub participants: &'t [usize],
 }
 
-impl<'l> ObservedTile<'l> {
-    /// The observers as the tile's work wants them.
+impl<'t> ObservedTile<'t> {
+    /// Observations for the work on the tile.
     #[inline(always)]
-    pub fn seen(&self) -> impl Iterator<Item = Seen<'l>> + use<'l> {
-        let views = self.views;
-        self.observers.iter().map(move |o| o.seen(views))
+    pub fn observations(&self) -> impl Iterator<Item = TileObservation<'t>> + use<'t> {
+        let sampled_frames = self.sampled_frames;
+        self.observers
+            .iter()
+            .map(move |o| o.observation(sampled_frames))
     }
 }

@@ -1,28 +1,29 @@
-//! The columns that one observer of a tile adds to the normal equations.
+//! Columns of the normal equations of one observer of a tile.
 
 use crate::refine::linear::normal_equations::Block;
-use crate::refine::parameters::frame_estimate::UNKNOWNS;
-use crate::refine::tiles::tile::ObserverMoments;
+use crate::refine::parameters::frame_estimate::FRAME_PARAMETERS;
+use crate::refine::tiles::tile_moments::ObserverMoments;
 use nalgebra::{Matrix2x6, Matrix4, SMatrix};
 
-/// An active observer of a tile.
-pub struct Column {
-    /// Which of the block's frames.
-    pub place: usize,
+/// Jacobians and moments of an active observer of a tile.
+pub struct ObserverColumn {
+    /// Index of the frame among those of the block.
+    pub frame: usize,
+    /// Moments.
     pub moments: ObserverMoments,
-    /// A.
+    /// `A = ∂(s, h)/∂ξ`.
     pub a: Matrix2x6<f64>,
-    /// C; zero unless shared unknowns are estimated.
+    /// `C = ∂(s, h)/∂κ`; zero unless shared parameters are estimated.
     pub c: Matrix2x6<f64>,
     /// `1/a`, shading included.
     pub inverse_gain: f64,
 }
 
-impl Column {
-    /// `M B` (4 × 8) for this observer's `B = diag(A, 1, 1/a)`.
+impl ObserverColumn {
+    /// Computes `M B` (4 × 8) with the observer's `B = diag(A, 1, 1/a)`.
     #[inline(always)]
-    pub fn features_times_b(&self, m: &Matrix4<f64>) -> SMatrix<f64, 4, UNKNOWNS> {
-        let mut product = SMatrix::<f64, 4, UNKNOWNS>::zeros();
+    pub fn features_times_b(&self, m: &Matrix4<f64>) -> SMatrix<f64, 4, FRAME_PARAMETERS> {
+        let mut product = SMatrix::<f64, 4, FRAME_PARAMETERS>::zeros();
         for c in 0..6 {
             for r in 0..4 {
                 product[(r, c)] = m[(r, 0)] * self.a[(0, c)] + m[(r, 1)] * self.a[(1, c)];
@@ -39,11 +40,11 @@ impl Column {
     #[inline(always)]
     pub fn add_b_transposed_times(
         &self,
-        f: &SMatrix<f64, 4, UNKNOWNS>,
+        f: &SMatrix<f64, 4, FRAME_PARAMETERS>,
         scale: f64,
         block: &mut Block,
     ) {
-        for c in 0..UNKNOWNS {
+        for c in 0..FRAME_PARAMETERS {
             let (f0, f1) = (scale * f[(0, c)], scale * f[(1, c)]);
             for r in 0..6 {
                 block[(r, c)] += self.a[(0, r)] * f0 + self.a[(1, r)] * f1;

@@ -3,109 +3,167 @@
 use crate::camera::Camera;
 use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::refine::problem::block_sums::{BlockSums, TileSums};
-use crate::refine::problem::observer_column::Column;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::observer_column::ObserverColumn;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
+use crate::refine::samples::observer::Observer;
 use crate::refine::samples::visibility::{Tile, Visibility};
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::TilePoints;
-use crate::refine::tiles::tile::{ResidualWeighting, TileMoments, TileWork};
+use crate::refine::tiles::tile::ResidualWeighting;
+use crate::refine::tiles::tile_moments::TileMoments;
+use crate::refine::tiles::workspace::TileWorkspace;
 use nalgebra::Matrix2x6;
 use std::ops::Range;
 
-impl Problem<'_> {
-    /// Sums over the tiles of one block, for the few active frames that see it.
+/// A block of the wall with the frames of its stretch.
+struct BlockContext<'b> {
+    /// Observations of the stretch.
+    visibility: &'b Visibility,
+    /// Frames of the stretch.
+    sampled_frames: &'b [SampledFrame<'b>],
+    /// Which participants these are.
+    participants: &'b [usize],
+    /// Their indices among the active frames.
+    slots: Vec<Option<usize>>,
+    /// The camera at full size.
+    camera: &'b Camera,
+}
+
+impl PhotometricProblem<'_> {
+    /// Sums over the tiles of one block, for the few active frames that observe it.
     pub fn sum_block(
         &self,
         stretch: usize,
         visibility: &Visibility,
         block: &Range<usize>,
-        views: &[SampledFrame],
-        lens: &Camera,
+        sampled_frames: &[SampledFrame],
+        camera: &Camera,
     ) -> BlockSums {
-        let tiles = &visibility.tiles[block.clone()];
-        let stretch_slots: Vec<Option<usize>> = self
-            .coverage
-            .frames(stretch)
-            .iter()
-            .map(|k| self.slot(*k))
-            .collect();
+        let participants = self.coverage.frames(stretch);
+        let context = BlockContext {
+            visibility,
+            sampled_frames,
+            participants,
+            slots: participants.iter().map(|k| self.slot(*k)).collect(),
+            camera,
+        };
         let frames = visibility.frames(block).into_iter();
-        let slots = frames.filter_map(|k| stretch_slots[k]).collect();
-        let mut sums = BlockSums::new(slots, self.calibrates);
-        let mut work = TileWork::default();
-        let mut scratch = Vec::new();
-        let spacing = (self.grid.spacing_s_m, self.grid.spacing_h_m);
-        let weighting = ResidualWeighting {
-            noise: &self.noise,
-            variance_weighting: self.sampling.variance_weighting,
-            denoiser: self.denoiser.as_ref(),
-        };
-        let mut summed: Vec<TileSums> = Vec::with_capacity(tiles.len());
-        let mut add = |tile: &Tile, points: &TilePoints, found: &TileMoments| {
-            let observers = visibility.observers(tile);
-            let mut columns = Vec::with_capacity(observers.len());
-            for (observer, moments) in observers.iter().zip(&found.observers) {
-                sums.cost += moments.cost;
-                let view = &views[observer.frame as usize];
-                if let Some(slot) = stretch_slots[observer.frame as usize] {
-                    let a = view.wall_jacobian(points);
-                    let mut c = Matrix2x6::zeros();
-                    if self.calibrates {
-                        let frame = self.coverage.frames(stretch)[observer.frame as usize];
-                        let seen = view.shared_jacobian(points, &a, lens, &self.rates[frame]);
-                        c.copy_from(&seen);
-                    }
-                    columns.push(Column {
-                        place: sums.place(slot),
-                        moments: *moments,
-                        a,
-                        c,
-                        inverse_gain: 1.0 / f64::from(view.gain() * observer.shade),
-                    });
-                }
-            }
-            let mut features = found.features;
-            if let Some(texture) = &self.unknown_texture {
-                texture.weaken(&mut features, observers.len());
-            }
-            summed.push(TileSums {
-                columns,
-                features,
-                total: found.observers.iter().map(|observer| observer.weight).sum(),
-            });
-        };
-        let points_of = |tile: &Tile, scratch: &mut Vec<_>| {
-            TilePoints::new(&self.grid, self.scene.surface, tile.id, scratch)
-        };
-        if let Some(wall) = &self.wall {
-            let found = self.joint(visibility, block, views).moments(wall);
-            for (tile, found) in tiles.iter().zip(&found) {
-                add(tile, &points_of(tile, &mut scratch), found);
-            }
-        } else {
-            for tile in tiles {
-                let points = points_of(tile, &mut scratch);
-                dispatch_simd(
-                    #[inline(always)]
-                    || {
-                        let seen = visibility.observers(tile).iter().map(|o| o.seen(views));
-                        work.moments(&points, seen, spacing, &weighting);
-                    },
-                );
-                add(tile, &points, &work.found);
-            }
-        }
+        let slots = frames.filter_map(|k| context.slots[k]).collect();
+        let mut sums = BlockSums::new(slots, self.estimates_shared);
+        let tiles = self.sum_tiles(&context, block, &mut sums);
         dispatch_simd(
             #[inline(always)]
             || {
-                for tile in &summed {
-                    sums.add_tile(&tile.columns, &tile.features, tile.total);
-                    if let Some(lens) = &mut sums.lens {
-                        lens.add_tile(&tile.columns, &tile.features, tile.total);
+                for tile in &tiles {
+                    sums.add_tile(&tile.columns, &tile.features, tile.total_weight);
+                    if let Some(intrinsics) = &mut sums.intrinsics {
+                        intrinsics.add_tile(&tile.columns, &tile.features, tile.total_weight);
                     }
                 }
             },
         );
         sums
+    }
+
+    /// Computes the contribution of each tile of a block, and adds its cost to `sums`.
+    fn sum_tiles(
+        &self,
+        context: &BlockContext,
+        block: &Range<usize>,
+        sums: &mut BlockSums,
+    ) -> Vec<TileSums> {
+        let visibility = context.visibility;
+        let tiles = &visibility.tiles[block.clone()];
+        let mut scratch = Vec::new();
+        let mut points_of =
+            |tile: &Tile| TilePoints::new(&self.grid, self.context.surface, tile.id, &mut scratch);
+        if let Some(wall_model) = &self.wall_model {
+            let joint = self.joint_block(visibility, block, context.sampled_frames);
+            let moments = joint.moments(wall_model);
+            return (tiles.iter().zip(&moments))
+                .map(|(tile, moments)| {
+                    self.tile_sums(context, tile, &points_of(tile), moments, sums)
+                })
+                .collect();
+        }
+        let spacing_m = (self.grid.spacing_s_m, self.grid.spacing_h_m);
+        let weighting = ResidualWeighting {
+            noise: &self.noise,
+            variance_weighting: self.sampling.variance_weighting,
+            denoiser: self.denoiser.as_ref(),
+        };
+        let mut workspace = TileWorkspace::default();
+        tiles
+            .iter()
+            .map(|tile| {
+                let points = points_of(tile);
+                dispatch_simd(
+                    #[inline(always)]
+                    || {
+                        let observers = visibility.observers(tile).iter();
+                        let observations = observers.map(|o| o.observation(context.sampled_frames));
+                        workspace.compute_moments(&points, observations, spacing_m, &weighting);
+                    },
+                );
+                self.tile_sums(context, tile, &points, &workspace.moments, sums)
+            })
+            .collect()
+    }
+
+    /// Turns the moments of a tile into its contribution, and adds its cost to `sums`.
+    fn tile_sums(
+        &self,
+        context: &BlockContext,
+        tile: &Tile,
+        points: &TilePoints,
+        moments: &TileMoments,
+        sums: &mut BlockSums,
+    ) -> TileSums {
+        let observers = context.visibility.observers(tile);
+        let mut columns = Vec::with_capacity(observers.len());
+        for (observer, moments) in observers.iter().zip(&moments.observers) {
+            sums.cost += moments.cost;
+            let frame = &context.sampled_frames[observer.frame as usize];
+            if let Some(slot) = context.slots[observer.frame as usize] {
+                let a = frame.wall_jacobian(points);
+                columns.push(ObserverColumn {
+                    frame: sums.index_of(slot),
+                    moments: *moments,
+                    a,
+                    c: self.shared_jacobian(context, observer, points, &a),
+                    inverse_gain: 1.0 / f64::from(frame.gain() * observer.shade),
+                });
+            }
+        }
+        let mut features = moments.features;
+        if let Some(texture) = &self.unknown_texture {
+            texture.reduce_information(&mut features, observers.len());
+        }
+        TileSums {
+            columns,
+            features,
+            total_weight: moments
+                .observers
+                .iter()
+                .map(|observer| observer.weight)
+                .sum(),
+        }
+    }
+
+    /// `C` of an observer; zero if the shared parameters are not estimated.
+    fn shared_jacobian(
+        &self,
+        context: &BlockContext,
+        observer: &Observer,
+        points: &TilePoints,
+        a: &Matrix2x6<f64>,
+    ) -> Matrix2x6<f64> {
+        if self.estimates_shared {
+            let frame = &context.sampled_frames[observer.frame as usize];
+            let participant = context.participants[observer.frame as usize];
+            frame.shared_jacobian(points, a, context.camera, &self.rates[participant])
+        } else {
+            Matrix2x6::zeros()
+        }
     }
 }

@@ -1,9 +1,25 @@
-//! Choice of the wall samples at which frames are compared.
+//! Selection of the wall samples at which frames are compared.
+//!
+//! ```text
+//! poses ─> footprints ─> tile_candidates ─> tile_projection ─> Visibility (tile, observers)
+//!                                                                  │
+//! images ──> tile_selection (most informative tiles) ──────────────┤
+//! images ──> OutlierMask (observers that do not show the wall) ────┤
+//!                                                                  ▼
+//!                                          TileCoverage, stretch by stretch
+//! ```
+//!
+//! [`sampling`] holds the settings of a problem. [`point_sampler`] projects single wall points and
+//! is used by tracking and validation.
 
 pub mod footprints;
+pub mod observer;
 pub mod observer_marks;
 pub mod outlier_mask;
 pub mod point_sampler;
+pub mod sampling;
+pub mod tile_candidates;
 pub mod tile_coverage;
+pub mod tile_projection;
 pub mod tile_selection;
 pub mod visibility;

@@ -1,20 +1,20 @@
-//! ObserverMarks on single observations of wall tiles.
+//! Marks on single observers of wall tiles.
 
-/// ObserverMarks on some of the observers of a [`crate::refine::samples::visibility::Visibility`], a bit each.
+/// A bit for each observer of a [`crate::refine::samples::visibility::Visibility`].
 #[derive(Clone, Debug)]
 pub struct ObserverMarks {
     bits: Vec<u64>,
 }
 
 impl ObserverMarks {
-    /// None of so many observers.
+    /// Marks of `observers` observers, none of them set.
     pub fn none(observers: usize) -> Self {
         Self {
             bits: vec![0; observers.div_ceil(64)],
         }
     }
 
-    /// ObserverMarks an observer.
+    /// Marks an observer.
     pub fn set(&mut self, observer: usize) {
         self.bits[observer / 64] |= 1 << (observer % 64);
     }

@@ -1,64 +1,61 @@
-//! What is in a frame but not on the wall: glints, things that moved, smears.
+//! Outlier mask: tiles in which a frame shows something else than the wall, such as glints, moved
+//! objects or smears.
 //!
-//! The robust loss rejects what stands out by itself, sample by sample. The flanks of a glint do
-//! not: a few grey levels too bright, over some pixels, they pass for noise, yet they move with the
-//! camera, and on a faint wall they are as steep as anything on it. All samples of a tile together
-//! tell them from noise. For each frame that sees a tile
+//! The robust loss rejects single samples. It does not reject the flanks of a glint: a few grey
+//! levels too bright over some pixels, they pass for noise, yet they move with the camera, and on a
+//! faint wall they are as steep as its texture. All samples of a tile together separate them from
+//! noise. For each observer of a tile the misfit is
 //!
-//! `R = Σ_x v ρ(e)/v / Σ_x v`,   e: residual from the median over the frames,
+//! `R = Σ_x v (ρ(e)/v) / Σ_x v`,   e: residual from the robust mean that starts at the median.
 //!
-//! is about ½ whatever the texture, if the frame shows the wall. What R is usual is read from the
-//! survey itself, the median and the spread for flat tiles and for steep ones; a frame is left out
-//! of a tile where R exceeds what is usual by [`SURE`] times the spread, or where it and the tiles
-//! around it do so together.
+//! R is about ½ whatever the texture, if the frame shows the wall. Median and spread of R are
+//! estimated from the survey itself, in classes of the mean variance v. A frame is excluded from a
+//! tile where R exceeds the median by [`MIN_OUTLIER_EXCESS`] spreads, or where the sum of the
+//! excesses of the tile and its neighbours does, `Σz/√n`.
 //!
-//! Decided once before a solve, not step by step: the observations stay the same while the poses
-//! move.
+//! The mask is computed once before a solve: the observations stay constant while the poses move.
 
 use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::refine::samples::observer_marks::ObserverMarks;
 use crate::refine::samples::visibility::{Tile, Visibility};
+use crate::refine::thresholds::outlier_mask::{
+    MAX_NEIGHBOUR_EXCESS, MIN_MISFIT_SPREAD, MIN_OUTLIER_EXCESS,
+};
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, TileId, TilePoints, WallGrid};
 use crate::refine::tiles::residual_weighting::{NoiseModel, median_and_sigma};
-use crate::refine::tiles::tile::{Misfit, TileWork};
+use crate::refine::tiles::workspace::{Misfit, TileWorkspace};
 use crate::surface::Surface;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Spreads above the usual from which on a frame does not show the wall.
-const SURE: f32 = 5.0;
-/// Spreads at the most that a tile counts for with its neighbours.
-const MOST: f32 = 15.0;
-/// Classes of steepness, with as many tiles in each.
+/// Number of classes of the mean variance, with equally many tiles each.
 const CLASSES: usize = 8;
-/// The spread is no smaller than this: tiles differ in how sharp the frames show them.
-const LEAST_SPREAD: f32 = 0.08;
 
-/// What misfit is usual.
+/// Median and spread of the misfits of a survey.
 #[derive(Clone, Debug)]
-struct Usual {
-    /// Steepness up to which a class goes, median of R and its spread.
+struct TypicalMisfit {
+    /// Upper limit of a class of the mean variance, median of R and its spread.
     classes: Vec<(f32, f32, f32)>,
 }
 
-impl Usual {
-    /// Reads it from the misfits of some tiles.
-    fn of(mut misfits: Vec<Misfit>) -> Self {
+impl TypicalMisfit {
+    /// Estimates median and spread from the misfits of some tiles.
+    fn new(mut misfits: Vec<Misfit>) -> Self {
         misfits.sort_unstable_by(|a, b| a.steepness.total_cmp(&b.steepness));
         let size = misfits.len().div_ceil(CLASSES).max(1);
         let classes = misfits.chunks(size).map(|class| {
             let mut values: Vec<f32> = class.iter().map(|m| m.loss).collect();
             let (median, sigma) = median_and_sigma(&mut values);
             let last = class.last().map_or(0.0, |m| m.steepness);
-            (last, median, sigma.max(LEAST_SPREAD))
+            (last, median, sigma.max(MIN_MISFIT_SPREAD))
         });
         Self {
             classes: classes.collect(),
         }
     }
 
-    /// By how many spreads a misfit exceeds the usual.
+    /// Excess of a misfit over the median, in spreads.
     fn excess(&self, misfit: &Misfit) -> f32 {
         let class = self
             .classes
@@ -69,92 +66,97 @@ impl Usual {
     }
 }
 
-/// Where frames show something else than the wall.
+/// The tiles in which participants show something else than the wall.
 #[derive(Clone, Debug)]
 pub struct OutlierMask {
     grid: WallGrid,
-    usual: Usual,
-    /// The participants that do, ascending, tile by tile.
+    typical: TypicalMisfit,
+    /// Outlying participants, ascending, tile by tile.
     tiles: HashMap<TileId, Vec<usize>>,
 }
 
 impl OutlierMask {
-    /// Nothing yet; `misfits` are those of some tiles of `grid`.
+    /// An empty mask; `misfits` of some tiles of `grid` are the reference.
     pub fn new(grid: WallGrid, misfits: Vec<Misfit>) -> Self {
         Self {
             grid,
-            usual: Usual::of(misfits),
+            typical: TypicalMisfit::new(misfits),
             tiles: HashMap::new(),
         }
     }
 
-    /// Forgets what it has found: the stretches to come show other tiles.
-    pub fn forget(&mut self) {
+    /// Removes all outliers; the reference stays.
+    pub fn clear(&mut self) {
         self.tiles.clear();
     }
 
-    /// Looks at all tiles of a stretch; `frames` are the participants whose `views` these are.
-    pub fn look(
+    /// Adds the outliers of all tiles of a stretch; `participants` are the indices of its
+    /// `sampled_frames`.
+    pub fn detect(
         &mut self,
         surface: &dyn Surface,
         visibility: &Visibility,
-        frames: &[usize],
-        views: &[SampledFrame],
+        participants: &[usize],
+        sampled_frames: &[SampledFrame],
         noise: &NoiseModel,
     ) {
-        let found = visibility.blocks.par_iter().map(|block| {
+        let outliers = visibility.blocks.par_iter().map(|block| {
             let tiles = &visibility.tiles[block.clone()];
-            let mut work = TileWork::default();
+            let mut workspace = TileWorkspace::default();
             let mut scratch = Vec::new();
             let mut excess = Vec::new();
-            let mut around: Vec<Option<Box<Neighbourhood>>> = vec![None; views.len()];
+            let mut sums: Vec<Option<Box<BlockExcess>>> = vec![None; sampled_frames.len()];
             for tile in tiles {
                 let points = TilePoints::new(&self.grid, surface, tile.id, &mut scratch);
                 let observers = visibility.observers(tile);
                 dispatch_simd(
                     #[inline(always)]
-                    || work.misfit(&points, observers.iter().map(|o| o.seen(views)), noise),
+                    || {
+                        let observations = observers.iter().map(|o| o.observation(sampled_frames));
+                        workspace.compute_misfits(&points, observations, noise);
+                    },
                 );
-                for (observer, misfit) in observers.iter().zip(&work.misfits) {
-                    let z = self.usual.excess(misfit);
+                for (observer, misfit) in observers.iter().zip(&workspace.misfits) {
+                    let z = self.typical.excess(misfit);
                     excess.push(z);
-                    let around = around[observer.frame as usize].get_or_insert_default();
-                    around.add(tile, z.min(MOST));
+                    let sums = sums[observer.frame as usize].get_or_insert_default();
+                    sums.add(tile, z.min(MAX_NEIGHBOUR_EXCESS));
                 }
             }
             let mut excess = excess.into_iter();
-            let mut found = Vec::new();
+            let mut outliers = Vec::new();
             for tile in tiles {
                 let observers = visibility.observers(tile).iter().zip(&mut excess);
-                let foreign = observers.filter(|(observer, z)| {
-                    let around = around[observer.frame as usize].as_ref();
-                    *z > SURE || around.is_some_and(|around| around.together(tile) > SURE)
+                let outlying = observers.filter(|(observer, z)| {
+                    let sums = sums[observer.frame as usize].as_ref();
+                    *z > MIN_OUTLIER_EXCESS
+                        || sums.is_some_and(|sums| sums.combined(tile) > MIN_OUTLIER_EXCESS)
                 });
-                let foreign = foreign.map(|(observer, _)| frames[observer.frame as usize]);
-                let foreign: Vec<usize> = foreign.collect();
-                if !foreign.is_empty() {
-                    found.push((tile.id, foreign));
+                let outlying = outlying.map(|(observer, _)| participants[observer.frame as usize]);
+                let outlying: Vec<usize> = outlying.collect();
+                if !outlying.is_empty() {
+                    outliers.push((tile.id, outlying));
                 }
             }
-            found
+            outliers
         });
-        self.tiles.extend(found.collect::<Vec<_>>().concat());
+        self.tiles.extend(outliers.collect::<Vec<_>>().concat());
     }
 
-    /// For each observer in a stretch of another lattice, whether it shows something else there.
-    pub fn among(
+    /// Marks the outlying observers of a stretch, of this or another lattice `grid`.
+    pub fn mark(
         &self,
         visibility: &Visibility,
         grid: &WallGrid,
-        frames: &[usize],
+        participants: &[usize],
     ) -> ObserverMarks {
         let mut marks = ObserverMarks::none(visibility.observers.len());
         for tile in &visibility.tiles {
-            let foreign = self.tiles.get(&self.grid.tile_around(grid, &tile.id));
-            let Some(foreign) = foreign else { continue };
+            let outlying = self.tiles.get(&self.grid.tile_around(grid, &tile.id));
+            let Some(outlying) = outlying else { continue };
             for k in tile.observers.clone() {
-                let frame = frames[visibility.observers[k].frame as usize];
-                if foreign.binary_search(&frame).is_ok() {
+                let participant = participants[visibility.observers[k].frame as usize];
+                if outlying.binary_search(&participant).is_ok() {
                     marks.set(k);
                 }
             }
@@ -163,21 +165,24 @@ impl OutlierMask {
     }
 }
 
-/// A frame's excesses over a block.
+/// Excesses of a frame, summed over the neighbourhood of each tile of a block.
 #[derive(Clone, Copy, Debug, Default)]
-struct Neighbourhood {
-    /// Sum and number over a tile and its neighbours, with a ring around the block.
+struct BlockExcess {
+    /// Sum and number over a tile and its eight neighbours; the block has a ring of tiles around
+    /// it.
     cells: [[(f32, f32); BLOCK as usize + 2]; BLOCK as usize + 2],
 }
 
-impl Neighbourhood {
-    fn place(tile: &Tile) -> (usize, usize) {
+impl BlockExcess {
+    /// Row and column of a tile in `cells`.
+    fn position(tile: &Tile) -> (usize, usize) {
         let within = |k: i64| k.rem_euclid(BLOCK) as usize + 1;
         (within(tile.id.row), within(tile.id.column))
     }
 
+    /// Adds the excess of a tile to its neighbourhoods.
     fn add(&mut self, tile: &Tile, z: f32) {
-        let (row, column) = Self::place(tile);
+        let (row, column) = Self::position(tile);
         for cells in &mut self.cells[row - 1..=row + 1] {
             for (sum, number) in &mut cells[column - 1..=column + 1] {
                 *sum += z;
@@ -186,9 +191,9 @@ impl Neighbourhood {
         }
     }
 
-    /// `Σz/√n`: as sure as one tile with that excess.
-    fn together(&self, tile: &Tile) -> f32 {
-        let (row, column) = Self::place(tile);
+    /// Excess of one tile with the significance of the neighbourhood: `Σz/√n`.
+    fn combined(&self, tile: &Tile) -> f32 {
+        let (row, column) = Self::position(tile);
         let (sum, number) = self.cells[row][column];
         sum / number.max(1.0).sqrt()
     }
@@ -200,17 +205,17 @@ mod tests {
     use crate::camera::Sweep;
     use crate::frames::GreyImage;
     use crate::refine::parameters::frame_estimate::FrameEstimate;
-    use crate::refine::samples::visibility::{Hidden, PosedFrame};
+    use crate::refine::samples::visibility::{Exclusions, PosedFrame};
     use crate::surface::Footprint;
     use crate::test_wall::{TestWall, waves};
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
 
-    /// A glint in the middle of one frame, 40 grey levels bright and 6 pixels wide: its tiles are
-    /// left out there and nowhere else, its flanks too, where it is no brighter than the noise; and
-    /// next to nothing of what is wall.
+    /// A glint in the centre of one frame, 40 grey levels bright and 6 pixels wide: its tiles are
+    /// excluded there and nowhere else, with its flanks, where it is no brighter than the noise;
+    /// and less than 1 % of the wall is.
     #[test]
-    fn a_glint_is_left_out_with_its_flanks_and_the_wall_is_not() {
+    fn a_glint_and_its_flanks_are_excluded_and_the_wall_is_not() {
         const GLINTING: usize = 5;
         let wall = TestWall::ring(waves);
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(11);
@@ -229,10 +234,10 @@ mod tests {
             .collect();
         let camera = wall.camera;
         let estimates = wall.poses.iter().map(|pose| FrameEstimate::at(*pose));
-        let views: Vec<SampledFrame> = (images.iter().zip(estimates))
+        let sampled_frames: Vec<SampledFrame> = (images.iter().zip(estimates))
             .map(|(image, estimate)| SampledFrame::new(image, camera, &estimate))
             .collect();
-        let placed: Vec<PosedFrame> = wall
+        let posed: Vec<PosedFrame> = wall
             .poses
             .iter()
             .map(|pose| PosedFrame {
@@ -253,23 +258,30 @@ mod tests {
             &grid,
             &camera,
             None,
-            &Hidden::NOTHING,
-            &placed,
+            &Exclusions::NONE,
+            &posed,
             &rows,
         );
-        let frames: Vec<usize> = (0..views.len()).collect();
+        let participants: Vec<usize> = (0..sampled_frames.len()).collect();
         let mut misfits = Vec::new();
-        let mut work = TileWork::default();
+        let mut workspace = TileWorkspace::default();
         for tile in &visibility.tiles {
             let points = TilePoints::new(&grid, &wall.circle, tile.id, &mut Vec::new());
             let observers = visibility.observers(tile).iter();
-            work.misfit(&points, observers.map(|o| o.seen(&views)), &model);
-            misfits.append(&mut work.misfits);
+            let observations = observers.map(|o| o.observation(&sampled_frames));
+            workspace.compute_misfits(&points, observations, &model);
+            misfits.append(&mut workspace.misfits);
         }
-        let mut foreign = OutlierMask::new(grid, misfits);
-        foreign.look(&wall.circle, &visibility, &frames, &views, &model);
-        let marks = foreign.among(&visibility, &grid, &frames);
-        let (mut near, mut left_near, mut elsewhere, mut left_elsewhere) = (0, 0, 0, 0);
+        let mut mask = OutlierMask::new(grid, misfits);
+        mask.detect(
+            &wall.circle,
+            &visibility,
+            &participants,
+            &sampled_frames,
+            &model,
+        );
+        let marks = mask.mark(&visibility, &grid, &participants);
+        let (mut near, mut excluded_near, mut elsewhere, mut excluded_elsewhere) = (0, 0, 0, 0);
         for tile in &visibility.tiles {
             let centre = TilePoints::new(&grid, &wall.circle, tile.id, &mut Vec::new()).centre;
             for k in tile.observers.clone() {
@@ -277,20 +289,20 @@ mod tests {
                 let pixel = camera
                     .project(&wall.poses[frame].to_camera(&centre.x_w))
                     .unwrap();
-                // Where 3 grey levels are left of it: 2.3 times its width.
+                // At 2.3 times its width the glint is 3 grey levels bright.
                 let distance = (pixel.x - 80.0).hypot(pixel.y - 60.0);
                 if frame == GLINTING && distance < 14.0 {
                     near += 1;
-                    left_near += usize::from(marks.has(k));
+                    excluded_near += usize::from(marks.has(k));
                 } else if frame != GLINTING || distance > 30.0 {
                     elsewhere += 1;
-                    left_elsewhere += usize::from(marks.has(k));
+                    excluded_elsewhere += usize::from(marks.has(k));
                 }
             }
         }
         assert!(near >= 6, "{near}");
-        assert_eq!(left_near, near);
-        let share = f64::from(left_elsewhere as u32) / f64::from(elsewhere as u32);
-        assert!(share < 0.01, "{left_elsewhere} of {elsewhere}");
+        assert_eq!(excluded_near, near);
+        let share = f64::from(excluded_elsewhere as u32) / f64::from(elsewhere as u32);
+        assert!(share < 0.01, "{excluded_elsewhere} of {elsewhere}");
     }
 }

@@ -1,12 +1,12 @@
-//! Where single wall points appear in a frame.
+//! Projection and bilinear sampling of single wall points in a frame.
 
 use crate::camera::{Camera, LensF32, ProjectF32};
 use crate::frames::GreyImage;
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Vector3};
 
-/// A camera at a pose, ready to look at wall points relative to an origin near them.
-pub struct Sampler {
+/// A camera at a pose, prepared to project wall points relative to an origin near them.
+pub struct PointSampler {
     r_cw: Matrix3<f32>,
     centre: Vector3<f32>,
     focal: (f32, f32),
@@ -16,19 +16,19 @@ pub struct Sampler {
     width: usize,
 }
 
-/// A place between four pixels of a picture.
+/// A position between four pixels of an image.
 #[derive(Clone, Copy, Debug)]
-pub struct Spot {
-    /// The upper left one.
+pub struct ImagePoint {
+    /// Index of the upper left pixel.
     index: usize,
     width: usize,
-    /// How far from it to the right and down.
+    /// Fractions from it to the right and down, 0 to 1.
     fu: f32,
     fv: f32,
 }
 
-impl Sampler {
-    /// The `camera` at `pose`; points will be relative to `origin`.
+impl PointSampler {
+    /// The `camera` at `pose`, for points relative to `origin`.
     pub fn new(camera: &Camera, pose: &Pose, origin: &Vector3<f64>) -> Self {
         let r_wc = pose.r_wc.to_rotation_matrix();
         Self {
@@ -42,9 +42,9 @@ impl Sampler {
         }
     }
 
-    /// Where a wall point (relative to the origin) appears, if it does.
+    /// Projects a wall point (relative to the origin, metres); None outside the image.
     #[inline]
-    pub fn at(&self, point: &[f32; 3]) -> Option<Spot> {
+    pub fn project(&self, point: &[f32; 3]) -> Option<ImagePoint> {
         let r = &self.r_cw;
         let dot =
             |row: usize| r[(row, 0)] * point[0] + r[(row, 1)] * point[1] + r[(row, 2)] * point[2];
@@ -57,7 +57,7 @@ impl Sampler {
             return None;
         }
         let (x, y) = (u as usize, v as usize);
-        Some(Spot {
+        Some(ImagePoint {
             index: y * self.width + x,
             width: self.width,
             fu: u - x as f32,
@@ -66,20 +66,20 @@ impl Sampler {
     }
 }
 
-impl Spot {
-    /// The value there in a picture of the camera's size, bilinear; NaN where a pixel has none.
+impl ImagePoint {
+    /// Bilinear value of an image of the camera's size; NaN if a pixel has no value.
     #[inline]
-    pub fn of(&self, image: &GreyImage) -> f32 {
+    pub fn sample(&self, image: &GreyImage) -> f32 {
         let data = &image.data()[self.index..][..self.width + 2];
         let a = data[0] + self.fu * (data[1] - data[0]);
         let b = data[self.width] + self.fu * (data[self.width + 1] - data[self.width]);
         a + self.fv * (b - a)
     }
 
-    /// The same; None where a pixel has none.
+    /// Bilinear value as [`ImagePoint::sample`]; None if a pixel has no value.
     #[inline]
-    pub fn known(&self, image: &GreyImage) -> Option<f32> {
-        let value = self.of(image);
+    pub fn sample_valid(&self, image: &GreyImage) -> Option<f32> {
+        let value = self.sample(image);
         (!value.is_nan()).then_some(value)
     }
 }
@@ -90,20 +90,20 @@ mod tests {
     use crate::camera::{Lens, Sweep};
     use crate::trajectory::so3;
 
-    /// A picture of its own pixel coordinates, sampled where the camera itself projects a point,
-    /// lens included.
+    /// Images of the pixel coordinates, sampled where the camera itself projects a point, lens
+    /// included.
     #[test]
-    fn a_point_is_seen_where_the_camera_projects_it() {
+    fn points_are_sampled_where_the_camera_projects_them() {
         let mut camera = Camera::from_vertical_fov(64, 48, 1.0);
         camera.lens = Lens::radial(-0.1, 0.02);
-        seen_where_projected(&camera);
-        seen_where_projected(&camera.with_sweep(&Sweep {
+        assert_sampled_where_projected(&camera);
+        assert_sampled_where_projected(&camera.with_sweep(&Sweep {
             omega_rad: Vector3::new(0.01, 0.03, -0.01),
             nu_m: Vector3::new(0.001, -0.002, 0.001),
         }));
     }
 
-    fn seen_where_projected(camera: &Camera) {
+    fn assert_sampled_where_projected(camera: &Camera) {
         let pose = Pose::new(
             so3::exp(&Vector3::new(0.1, 0.4, -0.2)),
             Vector3::new(0.3, 5.0, 0.1),
@@ -113,8 +113,8 @@ mod tests {
         let across = GreyImage::new(64, 48, across);
         let down = GreyImage::new(64, 48, down);
         let origin = pose.to_world(&Vector3::new(0.1, -0.1, 2.0));
-        let sampler = Sampler::new(camera, &pose, &origin);
-        let mut seen = 0;
+        let sampler = PointSampler::new(camera, &pose, &origin);
+        let mut inside_count = 0;
         for k in 0..400 {
             let offset = Vector3::new(
                 0.2 * f64::from(k % 20) - 2.0,
@@ -123,16 +123,16 @@ mod tests {
             );
             let point = offset.cast::<f32>().into();
             let pixel = camera.project(&pose.to_camera(&(origin + offset)));
-            let Some(spot) = sampler.at(&point) else {
+            let Some(image_point) = sampler.project(&point) else {
                 let inside = pixel.is_some_and(|p| camera.is_in_image(&p, 0.001));
                 assert!(!inside, "{pixel:?}");
                 continue;
             };
             let pixel = pixel.unwrap();
-            assert!((f64::from(spot.of(&across)) - pixel.x).abs() < 1e-3);
-            assert!((f64::from(spot.of(&down)) - pixel.y).abs() < 1e-3);
-            seen += 1;
+            assert!((f64::from(image_point.sample(&across)) - pixel.x).abs() < 1e-3);
+            assert!((f64::from(image_point.sample(&down)) - pixel.y).abs() < 1e-3);
+            inside_count += 1;
         }
-        assert!(seen > 50, "{seen}");
+        assert!(inside_count > 50, "{inside_count}");
     }
 }

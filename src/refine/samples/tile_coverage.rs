@@ -1,14 +1,18 @@
-//! The wall in stretches along the tunnel, each with the frames that see it.
+//! Tile coverage: the wall in stretches along the tunnel, each with the frames that observe it.
 //!
-//! The wall is worked through stretch by stretch, so that memory for samples and frames does not
-//! grow with the tunnel's length.
+//! The wall is processed stretch by stretch, so that memory for samples and frames does not grow
+//! with the tunnel's length.
 
 use crate::camera::Camera;
 use crate::frames::{FrameCache, FrameError, Pyramid};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::samples::observer_marks::ObserverMarks;
-use crate::refine::samples::tile_selection::most_informative;
-use crate::refine::samples::visibility::{Hidden, PosedFrame, Visibility, rows_of};
+use crate::refine::samples::tile_candidates::covered_rows;
+use crate::refine::samples::tile_selection::select_most_informative;
+use crate::refine::samples::visibility::{Exclusions, PosedFrame, Visibility};
+use crate::refine::thresholds::tile_coverage::{
+    MAX_KEPT_OBSERVATIONS, MAX_STRETCH_FRAMES, MAX_STRETCH_OBSERVATIONS,
+};
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::{BLOCK, WallGrid};
 use crate::surface::Surface;
@@ -17,38 +21,29 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Observations of a stretch: enough work for all threads, little enough to hold in memory.
-const STRETCH_OBSERVATIONS: f64 = 1e6;
-/// Frames of a stretch, apart from those that reach over from its neighbours, or as many as there
-/// is room for: at coarse levels so many observations would be more.
-const STRETCH_FRAMES: f64 = 256.0;
-/// Observations whose visibility is kept from one linearisation to the next; beyond, it is found
-/// anew each time.
-const KEPT_OBSERVATIONS: usize = 16_000_000;
-
-/// A stretch of the wall that is worked on at once.
+/// A stretch of the wall that is processed at once.
 #[derive(Clone, Debug)]
 struct Stretch {
     /// Rows of tiles.
     rows: Range<i64>,
-    /// Compared participants that see some of them.
+    /// Compared participants whose footprints meet these rows.
     frames: Vec<usize>,
 }
 
-/// The participants' pictures.
+/// Access to the participants' images.
 #[derive(Clone, Copy, Debug)]
-pub struct Pictures<'a> {
+pub struct FrameImages<'a> {
     /// All frames.
     pub frames: &'a FrameCache,
-    /// The frame that is the first participant.
+    /// Index of the first participant among all frames.
     pub first: usize,
     /// Pyramid level.
     pub level: usize,
 }
 
-impl Pictures<'_> {
-    /// The pictures of some participants.
-    pub fn of(&self, participants: &[usize]) -> Result<Vec<Arc<Pyramid>>, FrameError> {
+impl FrameImages<'_> {
+    /// Loads the images of some participants.
+    pub fn load(&self, participants: &[usize]) -> Result<Vec<Arc<Pyramid>>, FrameError> {
         let participants = participants.par_iter();
         participants
             .map(|k| self.frames.get(self.first + k))
@@ -56,59 +51,60 @@ impl Pictures<'_> {
     }
 }
 
-/// Which frames see which tiles, stretch by stretch.
+/// The observations of a window of frames, stretch by stretch.
 #[derive(Debug)]
-pub struct Coverage<'a> {
+pub struct TileCoverage<'a> {
     surface: &'a dyn Surface,
     grid: WallGrid,
-    /// Of the level.
+    /// The camera at the pyramid level.
     camera: Camera,
-    pictures: Pictures<'a>,
-    hidden: Hidden<'a>,
-    /// Share of the information that the tiles compared hold.
+    images: FrameImages<'a>,
+    exclusions: Exclusions<'a>,
+    /// Share of the information that the selected tiles hold, 0 to 1.
     information: f64,
-    /// Where the participants stood when the samples were chosen; None for those that are not
+    /// Poses of the participants at which the tiles are selected; None for those that are not
     /// compared.
-    placed: Vec<Option<PosedFrame>>,
+    posed: Vec<Option<PosedFrame>>,
     stretches: Vec<Stretch>,
+    /// Observations of the stretches that are kept in memory.
     kept: Vec<Option<Visibility>>,
-    /// Which observers are left out, stretch by stretch; empty where none is.
-    left_out: Vec<ObserverMarks>,
-    /// Number of tiles that are compared.
+    /// Excluded observers, stretch by stretch; empty if there are none.
+    excluded: Vec<ObserverMarks>,
+    /// Number of selected tiles.
     pub tiles: usize,
-    /// Number of tiles there are.
+    /// Number of all tiles.
     pub all_tiles: usize,
-    /// Participants that see wall in common: pairs in ascending order, each once, a frame with
+    /// Pairs of participants that observe common tiles, in ascending order, each once, a frame with
     /// itself included.
     pub pairs: Vec<(usize, usize)>,
 }
 
-impl<'a> Coverage<'a> {
-    /// Finds the tiles of all participants' frames, and chooses those that hold a share
-    /// `information` of what they tell if it is less than 1.
+impl<'a> TileCoverage<'a> {
+    /// Finds the tiles of all participants and selects those that hold the share `information` of
+    /// the information.
     ///
     /// # Errors
-    /// [`FrameError`] of a picture that is needed to choose.
+    /// [`FrameError`] if an image that the selection needs cannot be read.
     pub fn new(
         surface: &'a dyn Surface,
         grid: WallGrid,
         camera: Camera,
-        pictures: Pictures<'a>,
-        hidden: Hidden<'a>,
+        images: FrameImages<'a>,
+        exclusions: Exclusions<'a>,
         information: f64,
-        placed: Vec<Option<PosedFrame>>,
+        posed: Vec<Option<PosedFrame>>,
     ) -> Result<Self, FrameError> {
         let mut coverage = Self {
-            stretches: stretches(&grid, &placed, pictures.frames.pyramid_capacity()),
+            stretches: divide_into_stretches(&grid, &posed, images.frames.pyramid_capacity()),
             surface,
             grid,
             camera,
-            pictures,
-            hidden,
+            images,
+            exclusions,
             information,
-            placed,
+            posed,
             kept: Vec::new(),
-            left_out: Vec::new(),
+            excluded: Vec::new(),
             tiles: 0,
             all_tiles: 0,
             pairs: Vec::new(),
@@ -121,7 +117,7 @@ impl<'a> Coverage<'a> {
             let pairs = coverage.pairs_of(stretch, &visibility);
             coverage.pairs.extend(pairs);
             observations += visibility.observers.len();
-            let keep = observations <= KEPT_OBSERVATIONS;
+            let keep = observations <= MAX_KEPT_OBSERVATIONS;
             coverage.kept.push(keep.then_some(visibility));
         }
         coverage.pairs.sort_unstable();
@@ -129,9 +125,9 @@ impl<'a> Coverage<'a> {
         Ok(coverage)
     }
 
-    /// Which participants are compared.
+    /// True for the participants that are compared.
     pub fn compared(&self) -> Vec<bool> {
-        self.placed.iter().map(Option::is_some).collect()
+        self.posed.iter().map(Option::is_some).collect()
     }
 
     /// Number of stretches.
@@ -139,13 +135,13 @@ impl<'a> Coverage<'a> {
         self.stretches.len()
     }
 
-    /// The participants whose frames see some of a stretch; a [`Visibility`]'s frames are places in
-    /// this list.
+    /// The participants that may observe a stretch; the frames of its [`Visibility`] are indices
+    /// into this list.
     pub fn frames(&self, stretch: usize) -> &[usize] {
         &self.stretches[stretch].frames
     }
 
-    /// The observations of a stretch: those kept, or found anew (the same, from the same poses).
+    /// The observations of a stretch: those kept in memory, or computed anew from the same poses.
     ///
     /// # Errors
     /// [`FrameError`].
@@ -154,63 +150,70 @@ impl<'a> Coverage<'a> {
             Some(visibility) => Cow::Borrowed(visibility),
             None => {
                 let all = self.find(stretch)?.0;
-                Cow::Owned(match self.left_out.get(stretch) {
-                    Some(marks) => all.without(marks),
+                Cow::Owned(match self.excluded.get(stretch) {
+                    Some(marks) => all.exclude(marks),
                     None => all,
                 })
             }
         })
     }
 
-    /// Leaves out the observers that are marked, stretch by stretch.
-    pub fn leave_out(&mut self, marks: Vec<ObserverMarks>) {
+    /// Excludes the marked observers, stretch by stretch.
+    pub fn exclude(&mut self, marks: Vec<ObserverMarks>) {
         for (kept, marks) in self.kept.iter_mut().zip(&marks) {
             if let Some(kept) = kept {
-                *kept = kept.without(marks);
+                *kept = kept.exclude(marks);
             }
         }
-        self.left_out = marks;
+        self.excluded = marks;
     }
 
-    /// The observations of a stretch, and the number of tiles they are chosen from.
+    /// Computes the observations of a stretch; also returns the number of tiles before selection.
     fn find(&self, stretch: usize) -> Result<(Visibility, usize), FrameError> {
         let Stretch { rows, frames } = &self.stretches[stretch];
-        let placed: Vec<PosedFrame> = frames.iter().filter_map(|k| self.placed[*k]).collect();
+        let posed: Vec<PosedFrame> = frames.iter().filter_map(|k| self.posed[*k]).collect();
         let all = Visibility::find(
             self.surface,
             &self.grid,
             &self.camera,
-            self.pictures.frames.shading().as_deref(),
-            &self.hidden,
-            &placed,
+            self.images.frames.shading().as_deref(),
+            &self.exclusions,
+            &posed,
             rows,
         );
         if self.information >= 1.0 {
             let count = all.tiles.len();
             return Ok((all, count));
         }
-        let pictures = self.pictures.of(frames)?;
-        let views: Vec<SampledFrame> = pictures
+        let pyramids = self.images.load(frames)?;
+        let sampled_frames: Vec<SampledFrame> = pyramids
             .iter()
-            .zip(&placed)
-            .map(|(picture, placed)| {
-                let picture = picture.level(self.pictures.level);
-                let camera = self.camera.with_sweep(&placed.sweep);
-                SampledFrame::new(picture, camera, &FrameEstimate::at(placed.pose))
+            .zip(&posed)
+            .map(|(pyramid, posed)| {
+                let image = pyramid.level(self.images.level);
+                let camera = self.camera.with_sweep(&posed.sweep);
+                SampledFrame::new(image, camera, &FrameEstimate::at(posed.pose))
             })
             .collect();
-        let chosen = most_informative(&all, self.information, &self.grid, self.surface, &views);
-        Ok((chosen, all.tiles.len()))
+        let selected = select_most_informative(
+            &all,
+            self.information,
+            &self.grid,
+            self.surface,
+            &sampled_frames,
+        );
+        Ok((selected, all.tiles.len()))
     }
 
+    /// Pairs of participants that observe common blocks of a stretch.
     fn pairs_of(&self, stretch: usize, visibility: &Visibility) -> Vec<(usize, usize)> {
         let frames = self.frames(stretch);
         let mut pairs = Vec::new();
         for block in &visibility.blocks {
-            let seen = visibility.frames(block).into_iter().map(|k| frames[k]);
-            let seen: Vec<usize> = seen.collect();
-            for (n, a) in seen.iter().enumerate() {
-                pairs.extend(seen[n..].iter().map(|b| (*a, *b)));
+            let observers = visibility.frames(block).into_iter().map(|k| frames[k]);
+            let observers: Vec<usize> = observers.collect();
+            for (n, a) in observers.iter().enumerate() {
+                pairs.extend(observers[n..].iter().map(|b| (*a, *b)));
             }
         }
         pairs.sort_unstable();
@@ -219,27 +222,36 @@ impl<'a> Coverage<'a> {
     }
 }
 
-/// Cuts the lattice's rows into stretches of about [`STRETCH_OBSERVATIONS`] or [`STRETCH_FRAMES`].
-fn stretches(grid: &WallGrid, placed: &[Option<PosedFrame>], room: usize) -> Vec<Stretch> {
-    let most_frames = STRETCH_FRAMES.min(room as f64);
-    let rows: Vec<Option<Range<i64>>> = placed
+/// Divides the lattice's rows into stretches of about [`MAX_STRETCH_OBSERVATIONS`] or
+/// [`MAX_STRETCH_FRAMES`] (at most `room`, the frames that fit into memory).
+fn divide_into_stretches(
+    grid: &WallGrid,
+    posed: &[Option<PosedFrame>],
+    room: usize,
+) -> Vec<Stretch> {
+    let max_frames = MAX_STRETCH_FRAMES.min(room as f64);
+    let rows: Vec<Option<Range<i64>>> = posed
         .iter()
-        .map(|frame| frame.as_ref().map(|frame| rows_of(grid, &frame.footprint)))
+        .map(|frame| {
+            frame
+                .as_ref()
+                .map(|frame| covered_rows(grid, &frame.footprint))
+        })
         .collect();
     let Some(first) = rows.iter().flatten().map(|r| r.start).min() else {
         return Vec::new();
     };
     let last = rows.iter().flatten().map(|r| r.end).max().unwrap_or(first);
-    // Whole blocks of rows, so that no block is cut.
+    // Whole blocks of rows, so that no block is divided.
     let (first, last) = (first.div_euclid(BLOCK), (last - 1).div_euclid(BLOCK));
-    // Shares of a stretch.
+    // Load of each row of blocks, as a share of a stretch.
     let mut load = vec![0.0; (last - first + 1) as usize];
     let (width, _) = grid.tile_size_m();
-    for (frame, rows) in placed.iter().flatten().zip(rows.iter().flatten()) {
+    for (frame, rows) in posed.iter().flatten().zip(rows.iter().flatten()) {
         let columns = (frame.footprint.s_max_m - frame.footprint.s_min_m) / width;
         let blocks = rows.start.div_euclid(BLOCK)..(rows.end - 1).div_euclid(BLOCK) + 1;
-        let of_frames = 1.0 / (most_frames * (blocks.end - blocks.start) as f64);
-        let of_observations = columns * BLOCK as f64 / STRETCH_OBSERVATIONS;
+        let of_frames = 1.0 / (max_frames * (blocks.end - blocks.start) as f64);
+        let of_observations = columns * BLOCK as f64 / MAX_STRETCH_OBSERVATIONS;
         for row in blocks {
             load[(row - first) as usize] += of_observations.max(of_frames);
         }

@@ -3,7 +3,7 @@
 
 use crate::progress::Progress;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::solver::gauss_newton::{DampedGaussNewton, Solution, SolveState, Unknowns};
 use crate::refine::solver::stopping::Stopping;
 use argmin::core::observers::{Observe, ObserverMode};
@@ -33,7 +33,10 @@ pub struct Observation<'k> {
 /// # Errors
 /// [`ProblemError::Factor`] if the normal equations stay singular whatever the damping;
 /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
-pub fn solve<'a>(problem: Problem<'a>, stopping: Stopping) -> Result<Solution<'a>, ProblemError> {
+pub fn solve<'a>(
+    problem: PhotometricProblem<'a>,
+    stopping: Stopping,
+) -> Result<Solution<'a>, ProblemError> {
     resume(problem, stopping, None, None)
 }
 
@@ -42,14 +45,14 @@ pub fn solve<'a>(problem: Problem<'a>, stopping: Stopping) -> Result<Solution<'a
 /// # Errors
 /// The errors of [`solve`], and those of [`Observation::keep`].
 pub fn resume<'a>(
-    problem: Problem<'a>,
+    problem: PhotometricProblem<'a>,
     stopping: Stopping,
     begun: Option<SolveState>,
     observation: Option<Observation>,
 ) -> Result<Solution<'a>, ProblemError> {
     let (gauss_newton, start, done) = match begun {
         None => {
-            let start = (problem.start(), problem.kappa());
+            let start = (problem.initial_estimates(), problem.kappa());
             (DampedGaussNewton::new(stopping), start, 0)
         }
         Some(state) => {
@@ -92,14 +95,14 @@ struct Adapter<'k> {
     keep: Option<&'k mut KeepState<'k>>,
 }
 
-impl<'a> Solver<Problem<'a>, Iterate> for Adapter<'_> {
+impl<'a> Solver<PhotometricProblem<'a>, Iterate> for Adapter<'_> {
     fn name(&self) -> &str {
         "damped Gauss–Newton"
     }
 
     fn next_iter(
         &mut self,
-        problem: &mut Counted<Problem<'a>>,
+        problem: &mut Counted<PhotometricProblem<'a>>,
         mut state: Iterate,
     ) -> Result<(Iterate, Option<KV>), Error> {
         let unknowns = state.take_param().unwrap_or_default();

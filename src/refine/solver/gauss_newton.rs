@@ -6,9 +6,9 @@
 use crate::refine::linear::sparse_cholesky::FactorError;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::parameters::calibration::Kappa;
-use crate::refine::parameters::frame_estimate::{FrameEstimate, FrameStep, UNKNOWNS};
+use crate::refine::parameters::frame_estimate::{FRAME_PARAMETERS, FrameEstimate, FrameStep};
 use crate::refine::problem::linearisation::Linearisation;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::solver::solve_record::{SolveRecord, StepRecord};
 use crate::refine::solver::stopping::{StopReason, Stopping};
 use crate::refine::thresholds::gauss_newton::{
@@ -22,7 +22,7 @@ pub type Unknowns = (Vec<FrameEstimate>, Kappa);
 /// The end of a solve.
 pub struct Solution<'a> {
     /// The problem that was solved.
-    pub problem: Problem<'a>,
+    pub problem: PhotometricProblem<'a>,
     /// Estimates of the active frames.
     pub estimates: Vec<FrameEstimate>,
     /// The shared parameters.
@@ -120,7 +120,7 @@ impl DampedGaussNewton {
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
     pub fn iterate(
         &mut self,
-        problem: &Problem,
+        problem: &PhotometricProblem,
         unknowns: &Unknowns,
     ) -> Result<(Unknowns, f64), ProblemError> {
         let current = match self.current.take() {
@@ -135,7 +135,11 @@ impl DampedGaussNewton {
     }
 
     /// The solution at `unknowns`, where the last iteration ended; None before the first.
-    pub fn finish<'a>(self, problem: Problem<'a>, unknowns: Unknowns) -> Option<Solution<'a>> {
+    pub fn finish<'a>(
+        self,
+        problem: PhotometricProblem<'a>,
+        unknowns: Unknowns,
+    ) -> Option<Solution<'a>> {
         let linearisation = self.current?;
         let record = SolveRecord {
             iterations: self.steps.len() as u64,
@@ -161,7 +165,7 @@ impl DampedGaussNewton {
     /// reason there is none.
     fn step(
         &mut self,
-        problem: &Problem,
+        problem: &PhotometricProblem,
         unknowns: &Unknowns,
         current: Linearisation,
     ) -> Result<(Unknowns, Linearisation), ProblemError> {
@@ -176,7 +180,7 @@ impl DampedGaussNewton {
             let moved = problem.wall_step_px(estimates, &step, &shared);
             let step_px = moved.into_iter().fold(0.0, f64::max);
             let decrement = -slope(&step, &shared, &current);
-            let stop = self.reason_to_stop(step_px, decrement, UNKNOWNS * step.len());
+            let stop = self.reason_to_stop(step_px, decrement, FRAME_PARAMETERS * step.len());
             if stop.is_some() && self.lambda > 0.0 {
                 // It is the damping that makes the step short.
                 if undamped_failed {
@@ -225,7 +229,7 @@ impl DampedGaussNewton {
     /// stronger damping is needed.
     fn damped_step(
         &self,
-        problem: &Problem,
+        problem: &PhotometricProblem,
         current: &Linearisation,
     ) -> Result<Option<(Vec<FrameStep>, Kappa)>, ProblemError> {
         let normal = &current.normal;
@@ -275,7 +279,7 @@ impl DampedGaussNewton {
 /// Sets the steps of frames to zero that would become infeasible: one frame that fits nowhere must
 /// not hold back the others. Returns true if there are none.
 fn hold_infeasible_frames(
-    problem: &Problem,
+    problem: &PhotometricProblem,
     estimates: &[FrameEstimate],
     step: &mut [FrameStep],
 ) -> bool {
@@ -301,5 +305,5 @@ fn frames_slope(step: &[FrameStep], at: &Linearisation, unknowns: usize) -> f64 
 fn slope(step: &[FrameStep], shared: &Kappa, at: &Linearisation) -> f64 {
     let border = at.border.as_ref();
     let of_shared = border.map_or(0.0, |border| shared.dot(&border.gradient));
-    frames_slope(step, at, UNKNOWNS) + of_shared
+    frames_slope(step, at, FRAME_PARAMETERS) + of_shared
 }

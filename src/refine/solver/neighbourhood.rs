@@ -4,15 +4,17 @@
 //! rejecting a frame therefore does not grow with the length of the survey. What it has bent farther
 //! away is left to the next solve of all frames.
 
-use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
-use crate::refine::problem::linearisation::FrameShare;
-use crate::refine::problem::photometric_problem::Problem;
-use crate::refine::samples::footprints::{FARTHEST, footprints};
+use crate::refine::problem::linearisation::FrameContribution;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
+use crate::refine::samples::footprints::footprints;
+use crate::refine::samples::sampling::Sampling;
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
+use crate::refine::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
 use crate::refine::thresholds::neighbourhood::MAX_CHANGED_DISTANCE;
 use std::ops::{Range, RangeInclusive};
 
@@ -48,8 +50,9 @@ impl Neighbourhood {
             others.any(|other| other.overlaps(own, perimeter))
         };
         let widened = ranges.into_iter().map(|active| {
-            let earlier = active.start.saturating_sub(FARTHEST)..active.start;
-            let later = active.end..(active.end + FARTHEST).min(footprints.len());
+            let earlier = active.start.saturating_sub(MAX_OVERLAP_DISTANCE_FRAMES)..active.start;
+            let later =
+                active.end..(active.end + MAX_OVERLAP_DISTANCE_FRAMES).min(footprints.len());
             let first = earlier.clone().find(|k| shares(k, &active));
             let last = later.clone().rev().find(|k| shares(k, &active));
             // The prior ties the first and the last to their neighbours, wall in common or not.
@@ -83,11 +86,11 @@ impl Neighbourhood {
         options: &RefineOptions,
         levels: RangeInclusive<usize>,
         frames: &mut FrameStates,
-    ) -> Result<Vec<FrameShare>, ProblemError> {
+    ) -> Result<Vec<FrameContribution>, ProblemError> {
         let mut shares = Vec::new();
         for level in levels.rev() {
             let window = frames.window_of(self.participants.clone(), self.active.clone());
-            let problem = Problem::new(context, Sampling::of(level), window)?;
+            let problem = PhotometricProblem::new(context, Sampling::of(level), window)?;
             let solution = solve(problem, Stopping::intermediate(options, level))?;
             frames.estimates[self.active.clone()].copy_from_slice(&solution.estimates);
             shares = solution.linearisation.frames;

@@ -7,9 +7,9 @@ use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::model::rejection::RejectionReason;
-use crate::refine::parameters::calibration::{Calibration, Kappa, Metric};
+use crate::refine::parameters::calibration::{Calibration, Datum, Kappa};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
-use crate::refine::problem::linearisation::FrameShare;
+use crate::refine::problem::linearisation::FrameContribution;
 use crate::refine::refined::Refined;
 use crate::refine::report::{FrameFlag, FrameReport, PoseReport, RefineReport};
 use crate::refine::setup::Setup;
@@ -46,14 +46,14 @@ pub fn run<'a>(
     let readout = estimate_readout(&context, setup.options, &state.frames)?;
     let calibration = setup.calibration_at(state);
     let uncertainty = SolutionUncertainty::at(&context, &solution, &calibration)?;
-    let metric = calibration.metric(&context.kappa);
+    let metric = calibration.datum(&context.kappa);
     let estimates = &state.frames.estimates;
     let motion = setup
         .prior
-        .settle_gauge(&context.surface.gauge(), estimates, &metric);
+        .align_gauge(&context.surface.gauge(), estimates, &metric);
     for rejection in state.frames.rejections.iter_mut().flatten() {
         if let RejectionReason::Ambiguous { other, .. } = rejection {
-            *other = metric.in_metres(&motion.apply(other));
+            *other = metric.to_metres(&motion.apply(other));
         }
     }
     let frames = report_frames(setup, &context, &state.frames, &solution, &uncertainty);
@@ -148,7 +148,7 @@ fn report_calibration(
     uncertainty: &SolutionUncertainty,
     state: &PipelineState,
 ) -> Option<CalibrationReport> {
-    let any = calibration.any() || !state.unobservable.is_empty();
+    let any = calibration.has_free_parameters() || !state.unobservable.is_empty();
     any.then(|| {
         CalibrationReport::new(
             calibration,
@@ -164,13 +164,13 @@ fn report_calibration(
 fn trajectory(
     initial: &[StampedPose],
     frames: &FrameStates,
-    metric: &Metric,
+    metric: &Datum,
     motion: &GaugeMotion,
 ) -> Trajectory {
     let poses = initial.iter().zip(&frames.estimates);
     let poses = poses.map(|(initial, estimate)| StampedPose {
         time_s: initial.time_s,
-        pose: metric.in_metres(&motion.apply(&estimate.pose)),
+        pose: metric.to_metres(&motion.apply(&estimate.pose)),
     });
     poses.collect()
 }
@@ -199,8 +199,9 @@ fn final_rejection(
     step_px: f64,
     sigma: &FrameSigma,
 ) -> Option<RejectionReason> {
-    let share: &FrameShare = &solution.linearisation.frames[k];
-    let all = f64::from(camera.width) * f64::from(camera.height) * solution.problem.share_of_wall();
+    let share: &FrameContribution = &solution.linearisation.frames[k];
+    let all =
+        f64::from(camera.width) * f64::from(camera.height) * solution.problem.compared_share();
     if share.pixels < MIN_PIXEL_SHARE * all {
         Some(RejectionReason::NoOverlap {
             share: share.pixels / all,
@@ -227,7 +228,7 @@ fn report_frame(
     sigma: FrameSigma,
     overdispersion_px: f64,
 ) -> FrameReport {
-    let share: &FrameShare = &solution.linearisation.frames[k];
+    let share: &FrameContribution = &solution.linearisation.frames[k];
     let estimate: &FrameEstimate = &solution.estimates[k];
     FrameReport {
         index: k,

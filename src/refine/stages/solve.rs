@@ -1,12 +1,12 @@
 //! Stage: solves all frames together at one pyramid level.
 
 use crate::refine::error::RefineError;
-use crate::refine::joint::joint_block as joint;
-use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::context::EstimationContext;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::report::LevelReport;
+use crate::refine::samples::sampling::Sampling;
 use crate::refine::setup::Setup;
 use crate::refine::solver::argmin_glue::{self, Observation};
 use crate::refine::solver::gauss_newton::{Solution, SolveState};
@@ -14,6 +14,7 @@ use crate::refine::solver::stopping::Stopping;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::stage::Stage;
 use crate::refine::stages::state::{Estimation, PipelineState};
+use crate::refine::thresholds::joint;
 use crate::refine::tiles::interpolation::Interpolation;
 use crate::refine::tracking::shading_correction::correct;
 use crate::refine::uncertainty::observability::UnobservableParameter;
@@ -75,12 +76,12 @@ impl SolvePlan {
         let last = Self::last(options);
         Self {
             sampling: Sampling {
-                density: joint::DENSITY,
+                density: joint::SAMPLES_PER_PIXEL,
                 joint: true,
                 ..last.sampling
             },
             stopping: Stopping {
-                step_sigma: joint::STEP_SIGMA,
+                step_sigma: joint::MAX_FINAL_STEP_SIGMA,
                 ..last.stopping
             },
         }
@@ -148,7 +149,7 @@ pub fn run<'a>(
     state.levels.push(LevelReport {
         level: plan.sampling.level,
         samples_per_pixel: plan.sampling.density,
-        share_of_wall: solution.problem.share_of_wall(),
+        share_of_wall: solution.problem.compared_share(),
         joint: solution.problem.is_joint(),
         solve: solution.record.clone(),
     });
@@ -167,9 +168,10 @@ fn problem_of<'a>(
     setup: &Setup,
     context: &EstimationContext<'a>,
     state: &PipelineState,
-) -> Result<Option<Problem<'a>>, ProblemError> {
+) -> Result<Option<PhotometricProblem<'a>>, ProblemError> {
     let sampling = plan.sampling;
-    let problem = Problem::new(context, sampling, state.frames.window())?.calibrating();
+    let problem =
+        PhotometricProblem::new(context, sampling, state.frames.window())?.with_shared_parameters();
     if sampling.joint && !problem.is_joint() {
         return Ok(None);
     }
@@ -178,18 +180,18 @@ fn problem_of<'a>(
         return Ok(Some(problem));
     }
     let density = if sampling.joint {
-        Some(joint::OUTLIER_MASK_DENSITY)
+        Some(joint::OUTLIER_MASK_SAMPLES_PER_PIXEL)
     } else {
         let chosen = setup.options.outlier_mask_density;
         chosen.filter(|_| sampling.variance_weighting)
     };
-    problem.without_outliers(density).map(Some)
+    problem.exclude_outliers(density).map(Some)
 }
 
 /// Solves the problem, from where an interrupted solve was.
 fn solve<'a>(
     plan: &SolvePlan,
-    problem: Problem<'a>,
+    problem: PhotometricProblem<'a>,
     setup: &Setup,
     state: &mut PipelineState,
     session: &mut Session,
@@ -224,7 +226,7 @@ fn find_unobservable(
     solution: &Solution,
 ) -> Result<Vec<UnobservableParameter>, ProblemError> {
     let calibration = setup.calibration_at(state);
-    if plan.sampling.level > 0 || !calibration.any() {
+    if plan.sampling.level > 0 || !calibration.has_free_parameters() {
         return Ok(Vec::new());
     }
     let solved = context.at(solution.kappa);

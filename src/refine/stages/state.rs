@@ -2,7 +2,7 @@
 
 use crate::frames::Shading;
 use crate::refine::model::frame_states::FrameStates;
-use crate::refine::parameters::calibration::{Kappa, SHARED};
+use crate::refine::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::refine::refined::Refined;
 use crate::refine::report::{LevelReport, StageTime};
 use crate::refine::solver::gauss_newton::{Solution, SolveState};
@@ -28,7 +28,7 @@ pub struct PipelineState {
     /// The shared parameters κ, ...
     pub kappa: Kappa,
     /// ... and which of them are still estimated.
-    pub free: [bool; SHARED],
+    pub free: [bool; SHARED_PARAMETERS],
     /// Tracking, if it is under way.
     pub tracking: Option<AlternatingCalibration>,
     /// The global solve that is under way.

@@ -1,31 +1,29 @@
-//! What of the fused texture is texture and not noise.
+//! Wiener filter of the fused texture, for its slopes.
 //!
-//! The derivative of a residual takes the slopes of the fused texture S, and S is noisy. On a wall
-//! of low contrast most of a slope between neighbouring samples is noise: the score `Σ e φ` then
-//! picks up noise times noise. So at full size slopes are taken of the texture as it most likely
-//! is, given what is typical of the wall.
+//! The derivative of a residual contains the slopes of the fused texture S, and S is noisy. On a
+//! wall of low contrast most of a slope between neighbouring samples is noise, and the score
+//! `Σ e φ` then contains products of noise with noise. At full size the slopes are therefore those
+//! of the linear minimum mean square error estimate of the texture.
 //!
-//! A tile of S (10 × 10 samples with its ring) is written in polynomials `p_k(s) p_l(h)`,
+//! A tile of S (10 × 10 samples with its ring) is expanded in polynomials `p_k(s) p_l(h)`,
 //! orthonormal on the samples, so that a ramp is one of them and does not bend at the tile's
 //! border. A coefficient `c_kl` has the noise variance `n_kl` and, over many tiles of the wall, the
-//! mean square `m_kl`. The share
+//! mean square `m_kl`. The filter multiplies it by
 //!
-//! `W_kl = max(0, 1 − n_kl/m_kl)`
+//! `W_kl = max(0, 1 − n_kl/m_kl)`.
 //!
-//! of its square is texture, and `W_kl c_kl` is the best linear estimate of it. Let `φ̂` be the
-//! slopes of what is left: the mean of `φ̂φ̂ᵀ` is that of `φ̂φᵀ` with the true slopes φ, the
-//! derivative of the score; so M needs no correction for the noise in it.
+//! Let `φ̂` be the slopes of the filtered texture. The mean of `φ̂φ̂ᵀ` is that of `φ̂φᵀ` with the
+//! true slopes φ, the derivative of the score; so M needs no correction for noise.
 //!
-//! `S = Σ q_i a_i² z_i / Σ q_i a_i²`, and the noise of z_i has the variance `σ²/a_i²` and, along
-//! each axis, the autocorrelation `β(d)/β(0)` of the interpolation's kernel
-//! ([`Interpolation::autocorrelation`]), d pixels apart. With `d_i = √q_i` pixels from sample to
-//! sample of frame i, on average over the tiles,
+//! With `S = Σ q_i a_i² z_i / Σ q_i a_i²`, the noise of `z_i` has the variance `σ²/a_i²` and, along
+//! each axis, the autocorrelation `β(d)/β(0)` of the interpolation kernel at a distance of d pixels
+//! ([`Interpolation::autocorrelation`]). Samples of frame i are `d_i = √q_i` pixels apart, so that
+//! on average over the tiles
 //!
 //! `n_kl = σ² ⟨Σ_i u_i ν_k(d_i) ν_l(d_i)⟩`, `u_i = (q_i a_i)² / (Σ_j q_j a_j²)²`,
 //! `ν_k(d) = Σ_ij p_k(i) p_k(j) β(|i − j| d)/β(0)`.
 //!
-//! From aslant a frame has fewer pixels to a sample, whose noise hangs together the more, and more
-//! of it is in the slopes.
+//! An oblique frame has fewer pixels per sample: its noise is more correlated between samples.
 //!
 //! Source: N. Wiener, "Extrapolation, Interpolation, and Smoothing of Stationary Time Series",
 //! 1949; J. P. Gram, "Ueber die Entwickelung reeller Functionen in Reihen mittelst der Methode der
@@ -36,17 +34,20 @@ use crate::refine::tiles::interpolation::Interpolation;
 
 type Square<T> = [[T; SIDE]; SIDE];
 
-/// Mean squares of the coefficients over tiles of the wall.
+/// Sums of the squared coefficients and of the noise gains over tiles of the wall.
 #[derive(Clone, Debug)]
 pub struct TextureSpectrum {
+    /// `p_k(i)`, k the row.
     basis: Square<f64>,
+    /// `Σ c_kl²`, l the row.
     squares: Square<f64>,
-    /// `Σ u` by the spacing d, in steps of [`SPACING_PX`].
-    noise_shares: [f64; SPACINGS],
+    /// `Σ u` by the spacing d, in bins of [`SPACING_PX`].
+    noise_gains: [f64; SPACINGS],
 }
 
-/// Width of a bin of spacings, pixels, and their number: the last has all that is beyond.
+/// Width of a bin of spacings, pixels.
 const SPACING_PX: f64 = 1.0 / 32.0;
+/// Number of bins of spacings; the last one holds all larger ones.
 const SPACINGS: usize = 64;
 
 impl Default for TextureSpectrum {
@@ -54,13 +55,13 @@ impl Default for TextureSpectrum {
         Self {
             basis: polynomials(),
             squares: [[0.0; SIDE]; SIDE],
-            noise_shares: [0.0; SPACINGS],
+            noise_gains: [0.0; SPACINGS],
         }
     }
 }
 
 impl TextureSpectrum {
-    /// Counts a tile of S, of frames with `(d_i, u_i)`.
+    /// Adds a tile of S; `frames` gives `(d_i, u_i)` of each frame.
     pub fn add(&mut self, texture: &Plane, frames: impl Iterator<Item = (f64, f64)>) {
         let mut along_s = [[0.0; SIDE]; SIDE];
         for (row, samples) in along_s.iter_mut().zip(texture.chunks_exact(SIDE)) {
@@ -74,29 +75,29 @@ impl TextureSpectrum {
                 *square += c * c;
             }
         }
-        for (spacing_px, share) in frames {
+        for (spacing_px, gain) in frames {
             let bin = (spacing_px / SPACING_PX) as usize;
-            self.noise_shares[bin.min(SPACINGS - 1)] += share;
+            self.noise_gains[bin.min(SPACINGS - 1)] += gain;
         }
     }
 
-    /// Adds the counts of another.
+    /// Adds the sums of another spectrum.
     pub fn merge(mut self, other: &Self) -> Self {
-        let others = other.squares.iter().flatten().chain(&other.noise_shares);
+        let others = other.squares.iter().flatten().chain(&other.noise_gains);
         let own = self
             .squares
             .iter_mut()
             .flatten()
-            .chain(&mut self.noise_shares);
+            .chain(&mut self.noise_gains);
         own.zip(others).for_each(|(a, b)| *a += b);
         self
     }
 
-    /// The filter for samples with noise of variance `floor`, σ² (grey levels²).
+    /// The filter for samples with noise of the variance `floor`, σ² (grey levels²).
     pub fn denoiser(&self, floor: f64, interpolation: Interpolation) -> Denoiser {
         let mut noise = [[0.0; SIDE]; SIDE];
-        let shares = self.noise_shares.iter().enumerate();
-        for (bin, u) in shares.filter(|(_, u)| **u > 0.0) {
+        let gains = self.noise_gains.iter().enumerate();
+        for (bin, u) in gains.filter(|(_, u)| **u > 0.0) {
             let nu = self.nu((bin as f64 + 0.5) * SPACING_PX, interpolation);
             for (row, nu_l) in noise.iter_mut().zip(&nu) {
                 for (noise, nu_k) in row.iter_mut().zip(&nu) {
@@ -104,15 +105,15 @@ impl TextureSpectrum {
                 }
             }
         }
-        // The mean has no slope.
+        // The mean has no slope: it passes.
         noise[0][0] = 0.0;
-        let share = |l: usize, k: usize| {
+        let factor = |l: usize, k: usize| {
             (1.0 - noise[l][k] / self.squares[l][k].max(f64::MIN_POSITIVE)).max(0.0) as f32
         };
         Denoiser {
             basis: self.basis.map(|p| p.map(|v| v as f32)),
             transposed: std::array::from_fn(|i| std::array::from_fn(|k| self.basis[k][i] as f32)),
-            shares: std::array::from_fn(|l| std::array::from_fn(|k| share(l, k))),
+            factors: std::array::from_fn(|l| std::array::from_fn(|k| factor(l, k))),
         }
     }
 
@@ -129,18 +130,19 @@ impl TextureSpectrum {
     }
 }
 
-/// The Wiener filter of a tile.
+/// Wiener filter of a tile.
 #[derive(Clone, Debug)]
 pub struct Denoiser {
     /// `p_k(i)`, k the row.
     basis: Square<f32>,
+    /// `p_k(i)`, k the column.
     transposed: Square<f32>,
     /// `W_kl`, l (along h) the row.
-    shares: Square<f32>,
+    factors: Square<f32>,
 }
 
 impl Denoiser {
-    /// What of a tile is texture.
+    /// Filters a tile of S.
     #[inline(always)]
     pub fn apply(&self, texture: &Plane) -> Plane {
         let mut samples = [[0.0f32; SIDE]; SIDE];
@@ -148,20 +150,21 @@ impl Denoiser {
             row.copy_from_slice(samples);
         }
         let mut coefficients = product(&product(&self.basis, &samples), &self.transposed);
-        for (row, shares) in coefficients.iter_mut().zip(&self.shares) {
-            for (c, share) in row.iter_mut().zip(shares) {
-                *c *= share;
+        for (row, factors) in coefficients.iter_mut().zip(&self.factors) {
+            for (c, factor) in row.iter_mut().zip(factors) {
+                *c *= factor;
             }
         }
-        let left = product(&product(&self.transposed, &coefficients), &self.basis);
+        let filtered = product(&product(&self.transposed, &coefficients), &self.basis);
         let mut plane = ZERO;
-        for (samples, row) in plane.chunks_exact_mut(SIDE).zip(&left) {
+        for (samples, row) in plane.chunks_exact_mut(SIDE).zip(&filtered) {
             samples.copy_from_slice(row);
         }
         plane
     }
 }
 
+/// Product of two matrices.
 #[inline(always)]
 fn product(a: &Square<f32>, b: &Square<f32>) -> Square<f32> {
     let mut product = [[0.0f32; SIDE]; SIDE];
@@ -184,7 +187,7 @@ fn polynomials() -> Square<f64> {
             0 => [1.0; SIDE],
             _ => std::array::from_fn(|i| x(i) * basis[k - 1][i]),
         };
-        // Twice, for rounding's sake.
+        // Gram–Schmidt twice, against rounding.
         for _ in 0..2 {
             for earlier in &basis[..k] {
                 let part: f64 = row.iter().zip(earlier).map(|(a, b)| a * b).sum();
@@ -206,7 +209,7 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     #[test]
-    fn the_polynomials_are_orthonormal_and_the_second_is_a_ramp() {
+    fn polynomials_are_orthonormal_and_the_second_is_a_ramp() {
         let basis = polynomials();
         for (k, a) in basis.iter().enumerate() {
             for (l, b) in basis.iter().enumerate() {
@@ -223,10 +226,10 @@ mod tests {
         );
     }
 
-    /// Ramps of all slopes in noise that does not correlate: of each filtered tile, the slope is
-    /// nearer to the truth than of the noisy one, and `φ̂²` is on average `φ̂φ`.
+    /// Ramps in uncorrelated noise: the slopes of the filtered tiles have a smaller error than
+    /// those of the noisy ones, and `φ̂²` is on average `φ̂φ`.
     #[test]
-    fn slopes_are_nearer_to_the_truth_and_their_squares_unbiased() {
+    fn filtered_slopes_are_nearer_to_the_truth_and_their_squares_unbiased() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let (slopes, noise) = (
             Normal::new(0.0f32, 0.5).unwrap(),
@@ -240,7 +243,7 @@ mod tests {
                 for (k, value) in tile[..SIDE * SIDE].iter_mut().enumerate() {
                     *value = slope * (k % SIDE) as f32 + noise.sample(&mut rng);
                 }
-                // Far apart: no correlation.
+                // Two pixels apart: no correlation.
                 spectrum.add(&tile, [(2.0, 1.0)].into_iter());
                 (slope, tile)
             })
@@ -252,11 +255,11 @@ mod tests {
             for row in 1..SIDE - 1 {
                 for k in row * SIDE + 1..(row + 1) * SIDE - 1 {
                     let at = |tile: &Plane| f64::from(0.5 * (tile[k + 1] - tile[k - 1]));
-                    let (truth, noisy, left) = (f64::from(*slope), at(tile), at(&clean));
+                    let (truth, noisy, filtered) = (f64::from(*slope), at(tile), at(&clean));
                     before += (noisy - truth).powi(2);
-                    after += (left - truth).powi(2);
-                    square += left * left;
-                    product += left * truth;
+                    after += (filtered - truth).powi(2);
+                    square += filtered * filtered;
+                    product += filtered * truth;
                 }
             }
         }
@@ -265,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn without_noise_everything_stays() {
+    fn filter_without_noise_changes_nothing() {
         let mut tile = ZERO;
         for (k, value) in tile[..SIDE * SIDE].iter_mut().enumerate() {
             *value = (7.3 * k as f32).sin() * 50.0;
@@ -273,7 +276,11 @@ mod tests {
         let mut spectrum = TextureSpectrum::default();
         spectrum.add(&tile, [(0.5, 1.0)].into_iter());
         let denoiser = spectrum.denoiser(0.0, Interpolation::Bilinear);
-        let same = denoiser.apply(&tile);
-        assert!(tile.iter().zip(&same).all(|(a, b)| (a - b).abs() < 1e-3));
+        let filtered = denoiser.apply(&tile);
+        assert!(
+            tile.iter()
+                .zip(&filtered)
+                .all(|(a, b)| (a - b).abs() < 1e-3)
+        );
     }
 }

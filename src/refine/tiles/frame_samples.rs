@@ -1,4 +1,4 @@
-//! Sampling a frame at the wall samples of a tile.
+//! Values of a frame at the wall samples of a tile, and its Jacobians there.
 
 use crate::camera::{Camera, LensF32, ProjectF32, Sweep};
 use crate::frames::GreyImage;
@@ -10,14 +10,14 @@ use crate::surface::{lens_jacobian, wall_jacobian};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix2x6, Matrix3, Vector3};
 
-/// Added to a float from 0 on, 2²³ rounds it to an integer that stands in the last bits of the sum.
-/// Unlike a cast, which saturates, this is done on whole vectors.
-const INTEGER: f32 = 8_388_608.0;
+/// 2²³: added to a non-negative float, it rounds it to an integer in the last bits of the sum.
+/// Unlike a cast, which saturates, this vectorises.
+const ROUNDING: f32 = 8_388_608.0;
 
-/// For every sample of a tile, where in a picture's data the pixel to its upper left is.
+/// For every sample of a tile, the index of the pixel to its upper left in an image.
 type Indices = [u32; ZERO.len()];
 
-/// A frame at one pyramid level with its current estimate, ready to be sampled.
+/// A frame at one pyramid level with its current estimate, prepared for sampling.
 pub struct SampledFrame<'a> {
     image: &'a GreyImage,
     camera: Camera,
@@ -32,7 +32,7 @@ pub struct SampledFrame<'a> {
 }
 
 impl<'a> SampledFrame<'a> {
-    /// A frame's `image` seen by `camera` (of the same level).
+    /// A frame's `image`, taken by `camera` (of the same level).
     pub fn new(image: &'a GreyImage, camera: Camera, estimate: &FrameEstimate) -> Self {
         let r_wc = estimate.pose.r_wc.to_rotation_matrix();
         Self {
@@ -48,24 +48,24 @@ impl<'a> SampledFrame<'a> {
         }
     }
 
-    /// The same, interpolated so.
-    pub fn interpolated(self, interpolation: Interpolation) -> Self {
+    /// Replaces the interpolation, which is bilinear at first.
+    pub fn with_interpolation(self, interpolation: Interpolation) -> Self {
         Self {
             interpolation,
             ..self
         }
     }
 
-    /// The frame as its footprints are sought.
-    pub fn placed(&self) -> super_resolve::PosedCamera<'_> {
+    /// Camera and pose, for the search of pixel footprints.
+    pub fn view(&self) -> super_resolve::PosedCamera<'_> {
         super_resolve::PosedCamera {
             camera: self.camera,
             pose: &self.pose,
         }
     }
 
-    /// What a pixel (by its number, row-major) says of the wall where the shading is `shade`, with
-    /// noise of `sigma` grey levels; nothing where it has no value.
+    /// The wall's grey value that a pixel (row-major index) observes where the shading is `shade`,
+    /// with noise of `sigma` grey levels; without weight if the pixel has no value.
     #[inline(always)]
     pub fn reading(&self, pixel: u32, shade: f32, sigma: f32) -> Reading {
         let value = (self.image.data()[pixel as usize] - self.bias / shade) / self.gain;
@@ -84,20 +84,21 @@ impl<'a> SampledFrame<'a> {
         self.gain
     }
 
-    /// `∂(s, h)/∂ξ` at the middle of a tile.
+    /// `A = ∂(s, h)/∂ξ` at the centre of a tile.
     ///
-    /// With a sweep, the ray starts where the camera is when the row is read, millimetres off: to a
-    /// thousandth, that is no matter.
+    /// The motion during the readout is neglected: the ray starts a few millimetres away, which
+    /// changes A by a thousandth.
     pub fn wall_jacobian(&self, points: &TilePoints) -> Matrix2x6<f64> {
         wall_jacobian(&self.pose, &points.centre)
     }
 
-    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2, ρ)` at the middle of a tile, for the `camera` at full
+    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2, ρ)` at the centre of a tile, for the `camera` at full
     /// size; `a`: the pose's Jacobian there, `rate`: the motion of the frame's camera during a
     /// readout of one second.
     ///
-    /// A row read at the share τ of the picture's time is where the pose moved by `(ω τ, R ν τ)`
-    /// would put it, with ω and ν in proportion to the readout time ρ: `∂(s, h)/∂ρ = A (ω, R ν) τ`.
+    /// A row that is read at the share u of the readout sees the wall as from the pose moved by
+    /// `(ω u, R ν u)`, with ω and ν proportional to the readout time ρ:
+    /// `∂(s, h)/∂ρ = A (ω, R ν) u`.
     pub fn shared_jacobian(
         &self,
         points: &TilePoints,
@@ -109,16 +110,18 @@ impl<'a> SampledFrame<'a> {
         let lens = lens_jacobian(&self.pose, a, camera, &x_c);
         let share = (camera.project(&x_c)).map_or(0.0, |pixel| camera.share(pixel.y));
         let shift = self.pose.r_wc * rate.nu_m;
-        let moved = a.fixed_columns::<3>(0) * rate.omega_rad + a.fixed_columns::<3>(3) * shift;
-        let mut seen = Matrix2x6::zeros();
-        seen.fixed_columns_mut::<5>(0).copy_from(&lens);
-        seen.set_column(5, &(moved * share));
-        seen
+        let by_readout = a.fixed_columns::<3>(0) * rate.omega_rad + a.fixed_columns::<3>(3) * shift;
+        let mut c = Matrix2x6::zeros();
+        c.fixed_columns_mut::<5>(0).copy_from(&lens);
+        c.set_column(5, &(by_readout * share));
+        c
     }
 
-    /// The wall's values `(I/V − b/V)/a` as this frame shows them, into `values`; the frame holds
-    /// `I/V`, and `shade` is V around the tile. NaN where a pixel that the interpolation takes has
-    /// no value. Samples that a step has moved out of the picture repeat its border.
+    /// Writes the values `z = (I/V − b/V)/exp(α)` of the samples into `values`; the image holds
+    /// `I/V`, and `shade` is V at the tile.
+    ///
+    /// NaN where an interpolated pixel has no value. Samples that a step has moved out of the image
+    /// repeat its border.
     #[inline(always)]
     pub fn sample(&self, points: &TilePoints, shade: f32, values: &mut Plane) {
         match self.lens {
@@ -131,6 +134,7 @@ impl<'a> SampledFrame<'a> {
         }
     }
 
+    /// Samples through one kind of lens.
     #[inline(always)]
     fn sample_through(
         &self,
@@ -143,13 +147,13 @@ impl<'a> SampledFrame<'a> {
         let r = &self.r_cw;
         let [fx, fy, cx, cy] = self.intrinsics;
         let (width, height) = (self.image.width(), self.image.height());
-        // The cubic takes a pixel more on either side.
-        let more = match self.interpolation {
+        // The cubic needs one more pixel on either side.
+        let margin = match self.interpolation {
             Interpolation::Bicubic if width.min(height) >= 4 => 1,
             _ => 0,
         };
-        let first = more as f32;
-        let (last_u, last_v) = ((width - 2 - more) as f32, (height - 2 - more) as f32);
+        let first = margin as f32;
+        let (last_u, last_v) = ((width - 2 - margin) as f32, (height - 2 - margin) as f32);
         let mut index: Indices = [0; ZERO.len()];
         let (mut fu, mut fv) = (ZERO, ZERO);
         for k in 0..ZERO.len() {
@@ -160,14 +164,14 @@ impl<'a> SampledFrame<'a> {
             let (p, q, _) = lens.project_f32(x, y, z);
             let (u, v) = (fx * p + cx, fy * q + cy);
             // `max` first: a NaN (a sample behind the camera) becomes the first pixel.
-            let x0 = (u - 0.5).max(first).min(last_u) + INTEGER;
-            let y0 = (v - 0.5).max(first).min(last_v) + INTEGER;
-            fu[k] = (u - (x0 - INTEGER)).clamp(0.0, 1.0);
-            fv[k] = (v - (y0 - INTEGER)).clamp(0.0, 1.0);
-            index[k] = (y0.to_bits() - INTEGER.to_bits()) * width as u32
-                + (x0.to_bits() - INTEGER.to_bits());
+            let x0 = (u - 0.5).max(first).min(last_u) + ROUNDING;
+            let y0 = (v - 0.5).max(first).min(last_v) + ROUNDING;
+            fu[k] = (u - (x0 - ROUNDING)).clamp(0.0, 1.0);
+            fv[k] = (v - (y0 - ROUNDING)).clamp(0.0, 1.0);
+            index[k] = (y0.to_bits() - ROUNDING.to_bits()) * width as u32
+                + (x0.to_bits() - ROUNDING.to_bits());
         }
-        match more {
+        match margin {
             0 => self.bilinear(&index, [&fu, &fv], values),
             _ => self.bicubic(&index, [&fu, &fv], values),
         }
@@ -177,7 +181,7 @@ impl<'a> SampledFrame<'a> {
         }
     }
 
-    /// What the picture shows at the fractions `fu`, `fv` from the pixels at `index` to the next.
+    /// Bilinear interpolation at the fractions `fu`, `fv` from the pixels at `index` to the next.
     #[inline(always)]
     fn bilinear(&self, index: &Indices, [fu, fv]: [&Plane; 2], values: &mut Plane) {
         let (data, width) = (self.image.data(), self.image.width());
@@ -194,7 +198,7 @@ impl<'a> SampledFrame<'a> {
         }
     }
 
-    /// The same by cubics: of four rows first, then of what they make of four columns.
+    /// Bicubic interpolation, over four rows first and then over four columns.
     #[inline(always)]
     fn bicubic(&self, index: &Indices, [fu, fv]: [&Plane; 2], values: &mut Plane) {
         let (data, width) = (self.image.data(), self.image.width());
@@ -228,14 +232,14 @@ impl<'a> SampledFrame<'a> {
 mod tests {
     use super::*;
     use crate::camera::{KannalaBrandt, Lens};
-    use crate::refine::parameters::calibration::{Calibration, Kappa, LENS};
+    use crate::refine::parameters::calibration::{Calibration, INTRINSIC_PARAMETERS, Kappa};
     use crate::refine::tiles::grid::{AREA, SIDE, TileId, WallGrid};
     use crate::surface::{Circle, Surface, WallPoint};
     use crate::trajectory::so3;
 
-    /// The wall point that a pixel shows, against central differences over the camera's unknowns.
+    /// Central differences over the camera's parameters and the readout time.
     #[test]
-    fn the_wall_follows_the_lens() {
+    fn shared_jacobian_matches_central_differences() {
         let circle = Circle::new(3.0).unwrap();
         let calibration = Calibration::none(&Camera {
             lens: Lens::radial(-0.1, 0.02),
@@ -252,31 +256,36 @@ mod tests {
             omega_rad: Vector3::new(0.1, 0.5, -0.2),
             nu_m: Vector3::new(0.3, -0.1, 0.2),
         };
-        let view = SampledFrame::new(&image, camera.at_level(1), &estimate);
+        let frame = SampledFrame::new(&image, camera.at_level(1), &estimate);
         let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
         let wall_of = |camera: &Camera, pixel: &nalgebra::Vector2<f64>| {
             let ray = pose.r_wc * camera.ray(pixel.x, pixel.y).unwrap();
             let start = pose.to_world(&camera.origin(pixel.y));
             circle.hit(&start, &ray).unwrap().wall
         };
-        let seen = wall_of(&camera, &nalgebra::Vector2::new(130.0, 25.0));
+        let observed = wall_of(&camera, &nalgebra::Vector2::new(130.0, 25.0));
         let (width, height) = grid.tile_size_m();
         let tile = TileId {
-            column: (seen.s_m / width) as i64,
-            row: (seen.h_m / height) as i64,
+            column: (observed.s_m / width) as i64,
+            row: (observed.h_m / height) as i64,
         };
         let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
         let pixel = camera.project(&pose.to_camera(&points.centre.x_w)).unwrap();
-        let analytic = view.shared_jacobian(&points, &view.wall_jacobian(&points), &camera, &rate);
+        let analytic =
+            frame.shared_jacobian(&points, &frame.wall_jacobian(&points), &camera, &rate);
         let step = 1e-6;
-        for k in 0..=LENS {
+        for k in 0..=INTRINSIC_PARAMETERS {
             let moved = |amount: f64| {
                 let mut kappa = Kappa::zeros();
-                if k < LENS {
+                if k < INTRINSIC_PARAMETERS {
                     kappa[k] = amount;
                 }
                 let camera = calibration.camera(&kappa).unwrap();
-                let readout_s = if k == LENS { amount } else { 0.0 };
+                let readout_s = if k == INTRINSIC_PARAMETERS {
+                    amount
+                } else {
+                    0.0
+                };
                 wall_of(&camera.with_sweep(&rate.scaled(readout_s)), &pixel)
             };
             let (plus, minus) = (moved(step), moved(-step));
@@ -287,30 +296,30 @@ mod tests {
         }
     }
 
-    /// A frame whose grey value is a linear function of the pixel: either interpolation must return
-    /// it exactly.
+    /// A frame whose grey value is a linear function of the pixel, which both interpolations
+    /// reproduce exactly.
     #[test]
-    fn samples_are_where_the_camera_projects_them() {
+    fn samples_are_taken_where_the_camera_projects_them() {
         let straight = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
-        sampled_where_projected(straight);
+        assert_sampled_where_projected(straight);
         let fisheye = KannalaBrandt::new([-0.01, 0.005, -0.004, 0.0007]);
         for lens in [Lens::radial(-0.1, 0.02), Lens::KannalaBrandt(fisheye)] {
             let camera = Camera { lens, ..straight };
-            sampled_where_projected(camera);
-            sampled_where_projected(camera.with_sweep(&Sweep {
+            assert_sampled_where_projected(camera);
+            assert_sampled_where_projected(camera.with_sweep(&Sweep {
                 omega_rad: Vector3::new(0.01, 0.03, -0.01),
                 nu_m: Vector3::new(0.001, -0.002, 0.001),
             }));
         }
     }
 
-    fn sampled_where_projected(camera: Camera) {
+    fn assert_sampled_where_projected(camera: Camera) {
         for interpolation in [Interpolation::Bilinear, Interpolation::Bicubic] {
-            interpolated_where_projected(camera, interpolation);
+            assert_interpolated_where_projected(camera, interpolation);
         }
     }
 
-    fn interpolated_where_projected(camera: Camera, interpolation: Interpolation) {
+    fn assert_interpolated_where_projected(camera: Camera, interpolation: Interpolation) {
         let circle = Circle::new(3.0).unwrap();
         let data = (0..160 * 120)
             .map(|k| 0.5 * (k % 160) as f32 + 1.5 * (k / 160) as f32)
@@ -322,7 +331,7 @@ mod tests {
         ));
         estimate.log_gain = 0.2;
         estimate.bias = 3.0;
-        let view = SampledFrame::new(&image, camera, &estimate).interpolated(interpolation);
+        let frame = SampledFrame::new(&image, camera, &estimate).with_interpolation(interpolation);
         let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
         let hit = circle
             .hit(&estimate.pose.t_wc, &(estimate.pose.r_wc * Vector3::z()))
@@ -335,7 +344,7 @@ mod tests {
         let points = TilePoints::new(&grid, &circle, tile, &mut Vec::new());
         let mut values = ZERO;
         let shade = 0.5;
-        view.sample(&points, shade, &mut values);
+        frame.sample(&points, shade, &mut values);
         let centre = grid.centre(tile);
         for (k, value) in values[..AREA].iter().enumerate() {
             let (i, j) = ((k % SIDE) as f64 - 4.5, (k / SIDE) as f64 - 4.5);

@@ -1,24 +1,23 @@
-//! The lattice of wall samples, cut into square tiles.
+//! Lattice of wall samples in square tiles.
 
 use crate::surface::{Footprint, Surface, WallFrame, WallPoint};
 use nalgebra::Vector3;
 
 /// Samples along the side of a tile.
 pub const TILE: usize = 8;
-/// Samples along the side of a tile with the ring that its gradients need.
+/// Samples along the side of a tile with its ring, which the gradients need.
 pub const SIDE: usize = TILE + 2;
 /// Samples of a tile with its ring.
 pub const AREA: usize = SIDE * SIDE;
-/// Values that vector instructions work on at once; sums run in as many lanes, whatever the
-/// processor has.
+/// Number of values in a vector; sums run in as many lanes, whatever the processor has.
 pub const LANES: usize = 8;
-/// A value at every sample of a tile with its ring, row by row (s runs fastest), in whole vectors:
-/// the last few repeat the tile's middle and count for nothing.
+/// A value at every sample of a tile with its ring, row by row (s runs fastest), padded to whole
+/// vectors; the padding repeats the tile's centre and has no weight.
 pub type Plane = [f32; AREA.next_multiple_of(LANES)];
-/// Zero everywhere.
+/// A plane of zeros.
 pub const ZERO: Plane = [0.0; AREA.next_multiple_of(LANES)];
 
-/// Tiles along the side of a block: the unit of parallel work, about a hundredth of a frame.
+/// Tiles along the side of a block, the unit of parallel work: about a hundredth of a frame.
 pub const BLOCK: i64 = 8;
 
 /// A regular lattice on the unrolled wall; a whole number of tiles goes around the section.
@@ -30,11 +29,11 @@ pub struct WallGrid {
     pub spacing_h_m: f64,
     /// Tiles around the section.
     pub columns: i64,
-    /// Samples per pixel along each axis, where the lattice was made for.
+    /// Samples per pixel along each axis, at the distance that the lattice was laid out for.
     pub density: f64,
 }
 
-/// Name of a tile: column around the section, row along the axis (row 0 begins at h = 0).
+/// Index of a tile: column around the section, row along the axis (row 0 begins at h = 0).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TileId {
     /// `0..columns`.
@@ -50,8 +49,8 @@ impl TileId {
     }
 }
 
-/// Two numbers from 0 to 1 for a column and row, of a sequence that fills the square evenly:
-/// `frac(row φ⁻¹ + column φ⁻²)` and its mirror with φ³ = φ + 1.
+/// Quasi-random point of the unit square for a column and row:
+/// `frac(row φ⁻¹ + column φ⁻²)` and its mirror, with φ³ = φ + 1.
 ///
 /// Source: M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
 pub fn fractions(column: i64, row: i64) -> [f64; 2] {
@@ -64,7 +63,7 @@ pub fn fractions(column: i64, row: i64) -> [f64; 2] {
 }
 
 impl WallGrid {
-    /// A lattice with about `density` samples to a pixel's width of `pixel_size_m` on the wall.
+    /// A lattice with about `density` samples per pixel width of `pixel_size_m` on the wall.
     pub fn new(surface: &dyn Surface, pixel_size_m: f64, density: f64) -> Self {
         let spacing_m = pixel_size_m / density;
         let tiles = surface.perimeter_m() / (spacing_m * TILE as f64);
@@ -85,7 +84,7 @@ impl WallGrid {
         )
     }
 
-    /// The tile of this lattice around the middle of a tile of another lattice on the same wall.
+    /// The tile of this lattice that contains the centre of a tile of another one on the same wall.
     pub fn tile_around(&self, other: &Self, tile: &TileId) -> TileId {
         let (width, height) = self.tile_size_m();
         let (other_width, other_height) = other.tile_size_m();
@@ -96,11 +95,11 @@ impl WallGrid {
         }
     }
 
-    /// The middle of a tile, a fraction of a sample off the regular place.
+    /// The centre of a tile, shifted from the regular position by [`fractions`] of a sample.
     ///
-    /// Walls repeat in step with a regular lattice: courses of bricks run along its rows, so that
-    /// every joint would be sampled at the same fraction everywhere, and what falls between the
-    /// samples would not average out. The fractions are [`fractions`].
+    /// Walls are periodic along the lattice: courses of bricks run along its rows, so that a
+    /// regular lattice would sample every joint at the same fraction, and interpolation errors
+    /// would not average out.
     pub fn centre(&self, tile: TileId) -> WallPoint {
         let (width, height) = self.tile_size_m();
         let (column, row) = (tile.column as f64, tile.row as f64);
@@ -111,7 +110,7 @@ impl WallGrid {
         }
     }
 
-    /// Coordinates along s and h of a tile's samples, ring included.
+    /// Coordinates along s and h of a tile's samples, ring included, metres.
     fn samples(&self, tile: TileId) -> ([f64; SIDE], [f64; SIDE]) {
         let centre = self.centre(tile);
         let reach = 0.5 * (SIDE - 1) as f64;
@@ -121,7 +120,7 @@ impl WallGrid {
         )
     }
 
-    /// The wall that a tile covers with its ring.
+    /// The part of the wall that a tile covers with its ring.
     pub fn area(&self, tile: TileId) -> Footprint {
         let (s, h) = self.samples(tile);
         Footprint {
@@ -132,18 +131,18 @@ impl WallGrid {
         }
     }
 
-    /// The four corners of a tile with its ring, in `points`.
+    /// Writes the four corners of a tile with its ring into `points`, metres.
     pub fn corners(&self, surface: &dyn Surface, tile: TileId, points: &mut Vec<Vector3<f64>>) {
         let (s, h) = self.samples(tile);
         surface.lattice(&[s[0], s[SIDE - 1]], &[h[0], h[SIDE - 1]], points);
     }
 }
 
-/// World coordinates of the samples of one tile with its ring, relative to its middle (so that
-/// single precision is enough).
+/// World coordinates of the samples of one tile with its ring, relative to its centre, so that
+/// single precision suffices.
 #[derive(Clone, Debug)]
 pub struct TilePoints {
-    /// The wall at the tile's middle.
+    /// The wall at the tile's centre.
     pub centre: WallFrame,
     /// x of every sample minus the centre's, metres.
     pub dx: Plane,
@@ -154,7 +153,7 @@ pub struct TilePoints {
 }
 
 impl TilePoints {
-    /// The samples of `tile`; `scratch` is room for the work.
+    /// The samples of `tile`; `scratch` is reusable memory.
     pub fn new(
         grid: &WallGrid,
         surface: &dyn Surface,
@@ -195,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_lies_in_one_of_a_coarser_lattice() {
+    fn tile_is_found_in_a_coarser_lattice() {
         let circle = Circle::new(3.0).unwrap();
         let (fine, coarse) = (
             WallGrid::new(&circle, 0.02, 2.0),
@@ -207,7 +206,7 @@ mod tests {
             let around = coarse.tile_around(&fine, &tile);
             assert!((0..coarse.columns).contains(&around.column));
             let (a, b) = (fine.centre(tile), coarse.centre(around));
-            // Middles are moved by up to a sample from their regular places.
+            // Centres are shifted by up to a sample from their regular positions.
             let along = shortest_arc(a.s_m - b.s_m, circle.perimeter_m()).abs();
             assert!(along < 0.5 * width + 0.02, "{along}");
             assert!((a.h_m - b.h_m).abs() < 0.5 * height + 0.02);
@@ -218,9 +217,9 @@ mod tests {
         );
     }
 
-    /// No gap and no overlap of more than a sample between neighbours, across the wrap too.
+    /// Gaps and overlaps of neighbours stay below a sample, across the seam of the section too.
     #[test]
-    fn tiles_lie_side_by_side_within_a_sample() {
+    fn neighbouring_tiles_adjoin_within_a_sample() {
         let circle = Circle::new(3.0).unwrap();
         let grid = WallGrid::new(&circle, 0.02, 2.0);
         let (width, height) = grid.tile_size_m();
@@ -239,9 +238,9 @@ mod tests {
         }
     }
 
-    /// Any few tiles in a row or column see the wall at well-spread fractions of a sample.
+    /// Tiles of a row or column sample the wall at evenly distributed fractions.
     #[test]
-    fn fractions_of_a_sample_are_spread_evenly() {
+    fn fractions_are_evenly_distributed() {
         let circle = Circle::new(3.0).unwrap();
         let grid = WallGrid::new(&circle, 0.02, 2.0);
         let fraction = |column: i64, row: i64| {

@@ -1,8 +1,7 @@
-//! What a frame shows between its pixels.
+//! Interpolation between a frame's pixels, and the correlation of noise that it causes.
 //!
-//! Along each axis a sample at the fraction f from one pixel to the next is `Σ_i K(i − f) I_i`.
-//! Sharp edges are where it matters: what a sample shows of one depends on f, and that passes for a
-//! displacement of some hundredths of a pixel.
+//! Along each axis a sample at the fraction f from one pixel to the next is `Σ_i K(i − f) I_i`. At
+//! sharp edges its value depends on f, which mimics a displacement of some hundredths of a pixel.
 //!
 //! Source: R. G. Keys, "Cubic convolution interpolation for digital image processing", IEEE
 //! Transactions on Acoustics, Speech, and Signal Processing 29(6), 1981.
@@ -10,7 +9,7 @@
 use crate::numerics::kernel;
 use serde::{Deserialize, Serialize};
 
-/// The kernel K.
+/// Interpolation kernel K.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Interpolation {
     /// A triangle: two pixels along each axis.
@@ -19,11 +18,11 @@ pub enum Interpolation {
     Bicubic,
 }
 
-/// Steps of an integral over a pixel.
+/// Number of steps of an integral over a pixel.
 const STEPS: usize = 256;
 
 impl Interpolation {
-    /// The one that panoramas are drawn with, which has `K(x)` and how far it reaches.
+    /// The kernel `K(x)` and its reach.
     fn kernel(self) -> kernel::Interpolation {
         match self {
             Self::Bilinear => kernel::Interpolation::Bilinear,
@@ -31,14 +30,16 @@ impl Interpolation {
         }
     }
 
-    /// Covariance, along one axis, of samples `apart_px` pixels apart in a picture of white noise
-    /// of variance 1, on average over all fractions: `∫ K(x) K(x + d) dx`. So the variance of a
-    /// sample is the square of this at 0; bilinear: 4/9.
-    pub fn autocorrelation(self, apart_px: f64) -> f64 {
+    /// Covariance along one axis of two samples at a distance d in an image of white noise of
+    /// variance 1, on average over all fractions: `β(d) = ∫ K(x) K(x + d) dx`.
+    ///
+    /// `distance_px`: d. The variance of a sample in both axes is `β(0)²`; bilinear: 4/9.
+    pub fn autocorrelation(self, distance_px: f64) -> f64 {
         let kernel = self.kernel();
         let steps = (2.0 * kernel.reach()) as usize * STEPS;
         let at = |k: usize| (k as f64 + 0.5) / STEPS as f64 - kernel.reach();
-        let products = (0..steps).map(|k| kernel.weight(at(k)) * kernel.weight(at(k) + apart_px));
+        let products =
+            (0..steps).map(|k| kernel.weight(at(k)) * kernel.weight(at(k) + distance_px));
         products.sum::<f64>() / STEPS as f64
     }
 }
@@ -61,7 +62,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_are_the_kernels() {
+    fn cubic_weights_are_the_kernel() {
         for k in 0..=10 {
             let f = k as f32 / 10.0;
             for (i, weight) in cubic_weights(f).into_iter().enumerate() {
@@ -71,9 +72,9 @@ mod tests {
         }
     }
 
-    /// A triangle's autocorrelation is the cubic B-spline; and a cubic leaves more of the noise.
+    /// A triangle's autocorrelation is the cubic B-spline; the cubic passes more noise.
     #[test]
-    fn noise_correlates_as_the_kernel_with_itself() {
+    fn noise_correlation_is_the_autocorrelation_of_the_kernel() {
         let bilinear = |d: f64| Interpolation::Bilinear.autocorrelation(d);
         let expected = [
             (0.0, 2.0 / 3.0),
@@ -81,8 +82,8 @@ mod tests {
             (1.0, 1.0 / 6.0),
             (2.0, 0.0),
         ];
-        for (apart, value) in expected {
-            assert!((bilinear(apart) - value).abs() < 1e-5, "{apart}");
+        for (distance, value) in expected {
+            assert!((bilinear(distance) - value).abs() < 1e-5, "{distance}");
         }
         // Σ_i K(i − f)² over many fractions.
         let squares = (0..1000).map(|k| {

@@ -1,13 +1,16 @@
-//! The noise of residuals and the robust loss that goes with it.
+//! Noise model of the residuals, robust loss, and robust statistics.
 
 use crate::frames::MAD_TO_SIGMA;
+use crate::refine::thresholds::residual_weighting::{
+    MIN_RESIDUALS_PER_BIN, MIN_SIGMA_GREY, TUKEY_CUTOFF_SIGMAS,
+};
 
-/// Residuals' variance at a wall point whose texture changes by g grey levels from one sample to
-/// the next: `v(g) = σ² + κ g²`.
+/// Variance of the residuals at a wall sample with the texture gradient g (grey levels per sample):
+/// `v(g) = σ² + κ g²`.
 ///
-/// σ is the sensor's noise. κ stands for what sampling adds where the picture is steep: aliasing,
-/// differences of blur between near and oblique views, interpolation, and the misalignment still to
-/// be removed.
+/// σ² is the sensor's noise in an interpolated sample. κ covers the errors that grow with the
+/// gradient: aliasing, differences of blur between near and oblique frames, interpolation, and the
+/// misalignment still to be removed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseModel {
     /// σ², grey levels².
@@ -27,11 +30,11 @@ impl NoiseModel {
 /// Tukey's biweight of a residual e with variance v: `ρ = c²/6 (1 − (1 − e²/c²)³)`, weight
 /// `ω = ρ'(e)/e = (1 − e²/c²)²`, both constant beyond `c² = 36 v`.
 ///
-/// Something that moved or a wet patch costs `c²/6` and pulls nothing at all. (With a loss whose
-/// weight only fades, glints on a faint wall, fifty times as steep as its texture, stiffen the
-/// normal matrix so much that steps come to nothing.) With c at six times the residuals' own
-/// standard deviation it loses about 2 % of the information in Gaussian noise. Polynomial, so it
-/// vectorises. Arguments: `e²` and `1/v`.
+/// A moved object or a wet patch costs `c²/6` and exerts no force at all. (A loss whose weight
+/// decays slowly gives glints on a faint wall, fifty times as steep as its texture, so much weight
+/// in the normal matrix that the steps vanish.) With c at six standard deviations it loses about 2
+/// % of the information in Gaussian noise. It is a polynomial, so it vectorises. Arguments: `e²`
+/// and `1/v`.
 ///
 /// Source: A. E. Beaton and J. W. Tukey, "The fitting of power series, meaning polynomials,
 /// illustrated on band-spectroscopic data", Technometrics 16(2), 1974.
@@ -39,26 +42,26 @@ impl NoiseModel {
 pub struct Loss;
 
 /// `1/(c²/v)`.
-const SHARPNESS: f32 = 1.0 / 36.0;
+const INVERSE_SQUARE_CUTOFF: f32 = 1.0 / (TUKEY_CUTOFF_SIGMAS * TUKEY_CUTOFF_SIGMAS);
 
 impl Loss {
     /// `ω(e)`.
     #[inline(always)]
     pub fn weight(square: f32, precision: f32) -> f32 {
-        let left = (1.0 - SHARPNESS * square * precision).max(0.0);
+        let left = (1.0 - INVERSE_SQUARE_CUTOFF * square * precision).max(0.0);
         left * left
     }
 
     /// `ρ(e)/v`.
     #[inline(always)]
-    pub fn share(square: f32, precision: f32) -> f32 {
-        let left = (1.0 - SHARPNESS * square * precision).max(0.0);
-        (1.0 - left * left * left) * (1.0 / (6.0 * SHARPNESS))
+    pub fn relative_loss(square: f32, precision: f32) -> f32 {
+        let left = (1.0 - INVERSE_SQUARE_CUTOFF * square * precision).max(0.0);
+        (1.0 - left * left * left) * (1.0 / (6.0 * INVERSE_SQUARE_CUTOFF))
     }
 }
 
-/// Median of some values and their robust standard deviation: the median distance from it, as a
-/// Gaussian's σ. The values are lost; 0, 0 of none.
+/// Median and robust standard deviation of some values: `1.4826 · median |x − median|`. Reorders
+/// and overwrites the values; 0, 0 of none.
 pub fn median_and_sigma(values: &mut [f32]) -> (f32, f32) {
     let middle = values.len() / 2;
     if values.is_empty() {
@@ -72,9 +75,10 @@ pub fn median_and_sigma(values: &mut [f32]) -> (f32, f32) {
     (median, MAD_TO_SIGMA as f32 * deviation)
 }
 
-/// Robust correlation, −1 to 1, of pairs of values: with both scaled to robust σ 1,
-/// `(σ²(x + y) − σ²(x − y))/(σ²(x + y) + σ²(x − y))`. It is that of most pairs, whatever the rest
-/// shows; 0 of values without spread.
+/// Robust correlation of pairs of values, −1 to 1:
+/// `(σ²(x + y) − σ²(x − y))/(σ²(x + y) + σ²(x − y))` with x and y scaled to robust σ 1.
+///
+/// It is the correlation of the majority of the pairs; 0 of values without spread.
 ///
 /// Source: R. Gnanadesikan and J. R. Kettenring, "Robust estimates, residuals, and outlier
 /// detection with multiresponse data", Biometrics 28, 1972.
@@ -92,15 +96,14 @@ pub fn robust_correlation(pairs: &[(f32, f32)]) -> f64 {
     (sum - difference) / (sum + difference).max(f64::MIN_POSITIVE)
 }
 
-/// Gradients are told apart by half octaves from 1 grey level a sample up.
+/// Bins of the gradient: half octaves from 1 grey level per sample.
 const GRADIENT_BINS: usize = 14;
-/// Residuals by sixteen steps an octave from 0.01 grey levels up.
+/// Bins of the residual: sixteen per octave from [`FIRST_RESIDUAL_GREY`].
 const RESIDUAL_BINS: usize = 256;
-const LEAST_RESIDUAL: f32 = 0.01;
-/// σ never goes below this: rounding to 8 bits alone gives 0.29, less what averaging takes off it.
-const LEAST_SIGMA: f64 = 0.2;
+/// Upper limit of the first bin of the residual, grey levels.
+const FIRST_RESIDUAL_GREY: f32 = 0.01;
 
-/// Counts of residual magnitudes by steepness of the texture, from which the noise model is read.
+/// Counts of residual magnitudes by gradient of the texture, to which the noise model is fitted.
 #[derive(Clone, Debug)]
 pub struct NoiseHistogram {
     counts: Vec<u64>,
@@ -117,10 +120,10 @@ impl Default for NoiseHistogram {
 impl NoiseHistogram {
     /// Counts a residual (grey levels) where the texture's gradient squared is `gradient_square`.
     pub fn add(&mut self, residual: f32, gradient_square: f32) {
-        // A float's exponent is the octave, and the first bits of its fraction the step.
+        // A float's exponent is the octave, and the first bits of its mantissa the step.
         let octave = |value: f32| (value.to_bits() >> 23) as i32 - 127;
         let row = (octave(gradient_square) + 1).clamp(0, GRADIENT_BINS as i32 - 1) as usize;
-        let size = (residual.abs() / LEAST_RESIDUAL).max(1.0);
+        let size = (residual.abs() / FIRST_RESIDUAL_GREY).max(1.0);
         let steps = (size.to_bits() >> 19) as usize - (127 << 4);
         let column = steps.min(RESIDUAL_BINS - 1);
         self.counts[row * RESIDUAL_BINS + column] += 1;
@@ -141,7 +144,7 @@ impl NoiseHistogram {
         let mut m = [0.0f64; 5];
         for (row, counts) in self.counts.chunks_exact(RESIDUAL_BINS).enumerate() {
             let total: u64 = counts.iter().sum();
-            if total < 100 {
+            if total < MIN_RESIDUALS_PER_BIN {
                 continue;
             }
             let x = if row == 0 {
@@ -150,7 +153,7 @@ impl NoiseHistogram {
                 1.5 * 2f64.powi(row as i32 - 1)
             };
             let y = (MAD_TO_SIGMA * median(counts, total))
-                .max(LEAST_SIGMA)
+                .max(MIN_SIGMA_GREY)
                 .powi(2);
             let w = total as f64 / (y * y);
             for (sum, term) in m.iter_mut().zip([1.0, x, x * x, y, x * y]) {
@@ -169,19 +172,20 @@ impl NoiseHistogram {
             1.0
         };
         NoiseModel {
-            floor: floor.max(LEAST_SIGMA * LEAST_SIGMA) as f32,
+            floor: floor.max(MIN_SIGMA_GREY * MIN_SIGMA_GREY) as f32,
             steepness: steepness as f32,
         }
     }
 }
 
+/// Median of the residual magnitudes of one gradient bin.
 fn median(counts: &[u64], total: u64) -> f64 {
     let mut below = 0;
     for (column, count) in counts.iter().enumerate() {
         if below + count > total / 2 {
             let part = (total / 2 - below) as f64 / *count as f64;
             let octave = 2f64.powi(column as i32 / 16);
-            return f64::from(LEAST_RESIDUAL)
+            return f64::from(FIRST_RESIDUAL_GREY)
                 * octave
                 * (1.0 + ((column % 16) as f64 + part) / 16.0);
         }
@@ -197,11 +201,11 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
 
     #[test]
-    fn the_weight_is_the_slope_over_the_residual() {
+    fn weight_is_the_derivative_of_the_loss_over_the_residual() {
         for e in [0.1f32, 1.0, 5.0, 20.0, 80.0] {
             let precision = 0.25;
             let step = 1e-2 * e.max(1.0);
-            let value = |e: f32| Loss::share(e * e, precision) / precision;
+            let value = |e: f32| Loss::relative_loss(e * e, precision) / precision;
             let slope = (value(e + step) - value(e - step)) / (2.0 * step);
             assert!(
                 (slope / e - Loss::weight(e * e, precision)).abs() < 2e-3,
@@ -211,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn the_fit_finds_the_noise_in_spite_of_outliers() {
+    fn fit_finds_the_noise_in_spite_of_outliers() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
         let mut histogram = NoiseHistogram::default();
         for k in 0..400_000u32 {
@@ -225,9 +229,9 @@ mod tests {
         assert!((model.steepness / 0.01 - 1.0).abs() < 0.2, "{model:?}");
     }
 
-    /// Both values share a Gaussian with correlation 0.8, and a tenth of them is garbage.
+    /// Gaussian pairs with correlation 0.8, a tenth of them replaced by outliers.
     #[test]
-    fn a_robust_correlation_is_that_of_most() {
+    fn robust_correlation_is_that_of_the_majority() {
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(5);
         let mut draw = || -> f32 { StandardNormal.sample(&mut rng) };
         let pairs: Vec<(f32, f32)> = (0..20_000)

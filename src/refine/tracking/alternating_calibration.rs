@@ -11,13 +11,14 @@
 
 use crate::camera::Camera;
 use crate::progress::Progress;
-use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::model::rejection::RejectionReason;
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::calibration::Kappa;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
+use crate::refine::samples::sampling::Sampling;
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
 use crate::refine::tracking::shading_correction::{MOST_FRAMES, correct_until_settled};
@@ -104,7 +105,7 @@ impl AlternatingCalibration {
         mut between: impl FnMut(&Self) -> Result<(), ProblemError>,
     ) -> Result<FrameStates, ProblemError> {
         let mut scene = EstimationContext {
-            calibration: scene.calibration.of_camera(),
+            calibration: scene.calibration.intrinsics_only(),
             ..*scene
         }
         .at(self.kappa);
@@ -121,15 +122,15 @@ impl AlternatingCalibration {
             }
             progress.finish();
             let mut tracked = self.tracking.clone().finish();
-            if !scene.calibration.any() {
+            if !scene.calibration.has_free_parameters() {
                 return Ok(tracked);
             }
             let before = scene.camera;
             scene = scene.at(tracked.kappa);
             let level = options.handover_level(scene.camera.shorter_side());
-            let problem = Problem::new(&scene, Sampling::of(level), tracked.window())?;
+            let problem = PhotometricProblem::new(&scene, Sampling::of(level), tracked.window())?;
             if problem.tiles() > 0 {
-                let solution = solve(problem.calibrating(), stopping)?;
+                let solution = solve(problem.with_shared_parameters(), stopping)?;
                 tracked.estimates = solution.estimates;
                 tracked.kappa = solution.kappa;
             }

@@ -8,7 +8,7 @@ use crate::refine::model::context::EstimationContext;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::samples::footprints::reach_m;
-use crate::refine::samples::point_sampler::{Sampler, Spot};
+use crate::refine::samples::point_sampler::{ImagePoint, PointSampler};
 use crate::surface::{Footprint, WallPoint, viewing_distance};
 use crate::trajectory::Pose;
 use nalgebra::Vector3;
@@ -160,7 +160,7 @@ impl UnwrappedFrame {
     ) -> UnwrappedSampler<'_> {
         UnwrappedSampler {
             unwrapped: self,
-            sampler: Sampler::new(&self.camera, pose, origin),
+            sampler: PointSampler::new(&self.camera, pose, origin),
             variance: (scene.noise * scene.noise * noise_at_level(self.level)) as f32,
         }
     }
@@ -171,8 +171,8 @@ impl UnwrappedFrame {
         pose: &Pose,
         origin: &Vector3<f64>,
     ) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
-        let sampler = Sampler::new(&self.camera, pose, origin);
-        move |point| sampler.at(point)?.known(&self.local.contrast)
+        let sampler = PointSampler::new(&self.camera, pose, origin);
+        move |point| sampler.project(point)?.sample_valid(&self.local.contrast)
     }
 
     /// Its grey values, likewise.
@@ -181,8 +181,8 @@ impl UnwrappedFrame {
         pose: &Pose,
         origin: &Vector3<f64>,
     ) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
-        let sampler = Sampler::new(&self.camera, pose, origin);
-        move |point| sampler.at(point)?.known(self.picture())
+        let sampler = PointSampler::new(&self.camera, pose, origin);
+        move |point| sampler.project(point)?.sample_valid(self.picture())
     }
 
     fn picture(&self) -> &GreyImage {
@@ -193,7 +193,7 @@ impl UnwrappedFrame {
 /// A frame on the wall, ready to be looked at.
 pub struct UnwrappedSampler<'a> {
     unwrapped: &'a UnwrappedFrame,
-    sampler: Sampler,
+    sampler: PointSampler,
     /// Variance of a pixel's noise.
     variance: f32,
 }
@@ -203,35 +203,35 @@ impl UnwrappedSampler<'_> {
     /// the frame has a value.
     #[inline]
     pub fn contrast_and_noise(&self, point: &[f32; 3]) -> Option<(f32, f32)> {
-        let spot = self.sampler.at(point)?;
-        let contrast = spot.known(&self.unwrapped.local.contrast)?;
+        let spot = self.sampler.project(point)?;
+        let contrast = spot.sample_valid(&self.unwrapped.local.contrast)?;
         Some((contrast, self.noise(&spot)))
     }
 
     /// Local contrast, the variance of its noise, and the detail in grey levels, likewise.
     #[inline]
     pub fn contrast_and_detail(&self, point: &[f32; 3]) -> Option<(f32, f32, f32)> {
-        let spot = self.sampler.at(point)?;
-        let contrast = spot.known(&self.unwrapped.local.contrast)?;
-        let detail = spot.of(&self.unwrapped.local.detail);
+        let spot = self.sampler.project(point)?;
+        let contrast = spot.sample_valid(&self.unwrapped.local.contrast)?;
+        let detail = spot.sample(&self.unwrapped.local.detail);
         Some((contrast, self.noise(&spot), detail))
     }
 
     /// Local contrast, the variance of its noise, and the grey value, likewise.
     #[inline]
     fn contrast_and_grey(&self, point: &[f32; 3]) -> Option<(f32, f32, f32)> {
-        let spot = self.sampler.at(point)?;
-        let contrast = spot.known(&self.unwrapped.local.contrast)?;
+        let spot = self.sampler.project(point)?;
+        let contrast = spot.sample_valid(&self.unwrapped.local.contrast)?;
         Some((
             contrast,
             self.noise(&spot),
-            spot.of(self.unwrapped.picture()),
+            spot.sample(self.unwrapped.picture()),
         ))
     }
 
     #[inline]
-    fn noise(&self, spot: &Spot) -> f32 {
-        self.variance * spot.of(&self.unwrapped.local.sensitivity)
+    fn noise(&self, spot: &ImagePoint) -> f32 {
+        self.variance * spot.sample(&self.unwrapped.local.sensitivity)
     }
 }
 

@@ -2,13 +2,14 @@
 //! verdict.
 
 use crate::camera::Sweep;
-use crate::refine::model::context::{EstimationContext, FrameWindow, Sampling};
+use crate::refine::model::context::{EstimationContext, FrameWindow};
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::model::rejection::RejectionReason;
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::samples::footprints::footprint;
+use crate::refine::samples::sampling::Sampling;
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
 use crate::refine::tracking::correlation_search::{
@@ -169,7 +170,7 @@ pub fn register_frame(
             estimates: &estimates,
             compared: Cow::Owned(compared),
         };
-        let problem = Problem::new(scene, Sampling::of(level), members)?;
+        let problem = PhotometricProblem::new(scene, Sampling::of(level), members)?;
         if problem.tiles() == 0 {
             return Ok(estimate);
         }

@@ -19,11 +19,12 @@
 //! different places).
 
 use crate::frames::{Agreement, MAD_TO_SIGMA, SHADING_TERMS, Shading, shading_terms};
-use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
+use crate::refine::samples::sampling::Sampling;
 use crate::refine::solver::neighbourhood::Neighbourhood;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -99,19 +100,20 @@ pub fn correct(
     let first = count.saturating_sub(MOST_FRAMES) / 2;
     let run = first..(first + MOST_FRAMES).min(count);
     let members = tracked.window_of(run.clone(), run.clone());
-    let problem = Problem::new(scene, Sampling::of(level), members)?;
+    let problem = PhotometricProblem::new(scene, Sampling::of(level), members)?;
     let size = (scene.camera.width as usize, scene.camera.height as usize);
-    let tiles = problem.at_tiles(TILES, |tiles: &mut Vec<Vec<Glimpse>>, look| {
-        let means = look.work.means(look.points, look.seen());
+    let tiles = problem.gather_from_tiles(TILES, |tiles: &mut Vec<Vec<Glimpse>>, look| {
+        let means = look.workspace.mean_values(look.points, look.observations());
         let bright = look.observers.iter().zip(means);
         let bright = bright.filter(|(_, mean)| *mean > LEAST_GREY);
         let glimpses = bright.filter_map(|(observer, mean)| {
-            let frame = look.frames[observer.frame as usize];
+            let frame = look.participants[observer.frame as usize];
             let pose = &tracked.estimates[run.start + frame].pose;
             let pixel = problem
                 .camera_of(frame)
                 .project(&pose.to_camera(&look.points.centre.x_w))?;
-            let gain = f64::from(look.views[observer.frame as usize].gain() * observer.shade);
+            let gain =
+                f64::from(look.sampled_frames[observer.frame as usize].gain() * observer.shade);
             Some(Glimpse {
                 frame,
                 terms: shading_terms(&pixel, size),
@@ -275,7 +277,7 @@ impl Glimpse {
 mod tests {
     use super::*;
     use crate::frames::{FrameCache, GreyImage, Pyramid};
-    use crate::refine::test_scene::{prior, scene, tracked};
+    use crate::refine::test_scene::{frame_states, independent_prior, test_context};
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::spiral;
     use nalgebra::Vector2;
@@ -296,9 +298,9 @@ mod tests {
             Pyramid::new(GreyImage::new(w, h, lit.collect()), 1)
         });
         let frames = FrameCache::of_pyramids(pictures.collect());
-        let prior = prior(&wall.poses);
-        let scene = scene(&wall, &frames, &prior);
-        let tracked = tracked(&wall.poses);
+        let prior = independent_prior(&wall.poses);
+        let scene = test_context(&wall, &frames, &prior);
+        let tracked = frame_states(&wall.poses);
         let any = correct(&scene, &RefineOptions::default(), &tracked).unwrap();
         assert_eq!(any, frames.shading().is_some());
         let shading = frames.shading()?;

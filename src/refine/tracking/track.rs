@@ -11,7 +11,7 @@
 //! A frame that cannot be placed stays where the prior expects it, and no other is compared with
 //! it.
 
-use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::prior::predict;
 use crate::refine::model::problem_error::ProblemError;
@@ -19,11 +19,13 @@ use crate::refine::model::rejection::RejectionReason;
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::calibration::Kappa;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::samples::footprints::footprint;
-use crate::refine::samples::footprints::{FARTHEST, footprints};
+use crate::refine::samples::footprints::footprints;
+use crate::refine::samples::sampling::Sampling;
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
+use crate::refine::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
 use crate::refine::tracking::registration::{Expectation, Neighbours, register_frame};
 use crate::surface::Footprint;
 use crate::trajectory::{JitterModel, Pose};
@@ -204,7 +206,8 @@ fn solve_window(
 ) -> Result<f64, ProblemError> {
     let active = window.start + held..window.end;
     let members = tracked.window_of(window, active.clone());
-    let problem = Problem::new(scene, Sampling::of(level), members)?.calibrating();
+    let problem =
+        PhotometricProblem::new(scene, Sampling::of(level), members)?.with_shared_parameters();
     if problem.tiles() == 0 {
         return Ok(f64::INFINITY);
     }
@@ -220,7 +223,7 @@ fn solve_window(
 fn earliest_overlap(scene: &EstimationContext, footprints: &[Footprint]) -> usize {
     let last = footprints.len() - 1;
     let perimeter = scene.surface.perimeter_m();
-    (last.saturating_sub(FARTHEST)..last)
+    (last.saturating_sub(MAX_OVERLAP_DISTANCE_FRAMES)..last)
         .find(|k| footprints[*k].overlaps(&footprints[last], perimeter))
         .unwrap_or(last)
 }
@@ -244,9 +247,10 @@ pub fn expect(scene: &EstimationContext, k: usize, tracked: &FrameStates) -> Exp
 }
 
 fn expect_anywhere(scene: &EstimationContext, k: usize, tracked: &FrameStates) -> Expectation {
-    let metric = scene.calibration.metric(&scene.kappa);
-    let initial = |k: usize| metric.place_nominal(&scene.prior.initial[k]);
-    let around = k.saturating_sub(FARTHEST)..(k + FARTHEST).min(tracked.estimates.len());
+    let metric = scene.calibration.datum(&scene.kappa);
+    let initial = |k: usize| metric.to_nominal_tunnel(&scene.prior.initial[k]);
+    let around = k.saturating_sub(MAX_OVERLAP_DISTANCE_FRAMES)
+        ..(k + MAX_OVERLAP_DISTANCE_FRAMES).min(tracked.estimates.len());
     let inliers = around.filter(|i| *i != k && tracked.rejections[*i].is_none());
     match scene.prior.jitter.model {
         JitterModel::RandomWalk => match inliers.min_by_key(|i| i.abs_diff(k)) {
@@ -296,7 +300,8 @@ pub fn register_rejected(
         {
             continue;
         }
-        let run = k.saturating_sub(FARTHEST)..(k + FARTHEST).min(count);
+        let run = k.saturating_sub(MAX_OVERLAP_DISTANCE_FRAMES)
+            ..(k + MAX_OVERLAP_DISTANCE_FRAMES).min(count);
         let expected = expect(scene, k, tracked);
         let placed = tracked.inliers(&run);
         let neighbours = Neighbours {

@@ -45,15 +45,15 @@ use crate::refine::linear::bordered_system::{BorderBlock, SharedBlock};
 use crate::refine::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::refine::linear::selected_inverse::SelectedInverse;
 use crate::refine::linear::sparse_cholesky::FactorError;
-use crate::refine::parameters::calibration::LENS;
-use crate::refine::parameters::frame_estimate::{FrameEstimate, FrameStep, UNKNOWNS};
+use crate::refine::parameters::calibration::INTRINSIC_PARAMETERS;
+use crate::refine::parameters::frame_estimate::{FRAME_PARAMETERS, FrameEstimate, FrameStep};
 use crate::surface::{GaugeMotion, Surface, lens_jacobian, viewing_distance, wall_jacobian};
 use nalgebra::{Matrix6, Vector6};
 use serde::{Deserialize, Deserializer};
 
 /// Unknowns of a frame's pose, and of its exposure.
 const POSE: usize = 6;
-const EXPOSURE: usize = UNKNOWNS - POSE;
+const EXPOSURE: usize = FRAME_PARAMETERS - POSE;
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
 ///
@@ -217,7 +217,7 @@ fn trace_of_product(pattern: &Pattern, inverse: &SelectedInverse, blocks: &[Bloc
     for column in 0..pattern.frames() {
         for &row in pattern.rows(column) {
             let z = inverse.block(row, column);
-            if let Some((place, z)) = pattern.place(row, column).zip(z) {
+            if let Some((place, z)) = pattern.block_index(row, column).zip(z) {
                 // Off the diagonal each block stands for its transpose, too.
                 let times = if row == column { 1.0 } else { 2.0 };
                 trace += times * z.component_mul(&blocks[place]).sum();
@@ -274,8 +274,8 @@ pub fn frame_sigma(
             let mut variance = (a * covariance * a.transpose()).trace();
             if let Some((w, covariance)) = shared {
                 let c = lens_jacobian(pose, &a, camera, &(ray_c * hit.range));
-                let lens = covariance.fixed_rows::<LENS>(0);
-                let own = c * lens.fixed_columns::<LENS>(0) * c.transpose();
+                let lens = covariance.fixed_rows::<INTRINSIC_PARAMETERS>(0);
+                let own = c * lens.fixed_columns::<INTRINSIC_PARAMETERS>(0) * c.transpose();
                 let crossed = c * lens * w.fixed_rows::<6>(0).transpose() * a.transpose();
                 variance += own.trace() - 2.0 * crossed.trace();
             }
@@ -355,15 +355,17 @@ mod tests {
     fn the_factor_is_that_of_the_poses_with_the_exposures_eliminated() {
         let pattern = Pattern::new(2, [(0, 1)]);
         let matrix = |salt: f64| {
-            let n = 2 * UNKNOWNS;
+            let n = 2 * FRAME_PARAMETERS;
             let number = |r: usize, c: usize| (12.9898 * (r + n * c) as f64 + salt).sin();
             let root = DMatrix::from_fn(n, n, number);
             &root * root.transpose() + DMatrix::identity(n, n)
         };
         let blocks = |dense: &DMatrix<f64>| {
             let block = |row: usize, column: usize| {
-                let view =
-                    dense.fixed_view::<UNKNOWNS, UNKNOWNS>(row * UNKNOWNS, column * UNKNOWNS);
+                let view = dense.fixed_view::<FRAME_PARAMETERS, FRAME_PARAMETERS>(
+                    row * FRAME_PARAMETERS,
+                    column * FRAME_PARAMETERS,
+                );
                 view.into_owned()
             };
             vec![block(0, 0), block(0, 1), block(1, 1)]
@@ -373,7 +375,9 @@ mod tests {
         normal.blocks = blocks(&h);
         let none = vec![Block::zeros(); pattern.blocks()];
         let found = covariances(&pattern, &normal, 0, &blocks(&q), &none, 1.0).unwrap();
-        let poses: Vec<usize> = (0..2 * UNKNOWNS).filter(|k| k % UNKNOWNS < POSE).collect();
+        let poses: Vec<usize> = (0..2 * FRAME_PARAMETERS)
+            .filter(|k| k % FRAME_PARAMETERS < POSE)
+            .collect();
         let inverse = h.try_inverse().unwrap();
         let sandwich = &inverse * q * &inverse;
         let part = |m: &DMatrix<f64>| m.select_rows(&poses).select_columns(&poses);

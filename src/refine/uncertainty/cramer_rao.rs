@@ -37,12 +37,13 @@ use crate::frames::{FrameCache, GreyImage, Pyramid};
 use crate::refine::error::RefineError;
 use crate::refine::linear::normal_equations::{Block, NormalEquations};
 use crate::refine::linear::selected_inverse::SelectedInverse;
-use crate::refine::model::context::{EstimationContext, FrameWindow, Sampling};
-use crate::refine::model::prior::{Prior, usual_step_s};
+use crate::refine::model::context::{EstimationContext, FrameWindow};
+use crate::refine::model::prior::{Prior, median_step_s};
 use crate::refine::parameters::calibration::{Calibration, Kappa};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::problem::unknown_texture::UnknownTexture;
+use crate::refine::samples::sampling::Sampling;
 use crate::refine::tiles::interpolation::Interpolation;
 use crate::refine::uncertainty::covariance::Covariances;
 use crate::survey::Survey;
@@ -94,7 +95,7 @@ pub fn pose_bounds(
     let prior = Prior {
         jitter: survey.prior,
         initial: survey.initial_poses(),
-        usual_step_s: usual_step_s(&times_s),
+        median_step_s: median_step_s(&times_s),
         times_s,
         log_gain_sigma: options.log_gain_sigma,
         bias_sigma: options.bias_sigma,
@@ -132,12 +133,12 @@ pub fn pose_bounds(
     };
     // FINER² fine pixels are a pixel.
     let noise_grey = f64::from(FINER) * noise_grey;
-    let problem = Problem::new(&scene, sampling, members)?.with_known_noise(noise_grey);
+    let problem = PhotometricProblem::new(&scene, sampling, members)?.with_known_noise(noise_grey);
     let (prior, _) = problem.prior_information(&estimates, &Kappa::zeros());
     let with_prior = problem.linearise(&estimates)?.normal;
     let bayesian = covariances(&problem, &with_prior)?;
     let known = covariances(&problem, &without(&prior, with_prior))?;
-    let problem = problem.of_unknown_texture(texture);
+    let problem = problem.with_unknown_texture(texture);
     let pixels = without(&prior, problem.linearise(&estimates)?.normal);
     Ok(PoseBounds {
         known,
@@ -155,7 +156,10 @@ fn without(prior: &[Block], mut normal: NormalEquations) -> NormalEquations {
 }
 
 /// The inverse of an information, as far as neighbours go.
-fn covariances(problem: &Problem, normal: &NormalEquations) -> Result<Covariances, RefineError> {
+fn covariances(
+    problem: &PhotometricProblem,
+    normal: &NormalEquations,
+) -> Result<Covariances, RefineError> {
     let inverse = SelectedInverse::new(problem.pattern(), normal)
         .map_err(|source| problem.factor_error(source))?;
     let pose = |row: usize, column: usize| {

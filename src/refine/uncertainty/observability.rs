@@ -5,9 +5,11 @@
 //! solved without it. The worst goes first, for without it another may be certain.
 
 use crate::camera::Camera;
-use crate::refine::linear::bordered_system::{BorderBlock, Eliminated, SharedBlock, reduce};
+use crate::refine::linear::bordered_system::{
+    BorderBlock, SchurComplement, SharedBlock, reduce_to_shared,
+};
 use crate::refine::linear::sparse_cholesky::FactorError;
-use crate::refine::parameters::calibration::{Calibration, Kappa, SHARED};
+use crate::refine::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
 use crate::refine::solver::gauss_newton::Solution;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -51,17 +53,17 @@ impl Posterior {
         };
         let pattern = problem.pattern();
         let factor = problem.symbolic().factorise(pattern, &at.normal, 0.0)?;
-        let Eliminated { w, schur } = border.eliminate(&factor, 0.0);
+        let SchurComplement { w, schur } = border.eliminate(&factor, 0.0);
         let (prior, prior_border) = problem.prior_information(&solution.estimates, &solution.kappa);
-        let scatter = (reduce(pattern, &at.scatter, border_scatter, &w)
-            + reduce(pattern, &prior, &prior_border, &w))
+        let scatter = (reduce_to_shared(pattern, &at.scatter, border_scatter, &w)
+            + reduce_to_shared(pattern, &prior, &prior_border, &w))
             / solution.record.curvature().powi(2);
         Ok(Some(Self { w, schur, scatter }))
     }
 
     /// `Σ_κ` of the `free` unknowns, zero elsewhere; None if S is singular.
-    pub fn covariance(&self, free: &[bool; SHARED]) -> Option<SharedBlock> {
-        let places: Vec<usize> = (0..SHARED).filter(|k| free[*k]).collect();
+    pub fn covariance(&self, free: &[bool; SHARED_PARAMETERS]) -> Option<SharedBlock> {
+        let places: Vec<usize> = (0..SHARED_PARAMETERS).filter(|k| free[*k]).collect();
         let n = places.len();
         let part = |of: &SharedBlock| DMatrix::from_fn(n, n, |r, c| of[(places[r], places[c])]);
         let inverse = part(&self.schur).cholesky()?.inverse();
@@ -84,7 +86,7 @@ impl Posterior {
                 .covariance(&free)
                 .unwrap_or_else(|| SharedBlock::from_diagonal(&Kappa::repeat(f64::INFINITY)));
             let share = |k: usize| covariance[(k, k)].sqrt() / calibration.sigma[k];
-            let worst = (0..SHARED)
+            let worst = (0..SHARED_PARAMETERS)
                 .filter(|k| free[*k])
                 .max_by(|a, b| share(*a).total_cmp(&share(*b)));
             let Some(worst) = worst.filter(|k| share(*k).is_nan() || share(*k) > MOST_UNCERTAIN)
@@ -104,7 +106,7 @@ impl Posterior {
     }
 }
 
-fn reason(unknown: usize, covariance: &SharedBlock, free: &[bool; SHARED]) -> String {
+fn reason(unknown: usize, covariance: &SharedBlock, free: &[bool; SHARED_PARAMETERS]) -> String {
     let mut reason = match NAMES[unknown].1 {
         Kind::Radius => "pictures stay the same when the radius and all positions grow together, and the steps of the \
                          initial poses are not sure enough to tell metres; measure the radius, or give poses with smaller \
@@ -121,7 +123,7 @@ fn reason(unknown: usize, covariance: &SharedBlock, free: &[bool; SHARED]) -> St
         let variances = covariance[(k, k)] * covariance[(unknown, unknown)];
         covariance[(unknown, k)] / variances.sqrt()
     };
-    let twin = (0..SHARED)
+    let twin = (0..SHARED_PARAMETERS)
         .filter(|k| *k != unknown && free[*k])
         .map(|k| (k, correlation(k)))
         .filter(|(_, r)| r.is_finite() && r.abs() > CLOSE_CORRELATION)
@@ -148,7 +150,7 @@ enum Kind {
 }
 
 /// Names in the report, in the order of κ.
-const NAMES: [(&str, Kind); SHARED] = [
+const NAMES: [(&str, Kind); SHARED_PARAMETERS] = [
     ("focal", Kind::Focal),
     ("cx", Kind::Pixel),
     ("cy", Kind::Pixel),
@@ -214,9 +216,10 @@ impl CalibrationReport {
         let given = &calibration.given;
         let [k1, k2] = given.lens.k1_k2();
         // The axis moves in the initial poses' frame as that frame would have to move back.
-        let (point, direction) = calibration.metric(kappa).axis();
+        let (point, direction) = calibration.datum(kappa).axis();
         let tilt = [direction.z, -direction.x].map(|sine| sine.asin());
-        let radius_m = given_radius_m * kappa[crate::refine::parameters::calibration::RADIUS].exp();
+        let radius_m =
+            given_radius_m * kappa[crate::refine::parameters::calibration::RADIUS_INDEX].exp();
         let estimates = [
             given.fx * kappa[0].exp(),
             given.cx + kappa[1],
@@ -245,7 +248,7 @@ impl CalibrationReport {
         ];
         let asked =
             |k: &usize| calibration.free[*k] || unobservable.iter().any(|r| r.unknown == *k);
-        let unknowns = (0..SHARED).filter(asked).map(|k| {
+        let unknowns = (0..SHARED_PARAMETERS).filter(asked).map(|k| {
             let refusal = unobservable.iter().find(|refusal| refusal.unknown == k);
             let (name, kind) = NAMES[k];
             // From κ to the unit of the report.
@@ -286,7 +289,7 @@ mod tests {
 
     fn calibration() -> Calibration {
         Calibration {
-            free: [true; SHARED],
+            free: [true; SHARED_PARAMETERS],
             sigma: Kappa::repeat(0.1),
             ..Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0))
         }

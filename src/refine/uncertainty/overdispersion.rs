@@ -18,7 +18,7 @@ use crate::refine::model::rejection::RejectionReason;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::solver::gauss_newton::Solution;
 use crate::refine::tiles::grid::BLOCK;
-use crate::refine::tiles::tile::SAMPLES;
+use crate::refine::tiles::tile_arrays::SAMPLES;
 use crate::refine::uncertainty::covariance::frame_sigma;
 use nalgebra::Matrix6;
 
@@ -87,9 +87,9 @@ fn pull(information: &Block, scatter: &Block) -> Option<(f64, Matrix6<f64>)> {
 pub fn overdispersions(scene: &EstimationContext, solution: &Solution) -> Vec<Overdispersion> {
     let at = &solution.linearisation;
     let pattern = solution.problem.pattern();
-    let patch = PATCH as f64 * solution.problem.share_of_wall();
+    let patch = PATCH as f64 * solution.problem.compared_share();
     let of = |(k, estimate): (usize, &FrameEstimate)| {
-        let place = pattern.place(k, k)?;
+        let place = pattern.block_index(k, k)?;
         let blocks = (&at.normal.blocks[place], &at.scatter[place]);
         let patches = at.frames[k].samples as f64 / patch;
         Overdispersion::of_frame(scene, estimate, blocks, patches)

@@ -7,12 +7,15 @@
 //! the frames fit best, with everything else free ([`crate::refine::linear::bordered_system`]), and how sure it is. The lens
 //! is free, too, as far as it usually may be off: a wrong one must not pass for a wrong time.
 
-use crate::refine::model::context::{EstimationContext, Sampling};
+use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
-use crate::refine::parameters::calibration::{Calibration, Kappa, LENS, READOUT};
-use crate::refine::problem::photometric_problem::Problem;
+use crate::refine::parameters::calibration::{
+    Calibration, INTRINSIC_PARAMETERS, Kappa, READOUT_INDEX,
+};
+use crate::refine::problem::photometric_problem::PhotometricProblem;
+use crate::refine::samples::sampling::Sampling;
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
 use crate::refine::uncertainty::observability::Posterior;
@@ -75,7 +78,7 @@ pub fn estimate_readout(
         ..Sampling::of(options.handover_level(scene.camera.shorter_side()))
     };
     let members = tracked.window_of(run.clone(), run.clone());
-    let problem = Problem::new(scene, sampling, members)?.calibrating();
+    let problem = PhotometricProblem::new(scene, sampling, members)?.with_shared_parameters();
     if problem.tiles() == 0 {
         return Ok(None);
     }
@@ -92,7 +95,7 @@ pub fn estimate_readout(
     };
     let found = |kappa: &Kappa| 1e3 * calibration.readout_s(kappa);
     let (given_ms, estimate_ms) = (found(&scene.kappa), found(&solution.kappa));
-    let sigma_ms = 1e3 * covariance[(READOUT, READOUT)].sqrt();
+    let sigma_ms = 1e3 * covariance[(READOUT_INDEX, READOUT_INDEX)].sqrt();
     let off_ms = estimate_ms - given_ms;
     let shift_px = 1e-3 * off_ms.abs() * shift_px_per_s(scene, tracked);
     let sure = off_ms.abs() > SURE * sigma_ms;
@@ -108,15 +111,15 @@ pub fn estimate_readout(
 /// What is estimated of the scene's calibration, the lens, and the readout time.
 fn with_readout(scene: &EstimationContext) -> Calibration {
     use CalibrationGroup::{Centre, Distortion, Focal};
-    let mut calibration = scene.calibration.of_camera();
+    let mut calibration = scene.calibration.intrinsics_only();
     let section = CalibrateSection::default();
     let usual = Calibration::new(&[Focal, Centre, Distortion], &section, &scene.camera, &[]);
-    for k in (0..LENS).filter(|k| !scene.calibration.free[*k]) {
+    for k in (0..INTRINSIC_PARAMETERS).filter(|k| !scene.calibration.free[*k]) {
         (calibration.free[k], calibration.sigma[k]) = (true, usual.sigma[k]);
     }
     // Any time between frames is possible.
-    calibration.free[READOUT] = true;
-    calibration.sigma[READOUT] = scene.prior.usual_step_s;
+    calibration.free[READOUT_INDEX] = true;
+    calibration.sigma[READOUT_INDEX] = scene.prior.median_step_s;
     calibration
 }
 

@@ -4,7 +4,7 @@ use crate::refine::linear::bordered_system::SharedBlock;
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::model::rejection::RejectionReason;
-use crate::refine::parameters::calibration::{Calibration, SHARED};
+use crate::refine::parameters::calibration::{Calibration, SHARED_PARAMETERS};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::solver::gauss_newton::Solution;
 use crate::refine::uncertainty::covariance::{Covariances, FrameSigma, covariances, frame_sigma};
@@ -49,7 +49,7 @@ impl SolutionUncertainty {
         let found = covariances(
             problem.pattern(),
             &solution.linearisation.normal,
-            problem.tied_freedoms(),
+            problem.constrained_gauge_freedoms(),
             &solution.linearisation.scatter,
             &prior,
             solution.record.curvature(),
@@ -157,7 +157,7 @@ impl SolutionUncertainty {
 
 /// Refuses every free unknown.
 fn refuse_all(calibration: &Calibration, reason: &str) -> Vec<UnobservableParameter> {
-    let free = (0..SHARED).filter(|k| calibration.free[*k]);
+    let free = (0..SHARED_PARAMETERS).filter(|k| calibration.free[*k]);
     free.map(|unknown| UnobservableParameter {
         unknown,
         sigma: calibration.sigma[unknown],

@@ -19,7 +19,8 @@ use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::prior::Prior;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
-use crate::refine::samples::footprints::{FARTHEST, footprints};
+use crate::refine::samples::footprints::footprints;
+use crate::refine::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
 use crate::refine::tracking::correlation_search::matches;
 use crate::refine::tracking::reference_mosaic::{ReferenceMosaic, UnwrappedFrame};
 use crate::refine::tracking::registration::{
@@ -195,7 +196,8 @@ fn repeats_of(
         .handover_level(side)
         .max(options.coarsest_level(side).saturating_sub(1));
     let camera = scene.camera.at_level(level);
-    let run = frame.saturating_sub(FARTHEST)..(frame + FARTHEST).min(tracked.estimates.len());
+    let run = frame.saturating_sub(MAX_OVERLAP_DISTANCE_FRAMES)
+        ..(frame + MAX_OVERLAP_DISTANCE_FRAMES).min(tracked.estimates.len());
     let mut placed = tracked.inliers(&run);
     placed[frame - run.start] = false;
     let neighbours = Neighbours {
@@ -433,7 +435,7 @@ mod tests {
             },
             initial: spiral(12, 0.1, 30f64.to_radians()),
             times_s: (0..12).map(f64::from).collect(),
-            usual_step_s: 1.0,
+            median_step_s: 1.0,
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
         }

@@ -6,7 +6,7 @@
 //! says nothing, or the prior.
 
 use crate::refine::model::rejection::RejectionReason;
-use crate::refine::problem::linearisation::FrameShare;
+use crate::refine::problem::linearisation::FrameContribution;
 use crate::refine::validation::pairwise_lucas_kanade::Alignment;
 
 /// Pairs may be misaligned by this much, pixels, ...
@@ -29,7 +29,7 @@ const MAX_REJECTED_SHARE: f64 = 0.3;
 /// Rejects the frames of which the robust loss has rejected most pixels at full size, so that the
 /// last solve does without them.
 pub fn reject_disagreeing_frames(
-    shares: &[FrameShare],
+    shares: &[FrameContribution],
     rejections: &mut [Option<RejectionReason>],
 ) {
     for (share, rejection) in shares.iter().zip(rejections) {
@@ -40,7 +40,7 @@ pub fn reject_disagreeing_frames(
 }
 
 /// The rejection reason of a frame of which the robust loss has rejected most pixels.
-pub fn find_disagreement(share: &FrameShare) -> Option<RejectionReason> {
+pub fn find_disagreement(share: &FrameContribution) -> Option<RejectionReason> {
     let share = 1.0 - share.inliers / share.pixels.max(1e-9);
     (share > MAX_REJECTED_SHARE).then_some(RejectionReason::Disagrees { share })
 }

@@ -4,8 +4,8 @@ use crate::camera::Camera;
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::samples::footprints::FARTHEST;
 use crate::refine::samples::footprints::footprint;
+use crate::refine::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
 use crate::surface::Footprint;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -86,7 +86,7 @@ impl Overlaps {
         let Some(own) = &self.footprints[a] else {
             return Vec::new();
         };
-        let last = (a + FARTHEST + 1).min(self.run.end);
+        let last = (a + MAX_OVERLAP_DISTANCE_FRAMES + 1).min(self.run.end);
         let overlaps = |other: &Footprint| other.overlaps(own, self.perimeter_m);
         (a + 1..last)
             .filter(|b| self.footprints[*b].as_ref().is_some_and(overlaps))

@@ -26,7 +26,7 @@ use crate::frames::{MAD_TO_SIGMA, Pyramid, noise_at_level};
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::samples::point_sampler::Sampler;
+use crate::refine::samples::point_sampler::PointSampler;
 use crate::refine::tiles::residual_weighting::{Loss, robust_correlation};
 use crate::refine::tracking::reference_mosaic::{MosaicGrid, pixel_size_m};
 use crate::refine::validation::overlaps::{Batch, Overlaps};
@@ -139,9 +139,9 @@ struct Look<'a> {
 impl Look<'_> {
     /// The frame's grey values at wall points relative to `origin`.
     fn greys(&self, origin: &Vector3<f64>) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
-        let sampler = Sampler::new(&self.camera, self.pose, origin);
+        let sampler = PointSampler::new(&self.camera, self.pose, origin);
         let image = self.picture.level(self.level);
-        move |point| sampler.at(point)?.known(image)
+        move |point| sampler.project(point)?.sample_valid(image)
     }
 }
 
@@ -494,7 +494,7 @@ impl Fit {
 mod tests {
     use super::*;
     use crate::frames::FrameCache;
-    use crate::refine::test_scene::{prior, scene, tracked};
+    use crate::refine::test_scene::{frame_states, independent_prior, test_context};
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Pose;
 
@@ -505,9 +505,9 @@ mod tests {
             .into_iter()
             .map(|frame| Pyramid::new(frame, 1));
         let frames = FrameCache::of_pyramids(pictures.collect());
-        let prior = prior(poses);
-        let scene = scene(wall, &frames, &prior);
-        let tracked = tracked(poses);
+        let prior = independent_prior(poses);
+        let scene = test_context(wall, &frames, &prior);
+        let tracked = frame_states(poses);
         align_pairs(&scene, 0, &tracked, &(0..tracked.estimates.len())).unwrap()
     }
 

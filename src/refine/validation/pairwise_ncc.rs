@@ -353,7 +353,7 @@ pub fn find_blurred_frames(pairs: &[Pair], frames: usize) -> Vec<(usize, Rejecti
 mod tests {
     use super::*;
     use crate::frames::{FrameCache, GreyImage, Pyramid};
-    use crate::refine::test_scene::{prior, scene, tracked};
+    use crate::refine::test_scene::{frame_states, independent_prior, test_context};
     use crate::surface::{GaugeMotion, WallPoint};
     use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Pose;
@@ -376,9 +376,9 @@ mod tests {
     fn compared(wall: &TestWall, pictures: Vec<GreyImage>, poses: &[Pose]) -> Vec<Pair> {
         let pyramids = pictures.into_iter().map(|frame| Pyramid::new(frame, 1));
         let frames = FrameCache::of_pyramids(pyramids.collect());
-        let prior = prior(poses);
-        let scene = scene(wall, &frames, &prior);
-        let tracked = tracked(poses);
+        let prior = independent_prior(poses);
+        let scene = test_context(wall, &frames, &prior);
+        let tracked = frame_states(poses);
         compute_pairwise_ncc(&scene, 0, &tracked, &(0..poses.len())).unwrap()
     }
 
@@ -424,8 +424,8 @@ mod tests {
         let pairs = compared(&wall, pictures, &wall.poses);
         // Of a strip hardly wider than what stands out nothing is left to look at.
         let wide = || pairs.iter().filter(|pair| pair.samples > 80.0);
-        assert!(wide().any(|pair| pair.quality < LEAST_QUALITY));
-        for pair in wide() {
+        assert!(dispatch_simd().any(|pair| pair.quality < LEAST_QUALITY));
+        for pair in dispatch_simd() {
             assert!(!pair.wrong, "{pair:?}");
         }
     }
