@@ -101,7 +101,7 @@ fn reject_finally(
     let ambiguous = aliases.map(|(frame, motion)| {
         let pose = &state.frames.estimates[frame].pose;
         let other = motion.apply(pose);
-        let separation_m = separation_m(context, pose, &other);
+        let separation_m = separation_m(context.surface, &context.camera, pose, &other);
         let ambiguous = RejectionReason::Ambiguous {
             other,
             separation_m,

@@ -1,7 +1,7 @@
 //! Placing one frame on the wall that others show: search, brief refinement of the hypotheses,
 //! verdict.
 
-use crate::camera::Sweep;
+use crate::camera::{Camera, Sweep};
 use crate::refine::model::context::{EstimationContext, FrameWindow, Sampling};
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::model::rejection::RejectionReason;
@@ -17,7 +17,7 @@ use crate::refine::tracking::correlation_search::{
 use crate::refine::tracking::reference_mosaic::{
     NccScore, ReferenceMosaic, UnwrappedFrame, pixel_size_m,
 };
-use crate::surface::{Footprint, shortest_arc, viewing_distance};
+use crate::surface::{Footprint, Surface, shortest_arc, viewing_distance};
 use crate::trajectory::{Jitter, Pose};
 use std::borrow::Cow;
 use std::ops::Range;
@@ -251,7 +251,8 @@ pub fn register_frame(
         .min_by(|a, b| a.deviation.total_cmp(&b.deviation))
         .unwrap_or(&first);
     for rival in &rivals {
-        let separation_m = separation_m(scene, &best.estimate.pose, &rival.estimate.pose);
+        let (a, b) = (&best.estimate.pose, &rival.estimate.pose);
+        let separation_m = separation_m(scene.surface, &scene.camera, a, b);
         if separation_m > APART * pixel && rival.deviation - best.deviation < PRIOR_MARGIN {
             return Ok(Err(RejectionReason::Ambiguous {
                 other: rival.estimate.pose,
@@ -305,18 +306,50 @@ fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
     [turn.hypot(along), turn.hypot(across), turn]
 }
 
-/// How far apart two poses put the frame on the wall: the mean over its middle and corners, metres.
-pub fn separation_m(scene: &EstimationContext, a: &Pose, b: &Pose) -> f64 {
-    let perimeter = scene.surface.perimeter_m();
-    (scene.camera.probes().iter())
-        .filter_map(|ray_c| {
-            let look = |pose: &Pose| {
-                let ray = pose.r_wc * ray_c;
-                scene.surface.hit(&pose.t_wc, &ray).ok()
-            };
-            let (a, b) = (look(a)?.wall, look(b)?.wall);
-            Some(shortest_arc(a.s_m - b.s_m, perimeter).hypot(a.h_m - b.h_m))
-        })
-        .sum::<f64>()
-        / 5.0
+/// Distance on the wall between what two poses of a frame show, metres: the mean over the middle
+/// and the corners of the picture, as far as the lens shows them and both poses see the wall there.
+///
+/// Infinity if no such point is left: two poses that see no wall through a common pixel cannot be
+/// taken for one, so the ambiguity test must find them apart.
+pub fn separation_m(surface: &dyn Surface, camera: &Camera, a: &Pose, b: &Pose) -> f64 {
+    let perimeter = surface.perimeter_m();
+    let (mut sum_m, mut count) = (0.0, 0.0);
+    for ray_c in camera.probes() {
+        let hit = |pose: &Pose| surface.hit(&pose.t_wc, &(pose.r_wc * ray_c)).ok();
+        if let (Some(a), Some(b)) = (hit(a), hit(b)) {
+            let (a, b) = (a.wall, b.wall);
+            sum_m += shortest_arc(a.s_m - b.s_m, perimeter).hypot(a.h_m - b.h_m);
+            count += 1.0;
+        }
+    }
+    if count > 0.0 {
+        sum_m / count
+    } else {
+        f64::INFINITY
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{KannalaBrandt, Lens};
+    use crate::surface::Circle;
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    /// A fisheye of which the lens shows the middle, but not the corners of the picture.
+    #[test]
+    fn separation_counts_only_pixels_that_the_lens_shows() {
+        let circle = Circle::new(3.0).unwrap();
+        let fisheye = KannalaBrandt::new([0.0; 4]).limited_to(0.3);
+        let camera = Camera {
+            lens: Lens::KannalaBrandt(fisheye),
+            ..Camera::from_vertical_fov(160, 120, 60f64.to_radians())
+        };
+        assert_eq!(camera.probes().len(), 1);
+        let pose = |h_m: f64| Pose::new(UnitQuaternion::identity(), Vector3::new(0.0, h_m, 0.0));
+        let separation_m = |b: &Pose| separation_m(&circle, &camera, &pose(0.0), b);
+        assert!((separation_m(&pose(0.25)) - 0.25).abs() < 1e-12);
+        let outside = Pose::new(UnitQuaternion::identity(), Vector3::new(0.0, 0.0, 9.0));
+        assert_eq!(separation_m(&outside), f64::INFINITY);
+    }
 }
