@@ -30,12 +30,46 @@ pub mod alternating_calibration {
 pub mod registration {
     // registration: begin
 
+    /// Largest deficit of the log-posterior that a hypothesis may attain to that of the best one,
+    /// nats, for it to be refined: log-posterior odds.
+    ///
+    /// The probability that a hypothesis is right whose log-posterior is Δ lower is no more than
+    /// `exp(−Δ)`. The deficit is taken from the most that refinement can make of the hypothesis to
+    /// the least that it makes of the best one, for the search underestimates both, in proportion to
+    /// the samples.
+    ///
+    /// Higher: more hypotheses are refined, and fewer right ones are dismissed.
+    ///
+    /// Chosen by: derivation. `ln(10/0.001)`: with ten hypotheses, a right one is dismissed once
+    /// in a thousand frames.
+    pub const MAX_SCORE_DEFICIT_NATS: f64 = 9.2;
+
+    /// Least gain in log-posterior, nats, for which another closer look is worth its time.
+    ///
+    /// Higher: fewer closer looks.
+    ///
+    /// Chosen by: derivation. Twice the gain that fitting the six unknowns of a pose to other noise
+    /// brings follows χ² with six degrees of freedom (Wilks), whose mean is 6: a smaller gain is
+    /// noise.
+    pub const MIN_SCORE_GAIN_NATS: f64 = 3.0;
+
     // registration: end
 }
 
 /// Thresholds of `tracking/correlation_search.rs`.
 pub mod correlation_search {
     // correlation_search: begin
+
+    /// Share of its squared correlation that a right hypothesis keeps, at least, half a step of the
+    /// search off.
+    ///
+    /// Higher: fewer hypotheses are refined, fewer aliases are looked at closer.
+    ///
+    /// Chosen by: derivation. With the autocorrelation `exp(−d²/2L²)` of the texture, `π L²` = 4
+    /// samples (an independent piece), half a sample off along both axes (d² = 1/2) and half a step
+    /// of roll off (one sample at the corners, d² = 1/3 in the mean) leave
+    /// `exp(−d²/L²)` = 0.52 of it.
+    pub const MIN_SQUARED_CORRELATION_LEFT: f64 = 0.5;
 
     // correlation_search: end
 }

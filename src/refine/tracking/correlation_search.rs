@@ -22,6 +22,7 @@
 
 use crate::numerics::spectrum::{Spectrum, Transform};
 use crate::refine::model::context::EstimationContext;
+use crate::refine::thresholds::correlation_search::MIN_SQUARED_CORRELATION_LEFT;
 use crate::refine::tracking::reference_mosaic::{ReferenceMosaic, UnwrappedFrame};
 use crate::surface::{WallPoint, shortest_arc, wall_jacobian};
 use crate::trajectory::{Pose, so3};
@@ -50,14 +51,24 @@ const APART: f64 = 2.5;
 pub struct Hypothesis {
     /// The pose.
     pub pose: Pose,
-    /// Log-posterior ℓ.
+    /// Log-posterior ℓ, as the search finds it.
     pub score: f64,
+    /// Upper bound of the log-posterior after refinement ([`attainable_log_likelihood`]).
+    pub attainable_score: f64,
 }
 
 /// ℓ without the prior.
 pub fn log_likelihood(correlation: f64, samples: f64) -> f64 {
     let c = correlation.clamp(0.0, 1.0 - 1e-6);
     -0.5 * samples / SAMPLES_PER_PIECE * (1.0 - c * c).ln()
+}
+
+/// Upper bound of the log-likelihood that refinement reaches from a hypothesis of the search.
+///
+/// The search's steps leave a right hypothesis at least [`MIN_SQUARED_CORRELATION_LEFT`] of its
+/// squared correlation, so refinement finds no more than `c²/MIN_SQUARED_CORRELATION_LEFT`.
+pub fn attainable_log_likelihood(correlation: f64, samples: f64) -> f64 {
+    log_likelihood(correlation / MIN_SQUARED_CORRELATION_LEFT.sqrt(), samples)
 }
 
 /// Least number of samples a frame must share with the wall to be compared.
@@ -73,6 +84,7 @@ struct Peak {
     /// Shift along s and h, metres.
     shift_m: Vector2<f64>,
     score: f64,
+    attainable_score: f64,
 }
 
 /// Searches around `predicted` over `sigma_rad`, the prior's σ of pitch, yaw and roll as seen in
@@ -146,11 +158,17 @@ pub fn search(
                         .zip(sigma_rad)
                         .map(|(axis, sigma)| 0.5 * (omega.dot(axis) / sigma).powi(2))
                         .sum();
+                    let Maximum {
+                        correlation,
+                        samples,
+                        ..
+                    } = found;
                     Peak {
                         pitch,
                         roll,
                         shift_m,
-                        score: log_likelihood(found.correlation, found.samples) - prior,
+                        score: log_likelihood(correlation, samples) - prior,
+                        attainable_score: attainable_log_likelihood(correlation, samples) - prior,
                     }
                 })
                 .collect();
@@ -182,6 +200,7 @@ pub fn search(
             Some(Hypothesis {
                 pose: shifted(scene, &pose, &peak.shift_m)?,
                 score: peak.score,
+                attainable_score: peak.attainable_score,
             })
         })
         .collect()

@@ -11,6 +11,7 @@ use crate::refine::problem::photometric_problem::Problem;
 use crate::refine::samples::footprints::footprint;
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
+use crate::refine::thresholds::registration::{MAX_SCORE_DEFICIT_NATS, MIN_SCORE_GAIN_NATS};
 use crate::refine::tracking::correlation_search::{
     Hypothesis, REACH, least_samples, log_likelihood, search,
 };
@@ -24,8 +25,6 @@ use std::ops::Range;
 
 /// Hypotheses refined per frame, at the most.
 const HYPOTHESES: usize = 10;
-/// A hypothesis is refined if its log-posterior is at least this share of the best one's.
-const WORTH_REFINING: f64 = 0.5;
 /// Stopping rule of a single frame; the global solve does the rest.
 const STOPPING: Stopping = Stopping {
     max_iterations: 12,
@@ -41,8 +40,6 @@ const SETTLED: f64 = 0.9;
 /// Closer looks at the most, and half their σ, radians.
 const CLOSER_LOOKS: usize = 4;
 const CLOSE_RAD: f64 = 0.05;
-/// Gain in log-posterior, as a factor, for which another closer look is worth its time.
-const WORTH_ANOTHER: f64 = 1.02;
 /// Two places are told apart by the pixels if what they leave unexplained, `1 − c²`, differs by
 /// this factor, ...
 pub const UNEXPLAINED: f64 = 2.0;
@@ -153,9 +150,10 @@ pub fn register_frame(
         vec![Hypothesis {
             pose: expected.pose,
             score: 0.0,
+            attainable_score: 0.0,
         }]
     };
-    let best = found.first().map_or(0.0, |hypothesis| hypothesis.score);
+    let best_score = found.first().map_or(0.0, |hypothesis| hypothesis.score);
 
     let refine_at = |level: usize, estimate: FrameEstimate| {
         let own = frame - neighbours.run.start;
@@ -206,10 +204,10 @@ pub fn register_frame(
         }))
     };
     let mut candidates: Vec<Candidate> = Vec::new();
-    for hypothesis in found {
-        if hypothesis.score < WORTH_REFINING * best {
-            break;
-        }
+    let worth_refining = found
+        .iter()
+        .filter(|one| is_worth_refining(one, best_score));
+    for hypothesis in worth_refining {
         candidates.extend(refined(&hypothesis.pose)?);
     }
     // A half-right pose has stretched and sheared what it unrolled; from there the search sees
@@ -226,10 +224,7 @@ pub fn register_frame(
         for hypothesis in search(scene, &wall, &unwrapped, &from, close, 2) {
             candidates.extend(refined(&hypothesis.pose)?);
         }
-        if candidates
-            .iter()
-            .all(|c| c.score() < WORTH_ANOTHER * before)
-        {
+        if !candidates.iter().any(|c| has_gained(before, c.score())) {
             break;
         }
     }
@@ -268,6 +263,17 @@ pub fn register_frame(
         estimate,
         settled: best.quality >= SETTLED,
     }))
+}
+
+/// True if refinement may bring a hypothesis close enough to the best one, whose log-posterior is
+/// `best_score`, for it to be the right one.
+fn is_worth_refining(hypothesis: &Hypothesis, best_score: f64) -> bool {
+    hypothesis.attainable_score >= best_score - MAX_SCORE_DEFICIT_NATS
+}
+
+/// True if a closer look has raised the log-posterior by more than noise does.
+fn has_gained(before: f64, after: f64) -> bool {
+    after - before >= MIN_SCORE_GAIN_NATS
 }
 
 /// `1 − c²`, c the correlation with the wall, noise aside; none if too little is shared, or the two
@@ -333,8 +339,52 @@ pub fn separation_m(surface: &dyn Surface, camera: &Camera, a: &Pose, b: &Pose) 
 mod tests {
     use super::*;
     use crate::camera::{KannalaBrandt, Lens};
+    use crate::refine::tracking::correlation_search::attainable_log_likelihood;
     use crate::surface::Circle;
     use nalgebra::{UnitQuaternion, Vector3};
+
+    fn hypothesis(correlation: f64, samples: f64, prior: f64) -> Hypothesis {
+        Hypothesis {
+            pose: Pose::new(UnitQuaternion::identity(), Vector3::zeros()),
+            score: log_likelihood(correlation, samples) - prior,
+            attainable_score: attainable_log_likelihood(correlation, samples) - prior,
+        }
+    }
+
+    /// Where hardly anything correlates, the prior makes every log-posterior negative.
+    #[test]
+    fn best_hypothesis_is_worth_refining_at_a_negative_log_posterior() {
+        let best = hypothesis(0.05, 200.0, 3.0);
+        assert!(best.score < 0.0);
+        assert!(is_worth_refining(&best, best.score));
+        assert!(is_worth_refining(&hypothesis(0.05, 200.0, 5.0), best.score));
+    }
+
+    /// A hypothesis that the search's steps explain may be right, however many samples there are;
+    /// one that is less likely by the prior alone is judged by its odds, however few.
+    #[test]
+    fn hypotheses_are_judged_by_their_odds() {
+        for samples in [100.0, 1000.0, 10_000.0] {
+            let best = hypothesis(0.8, samples, 0.0).score;
+            assert!(is_worth_refining(&hypothesis(0.6, samples, 0.0), best));
+        }
+        let best = hypothesis(0.8, 10_000.0, 0.0).score;
+        assert!(!is_worth_refining(&hypothesis(0.5, 10_000.0, 0.0), best));
+        for samples in [0.0, 100.0, 10_000.0] {
+            let best = hypothesis(0.0, samples, 1.0).score;
+            assert!(is_worth_refining(&hypothesis(0.0, samples, 10.0), best));
+            assert!(!is_worth_refining(&hypothesis(0.0, samples, 10.5), best));
+        }
+    }
+
+    #[test]
+    fn gain_is_a_difference_of_log_posteriors() {
+        for before in [-50.0, 0.0, 50.0, 5000.0] {
+            assert!(!has_gained(before, before));
+            assert!(!has_gained(before, before + 2.9));
+            assert!(has_gained(before, before + 3.1));
+        }
+    }
 
     /// A fisheye of which the lens shows the middle, but not the corners of the picture.
     #[test]

@@ -20,6 +20,7 @@ use crate::refine::model::prior::Prior;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
 use crate::refine::samples::footprints::{FARTHEST, footprints};
+use crate::refine::thresholds::correlation_search::MIN_SQUARED_CORRELATION_LEFT;
 use crate::refine::tracking::correlation_search::matches;
 use crate::refine::tracking::reference_mosaic::{ReferenceMosaic, UnwrappedFrame};
 use crate::refine::tracking::registration::{
@@ -33,9 +34,6 @@ use std::collections::BTreeMap;
 
 /// Difference of log-posteriors from which on one place is inliers: odds of 1000 to 1.
 const CLEAR: f64 = 6.9;
-/// Share of the squared correlation that is left, at least, where the shift is known to a whole
-/// sample only.
-const LEFT_BY_STEPS: f64 = 0.5;
 /// Motions closer to none than this are none, samples of the search level.
 const APART: f64 = 3.0;
 /// Sweeps over all frames until no choice changes, at the most.
@@ -238,7 +236,7 @@ fn repeats_of(
     let spacing = wall.lattice.spacing_m;
     let mut found = Vec::new();
     // Of the correlation as it is, noise and all.
-    let least = LEFT_BY_STEPS * (1.0 - most).max(0.0) * at_home.texture().powi(2);
+    let least = MIN_SQUARED_CORRELATION_LEFT * (1.0 - most).max(0.0) * at_home.texture().powi(2);
     for shift_m in matches(&wall, &unwrapped, &pose, reach_m, least) {
         // Where the shape forbids a motion, no repeat leads there.
         let (made_m, _) = motion(shift_m);
