@@ -14,7 +14,7 @@ use crate::refine::report::{FrameFlag, FrameReport, PoseReport, RefineReport};
 use crate::refine::solver::gauss_newton::Solution;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::{Estimation, PipelineState};
-use crate::refine::tracking::registration::separation_m;
+use crate::refine::tracking::pose_separation::separation_m;
 use crate::refine::uncertainty::covariance::FrameSigma;
 use crate::refine::uncertainty::observability::CalibrationReport;
 use crate::refine::uncertainty::rolling_shutter_test::estimate_readout;

@@ -7,9 +7,9 @@ use crate::refine::solver::neighbourhood::Neighbourhood;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::Estimation;
 use crate::refine::tracking::track::register_rejected;
-use crate::refine::validation::pairwise_ncc::{
-    compute_pairwise_ncc, find_blurred_frames, find_contradictions,
-};
+use crate::refine::validation::blurred_frames::find_blurred_frames;
+use crate::refine::validation::contradictions::find_contradictions;
+use crate::refine::validation::pairwise_ncc::compute_pairwise_ncc;
 
 /// Comparisons, with rejected frames registered again between two, at the most.
 const MAX_ITERATIONS: usize = 3;
