@@ -786,32 +786,136 @@ pub mod repair {
     pub const MAX_ITERATIONS: usize = 8;
 }
 
-/// Thresholds of `uncertainty/observability.rs, solution_uncertainty.rs`.
+/// Thresholds of `uncertainty/observability.rs` and `uncertainty/solution_uncertainty.rs`.
 pub mod observability {
-    // observability: begin
+    /// Posterior σ of a shared parameter over that of its prior up to which it is observed.
+    ///
+    /// Higher: more parameters are estimated, on less evidence.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SIGMA_SHARE: f64 = 0.5;
 
-    // observability: end
+    /// Correlation with another parameter from which on it is reported.
+    ///
+    /// Higher: fewer correlations are reported.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_REPORTED_CORRELATION: f64 = 0.9;
+
+    /// Share of frames that fit nowhere up to which shared parameters are estimated: beyond it the
+    /// others may fit each other in wrong places.
+    ///
+    /// Higher: self-calibration of worse surveys.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_MISFIT_SHARE: f64 = 0.1;
+
+    /// 1-σ of the median frame on the wall up to which shared parameters are estimated, pixels.
+    /// Frames that are tied more loosely can tilt and shift together, the camera with them, at less
+    /// cost than aliasing causes; the covariance does not know that.
+    ///
+    /// Higher: self-calibration of weaker surveys.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_MEDIAN_SIGMA_PX: f64 = 0.2;
 }
 
 /// Thresholds of `uncertainty/overdispersion.rs`.
 pub mod overdispersion {
-    // overdispersion: begin
+    /// Overdispersion that is accepted of a single frame, pixels; it must exceed
+    /// [`MAX_OVERDISPERSION_RATIO`], too, to be rejected.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_OVERDISPERSION_PX: f64 = 0.25;
 
-    // overdispersion: end
+    /// Overdispersion that is accepted of a single frame, over the displacement by noise.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: a glint on a faint wall makes it five to ten in one patch of a right frame (and a
+    /// pixel).
+    pub const MAX_OVERDISPERSION_RATIO: f64 = 12.0;
+
+    /// Overdispersion of the median frame that is accepted, pixels; beyond it all frames are
+    /// overdispersed.
+    ///
+    /// Higher: larger errors of the model go unnoticed.
+    ///
+    /// Chosen by: right surveys have none, whatever wall, light and noise; a focal length 0.3 % off
+    /// makes it 0.05, one 1 % off 0.13.
+    pub const MAX_MEDIAN_OVERDISPERSION_PX: f64 = 0.04;
 }
 
 /// Thresholds of `uncertainty/rolling_shutter_test.rs`.
 pub mod rolling_shutter_test {
-    // rolling_shutter_test: begin
+    /// Number of frames that are used, from the middle of the survey.
+    ///
+    /// Higher: a more certain readout time, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_FRAMES: usize = 120;
 
-    // rolling_shutter_test: end
+    /// Number of Gauss–Newton iterations.
+    ///
+    /// Higher: a more exact readout time, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SOLVE_ITERATIONS: u64 = 4;
+
+    /// Step length below which the solve has converged, pixels of the level.
+    ///
+    /// Higher: a less exact readout time.
+    ///
+    /// Chosen by: unknown.
+    pub const STEP_TOLERANCE_PX: f64 = 0.02;
+
+    /// Step length below which the solve has converged, σ.
+    ///
+    /// Higher: a less exact readout time.
+    ///
+    /// Chosen by: unknown.
+    pub const STEP_TOLERANCE_SIGMA: f64 = 1.0;
+
+    /// Difference from the readout time given that is systematic, σ.
+    ///
+    /// Higher: fewer wrong times are reported.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_DIFFERENCE_SIGMA: f64 = 6.0;
+
+    /// Displacement of the first row against the last by the difference that is systematic, pixels.
+    ///
+    /// Higher: fewer wrong times are reported.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SHIFT_PX: f64 = 0.5;
 }
 
 /// Thresholds of `pose_convention_search.rs`.
 pub mod pose_convention_search {
-    // pose_convention_search: begin
+    /// Angle by which the camera turns within the frames that are refined, radians: once around and
+    /// some.
+    ///
+    /// Higher: a more certain answer, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_TURN_RAD: f64 = 1.15 * std::f64::consts::TAU;
 
-    // pose_convention_search: end
+    /// Smallest number of frames that are refined in each convention.
+    ///
+    /// Higher: a more certain answer, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_FRAMES: usize = 8;
+
+    /// Largest number of frames that are refined in each convention.
+    ///
+    /// Higher: a more certain answer, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_FRAMES: usize = 40;
 }
 
 /// Thresholds of `stages/assess.rs, validate_pairs.rs`.

@@ -15,8 +15,8 @@ use crate::refine::solver::gauss_newton::Solution;
 use crate::refine::stages::session::Session;
 use crate::refine::stages::state::{Estimation, PipelineState};
 use crate::refine::tracking::pose_separation::separation_m;
-use crate::refine::uncertainty::covariance::FrameSigma;
-use crate::refine::uncertainty::observability::CalibrationReport;
+use crate::refine::uncertainty::calibration_report::CalibrationReport;
+use crate::refine::uncertainty::frame_sigma::FrameSigma;
 use crate::refine::uncertainty::rolling_shutter_test::estimate_readout;
 use crate::refine::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::refine::validation::inconsistent_frames::{find_disagreement, find_inconsistent_frames};
@@ -126,9 +126,9 @@ fn report_frames(
     let count = inputs.count();
     // Without a covariance there is no step either; its lack is reported already.
     let steps_px = steps_left(solution).unwrap_or_else(|_| vec![0.0; count]);
-    let rejections = uncertainty.with_overdispersion(frames.rejections.clone());
+    let rejections = uncertainty.reject_overdispersed(frames.rejections.clone());
     let reports = rejections.into_iter().enumerate().map(|(k, rejection)| {
-        let sigma = uncertainty.of_frame(context, k, &frames.estimates[k]);
+        let sigma = uncertainty.frame_sigma(context, k, &frames.estimates[k]);
         let rejection =
             rejection.or_else(|| final_rejection(inputs.survey, k, solution, steps_px[k], &sigma));
         let overdispersion_px = uncertainty.overdispersions[k].px;
