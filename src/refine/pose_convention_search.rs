@@ -1,9 +1,9 @@
 //! Search for the pose convention that the frames agree with.
 //!
 //! In a round tunnel a camera on the axis looks at the wall in every convention of its poses: from
-//! camera to world or from world to camera, along +z or −z. The geometry cannot tell them apart, but
-//! the overlaps of the frames can. Where a refinement has failed, the first frames are refined in each
-//! convention.
+//! camera to world or from world to camera, along +z or −z. The geometry cannot tell them apart,
+//! but the overlaps of the frames can. Where a refinement has failed, the first frames are refined
+//! in each convention.
 
 use crate::progress::{Progress, Silent};
 use crate::refine::options::RefineOptions;
@@ -26,11 +26,11 @@ fn count_frames(survey: &Survey) -> usize {
     (turning_steps + 2).clamp(MIN_FRAMES, MAX_FRAMES)
 }
 
-/// Finds the conventions in which more than half of the first frames are photometric, and returns the
-/// flags that select those with the fewest changes.
+/// Finds the conventions in which more than half of the first frames are photometric, and returns
+/// the flags that select those with the fewest changes.
 ///
-/// There may be two: poses exactly as planned, seen from the tunnel's other end, are those of another
-/// convention. None is returned if the convention given is right, or no other is.
+/// There may be two: poses exactly as planned, seen from the tunnel's other end, are those of
+/// another convention. None is returned if the convention given is right, or no other is.
 ///
 /// # Errors
 /// [`SurveyError`] if the poses cannot be read.

@@ -132,18 +132,19 @@ pub mod registration {
     /// Chosen by: unknown.
     pub const MAX_HYPOTHESES: usize = 10;
 
-    /// Largest deficit of the log-posterior that a hypothesis may attain to that of the best one,
-    /// nats, for it to be refined: log-posterior odds.
+    /// Largest deficit of a hypothesis to the best one with which it is refined, nats:
+    /// log-posterior odds.
     ///
     /// The probability that a hypothesis is right whose log-posterior is Δ lower is no more than
-    /// `exp(−Δ)`. The deficit is taken from the most that refinement can make of the hypothesis to
-    /// the least that it makes of the best one, for the search underestimates both, in proportion to
-    /// the samples.
+    /// `exp(−Δ)`. The search underestimates log-posteriors by its steps, in proportion to the
+    /// number of samples. So the deficit is between the upper bound for the hypothesis after
+    /// refinement ([`super::correlation_search::MIN_SQUARED_CORRELATION_LEFT`]) and the lower bound
+    /// for the best one, its score before refinement.
     ///
     /// Higher: more hypotheses are refined, and fewer right ones are dismissed.
     ///
-    /// Chosen by: derivation. `ln(10/0.001)`: with ten hypotheses, a right one is dismissed once
-    /// in a thousand frames.
+    /// Chosen by: derivation. `ln(10/0.001)`: of ten hypotheses, a right one is dismissed at most
+    /// once in a thousand frames.
     pub const MAX_SCORE_DEFICIT_NATS: f64 = 9.2;
 
     /// Number of Gauss–Newton iterations for a single frame at one level.
@@ -197,9 +198,9 @@ pub mod registration {
     /// Chosen by: unknown.
     pub const CLOSER_SEARCH_SIGMA_RAD: f64 = 0.05;
 
-    /// Least gain in log-posterior, nats, for which another closer look is worth its time.
+    /// Least gain in log-posterior, nats, for which another closer search is worth its time.
     ///
-    /// Higher: fewer closer looks.
+    /// Higher: fewer closer searches.
     ///
     /// Chosen by: derivation. Twice the gain that fitting the six unknowns of a pose to other noise
     /// brings follows χ² with six degrees of freedom (Wilks), whose mean is 6: a smaller gain is
@@ -271,10 +272,10 @@ pub mod correlation_search {
     /// Chosen by: unknown.
     pub const MIN_OVERLAP_SHARE: f64 = 0.08;
 
-    /// Share of its squared correlation that a right hypothesis keeps, at least, half a step of the
-    /// search off.
+    /// Smallest share of its squared correlation that a right hypothesis keeps at half a step of
+    /// the search from the right pose.
     ///
-    /// Higher: fewer hypotheses are refined, fewer aliases are looked at closer.
+    /// Higher: fewer hypotheses and fewer aliases are refined.
     ///
     /// Chosen by: derivation. With the autocorrelation `exp(−d²/2L²)` of the texture, `π L²` = 4
     /// samples (an independent piece), half a sample off along both axes (d² = 1/2) and half a step
@@ -348,7 +349,8 @@ pub mod correlation_search {
     pub const MAX_VIEW_STEP_RAD: f64 = 0.3;
 }
 
-/// Thresholds of `tracking/reference_mosaic.rs`, `tracking/mosaic_grid.rs` and `tracking/ncc_score.rs`.
+/// Thresholds of `tracking/reference_mosaic.rs`, `tracking/mosaic_grid.rs` and
+/// `tracking/ncc_score.rs`.
 pub mod reference_mosaic {
     /// Share of the pixels that a piece of wall has when seen squarely from the axis, below which
     /// it is left out.
@@ -494,7 +496,8 @@ pub mod neighbourhood {
     // neighbourhood: end
 }
 
-/// Thresholds of `validation/pairwise_ncc.rs`, `validation/contradictions.rs` and `validation/blurred_frames.rs`.
+/// Thresholds of `validation/pairwise_ncc.rs`, `validation/contradictions.rs` and
+/// `validation/blurred_frames.rs`.
 pub mod pairwise_ncc {
     /// Distance between samples of the coarse comparison, pixels of the level.
     ///
@@ -578,7 +581,8 @@ pub mod pairwise_ncc {
     pub const MIN_SHARPNESS_RATIO: f64 = 0.5;
 }
 
-/// Thresholds of `validation/pairwise_lucas_kanade.rs`, `validation/lucas_kanade_template.rs` and `validation/lucas_kanade_fit.rs`.
+/// Thresholds of `validation/pairwise_lucas_kanade.rs`, `validation/lucas_kanade_template.rs` and
+/// `validation/lucas_kanade_fit.rs`.
 pub mod pairwise_lucas_kanade {
     /// Pyramid level at which displacements are measured.
     ///
@@ -723,7 +727,8 @@ pub mod inconsistent_frames {
     pub const MAX_REJECTED_SHARE: f64 = 0.3;
 }
 
-/// Thresholds of `validation/aliasing.rs`, `validation/alias_choice.rs` and `validation/alias_search.rs`.
+/// Thresholds of `validation/aliasing.rs`, `validation/alias_choice.rs` and
+/// `validation/alias_search.rs`.
 pub mod aliasing {
     /// Difference of log-posteriors from which on the prior decides between two aliases, nats.
     ///

@@ -1,14 +1,14 @@
 //! Tracking that alternates with the calibration of the shading and of the camera, while these are
 //! only roughly known.
 //!
-//! The mean of all frames shows the shading up to what is left of the wall's texture in it, which on
-//! a faint wall is as much as there is to see. So a few frames are tracked first. The shading is
+//! The mean of all frames shows the shading up to what is left of the wall's texture in it, which
+//! on a faint wall is as much as there is to see. So a few frames are tracked first. The shading is
 //! corrected where they overlap ([`crate::refine::tracking::shading_correction`]), and they are
-//! tracked again with that, until the shading changes no more. Then all frames are states.
+//! tracked again with that, until the shading changes no more. Then all frames are tracked.
 //!
 //! Likewise, frames that are tracked with a wrong camera fit badly where they overlap, and some are
-//! registered wrongly. But the camera that they are refined to is much better than the one given, so
-//! they are tracked again with that, until the camera changes no more.
+//! registered wrongly. But the camera that they are refined to is much better than the one given,
+//! so they are tracked again with that, until the camera changes no more.
 
 use crate::camera::Camera;
 use crate::progress::Progress;

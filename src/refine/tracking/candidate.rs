@@ -42,9 +42,11 @@ pub fn sort_candidates(candidates: &mut [Candidate]) {
 
 /// Chooses one of the candidates, which are sorted best first.
 ///
-/// Among those whose unexplained shares are too similar for the pixels to decide, the prior chooses.
-/// If its margin is too small for a candidate elsewhere on the wall, the frame is ambiguous.
-/// `pixel_size_m` tells how large a pixel of the search level is on the wall where a candidate looks.
+/// Among those whose unexplained shares are too similar for the pixels to decide, the prior
+/// chooses. If its margin is too small for a candidate elsewhere on the wall, the frame is
+/// ambiguous.
+/// `pixel_size_m` tells how large a pixel of the search level is on the wall where a candidate
+/// looks.
 ///
 /// # Errors
 /// The reason to reject the frame.
@@ -83,11 +85,11 @@ pub fn choose_candidate<'c>(
     Ok(best)
 }
 
-/// Unexplained share `1 − c²` of the texture's variance, c the correlation corrected for noise; None
-/// if too few samples are shared or the two do not correlate.
+/// Unexplained share `1 − c²` of the texture's variance, c the correlation corrected for noise;
+/// None if too few samples are shared or the two do not correlate.
 ///
-/// It is 0 where noise drowns the texture: nothing speaks against the pose, and the covariance states
-/// how uncertain it is.
+/// It is 0 where noise drowns the texture: nothing speaks against the pose, and the covariance
+/// states how uncertain it is.
 pub fn unexplained_share(ncc_score: &NccScore, unwrapped: &UnwrappedFrame) -> Option<f64> {
     let compared = ncc_score.samples >= min_samples(unwrapped) && ncc_score.correlation() > 0.0;
     let correlation = ncc_score.corrected_correlation().unwrap_or(1.0);

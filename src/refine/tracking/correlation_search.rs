@@ -1,11 +1,11 @@
 //! Correlation search: hypotheses of a frame's pose beyond the basin of Gauss–Newton.
 //!
 //! A brick wall correlates with itself over a fraction of a brick only, and the prior is wider than
-//! that. So before a frame is refined, it is compared with the reference mosaic over the whole width
-//! of the prior. The frame is unwrapped under a few hypotheses of pitch and roll; each picture is
-//! correlated with the mosaic over all shifts at once, by Fourier transform ([`Correlator`]). (A
-//! translation of the camera looks nearly like a rotation; refinement tells them apart.) The best
-//! maxima are the hypotheses.
+//! that. So before a frame is refined, it is compared with the reference mosaic over the whole
+//! width of the prior. The frame is unwrapped under a few hypotheses of pitch and roll; each
+//! picture is correlated with the mosaic over all shifts at once, by Fourier transform
+//! ([`Correlator`]). (A translation of the camera looks nearly like a rotation; refinement tells
+//! them apart.) The best maxima are the hypotheses.
 //!
 //! The score of a hypothesis is its log-posterior with exposure and noise profiled out:
 //! `ℓ = −(n/2ν) ln(1 − c²) − ½ ωᵀΣ⁻¹ω`, n the samples that both show, ν those that share one
@@ -37,8 +37,8 @@ pub struct Hypothesis {
     pub attainable_score: f64,
 }
 
-/// Log-likelihood `−(n/2ν) ln(1 − c²)` of a correlation over a number of samples, exposure and noise
-/// profiled out.
+/// Log-likelihood `−(n/2ν) ln(1 − c²)` of a correlation over a number of samples, exposure and
+/// noise profiled out.
 pub fn log_likelihood(correlation: f64, samples: f64) -> f64 {
     let c = correlation.clamp(0.0, 1.0 - 1e-6);
     -0.5 * samples / SAMPLES_PER_INDEPENDENT_PIECE * (1.0 - c * c).ln()
@@ -128,9 +128,9 @@ struct SearchGrid<'p> {
     tunnel_axis: Vector3<f64>,
     /// The axis of pitch in the camera's frame.
     pitch_axis: Vector3<f64>,
-    /// Distance by which a radian moves the middle of the view, metres: of pitch along the tunnel, ...
+    /// Motion of the middle of the view along the tunnel by a radian of pitch, metres.
     along_m: f64,
-    /// ... of a rotation about the tunnel's axis around it.
+    /// Motion of the middle of the view around the tunnel by a radian about its axis, metres.
     across_m: f64,
     /// Half the diagonal of the picture, pixels.
     half_diagonal: f64,
@@ -159,8 +159,8 @@ impl<'p> SearchGrid<'p> {
         let across_m = (a.fixed_columns::<3>(0) * tunnel_axis).norm();
         let camera = unwrapped.camera();
         let half_diagonal = 0.5 * f64::from(camera.width).hypot(f64::from(camera.height));
-        // The more steeply a frame looks along the tunnel, the faster its picture on the wall stretches
-        // with the pitch.
+        // The more steeply a frame looks along the tunnel, the faster its picture on the wall
+        // stretches with the pitch.
         let steepness = (hit.range / along_m).clamp(MIN_PITCH_STEP_SHARE, 1.0);
         let pitch_reach = MAX_DEVIATION_SIGMA * sigma_rad[0];
         let pitches = symmetric_steps(pitch_reach, PITCH_STEP_RAD * steepness);
@@ -225,8 +225,8 @@ impl<'p> SearchGrid<'p> {
         }
     }
 
-    /// Selects the best of the maxima, which are sorted best first, without those that are nearly the
-    /// pose of a better one; `count` at most.
+    /// Selects the best of the maxima, which are sorted best first, without those that are nearly
+    /// the pose of a better one; `count` at most.
     fn select_distinct<'m>(
         &self,
         maxima: &'m [ScoredMaximum],
@@ -267,8 +267,8 @@ fn pitch_axis(tunnel_axis: &Vector3<f64>) -> Option<Vector3<f64>> {
     tunnel_axis.cross(&Vector3::z()).try_normalize(1e-6)
 }
 
-/// Finds shifts along s and h, metres, up to `reach_m`, at which a frame at `pose` matches the mosaic:
-/// maxima of the squared correlation of at least `min_squared_correlation`.
+/// Finds shifts along s and h, metres, up to `reach_m`, at which a frame at `pose` matches the
+/// mosaic: maxima of the squared correlation of at least `min_squared_correlation`.
 ///
 /// Zero shift is one of them where the pose is right.
 pub fn find_matching_shifts(
@@ -301,8 +301,9 @@ fn symmetric_steps(reach: f64, step: f64) -> Vec<f64> {
 /// Rotates a pose so that its middle looks at a wall point `shift_m` away from where it does; None
 /// if it leaves the wall.
 ///
-/// It rotates about the tunnel's axis, which moves the picture along s and does not distort it however
-/// steeply the camera looks along the tunnel, and in pitch. Newton's method finds the two angles.
+/// It rotates about the tunnel's axis, which moves the picture along s and does not distort it
+/// however steeply the camera looks along the tunnel, and in pitch. Newton's method finds the two
+/// angles.
 fn shift_view(context: &EstimationContext, pose: &Pose, shift_m: &Vector2<f64>) -> Option<Pose> {
     let hit = |pose: &Pose| {
         let ray = pose.r_wc * Vector3::z();

@@ -6,10 +6,10 @@
 //! ```
 //!
 //! Prescreening rejects frames that show nothing. Tracking registers one frame after another: the
-//! prior predicts a pose, the correlation search compares the unwrapped frame with a reference mosaic
-//! of its neighbours, and the hypotheses are refined and chosen from. Sliding windows keep the error
-//! bounded. While shading or camera are only roughly known, tracking alternates with their
-//! calibration.
+//! prior predicts a pose, the correlation search compares the unwrapped frame with a reference
+//! mosaic of its neighbours, and the hypotheses are refined and chosen from. Sliding windows keep
+//! the error bounded. While shading or camera are only roughly known, tracking alternates with
+//! their calibration.
 
 pub mod alternating_calibration;
 pub mod candidate;

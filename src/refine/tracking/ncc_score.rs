@@ -33,17 +33,18 @@ impl NccScore {
         self.xy / (self.xx * self.yy).sqrt().max(f64::MIN_POSITIVE)
     }
 
-    /// The share of the contrast's variance that is texture and not noise, 0 to 1: the geometric mean
-    /// of both pictures.
+    /// The share of the contrast's variance that is texture and not noise, 0 to 1: the geometric
+    /// mean of both pictures.
     pub fn texture_share(&self) -> f64 {
         let share = |all: f64, noise: f64| (1.0 - noise / all.max(f64::MIN_POSITIVE)).max(0.0);
         (share(self.xx, self.noise_x) * share(self.yy, self.noise_y)).sqrt()
     }
 
-    /// The correlation corrected for noise: the normalised cross-correlation over the texture's share.
+    /// The correlation corrected for noise: the normalised cross-correlation over the texture's
+    /// share.
     ///
-    /// It is about 1 where both pictures show the same wall, however noisy they are. None where noise
-    /// drowns the texture.
+    /// It is about 1 where both pictures show the same wall, however noisy they are. None where
+    /// noise drowns the texture.
     ///
     /// Source: C. Spearman, "The proof and measurement of association between two things", 1904
     /// (correction for attenuation).

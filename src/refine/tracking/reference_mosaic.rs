@@ -24,8 +24,8 @@ pub struct ReferenceMosaic {
     pub origin: Vector3<f64>,
     /// The grid points relative to the origin.
     pub points: Vec<[f32; 3]>,
-    /// Local contrast, the mean over the frames; NaN where no frame has a value and on ignored parts
-    /// of the wall.
+    /// Local contrast, the mean over the frames; NaN where no frame has a value and on ignored
+    /// parts of the wall.
     pub contrast: Vec<f32>,
     /// Variance of the noise of the local contrast.
     noise: Vec<f32>,
@@ -43,8 +43,8 @@ struct Viewpoint {
 }
 
 impl Viewpoint {
-    /// True if a wall point with this normal is seen with at least [`MIN_PIXEL_DENSITY`] of the pixels
-    /// that it has when seen squarely from the axis.
+    /// True if a wall point with this normal is seen with at least [`MIN_PIXEL_DENSITY`] of the
+    /// pixels that it has when seen squarely from the axis.
     ///
     /// At distance d and angle β to the normal the share is `cos β (r/d)²`.
     #[inline]
@@ -65,8 +65,8 @@ struct Source<'a> {
 }
 
 impl ReferenceMosaic {
-    /// Fuses the `registered` frames over the wall where frame `frame` looks from `pose`, widened by
-    /// `margin_m` metres on every side.
+    /// Fuses the `registered` frames over the wall where frame `frame` looks from `pose`, widened
+    /// by `margin_m` metres on every side.
     ///
     /// # Errors
     /// [`ProblemError::Placement`] for a `pose` outside the tunnel.

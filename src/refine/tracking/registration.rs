@@ -48,8 +48,8 @@ pub struct Registered {
     pub is_reliable: bool,
 }
 
-/// Registers frame `frame` on the wall that the registered frames around it show; returns the reason
-/// if it must be rejected.
+/// Registers frame `frame` on the wall that the registered frames around it show; returns the
+/// reason if it must be rejected.
 ///
 /// # Errors
 /// [`ProblemError`]: a frame that cannot be read, equations without a solution.
@@ -87,11 +87,11 @@ struct Registration<'r> {
     frame: usize,
     predicted: &'r PosePrediction,
     neighbours: &'r Neighbours<'r>,
-    /// Pyramid levels: of the first solves, ...
+    /// Pyramid level of the first solves.
     coarsest_level: usize,
-    /// ... of the search and the candidates, ...
+    /// Pyramid level of the search and the candidates.
     search_level: usize,
-    /// ... and of the estimate.
+    /// Pyramid level of the estimate.
     finest_level: usize,
     /// σ of pitch, yaw and roll as they appear in the picture, radians.
     sigma_rad: [f64; 3],
@@ -212,8 +212,8 @@ impl<'r> Registration<'r> {
         Ok(())
     }
 
-    /// Refines a pose by Gauss–Newton down to the level of the search; None if that leads out of the
-    /// tunnel, off the wall, or beyond what the prior allows.
+    /// Refines a pose by Gauss–Newton down to the level of the search; None if that leads out of
+    /// the tunnel, off the wall, or beyond what the prior allows.
     fn refine_pose(&self, pose: &Pose) -> Result<Option<Candidate>, ProblemError> {
         let mut estimate = self.mosaic.fit_exposure(&self.unwrapped, pose);
         for level in (self.search_level..=self.coarsest_level).rev() {
@@ -258,8 +258,8 @@ impl<'r> Registration<'r> {
         })
     }
 
-    /// Solves for the frame's estimate at one pyramid level, with all other frames held; returns the
-    /// estimate unchanged where it shares no wall with them.
+    /// Solves for the frame's estimate at one pyramid level, with all other frames held; returns
+    /// the estimate unchanged where it shares no wall with them.
     fn solve_at(
         &self,
         level: usize,

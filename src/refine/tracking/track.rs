@@ -163,8 +163,8 @@ fn find_earliest_overlap(context: &EstimationContext, footprints: &[Footprint]) 
         .unwrap_or(last)
 }
 
-/// Registers rejected frames again, now that there are frames on both sides of them; returns how many
-/// have been registered. Frames that show nothing are left out.
+/// Registers rejected frames again, now that there are frames on both sides of them; returns how
+/// many have been registered. Frames that show nothing are left out.
 ///
 /// # Errors
 /// [`ProblemError`].

@@ -131,8 +131,8 @@ impl UnwrappedSampler<'_> {
         Some((contrast, self.noise_at(&spot)))
     }
 
-    /// Local contrast, the variance of its noise, and the fine detail in grey levels; None where the
-    /// frame has no value.
+    /// Local contrast, the variance of its noise, and the fine detail in grey levels; None where
+    /// the frame has no value.
     #[inline]
     pub fn contrast_and_detail(&self, point: &[f32; 3]) -> Option<(f32, f32, f32)> {
         let spot = self.sampler.at(point)?;

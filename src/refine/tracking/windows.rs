@@ -27,8 +27,8 @@ const STOPPING: Stopping = Stopping {
     step_sigma: 0.0,
 };
 
-/// Solves the window that reaches from frame `first` to the last tracked one, the oldest third of it
-/// held; `drifted`: the last frame may be many pixels off.
+/// Solves the window that reaches from frame `first` to the last tracked one, the oldest third of
+/// it held; `drifted`: the last frame may be many pixels off.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -109,8 +109,8 @@ impl WindowState {
     }
 }
 
-/// Solves the frames of a window together, the oldest `held` of them held; with the camera's unknowns
-/// if these are to be estimated.
+/// Solves the frames of a window together, the oldest `held` of them held; with the camera's
+/// unknowns if these are to be estimated.
 ///
 /// Returns the final cost per observation, grey levels²; infinity if no wall is seen twice.
 fn solve_window(

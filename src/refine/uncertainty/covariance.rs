@@ -6,32 +6,32 @@
 //!
 //! **D is not the normal matrix H.** Gauss–Newton weighs a residual by `ω = ψ(e)/e`, but as the
 //! residual grows its weight falls: a score `Σ ψ(e) ∂e` has the derivative `Σ ψ'(e) ∂e ∂eᵀ`, and ψ'
-//! is less than ω (0.89 of it in the mean, for Gaussian residuals). Slopes that are not quite those of
-//! the wall, as on faint or very sharp walls, make a difference, too. The solver observes D for poses
-//! from step to step: `D = κ H`, with κ the [`SolveRecord::curvature`], about 0.9.
+//! is less than ω (0.89 of it in the mean, for Gaussian residuals). Slopes that are not quite those
+//! of the wall, as on faint or very sharp walls, make a difference, too. The solver observes D for
+//! poses from step to step: `D = κ H`, with κ the [`SolveRecord::curvature`], about 0.9.
 //!
-//! **Q** is estimated from the scatter of the gradients of parts of the cost, `V = Σ_b g_b g_bᵀ` over
-//! blocks b of the wall (32 × 32 pixels: errors of neighbouring samples are correlated, those of
-//! blocks hardly), whatever the residuals are like, over κ², plus the prior's own information P. If
-//! the residuals were independent Gaussian noise of the assumed σ, c would be 0.97. They are not
-//! quite: where the wall is steep, aliasing and interpolation add errors that depend on the position
-//! between pixels, with correlations of their own. With one factor for all poses, and J the normal
-//! matrix of the poses with the exposures eliminated,
+//! **Q** is estimated from the scatter of the gradients of parts of the cost, `V = Σ_b g_b g_bᵀ`
+//! over blocks b of the wall (32 × 32 pixels: errors of neighbouring samples are correlated, those
+//! of blocks hardly), whatever the residuals are like, over κ², plus the prior's own information P.
+//! If the residuals were independent Gaussian noise of the assumed σ, c would be 0.97. They are not
+//! quite: where the wall is steep, aliasing and interpolation add errors that depend on the
+//! position between pixels, with correlations of their own. With one factor for all poses, and J
+//! the normal matrix of the poses with the exposures eliminated,
 //!
 //! `Σ = c J⁻¹`, `c = tr(J⁻¹ E Q Eᵀ) / freedoms`, `Q = V/κ² + P`, `J = H_pp − H_pe H_ee⁻¹ H_ep`,
 //! `E = (I, −H_pe H_ee⁻¹)`,
 //!
 //! the freedoms being six of each frame less those of the gauge. The exposures are left out because
-//! their errors differ: where a wall is sharp, a frame that sees it obliquely is blurred, which looks
-//! like a lower gain, block after block, and says nothing of its pose. As
+//! their errors differ: where a wall is sharp, a frame that sees it obliquely is blurred, which
+//! looks like a lower gain, block after block, and says nothing of its pose. As
 //! `H⁻¹ = Eᵀ J⁻¹ E + diag(0, H_ee⁻¹)`,
 //!
 //! `tr(J⁻¹ E Q Eᵀ) = tr(H⁻¹ Q) − tr(H_ee⁻¹ Q_ee)`,
 //!
 //! for which only those blocks of `H⁻¹` and `H_ee⁻¹` are needed where H itself has blocks
-//! ([`crate::refine::linear::selected_inverse`]). `J⁻¹` is the poses' part of `H⁻¹`. c is about 0.35
-//! on sharp bricks, where aliasing, which the weight of every sample takes for independent, cancels
-//! over a block, and 0.7 on noisy walls of low contrast.
+//! ([`crate::refine::linear::selected_inverse`]). `J⁻¹` is the poses' part of `H⁻¹`. c is about
+//! 0.35 on sharp bricks, where aliasing, which the weight of every sample takes for independent,
+//! cancels over a block, and 0.7 on noisy walls of low contrast.
 //!
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard
 //! conditions", 1967 (`D⁻¹ Q D⁻¹`); F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw, W. A. Stahel,
@@ -112,7 +112,8 @@ impl Covariances {
         self
     }
 
-    /// Formats the covariances as `covariance.csv`: one line per frame and one per pair of neighbours.
+    /// Formats the covariances as `covariance.csv`: one line per frame and one per pair of
+    /// neighbours.
     ///
     /// Columns: `frame_a`, `frame_b` (the same for a frame by itself, the next for a pair), 1-σ of
     /// the frame on the wall in mm (empty for pairs), then the 36 elements row by row, rows `ξ_a`
@@ -149,8 +150,8 @@ impl Covariances {
 
 /// Computes the covariances at a solution.
 ///
-/// `normal`: H, with `tied` freedoms of the gauge tied; `scatter`: V of the pixels; `prior`: P; all on
-/// `pattern`. `curvature`: κ.
+/// `normal`: H, with `tied` freedoms of the gauge tied; `scatter`: V of the pixels; `prior`: P; all
+/// on `pattern`. `curvature`: κ.
 ///
 /// # Errors
 /// [`FactorError`] if the normal matrix is singular.

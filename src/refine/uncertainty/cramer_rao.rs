@@ -1,8 +1,8 @@
 //! Cramér–Rao bound: the covariance that no unbiased estimate of the poses undercuts.
 //!
-//! Each pixel has the value `I = a S(x(ξ)) + b + n` with the wall's texture S (averaged over the square
-//! of a pixel) unknown, and n Gaussian with variance σ². Parameters are the poses' ξ, the exposures and
-//! S at every wall point. The Fisher information of one observation is `σ⁻² ∂I ∂Iᵀ`,
+//! Each pixel has the value `I = a S(x(ξ)) + b + n` with the wall's texture S (averaged over the
+//! square of a pixel) unknown, and n Gaussian with variance σ². Parameters are the poses' ξ, the
+//! exposures and S at every wall point. The Fisher information of one observation is `σ⁻² ∂I ∂Iᵀ`,
 //! with `∂I/∂ξ_i = a φᵀ B_i` as in [`crate::refine::tiles::tile`] and `∂I/∂S = a`. Eliminating S at
 //! each wall point by the Schur complement leaves for the poses
 //!
@@ -15,19 +15,20 @@
 //!
 //! # The bound for an unknown texture
 //!
-//! This bound takes the slopes of the texture as known, but an estimator has them from the same pixels.
-//! The bound with the texture integrated out, as a Gaussian process with the wall's own spectrum, is
-//! derived in [`crate::refine::problem::unknown_texture`]: a tile that N frames see keeps a share of the
-//! information in M that belongs to displacements. On faint walls the share falls with more noise; on
-//! sharp walls, because of aliasing, it falls with *less* noise. An estimator that knows no more of the
-//! wall than its spectrum cannot undercut it; one that knows more, for example that edges are straight,
-//! can. `benches/reach.py` computes the share independently.
+//! This bound takes the slopes of the texture as known, but an estimator has them from the same
+//! pixels. The bound with the texture integrated out, as a Gaussian process with the wall's own
+//! spectrum, is derived in [`crate::refine::problem::unknown_texture`]: a tile that N frames see
+//! keeps a share of the information in M that belongs to displacements. On faint walls the share
+//! falls with more noise; on sharp walls, because of aliasing, it falls with *less* noise. An
+//! estimator that knows no more of the wall than its spectrum cannot undercut it; one that knows
+//! more, for example that edges are straight, can. `benches/reach.py` computes the share
+//! independently.
 //!
 //! # Accuracy of the bound
 //!
 //! Slopes are differences over an eighth of a pixel to each side of frames with 4 × 4 times the
-//! pixels, interpolated by a cubic. That loses 6 % of the information for the spectrum of bricks, 2.5 %
-//! for that of concrete, so both bounds are too large by half of that.
+//! pixels, interpolated by a cubic. That loses 6 % of the information for the spectrum of bricks,
+//! 2.5 % for that of concrete, so both bounds are too large by half of that.
 //!
 //! Source: C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection, Estimation, and
 //! Modulation Theory", 1968.
@@ -64,8 +65,8 @@ pub struct PoseBounds {
     pub known: Covariances,
     /// Cramér–Rao bound with the texture unknown but for its spectrum.
     pub unknown: Covariances,
-    /// Bayesian bound (van Trees) of estimates that also know the survey's prior, with the slopes of the
-    /// texture known.
+    /// Bayesian bound (van Trees) of estimates that also know the survey's prior, with the slopes
+    /// of the texture known.
     pub bayesian: Covariances,
 }
 

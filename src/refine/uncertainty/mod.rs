@@ -8,8 +8,8 @@
 //!
 //! A solution's covariance follows from its normal equations and the scatter of its scores. Frames
 //! whose residuals scatter more than noise are overdispersed, and shared parameters that the data
-//! hardly narrow down are unobservable. The rolling-shutter test estimates the readout time, and the
-//! Cramér–Rao bound states what any estimator could reach.
+//! hardly narrow down are unobservable. The rolling-shutter test estimates the readout time, and
+//! the Cramér–Rao bound states what any estimator could reach.
 
 pub mod calibration_report;
 pub mod covariance;

@@ -1,9 +1,9 @@
 //! Observability of the shared parameters.
 //!
 //! After a solve, `Σ_κ` ([`crate::refine::linear::bordered_system`]) is the covariance of the free
-//! shared parameters. One that is hardly more certain than by its prior is unobservable: it is held at
-//! the value given, and the others are solved without it. The worst is held first, for without it
-//! another may be observed.
+//! shared parameters. One that is hardly more certain than by its prior is unobservable: it is held
+//! at the value given, and the others are solved without it. The worst is held first, for without
+//! it another may be observed.
 
 use crate::refine::linear::bordered_system::{BorderBlock, Eliminated, SharedBlock, reduce};
 use crate::refine::linear::sparse_cholesky::FactorError;
@@ -73,8 +73,8 @@ impl Posterior {
         Some(covariance)
     }
 
-    /// Finds the parameters that the data do not observe, one by one, the worst first. If S is singular,
-    /// none is observed.
+    /// Finds the parameters that the data do not observe, one by one, the worst first. If S is
+    /// singular, none is observed.
     pub fn find_unobservable(&self, calibration: &Calibration) -> Vec<UnobservableParameter> {
         let mut free = calibration.free;
         let mut unobservable = Vec::new();

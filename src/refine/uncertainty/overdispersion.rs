@@ -3,15 +3,16 @@
 //! Where the model is wrong (a camera's focal length, a turn closed a period off and bent), patches
 //! of the wall pull a frame in different directions, and it rests between them. If that were noise,
 //! the scatter of the patches' scores would be `V_k ≈ H_k`, the frame's own blocks on the diagonal,
-//! all other frames held (White's information-matrix test). With `q = tr(H_k⁻¹ V_k)/6` over the pose
-//! ([`compute_dispersion`]) a patch is displaced `√q` times as far as by noise. By noise, N patches of
-//! information I px⁻² each, which together determine six unknowns, leave the middle of the picture the
-//! variance `σ² = 6/(N I)`, and a patch by itself, in both directions, the variance
+//! all other frames held (White's information-matrix test). With `q = tr(H_k⁻¹ V_k)/6` over the
+//! pose ([`compute_dispersion`]) a patch is displaced `√q` times as far as by noise. By noise, N
+//! patches of information I px⁻² each, which together determine six unknowns, leave the middle of
+//! the picture the variance `σ² = 6/(N I)`, and a patch by itself, in both directions, the variance
 //! `2/I = N σ²/3`. So the displacement of patches beyond noise is
 //!
 //! `overdispersion² = (q − 1) N σ²/3`   px².
 //!
-//! Source: H. White, "Maximum likelihood estimation of misspecified models", Econometrica 50(1), 1982.
+//! Source: H. White, "Maximum likelihood estimation of misspecified models", Econometrica 50(1),
+//! 1982.
 
 use crate::numerics::median::upper_median;
 use crate::refine::linear::normal_equations::Block;
@@ -40,8 +41,8 @@ pub struct Overdispersion {
 }
 
 impl Overdispersion {
-    /// The overdispersion for q, the number N of patches, and σ of the middle of the picture by noise,
-    /// all other frames held.
+    /// The overdispersion for q, the number N of patches, and σ of the middle of the picture by
+    /// noise, all other frames held.
     fn new(q: f64, patches: f64, sigma_px: f64) -> Self {
         Self {
             ratio: q.sqrt(),
@@ -49,8 +50,8 @@ impl Overdispersion {
         }
     }
 
-    /// The overdispersion of a frame with its own block of the normal matrix, `information`, and of V,
-    /// `scatter`, over a number of `patches`. None if the others do not determine its pose.
+    /// The overdispersion of a frame with its own block of the normal matrix, `information`, and of
+    /// V, `scatter`, over a number of `patches`. None if the others do not determine its pose.
     fn of_frame(
         context: &EstimationContext,
         estimate: &FrameEstimate,
@@ -71,8 +72,9 @@ impl Overdispersion {
 
 /// Computes q and, by noise alone, the covariance of the pose with all other frames held.
 ///
-/// The exposure is eliminated: with `E = (I, −H_pe H_ee⁻¹)`, scores of the pose p that the exposure e
-/// does not compensate have the scatter `E V Eᵀ`; and `E` is `Z_pp⁻¹ (Z_pp Z_pe)` with `Z = H_k⁻¹`.
+/// The exposure is eliminated: with `E = (I, −H_pe H_ee⁻¹)`, scores of the pose p that the exposure
+/// e does not compensate have the scatter `E V Eᵀ`; and `E` is `Z_pp⁻¹ (Z_pp Z_pe)` with
+/// `Z = H_k⁻¹`.
 fn compute_dispersion(information: &Block, scatter: &Block) -> Option<(f64, Matrix6<f64>)> {
     let inverse = information.cholesky()?.inverse();
     let rows = inverse.fixed_rows::<6>(0);
@@ -82,8 +84,8 @@ fn compute_dispersion(information: &Block, scatter: &Block) -> Option<(f64, Matr
     Some((q, pose))
 }
 
-/// Computes the overdispersion of every frame at a solution; 0 for those that show nothing. `context`:
-/// with the solution's own κ.
+/// Computes the overdispersion of every frame at a solution; 0 for those that show nothing.
+/// `context`: with the solution's own κ.
 pub fn compute_overdispersions(
     context: &EstimationContext,
     solution: &Solution,
@@ -123,8 +125,8 @@ pub fn find_overdispersed(
 mod tests {
     use super::*;
 
-    /// Patches displaced by noise alone have no overdispersion; those displaced by half a pixel more have
-    /// one of half a pixel.
+    /// Patches displaced by noise alone have no overdispersion; those displaced by half a pixel
+    /// more have one of half a pixel.
     #[test]
     fn overdispersion_is_displacement_beyond_noise() {
         // N patches, each with information I px⁻² in both directions, determine six unknowns.

@@ -1,11 +1,13 @@
-//! Rolling-shutter test: whether the frames fit better with another readout time than the one given.
+//! Rolling-shutter test: whether the frames fit better with another readout time than the one
+//! given.
 //!
-//! A camera that moves while rows are read displaces what it sees, more from row to row, in proportion
-//! to the time since the middle row. Where this is ignored, poses take up most of it: frames roll, and
-//! the whole wall is wound around the axis a little. The rest is the same in all frames, a residual
-//! along the rows. It is estimated as one number, the readout time with which the frames fit best,
-//! with everything else free ([`crate::refine::linear::bordered_system`]). The intrinsics are free,
-//! too, within their usual uncertainty, so that a wrong lens does not pass for a wrong time.
+//! A camera that moves while rows are read displaces what it sees, more from row to row, in
+//! proportion to the time since the middle row. Where this is ignored, poses take up most of it:
+//! frames roll, and the whole wall is wound around the axis a little. The rest is the same in all
+//! frames, a residual along the rows. It is estimated as one number, the readout time with which
+//! the frames fit best, with everything else free ([`crate::refine::linear::bordered_system`]). The
+//! intrinsics are free, too, within their usual uncertainty, so that a wrong lens does not pass for
+//! a wrong time.
 
 use crate::refine::model::context::{EstimationContext, Sampling};
 use crate::refine::model::frame_states::FrameStates;
@@ -43,8 +45,8 @@ pub struct ReadoutEstimate {
     pub estimate_ms: f64,
     /// 1-σ of the estimate, milliseconds.
     pub sigma_ms: f64,
-    /// Displacement of the first row against the last by the difference, pixels in the middle of the
-    /// median frame.
+    /// Displacement of the first row against the last by the difference, pixels in the middle of
+    /// the median frame.
     pub shift_px: f64,
     /// True if the difference is a systematic error.
     pub systematic: bool,

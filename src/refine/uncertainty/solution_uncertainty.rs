@@ -27,8 +27,8 @@ pub struct SolutionUncertainty {
 }
 
 impl SolutionUncertainty {
-    /// Computes the uncertainty of a solution, with the free parameters of `calibration`; `context`: with
-    /// the solution's own κ.
+    /// Computes the uncertainty of a solution, with the free parameters of `calibration`;
+    /// `context`: with the solution's own κ.
     ///
     /// # Errors
     /// [`ProblemError::Factor`] if shared parameters were estimated and the poses' normal matrix is
@@ -102,9 +102,9 @@ impl SolutionUncertainty {
         rejections
     }
 
-    /// Finds the shared parameters that the data do not observe. All are unobservable if too many frames
-    /// do not fit the others, if all are overdispersed, or if they are tied too loosely. `context`: with
-    /// the solution's own κ.
+    /// Finds the shared parameters that the data do not observe. All are unobservable if too many
+    /// frames do not fit the others, if all are overdispersed, or if they are tied too loosely.
+    /// `context`: with the solution's own κ.
     pub fn find_unobservable(
         &self,
         context: &EstimationContext,
@@ -144,8 +144,8 @@ impl SolutionUncertainty {
         if median.is_nan() || median > MAX_MEDIAN_SIGMA_PX {
             let reason = format!(
                 "the frames tie each other to {median:.2} px of the wall only (1-σ), and more than \
-                 {MAX_MEDIAN_SIGMA_PX} px leave the camera to chance; use more frames, best a whole \
-                 turn or two, or more of a wall with texture"
+                 {MAX_MEDIAN_SIGMA_PX} px leave the camera to chance; use more frames, best a \
+                 whole turn or two, or more of a wall with texture"
             );
             return mark_all_unobservable(calibration, &reason);
         }

@@ -1,8 +1,8 @@
 //! Choice between aliases by the prior.
 //!
 //! With errors that accumulate, a step can be wrong by a period of the wall, and with it all frames
-//! after it; with independent errors, each frame by itself. Where less than half of the frames would
-//! be decided, none is: the others are what they are decided against.
+//! after it; with independent errors, each frame by itself. Where less than half of the frames
+//! would be decided, none is: the others are what they are decided against.
 //!
 //! A frame may match the wall at its present pose and, for all that is seen there, nowhere else,
 //! because the frames that it is compared with are wrong by a period as well. If the prior would
@@ -42,7 +42,8 @@ impl AliasChoice {
     /// Marks every frame as undecided that has an alias by this choice, by a `first` one or by its
     /// alias motions, or that may be a period of the wall away.
     ///
-    /// This is for walls where most frames are undecided: the others may be wrong by a period as well.
+    /// This is for walls where most frames are undecided: the others may be wrong by a period as
+    /// well.
     pub fn mark_all_undecided(
         &mut self,
         first: &Self,
@@ -57,8 +58,8 @@ impl AliasChoice {
     }
 }
 
-/// Finds the periods of the wall: the alias motions of all frames and their opposites, without those
-/// that are nearly the same.
+/// Finds the periods of the wall: the alias motions of all frames and their opposites, without
+/// those that are nearly the same.
 pub fn find_periods(alias_motions: &[Vec<GaugeMotion>], radius_m: f64) -> Vec<GaugeMotion> {
     let length = |motion: &GaugeMotion| (radius_m * motion.turn_rad).hypot(motion.shift_m);
     let mut found: Vec<GaugeMotion> = Vec::new();
@@ -75,9 +76,9 @@ pub fn find_periods(alias_motions: &[Vec<GaugeMotion>], radius_m: f64) -> Vec<Ga
     found
 }
 
-/// Chooses the likeliest of some motions, none included. Returns with it the second one if it is less
-/// likely by no more than `min_odds`; or else one of the wall's `periods` if it is likelier by more
-/// than that.
+/// Chooses the likeliest of some motions and no motion. Returns with it the second one if it is
+/// less likely by no more than `min_odds`; or else one of the wall's `periods` if it is likelier by
+/// more than that.
 fn choose_likeliest(
     motions: &[GaugeMotion],
     periods: &[GaugeMotion],
@@ -104,7 +105,8 @@ fn choose_likeliest(
 }
 
 impl Evidence<'_> {
-    /// Chooses between the aliases by the prior; odds below `min_odds`, nats, leave a frame undecided.
+    /// Chooses between the aliases by the prior; odds below `min_odds`, nats, leave a frame
+    /// undecided.
     pub fn choose(&self, min_odds: f64) -> AliasChoice {
         match self.prior.jitter.model {
             JitterModel::RandomWalk => self.choose_by_steps(min_odds),
@@ -157,8 +159,8 @@ impl Evidence<'_> {
         AliasChoice { motions, aliases }
     }
 
-    /// Chooses frame by frame, for independent errors, against the gauge motion that all frames have
-    /// taken on, until nothing changes.
+    /// Chooses frame by frame, for independent errors, against the gauge motion that all frames
+    /// have taken on, until nothing changes.
     fn choose_by_frames(&self, min_odds: f64) -> AliasChoice {
         let initial: Vec<Pose> = self.frames.iter().map(|k| self.prior.initial[*k]).collect();
         let mut choice = AliasChoice {
@@ -265,8 +267,8 @@ mod tests {
         );
     }
 
-    /// The frames that a frame was compared with are a period off, too, so it matches nowhere else; but
-    /// others have shown the period.
+    /// The frames that a frame was compared with are a period off, too, so it matches nowhere else;
+    /// but others have shown the period.
     #[test]
     fn frame_a_period_off_by_the_prior_is_ambiguous() {
         for model in [JitterModel::RandomWalk, JitterModel::Independent] {

@@ -19,8 +19,8 @@ use crate::surface::{Footprint, GaugeMotion, free_part};
 use crate::trajectory::Pose;
 use nalgebra::Vector2;
 
-/// Finds the gauge motions (rotations about the axis, translations along it) within the prior's reach
-/// after which frame `frame` matches what the others show as well as it does now.
+/// Finds the gauge motions (rotations about the axis, translations along it) within the prior's
+/// reach after which frame `frame` matches what the others show as well as it does now.
 ///
 /// # Errors
 /// [`ProblemError`].
@@ -128,8 +128,8 @@ impl Comparison<'_> {
         unexplained_share(&ncc_score, self.unwrapped)
     }
 
-    /// Refines a shift to a fraction of a sample by pattern search: the best of ever closer neighbours.
-    /// Returns it with its unexplained share.
+    /// Refines a shift to a fraction of a sample by pattern search: the best of ever closer
+    /// neighbours. Returns it with its unexplained share.
     fn refine_shift(&self, shift_m: [f64; 2], spacing_m: f64) -> (Option<f64>, [f64; 2]) {
         let mut best = (self.unexplained(shift_m), shift_m);
         let mut step = 0.5 * spacing_m;
@@ -152,8 +152,8 @@ impl Comparison<'_> {
 /// leaves the share `present`.
 ///
 /// It is bounded by odds: (1 − u)/u no less than 1/[`MAX_UNEXPLAINED_RATIO`] of that at the present
-/// pose. Where little is explained there, a pose that explains nothing is no alias, though it leaves
-/// less than twice as much.
+/// pose. Where little is explained there, a pose that explains nothing is no alias, though it
+/// leaves less than twice as much.
 fn max_alias_unexplained(present: f64) -> f64 {
     let present = present.max(MIN_UNEXPLAINED);
     MAX_UNEXPLAINED_RATIO * present / (1.0 + (MAX_UNEXPLAINED_RATIO - 1.0) * present)

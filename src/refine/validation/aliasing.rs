@@ -1,12 +1,12 @@
 //! Resolution of perceptual aliasing: frames on a repetitive wall are moved to where the prior has
 //! them, or reported as ambiguous.
 //!
-//! On a wall with a printed pattern, a frame moved by a whole period shows exactly the same: neither
-//! its residual nor a comparison with other frames can tell. Only the prior can. So each frame is
-//! compared with the wall after all gauge motions (rotations about the axis, translations along it)
-//! within the prior's reach ([`crate::refine::validation::alias_search`]). If it matches elsewhere as
-//! well, the prior chooses ([`crate::refine::validation::alias_choice`]); if its odds are not clear,
-//! the frame is ambiguous.
+//! On a wall with a printed pattern, a frame moved by a whole period shows exactly the same:
+//! neither its residual nor a comparison with other frames can tell. Only the prior can. So each
+//! frame is compared with the wall after all gauge motions (rotations about the axis, translations
+//! along it) within the prior's reach ([`crate::refine::validation::alias_search`]). If it matches
+//! elsewhere as well, the prior chooses ([`crate::refine::validation::alias_choice`]); if its odds
+//! are not clear, the frame is ambiguous.
 
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
@@ -27,15 +27,16 @@ pub type AliasHypothesis = (usize, GaugeMotion);
 /// The result of resolving aliases.
 #[derive(Debug, Default)]
 pub struct AliasResolution {
-    /// Frames that have been moved, with the motions back. They were compared at their old poses; at
-    /// the new ones the others may contradict.
+    /// Frames that have been moved, with the motions back. They were compared at their old poses;
+    /// at the new ones the others may contradict.
     pub moved: Vec<AliasHypothesis>,
     /// Frames for which the prior does not decide.
     pub undecided: Vec<AliasHypothesis>,
 }
 
 impl AliasResolution {
-    /// All frames that nothing decides if no further comparison follows, those moved last among them.
+    /// All frames that nothing decides if no further comparison follows, those moved last among
+    /// them.
     pub fn into_undecided(self) -> Vec<AliasHypothesis> {
         let Self { moved, undecided } = self;
         let mut all: BTreeMap<usize, GaugeMotion> = moved.into_iter().collect();

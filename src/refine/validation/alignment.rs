@@ -11,9 +11,10 @@ pub struct Alignment {
     pub samples: f64,
     /// Root mean square displacement e, pixels of full size.
     pub error_px: f64,
-    /// Uncertainty σ of the displacement, pixels of full size; infinite where the texture is too faint.
+    /// Uncertainty σ of the displacement, pixels of full size; infinite where the texture is too
+    /// faint.
     pub sigma_px: f64,
-    /// Correlation of their grey values at the present poses, without robust weights that could hide
-    /// that the frames show different things: of all samples or of most, whichever is greater.
+    /// Correlation of their grey values at the present poses, without robust weights that could
+    /// hide that the frames show different things: of all samples or of most, whichever is greater.
     pub correlation: f64,
 }

@@ -1,9 +1,9 @@
 //! Rejection of frames that the others do not support, once all are solved at full size.
 //!
-//! A frame is an inlier if it is aligned with every inlier that it shares wall with, and if such pairs
-//! tie it to the others. Agreement of neighbours is not enough: a group of frames can be right in
-//! itself and stand in the wrong place, if all that it shares with the others is a strip without
-//! texture, or the prior.
+//! A frame is an inlier if it is aligned with every inlier that it shares wall with, and if such
+//! pairs tie it to the others. Agreement of neighbours is not enough: a group of frames can be
+//! right in itself and stand in the wrong place, if all that it shares with the others is a strip
+//! without texture, or the prior.
 
 use crate::refine::model::rejection::RejectionReason;
 use crate::refine::problem::linearisation::FrameShare;
@@ -13,8 +13,8 @@ use crate::refine::thresholds::inconsistent_frames::{
 };
 use crate::refine::validation::alignment::Alignment;
 
-/// Rejects the frames of which the robust loss has rejected too many pixels at full size, so that the
-/// last solve leaves them out.
+/// Rejects the frames of which the robust loss has rejected too many pixels at full size, so that
+/// the last solve leaves them out.
 pub fn reject_disagreeing_frames(
     shares: &[FrameShare],
     rejections: &mut [Option<RejectionReason>],
@@ -26,7 +26,8 @@ pub fn reject_disagreeing_frames(
     }
 }
 
-/// The rejection reason of a frame of which the robust loss has rejected too many pixels, if it has.
+/// The rejection reason of a frame of which the robust loss has rejected too many pixels, if it
+/// has.
 pub fn find_disagreement(share: &FrameShare) -> Option<RejectionReason> {
     let share = 1.0 - share.inliers / share.pixels.max(1e-9);
     (share > MAX_REJECTED_SHARE).then_some(RejectionReason::Disagrees { share })
@@ -34,9 +35,9 @@ pub fn find_disagreement(share: &FrameShare) -> Option<RejectionReason> {
 
 /// Finds the frames that the others do not support, with the reason.
 ///
-/// Of two misaligned frames one is wrong: the one with the largest share of its samples in misaligned
-/// pairs is rejected first, until no such pair is left. The inliers are the largest group of the rest
-/// that pairs tie together.
+/// Of two misaligned frames one is wrong: the one with the largest share of its samples in
+/// misaligned pairs is rejected first, until no such pair is left. The inliers are the largest
+/// group of the rest that pairs tie together.
 pub fn find_inconsistent_frames(
     alignments: &[Alignment],
     frames: usize,
@@ -99,14 +100,15 @@ pub fn find_inconsistent_frames(
     rejections
 }
 
-/// True if two frames show different things, or are displaced by more than their uncertainty explains.
+/// True if two frames show different things, or are displaced by more than their uncertainty
+/// explains.
 fn is_misaligned(pair: &Alignment, max_error_px: f64) -> bool {
     let is_different = pair.sigma_px <= MAX_TYING_SIGMA_PX && pair.correlation < MIN_CORRELATION;
     is_different || pair.error_px > max_error_px + MISALIGNMENT_SIGMA * pair.sigma_px
 }
 
-/// The largest alignment error that is accepted, pixels: relative to the median of the survey, for where
-/// all pairs are misaligned, the calibration is at fault and no frame.
+/// The largest alignment error that is accepted, pixels: relative to the median of the survey, for
+/// where all pairs are misaligned, the calibration is at fault and no frame.
 fn max_error_px(alignments: &[Alignment]) -> f64 {
     let measured = alignments.iter().filter(|p| p.sigma_px.is_finite());
     let mut errors: Vec<f64> = measured.map(|p| p.error_px).collect();

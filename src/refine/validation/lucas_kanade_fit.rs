@@ -43,7 +43,8 @@ pub struct AffineFit {
 }
 
 impl AffineFit {
-    /// Linearises the samples shared with another frame, in a number of `patches`; `slope_noise` and
+    /// Linearises the samples shared with another frame, in a number of `patches`; `slope_noise`
+    /// and
     /// `variance`: of the noise of a slope, and of the residuals.
     pub fn new(
         shared: &[(&TemplateSample, f32)],
@@ -67,8 +68,8 @@ impl AffineFit {
             let outer = regressors * regressors.transpose();
             w += outer;
             let (gs, gh) = (gain32 * sample.slope[0], gain32 * sample.slope[1]);
-            // I_b(x + d) ≈ a I_a(x) + b − a ∇I_a · δ with δ the remaining displacement, so the row of
-            // δ is −a∇I_a.
+            // I_b(x + d) ≈ a I_a(x) + b − a ∇I_a · δ with δ the remaining displacement, so the row
+            // of δ is −a∇I_a.
             let row = SVector::<f64, 8>::from_column_slice(&[
                 f64::from(-gs * x[0]),
                 f64::from(-gs * x[1]),

@@ -131,8 +131,8 @@ impl Template {
 
     /// Aligns another frame with the template; None if the two share too little.
     ///
-    /// Where the iterations diverge, the result of the first one is returned: small where the poses are
-    /// right.
+    /// Where the iterations diverge, the result of the first one is returned: small where the poses
+    /// are right.
     pub fn align(&self, other: &PosedImage) -> Option<Alignment> {
         let grey = other.grey_at(&self.origin);
         let mut p = Vector6::<f64>::zeros();
@@ -176,8 +176,8 @@ impl Template {
         result
     }
 
-    /// The samples with another frame's grey value at the points displaced by the field `p`, where it
-    /// has one.
+    /// The samples with another frame's grey value at the points displaced by the field `p`, where
+    /// it has one.
     fn sample_displaced(
         &self,
         p: &Vector6<f64>,
@@ -216,8 +216,8 @@ impl Template {
     }
 }
 
-/// Weighs steep samples such that none has more influence than `√MAX_SQUARED_SLOPE_RATIO` times that
-/// of the median slope.
+/// Weighs steep samples such that none has more influence than `√MAX_SQUARED_SLOPE_RATIO` times
+/// that of the median slope.
 fn bound_influence(samples: &mut [TemplateSample]) {
     let square = |sample: &TemplateSample| sample.slope[0].powi(2) + sample.slope[1].powi(2);
     let mut squares: Vec<f32> = samples.iter().map(square).collect();
@@ -255,8 +255,8 @@ fn fit_exposure(shared: &[(&TemplateSample, f32)]) -> (f64, f64) {
 
 /// Correlation of grey values, −1 to 1: of all samples or of most, whichever is greater.
 ///
-/// Glints outweigh a faint wall in the former; where most of the wall is flat, the latter is that of
-/// noise.
+/// Glints outweigh a faint wall in the former; where most of the wall is flat, the latter is that
+/// of noise.
 fn compute_correlation(shared: &[(&TemplateSample, f32)]) -> f64 {
     let pairs: Vec<(f32, f32)> = shared.iter().map(|(s, value)| (s.grey, *value)).collect();
     let mut m = [0.0f64; 6];

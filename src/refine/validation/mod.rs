@@ -7,9 +7,9 @@
 //!              alias_search          → alias_choice → aliasing ────────┘
 //! ```
 //!
-//! Normalised cross-correlation tells whether two frames show the same wall, Lucas–Kanade how far one
-//! is displaced against the other. On repetitive walls neither can tell a frame from its alias; there
-//! the prior decides.
+//! Normalised cross-correlation tells whether two frames show the same wall, Lucas–Kanade how far
+//! one is displaced against the other. On repetitive walls neither can tell a frame from its alias;
+//! there the prior decides.
 
 pub mod alias_choice;
 pub mod alias_search;

@@ -1,26 +1,27 @@
 //! Pairwise Lucas–Kanade registration: how far two overlapping frames are displaced against each
 //! other, and with which uncertainty.
 //!
-//! Gauss–Newton compares each frame with the wall fused from all. Where the trajectory is bent, that
-//! wall is blurred, the robust loss rejects what does not fit, and every residual looks small. A pair
-//! of frames shows its displacement: an affine field
+//! Gauss–Newton compares each frame with the wall fused from all. Where the trajectory is bent,
+//! that wall is blurred, the robust loss rejects what does not fit, and every residual looks small.
+//! A pair of frames shows its displacement: an affine field
 //!
 //! `d(x) = P (1, s, h)ᵀ`,   P: 2 × 3,
 //!
 //! that minimises `Σ ω (a I_a(x) + b − I_b(x + d(x)))²` at a fine pyramid level, with the exposure
-//! a, b and the biweight ω of [`crate::refine::tiles::residual_weighting::Loss`] for what is not wall.
-//! With N the normal matrix, corrected for the noise in its slopes, and v the variance of the
+//! a, b and the biweight ω of [`crate::refine::tiles::residual_weighting::Loss`] for what is not
+//! wall. With N the normal matrix, corrected for the noise in its slopes, and v the variance of the
 //! residuals, P has the covariance `v N⁻¹` if they are noise. Glints are not: steeper than a faint
-//! wall, they move with the camera. So the influence of every sample is bounded to that of one a few
-//! times as steep as the median. With g the contributions of patches of samples to the gradient, the
-//! covariance is `C = N⁻¹ (Σ g gᵀ) N⁻¹` where that makes σ larger, whatever the residuals are like.
+//! wall, they move with the camera. So the influence of every sample is bounded to that of one a
+//! few times as steep as the median. With g the contributions of patches of samples to the
+//! gradient, the covariance is `C = N⁻¹ (Σ g gᵀ) N⁻¹` where that makes σ larger, whatever the
+//! residuals are like.
 //!
-//! The root mean square of the displacement over the overlap is `e = √(pᵀWp)`, to which errors alone
-//! contribute `σ = √tr(C W)`. By the triangle inequality, frames that are aligned to τ show
+//! The root mean square of the displacement over the overlap is `e = √(pᵀWp)`, to which errors
+//! alone contribute `σ = √tr(C W)`. By the triangle inequality, frames that are aligned to τ show
 //! `e > τ + z σ` no more often than a Gaussian exceeds z standard deviations.
 //!
-//! Source: B. D. Lucas and T. Kanade, "An iterative image registration technique with an application
-//! to stereo vision", 1981.
+//! Source: B. D. Lucas and T. Kanade, "An iterative image registration technique with an
+//! application to stereo vision", 1981.
 
 use crate::frames::Pyramid;
 use crate::refine::model::context::EstimationContext;

@@ -1,10 +1,10 @@
 //! Normalised cross-correlation of overlapping frames: whether they show the same wall.
 //!
-//! Gauss–Newton ends in a minimum, which is not always the right one; neighbours may agree with each
-//! other and not with the turn before. So once all frames are tracked, every pair that overlaps is
-//! compared on the wall: local contrast of the one against that of the other. Pairs at right poses
-//! correlate as well as the texture allows, others do not, and a low residual fused from several
-//! frames cannot hide it.
+//! Gauss–Newton ends in a minimum, which is not always the right one; neighbours may agree with
+//! each other and not with the turn before. So once all frames are tracked, every pair that
+//! overlaps is compared on the wall: local contrast of the one against that of the other. Pairs at
+//! right poses correlate as well as the texture allows, others do not, and a low residual fused
+//! from several frames cannot hide it.
 
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
@@ -37,17 +37,17 @@ pub struct PairNcc {
     pub contradicts: bool,
     /// Correlation of local contrast, corrected for noise.
     pub correlation: f64,
-    /// Variance of the earlier frame's finest detail over the later one's, gains removed; None where
-    /// noise drowns it.
+    /// Variance of the earlier frame's finest detail over the later one's, gains removed; None
+    /// where noise drowns it.
     pub sharpness_ratio: Option<f64>,
 }
 
-/// Compares those of some consecutive frames that are inliers and overlap: at pyramid level `level`,
-/// in windows that hold a brick or two, and in finest detail.
+/// Compares those of some consecutive frames that are inliers and overlap: at pyramid level
+/// `level`, in windows that hold a brick or two, and in finest detail.
 ///
-/// The coarse comparison tells whether they show the same wall. The fine one is used only where noise
-/// drowns the coarse one: of a repetitive wall it shows edges alone, and these coincide wherever the
-/// pattern does, whatever is between them.
+/// The coarse comparison tells whether they show the same wall. The fine one is used only where
+/// noise drowns the coarse one: of a repetitive wall it shows edges alone, and these coincide
+/// wherever the pattern does, whatever is between them.
 ///
 /// Two frames that do not show the same wall are compared once more without what stands out of it:
 /// water is dark in one frame and glints in the other, and on a faint wall a few such patches in a
@@ -278,8 +278,8 @@ impl PosedFrames<'_> {
 /// detail.
 type Sample = ([f32; 3], (f32, f32, f32));
 
-/// The correlation corrected for noise, of all samples or of most, whichever is greater: a few glints
-/// outweigh a faint wall.
+/// The correlation corrected for noise, of all samples or of most, whichever is greater: a few
+/// glints outweigh a faint wall.
 fn robust_corrected_correlation(ncc_score: &NccScore, shared: &[(f32, f32)]) -> Option<f64> {
     let of_all = ncc_score.corrected_correlation()?;
     if of_all > MIN_CERTAIN_CORRELATION {

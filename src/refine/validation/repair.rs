@@ -1,10 +1,10 @@
 //! Repair: rejects frames that the others do not support, registers them again, and solves their
 //! neighbourhood.
 //!
-//! A wrong frame bends those that it is compared with, and a bent wall makes the registration of the
-//! next frame wrong. Gauss–Newton at full size cannot undo that: many pixels off, it is outside its
-//! basin. So when frames are found wrong, they are rejected, the others are solved again from the
-//! coarsest level, and the rejected frames are registered once more on the wall as it is then.
+//! A wrong frame bends those that it is compared with, and a bent wall makes the registration of
+//! the next frame wrong. Gauss–Newton at full size cannot undo that: many pixels off, it is outside
+//! its basin. So when frames are found wrong, they are rejected, the others are solved again from
+//! the coarsest level, and the rejected frames are registered once more on the wall as it is then.
 
 use crate::progress::Progress;
 use crate::refine::model::context::EstimationContext;
@@ -86,8 +86,9 @@ pub fn repair(
     }
 }
 
-/// Solves neighbourhoods from the coarsest level to full size, and rejects their frames that disagree
-/// with the others or contradict them. `solved` is set to the frames as these solves leave them.
+/// Solves neighbourhoods from the coarsest level to full size, and rejects their frames that
+/// disagree with the others or contradict them. `solved` is set to the frames as these solves leave
+/// them.
 fn solve_neighbourhoods(
     context: &EstimationContext,
     options: &RefineOptions,
