@@ -1,8 +1,8 @@
 //! `refine.json`: the report of a refinement.
 
 use crate::refine::solver::solve_record::SolveRecord;
-use crate::refine::uncertainty::covariance::FrameSigma;
-use crate::refine::uncertainty::observability::CalibrationReport;
+use crate::refine::uncertainty::calibration_report::CalibrationReport;
+use crate::refine::uncertainty::frame_sigma::FrameSigma;
 use crate::refine::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::trajectory::Pose;
 use serde::{Deserialize, Serialize};

@@ -7,44 +7,402 @@
 
 /// Thresholds of `tracking/prescreening.rs`.
 pub mod prescreening {
-    // prescreening: begin
+    /// Standard deviation of the grey values at the coarsest level below which a frame shows
+    /// nothing, grey levels.
+    ///
+    /// Higher: more frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_CONTRAST_GREY: f64 = 0.75;
 
-    // prescreening: end
+    /// Share of a frame's pixels at the coarsest level that must have a value.
+    ///
+    /// Higher: more frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_KNOWN_SHARE: f64 = 0.1;
+
+    /// Root mean square difference at the coarsest level below which two frames are the same
+    /// picture, grey levels.
+    ///
+    /// Higher: more frames are rejected as repeated.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_REPEAT_DIFFERENCE_GREY: f64 = 0.1;
+
+    /// Motion between two initial poses from which on two equal pictures cannot both be right,
+    /// pixels of full size.
+    ///
+    /// Higher: fewer frames are rejected as repeated.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_MOTION_PX: f64 = 20.0;
+
+    /// Number of frames whose mean tells shading from texture.
+    ///
+    /// Higher: shading is corrected in longer surveys only.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SHADING_FRAMES: usize = 10;
 }
 
-/// Thresholds of `tracking/track.rs`.
+/// Thresholds of `tracking/windows.rs` and `tracking/track.rs`.
 pub mod tracking {
-    // tracking: begin
+    /// Number of frames in a long window.
+    ///
+    /// Higher: less bend is left over several turns, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const LONG_WINDOW_FRAMES: usize = 160;
 
-    // tracking: end
+    /// Number of frames tracked between the solves of two long windows.
+    ///
+    /// Higher: fewer long windows are solved.
+    ///
+    /// Chosen by: unknown.
+    pub const LONG_WINDOW_STRIDE: usize = 30;
+
+    /// The oldest of so many equal parts of a long window is held.
+    ///
+    /// Higher: fewer frames are held.
+    ///
+    /// Chosen by: unknown.
+    pub const LONG_WINDOW_HELD_DIVISOR: usize = 8;
+
+    /// The oldest of so many equal parts of a sliding window is held.
+    ///
+    /// Higher: fewer frames are held, and the window is tied more loosely to the frames before it.
+    ///
+    /// Chosen by: a prototype whose windows held the oldest third and stayed bounded.
+    pub const WINDOW_HELD_DIVISOR: usize = 3;
+
+    /// Number of Gauss–Newton iterations in a window.
+    ///
+    /// Higher: windows converge further, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_WINDOW_ITERATIONS: u64 = 6;
+
+    /// Step length below which a window has converged, pixels of the level.
+    ///
+    /// Higher: windows stop earlier; the global solve has more to do.
+    ///
+    /// Chosen by: unknown.
+    pub const WINDOW_STEP_TOLERANCE_PX: f64 = 0.2;
 }
 
 /// Thresholds of `tracking/alternating_calibration.rs`.
 pub mod alternating_calibration {
-    // alternating_calibration: begin
+    /// Number of times that all frames are tracked.
+    ///
+    /// Higher: a camera that is farther off can be estimated, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_TRACKING_ITERATIONS: usize = 5;
 
-    // alternating_calibration: end
+    /// Displacement of the picture's border by the change of the camera, pixels of full size, below
+    /// which frames need not be tracked again.
+    ///
+    /// Higher: frames are tracked fewer times.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_CAMERA_CHANGE_PX: f64 = 2.0;
+
+    /// Number of times that the first frames are tracked for the shading.
+    ///
+    /// Higher: the shading converges further, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SHADING_ITERATIONS: usize = 3;
+
+    /// Relative change of the shading below which frames need not be tracked again.
+    ///
+    /// Higher: the first frames are tracked fewer times.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SHADING_CHANGE: f64 = 0.01;
 }
 
-/// Thresholds of `tracking/registration.rs`.
+/// Thresholds of `tracking/registration.rs` and `tracking/candidate.rs`.
 pub mod registration {
-    // registration: begin
+    /// Number of hypotheses of a frame's pose that are refined.
+    ///
+    /// Higher: fewer right poses are missed on repetitive walls, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_HYPOTHESES: usize = 10;
 
-    // registration: end
+    /// Largest deficit of a hypothesis to the best one with which it is refined, nats:
+    /// log-posterior odds.
+    ///
+    /// The probability that a hypothesis is right whose log-posterior is Δ lower is no more than
+    /// `exp(−Δ)`. The search underestimates log-posteriors by its steps, in proportion to the
+    /// number of samples. So the deficit is between the upper bound for the hypothesis after
+    /// refinement ([`super::correlation_search::MIN_SQUARED_CORRELATION_LEFT`]) and the lower bound
+    /// for the best one, its score before refinement.
+    ///
+    /// Higher: more hypotheses are refined, and fewer right ones are dismissed.
+    ///
+    /// Chosen by: derivation. `ln(10/0.001)`: of ten hypotheses, a right one is dismissed at most
+    /// once in a thousand frames.
+    pub const MAX_SCORE_DEFICIT_NATS: f64 = 9.2;
+
+    /// Number of Gauss–Newton iterations for a single frame at one level.
+    ///
+    /// Higher: candidates converge further, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SOLVE_ITERATIONS: u64 = 12;
+
+    /// Step length below which a single frame has converged, pixels of the level.
+    ///
+    /// Higher: candidates stop earlier; the windows have more to do.
+    ///
+    /// Chosen by: unknown.
+    pub const SOLVE_STEP_TOLERANCE_PX: f64 = 0.1;
+
+    /// Correlation with the reference mosaic, corrected for noise, that a registered frame must
+    /// reach.
+    ///
+    /// Higher: more frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_CORRELATION: f64 = 0.5;
+
+    /// Correlation with the reference mosaic, corrected for noise, from which on a pose is reliable
+    /// and no closer search is made.
+    ///
+    /// Higher: more closer searches, and more windows solved from the coarsest level.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_RELIABLE_CORRELATION: f64 = 0.9;
+
+    /// Number of closer searches around the best candidate.
+    ///
+    /// Higher: frames that are tilted farther are found, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_CLOSER_SEARCH_ITERATIONS: usize = 4;
+
+    /// Number of hypotheses that are refined after a closer search.
+    ///
+    /// Higher: fewer right poses are missed, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_CLOSER_HYPOTHESES: usize = 2;
+
+    /// Largest σ of pitch, yaw and roll in a closer search, radians.
+    ///
+    /// Higher: closer searches reach farther.
+    ///
+    /// Chosen by: unknown.
+    pub const CLOSER_SEARCH_SIGMA_RAD: f64 = 0.05;
+
+    /// Least gain in log-posterior, nats, for which another closer search is worth its time.
+    ///
+    /// Higher: fewer closer searches.
+    ///
+    /// Chosen by: derivation. Twice the gain that fitting the six unknowns of a pose to other noise
+    /// brings follows χ² with six degrees of freedom (Wilks), whose mean is 6: a smaller gain is
+    /// noise.
+    pub const MIN_SCORE_GAIN_NATS: f64 = 3.0;
+
+    /// Share `1 − c²` of the texture's variance that even the right pose leaves unexplained: blur,
+    /// interpolation.
+    ///
+    /// Higher: good matches differ less from each other, so the prior decides more often.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_UNEXPLAINED: f64 = 0.05;
+
+    /// Ratio of the unexplained shares `1 − c²` of two poses up to which the pixels do not tell
+    /// them apart.
+    ///
+    /// Higher: more frames are left to the prior, or are ambiguous.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_UNEXPLAINED_RATIO: f64 = 2.0;
+
+    /// Difference of the prior's log-densities from which on the prior tells two poses apart.
+    ///
+    /// Higher: more frames are ambiguous.
+    ///
+    /// Chosen by: derivation. `½ 3²`: three σ.
+    pub const MIN_PRIOR_MARGIN_NATS: f64 = 4.5;
+
+    /// Deviation `½ eᵀΣ⁻¹e` of a pose from the prior's prediction up to which the prior allows it.
+    ///
+    /// Higher: poses farther from the prior are accepted.
+    ///
+    /// Chosen by: derivation. All six unknowns of the pose as far off as the search reaches.
+    pub const MAX_DEVIATION_COST: f64 = 0.5
+        * 6.0
+        * super::correlation_search::MAX_DEVIATION_SIGMA
+        * super::correlation_search::MAX_DEVIATION_SIGMA;
+
+    /// Distance on the wall from which on two candidates are different poses, samples of the search
+    /// level.
+    ///
+    /// Higher: fewer frames are ambiguous.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SEPARATION_SAMPLES: f64 = 2.0;
 }
 
 /// Thresholds of `tracking/correlation_search.rs`.
 pub mod correlation_search {
-    // correlation_search: begin
+    /// Deviation from the prior's prediction that the search covers in each direction, σ.
+    ///
+    /// Higher: poses farther from the prior are found, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_DEVIATION_SIGMA: f64 = 3.5;
 
-    // correlation_search: end
+    /// Number ν of samples that share one independent piece of texture.
+    ///
+    /// Higher: the pixels weigh less against the prior.
+    ///
+    /// Chosen by: unknown.
+    pub const SAMPLES_PER_INDEPENDENT_PIECE: f64 = 4.0;
+
+    /// Share of the frame's pixels that must lie on known wall.
+    ///
+    /// Higher: more frames with little overlap are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_OVERLAP_SHARE: f64 = 0.08;
+
+    /// Smallest share of its squared correlation that a right hypothesis keeps at half a step of
+    /// the search from the right pose.
+    ///
+    /// Higher: fewer hypotheses and fewer aliases are refined.
+    ///
+    /// Chosen by: derivation. With the autocorrelation `exp(−d²/2L²)` of the texture, `π L²` = 4
+    /// samples (an independent piece), half a sample off along both axes (d² = 1/2) and half a step
+    /// of roll off (one sample at the corners, d² = 1/3 in the mean) leave
+    /// `exp(−d²/L²)` = 0.52 of it.
+    pub const MIN_SQUARED_CORRELATION_LEFT: f64 = 0.5;
+
+    /// Step between roll hypotheses: motion of the picture's corners, samples.
+    ///
+    /// Higher: a coarser search, which misses more poses, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const ROLL_STEP_SAMPLES: f64 = 2.0;
+
+    /// Step between pitch hypotheses, radians; shifts along the tunnel make up for what lies
+    /// between.
+    ///
+    /// Higher: a coarser search, which misses more poses, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const PITCH_STEP_RAD: f64 = 0.12;
+
+    /// Share of the pitch step to which it shrinks as the frame looks more steeply along the
+    /// tunnel.
+    ///
+    /// Higher: a coarser search for steep views, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_PITCH_STEP_SHARE: f64 = 0.4;
+
+    /// Share of a pitch step for which shifts along the tunnel make up.
+    ///
+    /// Higher: neighbouring pitches overlap more, in more time.
+    ///
+    /// Chosen by: derivation. Half a step to either side, and some overlap.
+    pub const PITCH_STEP_SHARE_BY_SHIFT: f64 = 0.6;
+
+    /// Number of maxima kept for each pitch and roll.
+    ///
+    /// Higher: fewer right poses are missed on repetitive walls.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_MAXIMA_PER_TURN: usize = 4;
+
+    /// Distance on the wall from which on two maxima are different hypotheses, samples.
+    ///
+    /// Higher: fewer hypotheses close to each other.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SEPARATION_SAMPLES: f64 = 2.5;
+
+    /// Difference of roll from which on two maxima are different hypotheses, steps of roll.
+    ///
+    /// Higher: fewer hypotheses close to each other.
+    ///
+    /// Chosen by: derivation. Neighbouring steps show the same pose, the next but one does not.
+    pub const MIN_SEPARATION_ROLL_STEPS: f64 = 1.5;
+
+    /// Number of Newton iterations that rotate a pose to look at a given wall point.
+    ///
+    /// Higher: more exact hypotheses.
+    ///
+    /// Chosen by: unknown.
+    pub const VIEW_ITERATIONS: usize = 8;
+
+    /// Length of a single one of these iterations, radians.
+    ///
+    /// Higher: faster convergence, but steep views may diverge.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_VIEW_STEP_RAD: f64 = 0.3;
 }
 
-/// Thresholds of `tracking/reference_mosaic.rs`.
+/// Thresholds of `tracking/reference_mosaic.rs`, `tracking/mosaic_grid.rs` and
+/// `tracking/ncc_score.rs`.
 pub mod reference_mosaic {
-    // reference_mosaic: begin
+    /// Share of the pixels that a piece of wall has when seen squarely from the axis, below which
+    /// it is left out.
+    ///
+    /// Higher: the mosaic covers less of obliquely seen wall.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_PIXEL_DENSITY: f32 = 0.1;
 
-    // reference_mosaic: end
+    /// Distance along the tunnel that the mosaic covers, radii.
+    ///
+    /// Higher: the mosaic covers more wall, in more time.
+    ///
+    /// Chosen by: derivation. At an angle φ to the section `cos³ φ` of the pixels are left: at this
+    /// distance less than [`MIN_PIXEL_DENSITY`], with some room.
+    pub const MAX_REACH_RADII: f64 = 2.5;
+
+    /// The wall is sampled as if it were no farther away than this, radii.
+    ///
+    /// Higher: a coarser mosaic for frames that look along the tunnel.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SPACING_RADII: f64 = 1.25;
+
+    /// Viewing distance to which the size of a pixel on the wall is bounded, radii.
+    ///
+    /// Higher: coarser grids for frames that look along the tunnel.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_VIEWING_DISTANCE_RADII: f64 = 3.0;
+
+    /// Smallest gain of a frame against the mosaic.
+    ///
+    /// Higher: frames that are darker are fitted worse.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_GAIN: f64 = 0.4;
+
+    /// Largest gain of a frame against the mosaic.
+    ///
+    /// Higher: frames that are brighter are fitted better.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_GAIN: f64 = 2.5;
+
+    /// Share of the contrast's variance that must be texture for a correlation to be corrected for
+    /// noise.
+    ///
+    /// Higher: more pairs are too noisy to compare.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_TEXTURE_SHARE: f64 = 0.2;
 }
 
 /// Thresholds of `tracking/shading_correction.rs`.
@@ -319,74 +677,431 @@ pub mod neighbourhood {
     pub const MAX_CHANGED_DISTANCE: usize = 64;
 }
 
-/// Thresholds of `validation/overlaps.rs`.
-pub mod overlaps {
-    // overlaps: begin
-
-    // overlaps: end
-}
-
-/// Thresholds of `validation/pairwise_ncc.rs`.
+/// Thresholds of `validation/pairwise_ncc.rs`, `validation/contradictions.rs` and
+/// `validation/blurred_frames.rs`.
 pub mod pairwise_ncc {
-    // pairwise_ncc: begin
+    /// Distance between samples of the coarse comparison, pixels of the level.
+    ///
+    /// Higher: fewer samples, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const COARSE_STRIDE_PX: usize = 4;
 
-    // pairwise_ncc: end
+    /// Half width of the window of local contrast in the coarse comparison, pixels of the level.
+    ///
+    /// Higher: larger structures are compared.
+    ///
+    /// Chosen by: a window that holds a brick or two.
+    pub const COARSE_WINDOW_PX: usize = 6;
+
+    /// Pyramid level of the fine comparison.
+    ///
+    /// Higher: noise weighs less, but so does detail.
+    ///
+    /// Chosen by: unknown.
+    pub const FINE_LEVEL: usize = 1;
+
+    /// Distance between samples of the fine comparison, pixels of the level.
+    ///
+    /// Higher: fewer samples, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const FINE_STRIDE_PX: usize = 5;
+
+    /// Half width of the window of local contrast in the fine comparison, pixels of the level.
+    ///
+    /// Higher: larger structures are compared.
+    ///
+    /// Chosen by: unknown.
+    pub const FINE_WINDOW_PX: usize = 3;
+
+    /// Share of the earlier frame's samples that two frames must have in common to be compared.
+    ///
+    /// Higher: fewer pairs are compared.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_OVERLAP_SHARE: f64 = 0.03;
+
+    /// Correlation, corrected for noise, below which two frames contradict each other.
+    ///
+    /// Higher: more pairs contradict, and more frames are rejected.
+    ///
+    /// Chosen by: the tests `frames_at_true_poses_correlate` (above 0.8) and
+    /// `frame_displaced_by_a_brick_contradicts_the_others`.
+    pub const MIN_CORRELATION: f64 = 0.6;
+
+    /// Correlation of all samples, corrected for noise, from which on that of most samples is not
+    /// computed.
+    ///
+    /// Higher: more robust correlations, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_CERTAIN_CORRELATION: f64 = 0.85;
+
+    /// Share of the samples that must be left without what stands out of the wall, for the rest to
+    /// vouch for the pair.
+    ///
+    /// Higher: fewer pairs vouch for their frames.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SHARE_WITHOUT_OUTLIERS: f64 = 0.5;
+
+    /// Share of a frame's samples in contradicting pairs up to which it is kept.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_CONTRADICTING_SHARE: f64 = 0.15;
+
+    /// Ratio of a frame's variance of fine detail to that of its median partner below which it is
+    /// blurred.
+    ///
+    /// Higher: more frames are rejected as blurred.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SHARPNESS_RATIO: f64 = 0.5;
 }
 
-/// Thresholds of `validation/pairwise_lucas_kanade.rs`.
+/// Thresholds of `validation/pairwise_lucas_kanade.rs`, `validation/lucas_kanade_template.rs` and
+/// `validation/lucas_kanade_fit.rs`.
 pub mod pairwise_lucas_kanade {
-    // pairwise_lucas_kanade: begin
+    /// Pyramid level at which displacements are measured.
+    ///
+    /// Higher: less noise, but smaller displacements are missed.
+    ///
+    /// Chosen by: small against a brick's edge, and half the noise of full size.
+    pub const LEVEL: usize = 1;
 
-    // pairwise_lucas_kanade: end
+    /// Distance between samples along each axis, pixels of the level.
+    ///
+    /// Higher: fewer samples, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const STRIDE_PX: f64 = 4.0;
+
+    /// Number of Gauss–Newton iterations.
+    ///
+    /// Higher: larger displacements are measured, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_ITERATIONS: usize = 8;
+
+    /// Number of samples that two frames must share to be aligned.
+    ///
+    /// Higher: fewer pairs are measured.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SAMPLES: f64 = 40.0;
+
+    /// Share of the earlier frame's samples that two frames must share to be aligned.
+    ///
+    /// Higher: fewer pairs are measured.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_OVERLAP_SHARE: f64 = 0.02;
+
+    /// Root mean square displacement beyond which the iterations have diverged, pixels of the
+    /// level.
+    ///
+    /// Higher: larger displacements are measured, chance matches among them.
+    ///
+    /// Chosen by: Gauss–Newton finds no larger displacement.
+    pub const MAX_DISPLACEMENT_PX: f64 = 8.0;
+
+    /// Share of the squared slopes that must be texture and not noise; with less, the normal matrix
+    /// is chance.
+    ///
+    /// Higher: more pairs are too faint to measure.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_TEXTURE_SHARE: f64 = 0.3;
+
+    /// Ratio of a sample's squared slope to the median one beyond which its influence no longer
+    /// grows.
+    ///
+    /// Higher: glints weigh more.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SQUARED_SLOPE_RATIO: f32 = 10.0;
+
+    /// Step length below which the iterations have converged, pixels of the level.
+    ///
+    /// Higher: fewer iterations, less exact displacements.
+    ///
+    /// Chosen by: unknown.
+    pub const CONVERGED_STEP_PX: f64 = 0.03;
+
+    /// Step length at which the result counts nevertheless, multiples of [`CONVERGED_STEP_PX`].
+    ///
+    /// Higher: fewer results of the first iteration are returned.
+    ///
+    /// Chosen by: unknown.
+    pub const ENDED_STEP_FACTOR: f64 = 3.0;
+
+    /// Noise of the residuals that is assumed at least, grey levels.
+    ///
+    /// Higher: larger σ of noise-free frames.
+    ///
+    /// Chosen by: derivation. Rounding to whole grey levels has σ = 1/√12 = 0.29.
+    pub const MIN_RESIDUAL_SIGMA_GREY: f32 = 0.3;
+
+    /// Smallest gain of one frame against the other.
+    ///
+    /// Higher: pairs of very different exposure are fitted worse.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_GAIN: f64 = 0.4;
+
+    /// Largest gain of one frame against the other.
+    ///
+    /// Higher: pairs of very different exposure are fitted better.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_GAIN: f64 = 2.5;
 }
 
 /// Thresholds of `validation/inconsistent_frames.rs`.
 pub mod inconsistent_frames {
-    // inconsistent_frames: begin
+    /// Displacement of a pair that is accepted, pixels of full size.
+    ///
+    /// Higher: fewer frames are rejected as misaligned.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_ERROR_PX: f64 = 0.5;
 
-    // inconsistent_frames: end
+    /// Displacement of a pair that is accepted, multiples of the median of the survey: where all
+    /// pairs are misaligned, the calibration is at fault.
+    ///
+    /// Higher: fewer frames are rejected as misaligned where all are displaced.
+    ///
+    /// Chosen by: the test `no_frame_is_rejected_where_all_pairs_are_misaligned`.
+    pub const MAX_ERROR_RATIO: f64 = 4.0;
+
+    /// Deviation z beyond the accepted displacement from which on a pair is misaligned, σ.
+    ///
+    /// Higher: fewer frames are rejected as misaligned.
+    ///
+    /// Chosen by: derivation. A pair at the limit is called misaligned about once in a million.
+    pub const MISALIGNMENT_SIGMA: f64 = 5.0;
+
+    /// Correlation below which two frames with enough texture to be measured show different things.
+    ///
+    /// Higher: more pairs are misaligned.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_CORRELATION: f64 = 0.3;
+
+    /// σ of a displacement up to which a pair ties its frames to each other, pixels of full size.
+    ///
+    /// Higher: fewer frames are disconnected.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_TYING_SIGMA_PX: f64 = 1.0;
+
+    /// Share of a frame's weight that the robust loss may reject. Things before the wall, glints
+    /// and oblique views cost a right frame some; whether its pose is right is decided by its
+    /// alignment with others.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_REJECTED_SHARE: f64 = 0.3;
 }
 
-/// Thresholds of `validation/aliasing.rs`.
+/// Thresholds of `validation/aliasing.rs`, `validation/alias_choice.rs` and
+/// `validation/alias_search.rs`.
 pub mod aliasing {
-    // aliasing: begin
+    /// Difference of log-posteriors from which on the prior decides between two aliases, nats.
+    ///
+    /// Higher: more frames are ambiguous.
+    ///
+    /// Chosen by: derivation. `ln 1000`: odds of 1000 to 1.
+    pub const MIN_CLEAR_ODDS_NATS: f64 = 6.9;
 
-    // aliasing: end
+    /// Length of a gauge motion on the wall from which on it leads to an alias, samples of the
+    /// search level.
+    ///
+    /// Higher: aliases of short periods are missed.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_MOTION_SAMPLES: f64 = 3.0;
+
+    /// Number of times that the step of the search for the best fraction of a sample is halved.
+    ///
+    /// Higher: more exact aliases, in more time.
+    ///
+    /// Chosen by: derivation. The last step is a sixteenth of a sample.
+    pub const SHIFT_REFINEMENTS: usize = 4;
+
+    /// Number of sweeps over all frames until no choice changes.
+    ///
+    /// Higher: choices settle in longer surveys.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SWEEPS: usize = 20;
+
+    /// Difference of two periods, as a share of one of them, below which they are the same.
+    ///
+    /// Higher: fewer periods are told apart.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_PERIOD_DIFFERENCE: f64 = 0.1;
+
+    /// Number of times that all frames are compared with the wall elsewhere.
+    ///
+    /// Higher: fewer frames remain undecided, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_ITERATIONS: usize = 8;
 }
 
 /// Thresholds of `validation/repair.rs`.
 pub mod repair {
-    // repair: begin
+    /// Number of iterations in which rejected frames are registered again.
+    ///
+    /// Higher: more frames are recovered, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_REGISTRATION_ITERATIONS: usize = 3;
 
-    // repair: end
+    /// Number of iterations in which frames are rejected and their neighbourhoods solved.
+    ///
+    /// Higher: longer repairs, fewer wrong frames left.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_ITERATIONS: usize = 8;
 }
 
-/// Thresholds of `uncertainty/observability.rs, solution_uncertainty.rs`.
+/// Thresholds of `uncertainty/observability.rs` and `uncertainty/solution_uncertainty.rs`.
 pub mod observability {
-    // observability: begin
+    /// Posterior σ of a shared parameter over that of its prior up to which it is observed.
+    ///
+    /// Higher: more parameters are estimated, on less evidence.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SIGMA_SHARE: f64 = 0.5;
 
-    // observability: end
+    /// Correlation with another parameter from which on it is reported.
+    ///
+    /// Higher: fewer correlations are reported.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_REPORTED_CORRELATION: f64 = 0.9;
+
+    /// Share of frames that fit nowhere up to which shared parameters are estimated: beyond it the
+    /// others may fit each other in wrong places.
+    ///
+    /// Higher: self-calibration of worse surveys.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_MISFIT_SHARE: f64 = 0.1;
+
+    /// 1-σ of the median frame on the wall up to which shared parameters are estimated, pixels.
+    /// Frames that are tied more loosely can tilt and shift together, the camera with them, at less
+    /// cost than aliasing causes; the covariance does not know that.
+    ///
+    /// Higher: self-calibration of weaker surveys.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_MEDIAN_SIGMA_PX: f64 = 0.2;
 }
 
 /// Thresholds of `uncertainty/overdispersion.rs`.
 pub mod overdispersion {
-    // overdispersion: begin
+    /// Overdispersion that is accepted of a single frame, pixels; it must exceed
+    /// [`MAX_OVERDISPERSION_RATIO`], too, to be rejected.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_OVERDISPERSION_PX: f64 = 0.25;
 
-    // overdispersion: end
+    /// Overdispersion that is accepted of a single frame, over the displacement by noise.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: a glint on a faint wall makes it five to ten in one patch of a right frame (and a
+    /// pixel).
+    pub const MAX_OVERDISPERSION_RATIO: f64 = 12.0;
+
+    /// Overdispersion of the median frame that is accepted, pixels; beyond it all frames are
+    /// overdispersed.
+    ///
+    /// Higher: larger errors of the model go unnoticed.
+    ///
+    /// Chosen by: right surveys have none, whatever wall, light and noise; a focal length 0.3 % off
+    /// makes it 0.05, one 1 % off 0.13.
+    pub const MAX_MEDIAN_OVERDISPERSION_PX: f64 = 0.04;
 }
 
 /// Thresholds of `uncertainty/rolling_shutter_test.rs`.
 pub mod rolling_shutter_test {
-    // rolling_shutter_test: begin
+    /// Number of frames that are used, from the middle of the survey.
+    ///
+    /// Higher: a more certain readout time, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_FRAMES: usize = 120;
 
-    // rolling_shutter_test: end
+    /// Number of Gauss–Newton iterations.
+    ///
+    /// Higher: a more exact readout time, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SOLVE_ITERATIONS: u64 = 4;
+
+    /// Step length below which the solve has converged, pixels of the level.
+    ///
+    /// Higher: a less exact readout time.
+    ///
+    /// Chosen by: unknown.
+    pub const STEP_TOLERANCE_PX: f64 = 0.02;
+
+    /// Step length below which the solve has converged, σ.
+    ///
+    /// Higher: a less exact readout time.
+    ///
+    /// Chosen by: unknown.
+    pub const STEP_TOLERANCE_SIGMA: f64 = 1.0;
+
+    /// Difference from the readout time given that is systematic, σ.
+    ///
+    /// Higher: fewer wrong times are reported.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_DIFFERENCE_SIGMA: f64 = 6.0;
+
+    /// Displacement of the first row against the last by the difference that is systematic, pixels.
+    ///
+    /// Higher: fewer wrong times are reported.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SHIFT_PX: f64 = 0.5;
 }
 
 /// Thresholds of `pose_convention_search.rs`.
 pub mod pose_convention_search {
-    // pose_convention_search: begin
+    /// Angle by which the camera turns within the frames that are refined, radians: once around and
+    /// some.
+    ///
+    /// Higher: a more certain answer, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_TURN_RAD: f64 = 1.15 * std::f64::consts::TAU;
 
-    // pose_convention_search: end
+    /// Smallest number of frames that are refined in each convention.
+    ///
+    /// Higher: a more certain answer, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_FRAMES: usize = 8;
+
+    /// Largest number of frames that are refined in each convention.
+    ///
+    /// Higher: a more certain answer, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_FRAMES: usize = 40;
 }
 
 /// Thresholds of `stages/assess.rs, validate_pairs.rs`.

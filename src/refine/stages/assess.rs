@@ -19,9 +19,9 @@ use crate::refine::stages::state::{Estimation, PipelineState};
 use crate::refine::thresholds::assessment::{
     MAX_SIGMA_PX, MAX_STEP_PX, MAX_STEP_SIGMA, MIN_PIXEL_SHARE,
 };
-use crate::refine::tracking::registration::separation_m;
-use crate::refine::uncertainty::covariance::FrameSigma;
-use crate::refine::uncertainty::observability::CalibrationReport;
+use crate::refine::tracking::pose_separation::separation_m;
+use crate::refine::uncertainty::calibration_report::CalibrationReport;
+use crate::refine::uncertainty::frame_sigma::FrameSigma;
 use crate::refine::uncertainty::rolling_shutter_test::estimate_readout;
 use crate::refine::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::refine::validation::inconsistent_frames::{find_disagreement, find_inconsistent_frames};
@@ -95,7 +95,7 @@ fn reject_finally(
     let ambiguous = aliases.map(|(frame, motion)| {
         let pose = &state.frames.estimates[frame].pose;
         let other = motion.apply(pose);
-        let separation_m = separation_m(context, pose, &other);
+        let separation_m = separation_m(context.surface, &context.camera, pose, &other);
         let ambiguous = RejectionReason::Ambiguous {
             other,
             separation_m,
@@ -120,9 +120,9 @@ fn report_frames(
     let count = setup.count();
     // Without a covariance there is no step either; its lack is reported already.
     let steps_px = steps_left(solution).unwrap_or_else(|_| vec![0.0; count]);
-    let rejections = uncertainty.with_overdispersion(frames.rejections.clone());
+    let rejections = uncertainty.reject_overdispersed(frames.rejections.clone());
     let reports = rejections.into_iter().enumerate().map(|(k, rejection)| {
-        let sigma = uncertainty.of_frame(context, k, &frames.estimates[k]);
+        let sigma = uncertainty.frame_sigma(context, k, &frames.estimates[k]);
         let rejection = rejection
             .or_else(|| final_rejection(&setup.input.camera, k, solution, steps_px[k], &sigma));
         let overdispersion_px = uncertainty.overdispersions[k].px;

@@ -231,7 +231,7 @@ fn find_unobservable(
     }
     let solved = context.at(solution.kappa);
     let uncertainty = SolutionUncertainty::at(&solved, solution, &calibration)?;
-    Ok(uncertainty.unobservable(
+    Ok(uncertainty.find_unobservable(
         &solved,
         &calibration,
         &solution.estimates,

@@ -26,7 +26,7 @@ pub fn run<'a>(
     };
     let tracking = state.tracking.take();
     let tracking =
-        tracking.unwrap_or_else(|| AlternatingCalibration::begin(state.frames.rejections.clone()));
+        tracking.unwrap_or_else(|| AlternatingCalibration::new(state.frames.rejections.clone()));
     let stopping = Stopping::intermediate(setup.options, setup.handover_level());
     let progress = session.progress.clone();
     let keep = |tracking: &AlternatingCalibration| {
@@ -35,7 +35,7 @@ pub fn run<'a>(
             ..state.clone()
         })
     };
-    let frames = tracking.finish(&context, setup.options, stopping, progress.as_ref(), keep)?;
+    let frames = tracking.run(&context, setup.options, stopping, progress.as_ref(), keep)?;
     state.kappa = initial.at(frames.kappa).kappa;
     state.frames = frames;
     session.record_time("track");

@@ -8,9 +8,9 @@ use crate::refine::stages::session::Session;
 use crate::refine::stages::state::Estimation;
 use crate::refine::thresholds::assessment::MAX_PAIR_ITERATIONS;
 use crate::refine::tracking::track::register_rejected;
-use crate::refine::validation::pairwise_ncc::{
-    compute_pairwise_ncc, find_blurred_frames, find_contradictions,
-};
+use crate::refine::validation::blurred_frames::find_blurred_frames;
+use crate::refine::validation::contradictions::find_contradictions;
+use crate::refine::validation::pairwise_ncc::compute_pairwise_ncc;
 
 /// Runs the stage at the finest level of tracking.
 ///

@@ -1,13 +1,14 @@
-//! Tracking in a light and with a camera that are only roughly known.
+//! Tracking that alternates with the calibration of the shading and of the camera, while these are
+//! only roughly known.
 //!
-//! The mean of all frames shows the camera's light up to what is left of the wall in it, which on a
-//! faint wall is as much as there is to see. So a few frames are tracked first; where they overlap
-//! they tell the light ([`crate::refine::tracking::shading_correction`]), and they are tracked again in that, until the light
-//! stays as it is. Then the others follow.
+//! The mean of all frames shows the shading up to what is left of the wall's texture in it, which
+//! on a faint wall is as much as there is to see. So a few frames are tracked first. The shading is
+//! corrected where they overlap ([`crate::refine::tracking::shading_correction`]), and they are
+//! tracked again with that, until the shading changes no more. Then all frames are tracked.
 //!
-//! Likewise, frames placed with a wrong camera fit badly where they overlap, and some end up in the
-//! wrong place. But what they tell of the camera is much better than what was given, so they are
-//! tracked again with that, until the camera stays as it is.
+//! Likewise, frames that are tracked with a wrong camera fit badly where they overlap, and some are
+//! registered wrongly. But the camera that they are refined to is much better than the one given,
+//! so they are tracked again with that, until the camera changes no more.
 
 use crate::camera::Camera;
 use crate::progress::Progress;
@@ -21,138 +22,133 @@ use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::samples::sampling::Sampling;
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
+use crate::refine::thresholds::alternating_calibration::{
+    MAX_CAMERA_CHANGE_PX, MAX_SHADING_CHANGE, MAX_SHADING_ITERATIONS, MAX_TRACKING_ITERATIONS,
+};
 use crate::refine::tracking::shading_correction::{MOST_FRAMES, correct_until_settled};
 use crate::refine::tracking::track::Tracking;
 use serde::{Deserialize, Serialize};
 
-/// Times that the frames are tracked, at the most.
-const ROUNDS: usize = 5;
-/// A camera that has moved a pixel by less than this, pixels of full size, is the one the frames
-/// were placed with.
-const SAME_CAMERA_PX: f64 = 2.0;
-/// Times that a few frames are tracked for the light, at the most.
-const LIGHT_ROUNDS: usize = 3;
-/// A light that has changed nowhere by more than this share is the one the frames were placed in.
-const SAME_LIGHT: f64 = 0.01;
 /// Points on each edge of the picture at which cameras are compared.
 const STEPS_PER_EDGE: usize = 4;
 
-/// Frames being placed, in one round after another.
+/// Tracking in rounds, each with the calibration that the one before has found.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct AlternatingCalibration {
-    /// The round, from 0.
+    /// The round, counted from 0.
     round: usize,
-    /// The shared unknowns that it began with.
+    /// The shared parameters κ that it began with.
     kappa: Kappa,
-    /// Why frames are known to be useless beforehand.
-    useless: Vec<Option<RejectionReason>>,
+    /// The rejection reasons of prescreening.
+    rejections: Vec<Option<RejectionReason>>,
     tracking: Tracking,
 }
 
 impl AlternatingCalibration {
-    /// Nothing placed yet. `rejections` are frames known to be useless beforehand.
-    pub fn begin(rejections: Vec<Option<RejectionReason>>) -> Self {
+    /// Tracking that has not begun; `rejections`: of frames that prescreening has rejected.
+    pub fn new(rejections: Vec<Option<RejectionReason>>) -> Self {
         let kappa = Kappa::zeros();
         Self {
             round: 0,
             kappa,
-            tracking: Tracking::begin(rejections.clone(), kappa),
-            useless: rejections,
+            tracking: Tracking::new(rejections.clone(), kappa),
+            rejections,
         }
     }
 
-    /// Places the first frames and corrects the shading, if there is one, by what they tell where
-    /// they overlap.
-    fn find_light(
+    /// Tracks the first frames and corrects the shading, if there is one, where they overlap.
+    fn correct_shading(
         &mut self,
-        scene: &EstimationContext,
+        context: &EstimationContext,
         options: &RefineOptions,
         progress: &dyn Progress,
     ) -> Result<(), ProblemError> {
-        let frames = self.useless.len().min(MOST_FRAMES);
-        for _ in 0..LIGHT_ROUNDS {
-            let Some(before) = scene.frames.shading() else {
+        let frames = self.rejections.len().min(MOST_FRAMES);
+        for _ in 0..MAX_SHADING_ITERATIONS {
+            let Some(before) = context.frames.shading() else {
                 break;
             };
-            self.tracking = Tracking::begin(self.useless.clone(), self.kappa);
+            self.tracking = Tracking::new(self.rejections.clone(), self.kappa);
             progress.start("light", frames);
-            while self.tracking.placed() < frames {
-                self.tracking.place_next(scene, options)?;
+            while self.tracking.tracked_frames() < frames {
+                self.tracking.track_next(context, options)?;
                 progress.advance(1);
             }
             progress.finish();
-            let mut tracked = self.tracking.so_far();
-            correct_until_settled(&scene.at(tracked.kappa), options, &mut tracked)?;
-            let after = scene.frames.shading();
-            if after.is_none_or(|after| after.differs(&before) < SAME_LIGHT) {
+            let mut states = self.tracking.tracked_states();
+            correct_until_settled(&context.at(states.kappa), options, &mut states)?;
+            let after = context.frames.shading();
+            if after.is_none_or(|after| after.differs(&before) < MAX_SHADING_CHANGE) {
                 break;
             }
         }
         Ok(())
     }
 
-    /// Places all frames that are left, with the camera's unknowns if they are to be estimated.
-    /// `between` is called after every frame.
+    /// Tracks all frames that are left, and estimates the camera's unknowns if that is asked for.
+    /// `checkpoint` is called after every frame.
     ///
     /// # Errors
-    /// As [`Tracking::place_next`], and those of `between`.
-    pub fn finish(
+    /// As [`Tracking::track_next`], and those of `checkpoint`.
+    pub fn run(
         mut self,
-        scene: &EstimationContext,
+        context: &EstimationContext,
         options: &RefineOptions,
         stopping: Stopping,
         progress: &dyn Progress,
-        mut between: impl FnMut(&Self) -> Result<(), ProblemError>,
+        mut checkpoint: impl FnMut(&Self) -> Result<(), ProblemError>,
     ) -> Result<FrameStates, ProblemError> {
-        let mut scene = EstimationContext {
-            calibration: scene.calibration.intrinsics_only(),
-            ..*scene
+        let mut context = EstimationContext {
+            calibration: context.calibration.intrinsics_only(),
+            ..*context
         }
         .at(self.kappa);
-        if self.round == 0 && self.tracking.placed() == 0 {
-            self.find_light(&scene, options, progress)?;
+        if self.round == 0 && self.tracking.tracked_frames() == 0 {
+            self.correct_shading(&context, options, progress)?;
         }
         loop {
-            progress.start("tracking", self.useless.len());
-            progress.advance(self.tracking.placed());
+            progress.start("tracking", self.rejections.len());
+            progress.advance(self.tracking.tracked_frames());
             while !self.tracking.is_complete() {
-                self.tracking.place_next(&scene, options)?;
+                self.tracking.track_next(&context, options)?;
                 progress.advance(1);
-                between(&self)?;
+                checkpoint(&self)?;
             }
             progress.finish();
-            let mut tracked = self.tracking.clone().finish();
-            if !scene.calibration.has_free_parameters() {
-                return Ok(tracked);
+            let mut states = self.tracking.clone().into_states();
+            if !context.calibration.has_free_parameters() {
+                return Ok(states);
             }
-            let before = scene.camera;
-            scene = scene.at(tracked.kappa);
-            let level = options.handover_level(scene.camera.shorter_side());
-            let problem = PhotometricProblem::new(&scene, Sampling::of(level), tracked.window())?;
+            let before = context.camera;
+            context = context.at(states.kappa);
+            let level = options.handover_level(context.camera.shorter_side());
+            let problem = PhotometricProblem::new(&context, Sampling::of(level), states.window())?;
             if problem.tiles() > 0 {
                 let solution = solve(problem.with_shared_parameters(), stopping)?;
-                tracked.estimates = solution.estimates;
-                tracked.kappa = solution.kappa;
+                states.estimates = solution.estimates;
+                states.kappa = solution.kappa;
             }
-            scene = scene.at(tracked.kappa);
+            context = context.at(states.kappa);
             self.round += 1;
-            if moved_px(&before, &scene.camera) < SAME_CAMERA_PX || self.round == ROUNDS {
-                return Ok(tracked);
+            let change_px = border_displacement_px(&before, &context.camera);
+            if change_px < MAX_CAMERA_CHANGE_PX || self.round == MAX_TRACKING_ITERATIONS {
+                return Ok(states);
             }
-            self.kappa = scene.kappa;
-            self.tracking = Tracking::begin(self.useless.clone(), scene.kappa);
+            self.kappa = context.kappa;
+            self.tracking = Tracking::new(self.rejections.clone(), context.kappa);
         }
     }
 }
 
-/// How far the rays of one camera's border appear from there in another, pixels, at the most.
-fn moved_px(before: &Camera, after: &Camera) -> f64 {
+/// The largest displacement of the picture's border from one camera to another, pixels: each border
+/// pixel's ray, projected by the other.
+fn border_displacement_px(before: &Camera, after: &Camera) -> f64 {
     let border = before.border(STEPS_PER_EDGE, 0.0);
-    let apart = border.iter().map(|pixel| {
-        let seen = (before.ray(pixel.x, pixel.y)).and_then(|ray| after.project(&ray));
-        seen.map_or(f64::INFINITY, |seen| (seen - pixel).norm())
+    let displacements = border.iter().map(|pixel| {
+        let projected = (before.ray(pixel.x, pixel.y)).and_then(|ray| after.project(&ray));
+        projected.map_or(f64::INFINITY, |projected| (projected - pixel).norm())
     });
-    apart.fold(0.0, f64::max)
+    displacements.fold(0.0, f64::max)
 }
 
 #[cfg(test)]
@@ -160,13 +156,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_longer_lens_moves_the_border_outwards() {
+    fn a_longer_focal_length_displaces_the_border_outwards() {
         let before = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
         let mut after = before;
         (after.fx, after.fy) = (1.02 * before.fx, 1.02 * before.fy);
         // The corners are half a diagonal from the middle.
         let expected = 0.02 * 319.5f64.hypot(239.5);
-        assert!((moved_px(&before, &after) - expected).abs() < 1e-9);
-        assert_eq!(moved_px(&before, &before), 0.0);
+        assert!((border_displacement_px(&before, &after) - expected).abs() < 1e-9);
+        assert_eq!(border_displacement_px(&before, &before), 0.0);
     }
 }

@@ -1,9 +1,29 @@
-//! Initial estimates: one frame after another is registered on the wall that its predecessors show.
+//! Tracking: initial estimates for the global solve.
+//!
+//! ```text
+//! prescreening → alternating_calibration → track ─┬→ pose_prediction → registration
+//!                 (shading_correction)            └→ windows
+//! ```
+//!
+//! Prescreening rejects frames that show nothing. Tracking registers one frame after another: the
+//! prior predicts a pose, the correlation search compares the unwrapped frame with a reference
+//! mosaic of its neighbours, and the hypotheses are refined and chosen from. Sliding windows keep
+//! the error bounded. While shading or camera are only roughly known, tracking alternates with
+//! their calibration.
 
 pub mod alternating_calibration;
+pub mod candidate;
 pub mod correlation_search;
+pub mod correlator;
+pub mod mosaic_grid;
+pub mod ncc_score;
+pub mod neighbours;
+pub mod pose_prediction;
+pub mod pose_separation;
 pub mod prescreening;
 pub mod reference_mosaic;
 pub mod registration;
 pub mod shading_correction;
 pub mod track;
+pub mod unwrapped_frame;
+pub mod windows;

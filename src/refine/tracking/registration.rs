@@ -1,186 +1,224 @@
-//! Placing one frame on the wall that others show: search, brief refinement of the hypotheses,
-//! verdict.
+//! Registration of one frame on the wall that its neighbours show.
+//!
+//! ```text
+//! correlation search → hypotheses → Gauss–Newton → candidates → closer searches → choice
+//! ```
 
-use crate::camera::Sweep;
 use crate::refine::model::context::{EstimationContext, FrameWindow};
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::model::rejection::RejectionReason;
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::problem::photometric_problem::PhotometricProblem;
-use crate::refine::samples::footprints::footprint;
 use crate::refine::samples::sampling::Sampling;
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
-use crate::refine::tracking::correlation_search::{
-    Hypothesis, REACH, least_samples, log_likelihood, search,
+use crate::refine::thresholds::correlation_search::MAX_DEVIATION_SIGMA;
+use crate::refine::thresholds::registration::{
+    CLOSER_SEARCH_SIGMA_RAD, MAX_CLOSER_HYPOTHESES, MAX_CLOSER_SEARCH_ITERATIONS,
+    MAX_DEVIATION_COST, MAX_HYPOTHESES, MAX_SCORE_DEFICIT_NATS, MAX_SOLVE_ITERATIONS,
+    MIN_RELIABLE_CORRELATION, MIN_SCORE_GAIN_NATS, MIN_UNEXPLAINED, SOLVE_STEP_TOLERANCE_PX,
 };
-use crate::refine::tracking::reference_mosaic::{
-    NccScore, ReferenceMosaic, UnwrappedFrame, pixel_size_m,
+use crate::refine::tracking::candidate::{
+    Candidate, choose_candidate, sort_candidates, unexplained_share,
 };
-use crate::surface::{Footprint, shortest_arc, viewing_distance};
+use crate::refine::tracking::correlation_search::{Hypothesis, log_likelihood, search_poses};
+use crate::refine::tracking::mosaic_grid::pixel_size_m;
+use crate::refine::tracking::neighbours::Neighbours;
+use crate::refine::tracking::pose_prediction::PosePrediction;
+use crate::refine::tracking::reference_mosaic::ReferenceMosaic;
+use crate::refine::tracking::unwrapped_frame::UnwrappedFrame;
+use crate::surface::viewing_distance;
 use crate::trajectory::{Jitter, Pose};
 use std::borrow::Cow;
-use std::ops::Range;
 
-/// Hypotheses refined per frame, at the most.
-const HYPOTHESES: usize = 10;
-/// A hypothesis is refined if its log-posterior is at least this share of the best one's.
-const WORTH_REFINING: f64 = 0.5;
-/// Stopping rule of a single frame; the global solve does the rest.
+/// Stopping rule of the solve of a single frame; the global solve does the rest.
 const STOPPING: Stopping = Stopping {
-    max_iterations: 12,
-    step_px: 0.1,
+    max_iterations: MAX_SOLVE_ITERATIONS,
+    step_px: SOLVE_STEP_TOLERANCE_PX,
     step_sigma: 0.0,
 };
-/// Correlation of local contrast with the wall, noise aside, that a placed frame must reach.
-const LEAST_QUALITY: f64 = 0.5;
-/// Share of the texture that even the right pose leaves unexplained: blur, interpolation.
-pub const LEAST_UNEXPLAINED: f64 = 0.05;
-/// Correlation from which on a pose is settled and is not looked for any closer.
-const SETTLED: f64 = 0.9;
-/// Closer looks at the most, and half their σ, radians.
-const CLOSER_LOOKS: usize = 4;
-const CLOSE_RAD: f64 = 0.05;
-/// Gain in log-posterior, as a factor, for which another closer look is worth its time.
-const WORTH_ANOTHER: f64 = 1.02;
-/// Two places are told apart by the pixels if what they leave unexplained, `1 − c²`, differs by
-/// this factor, ...
-pub const UNEXPLAINED: f64 = 2.0;
-/// ... or else by the prior if its log-densities differ by this (3 σ).
-const PRIOR_MARGIN: f64 = 4.5;
-/// `½ eᵀΣ⁻¹e` beyond which a pose is not what the prior allows: all six unknowns 3.5 σ off.
-pub const MOST_DEVIATION: f64 = 0.5 * 6.0 * REACH * REACH;
-/// Places closer than this are one, samples of the search level.
-const APART: f64 = 2.0;
 
-/// What is known of a frame before it is placed.
-#[derive(Clone, Copy, Debug)]
-pub struct Expectation {
-    /// Pose that the prior predicts.
-    pub pose: Pose,
-    /// σ of that prediction over that of the prior's single step.
-    pub widened: f64,
-}
-
-/// A frame that has found its place.
+/// The estimate of a registered frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Registered {
-    /// Its estimate.
+    /// The estimate.
     pub estimate: FrameEstimate,
-    /// False if it matches the wall less well than it should: the wall itself may be bent.
-    pub settled: bool,
+    /// True if the frame matches the wall as well as it should; otherwise the wall itself may be
+    /// bent.
+    pub is_reliable: bool,
 }
 
-/// A candidate after its refinement.
-struct Candidate {
-    estimate: FrameEstimate,
-    /// `1 − c²`.
-    unexplained: f64,
-    /// Correlation c with the wall, noise aside.
-    quality: f64,
-    likelihood: f64,
-    /// `½ eᵀΣ⁻¹e` of the prior.
-    deviation: f64,
-}
-
-impl Candidate {
-    fn score(&self) -> f64 {
-        self.likelihood - self.deviation
-    }
-}
-
-/// The frames around the one that is placed.
-pub struct Neighbours<'s> {
-    /// A run of frames that includes the one to be placed.
-    pub run: Range<usize>,
-    /// Their estimates.
-    pub estimates: &'s [FrameEstimate],
-    /// Which of them show the wall: those placed already.
-    pub placed: &'s [bool],
-    /// What they see of it.
-    pub footprints: &'s [Footprint],
-}
-
-impl Neighbours<'_> {
-    /// How the camera of one of the run moves while its rows are read.
-    pub fn sweep(&self, scene: &EstimationContext, frame: usize) -> Sweep {
-        scene.sweep(frame, &self.run, self.estimates)
-    }
-}
-
-/// Places frame `frame` on the wall that the placed frames around it show.
+/// Registers frame `frame` on the wall that the registered frames around it show; returns the
+/// reason if it must be rejected.
 ///
 /// # Errors
 /// [`ProblemError`]: a frame that cannot be read, equations without a solution.
 pub fn register_frame(
-    scene: &EstimationContext,
+    context: &EstimationContext,
     options: &RefineOptions,
     frame: usize,
-    expected: &Expectation,
+    predicted: &PosePrediction,
     neighbours: &Neighbours,
 ) -> Result<Result<Registered, RejectionReason>, ProblemError> {
-    let side = scene.camera.shorter_side();
-    let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
-    let level = finest.max(coarsest.saturating_sub(1));
-    let camera = scene.camera.at_level(level);
-    let no_match = |correlation| Ok(Err(RejectionReason::NoMatch { correlation }));
-    let Ok(distance) = viewing_distance(scene.surface, &expected.pose) else {
-        return no_match(0.0);
+    let Ok(distance_m) = viewing_distance(context.surface, &predicted.pose) else {
+        return Ok(Err(RejectionReason::NoMatch { correlation: 0.0 }));
     };
-    let sigma = picture_sigma(&scene.prior.jitter, distance).map(|s| s * expected.widened);
-    // Beyond half a turn there is no more wall to look at.
-    let widest = 0.5 * scene.surface.perimeter_m();
-    let margin = (REACH * sigma[1].max(sigma[0]) * distance).min(widest);
-    let near = near(scene, frame, &expected.pose, margin, neighbours)?;
-    let mut unwrapped_frames = Vec::new();
-    for (k, _) in near.iter().enumerate().filter(|(_, near)| **near) {
-        let sweep = neighbours.sweep(scene, neighbours.run.start + k);
-        let unwrapped = UnwrappedFrame::new(scene, level, neighbours.run.start + k, &sweep)?;
-        unwrapped_frames.push((unwrapped, neighbours.estimates[k]));
+    let registration =
+        Registration::new(context, options, frame, predicted, neighbours, distance_m)?;
+    let hypotheses = registration.find_hypotheses(options);
+    let mut candidates = registration.refine_hypotheses(&hypotheses)?;
+    if options.search {
+        registration.search_closer(&mut candidates)?;
     }
-    let sweep = neighbours.sweep(scene, frame);
-    let unwrapped = UnwrappedFrame::new(scene, level, frame, &sweep)?;
-    let wall = ReferenceMosaic::new(
-        scene,
-        &unwrapped_frames,
-        &camera,
-        (frame, &expected.pose),
-        margin,
-    )?;
-    let found = if options.search {
-        search(scene, &wall, &unwrapped, &expected.pose, sigma, HYPOTHESES)
-    } else {
-        vec![Hypothesis {
-            pose: expected.pose,
-            score: 0.0,
-        }]
-    };
-    let best = found.first().map_or(0.0, |hypothesis| hypothesis.score);
+    sort_candidates(&mut candidates);
+    let camera = context.camera.at_level(registration.search_level);
+    let pixel_size =
+        |candidate: &Candidate| pixel_size_m(context, &camera, &candidate.estimate.pose);
+    let chosen = choose_candidate(&candidates, context.surface, &context.camera, pixel_size);
+    match chosen {
+        Ok(candidate) => registration.finish(candidate).map(Ok),
+        Err(reason) => Ok(Err(reason)),
+    }
+}
 
-    let refine_at = |level: usize, estimate: FrameEstimate| {
-        let own = frame - neighbours.run.start;
-        let mut estimates = neighbours.estimates.to_vec();
-        estimates[own] = estimate;
-        let mut compared = near.clone();
-        compared[own] = true;
-        let members = FrameWindow {
-            participants: neighbours.run.clone(),
-            active: frame..frame + 1,
-            estimates: &estimates,
-            compared: Cow::Owned(compared),
-        };
-        let problem = PhotometricProblem::new(scene, Sampling::of(level), members)?;
-        if problem.tiles() == 0 {
-            return Ok(estimate);
+/// The registration of one frame: the frame, unwrapped, and the reference mosaic around it.
+struct Registration<'r> {
+    context: &'r EstimationContext<'r>,
+    frame: usize,
+    predicted: &'r PosePrediction,
+    neighbours: &'r Neighbours<'r>,
+    /// Pyramid level of the first solves.
+    coarsest_level: usize,
+    /// Pyramid level of the search and the candidates.
+    search_level: usize,
+    /// Pyramid level of the estimate.
+    finest_level: usize,
+    /// σ of pitch, yaw and roll as they appear in the picture, radians.
+    sigma_rad: [f64; 3],
+    /// Which neighbours may share wall with the frame.
+    overlapping: Vec<bool>,
+    mosaic: ReferenceMosaic,
+    unwrapped: UnwrappedFrame,
+}
+
+impl<'r> Registration<'r> {
+    /// Fuses the reference mosaic wherever the frame may look; `distance_m`: of the wall at its
+    /// predicted pose.
+    fn new(
+        context: &'r EstimationContext<'r>,
+        options: &RefineOptions,
+        frame: usize,
+        predicted: &'r PosePrediction,
+        neighbours: &'r Neighbours<'r>,
+        distance_m: f64,
+    ) -> Result<Self, ProblemError> {
+        let side = context.camera.shorter_side();
+        let coarsest_level = options.coarsest_level(side);
+        let finest_level = options.handover_level(side);
+        let search_level = finest_level.max(coarsest_level.saturating_sub(1));
+        let camera = context.camera.at_level(search_level);
+        let sigma_rad = picture_sigma_rad(&context.prior.jitter, distance_m);
+        let sigma_rad = sigma_rad.map(|sigma| sigma * predicted.sigma_scale);
+        // Beyond half a turn there is no more wall to look at.
+        let widest_m = 0.5 * context.surface.perimeter_m();
+        let reach_m = MAX_DEVIATION_SIGMA * sigma_rad[1].max(sigma_rad[0]) * distance_m;
+        let margin_m = reach_m.min(widest_m);
+        let overlapping = neighbours.find_overlapping(context, frame, &predicted.pose, margin_m)?;
+        let unwrapped_frames = neighbours.unwrap_frames(context, search_level, &overlapping)?;
+        let sweep = neighbours.sweep(context, frame);
+        let unwrapped = UnwrappedFrame::new(context, search_level, frame, &sweep)?;
+        let target = (frame, &predicted.pose);
+        let mosaic = ReferenceMosaic::new(context, &unwrapped_frames, &camera, target, margin_m)?;
+        Ok(Self {
+            context,
+            frame,
+            predicted,
+            neighbours,
+            coarsest_level,
+            search_level,
+            finest_level,
+            sigma_rad,
+            overlapping,
+            mosaic,
+            unwrapped,
+        })
+    }
+
+    /// The hypotheses of the correlation search, or the prediction alone where there is no search.
+    fn find_hypotheses(&self, options: &RefineOptions) -> Vec<Hypothesis> {
+        let pose = self.predicted.pose;
+        if options.search {
+            self.search(&pose, self.sigma_rad, MAX_HYPOTHESES)
+        } else {
+            vec![Hypothesis {
+                pose,
+                score: 0.0,
+                attainable_score: 0.0,
+            }]
         }
-        Ok(solve(problem, STOPPING)?.estimates[0])
-    };
-    // Gauss–Newton from a pose; None if it leads out of the tunnel or off the wall.
-    let refined = |pose: &Pose| -> Result<Option<Candidate>, ProblemError> {
-        let mut estimate = wall.exposed(&unwrapped, pose);
-        for level in (level..=coarsest).rev() {
-            estimate = match refine_at(level, estimate) {
+    }
+
+    /// Searches around a pose; see [`search_poses`].
+    fn search(&self, pose: &Pose, sigma_rad: [f64; 3], count: usize) -> Vec<Hypothesis> {
+        let Self {
+            context,
+            mosaic,
+            unwrapped,
+            ..
+        } = self;
+        search_poses(context, mosaic, unwrapped, pose, sigma_rad, count)
+    }
+
+    /// Refines the hypotheses that may turn out to be right.
+    fn refine_hypotheses(&self, hypotheses: &[Hypothesis]) -> Result<Vec<Candidate>, ProblemError> {
+        let best_score = hypotheses
+            .first()
+            .map_or(0.0, |hypothesis| hypothesis.score);
+        let promising = hypotheses
+            .iter()
+            .filter(|one| is_worth_refining(one, best_score));
+        let mut candidates = Vec::new();
+        for hypothesis in promising {
+            candidates.extend(self.refine_pose(&hypothesis.pose)?);
+        }
+        Ok(candidates)
+    }
+
+    /// Searches again around the best candidate until it is reliable or gains no more.
+    ///
+    /// A pose that is half right has stretched and sheared the picture that it unwraps; from there
+    /// the search correlates better.
+    fn search_closer(&self, candidates: &mut Vec<Candidate>) -> Result<(), ProblemError> {
+        let sigma_rad = self
+            .sigma_rad
+            .map(|sigma| sigma.min(CLOSER_SEARCH_SIGMA_RAD));
+        for _ in 0..MAX_CLOSER_SEARCH_ITERATIONS {
+            sort_candidates(candidates);
+            let first = candidates.first();
+            let Some(first) = first.filter(|c| c.correlation < MIN_RELIABLE_CORRELATION) else {
+                break;
+            };
+            let (pose, before) = (first.estimate.pose, first.log_posterior());
+            for hypothesis in self.search(&pose, sigma_rad, MAX_CLOSER_HYPOTHESES) {
+                candidates.extend(self.refine_pose(&hypothesis.pose)?);
+            }
+            if !candidates
+                .iter()
+                .any(|c| has_gained(before, c.log_posterior()))
+            {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refines a pose by Gauss–Newton down to the level of the search; None if that leads out of
+    /// the tunnel, off the wall, or beyond what the prior allows.
+    fn refine_pose(&self, pose: &Pose) -> Result<Option<Candidate>, ProblemError> {
+        let mut estimate = self.mosaic.fit_exposure(&self.unwrapped, pose);
+        for level in (self.search_level..=self.coarsest_level).rev() {
+            estimate = match self.solve_at(level, estimate) {
                 Ok(refined) => refined,
                 Err(ProblemError::Placement { .. } | ProblemError::Factor { .. }) => {
                     return Ok(None);
@@ -188,136 +226,131 @@ pub fn register_frame(
                 Err(error) => return Err(error),
             };
         }
-        let ncc_score = wall.ncc_score(scene, &unwrapped, &estimate.pose);
-        let correlation = ncc_score.correlation();
-        let Some(unexplained) = unexplained(&ncc_score, &unwrapped) else {
+        let ncc_score = self
+            .mosaic
+            .compute_ncc(self.context, &self.unwrapped, &estimate.pose);
+        let Some(unexplained) = unexplained_share(&ncc_score, &self.unwrapped) else {
             return Ok(None);
         };
-        let deviation =
-            scene.prior.deviation_cost(&expected.pose, &estimate.pose) / expected.widened.powi(2);
-        if deviation > MOST_DEVIATION {
+        let prior = self.context.prior;
+        let deviation = prior.deviation_cost(&self.predicted.pose, &estimate.pose)
+            / self.predicted.sigma_scale.powi(2);
+        if deviation > MAX_DEVIATION_COST {
             return Ok(None);
         }
         Ok(Some(Candidate {
             estimate,
-            unexplained: unexplained.max(LEAST_UNEXPLAINED),
-            quality: (1.0 - unexplained).sqrt(),
-            likelihood: log_likelihood(correlation, ncc_score.samples),
+            unexplained: unexplained.max(MIN_UNEXPLAINED),
+            correlation: (1.0 - unexplained).sqrt(),
+            log_likelihood: log_likelihood(ncc_score.correlation(), ncc_score.samples),
             deviation,
         }))
-    };
-    let mut candidates: Vec<Candidate> = Vec::new();
-    for hypothesis in found {
-        if hypothesis.score < WORTH_REFINING * best {
-            break;
-        }
-        candidates.extend(refined(&hypothesis.pose)?);
     }
-    // A half-right pose has stretched and sheared what it unrolled; from there the search sees
-    // better.
-    let close = sigma.map(|s| s.min(CLOSE_RAD));
-    let looks = if options.search { CLOSER_LOOKS } else { 0 };
-    for _ in 0..looks {
-        candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
-        let Some(first) = candidates.first().filter(|c| c.quality < SETTLED) else {
-            break;
+
+    /// Refines the chosen candidate down to the finest level.
+    fn finish(&self, candidate: &Candidate) -> Result<Registered, ProblemError> {
+        let mut estimate = candidate.estimate;
+        for level in (self.finest_level..self.search_level).rev() {
+            estimate = self.solve_at(level, estimate)?;
+        }
+        Ok(Registered {
+            estimate,
+            is_reliable: candidate.correlation >= MIN_RELIABLE_CORRELATION,
+        })
+    }
+
+    /// Solves for the frame's estimate at one pyramid level, with all other frames held; returns
+    /// the estimate unchanged where it shares no wall with them.
+    fn solve_at(
+        &self,
+        level: usize,
+        estimate: FrameEstimate,
+    ) -> Result<FrameEstimate, ProblemError> {
+        let own = self.frame - self.neighbours.frame_range.start;
+        let mut estimates = self.neighbours.estimates.to_vec();
+        estimates[own] = estimate;
+        let mut compared = self.overlapping.clone();
+        compared[own] = true;
+        let window = FrameWindow {
+            participants: self.neighbours.frame_range.clone(),
+            active: self.frame..self.frame + 1,
+            estimates: &estimates,
+            compared: Cow::Owned(compared),
         };
-        let from = first.estimate.pose;
-        let before = first.score();
-        for hypothesis in search(scene, &wall, &unwrapped, &from, close, 2) {
-            candidates.extend(refined(&hypothesis.pose)?);
+        let problem = PhotometricProblem::new(self.context, Sampling::of(level), window)?;
+        if problem.tiles() == 0 {
+            return Ok(estimate);
         }
-        if candidates
-            .iter()
-            .all(|c| c.score() < WORTH_ANOTHER * before)
-        {
-            break;
-        }
+        Ok(solve(problem, STOPPING)?.estimates[0])
     }
-    candidates.sort_by(|a, b| b.score().total_cmp(&a.score()));
-    let Some(first) = candidates.first() else {
-        return no_match(0.0);
-    };
-    if first.quality < LEAST_QUALITY {
-        return no_match(first.quality);
-    }
-    // Those that the pixels alone cannot tell from the best.
-    let pixel = pixel_size_m(scene, &camera, &first.estimate.pose);
-    let rivals: Vec<&Candidate> = candidates
-        .iter()
-        .filter(|c| c.unexplained < UNEXPLAINED * first.unexplained)
-        .collect();
-    let best = rivals
-        .iter()
-        .min_by(|a, b| a.deviation.total_cmp(&b.deviation))
-        .unwrap_or(&first);
-    for rival in &rivals {
-        let separation_m = separation_m(scene, &best.estimate.pose, &rival.estimate.pose);
-        if separation_m > APART * pixel && rival.deviation - best.deviation < PRIOR_MARGIN {
-            return Ok(Err(RejectionReason::Ambiguous {
-                other: rival.estimate.pose,
-                separation_m,
-            }));
-        }
-    }
-    let mut estimate = best.estimate;
-    for level in (finest..level).rev() {
-        estimate = refine_at(level, estimate)?;
-    }
-    Ok(Ok(Registered {
-        estimate,
-        settled: best.quality >= SETTLED,
-    }))
 }
 
-/// `1 − c²`, c the correlation with the wall, noise aside; none if too little is shared, or the two
-/// do not correlate.
-///
-/// Where noise drowns the texture, nothing speaks against the pose; its σ will tell.
-pub fn unexplained(ncc_score: &NccScore, unwrapped: &UnwrappedFrame) -> Option<f64> {
-    let compared = ncc_score.samples >= least_samples(unwrapped) && ncc_score.correlation() > 0.0;
-    let quality = ncc_score.match_quality().unwrap_or(1.0);
-    compared.then_some(1.0 - quality * quality)
+/// True if refinement may bring a hypothesis close enough to the best one, whose log-posterior is
+/// `best_score`, for it to be the right one.
+fn is_worth_refining(hypothesis: &Hypothesis, best_score: f64) -> bool {
+    hypothesis.attainable_score >= best_score - MAX_SCORE_DEFICIT_NATS
 }
 
-/// Which placed frames may show wall that `pose` sees, or would see `margin_m` farther.
-pub fn near(
-    scene: &EstimationContext,
-    frame: usize,
-    pose: &Pose,
-    margin_m: f64,
-    neighbours: &Neighbours,
-) -> Result<Vec<bool>, ProblemError> {
-    let perimeter = scene.surface.perimeter_m();
-    let own = footprint(scene, &scene.camera, frame, pose)?.widened(margin_m);
-    let frames = neighbours.footprints.iter().zip(neighbours.placed);
-    let near = frames.enumerate().map(|(k, (footprint, placed))| {
-        *placed && neighbours.run.start + k != frame && footprint.overlaps(&own, perimeter)
-    });
-    Ok(near.collect())
+/// True if a closer search has raised the log-posterior by more than noise does.
+fn has_gained(before: f64, after: f64) -> bool {
+    after - before >= MIN_SCORE_GAIN_NATS
 }
 
-/// σ of pitch, yaw and roll as they appear in the picture: a shift across the view looks like a
-/// turn.
-fn picture_sigma(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
-    let turn = jitter.rotation_sigma_rad;
+/// σ of pitch, yaw and roll as they appear in the picture, radians: a translation across the view
+/// looks like a rotation.
+fn picture_sigma_rad(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
+    let rotation = jitter.rotation_sigma_rad;
     let [x, y, z] = jitter.translation_sigma_m;
     let (along, across) = (y / distance_m, x.max(z) / distance_m);
-    [turn.hypot(along), turn.hypot(across), turn]
+    [rotation.hypot(along), rotation.hypot(across), rotation]
 }
 
-/// How far apart two poses put the frame on the wall: the mean over its middle and corners, metres.
-pub fn separation_m(scene: &EstimationContext, a: &Pose, b: &Pose) -> f64 {
-    let perimeter = scene.surface.perimeter_m();
-    (scene.camera.corner_and_centre_rays().iter())
-        .filter_map(|ray_c| {
-            let look = |pose: &Pose| {
-                let ray = pose.r_wc * ray_c;
-                scene.surface.hit(&pose.t_wc, &ray).ok()
-            };
-            let (a, b) = (look(a)?.wall, look(b)?.wall);
-            Some(shortest_arc(a.s_m - b.s_m, perimeter).hypot(a.h_m - b.h_m))
-        })
-        .sum::<f64>()
-        / 5.0
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::refine::tracking::correlation_search::attainable_log_likelihood;
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    fn hypothesis(correlation: f64, samples: f64, prior: f64) -> Hypothesis {
+        Hypothesis {
+            pose: Pose::new(UnitQuaternion::identity(), Vector3::zeros()),
+            score: log_likelihood(correlation, samples) - prior,
+            attainable_score: attainable_log_likelihood(correlation, samples) - prior,
+        }
+    }
+
+    /// Where hardly anything correlates, the prior makes every log-posterior negative.
+    #[test]
+    fn best_hypothesis_is_worth_refining_at_a_negative_log_posterior() {
+        let best = hypothesis(0.05, 200.0, 3.0);
+        assert!(best.score < 0.0);
+        assert!(is_worth_refining(&best, best.score));
+        assert!(is_worth_refining(&hypothesis(0.05, 200.0, 5.0), best.score));
+    }
+
+    /// A hypothesis that the search's steps explain may be right, however many samples there are;
+    /// one that is less likely by the prior alone is judged by its odds, however few.
+    #[test]
+    fn hypotheses_are_judged_by_their_odds() {
+        for samples in [100.0, 1000.0, 10_000.0] {
+            let best = hypothesis(0.8, samples, 0.0).score;
+            assert!(is_worth_refining(&hypothesis(0.6, samples, 0.0), best));
+        }
+        let best = hypothesis(0.8, 10_000.0, 0.0).score;
+        assert!(!is_worth_refining(&hypothesis(0.5, 10_000.0, 0.0), best));
+        for samples in [0.0, 100.0, 10_000.0] {
+            let best = hypothesis(0.0, samples, 1.0).score;
+            assert!(is_worth_refining(&hypothesis(0.0, samples, 10.0), best));
+            assert!(!is_worth_refining(&hypothesis(0.0, samples, 10.5), best));
+        }
+    }
+
+    #[test]
+    fn gain_is_a_difference_of_log_posteriors() {
+        for before in [-50.0, 0.0, 50.0, 5000.0] {
+            assert!(!has_gained(before, before));
+            assert!(!has_gained(before, before + 2.9));
+            assert!(has_gained(before, before + 3.1));
+        }
+    }
 }

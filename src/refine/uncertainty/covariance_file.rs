@@ -1,18 +1,18 @@
-//! `covariance.csv`, read back.
+//! Reading of `covariance.csv`.
 
 use nalgebra::Matrix6;
 use std::path::{Path, PathBuf};
 
-/// Why a covariance file cannot be used.
+/// Reason why a covariance file cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CovarianceError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{}: cannot read the covariances: {source}", path.display())]
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
     /// A line is malformed.
@@ -22,16 +22,19 @@ pub enum CovarianceError {
         path: PathBuf,
         /// 1-based line.
         line: usize,
-        /// What is wrong.
+        /// The mistake.
         what: String,
     },
 }
 
-/// The covariances of the frames ([`crate::refine::Covariances::frames`]) in a file that
+/// Columns of the file: two frames, σ, and the 36 elements of a covariance.
+const COLUMNS: usize = 39;
+
+/// Reads the covariances of the frames ([`crate::refine::Covariances::frames`]) from a file that
 /// [`crate::refine::Covariances::csv`] has written.
 ///
 /// # Errors
-/// [`CovarianceError`]; other frames than 0 to `frames − 1` in their order.
+/// [`CovarianceError`]; also if the frames are not 0 to `frames − 1` in ascending order.
 pub fn read_covariances(path: &Path, frames: usize) -> Result<Vec<Matrix6<f64>>, CovarianceError> {
     let text = std::fs::read_to_string(path).map_err(|source| CovarianceError::Read {
         path: path.to_owned(),
@@ -45,8 +48,8 @@ pub fn read_covariances(path: &Path, frames: usize) -> Result<Vec<Matrix6<f64>>,
     };
     for (k, line) in text.lines().enumerate().skip(1) {
         let fields: Vec<&str> = line.split(',').collect();
-        if fields.len() != 39 {
-            let what = format!("{} fields, but a line has 39", fields.len());
+        if fields.len() != COLUMNS {
+            let what = format!("{} fields, but a line has {COLUMNS}", fields.len());
             return Err(fail(k + 1, what));
         }
         if fields[0] != fields[1] {
@@ -75,7 +78,7 @@ mod tests {
     use crate::refine::Covariances;
 
     #[test]
-    fn what_was_written_is_read() {
+    fn written_covariances_are_read_back() {
         let element = |k: usize| move |r: usize, c: usize| (100 * k + 10 * r + c) as f64 * 1e-7;
         let covariances = Covariances {
             frames: (0..3).map(|k| Matrix6::from_fn(element(k))).collect(),

@@ -1,10 +1,10 @@
-//! The Cramér–Rao bound: how exact any unbiased estimate of the poses can be.
+//! Cramér–Rao bound: the covariance that no unbiased estimate of the poses undercuts.
 //!
-//! Each pixel reads `I = a S(x(ξ)) + b + n` with the wall's texture S (as a pixel sees it, averaged
-//! over its square) unknown, and n Gaussian with variance σ². Parameters are the poses' ξ,
+//! Each pixel has the value `I = a S(x(ξ)) + b + n` with the wall's texture S (averaged over the
+//! square of a pixel) unknown, and n Gaussian with variance σ². Parameters are the poses' ξ, the
 //! exposures and S at every wall point. The Fisher information of one observation is `σ⁻² ∂I ∂Iᵀ`,
-//! with `∂I/∂ξ_i = a φᵀ B_i` as in [`crate::refine::tiles::tile`] and `∂I/∂S = a`. Eliminating S at each wall
-//! point by the Schur complement leaves for the poses
+//! with `∂I/∂ξ_i = a φᵀ B_i` as in [`crate::refine::tiles::tile`] and `∂I/∂S = a`. Eliminating S at
+//! each wall point by the Schur complement leaves for the poses
 //!
 //! `J_ij = σ⁻² Σ_x (w_i δ_ij − w_i w_j / Σ_k w_k) B_iᵀ φ φᵀ B_j`,   `w_i = q_i a_i²`,
 //!
@@ -13,21 +13,22 @@
 //! unbiased estimate, and with the prior's information added the Bayesian bound (van Trees) for any
 //! estimate at all.
 //!
-//! # What can be reached
+//! # The bound for an unknown texture
 //!
-//! This bound takes the slopes of the texture for known, and an estimator has them from the same
-//! pixels. The same with the texture integrated out, as a Gaussian process with the wall's own
-//! spectrum, is derived in [`crate::refine::problem::unknown_texture`]: M of a tile that N frames see is left with a
-//! share of its part that belongs to displacements. On faint walls the share is the less the more
-//! noise there is; on sharp walls, because of aliasing, the less the *less* noise there is. An
+//! This bound takes the slopes of the texture as known, but an estimator has them from the same
+//! pixels. The bound with the texture integrated out, as a Gaussian process with the wall's own
+//! spectrum, is derived in [`crate::refine::problem::unknown_texture`]: a tile that N frames see
+//! keeps a share of the information in M that belongs to displacements. On faint walls the share
+//! falls with more noise; on sharp walls, because of aliasing, it falls with *less* noise. An
 //! estimator that knows no more of the wall than its spectrum cannot undercut it; one that knows
-//! more, as that edges are straight, can. `benches/reach.py` computes the same share on its own.
+//! more, for example that edges are straight, can. `benches/reach.py` computes the share
+//! independently.
 //!
-//! # How exact it is
+//! # Accuracy of the bound
 //!
 //! Slopes are differences over an eighth of a pixel to each side of frames with 4 × 4 times the
-//! pixels, interpolated by a cubic. For the spectrum of bricks that misses 6 % of their
-//! information, of concrete 2.5 %, so both bounds are too large by half of that.
+//! pixels, interpolated by a cubic. That loses 6 % of the information for the spectrum of bricks,
+//! 2.5 % for that of concrete, so both bounds are too large by half of that.
 //!
 //! Source: C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection, Estimation, and
 //! Modulation Theory", 1968.
@@ -39,6 +40,7 @@ use crate::refine::linear::normal_equations::{Block, NormalEquations};
 use crate::refine::linear::selected_inverse::SelectedInverse;
 use crate::refine::model::context::{EstimationContext, FrameWindow};
 use crate::refine::model::prior::{Prior, median_step_s};
+use crate::refine::options::RefineOptions;
 use crate::refine::parameters::calibration::{Calibration, Kappa};
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::problem::photometric_problem::PhotometricProblem;
@@ -51,7 +53,7 @@ use crate::trajectory::{Shutter, poses_of};
 use nalgebra::Matrix6;
 use std::borrow::Cow;
 
-/// Times that the frames of the bound have as many pixels along each axis.
+/// Factor by which the frames of the bound have more pixels along each axis.
 pub const FINER: u32 = 4;
 /// Wall samples per fine pixel: slopes of the texture are differences over an eighth of a pixel to
 /// each side.
@@ -60,22 +62,23 @@ const DENSITY: f64 = 2.0;
 /// Covariances that no estimate of the true poses undercuts.
 #[derive(Clone, Debug)]
 pub struct PoseBounds {
-    /// Cramér–Rao bound: of unbiased estimates, with the slopes of the texture known.
+    /// Cramér–Rao bound of unbiased estimates, with the slopes of the texture known.
     pub known: Covariances,
-    /// The same with the texture unknown but for its spectrum.
+    /// Cramér–Rao bound with the texture unknown but for its spectrum.
     pub unknown: Covariances,
-    /// Bayesian bound (van Trees): the first, of estimates that also know the survey's prior.
+    /// Bayesian bound (van Trees) of estimates that also know the survey's prior, with the slopes
+    /// of the texture known.
     pub bayesian: Covariances,
 }
 
-/// The bounds for a survey that has true poses.
+/// Computes the bounds for a survey that has true poses.
 ///
 /// `fine` are its frames without noise and with [`FINER`] times as many pixels along each axis: the
 /// slopes of what a pixel sees can only be had from finer pixels. `noise_grey`: σ of a pixel, grey
-/// levels; `texture`: what can be known of the wall's.
+/// levels; `texture`: the spectrum of the wall's texture.
 ///
 /// # Errors
-/// [`RefineError`]; [`RefineError::NoOverlap`] for a survey without true poses, too.
+/// [`RefineError`]; also [`RefineError::NoOverlap`] for a survey without true poses.
 pub fn pose_bounds(
     survey: &Survey,
     fine: &[GreyImage],
@@ -91,7 +94,7 @@ pub fn pose_bounds(
         .iter()
         .map(|stamped| stamped.time_s)
         .collect();
-    let options = crate::refine::RefineOptions::default();
+    let options = RefineOptions::default();
     let prior = Prior {
         jitter: survey.prior,
         initial: survey.initial_poses(),
@@ -103,11 +106,11 @@ pub fn pose_bounds(
     let camera = finer_camera(&survey.camera);
     let frames = fine
         .iter()
-        .map(|frame| Pyramid::new(as_pixels_see(frame), 1));
+        .map(|frame| Pyramid::new(average_pixels(frame), 1));
     let frames = FrameCache::of_pyramids(frames.collect());
-    // The rows' own poses change next to nothing of what can be known.
+    // The motion during readout hardly changes the information.
     let shutter = Shutter::default();
-    let scene = EstimationContext {
+    let context = EstimationContext {
         surface: survey.surface.as_ref(),
         ignored: &survey.ignored,
         camera,
@@ -120,7 +123,7 @@ pub fn pose_bounds(
     };
     let estimates: Vec<FrameEstimate> =
         poses_of(truth).into_iter().map(FrameEstimate::at).collect();
-    let members = FrameWindow {
+    let window = FrameWindow {
         participants: 0..count,
         active: 0..count,
         estimates: &estimates,
@@ -131,32 +134,32 @@ pub fn pose_bounds(
         interpolation: Interpolation::Bicubic,
         ..Sampling::of(0)
     };
-    // FINER² fine pixels are a pixel.
+    // One pixel is FINER² fine pixels.
     let noise_grey = f64::from(FINER) * noise_grey;
-    let problem = PhotometricProblem::new(&scene, sampling, members)?.with_known_noise(noise_grey);
+    let problem = PhotometricProblem::new(&context, sampling, window)?.with_known_noise(noise_grey);
     let (prior, _) = problem.prior_information(&estimates, &Kappa::zeros());
     let with_prior = problem.linearise(&estimates)?.normal;
-    let bayesian = covariances(&problem, &with_prior)?;
-    let known = covariances(&problem, &without(&prior, with_prior))?;
+    let bayesian = invert(&problem, &with_prior)?;
+    let known = invert(&problem, &subtract_pose_prior(&prior, with_prior))?;
     let problem = problem.with_unknown_texture(texture);
-    let pixels = without(&prior, problem.linearise(&estimates)?.normal);
+    let pixels = subtract_pose_prior(&prior, problem.linearise(&estimates)?.normal);
     Ok(PoseBounds {
         known,
-        unknown: covariances(&problem, &pixels)?,
+        unknown: invert(&problem, &pixels)?,
         bayesian,
     })
 }
 
-/// Normal equations without the prior of poses: exposures keep theirs.
-fn without(prior: &[Block], mut normal: NormalEquations) -> NormalEquations {
+/// Subtracts the prior of the poses from the normal equations; exposures keep theirs.
+fn subtract_pose_prior(prior: &[Block], mut normal: NormalEquations) -> NormalEquations {
     for (block, prior) in normal.blocks.iter_mut().zip(prior) {
-        *block -= of_pose(prior);
+        *block -= pose_part(prior);
     }
     normal
 }
 
-/// The inverse of an information, as far as neighbours go.
-fn covariances(
+/// Inverts an information matrix, for each frame and for each pair of neighbours.
+fn invert(
     problem: &PhotometricProblem,
     normal: &NormalEquations,
 ) -> Result<Covariances, RefineError> {
@@ -177,7 +180,7 @@ fn covariances(
 }
 
 /// The part of a block that belongs to poses.
-fn of_pose(block: &Block) -> Block {
+fn pose_part(block: &Block) -> Block {
     let mut pose = Block::zeros();
     pose.fixed_view_mut::<6, 6>(0, 0)
         .copy_from(&block.fixed_view::<6, 6>(0, 0));
@@ -197,8 +200,8 @@ fn finer_camera(camera: &Camera) -> Camera {
     }
 }
 
-/// What full pixels see at every fine pixel: means over [`FINER`] × [`FINER`] fine pixels.
-fn as_pixels_see(fine: &GreyImage) -> GreyImage {
+/// Averages [`FINER`] × [`FINER`] fine pixels to the value of a full pixel, at every fine pixel.
+fn average_pixels(fine: &GreyImage) -> GreyImage {
     let n = FINER as usize;
     let (width, height) = (fine.width() + 1 - n, fine.height() + 1 - n);
     let mut columns = vec![0.0; fine.width()];
@@ -207,7 +210,11 @@ fn as_pixels_see(fine: &GreyImage) -> GreyImage {
         for (x, column) in columns.iter_mut().enumerate() {
             *column = (y..y + n).map(|y| fine.at(x, y)).sum::<f32>() / (n * n) as f32;
         }
-        data.extend(columns.windows(n).map(|run| run.iter().sum::<f32>()));
+        data.extend(
+            columns
+                .windows(n)
+                .map(|columns| columns.iter().sum::<f32>()),
+        );
     }
     GreyImage::new(width, height, data)
 }

@@ -1,9 +1,23 @@
 //! The stated uncertainty, and tests of the model that it rests on.
+//!
+//! ```text
+//! covariance, frame_sigma ──→ overdispersion ─┐
+//! observability ──────────────────────────────┴→ solution_uncertainty
+//! observability → calibration_report, rolling_shutter_test
+//! ```
+//!
+//! A solution's covariance follows from its normal equations and the scatter of its scores. Frames
+//! whose residuals scatter more than noise are overdispersed, and shared parameters that the data
+//! hardly narrow down are unobservable. The rolling-shutter test estimates the readout time, and
+//! the Cramér–Rao bound states what any estimator could reach.
 
+pub mod calibration_report;
 pub mod covariance;
 pub mod covariance_file;
 pub mod cramer_rao;
+pub mod frame_sigma;
 pub mod observability;
 pub mod overdispersion;
 pub mod rolling_shutter_test;
+pub mod shared_parameter_names;
 pub mod solution_uncertainty;

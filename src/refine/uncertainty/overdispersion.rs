@@ -1,15 +1,18 @@
-//! How far a frame is pulled hither and thither.
+//! Overdispersion of a frame: residuals that scatter more than noise.
 //!
 //! Where the model is wrong (a camera's focal length, a turn closed a period off and bent), patches
-//! of the wall pull a frame hither and thither, and it rests between. Were it noise, the scatter of
-//! what the patches pull would be `V_k ≈ H_k`, the frame's own blocks on the diagonal, all other
-//! frames held. With `q = tr(H_k⁻¹ V_k)/6` over the pose ([`pull`]) a patch lies `√q` times as far
-//! off as by noise. By noise, N patches of information I px⁻² each, which together fix six
-//! unknowns, leave the mean point of the picture the variance `σ² = 6/(N I)`, and a patch by
-//! itself, in both directions, is uncertain by `2/I = N σ²/3`. So what patches are off by, beyond
-//! noise, is
+//! of the wall pull a frame in different directions, and it rests between them. If that were noise,
+//! the scatter of the patches' scores would be `V_k ≈ H_k`, the frame's own blocks on the diagonal,
+//! all other frames held (White's information-matrix test). With `q = tr(H_k⁻¹ V_k)/6` over the
+//! pose ([`compute_dispersion`]) a patch is displaced `√q` times as far as by noise. By noise, N
+//! patches of information I px⁻² each, which together determine six unknowns, leave the middle of
+//! the picture the variance `σ² = 6/(N I)`, and a patch by itself, in both directions, the variance
+//! `2/I = N σ²/3`. So the displacement of patches beyond noise is
 //!
-//! `strain² = (q − 1) N σ²/3`   px².
+//! `overdispersion² = (q − 1) N σ²/3`   px².
+//!
+//! Source: H. White, "Maximum likelihood estimation of misspecified models", Econometrica 50(1),
+//! 1982.
 
 use crate::numerics::median::upper_median;
 use crate::refine::linear::normal_equations::Block;
@@ -17,101 +20,104 @@ use crate::refine::model::context::EstimationContext;
 use crate::refine::model::rejection::RejectionReason;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::solver::gauss_newton::Solution;
+use crate::refine::thresholds::overdispersion::{
+    MAX_MEDIAN_OVERDISPERSION_PX, MAX_OVERDISPERSION_PX, MAX_OVERDISPERSION_RATIO,
+};
 use crate::refine::tiles::grid::BLOCK;
 use crate::refine::tiles::tile_arrays::SAMPLES;
-use crate::refine::uncertainty::covariance::frame_sigma;
+use crate::refine::uncertainty::frame_sigma::compute_frame_sigma;
 use nalgebra::Matrix6;
 
-/// Largest overdispersion that can be borne of a frame by itself, if it is that many times what noise does
-/// ([`Overdispersion`]): a glint on a faint wall makes it a pixel and five to ten times, in one patch of a
-/// frame that is right.
-const MOST_STRAIN: Overdispersion = Overdispersion {
-    times: 12.0,
-    px: 0.25,
-};
-/// Largest overdispersion of the median frame, pixels. Right surveys have none, whatever wall, light and
-/// noise; a focal length 0.3 % off makes it 0.05, one 1 % off 0.13.
-const MOST_USUAL_STRAIN_PX: f64 = 0.04;
-/// Wall samples of a patch: of the blocks over which the scatter is told.
+/// Wall samples of a patch: of the blocks over which the scatter is estimated.
 const PATCH: i64 = BLOCK * BLOCK * SAMPLES as i64;
 
-/// How far patches of the wall pull a frame's pose apart: see the [module](self).
+/// Overdispersion of a frame; see the [module](self).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Overdispersion {
-    /// What patches are off by, in terms of what they are by noise: √q.
-    pub times: f64,
-    /// What they are off by beyond noise, pixels, root mean square.
+    /// Displacement of patches over that by noise: √q.
+    pub ratio: f64,
+    /// Displacement of patches beyond noise, pixels, root mean square.
     pub px: f64,
 }
 
 impl Overdispersion {
-    /// From q, the number N of patches, and σ of the mean point of the picture by noise, all other
-    /// frames held.
+    /// The overdispersion for q, the number N of patches, and σ of the middle of the picture by
+    /// noise, all other frames held.
     fn new(q: f64, patches: f64, sigma_px: f64) -> Self {
         Self {
-            times: q.sqrt(),
+            ratio: q.sqrt(),
             px: ((q - 1.0).max(0.0) * patches / 3.0).sqrt() * sigma_px,
         }
     }
 
-    /// Of a frame with its own block of the normal matrix, `information`, and of V, `scatter`, over
-    /// a number of `patches`. None if the frame is not fixed by the others.
+    /// The overdispersion of a frame with its own block of the normal matrix, `information`, and of
+    /// V, `scatter`, over a number of `patches`. None if the others do not determine its pose.
     fn of_frame(
-        scene: &EstimationContext,
+        context: &EstimationContext,
         estimate: &FrameEstimate,
         (information, scatter): (&Block, &Block),
         patches: f64,
     ) -> Option<Self> {
-        let (q, covariance) = pull(information, scatter)?;
-        let sigma = frame_sigma(scene.surface, &scene.camera, estimate, &covariance, None);
+        let (q, covariance) = compute_dispersion(information, scatter)?;
+        let sigma = compute_frame_sigma(
+            context.surface,
+            &context.camera,
+            estimate,
+            &covariance,
+            None,
+        );
         (q.is_finite() && sigma.wall_px.is_finite()).then(|| Self::new(q, patches, sigma.wall_px))
     }
 }
 
-/// q and, by noise alone, the covariance of the pose with all other frames held.
+/// Computes q and, by noise alone, the covariance of the pose with all other frames held.
 ///
-/// The exposure goes along: with `E = (I, −H_pe H_ee⁻¹)`, pulls on the pose p that the exposure e
-/// does not make up for have the scatter `E V Eᵀ`; and `E` is `Z_pp⁻¹ (Z_pp Z_pe)` with
+/// The exposure is eliminated: with `E = (I, −H_pe H_ee⁻¹)`, scores of the pose p that the exposure
+/// e does not compensate have the scatter `E V Eᵀ`; and `E` is `Z_pp⁻¹ (Z_pp Z_pe)` with
 /// `Z = H_k⁻¹`.
-fn pull(information: &Block, scatter: &Block) -> Option<(f64, Matrix6<f64>)> {
+fn compute_dispersion(information: &Block, scatter: &Block) -> Option<(f64, Matrix6<f64>)> {
     let inverse = information.cholesky()?.inverse();
     let rows = inverse.fixed_rows::<6>(0);
     let pose = rows.fixed_columns::<6>(0).into_owned();
-    let moved = rows * scatter * rows.transpose();
-    let q = pose.cholesky()?.solve(&moved).trace() / 6.0;
+    let pose_scatter = rows * scatter * rows.transpose();
+    let q = pose.cholesky()?.solve(&pose_scatter).trace() / 6.0;
     Some((q, pose))
 }
 
-/// Each frame's overdispersion at a solution; none of those that show nothing. `scene`: with the solution's
-/// own κ.
-pub fn overdispersions(scene: &EstimationContext, solution: &Solution) -> Vec<Overdispersion> {
+/// Computes the overdispersion of every frame at a solution; 0 for those that show nothing.
+/// `context`: with the solution's own κ.
+pub fn compute_overdispersions(
+    context: &EstimationContext,
+    solution: &Solution,
+) -> Vec<Overdispersion> {
     let at = &solution.linearisation;
     let pattern = solution.problem.pattern();
     let patch = PATCH as f64 * solution.problem.compared_share();
-    let of = |(k, estimate): (usize, &FrameEstimate)| {
+    let of_frame = |(k, estimate): (usize, &FrameEstimate)| {
         let place = pattern.block_index(k, k)?;
         let blocks = (&at.normal.blocks[place], &at.scatter[place]);
         let patches = at.frames[k].samples as f64 / patch;
-        Overdispersion::of_frame(scene, estimate, blocks, patches)
+        Overdispersion::of_frame(context, estimate, blocks, patches)
     };
     let frames = solution.estimates.iter().enumerate();
-    frames.map(|frame| of(frame).unwrap_or_default()).collect()
+    frames
+        .map(|frame| of_frame(frame).unwrap_or_default())
+        .collect()
 }
 
-/// Which of the frames inliers so far are under more overdispersion than can be borne; where their median
-/// is, all are.
-pub fn overdispersed(
+/// Marks the inliers with more overdispersion than is accepted; all of them if their median has.
+pub fn find_overdispersed(
     overdispersions: &[Overdispersion],
     rejections: &[Option<RejectionReason>],
 ) -> Vec<bool> {
     let inliers = (0..rejections.len()).filter(|k| rejections[*k].is_none());
-    let usual = upper_median(inliers.map(|k| overdispersions[k].px).collect());
-    let all = usual.is_some_and(|px| px > MOST_USUAL_STRAIN_PX);
-    let beyond = |overdispersion: &Overdispersion| {
-        overdispersion.px > MOST_STRAIN.px && overdispersion.times > MOST_STRAIN.times
+    let median_px = upper_median(inliers.map(|k| overdispersions[k].px).collect());
+    let all = median_px.is_some_and(|px| px > MAX_MEDIAN_OVERDISPERSION_PX);
+    let exceeds = |overdispersion: &Overdispersion| {
+        overdispersion.px > MAX_OVERDISPERSION_PX && overdispersion.ratio > MAX_OVERDISPERSION_RATIO
     };
     (0..rejections.len())
-        .map(|k| rejections[k].is_none() && (all || beyond(&overdispersions[k])))
+        .map(|k| rejections[k].is_none() && (all || exceeds(&overdispersions[k])))
         .collect()
 }
 
@@ -119,53 +125,53 @@ pub fn overdispersed(
 mod tests {
     use super::*;
 
-    /// WallRegions that all pull at random, each by its own noise, are no overdispersion; those that pull by
-    /// half a pixel more are half a pixel.
+    /// WallRegions displaced by noise alone have no overdispersion; those displaced by half a pixel
+    /// more have one of half a pixel.
     #[test]
-    fn strain_is_what_patches_are_off_by_beyond_noise() {
-        // N patches, each with information I px⁻² about both directions of a picture that can move
-        // in six ways.
+    fn overdispersion_is_displacement_beyond_noise() {
+        // N patches, each with information I px⁻² in both directions, determine six unknowns.
         let (patches, information) = (300.0, 40.0);
         let sigma_px = f64::sqrt(6.0 / (patches * information));
         assert_eq!(Overdispersion::new(1.0, patches, sigma_px).px, 0.0);
-        let off_px = 0.5;
-        // Pull I · off in each of the two directions, so its square over that by noise, I.
-        let q = 1.0 + 0.5 * information * off_px * off_px;
-        assert!((Overdispersion::new(q, patches, sigma_px).px - off_px).abs() < 1e-12);
+        let displacement_px = 0.5;
+        // The score is I · displacement in each of the two directions; its variance by noise is I.
+        let q = 1.0 + 0.5 * information * displacement_px * displacement_px;
+        assert!((Overdispersion::new(q, patches, sigma_px).px - displacement_px).abs() < 1e-12);
         let scatter = Block::identity() * 12.0;
-        let (q, pose) = pull(&(Block::identity() * 4.0), &scatter).unwrap();
+        let (q, pose) = compute_dispersion(&(Block::identity() * 4.0), &scatter).unwrap();
         assert!((q - 3.0).abs() < 1e-12);
         assert!((pose - Matrix6::identity() * 0.25).norm() < 1e-12);
-        assert!(pull(&Block::zeros(), &scatter).is_none());
-        // What the exposure makes up for is no pull on the pose.
+        assert!(compute_dispersion(&Block::zeros(), &scatter).is_none());
+        // Scores that the exposure compensates do not count.
         let (mut information, mut scatter) = (Block::identity(), Block::identity());
         for (row, column) in [(0, 7), (7, 0)] {
             information[(row, column)] = 0.5;
             scatter[(row, column)] = 0.5;
         }
         let along = Block::from_fn(|r, c| information[(r, 7)] * information[(7, c)]);
-        let (q, _) = pull(&information, &(scatter + along * 100.0)).unwrap();
+        let (q, _) = compute_dispersion(&information, &(scatter + along * 100.0)).unwrap();
         assert!((q - 1.0).abs() < 1e-12, "{q}");
     }
 
     #[test]
-    fn what_strains_the_median_frame_strains_all() {
+    fn overdispersion_of_the_median_frame_counts_for_all() {
         let mut rejections = vec![None; 4];
         rejections[0] = Some(RejectionReason::Featureless);
-        let overdispersion = |times, px| Overdispersion { times, px };
-        let of =
-            |overdispersions: [Overdispersion; 4]| overdispersed(&overdispersions, &rejections);
-        let (none, usual, much) = (
+        let overdispersion = |ratio, px| Overdispersion { ratio, px };
+        let of = |overdispersions: [Overdispersion; 4]| {
+            find_overdispersed(&overdispersions, &rejections)
+        };
+        let (none, moderate, large) = (
             overdispersion(1.5, 0.01),
             overdispersion(10.0, 0.1),
             overdispersion(20.0, 0.5),
         );
         let (faint, clean) = (overdispersion(8.0, 1.0), overdispersion(20.0, 0.02));
-        assert_eq!(of([much, none, none, none]), [false; 4]);
-        assert_eq!(of([none, none, much, usual]), [false, true, true, true]);
-        assert_eq!(of([none, none, much, none]), [false, false, true, false]);
-        assert_eq!(of([usual, none, usual, none]), [false; 4]);
+        assert_eq!(of([large, none, none, none]), [false; 4]);
+        assert_eq!(of([none, none, large, moderate]), [false, true, true, true]);
+        assert_eq!(of([none, none, large, none]), [false, false, true, false]);
+        assert_eq!(of([moderate, none, moderate, none]), [false; 4]);
         assert_eq!(of([none, clean, faint, clean]), [false; 4]);
-        assert_eq!(overdispersed(&[], &[]), [false; 0]);
+        assert_eq!(find_overdispersed(&[], &[]), [false; 0]);
     }
 }

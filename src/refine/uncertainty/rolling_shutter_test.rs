@@ -1,11 +1,13 @@
-//! Do the frames look as if their rows were read in another time than given?
+//! Rolling-shutter test: whether the frames fit better with another readout time than the one
+//! given.
 //!
-//! A camera that moves while rows are read puts what it sees ever farther off from row to row, by
-//! the time since the middle row. Poses take up most of that where it is ignored: frames roll, and
-//! the whole wall is wound around the axis a little. What they cannot take up is the same in all
-//! frames, a residual along the rows. It is asked for in one number: the readout time with which
-//! the frames fit best, with everything else free ([`crate::refine::linear::bordered_system`]), and how sure it is. The lens
-//! is free, too, as far as it usually may be off: a wrong one must not pass for a wrong time.
+//! A camera that moves while rows are read displaces what it sees, more from row to row, in
+//! proportion to the time since the middle row. Where this is ignored, poses take up most of it:
+//! frames roll, and the whole wall is wound around the axis a little. The rest is the same in all
+//! frames, a residual along the rows. It is estimated as one number, the readout time with which
+//! the frames fit best, with everything else free ([`crate::refine::linear::bordered_system`]). The
+//! intrinsics are free, too, within their usual uncertainty, so that a wrong lens does not pass for
+//! a wrong time.
 
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
@@ -18,67 +20,64 @@ use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::samples::sampling::Sampling;
 use crate::refine::solver::argmin_glue::solve;
 use crate::refine::solver::stopping::Stopping;
+use crate::refine::thresholds::rolling_shutter_test::{
+    MAX_FRAMES, MAX_SOLVE_ITERATIONS, MIN_DIFFERENCE_SIGMA, MIN_SHIFT_PX, STEP_TOLERANCE_PX,
+    STEP_TOLERANCE_SIGMA,
+};
 use crate::refine::uncertainty::observability::Posterior;
 use crate::surface::viewing_distance;
 use crate::survey::{CalibrateSection, CalibrationGroup};
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// Frames that are asked, at the most: those in the middle of the survey.
-const MOST_FRAMES: usize = 120;
-/// Steps at the most, and when one is the last; where the given time is right, the first is.
+/// Stopping rule of the solve; where the given time is right, the first step is the last.
 const STOPPING: Stopping = Stopping {
-    max_iterations: 4,
-    step_px: 0.02,
-    step_sigma: 1.0,
+    max_iterations: MAX_SOLVE_ITERATIONS,
+    step_px: STEP_TOLERANCE_PX,
+    step_sigma: STEP_TOLERANCE_SIGMA,
 };
-/// A difference of the time is systematic if it is this many times its 1-σ, ...
-const SURE: f64 = 6.0;
-/// ... and shifts the picture's rows against one another by this much from the first to the last,
-/// pixels.
-const LEAST_SHIFT_PX: f64 = 0.5;
 
-/// The readout time that the frames want.
+/// The readout time with which the frames fit best.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[non_exhaustive]
 pub struct ReadoutEstimate {
     /// Time from reading a frame's first row to reading its last as given, milliseconds; 0 for a
     /// global shutter.
     pub given_ms: f64,
-    /// The same with which the frames fit best.
+    /// The readout time with which the frames fit best, milliseconds.
     pub estimate_ms: f64,
-    /// 1-σ of that.
+    /// 1-σ of the estimate, milliseconds.
     pub sigma_ms: f64,
-    /// How far the difference shifts the first row against the last, pixels in the middle of the
-    /// median frame.
+    /// Displacement of the first row against the last by the difference, pixels in the middle of
+    /// the median frame.
     pub shift_px: f64,
-    /// True if that is a systematic error.
+    /// True if the difference is a systematic error.
     pub systematic: bool,
 }
 
-/// Asks the frames for their readout time; None if they cannot tell.
+/// Estimates the readout time; None if the frames do not observe it.
 ///
 /// # Errors
 /// [`ProblemError`] for a frame that cannot be read.
 pub fn estimate_readout(
-    scene: &EstimationContext,
+    context: &EstimationContext,
     options: &RefineOptions,
-    tracked: &FrameStates,
+    states: &FrameStates,
 ) -> Result<Option<ReadoutEstimate>, ProblemError> {
-    let count = tracked.estimates.len();
-    let first = count.saturating_sub(MOST_FRAMES) / 2;
-    let run = first..(first + MOST_FRAMES).min(count);
-    let calibration = with_readout(scene);
-    let scene = &EstimationContext {
+    let count = states.estimates.len();
+    let first = count.saturating_sub(MAX_FRAMES) / 2;
+    let frame_range = first..(first + MAX_FRAMES).min(count);
+    let calibration = free_readout(context);
+    let context = &EstimationContext {
         calibration,
-        ..*scene
+        ..*context
     };
     let sampling = Sampling {
         information: options.intermediate_information,
-        ..Sampling::of(options.handover_level(scene.camera.shorter_side()))
+        ..Sampling::of(options.handover_level(context.camera.shorter_side()))
     };
-    let members = tracked.window_of(run.clone(), run.clone());
-    let problem = PhotometricProblem::new(scene, sampling, members)?.with_shared_parameters();
+    let window = states.window_of(frame_range.clone(), frame_range);
+    let problem = PhotometricProblem::new(context, sampling, window)?.with_shared_parameters();
     if problem.tiles() == 0 {
         return Ok(None);
     }
@@ -93,47 +92,47 @@ pub fn estimate_readout(
     let Some(covariance) = posterior.covariance(&calibration.free) else {
         return Ok(None);
     };
-    let found = |kappa: &Kappa| 1e3 * calibration.readout_s(kappa);
-    let (given_ms, estimate_ms) = (found(&scene.kappa), found(&solution.kappa));
+    let readout_ms = |kappa: &Kappa| 1e3 * calibration.readout_s(kappa);
+    let (given_ms, estimate_ms) = (readout_ms(&context.kappa), readout_ms(&solution.kappa));
     let sigma_ms = 1e3 * covariance[(READOUT_INDEX, READOUT_INDEX)].sqrt();
-    let off_ms = estimate_ms - given_ms;
-    let shift_px = 1e-3 * off_ms.abs() * shift_px_per_s(scene, tracked);
-    let sure = off_ms.abs() > SURE * sigma_ms;
+    let difference_ms = estimate_ms - given_ms;
+    let shift_px = 1e-3 * difference_ms.abs() * shift_px_per_s(context, states);
+    let is_significant = difference_ms.abs() > MIN_DIFFERENCE_SIGMA * sigma_ms;
     Ok(sigma_ms.is_finite().then_some(ReadoutEstimate {
         given_ms,
         estimate_ms,
         sigma_ms,
         shift_px,
-        systematic: sure && shift_px > LEAST_SHIFT_PX,
+        systematic: is_significant && shift_px > MIN_SHIFT_PX,
     }))
 }
 
-/// What is estimated of the scene's calibration, the lens, and the readout time.
-fn with_readout(scene: &EstimationContext) -> Calibration {
+/// The calibration with the intrinsics and the readout time free, besides what is free already.
+fn free_readout(context: &EstimationContext) -> Calibration {
     use CalibrationGroup::{Centre, Distortion, Focal};
-    let mut calibration = scene.calibration.intrinsics_only();
+    let mut calibration = context.calibration.intrinsics_only();
     let section = CalibrateSection::default();
-    let usual = Calibration::new(&[Focal, Centre, Distortion], &section, &scene.camera, &[]);
-    for k in (0..INTRINSIC_PARAMETERS).filter(|k| !scene.calibration.free[*k]) {
-        (calibration.free[k], calibration.sigma[k]) = (true, usual.sigma[k]);
+    let intrinsics = Calibration::new(&[Focal, Centre, Distortion], &section, &context.camera, &[]);
+    for k in (0..INTRINSIC_PARAMETERS).filter(|k| !context.calibration.free[*k]) {
+        (calibration.free[k], calibration.sigma[k]) = (true, intrinsics.sigma[k]);
     }
-    // Any time between frames is possible.
+    // Any time up to that between frames is possible.
     calibration.free[READOUT_INDEX] = true;
-    calibration.sigma[READOUT_INDEX] = scene.prior.median_step_s;
+    calibration.sigma[READOUT_INDEX] = context.prior.median_step_s;
     calibration
 }
 
-/// How far the first row is shifted against the last in the middle of the median frame if the
-/// readout takes a second, pixels.
-fn shift_px_per_s(scene: &EstimationContext, tracked: &FrameStates) -> f64 {
-    let all = 0..tracked.estimates.len();
-    let between = 1.0 - 1.0 / f64::from(scene.camera.height);
+/// Displacement of the first row against the last in the middle of the median frame if the readout
+/// takes a second, pixels.
+fn shift_px_per_s(context: &EstimationContext, states: &FrameStates) -> f64 {
+    let all = 0..states.estimates.len();
+    let row_share = 1.0 - 1.0 / f64::from(context.camera.height);
     let shift = |k: usize| {
-        let pose = &tracked.estimates[k].pose;
-        let x_c = Vector3::z() * viewing_distance(scene.surface, pose).ok()?;
-        let rate = scene.sweep_rate(k, &all, &tracked.estimates);
+        let pose = &states.estimates[k].pose;
+        let x_c = Vector3::z() * viewing_distance(context.surface, pose).ok()?;
+        let rate = context.sweep_rate(k, &all, &states.estimates);
         let moved = rate.omega_rad.cross(&x_c) + rate.nu_m;
-        Some((scene.camera.project_jacobian(&x_c) * moved).norm() * between)
+        Some((context.camera.project_jacobian(&x_c) * moved).norm() * row_share)
     };
     let mut shifts: Vec<f64> = all.clone().filter_map(shift).collect();
     shifts.sort_unstable_by(f64::total_cmp);

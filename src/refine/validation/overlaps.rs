@@ -1,4 +1,4 @@
-//! Which frames see wall in common.
+//! Pairs of frames that may share wall, in batches.
 
 use crate::camera::Camera;
 use crate::refine::model::context::EstimationContext;
@@ -13,67 +13,67 @@ use std::ops::Range;
 /// Frames compared at once: bounds the memory.
 const BATCH: usize = 32;
 
-/// The inliers frames of a run on the wall.
+/// The parts of the wall that the inliers among some consecutive frames see.
 pub struct Overlaps {
-    /// What each sees; None for those in rejection and outside the run.
+    /// The footprint of every frame; None for rejected ones and those outside the range.
     pub footprints: Vec<Option<Footprint>>,
-    run: Range<usize>,
+    frame_range: Range<usize>,
     perimeter_m: f64,
 }
 
-/// Some frames and those after them that may share wall with them.
+/// Some frames, each with the later ones that may share wall with it.
 pub struct Batch {
-    /// A frame and those after it, for every frame that has any.
+    /// Each frame that has any with its later partners.
     pub partners: Vec<(usize, Vec<usize>)>,
-    /// All of them, ascending.
+    /// All frames of the batch, ascending.
     pub needed: Vec<usize>,
 }
 
 impl Overlaps {
-    /// Of a run of frames at their present poses, through `camera`.
+    /// The overlaps of the inliers of `frame_range` at their present poses, through `camera`.
     ///
     /// # Errors
     /// [`ProblemError::Placement`].
     pub fn of(
-        scene: &EstimationContext,
+        context: &EstimationContext,
         camera: &Camera,
-        tracked: &FrameStates,
-        run: &Range<usize>,
+        states: &FrameStates,
+        frame_range: &Range<usize>,
     ) -> Result<Self, ProblemError> {
-        let frames = tracked.estimates.par_iter().zip(&tracked.rejections);
+        let frames = states.estimates.par_iter().zip(&states.rejections);
         let footprints = frames
             .enumerate()
             .map(|(k, (estimate, rejection))| {
-                if !(run.contains(&k) && rejection.is_none()) {
-                    Ok(None)
+                if frame_range.contains(&k) && rejection.is_none() {
+                    let camera = camera.with_sweep(&states.sweep(context, k));
+                    footprint(context, &camera, k, &estimate.pose).map(Some)
                 } else {
-                    let camera = camera.with_sweep(&tracked.sweep(scene, k));
-                    footprint(scene, &camera, k, &estimate.pose).map(Some)
+                    Ok(None)
                 }
             })
             .collect::<Result<_, _>>()?;
         Ok(Self {
             footprints,
-            run: run.clone(),
-            perimeter_m: scene.surface.perimeter_m(),
+            frame_range: frame_range.clone(),
+            perimeter_m: context.surface.perimeter_m(),
         })
     }
 
-    /// The frames of the run, a few at a time, with those partners that are `wanted`.
-    pub fn batches(&self, wanted: impl Fn(usize, usize) -> bool) -> impl Iterator<Item = Batch> {
-        self.run.clone().step_by(BATCH).map(move |start| {
-            let frames = start..(start + BATCH).min(self.run.end);
+    /// The frames in batches, each with those of its later partners for which `is_wanted` is true.
+    pub fn batches(&self, is_wanted: impl Fn(usize, usize) -> bool) -> impl Iterator<Item = Batch> {
+        self.frame_range.clone().step_by(BATCH).map(move |start| {
+            let frames = start..(start + BATCH).min(self.frame_range.end);
             let partners: Vec<(usize, Vec<usize>)> = frames
                 .map(|a| {
-                    let mut others = self.after(a);
-                    others.retain(|b| wanted(a, *b));
-                    (a, others)
+                    let mut partners = self.later_partners(a);
+                    partners.retain(|b| is_wanted(a, *b));
+                    (a, partners)
                 })
-                .filter(|(_, others)| !others.is_empty())
+                .filter(|(_, partners)| !partners.is_empty())
                 .collect();
             let all = partners
                 .iter()
-                .flat_map(|(a, others)| std::iter::once(a).chain(others));
+                .flat_map(|(a, partners)| std::iter::once(a).chain(partners));
             let mut needed: Vec<usize> = all.copied().collect();
             needed.sort_unstable();
             needed.dedup();
@@ -81,14 +81,14 @@ impl Overlaps {
         })
     }
 
-    /// The frames after frame `a` that may share wall with it, as far on as overlap is looked for.
-    fn after(&self, a: usize) -> Vec<usize> {
+    /// The frames after frame `a` that may share wall with it.
+    fn later_partners(&self, a: usize) -> Vec<usize> {
         let Some(own) = &self.footprints[a] else {
             return Vec::new();
         };
-        let last = (a + MAX_OVERLAP_DISTANCE_FRAMES + 1).min(self.run.end);
+        let end = (a + MAX_OVERLAP_DISTANCE_FRAMES + 1).min(self.frame_range.end);
         let overlaps = |other: &Footprint| other.overlaps(own, self.perimeter_m);
-        (a + 1..last)
+        (a + 1..end)
             .filter(|b| self.footprints[*b].as_ref().is_some_and(overlaps))
             .collect()
     }

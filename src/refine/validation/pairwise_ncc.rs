@@ -1,115 +1,116 @@
-//! Do frames that show the same wall show the same thing?
+//! Normalised cross-correlation of overlapping frames: whether they show the same wall.
 //!
-//! Gauss–Newton ends in a minimum, not always the right one; neighbours may agree with each other
-//! and not with the turn before. So once all frames are placed, every pair that overlaps is
-//! compared on the wall: local contrast of the one against that of the other. Right pairs correlate
-//! as well as the texture lets them, wrong ones do not, and a low residual fused from several
-//! frames cannot hide it.
+//! Gauss–Newton ends in a minimum, which is not always the right one; neighbours may agree with
+//! each other and not with the turn before. So once all frames are tracked, every pair that
+//! overlaps is compared on the wall: local contrast of the one against that of the other. Pairs at
+//! right poses correlate as well as the texture allows, others do not, and a low residual fused
+//! from several frames cannot hide it.
 
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
-use crate::refine::model::rejection::RejectionReason;
-use crate::refine::tiles::residual_weighting::robust_correlation;
-use crate::refine::tracking::reference_mosaic::{
-    MosaicGrid, NccScore, UnwrappedFrame, pixel_size_m,
+use crate::refine::thresholds::pairwise_ncc::{
+    COARSE_STRIDE_PX, COARSE_WINDOW_PX, FINE_LEVEL, FINE_STRIDE_PX, FINE_WINDOW_PX,
+    MIN_CERTAIN_CORRELATION, MIN_CORRELATION, MIN_OVERLAP_SHARE, MIN_SHARE_WITHOUT_OUTLIERS,
 };
+use crate::refine::tiles::residual_weighting::robust_correlation;
+use crate::refine::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
+use crate::refine::tracking::ncc_score::NccScore;
+use crate::refine::tracking::unwrapped_frame::UnwrappedFrame;
 use crate::refine::validation::overlaps::{Batch, Overlaps};
 use crate::surface::Footprint;
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-/// Least samples that two frames share, as a share of the lattice over one.
-const LEAST_OVERLAP: f64 = 0.03;
-/// Correlation, noise aside, that a right pair reaches.
-const LEAST_QUALITY: f64 = 0.6;
-/// Share of what two frames share that must be left without what stands out of it, for the rest to
-/// speak for them.
-const LEAST_LEFT: f64 = 0.5;
-/// One above this is not asked for that of most samples.
-const SURE_QUALITY: f64 = 0.85;
-/// Share of its weight that may contradict before a frame is doubted.
-const MOST_CONTRADICTION: f64 = 0.15;
-/// A blurred frame has less than this share of the others' fine contrast (variance).
-const LEAST_SHARPNESS: f64 = 0.5;
-
-/// Two frames compared where they overlap.
+/// The comparison of two frames where they overlap.
 #[derive(Clone, Copy, Debug)]
-pub struct Pair {
+pub struct PairNcc {
     /// The earlier frame.
     pub a: usize,
     /// The later one.
     pub b: usize,
-    /// Wall samples both show.
+    /// Wall samples that both show.
     pub samples: f64,
     /// True if they cannot show the same wall.
-    pub wrong: bool,
-    /// Correlation of local contrast there, noise aside.
-    pub quality: f64,
-    /// Variance of the earlier frame's finest detail over the later one's there, gains removed;
-    /// None where noise drowns it.
-    pub sharpness: Option<f64>,
+    pub contradicts: bool,
+    /// Correlation of local contrast, corrected for noise.
+    pub correlation: f64,
+    /// Variance of the earlier frame's finest detail over the later one's, gains removed; None
+    /// where noise drowns it.
+    pub sharpness_ratio: Option<f64>,
 }
 
-/// Compares those of a run of frames that are inliers and overlap: at pyramid level `level`, in
-/// windows that hold a brick or two, and in finest detail.
+/// Compares those of some consecutive frames that are inliers and overlap: at pyramid level
+/// `level`, in windows that hold a brick or two, and in finest detail.
 ///
-/// The first tells whether they show the same wall; finest detail only where the first is drowned
-/// by noise, for of a pattern it is edges alone, and they coincide wherever the pattern does,
-/// whatever is between them. Where two frames do not show the same wall, they are looked at once
-/// more without what stands out of it: water is dark in one and glints in the other, and on a faint
-/// wall a few such patches in a strip are all that is compared. Two frames contradict unless the
-/// wall between agrees; where little of it is left they neither agree nor contradict.
+/// The coarse comparison tells whether they show the same wall. The fine one is used only where
+/// noise drowns the coarse one: of a repetitive wall it shows edges alone, and these coincide
+/// wherever the pattern does, whatever is between them.
+///
+/// Two frames that do not show the same wall are compared once more without what stands out of it:
+/// water is dark in one frame and glints in the other, and on a faint wall a few such patches in a
+/// strip are all that is compared. The two contradict each other unless the wall between agrees. If
+/// little of that is left, they neither agree nor contradict.
 ///
 /// # Errors
 /// [`ProblemError`].
 pub fn compute_pairwise_ncc(
-    scene: &EstimationContext,
+    context: &EstimationContext,
     level: usize,
-    tracked: &FrameStates,
-    frames: &Range<usize>,
-) -> Result<Vec<Pair>, ProblemError> {
+    states: &FrameStates,
+    frame_range: &Range<usize>,
+) -> Result<Vec<PairNcc>, ProblemError> {
     let any = |_, _| true;
-    let coarse = Comparison { level, ..COARSE };
-    let fine = Comparison {
-        level: FINE.level.min(level),
-        ..FINE
+    let coarse = Comparison {
+        level,
+        stride_px: COARSE_STRIDE_PX,
+        window_px: COARSE_WINDOW_PX,
+        with_outliers: true,
     };
-    let of_coarse = compare_at(scene, coarse, tracked, frames, &any)?;
-    let of_fine = by_pair(compare_at(scene, fine, tracked, frames, &any)?);
-    let mut pairs: Vec<Pair> = of_coarse
+    let fine = Comparison {
+        level: FINE_LEVEL.min(level),
+        stride_px: FINE_STRIDE_PX,
+        window_px: FINE_WINDOW_PX,
+        with_outliers: true,
+    };
+    let of_coarse = compare_pairs(context, coarse, states, frame_range, &any)?;
+    let of_fine = by_pair(compare_pairs(context, fine, states, frame_range, &any)?);
+    let mut pairs: Vec<PairNcc> = of_coarse
         .into_iter()
         .filter_map(|coarse| {
             let fine = of_fine.get(&(coarse.a, coarse.b));
-            let fine_quality = fine.and_then(|fine| fine.quality);
-            let quality = coarse.quality.or(fine_quality)?;
-            Some(Pair {
+            let fine_correlation = fine.and_then(|fine| fine.correlation);
+            let correlation = coarse.correlation.or(fine_correlation)?;
+            Some(PairNcc {
                 a: coarse.a,
                 b: coarse.b,
                 samples: coarse.samples,
-                wrong: quality < LEAST_QUALITY,
-                quality,
-                sharpness: fine_quality.and(fine.map(|fine| fine.sharpness)),
+                contradicts: correlation < MIN_CORRELATION,
+                correlation,
+                sharpness_ratio: fine_correlation.and(fine.map(|fine| fine.sharpness_ratio)),
             })
         })
         .collect();
-    let wrong = pairs.iter().filter(|pair| pair.wrong);
-    let wrong: BTreeSet<(usize, usize)> = wrong.map(|pair| (pair.a, pair.b)).collect();
-    if wrong.is_empty() {
+    let contradicting = pairs.iter().filter(|pair| pair.contradicts);
+    let contradicting: BTreeSet<(usize, usize)> =
+        contradicting.map(|pair| (pair.a, pair.b)).collect();
+    if contradicting.is_empty() {
         return Ok(pairs);
     }
-    let usual = Comparison {
-        all: false,
+    let without_outliers = Comparison {
+        with_outliers: false,
         ..coarse
     };
-    let again = |a, b| wrong.contains(&(a, b));
-    let of_usual = by_pair(compare_at(scene, usual, tracked, frames, &again)?);
+    let again = |a, b| contradicting.contains(&(a, b));
+    let compared = compare_pairs(context, without_outliers, states, frame_range, &again)?;
+    let compared = by_pair(compared);
     // Where little is left, and that agrees, the pair says nothing.
-    pairs.retain_mut(|pair| match of_usual.get(&(pair.a, pair.b)) {
-        Some(usual) if usual.quality.is_some_and(|q| q >= LEAST_QUALITY) => {
-            pair.wrong = false;
-            usual.samples >= LEAST_LEFT * pair.samples
+    pairs.retain_mut(|pair| match compared.get(&(pair.a, pair.b)) {
+        Some(left) if left.correlation.is_some_and(|c| c >= MIN_CORRELATION) => {
+            pair.contradicts = false;
+            left.samples >= MIN_SHARE_WITHOUT_OUTLIERS * pair.samples
         }
         _ => true,
     });
@@ -121,232 +122,171 @@ fn by_pair(compared: Vec<Compared>) -> BTreeMap<(usize, usize), Compared> {
     compared.map(|one| ((one.a, one.b), one)).collect()
 }
 
-/// How frames are compared.
+/// A way to compare frames.
 #[derive(Clone, Copy, Debug)]
 struct Comparison {
     /// Pyramid level.
     level: usize,
-    /// Every how many pixels a wall sample is taken, along each axis.
-    stride: usize,
+    /// Distance between wall samples along each axis, pixels.
+    stride_px: usize,
     /// Half width of the window of local contrast, pixels.
-    window: usize,
-    /// All that they show, or the usual alone.
-    all: bool,
+    window_px: usize,
+    /// True to compare all that the frames show; false to leave out what stands out of the wall.
+    with_outliers: bool,
 }
 
-const COARSE: Comparison = Comparison {
-    level: 2,
-    stride: 4,
-    window: 6,
-    all: true,
-};
-const FINE: Comparison = Comparison {
-    level: 1,
-    stride: 5,
-    window: 3,
-    all: true,
-};
-
-/// Two frames compared in one way.
+/// The result of one comparison of two frames.
 struct Compared {
     a: usize,
     b: usize,
     samples: f64,
-    quality: Option<f64>,
-    sharpness: f64,
+    correlation: Option<f64>,
+    sharpness_ratio: f64,
 }
 
-/// Compares the pairs that are `wanted`.
-fn compare_at(
-    scene: &EstimationContext,
+/// Compares the pairs for which `is_wanted` is true.
+fn compare_pairs(
+    context: &EstimationContext,
     comparison: Comparison,
-    tracked: &FrameStates,
-    frames: &Range<usize>,
-    wanted: &(dyn Fn(usize, usize) -> bool + Sync),
+    states: &FrameStates,
+    frame_range: &Range<usize>,
+    is_wanted: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Vec<Compared>, ProblemError> {
     let Comparison {
         level,
-        stride,
-        window,
-        all,
+        stride_px,
+        window_px,
+        with_outliers,
     } = comparison;
-    let camera = scene.camera.at_level(level);
-    let overlaps = Overlaps::of(scene, &camera, tracked, frames)?;
+    let camera = context.camera.at_level(level);
+    let overlaps = Overlaps::of(context, &camera, states, frame_range)?;
     let mut pairs = Vec::new();
     let mut unwrapped_frames: BTreeMap<usize, UnwrappedFrame> = BTreeMap::new();
-    for Batch { partners, needed } in overlaps.batches(wanted) {
-        // What the batch before has left is not made again.
+    for Batch { partners, needed } in overlaps.batches(is_wanted) {
+        // Frames that the batch before has unwrapped are kept.
         unwrapped_frames.retain(|k, _| needed.binary_search(k).is_ok());
-        let made: Vec<(usize, UnwrappedFrame)> = needed
+        let added: Vec<(usize, UnwrappedFrame)> = needed
             .into_par_iter()
             .filter(|k| !unwrapped_frames.contains_key(k))
             .map(|k| {
-                let sweep = tracked.sweep(scene, k);
-                Ok((
+                let sweep = states.sweep(context, k);
+                let unwrapped = UnwrappedFrame::with_window(
+                    context,
+                    level,
                     k,
-                    UnwrappedFrame::fine(scene, level, k, &sweep, window, all)?,
-                ))
+                    &sweep,
+                    window_px,
+                    with_outliers,
+                )?;
+                Ok((k, unwrapped))
             })
             .collect::<Result<_, ProblemError>>()?;
-        unwrapped_frames.extend(made);
+        unwrapped_frames.extend(added);
+        let frames = PosedFrames {
+            context,
+            states,
+            footprints: &overlaps.footprints,
+            unwrapped_frames: &unwrapped_frames,
+        };
         let compared: Vec<Vec<Compared>> = partners
             .par_iter()
-            .map(|(a, others)| {
-                compare(
-                    scene,
-                    *a,
-                    others,
-                    stride,
-                    &overlaps.footprints,
-                    &unwrapped_frames,
-                    tracked,
-                )
-            })
+            .map(|(a, partners)| frames.compare_with_partners(*a, partners, stride_px))
             .collect();
         pairs.extend(compared.into_iter().flatten());
     }
     Ok(pairs)
 }
 
-fn compare(
-    scene: &EstimationContext,
-    a: usize,
-    others: &[usize],
-    stride: usize,
-    footprints: &[Option<Footprint>],
-    unwrapped_frames: &BTreeMap<usize, UnwrappedFrame>,
-    tracked: &FrameStates,
-) -> Vec<Compared> {
-    let (Some(own), Some(footprint)) = (unwrapped_frames.get(&a), &footprints[a]) else {
-        return Vec::new();
-    };
-    let pose = &tracked.estimates[a].pose;
-    let lattice = MosaicGrid::over(
-        footprint,
-        stride as f64 * pixel_size_m(scene, own.camera(), pose),
-    );
-    let points = lattice.points(scene);
-    let origin = points[points.len() / 2];
-    let gain = |k: usize| tracked.estimates[k].log_gain.exp();
-    let sampler = own.at(scene, pose, &origin);
-    let seen: Vec<([f32; 3], (f32, f32, f32))> = points
-        .iter()
-        .enumerate()
-        .filter(|(k, _)| !scene.ignored.contains(&lattice.wall(*k)))
-        .filter_map(|(_, x_w)| {
-            let offset = x_w - origin;
-            let point = [offset.x as f32, offset.y as f32, offset.z as f32];
-            Some((point, sampler.contrast_and_detail(&point)?))
-        })
-        .collect();
-    let least = LEAST_OVERLAP * seen.len() as f64;
-    others
-        .iter()
-        .filter_map(|b| {
-            let unwrapped = unwrapped_frames.get(b)?;
-            let pose = &tracked.estimates[*b].pose;
-            let sampler = unwrapped.at(scene, pose, &origin);
-            let mut ncc_score = NccScore::default();
-            let (mut own_detail, mut other_detail) = (0.0f64, 0.0f64);
-            let mut shared = Vec::with_capacity(seen.len());
-            for (point, (x, noise_x, own)) in &seen {
-                if let Some((y, noise_y, other)) = sampler.contrast_and_detail(point) {
-                    ncc_score.add((*x, *noise_x), (y, noise_y));
-                    shared.push((*x, y));
-                    own_detail += f64::from(*own).powi(2);
-                    other_detail += f64::from(other).powi(2);
-                }
-            }
-            let exposure = gain(*b) / gain(a);
-            (ncc_score.samples >= least).then(|| Compared {
-                a,
-                b: *b,
-                samples: ncc_score.samples,
-                quality: quality(&ncc_score, &shared),
-                sharpness: exposure * exposure * own_detail / other_detail.max(f64::MIN_POSITIVE),
-            })
-        })
-        .collect()
+/// Unwrapped frames at their present poses.
+struct PosedFrames<'a> {
+    context: &'a EstimationContext<'a>,
+    states: &'a FrameStates,
+    footprints: &'a [Option<Footprint>],
+    unwrapped_frames: &'a BTreeMap<usize, UnwrappedFrame>,
 }
 
-/// Correlation of the textures behind the noise, of all samples or of most, whichever is greater: a
-/// few glints outweigh a faint wall.
-fn quality(ncc_score: &NccScore, shared: &[(f32, f32)]) -> Option<f64> {
-    let of_all = ncc_score.match_quality()?;
-    if of_all > SURE_QUALITY {
+impl PosedFrames<'_> {
+    /// Compares frame `a` with its partners.
+    fn compare_with_partners(
+        &self,
+        a: usize,
+        partners: &[usize],
+        stride_px: usize,
+    ) -> Vec<Compared> {
+        let context = self.context;
+        let (Some(own), Some(footprint)) = (self.unwrapped_frames.get(&a), &self.footprints[a])
+        else {
+            return Vec::new();
+        };
+        let pose = &self.states.estimates[a].pose;
+        let pixel_size_m = pixel_size_m(context, own.camera(), pose);
+        let grid = MosaicGrid::over(footprint, stride_px as f64 * pixel_size_m);
+        let points = grid.world_points(context);
+        let origin = points[points.len() / 2];
+        let sampler = own.sampler_at(context, pose, &origin);
+        let samples: Vec<Sample> = points
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| !context.ignored.contains(&grid.wall_point(*k)))
+            .filter_map(|(_, x_w)| {
+                let offset = x_w - origin;
+                let point = [offset.x as f32, offset.y as f32, offset.z as f32];
+                Some((point, sampler.contrast_and_detail(&point)?))
+            })
+            .collect();
+        let compare = |b: &usize| self.compare(a, *b, &origin, &samples);
+        partners.iter().filter_map(compare).collect()
+    }
+
+    /// Compares the samples of frame `a` with frame `b`; None if too few of them are shared.
+    fn compare(
+        &self,
+        a: usize,
+        b: usize,
+        origin: &Vector3<f64>,
+        samples: &[Sample],
+    ) -> Option<Compared> {
+        let unwrapped = self.unwrapped_frames.get(&b)?;
+        let pose = &self.states.estimates[b].pose;
+        let sampler = unwrapped.sampler_at(self.context, pose, origin);
+        let mut ncc_score = NccScore::default();
+        let (mut own_detail, mut other_detail) = (0.0f64, 0.0f64);
+        let mut shared = Vec::with_capacity(samples.len());
+        for (point, (x, noise_x, own)) in samples {
+            if let Some((y, noise_y, other)) = sampler.contrast_and_detail(point) {
+                ncc_score.add((*x, *noise_x), (y, noise_y));
+                shared.push((*x, y));
+                own_detail += f64::from(*own).powi(2);
+                other_detail += f64::from(other).powi(2);
+            }
+        }
+        let gain = |k: usize| self.states.estimates[k].log_gain.exp();
+        let gain_ratio = gain(b) / gain(a);
+        let min_samples = MIN_OVERLAP_SHARE * samples.len() as f64;
+        (ncc_score.samples >= min_samples).then(|| Compared {
+            a,
+            b,
+            samples: ncc_score.samples,
+            correlation: robust_corrected_correlation(&ncc_score, &shared),
+            sharpness_ratio: gain_ratio * gain_ratio * own_detail
+                / other_detail.max(f64::MIN_POSITIVE),
+        })
+    }
+}
+
+/// A wall point relative to the origin, with local contrast, the variance of its noise, and fine
+/// detail.
+type Sample = ([f32; 3], (f32, f32, f32));
+
+/// The correlation corrected for noise, of all samples or of most, whichever is greater: a few
+/// glints outweigh a faint wall.
+fn robust_corrected_correlation(ncc_score: &NccScore, shared: &[(f32, f32)]) -> Option<f64> {
+    let of_all = ncc_score.corrected_correlation()?;
+    if of_all > MIN_CERTAIN_CORRELATION {
         return Some(of_all);
     }
-    let of_most = robust_correlation(shared) / ncc_score.texture();
+    let of_most = robust_correlation(shared) / ncc_score.texture_share();
     Some(of_all.max(of_most.min(1.0)))
-}
-
-/// The frames that contradict the rest, worst first.
-///
-/// Frames are taken out one by one, always the one with the largest share of its overlap in pairs
-/// that do not match, until no frame contradicts the others by more than a little. Pairs count by
-/// their samples.
-pub fn find_contradictions(pairs: &[Pair], frames: usize) -> Vec<(usize, RejectionReason)> {
-    let (mut all, mut bad) = (vec![0.0; frames], vec![0.0; frames]);
-    let mut of_frame: Vec<Vec<usize>> = vec![Vec::new(); frames];
-    for (k, pair) in pairs.iter().enumerate() {
-        for frame in [pair.a, pair.b] {
-            all[frame] += pair.samples;
-            if pair.wrong {
-                bad[frame] += pair.samples;
-            }
-            of_frame[frame].push(k);
-        }
-    }
-    let mut out = vec![false; frames];
-    let mut rejections = Vec::new();
-    loop {
-        let worst = (0..frames)
-            .filter(|k| !out[*k] && bad[*k] > MOST_CONTRADICTION * all[*k])
-            .max_by(|a, b| (bad[*a] / all[*a]).total_cmp(&(bad[*b] / all[*b])));
-        let Some(worst) = worst else {
-            return rejections;
-        };
-        out[worst] = true;
-        let mut against = (worst, 1.0);
-        for pair in of_frame[worst].iter().map(|k| &pairs[*k]) {
-            let other = if pair.a == worst { pair.b } else { pair.a };
-            if out[other] {
-                continue;
-            }
-            all[other] -= pair.samples;
-            if pair.wrong {
-                bad[other] -= pair.samples;
-                if pair.quality < against.1 {
-                    against = (other, pair.quality);
-                }
-            }
-        }
-        rejections.push((
-            worst,
-            RejectionReason::Contradicts {
-                frame: against.0,
-                correlation: against.1,
-            },
-        ));
-    }
-}
-
-/// The frames that show less fine detail than those they overlap.
-pub fn find_blurred_frames(pairs: &[Pair], frames: usize) -> Vec<(usize, RejectionReason)> {
-    let mut ratios: Vec<Vec<f64>> = vec![Vec::new(); frames];
-    for (pair, sharpness) in pairs.iter().filter_map(|p| Some((p, p.sharpness?))) {
-        ratios[pair.a].push(sharpness);
-        ratios[pair.b].push(1.0 / sharpness);
-    }
-    ratios
-        .into_iter()
-        .enumerate()
-        .filter_map(|(frame, mut ratios)| {
-            ratios.sort_unstable_by(f64::total_cmp);
-            let share = *ratios.get(ratios.len() / 2)?;
-            (share < LEAST_SHARPNESS).then_some((frame, RejectionReason::Blurred { share }))
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -361,7 +301,7 @@ mod tests {
     /// Bricks around.
     const BRICKS: f64 = 60.0;
 
-    /// Bricks of tones of their own, 10 × 6 cm, between light joints of 1 cm.
+    /// Bricks, each of its own grey value, 10 × 6 cm, between light joints of 1 cm.
     fn bricks(wall: WallPoint, perimeter_m: f64) -> f64 {
         let (x, y) = (BRICKS * wall.s_m / perimeter_m, wall.h_m / 0.06);
         let of_brick = |x: f64, joint: f64| x.rem_euclid(1.0) > joint;
@@ -372,43 +312,43 @@ mod tests {
         90.0 + 80.0 * (43758.5453 * brick.sin()).rem_euclid(1.0)
     }
 
-    /// Pairs of these frames.
-    fn compared(wall: &TestWall, pictures: Vec<GreyImage>, poses: &[Pose]) -> Vec<Pair> {
+    /// Compares these frames at these poses.
+    fn compare_frames(wall: &TestWall, pictures: Vec<GreyImage>, poses: &[Pose]) -> Vec<PairNcc> {
         let pyramids = pictures.into_iter().map(|frame| Pyramid::new(frame, 1));
         let frames = FrameCache::of_pyramids(pyramids.collect());
         let prior = independent_prior(poses);
-        let scene = test_context(wall, &frames, &prior);
-        let tracked = frame_states(poses);
-        compute_pairwise_ncc(&scene, 0, &tracked, &(0..poses.len())).unwrap()
+        let context = test_context(wall, &frames, &prior);
+        let states = frame_states(poses);
+        compute_pairwise_ncc(&context, 0, &states, &(0..poses.len())).unwrap()
     }
 
     #[test]
-    fn true_poses_show_the_same_wall() {
+    fn frames_at_true_poses_correlate() {
         let wall = TestWall::ring(bricks);
-        let pairs = compared(&wall, wall.frames(), &wall.poses);
+        let pairs = compare_frames(&wall, wall.frames(), &wall.poses);
         assert!(pairs.len() >= 14);
         for pair in pairs {
-            assert!(!pair.wrong && pair.quality > 0.8, "{pair:?}");
+            assert!(!pair.contradicts && pair.correlation > 0.8, "{pair:?}");
         }
     }
 
     /// All joints lie on joints.
     #[test]
-    fn a_frame_a_brick_off_does_not_show_the_same_wall() {
+    fn frame_displaced_by_a_brick_contradicts_the_others() {
         let wall = TestWall::ring(bricks);
         let mut poses = wall.poses.clone();
         let brick = GaugeMotion::about_y(std::f64::consts::TAU / BRICKS, 0.0);
         poses[5] = brick.apply(&poses[5]);
-        let pairs = compared(&wall, wall.frames(), &poses);
+        let pairs = compare_frames(&wall, wall.frames(), &poses);
         assert!(pairs.iter().filter(|p| p.a == 5 || p.b == 5).count() >= 2);
         for pair in pairs {
-            assert_eq!(pair.wrong, pair.a == 5 || pair.b == 5, "{pair:?}");
+            assert_eq!(pair.contradicts, pair.a == 5 || pair.b == 5, "{pair:?}");
         }
     }
 
     /// Dark in some frames and bright in others, with the wall between as it is.
     #[test]
-    fn what_stands_out_of_the_wall_does_not_contradict() {
+    fn glints_and_water_do_not_contradict() {
         let faint =
             |wall: WallPoint, perimeter_m: f64| 128.0 + 0.1 * (waves(wall, perimeter_m) - 128.0);
         let wall = TestWall::ring(faint);
@@ -421,47 +361,12 @@ mod tests {
                 }
             }
         }
-        let pairs = compared(&wall, pictures, &wall.poses);
-        // Of a strip hardly wider than what stands out nothing is left to look at.
+        let pairs = compare_frames(&wall, pictures, &wall.poses);
+        // Of a strip hardly wider than a glint nothing is left to compare.
         let wide = || pairs.iter().filter(|pair| pair.samples > 80.0);
-        assert!(dispatch_simd().any(|pair| pair.quality < LEAST_QUALITY));
-        for pair in dispatch_simd() {
-            assert!(!pair.wrong, "{pair:?}");
+        assert!(wide().any(|pair| pair.correlation < MIN_CORRELATION));
+        for pair in wide() {
+            assert!(!pair.contradicts, "{pair:?}");
         }
-    }
-
-    fn pair(a: usize, b: usize, quality: f64) -> Pair {
-        Pair {
-            a,
-            b,
-            samples: 100.0,
-            quality,
-            wrong: quality < LEAST_QUALITY,
-            sharpness: Some(1.0),
-        }
-    }
-
-    #[test]
-    fn one_wrong_frame_is_taken_out_and_its_neighbours_stay() {
-        let mut pairs = Vec::new();
-        for a in 0..8usize {
-            for b in a + 1..(a + 4).min(8) {
-                let wrong = a == 5 || b == 5;
-                pairs.push(pair(a, b, if wrong { 0.2 } else { 0.9 }));
-            }
-        }
-        let rejections = find_contradictions(&pairs, 8);
-        assert_eq!(rejections.len(), 1);
-        assert_eq!(rejections[0].0, 5);
-        assert!(find_contradictions(&pairs[..1], 8).is_empty());
-    }
-
-    #[test]
-    fn the_frame_without_fine_detail_is_the_blurred_one() {
-        let mut pairs = vec![pair(0, 1, 0.9), pair(1, 2, 0.9), pair(0, 2, 0.9)];
-        (pairs[0].sharpness, pairs[1].sharpness) = (Some(5.0), Some(0.2));
-        let blurred = find_blurred_frames(&pairs, 3);
-        assert_eq!(blurred.len(), 1);
-        assert_eq!(blurred[0].0, 1);
     }
 }
