@@ -351,6 +351,54 @@ mod tests {
         assert!(differs < 0.001, "{differs}");
     }
 
+    /// Frames of a wall without bias, taken in the light that is known already: neither shading nor
+    /// bias is left to find. Over many draws of the noise, what is found must average to zero
+    /// within its standard error: `‖mean‖²` is expected to be `Σ_k Var(c_k)/n`.
+    ///
+    /// A regressor that contains the measured value carries its noise to both sides of the
+    /// equation, which looks like a bias, and behind a known shading like a change of the shading.
+    #[test]
+    fn noise_is_taken_for_neither_bias_nor_shading() {
+        const DRAWS: usize = 12;
+        let (frames, size) = (8, (64, 48));
+        let lamp = |u: f64, v: f64| (1.0 + 0.8 * ((u - 0.6).powi(2) + (v - 0.4).powi(2))).powi(-2);
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(11);
+        let found: Vec<[f64; SHADING_TERMS]> = (0..DRAWS)
+            .map(|_| {
+                let tiles: Vec<Vec<Glimpse>> = (0..1000)
+                    .map(|tile| {
+                        let wall = rng.random_range(95.0..105.0);
+                        let glimpses = (0..5).map(|k| {
+                            let [u, v]: [f64; 2] =
+                                std::array::from_fn(|_| rng.random_range(0.0..1.0));
+                            let known = lamp(u, v);
+                            let noise = rng.sample::<f64, _>(rand_distr::StandardNormal);
+                            let value = wall + noise / known;
+                            Glimpse {
+                                frame: (tile + k) % frames,
+                                terms: shading_terms(&Vector2::new(63.0 * u, 47.0 * v), size),
+                                bias: 1.0 / (known * value),
+                                log: value.ln(),
+                            }
+                        });
+                        let mut glimpses: Vec<Glimpse> = glimpses.collect();
+                        glimpses.sort_by_key(|glimpse| glimpse.frame);
+                        glimpses
+                    })
+                    .collect();
+                fit(&tiles, frames, &[0.3, 10.0], 0.0).unwrap()
+            })
+            .collect();
+        let (mut square, mut expected) = (0.0, 0.0);
+        for k in 0..SHADING_TERMS {
+            let mean = found.iter().map(|c| c[k]).sum::<f64>() / DRAWS as f64;
+            let spread = found.iter().map(|c| (c[k] - mean).powi(2)).sum::<f64>();
+            square += mean * mean;
+            expected += spread / ((DRAWS - 1) * DRAWS) as f64;
+        }
+        assert!(square < 3.0 * expected, "{square} {expected}");
+    }
+
     #[test]
     fn even_light_is_left_alone() {
         assert!(corrected(|_, _| 1.0).is_none());
