@@ -1,6 +1,5 @@
 //! The pictures: loading, grey values, pyramids, writing.
 
-mod agreement;
 mod cache;
 mod contrast;
 mod grey;
@@ -14,7 +13,6 @@ mod stored;
 mod video;
 mod write;
 
-pub(crate) use agreement::Agreement;
 pub use cache::FrameCache;
 pub use contrast::{LocalContrast, local_contrast, usual};
 pub use grey::GreyImage;

@@ -11,7 +11,7 @@
 
 use super::calibration::Kappa;
 use super::doubt::Doubt;
-use super::flat_field::{MOST_FRAMES, flatten};
+use super::flat_field::{MAX_SHADING_FRAMES, flatten};
 use super::gauss_newton::{Stopping, solve};
 use super::options::RefineOptions;
 use super::problem::{Problem, ProblemError, Sampling, Scene};
@@ -64,7 +64,7 @@ impl Retracking {
         options: &RefineOptions,
         progress: &dyn Progress,
     ) -> Result<(), ProblemError> {
-        let frames = self.useless.len().min(MOST_FRAMES);
+        let frames = self.useless.len().min(MAX_SHADING_FRAMES);
         for _ in 0..LIGHT_ROUNDS {
             let Some(before) = scene.frames.shading() else {
                 break;
