@@ -9,8 +9,8 @@ use rayon::prelude::*;
 /// overlaps do not determine near 0.
 pub const SHADING_SIGMA: f64 = 0.5;
 
-/// Reweighting iterations at the most: from equal weights it takes ten until glints weigh nothing,
-/// and three leave the shading 0.7 % off.
+/// Reweighting iterations at the most: it takes ten until glints weigh nothing, and three leave the
+/// shading 0.7 % off.
 const MAX_REWEIGHTING_ITERATIONS: usize = 30;
 /// Relative change of the residuals' variance below which the reweighting has settled.
 const SETTLED_VARIANCE_CHANGE: f64 = 0.01;
@@ -214,7 +214,8 @@ mod tests {
 
     fn differs(found: &[f64; SHADING_TERMS], truth: &[f64; SHADING_TERMS]) -> f64 {
         let none = Shading::none(SIZE);
-        none.changed(found).differs(&none.changed(truth))
+        none.changed(found)
+            .relative_difference(&none.changed(truth))
     }
 
     #[test]

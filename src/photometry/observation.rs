@@ -8,7 +8,7 @@ use std::ops::Range;
 /// Grey values of a frame, of 255, that determine a factor: a darker one is mostly bias and noise,
 /// a brighter one may be clipped.
 const USABLE_GREY: Range<f32> = 4.0..250.0;
-/// Share of the value that is left at the least when a bias is taken off.
+/// Smallest share of a value that remains when the bias is taken off.
 const MIN_VALUE_SHARE: f64 = 0.1;
 
 /// Unknowns of a frame: α, β.
@@ -90,27 +90,26 @@ impl LinearisedPoint {
     /// of the inverse variance, the noise of s has the same covariance with that of every
     /// observation, so that it is independent of what is left once s is eliminated.
     pub fn new(point: &[Observation], size: (usize, usize), x: &Unknowns, variance: f64) -> Self {
-        let lit: Vec<Lit> = point.iter().map(|one| Lit::new(one, size, x)).collect();
-        let readings: Vec<f64> = lit.iter().map(|one| one.wall()).collect();
-        let middle = median(&readings);
-        let slopes: Vec<f64> = lit
-            .iter()
-            .map(|one| one.factor * (middle + one.light).exp())
-            .collect();
-        let robust = RobustWeights::of(&readings, middle, &slopes, variance);
-        let weighted = readings.iter().zip(&robust.weights);
+        let readings = point.iter().map(|one| WallReading::new(one, size, x));
+        let readings: Vec<WallReading> = readings.collect();
+        let logs: Vec<f64> = readings.iter().map(WallReading::log_wall).collect();
+        let middle = median(&logs);
+        let greys = readings.iter().map(|reading| reading.model_grey(middle));
+        let greys: Vec<f64> = greys.collect();
+        let robust = RobustWeights::of(&logs, middle, &greys, variance);
+        let weighted = logs.iter().zip(&robust.weights);
         let wall = if robust.total > 0.0 {
             weighted.map(|(s, w)| w * s).sum::<f64>() / robust.total
         } else {
             middle
         };
-        let rows = lit.iter().map(|one| one.row(wall)).collect();
+        let rows = readings.iter().map(|reading| reading.row(wall)).collect();
         Self { rows, robust }
     }
 }
 
-/// An observation with its parts by the solution so far.
-struct Lit {
+/// An observation's reading of the wall by the solution so far.
+struct WallReading {
     frame: usize,
     terms: [f64; SHADING_TERMS],
     factor: f64,
@@ -122,20 +121,16 @@ struct Lit {
     bias: f64,
 }
 
-impl Lit {
+impl WallReading {
     fn new(observation: &Observation, size: (usize, usize), x: &Unknowns) -> Self {
         let [u, v] = observation.pixel.map(f64::from);
         let terms = shading_terms(&Vector2::new(u, v), size);
         let [log_gain, bias] = x.frames[observation.frame];
         let (value, factor) = (f64::from(observation.value), f64::from(observation.factor));
+        let shading: f64 = terms.iter().zip(&x.shading).map(|(t, c)| t * c).sum();
         Self {
             frame: observation.frame,
-            light: log_gain
-                + terms
-                    .iter()
-                    .zip(&x.shading)
-                    .map(|(t, c)| t * c)
-                    .sum::<f64>(),
+            light: log_gain + shading,
             terms,
             factor,
             log: (value - bias / factor).max(MIN_VALUE_SHARE * value).ln(),
@@ -143,19 +138,25 @@ impl Lit {
         }
     }
 
-    /// The logarithm of the wall as this observation reads it.
-    fn wall(&self) -> f64 {
+    /// `s_i`: the logarithm of the wall as this observation reads it.
+    fn log_wall(&self) -> f64 {
         self.log - self.light
     }
 
-    /// The row at the model value of a wall whose logarithm is `wall`.
+    /// `f m`, grey levels of the frame, for a wall whose logarithm is `wall`; also the derivative
+    /// of the grey value with respect to that logarithm.
+    fn model_grey(&self, wall: f64) -> f64 {
+        self.factor * (wall + self.light).exp()
+    }
+
+    /// The row of the equation for a wall whose logarithm is `wall`.
     fn row(&self, wall: f64) -> Row {
-        let of_bias = 1.0 / (self.factor * (wall + self.light).exp());
+        let bias_regressor = 1.0 / self.model_grey(wall);
         Row {
             frame: self.frame,
-            own: [1.0, of_bias],
+            own: [1.0, bias_regressor],
             terms: self.terms,
-            log: self.log + of_bias * self.bias,
+            log: self.log + bias_regressor * self.bias,
         }
     }
 }

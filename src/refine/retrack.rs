@@ -79,7 +79,7 @@ impl Retracking {
             let mut tracked = self.tracking.so_far();
             flatten(&scene.at(tracked.kappa), options, &mut tracked)?;
             let after = scene.frames.shading();
-            if after.is_none_or(|after| after.differs(&before) < SAME_LIGHT) {
+            if after.is_none_or(|after| after.relative_difference(&before) < SAME_LIGHT) {
                 break;
             }
         }

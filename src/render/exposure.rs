@@ -24,7 +24,8 @@ use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
 /// Standard deviations of the unknowns beforehand: a third more or less light, and a bias of about
-/// a grey level, for nothing after the stitching corrects one that noise pretends.
+/// a grey level. Refining has a wider prior of the bias, which its later solves correct; a panorama
+/// keeps what is found here.
 const PRIORS: Priors = Priors {
     log_gain_sigma: 0.3,
     bias_sigma_grey: 1.0,
@@ -108,7 +109,7 @@ impl Exposure {
         &self.frames
     }
 
-    /// What undoes the exposure of a frame.
+    /// The response of a frame, which undoes its exposure.
     pub fn of(&self, frame: usize) -> Response<'_> {
         let FrameExposure { gain, bias } = self.frames[frame];
         Response {
@@ -118,7 +119,7 @@ impl Exposure {
         }
     }
 
-    /// The same for thumbnails, which are 16 bits deep.
+    /// The exposure of the thumbnails of the same frames, which are 16 bits deep.
     pub fn of_thumbnails(&self, thumbnails: &Thumbnails) -> Self {
         let shading = self.shading.clone().map(|table| Table {
             offset: table.scale.map(|s| s * thumbnails.full(0.0)),
@@ -152,8 +153,8 @@ impl Response<'_> {
         self.bias
     }
 
-    /// What values are multiplied by over a patch, by where its ends and middles appear in the
-    /// frame; None if there is nothing to undo.
+    /// The factor of values over a patch, by the pixels at which its ends and middles appear in the
+    /// frame; `None` if there is nothing to undo.
     pub fn light(&self, pixels: impl FnOnce() -> [[[f32; 2]; 3]; 3]) -> Option<Light> {
         if self.is_none() {
             return None;
@@ -165,7 +166,7 @@ impl Response<'_> {
         Some(Light::through(pixels().map(|row| row.map(at))))
     }
 
-    /// Undoes it in the values of some columns of a run that lie in one row of a patch; `first`:
+    /// Undoes the exposure in the values of some columns of a run that lie in one row of a patch; `first`:
     /// the column where the patch begins.
     pub fn undo_by(
         &self,
@@ -192,7 +193,7 @@ impl Response<'_> {
         );
     }
 
-    /// Undoes it in some of the values of a run by where its points appear.
+    /// Undoes the exposure in some of the values of a run by the pixels at which its points appear.
     pub fn undo(&self, run: &mut Run, columns: Range<usize>) {
         if self.is_none() {
             return;

@@ -1,4 +1,4 @@
-//! What undoes the light in a frame, over a patch of the chart.
+//! Factor that undoes the light in a frame, over a patch of the chart.
 
 use super::chart::SCALE;
 
@@ -22,7 +22,7 @@ impl Light {
         Self(c)
     }
 
-    /// The same factor everywhere.
+    /// A constant factor.
     pub fn even(factor: f32) -> Self {
         Self([[factor, 0.0, 0.0], [0.0; 3], [0.0; 3]])
     }
