@@ -98,6 +98,7 @@ pub mod frames;
 pub mod inspect;
 mod numerics;
 pub mod persist;
+mod photometry;
 pub mod progress;
 pub mod raster;
 pub mod refine;

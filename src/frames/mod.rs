@@ -1,6 +1,5 @@
 //! Frames: reading, grey images, pyramids, masks, noise and writing of pictures.
 
-mod agreement;
 mod cache;
 mod decode;
 mod error;
@@ -17,7 +16,6 @@ mod stored_frame;
 mod video;
 mod write;
 
-pub(crate) use agreement::Agreement;
 pub use cache::FrameCache;
 pub use decode::{colour_type, load_colour};
 pub use error::FrameError;

@@ -1,4 +1,4 @@
-//! Light that moves with the camera, and vignetting: what every frame is multiplied by.
+//! Shading of all frames by a light that moves with the camera, and by vignetting.
 
 use super::grey::GreyImage;
 use nalgebra::{DMatrix, DVector, Vector2};
@@ -93,7 +93,7 @@ impl Shading {
         self.at(&(pixel * scale + Vector2::repeat(0.5 * (scale - 1.0))))
     }
 
-    /// Least and greatest V over the picture.
+    /// The smallest and the largest V over the picture.
     pub fn range(&self) -> [f64; 2] {
         let (w, h) = self.size;
         let mut range = [f64::INFINITY, f64::NEG_INFINITY];
@@ -108,9 +108,9 @@ impl Shading {
         range
     }
 
-    /// By what share two shadings of the same pictures differ, at the most, once their exposures
+    /// The largest relative difference of two shadings of the same pictures once their exposures
     /// are made equal: half of the spread of `ln V/V'`.
-    pub fn differs(&self, other: &Self) -> f64 {
+    pub fn relative_difference(&self, other: &Self) -> f64 {
         let ratio = self.changed(&other.coefficients.map(|c| -c));
         let [least, greatest] = ratio.range();
         0.5 * (greatest / least).ln()
@@ -180,7 +180,7 @@ impl Shading {
         let left = (&target - &design * &solution).norm_squared();
         let spread = (target.norm_squared() / count).sqrt();
         let explained = 1.0 - left / target.norm_squared().max(f64::MIN_POSITIVE);
-        (spread > LEAST_SPREAD && explained > LEAST_EXPLAINED).then(|| Self {
+        (spread > MIN_LOG_SPREAD && explained > MIN_EXPLAINED_SHARE).then(|| Self {
             size,
             coefficients: std::array::from_fn(|k| solution[k + 1]),
         })
@@ -188,9 +188,9 @@ impl Shading {
 }
 
 /// Standard deviation of `log mean` over the picture below which nothing is corrected.
-const LEAST_SPREAD: f64 = 0.04;
+const MIN_LOG_SPREAD: f64 = 0.04;
 /// Share of its variance that a shading must explain.
-const LEAST_EXPLAINED: f64 = 0.8;
+const MIN_EXPLAINED_SHARE: f64 = 0.8;
 
 #[cfg(test)]
 mod tests {
@@ -208,9 +208,12 @@ mod tests {
         // P_1(x), from −1 to 1.
         delta[0] = 0.03;
         let sloped = none.changed(&delta);
-        assert!((sloped.differs(&none) - 0.03).abs() < 1e-12);
-        assert_eq!(sloped.differs(&none), none.differs(&sloped));
-        assert_eq!(sloped.differs(&sloped), 0.0);
+        assert!((sloped.relative_difference(&none) - 0.03).abs() < 1e-12);
+        assert_eq!(
+            sloped.relative_difference(&none),
+            none.relative_difference(&sloped)
+        );
+        assert_eq!(sloped.relative_difference(&sloped), 0.0);
     }
 
     #[test]

@@ -407,9 +407,21 @@ pub mod reference_mosaic {
 
 /// Thresholds of `tracking/shading_correction.rs`.
 pub mod shading_correction {
-    // shading_correction: begin
-
-    // shading_correction: end
+    /// Frames that the shading is estimated from, at the most. Higher: more time; the shading is the
+    /// same in all frames. Chosen by: unknown.
+    pub const MAX_SHADING_FRAMES: usize = 60;
+    /// Tiles that the shading is estimated from, spread over all of these frames. Higher: less noise,
+    /// more time. Chosen by: unknown.
+    pub const MAX_SHADING_TILES: usize = 1000;
+    /// Corrections of the shading with solves between, at the most. Higher: more time. Chosen by:
+    /// unknown.
+    pub const MAX_CORRECTION_ITERATIONS: usize = 2;
+    /// Size of a new shading over its 1-σ from noise above which it is taken over. Higher: weak
+    /// shadings are ignored. Chosen by: 3 σ.
+    pub const MIN_SIGNIFICANCE_SIGMA: f64 = 3.0;
+    /// Size of a change of an existing shading over its 1-σ from noise above which it is taken over.
+    /// Higher: fewer corrections. Chosen by: unknown.
+    pub const MIN_CHANGE_SIGNIFICANCE_SIGMA: f64 = 1.5;
 }
 
 /// Thresholds of `samples/footprints.rs`.

@@ -25,7 +25,8 @@ use crate::refine::solver::stopping::Stopping;
 use crate::refine::thresholds::alternating_calibration::{
     MAX_CAMERA_CHANGE_PX, MAX_SHADING_CHANGE, MAX_SHADING_ITERATIONS, MAX_TRACKING_ITERATIONS,
 };
-use crate::refine::tracking::shading_correction::{MOST_FRAMES, correct_until_settled};
+use crate::refine::thresholds::shading_correction::MAX_SHADING_FRAMES;
+use crate::refine::tracking::shading_correction::correct_until_settled;
 use crate::refine::tracking::track::Tracking;
 use serde::{Deserialize, Serialize};
 
@@ -63,7 +64,7 @@ impl AlternatingCalibration {
         options: &RefineOptions,
         progress: &dyn Progress,
     ) -> Result<(), ProblemError> {
-        let frames = self.rejections.len().min(MOST_FRAMES);
+        let frames = self.rejections.len().min(MAX_SHADING_FRAMES);
         for _ in 0..MAX_SHADING_ITERATIONS {
             let Some(before) = context.frames.shading() else {
                 break;
@@ -78,7 +79,7 @@ impl AlternatingCalibration {
             let mut states = self.tracking.tracked_states();
             correct_until_settled(&context.at(states.kappa), options, &mut states)?;
             let after = context.frames.shading();
-            if after.is_none_or(|after| after.differs(&before) < MAX_SHADING_CHANGE) {
+            if after.is_none_or(|after| after.relative_difference(&before) < MAX_SHADING_CHANGE) {
                 break;
             }
         }

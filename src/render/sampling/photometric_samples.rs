@@ -1,83 +1,56 @@
-//! What the frames show of single points of the wall.
+//! Observations of single wall points by the frames, for their photometric calibration.
 
-use super::point_batch::PointBatch as Run;
+use super::point_batch::PointBatch;
 use super::thumbnails::Thumbnails;
-use crate::frames::{SHADING_TERMS, shading_terms};
+use crate::photometry::Observation;
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::Placement;
 use crate::render::layout::tiles::{EDGE, Tile, tiles};
-use crate::render::warp::projection::LocalPoints as Points;
+use crate::render::warp::projection::LocalPoints;
 use crate::surface::Surface;
-use nalgebra::Vector2;
 use rayon::prelude::*;
 
-/// What one frame shows of a wall point.
-#[derive(Clone, Copy, Debug)]
-pub struct Glimpse {
-    /// The frame.
-    pub frame: usize,
-    /// The pixel, of the frame's own size.
-    pub pixel: [f32; 2],
-    /// The grey value, of 255.
-    pub grey: f32,
-}
-
-impl Glimpse {
-    /// The terms of the shading at its pixel of a frame of `size` pixels.
-    pub fn terms(&self, size: (usize, usize)) -> [f64; SHADING_TERMS] {
-        let [u, v] = self.pixel.map(f64::from);
-        shading_terms(&Vector2::new(u, v), size)
-    }
-}
-
-/// Darker and brighter than this (grey levels of 255) a frame tells little of a factor: it may be
-/// clipped.
-const USEFUL: std::ops::Range<f32> = 4.0..250.0;
-
-/// Glimpses of the points of `grid` that at least two frames show, by the thumbnails.
-pub fn glimpses(
+/// Observes the points of `grid` that at least two frames show in the thumbnails, with nothing
+/// known of gain, bias and shading.
+pub fn observe_points(
     surface: &dyn Surface,
     thumbnails: &Thumbnails,
     placements: &[Placement],
     grid: &Canvas,
-) -> Vec<Vec<Glimpse>> {
+) -> Vec<Vec<Observation>> {
     let bands = tiles(surface, grid, placements, EDGE);
-    let found: Vec<Vec<Vec<Glimpse>>> = bands
+    let found: Vec<Vec<Vec<Observation>>> = bands
         .par_iter()
         .flatten()
-        .map(|tile| of_tile(surface, thumbnails, placements, grid, tile))
+        .map(|tile| observe_tile(surface, thumbnails, placements, grid, tile))
         .collect();
     found.into_iter().flatten().collect()
 }
 
-fn of_tile(
+/// Observes the points of one tile of `grid`.
+fn observe_tile(
     surface: &dyn Surface,
     thumbnails: &Thumbnails,
     placements: &[Placement],
     grid: &Canvas,
     tile: &Tile,
-) -> Vec<Vec<Glimpse>> {
-    let points = Points::new(&tile.points(surface, grid));
-    let mut found: Vec<Vec<Glimpse>> = vec![Vec::new(); tile.pixels()];
+) -> Vec<Vec<Observation>> {
+    let points = LocalPoints::new(&tile.points(surface, grid));
+    let mut found: Vec<Vec<Observation>> = vec![Vec::new(); tile.pixels()];
     let columns = tile.columns as usize;
-    let mut run = Run::default();
+    let mut batch = PointBatch::default();
     for &frame in &tile.frames {
         let view = thumbnails.view(frame, &placements[frame], &points);
         for row in 0..tile.rows as usize {
-            view.look_at(&mut run, row * columns, columns);
-            let (u, v) = run.pixels();
+            view.look_at(&mut batch, row * columns, columns);
+            let (u, v) = batch.pixels();
             for k in 0..columns {
-                if !run.seen()[k] {
+                if !batch.seen()[k] {
                     continue;
                 }
-                let grey = thumbnails.format().grey(run.values()[k]);
-                if USEFUL.contains(&grey) {
-                    found[row * columns + k].push(Glimpse {
-                        frame,
-                        pixel: [u[k], v[k]].map(|t| thumbnails.full(t)),
-                        grey,
-                    });
-                }
+                let grey = thumbnails.format().grey(batch.values()[k]);
+                let pixel = [u[k], v[k]].map(|t| thumbnails.full(t));
+                found[row * columns + k].extend(Observation::new(frame, pixel, grey, 1.0));
             }
         }
     }
