@@ -4,7 +4,6 @@ use crate::PROGRAM;
 use crate::camera::Camera;
 use crate::inspect::level_strip::BORDER;
 use crate::inspect::mesh::{GridLines, WallRectangle};
-use crate::inspect::tiles_target::MAP_FOLDER;
 use crate::inspect::tileset::TILESET;
 use crate::render::Canvas;
 use crate::surface::Surface;
@@ -16,6 +15,10 @@ pub const MANIFEST: &str = "tunnel.json";
 /// Name of the file with the wall's points.
 pub const WALL: &str = "wall.json";
 
+/// Folder of the map's images.
+pub(super) const MAP_FOLDER: &str = "map";
+
+/// Version of the content of `tunnel.json`.
 const SCHEMA_VERSION: u32 = 1;
 
 /// Maximum distance of the wall from the polyline of its points, as a share of the perimeter.

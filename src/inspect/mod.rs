@@ -13,8 +13,8 @@
 //! ```
 //!
 //! Textures are cut from the bands of the panorama while it is rendered; a few hundred rows of
-//! every level are in memory. All coordinates are metric and in the world frame; vertex positions are
-//! relative to a nearby origin.
+//! every level are in memory. All coordinates are metric and in the world frame; vertex positions
+//! are relative to a nearby origin.
 //!
 //! # Example
 //!

@@ -4,7 +4,7 @@ use crate::inspect::block_cutter::{BlockCutter, build_part};
 use crate::inspect::error::InspectError;
 use crate::inspect::glb::{WallPart, encode_glb};
 use crate::inspect::level_strip::TextureBlock;
-use crate::inspect::manifest::MapImages;
+use crate::inspect::manifest::{MAP_FOLDER, MapImages};
 use crate::inspect::tileset::{TileKey, TileTree, content_name};
 use crate::persist::atomic::{self, StagedFolder, WriteError};
 use crate::raster::RasterError;
@@ -32,9 +32,6 @@ const COLUMN_MULTIPLE: f64 = 64.0;
 
 /// Maximum columns of the level of the map.
 const MAX_MAP_COLUMNS: u32 = 512;
-
-/// Folder of the map's images.
-pub(super) const MAP_FOLDER: &str = "map";
 
 /// Smallest resolution of at least `px_per_metre` at which all levels close around the section.
 pub fn tiles_px_per_metre(surface: &dyn Surface, px_per_metre: f64) -> f64 {

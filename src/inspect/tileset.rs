@@ -1,7 +1,8 @@
 //! Tree of a tileset: OGC 3D Tiles 1.1, explicit tiling.
 //!
 //! Levels are those of the panorama's pyramid; a tile has up to four children of half its size
-//! that replace it. Coordinates are those of the world: 3D Tiles has z up, too, and converts glTF's axes.
+//! that replace it. Coordinates are those of the world: 3D Tiles has z up, too, and converts the
+//! axes of glTF.
 //!
 //! **Geometric error.** Coarse tiles lack resolution. Programs refine a tile whose error on the
 //! screen exceeds some 16 pixels, so the error of a tile is [`SCREEN_PX`] pixels of its texture, in

@@ -5,9 +5,9 @@
 //! readings, initial values ────────────┴─ WallSolve ─> fine pixels, for given roughness and losses
 //! ```
 //!
-//! A pixel is the mean of the wall over its square, and the squares of different frames overlap.
-//! Where several frames show the wall, there is one wall x of finer pixels that explains all their
-//! readings, `y = W x + noise`. It is the x that minimises
+//! A pixel is the mean of the wall over its square, and the squares of different frames overlap. If
+//! several frames show the wall, one wall x of finer pixels explains all their readings,
+//! `y = W x + noise`. It is the x that minimises
 //!
 //! ```text
 //! Σ_p ρ((y_p − Σ_k w_pk x_k)/σ_p) + Σ_i a_i Σ_n ρ_i((D_i x)_n)
