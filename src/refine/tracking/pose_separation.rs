@@ -4,11 +4,11 @@ use crate::camera::Camera;
 use crate::surface::{Surface, shortest_arc};
 use crate::trajectory::Pose;
 
-/// Distance on the wall between what two poses of a frame show, metres: the mean over the middle
-/// and the corners of the picture, as far as the lens shows them and both poses see the wall there.
+/// Distance on the wall between two poses of a frame, metres: the mean over those of the picture's
+/// middle and corners through which both poses see the wall.
 ///
-/// Infinity if no such point is left: two poses that see no wall through a common pixel cannot be
-/// taken for one, so the ambiguity test must find them apart.
+/// It is infinite if there is none: two poses that see no wall through a common pixel cannot be
+/// taken for one, so the ambiguity test must find them different.
 pub fn separation_m(surface: &dyn Surface, camera: &Camera, a: &Pose, b: &Pose) -> f64 {
     let perimeter = surface.perimeter_m();
     let (mut sum_m, mut count) = (0.0, 0.0);
@@ -30,24 +30,23 @@ pub fn separation_m(surface: &dyn Surface, camera: &Camera, a: &Pose, b: &Pose) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::{KannalaBrandt, Lens};
     use crate::surface::Circle;
     use nalgebra::{UnitQuaternion, Vector3};
 
-    /// A fisheye of which the lens shows the middle, but not the corners of the picture.
+    /// A camera that looks along the tunnel: its corners see the wall, its middle does not.
     #[test]
-    fn separation_counts_only_pixels_that_the_lens_shows() {
+    fn separation_counts_only_pixels_that_see_the_wall() {
         let circle = Circle::new(3.0).unwrap();
-        let fisheye = KannalaBrandt::new([0.0; 4]).limited_to(0.3);
-        let camera = Camera {
-            lens: Lens::KannalaBrandt(fisheye),
-            ..Camera::from_vertical_fov(160, 120, 60f64.to_radians())
-        };
-        assert_eq!(camera.corner_and_centre_rays().len(), 1);
-        let pose = |h_m: f64| Pose::new(UnitQuaternion::identity(), Vector3::new(0.0, h_m, 0.0));
+        let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
+        let along =
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -0.5 * std::f64::consts::PI);
+        let pose = |h_m: f64| Pose::new(along, Vector3::new(0.0, h_m, 0.0));
+        let middle = pose(0.0).r_wc * Vector3::z();
+        assert!(circle.hit(&pose(0.0).t_wc, &middle).is_err());
         let separation_m = |b: &Pose| separation_m(&circle, &camera, &pose(0.0), b);
         assert!((separation_m(&pose(0.25)) - 0.25).abs() < 1e-12);
-        let outside = Pose::new(UnitQuaternion::identity(), Vector3::new(0.0, 0.0, 9.0));
+        // Outside the tunnel no pixel sees the wall.
+        let outside = Pose::new(along, Vector3::new(0.0, 0.0, 9.0));
         assert_eq!(separation_m(&outside), f64::INFINITY);
     }
 }
