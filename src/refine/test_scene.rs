@@ -35,7 +35,7 @@ static NO_PATCHES: WallRegions = WallRegions::NONE;
 /// A global shutter.
 static GLOBAL_SHUTTER: LazyLock<Shutter> = LazyLock::new(Shutter::default);
 
-/// Context of noise-free frames of the wall, with poses and exposures unknown alone.
+/// Context of noise-free frames of the wall; only poses and exposures are estimated.
 pub fn test_context<'a>(
     wall: &'a TestWall,
     frames: &'a FrameCache,

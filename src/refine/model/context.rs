@@ -83,9 +83,9 @@ impl EstimationContext<'_> {
     }
 }
 
-/// The frames that take part in a problem.
+/// The frames of a problem.
 pub struct FrameWindow<'m> {
-    /// A window of frames.
+    /// Consecutive frames.
     pub participants: Range<usize>,
     /// Those of them that are estimated; the others are held fixed.
     pub active: Range<usize>,

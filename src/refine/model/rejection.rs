@@ -102,7 +102,7 @@ impl fmt::Display for RejectionReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Featureless => write!(f, "it shows hardly any contrast (dark, white or covered)"),
-            Self::Repeated(frame) => write!(f, "it is the same picture as frame {frame}"),
+            Self::Repeated(frame) => write!(f, "it is the same image as frame {frame}"),
             Self::NoMatch { correlation } => write!(
                 f,
                 "it does not match the wall anywhere near its prior \

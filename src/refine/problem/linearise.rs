@@ -21,7 +21,7 @@ impl PhotometricProblem<'_> {
     /// parameters.
     ///
     /// # Errors
-    /// As [`PhotometricProblem::linearise_at`].
+    /// Those of [`PhotometricProblem::linearise_at`].
     pub fn linearise(&self, active: &[FrameEstimate]) -> Result<Linearisation, ProblemError> {
         self.linearise_at(active, &self.context.kappa)
     }

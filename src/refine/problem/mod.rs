@@ -12,9 +12,9 @@
 //! Linearisation: cost, NormalEquations, scatter, SharedBorder
 //! ```
 //!
-//! The objective is that of [`crate::refine::tiles::tile`]. [`step_length`] measures a step on the
-//! wall; [`unknown_texture`] reduces the information to that of an unknown texture, for the
-//! Cramér–Rao bound.
+//! The objective is that of [`crate::refine::tiles::tile`]. [`set_up`] has the steps of the set-up.
+//! [`step_length`] measures a step on the wall; [`unknown_texture`] reduces the information to that
+//! of an unknown texture, for the Cramér–Rao bound.
 
 pub mod block_sums;
 pub mod intrinsics_terms;
@@ -23,6 +23,7 @@ pub mod linearise;
 pub mod noise_estimation;
 pub mod observer_column;
 pub mod photometric_problem;
+pub mod set_up;
 pub mod step_length;
 pub mod sum_block;
 #[cfg(test)]

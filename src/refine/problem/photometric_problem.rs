@@ -9,20 +9,17 @@ use crate::refine::model::context::{EstimationContext, FrameWindow};
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::parameters::calibration::Kappa;
 use crate::refine::parameters::frame_estimate::FrameEstimate;
+use crate::refine::problem::set_up::{
+    min_density, normal_pattern, pixel_size_on_wall, pose_frames,
+};
 use crate::refine::problem::unknown_texture::UnknownTexture;
-use crate::refine::samples::footprints::footprint;
 use crate::refine::samples::sampling::Sampling;
 use crate::refine::samples::tile_coverage::{FrameImages, TileCoverage};
-use crate::refine::samples::visibility::{Exclusions, PosedFrame};
-use crate::refine::thresholds::photometric_problem::{
-    MAX_VIEWING_DISTANCE_RADII, MIN_SAMPLES_PER_IMAGE_HEIGHT,
-};
+use crate::refine::samples::visibility::Exclusions;
 use crate::refine::tiles::denoising::Denoiser;
 use crate::refine::tiles::frame_samples::SampledFrame;
 use crate::refine::tiles::grid::WallGrid;
 use crate::refine::tiles::residual_weighting::NoiseModel;
-use crate::surface::{Surface, viewing_distance};
-use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -37,28 +34,38 @@ use std::sync::Arc;
 /// estimates and stays constant. A step of a frame by ξ changes its neighbours' motion by
 /// `readout/(2 interval) ξ`, a few hundredths; the next solve removes the rest.
 pub struct PhotometricProblem<'a> {
+    /// Inputs of the estimator.
     pub(super) context: EstimationContext<'a>,
+    /// Resolution and share of the samples.
     pub(super) sampling: Sampling,
+    /// Images of the participants.
     pub(super) images: FrameImages<'a>,
     /// The camera at the pyramid level.
     pub(super) camera: Camera,
+    /// Lattice of the samples.
     pub(super) grid: WallGrid,
+    /// Frames that are sampled.
     pub(super) participants: Range<usize>,
+    /// Frames of them that are estimated.
     pub(super) active: Range<usize>,
     /// Initial estimates of all participants.
     pub(super) estimates: Vec<FrameEstimate>,
     /// Motion of each participant's camera during a readout of one second.
     pub(super) rates: Vec<Sweep>,
+    /// Observations of the samples.
     pub(super) coverage: TileCoverage<'a>,
     /// The first active frame that is compared, counted from the first active one; the gauge is
     /// constrained there.
     pub(super) gauge_slot: Option<usize>,
     /// Number of frames that are compared.
     pub(super) compared: usize,
+    /// Sparsity pattern of the normal matrix.
     pub(super) pattern: Pattern,
+    /// Symbolic factorisation of the normal matrix.
     pub(super) symbolic: SymbolicFactorisation,
     /// Noise of a pixel, 1-σ in grey levels.
     pub(super) sigma: f64,
+    /// Noise model of the residuals.
     pub(super) noise: NoiseModel,
     /// Filter of the fused texture for its slopes.
     pub(super) denoiser: Option<Denoiser>,
@@ -87,44 +94,23 @@ impl<'a> PhotometricProblem<'a> {
             information,
             ..
         } = sampling;
+        let camera = context.camera.at_level(level);
+        let rate = |frame| context.sweep_rate(frame, &window.participants, window.estimates);
+        let rates: Vec<Sweep> = window.participants.clone().map(rate).collect();
+        let posed = pose_frames(context, &camera, &window, &rates)?;
         let FrameWindow {
             participants,
             active,
             estimates,
             compared,
         } = window;
-        let camera = context.camera.at_level(level);
         let compared_frames = compared.iter().filter(|compared| **compared).count();
         let gauge_slot = active
             .clone()
             .position(|frame| compared[frame - participants.start]);
-        let rate = |frame| context.sweep_rate(frame, &participants, estimates);
-        let rates: Vec<Sweep> = participants.clone().map(rate).collect();
-        let readout_s = context.calibration.readout_s(&context.kappa);
-        let posed = participants
-            .clone()
-            .into_par_iter()
-            .zip(estimates.par_iter().zip(compared.par_iter()))
-            .map(|(frame, (estimate, compared))| {
-                if !compared {
-                    return Ok(None);
-                }
-                let pose = estimate.pose;
-                let sweep = rates[frame - participants.start].scaled(readout_s);
-                Ok(Some(PosedFrame {
-                    pose,
-                    sweep,
-                    footprint: footprint(context, &camera.with_sweep(&sweep), frame, &pose)?,
-                    active: active.contains(&frame),
-                }))
-            })
-            .collect::<Result<Vec<Option<PosedFrame>>, ProblemError>>()?;
         let pixel_size_m = pixel_size_on_wall(context.surface, &camera, posed.iter().flatten());
-        let grid = WallGrid::new(
-            context.surface,
-            pixel_size_m,
-            density.max(min_density(camera.height)),
-        );
+        let density = density.max(min_density(camera.height));
+        let grid = WallGrid::new(context.surface, pixel_size_m, density);
         let images = FrameImages {
             frames: context.frames,
             first: participants.start,
@@ -143,13 +129,8 @@ impl<'a> PhotometricProblem<'a> {
             information,
             posed,
         )?;
-        let slot = |k: &usize| {
-            let frame = participants.start + k;
-            active.contains(&frame).then(|| frame - active.start)
-        };
-        let covisible = coverage.pairs.iter();
-        let covisible = covisible.filter_map(|(a, b)| slot(a).zip(slot(b)));
-        let pattern = Pattern::new(active.len(), covisible.chain(context.prior.pairs(&active)));
+        let prior_pairs = context.prior.pairs(&active);
+        let pattern = normal_pattern(&coverage.pairs, prior_pairs, participants.start, &active);
         let symbolic =
             SymbolicFactorisation::new(&pattern).map_err(|source| ProblemError::Factor {
                 first: active.start,
@@ -188,8 +169,8 @@ impl<'a> PhotometricProblem<'a> {
         Ok(problem)
     }
 
-    /// Replaces the noise estimated from frames without noise by `sigma` grey levels per pixel: no
-    /// residual is rejected, and the slopes are not denoised.
+    /// Sets the noise of a pixel to `sigma` grey levels, for frames that were rendered without
+    /// noise: no residual is rejected, and the slopes are not denoised.
     pub fn with_known_noise(self, sigma: f64) -> Self {
         Self {
             sigma,
@@ -339,34 +320,6 @@ impl<'a> PhotometricProblem<'a> {
             _ => 0,
         }
     }
-}
-
-/// Least number of wall samples per pixel along each axis: one, but more at coarse levels, where
-/// whole tiles of pixels would leave much of the image's border unused.
-fn min_density(rows: u32) -> f64 {
-    (f64::from(MIN_SAMPLES_PER_IMAGE_HEIGHT) / f64::from(rows))
-        .ceil()
-        .max(1.0)
-}
-
-/// Width of a pixel on the wall at the image centre of the median frame, metres. Frames that look
-/// along the tunnel do not count.
-fn pixel_size_on_wall<'p>(
-    surface: &dyn Surface,
-    camera: &Camera,
-    posed: impl Iterator<Item = &'p PosedFrame>,
-) -> f64 {
-    let mut ranges: Vec<f64> = posed
-        .filter_map(|frame| viewing_distance(surface, &frame.pose).ok())
-        .collect();
-    ranges.sort_unstable_by(f64::total_cmp);
-    let median = ranges.get(ranges.len() / 2);
-    let radius_m = surface.perimeter_m() / std::f64::consts::TAU;
-    median
-        .copied()
-        .unwrap_or(radius_m)
-        .min(MAX_VIEWING_DISTANCE_RADII * radius_m)
-        / camera.fy
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ struct BlockContext<'b> {
     visibility: &'b Visibility,
     /// Frames of the stretch.
     sampled_frames: &'b [SampledFrame<'b>],
-    /// Which participants these are.
+    /// Indices of these frames among the participants.
     participants: &'b [usize],
     /// Their indices among the active frames.
     slots: Vec<Option<usize>>,

@@ -42,12 +42,12 @@ struct TypicalMisfit {
 impl TypicalMisfit {
     /// Estimates median and spread from the misfits of some tiles.
     fn new(mut misfits: Vec<Misfit>) -> Self {
-        misfits.sort_unstable_by(|a, b| a.steepness.total_cmp(&b.steepness));
+        misfits.sort_unstable_by(|a, b| a.mean_variance.total_cmp(&b.mean_variance));
         let size = misfits.len().div_ceil(CLASSES).max(1);
         let classes = misfits.chunks(size).map(|class| {
             let mut values: Vec<f32> = class.iter().map(|m| m.loss).collect();
             let (median, sigma) = median_and_sigma(&mut values);
-            let last = class.last().map_or(0.0, |m| m.steepness);
+            let last = class.last().map_or(0.0, |m| m.mean_variance);
             (last, median, sigma.max(MIN_MISFIT_SPREAD))
         });
         Self {
@@ -60,7 +60,7 @@ impl TypicalMisfit {
         let class = self
             .classes
             .iter()
-            .find(|(last, _, _)| misfit.steepness <= *last)
+            .find(|(last, _, _)| misfit.mean_variance <= *last)
             .or(self.classes.last());
         class.map_or(0.0, |(_, median, spread)| (misfit.loss - median) / spread)
     }

@@ -2,7 +2,7 @@
 //!
 //! # Objective
 //!
-//! The unknowns are the poses `T_i`, log-gains `α_i` and biases `b_i` of the frames, the texture S
+//! The parameters are the poses `T_i`, log-gains `α_i` and biases `b_i` of the frames, the texture S
 //! of the wall, and the shared parameters κ if they are estimated. The estimator minimises
 //!
 //! `E = 1/σ² Σ_x Σ_i q_i τ(x) ρ(e_i(x); v(x))`   (pixels)

@@ -39,7 +39,7 @@ impl TileWorkspace {
             let total = sum(&variance);
             self.misfits.push(Misfit {
                 loss: sum(&loss) / total.max(1e-9),
-                steepness: total / SAMPLES as f32,
+                mean_variance: total / SAMPLES as f32,
             });
         }
     }
@@ -98,6 +98,7 @@ impl TileWorkspace {
             }
         }
     }
+
     /// Spacing of the samples `d = √q` in pixels, and noise gain `u = (q a)² / (Σ q a²)²`, of each
     /// observer ([`crate::refine::tiles::denoising`]).
     fn noise_gains(&self) -> impl Iterator<Item = (f64, f64)> {

@@ -21,7 +21,7 @@ pub struct Misfit {
     /// Mean loss, weighted by the variance: R of [`crate::refine::samples::outlier_mask`].
     pub loss: f32,
     /// Mean variance v of the samples, grey levels²; it grows with the gradient of the texture.
-    pub steepness: f32,
+    pub mean_variance: f32,
 }
 
 /// Values of one frame at the samples of a tile.
