@@ -1,7 +1,5 @@
 //! Structural similarity.
 
-use image::{ImageBuffer, Luma};
-use imageproc::filter::separable_filter_equal;
 use rayon::prelude::*;
 
 /// Half the edge of the 11 × 11 window.
@@ -45,12 +43,8 @@ pub(super) fn sum_of_ssim(a: &[f32], b: &[f32], valid: &[bool], width: usize) ->
 fn band(a: &[f32], b: &[f32], valid: &[bool], width: usize) -> (f64, usize) {
     let height = a.len() / width;
     let blurred = |value: &dyn Fn(usize) -> f32| -> Vec<f32> {
-        let data: Vec<f32> = (0..a.len()).map(value).collect();
-        // The buffer holds width · height values by construction.
-        match ImageBuffer::<Luma<f32>, _>::from_raw(width as u32, height as u32, data) {
-            Some(image) => separable_filter_equal(&image, &window()).into_raw(),
-            None => Vec::new(),
-        }
+        let values: Vec<f32> = (0..a.len()).map(value).collect();
+        filtered(&values, width)
     };
     let (mean_a, mean_b) = (blurred(&|k| a[k]), blurred(&|k| b[k]));
     let (mean_aa, mean_bb) = (blurred(&|k| a[k] * a[k]), blurred(&|k| b[k] * b[k]));
@@ -74,6 +68,36 @@ fn band(a: &[f32], b: &[f32], valid: &[bool], width: usize) -> (f64, usize) {
         }
     }
     (sum, count)
+}
+
+/// Weights `values` by the window along the rows, then down the columns; zero within [`RADIUS`] of
+/// the edges.
+fn filtered(values: &[f32], width: usize) -> Vec<f32> {
+    let weights = window();
+    let mut along_rows = vec![0.0; values.len()];
+    for (out, row) in along_rows.chunks_exact_mut(width).zip(values.chunks_exact(width)) {
+        let out = &mut out[RADIUS..width - RADIUS];
+        for (k, weight) in weights.iter().enumerate() {
+            add_weighted(out, &row[k..], *weight);
+        }
+    }
+    let mut both = vec![0.0; values.len()];
+    let height = values.len() / width;
+    for (y, out) in both.chunks_exact_mut(width).enumerate().skip(RADIUS) {
+        if y >= height - RADIUS {
+            break;
+        }
+        for (k, weight) in weights.iter().enumerate() {
+            add_weighted(out, &along_rows[(y + k - RADIUS) * width..], *weight);
+        }
+    }
+    both
+}
+
+fn add_weighted(sums: &mut [f32], values: &[f32], weight: f32) {
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += value * weight;
+    }
 }
 
 /// The Gaussian's 11 weights, summing to 1.
