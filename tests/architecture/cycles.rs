@@ -2,6 +2,7 @@
 
 use crate::Offence;
 use crate::tree::{Import, Tree};
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The shortest cycle through each file that is on one, each cycle once.
@@ -59,8 +60,8 @@ fn shortest_way_round<'a>(
             .filter_map(|from| next.get(from))
             .flat_map(BTreeMap::values)
         {
-            if !came.contains_key(&import.to) {
-                came.insert(import.to, import);
+            if let Entry::Vacant(place) = came.entry(import.to) {
+                place.insert(import);
                 reached.push(import.to);
             }
         }

@@ -390,9 +390,8 @@ fn mark_modules(tokens: &mut [Token]) {
                 open.push(opens_module);
             }
             "}" => {
-                if open.pop() == Some(true) {
-                    inline.pop();
-                }
+                let closes_module = open.pop() == Some(true);
+                inline.truncate(inline.len() - usize::from(closes_module));
             }
             _ => {}
         }

@@ -187,7 +187,7 @@ impl Tree {
             let globbed = here
                 .globs
                 .iter()
-                .map(|glob| [&glob[..], &[name.clone()]].concat());
+                .map(|glob| [&glob[..], std::slice::from_ref(name)].concat());
             let named = known.map(|(_, path)| path.clone());
             for target in named.chain(globbed) {
                 // `use name::…` of another crate stands for itself.
