@@ -23,6 +23,21 @@
 //! [`raster`] writes pictures larger than the memory; [`evaluate`] measures; [`report`] makes a
 //! page of it all; [`inspect`] puts the panorama on the wall in three dimensions; [`cli`] prints.
 //!
+//! # The order of the folders
+//!
+//! Imports point from a folder to those before it in its row; folders between two `<` do not know
+//! each other. `tests/architecture.rs` reads this table and holds the sources to it.
+//!
+//! <!-- order of the folders -->
+//!
+//! | in | lowest first |
+//! | --- | --- |
+//! | `src` | `bitmap_text`, `numerics`, `persist`, `progress` < `raster` < `camera` < `trajectory` < `surface` < `frames` < `survey` < `photometry`, `super_resolve` < `refine`, `render`, `simulate` < `evaluate`, `check` < `report`, `inspect` < `cli` |
+//! | `src/refine` | `parameters` < `linear` < `model` < `tiles` < `samples` < `joint` < `problem` < `solver` < `tracking` < `validation` < `uncertainty` < `stages` < `pipeline` |
+//! | `src/render` | `layout` < `warp`, `sampling` < `compositing` < `output` |
+//!
+//! <!-- end of the order -->
+//!
 //! # An example
 //!
 //! Simulate two turns of the paper's third experiment, repair its poses, and measure what is left:

@@ -75,16 +75,6 @@ impl Drop for Running {
     }
 }
 
-/// True if the page was built in; in CI it must be.
-fn has_viewer() -> bool {
-    let bundled = Viewer::bundled();
-    assert!(
-        bundled.is_ok() || std::env::var_os("CI").is_none(),
-        "{bundled:?}"
-    );
-    bundled.is_ok()
-}
-
 const JSON: &str = "Content-Type: application/json\r\n";
 
 fn mark(id: &str) -> String {
@@ -115,7 +105,7 @@ fn without_the_page_it_says_what_to_install() {
 
 #[test]
 fn the_server_answers_its_own_page_and_writes_nothing_but_marks() {
-    if !has_viewer() {
+    if npm::is_viewer_missing() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
@@ -295,7 +285,7 @@ fn run(browser: &Path, modules: &Path, scenario: &str, place: &str, picture: &Pa
 
 #[test]
 fn an_inspector_walks_measures_marks_and_comes_back() {
-    if !has_viewer() {
+    if npm::is_viewer_missing() {
         return;
     }
     let (Some(browser), Some(modules)) = (chromium::find(), npm::find()) else {
@@ -444,7 +434,7 @@ fn a_tablet_will_do(seen: &Value) {
 /// A box that bends: points found by the page lie where the tiles are, and the eye stays inside.
 #[test]
 fn a_bend_is_walked_through() {
-    if !has_viewer() {
+    if npm::is_viewer_missing() {
         return;
     }
     let (Some(browser), Some(modules)) = (chromium::find(), npm::find()) else {

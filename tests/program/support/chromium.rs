@@ -1,8 +1,6 @@
 //! Looking at pages with headless Chromium.
 
-// Every test binary uses its own part of this.
-#![allow(dead_code)]
-
+use super::missing::find_program;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -10,21 +8,9 @@ use std::time::{Duration, Instant};
 /// Longest time for one look.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// The browser. Without one, `None` after saying so; where the environment says CI, a failure.
+/// Finds the browser; without one the test is skipped.
 pub fn find() -> Option<PathBuf> {
-    let folders = std::env::var_os("PATH").unwrap_or_default();
-    let names = ["chromium", "chromium-browser", "google-chrome"];
-    let found = std::env::split_paths(&folders)
-        .flat_map(|folder| names.map(|name| folder.join(name)))
-        .find(|path| path.is_file());
-    if found.is_none() {
-        assert!(
-            std::env::var_os("CI").is_none(),
-            "no Chromium; install the package chromium"
-        );
-        eprintln!("no Chromium (package chromium): the page has not been looked at");
-    }
-    found
+    find_program(&["chromium", "chromium-browser", "google-chrome"])
 }
 
 /// Window and colour scheme of a screenshot.

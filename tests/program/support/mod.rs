@@ -2,6 +2,7 @@
 //! program.
 
 pub mod chromium;
+pub mod missing;
 pub mod npm;
 
 use std::path::{Path, PathBuf};

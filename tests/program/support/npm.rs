@@ -1,25 +1,30 @@
 //! Programs from npm that judge what is written: `.ci/run` installs what
 //! `src/inspect/web/package-lock.json` names.
 
+use super::missing::{find_installed, find_program, skip};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use tunnelstitch::inspect::Viewer;
 
-/// The folder `node_modules` with these programs. Without it, `None` after saying so; where the
-/// environment says CI, a failure.
+/// Finds the folder `node_modules` with gltf-validator and playwright-core, and Node.js to run
+/// them; without one of them the test is skipped.
 pub fn find() -> Option<PathBuf> {
+    find_program(&["node"])?;
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent()?;
     let modules = target.join("npm/node_modules");
-    if modules.join("gltf-validator").is_dir() && modules.join("playwright-core").is_dir() {
-        return Some(modules);
+    for package in ["gltf-validator", "playwright-core"] {
+        find_installed(&modules.join(package), &format!("{package} (npm)"))?;
     }
-    let what = format!(
-        "no gltf-validator and playwright-core: copy src/inspect/web/package*.json to {0} and run \
-         `npm ci --prefix {0}`",
-        target.join("npm").display()
-    );
-    assert!(std::env::var_os("CI").is_none(), "{what}");
-    eprintln!("{what}; nothing was checked by them");
-    None
+    Some(modules)
+}
+
+/// Returns true after a notice if the program was built without its viewer.
+pub fn is_viewer_missing() -> bool {
+    let missing = Viewer::bundled().is_err();
+    if missing {
+        skip("the viewer's page (npm when the program was built)");
+    }
+    missing
 }
 
 /// Runs a script of `tests/program/support` with Node.js and returns what it printed.
