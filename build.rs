@@ -23,7 +23,8 @@ fn main() {
     let script = out.join("viewer.js");
     if let Err(error) = bundle(web, &out.join("web"), &script) {
         println!(
-            "cargo::warning=the viewer is left out ({error}): install Node.js 20 or newer with npm, then `touch build.rs` and build again"
+            "cargo::warning=the viewer is left out ({error}): install Node.js 20 or newer with \
+             npm, then `touch build.rs` and build again"
         );
         if let Err(error) = fs::write(&script, "") {
             println!("cargo::error=cannot write {}: {error}", script.display());

@@ -1,10 +1,10 @@
 //! Ablation study of the estimator, which leaves out one technique at a time:
 //! `cargo bench --bench ablation [-- FRAMES]`.
 //!
-//! The surveys are those of `tunnelstitch demo` (120 frames of 640 × 480 px, or FRAMES of them) with
-//! seeds 1 to 3. The table gives time and accuracy, the wall error of the refined poses: the root
-//! mean square over the surveys, and the worst frame of all. Frames that are left at their prior
-//! count as well.
+//! The surveys are those of `tunnelstitch demo` (120 frames of 640 × 480 px, or FRAMES of them)
+//! with seeds 1 to 3. The table gives time and accuracy, the wall error of the refined poses: the
+//! root mean square over the surveys, and the worst frame of all. Frames that are left at their
+//! prior count as well.
 
 use std::sync::Arc;
 use std::time::Instant;

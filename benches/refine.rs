@@ -1,8 +1,8 @@
 //! Duration of the estimator's stages on a simulated survey: `cargo bench --bench refine`.
 //!
 //! The survey is that of `tunnelstitch demo`: 120 frames of 640 × 480 px. Each repetition decodes
-//! and refines it again, in the default mode and with `--fast`; the tables give the median and the range
-//! over the repetitions, and frames per second end to end.
+//! and refines it again, in the default mode and with `--fast`; the tables give the median and the
+//! range over the repetitions, and frames per second end to end.
 
 use std::sync::Arc;
 use tunnelstitch::progress::{Progress, Silent};

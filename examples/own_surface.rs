@@ -1,8 +1,8 @@
 //! Stitches a panorama in a tunnel of one's own shape: a tapered pipe.
 //!
-//! A shape implements [`Surface`]: the intersection of a ray with the wall, point and tangents of the
-//! wall at (s, h), the period of s, the gauge, and a test whether a camera is inside. Refinement,
-//! rendering and evaluation take it like the shapes of the crate.
+//! A shape implements [`Surface`]: the intersection of a ray with the wall, point and tangents of
+//! the wall at (s, h), the period of s, the gauge, and a test whether a camera is inside.
+//! Refinement, rendering and evaluation take it like the shapes of the crate.
 //!
 //! Run it with `cargo run --release --example own_surface`; it writes `tapered-pipe.png`.
 

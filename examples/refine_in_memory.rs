@@ -1,7 +1,8 @@
 //! Refines frames and poses that are in memory, without a file.
 //!
-//! Two turns of a camera in a pipe of 1 m radius: the frames are cast from a known texture at the true
-//! poses, the initial poses are those of the plan, and the refined poses are compared with the truth.
+//! Two turns of a camera in a pipe of 1 m radius: the frames are cast from a known texture at the
+//! true poses, the initial poses are those of the plan, and the refined poses are compared with the
+//! truth.
 //!
 //! Run it with `cargo run --release --example refine_in_memory`.
 

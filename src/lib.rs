@@ -26,15 +26,15 @@
 //! # The order of the folders
 //!
 //! Imports point from a folder to those before it in its row; folders between two `<` do not know
-//! each other. `tests/architecture.rs` reads this table and holds the sources to it.
+//! each other. `tests/architecture` reads this table and holds the sources to it.
 //!
 //! <!-- order of the folders -->
 //!
 //! | in | lowest first |
 //! | --- | --- |
 //! | `src` | `bitmap_text`, `numerics`, `persist`, `progress` < `raster` < `camera` < `trajectory` < `surface` < `frames` < `survey` < `photometry`, `super_resolve` < `refine`, `render`, `simulate` < `evaluate`, `check` < `report`, `inspect` < `cli` |
-//! | `src/refine` | `parameters` < `linear` < `model` < `tiles` < `samples` < `joint` < `problem` < `solver` < `tracking` < `validation` < `uncertainty` < `stages` < `pipeline` |
-//! | `src/render` | `layout` < `warp`, `sampling` < `compositing` < `output` |
+//! | `src/refine` | `thresholds`, `options` < `parameters` < `linear` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `tracking` < `validation` < `uncertainty` < `report` < `refined` < `stages` < `pipeline` < `pose_convention_search` |
+//! | `src/render` | `error` < `layout` < `warp` < `sampling` < `compositing` < `output` |
 //!
 //! <!-- end of the order -->
 //!

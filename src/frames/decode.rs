@@ -167,7 +167,9 @@ mod tests {
     use crate::frames::mask::Mask;
 
     /// The beginning of a PNG file whose header claims 60000 × 60000 pixels.
-    const BOAST: &[u8] = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\xea`\0\0\xea`\x08\0\0\0\0\xa5\xb9*\x9e\0\0\0\x09IDATx\x9cc\0\0\0\x01\0\x01^\xff}\xf9";
+    const BOAST: &[u8] =
+        b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\xea`\0\0\xea`\x08\0\0\0\0\xa5\xb9*\x9e\
+        \0\0\0\x09IDATx\x9cc\0\0\0\x01\0\x01^\xff}\xf9";
 
     #[test]
     fn no_room_is_made_for_what_only_a_header_claims() {

@@ -77,7 +77,10 @@ pub enum CheckpointError {
         what: String,
     },
     /// The checkpoint is corrupt.
-    #[error("{}: the interrupted run in it is corrupt ({what}); give --fresh to restart", folder.display())]
+    #[error(
+        "{}: the interrupted run in it is corrupt ({what}); give --fresh to restart",
+        folder.display()
+    )]
     Damaged {
         /// The folder.
         folder: PathBuf,

@@ -2,12 +2,9 @@
 
 use super::normal_equations::{NormalEquations, Solution};
 use super::observation::{LinearisedPoint, Observation, Unknowns};
+use super::priors::Priors;
 use crate::frames::{MAD_TO_SIGMA, SHADING_TERMS};
 use rayon::prelude::*;
-
-/// 1-σ of the shading's coefficients around what is known, for [`Priors`]: it keeps terms that the
-/// overlaps do not determine near 0.
-pub const SHADING_SIGMA: f64 = 0.5;
 
 /// Reweighting iterations at the most: it takes ten until glints weigh nothing, and three leave the
 /// shading 0.7 % off.
@@ -21,18 +18,7 @@ const MIN_VARIANCE_GREY2: f64 = 1e-6;
 /// on the number of threads.
 const PARTS: usize = 16;
 
-/// Standard deviations of the unknowns around 0 beforehand.
-#[derive(Clone, Copy, Debug)]
-pub struct Priors {
-    /// Of α, the logarithm of a frame's gain.
-    pub log_gain_sigma: f64,
-    /// Of β, a frame's bias, grey levels.
-    pub bias_sigma_grey: f64,
-    /// Of the shading's coefficients `c_k`.
-    pub shading_sigma: f64,
-}
-
-/// What the observations find missing from the known gains, biases and shading.
+/// Corrections of the known gains, biases and shading.
 #[derive(Clone, Debug)]
 pub struct PhotometricCalibration {
     /// `α_i`: logarithms of the frames' gains.

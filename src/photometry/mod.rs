@@ -27,12 +27,13 @@
 //! by τ, β is wrong by about `−ε²/(τ² + ε²)` of the grey value, and behind a known shading V this
 //! wrong `β/(a V S)` passes for a change of V.
 //!
-//! The model value contains s, which is estimated from the same observations. The noise of
-//! `ln z_i` is `n_i/(f_i m_i)`, n being equal in all frames as grey levels of the frame. In the mean
-//! with weights of the inverse variance, `w_i = (f_i m_i)²`, it becomes `n_s = Σ w_i n_i/(f_i m_i) /
-//! Σ w_i`, and `Cov(n_s, n_i/(f_i m_i)) = σ²/Σ w` is the same for all i. It cancels in the
-//! difference of any two observations, which is all that is left once s is eliminated. Equal
-//! weights would leave a part of the error above where frames see the point in different light.
+//! The model value contains s, which is estimated from the same observations. The noise of `ln z_i`
+//! is `n_i/(f_i m_i)`, n being equal in all frames as grey levels of the frame. In the mean with
+//! weights of the inverse variance, `w_i = (f_i m_i)²`, it becomes
+//! `n_s = Σ w_i n_i/(f_i m_i) / Σ w_i`, and `Cov(n_s, n_i/(f_i m_i)) = σ²/Σ w` is the same for all
+//! i. It cancels in the difference of any two observations, which is all that is left once s is
+//! eliminated. Equal weights would leave a part of the error above where frames see the point in
+//! different light.
 //!
 //! # The solution
 //!
@@ -60,7 +61,8 @@
 //! | observations and their rows of the equation | [`observation`] |
 //! | residuals and weights of the readings of one point | [`robust_weights`] |
 //! | sparse normal equations, s eliminated | [`normal_equations`] |
-//! | priors, reweighting, result and its significance | [`calibration`] |
+//! | priors of the unknowns | [`priors`] |
+//! | reweighting, result and its significance | [`calibration`] |
 //!
 //! Source: D. J. Fixsen, S. H. Moseley and R. G. Arendt, "Calibrating array detectors",
 //! Astrophysical Journal Supplement 128, 2000 (flat fields from pictures that show the same sky in
@@ -71,7 +73,9 @@
 mod calibration;
 mod normal_equations;
 mod observation;
+mod priors;
 mod robust_weights;
 
-pub use calibration::{PhotometricCalibration, Priors, SHADING_SIGMA};
+pub use calibration::PhotometricCalibration;
 pub use observation::Observation;
+pub use priors::{Priors, SHADING_SIGMA};

@@ -1,7 +1,7 @@
 //! Sparse normal equations of the photometric calibration, the wall eliminated.
 
-use super::calibration::Priors;
 use super::observation::{FRAME_UNKNOWNS, Row, Unknowns};
+use super::priors::Priors;
 use crate::frames::SHADING_TERMS;
 use faer::linalg::solvers::Solve;
 use faer::sparse::linalg::solvers::Llt;

@@ -185,7 +185,7 @@ mod tests {
         (x, [([10.0, 40.0], 0.5), ([50.0, 20.0], 1.5)])
     }
 
-    /// What two frames show of a wall.
+    /// Observations of a wall point by two frames.
     fn point(wall: f64, x: &Unknowns, places: [([f32; 2], f32); 2]) -> Vec<Observation> {
         let seen = (0..).zip(places).map(|(frame, (pixel, factor))| {
             let mut seen = Observation::new(frame, pixel, 60.0, factor).unwrap();

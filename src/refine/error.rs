@@ -8,7 +8,8 @@ use crate::refine::model::problem_error::ProblemError;
 pub enum RefineError {
     /// Nothing to compare with.
     #[error(
-        "the survey has a single frame; refinement compares frames that overlap on the wall, so it needs two or more"
+        "the survey has a single frame; refinement compares frames that overlap on the wall, so it \
+         needs two or more"
     )]
     SingleFrame,
     /// Frames and poses do not correspond.
@@ -21,12 +22,15 @@ pub enum RefineError {
     },
     /// Nothing overlaps.
     #[error(
-        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m and the calibration's focal length, whether the mask or tunnel.ignore leaves anything, or take frames closer together"
+        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m \
+         and the calibration's focal length, whether the mask or tunnel.ignore leaves anything, or \
+         take frames closer together"
     )]
     NoOverlap,
     /// Something that is known by its shape only for a straight round tunnel.
     #[error(
-        "{unknown} can be estimated of a straight round tunnel only; leave it out of --calibrate and [calibrate] unknowns"
+        "{unknown} can be estimated of a straight round tunnel only; leave it out of --calibrate \
+         and [calibrate] unknowns"
     )]
     OnlyRound {
         /// The parameter that was to be estimated.

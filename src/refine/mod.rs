@@ -1,9 +1,9 @@
 //! The estimator: every frame's pose and exposure from the photometric consistency of overlapping
 //! strips of the wall.
 //!
-//! It minimises the robust photometric cost plus the priors, over all poses, exposures and, if asked
-//! for, parameters that all frames share. The wall's texture is eliminated exactly. The objective is
-//! stated and derived in one place, beside the code that computes it: [`tiles::tile`].
+//! It minimises the robust photometric cost plus the priors, over all poses, exposures and, if
+//! asked for, parameters that all frames share. The wall's texture is eliminated exactly. The
+//! objective is stated and derived in one place, beside the code that computes it: [`tiles::tile`].
 //!
 //! # The pipeline
 //!
@@ -22,8 +22,8 @@
 //!
 //! # A solve
 //!
-//! Every solve, of one frame, a window or all frames, is the same: choose samples, linearise, reduce,
-//! solve, accept.
+//! Every solve, of one frame, a window or all frames, is the same: choose samples, linearise,
+//! reduce, solve, accept.
 //!
 //! | step | where |
 //! | --- | --- |
@@ -33,22 +33,22 @@
 //! | solve: sparse Cholesky, shared parameters by Schur complement | [`linear`] |
 //! | accept: damping, step test, stopping | [`solver::gauss_newton`] |
 //!
-//! Dependencies point downwards only, in the order parameters, linear, model, tiles, samples, joint,
-//! problem, solver, tracking, validation, uncertainty, stages, pipeline. Every tuned number is in
-//! [`thresholds`].
+//! Dependencies point downwards only, in the order parameters, linear, model, tiles, samples,
+//! joint, problem, solver, tracking, validation, uncertainty, stages, pipeline. Every tuned number
+//! is in [`thresholds`].
 //!
 //! # Speed
 //!
-//! - The work on a tile is loops over whole vectors ([`tiles::tile`]), compiled for several processors;
-//!   the version for the present one is chosen at run time. Sums keep their order, so results stay
-//!   the same.
-//! - The last solve samples the wall twice a pixel along each axis; those before it use the tiles with
-//!   most information ([`samples::tile_selection`]). `--fast` samples 1.5 times a pixel and takes a
-//!   single step, if that is short.
-//! - Each linearisation serves twice: its cost judges the step that led there, its equations make the
-//!   next. The last step of a solve is within its tolerance and is not judged.
-//! - The corners of tiles are computed once for all frames ([`samples::visibility`]), local contrast
-//!   once for a picture.
+//! - The work on a tile is loops over whole vectors ([`tiles::tile`]), compiled for several
+//!   processors; the version for the present one is chosen at run time. Sums keep their order, so
+//!   results stay the same.
+//! - The last solve samples the wall twice a pixel along each axis; those before it use the tiles
+//!   with most information ([`samples::tile_selection`]). `--fast` samples 1.5 times a pixel and
+//!   takes a single step, if that is short.
+//! - Each linearisation serves twice: its cost judges the step that led there, its equations make
+//!   the next. The last step of a solve is within its tolerance and is not judged.
+//! - The corners of tiles are computed once for all frames ([`samples::visibility`]), local
+//!   contrast once for a picture.
 //!
 #![doc = include_str!("ablation.md")]
 
@@ -65,7 +65,6 @@ mod problem;
 mod refined;
 mod report;
 mod samples;
-mod setup;
 mod solver;
 mod stages;
 #[cfg(test)]

@@ -22,8 +22,8 @@ pub struct RefineOptions {
     pub window_stride: usize,
     /// Wall samples per pixel along each axis in the last solve (but for a joint one).
     pub final_density: f64,
-    /// Wall samples per pixel along each axis at which the outlier mask of the last solve is found; if
-    /// None, those of that solve. (A joint solve always uses two a pixel.)
+    /// Wall samples per pixel along each axis at which the outlier mask of the last solve is found;
+    /// if None, those of that solve. (A joint solve always uses two a pixel.)
     pub outlier_mask_density: Option<f64>,
     /// Share of the information that the global solves before the last use, below the level where
     /// tracking ends: they compare the most informative tiles, 0 to 1.
@@ -35,8 +35,8 @@ pub struct RefineOptions {
     pub windows: bool,
     /// Solve once more, for the wall at a third of a pixel jointly with the poses, instead of
     /// interpolating between the frames' pixels: on walls with sharp edges errors are about a third
-    /// smaller, in ten to twenty times the time. The solve is skipped where the wall is too smooth to
-    /// gain from it.
+    /// smaller, in ten to twenty times the time. The solve is skipped where the wall is too smooth
+    /// to gain from it.
     pub joint: bool,
     /// Memory for decoded frames, bytes. Frames that do not fit are decoded again when needed.
     pub cache_bytes: usize,
@@ -73,9 +73,9 @@ impl Default for RefineOptions {
 }
 
 impl RefineOptions {
-    /// Options for speed: the last solve ends with the first step shorter than a tenth of a pixel or
-    /// twice the uncertainty, most often its first. Gauss–Newton leaves a few hundredths of such a
-    /// step. The outlier mask is found at coarser samples.
+    /// Options for speed: the last solve ends with the first step shorter than a tenth of a pixel
+    /// or twice the uncertainty, most often its first. Gauss–Newton leaves a few hundredths of such
+    /// a step. The outlier mask is found at coarser samples.
     pub fn fast() -> Self {
         Self {
             final_density: 1.5,

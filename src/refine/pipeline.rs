@@ -8,15 +8,15 @@ use crate::refine::model::frame_states::FrameStates;
 use crate::refine::options::RefineOptions;
 use crate::refine::parameters::calibration::Kappa;
 use crate::refine::refined::Refined;
-use crate::refine::setup::Setup;
+use crate::refine::stages::plan::plan_stages;
+use crate::refine::stages::run::run_stage;
 use crate::refine::stages::session::Session;
-use crate::refine::stages::solve::SolvePlan;
-use crate::refine::stages::stage::Stage;
+use crate::refine::stages::setup::Setup;
 use crate::refine::stages::state::{Estimation, PipelineState};
-use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Refines the poses of frames: a [`RefineInput`], or a [`Survey`](crate::survey::Survey) that converts into one.
+/// Refines the poses of frames: a [`RefineInput`], or a [`Survey`](crate::survey::Survey) that
+/// converts into one.
 ///
 /// Equal input gives equal bytes, whatever the number of threads.
 ///
@@ -57,31 +57,10 @@ pub fn refine_with_checkpoint<'a>(
         if estimation.solution.is_none() {
             session.keep_if_due(&setup, || estimation.state.clone())?;
         }
-        estimation = stage.run(&setup, estimation, &mut session)?;
+        estimation = run_stage(stage, &setup, estimation, &mut session)?;
         estimation.state.stages.pop_front();
     }
     estimation.refined.ok_or(RefineError::NoOverlap)
-}
-
-/// The stages: track coarsely, solve coarse to fine with a check after the first solve and a repair
-/// before the last, assess.
-fn stages(setup: &Setup) -> VecDeque<Stage> {
-    let (options, handover) = (setup.options, setup.handover_level());
-    let mut stages = VecDeque::from([Stage::Prescreen, Stage::Track, Stage::CorrectShading]);
-    for level in (0..=handover).rev() {
-        let plan = SolvePlan::intermediate(options, level, handover);
-        stages.push_back(Stage::Solve(plan));
-        if level == handover {
-            stages.push_back(Stage::ValidatePairs);
-        }
-    }
-    stages.push_back(Stage::Repair);
-    stages.push_back(Stage::Solve(SolvePlan::last(options)));
-    if options.joint {
-        stages.push_back(Stage::Solve(SolvePlan::joint(options)));
-    }
-    stages.push_back(Stage::Assess);
-    stages
 }
 
 /// The state before the first stage.
@@ -92,7 +71,7 @@ fn begin(setup: &Setup) -> PipelineState {
         kappa: Kappa::zeros(),
     };
     PipelineState {
-        stages: stages(setup),
+        stages: plan_stages(setup.options, setup.handover_level()),
         noise: 0.0,
         solved: frames.clone(),
         frames,

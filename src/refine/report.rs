@@ -67,9 +67,9 @@ pub struct FrameReport {
     pub bias: f64,
     /// 1-σ relative to the first frame.
     pub sigma: FrameSigma,
-    /// Overdispersion: displacement of the frame's patches against the others beyond noise, root mean
-    /// square, pixels. Much of it indicates a wrong camera, radius or shape. (Called `strain_px` until
-    /// version 0.1; both names are read.)
+    /// Overdispersion: displacement of the frame's patches against the others beyond noise, root
+    /// mean square, pixels. Much of it indicates a wrong camera, radius or shape. (Called
+    /// `strain_px` until version 0.1; both names are read.)
     #[serde(default, alias = "strain_px")]
     pub overdispersion_px: f64,
 }
@@ -112,10 +112,12 @@ pub struct RefineReport {
     pub frames: Vec<FrameReport>,
     /// Frames whose pose rests on the prior.
     pub frames_on_prior: usize,
-    /// The covariance over the inverse of the normal matrix, c of [`crate::refine::uncertainty::covariance`]: above 1
-    /// where residuals err together, below where they cancel.
+    /// The covariance over the inverse of the normal matrix, c of
+    /// [`crate::refine::uncertainty::covariance`]: above 1 where residuals err together, below
+    /// where they cancel.
     pub variance_factor: f64,
-    /// The rolling-shutter test: the readout time that fits the frames best, where they determine it.
+    /// The rolling-shutter test: the readout time that fits the frames best, where they determine
+    /// it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rolling_shutter: Option<ReadoutEstimate>,
     /// Self-calibration, if it was asked for.

@@ -407,11 +407,11 @@ pub mod reference_mosaic {
 
 /// Thresholds of `tracking/shading_correction.rs`.
 pub mod shading_correction {
-    /// Frames that the shading is estimated from, at the most. Higher: more time; the shading is the
-    /// same in all frames. Chosen by: unknown.
+    /// Frames that the shading is estimated from, at the most. Higher: more time; the shading is
+    /// the same in all frames. Chosen by: unknown.
     pub const MAX_SHADING_FRAMES: usize = 60;
-    /// Tiles that the shading is estimated from, spread over all of these frames. Higher: less noise,
-    /// more time. Chosen by: unknown.
+    /// Tiles that the shading is estimated from, spread over all of these frames. Higher: less
+    /// noise, more time. Chosen by: unknown.
     pub const MAX_SHADING_TILES: usize = 1000;
     /// Corrections of the shading with solves between, at the most. Higher: more time. Chosen by:
     /// unknown.
@@ -419,8 +419,8 @@ pub mod shading_correction {
     /// Size of a new shading over its 1-σ from noise above which it is taken over. Higher: weak
     /// shadings are ignored. Chosen by: 3 σ.
     pub const MIN_SIGNIFICANCE_SIGMA: f64 = 3.0;
-    /// Size of a change of an existing shading over its 1-σ from noise above which it is taken over.
-    /// Higher: fewer corrections. Chosen by: unknown.
+    /// Size of a change of an existing shading over its 1-σ from noise above which it is taken
+    /// over. Higher: fewer corrections. Chosen by: unknown.
     pub const MIN_CHANGE_SIGNIFICANCE_SIGMA: f64 = 1.5;
 }
 
@@ -665,7 +665,8 @@ pub mod gauss_newton {
     /// Factor from one damping to the next. Higher: fewer, coarser dampings are tried. Chosen by:
     /// Marquardt's original choice.
     pub const DAMPING_FACTOR: f64 = 10.0;
-    /// Dampings tried before a step is given up. Higher: longer search for a step. Chosen by: unknown.
+    /// Dampings tried before a step is given up. Higher: longer search for a step. Chosen by:
+    /// unknown.
     pub const MAX_DAMPING_ITERATIONS: usize = 8;
     /// Plausible curvatures of a solve; others belong to solves that were still far from their end.
     /// Wider: curvatures of such solves count, too. Chosen by: unknown.
@@ -674,8 +675,8 @@ pub mod gauss_newton {
 
 /// Thresholds of `solver/stopping.rs`.
 pub mod stopping {
-    /// Step at which a solve that another one follows ends, pixels of its level. Higher: fewer steps.
-    /// Chosen by: unknown.
+    /// Step at which a solve that another one follows ends, pixels of its level. Higher: fewer
+    /// steps. Chosen by: unknown.
     pub const INTERMEDIATE_STEP_PX: f64 = 0.01;
     /// Step at which a solve that another one follows ends, multiples of the uncertainty. Higher:
     /// fewer steps. Chosen by: unknown.
@@ -1118,19 +1119,19 @@ pub mod pose_convention_search {
 
 /// Thresholds of `stages/assess.rs, validate_pairs.rs`.
 pub mod assessment {
-    /// Share of a frame's pixels that must overlap other frames for its pose to count as photometric,
-    /// 0 to 1. Higher: fewer frames are photometric. Chosen by: unknown.
+    /// Share of a frame's pixels that must overlap other frames for its pose to count as
+    /// photometric, 0 to 1. Higher: fewer frames are photometric. Chosen by: unknown.
     pub const MIN_PIXEL_SHARE: f64 = 0.02;
     /// Largest step left of a photometric pose, pixels on the wall. Higher: more frames are
     /// photometric. Chosen by: as [`MAX_SIGMA_PX`].
     pub const MAX_STEP_PX: f64 = 0.25;
-    /// Largest step left of a photometric pose, multiples of σ, if that is more. Higher: more frames
-    /// are photometric. Chosen by: 2 σ.
+    /// Largest step left of a photometric pose, multiples of σ, if that is more. Higher: more
+    /// frames are photometric. Chosen by: 2 σ.
     pub const MAX_STEP_SIGMA: f64 = 2.0;
     /// Largest 1-σ on the wall of a photometric pose, pixels. Higher: more frames are photometric.
     /// Chosen by: twice that is half a pixel.
     pub const MAX_SIGMA_PX: f64 = 0.25;
-    /// Pairwise comparisons of all frames, with rejected frames registered again between two, at the
-    /// most. Higher: more attempts, in more time. Chosen by: unknown.
+    /// Pairwise comparisons of all frames, with rejected frames registered again between two, at
+    /// the most. Higher: more attempts, in more time. Chosen by: unknown.
     pub const MAX_PAIR_ITERATIONS: usize = 3;
 }

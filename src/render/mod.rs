@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! poses ─ place ──> footprints ─ Canvas::covering ──────────────────> canvas ─┐
-//! files ─ Thumbnails ─ Exposure::solve ─> exposure ─ Seams::find ───> seams ──┼─ TileRenderer ─> bands
+//! files ─ Thumbnails ─ Exposure::solve ─> exposure ─ Seams::find ──> seams ───┼─> bands
 //!     └── PictureCache::load, band by band ─────────────────────────> frames ─┘
 //! ```
 //!

@@ -160,7 +160,8 @@ mod tests {
             d in vector(-1.0..1.0),
         ) {
             let circle = Circle::new(radius).unwrap();
-            let t = Vector3::new(around.sin(), 0.0, around.cos()) * (radius * factor * (1.0 + 1e-12));
+            let outwards = Vector3::new(around.sin(), 0.0, around.cos());
+            let t = outwards * (radius * factor * (1.0 + 1e-12));
             let outside = matches!(circle.hit(&t, &d), Err(SurfaceError::CameraOutside { .. }));
             prop_assert!(outside);
         }

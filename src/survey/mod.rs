@@ -23,7 +23,7 @@
 //! mask = "mask.png"           # optional: an image, black where the wall is hidden
 //!
 //! [poses]
-//! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio or EuRoC, detected from the content
+//! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC: see the content
 //! truth = "groundtruth.tum"   # optional: for comparison; all keys below apply to both
 //! format = "tum"              # optional, like all below: overrides the detection
 //! convention = "c2w"          # or "w2c"; the default depends on the format

@@ -107,7 +107,8 @@ proptest! {
     fn no_text_makes_it_panic(text in "[-0-9eE.,;\\[\\]{}\" #a-zA-Z\n\r\t]{0,200}") {
         let (_dir, path) = file_of(text.as_bytes());
         let _ = read_poses(&path, None);
-        for format in [PoseFormat::Tum, PoseFormat::Kitti, PoseFormat::Csv, PoseFormat::Colmap, PoseFormat::Nerfstudio, PoseFormat::Euroc] {
+        use PoseFormat::{Colmap, Csv, Euroc, Kitti, Nerfstudio, Tum};
+        for format in [Tum, Kitti, Csv, Colmap, Nerfstudio, Euroc] {
             let _ = read_poses(&path, Some(format));
         }
     }
@@ -173,8 +174,10 @@ fn what_is_no_text_is_refused() {
 fn euroc_is_read_in_nanoseconds_with_w_first() {
     let text = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], \
                 q_RS_y [], q_RS_z [], v_RS_R_x [m s^-1]\n\
-        1403636580838555648,4.688319,-1.786938,0.783338,0.534108,-0.153029,-0.827383,-0.082152,-0.027876\n\
-        1403636580843555328,4.688177,-1.786770,0.787350,0.534640,-0.152990,-0.826976,-0.082863,-0.031\n";
+        1403636580838555648,4.688319,-1.786938,0.783338,\
+        0.534108,-0.153029,-0.827383,-0.082152,-0.027876\n\
+        1403636580843555328,4.688177,-1.786770,0.787350,\
+        0.534640,-0.152990,-0.826976,-0.082863,-0.031\n";
     let file = read_text(text).unwrap();
     assert_eq!(file.format, PoseFormat::Euroc);
     let first = &file.entries[0];

@@ -93,7 +93,8 @@ mod tests {
         let text = found[0].to_string();
         assert_eq!(
             text,
-            "src/a.rs:1: imports itself by way of src/b/deep.rs (Deep, line 1) -> src/a.rs (A, line 2)"
+            "src/a.rs:1: imports itself by way of src/b/deep.rs (Deep, line 1) \
+             -> src/a.rs (A, line 2)"
         );
     }
 

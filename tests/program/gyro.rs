@@ -30,7 +30,8 @@ fn gcsv(truth: &[Pose], title: &str) -> String {
         .map(|pair| (pair[0].r_wc.inverse() * pair[1].r_wc).scaled_axis())
         .collect();
     let mut text = format!(
-        "{title}\nversion,1.3\nid,simulated\norientation,YxZ\nframe_readout_time,12.5\nframe_readout_direction,1\n\
+        "{title}\nversion,1.3\nid,simulated\norientation,YxZ\n\
+         frame_readout_time,12.5\nframe_readout_direction,1\n\
          tscale,0.001\ngscale,0.0001\nascale,0.0005\nt,gx,gy,gz,ax,ay,az\n"
     );
     let last_s = 2.0 * REST_S + steps.len() as f64;

@@ -49,7 +49,8 @@ fn assert_repaired(report: &serde_json::Value) {
 #[test]
 fn a_fisheye_is_repaired() {
     let camera = format!(
-        r#"{{"model":"kannala-brandt",{PICTURE},"fx":150,"fy":150.5,"k1":-0.01,"k2":0.005,"k3":-0.004,"k4":0.0007}}"#
+        r#"{{"model":"kannala-brandt",{PICTURE},"fx":150,"fy":150.5,
+            "k1":-0.01,"k2":0.005,"k3":-0.004,"k4":0.0007}}"#
     );
     assert_repaired(&repaired(&camera, "camera.json"));
 }

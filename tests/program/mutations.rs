@@ -12,12 +12,16 @@ const KITTI: &str = "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0.5 0 1 0 0.25 0 0 1 0\n";
 const CSV: &str =
     "time,name,tx,ty,tz,qx,qy,qz,qw\n0,a.jpg,0,0,0,0,0,0,1\n1,b.jpg,0,0.1,0,0,0.26,0,0.97\n";
 const EUROC: &str = "#timestamp \
-                     [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z\n1000000000,0,0,0,1,0,0,0\n1100000000,0,0,0,1,0,0,0\n";
+                     [ns],p_x,p_y,p_z,q_w,q_x,q_y,q_z\n\
+                     1000000000,0,0,0,1,0,0,0\n1100000000,0,0,0,1,0,0,0\n";
 const COLMAP: &str =
     "# Image list\n1 1 0 0 0 0 0 0 1 a.jpg\n\n2 1 0 0 0 0 0.5 0 1 b.jpg\n1.5 2.5 -1\n";
-const NERF: &str = r#"{"fl_x": 400, "fl_y": 400, "cx": 320, "cy": 240, "w": 640, "h": 480, "k1": -0.1, "camera_model": "OPENCV",
- "frames": [{"file_path": "a.jpg", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}"#;
-const OWN: &str = r#"{"model": "kannala-brandt", "width": 640, "height": 480, "fx": 300, "fy": 300, "cx": 320, "cy": 240, "k1": -0.01}"#;
+const NERF: &str = r#"{"fl_x": 400, "fl_y": 400, "cx": 320, "cy": 240, "w": 640, "h": 480,
+ "k1": -0.1, "camera_model": "OPENCV",
+ "frames": [{"file_path": "a.jpg",
+ "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}]}"#;
+const OWN: &str = r#"{"model": "kannala-brandt", "width": 640, "height": 480,
+ "fx": 300, "fy": 300, "cx": 320, "cy": 240, "k1": -0.01}"#;
 const OPENCV: &str = "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: \
                       !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   \
                       data: [415., 0., 318., 0., 417., 241., 0., 0., \

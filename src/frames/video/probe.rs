@@ -57,7 +57,8 @@ pub fn probe(path: &Path) -> Result<VideoInfo, String> {
         "-show_entries",
     ]);
     command.arg(
-        "packet=pts,flags:stream=width,height,pix_fmt,field_order,time_base:stream_side_data=rotation",
+        "packet=pts,flags:stream=width,height,pix_fmt,field_order,time_base:\
+         stream_side_data=rotation",
     );
     let output = command
         .arg(path)
@@ -202,7 +203,8 @@ mod tests {
     #[test]
     fn pictures_are_in_the_order_of_their_times_without_those_cut_away() {
         let json = format!(
-            r#"{{"packets": [{{"pts": -20, "flags": "KD"}}, {{"pts": 0, "flags": "K_"}}, {{"pts": 60, "flags": "__"}}, {{"pts": 20, "flags": "__"}}],
+            r#"{{"packets": [{{"pts": -20, "flags": "KD"}}, {{"pts": 0, "flags": "K_"}},
+            {{"pts": 60, "flags": "__"}}, {{"pts": 20, "flags": "__"}}],
                  "streams": [{{{STREAM}, "side_data_list": [{{}}, {{"rotation": -90}}]}}]}}"#
         );
         let video = probed(&json).unwrap();
@@ -234,7 +236,8 @@ mod tests {
             ),
             (
                 format!(
-                    r#"{{{packets}, "streams": [{{{STREAM}, "side_data_list": [{{"rotation": 30}}]}}]}}"#
+                    r#"{{{packets},
+                    "streams": [{{{STREAM}, "side_data_list": [{{"rotation": 30}}]}}]}}"#
                 ),
                 "not a multiple of 90°",
             ),

@@ -1,5 +1,6 @@
 //! Synchronisation of files and folders to disk, to survive power failures.
 
+use super::parent::parent_folder;
 use rayon::prelude::*;
 use std::fs::File;
 use std::io;
@@ -15,10 +16,7 @@ pub(crate) fn sync_files(files: &[PathBuf]) -> io::Result<()> {
         // Some systems require write access.
         File::options().write(true).open(path)?.sync_all()
     })?;
-    let mut folders: Vec<&Path> = files
-        .iter()
-        .map(|path| crate::persist::atomic::parent_folder(path))
-        .collect();
+    let mut folders: Vec<&Path> = files.iter().map(|path| parent_folder(path)).collect();
     folders.sort_unstable();
     folders.dedup();
     folders.into_iter().for_each(sync_folder);

@@ -29,8 +29,8 @@
 //!
 //! **Roughness.** The strength of the roughness is estimated once, from blocks spread over the
 //! wall. Edges are detected in every solve, and the roughness there is reduced
-//! ([`WallSolve::reweight_edges`]). On bricks, whose texture is far from Gaussian, this is the largest
-//! gain.
+//! ([`WallSolve::reweight_edges`]). On bricks, whose texture is far from Gaussian, this is the
+//! largest gain.
 //!
 //! **FineGrid.** Fine pixels are constant, so the error at an edge depends on its position in one.
 //! Walls are periodic along a lattice, as courses of bricks are, and errors that are equal along a

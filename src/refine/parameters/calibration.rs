@@ -22,8 +22,8 @@
 //! therefore estimated in the tunnel of the given radius, and only the prior, which is in metres,
 //! depends on the scale `exp(ln r)`. The images show the cameras relative to the tunnel, whatever
 //! frame the initial poses are given in, so tilt and offset of that frame enter through the prior
-//! alone as well. (Rotation about the axis and shift along it are the gauge.) These five parameters,
-//! `ln r` to `o_z`, are the [`Datum`].
+//! alone as well. (Rotation about the axis and shift along it are the gauge.) These five
+//! parameters, `ln r` to `o_z`, are the [`Datum`].
 //!
 //! Every parameter has a Gaussian prior around 0. A parameter whose posterior is nearly as wide as
 //! its prior is unobservable ([`crate::refine::uncertainty::observability`]).

@@ -1,7 +1,7 @@
 //! Damped Gauss–Newton on the manifold of poses.
 //!
-//! This is the iteration itself, as plain code; [`crate::refine::solver::argmin_glue`] hands it to argmin's executor,
-//! which counts iterations and shows progress.
+//! This is the iteration itself, as plain code; [`crate::refine::solver::argmin_glue`] hands it to
+//! argmin's executor, which counts iterations and shows progress.
 
 use crate::refine::linear::sparse_cholesky::FactorError;
 use crate::refine::model::problem_error::ProblemError;
@@ -48,19 +48,19 @@ pub struct SolveState {
 /// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
 ///
 /// λ starts at 0 and rises after a bad step, which is never taken. A step is good if it lowers the
-/// robust cost on the same wall samples, or if, within a pixel, it removes at least half of the slope
-/// along it ([`MIN_SLOPE_REDUCTION`]) and hardly raises the cost ([`MAX_COST_RISE`]).
+/// robust cost on the same wall samples, or if, within a pixel, it removes at least half of the
+/// slope along it ([`MIN_SLOPE_REDUCTION`]) and hardly raises the cost ([`MAX_COST_RISE`]).
 ///
-/// The second rule is needed because the solve seeks a zero of the gradient, and the gradient is not
-/// quite the derivative of the cost: it uses the slopes of the fused texture
+/// The second rule is needed because the solve seeks a zero of the gradient, and the gradient is
+/// not quite the derivative of the cost: it uses the slopes of the fused texture
 /// ([`crate::refine::tiles::tile`]) and is smooth, whereas the cost of sharp edges depends on where
 /// samples fall between pixels. Along weak directions, in which all frames move together and hardly
-/// against each other, that roughness exceeds the gain, and a solve that asked for a lower cost would
-/// get stuck.
+/// against each other, that roughness exceeds the gain, and a solve that asked for a lower cost
+/// would get stuck.
 ///
-/// Frames that a step would make infeasible ([`Problem::is_feasible`]) keep their estimates. The last
-/// step, undamped and shorter than the tolerance, is not judged: cost and equations are those before
-/// it.
+/// Frames that a step would make infeasible ([`Problem::is_feasible`]) keep their estimates. The
+/// last step, undamped and shorter than the tolerance, is not judged: cost and equations are those
+/// before it.
 ///
 /// Source: P. Wolfe, "Convergence conditions for ascent methods", SIAM Review 11(2), 1969 (the
 /// slope along a step).

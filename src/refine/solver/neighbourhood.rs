@@ -1,8 +1,8 @@
 //! Solves around few changed frames, with all others held.
 //!
 //! A wrong frame bends its neighbours over a few turns; a survey may have hundreds. The effort of
-//! rejecting a frame therefore does not grow with the length of the survey. What it has bent farther
-//! away is left to the next solve of all frames.
+//! rejecting a frame therefore does not grow with the length of the survey. What it has bent
+//! farther away is left to the next solve of all frames.
 
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
@@ -75,8 +75,8 @@ impl Neighbourhood {
         }
     }
 
-    /// Solves the inliers at the given pyramid levels, coarse to fine, each close enough for the next;
-    /// returns the share of every frame in the last solve.
+    /// Solves the inliers at the given pyramid levels, coarse to fine, each close enough for the
+    /// next; returns the share of every frame in the last solve.
     ///
     /// # Errors
     /// [`ProblemError`].

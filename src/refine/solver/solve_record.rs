@@ -42,11 +42,13 @@ pub struct SolveRecord {
     pub stop: StopReason,
 }
 
-/// Curvature for Gaussian residuals and slopes without error: the mean of `ψ'` over that of `ω` with [`crate::refine::tiles::residual_weighting::Loss`].
+/// Curvature for Gaussian residuals and slopes without error: the mean of `ψ'` over that of `ω`
+/// with [`crate::refine::tiles::residual_weighting::Loss`].
 const GAUSSIAN_CURVATURE: f64 = 0.89;
 
 impl SolveRecord {
-    /// Derivative of the gradient over the normal matrix: the mean over all steps that show it, by the squares of their lengths ([`crate::refine::uncertainty::covariance`]).
+    /// Derivative of the gradient over the normal matrix: the mean over all steps that show it, by
+    /// the squares of their lengths ([`crate::refine::uncertainty::covariance`]).
     pub fn curvature(&self) -> f64 {
         let steps = self.steps.iter().filter_map(|step| {
             let curvature = step

@@ -58,7 +58,8 @@ impl StopReason {
                 "no step, however damped, lowers the robust cost any more".to_owned()
             }
             Self::MaxIterations => format!(
-                "the {} steps allowed were used up; the last moved the wall by {last_step_px:.4} px",
+                "the {} steps allowed were used up; the last moved the wall by \
+                 {last_step_px:.4} px",
                 stopping.max_iterations
             ),
         }

@@ -12,9 +12,9 @@ use crate::refine::parameters::frame_estimate::FrameEstimate;
 use crate::refine::problem::linearisation::FrameContribution;
 use crate::refine::refined::Refined;
 use crate::refine::report::{FrameFlag, FrameReport, PoseReport, RefineReport};
-use crate::refine::setup::Setup;
 use crate::refine::solver::gauss_newton::Solution;
 use crate::refine::stages::session::Session;
+use crate::refine::stages::setup::Setup;
 use crate::refine::stages::state::{Estimation, PipelineState};
 use crate::refine::thresholds::assessment::{
     MAX_SIGMA_PX, MAX_STEP_PX, MAX_STEP_SIGMA, MIN_PIXEL_SHARE,
@@ -175,8 +175,8 @@ fn trajectory(
     poses.collect()
 }
 
-/// Movement of each frame, pixels on the wall, in the undamped step that is left where the solve ended
-/// for want of iterations or of descent.
+/// Movement of each frame, pixels on the wall, in the undamped step that is left where the solve
+/// ended for want of iterations or of descent.
 ///
 /// # Errors
 /// [`ProblemError::Factor`].

@@ -1,8 +1,8 @@
 //! Stage: corrects the common shading until overlapping frames agree.
 
 use crate::refine::error::RefineError;
-use crate::refine::setup::Setup;
 use crate::refine::stages::session::Session;
+use crate::refine::stages::setup::Setup;
 use crate::refine::stages::state::Estimation;
 use crate::refine::tracking::shading_correction::correct_until_settled;
 

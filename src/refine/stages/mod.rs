@@ -1,17 +1,25 @@
 //! The stages of a refinement, one file each.
 //!
-//! Every stage is a function `run(setup, estimation, session) -> estimation`: it takes the estimation
-//! as the stage before has left it and returns it changed. What is fixed is in
-//! [`Setup`](crate::refine::setup::Setup), what a checkpoint keeps in [`state::PipelineState`]; checkpoints,
-//! progress and times go through [`session::Session`].
+//! Every stage is a function `run(setup, estimation, session) -> estimation`: it takes the
+//! estimation as the stage before has left it and returns it changed.
+//!
+//! | what | file |
+//! | --- | --- |
+//! | list of the stages, rules of the solves | [`plan`] |
+//! | what is fixed | [`setup`] |
+//! | what changes, and what a checkpoint keeps of it | [`state`] |
+//! | checkpoints, progress, times | [`session`] |
+//! | dispatch | [`run`](mod@run) |
 
 pub mod assess;
 pub mod correct_shading;
+pub mod plan;
 pub mod prescreen;
 pub mod repair;
+pub mod run;
 pub mod session;
+pub mod setup;
 pub mod solve;
-pub mod stage;
 pub mod state;
 pub mod track;
 pub mod validate_pairs;

@@ -1,8 +1,8 @@
 //! Stage: rejects frames that show nothing, estimates the common shading and the sensor's noise.
 
 use crate::refine::error::RefineError;
-use crate::refine::setup::Setup;
 use crate::refine::stages::session::Session;
+use crate::refine::stages::setup::Setup;
 use crate::refine::stages::state::Estimation;
 use crate::refine::tracking::prescreening;
 

@@ -1,12 +1,13 @@
 //! Stage: repairs the trajectory where frames do not support each other.
 
 use crate::refine::error::RefineError;
-use crate::refine::setup::Setup;
 use crate::refine::stages::session::Session;
+use crate::refine::stages::setup::Setup;
 use crate::refine::stages::state::Estimation;
 use crate::refine::validation::repair;
 
-/// Runs the stage on frames that have been solved at full size; without such a solve it does nothing.
+/// Runs the stage on frames that have been solved at full size; without such a solve it does
+/// nothing.
 ///
 /// # Errors
 /// A frame that cannot be read, equations without a solution.

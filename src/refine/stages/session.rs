@@ -4,7 +4,7 @@ use crate::persist::checkpoint::{Checkpoint, CheckpointError};
 use crate::progress::Progress;
 use crate::refine::model::problem_error::ProblemError;
 use crate::refine::report::StageTime;
-use crate::refine::setup::Setup;
+use crate::refine::stages::setup::Setup;
 use crate::refine::stages::state::{PipelineState, Snapshot};
 use std::sync::Arc;
 use std::time::Instant;

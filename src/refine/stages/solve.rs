@@ -6,105 +6,17 @@ use crate::refine::model::problem_error::ProblemError;
 use crate::refine::options::RefineOptions;
 use crate::refine::problem::photometric_problem::PhotometricProblem;
 use crate::refine::report::LevelReport;
-use crate::refine::samples::sampling::Sampling;
-use crate::refine::setup::Setup;
 use crate::refine::solver::argmin_glue::{self, Observation};
 use crate::refine::solver::gauss_newton::{Solution, SolveState};
-use crate::refine::solver::stopping::Stopping;
+use crate::refine::stages::plan::{SolvePlan, Stage};
 use crate::refine::stages::session::Session;
-use crate::refine::stages::stage::Stage;
+use crate::refine::stages::setup::Setup;
 use crate::refine::stages::state::{Estimation, PipelineState};
 use crate::refine::thresholds::joint;
-use crate::refine::tiles::interpolation::Interpolation;
 use crate::refine::tracking::shading_correction::correct;
 use crate::refine::uncertainty::observability::UnobservableParameter;
 use crate::refine::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::refine::validation::inconsistent_frames::reject_disagreeing_frames;
-use serde::{Deserialize, Serialize};
-
-/// Sampling and stopping rule of one global solve.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SolvePlan {
-    /// The wall samples.
-    pub sampling: Sampling,
-    /// When to stop.
-    pub stopping: Stopping,
-}
-
-impl SolvePlan {
-    /// A solve that only brings the estimate close for the next one, finer level; the first, at the
-    /// level where tracking ended, uses all of the information.
-    pub fn intermediate(options: &RefineOptions, level: usize, handover_level: usize) -> Self {
-        let information = if level == handover_level {
-            1.0
-        } else {
-            options.intermediate_information
-        };
-        Self {
-            sampling: Sampling {
-                information,
-                ..Sampling::of(level)
-            },
-            stopping: Stopping::intermediate(options, level),
-        }
-    }
-
-    /// The last solve, at full size with denser samples.
-    ///
-    /// One sample per pixel is too sparse to end with: the products of residual and gradient vary
-    /// faster than either, and where the wall repeats in step with the samples (courses of bricks run
-    /// along them) what falls between them does not average out. On brick this alone is 0.05 px of
-    /// wall error over two turns.
-    pub fn last(options: &RefineOptions) -> Self {
-        Self {
-            sampling: Sampling {
-                density: options.final_density,
-                interpolation: Interpolation::Bicubic,
-                variance_weighting: true,
-                ..Sampling::of(0)
-            },
-            stopping: Stopping {
-                max_iterations: options.max_iterations,
-                step_px: options.step_tolerance_px,
-                step_sigma: options.step_tolerance_sigma,
-            },
-        }
-    }
-
-    /// The solve after the last one, jointly with the wall ([`crate::refine::joint`]).
-    pub fn joint(options: &RefineOptions) -> Self {
-        let last = Self::last(options);
-        Self {
-            sampling: Sampling {
-                density: joint::SAMPLES_PER_PIXEL,
-                joint: true,
-                ..last.sampling
-            },
-            stopping: Stopping {
-                step_sigma: joint::MAX_FINAL_STEP_SIGMA,
-                ..last.stopping
-            },
-        }
-    }
-
-    /// The solve in words, for the progress display and the timings.
-    fn name(&self) -> String {
-        let Sampling {
-            level,
-            density,
-            information,
-            ..
-        } = self.sampling;
-        let mut name = format!("level {level}");
-        if density != 1.0 {
-            name += &format!(", {density} samples per pixel");
-        }
-        if information != 1.0 {
-            name += &format!(", {:.0} % of the information", 100.0 * information);
-        }
-        name
-    }
-}
 
 /// Runs the stage; a snapshot may be kept between two steps.
 ///

@@ -7,7 +7,7 @@ use crate::refine::refined::Refined;
 use crate::refine::report::{LevelReport, StageTime};
 use crate::refine::solver::gauss_newton::{Solution, SolveState};
 use crate::refine::solver::stopping::Stopping;
-use crate::refine::stages::stage::Stage;
+use crate::refine::stages::plan::Stage;
 use crate::refine::tracking::alternating_calibration::AlternatingCalibration;
 use crate::refine::uncertainty::observability::UnobservableParameter;
 use crate::refine::validation::aliasing::AliasHypothesis;
@@ -58,8 +58,8 @@ pub struct Snapshot {
 pub struct Estimation<'a> {
     /// The state.
     pub state: PipelineState,
-    /// The last full-size solve, with its stopping rule. It is held in memory only; no checkpoint is
-    /// kept between it and the assessment that uses it.
+    /// The last full-size solve, with its stopping rule. It is held in memory only; no checkpoint
+    /// is kept between it and the assessment that uses it.
     pub solution: Option<(Solution<'a>, Stopping)>,
     /// The result, once assessed.
     pub refined: Option<Refined>,

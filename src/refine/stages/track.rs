@@ -3,9 +3,9 @@
 
 use crate::refine::error::RefineError;
 use crate::refine::model::context::EstimationContext;
-use crate::refine::setup::Setup;
 use crate::refine::solver::stopping::Stopping;
 use crate::refine::stages::session::Session;
+use crate::refine::stages::setup::Setup;
 use crate::refine::stages::state::{Estimation, PipelineState};
 use crate::refine::tracking::alternating_calibration::AlternatingCalibration;
 

@@ -1,10 +1,10 @@
-//! Stage: compares all frames pair by pair, rejects those that contradict the others or are blurred,
-//! registers rejected ones again, and solves.
+//! Stage: compares all frames pair by pair, rejects those that contradict the others or are
+//! blurred, registers rejected ones again, and solves.
 
 use crate::refine::error::RefineError;
-use crate::refine::setup::Setup;
 use crate::refine::solver::neighbourhood::Neighbourhood;
 use crate::refine::stages::session::Session;
+use crate::refine::stages::setup::Setup;
 use crate::refine::stages::state::Estimation;
 use crate::refine::thresholds::assessment::MAX_PAIR_ITERATIONS;
 use crate::refine::tracking::track::register_rejected;

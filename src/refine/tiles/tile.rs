@@ -2,8 +2,8 @@
 //!
 //! # Objective
 //!
-//! The parameters are the poses `T_i`, log-gains `α_i` and biases `b_i` of the frames, the texture S
-//! of the wall, and the shared parameters κ if they are estimated. The estimator minimises
+//! The parameters are the poses `T_i`, log-gains `α_i` and biases `b_i` of the frames, the texture
+//! S of the wall, and the shared parameters κ if they are estimated. The estimator minimises
 //!
 //! `E = 1/σ² Σ_x Σ_i q_i τ(x) ρ(e_i(x); v(x))`   (pixels)
 //! `  + ½ Σ_k ε_kᵀ Σ_k⁻¹ ε_k`   (poses)

@@ -319,7 +319,7 @@ mod tests {
         }
     }
 
-    /// Where hardly anything correlates, the prior makes every log-posterior negative.
+    /// The prior makes every log-posterior negative if hardly anything correlates.
     #[test]
     fn best_hypothesis_is_worth_refining_at_a_negative_log_posterior() {
         let best = hypothesis(0.05, 200.0, 3.0);

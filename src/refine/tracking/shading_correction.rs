@@ -80,8 +80,8 @@ pub fn correct(
     Ok(true)
 }
 
-/// Observes tiles spread over all of the wall by the frames of a range, tile by tile; frames are counted
-/// from the first of the range.
+/// Observes tiles spread over all of the wall by the frames of a range, tile by tile; frames are
+/// counted from the first of the range.
 fn observe_tiles(
     context: &EstimationContext,
     options: &RefineOptions,

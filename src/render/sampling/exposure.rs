@@ -167,8 +167,8 @@ impl Response<'_> {
         Some(PatchLight::through(pixels().map(|row| row.map(at))))
     }
 
-    /// Undoes the exposure in the values of some columns of a run that lie in one row of a patch; `first`:
-    /// the column where the patch begins.
+    /// Undoes the exposure in the values of some columns of a run that lie in one row of a patch;
+    /// `first`: the column where the patch begins.
     pub fn undo_by(
         &self,
         light: &PatchLight,
@@ -262,7 +262,7 @@ struct Table {
     values: Vec<f32>,
     /// Nodes per pixel across and down.
     scale: [f32; 2],
-    /// Where the first pixel's centre lies, nodes.
+    /// Position of the first pixel's centre, nodes.
     offset: [f32; 2],
 }
 

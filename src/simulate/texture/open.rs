@@ -12,7 +12,7 @@ use crate::simulate::texture::wall_texture::WallTexture;
 ///
 /// # Errors
 /// [`SimulateError::Texture`] for an image that cannot be used.
-pub(in crate::simulate) fn open_texture(
+pub(crate) fn open_texture(
     wall: &Wall,
     seed: u64,
     perimeter_m: f64,

@@ -1,7 +1,7 @@
 //! Interface of a wall's texture.
 
 /// Grey levels of the wall under even light.
-pub(in crate::simulate) trait WallTexture: Send + Sync {
+pub(crate) trait WallTexture: Send + Sync {
     /// Fills one row of texels once around the section.
     ///
     /// Texel k is the mean over the square of side `texel_m` around

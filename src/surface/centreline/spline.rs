@@ -53,9 +53,9 @@ pub(super) struct Spline {
 }
 
 impl Spline {
-    /// Interpolates points with C² continuity:
-    /// `m_{k−1}/c_{k−1} + 2 (1/c_{k−1} + 1/c_k) m_k + m_{k+1}/c_k = 3 (Δ_{k−1}/c_{k−1}² + Δ_k/c_k²)`,
-    /// a tridiagonal system; the slopes at the ends are those of the circles through three points.
+    /// Interpolates points with C² continuity: `m_{k−1}/c_{k−1} + 2 (1/c_{k−1} + 1/c_k) m_k +
+    /// m_{k+1}/c_k = 3 (Δ_{k−1}/c_{k−1}² + Δ_k/c_k²)`, a tridiagonal system; the slopes at the ends
+    /// are those of the circles through three points.
     pub(super) fn through(points: Vec<Vector3<f64>>) -> Self {
         let n = points.len();
         let chords: Vec<f64> = points.windows(2).map(|p| (p[1] - p[0]).norm()).collect();

@@ -287,9 +287,11 @@ mod tests {
     /// The example of the format's documentation.
     const EXAMPLE: &str = "GYROFLOW IMU LOG\nversion,1.3\nid,custom_logger_name\norientation,YxZ\n\
         note,development, test\nfwversion,FIRMWARE_0.1.0\ntimestamp,1644159993\nvendor,potatocam\n\
-        videofilename,videofilename.mp4\nlensprofile,potatocam/potatocam_mark1_prime_7_5mm_4k\nlens_info,wide\n\
+        videofilename,videofilename.mp4\n\
+        lensprofile,potatocam/potatocam_mark1_prime_7_5mm_4k\nlens_info,wide\n\
         frame_readout_time,15.23\nframe_readout_direction,0\ntscale,0.001\ngscale,0.00122173047\n\
-        ascale,0.00048828125\nt,gx,gy,gz,ax,ay,az\n0,39,86,183,-1137,-15689,-2986\n1,56,100,202,-1179,-15694,-2887\n";
+        ascale,0.00048828125\nt,gx,gy,gz,ax,ay,az\n\
+        0,39,86,183,-1137,-15689,-2986\n1,56,100,202,-1179,-15694,-2887\n";
 
     #[test]
     fn the_documented_log_is_read() {
@@ -317,7 +319,8 @@ mod tests {
         assert!(log.orientation.is_none() && log.readout.is_none());
         assert!(log.samples[0].acceleration_g.is_none());
         let all = "GYROFLOW IMU LOG\ntscale,1\ngscale,1\nascale,1\nmscale,1\nframe_readout_time,8\n\
-            frame_readout_direction,1\nt,gx,gy,gz,ax,ay,az,mx,my,mz\n0,1,2,3,4,5,6,7,8,9\n1,1,2,3,4,5,6,7,8,9\n";
+            frame_readout_direction,1\nt,gx,gy,gz,ax,ay,az,mx,my,mz\n\
+            0,1,2,3,4,5,6,7,8,9\n1,1,2,3,4,5,6,7,8,9\n";
         let log = read(all).unwrap();
         assert_eq!(
             log.samples[0].acceleration_g,
@@ -335,19 +338,44 @@ mod tests {
         for (text, expected) in [
             (String::new(), ":1: `` where a gcsv log begins"),
             ("0,1,2,3\n".to_owned(), ":1: `0,1,2,3` where"),
-            ("GYROFLOW IMU LOG\ntscale,1\n".to_owned(), "ends within its header"),
+            (
+                "GYROFLOW IMU LOG\ntscale,1\n".to_owned(),
+                "ends within its header",
+            ),
             ("GYROFLOW IMU LOG\nhello\n".to_owned(), ":2: `hello`"),
-            ("GYROFLOW IMU LOG\ngscale,1\nt,gx,gy,gz\n".to_owned(), "no `tscale`"),
-            ("GYROFLOW IMU LOG\ntscale,0\ngscale,1\nt,gx,gy,gz\n".to_owned(), ":2: tscale is 0"),
-            ("GYROFLOW IMU LOG\ntscale,x\ngscale,1\nt,gx,gy,gz\n".to_owned(), ":2: tscale: `x`"),
-            ("GYROFLOW IMU LOG\norientation,XXZ\ntscale,1\ngscale,1\nt,gx,gy,gz\n".to_owned(), ":2: `XXZ`"),
-            ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,ax,ay,az\n".to_owned(), ":4: columns"),
-            ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,gx,gy,gz,ax\n".to_owned(), ":4: columns"),
-            ("GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,gx,gy,gz,ax,ay,az\n".to_owned(), "no \
-                                                                                        `ascale`"),
+            (
+                "GYROFLOW IMU LOG\ngscale,1\nt,gx,gy,gz\n".to_owned(),
+                "no `tscale`",
+            ),
+            (
+                "GYROFLOW IMU LOG\ntscale,0\ngscale,1\nt,gx,gy,gz\n".to_owned(),
+                ":2: tscale is 0",
+            ),
+            (
+                "GYROFLOW IMU LOG\ntscale,x\ngscale,1\nt,gx,gy,gz\n".to_owned(),
+                ":2: tscale: `x`",
+            ),
+            (
+                "GYROFLOW IMU LOG\norientation,XXZ\ntscale,1\ngscale,1\nt,gx,gy,gz\n".to_owned(),
+                ":2: `XXZ`",
+            ),
+            (
+                "GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,ax,ay,az\n".to_owned(),
+                ":4: columns",
+            ),
+            (
+                "GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,gx,gy,gz,ax\n".to_owned(),
+                ":4: columns",
+            ),
+            (
+                "GYROFLOW IMU LOG\ntscale,1\ngscale,1\nt,gx,gy,gz,ax,ay,az\n".to_owned(),
+                "no \
+                                                                                        `ascale`",
+            ),
             (
                 "GYROFLOW IMU \
-                 LOG\nframe_readout_time,1\nframe_readout_direction,7\ntscale,1\ngscale,1\nt,gx,gy,gz\n"
+                 LOG\nframe_readout_time,1\nframe_readout_direction,7\n\
+                 tscale,1\ngscale,1\nt,gx,gy,gz\n"
                     .to_owned(),
                 ":3: frame_readout_direction is `7`",
             ),
@@ -355,8 +383,14 @@ mod tests {
             (format!("{table}0,1,2,3\n1,1,2\n"), ":6: 3 columns"),
             (format!("{table}0,1,2,nan\n"), ":5: `nan`"),
             (format!("{table}0,1,2,\n"), ":5: ``"),
-            (format!("{table}1,1,2,3\n0,1,2,3\n"), ":6: time 0 s after 1 s"),
-            (format!("{table}1,1,2,3\n1,1,2,3\n"), ":6: time 1 s after 1 s"),
+            (
+                format!("{table}1,1,2,3\n0,1,2,3\n"),
+                ":6: time 0 s after 1 s",
+            ),
+            (
+                format!("{table}1,1,2,3\n1,1,2,3\n"),
+                ":6: time 1 s after 1 s",
+            ),
         ] {
             let message = read(&text).unwrap_err().to_string();
             assert!(message.contains(expected), "{text}: {message}");

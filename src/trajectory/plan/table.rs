@@ -198,8 +198,11 @@ mod tests {
 
     #[test]
     fn stations_lie_between_rows_and_angles_are_not_wrapped() {
-        let plan = table("angle_deg;frame;chainage_m;x_m;z_m;note\n350;0;1;0;0.5;a\n370;2;2;0.2;0.5;b\n0;4;2;0;0;c\n")
-            .unwrap();
+        let plan = table(
+            "angle_deg;frame;chainage_m;x_m;z_m;note\n\
+            350;0;1;0;0.5;a\n370;2;2;0.2;0.5;b\n0;4;2;0;0;c\n",
+        )
+        .unwrap();
         let stations = plan.stations(&[7.0, 8.0, 9.0, 10.0]).unwrap();
         let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
         near(stations[1].angle_rad.to_degrees(), 360.0);

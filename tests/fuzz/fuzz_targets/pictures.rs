@@ -6,7 +6,7 @@ use tunnelstitch::frames::{FrameFile, Mask, colour_type, load_colour};
 use tunnelstitch_fuzz::file;
 
 /// Larger ones only cost time.
-const MOST_PX: u32 = 1 << 16;
+const MAX_PX: u32 = 1 << 16;
 
 fuzz_target!(|data: &[u8]| {
     let (_folder, path) = file("picture", data);
@@ -15,7 +15,7 @@ fuzz_target!(|data: &[u8]| {
     let Ok((width, height)) = frame.size() else {
         return;
     };
-    let (width, height) = match width.saturating_mul(height) <= MOST_PX {
+    let (width, height) = match width.saturating_mul(height) <= MAX_PX {
         true => (width, height),
         // Refused, before it is decoded.
         false => (8, 6),

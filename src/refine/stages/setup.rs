@@ -1,4 +1,5 @@
-//! Everything that is fixed during a refinement: the input, the options, and what follows from both.
+//! Everything that is fixed during a refinement: the input, the options, and what follows from
+//! both.
 
 use crate::frames::FrameCache;
 use crate::refine::error::RefineError;
