@@ -128,6 +128,7 @@ impl Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::photometry::SHADING_SIGMA;
     use crate::frames::{Shading, shading_terms};
     use nalgebra::Vector2;
     use rand::{Rng, SeedableRng};
