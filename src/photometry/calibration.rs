@@ -128,8 +128,8 @@ impl Sums {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::photometry::SHADING_SIGMA;
     use crate::frames::{Shading, shading_terms};
+    use crate::photometry::SHADING_SIGMA;
     use nalgebra::Vector2;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;

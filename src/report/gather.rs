@@ -238,6 +238,13 @@ fn notes(survey: &Survey, refined: &RefinedFiles, comparison: &Comparison) -> Ve
             is_beside("refine.json")
         )),
         Some(refinement) => {
+            if refinement.has_old_keys {
+                notes.push(
+                    "refine.json is of version 0.1: its key strain_px is read as \
+                     overdispersion_px, for one more version. Refine again to renew it."
+                        .to_owned(),
+                );
+            }
             if let Some(calibration) = &refinement.calibration
                 && (calibration.radius_m != survey.file.tunnel.nominal_m()
                     || calibration.camera != Value::Object(object(&survey.camera)))

@@ -35,6 +35,9 @@ pub struct Refinement {
     pub stopped_because: String,
     /// Time by stage.
     pub timings: Vec<StageTime>,
+    /// True if the file has keys of version 0.1, which are read for one more version.
+    #[serde(skip)]
+    pub has_old_keys: bool,
 }
 
 /// Self-calibration, as in `refine.json`.
@@ -141,13 +144,14 @@ fn read_refinement(path: &Path, frames: usize) -> Result<Refinement, ReportError
         path: path.to_owned(),
         source,
     })?;
-    let refinement: Refinement =
+    let mut refinement: Refinement =
         serde_json::from_str(&text).map_err(|error| ReportError::Parse {
             path: path.to_owned(),
             line: error.line(),
             column: error.column(),
             what: error.to_string(),
         })?;
+    refinement.has_old_keys = text.contains("\"strain_px\"");
     match refinement.frames.len() {
         found if found == frames => Ok(refinement),
         found => Err(ReportError::Count {
@@ -155,5 +159,34 @@ fn read_refinement(path: &Path, frames: usize) -> Result<Refinement, ReportError
             found,
             frames,
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame as version 0.1 has written it.
+    const OLD_FRAME: &str = r#"{"index": 0, "file": "a.jpg", "flag": "photometric", "points": 9,
+        "residual": 2.0, "inlier_share": 0.9, "gain": 1.0, "bias": 0.0, "strain_px": 0.25,
+        "sigma": {"rotation_deg": 0.1, "translation_m": 0.1, "wall_m": 0.1, "wall_px": 0.1}}"#;
+
+    #[test]
+    fn keys_of_the_version_before_are_read_and_noted() {
+        let text = format!(
+            r#"{{"program": "tunnelstitch 0.1.0", "command": [], "options": {{}},
+                "survey_file": {{}}, "levels": [], "frames": [{OLD_FRAME}], "frames_on_prior": 0,
+                "variance_factor": 1.0, "stopped_because": "", "timings": []}}"#
+        );
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("refine.json");
+        std::fs::write(&path, &text).unwrap();
+        let old = read_refinement(&path, 1).unwrap();
+        assert_eq!(old.frames[0].overdispersion_px, 0.25);
+        assert!(old.has_old_keys);
+        std::fs::write(&path, text.replace("strain_px", "overdispersion_px")).unwrap();
+        let new = read_refinement(&path, 1).unwrap();
+        assert_eq!(new.frames[0].overdispersion_px, 0.25);
+        assert!(!new.has_old_keys);
     }
 }
