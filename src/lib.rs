@@ -5,6 +5,41 @@
 //! them right by the photometric consistency of overlapping strips of the wall, says how sure it
 //! is, and unrolls the wall into one panorama in metres.
 //!
+//! # Refine frames in memory
+//!
+//! Frames, initial poses, camera and tunnel in; poses and covariances out, without a folder on disk:
+//!
+//! ```
+//! use std::path::Path;
+//! use std::sync::Arc;
+//! use tunnelstitch::frames::FrameSet;
+//! use tunnelstitch::progress::{Progress, Silent};
+//! use tunnelstitch::refine::{RefineInput, RefineOptions, refine};
+//! use tunnelstitch::survey::Survey;
+//!
+//! // Camera, tunnel, poses and their noise model may come from anywhere; here from a survey.
+//! let survey = Survey::open(Path::new("fixtures/blender_free48"))?;
+//! let pictures = survey.frames.iter().take(14).map(|frame| image::open(&frame.path));
+//! let frames = FrameSet::in_memory(pictures.collect::<Result<Vec<_>, _>>()?);
+//!
+//! let input = RefineInput::new(
+//!     survey.camera,
+//!     survey.surface.as_ref(),
+//!     &frames,
+//!     &survey.initial[..14],
+//!     survey.prior,
+//! );
+//! let silent: Arc<dyn Progress> = Arc::new(Silent);
+//! let refined = refine(input, &RefineOptions::default(), &silent)?;
+//! assert_eq!(refined.trajectory.len(), 14);
+//! // 6 × 6 covariances of rotation (rad) and translation (m).
+//! assert!(refined.covariances.frames.iter().all(|covariance| covariance.trace() < 1.0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! More programs are in `examples/`: frames cast from a known texture and compared with the truth, a
+//! tunnel shape of one's own, panoramas from given poses.
+//!
 //! # The flow of data
 //!
 //! ```text
@@ -38,7 +73,7 @@
 //!
 //! <!-- end of the order -->
 //!
-//! # An example
+//! # A simulated survey
 //!
 //! Simulate two turns of the paper's third experiment, repair its poses, and measure what is left:
 //!
@@ -107,6 +142,7 @@ const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
 mod bitmap_text;
 pub mod camera;
 pub mod check;
+#[doc(hidden)]
 pub mod cli;
 pub mod evaluate;
 pub mod frames;
