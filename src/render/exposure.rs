@@ -166,8 +166,8 @@ impl Response<'_> {
         Some(Light::through(pixels().map(|row| row.map(at))))
     }
 
-    /// Undoes the exposure in the values of some columns of a run that lie in one row of a patch; `first`:
-    /// the column where the patch begins.
+    /// Undoes the exposure in the values of some columns of a run that lie in one row of a patch;
+    /// `first`: the column where the patch begins.
     pub fn undo_by(
         &self,
         light: &Light,
