@@ -28,11 +28,12 @@
 //! wrong `β/(a V S)` passes for a change of V.
 //!
 //! The model value contains s, which is estimated from the same observations. The noise of
-//! `ln z_i` is `n_i/(f_i m_i)`, n being equal in all frames as grey levels of the frame. In the mean
-//! with weights of the inverse variance, `w_i = (f_i m_i)²`, it becomes `n_s = Σ w_i n_i/(f_i m_i) /
-//! Σ w_i`, and `Cov(n_s, n_i/(f_i m_i)) = σ²/Σ w` is the same for all i. It cancels in the
-//! difference of any two observations, which is all that is left once s is eliminated. Equal
-//! weights would leave a part of the error above where frames see the point in different light.
+//! `ln z_i` is `n_i/(f_i m_i)`, n being equal in all frames as grey levels of the frame. In the
+//! mean with weights of the inverse variance, `w_i = (f_i m_i)²`, it becomes
+//! `n_s = Σ w_i n_i/(f_i m_i) / Σ w_i`, and `Cov(n_s, n_i/(f_i m_i)) = σ²/Σ w` is the same for all
+//! i. It cancels in the difference of any two observations, which is all that is left once s is
+//! eliminated. Equal weights would leave a part of the error above where frames see the point in
+//! different light.
 //!
 //! # The solution
 //!
