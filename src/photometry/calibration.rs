@@ -1,9 +1,10 @@
 //! Robust solution of the photometric calibration.
 
-use super::normal_equations::{NormalEquations, Solution};
+use super::normal_equations::{NormalEquations, ShadingMatrix, Solution};
 use super::observation::{LinearisedPoint, Observation, Unknowns};
 use super::priors::Priors;
 use crate::frames::{MAD_TO_SIGMA, SHADING_TERMS};
+use nalgebra::SVector;
 use rayon::prelude::*;
 
 /// Reweighting iterations at the most: it takes ten until glints weigh nothing, and three leave the
@@ -27,8 +28,8 @@ pub struct PhotometricCalibration {
     pub biases: Vec<f64>,
     /// `c_k`: coefficients of the logarithmic shading.
     pub shading: [f64; SHADING_TERMS],
-    /// Trace of the covariance of `c_k`: their expected square for noise alone.
-    pub shading_variance: f64,
+    /// Covariance C of `c_k`.
+    pub shading_covariance: ShadingMatrix,
 }
 
 impl PhotometricCalibration {
@@ -63,14 +64,22 @@ impl PhotometricCalibration {
             log_gains: frames.iter().map(|[log_gain, _]| *log_gain).collect(),
             biases: frames.iter().map(|[_, bias]| *bias).collect(),
             shading: *shading,
-            shading_variance: variance * solution.shading_trace(),
+            shading_covariance: variance * solution.shading_cofactors(),
         }
     }
 
-    /// True if the shading is more than `sigmas` times as large as noise alone makes it.
+    /// True if the shading is more than `sigmas` times as large as noise alone makes it:
+    /// `cᵀ C⁻¹ c > sigmas² K` with K coefficients, for noise alone `χ²` with a mean of K.
+    ///
+    /// Each direction counts by its own accuracy. A shading as a common bias behind a lamp makes it
+    /// is hardly determined, and must not hide errors of one that is.
     pub fn is_shading_significant(&self, sigmas: f64) -> bool {
-        let square: f64 = self.shading.iter().map(|c| c * c).sum();
-        square > sigmas * sigmas * self.shading_variance
+        let c = SVector::from(self.shading);
+        let square = self
+            .shading_covariance
+            .cholesky()
+            .map(|factor| c.dot(&factor.solve(&c)));
+        square.is_some_and(|square| square > sigmas * sigmas * SHADING_TERMS as f64)
     }
 }
 
@@ -272,7 +281,7 @@ mod tests {
             "bias {square_bias} {expected_bias}"
         );
         // The stated variance is that of the draws.
-        let stated = found[0].shading_variance / DRAWS as f64;
+        let stated = found[0].shading_covariance.trace() / DRAWS as f64;
         assert!(
             (0.5..2.0).contains(&(stated / expected)),
             "{stated} {expected}"
