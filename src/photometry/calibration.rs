@@ -138,7 +138,6 @@ impl Sums {
 mod tests {
     use super::*;
     use crate::frames::{Shading, shading_terms};
-    use crate::photometry::SHADING_SIGMA;
     use nalgebra::Vector2;
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
@@ -148,7 +147,7 @@ mod tests {
     const PRIORS: Priors = Priors {
         log_gain_sigma: 0.3,
         bias_sigma_grey: 10.0,
-        shading_sigma: SHADING_SIGMA,
+        shading_sigma: 0.5,
     };
 
     /// Frames of a wall with a known truth.

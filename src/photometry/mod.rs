@@ -78,4 +78,4 @@ mod robust_weights;
 
 pub use calibration::PhotometricCalibration;
 pub use observation::Observation;
-pub use priors::{Priors, SHADING_SIGMA};
+pub use priors::Priors;

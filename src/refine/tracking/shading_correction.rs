@@ -11,7 +11,7 @@
 //! Only the shading is taken over; the solves that follow estimate gains and biases themselves.
 
 use crate::frames::Shading;
-use crate::photometry::{Observation, PhotometricCalibration, Priors, SHADING_SIGMA};
+use crate::photometry::{Observation, PhotometricCalibration, Priors};
 use crate::refine::model::context::EstimationContext;
 use crate::refine::model::frame_states::FrameStates;
 use crate::refine::model::problem_error::ProblemError;
@@ -63,16 +63,11 @@ pub fn correct(
         context.camera.height as usize,
     );
     let points = observe_tiles(context, options, frames, &range)?;
-    let priors = Priors {
-        log_gain_sigma: context.prior.log_gain_sigma,
-        bias_sigma_grey: context.prior.bias_sigma,
-        shading_sigma: SHADING_SIGMA,
-    };
     let (before, sigmas) = match context.frames.shading() {
         Some(shading) => ((*shading).clone(), MIN_CHANGE_SIGNIFICANCE_SIGMA),
         None => (Shading::none(size), MIN_SIGNIFICANCE_SIGMA),
     };
-    let found = PhotometricCalibration::solve(&points, range.len(), size, &priors);
+    let found = PhotometricCalibration::solve(&points, range.len(), size, &Priors::default());
     let Some(found) = found.filter(|found| found.is_shading_significant(sigmas)) else {
         return Ok(false);
     };

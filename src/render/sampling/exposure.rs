@@ -15,7 +15,7 @@ use super::sample::Sample;
 use super::thumbnails::Thumbnails;
 use crate::frames::Shading;
 use crate::numerics::simd_dispatch::dispatch_simd;
-use crate::photometry::{PhotometricCalibration, Priors, SHADING_SIGMA};
+use crate::photometry::{PhotometricCalibration, Priors};
 use crate::render::layout::canvas::Canvas;
 use crate::render::layout::placement::Placement;
 use crate::render::warp::patches::PATCH_SCALE;
@@ -24,14 +24,6 @@ use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 
-/// Standard deviations of the unknowns beforehand: a third more or less light, and a bias of about
-/// a grey level. Refining has a wider prior of the bias, which its later solves correct; a panorama
-/// keeps what is found here.
-const PRIORS: Priors = Priors {
-    log_gain_sigma: 0.3,
-    bias_sigma_grey: 1.0,
-    shading_sigma: SHADING_SIGMA,
-};
 /// Wall points a frame.
 const POINTS_PER_FRAME: usize = 40;
 /// Wall points at the least.
@@ -84,7 +76,8 @@ impl Exposure {
         let grid = canvas.coarser((POINTS_PER_FRAME * count).max(MIN_POINTS));
         let size = thumbnails.full_size();
         let points = observe_points(surface, thumbnails, placements, &grid);
-        let Some(found) = PhotometricCalibration::solve(&points, count, size, &PRIORS) else {
+        let Some(found) = PhotometricCalibration::solve(&points, count, size, &Priors::default())
+        else {
             return Self {
                 scale: white / 255.0,
                 ..Self::none(count)
