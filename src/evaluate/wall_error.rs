@@ -15,7 +15,7 @@ const MAX_MEAN_ITERATIONS: usize = 20;
 
 /// Distances on the unrolled wall between a pixel's projections by the estimated and true poses.
 ///
-/// They are computed for 9 × 7 pixels per frame ([`Camera::rays_across`]). The mean `Δs` and the
+/// They are computed for 9 × 7 pixels per frame ([`Camera::grid_rays`]). The mean `Δs` and the
 /// mean `Δh` over all pixels of all frames are removed as far as the tunnel's
 /// [gauge](crate::surface::Gauge) leaves them free: they are unobservable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

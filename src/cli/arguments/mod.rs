@@ -2,7 +2,7 @@
 //!
 //! | file | arguments |
 //! | --- | --- |
-//! | [`numbers`] | parsers of numbers, sizes and lists |
+//! | `numbers` | parsers of numbers, sizes and lists |
 //! | [`poses`] | which poses are used, and how they are read |
 //! | [`tunnel`] | section and centreline |
 //! | [`frame_times`] | number and times of the frames |

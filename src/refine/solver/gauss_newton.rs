@@ -58,7 +58,7 @@ pub struct SolveState {
 /// against each other, that roughness exceeds the gain, and a solve that asked for a lower cost
 /// would get stuck.
 ///
-/// Frames that a step would make infeasible ([`Problem::is_feasible`]) keep their estimates. The
+/// Frames that a step would make infeasible ([`PhotometricProblem::is_feasible`]) keep their estimates. The
 /// last step, undamped and shorter than the tolerance, is not judged: cost and equations are those
 /// before it.
 ///

@@ -2,7 +2,7 @@
 //!
 //! | subject | file |
 //! | --- | --- |
-//! | the line with its rotation-minimising frames | [`line`] |
+//! | the line with its rotation-minimising frames | [`line`](mod@line) |
 //! | the spline through the given points | [`spline`] |
 //! | bends too tight for the section, and a tunnel that meets itself | [`self_intersection`] |
 
