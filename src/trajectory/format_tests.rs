@@ -162,7 +162,7 @@ fn what_is_no_text_is_refused() {
         &[0x89, b'P', b'N', b'G'],
     ] {
         let message = read_poses(&file_of(bytes).1, None).unwrap_err().to_string();
-        assert!(message.contains("no text"), "{message}");
+        assert!(message.contains("is not UTF-8 text"), "{message}");
     }
     let message = read_poses(Path::new("/nowhere/poses.tum"), None)
         .unwrap_err()

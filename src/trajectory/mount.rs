@@ -133,11 +133,11 @@ mod tests {
         for (text, expected) in [
             ("", "0 rows"),
             ("1 0 0\n0 1 0\n0 0 1\n", ":1: 3 columns"),
-            ("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n", "mirror"),
+            ("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n", "a reflection"),
             ("T_BS:\n data: [1, 0, 0]\n", "3 numbers"),
             ("T_BS:\n data: [1, 0, x]\n", "`x` is not a number"),
             (&format!("{identity}{identity}"), "both T_BS and T_BS"),
-            ("\u{0}", "no text"),
+            ("\u{0}", "is not UTF-8 text"),
         ] {
             let message = read_text(text).unwrap_err().to_string();
             assert!(message.contains(expected), "{message}");

@@ -312,7 +312,7 @@ const ROWS: &[Row] = &[
         Write(CAMERA, b"\xff\xd8\xff"),
         REFINE,
         3,
-        &["camera.json", "no text"],
+        &["camera.json", "not a text file"],
     ),
     (
         Edit(CAMERA, "\"fx\"", "\"gx\""),

@@ -237,7 +237,7 @@ fn a_mask_is_recognised_reported_recorded_and_kept() {
         "ignore = [{ theta_deg = [330, 30] }]",
     );
     let said = succeed(&["check", text(&survey)]);
-    let masks = "9.0 % of every picture hidden, 16.7 % of the wall in 1 part ignored";
+    let masks = "9.0 % of every frame hidden, 16.7 % of the wall in 1 part ignored";
     assert!(said.contains(masks), "{said}");
     let config = succeed(&["config", text(&survey)]);
     for kept in ["mask = \"mask.png\"", "theta_deg = [330.0, 30.0]"] {

@@ -104,8 +104,8 @@ fn files_of_other_programs_are_the_same_camera() {
     );
     let ros = |model: &str, d: &str| {
         format!(
-            "image_width: 640\nimage_height: 480\ncamera_name: front\ncamera_matrix:\n  rows: 3\n \
-              cols: 3\n  data: [415, 0, 318, \
+            "image_width: 640\nimage_height: 480\ncamera_name: front\ncamera_matrix:\n  rows: 3\n  \
+             cols: 3\n  data: [415, 0, 318, \
              0, 417, 241, 0, 0, 1]\ndistortion_model: {model}\ndistortion_coefficients:\n  rows: \
              1\n  cols: 5\n  data: [{d}]\n\
              rectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"

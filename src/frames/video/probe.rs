@@ -243,13 +243,13 @@ mod tests {
             ),
             (
                 format!(r#"{{"packets": [{{"flags": "K_"}}], "streams": [{{{STREAM}}}]}}"#),
-                "when each picture is shown",
+                "pictures without times",
             ),
             (
                 format!(
                     r#"{{"packets": [{{"pts": 1}}, {{"pts": 1}}], "streams": [{{{STREAM}}}]}}"#
                 ),
-                "when each picture is shown",
+                "pictures without times",
             ),
         ] {
             let message = probed(&json).map(|_| ()).unwrap_err();
