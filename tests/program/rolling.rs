@@ -20,7 +20,7 @@ fn refine(survey: &Path, out: &Path) -> (Value, String) {
     let warned = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{warned}");
     let report = json(&out.join("refine.json"));
-    (report["rows"].clone(), warned)
+    (report["rolling_shutter"].clone(), warned)
 }
 
 fn compare(survey: &Path, refined: &Path, out: &Path) -> Value {

@@ -317,7 +317,7 @@ fn impossible_surveys_are_refused_with_the_reason() {
     refuse(&["--gain-percent", "100"], 2, "gain");
     refuse(&["--bias-grey", "-1"], 2, "bias");
     refuse(&["--lamp-corner", "0"], 2, "corner");
-    refuse(&["--specular-percent", "95"], 2, "damp patches");
+    refuse(&["--specular-percent", "95"], 2, "wet patches");
     refuse(&["--moving", "-1"], 2, "--moving");
     refuse(&["--bits", "12"], 2, "8, 16");
     refuse(&["--bad-frames", "5:black,9:blury"], 2, "`9:blury`");

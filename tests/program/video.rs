@@ -359,7 +359,7 @@ fn what_is_wrong_with_a_video_is_said() {
     std::fs::write(survey.join("a.mkv"), &sound[..sound.len() / 2]).unwrap();
     refine(&["a.mkv", "cut off", "copy it again"]);
     std::fs::write(survey.join("a.mkv"), "no video").unwrap();
-    refine(&["a.mkv", "no video"]);
+    refine(&["a.mkv", "not a video"]);
     let frames = survey.join("frames/%06d.png");
     let entangled = survey.join("b.mp4");
     video_of(&frames, &entangled, &ENTANGLED);
