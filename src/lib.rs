@@ -7,7 +7,8 @@
 //!
 //! # Refine frames in memory
 //!
-//! Frames, initial poses, camera and tunnel in; poses and covariances out, without a folder on disk:
+//! Frames, initial poses, camera and tunnel in; poses and covariances out, without a folder on
+//! disk:
 //!
 //! ```
 //! use std::path::Path;
@@ -37,8 +38,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! More programs are in `examples/`: frames cast from a known texture and compared with the truth, a
-//! tunnel shape of one's own, panoramas from given poses.
+//! More programs are in `examples/`: frames cast from a known texture and compared with the truth,
+//! a tunnel shape of one's own, panoramas from given poses.
 //!
 //! # The flow of data
 //!

@@ -1,7 +1,7 @@
 //! Priors of the photometric calibration.
 
-/// Standard deviations of the unknowns around 0 beforehand. The defaults suit refining and stitching
-/// alike.
+/// Standard deviations of the unknowns around 0 beforehand. The defaults suit refining and
+/// stitching alike.
 #[derive(Clone, Copy, Debug)]
 pub struct Priors {
     /// Of α, the logarithm of a frame's gain; 0.3 is a third more or less light.
@@ -9,8 +9,8 @@ pub struct Priors {
     /// Of β, a frame's bias, grey levels. On a wall of low contrast bias and gain are hardly told
     /// apart; a wide prior leaves that to noise.
     pub bias_sigma_grey: f64,
-    /// Of the shading's coefficients `c_k` around what is known: keeps terms that the overlaps do not
-    /// determine near 0.
+    /// Of the shading's coefficients `c_k` around what is known: keeps terms that the overlaps do
+    /// not determine near 0.
     pub shading_sigma: f64,
 }
 

@@ -104,7 +104,7 @@ fn rows_may_be_read_bottom_up_and_each_frame_may_err_by_itself() {
         "readout_ms = 20.0",
     );
     let (rows, warned) = refine(&survey, &out);
-    assert!(warned.contains("and not 20 ms"), "{warned}");
+    assert!(warned.contains("not 20 ms as given"), "{warned}");
     assert!(number(&rows, "/estimate_ms") < -15.0, "{rows}");
 }
 

@@ -58,9 +58,9 @@ pub struct SolveState {
 /// against each other, that roughness exceeds the gain, and a solve that asked for a lower cost
 /// would get stuck.
 ///
-/// Frames that a step would make infeasible ([`PhotometricProblem::is_feasible`]) keep their estimates. The
-/// last step, undamped and shorter than the tolerance, is not judged: cost and equations are those
-/// before it.
+/// Frames that a step would make infeasible ([`PhotometricProblem::is_feasible`]) keep their
+/// estimates. The last step, undamped and shorter than the tolerance, is not judged: cost and
+/// equations are those before it.
 ///
 /// Source: P. Wolfe, "Convergence conditions for ascent methods", SIAM Review 11(2), 1969 (the
 /// slope along a step).
