@@ -131,35 +131,20 @@
 //! Source: R. S. Pahwa, W. K. Leong, S. Foong, K. Leman, M. N. Do, "Feature-less Stitching of
 //! Cylindrical Tunnel", arXiv 1806.10278.
 
-#![forbid(unsafe_code)]
-#![warn(missing_docs)]
 // The equations stand beside the code that does them, much of it private: `cargo doc
 // --document-private-items` shows all of it.
 #![allow(rustdoc::private_intra_doc_links)]
 
-/// Name and version, as results carry them.
-const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
-
-mod bitmap_text;
-pub mod camera;
 pub mod check;
 #[doc(hidden)]
 pub mod cli;
 pub mod evaluate;
-pub mod frames;
 pub mod inspect;
-mod numerics;
-pub mod persist;
-mod photometry;
-pub mod progress;
-pub mod raster;
-pub mod refine;
-pub mod render;
 pub mod report;
-pub mod simulate;
-pub mod super_resolve;
-pub mod surface;
-pub mod survey;
-#[cfg(test)]
-mod test_wall;
-pub mod trajectory;
+
+pub use tunnelstitch_core::{
+    camera, frames, persist, progress, raster, super_resolve, surface, survey, trajectory,
+};
+pub use tunnelstitch_refine as refine;
+pub use tunnelstitch_render as render;
+pub use tunnelstitch_simulate as simulate;

@@ -58,12 +58,12 @@ pub fn image_metrics(first: &Panorama, second: &Panorama) -> Result<ImageMetrics
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_pictures::pictures;
     use super::*;
     use crate::progress::Silent;
-    use crate::render::tests::pictures::pictures;
     use crate::render::{Canvas, Mode, Picture, PictureCache, RenderOptions, place, render};
-    use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Shutter;
+    use tunnelstitch_core::test_wall::{TestWall, waves};
 
     fn panorama(wall: &TestWall, mut stack: PictureCache, ppm: f64) -> Panorama {
         let placements =

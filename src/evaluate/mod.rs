@@ -41,6 +41,8 @@ mod normalised_errors;
 mod seam_residual;
 mod ssim;
 mod survey;
+#[cfg(test)]
+mod test_pictures;
 mod trajectory_error;
 mod unaligned_error;
 mod wall_error;

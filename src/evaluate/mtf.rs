@@ -1,7 +1,7 @@
 //! Sharpness of an image from a slanted edge: modulation transfer function.
 
-use crate::numerics::signal::{hann, sinc};
-use realfft::RealFftPlanner;
+use tunnelstitch_core::numerics::signal::{hann, sinc};
+use tunnelstitch_core::numerics::spectrum::half_spectrum;
 
 /// Bins of the edge's profile per pixel of the image.
 const OVERSAMPLING: f64 = 4.0;
@@ -22,9 +22,7 @@ const OVERSAMPLING: f64 = 4.0;
 pub fn mtf50(samples: impl IntoIterator<Item = (f64, f64)>, pixel_m: f64) -> Option<f64> {
     let mut lsf = line_spread(&edge_spread(samples, pixel_m / OVERSAMPLING)?);
     let n = lsf.len();
-    let plan = RealFftPlanner::<f32>::new().plan_fft_forward(n);
-    let mut spectrum = plan.make_output_vec();
-    plan.process(&mut lsf, &mut spectrum).ok()?;
+    let spectrum = half_spectrum(&mut lsf);
     let at_zero = f64::from(spectrum.first()?.norm());
     let per_bin = OVERSAMPLING / (n as f64 * pixel_m);
     let mut last = 1.0;

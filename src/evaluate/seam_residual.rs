@@ -239,11 +239,11 @@ impl CellSums {
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_pictures::pictures;
     use super::*;
-    use crate::render::tests::pictures::pictures;
     use crate::render::{Picture, place};
-    use crate::test_wall::{TestWall, waves};
     use crate::trajectory::Shutter;
+    use tunnelstitch_core::test_wall::{TestWall, waves};
 
     #[test]
     fn true_poses_leave_rounding_noise_and_wrong_ones_much_more() {

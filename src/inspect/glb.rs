@@ -7,11 +7,11 @@
 //! Materials are unlit (`KHR_materials_unlit`), since the texture contains the illumination. Faces
 //! are visible from inside only.
 
-use crate::PROGRAM;
 use crate::inspect::mesh::Mesh;
 use crate::surface::WallPoint;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
+use tunnelstitch_core::PROGRAM;
 
 /// Mesh of a piece of the wall with its texture.
 #[derive(Debug)]

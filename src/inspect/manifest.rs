@@ -1,6 +1,5 @@
 //! Metadata of the viewer's page besides the tiles: `tunnel.json` and `wall.json`.
 
-use crate::PROGRAM;
 use crate::camera::Camera;
 use crate::inspect::level_strip::BORDER;
 use crate::inspect::mesh::{GridLines, WallRectangle};
@@ -9,6 +8,7 @@ use crate::render::Canvas;
 use crate::surface::Surface;
 use crate::trajectory::Pose;
 use serde::Serialize;
+use tunnelstitch_core::PROGRAM;
 
 /// Name of the file with the metadata of a tunnel.
 pub const MANIFEST: &str = "tunnel.json";

@@ -9,10 +9,10 @@
 //! metres: then a pixel of the texture covers at most one of the screen. The finest tiles have
 //! error 0.
 
-use crate::PROGRAM;
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::collections::HashMap;
+use tunnelstitch_core::PROGRAM;
 
 /// The error on the screen at which programs refine by default, pixels.
 pub(super) const SCREEN_PX: f64 = 16.0;

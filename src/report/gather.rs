@@ -6,9 +6,7 @@ use super::model::{
 };
 use super::pictures::{Pictures, panoramas, thumbnails};
 use super::refined_files::{RefinedFiles, Refinement};
-use crate::PROGRAM;
 use crate::evaluate::{ComparedPanoramas, Comparison, SeamMap, WallError};
-use crate::numerics::median::upper_median;
 use crate::refine::FrameFlag;
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
@@ -16,6 +14,8 @@ use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::path::Path;
+use tunnelstitch_core::PROGRAM;
+use tunnelstitch_core::numerics::median::upper_median;
 
 /// Sources of a report.
 #[derive(Debug)]

@@ -1,12 +1,12 @@
 //! Arguments and checkpoints of runs that can be continued after an interruption.
 
-use crate::PROGRAM;
 use crate::cli::output::{Failure, json};
 use crate::persist::checkpoint::{Checkpoint, Origin, folder_of};
 use crate::persist::provenance::Input;
 use crate::survey::Survey;
 use serde::Serialize;
 use std::path::Path;
+use tunnelstitch_core::PROGRAM;
 
 /// Arguments of a run that can be continued.
 #[derive(Debug, clap::Args)]

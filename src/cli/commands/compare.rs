@@ -1,6 +1,5 @@
 //! `tunnelstitch compare`: compares initial with refined poses.
 
-use crate::PROGRAM;
 use crate::cli::arguments::{PictureArguments, PoseReadingArguments, positive};
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::evaluate::{ComparedPanoramas, Comparison, compare_survey, draw_before_after};
@@ -13,6 +12,7 @@ use crate::trajectory::poses_of;
 use image::DynamicImage;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use tunnelstitch_core::PROGRAM;
 
 /// Compares the survey's initial poses with refined ones, and both with the true ones if known.
 ///

@@ -1,6 +1,5 @@
 //! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
 
-use crate::PROGRAM;
 use crate::camera::format_calibration;
 use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, resume};
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
@@ -16,6 +15,7 @@ use crate::trajectory::tum;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use tunnelstitch_core::PROGRAM;
 
 /// Refines the poses of a survey by photometric bundle adjustment.
 ///

@@ -1,7 +1,6 @@
 //! `run.toml`, the record beside a result: command line, options and hashes of all inputs.
 
 use super::failure::Failure;
-use crate::PROGRAM;
 use crate::frames::hash_frames;
 use crate::persist::atomic;
 use crate::persist::provenance::{self, HashError, Input};
@@ -9,6 +8,7 @@ use crate::survey::Survey;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use tunnelstitch_core::PROGRAM;
 
 /// Command line and options of a run.
 pub struct RunRecord {

@@ -110,7 +110,7 @@ impl ConvergeOptions {
     pub fn settings(&self) -> Settings {
         Settings {
             schema_version: SCHEMA_VERSION,
-            program: crate::PROGRAM.to_owned(),
+            program: tunnelstitch_core::PROGRAM.to_owned(),
             frames: self.frames,
             width: self.width,
             height: self.height,

@@ -4,11 +4,11 @@
 //! and a column for each rotation sigma. Each cell shows its success rate, successes and runs, and
 //! false successes if there are any.
 
-use crate::bitmap_text::{self, LETTER};
 use crate::evaluate::converge::options::TranslationScale;
 use crate::evaluate::converge::summary::{CellSummary, Convergence};
 use crate::evaluate::converge::sweep_cell::{jitter_name, unit_sigmas};
 use image::{Rgb, RgbImage};
+use tunnelstitch_core::bitmap_text::{self, LETTER};
 
 /// Scale of the text; small text has scale 1.
 const SCALE: u32 = 2;

@@ -101,7 +101,7 @@ impl Convergence {
     pub(super) fn new(options: &ConvergeOptions, cells: Vec<CellSummary>) -> Self {
         Self {
             schema_version: SCHEMA_VERSION,
-            program: crate::PROGRAM,
+            program: tunnelstitch_core::PROGRAM,
             options: options.clone(),
             refine_options: RefineOptions::default(),
             good_px: GOOD_PX,

@@ -1,0 +1,34 @@
+//! Frames: reading, grey images, pyramids, masks, noise and writing of pictures.
+
+mod cache;
+mod decode;
+mod error;
+mod frame_file;
+mod frame_set;
+mod grey;
+mod hash;
+mod local_contrast;
+mod mask;
+mod noise;
+mod pyramid;
+mod shading;
+mod stored_frame;
+mod video;
+mod write;
+
+pub use cache::FrameCache;
+pub use decode::{colour_type, load_colour};
+pub use error::FrameError;
+pub use frame_file::{FrameFile, list_frames};
+pub use frame_set::FrameSet;
+pub use grey::GreyImage;
+pub use hash::hash_frames;
+pub use local_contrast::{LocalContrast, local_contrast, mask_outliers};
+pub use mask::{Mask, PyramidMask};
+pub use noise::MAD_TO_SIGMA;
+pub use noise::{noise_at_level, noise_sigma};
+pub use pyramid::Pyramid;
+pub use shading::{Shading, TERMS as SHADING_TERMS, terms as shading_terms};
+pub use stored_frame::StoredFrame;
+pub use video::Video;
+pub use write::{FormatError, JPEG_LIMIT_PX, JPEG_QUALITY, PictureFormat, write_picture};

@@ -1,0 +1,21 @@
+//! Atomic files and folders: written under a temporary name beside the target, synchronised to
+//! disk, then renamed. Neither a killed program nor a power failure leaves a partial result.
+//!
+//! Unfinished files are removed when writing fails, and by [`remove_unfinished`] when the program
+//! is interrupted. Files abandoned by a killed program are removed by the next program that writes
+//! into the folder: a temporary file is locked as long as its writer lives, and an unlocked one is
+//! abandoned.
+
+mod durable;
+mod error;
+mod file;
+mod parent;
+mod staged;
+mod temporary;
+
+pub use durable::sync_files;
+pub use error::WriteError;
+pub use file::{create_folder, remove_file, write, write_text};
+pub use parent::parent_folder;
+pub use staged::{ScratchFolder, StagedFolder};
+pub use temporary::remove_unfinished;

@@ -1,0 +1,45 @@
+//! Tunnel shapes: ray–wall intersection, wall coordinates, and the Jacobian of a pixel's wall point
+//! with respect to the pose.
+//!
+//! A wall point has two coordinates in metres: `s`, the arc length around the section (periodic),
+//! and `h`, the chainage along the axis. One file per shape; each implements [`Surface`].
+//!
+//! # Example
+//!
+//! ```
+//! use nalgebra::Vector3;
+//! use tunnelstitch_core::surface::{Circle, Surface};
+//!
+//! let tunnel = Circle::new(3.0)?;
+//! let hit = tunnel.hit(&Vector3::new(0.5, 1.0, 0.0), &Vector3::new(0.0, 0.2, 1.0))?;
+//! let wall = tunnel.frame(hit.wall);
+//! assert!((wall.x_w - hit.x_w).norm() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod centreline;
+mod circle;
+mod displacement;
+mod error;
+mod footprint;
+mod gauge;
+mod gauge_component;
+mod prism;
+pub mod section;
+mod shape;
+mod swept;
+mod wall;
+mod wall_regions;
+
+pub use centreline::{CentrePoint, Centreline, CentrelineFrame};
+pub use circle::Circle;
+pub use displacement::{lens_jacobian, wall_jacobian};
+pub use error::SurfaceError;
+pub use footprint::{Footprint, shortest_arc};
+pub use gauge::{Axis, Gauge, GaugeMotion};
+pub use gauge_component::gauge_component;
+pub use prism::Prism;
+pub use shape::{Surface, viewing_distance};
+pub use swept::Swept;
+pub use wall::{Hit, WallFrame, WallPoint};
+pub use wall_regions::WallRegions;

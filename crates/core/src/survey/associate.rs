@@ -1,0 +1,311 @@
+//! Association of poses with frames.
+
+use super::error::SurveyError;
+use crate::frames::FrameFile;
+use crate::trajectory::{PoseEntry, PoseFile, StampedPose, Trajectory, se3};
+use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// The criterion by which poses are associated with frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Associate {
+    /// By order: the first pose belongs to the first frame and so on, with as many poses as frames.
+    Order,
+    /// By the frame's name in the file of poses.
+    Name,
+    /// By the frame's time.
+    Time,
+}
+
+/// Default tolerance between the times of a frame and its pose, seconds; the default of `evo`.
+pub const TIME_TOLERANCE_S: f64 = 0.01;
+
+/// Parameters of the association by time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct TimeAssociation {
+    /// Largest difference between the times of a frame and its pose, seconds.
+    pub tolerance_s: f64,
+    /// True to interpolate between the two neighbouring poses.
+    pub interpolate: bool,
+}
+
+/// Associates poses by order, in the convention of the file. The times are the file's, else the
+/// frames', else the indices.
+///
+/// # Errors
+/// Different numbers of poses and frames.
+pub(super) fn by_order(
+    file: &PoseFile,
+    frames: &[FrameFile],
+    times_s: Option<&[f64]>,
+) -> Result<Trajectory, SurveyError> {
+    if file.entries.len() != frames.len() {
+        return Err(SurveyError::Count {
+            path: file.path.clone(),
+            poses: file.entries.len(),
+            frames: frames.len(),
+            remedy: if file.has_names() {
+                "; or associate them by name (--associate name)"
+            } else if file.has_times() {
+                "; or associate them by time (--associate time)"
+            } else {
+                ""
+            },
+        });
+    }
+    Ok(file
+        .entries
+        .iter()
+        .enumerate()
+        .map(|(k, entry)| stamped(entry, k, times_s))
+        .collect())
+}
+
+/// Associates poses by name: the name in the file of poses must equal the frame's path or its end.
+/// Poses of other files are ignored.
+///
+/// # Errors
+/// A file without names; a frame without a pose, or with several.
+pub(super) fn by_name(
+    file: &PoseFile,
+    frames: &[FrameFile],
+    times_s: Option<&[f64]>,
+) -> Result<Trajectory, SurveyError> {
+    let fail = |what: String| SurveyError::Association {
+        path: file.path.clone(),
+        what,
+    };
+    let mut named: HashMap<String, Vec<(&Path, &PoseEntry)>> = HashMap::new();
+    for entry in &file.entries {
+        let path = Path::new(entry.name.as_deref().ok_or_else(|| {
+            fail(
+                "has no names of frames; associate its poses by --associate order or time"
+                    .to_owned(),
+            )
+        })?);
+        let base = path.file_name().unwrap_or_default().to_string_lossy();
+        named
+            .entry(base.into_owned())
+            .or_default()
+            .push((path, entry));
+    }
+    let of_frame = |frame: &FrameFile| {
+        let same = named.get(&frame.name()).map_or(&[][..], Vec::as_slice);
+        let entry = match same {
+            [] => Err(fail(format!(
+                "no pose of frame {} ({})",
+                frame.index,
+                frame.path.display()
+            ))),
+            [(_, only)] => Ok(*only),
+            // Several folders contain files of that name: compare the path's components.
+            several => {
+                let mut fitting = several
+                    .iter()
+                    .filter(|(path, _)| frame.path.ends_with(relative(path)));
+                match (fitting.next(), fitting.next()) {
+                    (Some((_, only)), None) => Ok(*only),
+                    _ => Err(fail(format!(
+                        "{} poses could be those of frame {} ({}); names in the file must end the \
+                         frames' paths",
+                        several.len(),
+                        frame.index,
+                        frame.path.display()
+                    ))),
+                }
+            }
+        }?;
+        Ok(stamped(entry, frame.index, times_s))
+    };
+    frames.iter().map(of_frame).collect()
+}
+
+/// A path without its root and `.` components.
+fn relative(path: &Path) -> &Path {
+    path.strip_prefix("./").unwrap_or(path)
+}
+
+fn stamped(entry: &PoseEntry, frame: usize, times_s: Option<&[f64]>) -> StampedPose {
+    let own = times_s.and_then(|times_s| times_s.get(frame).copied());
+    StampedPose {
+        time_s: entry.time_s.or(own).unwrap_or(frame as f64),
+        pose: entry.pose,
+    }
+}
+
+/// Associates poses by time: the nearest pose, or the interpolation between its neighbours
+/// ([`se3::between`]). There is no extrapolation beyond the first and the last pose.
+///
+/// # Errors
+/// A file without times; a frame whose nearest pose is farther than the tolerance; with
+/// interpolation, a frame before the first pose or after the last, or between two poses whose
+/// rotations differ too much.
+pub(super) fn by_time(
+    file: &PoseFile,
+    frames: &[FrameFile],
+    times_s: &[f64],
+    how: TimeAssociation,
+) -> Result<Trajectory, SurveyError> {
+    let fail = |what: String| SurveyError::Association {
+        path: file.path.clone(),
+        what,
+    };
+    if !file.has_times() {
+        return Err(fail(
+            "has no times; associate its poses by --associate order or name".to_owned(),
+        ));
+    }
+    let all = file.trajectory();
+    let of_frame = |(frame, &time_s): (&FrameFile, &f64)| {
+        let fail = |what: String| {
+            fail(format!(
+                "frame {} ({}) at {time_s} s: {what}",
+                frame.index,
+                frame.path.display()
+            ))
+        };
+        let after = all.partition_point(|stamped| stamped.time_s < time_s);
+        let (next, last) = (
+            all.get(after),
+            after.checked_sub(1).and_then(|k| all.get(k)),
+        );
+        let off = |stamped: &StampedPose| (stamped.time_s - time_s).abs();
+        let nearest = match (last, next) {
+            (Some(last), Some(next)) if off(last) <= off(next) => last,
+            (_, Some(next)) => next,
+            (Some(last), None) => last,
+            (None, None) => return Err(fail("there is no pose at all".to_owned())),
+        };
+        if off(nearest) > how.tolerance_s {
+            return Err(fail(format!(
+                "the nearest pose is at {} s, {:.6} s away, more than the tolerance of {} s \
+                 (--time-tolerance-s)",
+                nearest.time_s,
+                off(nearest),
+                how.tolerance_s
+            )));
+        }
+        let pose = match (how.interpolate && nearest.time_s != time_s, last, next) {
+            (false, ..) => nearest.pose,
+            (true, Some(last), Some(next)) => {
+                let share = (time_s - last.time_s) / (next.time_s - last.time_s);
+                se3::between(&last.pose, &next.pose, share).ok_or_else(|| {
+                    fail(format!(
+                        "the poses at {} s and {} s are turned too far from each other to find \
+                         the way between them",
+                        last.time_s, next.time_s
+                    ))
+                })?
+            }
+            (true, ..) => {
+                return Err(fail(format!(
+                    "lies beyond the poses, the nearest of which is at {} s, and nothing is \
+                     extrapolated",
+                    nearest.time_s
+                )));
+            }
+        };
+        Ok(StampedPose { time_s, pose })
+    };
+    frames.iter().zip(times_s).map(of_frame).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trajectory::{PoseFormat, spiral};
+
+    fn frames(paths: &[&str]) -> Vec<FrameFile> {
+        let frame = |(index, path): (usize, &&str)| FrameFile::picture(index, path.into());
+        paths.iter().enumerate().map(frame).collect()
+    }
+
+    /// Poses k of a spiral at the times 10 + k, with these names.
+    fn file(names: &[&str]) -> PoseFile {
+        let poses = spiral(names.len(), 0.1, 0.5);
+        let entry = |(k, name): (usize, &&str)| PoseEntry {
+            name: Some((*name).to_owned()),
+            time_s: Some(10.0 + k as f64),
+            pose: poses[k],
+        };
+        PoseFile {
+            path: "poses.csv".into(),
+            format: PoseFormat::Csv,
+            entries: names.iter().enumerate().map(entry).collect(),
+        }
+    }
+
+    #[test]
+    fn names_find_their_poses_in_any_order() {
+        let file = file(&["left/b.png", "./a.png", "right/b.png", "c.png"]);
+        let found = by_name(&file, &frames(&["s/a.png", "s/right/b.png"]), None).unwrap();
+        assert_eq!([found[0].time_s, found[1].time_s], [11.0, 12.0]);
+        for (path, expected) in [
+            ("s/d.png", "no pose of frame 0"),
+            ("s/b.png", "2 poses could be"),
+        ] {
+            let message = by_name(&file, &frames(&[path]), None)
+                .unwrap_err()
+                .to_string();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn times_find_the_nearest_or_the_way_between() {
+        let file = file(&["", "", ""]);
+        let how = |interpolate| TimeAssociation {
+            tolerance_s: 0.5,
+            interpolate,
+        };
+        let two = frames(&["a", "b"]);
+        let nearest = by_time(&file, &two, &[9.75, 11.25], how(false)).unwrap();
+        assert_eq!(nearest[0].pose, file.entries[0].pose);
+        assert_eq!(
+            (nearest[1].time_s, nearest[1].pose),
+            (11.25, file.entries[1].pose)
+        );
+        let between = by_time(&file, &two, &[10.0, 11.25], how(true)).unwrap();
+        assert_eq!(between[0].pose, file.entries[0].pose);
+        let expected = spiral(10, 0.025, 0.125)[5];
+        assert!(between[1].pose.local(&expected).norm() < 1e-12);
+        for (times_s, interpolate, expected) in [
+            (
+                [10.0, 12.75],
+                false,
+                ["frame 1 (b) at 12.75 s", "nearest pose is at 12 s, 0.75"],
+            ),
+            (
+                [10.0, 12.25],
+                true,
+                ["frame 1 (b) at 12.25 s", "nothing is extrapolated"],
+            ),
+            (
+                [9.9, 11.0],
+                true,
+                ["frame 0 (a) at 9.9 s", "nearest of which is at 10 s"],
+            ),
+        ] {
+            let message = by_time(&file, &two, &times_s, how(interpolate))
+                .unwrap_err()
+                .to_string();
+            assert!(
+                expected.iter().all(|part| message.contains(part)),
+                "{message}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_order_wants_as_many() {
+        let message = by_order(&file(&["a", "b"]), &frames(&["a"]), None)
+            .unwrap_err()
+            .to_string();
+        assert!(
+            message.contains("2 poses for 1 frames") && message.contains("--associate name"),
+            "{message}"
+        );
+    }
+}

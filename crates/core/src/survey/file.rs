@@ -1,0 +1,240 @@
+//! The content of `survey.toml`.
+
+use super::calibrate::CalibrateSection;
+use super::error::SurveyError;
+use super::poses_section::PosesSection;
+use super::tunnel::TunnelSection;
+use crate::trajectory::{Jitter, JitterModel};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Name of the file that describes a survey.
+pub const SURVEY_FILE: &str = "survey.toml";
+
+/// The content of `survey.toml`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurveyFile {
+    /// The tunnel.
+    pub tunnel: TunnelSection,
+    /// The camera.
+    pub camera: CameraSection,
+    /// The frames.
+    pub frames: FramesSection,
+    /// The poses.
+    pub poses: PosesSection,
+    /// Noise of the initial poses.
+    #[serde(default)]
+    pub prior: PriorSection,
+    /// Self-calibration.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibrate: Option<CalibrateSection>,
+    /// Options of the program's commands, one table per command, named like the long flags with
+    /// underscores. The program applies them; the library ignores them.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub options: BTreeMap<String, toml::Table>,
+}
+
+impl SurveyFile {
+    /// All paths in the file, except those of the frames.
+    pub fn paths_mut(&mut self) -> impl Iterator<Item = &mut PathBuf> {
+        let poses = &mut self.poses;
+        [
+            self.tunnel.centreline.as_mut(),
+            Some(&mut self.camera.file),
+            self.frames.times.as_mut(),
+            self.frames.mask.as_mut(),
+            Some(&mut poses.initial),
+            poses.truth.as_mut(),
+            poses.body_to_camera.as_mut(),
+            poses.tunnel_frame.as_mut(),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
+/// `[camera]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CameraSection {
+    /// Calibration file.
+    pub file: PathBuf,
+    /// Name of the camera, if the file has several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Rolling shutter: time from reading a frame's first row to reading its last, milliseconds of
+    /// the poses' times; negative if rows are read bottom-up. Time and pose of a frame are those of
+    /// its middle row. Without it, all rows are read at once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub readout_ms: Option<f64>,
+}
+
+/// `[frames]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FramesSection {
+    /// Glob pattern of the frames, if they are files of their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub images: Option<String>,
+    /// The video that contains the frames.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub video: Option<PathBuf>,
+    /// Sampling interval: every so many-th picture of the video is a frame, from the first on;
+    /// every picture by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub every: Option<usize>,
+    /// Keyframe selection: rotation between consecutive frames by the initial poses, degrees; the
+    /// poses must be associated by time.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angle_step_deg: Option<f64>,
+    /// A file of the frames' times, if they are not in the names.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub times: Option<PathBuf>,
+    /// An image of the frames' size, black where they never show the wall; see
+    /// [`crate::frames::Mask`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mask: Option<PathBuf>,
+}
+
+/// `[prior]`: the noise model of the initial poses.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PriorSection {
+    /// Correlation of the errors of consecutive poses.
+    pub model: JitterModel,
+    /// 1-σ about each axis, degrees.
+    pub rotation_sigma_deg: f64,
+    /// 1-σ along x, y, z, metres.
+    pub translation_sigma_m: [f64; 3],
+}
+
+impl Default for PriorSection {
+    /// The paper's experiment: 2° and (2, 2, 3) cm per step, accumulating.
+    fn default() -> Self {
+        Self {
+            model: JitterModel::RandomWalk,
+            rotation_sigma_deg: 2.0,
+            translation_sigma_m: [0.02, 0.02, 0.03],
+        }
+    }
+}
+
+impl From<PriorSection> for Jitter {
+    fn from(prior: PriorSection) -> Self {
+        Self {
+            model: prior.model,
+            rotation_sigma_rad: prior.rotation_sigma_deg.to_radians(),
+            translation_sigma_m: prior.translation_sigma_m,
+        }
+    }
+}
+
+/// Reads `survey.toml`.
+///
+/// # Errors
+/// An unreadable file; text that is no TOML, unknown or missing keys, with line and column.
+pub(super) fn read_survey_file(path: &Path) -> Result<SurveyFile, SurveyError> {
+    let text = std::fs::read_to_string(path).map_err(|source| SurveyError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    toml::from_str(&text).map_err(|error| {
+        let at = error.span().map_or(0, |span| span.start.min(text.len()));
+        let before = &text.as_bytes()[..at];
+        let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+        let column = 1 + before
+            .iter()
+            .rev()
+            .take_while(|byte| **byte != b'\n')
+            .count();
+        SurveyError::Parse {
+            path: path.to_owned(),
+            line,
+            column,
+            what: error.message().replace('\n', " "),
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::survey::associate::Associate;
+    use crate::survey::calibrate::CalibrationGroup;
+    use crate::survey::ignore::IgnoreSection;
+    use crate::survey::open::Survey;
+    use crate::survey::tunnel::Shape;
+    use crate::trajectory::{CameraAxes, Direction, PoseFormat};
+
+    #[test]
+    fn the_file_round_trips() {
+        let file = SurveyFile {
+            tunnel: TunnelSection {
+                shape: Shape::Box,
+                radius_m: None,
+                width_m: Some(4.0),
+                height_m: Some(3.0),
+                centreline: Some("curve.txt".into()),
+                ignore: vec![IgnoreSection {
+                    theta_deg: Some([150.0, 210.0]),
+                    chainage_m: None,
+                }],
+            },
+            camera: CameraSection {
+                file: "camera.json".into(),
+                name: None,
+                readout_ms: Some(-20.0),
+            },
+            frames: FramesSection {
+                images: None,
+                video: Some("survey.mp4".into()),
+                every: Some(5),
+                angle_step_deg: Some(15.0),
+                times: Some("times.txt".into()),
+                mask: Some("mask.png".into()),
+            },
+            poses: PosesSection {
+                format: Some(PoseFormat::Csv),
+                convention: Some(Direction::WorldToCamera),
+                camera_axes: Some(CameraAxes::OpenGl),
+                associate: Some(Associate::Time),
+                time_tolerance_s: Some(0.05),
+                interpolate: Some(true),
+                body_to_camera: Some("sensor.yaml".into()),
+                ..PosesSection::of("baseline.csv")
+            },
+            prior: PriorSection::default(),
+            calibrate: Some(CalibrateSection {
+                unknowns: CalibrationGroup::ALL.to_vec(),
+                ..CalibrateSection::default()
+            }),
+            options: BTreeMap::new(),
+        };
+        let text = toml::to_string(&file).unwrap();
+        assert_eq!(toml::from_str::<SurveyFile>(&text).unwrap(), file);
+    }
+
+    #[test]
+    fn an_unknown_unknown_is_named_with_what_is_possible() {
+        let error = toml::from_str::<CalibrateSection>("unknowns = [\"focus\"]").unwrap_err();
+        let message = error.to_string();
+        assert!(
+            message.contains("focus") && message.contains("`centre`"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn an_unknown_key_is_named_with_its_line_and_column() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(SURVEY_FILE);
+        std::fs::write(&path, "[tunnel]\nshape = \"circle\"\n  raduis_m = 3.0\n").unwrap();
+        let message = Survey::open(dir.path()).unwrap_err().to_string();
+        assert!(
+            message.contains("survey.toml:3:3: unknown field `raduis_m`"),
+            "{message}"
+        );
+    }
+}

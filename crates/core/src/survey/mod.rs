@@ -1,0 +1,99 @@
+//! Surveys: data sets described by a `survey.toml`.
+//!
+//! ```toml
+//! [tunnel]
+//! shape = "circle"            # with radius_m; "ellipse", "box" or "horseshoe" with
+//!                             # width_m and height_m
+//! radius_m = 3.0
+//! centreline = "curve.txt"    # optional, for curved tunnels: lines `x y z [radius]`
+//! ignore = [                  # optional: regions of the wall that refine excludes
+//!     { theta_deg = [150, 210], chainage_m = [2.0, 5.5] }, # either is optional
+//! ]
+//!
+//! [camera]
+//! file = "camera.json"
+//! readout_ms = 20.0           # optional: rolling shutter, from the first row to the last
+//!
+//! [frames]
+//! images = "frames/*.jpg"     # sorted by name; or
+//! # video = "survey.mp4"      # pictures of a video, read by ffmpeg, with its times
+//! # every = 5                 # sampling interval, pictures
+//! # angle_step_deg = 15.0     # keyframes by rotation of the view; needs associate = "time"
+//! times = "times.txt"         # optional: lines `time`, `time name` or `name time`
+//! mask = "mask.png"           # optional: an image, black where the wall is hidden
+//!
+//! [poses]
+//! initial = "baseline.tum"    # TUM, KITTI, CSV, COLMAP, nerfstudio, EuRoC: see the content
+//! truth = "groundtruth.tum"   # optional: for comparison; all keys below apply to both
+//! format = "tum"              # optional, like all below: overrides the detection
+//! convention = "c2w"          # or "w2c"; the default depends on the format
+//! camera_axes = "opencv"      # or "opengl"; the default depends on the format
+//! body_to_camera = "cam.yaml" # for poses of a body (`trajectory::read_camera_in_body`)
+//! tunnel_frame = "axis.json"  # for another axis than y (`trajectory::read_tunnel_frame`)
+//! associate = "time"          # or "name" (default if the file has names), or "order"
+//! time_tolerance_s = 0.01     # largest difference of times; the default
+//! interpolate = true          # by default the nearer pose is taken
+//!
+//! [prior]                     # optional: noise of the initial poses
+//! model = "random-walk"       # or "independent"
+//! rotation_sigma_deg = 2.0
+//! translation_sigma_m = [0.02, 0.02, 0.03]
+//!
+//! [calibrate]                 # optional: self-calibration by refine
+//! unknowns = ["focal", "centre", "distortion", "radius", "axis"]
+//! focal_sigma_percent = 2.0   # 1-σ of the given values; these are the defaults
+//! centre_sigma_percent = 1.0  # of the frames' width
+//! k1_sigma = 0.05
+//! k2_sigma = 0.05
+//! radius_sigma_percent = 1.0
+//! axis_tilt_sigma_deg = 1.0
+//! axis_offset_sigma_m = 0.05
+//! ```
+//!
+//! Relative paths are relative to `survey.toml`. Unknown keys are errors with line and column.
+//!
+//! # Example
+//!
+//! ```
+//! use std::path::Path;
+//! use tunnelstitch_core::survey::Survey;
+//!
+//! let survey = Survey::open(Path::new("../../fixtures/blender_free48"))?;
+//! assert_eq!(survey.frames.len(), survey.initial.len());
+//! assert!(survey.truth.is_some());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod associate;
+mod calibrate;
+mod calibrated;
+mod capture_times;
+mod discover;
+mod error;
+mod file;
+mod frame_list;
+mod frame_paths;
+mod frame_times;
+mod ignore;
+mod keyframe_selection;
+mod open;
+mod pose_reader;
+mod pose_validation;
+mod poses_section;
+mod template;
+mod tunnel;
+mod unposed_frames;
+
+pub use associate::{Associate, TIME_TOLERANCE_S};
+pub use calibrate::{CalibrateSection, CalibrationGroup};
+pub use capture_times::FrameTimes;
+pub use discover::{Discovery, PictureGroup, VideoChoice};
+pub use error::SurveyError;
+pub use file::{CameraSection, FramesSection, PriorSection, SURVEY_FILE, SurveyFile};
+pub use frame_times::read_frame_times;
+pub use ignore::IgnoreSection;
+pub use open::Survey;
+pub use open::toml_path;
+pub use poses_section::PosesSection;
+pub use tunnel::{Shape, TunnelSection, read_centreline};
+pub use unposed_frames::UnposedFrames;

@@ -1,0 +1,298 @@
+//! Opening and validation of surveys.
+
+use super::associate::TIME_TOLERANCE_S;
+use super::error::SurveyError;
+use super::file::read_survey_file;
+use super::file::{SURVEY_FILE, SurveyFile};
+use super::frame_list::FrameList;
+use super::pose_reader::{InterpretedPoses, PoseReader};
+use super::poses_section::PosesSection;
+use super::{ignore, pose_validation};
+use crate::camera::{Camera, read_calibration};
+use crate::frames::{FrameSet, Mask};
+use crate::surface::{Surface, WallRegions};
+use crate::trajectory::{Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of};
+use std::path::{Path, PathBuf};
+
+/// A survey, read and validated, except the pixels.
+#[derive(Debug)]
+pub struct Survey {
+    /// The folder of `survey.toml`.
+    pub folder: PathBuf,
+    /// The content of `survey.toml`.
+    pub file: SurveyFile,
+    /// The camera.
+    pub camera: Camera,
+    /// The tunnel.
+    pub surface: Box<dyn Surface>,
+    /// Regions of the wall that are excluded from the comparison of frames.
+    pub ignored: WallRegions,
+    /// The frames, sorted by name, with their common mask.
+    pub frames: FrameSet,
+    /// The initial poses, one per frame.
+    pub initial: Trajectory,
+    /// The true poses, one per frame, if known.
+    pub truth: Option<Trajectory>,
+    /// Noise model of the initial poses.
+    pub prior: Jitter,
+    /// Warnings about suspicious data, with a probable cause.
+    pub warnings: Vec<String>,
+    /// The frames' times, seconds, if given by a file or a video.
+    pub(super) times_s: Option<Vec<f64>>,
+    /// See [`Survey::own_files`].
+    own_files: Vec<PathBuf>,
+}
+
+impl Survey {
+    /// Reads a survey: `path` is its folder or its `survey.toml`.
+    ///
+    /// # Errors
+    /// All errors that can be detected before a pixel is read; see [`SurveyError`].
+    pub fn open(path: &Path) -> Result<Self, SurveyError> {
+        Self::open_with(path, |_| ())
+    }
+
+    /// Reads only survey.toml (or the one in the folder `path`).
+    ///
+    /// # Errors
+    /// A missing or malformed file.
+    pub fn read_file(path: &Path) -> Result<SurveyFile, SurveyError> {
+        read_survey_file(&toml_path(path))
+    }
+
+    /// Opens a survey with modified content of its `survey.toml`.
+    ///
+    /// # Errors
+    /// The errors of [`Survey::open`].
+    pub fn open_with(
+        path: &Path,
+        change: impl FnOnce(&mut SurveyFile),
+    ) -> Result<Self, SurveyError> {
+        let toml_path = toml_path(path);
+        let mut file = read_survey_file(&toml_path)?;
+        let folder = folder_of(&toml_path);
+        let mut own_files = vec![toml_path.clone()];
+        own_files.extend(file.paths_mut().map(|path| folder.join(&*path)));
+        change(&mut file);
+        own_files.extend(file.paths_mut().map(|path| folder.join(&*path)));
+        let value = |what: String| SurveyError::Value {
+            path: toml_path.clone(),
+            what,
+        };
+        let surface = file.tunnel.surface(&toml_path, &folder)?;
+        let prior = &file.prior;
+        if !(1e-6..=180.0).contains(&prior.rotation_sigma_deg) {
+            return Err(value(format!(
+                "prior.rotation_sigma_deg is {}; it must lie between 1e-6 and 180",
+                prior.rotation_sigma_deg
+            )));
+        }
+        if !prior
+            .translation_sigma_m
+            .iter()
+            .all(|s| (1e-9..=10.0 * file.tunnel.nominal_m()).contains(s))
+        {
+            return Err(value(format!(
+                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times \
+                 the radius (half the width)",
+                prior.translation_sigma_m
+            )));
+        }
+        if let Some(calibrate) = &file.calibrate {
+            calibrate.validate().map_err(value)?;
+        }
+        let tolerance_s = file.poses.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S);
+        if !(0.0..=1e6).contains(&tolerance_s) {
+            return Err(value(format!(
+                "poses.time_tolerance_s is {tolerance_s}; it must be seconds, 0 or more"
+            )));
+        }
+        let camera =
+            read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
+        let FrameList {
+            frames,
+            times_s,
+            video,
+        } = FrameList::new(&file.frames, &toml_path, &folder, None)?;
+        if let Some(video) = &video
+            && video.rotation_deg() != 0
+            && file.camera.readout_ms.is_some()
+        {
+            return Err(value(format!(
+                "camera.readout_ms goes from row to row, but {} is displayed with a rotation of \
+                 {}°, so that its rows are not the rows that the sensor \
+                 reads at once; extract the pictures with ffmpeg -noautorotate and calibrate for \
+                 these, or remove readout_ms",
+                video.path().display(),
+                video.rotation_deg()
+            )));
+        }
+        let mask = match &file.frames.mask {
+            Some(mask) => Some(Mask::read(&folder.join(mask), camera.width, camera.height)?),
+            None => None,
+        };
+        let ignored = ignore::wall_regions(&file.tunnel.ignore, surface.as_ref()).map_err(value)?;
+        let mut survey = Self {
+            camera,
+            surface,
+            ignored,
+            frames: FrameSet::new(frames, mask),
+            initial: Vec::new(),
+            truth: None,
+            prior: file.prior.into(),
+            warnings: Vec::new(),
+            times_s,
+            own_files,
+            folder,
+            file,
+        };
+        if let Some(step_deg) = survey.file.frames.angle_step_deg {
+            survey.select_keyframes(step_deg, &toml_path)?;
+        }
+        let section = &survey.file.poses;
+        let (initial, mut warnings) =
+            survey.read_as(section, &survey.folder.join(&section.initial))?;
+        let truth = match &section.truth {
+            Some(truth) => {
+                let (truth, more) = survey.read_as(section, &survey.folder.join(truth))?;
+                warnings.extend(more);
+                Some(truth)
+            }
+            None => None,
+        };
+        warnings.extend(
+            video
+                .iter()
+                .filter_map(|video| video.warning().map(str::to_owned)),
+        );
+        (survey.initial, survey.truth, survey.warnings) = (initial, truth, warnings);
+        survey.validate_readout().map_err(value)?;
+        Ok(survey)
+    }
+
+    /// Reads a file of poses in the tunnel, as `refine` and `convert` write them, in its format's
+    /// own convention, and checks it against the frames and the tunnel.
+    ///
+    /// # Errors
+    /// A malformed file, poses that cannot be associated with the frames, a camera outside the
+    /// tunnel.
+    pub fn read_poses(&self, path: &Path) -> Result<Trajectory, SurveyError> {
+        Ok(self.read_as(&PosesSection::of(path), path)?.0)
+    }
+
+    /// Reads a file of poses with the options of a section; also returns warnings.
+    pub(super) fn read_as(
+        &self,
+        section: &PosesSection,
+        path: &Path,
+    ) -> Result<(Trajectory, Vec<String>), SurveyError> {
+        let times_s = self.times_s.as_deref();
+        let reading: InterpretedPoses =
+            PoseReader::new(section, &self.folder, &self.frames, times_s)?.read(path)?;
+        let trajectory = reading.trajectory();
+        let poses = poses_of(&trajectory);
+        let surface = self.surface.as_ref();
+        let warning =
+            pose_validation::validate_poses(surface, &self.camera, &reading, &poses, path)?;
+        Ok((trajectory, warning))
+    }
+
+    /// The first frames of the survey with their initial poses in the given convention, and in
+    /// every other convention that leaves all cameras inside, each with its flags (none for the
+    /// first), in order of the number of flags.
+    ///
+    /// # Errors
+    /// The errors of [`Survey::open`], if the file has changed since.
+    pub fn pose_convention_variants(
+        &self,
+        most_frames: usize,
+    ) -> Result<Vec<(Vec<String>, Self)>, SurveyError> {
+        let section = &self.file.poses;
+        let times_s = self.times_s.as_deref();
+        let reading = PoseReader::new(section, &self.folder, &self.frames, times_s)?
+            .read(&self.folder.join(&section.initial))?;
+        let given = (Vec::new(), reading.convention);
+        let possible = pose_validation::feasible_conventions(self.surface.as_ref(), &reading);
+        let survey = |(flags, convention): (Vec<String>, Convention)| {
+            let stamped = reading.given.iter().map(|stamped| StampedPose {
+                time_s: stamped.time_s,
+                pose: convention.to_tunnel(&stamped.pose),
+            });
+            let survey = Self {
+                folder: self.folder.clone(),
+                file: self.file.clone(),
+                camera: self.camera,
+                surface: self
+                    .file
+                    .tunnel
+                    .surface(Path::new(SURVEY_FILE), &self.folder)?,
+                ignored: self.ignored.clone(),
+                frames: self.frames.first(most_frames),
+                initial: stamped.take(most_frames).collect(),
+                truth: None,
+                prior: self.prior,
+                warnings: Vec::new(),
+                times_s: None,
+                own_files: self.own_files.clone(),
+            };
+            Ok((flags, survey))
+        };
+        std::iter::once(given).chain(possible).map(survey).collect()
+    }
+
+    /// The files of the survey except the frames, even if others were read in their place.
+    pub fn own_files(&self) -> &[PathBuf] {
+        &self.own_files
+    }
+
+    /// Checks the readout time: it cannot be longer than the time between frames.
+    fn validate_readout(&self) -> Result<(), String> {
+        let Some(readout_ms) = self.file.camera.readout_ms else {
+            return Ok(());
+        };
+        let steps = self
+            .initial
+            .windows(2)
+            .map(|pair| pair[1].time_s - pair[0].time_s);
+        let shortest_ms = 1e3 * steps.fold(f64::INFINITY, f64::min);
+        let possible = readout_ms.is_finite() && readout_ms.abs() <= shortest_ms;
+        if possible {
+            Ok(())
+        } else {
+            Err(format!(
+                "camera.readout_ms is {readout_ms}; it must be a number of milliseconds and no \
+                 more than the {shortest_ms:.3} ms between \
+                 the times of the nearest two poses in {}",
+                self.file.poses.initial.display()
+            ))
+        }
+    }
+
+    /// The readout times of the frames' rows, from the times of the initial poses.
+    pub fn shutter(&self) -> Shutter {
+        let readout_s = 1e-3 * self.file.camera.readout_ms.unwrap_or_default();
+        Shutter::new(readout_s, self.camera.height, &self.initial)
+    }
+
+    /// The initial poses without their times.
+    pub fn initial_poses(&self) -> Vec<Pose> {
+        poses_of(&self.initial)
+    }
+}
+
+/// The folder that the paths in `survey.toml` are relative to.
+pub(super) fn folder_of(toml_path: &Path) -> PathBuf {
+    match toml_path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    }
+}
+
+/// The path of `survey.toml` for a folder or for the file itself.
+pub fn toml_path(path: &Path) -> PathBuf {
+    if path.is_dir() {
+        path.join(SURVEY_FILE)
+    } else {
+        path.to_owned()
+    }
+}

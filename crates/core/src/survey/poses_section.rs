@@ -1,0 +1,55 @@
+//! `[poses]`: the pose files and their convention.
+
+use super::associate::Associate;
+use crate::trajectory::{CameraAxes, Direction, PoseFormat};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+
+/// `[poses]`. Defaults are detected from the files' content or given by the conventions of their
+/// formats.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PosesSection {
+    /// The initial poses.
+    pub initial: PathBuf,
+    /// The true poses, if known; used for comparison only and read like the initial ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub truth: Option<PathBuf>,
+    /// The files' format.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub format: Option<PoseFormat>,
+    /// The direction of the poses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub convention: Option<Direction>,
+    /// The camera's axes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera_axes: Option<CameraAxes>,
+    /// The motion from the body whose poses the files hold to the camera; see
+    /// [`read_camera_in_body`](crate::trajectory::read_camera_in_body).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub body_to_camera: Option<PathBuf>,
+    /// The tunnel's frame in the poses' world; see
+    /// [`read_tunnel_frame`](crate::trajectory::read_tunnel_frame).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tunnel_frame: Option<PathBuf>,
+    /// The criterion that associates poses with frames; by default their names, if the file has
+    /// any, else their order.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub associate: Option<Associate>,
+    /// Largest difference between the times of a frame and its pose, seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_tolerance_s: Option<f64>,
+    /// True to interpolate between the two neighbouring poses, rather than take the nearer one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub interpolate: Option<bool>,
+}
+
+impl PosesSection {
+    /// A section with only the path of the initial poses.
+    pub fn of(initial: impl Into<PathBuf>) -> Self {
+        Self {
+            initial: initial.into(),
+            ..Self::default()
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! `[tunnel]`: the shape of the tunnel.
+
+use super::error::SurveyError;
+use super::ignore::IgnoreSection;
+use crate::surface::section::{CircleOutline, Ellipse, PiecewiseOutline, Section};
+use crate::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
+use crate::trajectory::{PoseError, text};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// The section of the tunnel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Shape {
+    /// A circle of radius `radius_m`.
+    Circle,
+    /// An ellipse with its axes along x and z: `width_m`, `height_m`.
+    Ellipse,
+    /// A rectangle, the axis in its middle: `width_m`, `height_m`.
+    Box,
+    /// A round arch on straight walls and a flat floor, the axis in the middle of the arch:
+    /// `width_m`, `height_m`.
+    Horseshoe,
+}
+
+/// `[tunnel]`. Width is along x, height along z; twelve o'clock is +z.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TunnelSection {
+    /// The shape of the section.
+    pub shape: Shape,
+    /// Radius of a circle, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radius_m: Option<f64>,
+    /// Width of any other section, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width_m: Option<f64>,
+    /// Height of any other section, metres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f64>,
+    /// A file of the centreline, if it is not the world's y axis; see [`read_centreline`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub centreline: Option<PathBuf>,
+    /// Regions of the wall that are excluded from the comparison of frames: water, plants, moving
+    /// objects.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub ignore: Vec<IgnoreSection>,
+}
+
+impl TunnelSection {
+    /// A straight round tunnel of the given radius, metres.
+    pub fn round(radius_m: f64) -> Self {
+        Self {
+            shape: Shape::Circle,
+            radius_m: Some(radius_m),
+            width_m: None,
+            height_m: None,
+            centreline: None,
+            ignore: Vec::new(),
+        }
+    }
+
+    /// Radius of a circle, half the width of any other section, metres; 0 where it is missing.
+    pub fn nominal_m(&self) -> f64 {
+        self.radius_m
+            .or(self.width_m.map(|width_m| 0.5 * width_m))
+            .unwrap_or_default()
+    }
+
+    /// True for a straight round tunnel, whose radius and axis can be estimated.
+    pub fn is_straight_and_round(&self) -> bool {
+        self.shape == Shape::Circle && self.centreline.is_none()
+    }
+
+    /// Creates the tunnel; paths are relative to `folder`, and errors name the file `toml`.
+    ///
+    /// # Errors
+    /// A size that is missing, impossible or of another shape; a centreline that cannot be read or
+    /// that no tunnel can follow.
+    pub fn surface(&self, toml: &Path, folder: &Path) -> Result<Box<dyn Surface>, SurveyError> {
+        let value = |what: String| SurveyError::Value {
+            path: toml.to_owned(),
+            what: format!("tunnel: {what}"),
+        };
+        let section = self.section().map_err(value)?;
+        let Some(centreline) = &self.centreline else {
+            return Ok(match (self.shape, self.radius_m) {
+                // The fastest shape.
+                (Shape::Circle, Some(radius_m)) => {
+                    Box::new(Circle::new(radius_m).map_err(|error| value(error.to_string()))?)
+                }
+                _ => Box::new(Prism::new(section)),
+            });
+        };
+        let path = folder.join(centreline);
+        let points = read_centreline(&path)?;
+        let line = Centreline::through(&points, self.nominal_m(), section.farthest_m());
+        let line = line.map_err(|error| PoseError::file(&path, error.to_string()))?;
+        Ok(Box::new(Swept::new(section, line)))
+    }
+
+    /// Creates the section, or returns the problem of its sizes.
+    pub fn section(&self) -> Result<Box<dyn Section>, String> {
+        let named = [
+            ("radius_m", self.radius_m, self.shape == Shape::Circle),
+            ("width_m", self.width_m, self.shape != Shape::Circle),
+            ("height_m", self.height_m, self.shape != Shape::Circle),
+        ];
+        for (name, size, needed) in named {
+            match (size, needed) {
+                (None, true) => return Err(format!("{name} is missing; this shape needs it")),
+                (Some(_), false) => return Err(format!("{name} is not a size of this shape")),
+                _ => {}
+            }
+        }
+        let (width_m, height_m) = (
+            self.width_m.unwrap_or_default(),
+            self.height_m.unwrap_or_default(),
+        );
+        let fail = |error: crate::surface::SurfaceError| error.to_string();
+        Ok(match self.shape {
+            Shape::Circle => {
+                let radius_m = self.radius_m.unwrap_or_default();
+                Circle::new(radius_m).map_err(fail)?;
+                Box::new(CircleOutline { radius_m })
+            }
+            Shape::Ellipse => Box::new(Ellipse::new(width_m, height_m).map_err(fail)?),
+            Shape::Box => Box::new(PiecewiseOutline::rectangle(width_m, height_m).map_err(fail)?),
+            Shape::Horseshoe => {
+                Box::new(PiecewiseOutline::horseshoe(width_m, height_m).map_err(fail)?)
+            }
+        })
+    }
+}
+
+/// Reads a centreline: lines `x y z [radius]`, metres, in the world of the poses; text after a `#`
+/// is ignored. A radius (half the width, if the section is not a circle) holds at its point and
+/// changes smoothly to that of the next.
+///
+/// # Errors
+/// An unreadable file, a line of another form.
+pub fn read_centreline(path: &Path) -> Result<Vec<CentrePoint>, SurveyError> {
+    let content = text::read(path)?;
+    let mut points = Vec::new();
+    for (k, line) in content.lines().enumerate() {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        if line.is_empty() {
+            continue;
+        }
+        let numbers: Result<Vec<f64>, _> = line.split_whitespace().map(str::parse).collect();
+        let (point, radius_m) = match numbers.as_deref() {
+            Ok([x, y, z]) => (Vector3::new(*x, *y, *z), None),
+            Ok([x, y, z, radius_m]) => (Vector3::new(*x, *y, *z), Some(*radius_m)),
+            _ => {
+                let what = "not a point of a centreline; a line is x y z or x y z radius, metres";
+                return Err(PoseError::line(path, k + 1, what.to_owned()).into());
+            }
+        };
+        if !point.iter().all(|v| v.is_finite())
+            || radius_m.is_some_and(|r| !(r.is_finite() && r > 0.0))
+        {
+            let what = "its numbers must be finite, and a radius more than 0";
+            return Err(PoseError::line(path, k + 1, what.to_owned()).into());
+        }
+        points.push(CentrePoint { point, radius_m });
+    }
+    Ok(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(content: &str) -> Result<Vec<CentrePoint>, String> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("curve.txt");
+        std::fs::write(&path, content).unwrap();
+        read_centreline(&path).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_centreline_has_points_radii_and_comments() {
+        let points = read("# a bend\n0 0 0 3\n\n 1.5 2e1 -3 # here\n").unwrap();
+        assert_eq!(points.len(), 2);
+        assert_eq!(points[0].radius_m, Some(3.0));
+        assert_eq!(points[1].point, Vector3::new(1.5, 20.0, -3.0));
+        for (bad, line) in [
+            ("0 0 0\n1 2\n", 2),
+            ("0 0 zero\n", 1),
+            ("\n0 0 NaN\n", 2),
+            ("0 0 0 0\n", 1),
+            ("0 0 0 1 2\n", 1),
+        ] {
+            let error = read(bad).unwrap_err();
+            assert!(error.contains(&format!("curve.txt:{line}: ")), "{error}");
+        }
+    }
+
+    #[test]
+    fn shapes_want_their_own_sizes() {
+        let tunnel = |shape, sizes: [Option<f64>; 3]| TunnelSection {
+            shape,
+            radius_m: sizes[0],
+            width_m: sizes[1],
+            height_m: sizes[2],
+            centreline: None,
+            ignore: Vec::new(),
+        };
+        let surface = |tunnel: TunnelSection| {
+            let made = tunnel.surface(Path::new("survey.toml"), Path::new("."));
+            made.map_err(|error| error.to_string())
+        };
+        let (r, w, h) = (Some(3.0), Some(4.0), Some(3.5));
+        assert!(surface(tunnel(Shape::Circle, [r, None, None])).is_ok());
+        for shape in [Shape::Ellipse, Shape::Box, Shape::Horseshoe] {
+            assert!(surface(tunnel(shape, [None, w, h])).is_ok());
+            let error = surface(tunnel(shape, [None, w, None])).unwrap_err();
+            assert!(error.contains("height_m is missing"), "{error}");
+            let error = surface(tunnel(shape, [r, w, h])).unwrap_err();
+            assert!(error.contains("radius_m is not"), "{error}");
+            let error = surface(tunnel(shape, [None, Some(-4.0), h])).unwrap_err();
+            assert!(error.contains("width_m is -4"), "{error}");
+        }
+        let error = surface(tunnel(Shape::Circle, [None; 3])).unwrap_err();
+        assert!(error.contains("radius_m is missing"), "{error}");
+    }
+}

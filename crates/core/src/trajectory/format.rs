@@ -1,0 +1,40 @@
+//! The formats of pose files.
+
+use super::axes::{CameraAxes, Direction};
+use serde::{Deserialize, Serialize};
+
+/// The format of a pose file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PoseFormat {
+    /// Lines `time tx ty tz qx qy qz qw`.
+    Tum,
+    /// Lines with the twelve numbers of a 3 × 4 matrix.
+    Kitti,
+    /// A table with named columns.
+    Csv,
+    /// COLMAP's text model: a folder with images.txt, or that file.
+    Colmap,
+    /// nerfstudio's transforms.json.
+    Nerfstudio,
+    /// EuRoC's csv of a body's poses; read only.
+    Euroc,
+}
+
+impl PoseFormat {
+    /// The direction of the format's poses.
+    pub fn direction(self) -> Direction {
+        match self {
+            Self::Colmap => Direction::WorldToCamera,
+            _ => Direction::CameraToWorld,
+        }
+    }
+
+    /// The camera axes of the format.
+    pub fn axes(self) -> CameraAxes {
+        match self {
+            Self::Nerfstudio => CameraAxes::OpenGl,
+            _ => CameraAxes::OpenCv,
+        }
+    }
+}

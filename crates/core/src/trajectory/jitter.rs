@@ -1,0 +1,147 @@
+//! Pose noise: simulation of the executed trajectory from the planned one.
+
+use super::pose::Pose;
+use super::so3;
+use nalgebra::{UnitQuaternion, Vector3};
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+/// Correlation of the errors of consecutive poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum JitterModel {
+    /// Each step composes its own error onto the running pose, so errors accumulate (odometry, a
+    /// plan executed blindly; the paper's "after each image capture").
+    RandomWalk,
+    /// The errors of the poses around the plan are independent (an IMU's attitude, a rail).
+    Independent,
+}
+
+/// Standard deviations of the pose noise, per step (random walk) or per pose (independent).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Jitter {
+    /// Correlation of the errors of consecutive poses.
+    pub model: JitterModel,
+    /// Rotation about each camera axis, radians.
+    pub rotation_sigma_rad: f64,
+    /// Translation along the world's x, y, z, metres.
+    pub translation_sigma_m: [f64; 3],
+}
+
+/// Fraction of the lateral offset, and of the tilt against the axis, that a random walk loses at
+/// each step, because the carrier steers back to the axis. 2 % keeps their spread below
+/// `σ / √(1 − 0.98²) ≈ 5 σ`, for any length.
+const STEERING_RATE: f64 = 0.02;
+
+/// Rotates an executed attitude towards the planned one by the fraction [`STEERING_RATE`] of the
+/// tilt between their tunnel axes. The rotation about the axis stays.
+fn steered(executed: &UnitQuaternion<f64>, planned: &UnitQuaternion<f64>) -> UnitQuaternion<f64> {
+    let carried = executed * planned.inverse() * Vector3::y();
+    match UnitQuaternion::rotation_between(&carried, &Vector3::y()) {
+        Some(tilt) => so3::exp(&(so3::log(&tilt) * STEERING_RATE)) * executed,
+        // Opposite axes: every direction of rotation is equivalent.
+        None => *executed,
+    }
+}
+
+impl Jitter {
+    /// Simulates the execution of `plan` with this noise.
+    ///
+    /// The first pose of a random walk equals the plan's. Each pose draws three random numbers for
+    /// the rotation and then three for the translation from `rng`.
+    pub fn apply(&self, plan: &[Pose], rng: &mut impl Rng) -> Vec<Pose> {
+        let mut executed: Vec<Pose> = Vec::with_capacity(plan.len());
+        for (k, planned) in plan.iter().enumerate() {
+            let pose = match (self.model, k) {
+                (JitterModel::RandomWalk, 0) => *planned,
+                (JitterModel::RandomWalk, _) => {
+                    let (before, last) = (&plan[k - 1], &executed[k - 1]);
+                    let increment = before.r_wc.inverse() * planned.r_wc;
+                    let (omega, rho) = self.draw(rng);
+                    let mut t_wc = last.t_wc + (planned.t_wc - before.t_wc) + rho;
+                    t_wc.x *= 1.0 - STEERING_RATE;
+                    t_wc.z *= 1.0 - STEERING_RATE;
+                    let r_wc = last.r_wc * increment * so3::exp(&omega);
+                    Pose::new(steered(&r_wc, &planned.r_wc), t_wc)
+                }
+                (JitterModel::Independent, _) => {
+                    let (omega, rho) = self.draw(rng);
+                    Pose::new(planned.r_wc * so3::exp(&omega), planned.t_wc + rho)
+                }
+            };
+            executed.push(pose);
+        }
+        executed
+    }
+
+    fn draw(&self, rng: &mut impl Rng) -> (Vector3<f64>, Vector3<f64>) {
+        let mut normal = || -> f64 { StandardNormal.sample(rng) };
+        let omega = Vector3::from_fn(|_, _| normal() * self.rotation_sigma_rad);
+        let rho = Vector3::from_fn(|k, _| normal() * self.translation_sigma_m[k]);
+        (omega, rho)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trajectory::plan::spiral;
+    use rand::SeedableRng;
+
+    fn jitter(model: JitterModel) -> Jitter {
+        Jitter {
+            model,
+            rotation_sigma_rad: 2f64.to_radians(),
+            translation_sigma_m: [0.02, 0.02, 0.03],
+        }
+    }
+
+    /// Root mean square of the steps' rotation errors, radians per axis.
+    fn step_error(plan: &[Pose], executed: &[Pose]) -> f64 {
+        let squares: f64 = (1..plan.len())
+            .map(|k| {
+                let planned = plan[k - 1].r_wc.inverse() * plan[k].r_wc;
+                let done = executed[k - 1].r_wc.inverse() * executed[k].r_wc;
+                so3::log(&(planned.inverse() * done)).norm_squared() / 3.0
+            })
+            .sum();
+        (squares / (plan.len() - 1) as f64).sqrt()
+    }
+
+    #[test]
+    fn a_random_walk_errs_by_one_sigma_per_step_and_independent_noise_by_root_two() {
+        let plan = spiral(2000, 0.1, 30f64.to_radians());
+        let sigma = 2f64.to_radians();
+        for (model, expected) in [
+            (JitterModel::RandomWalk, sigma),
+            (JitterModel::Independent, sigma * 2f64.sqrt()),
+        ] {
+            let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+            let executed = jitter(model).apply(&plan, &mut rng);
+            let measured = step_error(&plan, &executed);
+            assert!(
+                (measured / expected - 1.0).abs() < 0.05,
+                "{model:?}: {measured}"
+            );
+        }
+    }
+
+    /// Tilt and offset stay bounded in a long survey, so that the camera keeps looking at the wall.
+    #[test]
+    fn a_long_random_walk_keeps_its_tilt_and_offset_bounded() {
+        let plan = spiral(12_000, 0.1, 30f64.to_radians());
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let executed = jitter(JitterModel::RandomWalk).apply(&plan, &mut rng);
+        let (mut tilt, mut offset) = (0.0, 0.0);
+        for (planned, pose) in plan.iter().zip(&executed) {
+            let axis = pose.r_wc * planned.r_wc.inverse() * Vector3::y();
+            tilt += axis.angle(&Vector3::y()).powi(2) / 2.0;
+            offset += pose.t_wc.x.powi(2);
+        }
+        let rms = |sum: f64| (sum / plan.len() as f64).sqrt();
+        let expected = 1.0 / (1.0 - 0.98f64.powi(2)).sqrt();
+        assert!((rms(tilt) / (expected * 2f64.to_radians()) - 1.0).abs() < 0.2);
+        assert!((rms(offset) / (expected * 0.02) - 1.0).abs() < 0.2);
+    }
+}

@@ -1,0 +1,70 @@
+//! Camera trajectories: poses, motion plans, pose noise, gyroscope integration and pose files.
+//!
+//! | format | its own convention | times | names |
+//! | --- | --- | --- | --- |
+//! | [`tum`] | camera-to-world, OpenCV's axes | seconds | |
+//! | [`kitti`] | camera-to-world, OpenCV's axes | | |
+//! | [`mod@csv`] | camera-to-world, OpenCV's axes | seconds or nanoseconds, if there | if there |
+//! | [`colmap`] | world-to-camera, OpenCV's axes | | yes |
+//! | [`nerfstudio`] | camera-to-world, OpenGL's axes | | yes |
+//! | `euroc` (read only) | body-to-world | nanoseconds | |
+//!
+//! [`read_poses`] reads any of these formats without conversion; a [`Convention`] converts the
+//! poses to the tunnel's frame.
+//!
+//! # Example
+//!
+//! ```
+//! use std::path::Path;
+//! use tunnelstitch_core::trajectory::{PoseFormat, kitti, read_poses};
+//!
+//! let file = read_poses(Path::new("../../fixtures/blender_free48/baseline.tum"), None)?;
+//! assert_eq!((file.format, file.entries.len()), (PoseFormat::Tum, 48));
+//! let text = kitti::format(&file.trajectory());
+//! assert_eq!(text.lines().count(), 48);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod axes;
+pub mod colmap;
+mod convention;
+pub mod csv;
+mod detection;
+mod error;
+mod euroc;
+mod format;
+pub mod gyro;
+mod jitter;
+pub mod kitti;
+mod mount;
+pub mod nerfstudio;
+mod plan;
+mod pose;
+mod pose_entry;
+mod pose_file;
+mod rigid;
+pub mod se3;
+mod shutter;
+pub mod so3;
+mod stamped_pose;
+pub mod text;
+pub mod times;
+pub mod tum;
+mod tunnel_frame;
+
+#[cfg(test)]
+mod format_tests;
+
+pub use axes::{CameraAxes, Direction};
+pub use convention::Convention;
+pub use error::PoseError;
+pub use format::PoseFormat;
+pub use jitter::{Jitter, JitterModel};
+pub use mount::read_camera_in_body;
+pub use plan::{Mounting, PlanTable, Rate, Station, UniformMotion, spiral};
+pub use pose::Pose;
+pub use pose_entry::PoseEntry;
+pub use pose_file::{PoseFile, read_poses};
+pub use shutter::Shutter;
+pub use stamped_pose::{StampedPose, Trajectory, indexed, poses_of};
+pub use tunnel_frame::{TunnelAxis, read_tunnel_frame};

@@ -1,0 +1,42 @@
+//! Reasons why a survey cannot be refined.
+
+use crate::model::problem_error::ProblemError;
+
+/// A reason why frames cannot be refined.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RefineError {
+    /// Nothing to compare with.
+    #[error(
+        "the survey has a single frame; refinement compares frames that overlap on the wall, so it \
+         needs two or more"
+    )]
+    SingleFrame,
+    /// Frames and poses do not correspond.
+    #[error("{frames} frames, but {poses} initial poses; give one pose for each frame, in order")]
+    PoseCount {
+        /// Number of frames.
+        frames: usize,
+        /// Number of initial poses.
+        poses: usize,
+    },
+    /// Nothing overlaps.
+    #[error(
+        "no two frames overlap on the wall by as much as a tile; check the initial poses, radius_m \
+         and the calibration's focal length, whether the mask or tunnel.ignore leaves anything, or \
+         take frames closer together"
+    )]
+    NoOverlap,
+    /// Something that is known by its shape only for a straight round tunnel.
+    #[error(
+        "{unknown} can be estimated of a straight round tunnel only; leave it out of --calibrate \
+         and [calibrate] unknowns"
+    )]
+    OnlyRound {
+        /// The parameter that was to be estimated.
+        unknown: &'static str,
+    },
+    /// The equations.
+    #[error(transparent)]
+    Problem(#[from] ProblemError),
+}

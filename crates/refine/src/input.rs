@@ -1,0 +1,78 @@
+//! The input of a refinement: frames, camera, tunnel, poses and their noise model.
+
+use std::f64::consts::TAU;
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::frames::FrameSet;
+use tunnelstitch_core::surface::{Surface, WallRegions};
+use tunnelstitch_core::survey::{CalibrateSection, Survey};
+use tunnelstitch_core::trajectory::{Jitter, Shutter, StampedPose};
+
+/// No part of the wall.
+static NOTHING: WallRegions = WallRegions::NONE;
+
+/// Frames with initial poses, the camera that took them, and the tunnel that they show.
+///
+/// A [`Survey`] converts into it; [`RefineInput::new`] makes one of parts in memory.
+#[derive(Clone, Debug)]
+pub struct RefineInput<'a> {
+    /// The camera, at rest.
+    pub camera: Camera,
+    /// The tunnel.
+    pub surface: &'a dyn Surface,
+    /// The frames, in the order of their poses.
+    pub frames: &'a FrameSet,
+    /// The initial poses, camera to world, one per frame.
+    pub initial: &'a [StampedPose],
+    /// Noise model of the initial poses.
+    pub prior: Jitter,
+    /// When the rows of each frame are read.
+    pub shutter: Shutter,
+    /// Parts of the wall at which frames are not compared.
+    pub ignored: &'a WallRegions,
+    /// Shared parameters to estimate besides the poses, and their priors.
+    pub calibrate: CalibrateSection,
+    /// Radius of the tunnel, or half its width, as given; metres.
+    pub nominal_radius_m: f64,
+}
+
+impl<'a> RefineInput<'a> {
+    /// Frames of a global shutter, all of the wall to be compared, nothing but poses and exposures
+    /// to be estimated.
+    ///
+    /// `frames` and `initial` correspond one to one.
+    pub fn new(
+        camera: Camera,
+        surface: &'a dyn Surface,
+        frames: &'a FrameSet,
+        initial: &'a [StampedPose],
+        prior: Jitter,
+    ) -> Self {
+        Self {
+            camera,
+            surface,
+            frames,
+            initial,
+            prior,
+            shutter: Shutter::default(),
+            ignored: &NOTHING,
+            calibrate: CalibrateSection::default(),
+            nominal_radius_m: surface.perimeter_m() / TAU,
+        }
+    }
+}
+
+impl<'a> From<&'a Survey> for RefineInput<'a> {
+    fn from(survey: &'a Survey) -> Self {
+        Self {
+            camera: survey.camera,
+            surface: survey.surface.as_ref(),
+            frames: &survey.frames,
+            initial: &survey.initial,
+            prior: survey.prior,
+            shutter: survey.shutter(),
+            ignored: &survey.ignored,
+            calibrate: survey.file.calibrate.clone().unwrap_or_default(),
+            nominal_radius_m: survey.file.tunnel.nominal_m(),
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! The estimator: every frame's pose and exposure from the photometric consistency of overlapping
+//! strips of the wall.
+//!
+//! It minimises the robust photometric cost plus the priors, over all poses, exposures and, if
+//! asked for, parameters that all frames share. The wall's texture is eliminated exactly. The
+//! objective is stated and derived in one place, beside the code that computes it: [`tiles::tile`].
+//!
+//! # The pipeline
+//!
+//! [`pipeline`] runs a list of [`stages`], each a function from an estimation to an estimation:
+//!
+//! | stage | what it does | works with |
+//! | --- | --- | --- |
+//! | [`prescreen`](stages::prescreen) | rejects useless frames; common shading, sensor noise | [`tracking::prescreening`] |
+//! | [`track`](stages::track) | registers one frame after another on the wall that its predecessors show; sliding windows | [`tracking`] |
+//! | [`correct_shading`](stages::correct_shading) | light that moves with the camera, from the overlaps | [`tunnelstitch_photometry`] |
+//! | [`solve`](stages::solve) | all frames together, coarse to fine | [`problem`], [`solver`] |
+//! | [`validate_pairs`](stages::validate_pairs) | rejects frames that contradict the others | [`validation::pairwise_ncc`] |
+//! | [`repair`](stages::repair) | rejects inconsistent frames, registers them again, resolves aliases | [`validation`] |
+//! | [`solve`](stages::solve), last | full size, dense samples; then jointly with the wall, if asked for | [`joint`] |
+//! | [`assess`](stages::assess) | uncertainty and verdict of every frame | [`uncertainty`] |
+//!
+//! # A solve
+//!
+//! Every solve, of one frame, a window or all frames, is the same: choose samples, linearise,
+//! reduce, solve, accept.
+//!
+//! | step | where |
+//! | --- | --- |
+//! | samples: tiles of the wall, the frames that see them, the most informative ones, no outliers | [`samples`] |
+//! | linearise: texture, residuals, Jacobian and their moments over a tile | [`tiles`] |
+//! | reduce: sums over tiles to cost and normal equations | [`problem`] |
+//! | solve: sparse Cholesky, shared parameters by Schur complement | [`linear`] |
+//! | accept: damping, step test, stopping | [`solver::gauss_newton`] |
+//!
+//! Dependencies point downwards only, in the order parameters, linear, model, tiles, samples,
+//! joint, problem, solver, tracking, validation, uncertainty, stages, pipeline. Every tuned number
+//! is in [`thresholds`].
+//!
+//! # Speed
+//!
+//! - The work on a tile is loops over whole vectors ([`tiles::tile`]), compiled for several
+//!   processors; the version for the present one is chosen at run time. Sums keep their order, so
+//!   results stay the same.
+//! - The last solve samples the wall twice a pixel along each axis; those before it use the tiles
+//!   with most information ([`samples::tile_selection`]). `--fast` samples 1.5 times a pixel and
+//!   takes a single step, if that is short.
+//! - Each linearisation serves twice: its cost judges the step that led there, its equations make
+//!   the next. The last step of a solve is within its tolerance and is not judged.
+//! - The corners of tiles are computed once for all frames ([`samples::visibility`]), local
+//!   contrast once for a picture.
+//!
+#![doc = include_str!("ablation.md")]
+
+mod error;
+mod input;
+mod joint;
+mod linear;
+mod model;
+mod options;
+mod parameters;
+mod pipeline;
+mod pose_convention_search;
+mod problem;
+mod refined;
+mod report;
+mod samples;
+mod solver;
+mod stages;
+#[cfg(test)]
+mod test_scene;
+mod thresholds;
+mod tiles;
+mod tracking;
+mod uncertainty;
+mod validation;
+
+pub use error::RefineError;
+pub use input::RefineInput;
+pub use model::problem_error::ProblemError;
+pub use options::RefineOptions;
+pub use pipeline::{refine, refine_with_checkpoint};
+pub use pose_convention_search::search_pose_conventions;
+pub use problem::unknown_texture::UnknownTexture;
+pub use refined::Refined;
+pub use report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
+pub use solver::solve_record::{SolveRecord, StepRecord};
+pub use solver::stopping::StopReason;
+pub use uncertainty::calibration_report::{CalibrationReport, UnknownReport};
+pub use uncertainty::covariance::Covariances;
+pub use uncertainty::covariance_file::{CovarianceError, read_covariances};
+pub use uncertainty::cramer_rao::{FINER, PoseBounds, pose_bounds};
+pub use uncertainty::frame_sigma::FrameSigma;
+pub use uncertainty::rolling_shutter_test::ReadoutEstimate;

@@ -1,0 +1,246 @@
+//! Sparse Cholesky factorisation of the normal matrix, by faer.
+
+use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::linalg::cholesky::{
+    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
+use faer::{Conj, MatMut, Par, Side};
+use nalgebra::SMatrix;
+
+/// Failures of the factorisation of the normal matrix.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum FactorError {
+    /// The matrix is not positive definite: neither pixels nor prior constrain some parameter.
+    #[error("the normal matrix is not positive definite")]
+    NotPositiveDefinite,
+    /// The symbolic analysis failed (the matrix is too large for memory).
+    #[error("the normal matrix could not be analysed: {0}")]
+    Structure(String),
+}
+
+/// The symbolic factorisation of a pattern: computed once, used for every step.
+///
+/// faer runs sequentially (`Par::Seq`): this is faster at these sizes, and its parallel sums would
+/// depend on the number of threads.
+#[derive(Debug)]
+pub struct SymbolicFactorisation {
+    structure: SymbolicSparseColMat<usize>,
+    cholesky: SymbolicCholesky<usize>,
+}
+
+impl SymbolicFactorisation {
+    /// Analyses a pattern: fill-reducing order (approximate minimum degree), elimination tree and
+    /// supernodes.
+    ///
+    /// # Errors
+    /// [`FactorError::Structure`].
+    pub fn new(pattern: &Pattern) -> Result<Self, FactorError> {
+        let n = pattern.frames() * FRAME_PARAMETERS;
+        let mut column_starts = Vec::with_capacity(n + 1);
+        let mut row_indices =
+            Vec::with_capacity(pattern.blocks() * FRAME_PARAMETERS * FRAME_PARAMETERS);
+        column_starts.push(0);
+        for column in 0..pattern.frames() {
+            for c in 0..FRAME_PARAMETERS {
+                for &row in pattern.rows(column) {
+                    let height = if row == column {
+                        c + 1
+                    } else {
+                        FRAME_PARAMETERS
+                    };
+                    row_indices.extend((0..height).map(|r| row * FRAME_PARAMETERS + r));
+                }
+                column_starts.push(row_indices.len());
+            }
+        }
+        let structure = SymbolicSparseColMat::new_checked(n, n, column_starts, None, row_indices);
+        let cholesky = factorize_symbolic_cholesky(
+            structure.as_ref(),
+            Side::Upper,
+            SymmetricOrdering::Amd,
+            Default::default(),
+        )
+        .map_err(|error| FactorError::Structure(format!("{error:?}")))?;
+        Ok(Self {
+            structure,
+            cholesky,
+        })
+    }
+
+    /// Factorises `H + λ diag(H)`.
+    ///
+    /// # Errors
+    /// [`FactorError::NotPositiveDefinite`].
+    pub fn factorise(
+        &self,
+        pattern: &Pattern,
+        normal: &NormalEquations,
+        lambda: f64,
+    ) -> Result<Factor<'_>, FactorError> {
+        let mut values = Vec::with_capacity(self.structure.row_idx().len());
+        for column in 0..pattern.frames() {
+            for c in 0..FRAME_PARAMETERS {
+                for &row in pattern.rows(column) {
+                    let block: &Block = match pattern.block_index(row, column) {
+                        Some(index) => &normal.blocks[index],
+                        None => continue,
+                    };
+                    if row == column {
+                        values.extend((0..c).map(|r| block[(r, c)]));
+                        values.push(block[(c, c)] * (1.0 + lambda));
+                    } else {
+                        values.extend((0..FRAME_PARAMETERS).map(|r| block[(r, c)]));
+                    }
+                }
+            }
+        }
+        let matrix = SparseColMatRef::new(self.structure.as_ref(), &values);
+        let mut numeric = vec![0.0; self.cholesky.len_val()];
+        let scratch = self
+            .cholesky
+            .factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        self.cholesky
+            .factorize_numeric_llt(
+                &mut numeric,
+                matrix,
+                Side::Upper,
+                Default::default(),
+                Par::Seq,
+                MemStack::new(&mut MemBuffer::new(scratch)),
+                Default::default(),
+            )
+            .map_err(|_| FactorError::NotPositiveDefinite)?;
+        Ok(Factor {
+            symbolic: &self.cholesky,
+            numeric,
+        })
+    }
+}
+
+/// A numeric factorisation.
+pub struct Factor<'a> {
+    symbolic: &'a SymbolicCholesky<usize>,
+    numeric: Vec<f64>,
+}
+
+impl Factor<'_> {
+    /// Solves for `columns` right-hand sides at once, in place; `rhs` is column-major.
+    fn solve_in_place(&self, rhs: &mut [f64], columns: usize) {
+        let n = self.symbolic.nrows();
+        let scratch = self
+            .symbolic
+            .solve_in_place_scratch::<f64>(columns, Par::Seq);
+        LltRef::new(self.symbolic, &self.numeric).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(rhs, n, columns),
+            Par::Seq,
+            MemStack::new(&mut MemBuffer::new(scratch)),
+        );
+    }
+
+    /// Computes `H⁻¹ B` of a matrix B with C columns, given and returned frame by frame.
+    pub fn solve<const C: usize>(
+        &self,
+        blocks: &[SMatrix<f64, FRAME_PARAMETERS, C>],
+    ) -> Vec<SMatrix<f64, FRAME_PARAMETERS, C>> {
+        let n = blocks.len() * FRAME_PARAMETERS;
+        let mut rhs = Vec::with_capacity(n * C);
+        for column in 0..C {
+            rhs.extend(
+                blocks
+                    .iter()
+                    .flat_map(|b| b.column(column).into_owned().data.0[0]),
+            );
+        }
+        self.solve_in_place(&mut rhs, C);
+        let value = |frame: usize, row: usize, column: usize| {
+            rhs[column * n + frame * FRAME_PARAMETERS + row]
+        };
+        (0..blocks.len())
+            .map(|frame| SMatrix::from_fn(|row, column| value(frame, row, column)))
+            .collect()
+    }
+
+    /// Solves `H δ = −g` for the step δ.
+    pub fn step(&self, gradient: &[FrameStep]) -> Vec<FrameStep> {
+        let mut rhs: Vec<f64> = gradient.iter().flat_map(|g| g.iter().map(|v| -v)).collect();
+        self.solve_in_place(&mut rhs, 1);
+        rhs.chunks_exact(FRAME_PARAMETERS)
+            .map(FrameStep::from_column_slice)
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A random symmetric positive definite block matrix on a spiral-like pattern.
+    fn example() -> (Pattern, NormalEquations, nalgebra::DMatrix<f64>) {
+        let frames = 9;
+        let pairs = (0..frames).flat_map(|k| [(k, (k + 1).min(8)), (k, (k + 4).min(8))]);
+        let pattern = Pattern::new(frames, pairs);
+        let mut normal = NormalEquations::zeros(&pattern);
+        let n = frames * FRAME_PARAMETERS;
+        let mut dense = nalgebra::DMatrix::zeros(n, n);
+        let mut seed = 1u32;
+        let mut random = || {
+            seed = seed.wrapping_mul(1664525).wrapping_add(1013904223);
+            f64::from(seed >> 8) / f64::from(1 << 24) - 0.5
+        };
+        for column in 0..frames {
+            for &row in pattern.rows(column) {
+                let mut block = Block::from_fn(|_, _| random());
+                if row == column {
+                    block = block * block.transpose() + Block::identity() * 20.0;
+                }
+                normal.add_block(&pattern, row, column, &block);
+                for r in 0..FRAME_PARAMETERS {
+                    for c in 0..FRAME_PARAMETERS {
+                        dense[(row * FRAME_PARAMETERS + r, column * FRAME_PARAMETERS + c)] =
+                            block[(r, c)];
+                        dense[(column * FRAME_PARAMETERS + c, row * FRAME_PARAMETERS + r)] =
+                            block[(r, c)];
+                    }
+                }
+            }
+            normal.gradient[column] = FrameStep::from_fn(|_, _| random());
+        }
+        (pattern, normal, dense)
+    }
+
+    #[test]
+    fn steps_solve_the_equations() {
+        let (pattern, normal, dense) = example();
+        let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
+        let factor = symbolic.factorise(&pattern, &normal, 0.0).unwrap();
+        let step: Vec<f64> = factor
+            .step(&normal.gradient)
+            .iter()
+            .flat_map(|s| s.iter().copied().collect::<Vec<_>>())
+            .collect();
+        let gradient: Vec<f64> = normal
+            .gradient
+            .iter()
+            .flat_map(|s| s.iter().copied().collect::<Vec<_>>())
+            .collect();
+        let residual =
+            &dense * nalgebra::DVector::from_vec(step) + nalgebra::DVector::from_vec(gradient);
+        assert!(residual.norm() < 1e-10);
+    }
+
+    #[test]
+    fn indefinite_matrix_is_an_error() {
+        let pattern = Pattern::new(1, []);
+        let mut normal = NormalEquations::zeros(&pattern);
+        normal.add_block(&pattern, 0, 0, &-Block::identity());
+        let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
+        assert!(matches!(
+            symbolic.factorise(&pattern, &normal, 0.0),
+            Err(FactorError::NotPositiveDefinite)
+        ));
+    }
+}

@@ -1,0 +1,96 @@
+//! The estimator's inputs, and the window of frames that a problem estimates.
+
+use crate::model::prior::{Prior, predict};
+use crate::parameters::calibration::{Calibration, Kappa};
+use crate::parameters::frame_estimate::FrameEstimate;
+use std::borrow::Cow;
+use std::ops::Range;
+use tunnelstitch_core::camera::{Camera, Sweep};
+use tunnelstitch_core::frames::FrameCache;
+use tunnelstitch_core::surface::{Surface, WallRegions};
+use tunnelstitch_core::trajectory::{Pose, Shutter};
+
+/// All inputs of the estimator.
+#[derive(Clone, Copy)]
+pub struct EstimationContext<'a> {
+    /// The tunnel.
+    pub surface: &'a dyn Surface,
+    /// Parts of the wall where frames are not compared.
+    pub ignored: &'a WallRegions,
+    /// The camera at full size at the current κ, without motion during the readout.
+    pub camera: Camera,
+    /// Timing of the readout of the frames' rows.
+    pub shutter: &'a Shutter,
+    /// The shared parameters: which are estimated, and their prior.
+    pub calibration: Calibration,
+    /// Current values of the shared parameters.
+    pub kappa: Kappa,
+    /// The frames.
+    pub frames: &'a FrameCache,
+    /// Prior of poses and exposures.
+    pub prior: &'a Prior,
+    /// The sensor's noise, 1-σ in grey levels, estimated from single images.
+    pub noise: f64,
+}
+
+impl EstimationContext<'_> {
+    /// Replaces the shared parameters and the camera; no change if `kappa` gives no valid camera.
+    pub fn at(self, kappa: Kappa) -> Self {
+        match self.calibration.camera(&kappa) {
+            Some(camera) => Self {
+                camera,
+                kappa,
+                ..self
+            },
+            None => self,
+        }
+    }
+
+    /// Motion of the camera during the readout of frame `frame`, from the `estimates` of the frames
+    /// `window`.
+    ///
+    /// Neighbours outside the window (those not yet registered, for example) are predicted by the
+    /// initial steps from the frame.
+    pub fn sweep(&self, frame: usize, window: &Range<usize>, estimates: &[FrameEstimate]) -> Sweep {
+        let readout_s = self.calibration.readout_s(&self.kappa);
+        if readout_s == 0.0 {
+            Sweep::default()
+        } else {
+            self.sweep_rate(frame, window, estimates).scaled(readout_s)
+        }
+    }
+
+    /// Motion of the camera during a readout of one second, as [`EstimationContext::sweep`].
+    pub fn sweep_rate(
+        &self,
+        frame: usize,
+        window: &Range<usize>,
+        estimates: &[FrameEstimate],
+    ) -> Sweep {
+        let estimate = |k: usize| estimates.get(k.checked_sub(window.start)?);
+        let datum = self.calibration.datum(&self.kappa);
+        let initial = |k: usize| {
+            let pose = self.prior.initial.get(k)?;
+            Some(datum.to_nominal_tunnel(pose))
+        };
+        self.shutter.rate(frame, |k| {
+            let predicted = |own: &Pose| Some(predict(own, &initial(frame)?, &initial(k)?));
+            match estimate(k) {
+                Some(estimate) => Some(estimate.pose),
+                None => predicted(&estimate(frame)?.pose),
+            }
+        })
+    }
+}
+
+/// The frames of a problem.
+pub struct FrameWindow<'m> {
+    /// Consecutive frames.
+    pub participants: Range<usize>,
+    /// Those of them that are estimated; the others are held fixed.
+    pub active: Range<usize>,
+    /// Estimates of the participants.
+    pub estimates: &'m [FrameEstimate],
+    /// True for the participants whose pixels are compared; the others have only their prior.
+    pub compared: Cow<'m, [bool]>,
+}

@@ -1,0 +1,60 @@
+//! The state of every frame: its estimate, and a reason if its pixels are rejected.
+
+use crate::model::context::{EstimationContext, FrameWindow};
+use crate::model::rejection::RejectionReason;
+use crate::parameters::calibration::Kappa;
+use crate::parameters::frame_estimate::FrameEstimate;
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::ops::Range;
+use tunnelstitch_core::camera::Sweep;
+
+/// The states of all frames, and the shared parameters.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FrameStates {
+    /// Estimate of each frame.
+    pub estimates: Vec<FrameEstimate>,
+    /// Reason of each rejected frame; None for inliers. Rejected frames stay at their prior.
+    pub rejections: Vec<Option<RejectionReason>>,
+    /// Current values of the shared parameters.
+    pub kappa: Kappa,
+}
+
+impl FrameStates {
+    /// The window of all frames, all estimated; rejected frames from the prior alone.
+    pub fn window(&self) -> FrameWindow<'_> {
+        let all = 0..self.estimates.len();
+        self.window_of(all.clone(), all)
+    }
+
+    /// The window of the frames `participants`, of which those `active` are estimated and the
+    /// others held fixed; rejected frames from the prior alone.
+    pub fn window_of(&self, participants: Range<usize>, active: Range<usize>) -> FrameWindow<'_> {
+        FrameWindow {
+            estimates: &self.estimates[participants.clone()],
+            compared: Cow::Owned(self.inliers(&participants)),
+            participants,
+            active,
+        }
+    }
+
+    /// Motion of a frame's camera during its readout.
+    pub fn sweep(&self, context: &EstimationContext, frame: usize) -> Sweep {
+        context.sweep(frame, &(0..self.estimates.len()), &self.estimates)
+    }
+
+    /// True for the frames of `range` that are inliers.
+    pub fn inliers(&self, range: &Range<usize>) -> Vec<bool> {
+        self.rejections[range.clone()]
+            .iter()
+            .map(Option::is_none)
+            .collect()
+    }
+
+    /// Rejects frames, each with its reason.
+    pub fn reject(&mut self, rejected: Vec<(usize, RejectionReason)>) {
+        for (frame, reason) in rejected {
+            self.rejections[frame] = Some(reason);
+        }
+    }
+}

@@ -1,0 +1,369 @@
+//! The Gaussian prior on poses and exposures, and its part of the normal equations.
+
+use crate::linear::bordered_system::SharedBorder;
+use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
+use crate::model::prior_terms::{
+    DatumJacobian, absolute_error, absolute_error_by_datum, relative_error, relative_error_by_datum,
+};
+use crate::parameters::calibration::{DATUM_PARAMETERS, Datum, INTRINSIC_PARAMETERS};
+use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
+use nalgebra::{Matrix6, Vector3, Vector6};
+use std::ops::Range;
+use tunnelstitch_core::numerics::median::upper_median;
+use tunnelstitch_core::surface::{Gauge, GaugeMotion};
+use tunnelstitch_core::trajectory::{Jitter, JitterModel, Pose};
+
+/// Gaussian prior on poses and exposures.
+///
+/// Its cost is `½ Σ eᵀ Σ⁻¹ e`, with the errors
+///
+/// - `independent`: each pose around its initial value, `e = (Log(R̂ᵀR), t − t̂)`;
+/// - `random-walk`: each step around its initial value,
+///   `e = (Log(ΔR̂ᵀ R_{k−1}ᵀ R_k), (t_k − t_{k−1}) − (t̂_k − t̂_{k−1}))` with
+///   `ΔR̂ = R̂_{k−1}ᵀ R̂_k`, and the first frame around its initial pose, which also fixes the two
+///   gauge freedoms;
+/// - log-gain and bias of every frame around 0: without this prior they would absorb misalignment,
+///   and the exposures of all frames could drift together.
+///
+/// `R̂, t̂` are the initial poses transformed to the tunnel, and t is multiplied by the scale, both
+/// by the [`Datum`]. Σ is the diagonal variance of the jitter, for a step of a random walk times
+/// its [`Prior::step_ratio`].
+#[derive(Clone, Debug)]
+pub struct Prior {
+    /// Noise model of the initial poses.
+    pub jitter: Jitter,
+    /// The initial poses of all frames.
+    pub initial: Vec<Pose>,
+    /// Their times, seconds. A longer step, as where frames are missing, is less certain.
+    pub times_s: Vec<f64>,
+    /// Median step between these times, seconds.
+    pub median_step_s: f64,
+    /// 1-σ of the log-gain.
+    pub log_gain_sigma: f64,
+    /// 1-σ of the bias, grey levels.
+    pub bias_sigma: f64,
+}
+
+/// Median step between times, seconds; 1 for fewer than two times.
+pub fn median_step_s(times_s: &[f64]) -> f64 {
+    let steps = times_s.windows(2).map(|t| t[1] - t[0]);
+    upper_median(steps.collect()).unwrap_or(1.0)
+}
+
+/// Applies the step from `from` to `to` to a pose.
+pub fn predict(pose: &Pose, from: &Pose, to: &Pose) -> Pose {
+    Pose::new(
+        pose.r_wc * (from.r_wc.inverse() * to.r_wc),
+        pose.t_wc + (to.t_wc - from.t_wc),
+    )
+}
+
+impl Prior {
+    /// Number of median steps between two frames, by their times: the factor by which the variance
+    /// of a random walk grows. Each step counts at least once.
+    pub fn steps_between(&self, a: usize, b: usize) -> f64 {
+        (a..b).map(|k| self.step_ratio(k)).sum()
+    }
+
+    /// Step from frame `k` to the next over the median step, at least 1.
+    fn step_ratio(&self, k: usize) -> f64 {
+        ((self.times_s[k + 1] - self.times_s[k]) / self.median_step_s).max(1.0)
+    }
+
+    /// Lever arm of an error of scale or tilt, metres: the longest step of a random walk, or the
+    /// largest distance of independent poses from their mean.
+    pub fn lever_arm_m(&self) -> f64 {
+        let poses = &self.initial;
+        let lengths: Vec<f64> = match self.jitter.model {
+            JitterModel::RandomWalk => {
+                let steps = poses.windows(2);
+                steps.map(|p| (p[1].t_wc - p[0].t_wc).norm()).collect()
+            }
+            JitterModel::Independent => {
+                let sum: Vector3<f64> = poses.iter().map(|pose| pose.t_wc).sum();
+                let mean = sum / poses.len().max(1) as f64;
+                poses.iter().map(|p| (p.t_wc - mean).norm()).collect()
+            }
+        };
+        lengths.into_iter().fold(0.0, f64::max)
+    }
+
+    /// Predicts the pose of frame `to` from that of frame `from` by the initial steps.
+    pub fn predict(&self, from: usize, pose: &Pose, to: usize) -> Pose {
+        predict(pose, &self.initial[from], &self.initial[to])
+    }
+
+    /// Pairs of frames within `active` with a common error, counted from its start.
+    pub fn pairs(&self, active: &Range<usize>) -> Vec<(usize, usize)> {
+        match self.jitter.model {
+            JitterModel::RandomWalk => (1..active.len()).map(|k| (k - 1, k)).collect(),
+            JitterModel::Independent => Vec::new(),
+        }
+    }
+
+    /// Adds gradient and normal matrix of the `active` frames, and returns the cost `½ Σ eᵀ Σ⁻¹ e`.
+    ///
+    /// `estimates` are those of the frames `participants`, which include the active ones. `border`
+    /// receives the part of the shared parameters, if they are estimated.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "the estimates first, then the sums"
+    )]
+    pub fn add_to(
+        &self,
+        participants: &Range<usize>,
+        estimates: &[FrameEstimate],
+        active: &Range<usize>,
+        datum: &Datum,
+        pattern: &Pattern,
+        normal: &mut NormalEquations,
+        border: Option<&mut SharedBorder>,
+    ) -> f64 {
+        let mut cost = 0.0;
+        let mut sums = PriorSums {
+            active,
+            datum,
+            pattern,
+            normal,
+            border,
+        };
+        for k in active.clone() {
+            let estimate = &estimates[k - participants.start];
+            cost += self.add_exposure(estimate, k - active.start, pattern, sums.normal);
+            if self.jitter.model == JitterModel::Independent || k == 0 {
+                cost += self.add_absolute(k, &estimate.pose, &mut sums);
+            }
+        }
+        if self.jitter.model == JitterModel::RandomWalk {
+            let last = (active.end + 1).min(participants.end);
+            for k in active.start.max(participants.start + 1)..last {
+                let before = &estimates[k - 1 - participants.start].pose;
+                let pose = &estimates[k - participants.start].pose;
+                cost += self.add_relative(k, before, pose, &mut sums);
+            }
+        }
+        cost
+    }
+
+    /// Motion along the gauge that minimises the cost of the prior: that of the first frame for a
+    /// random walk, of all frames for independent errors.
+    pub fn align_gauge(
+        &self,
+        gauge: &Gauge,
+        estimates: &[FrameEstimate],
+        datum: &Datum,
+    ) -> GaugeMotion {
+        let count = match self.jitter.model {
+            JitterModel::RandomWalk => 1,
+            JitterModel::Independent => estimates.len(),
+        };
+        let poses: Vec<Pose> = estimates[..count].iter().map(|e| e.pose).collect();
+        let initial = self.initial[..count].iter();
+        let initial: Vec<Pose> = initial.map(|pose| datum.to_nominal_tunnel(pose)).collect();
+        gauge.align(&poses, &initial)
+    }
+
+    /// Half the squared Mahalanobis distance of a pose from the expected pose.
+    pub fn deviation_cost(&self, expected: &Pose, pose: &Pose) -> f64 {
+        let e = expected.local(pose);
+        0.5 * e.component_mul(&e).dot(&self.information())
+    }
+
+    /// Adds the errors of gain and bias.
+    fn add_exposure(
+        &self,
+        estimate: &FrameEstimate,
+        slot: usize,
+        pattern: &Pattern,
+        normal: &mut NormalEquations,
+    ) -> f64 {
+        let (gain, bias) = (self.log_gain_sigma.powi(-2), self.bias_sigma.powi(-2));
+        let mut block = Block::zeros();
+        block[(6, 6)] = gain;
+        block[(7, 7)] = bias;
+        normal.add_block(pattern, slot, slot, &block);
+        normal.gradient[slot][6] += gain * estimate.log_gain;
+        normal.gradient[slot][7] += bias * estimate.bias;
+        0.5 * (gain * estimate.log_gain.powi(2) + bias * estimate.bias.powi(2))
+    }
+
+    /// Diagonal of `Σ⁻¹`.
+    fn information(&self) -> Vector6<f64> {
+        let r = self.jitter.rotation_sigma_rad.powi(-2);
+        let t = self.jitter.translation_sigma_m.map(|s| s.powi(-2));
+        Vector6::new(r, r, r, t[0], t[1], t[2])
+    }
+
+    /// Adds the error of a pose around its initial value.
+    fn add_absolute(&self, k: usize, pose: &Pose, sums: &mut PriorSums) -> f64 {
+        let datum = sums.datum;
+        let initial = datum.to_tunnel(&self.initial[k]);
+        let (e, j) = absolute_error(&initial, pose, datum.scale);
+        let weighted = Matrix6::from_diagonal(&self.information());
+        let slot = k - sums.active.start;
+        add_gradient(sums.normal, slot, &(j.transpose() * weighted * e));
+        let block = embed(&(j.transpose() * weighted * j));
+        sums.normal.add_block(sums.pattern, slot, slot, &block);
+        if let Some(border) = &mut sums.border {
+            let j_shared = absolute_error_by_datum(datum, &initial, pose, &e);
+            add_shared(border, &j_shared, &weighted, &e, [(Some(slot), &j)]);
+        }
+        0.5 * (e.transpose() * weighted * e)[0]
+    }
+
+    /// Adds the error of the step that leads to frame `k`.
+    fn add_relative(&self, k: usize, before: &Pose, pose: &Pose, sums: &mut PriorSums) -> f64 {
+        let datum = sums.datum;
+        let [initial_before, initial] = [k - 1, k].map(|k| datum.to_tunnel(&self.initial[k]));
+        let (e, j_before, j) = relative_error(&initial_before, &initial, before, pose, datum.scale);
+        let weighted = Matrix6::from_diagonal(&(self.information() / self.step_ratio(k - 1)));
+        let slot = |k: usize| sums.active.contains(&k).then(|| k - sums.active.start);
+        let (slot_before, slot) = (slot(k - 1), slot(k));
+        for (slot, j) in [(slot_before, &j_before), (slot, &j)] {
+            if let Some(slot) = slot {
+                add_gradient(sums.normal, slot, &(j.transpose() * weighted * e));
+                let block = embed(&(j.transpose() * weighted * j));
+                sums.normal.add_block(sums.pattern, slot, slot, &block);
+            }
+        }
+        if let (Some(a), Some(b)) = (slot_before, slot) {
+            let block = j_before.transpose() * weighted * j;
+            sums.normal.add_block(sums.pattern, a, b, &embed(&block));
+        }
+        if let Some(border) = &mut sums.border {
+            let j_shared =
+                relative_error_by_datum(datum, (&initial_before, &initial), (before, pose));
+            let frames = [(slot_before, &j_before), (slot, &j)];
+            add_shared(border, &j_shared, &weighted, &e, frames);
+        }
+        0.5 * (e.transpose() * weighted * e)[0]
+    }
+}
+
+/// The sums that the prior adds to, and the frames they are for.
+struct PriorSums<'s> {
+    active: &'s Range<usize>,
+    datum: &'s Datum,
+    pattern: &'s Pattern,
+    normal: &'s mut NormalEquations,
+    border: Option<&'s mut SharedBorder>,
+}
+
+/// Adds an error to the border; `frames` are the slots of its poses with their Jacobians.
+fn add_shared<const N: usize>(
+    border: &mut SharedBorder,
+    j_shared: &DatumJacobian,
+    weighted: &Matrix6<f64>,
+    e: &Vector6<f64>,
+    frames: [(Option<usize>, &Matrix6<f64>); N],
+) {
+    let scaled = weighted * j_shared;
+    for (slot, j) in frames {
+        if let Some(slot) = slot {
+            let mut target =
+                border.frames[slot].fixed_view_mut::<6, DATUM_PARAMETERS>(0, INTRINSIC_PARAMETERS);
+            target += j.transpose() * scaled;
+        }
+    }
+    let mut own = border
+        .own
+        .fixed_view_mut::<DATUM_PARAMETERS, DATUM_PARAMETERS>(
+            INTRINSIC_PARAMETERS,
+            INTRINSIC_PARAMETERS,
+        );
+    own += j_shared.transpose() * scaled;
+    let mut gradient = border
+        .gradient
+        .fixed_rows_mut::<DATUM_PARAMETERS>(INTRINSIC_PARAMETERS);
+    gradient += scaled.transpose() * e;
+}
+
+/// Embeds a block of poses in one of frames.
+fn embed(pose_block: &Matrix6<f64>) -> Block {
+    let mut block = Block::zeros();
+    block.fixed_view_mut::<6, 6>(0, 0).copy_from(pose_block);
+    block
+}
+
+/// Adds the gradient of a pose.
+fn add_gradient(normal: &mut NormalEquations, slot: usize, gradient: &Vector6<f64>) {
+    let target: &mut FrameStep = &mut normal.gradient[slot];
+    for k in 0..6 {
+        target[k] += gradient[k];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::prior_terms::tests::{calibration, kappa, pose};
+    use crate::parameters::calibration::Kappa;
+
+    /// Central differences, for both jitter models, frames and datum.
+    #[test]
+    fn gradient_is_the_derivative_of_the_cost() {
+        for model in [JitterModel::RandomWalk, JitterModel::Independent] {
+            let prior = Prior {
+                jitter: Jitter {
+                    model,
+                    rotation_sigma_rad: 0.03,
+                    translation_sigma_m: [0.02, 0.02, 0.03],
+                },
+                initial: (0..5).map(|k| pose(0.1 * f64::from(k))).collect(),
+                times_s: vec![0.0, 1.0, 2.0, 5.0, 6.0],
+                median_step_s: 1.0,
+                log_gain_sigma: 0.3,
+                bias_sigma: 10.0,
+            };
+            let (participants, active) = (0..5, 1..4);
+            let pattern = Pattern::new(3, prior.pairs(&active));
+            let estimates: Vec<_> = (0..5)
+                .map(|k| FrameEstimate {
+                    pose: pose(0.13 * f64::from(k)),
+                    log_gain: 0.1,
+                    bias: 2.0,
+                })
+                .collect();
+            let evaluate = |estimates: &[FrameEstimate], kappa: &Kappa| {
+                let mut normal = NormalEquations::zeros(&pattern);
+                let mut border = SharedBorder::zeros(3);
+                let datum = calibration().datum(kappa);
+                let cost = prior.add_to(
+                    &participants,
+                    estimates,
+                    &active,
+                    &datum,
+                    &pattern,
+                    &mut normal,
+                    Some(&mut border),
+                );
+                (cost, normal, border)
+            };
+            let (_, normal, border) = evaluate(&estimates, &kappa());
+            for k in INTRINSIC_PARAMETERS..INTRINSIC_PARAMETERS + DATUM_PARAMETERS {
+                let cost_at = |amount: f64| {
+                    let mut moved = kappa();
+                    moved[k] += amount;
+                    evaluate(&estimates, &moved).0
+                };
+                let slope = (cost_at(1e-6) - cost_at(-1e-6)) / 2e-6;
+                let analytic = border.gradient[k];
+                assert!((slope - analytic).abs() < 1e-4 * (1.0 + analytic.abs()));
+            }
+            for slot in 0..3 {
+                for k in 0..8 {
+                    let cost_at = |amount: f64| {
+                        let mut moved = estimates.clone();
+                        let mut step = FrameStep::zeros();
+                        step[k] = amount;
+                        moved[slot + 1] = moved[slot + 1].retract(&step);
+                        evaluate(&moved, &kappa()).0
+                    };
+                    let slope = (cost_at(1e-6) - cost_at(-1e-6)) / 2e-6;
+                    let analytic = normal.gradient[slot][k];
+                    assert!((slope - analytic).abs() < 1e-4 * (1.0 + analytic.abs()));
+                }
+            }
+        }
+    }
+}

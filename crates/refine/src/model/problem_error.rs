@@ -1,0 +1,42 @@
+//! Errors of the photometric problem and its solver.
+
+use crate::linear::sparse_cholesky::FactorError;
+use tunnelstitch_core::frames::FrameError;
+use tunnelstitch_core::persist::checkpoint::CheckpointError;
+use tunnelstitch_core::surface::SurfaceError;
+
+/// Failures of setting up or solving a photometric problem.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProblemError {
+    /// A frame cannot be read.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// A frame's pose is outside the tunnel, or its camera does not see the wall.
+    #[error("frame {frame}: {source}; check the initial poses, radius_m and the calibration")]
+    Placement {
+        /// The frame.
+        frame: usize,
+        /// Cause.
+        source: SurfaceError,
+    },
+    /// The normal equations have no solution.
+    #[error(
+        "frames {first} to {last}: {source}; check that the poses are camera-to-world, radius_m, \
+         the calibration, and that [prior] is neither absurdly wide nor narrow"
+    )]
+    Factor {
+        /// First estimated frame.
+        first: usize,
+        /// Last estimated frame.
+        last: usize,
+        /// Cause.
+        source: FactorError,
+    },
+    /// The iteration stopped with an error.
+    #[error("the solver stopped: {0}")]
+    Solver(String),
+    /// The checkpoint cannot be written, or not be resumed.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+}

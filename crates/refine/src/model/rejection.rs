@@ -1,0 +1,168 @@
+//! Reasons to reject a frame's pixels.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use tunnelstitch_core::trajectory::Pose;
+
+/// A reason to reject a frame's pixels and to leave it at its prior.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum RejectionReason {
+    /// The image has hardly any contrast: black, white, lamp off, lens covered.
+    Featureless,
+    /// The image repeats that of an earlier frame.
+    Repeated(usize),
+    /// The image does not match the wall around its pose.
+    NoMatch {
+        /// Highest correlation of local contrast.
+        correlation: f64,
+    },
+    /// The image matches the wall at two places.
+    Ambiguous {
+        /// Pose at the second place.
+        other: Pose,
+        /// Distance on the wall between the image centres at the two poses, metres.
+        separation_m: f64,
+    },
+    /// The image contradicts frames that agree among themselves.
+    Contradicts {
+        /// One of them.
+        frame: usize,
+        /// Correlation of local contrast with it.
+        correlation: f64,
+    },
+    /// The image is blurred.
+    Blurred {
+        /// Its contrast at the finest detail over that of its neighbours, 0 to 1.
+        share: f64,
+    },
+    /// Too many pixels disagree with the other frames.
+    Disagrees {
+        /// Share of disagreeing pixels, 0 to 1.
+        share: f64,
+    },
+    /// The frame is displaced against frames that show the same wall.
+    Misaligned {
+        /// Displacement, pixels.
+        error_px: f64,
+    },
+    /// No reliable pair connects the frame, or the group that it agrees with, to the others.
+    Disconnected {
+        /// Number of frames of that group.
+        frames: usize,
+    },
+    /// The last solve did not converge.
+    NotConverged {
+        /// The next step, pixels on the wall.
+        step_px: f64,
+    },
+    /// Too little overlap with other frames.
+    NoOverlap {
+        /// Share of its pixels that others show, 0 to 1.
+        share: f64,
+    },
+    /// Residuals of its patches contradict each other beyond noise.
+    Overdispersed {
+        /// Displacement of patches beyond noise, pixels.
+        overdispersion_px: f64,
+    },
+    /// Too little texture to determine the pose.
+    Uncertain {
+        /// 1-σ on the wall, pixels.
+        wall_px: f64,
+    },
+}
+
+impl RejectionReason {
+    /// True if the image shows a wall that does not fit the other frames.
+    pub fn is_misfit(&self) -> bool {
+        matches!(
+            self,
+            Self::NoMatch { .. }
+                | Self::Ambiguous { .. }
+                | Self::Contradicts { .. }
+                | Self::Disagrees { .. }
+        )
+    }
+
+    /// True if the frame may register successfully among other neighbours.
+    pub fn is_retriable(&self) -> bool {
+        matches!(
+            self,
+            Self::NoMatch { .. }
+                | Self::Ambiguous { .. }
+                | Self::Contradicts { .. }
+                | Self::Disagrees { .. }
+                | Self::Misaligned { .. }
+                | Self::Disconnected { .. }
+        )
+    }
+}
+
+impl fmt::Display for RejectionReason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Featureless => write!(f, "it shows hardly any contrast (dark, white or covered)"),
+            Self::Repeated(frame) => write!(f, "it is the same image as frame {frame}"),
+            Self::NoMatch { correlation } => write!(
+                f,
+                "it does not match the wall anywhere near its prior \
+                 (correlation {correlation:.2} at best)"
+            ),
+            Self::Ambiguous { separation_m, .. } => write!(
+                f,
+                "it matches the wall equally well at two places {separation_m:.2} m apart, \
+                 and the prior does not tell which"
+            ),
+            Self::Contradicts { frame, correlation } => write!(
+                f,
+                "it contradicts frames that agree among themselves \
+                 (correlation {correlation:.2} with frame {frame})"
+            ),
+            Self::Blurred { share } => write!(
+                f,
+                "it is blurred: {:.0} % of the fine contrast that other frames show",
+                100.0 * share
+            ),
+            Self::Disagrees { share } => write!(
+                f,
+                "{:.0} % of its pixels disagree with the other frames",
+                100.0 * share
+            ),
+            Self::Misaligned { error_px } => write!(
+                f,
+                "it is displaced by {error_px:.1} px against frames that show the same wall"
+            ),
+            Self::Disconnected { frames: 1 } => {
+                write!(f, "no reliable pair connects it to the other frames")
+            }
+            Self::Disconnected { frames } => write!(
+                f,
+                "it is one of {frames} frames that agree with each other, \
+                 but no reliable pair connects them to the others"
+            ),
+            Self::NotConverged { step_px } => write!(
+                f,
+                "its pose did not converge: the next step would move it by {step_px:.1} px"
+            ),
+            Self::NoOverlap { share } if *share == 0.0 => {
+                write!(f, "it overlaps no other frame on the wall")
+            }
+            Self::NoOverlap { share } => write!(
+                f,
+                "only {:.1} % of its pixels overlap other frames",
+                100.0 * share
+            ),
+            Self::Overdispersed { overdispersion_px } => write!(
+                f,
+                "its residuals are overdispersed (patches of it are off by \
+                 {overdispersion_px:.2} px, or those of most frames are): a wrong camera, radius \
+                 or shape, or a repetitive wall that is closed one period off"
+            ),
+            Self::Uncertain { wall_px } => write!(
+                f,
+                "its position on the wall is uncertain by {wall_px:.1} px: too little texture, \
+                 or frames that do not match"
+            ),
+        }
+    }
+}

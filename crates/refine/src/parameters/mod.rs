@@ -1,0 +1,12 @@
+//! Parameters that the estimator adjusts.
+//!
+//! | parameters | frames | number | file |
+//! | --- | --- | --- | --- |
+//! | pose (rotation, translation), log-gain, bias | each | 8 | [`frame_estimate`] |
+//! | κ: intrinsics, radius, axis of the tunnel, readout time | all | up to 11 | [`calibration`] |
+//!
+//! The wall's texture is a nuisance parameter: it is eliminated
+//! ([`crate::tiles::tile`]).
+
+pub mod calibration;
+pub mod frame_estimate;

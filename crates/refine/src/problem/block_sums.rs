@@ -1,0 +1,125 @@
+//! Contribution of a block of the wall to the normal equations.
+
+use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
+use crate::parameters::frame_estimate::FrameStep;
+use crate::problem::intrinsics_terms::IntrinsicsSums;
+use crate::problem::linearisation::FrameContribution;
+use crate::problem::observer_column::ObserverColumn;
+use crate::tiles::tile_arrays::SAMPLES;
+use nalgebra::Matrix4;
+
+/// Contribution of a tile to the normal equations.
+pub struct TileSums {
+    /// Columns of its active observers.
+    pub columns: Vec<ObserverColumn>,
+    /// M.
+    pub features: Matrix4<f64>,
+    /// Sum of the mean weights `w̄` of all observers, held ones too.
+    pub total_weight: f64,
+}
+
+/// Sums over the tiles of one block, for the few active frames that observe it.
+pub struct BlockSums {
+    /// The frames, as indices among the active ones.
+    pub slots: Vec<usize>,
+    /// Robust cost.
+    pub cost: f64,
+    /// Gradient, frame by frame.
+    pub gradient: Vec<FrameStep>,
+    /// Contribution of each frame.
+    contributions: Vec<FrameContribution>,
+    /// Upper triangle of the normal matrix, row by row.
+    blocks: Vec<Block>,
+    /// Part of the intrinsics and the readout time, if they are estimated.
+    pub intrinsics: Option<IntrinsicsSums>,
+}
+
+impl BlockSums {
+    /// Zero sums of the frames `slots`, with the border if the shared parameters are estimated.
+    pub fn new(slots: Vec<usize>, estimates_shared: bool) -> Self {
+        let n = slots.len();
+        Self {
+            slots,
+            cost: 0.0,
+            gradient: vec![FrameStep::zeros(); n],
+            contributions: vec![FrameContribution::default(); n],
+            blocks: vec![Block::zeros(); n * (n + 1) / 2],
+            intrinsics: estimates_shared.then(|| IntrinsicsSums::new(n)),
+        }
+    }
+
+    /// Index of a slot among those of this block; it must be one of them.
+    pub fn index_of(&self, slot: usize) -> usize {
+        self.slots.partition_point(|s| *s < slot)
+    }
+
+    /// Index of a block of the upper triangle.
+    #[inline(always)]
+    fn block_index(&self, row: usize, column: usize) -> usize {
+        let n = self.slots.len();
+        row * n - row * (row + 1) / 2 + column
+    }
+
+    /// Adds a tile: `g = −B_iᵀ g_i`, `H_ij = (w̄_i δ_ij − w̄_i w̄_j / Σw̄) B_iᵀ M B_j`.
+    ///
+    /// `features`: M; `total_weight`: `Σw̄` over all its observers, held ones too.
+    #[inline(always)]
+    pub fn add_tile(
+        &mut self,
+        columns: &[ObserverColumn],
+        features: &Matrix4<f64>,
+        total_weight: f64,
+    ) {
+        for (n, b) in columns.iter().enumerate() {
+            let moments = &b.moments;
+            let contribution = &mut self.contributions[b.frame];
+            contribution.samples += SAMPLES;
+            contribution.pixels += moments.pixels;
+            contribution.inliers += moments.inliers;
+            contribution.square += moments.square;
+            let gradient = &mut self.gradient[b.frame];
+            for k in 0..6 {
+                gradient[k] -=
+                    b.a[(0, k)] * moments.gradient[0] + b.a[(1, k)] * moments.gradient[1];
+            }
+            gradient[6] -= moments.gradient[2];
+            gradient[7] -= moments.gradient[3] * b.inverse_gain;
+            let f = b.features_times_b(features);
+            for a in &columns[..=n] {
+                let own = if a.frame == b.frame {
+                    a.moments.weight
+                } else {
+                    0.0
+                };
+                let scale = own - a.moments.weight * moments.weight / total_weight.max(1e-12);
+                let index = self.block_index(a.frame, b.frame);
+                a.add_b_transposed_times(&f, scale, &mut self.blocks[index]);
+            }
+        }
+    }
+
+    /// Adds the block to the normal equations, their scatter and the frames' contributions.
+    pub fn add_to(
+        &self,
+        pattern: &Pattern,
+        normal: &mut NormalEquations,
+        scatter: &mut [Block],
+        frames: &mut [FrameContribution],
+    ) {
+        for (column, slot) in self.slots.iter().enumerate() {
+            normal.gradient[*slot] += self.gradient[column];
+            let (frame, sum) = (&mut frames[*slot], &self.contributions[column]);
+            frame.samples += sum.samples;
+            frame.pixels += sum.pixels;
+            frame.inliers += sum.inliers;
+            frame.square += sum.square;
+            for row in 0..=column {
+                let block = &self.blocks[self.block_index(row, column)];
+                normal.add_block(pattern, self.slots[row], *slot, block);
+                if let Some(index) = pattern.block_index(self.slots[row], *slot) {
+                    scatter[index] += self.gradient[row] * self.gradient[column].transpose();
+                }
+            }
+        }
+    }
+}

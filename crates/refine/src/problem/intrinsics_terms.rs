@@ -1,0 +1,101 @@
+//! Contribution of a block of the wall to the border of the normal equations.
+//!
+//! If the shared parameters κ change by δκ, the pixel of frame i that observes x shows the wall at
+//! `x − C_i δκ`, with `C_i = ∂(s, h)/∂κ`
+//! ([`crate::tiles::frame_samples::SampledFrame::shared_jacobian`]): C_i stands beside the
+//! pose's A_i ([`crate::tiles::tile`]). The sums over the bracket
+//! `w̄_i δ_ij − w̄_i w̄_j / Σw̄` become differences from the mean `C̄ = Σ w̄ C / Σ w̄`:
+//!
+//! `H_pκ,i = w̄_i B_iᵀ M (C_i − C̄)`, `H_κκ = Σ_i w̄_i (C_i − C̄)ᵀ M (C_i − C̄)`,
+//! `g_κ = −Σ_i C_iᵀ g_i`.
+//!
+//! [`crate::linear::bordered_system`] solves the bordered equations.
+
+use crate::linear::bordered_system::SharedBorder;
+use crate::parameters::calibration::{INTRINSIC_PARAMETERS, Kappa, READOUT_INDEX};
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+use crate::problem::observer_column::ObserverColumn;
+use nalgebra::{Matrix2x6, Matrix4, Matrix4x2, Matrix6, SMatrix, Vector6};
+
+/// Number of shared parameters that pixels depend on: the intrinsics and the readout time.
+const PIXEL_PARAMETERS: usize = INTRINSIC_PARAMETERS + 1;
+/// Their indices in κ.
+const KAPPA_INDICES: [usize; PIXEL_PARAMETERS] = [0, 1, 2, 3, 4, READOUT_INDEX];
+
+/// Sums over the tiles of one block for the shared parameters that pixels depend on, for the few
+/// frames that observe it.
+#[derive(Clone, Debug)]
+pub struct IntrinsicsSums {
+    /// `H_pκ`, one block per frame.
+    frames: Vec<SMatrix<f64, FRAME_PARAMETERS, PIXEL_PARAMETERS>>,
+    /// `H_κκ`.
+    own: Matrix6<f64>,
+    /// `g_κ`.
+    gradient: Vector6<f64>,
+}
+
+impl IntrinsicsSums {
+    /// All zero.
+    pub fn new(frames: usize) -> Self {
+        Self {
+            frames: vec![SMatrix::zeros(); frames],
+            own: Matrix6::zeros(),
+            gradient: Vector6::zeros(),
+        }
+    }
+
+    /// Adds a tile. `columns`: all its observers; `features`: M; `total_weight`: `Σ w̄`.
+    pub fn add_tile(
+        &mut self,
+        columns: &[ObserverColumn],
+        features: &Matrix4<f64>,
+        total_weight: f64,
+    ) {
+        let weighted = columns.iter().map(|i| i.c * i.moments.weight);
+        let mean = weighted.sum::<Matrix2x6<f64>>() / total_weight.max(1e-12);
+        // C affects the slopes along s and h only.
+        let slopes: Matrix4x2<f64> = features.fixed_columns::<2>(0).into_owned();
+        for i in columns {
+            let deviation = i.c - mean;
+            let f = slopes * deviation * i.moments.weight;
+            let block = &mut self.frames[i.frame];
+            for column in 0..PIXEL_PARAMETERS {
+                for row in 0..6 {
+                    block[(row, column)] +=
+                        i.a[(0, row)] * f[(0, column)] + i.a[(1, row)] * f[(1, column)];
+                }
+                block[(6, column)] += f[(2, column)];
+                block[(7, column)] += f[(3, column)] * i.inverse_gain;
+            }
+            self.own += deviation.transpose() * f.fixed_rows::<2>(0);
+            self.gradient -= i.c.transpose() * i.moments.gradient.fixed_rows::<2>(0);
+        }
+    }
+
+    /// Adds the block to the border, and the outer product of its gradient, with that of its frames
+    /// `slots`, to the scatter of the border.
+    pub fn add_to(
+        &self,
+        slots: &[usize],
+        gradient: &[FrameStep],
+        border: &mut SharedBorder,
+        scatter: &mut SharedBorder,
+    ) {
+        for (slot, block) in slots.iter().zip(&self.frames) {
+            for (column, index) in KAPPA_INDICES.into_iter().enumerate() {
+                let mut target = border.frames[*slot].column_mut(index);
+                target += block.column(column);
+            }
+        }
+        let mut shared = Kappa::zeros();
+        for (column, index) in KAPPA_INDICES.into_iter().enumerate() {
+            shared[index] = self.gradient[column];
+            for (row, other) in KAPPA_INDICES.into_iter().enumerate() {
+                border.own[(other, index)] += self.own[(row, column)];
+            }
+        }
+        border.gradient += shared;
+        let frames = slots.iter().copied().zip(gradient.iter().copied());
+        scatter.add_scatter(frames, &shared);
+    }
+}

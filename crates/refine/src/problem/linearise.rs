@@ -1,0 +1,369 @@
+//! Linearisation of the objective: cost, gradient and normal matrix.
+
+use crate::linear::bordered_system::SharedBorder;
+use crate::linear::normal_equations::{Block, NormalEquations};
+use crate::model::problem_error::ProblemError;
+use crate::parameters::calibration::{Kappa, RADIUS_INDEX};
+use crate::parameters::frame_estimate::FrameEstimate;
+use crate::problem::block_sums::BlockSums;
+use crate::problem::linearisation::{FrameContribution, Linearisation};
+use crate::problem::photometric_problem::PhotometricProblem;
+use crate::thresholds::photometric_problem::GAUGE_STIFFNESS_RATIO;
+use rayon::prelude::*;
+use tunnelstitch_core::camera::Camera;
+
+/// Blocks of tiles that are processed before their sums are added: bounds the memory, whatever the
+/// tunnel's length.
+const BATCH: usize = 64;
+
+impl PhotometricProblem<'_> {
+    /// Cost and normal equations at the given estimates of the active frames and the initial shared
+    /// parameters.
+    ///
+    /// # Errors
+    /// Those of [`PhotometricProblem::linearise_at`].
+    pub fn linearise(&self, active: &[FrameEstimate]) -> Result<Linearisation, ProblemError> {
+        self.linearise_at(active, &self.context.kappa)
+    }
+
+    /// Cost and normal equations at the given estimates of the active frames and shared parameters.
+    ///
+    /// The cost is infinite if κ gives no valid camera
+    /// ([`crate::parameters::calibration::Calibration::camera`]). All sums run in the same
+    /// order, whatever the number of threads.
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
+    pub fn linearise_at(
+        &self,
+        active: &[FrameEstimate],
+        kappa: &Kappa,
+    ) -> Result<Linearisation, ProblemError> {
+        let estimates = self.with_active(active);
+        let mut sums = self.zero_linearisation();
+        let calibration = self.context.calibration;
+        let Some(camera) = calibration.camera(kappa) else {
+            sums.cost = f64::INFINITY;
+            return Ok(sums);
+        };
+        self.add_pixels(&estimates, kappa, &camera, &mut sums)?;
+        self.scale_by_noise(&mut sums);
+        sums.cost += self.add_prior(&estimates, kappa, &mut sums.normal, sums.border.as_mut());
+        if let Some(border) = &mut sums.border {
+            sums.cost +=
+                calibration.prior_cost(kappa) - self.log_volume_slope() * kappa[RADIUS_INDEX];
+            border.gradient[RADIUS_INDEX] -= self.log_volume_slope();
+            border.apply_prior(&calibration, kappa);
+        }
+        if self.held_frame_count() == 0 {
+            let slot = self.gauge_slot.unwrap_or(0);
+            self.constrain_gauge(slot, &active[slot], &mut sums.normal);
+        }
+        Ok(sums)
+    }
+
+    /// A linearisation without any terms.
+    fn zero_linearisation(&self) -> Linearisation {
+        let border = self
+            .estimates_shared
+            .then(|| SharedBorder::zeros(self.active.len()));
+        Linearisation {
+            cost: 0.0,
+            normal: NormalEquations::zeros(&self.pattern),
+            scatter: vec![Block::zeros(); self.pattern.blocks()],
+            frames: vec![FrameContribution::default(); self.active.len()],
+            border_scatter: border.clone(),
+            border,
+        }
+    }
+
+    /// Adds the pixels' part, in units of grey levels², block by block of the wall.
+    fn add_pixels(
+        &self,
+        estimates: &[FrameEstimate],
+        kappa: &Kappa,
+        camera: &Camera,
+        sums: &mut Linearisation,
+    ) -> Result<(), ProblemError> {
+        let readout_s = self.context.calibration.readout_s(kappa);
+        for stretch in 0..self.coverage.len() {
+            let visibility = self.coverage.visibility(stretch)?;
+            let pyramids = self.images.load(self.coverage.frames(stretch))?;
+            let at_level = camera.at_level(self.sampling.level);
+            let sampled_frames =
+                self.sampled_frames(stretch, &pyramids, estimates, at_level, readout_s);
+            for batch in visibility.blocks.chunks(BATCH) {
+                let blocks: Vec<BlockSums> = batch
+                    .par_iter()
+                    .map(|block| {
+                        self.sum_block(stretch, &visibility, block, &sampled_frames, camera)
+                    })
+                    .collect();
+                for block in blocks {
+                    sums.cost += block.cost;
+                    block.add_to(
+                        &self.pattern,
+                        &mut sums.normal,
+                        &mut sums.scatter,
+                        &mut sums.frames,
+                    );
+                    if let Some(((intrinsics, border), scatter)) = block
+                        .intrinsics
+                        .as_ref()
+                        .zip(sums.border.as_mut())
+                        .zip(sums.border_scatter.as_mut())
+                    {
+                        intrinsics.add_to(&block.slots, &block.gradient, border, scatter);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Divides the pixels' part by the noise variance `σ²` of a pixel.
+    fn scale_by_noise(&self, sums: &mut Linearisation) {
+        let information = self.sigma.powi(-2);
+        sums.cost *= information;
+        let NormalEquations { blocks, gradient } = &mut sums.normal;
+        blocks.iter_mut().for_each(|b| *b *= information);
+        gradient.iter_mut().for_each(|g| *g *= information);
+        sums.scatter
+            .iter_mut()
+            .for_each(|b| *b *= information * information);
+        if let (Some(border), Some(scatter)) = (&mut sums.border, &mut sums.border_scatter) {
+            border.scale(information);
+            scatter.scale(information * information);
+        }
+    }
+
+    /// Derivative `3N − 1` of the logarithm of the volume that the pixels leave to the positions,
+    /// by `ln r`; 0 if the radius is not estimated.
+    ///
+    /// Pixels determine the 3N − 1 coordinates of N positions (without the one along the axis) in
+    /// units of the radius. In metres, where the prior is a density, they leave a volume that grows
+    /// as `r^(3N − 1)`. Without this term the radius would shrink until the steps had no noise.
+    pub(super) fn log_volume_slope(&self) -> f64 {
+        if self.context.calibration.free[RADIUS_INDEX] {
+            (3 * self.compared) as f64 - 1.0
+        } else {
+            0.0
+        }
+    }
+
+    /// Normal matrix and border of the prior alone, at the given estimates of the active frames.
+    pub fn prior_information(
+        &self,
+        active: &[FrameEstimate],
+        kappa: &Kappa,
+    ) -> (Vec<Block>, SharedBorder) {
+        let mut normal = NormalEquations::zeros(&self.pattern);
+        let mut border = SharedBorder::zeros(self.active.len());
+        let estimates = self.with_active(active);
+        self.add_prior(&estimates, kappa, &mut normal, Some(&mut border));
+        border.apply_prior(&self.context.calibration, kappa);
+        (normal.blocks, border)
+    }
+
+    /// Adds the prior of poses and exposures at the `estimates` of all participants and returns its
+    /// cost.
+    fn add_prior(
+        &self,
+        estimates: &[FrameEstimate],
+        kappa: &Kappa,
+        normal: &mut NormalEquations,
+        border: Option<&mut SharedBorder>,
+    ) -> f64 {
+        self.context.prior.add_to(
+            &self.participants,
+            estimates,
+            &self.active,
+            &self.context.calibration.datum(kappa),
+            &self.pattern,
+            normal,
+            border,
+        )
+    }
+
+    /// Stiffens the first compared frame along the gauge, where pixels give no information and
+    /// rounding would determine the step.
+    ///
+    /// Cost and gradient do not change: the position along the gauge follows in closed form from
+    /// the prior ([`crate::model::prior::Prior::align_gauge`]).
+    fn constrain_gauge(&self, slot: usize, first: &FrameEstimate, normal: &mut NormalEquations) {
+        let Some(index) = self.pattern.block_index(slot, slot) else {
+            return;
+        };
+        let pose_block = normal.blocks[index].fixed_view::<6, 6>(0, 0).into_owned();
+        for direction in self.context.surface.gauge().directions(&first.pose) {
+            let stiffness = (direction.transpose() * pose_block * direction)[0]
+                / direction.norm_squared().powi(2);
+            let constraint =
+                direction * direction.transpose() * (GAUGE_STIFFNESS_RATIO * stiffness);
+            let mut block = normal.blocks[index].fixed_view_mut::<6, 6>(0, 0);
+            block += constraint;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+    use crate::problem::test_ring::{Ring, number};
+    use crate::samples::sampling::Sampling;
+    use crate::tiles::interpolation::Interpolation;
+    use tunnelstitch_core::surface::Surface;
+
+    /// Central differences of the cost against the gradient, parameter by parameter.
+    ///
+    /// The texture is eliminated and the loss robust. Where frames agree except for their small
+    /// displacements, the fused texture's gradient is each frame's own, so the two agree up to the
+    /// errors of sampling (1 to 3 %). (The frames have no noise, so the loss is at its narrowest,
+    /// and the residuals must be well inside: at its shoulders S needs more reweighting steps to be
+    /// the minimiser.)
+    #[test]
+    fn gradient_is_the_derivative_of_the_cost() {
+        let ring = Ring::new(1e-4);
+        check_gradient(&ring, &ring.problem());
+        check_gradient(
+            &ring,
+            &ring.problem_of(Sampling {
+                interpolation: Interpolation::Bicubic,
+                variance_weighting: true,
+                ..ring.sampling()
+            }),
+        );
+    }
+
+    /// In the joint solve the gradient is not exactly the derivative of the pixels' cost (the prior
+    /// of the wall contributes), but its change along every parameter is that of the normal
+    /// equations.
+    #[test]
+    fn joint_gradient_changes_as_the_normal_equations_predict() {
+        let ring = Ring::new(1e-4);
+        let problem = ring.problem_of(ring.joint_sampling());
+        let normal = problem.linearise(&ring.estimates).unwrap().normal;
+        let steps = [2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 1e-3, 0.1];
+        for (parameter, step) in steps.into_iter().enumerate() {
+            // The first frame stays, as the equations constrain the gauge there.
+            let mut direction: Vec<f64> = (0..ring.estimates.len())
+                .map(|k| step * number(k, 20.0 + parameter as f64))
+                .collect();
+            direction[0] = 0.0;
+            let slope = |amount: f64| {
+                let moved: Vec<_> = (ring.estimates.iter().zip(&direction))
+                    .map(|(estimate, d)| {
+                        let mut step = FrameStep::zeros();
+                        step[parameter] = amount * d;
+                        estimate.retract(&step)
+                    })
+                    .collect();
+                let gradient = problem.linearise(&moved).unwrap().normal.gradient;
+                let along = gradient.iter().zip(&direction);
+                along.map(|(g, d)| g[parameter] * d).sum::<f64>()
+            };
+            let change = 0.5 * (slope(1.0) - slope(-1.0));
+            let mut predicted = 0.0;
+            for i in 0..direction.len() {
+                for j in i..direction.len() {
+                    if let Some(index) = problem.pattern().block_index(i, j) {
+                        let term = normal.blocks[index][(parameter, parameter)];
+                        let twice = if i == j { 1.0 } else { 2.0 };
+                        predicted += twice * term * direction[i] * direction[j];
+                    }
+                }
+            }
+            let ratio = change / predicted;
+            assert!(
+                (0.9..1.1).contains(&ratio),
+                "parameter {parameter}: {ratio}"
+            );
+        }
+    }
+
+    fn check_gradient(ring: &Ring, problem: &PhotometricProblem) {
+        let gradient = problem.linearise(&ring.estimates).unwrap().normal.gradient;
+        let steps = [2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 2e-4, 1e-3, 0.1];
+        for parameter in 0..FRAME_PARAMETERS {
+            let (mut error, mut size) = (0.0f64, 0.0f64);
+            for frame in 0..ring.estimates.len() {
+                let cost = |amount: f64| {
+                    let mut step = FrameStep::zeros();
+                    step[parameter] = amount;
+                    let mut moved = ring.estimates.clone();
+                    moved[frame] = moved[frame].retract(&step);
+                    problem.linearise(&moved).unwrap().cost
+                };
+                let h = steps[parameter];
+                let numeric = (cost(h) - cost(-h)) / (2.0 * h);
+                error += (numeric - gradient[frame][parameter]).powi(2);
+                size += numeric.powi(2);
+            }
+            let relative = (error / size).sqrt();
+            assert!(relative < 0.05, "parameter {parameter}: {relative}");
+        }
+    }
+
+    /// Central differences of the cost against the gradient of the shared parameters.
+    #[test]
+    fn shared_gradient_is_the_derivative_of_the_cost() {
+        let ring = Ring::new(1e-4);
+        let problem = ring.problem().with_shared_parameters();
+        let mut kappa = Kappa::zeros();
+        kappa
+            .fixed_rows_mut::<5>(0)
+            .copy_from_slice(&[2e-4, 0.02, -0.02, 3e-4, -3e-4]);
+        let at = |kappa: &Kappa| problem.linearise_at(&ring.estimates, kappa).unwrap();
+        let gradient = at(&kappa).border.unwrap().gradient;
+        let steps = [2e-4, 0.02, 0.02, 5e-4, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3];
+        for (k, h) in steps.into_iter().enumerate() {
+            let moved = |amount: f64| {
+                let mut kappa = kappa;
+                kappa[k] += amount;
+                at(&kappa).cost
+            };
+            let numeric = (moved(h) - moved(-h)) / (2.0 * h);
+            let relative = (numeric - gradient[k]).abs() / numeric.abs();
+            assert!(
+                relative < 0.05,
+                "parameter {k}: {numeric} and {}",
+                gradient[k]
+            );
+        }
+    }
+
+    /// Undamped steps from 2 mrad and 2 mm off to the truth, up to the gauge.
+    #[test]
+    fn gauss_newton_steps_converge_to_the_truth() {
+        let ring = Ring::new(2e-3);
+        assert_steps_converge_to_the_truth(&ring, &ring.problem());
+        assert_steps_converge_to_the_truth(&ring, &ring.problem_of(ring.joint_sampling()));
+    }
+
+    fn assert_steps_converge_to_the_truth(ring: &Ring, problem: &PhotometricProblem) {
+        let mut estimates = ring.estimates.clone();
+        let start = problem.linearise(&estimates).unwrap().cost;
+        for _ in 0..6 {
+            let at = problem.linearise(&estimates).unwrap();
+            let factor = problem
+                .symbolic()
+                .factorise(problem.pattern(), &at.normal, 0.0)
+                .unwrap();
+            let step = factor.step(&at.normal.gradient);
+            estimates = estimates
+                .iter()
+                .zip(&step)
+                .map(|(estimate, step)| estimate.retract(step))
+                .collect();
+        }
+        let end = problem.linearise(&estimates).unwrap().cost;
+        assert!(end < 0.1 * start, "{start} → {end}");
+        let poses: Vec<_> = estimates.iter().map(|e| e.pose).collect();
+        let motion = ring.wall.circle.gauge().align(&poses, &ring.wall.poses);
+        for (pose, truth) in poses.iter().zip(&ring.wall.poses) {
+            let error = truth.local(&motion.apply(pose)).norm();
+            assert!(error < 4e-4, "{error}");
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! The photometric problem over a window of frames at one pyramid level.
+//!
+//! ```text
+//! EstimationContext, Sampling, FrameWindow
+//!      │  noise_estimation: noise, model of the wall, outliers
+//!      ▼
+//! PhotometricProblem
+//!      │  linearise (estimates, κ): per block of the wall, in parallel,
+//!      │  sum_block: tiles ─> ObserverColumn ─> BlockSums, IntrinsicsSums;
+//!      │  then prior and gauge constraint
+//!      ▼
+//! Linearisation: cost, NormalEquations, scatter, SharedBorder
+//! ```
+//!
+//! The objective is that of [`crate::tiles::tile`]. [`set_up`] has the steps of the set-up.
+//! [`step_length`] measures a step on the wall; [`unknown_texture`] reduces the information to that
+//! of an unknown texture, for the Cramér–Rao bound.
+
+pub mod block_sums;
+pub mod intrinsics_terms;
+pub mod linearisation;
+pub mod linearise;
+pub mod noise_estimation;
+pub mod observer_column;
+pub mod photometric_problem;
+pub mod set_up;
+pub mod step_length;
+pub mod sum_block;
+#[cfg(test)]
+mod test_ring;
+pub mod unknown_texture;

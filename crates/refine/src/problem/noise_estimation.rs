@@ -1,0 +1,289 @@
+//! Estimates from the samples before a solve: noise, model of the wall, and outliers.
+
+use crate::joint::joint_block::{JointBlock, WallModel};
+use crate::joint::stiffness::StiffnessSums;
+use crate::model::context::FrameWindow;
+use crate::model::problem_error::ProblemError;
+use crate::problem::photometric_problem::PhotometricProblem;
+use crate::samples::observer::Observer;
+use crate::samples::outlier_mask::OutlierMask;
+use crate::samples::sampling::Sampling;
+use crate::samples::visibility::{Tile, Visibility};
+use crate::thresholds::photometric_problem::{
+    MAX_NOISE_UNDERESTIMATE, MIN_ALIASED_VARIANCE_RATIO, NOISE_ESTIMATION_TILES, WALL_MODEL_BLOCKS,
+};
+use crate::tiles::denoising::TextureSpectrum;
+use crate::tiles::frame_samples::SampledFrame;
+use crate::tiles::grid::{BLOCK, TilePoints};
+use crate::tiles::interpolation::Interpolation;
+use crate::tiles::residual_weighting::NoiseHistogram;
+use crate::tiles::workspace::{Misfit, TileObservation, TileWorkspace};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::ops::Range;
+use tunnelstitch_core::frames::noise_at_level;
+use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_core::super_resolve::{RoughnessEvidence, aliased_variance};
+
+/// Tiles of one piece of parallel work.
+const TILES_PER_TASK: usize = 32;
+
+impl PhotometricProblem<'_> {
+    /// Estimates the noise model and the spectrum of the texture from the residuals around the
+    /// plain mean in some tiles spread over the wall.
+    pub(super) fn estimate_noise(&mut self) -> Result<(), ProblemError> {
+        let counted = self.gather_from_tiles(
+            NOISE_ESTIMATION_TILES,
+            |(histogram, spectrum): &mut (NoiseHistogram, TextureSpectrum), tile| {
+                dispatch_simd(
+                    #[inline(always)]
+                    || {
+                        let observations = tile.observations();
+                        tile.workspace.count_residuals(
+                            tile.points,
+                            observations,
+                            histogram,
+                            spectrum,
+                        );
+                    },
+                );
+            },
+        )?;
+        let (mut histogram, mut spectrum) = (NoiseHistogram::default(), TextureSpectrum::default());
+        for (residuals, textures) in &counted {
+            histogram = histogram.merge(residuals);
+            spectrum = spectrum.merge(textures);
+        }
+        self.noise = histogram.fit();
+        // The residuals are a little too small, as S is fitted to them. Single images give a better
+        // estimate, but mistake fine texture for noise.
+        let interpolation = self.sampling.interpolation;
+        let axis = interpolation.autocorrelation(0.0);
+        let single = self.context.noise.powi(2)
+            * match interpolation {
+                Interpolation::Bilinear => noise_at_level(self.sampling.level),
+                // Used at full size only.
+                Interpolation::Bicubic => axis * axis,
+            };
+        let fitted = f64::from(self.noise.floor);
+        if single > fitted && single < MAX_NOISE_UNDERESTIMATE * fitted {
+            self.noise.floor = single as f32;
+        }
+        // At coarser levels the residuals are mostly misalignment.
+        if self.sampling.level == 0 && self.active.len() > 1 {
+            let floor = f64::from(self.noise.floor);
+            self.denoiser = Some(spectrum.denoiser(floor, interpolation));
+        }
+        // The variance of a sample is that of a pixel times `β(0)²`.
+        self.sigma = f64::from(self.noise.floor).sqrt() / axis;
+        Ok(())
+    }
+
+    /// Estimates roughness and stiffness of the wall from blocks spread over all of it; None if it
+    /// has too little detail finer than pixels ([`MIN_ALIASED_VARIANCE_RATIO`]).
+    pub(super) fn estimate_wall_model(&self) -> Result<Option<WallModel>, ProblemError> {
+        let evidence = self.map_blocks(|block| block.evidence())?;
+        let strengths = evidence
+            .iter()
+            .fold(RoughnessEvidence::default(), RoughnessEvidence::merge)
+            .strengths();
+        let aliased = aliased_variance(&strengths, self.grid.density);
+        if aliased < MIN_ALIASED_VARIANCE_RATIO * self.sigma.powi(2) {
+            return Ok(None);
+        }
+        let sums = self.map_blocks(|block| block.stiffness_sums(strengths))?;
+        let stiffness = sums
+            .iter()
+            .fold(StiffnessSums::default(), StiffnessSums::merge)
+            .stiffness();
+        Ok(Some(WallModel {
+            strengths,
+            stiffness,
+        }))
+    }
+
+    /// Applies `work` to about [`WALL_MODEL_BLOCKS`] blocks spread over all of the wall.
+    fn map_blocks<T: Send>(
+        &self,
+        work: impl Fn(JointBlock) -> T + Sync,
+    ) -> Result<Vec<T>, ProblemError> {
+        let blocks = self.coverage.tiles / (BLOCK * BLOCK) as usize;
+        let stride = (blocks / WALL_MODEL_BLOCKS).max(1);
+        let mut results = Vec::new();
+        for stretch in 0..self.coverage.len() {
+            let visibility = self.coverage.visibility(stretch)?;
+            let pyramids = self.images.load(self.coverage.frames(stretch))?;
+            let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
+            let blocks: Vec<&Range<usize>> = visibility.blocks.iter().step_by(stride).collect();
+            let work = |block| work(self.joint_block(&visibility, block, &sampled_frames));
+            results.extend(blocks.into_par_iter().map(work).collect::<Vec<T>>());
+        }
+        Ok(results)
+    }
+
+    /// A block of the wall, to be solved for jointly with the poses.
+    pub(super) fn joint_block<'v>(
+        &self,
+        visibility: &'v Visibility,
+        block: &Range<usize>,
+        sampled_frames: &'v [SampledFrame<'v>],
+    ) -> JointBlock<'v> {
+        JointBlock::new(
+            &self.context,
+            &self.grid,
+            visibility,
+            block,
+            sampled_frames,
+            self.sigma,
+        )
+    }
+
+    /// Excludes the observations that do not show the wall ([`OutlierMask`]), detected in the tiles
+    /// of the problem, or, if a `density` is given, in those of another lattice over all of the
+    /// wall.
+    ///
+    /// # Errors
+    /// [`ProblemError`].
+    pub fn exclude_outliers(mut self, density: Option<f64>) -> Result<Self, ProblemError> {
+        let mut mask = match density {
+            None => self.empty_outlier_mask()?,
+            Some(density) => {
+                let sampling = Sampling {
+                    density,
+                    information: 1.0,
+                    joint: false,
+                    ..self.sampling
+                };
+                let window = FrameWindow {
+                    participants: self.participants.clone(),
+                    active: self.active.clone(),
+                    estimates: &self.estimates,
+                    compared: Cow::Owned(self.coverage.compared()),
+                };
+                let other = Self::new(&self.context, sampling, window)?;
+                let mut mask = other.empty_outlier_mask()?;
+                for stretch in 0..other.coverage.len() {
+                    let visibility = other.coverage.visibility(stretch)?;
+                    other.detect_outliers(stretch, &visibility, &mut mask)?;
+                }
+                mask
+            }
+        };
+        let mut excluded = Vec::new();
+        for stretch in 0..self.coverage.len() {
+            let visibility = self.coverage.visibility(stretch)?;
+            if density.is_none() {
+                mask.clear();
+                self.detect_outliers(stretch, &visibility, &mut mask)?;
+            }
+            let participants = self.coverage.frames(stretch);
+            excluded.push(mask.mark(&visibility, &self.grid, participants));
+        }
+        self.coverage.exclude(excluded);
+        Ok(self)
+    }
+
+    /// An outlier mask without outliers, with the typical misfits of the wall.
+    fn empty_outlier_mask(&self) -> Result<OutlierMask, ProblemError> {
+        let gather = |misfits: &mut Vec<Misfit>, tile: &mut ObservedTile| {
+            dispatch_simd(
+                #[inline(always)]
+                || {
+                    let observations = tile.observations();
+                    tile.workspace
+                        .compute_misfits(tile.points, observations, &self.noise);
+                },
+            );
+            misfits.append(&mut tile.workspace.misfits);
+        };
+        let misfits = self.gather_from_tiles(NOISE_ESTIMATION_TILES, gather)?;
+        Ok(OutlierMask::new(self.grid, misfits.concat()))
+    }
+
+    /// Adds the outliers of a stretch to a mask.
+    fn detect_outliers(
+        &self,
+        stretch: usize,
+        visibility: &Visibility,
+        mask: &mut OutlierMask,
+    ) -> Result<(), ProblemError> {
+        let participants = self.coverage.frames(stretch);
+        let pyramids = self.images.load(participants)?;
+        let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
+        mask.detect(
+            self.context.surface,
+            visibility,
+            participants,
+            &sampled_frames,
+            &self.noise,
+        );
+        Ok(())
+    }
+
+    /// Applies `work` to about `count` tiles spread over all of the wall, or to all tiles if there
+    /// are fewer, at the initial estimates. Returns the results of all chunks of tiles, always in
+    /// the same order.
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`].
+    pub fn gather_from_tiles<T: Default + Send>(
+        &self,
+        count: usize,
+        work: impl Fn(&mut T, &mut ObservedTile) + Sync,
+    ) -> Result<Vec<T>, ProblemError> {
+        let stride = (self.coverage.tiles / count).max(1);
+        let mut gathered = Vec::new();
+        for stretch in 0..self.coverage.len() {
+            let visibility = self.coverage.visibility(stretch)?;
+            let participants = self.coverage.frames(stretch);
+            let pyramids = self.images.load(participants)?;
+            let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
+            let tiles: Vec<&Tile> = visibility.tiles.iter().step_by(stride).collect();
+            let chunks = tiles.par_chunks(TILES_PER_TASK).map(|tiles| {
+                let mut gathered = T::default();
+                let mut workspace = TileWorkspace::default();
+                let mut scratch = Vec::new();
+                for tile in tiles {
+                    let points =
+                        TilePoints::new(&self.grid, self.context.surface, tile.id, &mut scratch);
+                    let mut observed_tile = ObservedTile {
+                        workspace: &mut workspace,
+                        points: &points,
+                        observers: visibility.observers(tile),
+                        sampled_frames: &sampled_frames,
+                        participants,
+                    };
+                    work(&mut gathered, &mut observed_tile);
+                }
+                gathered
+            });
+            gathered.extend(chunks.collect::<Vec<T>>());
+        }
+        Ok(gathered)
+    }
+}
+
+/// A tile with its observers.
+pub struct ObservedTile<'t> {
+    /// Reusable memory.
+    pub workspace: &'t mut TileWorkspace,
+    /// The tile's samples.
+    pub points: &'t TilePoints,
+    /// The frames that observe it.
+    pub observers: &'t [Observer],
+    /// The frames of the stretch.
+    pub sampled_frames: &'t [SampledFrame<'t>],
+    /// Indices of these frames among the participants.
+    pub participants: &'t [usize],
+}
+
+impl<'t> ObservedTile<'t> {
+    /// Observations for the work on the tile.
+    #[inline(always)]
+    pub fn observations(&self) -> impl Iterator<Item = TileObservation<'t>> + use<'t> {
+        let sampled_frames = self.sampled_frames;
+        self.observers
+            .iter()
+            .map(move |o| o.observation(sampled_frames))
+    }
+}

@@ -1,0 +1,345 @@
+//! The photometric problem over a window of frames at one pyramid level.
+
+use crate::joint::joint_block::WallModel;
+use crate::linear::normal_equations::Pattern;
+use crate::linear::sparse_cholesky::{FactorError, SymbolicFactorisation};
+use crate::model::context::{EstimationContext, FrameWindow};
+use crate::model::problem_error::ProblemError;
+use crate::parameters::calibration::Kappa;
+use crate::parameters::frame_estimate::FrameEstimate;
+use crate::problem::set_up::{min_density, normal_pattern, pixel_size_on_wall, pose_frames};
+use crate::problem::unknown_texture::UnknownTexture;
+use crate::samples::sampling::Sampling;
+use crate::samples::tile_coverage::{FrameImages, TileCoverage};
+use crate::samples::visibility::Exclusions;
+use crate::tiles::denoising::Denoiser;
+use crate::tiles::frame_samples::SampledFrame;
+use crate::tiles::grid::WallGrid;
+use crate::tiles::residual_weighting::NoiseModel;
+use std::ops::Range;
+use std::sync::Arc;
+use tunnelstitch_core::camera::{Camera, Sweep};
+use tunnelstitch_core::frames::Pyramid;
+
+/// The objective ([`crate::tiles::tile`]) for a window of frames on a fixed set of wall
+/// samples.
+///
+/// `participants` are sampled; of them the `active` frames are estimated and the others held fixed.
+/// The wall is processed in stretches along the tunnel, so that memory for frames and samples does
+/// not grow with its length.
+///
+/// With a rolling shutter, the motion of each camera during its readout is that of the initial
+/// estimates and stays constant. A step of a frame by ξ changes its neighbours' motion by
+/// `readout/(2 interval) ξ`, a few hundredths; the next solve removes the rest.
+pub struct PhotometricProblem<'a> {
+    /// Inputs of the estimator.
+    pub(super) context: EstimationContext<'a>,
+    /// Resolution and share of the samples.
+    pub(super) sampling: Sampling,
+    /// Images of the participants.
+    pub(super) images: FrameImages<'a>,
+    /// The camera at the pyramid level.
+    pub(super) camera: Camera,
+    /// Lattice of the samples.
+    pub(super) grid: WallGrid,
+    /// Frames that are sampled.
+    pub(super) participants: Range<usize>,
+    /// Frames of them that are estimated.
+    pub(super) active: Range<usize>,
+    /// Initial estimates of all participants.
+    pub(super) estimates: Vec<FrameEstimate>,
+    /// Motion of each participant's camera during a readout of one second.
+    pub(super) rates: Vec<Sweep>,
+    /// Observations of the samples.
+    pub(super) coverage: TileCoverage<'a>,
+    /// The first active frame that is compared, counted from the first active one; the gauge is
+    /// constrained there.
+    pub(super) gauge_slot: Option<usize>,
+    /// Number of frames that are compared.
+    pub(super) compared: usize,
+    /// Sparsity pattern of the normal matrix.
+    pub(super) pattern: Pattern,
+    /// Symbolic factorisation of the normal matrix.
+    pub(super) symbolic: SymbolicFactorisation,
+    /// Noise of a pixel, 1-σ in grey levels.
+    pub(super) sigma: f64,
+    /// Noise model of the residuals.
+    pub(super) noise: NoiseModel,
+    /// Filter of the fused texture for its slopes.
+    pub(super) denoiser: Option<Denoiser>,
+    /// Roughness and stiffness of the wall, if it is solved for jointly with the poses.
+    pub(super) wall_model: Option<WallModel>,
+    /// Information of the slopes, if the texture is known by its spectrum only.
+    pub(super) unknown_texture: Option<UnknownTexture>,
+    /// True if the shared parameters are estimated.
+    pub(super) estimates_shared: bool,
+}
+
+impl<'a> PhotometricProblem<'a> {
+    /// Selects the wall samples for the given estimates and estimates the noise from the residuals
+    /// there.
+    ///
+    /// # Errors
+    /// [`ProblemError`].
+    pub fn new(
+        context: &EstimationContext<'a>,
+        sampling: Sampling,
+        window: FrameWindow,
+    ) -> Result<Self, ProblemError> {
+        let Sampling {
+            level,
+            density,
+            information,
+            ..
+        } = sampling;
+        let camera = context.camera.at_level(level);
+        let rate = |frame| context.sweep_rate(frame, &window.participants, window.estimates);
+        let rates: Vec<Sweep> = window.participants.clone().map(rate).collect();
+        let posed = pose_frames(context, &camera, &window, &rates)?;
+        let FrameWindow {
+            participants,
+            active,
+            estimates,
+            compared,
+        } = window;
+        let compared_frames = compared.iter().filter(|compared| **compared).count();
+        let gauge_slot = active
+            .clone()
+            .position(|frame| compared[frame - participants.start]);
+        let pixel_size_m = pixel_size_on_wall(context.surface, &camera, posed.iter().flatten());
+        let density = density.max(min_density(camera.height));
+        let grid = WallGrid::new(context.surface, pixel_size_m, density);
+        let images = FrameImages {
+            frames: context.frames,
+            first: participants.start,
+            level,
+        };
+        let exclusions = Exclusions {
+            ignored: context.ignored,
+            mask: context.frames.mask(&camera),
+        };
+        let coverage = TileCoverage::new(
+            context.surface,
+            grid,
+            camera,
+            images,
+            exclusions,
+            information,
+            posed,
+        )?;
+        let prior_pairs = context.prior.pairs(&active);
+        let pattern = normal_pattern(&coverage.pairs, prior_pairs, participants.start, &active);
+        let symbolic =
+            SymbolicFactorisation::new(&pattern).map_err(|source| ProblemError::Factor {
+                first: active.start,
+                last: active.end - 1,
+                source,
+            })?;
+        let mut problem = Self {
+            context: *context,
+            sampling,
+            images,
+            camera,
+            grid,
+            estimates: estimates.to_vec(),
+            rates,
+            coverage,
+            gauge_slot,
+            compared: compared_frames,
+            pattern,
+            symbolic,
+            participants,
+            active,
+            sigma: 1.0,
+            noise: NoiseModel {
+                floor: 1.0,
+                steepness: 0.0,
+            },
+            denoiser: None,
+            wall_model: None,
+            unknown_texture: None,
+            estimates_shared: false,
+        };
+        problem.estimate_noise()?;
+        if sampling.joint {
+            problem.wall_model = problem.estimate_wall_model()?;
+        }
+        Ok(problem)
+    }
+
+    /// Sets the noise of a pixel to `sigma` grey levels, for frames that were rendered without
+    /// noise: no residual is rejected, and the slopes are not denoised.
+    pub fn with_known_noise(self, sigma: f64) -> Self {
+        Self {
+            sigma,
+            noise: NoiseModel {
+                floor: f32::MAX,
+                steepness: 0.0,
+            },
+            denoiser: None,
+            ..self
+        }
+    }
+
+    /// Reduces the information to that of a texture which is known by its spectrum only.
+    pub fn with_unknown_texture(self, texture: &UnknownTexture) -> Self {
+        Self {
+            unknown_texture: Some(texture.clone()),
+            ..self
+        }
+    }
+
+    /// Estimates the context's free shared parameters as well, if all participants are active.
+    pub fn with_shared_parameters(self) -> Self {
+        Self {
+            estimates_shared: self.context.calibration.has_free_parameters()
+                && self.held_frame_count() == 0,
+            ..self
+        }
+    }
+
+    /// Initial values of the shared parameters.
+    pub fn kappa(&self) -> Kappa {
+        self.context.kappa
+    }
+
+    /// Initial estimates of the active frames.
+    pub fn initial_estimates(&self) -> Vec<FrameEstimate> {
+        let first = self.active.start - self.participants.start;
+        self.estimates[first..first + self.active.len()].to_vec()
+    }
+
+    /// The block pattern of the normal matrix.
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    /// The symbolic factorisation of the normal matrix.
+    pub fn symbolic(&self) -> &SymbolicFactorisation {
+        &self.symbolic
+    }
+
+    /// Number of selected tiles.
+    pub fn tiles(&self) -> usize {
+        self.coverage.tiles
+    }
+
+    /// True if the wall is solved for jointly with the poses: if the sampling requests it and the
+    /// wall has detail finer than pixels.
+    pub fn is_joint(&self) -> bool {
+        self.wall_model.is_some()
+    }
+
+    /// Share of the tiles that are selected, 0 to 1.
+    pub fn compared_share(&self) -> f64 {
+        self.coverage.tiles as f64 / self.coverage.all_tiles.max(1) as f64
+    }
+
+    /// Estimated noise of a pixel, 1-σ in grey levels.
+    pub fn sigma(&self) -> f64 {
+        self.sigma
+    }
+
+    /// Turns a factorisation failure into an error that names the frames.
+    pub fn factor_error(&self, source: FactorError) -> ProblemError {
+        ProblemError::Factor {
+            first: self.active.start,
+            last: self.active.end - 1,
+            source,
+        }
+    }
+
+    /// The camera at full size with the motion of a participant.
+    pub fn camera_of(&self, participant: usize) -> Camera {
+        let readout_s = self.context.calibration.readout_s(&self.context.kappa);
+        let sweep = self.rates[participant].scaled(readout_s);
+        self.context.camera.with_sweep(&sweep)
+    }
+
+    /// The frames of a stretch at the given estimates of all participants, taken by `camera` (of
+    /// the level) with a readout of `readout_s` seconds.
+    pub(super) fn sampled_frames<'s>(
+        &self,
+        stretch: usize,
+        pyramids: &'s [Arc<Pyramid>],
+        estimates: &[FrameEstimate],
+        camera: Camera,
+        readout_s: f64,
+    ) -> Vec<SampledFrame<'s>> {
+        let frames = self.coverage.frames(stretch).iter();
+        frames
+            .zip(pyramids)
+            .map(|(k, pyramid)| {
+                SampledFrame::new(
+                    pyramid.level(self.sampling.level),
+                    camera.with_sweep(&self.rates[*k].scaled(readout_s)),
+                    &estimates[*k],
+                )
+                .with_interpolation(self.sampling.interpolation)
+            })
+            .collect()
+    }
+
+    /// The frames of a stretch at the initial estimates.
+    pub(super) fn initial_sampled_frames<'s>(
+        &self,
+        stretch: usize,
+        pyramids: &'s [Arc<Pyramid>],
+    ) -> Vec<SampledFrame<'s>> {
+        let readout_s = self.context.calibration.readout_s(&self.context.kappa);
+        self.sampled_frames(stretch, pyramids, &self.estimates, self.camera, readout_s)
+    }
+
+    /// Estimates of all participants, with those of the active frames replaced.
+    pub(super) fn with_active(&self, active: &[FrameEstimate]) -> Vec<FrameEstimate> {
+        let mut estimates = self.estimates.clone();
+        let first = self.active.start - self.participants.start;
+        estimates[first..first + active.len()].copy_from_slice(active);
+        estimates
+    }
+
+    /// Number of participants that are held fixed.
+    pub(super) fn held_frame_count(&self) -> usize {
+        self.participants.len() - self.active.len()
+    }
+
+    /// Index of a participant among the active frames, if it is one.
+    pub(super) fn slot(&self, participant: usize) -> Option<usize> {
+        let frame = self.participants.start + participant;
+        self.active
+            .contains(&frame)
+            .then(|| frame - self.active.start)
+    }
+
+    /// Number of degrees of freedom of the poses that the gauge constraint removes.
+    pub fn constrained_gauge_freedoms(&self) -> usize {
+        match self.held_frame_count() {
+            0 => self.context.surface.gauge().degrees_of_freedom(),
+            _ => 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::test_ring::Ring;
+
+    /// Half of the information is in less than half of the wall.
+    #[test]
+    fn half_of_the_information_is_in_less_than_half_of_the_tiles() {
+        let ring = Ring::new(1e-4);
+        let (all, half) = (ring.problem(), ring.problem_with(0.5));
+        assert!((0.2..0.5).contains(&half.compared_share()));
+        let trace = |problem: &PhotometricProblem| -> f64 {
+            let at = problem.linearise(&ring.estimates).unwrap();
+            let poses = at.normal.blocks.iter();
+            problem.sigma().powi(2)
+                * poses
+                    .map(|b| b.fixed_view::<6, 6>(0, 0).trace())
+                    .sum::<f64>()
+        };
+        let share = trace(&half) / trace(&all);
+        assert!((0.4..0.65).contains(&share), "{share}");
+    }
+}

@@ -1,0 +1,88 @@
+//! Length of a step on the wall, and feasibility of an estimate.
+
+use crate::parameters::calibration::{INTRINSIC_PARAMETERS, Kappa};
+use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
+use crate::problem::photometric_problem::PhotometricProblem;
+use crate::thresholds::photometric_problem::MAX_LOG_GAIN_SIGMAS;
+use nalgebra::Vector5;
+use tunnelstitch_core::surface::{lens_jacobian, wall_jacobian};
+
+impl PhotometricProblem<'_> {
+    /// True if the camera is inside the tunnel and the log-gain within [`MAX_LOG_GAIN_SIGMAS`].
+    pub fn is_feasible(&self, estimate: &FrameEstimate) -> bool {
+        let max_log_gain = MAX_LOG_GAIN_SIGMAS * self.context.prior.log_gain_sigma;
+        let inside = self.context.surface.check_inside(&estimate.pose.t_wc);
+        inside.is_ok() && estimate.log_gain.abs() <= max_log_gain
+    }
+
+    /// Size of a pixel of the pyramid level, in pixels of full size.
+    pub fn pixel_px(&self) -> f64 {
+        2f64.powi(self.sampling.level as i32)
+    }
+
+    /// Motion of the wall in each active frame's image by a step, in pixels of full size: the
+    /// largest over the image's centre and corners. `shared`: step of the shared parameters.
+    pub fn wall_step_px(
+        &self,
+        active: &[FrameEstimate],
+        step: &[FrameStep],
+        shared: &Kappa,
+    ) -> Vec<f64> {
+        let intrinsics = shared.fixed_rows::<INTRINSIC_PARAMETERS>(0).into_owned();
+        active
+            .iter()
+            .zip(step)
+            .map(|(estimate, step)| {
+                self.frame_step_px(estimate, step, &intrinsics) * self.pixel_px()
+            })
+            .collect()
+    }
+
+    /// Motion of the wall in one frame's image, in pixels of the level.
+    fn frame_step_px(
+        &self,
+        estimate: &FrameEstimate,
+        step: &FrameStep,
+        intrinsics: &Vector5<f64>,
+    ) -> f64 {
+        let xi: nalgebra::Vector6<f64> = step.fixed_rows::<6>(0).into();
+        let pose = &estimate.pose;
+        (self.camera.corner_and_centre_rays().into_iter())
+            .filter_map(|ray_c| {
+                let ray = pose.r_wc * ray_c;
+                let hit = self.context.surface.hit(&pose.t_wc, &ray).ok()?;
+                let wall = self.context.surface.frame(hit.wall);
+                let a = wall_jacobian(pose, &wall);
+                let mut motion = a * xi;
+                if self.estimates_shared {
+                    let x_c = ray_c * hit.range;
+                    motion += lens_jacobian(pose, &a, &self.context.camera, &x_c) * intrinsics;
+                }
+                Some(motion.norm() * self.camera.fy / hit.range)
+            })
+            .fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::test_ring::Ring;
+    use tunnelstitch_core::surface::Surface;
+
+    #[test]
+    fn cameras_outside_and_vanishing_gains_are_infeasible() {
+        let ring = Ring::new(1e-4);
+        let problem = ring.problem();
+        let estimate = ring.estimates[2];
+        assert!(problem.is_feasible(&estimate));
+        let mut outside = estimate;
+        outside.pose.t_wc.z += 2.0 * ring.wall.circle.perimeter_m() / std::f64::consts::TAU;
+        assert!(!problem.is_feasible(&outside));
+        let vanishing = FrameEstimate {
+            log_gain: -14.0,
+            ..estimate
+        };
+        assert!(!problem.is_feasible(&vanishing));
+    }
+}

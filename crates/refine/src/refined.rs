@@ -1,0 +1,17 @@
+//! The result of a refinement: poses, their covariances and the report.
+
+use crate::report::RefineReport;
+use crate::uncertainty::covariance::Covariances;
+use tunnelstitch_core::trajectory::Trajectory;
+
+/// The result of a refinement.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Refined {
+    /// Refined poses with the times of the initial ones.
+    pub trajectory: Trajectory,
+    /// The report: solves, verdict and uncertainty of every frame.
+    pub report: RefineReport,
+    /// Covariances of the poses.
+    pub covariances: Covariances,
+}

@@ -1,0 +1,129 @@
+//! `refine.json`: the report of a refinement.
+
+use crate::solver::solve_record::SolveRecord;
+use crate::uncertainty::calibration_report::CalibrationReport;
+use crate::uncertainty::frame_sigma::FrameSigma;
+use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
+use serde::{Deserialize, Serialize};
+use tunnelstitch_core::trajectory::Pose;
+
+/// The basis of a frame's refined pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FrameFlag {
+    /// The pixels of the frame.
+    Photometric,
+    /// The prior alone: the pixels do not determine it.
+    Prior,
+    /// The prior alone: the pixels allow two poses.
+    Ambiguous,
+}
+
+/// A pose in the report, as in a TUM file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PoseReport {
+    /// Position, metres.
+    pub translation_m: [f64; 3],
+    /// Rotation, camera to world: x, y, z, w.
+    pub quaternion_xyzw: [f64; 4],
+}
+
+impl From<&Pose> for PoseReport {
+    fn from(pose: &Pose) -> Self {
+        Self {
+            translation_m: pose.t_wc.into(),
+            quaternion_xyzw: pose.r_wc.coords.into(),
+        }
+    }
+}
+
+/// One frame of the report.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct FrameReport {
+    /// Index of the frame.
+    pub index: usize,
+    /// Name of its file.
+    pub file: String,
+    /// The basis of its pose.
+    pub flag: FrameFlag,
+    /// The rejection reason, if the pose rests on the prior.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+    /// The other pose, if two are possible.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub other_pose: Option<PoseReport>,
+    /// Wall samples at which it was compared with other frames.
+    pub points: usize,
+    /// Root mean square of its residuals against the fused wall, grey levels, as weighted by the
+    /// robust loss.
+    pub residual: f64,
+    /// Share of its pixels' weight that the robust loss left, 0 to 1.
+    pub inlier_share: f64,
+    /// Gain `a` of `I = a S + b`.
+    pub gain: f64,
+    /// Bias `b`, grey levels.
+    pub bias: f64,
+    /// 1-σ relative to the first frame.
+    pub sigma: FrameSigma,
+    /// Overdispersion: displacement of the frame's patches against the others beyond noise, root
+    /// mean square, pixels. Much of it indicates a wrong camera, radius or shape. (Called
+    /// `strain_px` until version 0.1; both names are read.)
+    #[serde(default, alias = "strain_px")]
+    pub overdispersion_px: f64,
+}
+
+/// One global solve of the report.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct LevelReport {
+    /// Pyramid level; 0 is full size.
+    pub level: usize,
+    /// Wall samples per pixel along each axis.
+    pub samples_per_pixel: f64,
+    /// Share of the wall that was compared, the most informative.
+    pub share_of_wall: f64,
+    /// True if the wall was solved for jointly with the poses.
+    #[serde(default)]
+    pub joint: bool,
+    /// Its course.
+    #[serde(flatten)]
+    pub solve: SolveRecord,
+}
+
+/// Wall-clock time of one stage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct StageTime {
+    /// Name of the stage.
+    pub stage: String,
+    /// Seconds.
+    pub seconds: f64,
+}
+
+/// The whole report.
+#[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
+pub struct RefineReport {
+    /// Global solves, coarse to fine.
+    pub levels: Vec<LevelReport>,
+    /// Frames in order.
+    pub frames: Vec<FrameReport>,
+    /// Frames whose pose rests on the prior.
+    pub frames_on_prior: usize,
+    /// The covariance over the inverse of the normal matrix, c of
+    /// [`crate::uncertainty::covariance`]: above 1 where residuals err together, below
+    /// where they cancel.
+    pub variance_factor: f64,
+    /// The rolling-shutter test: the readout time that fits the frames best, where they determine
+    /// it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rolling_shutter: Option<ReadoutEstimate>,
+    /// Self-calibration, if it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub calibration: Option<CalibrationReport>,
+    /// The reason for which the last solve stopped, in words.
+    pub stopped_because: String,
+    /// Time by stage.
+    pub timings: Vec<StageTime>,
+}

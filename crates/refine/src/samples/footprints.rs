@@ -1,0 +1,46 @@
+//! Footprints: the parts of the wall that frames observe.
+
+use crate::model::context::EstimationContext;
+use crate::model::frame_states::FrameStates;
+use crate::model::problem_error::ProblemError;
+use crate::thresholds::footprints::MAX_REACH_RADII;
+use rayon::prelude::*;
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::surface::{Footprint, Surface};
+use tunnelstitch_core::trajectory::Pose;
+
+/// Largest distance along the tunnel at which a frame is compared, metres.
+pub fn reach_m(surface: &dyn Surface) -> f64 {
+    MAX_REACH_RADII * surface.perimeter_m() / std::f64::consts::TAU
+}
+
+/// Footprint of frame `frame` at `pose`, taken by `camera`.
+///
+/// # Errors
+/// [`ProblemError::Placement`].
+pub fn footprint(
+    context: &EstimationContext,
+    camera: &Camera,
+    frame: usize,
+    pose: &Pose,
+) -> Result<Footprint, ProblemError> {
+    Footprint::within(context.surface, camera, pose, reach_m(context.surface))
+        .map_err(|source| ProblemError::Placement { frame, source })
+}
+
+/// Footprint of each frame at its current pose.
+///
+/// # Errors
+/// [`ProblemError::Placement`].
+pub fn footprints(
+    context: &EstimationContext,
+    frames: &FrameStates,
+) -> Result<Vec<Footprint>, ProblemError> {
+    let estimates = frames.estimates.par_iter().enumerate();
+    estimates
+        .map(|(k, estimate)| {
+            let camera = context.camera.with_sweep(&frames.sweep(context, k));
+            footprint(context, &camera, k, &estimate.pose)
+        })
+        .collect()
+}

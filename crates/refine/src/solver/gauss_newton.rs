@@ -1,0 +1,309 @@
+//! Damped Gauss–Newton on the manifold of poses.
+//!
+//! This is the iteration itself, as plain code; [`crate::solver::argmin_glue`] hands it to
+//! argmin's executor, which counts iterations and shows progress.
+
+use crate::linear::sparse_cholesky::FactorError;
+use crate::model::problem_error::ProblemError;
+use crate::parameters::calibration::Kappa;
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameEstimate, FrameStep};
+use crate::problem::linearisation::Linearisation;
+use crate::problem::photometric_problem::PhotometricProblem;
+use crate::solver::solve_record::{SolveRecord, StepRecord};
+use crate::solver::stopping::{StopReason, Stopping};
+use crate::thresholds::gauss_newton::{
+    DAMPING_FACTOR, MAX_COST_RISE, MAX_DAMPING_ITERATIONS, MIN_DAMPING, MIN_SLOPE_REDUCTION,
+};
+use serde::{Deserialize, Serialize};
+
+/// The unknowns of a solve: estimates of the active frames, and the shared parameters κ.
+pub type Unknowns = (Vec<FrameEstimate>, Kappa);
+
+/// The end of a solve.
+pub struct Solution<'a> {
+    /// The problem that was solved.
+    pub problem: PhotometricProblem<'a>,
+    /// Estimates of the active frames.
+    pub estimates: Vec<FrameEstimate>,
+    /// The shared parameters.
+    pub kappa: Kappa,
+    /// Cost and normal equations there, or within the tolerance of there.
+    pub linearisation: Linearisation,
+    /// Its course.
+    pub record: SolveRecord,
+}
+
+/// A solve between two steps; it can be resumed from there.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct SolveState {
+    /// The unknowns.
+    pub unknowns: Unknowns,
+    /// Steps taken or given up.
+    pub iterations: u64,
+    lambda: f64,
+    cost_start: f64,
+    steps: Vec<StepRecord>,
+}
+
+/// Gauss–Newton with Levenberg–Marquardt damping `(H + λ diag H) δ = −g`.
+///
+/// λ starts at 0 and rises after a bad step, which is never taken. A step is good if it lowers the
+/// robust cost on the same wall samples, or if, within a pixel, it removes at least half of the
+/// slope along it ([`MIN_SLOPE_REDUCTION`]) and hardly raises the cost ([`MAX_COST_RISE`]).
+///
+/// The second rule is needed because the solve seeks a zero of the gradient, and the gradient is
+/// not quite the derivative of the cost: it uses the slopes of the fused texture
+/// ([`crate::tiles::tile`]) and is smooth, whereas the cost of sharp edges depends on where
+/// samples fall between pixels. Along weak directions, in which all frames move together and hardly
+/// against each other, that roughness exceeds the gain, and a solve that asked for a lower cost
+/// would get stuck.
+///
+/// Frames that a step would make infeasible ([`PhotometricProblem::is_feasible`]) keep their
+/// estimates. The last step, undamped and shorter than the tolerance, is not judged: cost and
+/// equations are those before it.
+///
+/// Source: P. Wolfe, "Convergence conditions for ascent methods", SIAM Review 11(2), 1969 (the
+/// slope along a step).
+pub struct DampedGaussNewton {
+    stopping: Stopping,
+    lambda: f64,
+    /// Cost and equations at the present unknowns; None before the first linearisation.
+    current: Option<Linearisation>,
+    cost_start: Option<f64>,
+    steps: Vec<StepRecord>,
+    stop: Option<StopReason>,
+}
+
+impl DampedGaussNewton {
+    /// Before the first step.
+    pub fn new(stopping: Stopping) -> Self {
+        Self {
+            stopping,
+            lambda: 0.0,
+            current: None,
+            cost_start: None,
+            steps: Vec::new(),
+            stop: None,
+        }
+    }
+
+    /// Between two steps, where an earlier solve of the same problem was.
+    pub fn resume(stopping: Stopping, state: &SolveState) -> Self {
+        Self {
+            lambda: state.lambda,
+            cost_start: Some(state.cost_start),
+            steps: state.steps.clone(),
+            ..Self::new(stopping)
+        }
+    }
+
+    /// The state at `unknowns` after `iterations` iterations.
+    pub fn state(&self, unknowns: &Unknowns, iterations: u64) -> SolveState {
+        SolveState {
+            unknowns: unknowns.clone(),
+            iterations,
+            lambda: self.lambda,
+            cost_start: self.cost_start.unwrap_or_default(),
+            steps: self.steps.clone(),
+        }
+    }
+
+    /// The reason to stop, once there is one.
+    pub fn stop(&self) -> Option<StopReason> {
+        self.stop
+    }
+
+    /// One iteration: linearise, solve, accept. Returns the new unknowns and the cost there.
+    ///
+    /// # Errors
+    /// [`ProblemError::Factor`] if the normal equations stay singular whatever the damping;
+    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
+    pub fn iterate(
+        &mut self,
+        problem: &PhotometricProblem,
+        unknowns: &Unknowns,
+    ) -> Result<(Unknowns, f64), ProblemError> {
+        let current = match self.current.take() {
+            Some(current) => current,
+            None => problem.linearise_at(&unknowns.0, &unknowns.1)?,
+        };
+        self.cost_start.get_or_insert(current.cost);
+        let (unknowns, next) = self.step(problem, unknowns, current)?;
+        let cost = next.cost;
+        self.current = Some(next);
+        Ok((unknowns, cost))
+    }
+
+    /// The solution at `unknowns`, where the last iteration ended; None before the first.
+    pub fn finish<'a>(
+        self,
+        problem: PhotometricProblem<'a>,
+        unknowns: Unknowns,
+    ) -> Option<Solution<'a>> {
+        let linearisation = self.current?;
+        let record = SolveRecord {
+            iterations: self.steps.len() as u64,
+            last_step_px: self.steps.last().map_or(0.0, |step| step.step_px),
+            steps: self.steps,
+            cost_start: self.cost_start.unwrap_or_default(),
+            cost_end: linearisation.cost,
+            observations: linearisation.frames.iter().map(|f| f.samples).sum(),
+            sigma: problem.sigma(),
+            stop: self.stop.unwrap_or(StopReason::MaxIterations),
+        };
+        let (estimates, kappa) = unknowns;
+        Some(Solution {
+            problem,
+            estimates,
+            kappa,
+            linearisation,
+            record,
+        })
+    }
+
+    /// One accepted step from `unknowns`, where the problem is linearised as `current`; or the
+    /// reason there is none.
+    fn step(
+        &mut self,
+        problem: &PhotometricProblem,
+        unknowns: &Unknowns,
+        current: Linearisation,
+    ) -> Result<(Unknowns, Linearisation), ProblemError> {
+        let (estimates, kappa) = unknowns;
+        let mut undamped_failed = false;
+        for _ in 0..MAX_DAMPING_ITERATIONS {
+            let Some((mut step, shared)) = self.damped_step(problem, &current)? else {
+                self.raise_damping();
+                continue;
+            };
+            let all_feasible = hold_infeasible_frames(problem, estimates, &mut step);
+            let moved = problem.wall_step_px(estimates, &step, &shared);
+            let step_px = moved.into_iter().fold(0.0, f64::max);
+            let decrement = -slope(&step, &shared, &current);
+            let stop = self.reason_to_stop(step_px, decrement, FRAME_PARAMETERS * step.len());
+            if stop.is_some() && self.lambda > 0.0 {
+                // It is the damping that makes the step short.
+                if undamped_failed {
+                    break;
+                }
+                self.lambda = 0.0;
+                continue;
+            }
+            let moved = estimates.iter().zip(&step);
+            let moved = moved.map(|(estimate, step)| estimate.retract(step));
+            let candidate = (moved.collect(), kappa + shared);
+            let mut record = StepRecord {
+                cost: None,
+                step_px,
+                damping: self.lambda,
+                curvature: None,
+            };
+            if stop.is_some() {
+                self.steps.push(record);
+                self.stop = stop;
+                return Ok((candidate, current));
+            }
+            let next = problem.linearise_at(&candidate.0, &candidate.1)?;
+            let left = slope(&step, &shared, &next).abs();
+            let settles = step_px < problem.pixel_px()
+                && left < (1.0 - MIN_SLOPE_REDUCTION) * decrement
+                && next.cost < (1.0 + MAX_COST_RISE) * current.cost;
+            if next.cost < current.cost || settles {
+                record.cost = Some(next.cost);
+                // A whole undamped step is δ = −H⁻¹ g.
+                let of_poses = |at| frames_slope(&step, at, 6);
+                record.curvature = (self.lambda == 0.0 && all_feasible)
+                    .then(|| 1.0 - of_poses(&next) / of_poses(&current));
+                self.steps.push(record);
+                self.lower_damping();
+                return Ok((candidate, next));
+            }
+            undamped_failed |= self.lambda == 0.0;
+            self.raise_damping();
+        }
+        self.stop = Some(StopReason::NoFurtherDescent);
+        Ok((unknowns.clone(), current))
+    }
+
+    /// The step `δ = −(H + λ diag H)⁻¹ g` of the frames and of the shared parameters; None if a
+    /// stronger damping is needed.
+    fn damped_step(
+        &self,
+        problem: &PhotometricProblem,
+        current: &Linearisation,
+    ) -> Result<Option<(Vec<FrameStep>, Kappa)>, ProblemError> {
+        let normal = &current.normal;
+        let factor = problem
+            .symbolic()
+            .factorise(problem.pattern(), normal, self.lambda);
+        let is_last_resort = self.lambda >= 1.0;
+        let factor = match factor {
+            Ok(factor) => factor,
+            Err(source) if is_last_resort => return Err(problem.factor_error(source)),
+            Err(_) => return Ok(None),
+        };
+        let Some(border) = &current.border else {
+            return Ok(Some((factor.step(&normal.gradient), Kappa::zeros())));
+        };
+        match border.step(&factor, &normal.gradient, self.lambda) {
+            None if is_last_resort => Err(problem.factor_error(FactorError::NotPositiveDefinite)),
+            step => Ok(step),
+        }
+    }
+
+    /// The reason for which a step that moves the wall by `step_px` and lowers the quadratic model
+    /// by `½ decrement` is the last one, if it is.
+    fn reason_to_stop(&self, step_px: f64, decrement: f64, unknowns: usize) -> Option<StopReason> {
+        if step_px < self.stopping.step_px {
+            Some(StopReason::StepBelowTolerance)
+        } else if decrement < self.stopping.step_sigma.powi(2) * unknowns as f64 {
+            Some(StopReason::StepBelowUncertainty)
+        } else {
+            None
+        }
+    }
+
+    fn raise_damping(&mut self) {
+        self.lambda = (self.lambda * DAMPING_FACTOR).max(MIN_DAMPING);
+    }
+
+    fn lower_damping(&mut self) {
+        self.lambda = if self.lambda > MIN_DAMPING {
+            self.lambda / DAMPING_FACTOR
+        } else {
+            0.0
+        };
+    }
+}
+
+/// Sets the steps of frames to zero that would become infeasible: one frame that fits nowhere must
+/// not hold back the others. Returns true if there are none.
+fn hold_infeasible_frames(
+    problem: &PhotometricProblem,
+    estimates: &[FrameEstimate],
+    step: &mut [FrameStep],
+) -> bool {
+    let mut all_feasible = true;
+    for (estimate, step) in estimates.iter().zip(step) {
+        if !problem.is_feasible(&estimate.retract(step)) {
+            *step = FrameStep::zeros();
+            all_feasible = false;
+        }
+    }
+    all_feasible
+}
+
+/// The derivative of the cost along the first `unknowns` of each frame's step: `δᵀ g`.
+fn frames_slope(step: &[FrameStep], at: &Linearisation, unknowns: usize) -> f64 {
+    let frames = step.iter().zip(&at.normal.gradient);
+    let slopes =
+        frames.map(|(step, gradient)| step.rows(0, unknowns).dot(&gradient.rows(0, unknowns)));
+    slopes.sum()
+}
+
+/// The derivative of the cost along a whole step, that of the shared unknowns included.
+fn slope(step: &[FrameStep], shared: &Kappa, at: &Linearisation) -> f64 {
+    let border = at.border.as_ref();
+    let of_shared = border.map_or(0.0, |border| shared.dot(&border.gradient));
+    frames_slope(step, at, FRAME_PARAMETERS) + of_shared
+}

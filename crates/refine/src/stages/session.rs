@@ -1,0 +1,96 @@
+//! Services that stages share: checkpoints, progress and a stopwatch.
+
+use crate::model::problem_error::ProblemError;
+use crate::report::StageTime;
+use crate::stages::setup::Setup;
+use crate::stages::state::{PipelineState, Snapshot};
+use std::sync::Arc;
+use std::time::Instant;
+use tunnelstitch_core::persist::checkpoint::{Checkpoint, CheckpointError};
+use tunnelstitch_core::progress::Progress;
+
+/// Name of the snapshots in a checkpoint.
+const NAME: &str = "refine";
+
+/// Services that the stages of one refinement share.
+pub struct Session<'a> {
+    checkpoint: Option<&'a mut Checkpoint>,
+    /// Progress display.
+    pub progress: &'a Arc<dyn Progress>,
+    /// Stages that are over, with their times.
+    pub timings: Vec<StageTime>,
+    since: Instant,
+    /// Time spent on the stage under way before the last interruption, seconds.
+    before_s: f64,
+}
+
+impl<'a> Session<'a> {
+    /// A session that keeps snapshots in `checkpoint`, if there is one.
+    pub fn new(checkpoint: Option<&'a mut Checkpoint>, progress: &'a Arc<dyn Progress>) -> Self {
+        Self {
+            checkpoint,
+            progress,
+            timings: Vec::new(),
+            since: Instant::now(),
+            before_s: 0.0,
+        }
+    }
+
+    /// Takes the state from the checkpoint, if it has one, and resumes shading and stopwatch.
+    ///
+    /// # Errors
+    /// [`ProblemError::Checkpoint`] if it is damaged.
+    pub fn restore(&mut self, setup: &Setup) -> Result<Option<PipelineState>, ProblemError> {
+        let Some(checkpoint) = &self.checkpoint else {
+            return Ok(None);
+        };
+        let Some(snapshot) = checkpoint.state::<Snapshot>(NAME)? else {
+            return Ok(None);
+        };
+        if let Some(shading) = snapshot.shading {
+            setup.frames.set_shading(shading);
+        }
+        self.timings = snapshot.timings;
+        self.before_s = snapshot.elapsed_s;
+        Ok(Some(snapshot.state))
+    }
+
+    /// Keeps the state in the checkpoint if it is time; `state` is only asked for then.
+    ///
+    /// # Errors
+    /// [`ProblemError::Checkpoint`] with whatever the system says.
+    pub fn keep_if_due(
+        &mut self,
+        setup: &Setup,
+        state: impl FnOnce() -> PipelineState,
+    ) -> Result<(), ProblemError> {
+        let elapsed_s = self.elapsed_s();
+        if let Some(checkpoint) = &mut self.checkpoint
+            && checkpoint.is_due()
+        {
+            let snapshot = Snapshot {
+                state: state(),
+                shading: setup.frames.shading().as_deref().cloned(),
+                timings: self.timings.clone(),
+                elapsed_s,
+            };
+            let kept = checkpoint.keep(NAME, &snapshot);
+            kept.map_err(CheckpointError::from)?;
+        }
+        Ok(())
+    }
+
+    /// Records the time since the last record under the name of a stage.
+    pub fn record_time(&mut self, stage: &str) {
+        self.timings.push(StageTime {
+            stage: stage.to_owned(),
+            seconds: self.elapsed_s(),
+        });
+        (self.since, self.before_s) = (Instant::now(), 0.0);
+    }
+
+    /// Time spent on the stage under way, seconds.
+    fn elapsed_s(&self) -> f64 {
+        self.before_s + self.since.elapsed().as_secs_f64()
+    }
+}

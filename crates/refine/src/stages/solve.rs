@@ -1,0 +1,169 @@
+//! Stage: solves all frames together at one pyramid level.
+
+use crate::error::RefineError;
+use crate::model::context::EstimationContext;
+use crate::model::problem_error::ProblemError;
+use crate::options::RefineOptions;
+use crate::problem::photometric_problem::PhotometricProblem;
+use crate::report::LevelReport;
+use crate::solver::argmin_glue::{self, Observation};
+use crate::solver::gauss_newton::{Solution, SolveState};
+use crate::stages::plan::{SolvePlan, Stage};
+use crate::stages::session::Session;
+use crate::stages::setup::Setup;
+use crate::stages::state::{Estimation, PipelineState};
+use crate::thresholds::joint;
+use crate::tracking::shading_correction::correct;
+use crate::uncertainty::observability::UnobservableParameter;
+use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
+use crate::validation::inconsistent_frames::reject_disagreeing_frames;
+
+/// Runs the stage; a snapshot may be kept between two steps.
+///
+/// A parameter that the last solve finds unobservable is fixed, and the solve planned again.
+///
+/// # Errors
+/// A frame that cannot be read, equations without a solution.
+pub fn run<'a>(
+    plan: SolvePlan,
+    setup: &'a Setup<'a>,
+    mut estimation: Estimation<'a>,
+    session: &mut Session,
+) -> Result<Estimation<'a>, RefineError> {
+    let state = &mut estimation.state;
+    let context = setup.context(state);
+    let Some(problem) = problem_of(&plan, setup, &context, state)? else {
+        session.record_time("joint model of the wall");
+        return Ok(estimation);
+    };
+    // Without overlap the prior is all there is to report.
+    if problem.tiles() == 0 && state.frames.rejections.iter().all(Option::is_none) {
+        return Ok(estimation);
+    }
+    let solution = solve(&plan, problem, setup, state, session)?;
+    state.frames.estimates.clone_from(&solution.estimates);
+    let unobservable = find_unobservable(&plan, setup, &context, state, &solution)?;
+    state.kappa = solution.kappa;
+    for parameter in &unobservable {
+        state.kappa[parameter.unknown] = 0.0;
+        state.free[parameter.unknown] = false;
+    }
+    let context = setup.context(state);
+    state.kappa = context.kappa;
+    if !unobservable.is_empty() && !has_solve_ahead(state) {
+        plan_again(&plan, setup.options, state);
+    }
+    state.unobservable.extend(unobservable);
+    state.solved.clone_from(&state.frames);
+    if plan.sampling.level == 0 {
+        reject_disagreeing_frames(&solution.linearisation.frames, &mut state.frames.rejections);
+    }
+    state.levels.push(LevelReport {
+        level: plan.sampling.level,
+        samples_per_pixel: plan.sampling.density,
+        share_of_wall: solution.problem.compared_share(),
+        joint: solution.problem.is_joint(),
+        solve: solution.record.clone(),
+    });
+    if has_solve_ahead(state) && setup.frames.shading().is_some() {
+        correct(&context, setup.options, &state.frames)?;
+    }
+    // The assessment uses the last one only.
+    estimation.solution = (!has_solve_ahead(state)).then_some((solution, plan.stopping));
+    session.record_time(&format!("global {}", plan.name()));
+    Ok(estimation)
+}
+
+/// Sets up the problem; none if it was to be joint and the wall is too smooth for that.
+fn problem_of<'a>(
+    plan: &SolvePlan,
+    setup: &Setup,
+    context: &EstimationContext<'a>,
+    state: &PipelineState,
+) -> Result<Option<PhotometricProblem<'a>>, ProblemError> {
+    let sampling = plan.sampling;
+    let problem =
+        PhotometricProblem::new(context, sampling, state.frames.window())?.with_shared_parameters();
+    if sampling.joint && !problem.is_joint() {
+        return Ok(None);
+    }
+    // Before the frames are aligned at full size, residuals are mostly misalignment.
+    if sampling.level > 0 {
+        return Ok(Some(problem));
+    }
+    let density = if sampling.joint {
+        Some(joint::OUTLIER_MASK_SAMPLES_PER_PIXEL)
+    } else {
+        let chosen = setup.options.outlier_mask_density;
+        chosen.filter(|_| sampling.variance_weighting)
+    };
+    problem.exclude_outliers(density).map(Some)
+}
+
+/// Solves the problem, from where an interrupted solve was.
+fn solve<'a>(
+    plan: &SolvePlan,
+    problem: PhotometricProblem<'a>,
+    setup: &Setup,
+    state: &mut PipelineState,
+    session: &mut Session,
+) -> Result<Solution<'a>, ProblemError> {
+    let progress = session.progress;
+    let begun = state.solve.take();
+    let state = &*state;
+    let mut keep = |solve: SolveState| {
+        session.keep_if_due(setup, || PipelineState {
+            solve: Some(solve),
+            ..state.clone()
+        })
+    };
+    let name = plan.name();
+    progress.start("global", setup.options.max_iterations as usize);
+    let observation = Observation {
+        stage: &name,
+        progress,
+        keep: &mut keep,
+    };
+    let solution = argmin_glue::resume(problem, plan.stopping, begun, Some(observation))?;
+    progress.finish();
+    Ok(solution)
+}
+
+/// The shared parameters that a full-size solution does not observe.
+fn find_unobservable(
+    plan: &SolvePlan,
+    setup: &Setup,
+    context: &EstimationContext,
+    state: &PipelineState,
+    solution: &Solution,
+) -> Result<Vec<UnobservableParameter>, ProblemError> {
+    let calibration = setup.calibration_at(state);
+    if plan.sampling.level > 0 || !calibration.has_free_parameters() {
+        return Ok(Vec::new());
+    }
+    let solved = context.at(solution.kappa);
+    let uncertainty = SolutionUncertainty::at(&solved, solution, &calibration)?;
+    Ok(uncertainty.find_unobservable(
+        &solved,
+        &calibration,
+        &solution.estimates,
+        &state.frames.rejections,
+    ))
+}
+
+/// True if another solve is certain to follow; a joint one may turn out to be needless.
+fn has_solve_ahead(state: &PipelineState) -> bool {
+    let mut ahead = state.stages.iter().skip(1);
+    ahead.any(|stage| matches!(stage, Stage::Solve(plan) if !plan.sampling.joint))
+}
+
+/// Plans the solve once more, after this one. Without the unobservable parameter the wall may look
+/// smooth, so a joint solve is preceded by one that is not.
+fn plan_again(plan: &SolvePlan, options: &RefineOptions, state: &mut PipelineState) {
+    state.stages.insert(1, Stage::Solve(*plan));
+    if plan.sampling.joint {
+        state
+            .stages
+            .insert(1, Stage::Solve(SolvePlan::last(options)));
+    }
+}

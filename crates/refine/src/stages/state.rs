@@ -1,0 +1,66 @@
+//! The state of a refinement between two stages: everything that it takes to resume from there.
+
+use crate::model::frame_states::FrameStates;
+use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
+use crate::refined::Refined;
+use crate::report::{LevelReport, StageTime};
+use crate::solver::gauss_newton::{Solution, SolveState};
+use crate::solver::stopping::Stopping;
+use crate::stages::plan::Stage;
+use crate::tracking::alternating_calibration::AlternatingCalibration;
+use crate::uncertainty::observability::UnobservableParameter;
+use crate::validation::aliasing::AliasHypothesis;
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+use tunnelstitch_core::frames::Shading;
+
+/// The part of a refinement's state that a checkpoint keeps.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PipelineState {
+    /// Stages that are left; the first is the next, or the one under way.
+    pub stages: VecDeque<Stage>,
+    /// 1-σ of the sensor's noise, grey levels.
+    pub noise: f64,
+    /// The frames: estimates (none before they are tracked) and rejection reasons.
+    pub frames: FrameStates,
+    /// The frames as the last solve left them; repair looks at what has changed since.
+    pub solved: FrameStates,
+    /// The shared parameters κ, ...
+    pub kappa: Kappa,
+    /// ... and which of them are still estimated.
+    pub free: [bool; SHARED_PARAMETERS],
+    /// Tracking, if it is under way.
+    pub tracking: Option<AlternatingCalibration>,
+    /// The global solve that is under way.
+    pub solve: Option<SolveState>,
+    /// Second poses that the wall's repetition leaves possible.
+    pub aliases: Vec<AliasHypothesis>,
+    /// Global solves that are over.
+    pub levels: Vec<LevelReport>,
+    /// Shared parameters that the data do not observe.
+    pub unobservable: Vec<UnobservableParameter>,
+}
+
+/// A checkpoint of a refinement: its state, and what lies beside it.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Snapshot {
+    /// The state.
+    pub state: PipelineState,
+    /// The shading that frames are divided by.
+    pub shading: Option<Shading>,
+    /// Stages that are over, with their times.
+    pub timings: Vec<StageTime>,
+    /// Seconds spent on the stage under way.
+    pub elapsed_s: f64,
+}
+
+/// A refinement between two stages.
+pub struct Estimation<'a> {
+    /// The state.
+    pub state: PipelineState,
+    /// The last full-size solve, with its stopping rule. It is held in memory only; no checkpoint
+    /// is kept between it and the assessment that uses it.
+    pub solution: Option<(Solution<'a>, Stopping)>,
+    /// The result, once assessed.
+    pub refined: Option<Refined>,
+}

@@ -1,0 +1,43 @@
+//! Stage: registers one frame after another, alternating with shading and camera while these are
+//! only roughly known.
+
+use crate::error::RefineError;
+use crate::model::context::EstimationContext;
+use crate::solver::stopping::Stopping;
+use crate::stages::session::Session;
+use crate::stages::setup::Setup;
+use crate::stages::state::{Estimation, PipelineState};
+use crate::tracking::alternating_calibration::AlternatingCalibration;
+
+/// Runs the stage; a snapshot may be kept after every frame.
+///
+/// # Errors
+/// A frame that cannot be read, an initial pose outside the tunnel, equations without a solution.
+pub fn run<'a>(
+    setup: &'a Setup<'a>,
+    mut estimation: Estimation<'a>,
+    session: &mut Session,
+) -> Result<Estimation<'a>, RefineError> {
+    let state = &mut estimation.state;
+    let initial = setup.initial_context(state.noise);
+    let context = EstimationContext {
+        prior: &setup.tracking_prior,
+        ..initial
+    };
+    let tracking = state.tracking.take();
+    let tracking =
+        tracking.unwrap_or_else(|| AlternatingCalibration::new(state.frames.rejections.clone()));
+    let stopping = Stopping::intermediate(setup.options, setup.handover_level());
+    let progress = session.progress.clone();
+    let keep = |tracking: &AlternatingCalibration| {
+        session.keep_if_due(setup, || PipelineState {
+            tracking: Some(tracking.clone()),
+            ..state.clone()
+        })
+    };
+    let frames = tracking.run(&context, setup.options, stopping, progress.as_ref(), keep)?;
+    state.kappa = initial.at(frames.kappa).kappa;
+    state.frames = frames;
+    session.record_time("track");
+    Ok(estimation)
+}

@@ -1,0 +1,82 @@
+//! Estimation context, prior and frames on a [`TestWall`], for tests.
+
+use crate::model::context::EstimationContext;
+use crate::model::frame_states::FrameStates;
+use crate::model::prior::Prior;
+use crate::parameters::calibration::{Calibration, Kappa};
+use crate::parameters::frame_estimate::FrameEstimate;
+use crate::samples::visibility::PosedFrame;
+use crate::tiles::grid::WallGrid;
+use std::sync::LazyLock;
+use tunnelstitch_core::camera::{Camera, Sweep};
+use tunnelstitch_core::frames::FrameCache;
+use tunnelstitch_core::surface::{Circle, Footprint, WallRegions};
+use tunnelstitch_core::test_wall::TestWall;
+use tunnelstitch_core::trajectory::{Jitter, JitterModel, Pose, Shutter, spiral};
+
+/// Prior of independent poses with 1-σ of 0.05 rad and 5 cm, one frame per second.
+pub fn independent_prior(initial: &[Pose]) -> Prior {
+    Prior {
+        jitter: Jitter {
+            model: JitterModel::Independent,
+            rotation_sigma_rad: 0.05,
+            translation_sigma_m: [0.05; 3],
+        },
+        times_s: (0..initial.len()).map(|k| k as f64).collect(),
+        median_step_s: 1.0,
+        initial: initial.to_vec(),
+        log_gain_sigma: 0.3,
+        bias_sigma: 10.0,
+    }
+}
+
+/// No part of the wall is ignored.
+static NO_PATCHES: WallRegions = WallRegions::NONE;
+/// A global shutter.
+static GLOBAL_SHUTTER: LazyLock<Shutter> = LazyLock::new(Shutter::default);
+
+/// Context of noise-free frames of the wall; only poses and exposures are estimated.
+pub fn test_context<'a>(
+    wall: &'a TestWall,
+    frames: &'a FrameCache,
+    prior: &'a Prior,
+) -> EstimationContext<'a> {
+    EstimationContext {
+        surface: &wall.circle,
+        ignored: &NO_PATCHES,
+        camera: wall.camera,
+        shutter: &GLOBAL_SHUTTER,
+        calibration: Calibration::none(&wall.camera),
+        kappa: Kappa::zeros(),
+        frames,
+        prior,
+        noise: 0.0,
+    }
+}
+
+/// States of frames at these poses, all inliers.
+pub fn frame_states(poses: &[Pose]) -> FrameStates {
+    FrameStates {
+        estimates: poses.iter().map(|pose| FrameEstimate::at(*pose)).collect(),
+        rejections: vec![None; poses.len()],
+        kappa: Kappa::zeros(),
+    }
+}
+
+/// A tunnel of 3 m radius, a camera, the lattice of its pixels, and a spiral of `frames` frames,
+/// all active.
+pub fn posed_spiral(frames: usize) -> (Circle, Camera, WallGrid, Vec<PosedFrame>) {
+    let circle = Circle::new(3.0).unwrap();
+    let camera = Camera::from_vertical_fov(160, 120, 60f64.to_radians());
+    let grid = WallGrid::new(&circle, 3.0 / camera.fy, 1.0);
+    let posed = spiral(frames, 0.1, 30f64.to_radians())
+        .into_iter()
+        .map(|pose| PosedFrame {
+            sweep: Sweep::default(),
+            pose,
+            footprint: Footprint::trace(&circle, &camera, &pose).unwrap(),
+            active: true,
+        });
+    let posed = posed.collect();
+    (circle, camera, grid, posed)
+}

@@ -1,0 +1,1137 @@
+//! Every tuned number of the estimator, grouped by stage.
+//!
+//! Each constant says what it bounds and in which unit, what a higher value does, and what it was
+//! chosen by: a row of the ablation, a test, a derivation, or "unknown". Sizes that follow from the
+//! data layout (tile size, batch sizes) are no thresholds and stay with their code; numbers that a
+//! user may want to change are options ([`crate::RefineOptions`]).
+
+/// Thresholds of `tracking/prescreening.rs`.
+pub mod prescreening {
+    /// Standard deviation of the grey values at the coarsest level below which a frame shows
+    /// nothing, grey levels.
+    ///
+    /// Higher: more frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_CONTRAST_GREY: f64 = 0.75;
+
+    /// Share of a frame's pixels at the coarsest level that must have a value.
+    ///
+    /// Higher: more frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_KNOWN_SHARE: f64 = 0.1;
+
+    /// Root mean square difference at the coarsest level below which two frames are the same
+    /// picture, grey levels.
+    ///
+    /// Higher: more frames are rejected as repeated.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_REPEAT_DIFFERENCE_GREY: f64 = 0.1;
+
+    /// Motion between two initial poses from which on two equal pictures cannot both be right,
+    /// pixels of full size.
+    ///
+    /// Higher: fewer frames are rejected as repeated.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_MOTION_PX: f64 = 20.0;
+
+    /// Number of frames whose mean tells shading from texture.
+    ///
+    /// Higher: shading is corrected in longer surveys only.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SHADING_FRAMES: usize = 10;
+}
+
+/// Thresholds of `tracking/windows.rs` and `tracking/track.rs`.
+pub mod tracking {
+    /// Number of frames in a long window.
+    ///
+    /// Higher: less bend is left over several turns, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const LONG_WINDOW_FRAMES: usize = 160;
+
+    /// Number of frames tracked between the solves of two long windows.
+    ///
+    /// Higher: fewer long windows are solved.
+    ///
+    /// Chosen by: unknown.
+    pub const LONG_WINDOW_STRIDE: usize = 30;
+
+    /// The oldest of so many equal parts of a long window is held.
+    ///
+    /// Higher: fewer frames are held.
+    ///
+    /// Chosen by: unknown.
+    pub const LONG_WINDOW_HELD_DIVISOR: usize = 8;
+
+    /// The oldest of so many equal parts of a sliding window is held.
+    ///
+    /// Higher: fewer frames are held, and the window is tied more loosely to the frames before it.
+    ///
+    /// Chosen by: a prototype whose windows held the oldest third and stayed bounded.
+    pub const WINDOW_HELD_DIVISOR: usize = 3;
+
+    /// Number of Gauss–Newton iterations in a window.
+    ///
+    /// Higher: windows converge further, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_WINDOW_ITERATIONS: u64 = 6;
+
+    /// Step length below which a window has converged, pixels of the level.
+    ///
+    /// Higher: windows stop earlier; the global solve has more to do.
+    ///
+    /// Chosen by: unknown.
+    pub const WINDOW_STEP_TOLERANCE_PX: f64 = 0.2;
+}
+
+/// Thresholds of `tracking/alternating_calibration.rs`.
+pub mod alternating_calibration {
+    /// Number of times that all frames are tracked.
+    ///
+    /// Higher: a camera that is farther off can be estimated, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_TRACKING_ITERATIONS: usize = 5;
+
+    /// Displacement of the picture's border by the change of the camera, pixels of full size, below
+    /// which frames need not be tracked again.
+    ///
+    /// Higher: frames are tracked fewer times.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_CAMERA_CHANGE_PX: f64 = 2.0;
+
+    /// Number of times that the first frames are tracked for the shading.
+    ///
+    /// Higher: the shading converges further, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SHADING_ITERATIONS: usize = 3;
+
+    /// Relative change of the shading below which frames need not be tracked again.
+    ///
+    /// Higher: the first frames are tracked fewer times.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SHADING_CHANGE: f64 = 0.01;
+}
+
+/// Thresholds of `tracking/registration.rs` and `tracking/candidate.rs`.
+pub mod registration {
+    /// Number of hypotheses of a frame's pose that are refined.
+    ///
+    /// Higher: fewer right poses are missed on repetitive walls, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_HYPOTHESES: usize = 10;
+
+    /// Largest deficit of a hypothesis to the best one with which it is refined, nats:
+    /// log-posterior odds.
+    ///
+    /// The probability that a hypothesis is right whose log-posterior is Δ lower is no more than
+    /// `exp(−Δ)`. The search underestimates log-posteriors by its steps, in proportion to the
+    /// number of samples. So the deficit is between the upper bound for the hypothesis after
+    /// refinement ([`super::correlation_search::MIN_SQUARED_CORRELATION_LEFT`]) and the lower bound
+    /// for the best one, its score before refinement.
+    ///
+    /// Higher: more hypotheses are refined, and fewer right ones are dismissed.
+    ///
+    /// Chosen by: derivation. `ln(10/0.001)`: of ten hypotheses, a right one is dismissed at most
+    /// once in a thousand frames.
+    pub const MAX_SCORE_DEFICIT_NATS: f64 = 9.2;
+
+    /// Number of Gauss–Newton iterations for a single frame at one level.
+    ///
+    /// Higher: candidates converge further, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SOLVE_ITERATIONS: u64 = 12;
+
+    /// Step length below which a single frame has converged, pixels of the level.
+    ///
+    /// Higher: candidates stop earlier; the windows have more to do.
+    ///
+    /// Chosen by: unknown.
+    pub const SOLVE_STEP_TOLERANCE_PX: f64 = 0.1;
+
+    /// Correlation with the reference mosaic, corrected for noise, that a registered frame must
+    /// reach.
+    ///
+    /// Higher: more frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_CORRELATION: f64 = 0.5;
+
+    /// Correlation with the reference mosaic, corrected for noise, from which on a pose is reliable
+    /// and no closer search is made.
+    ///
+    /// Higher: more closer searches, and more windows solved from the coarsest level.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_RELIABLE_CORRELATION: f64 = 0.9;
+
+    /// Number of closer searches around the best candidate.
+    ///
+    /// Higher: frames that are tilted farther are found, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_CLOSER_SEARCH_ITERATIONS: usize = 4;
+
+    /// Number of hypotheses that are refined after a closer search.
+    ///
+    /// Higher: fewer right poses are missed, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_CLOSER_HYPOTHESES: usize = 2;
+
+    /// Largest σ of pitch, yaw and roll in a closer search, radians.
+    ///
+    /// Higher: closer searches reach farther.
+    ///
+    /// Chosen by: unknown.
+    pub const CLOSER_SEARCH_SIGMA_RAD: f64 = 0.05;
+
+    /// Least gain in log-posterior, nats, for which another closer search is worth its time.
+    ///
+    /// Higher: fewer closer searches.
+    ///
+    /// Chosen by: derivation. Twice the gain that fitting the six unknowns of a pose to other noise
+    /// brings follows χ² with six degrees of freedom (Wilks), whose mean is 6: a smaller gain is
+    /// noise.
+    pub const MIN_SCORE_GAIN_NATS: f64 = 3.0;
+
+    /// Share `1 − c²` of the texture's variance that even the right pose leaves unexplained: blur,
+    /// interpolation.
+    ///
+    /// Higher: good matches differ less from each other, so the prior decides more often.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_UNEXPLAINED: f64 = 0.05;
+
+    /// Ratio of the unexplained shares `1 − c²` of two poses up to which the pixels do not tell
+    /// them apart.
+    ///
+    /// Higher: more frames are left to the prior, or are ambiguous.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_UNEXPLAINED_RATIO: f64 = 2.0;
+
+    /// Difference of the prior's log-densities from which on the prior tells two poses apart.
+    ///
+    /// Higher: more frames are ambiguous.
+    ///
+    /// Chosen by: derivation. `½ 3²`: three σ.
+    pub const MIN_PRIOR_MARGIN_NATS: f64 = 4.5;
+
+    /// Deviation `½ eᵀΣ⁻¹e` of a pose from the prior's prediction up to which the prior allows it.
+    ///
+    /// Higher: poses farther from the prior are accepted.
+    ///
+    /// Chosen by: derivation. All six unknowns of the pose as far off as the search reaches.
+    pub const MAX_DEVIATION_COST: f64 = 0.5
+        * 6.0
+        * super::correlation_search::MAX_DEVIATION_SIGMA
+        * super::correlation_search::MAX_DEVIATION_SIGMA;
+
+    /// Distance on the wall from which on two candidates are different poses, samples of the search
+    /// level.
+    ///
+    /// Higher: fewer frames are ambiguous.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SEPARATION_SAMPLES: f64 = 2.0;
+}
+
+/// Thresholds of `tracking/correlation_search.rs`.
+pub mod correlation_search {
+    /// Deviation from the prior's prediction that the search covers in each direction, σ.
+    ///
+    /// Higher: poses farther from the prior are found, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_DEVIATION_SIGMA: f64 = 3.5;
+
+    /// Number ν of samples that share one independent piece of texture.
+    ///
+    /// Higher: the pixels weigh less against the prior.
+    ///
+    /// Chosen by: unknown.
+    pub const SAMPLES_PER_INDEPENDENT_PIECE: f64 = 4.0;
+
+    /// Share of the frame's pixels that must lie on known wall.
+    ///
+    /// Higher: more frames with little overlap are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_OVERLAP_SHARE: f64 = 0.08;
+
+    /// Smallest share of its squared correlation that a right hypothesis keeps at half a step of
+    /// the search from the right pose.
+    ///
+    /// Higher: fewer hypotheses and fewer aliases are refined.
+    ///
+    /// Chosen by: derivation. With the autocorrelation `exp(−d²/2L²)` of the texture, `π L²` = 4
+    /// samples (an independent piece), half a sample off along both axes (d² = 1/2) and half a step
+    /// of roll off (one sample at the corners, d² = 1/3 in the mean) leave
+    /// `exp(−d²/L²)` = 0.52 of it.
+    pub const MIN_SQUARED_CORRELATION_LEFT: f64 = 0.5;
+
+    /// Step between roll hypotheses: motion of the picture's corners, samples.
+    ///
+    /// Higher: a coarser search, which misses more poses, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const ROLL_STEP_SAMPLES: f64 = 2.0;
+
+    /// Step between pitch hypotheses, radians; shifts along the tunnel make up for what lies
+    /// between.
+    ///
+    /// Higher: a coarser search, which misses more poses, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const PITCH_STEP_RAD: f64 = 0.12;
+
+    /// Share of the pitch step to which it shrinks as the frame looks more steeply along the
+    /// tunnel.
+    ///
+    /// Higher: a coarser search for steep views, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_PITCH_STEP_SHARE: f64 = 0.4;
+
+    /// Share of a pitch step for which shifts along the tunnel make up.
+    ///
+    /// Higher: neighbouring pitches overlap more, in more time.
+    ///
+    /// Chosen by: derivation. Half a step to either side, and some overlap.
+    pub const PITCH_STEP_SHARE_BY_SHIFT: f64 = 0.6;
+
+    /// Number of maxima kept for each pitch and roll.
+    ///
+    /// Higher: fewer right poses are missed on repetitive walls.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_MAXIMA_PER_TURN: usize = 4;
+
+    /// Distance on the wall from which on two maxima are different hypotheses, samples.
+    ///
+    /// Higher: fewer hypotheses close to each other.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SEPARATION_SAMPLES: f64 = 2.5;
+
+    /// Difference of roll from which on two maxima are different hypotheses, steps of roll.
+    ///
+    /// Higher: fewer hypotheses close to each other.
+    ///
+    /// Chosen by: derivation. Neighbouring steps show the same pose, the next but one does not.
+    pub const MIN_SEPARATION_ROLL_STEPS: f64 = 1.5;
+
+    /// Number of Newton iterations that rotate a pose to look at a given wall point.
+    ///
+    /// Higher: more exact hypotheses.
+    ///
+    /// Chosen by: unknown.
+    pub const VIEW_ITERATIONS: usize = 8;
+
+    /// Length of a single one of these iterations, radians.
+    ///
+    /// Higher: faster convergence, but steep views may diverge.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_VIEW_STEP_RAD: f64 = 0.3;
+}
+
+/// Thresholds of `tracking/reference_mosaic.rs`, `tracking/mosaic_grid.rs` and
+/// `tracking/ncc_score.rs`.
+pub mod reference_mosaic {
+    /// Share of the pixels that a piece of wall has when seen squarely from the axis, below which
+    /// it is left out.
+    ///
+    /// Higher: the mosaic covers less of obliquely seen wall.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_PIXEL_DENSITY: f32 = 0.1;
+
+    /// Distance along the tunnel that the mosaic covers, radii.
+    ///
+    /// Higher: the mosaic covers more wall, in more time.
+    ///
+    /// Chosen by: derivation. At an angle φ to the section `cos³ φ` of the pixels are left: at this
+    /// distance less than [`MIN_PIXEL_DENSITY`], with some room.
+    pub const MAX_REACH_RADII: f64 = 2.5;
+
+    /// The wall is sampled as if it were no farther away than this, radii.
+    ///
+    /// Higher: a coarser mosaic for frames that look along the tunnel.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SPACING_RADII: f64 = 1.25;
+
+    /// Viewing distance to which the size of a pixel on the wall is bounded, radii.
+    ///
+    /// Higher: coarser grids for frames that look along the tunnel.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_VIEWING_DISTANCE_RADII: f64 = 3.0;
+
+    /// Smallest gain of a frame against the mosaic.
+    ///
+    /// Higher: frames that are darker are fitted worse.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_GAIN: f64 = 0.4;
+
+    /// Largest gain of a frame against the mosaic.
+    ///
+    /// Higher: frames that are brighter are fitted better.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_GAIN: f64 = 2.5;
+
+    /// Share of the contrast's variance that must be texture for a correlation to be corrected for
+    /// noise.
+    ///
+    /// Higher: more pairs are too noisy to compare.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_TEXTURE_SHARE: f64 = 0.2;
+}
+
+/// Thresholds of `tracking/shading_correction.rs`.
+pub mod shading_correction {
+    /// Frames that the shading is estimated from, at the most. Higher: more time; the shading is
+    /// the same in all frames. Chosen by: unknown.
+    pub const MAX_SHADING_FRAMES: usize = 60;
+    /// Tiles that the shading is estimated from, spread over all of these frames. Higher: less
+    /// noise, more time. Chosen by: unknown.
+    pub const MAX_SHADING_TILES: usize = 1000;
+    /// Corrections of the shading with solves between, at the most. Higher: more time. Chosen by:
+    /// unknown.
+    pub const MAX_CORRECTION_ITERATIONS: usize = 2;
+    /// Size of a new shading over its 1-σ from noise above which it is taken over. Higher: weak
+    /// shadings are ignored. Chosen by: 3 σ.
+    pub const MIN_SIGNIFICANCE_SIGMA: f64 = 3.0;
+    /// Size of a change of an existing shading over its 1-σ from noise above which it is taken
+    /// over. Higher: fewer corrections. Chosen by: unknown.
+    pub const MIN_CHANGE_SIGNIFICANCE_SIGMA: f64 = 1.5;
+}
+
+/// Thresholds of `samples/footprints.rs`.
+pub mod footprints {
+    /// Largest distance in the sequence at which two frames are tested for overlap, frames.
+    ///
+    /// Higher: overlaps after more turns of a spiral are found, at more time and memory. Chosen by:
+    /// unknown.
+    pub const MAX_OVERLAP_DISTANCE_FRAMES: usize = 256;
+
+    /// Largest distance along the tunnel at which a frame is compared, radii of a circle with the
+    /// section's perimeter.
+    ///
+    /// Higher: frames that look along the tunnel keep more of their oblique wall. Chosen by:
+    /// unknown.
+    pub const MAX_REACH_RADII: f64 = 6.0;
+}
+
+/// Thresholds of `samples/visibility.rs`.
+pub mod visibility {
+    /// Least distance of a tile from the image's border and from masked pixels, pixels: room for
+    /// the steps to come.
+    ///
+    /// Higher: larger steps stay inside the image, but less of its border is used. Chosen by:
+    /// unknown.
+    pub const MIN_BORDER_DISTANCE_PX: f64 = 1.0;
+
+    /// Least area of a sample in a frame over that at the distance the lattice was laid out for.
+    ///
+    /// Higher: more oblique or distant tiles are excluded. Chosen by: unknown.
+    pub const MIN_RELATIVE_SAMPLE_AREA: f64 = 0.05;
+}
+
+/// Thresholds of `samples/tile_coverage.rs`.
+pub mod tile_coverage {
+    /// Observations per stretch of the wall.
+    ///
+    /// Higher: more work for parallel threads at once, and more memory. Chosen by: unknown (work
+    /// for all threads within little memory).
+    pub const MAX_STRETCH_OBSERVATIONS: f64 = 1e6;
+
+    /// Frames per stretch of the wall, apart from those that reach over from its neighbours.
+    ///
+    /// Higher: fewer stretches at coarse levels, and more memory. Chosen by: unknown.
+    pub const MAX_STRETCH_FRAMES: f64 = 256.0;
+
+    /// Observations whose visibility is kept from one linearisation to the next; further ones are
+    /// computed anew each time.
+    ///
+    /// Higher: less time and more memory on long surveys. Chosen by: unknown.
+    pub const MAX_KEPT_OBSERVATIONS: usize = 16_000_000;
+}
+
+/// Thresholds of `samples/outlier_mask.rs`.
+pub mod outlier_mask {
+    /// Excess of a misfit over the typical one, in spreads, from which a frame does not show the
+    /// wall.
+    ///
+    /// Higher: fewer tiles are excluded. Chosen by: the test
+    /// `a_glint_and_its_flanks_are_excluded_and_the_wall_is_not` bounds it; otherwise unknown.
+    pub const MIN_OUTLIER_EXCESS: f32 = 5.0;
+
+    /// Largest excess of a tile, in spreads, that counts in the test of its neighbourhood.
+    ///
+    /// Higher: a single bad tile excludes more of its neighbours. Chosen by: unknown.
+    pub const MAX_NEIGHBOUR_EXCESS: f32 = 15.0;
+
+    /// Least spread of the misfits R: frames differ in sharpness from tile to tile.
+    ///
+    /// Higher: fewer tiles are excluded on walls where the frames agree well. Chosen by: unknown.
+    pub const MIN_MISFIT_SPREAD: f32 = 0.08;
+}
+
+/// Thresholds of `tiles/residual_weighting.rs`.
+pub mod residual_weighting {
+    /// Cutoff c of Tukey's biweight, standard deviations of the residual.
+    ///
+    /// Higher: less of the information in Gaussian noise is lost (2 % at 6), but outliers exert
+    /// more force. Chosen by: unknown.
+    pub const TUKEY_CUTOFF_SIGMAS: f32 = 6.0;
+
+    /// Least σ of the noise model, grey levels.
+    ///
+    /// Higher: fewer residuals are rejected on images without noise. Chosen by: derivation:
+    /// rounding to 8 bits gives 0.29, which the averaging of interpolation lowers.
+    pub const MIN_SIGMA_GREY: f64 = 0.2;
+
+    /// Least number of residuals in a gradient bin for it to enter the fit of the noise model.
+    ///
+    /// Higher: the fit is less noisy, but uses fewer of the steep bins. Chosen by: unknown.
+    pub const MIN_RESIDUALS_PER_BIN: u64 = 100;
+}
+
+/// Thresholds of `tiles/tile.rs`.
+pub mod tile {
+    /// Steps of reweighting from the plain mean (or the median) to the robust texture.
+    ///
+    /// Higher: the texture is nearer to the minimiser under outliers, at more time per tile. Chosen
+    /// by: unknown (the tests of the gradient against the cost pass with it).
+    pub const REWEIGHTING_ITERATIONS: usize = 2;
+
+    /// Number of frames from which on the second smallest gradient sets the variance of a sample
+    /// instead of the smallest.
+    ///
+    /// Higher: the variance is lower where few frames observe the wall. Chosen by: unknown.
+    pub const MIN_FRAMES_FOR_SECOND_SMALLEST_GRADIENT: usize = 4;
+}
+
+/// Thresholds of `problem/*.rs`.
+pub mod photometric_problem {
+    /// Least number of wall samples over the height of an image.
+    ///
+    /// Higher: coarse pyramid levels are sampled more densely, so that whole tiles use more of the
+    /// images' borders, at more time. Chosen by: unknown.
+    pub const MIN_SAMPLES_PER_IMAGE_HEIGHT: u32 = 90;
+
+    /// Largest viewing distance for which the lattice is laid out, radii of the section.
+    ///
+    /// Higher: frames that look along the tunnel make the lattice coarser. Chosen by: unknown.
+    pub const MAX_VIEWING_DISTANCE_RADII: f64 = 3.0;
+
+    /// Largest log-gain of a feasible estimate, standard deviations of its prior.
+    ///
+    /// Higher: a frame that fits nowhere may lower its cost by a gain near 0, which amplifies
+    /// rounding. Chosen by: unknown.
+    pub const MAX_LOG_GAIN_SIGMAS: f64 = 10.0;
+
+    /// Stiffness of the gauge constraint at the first compared frame over that of its pixels.
+    ///
+    /// Higher: rounding moves the frames less along the gauge, but the matrix is worse conditioned.
+    /// Chosen by: unknown.
+    pub const GAUGE_STIFFNESS_RATIO: f64 = 1e6;
+
+    /// Number of tiles from which the noise and the typical misfit are estimated.
+    ///
+    /// Higher: better estimates at more time. Chosen by: unknown.
+    pub const NOISE_ESTIMATION_TILES: usize = 600;
+
+    /// Number of blocks of tiles that are solved for to estimate roughness and stiffness of the
+    /// wall.
+    ///
+    /// Higher: better estimates at more time. Chosen by: unknown.
+    pub const WALL_MODEL_BLOCKS: usize = 48;
+
+    /// Least variance that detail finer than pixels adds to a pixel, over the variance of its
+    /// noise, for the wall to be solved for jointly.
+    ///
+    /// Higher: fewer walls are solved for jointly. Chosen by: derivation: below it, less than a
+    /// fortieth of the error is at stake. On bricks of 30 × 10 pixels the ratio is 1.1, 0.35 and
+    /// 0.13 with noise of 1, 2 and 4 grey levels, on concrete 0.02 with 2.
+    pub const MIN_ALIASED_VARIANCE_RATIO: f64 = 0.05;
+
+    /// Largest factor by which the variance of the residuals may fall short of the sensor's;
+    /// beyond, the sensor's is taken for fine texture and ignored.
+    ///
+    /// Higher: the noise of single images replaces that of the residuals more often. Chosen by:
+    /// unknown.
+    pub const MAX_NOISE_UNDERESTIMATE: f64 = 1.25;
+
+    /// Random frequencies by which the information of an unknown texture is averaged.
+    ///
+    /// Higher: less Monte Carlo noise at more time. Chosen by: unknown.
+    pub const RANDOM_FREQUENCIES: usize = 800;
+
+    /// Random sets of sub-pixel positions for each of these frequencies.
+    ///
+    /// Higher: less Monte Carlo noise at more time. Chosen by: unknown.
+    pub const RANDOM_POSITION_SETS: usize = 4;
+
+    /// Largest number of frames that the information of an unknown texture is computed for.
+    ///
+    /// Higher: more time. Chosen by: beyond it the information hardly changes.
+    pub const MAX_TEXTURE_FRAMES: usize = 24;
+}
+
+/// Thresholds of `joint/*.rs`.
+pub mod joint {
+    /// Samples per pixel along each axis of the wall that is solved for.
+    ///
+    /// Higher: sharper edges, more time and memory. Chosen by: unknown.
+    pub const SAMPLES_PER_PIXEL: f64 = 3.0;
+
+    /// Samples per pixel of the lattice on which outliers are detected before the joint solve.
+    ///
+    /// Higher: smaller outliers are found at more time. Chosen by: unknown.
+    pub const OUTLIER_MASK_SAMPLES_PER_PIXEL: f64 = 2.0;
+
+    /// Largest step that ends the joint solve, standard deviations of the estimates.
+    ///
+    /// Higher: fewer of its expensive steps. Chosen by: the step after one of this length is a
+    /// tenth of it.
+    pub const MAX_FINAL_STEP_SIGMA: f64 = 0.3;
+
+    /// Conjugate-gradient iterations on the wall between two rounds of reweighting.
+    ///
+    /// Higher: the wall is nearer to the minimiser, at more time. Chosen by: unknown.
+    pub const MAX_WALL_ITERATIONS: usize = 10;
+
+    /// Rounds of reweighting of edges and pixels.
+    ///
+    /// Higher: sharper edges at more time. Chosen by: on bricks with noise of 2 grey levels, two
+    /// rounds make the poses' squared error 14 % larger, and seven 4 % smaller.
+    pub const REWEIGHTING_ROUNDS: usize = 4;
+
+    /// Width of Huber's loss in the first round of reweighting, standard deviations.
+    ///
+    /// Higher: outliers distort the first wall more. Chosen by: unknown.
+    pub const HUBER_WIDTH_SIGMAS: f32 = 2.0;
+
+    /// Conjugate-gradient iterations for the response of the wall to the motion of a frame.
+    ///
+    /// Higher: a more exact stiffness at more time. Chosen by: unknown.
+    pub const MAX_RESPONSE_ITERATIONS: usize = 20;
+
+    /// Largest number of frames that is distinguished in the stiffness of the wall.
+    ///
+    /// Higher: finer classes, each from fewer tiles. Chosen by: on bricks the stiffness is constant
+    /// from five frames on.
+    pub const MAX_STIFFNESS_FRAMES: usize = 12;
+
+    /// Least stiffness ratio.
+    ///
+    /// Higher: a wall of which hardly anything is known constrains frames more. Chosen by: unknown.
+    pub const MIN_STIFFNESS_RATIO: f64 = 0.05;
+}
+
+/// Thresholds of `solver/gauss_newton.rs, solve_record.rs`.
+pub mod gauss_newton {
+    use std::ops::RangeInclusive;
+
+    /// Share of the slope along a step, `δᵀ g`, that a step must remove if it does not lower the
+    /// cost. Higher: fewer steps count as good. Chosen by: the strong Wolfe condition.
+    pub const MIN_SLOPE_REDUCTION: f64 = 0.5;
+    /// Share of the cost by which it may rise along a good step. Higher: more steps count as good.
+    /// Chosen by: on sharp bricks the cost varies by up to 0.9 % while the whole survey moves along
+    /// its gauge, which changes nothing.
+    pub const MAX_COST_RISE: f64 = 0.01;
+    /// First damping λ after a rejected step. Higher: the first damped step is shorter. Chosen by:
+    /// unknown.
+    pub const MIN_DAMPING: f64 = 1e-4;
+    /// Factor from one damping to the next. Higher: fewer, coarser dampings are tried. Chosen by:
+    /// Marquardt's original choice.
+    pub const DAMPING_FACTOR: f64 = 10.0;
+    /// Dampings tried before a step is given up. Higher: longer search for a step. Chosen by:
+    /// unknown.
+    pub const MAX_DAMPING_ITERATIONS: usize = 8;
+    /// Plausible curvatures of a solve; others belong to solves that were still far from their end.
+    /// Wider: curvatures of such solves count, too. Chosen by: unknown.
+    pub const PLAUSIBLE_CURVATURES: RangeInclusive<f64> = 0.6..=1.2;
+}
+
+/// Thresholds of `solver/stopping.rs`.
+pub mod stopping {
+    /// Step at which a solve that another one follows ends, pixels of its level. Higher: fewer
+    /// steps. Chosen by: unknown.
+    pub const INTERMEDIATE_STEP_PX: f64 = 0.01;
+    /// Step at which a solve that another one follows ends, multiples of the uncertainty. Higher:
+    /// fewer steps. Chosen by: unknown.
+    pub const INTERMEDIATE_STEP_SIGMA: f64 = 2.0;
+}
+
+/// Thresholds of `solver/neighbourhood.rs`.
+pub mod neighbourhood {
+    /// Frames on either side of a changed one that are solved again. Higher: more of the trajectory
+    /// adapts, in more time. Chosen by: a wrong frame bends its neighbours over a few turns.
+    pub const MAX_CHANGED_DISTANCE: usize = 64;
+}
+
+/// Thresholds of `validation/pairwise_ncc.rs`, `validation/contradictions.rs` and
+/// `validation/blurred_frames.rs`.
+pub mod pairwise_ncc {
+    /// Distance between samples of the coarse comparison, pixels of the level.
+    ///
+    /// Higher: fewer samples, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const COARSE_STRIDE_PX: usize = 4;
+
+    /// Half width of the window of local contrast in the coarse comparison, pixels of the level.
+    ///
+    /// Higher: larger structures are compared.
+    ///
+    /// Chosen by: a window that holds a brick or two.
+    pub const COARSE_WINDOW_PX: usize = 6;
+
+    /// Pyramid level of the fine comparison.
+    ///
+    /// Higher: noise weighs less, but so does detail.
+    ///
+    /// Chosen by: unknown.
+    pub const FINE_LEVEL: usize = 1;
+
+    /// Distance between samples of the fine comparison, pixels of the level.
+    ///
+    /// Higher: fewer samples, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const FINE_STRIDE_PX: usize = 5;
+
+    /// Half width of the window of local contrast in the fine comparison, pixels of the level.
+    ///
+    /// Higher: larger structures are compared.
+    ///
+    /// Chosen by: unknown.
+    pub const FINE_WINDOW_PX: usize = 3;
+
+    /// Share of the earlier frame's samples that two frames must have in common to be compared.
+    ///
+    /// Higher: fewer pairs are compared.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_OVERLAP_SHARE: f64 = 0.03;
+
+    /// Correlation, corrected for noise, below which two frames contradict each other.
+    ///
+    /// Higher: more pairs contradict, and more frames are rejected.
+    ///
+    /// Chosen by: the tests `frames_at_true_poses_correlate` (above 0.8) and
+    /// `frame_displaced_by_a_brick_contradicts_the_others`.
+    pub const MIN_CORRELATION: f64 = 0.6;
+
+    /// Correlation of all samples, corrected for noise, from which on that of most samples is not
+    /// computed.
+    ///
+    /// Higher: more robust correlations, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_CERTAIN_CORRELATION: f64 = 0.85;
+
+    /// Share of the samples that must be left without what stands out of the wall, for the rest to
+    /// vouch for the pair.
+    ///
+    /// Higher: fewer pairs vouch for their frames.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SHARE_WITHOUT_OUTLIERS: f64 = 0.5;
+
+    /// Share of a frame's samples in contradicting pairs up to which it is kept.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_CONTRADICTING_SHARE: f64 = 0.15;
+
+    /// Ratio of a frame's variance of fine detail to that of its median partner below which it is
+    /// blurred.
+    ///
+    /// Higher: more frames are rejected as blurred.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SHARPNESS_RATIO: f64 = 0.5;
+}
+
+/// Thresholds of `validation/pairwise_lucas_kanade.rs`, `validation/lucas_kanade_template.rs` and
+/// `validation/lucas_kanade_fit.rs`.
+pub mod pairwise_lucas_kanade {
+    /// Pyramid level at which displacements are measured.
+    ///
+    /// Higher: less noise, but smaller displacements are missed.
+    ///
+    /// Chosen by: small against a brick's edge, and half the noise of full size.
+    pub const LEVEL: usize = 1;
+
+    /// Distance between samples along each axis, pixels of the level.
+    ///
+    /// Higher: fewer samples, in less time.
+    ///
+    /// Chosen by: unknown.
+    pub const STRIDE_PX: f64 = 4.0;
+
+    /// Number of Gauss–Newton iterations.
+    ///
+    /// Higher: larger displacements are measured, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_ITERATIONS: usize = 8;
+
+    /// Number of samples that two frames must share to be aligned.
+    ///
+    /// Higher: fewer pairs are measured.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SAMPLES: f64 = 40.0;
+
+    /// Share of the earlier frame's samples that two frames must share to be aligned.
+    ///
+    /// Higher: fewer pairs are measured.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_OVERLAP_SHARE: f64 = 0.02;
+
+    /// Root mean square displacement beyond which the iterations have diverged, pixels of the
+    /// level.
+    ///
+    /// Higher: larger displacements are measured, chance matches among them.
+    ///
+    /// Chosen by: Gauss–Newton finds no larger displacement.
+    pub const MAX_DISPLACEMENT_PX: f64 = 8.0;
+
+    /// Share of the squared slopes that must be texture and not noise; with less, the normal matrix
+    /// is chance.
+    ///
+    /// Higher: more pairs are too faint to measure.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_TEXTURE_SHARE: f64 = 0.3;
+
+    /// Ratio of a sample's squared slope to the median one beyond which its influence no longer
+    /// grows.
+    ///
+    /// Higher: glints weigh more.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SQUARED_SLOPE_RATIO: f32 = 10.0;
+
+    /// Step length below which the iterations have converged, pixels of the level.
+    ///
+    /// Higher: fewer iterations, less exact displacements.
+    ///
+    /// Chosen by: unknown.
+    pub const CONVERGED_STEP_PX: f64 = 0.03;
+
+    /// Step length at which the result counts nevertheless, multiples of [`CONVERGED_STEP_PX`].
+    ///
+    /// Higher: fewer results of the first iteration are returned.
+    ///
+    /// Chosen by: unknown.
+    pub const ENDED_STEP_FACTOR: f64 = 3.0;
+
+    /// Noise of the residuals that is assumed at least, grey levels.
+    ///
+    /// Higher: larger σ of noise-free frames.
+    ///
+    /// Chosen by: derivation. Rounding to whole grey levels has σ = 1/√12 = 0.29.
+    pub const MIN_RESIDUAL_SIGMA_GREY: f32 = 0.3;
+
+    /// Smallest gain of one frame against the other.
+    ///
+    /// Higher: pairs of very different exposure are fitted worse.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_GAIN: f64 = 0.4;
+
+    /// Largest gain of one frame against the other.
+    ///
+    /// Higher: pairs of very different exposure are fitted better.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_GAIN: f64 = 2.5;
+}
+
+/// Thresholds of `validation/inconsistent_frames.rs`.
+pub mod inconsistent_frames {
+    /// Displacement of a pair that is accepted, pixels of full size.
+    ///
+    /// Higher: fewer frames are rejected as misaligned.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_ERROR_PX: f64 = 0.5;
+
+    /// Displacement of a pair that is accepted, multiples of the median of the survey: where all
+    /// pairs are misaligned, the calibration is at fault.
+    ///
+    /// Higher: fewer frames are rejected as misaligned where all are displaced.
+    ///
+    /// Chosen by: the test `no_frame_is_rejected_where_all_pairs_are_misaligned`.
+    pub const MAX_ERROR_RATIO: f64 = 4.0;
+
+    /// Deviation z beyond the accepted displacement from which on a pair is misaligned, σ.
+    ///
+    /// Higher: fewer frames are rejected as misaligned.
+    ///
+    /// Chosen by: derivation. A pair at the limit is called misaligned about once in a million.
+    pub const MISALIGNMENT_SIGMA: f64 = 5.0;
+
+    /// Correlation below which two frames with enough texture to be measured show different things.
+    ///
+    /// Higher: more pairs are misaligned.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_CORRELATION: f64 = 0.3;
+
+    /// σ of a displacement up to which a pair ties its frames to each other, pixels of full size.
+    ///
+    /// Higher: fewer frames are disconnected.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_TYING_SIGMA_PX: f64 = 1.0;
+
+    /// Share of a frame's weight that the robust loss may reject. Things before the wall, glints
+    /// and oblique views cost a right frame some; whether its pose is right is decided by its
+    /// alignment with others.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_REJECTED_SHARE: f64 = 0.3;
+}
+
+/// Thresholds of `validation/aliasing.rs`, `validation/alias_choice.rs` and
+/// `validation/alias_search.rs`.
+pub mod aliasing {
+    /// Difference of log-posteriors from which on the prior decides between two aliases, nats.
+    ///
+    /// Higher: more frames are ambiguous.
+    ///
+    /// Chosen by: derivation. `ln 1000`: odds of 1000 to 1.
+    pub const MIN_CLEAR_ODDS_NATS: f64 = 6.9;
+
+    /// Length of a gauge motion on the wall from which on it leads to an alias, samples of the
+    /// search level.
+    ///
+    /// Higher: aliases of short periods are missed.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_MOTION_SAMPLES: f64 = 3.0;
+
+    /// Number of times that the step of the search for the best fraction of a sample is halved.
+    ///
+    /// Higher: more exact aliases, in more time.
+    ///
+    /// Chosen by: derivation. The last step is a sixteenth of a sample.
+    pub const SHIFT_REFINEMENTS: usize = 4;
+
+    /// Number of sweeps over all frames until no choice changes.
+    ///
+    /// Higher: choices settle in longer surveys.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SWEEPS: usize = 20;
+
+    /// Difference of two periods, as a share of one of them, below which they are the same.
+    ///
+    /// Higher: fewer periods are told apart.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_PERIOD_DIFFERENCE: f64 = 0.1;
+
+    /// Number of times that all frames are compared with the wall elsewhere.
+    ///
+    /// Higher: fewer frames remain undecided, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_ITERATIONS: usize = 8;
+}
+
+/// Thresholds of `validation/repair.rs`.
+pub mod repair {
+    /// Number of iterations in which rejected frames are registered again.
+    ///
+    /// Higher: more frames are recovered, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_REGISTRATION_ITERATIONS: usize = 3;
+
+    /// Number of iterations in which frames are rejected and their neighbourhoods solved.
+    ///
+    /// Higher: longer repairs, fewer wrong frames left.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_ITERATIONS: usize = 8;
+}
+
+/// Thresholds of `uncertainty/observability.rs` and `uncertainty/solution_uncertainty.rs`.
+pub mod observability {
+    /// Posterior σ of a shared parameter over that of its prior up to which it is observed.
+    ///
+    /// Higher: more parameters are estimated, on less evidence.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SIGMA_SHARE: f64 = 0.5;
+
+    /// Correlation with another parameter from which on it is reported.
+    ///
+    /// Higher: fewer correlations are reported.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_REPORTED_CORRELATION: f64 = 0.9;
+
+    /// Share of frames that fit nowhere up to which shared parameters are estimated: beyond it the
+    /// others may fit each other in wrong places.
+    ///
+    /// Higher: self-calibration of worse surveys.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_MISFIT_SHARE: f64 = 0.1;
+
+    /// 1-σ of the median frame on the wall up to which shared parameters are estimated, pixels.
+    /// Frames that are tied more loosely can tilt and shift together, the camera with them, at less
+    /// cost than aliasing causes; the covariance does not know that.
+    ///
+    /// Higher: self-calibration of weaker surveys.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_MEDIAN_SIGMA_PX: f64 = 0.2;
+}
+
+/// Thresholds of `uncertainty/overdispersion.rs`.
+pub mod overdispersion {
+    /// Overdispersion that is accepted of a single frame, pixels; it must exceed
+    /// [`MAX_OVERDISPERSION_RATIO`], too, to be rejected.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_OVERDISPERSION_PX: f64 = 0.25;
+
+    /// Overdispersion that is accepted of a single frame, over the displacement by noise.
+    ///
+    /// Higher: fewer frames are rejected.
+    ///
+    /// Chosen by: a glint on a faint wall makes it five to ten in one patch of a right frame (and a
+    /// pixel).
+    pub const MAX_OVERDISPERSION_RATIO: f64 = 12.0;
+
+    /// Overdispersion of the median frame that is accepted, pixels; beyond it all frames are
+    /// overdispersed.
+    ///
+    /// Higher: larger errors of the model go unnoticed.
+    ///
+    /// Chosen by: right surveys have none, whatever wall, light and noise; a focal length 0.3 % off
+    /// makes it 0.05, one 1 % off 0.13.
+    pub const MAX_MEDIAN_OVERDISPERSION_PX: f64 = 0.04;
+}
+
+/// Thresholds of `uncertainty/rolling_shutter_test.rs`.
+pub mod rolling_shutter_test {
+    /// Number of frames that are used, from the middle of the survey.
+    ///
+    /// Higher: a more certain readout time, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_FRAMES: usize = 120;
+
+    /// Number of Gauss–Newton iterations.
+    ///
+    /// Higher: a more exact readout time, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_SOLVE_ITERATIONS: u64 = 4;
+
+    /// Step length below which the solve has converged, pixels of the level.
+    ///
+    /// Higher: a less exact readout time.
+    ///
+    /// Chosen by: unknown.
+    pub const STEP_TOLERANCE_PX: f64 = 0.02;
+
+    /// Step length below which the solve has converged, σ.
+    ///
+    /// Higher: a less exact readout time.
+    ///
+    /// Chosen by: unknown.
+    pub const STEP_TOLERANCE_SIGMA: f64 = 1.0;
+
+    /// Difference from the readout time given that is systematic, σ.
+    ///
+    /// Higher: fewer wrong times are reported.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_DIFFERENCE_SIGMA: f64 = 6.0;
+
+    /// Displacement of the first row against the last by the difference that is systematic, pixels.
+    ///
+    /// Higher: fewer wrong times are reported.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_SHIFT_PX: f64 = 0.5;
+}
+
+/// Thresholds of `pose_convention_search.rs`.
+pub mod pose_convention_search {
+    /// Angle by which the camera turns within the frames that are refined, radians: once around and
+    /// some.
+    ///
+    /// Higher: a more certain answer, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_TURN_RAD: f64 = 1.15 * std::f64::consts::TAU;
+
+    /// Smallest number of frames that are refined in each convention.
+    ///
+    /// Higher: a more certain answer, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MIN_FRAMES: usize = 8;
+
+    /// Largest number of frames that are refined in each convention.
+    ///
+    /// Higher: a more certain answer, in more time.
+    ///
+    /// Chosen by: unknown.
+    pub const MAX_FRAMES: usize = 40;
+}
+
+/// Thresholds of `stages/assess.rs, validate_pairs.rs`.
+pub mod assessment {
+    /// Share of a frame's pixels that must overlap other frames for its pose to count as
+    /// photometric, 0 to 1. Higher: fewer frames are photometric. Chosen by: unknown.
+    pub const MIN_PIXEL_SHARE: f64 = 0.02;
+    /// Largest step left of a photometric pose, pixels on the wall. Higher: more frames are
+    /// photometric. Chosen by: as [`MAX_SIGMA_PX`].
+    pub const MAX_STEP_PX: f64 = 0.25;
+    /// Largest step left of a photometric pose, multiples of σ, if that is more. Higher: more
+    /// frames are photometric. Chosen by: 2 σ.
+    pub const MAX_STEP_SIGMA: f64 = 2.0;
+    /// Largest 1-σ on the wall of a photometric pose, pixels. Higher: more frames are photometric.
+    /// Chosen by: twice that is half a pixel.
+    pub const MAX_SIGMA_PX: f64 = 0.25;
+    /// Pairwise comparisons of all frames, with rejected frames registered again between two, at
+    /// the most. Higher: more attempts, in more time. Chosen by: unknown.
+    pub const MAX_PAIR_ITERATIONS: usize = 3;
+}

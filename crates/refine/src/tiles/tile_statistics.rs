@@ -1,0 +1,128 @@
+//! Statistics of a tile beside its moments: misfits, mean values, residuals and slopes.
+
+use crate::thresholds::tile::REWEIGHTING_ITERATIONS;
+use crate::tiles::denoising::TextureSpectrum;
+use crate::tiles::frame_samples::SampledFrame;
+use crate::tiles::grid::{SIDE, TilePoints, ZERO};
+use crate::tiles::residual_weighting::{Loss, NoiseHistogram, NoiseModel};
+use crate::tiles::tile_arrays::{INTERIOR, SAMPLES, ZERO_ROWS, dot, squared_gradients, sum};
+use crate::tiles::workspace::{FrameValues, Misfit, TileObservation, TileWorkspace};
+
+// Everything here is inlined into its caller, which is compiled for the processor's widest vectors.
+impl TileWorkspace {
+    /// Fills [`TileWorkspace::misfits`]: the residuals of a tile's observers from the robust mean
+    /// that starts at their median.
+    #[inline(always)]
+    pub fn compute_misfits<'a>(
+        &mut self,
+        points: &TilePoints,
+        observations: impl Iterator<Item = TileObservation<'a>>,
+        noise: &NoiseModel,
+    ) {
+        self.sample(points, observations);
+        let precision = self.precision(noise);
+        let mut texture = self.median();
+        for _ in 0..REWEIGHTING_ITERATIONS {
+            texture = self.reweight(&texture, &precision);
+        }
+        self.misfits.clear();
+        for frame in &self.frames {
+            let (mut loss, mut variance) = (ZERO_ROWS, ZERO_ROWS);
+            for k in 0..ZERO_ROWS.len() {
+                let c = k + SIDE;
+                let e = frame.gain * (frame.values[c] - texture[c]);
+                variance[k] = INTERIOR[k] * frame.valid[c] / precision[c];
+                loss[k] = variance[k] * Loss::relative_loss(e * e, precision[c]);
+            }
+            let total = sum(&variance);
+            self.misfits.push(Misfit {
+                loss: sum(&loss) / total.max(1e-9),
+                mean_variance: total / SAMPLES as f32,
+            });
+        }
+    }
+
+    /// Mean value z of each observer over the tile; NaN if it lacks a value.
+    #[inline(always)]
+    pub fn mean_values<'a>(
+        &mut self,
+        points: &TilePoints,
+        observations: impl Iterator<Item = TileObservation<'a>>,
+    ) -> Vec<f64> {
+        self.sample(points, observations);
+        let means = self.frames.iter().map(|frame| {
+            if sum(&frame.valid) < frame.valid.len() as f32 {
+                return f64::NAN;
+            }
+            let mut interior = ZERO_ROWS;
+            for k in 0..ZERO_ROWS.len() {
+                interior[k] = INTERIOR[k] * frame.values[k + SIDE];
+            }
+            f64::from(sum(&interior)) / SAMPLES as f64
+        });
+        means.collect()
+    }
+
+    /// Counts the residuals from the plain mean of n observers into `histogram`, and the texture,
+    /// if it has no gaps, into `spectrum`.
+    ///
+    /// A residual is scaled by `√(n/(n−1))`, as its own value is part of the mean.
+    #[inline(always)]
+    pub fn count_residuals<'a>(
+        &mut self,
+        points: &TilePoints,
+        observations: impl Iterator<Item = TileObservation<'a>>,
+        histogram: &mut NoiseHistogram,
+        spectrum: &mut TextureSpectrum,
+    ) {
+        self.sample(points, observations);
+        let n = self.frames.len() as f32;
+        let scale = (n / (n - 1.0)).sqrt();
+        let mean = self.mean();
+        if !self.has_gaps {
+            spectrum.add(&mean, self.noise_gains());
+        }
+        let gains: f32 = self.frames.iter().map(|frame| frame.gain.powi(2)).sum();
+        let square_gain = gains / self.frames.len().max(1) as f32;
+        // Of the mean: a single frame's gradient would correlate with its own noise.
+        let squares = squared_gradients(&mean);
+        for frame in &self.frames {
+            for k in 0..ZERO_ROWS.len() {
+                let c = k + SIDE;
+                if INTERIOR[k] * frame.valid[c] > 0.0 {
+                    let e = frame.gain * (frame.values[c] - mean[c]);
+                    histogram.add(scale * e, square_gain * squares[k]);
+                }
+            }
+        }
+    }
+
+    /// Spacing of the samples `d = √q` in pixels, and noise gain `u = (q a)² / (Σ q a²)²`, of each
+    /// observer ([`crate::tiles::denoising`]).
+    fn noise_gains(&self) -> impl Iterator<Item = (f64, f64)> {
+        let weight = |frame: &FrameValues| f64::from(frame.pixels * frame.gain * frame.gain);
+        let total: f64 = self.frames.iter().map(weight).sum();
+        self.frames.iter().map(move |frame| {
+            let own = f64::from(frame.pixels * frame.gain) / total;
+            (f64::from(frame.pixels).sqrt(), own * own)
+        })
+    }
+}
+
+/// Sums of the squared central differences along s and h over a tile, of the values of one frame;
+/// NaN if it lacks a value.
+#[inline(always)]
+pub fn squared_slopes(points: &TilePoints, frame: &SampledFrame, shade: f32) -> [f64; 2] {
+    let mut values = ZERO;
+    frame.sample(points, shade, &mut values);
+    let (mut along_s, mut along_h) = (ZERO_ROWS, ZERO_ROWS);
+    for k in 0..ZERO_ROWS.len() {
+        let c = k + SIDE;
+        along_s[k] = INTERIOR[k] * (values[c + 1] - values[c - 1]);
+        along_h[k] = INTERIOR[k] * (values[c + SIDE] - values[c - SIDE]);
+    }
+    [
+        f64::from(dot(&along_s, &along_s)),
+        f64::from(dot(&along_h, &along_h)),
+    ]
+}

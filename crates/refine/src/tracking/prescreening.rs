@@ -1,0 +1,133 @@
+//! Prescreening: rejects frames that show nothing or repeat an earlier picture, and estimates the
+//! common shading and the sensor's noise.
+
+use crate::model::context::EstimationContext;
+use crate::model::problem_error::ProblemError;
+use crate::model::rejection::RejectionReason;
+use crate::thresholds::prescreening::{
+    MAX_REPEAT_DIFFERENCE_GREY, MIN_CONTRAST_GREY, MIN_KNOWN_SHARE, MIN_MOTION_PX,
+    MIN_SHADING_FRAMES,
+};
+use rayon::prelude::*;
+use tunnelstitch_core::frames::{GreyImage, Shading, noise_sigma};
+use tunnelstitch_core::progress::Progress;
+use tunnelstitch_core::surface::viewing_distance;
+
+/// Frames decoded at once: bounds the memory.
+const BATCH: usize = 64;
+
+/// The result of prescreening.
+pub struct Prescreened {
+    /// The rejection reason of every frame that is of no use.
+    pub rejections: Vec<Option<RejectionReason>>,
+    /// The shading that all frames have in common, if there is one.
+    pub shading: Option<Shading>,
+    /// 1-σ of the sensor's noise, grey levels: the median over the frames.
+    pub noise: f64,
+}
+
+/// Prescreens every frame at the coarsest pyramid level.
+///
+/// # Errors
+/// [`ProblemError::Frame`].
+pub fn prescreen(
+    context: &EstimationContext,
+    coarsest: usize,
+    progress: &dyn Progress,
+) -> Result<Prescreened, ProblemError> {
+    let count = context.frames.frames();
+    progress.start("decoding", count);
+    let mut rejections = Vec::with_capacity(count);
+    let mut sums: Vec<[f64; 2]> = Vec::new();
+    let mut last: Option<(usize, GreyImage)> = None;
+    let mut size = (0, 0);
+    let mut noises = Vec::new();
+    for start in (0..count).step_by(BATCH) {
+        let pictures = (start..(start + BATCH).min(count))
+            .into_par_iter()
+            .map(|k| {
+                let frame = context.frames.get(k)?;
+                progress.advance(1);
+                Ok((frame.level(coarsest).clone(), noise_sigma(frame.level(0))))
+            })
+            .collect::<Result<Vec<(GreyImage, Option<f64>)>, ProblemError>>()?;
+        for (k, (picture, noise)) in (start..).zip(pictures) {
+            size = (picture.width(), picture.height());
+            sums.resize(size.0 * size.1, [0.0; 2]);
+            let (mean, spread, known) = compute_moments(&picture);
+            let repeated = last.as_ref().filter(|(earlier, other)| {
+                rms_difference(other, &picture) < MAX_REPEAT_DIFFERENCE_GREY
+                    && has_moved(context, *earlier, k)
+            });
+            rejections.push(if known < MIN_KNOWN_SHARE || spread < MIN_CONTRAST_GREY {
+                Some(RejectionReason::Featureless)
+            } else {
+                repeated.map(|(earlier, _)| RejectionReason::Repeated(*earlier))
+            });
+            if rejections[k].is_none() {
+                noises.extend(noise);
+                for (sum, value) in sums.iter_mut().zip(picture.data()) {
+                    if !value.is_nan() {
+                        sum[0] += f64::from(*value) / mean;
+                        sum[1] += 1.0;
+                    }
+                }
+                last = Some((k, picture));
+            }
+        }
+    }
+    progress.finish();
+    // A hundred times the relative brightness: grey levels of an ordinary picture.
+    let mean = sums.iter().map(|[sum, n]| (100.0 * sum / n) as f32);
+    let mean = GreyImage::new(size.0, size.1, mean.collect());
+    let full = (
+        context.camera.width as usize,
+        context.camera.height as usize,
+    );
+    let has_enough =
+        rejections.iter().filter(|reason| reason.is_none()).count() >= MIN_SHADING_FRAMES;
+    noises.sort_unstable_by(f64::total_cmp);
+    Ok(Prescreened {
+        noise: noises.get(noises.len() / 2).copied().unwrap_or(0.0),
+        rejections,
+        shading: has_enough.then(|| Shading::of_mean(&mean, full)).flatten(),
+    })
+}
+
+/// Mean and standard deviation of a picture, grey levels, and its share of pixels with a value.
+fn compute_moments(picture: &GreyImage) -> (f64, f64, f64) {
+    let (mut n, mut sum, mut square) = (0.0f64, 0.0f64, 0.0f64);
+    for value in picture.data().iter().filter(|v| !v.is_nan()) {
+        let value = f64::from(*value);
+        n += 1.0;
+        sum += value;
+        square += value * value;
+    }
+    let mean = sum / n.max(1.0);
+    let variance = (square / n.max(1.0) - mean * mean).max(0.0);
+    (mean, variance.sqrt(), n / picture.data().len() as f64)
+}
+
+/// Root mean square difference of two pictures where both have values, grey levels.
+fn rms_difference(a: &GreyImage, b: &GreyImage) -> f64 {
+    let (mut n, mut sum) = (0.0f64, 0.0f64);
+    for (a, b) in a.data().iter().zip(b.data()) {
+        let d = f64::from(a - b);
+        if !d.is_nan() {
+            n += 1.0;
+            sum += d * d;
+        }
+    }
+    (sum / n.max(1.0)).sqrt()
+}
+
+/// True if two frames cannot show the same picture by their initial poses.
+fn has_moved(context: &EstimationContext, a: usize, b: usize) -> bool {
+    let (from, to) = (&context.prior.initial[a], &context.prior.initial[b]);
+    let Ok(distance_m) = viewing_distance(context.surface, from) else {
+        return true;
+    };
+    let rotation = from.r_wc.angle_to(&to.r_wc);
+    let translation = (to.t_wc - from.t_wc).norm() / distance_m;
+    (rotation + translation) * context.camera.fy > MIN_MOTION_PX
+}

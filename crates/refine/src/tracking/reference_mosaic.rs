@@ -1,0 +1,231 @@
+//! Reference mosaic: the wall around a frame, fused from the registered frames.
+
+use crate::model::context::EstimationContext;
+use crate::model::problem_error::ProblemError;
+use crate::parameters::frame_estimate::FrameEstimate;
+use crate::samples::footprints::reach_m;
+use crate::thresholds::reference_mosaic::{
+    MAX_GAIN, MAX_REACH_RADII, MAX_SPACING_RADII, MIN_GAIN, MIN_PIXEL_DENSITY,
+};
+use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
+use crate::tracking::ncc_score::NccScore;
+use crate::tracking::unwrapped_frame::{UnwrappedFrame, UnwrappedSampler};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::surface::{Footprint, WallPoint};
+use tunnelstitch_core::trajectory::Pose;
+
+/// The wall around a frame, fused from the registered frames.
+pub struct ReferenceMosaic {
+    /// The grid on which the wall is sampled.
+    pub grid: MosaicGrid,
+    /// The world point that others are relative to.
+    pub origin: Vector3<f64>,
+    /// The grid points relative to the origin.
+    pub points: Vec<[f32; 3]>,
+    /// Local contrast, the mean over the frames; NaN where no frame has a value and on ignored
+    /// parts of the wall.
+    pub contrast: Vec<f32>,
+    /// Variance of the noise of the local contrast.
+    noise: Vec<f32>,
+    /// Grey values of the wall, NaN where there is no contrast.
+    grey: Vec<f32>,
+    /// True for points that the frame to be registered resolves from its predicted pose.
+    pub is_resolved: Vec<bool>,
+}
+
+/// A camera position, from which walls that are far off or oblique are hardly resolved.
+struct Viewpoint {
+    /// The camera's centre relative to the origin, metres.
+    centre: Vector3<f32>,
+    radius_m: f32,
+}
+
+impl Viewpoint {
+    /// True if a wall point with this normal is seen with at least [`MIN_PIXEL_DENSITY`] of the
+    /// pixels that it has when seen squarely from the axis.
+    ///
+    /// At distance d and angle β to the normal the share is `cos β (r/d)²`.
+    #[inline]
+    fn resolves(&self, point: &[f32; 3], normal: &Vector3<f32>) -> bool {
+        let ray = Vector3::from(*point) - self.centre;
+        let square = ray.norm_squared();
+        ray.dot(normal).abs() * self.radius_m * self.radius_m
+            > MIN_PIXEL_DENSITY * square * square.sqrt()
+    }
+}
+
+/// A registered frame that the mosaic is fused from.
+struct Source<'a> {
+    viewpoint: Viewpoint,
+    sampler: UnwrappedSampler<'a>,
+    inverse_gain: f32,
+    bias: f32,
+}
+
+impl ReferenceMosaic {
+    /// Fuses the `registered` frames over the wall where frame `frame` looks from `pose`, widened
+    /// by `margin_m` metres on every side.
+    ///
+    /// # Errors
+    /// [`ProblemError::Placement`] for a `pose` outside the tunnel.
+    pub fn new(
+        context: &EstimationContext,
+        registered: &[(UnwrappedFrame, FrameEstimate)],
+        camera: &Camera,
+        (frame, pose): (usize, &Pose),
+        margin_m: f64,
+    ) -> Result<Self, ProblemError> {
+        let radius_m = context.surface.perimeter_m() / std::f64::consts::TAU;
+        let reach_m = reach_m(context.surface).min(MAX_REACH_RADII * radius_m);
+        let footprint = Footprint::within(context.surface, camera, pose, reach_m)
+            .map_err(|source| ProblemError::Placement { frame, source })?
+            .widened(margin_m);
+        // A frame that looks along the tunnel has its detail where the wall is near.
+        let spacing_m =
+            pixel_size_m(context, camera, pose).min(MAX_SPACING_RADII * radius_m / camera.fy);
+        let grid = MosaicGrid::over(&footprint, spacing_m);
+        let middle = WallPoint {
+            s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
+            h_m: 0.5 * (footprint.h_min_m + footprint.h_max_m),
+        };
+        let origin = context.surface.frame(middle).x_w;
+        let normals = column_normals(context, &grid, middle.h_m);
+        let points: Vec<[f32; 3]> = grid
+            .world_points(context)
+            .iter()
+            .map(|x_w| (x_w - origin).cast().into())
+            .collect();
+        let viewpoint = |pose: &Pose| Viewpoint {
+            centre: (pose.t_wc - origin).cast(),
+            radius_m: radius_m as f32,
+        };
+        let resolves = |viewpoint: &Viewpoint, k: usize| {
+            viewpoint.resolves(&points[k], &normals[k % grid.columns])
+        };
+        let own = viewpoint(pose);
+        let is_resolved: Vec<bool> = (0..points.len()).map(|k| resolves(&own, k)).collect();
+        let sources: Vec<Source> = registered
+            .iter()
+            .map(|(unwrapped, estimate)| Source {
+                viewpoint: viewpoint(&estimate.pose),
+                sampler: unwrapped.sampler_at(context, &estimate.pose, &origin),
+                inverse_gain: (-estimate.log_gain).exp() as f32,
+                bias: estimate.bias as f32,
+            })
+            .collect();
+        let fused: Vec<[f32; 3]> = points
+            .par_iter()
+            .enumerate()
+            .map(|(k, point)| {
+                if context.ignored.contains(&grid.wall_point(k)) {
+                    return [f32::NAN; 3];
+                }
+                fuse_point(&sources, point, |viewpoint| resolves(viewpoint, k))
+            })
+            .collect();
+        Ok(Self {
+            grid,
+            origin,
+            points,
+            contrast: fused.iter().map(|f| f[0]).collect(),
+            noise: fused.iter().map(|f| f[1]).collect(),
+            grey: fused.iter().map(|f| f[2]).collect(),
+            is_resolved,
+        })
+    }
+
+    /// Compares a frame at `pose` with the mosaic.
+    pub fn compute_ncc(
+        &self,
+        context: &EstimationContext,
+        unwrapped: &UnwrappedFrame,
+        pose: &Pose,
+    ) -> NccScore {
+        let sampler = unwrapped.sampler_at(context, pose, &self.origin);
+        let mut ncc_score = NccScore::default();
+        let wall = self.contrast.iter().zip(&self.noise);
+        for (point, (wall, wall_noise)) in self.points.iter().zip(wall) {
+            if wall.is_nan() {
+                continue;
+            }
+            if let Some(own) = sampler.contrast_and_noise(point) {
+                ncc_score.add((*wall, *wall_noise), own);
+            }
+        }
+        ncc_score
+    }
+
+    /// The frame's estimate at `pose`, with the gain and bias that fit its grey values to those of
+    /// the mosaic: a regression line.
+    pub fn fit_exposure(&self, unwrapped: &UnwrappedFrame, pose: &Pose) -> FrameEstimate {
+        let grey = unwrapped.grey_at(pose, &self.origin);
+        let (mut n, mut x, mut y, mut xx, mut xy) = (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
+        for (point, wall) in self.points.iter().zip(&self.grey) {
+            if wall.is_nan() {
+                continue;
+            }
+            if let Some(value) = grey(point) {
+                let (wall, value) = (f64::from(*wall), f64::from(value));
+                n += 1.0;
+                x += wall;
+                y += value;
+                xx += wall * wall;
+                xy += wall * value;
+            }
+        }
+        if n == 0.0 {
+            return FrameEstimate::at(*pose);
+        }
+        let gain = (xy - x * y / n) / (xx - x * x / n);
+        let gain = if gain.is_finite() {
+            gain.clamp(MIN_GAIN, MAX_GAIN)
+        } else {
+            1.0
+        };
+        FrameEstimate {
+            pose: *pose,
+            log_gain: gain.ln(),
+            bias: (y - gain * x) / n,
+        }
+    }
+}
+
+/// The normal of the wall at every column of the grid, at chainage `h_m`.
+fn column_normals(context: &EstimationContext, grid: &MosaicGrid, h_m: f64) -> Vec<Vector3<f32>> {
+    (0..grid.columns)
+        .map(|column| {
+            let wall = WallPoint {
+                s_m: grid.s_m + column as f64 * grid.spacing_m,
+                h_m,
+            };
+            let frame = context.surface.frame(wall);
+            frame.e_s.cross(&frame.e_h).normalize().cast()
+        })
+        .collect()
+}
+
+/// Fuses one wall point from the frames that resolve it: mean contrast, variance of its noise, and
+/// mean grey value; NaN if there is none.
+#[inline]
+fn fuse_point(
+    sources: &[Source],
+    point: &[f32; 3],
+    resolves: impl Fn(&Viewpoint) -> bool,
+) -> [f32; 3] {
+    let (mut sum, mut count) = ([0.0f32; 3], 0.0f32);
+    for source in sources {
+        if !resolves(&source.viewpoint) {
+            continue;
+        }
+        if let Some((contrast, noise, grey)) = source.sampler.contrast_and_grey(point) {
+            sum[0] += contrast;
+            sum[1] += noise;
+            sum[2] += (grey - source.bias) * source.inverse_gain;
+            count += 1.0;
+        }
+    }
+    let count = if count > 0.0 { count } else { f32::NAN };
+    [sum[0] / count, sum[1] / (count * count), sum[2] / count]
+}

@@ -1,0 +1,354 @@
+//! Registration of one frame on the wall that its neighbours show.
+//!
+//! ```text
+//! correlation search → hypotheses → Gauss–Newton → candidates → closer searches → choice
+//! ```
+
+use crate::model::context::{EstimationContext, FrameWindow};
+use crate::model::problem_error::ProblemError;
+use crate::model::rejection::RejectionReason;
+use crate::options::RefineOptions;
+use crate::parameters::frame_estimate::FrameEstimate;
+use crate::problem::photometric_problem::PhotometricProblem;
+use crate::samples::sampling::Sampling;
+use crate::solver::argmin_glue::solve;
+use crate::solver::stopping::Stopping;
+use crate::thresholds::correlation_search::MAX_DEVIATION_SIGMA;
+use crate::thresholds::registration::{
+    CLOSER_SEARCH_SIGMA_RAD, MAX_CLOSER_HYPOTHESES, MAX_CLOSER_SEARCH_ITERATIONS,
+    MAX_DEVIATION_COST, MAX_HYPOTHESES, MAX_SCORE_DEFICIT_NATS, MAX_SOLVE_ITERATIONS,
+    MIN_RELIABLE_CORRELATION, MIN_SCORE_GAIN_NATS, MIN_UNEXPLAINED, SOLVE_STEP_TOLERANCE_PX,
+};
+use crate::tracking::candidate::{Candidate, choose_candidate, sort_candidates, unexplained_share};
+use crate::tracking::correlation_search::{Hypothesis, log_likelihood, search_poses};
+use crate::tracking::mosaic_grid::pixel_size_m;
+use crate::tracking::neighbours::Neighbours;
+use crate::tracking::pose_prediction::PosePrediction;
+use crate::tracking::reference_mosaic::ReferenceMosaic;
+use crate::tracking::unwrapped_frame::UnwrappedFrame;
+use std::borrow::Cow;
+use tunnelstitch_core::surface::viewing_distance;
+use tunnelstitch_core::trajectory::{Jitter, Pose};
+
+/// Stopping rule of the solve of a single frame; the global solve does the rest.
+const STOPPING: Stopping = Stopping {
+    max_iterations: MAX_SOLVE_ITERATIONS,
+    step_px: SOLVE_STEP_TOLERANCE_PX,
+    step_sigma: 0.0,
+};
+
+/// The estimate of a registered frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Registered {
+    /// The estimate.
+    pub estimate: FrameEstimate,
+    /// True if the frame matches the wall as well as it should; otherwise the wall itself may be
+    /// bent.
+    pub is_reliable: bool,
+}
+
+/// Registers frame `frame` on the wall that the registered frames around it show; returns the
+/// reason if it must be rejected.
+///
+/// # Errors
+/// [`ProblemError`]: a frame that cannot be read, equations without a solution.
+pub fn register_frame(
+    context: &EstimationContext,
+    options: &RefineOptions,
+    frame: usize,
+    predicted: &PosePrediction,
+    neighbours: &Neighbours,
+) -> Result<Result<Registered, RejectionReason>, ProblemError> {
+    let Ok(distance_m) = viewing_distance(context.surface, &predicted.pose) else {
+        return Ok(Err(RejectionReason::NoMatch { correlation: 0.0 }));
+    };
+    let registration =
+        Registration::new(context, options, frame, predicted, neighbours, distance_m)?;
+    let hypotheses = registration.find_hypotheses(options);
+    let mut candidates = registration.refine_hypotheses(&hypotheses)?;
+    if options.search {
+        registration.search_closer(&mut candidates)?;
+    }
+    sort_candidates(&mut candidates);
+    let camera = context.camera.at_level(registration.search_level);
+    let pixel_size =
+        |candidate: &Candidate| pixel_size_m(context, &camera, &candidate.estimate.pose);
+    let chosen = choose_candidate(&candidates, context.surface, &context.camera, pixel_size);
+    match chosen {
+        Ok(candidate) => registration.finish(candidate).map(Ok),
+        Err(reason) => Ok(Err(reason)),
+    }
+}
+
+/// The registration of one frame: the frame, unwrapped, and the reference mosaic around it.
+struct Registration<'r> {
+    context: &'r EstimationContext<'r>,
+    frame: usize,
+    predicted: &'r PosePrediction,
+    neighbours: &'r Neighbours<'r>,
+    /// Pyramid level of the first solves.
+    coarsest_level: usize,
+    /// Pyramid level of the search and the candidates.
+    search_level: usize,
+    /// Pyramid level of the estimate.
+    finest_level: usize,
+    /// σ of pitch, yaw and roll as they appear in the picture, radians.
+    sigma_rad: [f64; 3],
+    /// Which neighbours may share wall with the frame.
+    overlapping: Vec<bool>,
+    mosaic: ReferenceMosaic,
+    unwrapped: UnwrappedFrame,
+}
+
+impl<'r> Registration<'r> {
+    /// Fuses the reference mosaic wherever the frame may look; `distance_m`: of the wall at its
+    /// predicted pose.
+    fn new(
+        context: &'r EstimationContext<'r>,
+        options: &RefineOptions,
+        frame: usize,
+        predicted: &'r PosePrediction,
+        neighbours: &'r Neighbours<'r>,
+        distance_m: f64,
+    ) -> Result<Self, ProblemError> {
+        let side = context.camera.shorter_side();
+        let coarsest_level = options.coarsest_level(side);
+        let finest_level = options.handover_level(side);
+        let search_level = finest_level.max(coarsest_level.saturating_sub(1));
+        let camera = context.camera.at_level(search_level);
+        let sigma_rad = picture_sigma_rad(&context.prior.jitter, distance_m);
+        let sigma_rad = sigma_rad.map(|sigma| sigma * predicted.sigma_scale);
+        // Beyond half a turn there is no more wall to look at.
+        let widest_m = 0.5 * context.surface.perimeter_m();
+        let reach_m = MAX_DEVIATION_SIGMA * sigma_rad[1].max(sigma_rad[0]) * distance_m;
+        let margin_m = reach_m.min(widest_m);
+        let overlapping = neighbours.find_overlapping(context, frame, &predicted.pose, margin_m)?;
+        let unwrapped_frames = neighbours.unwrap_frames(context, search_level, &overlapping)?;
+        let sweep = neighbours.sweep(context, frame);
+        let unwrapped = UnwrappedFrame::new(context, search_level, frame, &sweep)?;
+        let target = (frame, &predicted.pose);
+        let mosaic = ReferenceMosaic::new(context, &unwrapped_frames, &camera, target, margin_m)?;
+        Ok(Self {
+            context,
+            frame,
+            predicted,
+            neighbours,
+            coarsest_level,
+            search_level,
+            finest_level,
+            sigma_rad,
+            overlapping,
+            mosaic,
+            unwrapped,
+        })
+    }
+
+    /// The hypotheses of the correlation search, or the prediction alone where there is no search.
+    fn find_hypotheses(&self, options: &RefineOptions) -> Vec<Hypothesis> {
+        let pose = self.predicted.pose;
+        if options.search {
+            self.search(&pose, self.sigma_rad, MAX_HYPOTHESES)
+        } else {
+            vec![Hypothesis {
+                pose,
+                score: 0.0,
+                attainable_score: 0.0,
+            }]
+        }
+    }
+
+    /// Searches around a pose; see [`search_poses`].
+    fn search(&self, pose: &Pose, sigma_rad: [f64; 3], count: usize) -> Vec<Hypothesis> {
+        let Self {
+            context,
+            mosaic,
+            unwrapped,
+            ..
+        } = self;
+        search_poses(context, mosaic, unwrapped, pose, sigma_rad, count)
+    }
+
+    /// Refines the hypotheses that may turn out to be right.
+    fn refine_hypotheses(&self, hypotheses: &[Hypothesis]) -> Result<Vec<Candidate>, ProblemError> {
+        let best_score = hypotheses
+            .first()
+            .map_or(0.0, |hypothesis| hypothesis.score);
+        let promising = hypotheses
+            .iter()
+            .filter(|one| is_worth_refining(one, best_score));
+        let mut candidates = Vec::new();
+        for hypothesis in promising {
+            candidates.extend(self.refine_pose(&hypothesis.pose)?);
+        }
+        Ok(candidates)
+    }
+
+    /// Searches again around the best candidate until it is reliable or gains no more.
+    ///
+    /// A pose that is half right has stretched and sheared the picture that it unwraps; from there
+    /// the search correlates better.
+    fn search_closer(&self, candidates: &mut Vec<Candidate>) -> Result<(), ProblemError> {
+        let sigma_rad = self
+            .sigma_rad
+            .map(|sigma| sigma.min(CLOSER_SEARCH_SIGMA_RAD));
+        for _ in 0..MAX_CLOSER_SEARCH_ITERATIONS {
+            sort_candidates(candidates);
+            let first = candidates.first();
+            let Some(first) = first.filter(|c| c.correlation < MIN_RELIABLE_CORRELATION) else {
+                break;
+            };
+            let (pose, before) = (first.estimate.pose, first.log_posterior());
+            for hypothesis in self.search(&pose, sigma_rad, MAX_CLOSER_HYPOTHESES) {
+                candidates.extend(self.refine_pose(&hypothesis.pose)?);
+            }
+            if !candidates
+                .iter()
+                .any(|c| has_gained(before, c.log_posterior()))
+            {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Refines a pose by Gauss–Newton down to the level of the search; None if that leads out of
+    /// the tunnel, off the wall, or beyond what the prior allows.
+    fn refine_pose(&self, pose: &Pose) -> Result<Option<Candidate>, ProblemError> {
+        let mut estimate = self.mosaic.fit_exposure(&self.unwrapped, pose);
+        for level in (self.search_level..=self.coarsest_level).rev() {
+            estimate = match self.solve_at(level, estimate) {
+                Ok(refined) => refined,
+                Err(ProblemError::Placement { .. } | ProblemError::Factor { .. }) => {
+                    return Ok(None);
+                }
+                Err(error) => return Err(error),
+            };
+        }
+        let ncc_score = self
+            .mosaic
+            .compute_ncc(self.context, &self.unwrapped, &estimate.pose);
+        let Some(unexplained) = unexplained_share(&ncc_score, &self.unwrapped) else {
+            return Ok(None);
+        };
+        let prior = self.context.prior;
+        let deviation = prior.deviation_cost(&self.predicted.pose, &estimate.pose)
+            / self.predicted.sigma_scale.powi(2);
+        if deviation > MAX_DEVIATION_COST {
+            return Ok(None);
+        }
+        Ok(Some(Candidate {
+            estimate,
+            unexplained: unexplained.max(MIN_UNEXPLAINED),
+            correlation: (1.0 - unexplained).sqrt(),
+            log_likelihood: log_likelihood(ncc_score.correlation(), ncc_score.samples),
+            deviation,
+        }))
+    }
+
+    /// Refines the chosen candidate down to the finest level.
+    fn finish(&self, candidate: &Candidate) -> Result<Registered, ProblemError> {
+        let mut estimate = candidate.estimate;
+        for level in (self.finest_level..self.search_level).rev() {
+            estimate = self.solve_at(level, estimate)?;
+        }
+        Ok(Registered {
+            estimate,
+            is_reliable: candidate.correlation >= MIN_RELIABLE_CORRELATION,
+        })
+    }
+
+    /// Solves for the frame's estimate at one pyramid level, with all other frames held; returns
+    /// the estimate unchanged where it shares no wall with them.
+    fn solve_at(
+        &self,
+        level: usize,
+        estimate: FrameEstimate,
+    ) -> Result<FrameEstimate, ProblemError> {
+        let own = self.frame - self.neighbours.frame_range.start;
+        let mut estimates = self.neighbours.estimates.to_vec();
+        estimates[own] = estimate;
+        let mut compared = self.overlapping.clone();
+        compared[own] = true;
+        let window = FrameWindow {
+            participants: self.neighbours.frame_range.clone(),
+            active: self.frame..self.frame + 1,
+            estimates: &estimates,
+            compared: Cow::Owned(compared),
+        };
+        let problem = PhotometricProblem::new(self.context, Sampling::of(level), window)?;
+        if problem.tiles() == 0 {
+            return Ok(estimate);
+        }
+        Ok(solve(problem, STOPPING)?.estimates[0])
+    }
+}
+
+/// True if refinement may bring a hypothesis close enough to the best one, whose log-posterior is
+/// `best_score`, for it to be the right one.
+fn is_worth_refining(hypothesis: &Hypothesis, best_score: f64) -> bool {
+    hypothesis.attainable_score >= best_score - MAX_SCORE_DEFICIT_NATS
+}
+
+/// True if a closer search has raised the log-posterior by more than noise does.
+fn has_gained(before: f64, after: f64) -> bool {
+    after - before >= MIN_SCORE_GAIN_NATS
+}
+
+/// σ of pitch, yaw and roll as they appear in the picture, radians: a translation across the view
+/// looks like a rotation.
+fn picture_sigma_rad(jitter: &Jitter, distance_m: f64) -> [f64; 3] {
+    let rotation = jitter.rotation_sigma_rad;
+    let [x, y, z] = jitter.translation_sigma_m;
+    let (along, across) = (y / distance_m, x.max(z) / distance_m);
+    [rotation.hypot(along), rotation.hypot(across), rotation]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tracking::correlation_search::attainable_log_likelihood;
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    fn hypothesis(correlation: f64, samples: f64, prior: f64) -> Hypothesis {
+        Hypothesis {
+            pose: Pose::new(UnitQuaternion::identity(), Vector3::zeros()),
+            score: log_likelihood(correlation, samples) - prior,
+            attainable_score: attainable_log_likelihood(correlation, samples) - prior,
+        }
+    }
+
+    /// The prior makes every log-posterior negative if hardly anything correlates.
+    #[test]
+    fn best_hypothesis_is_worth_refining_at_a_negative_log_posterior() {
+        let best = hypothesis(0.05, 200.0, 3.0);
+        assert!(best.score < 0.0);
+        assert!(is_worth_refining(&best, best.score));
+        assert!(is_worth_refining(&hypothesis(0.05, 200.0, 5.0), best.score));
+    }
+
+    /// A hypothesis that the search's steps explain may be right, however many samples there are;
+    /// one that is less likely by the prior alone is judged by its odds, however few.
+    #[test]
+    fn hypotheses_are_judged_by_their_odds() {
+        for samples in [100.0, 1000.0, 10_000.0] {
+            let best = hypothesis(0.8, samples, 0.0).score;
+            assert!(is_worth_refining(&hypothesis(0.6, samples, 0.0), best));
+        }
+        let best = hypothesis(0.8, 10_000.0, 0.0).score;
+        assert!(!is_worth_refining(&hypothesis(0.5, 10_000.0, 0.0), best));
+        for samples in [0.0, 100.0, 10_000.0] {
+            let best = hypothesis(0.0, samples, 1.0).score;
+            assert!(is_worth_refining(&hypothesis(0.0, samples, 10.0), best));
+            assert!(!is_worth_refining(&hypothesis(0.0, samples, 10.5), best));
+        }
+    }
+
+    #[test]
+    fn gain_is_a_difference_of_log_posteriors() {
+        for before in [-50.0, 0.0, 50.0, 5000.0] {
+            assert!(!has_gained(before, before));
+            assert!(!has_gained(before, before + 2.9));
+            assert!(has_gained(before, before + 3.1));
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! Correction of the camera's shading by frames that see the same wall in different parts of the
+//! picture.
+//!
+//! The mean over all frames shows the lamp and the lens ([`Shading::of_mean`]) up to what is left
+//! of the wall's texture in it: enough to register frames. On a faint wall a shading that is wrong
+//! by a grey level is still steeper than the texture, and it is fixed to the camera: frames get
+//! displaced by it. Where frames overlap, the wall itself determines the shading
+//! ([`tunnelstitch_photometry`]): an observation is the mean value z of a tile in a frame by the present
+//! bias and the present factor `f = a_i V`.
+//!
+//! Only the shading is taken over; the solves that follow estimate gains and biases themselves.
+
+use crate::model::context::EstimationContext;
+use crate::model::frame_states::FrameStates;
+use crate::model::problem_error::ProblemError;
+use crate::options::RefineOptions;
+use crate::problem::photometric_problem::PhotometricProblem;
+use crate::samples::sampling::Sampling;
+use crate::solver::neighbourhood::Neighbourhood;
+use crate::thresholds::shading_correction::{
+    MAX_CORRECTION_ITERATIONS, MAX_SHADING_FRAMES, MAX_SHADING_TILES,
+    MIN_CHANGE_SIGNIFICANCE_SIGMA, MIN_SIGNIFICANCE_SIGMA,
+};
+use std::ops::Range;
+use tunnelstitch_core::frames::Shading;
+use tunnelstitch_photometry::{Observation, PhotometricCalibration, Priors};
+
+/// Corrects the shading until frames agree where they overlap, solving for their poses in between.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn correct_until_settled(
+    context: &EstimationContext,
+    options: &RefineOptions,
+    frames: &mut FrameStates,
+) -> Result<(), ProblemError> {
+    let side = context.camera.shorter_side();
+    let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
+    for _ in 0..MAX_CORRECTION_ITERATIONS {
+        if !correct(context, options, frames)? {
+            break;
+        }
+        Neighbourhood::of_all(frames).solve(context, options, finest..=coarsest, frames)?;
+    }
+    Ok(())
+}
+
+/// Corrects the shading by what overlapping frames show at their present poses; false if nothing
+/// significant is wrong with it.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn correct(
+    context: &EstimationContext,
+    options: &RefineOptions,
+    frames: &FrameStates,
+) -> Result<bool, ProblemError> {
+    let count = frames.estimates.len();
+    let first = count.saturating_sub(MAX_SHADING_FRAMES) / 2;
+    let range = first..(first + MAX_SHADING_FRAMES).min(count);
+    let size = (
+        context.camera.width as usize,
+        context.camera.height as usize,
+    );
+    let points = observe_tiles(context, options, frames, &range)?;
+    let (before, sigmas) = match context.frames.shading() {
+        Some(shading) => ((*shading).clone(), MIN_CHANGE_SIGNIFICANCE_SIGMA),
+        None => (Shading::none(size), MIN_SIGNIFICANCE_SIGMA),
+    };
+    let found = PhotometricCalibration::solve(&points, range.len(), size, &Priors::default());
+    let Some(found) = found.filter(|found| found.is_shading_significant(sigmas)) else {
+        return Ok(false);
+    };
+    context.frames.set_shading(before.changed(&found.shading));
+    Ok(true)
+}
+
+/// Observes tiles spread over all of the wall by the frames of a range, tile by tile; frames are
+/// counted from the first of the range.
+fn observe_tiles(
+    context: &EstimationContext,
+    options: &RefineOptions,
+    frames: &FrameStates,
+    range: &Range<usize>,
+) -> Result<Vec<Vec<Observation>>, ProblemError> {
+    let level = options.handover_level(context.camera.shorter_side());
+    let window = frames.window_of(range.clone(), range.clone());
+    let problem = PhotometricProblem::new(context, Sampling::of(level), window)?;
+    let tiles = problem.gather_from_tiles(
+        MAX_SHADING_TILES,
+        |tiles: &mut Vec<Vec<Observation>>, tile| {
+            let means = tile.workspace.mean_values(tile.points, tile.observations());
+            let seen = tile.observers.iter().zip(means);
+            let observations = seen.filter_map(|(observer, mean)| {
+                let frame = tile.participants[observer.frame as usize];
+                let pose = &frames.estimates[range.start + frame].pose;
+                let pixel = problem
+                    .camera_of(frame)
+                    .project(&pose.to_camera(&tile.points.centre.x_w))?;
+                let factor = tile.sampled_frames[observer.frame as usize].gain() * observer.shade;
+                let pixel = [pixel.x as f32, pixel.y as f32];
+                Observation::new(frame, pixel, mean as f32, factor)
+            });
+            let observations: Vec<Observation> = observations.collect();
+            if observations.len() > 1 {
+                tiles.push(observations);
+            }
+        },
+    )?;
+    Ok(tiles.into_iter().flatten().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scene::{frame_states, independent_prior, test_context};
+    use nalgebra::Vector2;
+    use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
+    use tunnelstitch_core::test_wall::{TestWall, waves};
+    use tunnelstitch_core::trajectory::spiral;
+
+    /// Two and a half turns past a wall in a light that depends on the pixel, and exposures that
+    /// depend on the frame.
+    fn corrected(light: fn(f64, f64) -> f64) -> Option<impl Fn(f64, f64) -> f64> {
+        let mut wall = TestWall::ring(waves);
+        wall.poses = spiral(30, 0.05, 30f64.to_radians());
+        let pictures = wall.frames().into_iter().enumerate().map(|(k, frame)| {
+            let (w, h) = (frame.width(), frame.height());
+            let gain = 1.0 + 0.2 * (1.7 * k as f64).sin();
+            let lit = frame.data().iter().enumerate().map(|(n, value)| {
+                let (u, v) = ((n % w) as f64 / w as f64, (n / w) as f64 / h as f64);
+                (gain * light(u, v) * f64::from(*value)) as f32
+            });
+            Pyramid::new(GreyImage::new(w, h, lit.collect()), 1)
+        });
+        let frames = FrameCache::of_pyramids(pictures.collect());
+        let prior = independent_prior(&wall.poses);
+        let context = test_context(&wall, &frames, &prior);
+        let states = frame_states(&wall.poses);
+        let any = correct(&context, &RefineOptions::default(), &states).unwrap();
+        assert_eq!(any, frames.shading().is_some());
+        let shading = frames.shading()?;
+        let (w, h) = (f64::from(wall.camera.width), f64::from(wall.camera.height));
+        Some(move |u, v| shading.at(&Vector2::new(u * w, v * h)))
+    }
+
+    #[test]
+    fn a_lamp_is_found_where_frames_overlap() {
+        let lamp = |u: f64, v: f64| (1.0 + 0.8 * ((u - 0.6).powi(2) + (v - 0.4).powi(2))).powi(-2);
+        let found = corrected(lamp).unwrap();
+        let middle = found(0.5, 0.5) / lamp(0.5, 0.5);
+        // Closer to the corners there is no tile that a frame sees all of.
+        for (u, v) in [(0.1, 0.1), (0.9, 0.1), (0.1, 0.9), (0.9, 0.9), (0.5, 0.1)] {
+            let ratio = found(u, v) / lamp(u, v) / middle;
+            assert!((ratio - 1.0).abs() < 0.01, "{u} {v}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn even_light_is_left_alone() {
+        assert!(corrected(|_, _| 1.0).is_none());
+    }
+}

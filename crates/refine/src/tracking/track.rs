@@ -1,0 +1,209 @@
+//! Tracking: registers one frame after another and solves sliding windows.
+//!
+//! Registering each frame only against those before it accumulates error exponentially. Windows of
+//! the last frames that may overlap, solved together every few frames with the oldest third held,
+//! keep it bounded ([`crate::tracking::windows`]).
+//!
+//! A frame that cannot be registered stays at the prior's prediction, and no other is compared with
+//! it.
+
+use crate::model::context::EstimationContext;
+use crate::model::frame_states::FrameStates;
+use crate::model::problem_error::ProblemError;
+use crate::model::rejection::RejectionReason;
+use crate::options::RefineOptions;
+use crate::parameters::calibration::Kappa;
+use crate::parameters::frame_estimate::FrameEstimate;
+use crate::samples::footprints::footprint;
+use crate::samples::footprints::footprints;
+use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
+use crate::thresholds::tracking::LONG_WINDOW_STRIDE;
+use crate::tracking::neighbours::Neighbours;
+use crate::tracking::pose_prediction::{PosePrediction, predict_pose};
+use crate::tracking::registration::{Registered, register_frame};
+use crate::tracking::windows::{solve_long_window, solve_sliding_window};
+use serde::{Deserialize, Serialize};
+use tunnelstitch_core::surface::Footprint;
+
+/// Frames that are tracked one after another.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Tracking {
+    /// The estimates of those tracked so far; the rejection reasons of all frames.
+    states: FrameStates,
+    /// The parts of the wall that they saw when they were tracked.
+    footprints: Vec<Footprint>,
+    /// The first frame that the last tracked one may share wall with.
+    earliest_overlap: usize,
+    /// The last shared parameters κ that made a valid camera.
+    kappa: Kappa,
+}
+
+impl Tracking {
+    /// Tracking that has not begun; `rejections`: of frames that prescreening has rejected.
+    pub fn new(rejections: Vec<Option<RejectionReason>>, kappa: Kappa) -> Self {
+        Self {
+            states: FrameStates {
+                estimates: Vec::with_capacity(rejections.len()),
+                rejections,
+                kappa,
+            },
+            footprints: Vec::new(),
+            earliest_overlap: 0,
+            kappa,
+        }
+    }
+
+    /// The number of frames tracked so far, rejected ones included.
+    pub fn tracked_frames(&self) -> usize {
+        self.states.estimates.len()
+    }
+
+    /// True if all frames are tracked.
+    pub fn is_complete(&self) -> bool {
+        self.tracked_frames() == self.states.rejections.len()
+    }
+
+    /// The states of the frames tracked so far, without the others.
+    pub fn tracked_states(&self) -> FrameStates {
+        let mut states = self.states.clone();
+        states.rejections.truncate(states.estimates.len());
+        states
+    }
+
+    /// The states of all frames.
+    pub fn into_states(self) -> FrameStates {
+        self.states
+    }
+
+    /// Tracks the next frame, and solves the windows that end with it.
+    ///
+    /// # Errors
+    /// [`ProblemError`] if the frame cannot be read, its initial pose lies outside the tunnel, or
+    /// equations have no solution.
+    pub fn track_next(
+        &mut self,
+        context: &EstimationContext,
+        options: &RefineOptions,
+    ) -> Result<(), ProblemError> {
+        let k = self.tracked_frames();
+        let context = &context.at(self.kappa).at(self.states.kappa);
+        self.kappa = context.kappa;
+        let predicted = predict_pose(context, k, &self.states);
+        let estimate = FrameEstimate::at(predicted.pose);
+        self.states.estimates.push(estimate);
+        self.footprints
+            .push(footprint(context, &context.camera, k, &predicted.pose)?);
+        let first = find_earliest_overlap(context, &self.footprints);
+        let is_reliable = self.register(context, options, &predicted, first)?;
+        // The frame overlaps earlier frames than the one before it did: a turn has closed on wall
+        // that was tracked without it, and the drift in between may be many pixels.
+        let closes_turn = first < self.earliest_overlap;
+        self.earliest_overlap = first;
+        let drifted = closes_turn || !is_reliable;
+        if k > 0 && options.windows {
+            if drifted || k.is_multiple_of(options.window_stride) || self.is_complete() {
+                solve_sliding_window(context, options, first, drifted, &mut self.states)?;
+            }
+            if k.is_multiple_of(LONG_WINDOW_STRIDE) {
+                solve_long_window(context, options, &mut self.states)?;
+            }
+        }
+        let pose = &self.states.estimates[k].pose;
+        self.footprints[k] = footprint(context, &context.camera, k, pose)?;
+        Ok(())
+    }
+
+    /// Registers the last frame on the wall that frames from `first` on show; false if its pose is
+    /// not reliable.
+    fn register(
+        &mut self,
+        context: &EstimationContext,
+        options: &RefineOptions,
+        predicted: &PosePrediction,
+        first: usize,
+    ) -> Result<bool, ProblemError> {
+        let states = &mut self.states;
+        let k = states.estimates.len() - 1;
+        if states.rejections[k].is_some() || first >= k {
+            return Ok(true);
+        }
+        let frame_range = first..k + 1;
+        let mut registered = states.inliers(&frame_range);
+        registered[k - first] = false;
+        if !registered.contains(&true) {
+            return Ok(true);
+        }
+        let neighbours = Neighbours {
+            estimates: &states.estimates[frame_range.clone()],
+            registered: &registered,
+            footprints: &self.footprints[frame_range.clone()],
+            frame_range,
+        };
+        match register_frame(context, options, k, predicted, &neighbours)? {
+            Ok(Registered {
+                estimate,
+                is_reliable,
+            }) => {
+                states.estimates[k] = estimate;
+                Ok(is_reliable)
+            }
+            Err(reason) => {
+                states.rejections[k] = Some(reason);
+                Ok(true)
+            }
+        }
+    }
+}
+
+/// The first frame that may share wall with the last one; the last one itself if there is none.
+fn find_earliest_overlap(context: &EstimationContext, footprints: &[Footprint]) -> usize {
+    let last = footprints.len() - 1;
+    let perimeter = context.surface.perimeter_m();
+    (last.saturating_sub(MAX_OVERLAP_DISTANCE_FRAMES)..last)
+        .find(|k| footprints[*k].overlaps(&footprints[last], perimeter))
+        .unwrap_or(last)
+}
+
+/// Registers rejected frames again, now that there are frames on both sides of them; returns how
+/// many have been registered. Frames that show nothing are left out.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn register_rejected(
+    context: &EstimationContext,
+    options: &RefineOptions,
+    states: &mut FrameStates,
+) -> Result<usize, ProblemError> {
+    let count = states.estimates.len();
+    let mut registered_frames = 0;
+    let mut footprints = footprints(context, states)?;
+    for k in 0..count {
+        if !states.rejections[k]
+            .as_ref()
+            .is_some_and(RejectionReason::is_retriable)
+        {
+            continue;
+        }
+        let frame_range = k.saturating_sub(MAX_OVERLAP_DISTANCE_FRAMES)
+            ..(k + MAX_OVERLAP_DISTANCE_FRAMES).min(count);
+        let predicted = predict_pose(context, k, states);
+        let registered = states.inliers(&frame_range);
+        let neighbours = Neighbours {
+            estimates: &states.estimates[frame_range.clone()],
+            registered: &registered,
+            footprints: &footprints[frame_range.clone()],
+            frame_range,
+        };
+        let result = register_frame(context, options, k, &predicted, &neighbours)?;
+        states.estimates[k] = match result {
+            Ok(registered) => {
+                states.rejections[k] = None;
+                registered_frames += 1;
+                registered.estimate
+            }
+            Err(_) => FrameEstimate::at(predicted.pose),
+        };
+        footprints[k] = footprint(context, &context.camera, k, &states.estimates[k].pose)?;
+    }
+    Ok(registered_frames)
+}

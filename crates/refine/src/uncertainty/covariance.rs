@@ -1,0 +1,317 @@
+//! Covariance of the estimated poses.
+//!
+//! The estimate is where the score g, the gradient of the cost, is zero. Errors of the pixels that
+//! add ε to the score move the estimate by `−D⁻¹ ε`, D the derivative of the score. So its
+//! covariance is `D⁻¹ Q D⁻¹` with Q the covariance of ε.
+//!
+//! **D is not the normal matrix H.** Gauss–Newton weighs a residual by `ω = ψ(e)/e`, but as the
+//! residual grows its weight falls: a score `Σ ψ(e) ∂e` has the derivative `Σ ψ'(e) ∂e ∂eᵀ`, and ψ'
+//! is less than ω (0.89 of it in the mean, for Gaussian residuals). Slopes that are not quite those
+//! of the wall, as on faint or very sharp walls, make a difference, too. The solver observes D for
+//! poses from step to step: `D = κ H`, with κ the [`SolveRecord::curvature`], about 0.9.
+//!
+//! **Q** is estimated from the scatter of the gradients of parts of the cost, `V = Σ_b g_b g_bᵀ`
+//! over blocks b of the wall (32 × 32 pixels: errors of neighbouring samples are correlated, those
+//! of blocks hardly), whatever the residuals are like, over κ², plus the prior's own information P.
+//! If the residuals were independent Gaussian noise of the assumed σ, c would be 0.97. They are not
+//! quite: where the wall is steep, aliasing and interpolation add errors that depend on the
+//! position between pixels, with correlations of their own. With one factor for all poses, and J
+//! the normal matrix of the poses with the exposures eliminated,
+//!
+//! `Σ = c J⁻¹`, `c = tr(J⁻¹ E Q Eᵀ) / freedoms`, `Q = V/κ² + P`, `J = H_pp − H_pe H_ee⁻¹ H_ep`,
+//! `E = (I, −H_pe H_ee⁻¹)`,
+//!
+//! the freedoms being six of each frame less those of the gauge. The exposures are left out because
+//! their errors differ: where a wall is sharp, a frame that sees it obliquely is blurred, which
+//! looks like a lower gain, block after block, and says nothing of its pose. As
+//! `H⁻¹ = Eᵀ J⁻¹ E + diag(0, H_ee⁻¹)`,
+//!
+//! `tr(J⁻¹ E Q Eᵀ) = tr(H⁻¹ Q) − tr(H_ee⁻¹ Q_ee)`,
+//!
+//! for which only those blocks of `H⁻¹` and `H_ee⁻¹` are needed where H itself has blocks
+//! ([`crate::linear::selected_inverse`]). `J⁻¹` is the poses' part of `H⁻¹`. c is about
+//! 0.35 on sharp bricks, where aliasing, which the weight of every sample takes for independent,
+//! cancels over a block, and 0.7 on noisy walls of low contrast.
+//!
+//! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard
+//! conditions", 1967 (`D⁻¹ Q D⁻¹`); F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw, W. A. Stahel,
+//! "Robust Statistics: The Approach Based on Influence Functions", 1986, 6.3 (ψ' in D); R. W. M.
+//! Wedderburn, "Quasi-likelihood functions", Biometrika 61(3), 1974 (one factor for all).
+//!
+//! [`SolveRecord::curvature`]: crate::SolveRecord::curvature
+
+use crate::linear::bordered_system::{BorderBlock, SharedBlock};
+use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
+use crate::linear::selected_inverse::SelectedInverse;
+use crate::linear::sparse_cholesky::FactorError;
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+use crate::uncertainty::frame_sigma::FrameSigma;
+use nalgebra::{Matrix6, Vector6};
+use tunnelstitch_core::surface::GaugeMotion;
+
+/// Unknowns of a frame's pose.
+const POSE: usize = 6;
+/// Unknowns of a frame's exposure.
+const EXPOSURE: usize = FRAME_PARAMETERS - POSE;
+
+/// Covariances of the poses' steps `ξ = (ω, ρ)` ([`tunnelstitch_core::trajectory::Pose::retract`]): rad²,
+/// rad·m, m².
+#[derive(Clone, Debug)]
+pub struct Covariances {
+    /// Covariance of every frame, all others marginalised.
+    pub frames: Vec<Matrix6<f64>>,
+    /// Covariance of every frame (rows) with the next (columns); NaN where the two have nothing in
+    /// common.
+    pub next: Vec<Matrix6<f64>>,
+    /// Variance factor c.
+    pub variance_factor: f64,
+}
+
+impl Covariances {
+    /// Unknown covariances of `frames` frames: NaN.
+    pub fn unknown(frames: usize) -> Self {
+        let unknown = Matrix6::from_element(f64::NAN);
+        Self {
+            frames: vec![unknown; frames],
+            next: vec![unknown; frames.saturating_sub(1)],
+            variance_factor: f64::NAN,
+        }
+    }
+
+    /// Adds the uncertainty of the shared parameters: `Z + W Σ_κ Wᵀ`.
+    pub fn with_shared(mut self, w: &[BorderBlock], covariance: &SharedBlock) -> Self {
+        let pose = |k: usize| w[k].fixed_rows::<6>(0).into_owned();
+        for (k, frame) in self.frames.iter_mut().enumerate() {
+            *frame += pose(k) * covariance * pose(k).transpose();
+        }
+        for (k, next) in self.next.iter_mut().enumerate() {
+            *next += pose(k) * covariance * pose(k + 1).transpose();
+        }
+        self
+    }
+
+    /// Scales all positions by `scale`.
+    pub fn scaled(mut self, scale: f64) -> Self {
+        let d = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, scale, scale, scale));
+        for covariance in self.frames.iter_mut().chain(&mut self.next) {
+            *covariance = d * *covariance * d;
+        }
+        self
+    }
+
+    /// Moves all poses along the gauge: positions rotate with it, `ρ → R_n ρ`; rotations are in the
+    /// cameras' own axes.
+    pub fn moved(mut self, motion: &GaugeMotion) -> Self {
+        let turn = motion.rotation();
+        let mut t = Matrix6::identity();
+        t.fixed_view_mut::<3, 3>(3, 3)
+            .copy_from(turn.to_rotation_matrix().matrix());
+        for covariance in self.frames.iter_mut().chain(&mut self.next) {
+            *covariance = t * *covariance * t.transpose();
+        }
+        self
+    }
+
+    /// Formats the covariances as `covariance.csv`: one line per frame and one per pair of
+    /// neighbours.
+    ///
+    /// Columns: `frame_a`, `frame_b` (the same for a frame by itself, the next for a pair), 1-σ of
+    /// the frame on the wall in mm (empty for pairs), then the 36 elements row by row, rows `ξ_a`
+    /// and columns `ξ_b` with `ξ = (ω_x, ω_y, ω_z, ρ_x, ρ_y, ρ_z)`, rad and m, in the convention
+    /// `R ← R exp(ω)`, `t ← t + ρ`.
+    pub fn csv(&self, sigmas: &[FrameSigma]) -> String {
+        let names = ["wx", "wy", "wz", "x", "y", "z"];
+        let mut text = "frame_a,frame_b,wall_sigma_mm".to_owned();
+        for a in names {
+            for b in names {
+                text += &format!(",{a}_{b}");
+            }
+        }
+        text.push('\n');
+        let mut line = |a: usize, b: usize, wall: String, covariance: &Matrix6<f64>| {
+            text += &format!("{a},{b},{wall}");
+            for value in covariance.transpose().iter() {
+                text += &format!(",{value:.9e}");
+            }
+            text.push('\n');
+        };
+        for (k, covariance) in self.frames.iter().enumerate() {
+            let wall = sigmas
+                .get(k)
+                .map_or(String::new(), |s| format!("{:.6}", 1e3 * s.wall_m));
+            line(k, k, wall, covariance);
+            if let Some(next) = self.next.get(k) {
+                line(k, k + 1, String::new(), next);
+            }
+        }
+        text
+    }
+}
+
+/// Computes the covariances at a solution.
+///
+/// `normal`: H, with `tied` freedoms of the gauge tied; `scatter`: V of the pixels; `prior`: P; all
+/// on `pattern`. `curvature`: κ.
+///
+/// # Errors
+/// [`FactorError`] if the normal matrix is singular.
+pub fn compute_covariances(
+    pattern: &Pattern,
+    normal: &NormalEquations,
+    tied: usize,
+    scatter: &[Block],
+    prior: &[Block],
+    curvature: f64,
+) -> Result<Covariances, FactorError> {
+    let inverse = SelectedInverse::new(pattern, normal)?;
+    let of_exposures = SelectedInverse::new(pattern, &exposures_alone(pattern, normal))?;
+    let count = pattern.frames();
+    let q = scatter.iter().zip(prior);
+    let q: Vec<Block> = q.map(|(v, p)| v / curvature.powi(2) + p).collect();
+    let q_ee: Vec<Block> = q.iter().map(exposures_part).collect();
+    let trace =
+        trace_of_product(pattern, &inverse, &q) - trace_of_product(pattern, &of_exposures, &q_ee);
+    let freedoms = count * POSE - tied;
+    let variance_factor = trace / freedoms as f64;
+    let pose = |block: Block| variance_factor * block.fixed_view::<POSE, POSE>(0, 0).into_owned();
+    let unknown = Matrix6::from_element(f64::NAN);
+    Ok(Covariances {
+        frames: (0..count)
+            .map(|k| inverse.block(k, k).map_or(unknown, pose))
+            .collect(),
+        next: (1..count)
+            .map(|k| inverse.block(k - 1, k).map_or(unknown, pose))
+            .collect(),
+        variance_factor,
+    })
+}
+
+/// `tr(H⁻¹ Q)` of a symmetric matrix Q with the upper `blocks` on `pattern`.
+fn trace_of_product(pattern: &Pattern, inverse: &SelectedInverse, blocks: &[Block]) -> f64 {
+    let mut trace = 0.0;
+    for column in 0..pattern.frames() {
+        for &row in pattern.rows(column) {
+            let z = inverse.block(row, column);
+            if let Some((place, z)) = pattern.block_index(row, column).zip(z) {
+                // Off the diagonal each block stands for its transpose, too.
+                let multiplicity = if row == column { 1.0 } else { 2.0 };
+                trace += multiplicity * z.component_mul(&blocks[place]).sum();
+            }
+        }
+    }
+    trace
+}
+
+/// The part of a block that belongs to the exposures.
+fn exposures_part(block: &Block) -> Block {
+    let mut part = Block::zeros();
+    part.fixed_view_mut::<EXPOSURE, EXPOSURE>(POSE, POSE)
+        .copy_from(&block.fixed_view::<EXPOSURE, EXPOSURE>(POSE, POSE));
+    part
+}
+
+/// The normal matrix for known poses: `diag(I, H_ee)`.
+fn exposures_alone(pattern: &Pattern, normal: &NormalEquations) -> NormalEquations {
+    let mut alone = NormalEquations::zeros(pattern);
+    for (alone, block) in alone.blocks.iter_mut().zip(&normal.blocks) {
+        *alone = exposures_part(block);
+    }
+    let poses = Block::from_diagonal(&FrameStep::from_fn(|k, _| if k < POSE { 1.0 } else { 0.0 }));
+    for k in 0..pattern.frames() {
+        alone.add_block(pattern, k, k, &poses);
+    }
+    alone
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DMatrix;
+
+    #[test]
+    fn csv_has_a_line_per_frame_and_pair_and_39_columns() {
+        let mut covariances = Covariances::unknown(3);
+        covariances.next[1] = Matrix6::from_fn(|r, c| (10 * r + c) as f64);
+        let text = covariances.csv(&[]);
+        let lines: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
+        assert_eq!(lines.len(), 6);
+        assert!(lines.iter().all(|line| line.len() == 39));
+        assert_eq!(lines[4][..2], ["1", "2"]);
+        // Row by row: the second number is row 0, column 1.
+        assert_eq!(lines[4][4].parse(), Ok(1.0));
+        assert_eq!(lines[4][9].parse(), Ok(10.0));
+        assert_eq!(lines[0][4], "wx_wy");
+    }
+
+    /// If the scatter is as modelled, so is the covariance; twice the scatter makes twice the
+    /// covariance, half the curvature twice the error by pixels; scatter of the exposures does not
+    /// count.
+    #[test]
+    fn variance_factor_follows_scatter_and_curvature() {
+        let pattern = Pattern::new(3, [(0, 1), (1, 2)]);
+        let mut normal = NormalEquations::zeros(&pattern);
+        for k in 0..3 {
+            normal.add_block(&pattern, k, k, &(Block::identity() * 4.0));
+        }
+        for k in 0..2 {
+            normal.add_block(&pattern, k, k + 1, &(Block::identity() * -1.0));
+        }
+        let none = vec![Block::zeros(); pattern.blocks()];
+        let at = |scatter: &[Block], prior: &[Block], curvature: f64| {
+            compute_covariances(&pattern, &normal, 0, scatter, prior, curvature).unwrap()
+        };
+        let one = at(&normal.blocks, &none, 1.0);
+        assert!((one.variance_factor - 1.0).abs() < 1e-12);
+        let two = at(&normal.blocks, &normal.blocks, 1.0);
+        assert!((two.frames[1] - one.frames[1] * 2.0).norm() < 1e-12);
+        let bent = at(&normal.blocks, &normal.blocks, 0.5);
+        assert!((bent.frames[1] - one.frames[1] * 5.0).norm() < 1e-12);
+        assert!((one.frames[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
+        assert!((one.next[0][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
+        let mut exposed = normal.blocks.clone();
+        exposed
+            .iter_mut()
+            .for_each(|block| *block += exposures_part(block) * 9.0);
+        let same = at(&exposed, &none, 1.0);
+        assert!((same.variance_factor - 1.0).abs() < 1e-12);
+        // With the gauge tied, two of 18 freedoms are no freedoms.
+        let tied = compute_covariances(&pattern, &normal, 2, &normal.blocks, &none, 1.0).unwrap();
+        assert!((tied.variance_factor - 18.0 / 16.0).abs() < 1e-12);
+    }
+
+    /// Compared with the sandwich itself, where poses and exposures are correlated.
+    #[test]
+    fn variance_factor_is_that_of_the_poses_with_exposures_eliminated() {
+        let pattern = Pattern::new(2, [(0, 1)]);
+        let matrix = |salt: f64| {
+            let n = 2 * FRAME_PARAMETERS;
+            let number = |r: usize, c: usize| (12.9898 * (r + n * c) as f64 + salt).sin();
+            let root = DMatrix::from_fn(n, n, number);
+            &root * root.transpose() + DMatrix::identity(n, n)
+        };
+        let blocks = |dense: &DMatrix<f64>| {
+            let block = |row: usize, column: usize| {
+                let view = dense.fixed_view::<FRAME_PARAMETERS, FRAME_PARAMETERS>(
+                    row * FRAME_PARAMETERS,
+                    column * FRAME_PARAMETERS,
+                );
+                view.into_owned()
+            };
+            vec![block(0, 0), block(0, 1), block(1, 1)]
+        };
+        let (h, q) = (matrix(0.1), matrix(0.7));
+        let mut normal = NormalEquations::zeros(&pattern);
+        normal.blocks = blocks(&h);
+        let none = vec![Block::zeros(); pattern.blocks()];
+        let found = compute_covariances(&pattern, &normal, 0, &blocks(&q), &none, 1.0).unwrap();
+        let poses: Vec<usize> = (0..2 * FRAME_PARAMETERS)
+            .filter(|k| k % FRAME_PARAMETERS < POSE)
+            .collect();
+        let inverse = h.try_inverse().unwrap();
+        let sandwich = &inverse * q * &inverse;
+        let part = |m: &DMatrix<f64>| m.select_rows(&poses).select_columns(&poses);
+        let relative = part(&inverse).try_inverse().unwrap() * part(&sandwich);
+        let expected = relative.trace() / poses.len() as f64;
+        assert!((found.variance_factor / expected - 1.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,220 @@
+//! Cramér–Rao bound: the covariance that no unbiased estimate of the poses undercuts.
+//!
+//! Each pixel has the value `I = a S(x(ξ)) + b + n` with the wall's texture S (averaged over the
+//! square of a pixel) unknown, and n Gaussian with variance σ². Parameters are the poses' ξ, the
+//! exposures and S at every wall point. The Fisher information of one observation is `σ⁻² ∂I ∂Iᵀ`,
+//! with `∂I/∂ξ_i = a φᵀ B_i` as in [`crate::tiles::tile`] and `∂I/∂S = a`. Eliminating S at
+//! each wall point by the Schur complement leaves for the poses
+//!
+//! `J_ij = σ⁻² Σ_x (w_i δ_ij − w_i w_j / Σ_k w_k) B_iᵀ φ φᵀ B_j`,   `w_i = q_i a_i²`,
+//!
+//! with q the pixels per wall sample: the normal matrix of the estimator, but with the slopes of
+//! the true texture. Its null space is the gauge, fixed at the first frame. `cov(ξ̂) ⪰ J⁻¹` for any
+//! unbiased estimate, and with the prior's information added the Bayesian bound (van Trees) for any
+//! estimate at all.
+//!
+//! # The bound for an unknown texture
+//!
+//! This bound takes the slopes of the texture as known, but an estimator has them from the same
+//! pixels. The bound with the texture integrated out, as a Gaussian process with the wall's own
+//! spectrum, is derived in [`crate::problem::unknown_texture`]: a tile that N frames see
+//! keeps a share of the information in M that belongs to displacements. On faint walls the share
+//! falls with more noise; on sharp walls, because of aliasing, it falls with *less* noise. An
+//! estimator that knows no more of the wall than its spectrum cannot undercut it; one that knows
+//! more, for example that edges are straight, can. `benches/reach.py` computes the share
+//! independently.
+//!
+//! # Accuracy of the bound
+//!
+//! Slopes are differences over an eighth of a pixel to each side of frames with 4 × 4 times the
+//! pixels, interpolated by a cubic. That loses 6 % of the information for the spectrum of bricks,
+//! 2.5 % for that of concrete, so both bounds are too large by half of that.
+//!
+//! Source: C. R. Rao, 1945; H. Cramér, 1946; H. L. van Trees, "Detection, Estimation, and
+//! Modulation Theory", 1968.
+
+use crate::error::RefineError;
+use crate::linear::normal_equations::{Block, NormalEquations};
+use crate::linear::selected_inverse::SelectedInverse;
+use crate::model::context::{EstimationContext, FrameWindow};
+use crate::model::prior::{Prior, median_step_s};
+use crate::options::RefineOptions;
+use crate::parameters::calibration::{Calibration, Kappa};
+use crate::parameters::frame_estimate::FrameEstimate;
+use crate::problem::photometric_problem::PhotometricProblem;
+use crate::problem::unknown_texture::UnknownTexture;
+use crate::samples::sampling::Sampling;
+use crate::tiles::interpolation::Interpolation;
+use crate::uncertainty::covariance::Covariances;
+use nalgebra::Matrix6;
+use std::borrow::Cow;
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
+use tunnelstitch_core::survey::Survey;
+use tunnelstitch_core::trajectory::{Shutter, poses_of};
+
+/// Factor by which the frames of the bound have more pixels along each axis.
+pub const FINER: u32 = 4;
+/// Wall samples per fine pixel: slopes of the texture are differences over an eighth of a pixel to
+/// each side.
+const DENSITY: f64 = 2.0;
+
+/// Covariances that no estimate of the true poses undercuts.
+#[derive(Clone, Debug)]
+pub struct PoseBounds {
+    /// Cramér–Rao bound of unbiased estimates, with the slopes of the texture known.
+    pub known: Covariances,
+    /// Cramér–Rao bound with the texture unknown but for its spectrum.
+    pub unknown: Covariances,
+    /// Bayesian bound (van Trees) of estimates that also know the survey's prior, with the slopes
+    /// of the texture known.
+    pub bayesian: Covariances,
+}
+
+/// Computes the bounds for a survey that has true poses.
+///
+/// `fine` are its frames without noise and with [`FINER`] times as many pixels along each axis: the
+/// slopes of what a pixel sees can only be had from finer pixels. `noise_grey`: σ of a pixel, grey
+/// levels; `texture`: the spectrum of the wall's texture.
+///
+/// # Errors
+/// [`RefineError`]; also [`RefineError::NoOverlap`] for a survey without true poses.
+pub fn pose_bounds(
+    survey: &Survey,
+    fine: &[GreyImage],
+    noise_grey: f64,
+    texture: &UnknownTexture,
+) -> Result<PoseBounds, RefineError> {
+    let Some(truth) = &survey.truth else {
+        return Err(RefineError::NoOverlap);
+    };
+    let count = truth.len();
+    let times_s: Vec<f64> = survey
+        .initial
+        .iter()
+        .map(|stamped| stamped.time_s)
+        .collect();
+    let options = RefineOptions::default();
+    let prior = Prior {
+        jitter: survey.prior,
+        initial: survey.initial_poses(),
+        median_step_s: median_step_s(&times_s),
+        times_s,
+        log_gain_sigma: options.log_gain_sigma,
+        bias_sigma: options.bias_sigma,
+    };
+    let camera = finer_camera(&survey.camera);
+    let frames = fine
+        .iter()
+        .map(|frame| Pyramid::new(average_pixels(frame), 1));
+    let frames = FrameCache::of_pyramids(frames.collect());
+    // The motion during readout hardly changes the information.
+    let shutter = Shutter::default();
+    let context = EstimationContext {
+        surface: survey.surface.as_ref(),
+        ignored: &survey.ignored,
+        camera,
+        shutter: &shutter,
+        calibration: Calibration::none(&camera),
+        kappa: Kappa::zeros(),
+        frames: &frames,
+        prior: &prior,
+        noise: 0.0,
+    };
+    let estimates: Vec<FrameEstimate> =
+        poses_of(truth).into_iter().map(FrameEstimate::at).collect();
+    let window = FrameWindow {
+        participants: 0..count,
+        active: 0..count,
+        estimates: &estimates,
+        compared: Cow::Owned(vec![true; count]),
+    };
+    let sampling = Sampling {
+        density: DENSITY,
+        interpolation: Interpolation::Bicubic,
+        ..Sampling::of(0)
+    };
+    // One pixel is FINER² fine pixels.
+    let noise_grey = f64::from(FINER) * noise_grey;
+    let problem = PhotometricProblem::new(&context, sampling, window)?.with_known_noise(noise_grey);
+    let (prior, _) = problem.prior_information(&estimates, &Kappa::zeros());
+    let with_prior = problem.linearise(&estimates)?.normal;
+    let bayesian = invert(&problem, &with_prior)?;
+    let known = invert(&problem, &subtract_pose_prior(&prior, with_prior))?;
+    let problem = problem.with_unknown_texture(texture);
+    let pixels = subtract_pose_prior(&prior, problem.linearise(&estimates)?.normal);
+    Ok(PoseBounds {
+        known,
+        unknown: invert(&problem, &pixels)?,
+        bayesian,
+    })
+}
+
+/// Subtracts the prior of the poses from the normal equations; exposures keep theirs.
+fn subtract_pose_prior(prior: &[Block], mut normal: NormalEquations) -> NormalEquations {
+    for (block, prior) in normal.blocks.iter_mut().zip(prior) {
+        *block -= pose_part(prior);
+    }
+    normal
+}
+
+/// Inverts an information matrix, for each frame and for each pair of neighbours.
+fn invert(
+    problem: &PhotometricProblem,
+    normal: &NormalEquations,
+) -> Result<Covariances, RefineError> {
+    let inverse = SelectedInverse::new(problem.pattern(), normal)
+        .map_err(|source| problem.factor_error(source))?;
+    let pose = |row: usize, column: usize| {
+        let block = inverse.block(row, column);
+        block.map_or(Matrix6::from_element(f64::NAN), |block| {
+            block.fixed_view::<6, 6>(0, 0).into_owned()
+        })
+    };
+    let count = normal.gradient.len();
+    Ok(Covariances {
+        frames: (0..count).map(|k| pose(k, k)).collect(),
+        next: (1..count).map(|k| pose(k - 1, k)).collect(),
+        variance_factor: 1.0,
+    })
+}
+
+/// The part of a block that belongs to poses.
+fn pose_part(block: &Block) -> Block {
+    let mut pose = Block::zeros();
+    pose.fixed_view_mut::<6, 6>(0, 0)
+        .copy_from(&block.fixed_view::<6, 6>(0, 0));
+    pose
+}
+
+/// The camera of frames with pixels [`FINER`] times as fine, each averaged with its neighbours to
+/// the right and below: pixel `(u', v')` is centred at `(u'/FINER, v'/FINER)` of the camera's own.
+fn finer_camera(camera: &Camera) -> Camera {
+    let scale = f64::from(FINER);
+    Camera {
+        width: FINER * (camera.width - 1) + 1,
+        height: FINER * (camera.height - 1) + 1,
+        cx: scale * camera.cx,
+        cy: scale * camera.cy,
+        ..camera.upsampled(FINER)
+    }
+}
+
+/// Averages [`FINER`] × [`FINER`] fine pixels to the value of a full pixel, at every fine pixel.
+fn average_pixels(fine: &GreyImage) -> GreyImage {
+    let n = FINER as usize;
+    let (width, height) = (fine.width() + 1 - n, fine.height() + 1 - n);
+    let mut columns = vec![0.0; fine.width()];
+    let mut data = Vec::with_capacity(width * height);
+    for y in 0..height {
+        for (x, column) in columns.iter_mut().enumerate() {
+            *column = (y..y + n).map(|y| fine.at(x, y)).sum::<f32>() / (n * n) as f32;
+        }
+        data.extend(
+            columns
+                .windows(n)
+                .map(|columns| columns.iter().sum::<f32>()),
+        );
+    }
+    GreyImage::new(width, height, data)
+}

@@ -1,0 +1,105 @@
+//! Uncertainty of one frame, stated as σ of rotation, translation and wall position.
+
+use crate::linear::bordered_system::{BorderBlock, SharedBlock};
+use crate::parameters::calibration::INTRINSIC_PARAMETERS;
+use crate::parameters::frame_estimate::FrameEstimate;
+use nalgebra::Matrix6;
+use serde::{Deserialize, Deserializer};
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
+
+/// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
+///
+/// All are NaN where the equations are singular.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[non_exhaustive]
+pub struct FrameSigma {
+    /// Rotation, root mean square over the three axes, degrees.
+    #[serde(deserialize_with = "nan_if_null")]
+    pub rotation_deg: f64,
+    /// Translation, root mean square over the three axes, metres.
+    #[serde(deserialize_with = "nan_if_null")]
+    pub translation_m: f64,
+    /// Position on the wall, root mean square over the picture ([`Camera::grid_rays`]), metres.
+    #[serde(deserialize_with = "nan_if_null")]
+    pub wall_m: f64,
+    /// Position on the wall in pixels at the middle of the frame, as [`crate::evaluate::WallError`]
+    /// counts them.
+    #[serde(deserialize_with = "nan_if_null")]
+    pub wall_px: f64,
+}
+
+/// Reads a number that may be NaN, which JSON writes as null.
+fn nan_if_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
+}
+
+/// Computes σ of rotation, translation and wall position from the covariance of a pose.
+///
+/// `shared`: W of the frame and `Σ_κ`, where the shared parameters were estimated. As ξ moves by
+/// `−W κ` with κ, their covariance is `−W Σ_κ`; the wall point of a pixel, `A ξ + C κ`, is more
+/// certain than by the pose alone.
+pub fn compute_frame_sigma(
+    surface: &dyn Surface,
+    camera: &Camera,
+    estimate: &FrameEstimate,
+    covariance: &Matrix6<f64>,
+    shared: Option<(&BorderBlock, &SharedBlock)>,
+) -> FrameSigma {
+    let pose = &estimate.pose;
+    let trace = |first: usize| {
+        (0..3)
+            .map(|k| covariance[(first + k, first + k)])
+            .sum::<f64>()
+    };
+    let (mut variance_sum, mut points) = (0.0, 0.0);
+    for ray_c in camera.grid_rays() {
+        let ray = pose.r_wc * ray_c;
+        if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
+            let a = wall_jacobian(pose, &surface.frame(hit.wall));
+            let mut variance = (a * covariance * a.transpose()).trace();
+            if let Some((w, covariance)) = shared {
+                let c = lens_jacobian(pose, &a, camera, &(ray_c * hit.range));
+                let lens = covariance.fixed_rows::<INTRINSIC_PARAMETERS>(0);
+                let own = c * lens.fixed_columns::<INTRINSIC_PARAMETERS>(0) * c.transpose();
+                let crossed = c * lens * w.fixed_rows::<6>(0).transpose() * a.transpose();
+                variance += own.trace() - 2.0 * crossed.trace();
+            }
+            variance_sum += variance;
+            points += 1.0;
+        }
+    }
+    let wall_m = f64::sqrt(variance_sum / points);
+    let distance_m = viewing_distance(surface, pose).unwrap_or(f64::NAN);
+    FrameSigma {
+        rotation_deg: (trace(0) / 3.0).sqrt().to_degrees(),
+        translation_m: (trace(3) / 3.0).sqrt(),
+        wall_m,
+        wall_px: wall_m * camera.focal_px() / distance_m,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tunnelstitch_core::trajectory::{Pose, so3};
+
+    /// A camera with an error of a millimetre along the tunnel displaces all of the wall by a
+    /// millimetre; in pixels it is measured at the middle, even where the corners are far away.
+    #[test]
+    fn wall_sigma_in_pixels_is_measured_at_the_middle() {
+        let circle = tunnelstitch_core::surface::Circle::new(3.0).unwrap();
+        let camera = Camera::from_vertical_fov(160, 120, 40f64.to_radians());
+        let mut covariance = Matrix6::zeros();
+        covariance[(4, 4)] = 1e-6;
+        for (tilt_deg, distance_m) in [(0.0, 3.0), (45.0f64, 3.0 * 2f64.sqrt())] {
+            let tilt = nalgebra::Vector3::x() * tilt_deg.to_radians();
+            let pose = Pose::new(so3::exp(&tilt), nalgebra::Vector3::zeros());
+            let estimate = FrameEstimate::at(pose);
+            let sigma = compute_frame_sigma(&circle, &camera, &estimate, &covariance, None);
+            assert!((sigma.wall_m - 1e-3).abs() < 1e-9, "{sigma:?}");
+            let expected = 1e-3 * camera.fy / distance_m;
+            assert!((sigma.wall_px - expected).abs() < 1e-6, "{sigma:?}");
+        }
+    }
+}

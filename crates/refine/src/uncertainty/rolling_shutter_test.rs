@@ -1,0 +1,138 @@
+//! Rolling-shutter test: whether the frames fit better with another readout time than the one
+//! given.
+//!
+//! A camera that moves while rows are read displaces what it sees, more from row to row, in
+//! proportion to the time since the middle row. Where this is ignored, poses take up most of it:
+//! frames roll, and the whole wall is wound around the axis a little. The rest is the same in all
+//! frames, a residual along the rows. It is estimated as one number, the readout time with which
+//! the frames fit best, with everything else free ([`crate::linear::bordered_system`]). The
+//! intrinsics are free, too, within their usual uncertainty, so that a wrong lens does not pass for
+//! a wrong time.
+
+use crate::model::context::EstimationContext;
+use crate::model::frame_states::FrameStates;
+use crate::model::problem_error::ProblemError;
+use crate::options::RefineOptions;
+use crate::parameters::calibration::{Calibration, INTRINSIC_PARAMETERS, Kappa, READOUT_INDEX};
+use crate::problem::photometric_problem::PhotometricProblem;
+use crate::samples::sampling::Sampling;
+use crate::solver::argmin_glue::solve;
+use crate::solver::stopping::Stopping;
+use crate::thresholds::rolling_shutter_test::{
+    MAX_FRAMES, MAX_SOLVE_ITERATIONS, MIN_DIFFERENCE_SIGMA, MIN_SHIFT_PX, STEP_TOLERANCE_PX,
+    STEP_TOLERANCE_SIGMA,
+};
+use crate::uncertainty::observability::Posterior;
+use nalgebra::Vector3;
+use serde::Serialize;
+use tunnelstitch_core::surface::viewing_distance;
+use tunnelstitch_core::survey::{CalibrateSection, CalibrationGroup};
+
+/// Stopping rule of the solve; where the given time is right, the first step is the last.
+const STOPPING: Stopping = Stopping {
+    max_iterations: MAX_SOLVE_ITERATIONS,
+    step_px: STEP_TOLERANCE_PX,
+    step_sigma: STEP_TOLERANCE_SIGMA,
+};
+
+/// The readout time with which the frames fit best.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[non_exhaustive]
+pub struct ReadoutEstimate {
+    /// Time from reading a frame's first row to reading its last as given, milliseconds; 0 for a
+    /// global shutter.
+    pub given_ms: f64,
+    /// The readout time with which the frames fit best, milliseconds.
+    pub estimate_ms: f64,
+    /// 1-σ of the estimate, milliseconds.
+    pub sigma_ms: f64,
+    /// Displacement of the first row against the last by the difference, pixels in the middle of
+    /// the median frame.
+    pub shift_px: f64,
+    /// True if the difference is a systematic error.
+    pub systematic: bool,
+}
+
+/// Estimates the readout time; None if the frames do not observe it.
+///
+/// # Errors
+/// [`ProblemError`] for a frame that cannot be read.
+pub fn estimate_readout(
+    context: &EstimationContext,
+    options: &RefineOptions,
+    states: &FrameStates,
+) -> Result<Option<ReadoutEstimate>, ProblemError> {
+    let count = states.estimates.len();
+    let first = count.saturating_sub(MAX_FRAMES) / 2;
+    let frame_range = first..(first + MAX_FRAMES).min(count);
+    let calibration = free_readout(context);
+    let context = &EstimationContext {
+        calibration,
+        ..*context
+    };
+    let sampling = Sampling {
+        information: options.intermediate_information,
+        ..Sampling::of(options.handover_level(context.camera.shorter_side()))
+    };
+    let window = states.window_of(frame_range.clone(), frame_range);
+    let problem = PhotometricProblem::new(context, sampling, window)?.with_shared_parameters();
+    if problem.tiles() == 0 {
+        return Ok(None);
+    }
+    let solution = match solve(problem, STOPPING) {
+        Ok(solution) => solution,
+        Err(ProblemError::Factor { .. }) => return Ok(None),
+        Err(error) => return Err(error),
+    };
+    let Ok(Some(posterior)) = Posterior::at(&solution) else {
+        return Ok(None);
+    };
+    let Some(covariance) = posterior.covariance(&calibration.free) else {
+        return Ok(None);
+    };
+    let readout_ms = |kappa: &Kappa| 1e3 * calibration.readout_s(kappa);
+    let (given_ms, estimate_ms) = (readout_ms(&context.kappa), readout_ms(&solution.kappa));
+    let sigma_ms = 1e3 * covariance[(READOUT_INDEX, READOUT_INDEX)].sqrt();
+    let difference_ms = estimate_ms - given_ms;
+    let shift_px = 1e-3 * difference_ms.abs() * shift_px_per_s(context, states);
+    let is_significant = difference_ms.abs() > MIN_DIFFERENCE_SIGMA * sigma_ms;
+    Ok(sigma_ms.is_finite().then_some(ReadoutEstimate {
+        given_ms,
+        estimate_ms,
+        sigma_ms,
+        shift_px,
+        systematic: is_significant && shift_px > MIN_SHIFT_PX,
+    }))
+}
+
+/// The calibration with the intrinsics and the readout time free, besides what is free already.
+fn free_readout(context: &EstimationContext) -> Calibration {
+    use CalibrationGroup::{Centre, Distortion, Focal};
+    let mut calibration = context.calibration.intrinsics_only();
+    let section = CalibrateSection::default();
+    let intrinsics = Calibration::new(&[Focal, Centre, Distortion], &section, &context.camera, &[]);
+    for k in (0..INTRINSIC_PARAMETERS).filter(|k| !context.calibration.free[*k]) {
+        (calibration.free[k], calibration.sigma[k]) = (true, intrinsics.sigma[k]);
+    }
+    // Any time up to that between frames is possible.
+    calibration.free[READOUT_INDEX] = true;
+    calibration.sigma[READOUT_INDEX] = context.prior.median_step_s;
+    calibration
+}
+
+/// Displacement of the first row against the last in the middle of the median frame if the readout
+/// takes a second, pixels.
+fn shift_px_per_s(context: &EstimationContext, states: &FrameStates) -> f64 {
+    let all = 0..states.estimates.len();
+    let row_share = 1.0 - 1.0 / f64::from(context.camera.height);
+    let shift = |k: usize| {
+        let pose = &states.estimates[k].pose;
+        let x_c = Vector3::z() * viewing_distance(context.surface, pose).ok()?;
+        let rate = context.sweep_rate(k, &all, &states.estimates);
+        let moved = rate.omega_rad.cross(&x_c) + rate.nu_m;
+        Some((context.camera.project_jacobian(&x_c) * moved).norm() * row_share)
+    };
+    let mut shifts: Vec<f64> = all.clone().filter_map(shift).collect();
+    shifts.sort_unstable_by(f64::total_cmp);
+    shifts.get(shifts.len() / 2).copied().unwrap_or_default()
+}

@@ -1,0 +1,95 @@
+//! Pairs of frames that may share wall, in batches.
+
+use crate::model::context::EstimationContext;
+use crate::model::frame_states::FrameStates;
+use crate::model::problem_error::ProblemError;
+use crate::samples::footprints::footprint;
+use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
+use rayon::prelude::*;
+use std::ops::Range;
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::surface::Footprint;
+
+/// Frames compared at once: bounds the memory.
+const BATCH: usize = 32;
+
+/// The parts of the wall that the inliers among some consecutive frames see.
+pub struct Overlaps {
+    /// The footprint of every frame; None for rejected ones and those outside the range.
+    pub footprints: Vec<Option<Footprint>>,
+    frame_range: Range<usize>,
+    perimeter_m: f64,
+}
+
+/// Some frames, each with the later ones that may share wall with it.
+pub struct Batch {
+    /// Each frame that has any with its later partners.
+    pub partners: Vec<(usize, Vec<usize>)>,
+    /// All frames of the batch, ascending.
+    pub needed: Vec<usize>,
+}
+
+impl Overlaps {
+    /// The overlaps of the inliers of `frame_range` at their present poses, through `camera`.
+    ///
+    /// # Errors
+    /// [`ProblemError::Placement`].
+    pub fn of(
+        context: &EstimationContext,
+        camera: &Camera,
+        states: &FrameStates,
+        frame_range: &Range<usize>,
+    ) -> Result<Self, ProblemError> {
+        let frames = states.estimates.par_iter().zip(&states.rejections);
+        let footprints = frames
+            .enumerate()
+            .map(|(k, (estimate, rejection))| {
+                if frame_range.contains(&k) && rejection.is_none() {
+                    let camera = camera.with_sweep(&states.sweep(context, k));
+                    footprint(context, &camera, k, &estimate.pose).map(Some)
+                } else {
+                    Ok(None)
+                }
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Self {
+            footprints,
+            frame_range: frame_range.clone(),
+            perimeter_m: context.surface.perimeter_m(),
+        })
+    }
+
+    /// The frames in batches, each with those of its later partners for which `is_wanted` is true.
+    pub fn batches(&self, is_wanted: impl Fn(usize, usize) -> bool) -> impl Iterator<Item = Batch> {
+        self.frame_range.clone().step_by(BATCH).map(move |start| {
+            let frames = start..(start + BATCH).min(self.frame_range.end);
+            let partners: Vec<(usize, Vec<usize>)> = frames
+                .map(|a| {
+                    let mut partners = self.later_partners(a);
+                    partners.retain(|b| is_wanted(a, *b));
+                    (a, partners)
+                })
+                .filter(|(_, partners)| !partners.is_empty())
+                .collect();
+            let all = partners
+                .iter()
+                .flat_map(|(a, partners)| std::iter::once(a).chain(partners));
+            let mut needed: Vec<usize> = all.copied().collect();
+            needed.sort_unstable();
+            needed.dedup();
+            Batch { partners, needed }
+        })
+    }
+
+    /// The frames after frame `a` that may share wall with it.
+    fn later_partners(&self, a: usize) -> Vec<usize> {
+        let Some(own) = &self.footprints[a] else {
+            return Vec::new();
+        };
+        let end = (a + MAX_OVERLAP_DISTANCE_FRAMES + 1).min(self.frame_range.end);
+        let overlaps = |other: &Footprint| other.overlaps(own, self.perimeter_m);
+        (a + 1..end)
+            .filter(|b| self.footprints[*b].as_ref().is_some_and(overlaps))
+            .collect()
+    }
+}

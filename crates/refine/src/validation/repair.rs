@@ -1,0 +1,148 @@
+//! Repair: rejects frames that the others do not support, registers them again, and solves their
+//! neighbourhood.
+//!
+//! A wrong frame bends those that it is compared with, and a bent wall makes the registration of
+//! the next frame wrong. Gauss–Newton at full size cannot undo that: many pixels off, it is outside
+//! its basin. So when frames are found wrong, they are rejected, the others are solved again from
+//! the coarsest level, and the rejected frames are registered once more on the wall as it is then.
+
+use crate::model::context::EstimationContext;
+use crate::model::frame_states::FrameStates;
+use crate::model::problem_error::ProblemError;
+use crate::options::RefineOptions;
+use crate::solver::neighbourhood::{Neighbourhood, changes};
+use crate::thresholds::repair::{MAX_ITERATIONS, MAX_REGISTRATION_ITERATIONS};
+use crate::tracking::track::register_rejected;
+use crate::validation::aliasing::{AliasHypothesis, resolve_aliases, resolve_all_aliases};
+use crate::validation::alignment::Alignment;
+use crate::validation::contradictions::find_contradictions;
+use crate::validation::inconsistent_frames::{find_inconsistent_frames, reject_disagreeing_frames};
+use crate::validation::pairwise_lucas_kanade::align_pairs;
+use crate::validation::pairwise_ncc::compute_pairwise_ncc;
+use std::ops::Range;
+use tunnelstitch_core::progress::Progress;
+
+/// Rejects the frames that the others do not support, registers them again, and solves their
+/// neighbourhood, until nothing changes. `solved`: the frames as the last solve left them.
+///
+/// Returns the frames whose aliases remain undecided. If an earlier iteration had more inliers than
+/// the last, its frames are restored.
+///
+/// # Errors
+/// [`ProblemError`].
+pub fn repair(
+    context: &EstimationContext,
+    options: &RefineOptions,
+    states: &mut FrameStates,
+    mut solved: FrameStates,
+    progress: &dyn Progress,
+) -> Result<Vec<AliasHypothesis>, ProblemError> {
+    let count = states.estimates.len();
+    let finest = options.handover_level(context.camera.shorter_side());
+    progress.start("repair", MAX_ITERATIONS);
+    let mut alignments = align_pairs(context, finest, states, &(0..count))?;
+    let mut best: Option<FrameStates> = None;
+    // Known for the present poses only.
+    let mut undecided = None;
+    for iteration in 0..MAX_ITERATIONS {
+        alignments.retain(|pair| {
+            [pair.a, pair.b]
+                .iter()
+                .all(|k| states.rejections[*k].is_none())
+        });
+        states.reject(find_inconsistent_frames(&alignments, count));
+        let has_changed = !changes(&solved, states).is_empty();
+        let is_better = |best: &FrameStates| count_inliers(best) < count_inliers(states);
+        if !has_changed && best.as_ref().is_none_or(is_better) {
+            best = Some(states.clone());
+        }
+        let registered = if iteration < MAX_REGISTRATION_ITERATIONS {
+            register_rejected(context, options, states)?
+        } else {
+            0
+        };
+        if !has_changed && registered == 0 {
+            let resolution = resolve_aliases(context, options, states)?;
+            if resolution.moved.is_empty() || iteration + 1 == MAX_ITERATIONS {
+                undecided = Some(resolution.into_undecided());
+                break;
+            }
+        }
+        let neighbourhoods = Neighbourhood::of_changes(context, &solved, states)?;
+        solve_neighbourhoods(context, options, &neighbourhoods, states, &mut solved)?;
+        align_again(context, finest, &neighbourhoods, states, &mut alignments)?;
+        progress.advance(1);
+    }
+    progress.finish();
+    if let Some(best) = best.filter(|best| count_inliers(best) > count_inliers(states)) {
+        *states = best;
+        undecided = None;
+    }
+    match undecided {
+        Some(undecided) => Ok(undecided),
+        None => resolve_all_aliases(context, options, states),
+    }
+}
+
+/// Solves neighbourhoods from the coarsest level to full size, and rejects their frames that
+/// disagree with the others or contradict them. `solved` is set to the frames as these solves leave
+/// them.
+fn solve_neighbourhoods(
+    context: &EstimationContext,
+    options: &RefineOptions,
+    neighbourhoods: &[Neighbourhood],
+    states: &mut FrameStates,
+    solved: &mut FrameStates,
+) -> Result<(), ProblemError> {
+    let side = context.camera.shorter_side();
+    let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
+    let count = states.estimates.len();
+    let mut shares = Vec::new();
+    for neighbourhood in neighbourhoods {
+        shares.push(neighbourhood.solve(context, options, 0..=coarsest, states)?);
+    }
+    solved.clone_from(states);
+    for (neighbourhood, shares) in neighbourhoods.iter().zip(&shares) {
+        let rejections = &mut states.rejections[neighbourhood.active.clone()];
+        reject_disagreeing_frames(shares, rejections);
+    }
+    for neighbourhood in neighbourhoods {
+        let pairs = compute_pairwise_ncc(context, finest, states, &neighbourhood.participants)?;
+        let mut found = find_contradictions(&pairs, count);
+        // Frames that were held lack some of their pairs.
+        found.retain(|(frame, _)| neighbourhood.active.contains(frame));
+        states.reject(found);
+    }
+    Ok(())
+}
+
+/// Replaces the alignments that the solve of neighbourhoods has changed.
+fn align_again(
+    context: &EstimationContext,
+    finest: usize,
+    neighbourhoods: &[Neighbourhood],
+    states: &FrameStates,
+    alignments: &mut Vec<Alignment>,
+) -> Result<(), ProblemError> {
+    for Neighbourhood {
+        active,
+        participants,
+    } in neighbourhoods
+    {
+        let within =
+            |frames: &Range<usize>, pair: &Alignment| [pair.a, pair.b].map(|k| frames.contains(&k));
+        alignments.retain(|pair| {
+            within(participants, pair) != [true; 2] && within(active, pair) == [false; 2]
+        });
+        alignments.extend(align_pairs(context, finest, states, participants)?);
+    }
+    Ok(())
+}
+
+fn count_inliers(states: &FrameStates) -> usize {
+    states
+        .rejections
+        .iter()
+        .filter(|rejection| rejection.is_none())
+        .count()
+}

@@ -1,0 +1,294 @@
+//! Exposure of the frames, and its removal.
+//!
+//! A frame i shows `I = a_i V(u, v) S + b_i` of the evenly lit wall S: gain a and bias b are the
+//! frame's own, V is the shading of lamp and lens, the same in all frames ([`Shading`]). They are
+//! calibrated by wall points all over the panorama ([`tunnelstitch_photometry`]), with nothing known
+//! beforehand: `a = e^α`, `b = β`, `ln V = Σ c_k B_k`.
+//!
+//! A common factor of gains and wall cannot be observed. It is fixed twice over: V is 1 where it is
+//! brightest, and the gains are 1 in the (geometric) mean.
+
+use super::patch_light::PatchLight;
+use super::photometric_samples::observe_points;
+use super::point_batch::PointBatch;
+use super::sample::Sample;
+use super::thumbnails::Thumbnails;
+use crate::layout::canvas::Canvas;
+use crate::layout::placement::Placement;
+use crate::warp::patches::PATCH_SCALE;
+use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use tunnelstitch_core::frames::Shading;
+use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_core::surface::Surface;
+use tunnelstitch_photometry::{PhotometricCalibration, Priors};
+
+/// Wall points a frame.
+const POINTS_PER_FRAME: usize = 40;
+/// Wall points at the least.
+const MIN_POINTS: usize = 20_000;
+
+/// The exposure of all frames.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Exposure {
+    frames: Vec<FrameExposure>,
+    shading: Option<Table>,
+    /// Full scale of the frames over 255.
+    scale: f32,
+}
+
+/// Exposure of one frame: `I = a V S + b`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct FrameExposure {
+    /// Gain a.
+    pub gain: f64,
+    /// Bias b, grey levels of 255.
+    pub bias: f64,
+}
+
+impl Exposure {
+    /// Frames that stay as they are.
+    pub fn none(frames: usize) -> Self {
+        let own = FrameExposure {
+            gain: 1.0,
+            bias: 0.0,
+        };
+        Self {
+            frames: vec![own; frames],
+            shading: None,
+            scale: 1.0,
+        }
+    }
+
+    /// The exposures that make frames agree where they overlap.
+    ///
+    /// `white`: full scale of the frames' samples.
+    pub fn solve(
+        surface: &dyn Surface,
+        thumbnails: &Thumbnails,
+        placements: &[Placement],
+        canvas: &Canvas,
+        white: f32,
+    ) -> Self {
+        let count = placements.len();
+        let grid = canvas.coarser((POINTS_PER_FRAME * count).max(MIN_POINTS));
+        let size = thumbnails.full_size();
+        let points = observe_points(surface, thumbnails, placements, &grid);
+        let Some(found) = PhotometricCalibration::solve(&points, count, size, &Priors::default())
+        else {
+            return Self {
+                scale: white / 255.0,
+                ..Self::none(count)
+            };
+        };
+        let shading = Shading::none(size).changed(&found.shading);
+        let brightest = shading.range()[1];
+        let mean_log = found.log_gains.iter().sum::<f64>() / count as f64;
+        let own = found.log_gains.iter().zip(&found.biases);
+        let frames = own.map(|(log_gain, bias)| FrameExposure {
+            gain: (log_gain - mean_log).exp(),
+            bias: *bias,
+        });
+        Self {
+            frames: frames.collect(),
+            shading: Some(Table::new(&shading, brightest, size)),
+            scale: white / 255.0,
+        }
+    }
+
+    /// The frames' gains and biases.
+    pub fn frames(&self) -> &[FrameExposure] {
+        &self.frames
+    }
+
+    /// The response of a frame, which undoes its exposure.
+    pub fn of(&self, frame: usize) -> Response<'_> {
+        let FrameExposure { gain, bias } = self.frames[frame];
+        Response {
+            gain: (1.0 / gain) as f32,
+            bias: bias as f32 * self.scale,
+            shading: self.shading.as_ref(),
+        }
+    }
+
+    /// The exposure of the thumbnails of the same frames, which are 16 bits deep.
+    pub fn of_thumbnails(&self, thumbnails: &Thumbnails) -> Self {
+        let shading = self.shading.clone().map(|table| Table {
+            offset: table.scale.map(|s| s * thumbnails.full(0.0)),
+            scale: table.scale.map(|s| s * thumbnails.scale()),
+            ..table
+        });
+        Self {
+            frames: self.frames.clone(),
+            shading,
+            scale: u16::WHITE / 255.0,
+        }
+    }
+}
+
+/// Undoes the exposure of one frame: `S = (I − b)/(a V)`.
+#[derive(Clone, Copy, Debug)]
+pub struct Response<'a> {
+    gain: f32,
+    bias: f32,
+    shading: Option<&'a Table>,
+}
+
+impl Response<'_> {
+    /// True if there is nothing to undo.
+    pub fn is_none(&self) -> bool {
+        self.shading.is_none() && self.gain == 1.0 && self.bias == 0.0
+    }
+
+    /// The bias, which is taken away before values are multiplied by the light.
+    pub fn bias(&self) -> f32 {
+        self.bias
+    }
+
+    /// The factor of values over a patch, by the pixels at which its ends and middles appear in the
+    /// frame; `None` if there is nothing to undo.
+    pub fn light(&self, pixels: impl FnOnce() -> [[[f32; 2]; 3]; 3]) -> Option<PatchLight> {
+        if self.is_none() {
+            return None;
+        }
+        let Some(table) = self.shading else {
+            return Some(PatchLight::even(self.gain));
+        };
+        let at = |[u, v]: [f32; 2]| self.gain * table.at(u, v);
+        Some(PatchLight::through(pixels().map(|row| row.map(at))))
+    }
+
+    /// Undoes the exposure in the values of some columns of a run that lie in one row of a patch;
+    /// `first`: the column where the patch begins.
+    pub fn undo_by(
+        &self,
+        light: &PatchLight,
+        row: usize,
+        batch: &mut PointBatch,
+        first: usize,
+        columns: Range<usize>,
+    ) {
+        let [a, b, c] = light.row(row);
+        let bias = self.bias;
+        let values = &mut batch.values_mut()[columns.clone()];
+        dispatch_simd(
+            #[inline(always)]
+            || {
+                for (column, value) in columns.clone().zip(values.iter_mut()) {
+                    let x = (column - first) as f32 * PATCH_SCALE - 1.0;
+                    let factor = (c * x + b) * x + a;
+                    for value in value {
+                        *value = (*value - bias) * factor;
+                    }
+                }
+            },
+        );
+    }
+
+    /// Undoes the exposure in some of the values of a run by the pixels at which its points appear.
+    pub fn undo(&self, batch: &mut PointBatch, columns: Range<usize>) {
+        if self.is_none() {
+            return;
+        }
+        let (u, v, seen, values) = batch.parts();
+        let Some(table) = self.shading else {
+            for value in values[columns].as_flattened_mut() {
+                *value = self.undone(*value, self.gain);
+            }
+            return;
+        };
+        let last_column = columns.end.saturating_sub(1);
+        dispatch_simd(
+            #[inline(always)]
+            || {
+                // Light changes so slowly that it is looked up at the ends of short steps only.
+                for start in columns.clone().step_by(STEP) {
+                    let end = (start + STEP).min(columns.end);
+                    let last = end.min(last_column);
+                    if seen[start] && seen[last] {
+                        let first = self.gain * table.at(u[start], v[start]);
+                        let change = self.gain * table.at(u[last], v[last]) - first;
+                        let slope = change / (last - start).max(1) as f32;
+                        for (k, value) in values[start..end].iter_mut().enumerate() {
+                            let factor = first + k as f32 * slope;
+                            for value in value {
+                                *value = self.undone(*value, factor);
+                            }
+                        }
+                    } else {
+                        let places = u[start..end].iter().zip(&v[start..end]);
+                        for (value, (u, v)) in values[start..end].iter_mut().zip(places) {
+                            let factor = self.gain * table.at(*u, *v);
+                            for value in value {
+                                *value = self.undone(*value, factor);
+                            }
+                        }
+                    }
+                }
+            },
+        );
+    }
+
+    /// The value of the evenly lit wall for one of the frame at a pixel.
+    pub fn wall(&self, value: f32, u: f32, v: f32) -> f32 {
+        let light = self.shading.map_or(1.0, |table| table.at(u, v));
+        self.undone(value, self.gain * light)
+    }
+
+    #[inline(always)]
+    fn undone(&self, value: f32, factor: f32) -> f32 {
+        (value - self.bias) * factor
+    }
+}
+
+/// Points of a run between which light is taken for linear.
+const STEP: usize = 8;
+
+/// Nodes of [`Table`] across and down.
+const NODES: (usize, usize) = (65, 49);
+
+/// `1/V` at nodes spread over a picture; bilinear between them.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Table {
+    values: Vec<f32>,
+    /// Nodes per pixel across and down.
+    scale: [f32; 2],
+    /// Position of the first pixel's centre, nodes.
+    offset: [f32; 2],
+}
+
+impl Table {
+    fn new(shading: &Shading, brightest: f64, size: (usize, usize)) -> Self {
+        let last = |size: usize| (size.max(2) - 1) as f64;
+        let pixel =
+            |k: usize, nodes: usize, size: usize| k as f64 / (nodes - 1) as f64 * last(size);
+        let values = (0..NODES.1).flat_map(|j| {
+            (0..NODES.0).map(move |i| {
+                let at = Vector2::new(pixel(i, NODES.0, size.0), pixel(j, NODES.1, size.1));
+                (brightest / shading.at(&at)) as f32
+            })
+        });
+        let scale = |nodes: usize, size: usize| ((nodes - 1) as f64 / last(size)) as f32;
+        Self {
+            values: values.collect(),
+            scale: [scale(NODES.0, size.0), scale(NODES.1, size.1)],
+            offset: [0.0; 2],
+        }
+    }
+
+    #[inline(always)]
+    fn at(&self, u: f32, v: f32) -> f32 {
+        // Points that are not seen may be anywhere: the casts saturate, and what comes out is not
+        // used.
+        let x = u * self.scale[0] + self.offset[0];
+        let y = v * self.scale[1] + self.offset[1];
+        let (i, j) = ((x as usize).min(NODES.0 - 2), (y as usize).min(NODES.1 - 2));
+        let (s, t) = (x - i as f32, y - j as f32);
+        let nodes = &self.values[j * NODES.0 + i..][..NODES.0 + 2];
+        let upper = nodes[0] + s * (nodes[1] - nodes[0]);
+        let lower = nodes[NODES.0] + s * (nodes[NODES.0 + 1] - nodes[NODES.0]);
+        upper + t * (lower - upper)
+    }
+}

@@ -1,0 +1,59 @@
+//! Observations of single wall points by the frames, for their photometric calibration.
+
+use super::point_batch::PointBatch;
+use super::thumbnails::Thumbnails;
+use crate::layout::canvas::Canvas;
+use crate::layout::placement::Placement;
+use crate::layout::tiles::{EDGE, Tile, tiles};
+use crate::warp::projection::LocalPoints;
+use rayon::prelude::*;
+use tunnelstitch_core::surface::Surface;
+use tunnelstitch_photometry::Observation;
+
+/// Observes the points of `grid` that at least two frames show in the thumbnails, with nothing
+/// known of gain, bias and shading.
+pub fn observe_points(
+    surface: &dyn Surface,
+    thumbnails: &Thumbnails,
+    placements: &[Placement],
+    grid: &Canvas,
+) -> Vec<Vec<Observation>> {
+    let bands = tiles(surface, grid, placements, EDGE);
+    let found: Vec<Vec<Vec<Observation>>> = bands
+        .par_iter()
+        .flatten()
+        .map(|tile| observe_tile(surface, thumbnails, placements, grid, tile))
+        .collect();
+    found.into_iter().flatten().collect()
+}
+
+/// Observes the points of one tile of `grid`.
+fn observe_tile(
+    surface: &dyn Surface,
+    thumbnails: &Thumbnails,
+    placements: &[Placement],
+    grid: &Canvas,
+    tile: &Tile,
+) -> Vec<Vec<Observation>> {
+    let points = LocalPoints::new(&tile.points(surface, grid));
+    let mut found: Vec<Vec<Observation>> = vec![Vec::new(); tile.pixels()];
+    let columns = tile.columns as usize;
+    let mut batch = PointBatch::default();
+    for &frame in &tile.frames {
+        let view = thumbnails.view(frame, &placements[frame], &points);
+        for row in 0..tile.rows as usize {
+            view.look_at(&mut batch, row * columns, columns);
+            let (u, v) = batch.pixels();
+            for k in 0..columns {
+                if !batch.seen()[k] {
+                    continue;
+                }
+                let grey = thumbnails.format().grey(batch.values()[k]);
+                let pixel = [u[k], v[k]].map(|t| thumbnails.full(t));
+                found[row * columns + k].extend(Observation::new(frame, pixel, grey, 1.0));
+            }
+        }
+    }
+    found.retain(|point| point.len() > 1);
+    found
+}

@@ -1,0 +1,157 @@
+//! Small pictures of all frames, for exposure and seams.
+
+use super::picture::Picture;
+use super::picture_cache::PictureCache;
+use super::pixel_format::PixelFormat;
+use super::point_batch::PointBatch;
+use crate::error::RenderError;
+use crate::layout::canvas::Canvas;
+use crate::layout::placement::{Placement, native_px_per_metre};
+use crate::warp::projection::{LocalPoints, LocalProjection};
+use rayon::prelude::*;
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::numerics::kernel::{Interpolation, Kernel};
+use tunnelstitch_core::progress::Progress;
+use tunnelstitch_core::surface::Surface;
+
+/// Small 16-bit pictures of all frames.
+#[derive(Clone, Debug)]
+pub struct Thumbnails {
+    camera: Camera,
+    full_size: (usize, usize),
+    scale: f32,
+    pictures: Vec<Picture>,
+    bilinear: Kernel,
+}
+
+impl Thumbnails {
+    /// Makes thumbnails whose pixels are means of `2^level × 2^level` pixels of the frames.
+    ///
+    /// Frames that are not in memory are decoded and dropped again.
+    ///
+    /// # Errors
+    /// A frame that is missing, damaged or of another size than the calibration's; the first of
+    /// them.
+    pub fn of(
+        frames: &PictureCache,
+        level: usize,
+        progress: &dyn Progress,
+    ) -> Result<Self, RenderError> {
+        progress.start("thumbnails", frames.len());
+        let pictures: Vec<Result<Picture, RenderError>> = (0..frames.len())
+            .into_par_iter()
+            .map(|frame| {
+                let small = match frames.picture(frame) {
+                    Some(picture) => picture.thumbnail(level),
+                    None => frames.decode(frame)?.thumbnail(level),
+                };
+                progress.advance(1);
+                Ok(small)
+            })
+            .collect();
+        progress.finish();
+        let camera = frames.camera();
+        Ok(Self {
+            camera: camera.at_level(level),
+            full_size: (camera.width as usize, camera.height as usize),
+            scale: (1 << level) as f32,
+            bilinear: Kernel::new(Interpolation::Bilinear, 1.0),
+            pictures: pictures.into_iter().collect::<Result<Vec<_>, _>>()?,
+        })
+    }
+
+    /// Level at which frames, as they are held, are about as fine as `grid`.
+    ///
+    /// # Errors
+    /// As [`native_px_per_metre`].
+    pub fn level(
+        surface: &dyn Surface,
+        frames: &PictureCache,
+        placements: &[Placement],
+        grid: &Canvas,
+    ) -> Result<usize, RenderError> {
+        let camera = frames.camera();
+        let poses = placements.iter().map(|placement| &placement.pose);
+        let native = native_px_per_metre(surface, camera, poses)?;
+        let most = camera.shorter_side().max(16).ilog2() - 4;
+        let level = (native / grid.px_per_metre).log2().round();
+        Ok(level.clamp(0.0, f64::from(most)) as usize)
+    }
+
+    /// Memory of the thumbnails of `frames` frames of the given camera, bytes.
+    pub fn bytes(camera: &Camera, level: usize, channels: usize, frames: usize) -> u64 {
+        let small = camera.at_level(level);
+        let pixels = u64::from(small.width) * u64::from(small.height);
+        2 * pixels * (channels * frames) as u64
+    }
+
+    /// Samples a pixel: 1 or 3.
+    pub fn channels(&self) -> usize {
+        self.pictures.first().map_or(1, |p| p.format().channels)
+    }
+
+    /// The camera of the thumbnails.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// Width and height of the frames, pixels.
+    pub fn full_size(&self) -> (usize, usize) {
+        self.full_size
+    }
+
+    /// Pixels of a frame along each side of a thumbnail's.
+    pub fn scale(&self) -> f32 {
+        self.scale
+    }
+
+    /// Coordinate on a frame of one on its thumbnail: `2^l t + (2^l − 1)/2`.
+    #[inline(always)]
+    pub fn full(&self, t: f32) -> f32 {
+        self.scale * t + 0.5 * (self.scale - 1.0)
+    }
+
+    /// Channels and depth.
+    pub fn format(&self) -> PixelFormat {
+        PixelFormat {
+            channels: self.channels(),
+            deep: true,
+        }
+    }
+
+    /// Prepares the thumbnail of a frame for sampling at `points`.
+    pub fn view<'a>(
+        &'a self,
+        frame: usize,
+        placement: &Placement,
+        points: &'a LocalPoints,
+    ) -> ThumbnailView<'a> {
+        ThumbnailView {
+            projection: LocalProjection::new(
+                &placement.camera(&self.camera),
+                &placement.pose,
+                &points.origin,
+            ),
+            picture: &self.pictures[frame],
+            bilinear: &self.bilinear,
+            points,
+        }
+    }
+}
+
+/// A thumbnail, prepared for sampling at points of the wall.
+pub struct ThumbnailView<'a> {
+    projection: LocalProjection,
+    picture: &'a Picture,
+    bilinear: &'a Kernel,
+    points: &'a LocalPoints,
+}
+
+impl ThumbnailView<'_> {
+    /// Samples `count` of the points from index `start`: their pixels, and the values there,
+    /// bilinear.
+    pub fn look_at(&self, batch: &mut PointBatch, start: usize, count: usize) {
+        batch.project(&self.projection, self.points, start, count);
+        batch.sample(self.picture, self.bilinear, 0..count);
+    }
+}

@@ -1,0 +1,194 @@
+//! Simulated survey in memory.
+
+use crate::camera_path::CameraPath;
+use crate::error::SimulateError;
+use crate::exposure::GainBias;
+use crate::options::SimulateOptions;
+use crate::procedural_noise::RandomStream;
+use crate::rig_shaft::RigShaft;
+use crate::texture::open::open_texture;
+use crate::texture::wall_texture::WallTexture;
+use crate::tunnel::Tunnel;
+use crate::visible_wall::{texel_size_m, visible_chainage};
+use crate::wall_raster::MAX_TEXELS;
+use crate::wet_patches::WetPatches;
+use nalgebra::Vector3;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::trajectory::{Jitter, Pose, spiral};
+
+/// A tunnel and the camera's path through it.
+pub struct Scene {
+    pub(super) options: SimulateOptions,
+    pub(super) camera: Camera,
+    plan: Vec<Pose>,
+    pub(super) path: CameraPath,
+    /// Minimum and maximum chainage that each frame sees, metres.
+    pub(super) visible_h_m: Vec<[f64; 2]>,
+    pub(super) tunnel: Tunnel,
+    pub(super) texture: Box<dyn WallTexture>,
+    pub(super) wet_patches: Option<WetPatches>,
+    /// Number of texels around the section.
+    pub(super) columns: usize,
+}
+
+impl Scene {
+    /// Builds the survey: plan, true poses and wall.
+    ///
+    /// # Errors
+    /// [`SimulateError`] for impossible options, an unusable texture, and true poses outside the
+    /// tunnel or with a view along it.
+    pub fn new(options: &SimulateOptions) -> Result<Self, SimulateError> {
+        options.validate()?;
+        let camera = options.camera;
+        let plan = spiral(
+            options.frames,
+            options.advance_m,
+            options.turn_deg.to_radians(),
+        );
+        let offset = Vector3::from(options.offset_m);
+        let mut truth: Vec<Pose> = plan
+            .iter()
+            .map(|pose| Pose::new(pose.r_wc, pose.t_wc + offset))
+            .collect();
+        if let Some(jitter) = options.jitter {
+            let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+            truth = Jitter::from(jitter).apply(&truth, &mut rng);
+        }
+        // Both are defined along a straight axis, and then follow the real one.
+        let tunnel = Tunnel::new(options)?;
+        let [plan, truth] = [plan, truth]
+            .map(|poses| -> Vec<Pose> { poses.iter().map(|pose| tunnel.to_world(pose)).collect() });
+        let texel_m = texel_size_m(&tunnel, &camera, &truth);
+        let readout_share = 1e-3 * options.readout_ms / options.interval_s;
+        let path = CameraPath::new(truth, readout_share, camera.height);
+        let visible_h_m = (0..options.frames)
+            .map(|frame| visible_chainage(frame, &path, &camera, &tunnel))
+            .collect::<Result<Vec<_>, _>>()?;
+        let perimeter_m = tunnel.perimeter_m();
+        let widest = visible_h_m
+            .iter()
+            .map(|h_m| h_m[1] - h_m[0])
+            .fold(0.0, f64::max);
+        if perimeter_m / texel_m * widest / texel_m > 4.0 * MAX_TEXELS as f64 {
+            return Err(SimulateError::Option {
+                what: format!(
+                    "a frame would see {perimeter_m:.0} × {widest:.0} m of wall painted in steps \
+                     of {:.1} mm, which is more than memory is for; lower the radius, the field \
+                     of view or the frames' size",
+                    1e3 * texel_m
+                ),
+            });
+        }
+        Ok(Self {
+            texture: open_texture(
+                &options.wall,
+                RandomStream::WallTexture.seed(options.seed),
+                perimeter_m,
+            )?,
+            wet_patches: (options.specular_percent > 0.0)
+                .then(|| WetPatches::new(options.seed, options.specular_percent, perimeter_m)),
+            columns: (perimeter_m / texel_m).ceil() as usize,
+            tunnel,
+            options: options.clone(),
+            camera,
+            plan,
+            path,
+            visible_h_m,
+        })
+    }
+
+    /// The camera.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The planned poses, which become the survey's initial poses.
+    pub fn plan(&self) -> &[Pose] {
+        &self.plan
+    }
+
+    /// The true poses, at the time of each frame's middle row.
+    pub fn truth(&self) -> &[Pose] {
+        self.path.poses()
+    }
+
+    /// Gain and bias of a frame.
+    pub fn exposure(&self, frame: usize) -> GainBias {
+        GainBias::draw(&self.options, frame)
+    }
+
+    /// The indices of all frames that exist, in order.
+    pub fn frames(&self) -> impl Iterator<Item = usize> + '_ {
+        let bad_frames = &self.options.bad_frames;
+        (0..self.options.frames).filter(|frame| bad_frames.source_frame(*frame).is_some())
+    }
+
+    /// The shaft of the rig, if it is visible.
+    pub(super) fn shaft(&self) -> Option<RigShaft> {
+        let percent = self.options.shaft_percent;
+        let (width, height) = (self.camera.width as usize, self.camera.height as usize);
+        (percent > 0.0).then(|| RigShaft::new(percent, width, height))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tunnelstitch_core::survey::PriorSection;
+
+    fn small() -> SimulateOptions {
+        SimulateOptions {
+            camera: Camera::from_vertical_fov(80, 60, 60f64.to_radians()),
+            frames: 12,
+            ..SimulateOptions::free()
+        }
+    }
+
+    #[test]
+    fn off_centre_frames_stand_where_the_paper_put_them() {
+        let scene = Scene::new(&SimulateOptions::off_centre()).unwrap();
+        for (planned, real) in scene.plan().iter().zip(scene.truth()) {
+            assert_eq!(planned.t_wc.norm(), 0.0);
+            assert_eq!(real.t_wc, Vector3::new(0.5, 0.0, 0.5));
+            assert_eq!(planned.r_wc, real.r_wc);
+        }
+    }
+
+    #[test]
+    fn jitter_depends_on_the_seed_and_not_on_the_picture() {
+        let truth = |options: SimulateOptions| Scene::new(&options).unwrap().truth().to_vec();
+        let first = truth(small());
+        assert_eq!(
+            first,
+            truth(SimulateOptions {
+                noise_grey: 0.0,
+                camera: Camera::from_vertical_fov(64, 60, 60f64.to_radians()),
+                ..small()
+            })
+        );
+        assert_ne!(first, truth(SimulateOptions { seed: 2, ..small() }));
+    }
+
+    #[test]
+    fn poses_that_leave_the_tunnel_or_look_along_it_are_named() {
+        let jitter = |rotation_sigma_deg, sigma_m| SimulateOptions {
+            jitter: Some(PriorSection {
+                rotation_sigma_deg,
+                translation_sigma_m: [sigma_m; 3],
+                ..PriorSection::default()
+            }),
+            frames: 100,
+            ..small()
+        };
+        let message = |options: &SimulateOptions| Scene::new(options).err().unwrap().to_string();
+        let outside = message(&jitter(0.0, 5.0));
+        assert!(
+            outside.contains("frame") && outside.contains("off the axis"),
+            "{outside}"
+        );
+        let along = message(&jitter(40.0, 0.01));
+        assert!(along.contains("along the tunnel"), "{along}");
+    }
+}

@@ -1,0 +1,223 @@
+//! Writes a simulated survey to a folder.
+
+use crate::error::SimulateError;
+use crate::options::SimulateOptions;
+use crate::scene::Scene;
+use image::{GrayImage, Luma};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::Path;
+use tunnelstitch_core::camera::format_calibration;
+use tunnelstitch_core::frames::{PictureFormat, write_picture};
+use tunnelstitch_core::persist::atomic::{self, StagedFolder, WriteError};
+use tunnelstitch_core::progress::Progress;
+use tunnelstitch_core::survey::{
+    CameraSection, FramesSection, PosesSection, SURVEY_FILE, SurveyFile, TunnelSection,
+};
+use tunnelstitch_core::trajectory::{Pose, StampedPose, tum};
+
+/// Content of `simulation.json`, from which the survey can be simulated again.
+#[derive(Clone, Debug, Serialize)]
+pub struct SimulationRecord {
+    /// Name and version of the program.
+    pub program: &'static str,
+    /// Options of the simulation.
+    pub options: SimulateOptions,
+}
+
+/// Simulates a survey and writes its folder.
+///
+/// The folder has `survey.toml`, `camera.json`, `frames/000000.png` …, `baseline.tum` (the plan),
+/// `groundtruth.tum` and `simulation.json`, and `mask.png` if the rig's shaft is visible.
+///
+/// Nothing appears under the name `out` unless everything was written. With `overwrite`, an earlier
+/// simulated survey of that name is replaced. The same options give the same bytes, whatever the
+/// number of threads.
+///
+/// # Errors
+/// [`SimulateError`].
+pub fn write_survey(
+    options: &SimulateOptions,
+    out: &Path,
+    overwrite: bool,
+    progress: &dyn Progress,
+) -> Result<SimulationRecord, SimulateError> {
+    let scene = Scene::new(options)?;
+    check_output_folder(out, overwrite)?;
+    let simulated = SimulationRecord {
+        program: tunnelstitch_core::PROGRAM,
+        options: options.clone(),
+    };
+    let folder = StagedFolder::begin(out)?;
+    // Errors name the folder by its final name, not by that of the staging folder.
+    let final_name = |error: WriteError| {
+        let path = match error.path.strip_prefix(folder.path()) {
+            Ok(inside) => out.join(inside),
+            Err(_) => error.path,
+        };
+        WriteError::new(&path, error.source)
+    };
+    write_text_files(&scene, &simulated, folder.path()).map_err(final_name)?;
+    write_mask(&scene, &folder.path().join(MASK_FILE)).map_err(final_name)?;
+    write_frames(&scene, &folder.path().join("frames"), progress).map_err(final_name)?;
+    folder.finish()?;
+    Ok(simulated)
+}
+
+/// Mask of the pixels that show the wall; only written if the rig's shaft is visible.
+const MASK_FILE: &str = "mask.png";
+
+/// Centreline of a curved tunnel.
+const CENTRELINE_FILE: &str = "centreline.txt";
+
+/// Record of the simulation, by which a simulated survey is recognised.
+const RECORD_FILE: &str = "simulation.json";
+
+/// Files of a simulated survey.
+const FILES: [&str; 9] = [
+    SURVEY_FILE,
+    RECORD_FILE,
+    // Written by the command line program.
+    "run.toml",
+    MASK_FILE,
+    CENTRELINE_FILE,
+    "camera.json",
+    "baseline.tum",
+    "groundtruth.tum",
+    "frames",
+];
+
+/// Refuses to replace anything but a simulated survey.
+fn check_output_folder(out: &Path, overwrite: bool) -> Result<(), SimulateError> {
+    let exists = |what| {
+        Err(SimulateError::Exists {
+            path: out.to_owned(),
+            what,
+        })
+    };
+    if !out.exists() {
+        return Ok(());
+    }
+    let is_empty = std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none());
+    if is_empty {
+        return Ok(());
+    }
+    if !is_simulated(out) {
+        return exists(
+            "exists and is not just a simulated survey, so it is not replaced; \
+             choose another folder",
+        );
+    }
+    if !overwrite {
+        return exists("the survey exists; choose another folder, or replace it with --force");
+    }
+    Ok(())
+}
+
+/// True if a folder holds only files that [`write_survey`] writes.
+fn is_simulated(folder: &Path) -> bool {
+    let Ok(mut entries) = std::fs::read_dir(folder) else {
+        return false;
+    };
+    let ours = entries
+        .all(|entry| entry.is_ok_and(|entry| FILES.iter().any(|name| entry.file_name() == *name)));
+    ours && folder.join(RECORD_FILE).is_file()
+}
+
+fn write_text_files(
+    scene: &Scene,
+    simulated: &SimulationRecord,
+    folder: &Path,
+) -> Result<(), WriteError> {
+    let options = &simulated.options;
+    let survey = SurveyFile {
+        tunnel: TunnelSection {
+            centreline: options
+                .tunnel
+                .centreline
+                .is_some()
+                .then(|| CENTRELINE_FILE.into()),
+            ..options.tunnel.clone()
+        },
+        camera: CameraSection {
+            file: "camera.json".into(),
+            name: None,
+            readout_ms: (options.readout_ms != 0.0).then_some(options.readout_ms),
+        },
+        frames: FramesSection {
+            images: Some("frames/*.png".to_owned()),
+            video: None,
+            every: None,
+            angle_step_deg: None,
+            times: None,
+            mask: scene.shaft().map(|_| MASK_FILE.into()),
+        },
+        poses: PosesSection {
+            truth: Some("groundtruth.tum".into()),
+            ..PosesSection::of("baseline.tum")
+        },
+        prior: options.prior(),
+        calibrate: None,
+        options: std::collections::BTreeMap::new(),
+    };
+    let other = std::io::Error::other;
+    let path = |name: &str| folder.join(name);
+    let (survey_path, record_path) = (path(SURVEY_FILE), path(RECORD_FILE));
+    let survey = toml::to_string(&survey)
+        .map_err(|error| WriteError::new(&survey_path, other(error.to_string())))?;
+    let record = serde_json::to_string_pretty(simulated)
+        .map_err(|error| WriteError::new(&record_path, other(error.to_string())))?;
+    let trajectory = |poses: &[Pose]| {
+        let stamped = |frame: usize| StampedPose {
+            time_s: frame as f64 * options.interval_s,
+            pose: poses[frame],
+        };
+        let there: Vec<StampedPose> = scene.frames().map(stamped).collect();
+        tum::format(&there)
+    };
+    if let Some(centreline) = &options.tunnel.centreline {
+        let copy = path(CENTRELINE_FILE);
+        std::fs::copy(centreline, &copy).map_err(|source| WriteError::new(&copy, source))?;
+    }
+    atomic::write_text(&survey_path, &survey)?;
+    atomic::write_text(&record_path, &(record + "\n"))?;
+    atomic::write_text(&path("camera.json"), &format_calibration(scene.camera()))?;
+    atomic::write_text(&path("baseline.tum"), &trajectory(scene.plan()))?;
+    atomic::write_text(&path("groundtruth.tum"), &trajectory(scene.truth()))
+}
+
+fn write_mask(scene: &Scene, path: &Path) -> Result<(), WriteError> {
+    let Some(shaft) = scene.shaft() else {
+        return Ok(());
+    };
+    let (width, height) = (scene.camera().width, scene.camera().height);
+    let wall = shaft.wall_mask();
+    let mask = GrayImage::from_fn(width, height, |u, v| {
+        let shown = wall[v as usize * width as usize + u as usize];
+        Luma([if shown { 255 } else { 0 }])
+    });
+    write_picture(path, &mask.into(), PictureFormat::Png)
+}
+
+/// Renders and writes all frames that exist, named by their numbers in the plan.
+///
+/// The frames of a batch are rendered in parallel from one raster of the wall.
+fn write_frames(scene: &Scene, folder: &Path, progress: &dyn Progress) -> Result<(), WriteError> {
+    atomic::create_folder(folder)?;
+    progress.start("simulating", scene.frames().count());
+    for batch in scene.batches() {
+        let raster = scene.wall_raster(batch.h_m);
+        batch
+            .frames
+            .into_par_iter()
+            .try_for_each(|(frame, source)| {
+                let image = scene.digitised_frame(&raster, source);
+                let path = folder.join(format!("{frame:06}.png"));
+                write_picture(&path, &image, PictureFormat::Png)?;
+                progress.advance(1);
+                Ok(())
+            })?;
+    }
+    progress.finish();
+    Ok(())
+}
