@@ -138,13 +138,13 @@
 pub mod check;
 #[doc(hidden)]
 pub mod cli;
-pub mod evaluate;
 pub mod inspect;
 pub mod report;
 
 pub use tunnelstitch_core::{
     camera, frames, persist, progress, raster, super_resolve, surface, survey, trajectory,
 };
+pub use tunnelstitch_evaluate as evaluate;
 pub use tunnelstitch_refine as refine;
 pub use tunnelstitch_render as render;
 pub use tunnelstitch_simulate as simulate;

@@ -3,8 +3,9 @@
 use crate::camera::{Camera, read_calibration};
 use crate::cli::arguments::{InterpolationArgument, positive};
 use crate::cli::output::{Failure, RunRecord, Terminal, picture_format, record};
-use crate::frames::{FrameFile, load_colour, write_picture};
+use crate::frames::{FrameFile, load_colour, open_picture, write_picture};
 use crate::render::{Picture, cylinder};
+use image::ImageDecoder;
 use std::path::{Path, PathBuf};
 
 /// Projects one photo onto a cylinder around the camera.
@@ -99,9 +100,6 @@ fn described_camera(arguments: &ProjectArguments) -> Result<Camera, Failure> {
 
 fn dimensions(path: &Path) -> Result<(u32, u32), Failure> {
     let fail = |what: String| Failure::input(format!("{}: {what}", path.display()));
-    image::ImageReader::open(path)
-        .and_then(image::ImageReader::with_guessed_format)
-        .map_err(|error| fail(error.to_string()))?
-        .into_dimensions()
-        .map_err(|error| fail(error.to_string()))
+    let decoder = open_picture(path).map_err(|error| fail(error.to_string()))?;
+    Ok(decoder.dimensions())
 }

@@ -2,14 +2,8 @@
 
 use super::error::FrameError;
 use super::frame_file::{FrameFile, FrameSource};
-use image::{
-    ColorType, DynamicImage, GrayImage, ImageDecoder, ImageError, ImageReader, ImageResult,
-    RgbImage,
-};
-use std::cell::RefCell;
-use std::fs::File;
-use std::io::{BufRead, Cursor, Read, Seek};
-use std::path::Path;
+use super::picture_decoder::{Content, Input, decoder, open_picture};
+use image::{ColorType, DynamicImage, GrayImage, ImageDecoder, RgbImage};
 
 impl FrameFile {
     /// Width and height, pixels, from the file's header.
@@ -26,10 +20,7 @@ impl FrameFile {
 
     /// The decoder of a picture file after reading its header.
     fn header(&self) -> Result<impl ImageDecoder, FrameError> {
-        ImageReader::open(&self.path)
-            .map_err(ImageError::from)
-            .and_then(decoder)
-            .map_err(|error| self.decode_error(error.to_string()))
+        open_picture(&self.path).map_err(|error| self.decode_error(error.to_string()))
     }
 }
 
@@ -64,15 +55,15 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
         }
         FrameSource::File => {}
     }
-    let bytes = Content::of(&file.path).map_err(|error| fail(error.to_string()))?;
-    if bytes.as_ref().starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(bytes.as_ref()) {
+    let content = Content::of(&file.path).map_err(|error| fail(error.to_string()))?;
+    let bytes = content.as_ref();
+    if bytes.starts_with(&[0xff, 0xd8]) && !jpeg_is_complete(bytes) {
         return Err(fail("the JPEG file is truncated".to_owned()));
     }
-    if let Some(picture) = plain_tiff(bytes.as_ref(), width, height) {
+    if let Some(picture) = plain_tiff(content.input(), width, height) {
         return Ok(picture);
     }
-    let decoder =
-        decoder(ImageReader::new(Cursor::new(bytes))).map_err(|error| fail(error.to_string()))?;
+    let decoder = decoder(content.input()).map_err(|error| fail(error.to_string()))?;
     // Checked before allocating the memory that the header claims.
     check(decoder.dimensions())?;
     DynamicImage::from_decoder(decoder).map_err(|error| fail(error.to_string()))
@@ -80,8 +71,8 @@ pub fn load_colour(file: &FrameFile, width: u32, height: u32) -> Result<DynamicI
 
 /// Decodes an uncompressed TIFF file of this size with 8 bits per channel; None for any other or
 /// damaged file. The general decoder makes two intermediate copies.
-fn plain_tiff(bytes: &[u8], width: u32, height: u32) -> Option<DynamicImage> {
-    let mut decoder = tiff::decoder::Decoder::new(Cursor::new(bytes)).ok()?;
+fn plain_tiff(input: Input, width: u32, height: u32) -> Option<DynamicImage> {
+    let mut decoder = tiff::decoder::Decoder::new(input).ok()?;
     if decoder.dimensions().ok()? != (width, height) {
         return None;
     }
@@ -107,36 +98,6 @@ fn plain_tiff(bytes: &[u8], width: u32, height: u32) -> Option<DynamicImage> {
     }
 }
 
-/// The content of a file. Its buffer is reused for the thread's next file, because allocating
-/// zeroed memory costs as much as reading.
-struct Content(Vec<u8>);
-
-thread_local! {
-    static ROOM: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
-}
-
-impl Content {
-    fn of(path: &Path) -> std::io::Result<Self> {
-        let mut content = Self(ROOM.take());
-        content.0.clear();
-        File::open(path)?.read_to_end(&mut content.0)?;
-        Ok(content)
-    }
-}
-
-impl AsRef<[u8]> for Content {
-    fn as_ref(&self) -> &[u8] {
-        &self.0
-    }
-}
-
-impl Drop for Content {
-    fn drop(&mut self) {
-        // The buffer is dropped if the thread is ending.
-        let _ = ROOM.try_with(|room| room.replace(std::mem::take(&mut self.0)));
-    }
-}
-
 /// The colour type of a frame's pixels, from the file's header.
 ///
 /// # Errors
@@ -147,11 +108,6 @@ pub fn colour_type(file: &FrameFile) -> Result<ColorType, FrameError> {
         FrameSource::Memory(picture) => Ok(picture.color()),
         FrameSource::File => Ok(file.header()?.color_type()),
     }
-}
-
-/// The decoder for the content of a file, after reading its header.
-fn decoder<R: BufRead + Seek + 'static>(reader: ImageReader<R>) -> ImageResult<impl ImageDecoder> {
-    reader.with_guessed_format()?.into_decoder()
 }
 
 /// True if a JPEG file contains its end-of-image marker; the decoder silently fills missing parts
@@ -203,8 +159,9 @@ mod tests {
             let picture: DynamicImage = picture;
             picture.save(&path).unwrap();
             let bytes = std::fs::read(&path).unwrap();
-            assert_eq!(plain_tiff(&bytes, 32, 24).is_some(), plain);
-            assert!(plain_tiff(&bytes, 24, 32).is_none());
+            let input = || Content::of(&path).unwrap().input();
+            assert_eq!(plain_tiff(input(), 32, 24).is_some(), plain);
+            assert!(plain_tiff(input(), 24, 32).is_none());
             let frame = FrameFile::picture(0, path.clone());
             assert_eq!(load_colour(&frame, 32, 24).unwrap(), picture);
             std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();

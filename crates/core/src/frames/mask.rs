@@ -3,8 +3,9 @@
 
 use super::error::FrameError;
 use super::grey::GreyImage;
+use super::picture_decoder::open_picture;
 use crate::camera::Camera;
-use image::{DynamicImage, ImageDecoder};
+use image::{DynamicImage, ImageDecoder, ImageError};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -39,17 +40,13 @@ impl Mask {
             path: path.to_owned(),
             what,
         };
-        let undecodable =
-            |error: image::ImageError| fail(format!("{error}; save it as a PNG file"));
-        let decoder = image::ImageReader::open(path)
-            .and_then(image::ImageReader::with_guessed_format)
-            .map_err(|error| {
-                fail(format!(
-                    "{error}; draw a mask, or take frames.mask out of survey.toml"
-                ))
-            })?
-            .into_decoder()
-            .map_err(undecodable)?;
+        let undecodable = |error: ImageError| fail(format!("{error}; save it as a PNG file"));
+        let decoder = open_picture(path).map_err(|error| match error {
+            ImageError::IoError(error) => fail(format!(
+                "{error}; draw a mask, or take frames.mask out of survey.toml"
+            )),
+            error => undecodable(error),
+        })?;
         // Checked before allocating the memory that the header claims.
         let found = decoder.dimensions();
         if found != (width, height) {

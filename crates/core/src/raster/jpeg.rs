@@ -3,7 +3,7 @@
 use super::error::RasterError;
 use super::spec::{RasterSpec, SampleType, TILE_EDGE_PX};
 use crate::numerics::simd_dispatch::dispatch_simd;
-use jpeg_encoder::{ColorType, Encoder, EncodingError, ImageBuffer, JpegColorType, SamplingFactor};
+use jpeg_encoder::{Encoder, ImageBuffer, JpegColorType, SamplingFactor, rgb_to_ycbcr};
 use std::io;
 
 /// Subsampling factor of the chroma.
@@ -36,75 +36,76 @@ pub(super) fn encode(
     size: [usize; 2],
     quality: u8,
 ) -> io::Result<Vec<u8>> {
-    let [width, height] = size;
     let bytes = spec.pixel_bytes();
-    let rows = Rows {
+    let picture = Picture {
         pixels,
         bytes,
+        row_bytes: TILE_EDGE_PX * bytes,
         extent,
         size,
+        grey: spec.channels == 1,
     };
-    if spec.channels == 1 {
-        return packed(width * height, quality, |encoder| {
-            encoder.encode_image(rows)
-        });
-    }
-    let mut visible = Vec::with_capacity(3 * width * height);
-    for y in 0..height {
-        rows.push::<3>(y, &mut visible);
-    }
-    compress(&visible, size, 3, quality)
+    picture.encode(quality)
 }
 
-/// The encoded part of a tile.
-struct Rows<'a> {
+/// Compresses a picture of one channel or three, 8 bits, of at most 65535 columns and rows.
+pub fn compress(
+    pixels: &[u8],
+    size: [usize; 2],
+    channels: usize,
+    quality: u8,
+) -> io::Result<Vec<u8>> {
+    let picture = Picture {
+        pixels,
+        bytes: channels,
+        row_bytes: channels * size[0],
+        extent: size,
+        size,
+        grey: channels == 1,
+    };
+    picture.encode(quality)
+}
+
+/// What is encoded: one type for grey and colour, with and without alpha, so that the encoder is
+/// compiled once.
+struct Picture<'a> {
     pixels: &'a [u8],
-    /// Bytes of a pixel.
+    /// Bytes of a pixel: grey, or red, green and blue; then perhaps alpha.
     bytes: usize,
+    /// Bytes from a row to the next.
+    row_bytes: usize,
     /// Valid columns and rows.
     extent: [usize; 2],
     /// Columns and rows to encode.
     size: [usize; 2],
+    /// True if only the first byte of a pixel counts.
+    grey: bool,
 }
 
-impl Rows<'_> {
-    /// Appends the first `C` bytes of every pixel of a row, and repeats those of the last one for
-    /// missing pixels.
-    fn push<const C: usize>(&self, y: usize, out: &mut Vec<u8>) {
-        let start = y.min(self.extent[1] - 1) * TILE_EDGE_PX * self.bytes;
-        let there = self.extent[0].min(self.size[0]);
-        let row = &self.pixels[start..][..there * self.bytes];
-        let from = out.len();
-        out.resize(from + there * C, 0);
-        let own = &mut out[from..];
-        match self.bytes {
-            2 => first_of::<2, C>(row, own),
-            4 => first_of::<4, C>(row, own),
-            _ => own.copy_from_slice(row),
-        }
-        for _ in there..self.size[0] {
-            out.extend_from_within(out.len() - C..);
-        }
+impl Picture<'_> {
+    fn encode(self, quality: u8) -> io::Result<Vec<u8>> {
+        let channels = if self.grey { 1 } else { 3 };
+        let mut stream = Vec::with_capacity(channels * self.size[0] * self.size[1] / 4);
+        let mut encoder = Encoder::new(&mut stream, quality);
+        encoder.set_sampling_factor(SamplingFactor::F_2_2);
+        encoder.encode_image(self).map_err(io::Error::other)?;
+        Ok(stream)
+    }
+
+    /// The valid pixels of a row, or of the last one for a missing row.
+    fn row(&self, y: usize) -> &[u8] {
+        let start = y.min(self.extent[1] - 1) * self.row_bytes;
+        &self.pixels[start..][..self.extent[0].min(self.size[0]) * self.bytes]
     }
 }
 
-/// Copies the first `C` of the `B` bytes of every pixel.
-fn first_of<const B: usize, const C: usize>(row: &[u8], out: &mut [u8]) {
-    dispatch_simd(
-        #[inline(always)]
-        || {
-            let out = out.as_chunks_mut::<C>().0;
-            for (pixel, out) in row.as_chunks::<B>().0.iter().zip(out) {
-                out.copy_from_slice(&pixel[..C]);
-            }
-        },
-    );
-}
-
-/// Copies the grey value: the first byte of every pixel.
-impl ImageBuffer for Rows<'_> {
+impl ImageBuffer for Picture<'_> {
     fn get_jpeg_color_type(&self) -> JpegColorType {
-        JpegColorType::Luma
+        if self.grey {
+            JpegColorType::Luma
+        } else {
+            JpegColorType::Ycbcr
+        }
     }
 
     fn width(&self) -> u16 {
@@ -116,35 +117,45 @@ impl ImageBuffer for Rows<'_> {
     }
 
     fn fill_buffers(&self, y: u16, buffers: &mut [Vec<u8>; 4]) {
-        self.push::<1>(usize::from(y), &mut buffers[0]);
+        let row = self.row(usize::from(y));
+        let planes = if self.grey { 1 } else { 3 };
+        let [luma, blue, red, _] = buffers;
+        match (self.grey, self.bytes) {
+            (true, 1) => luma.extend_from_slice(row),
+            (true, _) => first_of::<2>(row, luma),
+            (false, 3) => to_ycbcr::<3>(row, [luma, blue, red]),
+            (false, _) => to_ycbcr::<4>(row, [luma, blue, red]),
+        }
+        for plane in &mut buffers[..planes] {
+            let last = plane[plane.len() - 1];
+            plane.resize(plane.len() + self.size[0] - row.len() / self.bytes, last);
+        }
     }
 }
 
-/// Compresses a picture of one channel or three, 8 bits, of at most 65535 columns and rows.
-pub fn compress(
-    pixels: &[u8],
-    [width, height]: [usize; 2],
-    channels: usize,
-    quality: u8,
-) -> io::Result<Vec<u8>> {
-    let colour = match channels {
-        1 => ColorType::Luma,
-        _ => ColorType::Rgb,
-    };
-    packed(pixels.len(), quality, |encoder| {
-        encoder.encode(pixels, width as u16, height as u16, colour)
-    })
+/// Appends the first of the `B` bytes of every pixel.
+fn first_of<const B: usize>(row: &[u8], out: &mut Vec<u8>) {
+    dispatch_simd(
+        #[inline(always)]
+        || out.extend(row.as_chunks::<B>().0.iter().map(|pixel| pixel[0])),
+    );
 }
 
-/// Runs an encoder of `bytes` bytes.
-fn packed(
-    bytes: usize,
-    quality: u8,
-    encode: impl FnOnce(Encoder<&mut Vec<u8>>) -> Result<(), EncodingError>,
-) -> io::Result<Vec<u8>> {
-    let mut stream = Vec::with_capacity(bytes / 4);
-    let mut encoder = Encoder::new(&mut stream, quality);
-    encoder.set_sampling_factor(SamplingFactor::F_2_2);
-    encode(encoder).map_err(io::Error::other)?;
-    Ok(stream)
+/// Appends luma and chroma of every pixel of `B` bytes.
+fn to_ycbcr<const B: usize>(row: &[u8], planes: [&mut Vec<u8>; 3]) {
+    let pixels = row.as_chunks::<B>().0;
+    let [luma, blue, red] = planes.map(|plane| {
+        let start = plane.len();
+        plane.resize(start + pixels.len(), 0);
+        &mut plane[start..]
+    });
+    dispatch_simd(
+        #[inline(always)]
+        || {
+            let chroma = blue.iter_mut().zip(red.iter_mut());
+            for ((pixel, luma), (blue, red)) in pixels.iter().zip(luma.iter_mut()).zip(chroma) {
+                (*luma, *blue, *red) = rgb_to_ycbcr(pixel[0], pixel[1], pixel[2]);
+            }
+        },
+    );
 }

@@ -2,8 +2,9 @@
 
 use super::file::SURVEY_FILE;
 use crate::camera::{Camera, read_calibration};
-use crate::frames::{FrameError, Video};
+use crate::frames::{FrameError, Video, open_picture};
 use crate::trajectory::{PoseFile, read_poses};
+use image::ImageDecoder;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -121,7 +122,9 @@ impl Discovery {
                     .to_string_lossy()
                     .replace('\\', "/"),
                 count: files.len(),
-                size: image::image_dimensions(folder.join(files[0])).ok(),
+                size: open_picture(&folder.join(files[0]))
+                    .map(|decoder| decoder.dimensions())
+                    .ok(),
             })
             .collect();
         found.sort();

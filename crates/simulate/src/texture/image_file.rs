@@ -2,8 +2,9 @@
 
 use crate::error::SimulateError;
 use crate::texture::wall_texture::WallTexture;
+use image::DynamicImage;
 use std::path::Path;
-use tunnelstitch_core::frames::GreyImage;
+use tunnelstitch_core::frames::{GreyImage, open_picture};
 
 /// An image that repeats along s and h, upright and unmirrored as seen from inside.
 ///
@@ -27,10 +28,8 @@ impl ImageWall {
             path: path.to_owned(),
             what,
         };
-        let image = image::ImageReader::open(path)
-            .and_then(image::ImageReader::with_guessed_format)
-            .map_err(|error| fail(error.to_string()))?
-            .decode()
+        let image = open_picture(path)
+            .and_then(DynamicImage::from_decoder)
             .map_err(|error| fail(error.to_string()))?;
         let grey = image.to_luma32f();
         let (width, height) = (grey.width() as usize, grey.height() as usize);

@@ -2,10 +2,10 @@
 
 use super::compare::{CompareInput, ComparedPanoramas, Comparison, compare};
 use super::error::EvaluateError;
-use crate::progress::Progress;
-use crate::render::{Interpolation, Mode, RenderOptions};
-use crate::survey::Survey;
-use crate::trajectory::{Pose, poses_of};
+use tunnelstitch_core::progress::Progress;
+use tunnelstitch_core::survey::Survey;
+use tunnelstitch_core::trajectory::{Pose, poses_of};
+use tunnelstitch_render::{Interpolation, Mode, RenderOptions};
 
 /// Compares a survey's initial poses with refined ones, and both with the true ones if they are
 /// known.

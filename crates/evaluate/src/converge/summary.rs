@@ -1,12 +1,12 @@
 //! Summary of a sweep, converge.json: statistics of the runs of each cell.
 
-use crate::evaluate::converge::majority_error::GOOD_PX;
-use crate::evaluate::converge::options::ConvergeOptions;
-use crate::evaluate::converge::run_record::{RunRecord, SCHEMA_VERSION};
-use crate::evaluate::converge::sweep_cell::SweepCell;
-use crate::evaluate::error_statistics::ErrorStatistics;
-use crate::refine::RefineOptions;
+use crate::converge::majority_error::GOOD_PX;
+use crate::converge::options::ConvergeOptions;
+use crate::converge::run_record::{RunRecord, SCHEMA_VERSION};
+use crate::converge::sweep_cell::SweepCell;
+use crate::error_statistics::ErrorStatistics;
 use serde::Serialize;
+use tunnelstitch_refine::RefineOptions;
 
 /// Result of a sweep, the content of converge.json.
 #[derive(Clone, Debug, Serialize)]
@@ -113,7 +113,7 @@ impl Convergence {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::converge::run_record::tests::record;
+    use crate::converge::run_record::tests::record;
 
     #[test]
     fn runs_are_counted_by_their_outcome() {

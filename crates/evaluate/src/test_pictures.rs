@@ -1,7 +1,7 @@
 //! Frames of the test wall as pictures of 8 bits, for tests.
 
-use crate::render::{Picture, PictureCache};
 use tunnelstitch_core::test_wall::TestWall;
+use tunnelstitch_render::{Picture, PictureCache};
 
 /// The frames of a wall as 8-bit pictures.
 pub fn pictures(wall: &TestWall) -> PictureCache {

@@ -1,10 +1,10 @@
 //! Pose errors without alignment: the errors that `evo` prints.
 
-use crate::evaluate::error::EvaluateError;
-use crate::evaluate::error::check_pairs;
-use crate::evaluate::error_statistics::ErrorStatistics;
-use crate::trajectory::Pose;
+use crate::error::EvaluateError;
+use crate::error::check_pairs;
+use crate::error_statistics::ErrorStatistics;
 use serde::{Deserialize, Serialize};
+use tunnelstitch_core::trajectory::Pose;
 
 /// Absolute and relative pose errors without alignment, not even along the gauge.
 ///
@@ -67,9 +67,9 @@ fn motion_statistics(motions: impl Iterator<Item = Pose>) -> (ErrorStatistics, E
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::GaugeMotion;
-    use crate::trajectory::{so3, spiral};
     use nalgebra::Vector3;
+    use tunnelstitch_core::surface::GaugeMotion;
+    use tunnelstitch_core::trajectory::{so3, spiral};
 
     #[test]
     fn known_errors_are_measured() {

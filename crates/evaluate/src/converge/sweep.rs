@@ -1,24 +1,24 @@
 //! Execution of a sweep.
 
-use crate::evaluate::converge::error::ConvergeError;
-use crate::evaluate::converge::feasible_survey::draw_survey;
-use crate::evaluate::converge::majority_error::{GOOD_PX, majority_error};
-use crate::evaluate::converge::options::ConvergeOptions;
-use crate::evaluate::converge::run_log::RunLog;
-use crate::evaluate::converge::run_record::RunRecord;
-use crate::evaluate::converge::success_map::draw_success_map;
-use crate::evaluate::converge::summary::{CellSummary, Convergence};
-use crate::evaluate::converge::sweep_cell::SweepCell;
-use crate::frames::{PictureFormat, write_picture};
-use crate::persist::atomic::{self, ScratchFolder};
-use crate::progress::{Progress, Silent};
-use crate::refine::{FrameFlag, RefineOptions, Refined, refine};
-use crate::simulate::{self, SimulateOptions};
-use crate::survey::Survey;
-use crate::trajectory::poses_of;
+use crate::converge::error::ConvergeError;
+use crate::converge::feasible_survey::draw_survey;
+use crate::converge::majority_error::{GOOD_PX, majority_error};
+use crate::converge::options::ConvergeOptions;
+use crate::converge::run_log::RunLog;
+use crate::converge::run_record::RunRecord;
+use crate::converge::success_map::draw_success_map;
+use crate::converge::summary::{CellSummary, Convergence};
+use crate::converge::sweep_cell::SweepCell;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
+use tunnelstitch_core::frames::{PictureFormat, write_picture};
+use tunnelstitch_core::persist::atomic::{self, ScratchFolder};
+use tunnelstitch_core::progress::{Progress, Silent};
+use tunnelstitch_core::survey::Survey;
+use tunnelstitch_core::trajectory::poses_of;
+use tunnelstitch_refine::{FrameFlag, RefineOptions, Refined, refine};
+use tunnelstitch_simulate::SimulateOptions;
 
 /// Outcome of a call of [`run_sweep`].
 #[derive(Clone, Debug)]
@@ -143,7 +143,7 @@ fn simulate_and_refine(
 ) -> Result<(), ConvergeError> {
     let scratch = ScratchFolder::inside(out)?;
     let folder = scratch.path().join("survey");
-    simulate::write_survey(survey, &folder, false, &Silent)?;
+    tunnelstitch_simulate::write_survey(survey, &folder, false, &Silent)?;
     let survey = Survey::open(&folder)?;
     let silent: Arc<dyn Progress> = Arc::new(Silent);
     let since = Instant::now();

@@ -1,11 +1,11 @@
 //! Pose errors after removing the gauge.
 
-use crate::evaluate::error::EvaluateError;
-use crate::evaluate::error::check_pairs;
-use crate::evaluate::error_statistics::ErrorStatistics;
-use crate::surface::{Gauge, GaugeMotion};
-use crate::trajectory::Pose;
+use crate::error::EvaluateError;
+use crate::error::check_pairs;
+use crate::error_statistics::ErrorStatistics;
 use serde::{Deserialize, Serialize};
+use tunnelstitch_core::surface::{Gauge, GaugeMotion};
+use tunnelstitch_core::trajectory::Pose;
 
 /// Pose errors after removing only the tunnel's gauge.
 ///
@@ -55,9 +55,9 @@ pub fn trajectory_error(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{Circle, Surface};
-    use crate::trajectory::{so3, spiral};
     use nalgebra::Vector3;
+    use tunnelstitch_core::surface::{Circle, Surface};
+    use tunnelstitch_core::trajectory::{so3, spiral};
 
     #[test]
     fn known_errors_are_measured_and_the_gauge_is_not() {

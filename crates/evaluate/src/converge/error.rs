@@ -1,11 +1,11 @@
 //! Errors of a convergence test.
 
-use crate::evaluate::error::EvaluateError;
-use crate::persist::atomic::WriteError;
-use crate::refine::RefineError;
-use crate::simulate::SimulateError;
-use crate::survey::SurveyError;
+use crate::error::EvaluateError;
 use std::path::PathBuf;
+use tunnelstitch_core::persist::atomic::WriteError;
+use tunnelstitch_core::survey::SurveyError;
+use tunnelstitch_refine::RefineError;
+use tunnelstitch_simulate::SimulateError;
 
 /// Reason why a sweep is impossible.
 ///

@@ -1,13 +1,13 @@
 //! Log of finished runs, runs.jsonl: one run per line.
 
-use crate::evaluate::converge::error::ConvergeError;
-use crate::evaluate::converge::run_record::{RunRecord, Settings};
-use crate::evaluate::converge::sweep_cell::SweepCell;
-use crate::persist::atomic::WriteError;
+use crate::converge::error::ConvergeError;
+use crate::converge::run_record::{RunRecord, Settings};
+use crate::converge::sweep_cell::SweepCell;
 use std::collections::HashMap;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use tunnelstitch_core::persist::atomic::WriteError;
 
 /// Start of every line.
 const LINE_START: &[u8] = b"{\"schema_version\":";
@@ -141,8 +141,8 @@ fn is_line_start(rest: &[u8]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::converge::options::ConvergeOptions;
-    use crate::evaluate::converge::run_record::tests::record;
+    use crate::converge::options::ConvergeOptions;
+    use crate::converge::run_record::tests::record;
 
     fn settings() -> Settings {
         ConvergeOptions::default().settings()

@@ -4,9 +4,9 @@
 //! and a column for each rotation sigma. Each cell shows its success rate, successes and runs, and
 //! false successes if there are any.
 
-use crate::evaluate::converge::options::TranslationScale;
-use crate::evaluate::converge::summary::{CellSummary, Convergence};
-use crate::evaluate::converge::sweep_cell::{jitter_name, unit_sigmas};
+use crate::converge::options::TranslationScale;
+use crate::converge::summary::{CellSummary, Convergence};
+use crate::converge::sweep_cell::{jitter_name, unit_sigmas};
 use image::{Rgb, RgbImage};
 use tunnelstitch_core::bitmap_text::{self, LETTER};
 
@@ -172,8 +172,8 @@ fn rate_colour(rate: f64) -> Rgb<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::converge::options::ConvergeOptions;
-    use crate::evaluate::converge::run_record::tests::record;
+    use crate::converge::options::ConvergeOptions;
+    use crate::converge::run_record::tests::record;
 
     /// Two panels of two rows and three columns; the runs of the middle column fail.
     #[test]

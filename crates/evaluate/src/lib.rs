@@ -17,11 +17,11 @@
 //!
 //! ```
 //! use std::path::Path;
-//! use tunnelstitch::evaluate::wall_error;
-//! use tunnelstitch::survey::Survey;
-//! use tunnelstitch::trajectory::poses_of;
+//! use tunnelstitch_evaluate::wall_error;
+//! use tunnelstitch_core::survey::Survey;
+//! use tunnelstitch_core::trajectory::poses_of;
 //!
-//! let survey = Survey::open(Path::new("fixtures/blender_free48"))?;
+//! let survey = Survey::open(Path::new("../../fixtures/blender_free48"))?;
 //! let truth = poses_of(survey.truth.as_deref().ok_or("no true poses")?);
 //! let initial = survey.initial_poses();
 //! let error = wall_error(survey.surface.as_ref(), &survey.camera, &initial, &truth)?;

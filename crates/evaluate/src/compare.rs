@@ -1,22 +1,22 @@
 //! Comparison of initial and refined poses by all measures.
 
-use crate::camera::Camera;
-use crate::evaluate::error::EvaluateError;
-use crate::evaluate::error::check_pairs;
-use crate::evaluate::image_metrics::{ImageMetrics, image_metrics};
-use crate::evaluate::seam_residual::{SeamMap, SeamResidual};
-use crate::evaluate::trajectory_error::{TrajectoryError, trajectory_error};
-use crate::evaluate::unaligned_error::{UnalignedError, unaligned_error};
-use crate::evaluate::wall_error::{WallError, wall_error};
-use crate::frames::FrameSet;
-use crate::progress::Progress;
-use crate::render::{
+use crate::error::EvaluateError;
+use crate::error::check_pairs;
+use crate::image_metrics::{ImageMetrics, image_metrics};
+use crate::seam_residual::{SeamMap, SeamResidual};
+use crate::trajectory_error::{TrajectoryError, trajectory_error};
+use crate::unaligned_error::{UnalignedError, unaligned_error};
+use crate::wall_error::{WallError, wall_error};
+use serde::{Deserialize, Serialize};
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::frames::FrameSet;
+use tunnelstitch_core::progress::Progress;
+use tunnelstitch_core::surface::Surface;
+use tunnelstitch_core::trajectory::{Pose, Shutter};
+use tunnelstitch_render::{
     Canvas, Panorama, PictureCache, Placement, RenderOptions, check_memory, level_for,
     native_px_per_metre, place, render,
 };
-use crate::surface::Surface;
-use crate::trajectory::{Pose, Shutter};
-use serde::{Deserialize, Serialize};
 
 /// Input of a comparison.
 #[derive(Clone, Copy, Debug)]
@@ -97,7 +97,7 @@ pub struct ComparedPanoramas {
 
 /// Compares initial with refined poses, and both with the true poses if they are known.
 ///
-/// With truth, both are first aligned to it along the tunnel's [gauge](crate::surface::Gauge), so
+/// With truth, both are first aligned to it along the tunnel's [gauge](tunnelstitch_core::surface::Gauge), so
 /// that the panoramas coincide. All panoramas share one canvas, which holds all footprints.
 ///
 /// # Errors

@@ -1,10 +1,10 @@
 //! Consistency of stated covariances: normalised estimation errors squared (NEES).
 
-use crate::evaluate::error::EvaluateError;
-use crate::evaluate::error::check_pairs;
-use crate::surface::Surface;
-use crate::trajectory::Pose;
+use crate::error::EvaluateError;
+use crate::error::check_pairs;
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
+use tunnelstitch_core::surface::Surface;
+use tunnelstitch_core::trajectory::Pose;
 
 /// Computes pose errors with the gauge fixed at the first pose.
 ///
@@ -76,8 +76,8 @@ pub fn normalised_errors_squared(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::{Circle, GaugeMotion};
-    use crate::trajectory::spiral;
+    use tunnelstitch_core::surface::{Circle, GaugeMotion};
+    use tunnelstitch_core::trajectory::spiral;
 
     #[test]
     fn the_gauge_is_no_error_and_the_rest_is() {

@@ -1,6 +1,6 @@
 //! Record of one run, a line of runs.jsonl.
 
-use crate::evaluate::converge::sweep_cell::SweepCell;
+use crate::converge::sweep_cell::SweepCell;
 use serde::{Deserialize, Serialize};
 
 /// Version of the content of runs.jsonl and converge.json.
@@ -84,9 +84,9 @@ pub struct RunRecord {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::evaluate::converge::options::ConvergeOptions;
-    use crate::evaluate::converge::sweep_cell::SweepWall;
-    use crate::trajectory::JitterModel;
+    use crate::converge::options::ConvergeOptions;
+    use crate::converge::sweep_cell::SweepWall;
+    use tunnelstitch_core::trajectory::JitterModel;
 
     /// A successful run of the default sweep.
     pub fn record(rotation_deg: f64, seed: u64) -> RunRecord {

@@ -1,7 +1,7 @@
 //! Text table of a comparison.
 
-use crate::evaluate::compare::{Comparison, Scores};
-use crate::evaluate::error_statistics::ErrorStatistics;
+use crate::compare::{Comparison, Scores};
+use crate::error_statistics::ErrorStatistics;
 use std::fmt;
 
 /// Line of the table of a comparison.
@@ -130,9 +130,9 @@ impl fmt::Display for Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::image_metrics::ImageMetrics;
-    use crate::evaluate::seam_residual::SeamResidual;
-    use crate::render::Canvas;
+    use crate::image_metrics::ImageMetrics;
+    use crate::seam_residual::SeamResidual;
+    use tunnelstitch_render::Canvas;
 
     fn scores(rms_grey: f64) -> Scores {
         Scores {

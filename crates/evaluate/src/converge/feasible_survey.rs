@@ -1,9 +1,9 @@
 //! Random draw of a feasible survey: true poses inside the tunnel that look at its wall.
 
-use crate::evaluate::converge::error::ConvergeError;
-use crate::evaluate::converge::options::{ConvergeOptions, MAX_SEEDS};
-use crate::evaluate::converge::sweep_cell::SweepCell;
-use crate::simulate::{Scene, SimulateError, SimulateOptions};
+use crate::converge::error::ConvergeError;
+use crate::converge::options::{ConvergeOptions, MAX_SEEDS};
+use crate::converge::sweep_cell::SweepCell;
+use tunnelstitch_simulate::{Scene, SimulateError, SimulateOptions};
 
 /// Maximum draws after the first.
 const MAX_REDRAWS: u64 = 1000;
@@ -63,8 +63,8 @@ pub(super) fn draw_survey(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::converge::sweep_cell::SweepWall;
-    use crate::trajectory::JitterModel;
+    use crate::converge::sweep_cell::SweepWall;
+    use tunnelstitch_core::trajectory::JitterModel;
 
     fn drawn(rotation_deg: f64, translation_scale: f64, frames: usize) -> SurveyDraw {
         let options = ConvergeOptions {

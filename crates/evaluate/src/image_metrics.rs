@@ -1,9 +1,9 @@
 //! Similarity of two panoramas: PSNR and SSIM.
 
-use crate::evaluate::error::EvaluateError;
-use crate::evaluate::ssim::sum_of_ssim;
-use crate::render::Panorama;
+use crate::error::EvaluateError;
+use crate::ssim::sum_of_ssim;
 use serde::{Deserialize, Serialize};
+use tunnelstitch_render::Panorama;
 
 /// Similarity of two panoramas over the pixels that both cover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,10 +60,10 @@ pub fn image_metrics(first: &Panorama, second: &Panorama) -> Result<ImageMetrics
 mod tests {
     use super::super::test_pictures::pictures;
     use super::*;
-    use crate::progress::Silent;
-    use crate::render::{Canvas, Mode, Picture, PictureCache, RenderOptions, place, render};
-    use crate::trajectory::Shutter;
+    use tunnelstitch_core::progress::Silent;
     use tunnelstitch_core::test_wall::{TestWall, waves};
+    use tunnelstitch_core::trajectory::Shutter;
+    use tunnelstitch_render::{Canvas, Mode, Picture, PictureCache, RenderOptions, place, render};
 
     fn panorama(wall: &TestWall, mut stack: PictureCache, ppm: f64) -> Panorama {
         let placements =

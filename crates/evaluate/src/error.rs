@@ -1,7 +1,7 @@
 //! Errors of an evaluation.
 
-use crate::render::RenderError;
-use crate::surface::SurfaceError;
+use tunnelstitch_core::surface::SurfaceError;
+use tunnelstitch_render::RenderError;
 
 /// Reason why an evaluation is impossible.
 #[derive(Debug, thiserror::Error)]

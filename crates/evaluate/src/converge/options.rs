@@ -1,14 +1,14 @@
 //! Options of a sweep.
 
-use crate::camera::Camera;
-use crate::evaluate::converge::error::ConvergeError;
-use crate::evaluate::converge::run_record::{SCHEMA_VERSION, Settings};
-use crate::evaluate::converge::sweep_cell::unit_sigmas;
-use crate::evaluate::converge::sweep_cell::{SweepCell, SweepWall};
-use crate::simulate::SimulateOptions;
-use crate::trajectory::JitterModel;
+use crate::converge::error::ConvergeError;
+use crate::converge::run_record::{SCHEMA_VERSION, Settings};
+use crate::converge::sweep_cell::unit_sigmas;
+use crate::converge::sweep_cell::{SweepCell, SweepWall};
 use serde::Serialize;
 use std::collections::HashSet;
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::trajectory::JitterModel;
+use tunnelstitch_simulate::SimulateOptions;
 
 /// Vertical field of view of the paper's camera: 60°.
 const VERTICAL_FOV_RAD: f64 = std::f64::consts::FRAC_PI_3;

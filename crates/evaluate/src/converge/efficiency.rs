@@ -1,27 +1,27 @@
 //! Efficiency of the refinement: its errors over the Cramér–Rao bound, and the consistency of its
 //! covariances.
 
-use crate::camera::Camera;
-use crate::evaluate::converge::error::ConvergeError;
-use crate::evaluate::converge::feasible_survey::draw_survey;
-use crate::evaluate::converge::options::ConvergeOptions;
-use crate::evaluate::converge::sweep_cell::SweepCell;
-use crate::evaluate::normalised_errors::{gauge_fixed_errors, normalised_errors_squared};
-use crate::persist::atomic::{self, ScratchFolder};
-use crate::progress::{Progress, Silent};
-use crate::refine::{
-    Covariances, FINER, PoseBounds, RefineOptions, UnknownTexture, pose_bounds, refine,
-};
-use crate::simulate::{self, Scene, SimulateOptions};
-use crate::surface::{Surface, wall_jacobian};
-use crate::survey::Survey;
-use crate::trajectory::{Pose, poses_of};
+use crate::converge::error::ConvergeError;
+use crate::converge::feasible_survey::draw_survey;
+use crate::converge::options::ConvergeOptions;
+use crate::converge::sweep_cell::SweepCell;
+use crate::normalised_errors::{gauge_fixed_errors, normalised_errors_squared};
 use nalgebra::{Matrix6, Vector6};
 use serde::Serialize;
 use std::f64::consts::TAU;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::persist::atomic::{self, ScratchFolder};
+use tunnelstitch_core::progress::{Progress, Silent};
+use tunnelstitch_core::surface::{Surface, wall_jacobian};
+use tunnelstitch_core::survey::Survey;
+use tunnelstitch_core::trajectory::{Pose, poses_of};
+use tunnelstitch_refine::{
+    Covariances, FINER, PoseBounds, RefineOptions, UnknownTexture, pose_bounds, refine,
+};
+use tunnelstitch_simulate::{Scene, SimulateOptions};
 
 /// 95 % quantile of χ² with 6 degrees of freedom.
 const CHI_SQUARE_95: f64 = 12.592;
@@ -108,7 +108,7 @@ pub struct Efficiency {
     /// Share of frames whose 95 % confidence ellipsoid contains the truth.
     pub inside_95: f64,
     /// Mean ratio of the covariances to those of independent noise
-    /// ([`crate::refine::RefineReport::variance_factor`]).
+    /// ([`tunnelstitch_refine::RefineReport::variance_factor`]).
     pub variance_factor: f64,
 }
 
@@ -265,7 +265,7 @@ fn refine_survey(
 ) -> Result<RefinedSurvey, ConvergeError> {
     let scratch = ScratchFolder::inside(out)?;
     let folder = scratch.path().join("survey");
-    simulate::write_survey(options, &folder, false, &Silent)?;
+    tunnelstitch_simulate::write_survey(options, &folder, false, &Silent)?;
     let survey = Survey::open(&folder)?;
     let silent: Arc<dyn Progress> = Arc::new(Silent);
     let refining = RefineOptions {

@@ -1,7 +1,7 @@
 //! Text table of a sweep, converge.txt.
 
-use crate::evaluate::converge::summary::{CellSummary, Convergence};
-use crate::evaluate::converge::sweep_cell::jitter_name;
+use crate::converge::summary::{CellSummary, Convergence};
+use crate::converge::sweep_cell::jitter_name;
 use std::fmt;
 
 /// Heading of a column and function that formats its value.
@@ -114,8 +114,8 @@ impl fmt::Display for Convergence {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::converge::options::ConvergeOptions;
-    use crate::evaluate::converge::run_record::tests::record;
+    use crate::converge::options::ConvergeOptions;
+    use crate::converge::run_record::tests::record;
 
     #[test]
     fn columns_are_aligned() {

@@ -1,10 +1,12 @@
 //! Seam residual: photometric consistency of overlapping frames, without truth.
 
-use crate::render::{Canvas, EDGE, Interpolation, Kernel, PictureCache, Placement, Tile, tiles};
-use crate::surface::Surface;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use tunnelstitch_core::surface::Surface;
+use tunnelstitch_render::{
+    Canvas, EDGE, Interpolation, Kernel, PictureCache, Placement, Tile, tiles,
+};
 
 /// Grey-level differences between frames at common wall points.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -241,15 +243,15 @@ impl CellSums {
 mod tests {
     use super::super::test_pictures::pictures;
     use super::*;
-    use crate::render::{Picture, place};
-    use crate::trajectory::Shutter;
     use tunnelstitch_core::test_wall::{TestWall, waves};
+    use tunnelstitch_core::trajectory::Shutter;
+    use tunnelstitch_render::{Picture, place};
 
     #[test]
     fn true_poses_leave_rounding_noise_and_wrong_ones_much_more() {
         let wall = TestWall::ring(waves);
         let stack = pictures(&wall);
-        let residual = |poses: &[crate::trajectory::Pose]| {
+        let residual = |poses: &[tunnelstitch_core::trajectory::Pose]| {
             let placements = place(&wall.circle, &wall.camera, poses, &Shutter::default()).unwrap();
             let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
             seam_residual(&wall.circle, &stack, &placements, &canvas).unwrap()

@@ -1,10 +1,10 @@
 //! Cell of a sweep: one point of the grid of noise models, walls and sigmas.
 
-use crate::simulate::{SimulateOptions, Wall};
-use crate::survey::PriorSection;
-use crate::trajectory::JitterModel;
 use serde::{Deserialize, Serialize};
 use std::fmt;
+use tunnelstitch_core::survey::PriorSection;
+use tunnelstitch_core::trajectory::JitterModel;
+use tunnelstitch_simulate::{SimulateOptions, Wall};
 
 /// Wall of a sweep; each is one that needs no image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,11 +1,11 @@
 //! Wall error with the gauge fixed by the majority of the frames.
 
-use crate::camera::Camera;
-use crate::evaluate::error::EvaluateError;
-use crate::evaluate::error::check_pairs;
-use crate::evaluate::wall_error::{FrameOffsets, frame_offsets, mean_arc};
-use crate::surface::{Surface, shortest_arc};
-use crate::trajectory::Pose;
+use crate::error::EvaluateError;
+use crate::error::check_pairs;
+use crate::wall_error::{FrameOffsets, frame_offsets, mean_arc};
+use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::surface::{Surface, shortest_arc};
+use tunnelstitch_core::trajectory::Pose;
 
 /// Root mean square wall error below which a frame is good, pixels.
 pub const GOOD_PX: f64 = 0.5;
@@ -32,13 +32,13 @@ impl MajorityError {
 
     /// Root mean square error of all frames, pixels.
     pub fn rms_px(&self) -> f64 {
-        crate::evaluate::error_statistics::root_mean_square(&self.frame_rms_px)
+        crate::error_statistics::root_mean_square(&self.frame_rms_px)
     }
 }
 
 /// Computes wall errors with the gauge fixed by the majority of the frames.
 ///
-/// It differs from [`wall_error()`](crate::evaluate::wall_error()) in the gauge shift (Δs, Δh),
+/// It differs from [`wall_error()`](crate::wall_error()) in the gauge shift (Δs, Δh),
 /// which is found by consensus. Every frame proposes its own mean, and the proposal with the most
 /// good frames wins (of equals, that of the least median error). The shift is then the mean over
 /// the good frames, repeated until they stay the same. Lost frames have no influence. If the
@@ -163,9 +163,9 @@ impl AllOffsets<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::evaluate::wall_error::wall_error;
-    use crate::surface::{Circle, GaugeMotion};
-    use crate::trajectory::spiral;
+    use crate::wall_error::wall_error;
+    use tunnelstitch_core::surface::{Circle, GaugeMotion};
+    use tunnelstitch_core::trajectory::spiral;
 
     fn scene() -> (Circle, Camera, Vec<Pose>) {
         let circle = Circle::new(3.0).unwrap();
