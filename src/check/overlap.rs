@@ -5,8 +5,8 @@ use crate::surface::{Footprint, shortest_arc};
 use crate::survey::Survey;
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
-use rayon::prelude::*;
 use serde::Serialize;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 
 /// Largest number of frames whose overlap with other turns is measured.
 const MAX_MEASURED_FRAMES: usize = 200;
@@ -119,10 +119,8 @@ impl OverlapCheck {
             Some(shared_sides(a, b, perimeter_m))
         };
         let meet = |a: usize, b: usize| sides(a, b).is_some_and(|[s, h]| s > 0.0 && h > 0.0);
-        let shares: Vec<f64> = (1..poses.len())
-            .into_par_iter()
-            .map(|k| meter.shared_share(&meter.wall_points(k - 1), k))
-            .collect();
+        let shares: Vec<f64> =
+            (1..poses.len()).par_map(|k| meter.shared_share(&meter.wall_points(k - 1), k));
         let least = shares.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1));
         let step = poses.len().div_ceil(MAX_MEASURED_FRAMES).max(1);
         let others = |k: usize| {

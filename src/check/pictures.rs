@@ -5,6 +5,7 @@ use crate::frames::{FrameFile, GreyImage, StoredFrame, noise_sigma};
 use crate::survey::Survey;
 use rayon::prelude::*;
 use serde::Serialize;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 
 /// Largest number of frames that are decoded.
 const MAX_DECODED_FRAMES: usize = 12;
@@ -51,9 +52,8 @@ impl PictureCheck {
         }
         let step = survey.frames.len().div_ceil(MAX_DECODED_FRAMES).max(1);
         let sampled: Vec<&FrameFile> = survey.frames.iter().step_by(step).collect();
-        let decoded: Vec<Result<GreyImage, String>> = sampled
-            .par_iter()
-            .map(|file| match StoredFrame::decode(file, width, height) {
+        let decoded: Vec<Result<GreyImage, String>> =
+            sampled.par_map(|file| match StoredFrame::decode(file, width, height) {
                 Ok(frame) => {
                     let mut grey = frame.grey();
                     if let Some(mask) = survey.frames.mask() {
@@ -62,8 +62,7 @@ impl PictureCheck {
                     Ok(grey)
                 }
                 Err(error) => Err(error.to_string()),
-            })
-            .collect();
+            });
         let hidden = survey
             .frames
             .mask()

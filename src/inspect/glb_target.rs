@@ -7,9 +7,9 @@ use crate::persist::atomic::{self, WriteError};
 use crate::raster::{RasterError, TILE_EDGE_PX};
 use crate::render::{Band, Canvas, PixelFormat, RenderError, Target};
 use crate::surface::Surface;
-use rayon::prelude::*;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 
 /// Tiles along the side of a texture, whose side is at most 4096 pixels with its border.
 const TILES_PER_SIDE: usize = (4096 - TILE_EDGE_PX) / TILE_EDGE_PX;
@@ -77,8 +77,8 @@ impl Target for GlbTarget<'_> {
         let blocks = self.cutter.add(band)?;
         let channels = self.cutter.channels();
         let parts = blocks
-            .par_iter()
-            .map(|block| build_part(self.surface, canvas, block, channels, self.quality))
+            .par_map(|block| build_part(self.surface, canvas, block, channels, self.quality))
+            .into_iter()
             .collect::<Result<Vec<WallPart>, _>>()
             .map_err(|error| RasterError::Write(WriteError::new(&self.path, error)))?;
         self.bytes += parts.iter().map(|part| part.jpeg.len() as u64).sum::<u64>();

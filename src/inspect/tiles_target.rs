@@ -11,9 +11,9 @@ use crate::raster::RasterError;
 use crate::render::{Band, Canvas, PixelFormat, RenderError, Target};
 use crate::surface::Surface;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 
 /// Render target that writes `tileset.json` and `LEVEL/COLUMN_ROW.glb` into a folder.
 ///
@@ -145,8 +145,8 @@ impl Target for TilesTarget<'_> {
     fn put(&mut self, canvas: &Canvas, band: &Band) -> Result<(), RenderError> {
         let blocks = self.cutter.add(band)?;
         let written = blocks
-            .par_iter()
-            .map(|block| self.write_tile(canvas, block))
+            .par_map(|block| self.write_tile(canvas, block))
+            .into_iter()
             .collect::<Result<Vec<_>, WriteError>>()
             .map_err(RasterError::Write)?;
         self.bounds_m.extend(written);

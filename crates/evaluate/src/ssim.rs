@@ -2,7 +2,7 @@
 
 use image::{ImageBuffer, Luma};
 use imageproc::filter::separable_filter_equal;
-use rayon::prelude::*;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 
 /// Half the side of the 11 × 11 window, pixels.
 const RADIUS: usize = 5;
@@ -28,14 +28,11 @@ pub(super) fn sum_of_ssim(a: &[f32], b: &[f32], valid: &[bool], width: usize) ->
     }
     let starts: Vec<usize> = (RADIUS..height - RADIUS).step_by(BAND_ROWS).collect();
     // Collected before they are added: the sum does not depend on the threads.
-    let parts: Vec<(f64, usize)> = starts
-        .par_iter()
-        .map(|start| {
-            let end = (start + BAND_ROWS).min(height - RADIUS);
-            let rows = (start - RADIUS) * width..(end + RADIUS) * width;
-            sum_over_band(&a[rows.clone()], &b[rows.clone()], &valid[rows], width)
-        })
-        .collect();
+    let parts: Vec<(f64, usize)> = starts.par_map(|start| {
+        let end = (start + BAND_ROWS).min(height - RADIUS);
+        let rows = (start - RADIUS) * width..(end + RADIUS) * width;
+        sum_over_band(&a[rows.clone()], &b[rows.clone()], &valid[rows], width)
+    });
     parts
         .iter()
         .fold((0.0, 0), |sum, part| (sum.0 + part.0, sum.1 + part.1))

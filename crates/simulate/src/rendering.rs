@@ -13,6 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use tunnelstitch_core::frames::GreyImage;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 
 /// Number of rows of [`Scene::wall`] that are rendered at a time.
 const STRIP_ROWS: usize = 128;
@@ -35,7 +36,7 @@ impl Scene {
         let frames_of = |batch: FrameBatch| {
             let raster = self.wall_raster(batch.h_m);
             let finer = |(_, source): &(usize, usize)| self.render_at(&raster, *source, times);
-            batch.frames.par_iter().map(finer).collect::<Vec<_>>()
+            batch.frames.par_map(finer)
         };
         self.batches().into_iter().flat_map(frames_of).collect()
     }

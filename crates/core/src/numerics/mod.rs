@@ -5,6 +5,7 @@
 //! | --- | --- |
 //! | median of values of which some may be unknown | [`median`] |
 //! | weights of the pixels around a point | [`kernel`] |
+//! | a function of every element, on all threads | [`parallel`] |
 //! | rounding of small numbers without casts | [`rounding`] |
 //! | sinc and Hann's window | [`signal`] |
 //! | two-dimensional Fourier transforms | [`spectrum`] |
@@ -12,6 +13,7 @@
 
 pub mod kernel;
 pub mod median;
+pub mod parallel;
 pub mod rounding;
 pub mod signal;
 pub mod simd_dispatch;

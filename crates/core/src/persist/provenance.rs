@@ -1,6 +1,6 @@
 //! Provenance of results: hashes of the input files.
 
-use rayon::prelude::*;
+use crate::numerics::parallel::ParallelMap;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -41,8 +41,8 @@ fn hash_file(path: &Path) -> Result<blake3::Hash, HashError> {
 /// in parallel.
 fn hash_files(paths: &[&Path]) -> Result<blake3::Hash, HashError> {
     let hashes: Vec<blake3::Hash> = paths
-        .par_iter()
-        .map(|path| hash_file(path))
+        .par_map(|path| hash_file(path))
+        .into_iter()
         .collect::<Result<_, _>>()?;
     let mut all = blake3::Hasher::new();
     for (path, hash) in paths.iter().zip(&hashes) {

@@ -8,8 +8,8 @@ use super::overviews::{LevelTile, OverviewBuilder, Waiting};
 use super::spec::{Georeference, Nodata, RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
 use super::spool::{Spool, Stored};
 use super::{deflate, jpeg};
+use crate::numerics::parallel::ParallelMap;
 use crate::persist::atomic::{self, WriteError};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -149,8 +149,8 @@ impl CogWriter {
         let (spec, compression) = (self.spec, self.compression);
         let complete = self.pyramid.add(batch)?;
         let packed: Vec<Packed> = complete
-            .par_iter()
-            .map(|tile| compression.pack(&spec, tile))
+            .par_map(|tile| compression.pack(&spec, tile))
+            .into_iter()
             .collect::<io::Result<_>>()
             .map_err(fail)?;
         for (LevelTile { level, tile }, packed) in complete.iter().zip(&packed) {

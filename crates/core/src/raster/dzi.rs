@@ -4,10 +4,10 @@ use super::error::RasterError;
 use super::jpeg;
 use super::overviews::{LevelTile, OverviewBuilder, Waiting};
 use super::spec::{RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
+use crate::numerics::parallel::ParallelMap;
 use crate::persist::atomic::{self, StagedFolder, WriteError};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io;
@@ -148,8 +148,8 @@ impl DziWriter {
     pub fn add(&mut self, batch: Vec<RasterTile>) -> Result<(), RasterError> {
         let complete = self.pyramid.add(batch)?;
         let written: Vec<PathBuf> = complete
-            .par_iter()
-            .map(|tile| self.write(tile))
+            .par_map(|tile| self.write(tile))
+            .into_iter()
             .collect::<Result<_, _>>()?;
         self.written += written.len() as u64;
         let unsynced = self.unsynced.get_mut();

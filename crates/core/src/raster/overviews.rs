@@ -4,7 +4,7 @@
 use super::downsample::{HALF_EDGE_PX, reduce};
 use super::error::RasterError;
 use super::spec::{RasterSpec, RasterTile, TILE_EDGE_PX};
-use rayon::prelude::*;
+use crate::numerics::parallel::ParallelMap;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 
@@ -110,13 +110,10 @@ impl OverviewBuilder {
             return Vec::new();
         }
         let spec = self.spec;
-        let quarters: Vec<Vec<u8>> = tiles
-            .par_iter()
-            .map(|tile| {
-                let extent = spec.extent(level - 1, tile.column, tile.row);
-                reduce(&spec, &tile.pixels, extent)
-            })
-            .collect();
+        let quarters: Vec<Vec<u8>> = tiles.par_map(|tile| {
+            let extent = spec.extent(level - 1, tile.column, tile.row);
+            reduce(&spec, &tile.pixels, extent)
+        });
         let pending = &mut self.waiting.pending;
         let mut complete = Vec::new();
         for (tile, quarter) in tiles.iter().zip(quarters) {

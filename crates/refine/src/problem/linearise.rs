@@ -9,8 +9,8 @@ use crate::problem::block_sums::BlockSums;
 use crate::problem::linearisation::{FrameContribution, Linearisation};
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::thresholds::photometric_problem::GAUGE_STIFFNESS_RATIO;
-use rayon::prelude::*;
 use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 
 /// Blocks of tiles that are processed before their sums are added: bounds the memory, whatever the
 /// tunnel's length.
@@ -93,12 +93,9 @@ impl PhotometricProblem<'_> {
             let sampled_frames =
                 self.sampled_frames(stretch, &pyramids, estimates, at_level, readout_s);
             for batch in visibility.blocks.chunks(BATCH) {
-                let blocks: Vec<BlockSums> = batch
-                    .par_iter()
-                    .map(|block| {
-                        self.sum_block(stretch, &visibility, block, &sampled_frames, camera)
-                    })
-                    .collect();
+                let blocks: Vec<BlockSums> = batch.par_map(|block| {
+                    self.sum_block(stretch, &visibility, block, &sampled_frames, camera)
+                });
                 for block in blocks {
                     sums.cost += block.cost;
                     block.add_to(

@@ -22,6 +22,7 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 use tunnelstitch_core::frames::noise_at_level;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_core::super_resolve::{RoughnessEvidence, aliased_variance};
 
@@ -115,8 +116,9 @@ impl PhotometricProblem<'_> {
             let pyramids = self.images.load(self.coverage.frames(stretch))?;
             let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
             let blocks: Vec<&Range<usize>> = visibility.blocks.iter().step_by(stride).collect();
-            let work = |block| work(self.joint_block(&visibility, block, &sampled_frames));
-            results.extend(blocks.into_par_iter().map(work).collect::<Vec<T>>());
+            let work =
+                |block: &&Range<usize>| work(self.joint_block(&visibility, block, &sampled_frames));
+            results.extend(blocks.par_map(work));
         }
         Ok(results)
     }

@@ -8,9 +8,9 @@ use crate::samples::visibility::PosedFrame;
 use crate::thresholds::photometric_problem::{
     MAX_VIEWING_DISTANCE_RADII, MIN_SAMPLES_PER_IMAGE_HEIGHT,
 };
-use rayon::prelude::*;
 use std::ops::Range;
 use tunnelstitch_core::camera::{Camera, Sweep};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::surface::{Surface, viewing_distance};
 
 /// The participants at their poses with their footprints; None for those that are not compared.
@@ -25,23 +25,21 @@ pub fn pose_frames(
     rates: &[Sweep],
 ) -> Result<Vec<Option<PosedFrame>>, ProblemError> {
     let readout_s = context.calibration.readout_s(&context.kappa);
-    let participants = window.participants.clone().into_par_iter();
-    participants
-        .zip(window.estimates.par_iter().zip(window.compared.par_iter()))
-        .map(|(frame, (estimate, compared))| {
-            if !compared {
-                return Ok(None);
-            }
-            let pose = estimate.pose;
-            let sweep = rates[frame - window.participants.start].scaled(readout_s);
-            Ok(Some(PosedFrame {
-                pose,
-                sweep,
-                footprint: footprint(context, &camera.with_sweep(&sweep), frame, &pose)?,
-                active: window.active.contains(&frame),
-            }))
-        })
-        .collect()
+    let posed = (0..window.participants.len()).par_map(|k| {
+        if !window.compared[k] {
+            return Ok(None);
+        }
+        let frame = window.participants.start + k;
+        let pose = window.estimates[k].pose;
+        let sweep = rates[k].scaled(readout_s);
+        Ok(Some(PosedFrame {
+            pose,
+            sweep,
+            footprint: footprint(context, &camera.with_sweep(&sweep), frame, &pose)?,
+            active: window.active.contains(&frame),
+        }))
+    });
+    posed.into_iter().collect()
 }
 
 /// Sparsity pattern of the `active` frames: pairs of participants (counted from frame `first`) that

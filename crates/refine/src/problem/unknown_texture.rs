@@ -35,9 +35,9 @@ use crate::thresholds::photometric_problem::{
 use nalgebra::{Complex, DMatrix, DVector, Matrix4};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 use std::f64::consts::TAU;
 use tunnelstitch_core::frames::GreyImage;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::numerics::signal::{hann, sinc};
 use tunnelstitch_core::numerics::spectrum::Transform;
 
@@ -58,11 +58,9 @@ impl UnknownTexture {
     /// frame noise of `noise_grey` grey levels (1-σ).
     pub fn of_wall(wall: &GreyImage, finer: usize, noise_grey: f64) -> Self {
         let spectrum = WallSpectrum::of(wall, finer);
-        let shares = (2..=MAX_TEXTURE_FRAMES).into_par_iter();
-        let shares = shares.map(|frames| spectrum.shares(frames, noise_grey));
-        Self {
-            roots: shares.map(|share| share.map(f64::sqrt)).collect(),
-        }
+        let shares = (2..MAX_TEXTURE_FRAMES + 1)
+            .par_map(|frames| spectrum.shares(frames, noise_grey).map(f64::sqrt));
+        Self { roots: shares }
     }
 
     /// Least number of rows and columns of a wall with `finer` pixels per pixel of a frame.
@@ -122,7 +120,7 @@ impl WallSpectrum {
         // In order, so that the sum does not depend on the number of threads.
         let mut half = vec![0.0; width * side];
         for run in positions.chunks(64) {
-            let squares: Vec<Vec<f64>> = run.par_iter().map(periodogram).collect();
+            let squares: Vec<Vec<f64>> = run.par_map(periodogram);
             half = squares.into_iter().fold(half, add);
         }
         let scale = 1.0 / (positions.len() as f64 * energy * energy * (finer * finer) as f64);

@@ -4,8 +4,8 @@ use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::thresholds::footprints::MAX_REACH_RADII;
-use rayon::prelude::*;
 use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::surface::{Footprint, Surface};
 use tunnelstitch_core::trajectory::Pose;
 
@@ -36,11 +36,9 @@ pub fn footprints(
     context: &EstimationContext,
     frames: &FrameStates,
 ) -> Result<Vec<Footprint>, ProblemError> {
-    let estimates = frames.estimates.par_iter().enumerate();
-    estimates
-        .map(|(k, estimate)| {
-            let camera = context.camera.with_sweep(&frames.sweep(context, k));
-            footprint(context, &camera, k, &estimate.pose)
-        })
-        .collect()
+    let footprints = (0..frames.estimates.len()).par_map(|k| {
+        let camera = context.camera.with_sweep(&frames.sweep(context, k));
+        footprint(context, &camera, k, &frames.estimates[k].pose)
+    });
+    footprints.into_iter().collect()
 }

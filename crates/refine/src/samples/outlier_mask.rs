@@ -24,8 +24,8 @@ use crate::tiles::frame_samples::SampledFrame;
 use crate::tiles::grid::{BLOCK, TileId, TilePoints, WallGrid};
 use crate::tiles::residual_weighting::{NoiseModel, median_and_sigma};
 use crate::tiles::workspace::{Misfit, TileWorkspace};
-use rayon::prelude::*;
 use std::collections::HashMap;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_core::surface::Surface;
 
@@ -100,7 +100,7 @@ impl OutlierMask {
         sampled_frames: &[SampledFrame],
         noise: &NoiseModel,
     ) {
-        let outliers = visibility.blocks.par_iter().map(|block| {
+        let outliers = visibility.blocks.par_map(|block| {
             let tiles = &visibility.tiles[block.clone()];
             let mut workspace = TileWorkspace::default();
             let mut scratch = Vec::new();
@@ -140,7 +140,7 @@ impl OutlierMask {
             }
             outliers
         });
-        self.tiles.extend(outliers.collect::<Vec<_>>().concat());
+        self.tiles.extend(outliers.concat());
     }
 
     /// Marks the outlying observers of a stretch, of this or another lattice `grid`.

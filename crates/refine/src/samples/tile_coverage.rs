@@ -13,12 +13,12 @@ use crate::thresholds::tile_coverage::{
 };
 use crate::tiles::frame_samples::SampledFrame;
 use crate::tiles::grid::{BLOCK, WallGrid};
-use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::{FrameCache, FrameError, Pyramid};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::surface::Surface;
 
 /// A stretch of the wall that is processed at once.
@@ -44,10 +44,8 @@ pub struct FrameImages<'a> {
 impl FrameImages<'_> {
     /// Loads the images of some participants.
     pub fn load(&self, participants: &[usize]) -> Result<Vec<Arc<Pyramid>>, FrameError> {
-        let participants = participants.par_iter();
-        participants
-            .map(|k| self.frames.get(self.first + k))
-            .collect()
+        let pyramids = participants.par_map(|k| self.frames.get(self.first + k));
+        pyramids.into_iter().collect()
     }
 }
 

@@ -20,8 +20,8 @@ use crate::samples::visibility::{Tile, Visibility};
 use crate::tiles::frame_samples::SampledFrame;
 use crate::tiles::grid::{TilePoints, WallGrid};
 use crate::tiles::tile_statistics::squared_slopes;
-use rayon::prelude::*;
 use std::ops::Range;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_core::surface::Surface;
 
@@ -34,17 +34,13 @@ pub fn select_most_informative(
     surface: &dyn Surface,
     frames: &[SampledFrame],
 ) -> Visibility {
-    let kept: Vec<Vec<usize>> = visibility
-        .blocks
-        .par_iter()
-        .map(|block| {
-            let squares = squared_slopes_of_tiles(visibility, block, grid, surface, frames);
-            find_best(&squares, information)
-                .into_iter()
-                .map(|k| block.start + k)
-                .collect()
-        })
-        .collect();
+    let kept: Vec<Vec<usize>> = visibility.blocks.par_map(|block| {
+        let squares = squared_slopes_of_tiles(visibility, block, grid, surface, frames);
+        find_best(&squares, information)
+            .into_iter()
+            .map(|k| block.start + k)
+            .collect()
+    });
     visibility.restrict_to(&kept)
 }
 

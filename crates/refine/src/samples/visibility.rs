@@ -5,11 +5,11 @@ use crate::samples::observer_marks::ObserverMarks;
 use crate::samples::tile_candidates::{TileNumbering, TileRange};
 use crate::samples::tile_projection::project_tile;
 use crate::tiles::grid::{TileId, WallGrid};
-use rayon::prelude::*;
 use std::collections::HashSet;
 use std::ops::Range;
 use tunnelstitch_core::camera::{Camera, Sweep};
 use tunnelstitch_core::frames::{PyramidMask, Shading};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::surface::{Footprint, Surface, WallRegions};
 use tunnelstitch_core::trajectory::Pose;
 
@@ -87,26 +87,22 @@ impl Visibility {
             .map(|frame| TileRange::new(grid, &frame.footprint, rows))
             .collect();
         let corners = numbering.corners(surface, &ranges, exclusions.ignored);
-        let observed: Vec<Vec<(usize, Observer)>> = posed
-            .par_iter()
-            .zip(&ranges)
-            .enumerate()
-            .map(|(k, (frame, range))| {
-                let camera = &camera.with_sweep(&frame.sweep);
-                let mut tiles = Vec::new();
-                let mask = exclusions.mask.as_ref();
-                for tile in numbering.numbers(range) {
-                    let Some(corners) = &corners[tile] else {
-                        continue;
-                    };
-                    let projection = project_tile(grid, camera, mask, &frame.pose, corners);
-                    if let Some(projection) = projection {
-                        tiles.push((tile, projection.observer(k, camera, shading)));
-                    }
+        let observed: Vec<Vec<(usize, Observer)>> = (0..posed.len()).par_map(|k| {
+            let (frame, range) = (&posed[k], &ranges[k]);
+            let camera = &camera.with_sweep(&frame.sweep);
+            let mut tiles = Vec::new();
+            let mask = exclusions.mask.as_ref();
+            for tile in numbering.numbers(range) {
+                let Some(corners) = &corners[tile] else {
+                    continue;
+                };
+                let projection = project_tile(grid, camera, mask, &frame.pose, corners);
+                if let Some(projection) = projection {
+                    tiles.push((tile, projection.observer(k, camera, shading)));
                 }
-                tiles
-            })
-            .collect();
+            }
+            tiles
+        });
         // Counting sort by tile, which keeps the order of the frames.
         let mut starts = vec![0; numbering.count() + 1];
         for (tile, _) in observed.iter().flatten() {

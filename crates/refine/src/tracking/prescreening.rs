@@ -8,8 +8,8 @@ use crate::thresholds::prescreening::{
     MAX_REPEAT_DIFFERENCE_GREY, MIN_CONTRAST_GREY, MIN_KNOWN_SHARE, MIN_MOTION_PX,
     MIN_SHADING_FRAMES,
 };
-use rayon::prelude::*;
 use tunnelstitch_core::frames::{GreyImage, Shading, noise_sigma};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_core::surface::viewing_distance;
 
@@ -44,12 +44,12 @@ pub fn prescreen(
     let mut noises = Vec::new();
     for start in (0..count).step_by(BATCH) {
         let pictures = (start..(start + BATCH).min(count))
-            .into_par_iter()
-            .map(|k| {
+            .par_map(|k| {
                 let frame = context.frames.get(k)?;
                 progress.advance(1);
                 Ok((frame.level(coarsest).clone(), noise_sigma(frame.level(0))))
             })
+            .into_iter()
             .collect::<Result<Vec<(GreyImage, Option<f64>)>, ProblemError>>()?;
         for (k, (picture, noise)) in (start..).zip(pictures) {
             size = (picture.width(), picture.height());

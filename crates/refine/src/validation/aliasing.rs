@@ -16,8 +16,8 @@ use crate::samples::footprints::footprints;
 use crate::thresholds::aliasing::{MAX_ITERATIONS, MIN_CLEAR_ODDS_NATS};
 use crate::validation::alias_choice::{Evidence, find_periods};
 use crate::validation::alias_search::find_alias_motions;
-use rayon::prelude::*;
 use std::collections::BTreeMap;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::surface::GaugeMotion;
 use tunnelstitch_core::trajectory::Pose;
 
@@ -79,8 +79,8 @@ pub fn resolve_aliases(
     let frames: Vec<usize> = all.filter(|k| inliers[*k]).collect();
     let footprints = footprints(context, states)?;
     let alias_motions = frames
-        .par_iter()
-        .map(|k| find_alias_motions(context, options, *k, states, &footprints))
+        .par_map(|k| find_alias_motions(context, options, *k, states, &footprints))
+        .into_iter()
         .collect::<Result<Vec<_>, _>>()?;
     if alias_motions.iter().all(Vec::is_empty) {
         return Ok(AliasResolution::default());

@@ -5,9 +5,9 @@ use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::samples::footprints::footprint;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
-use rayon::prelude::*;
 use std::ops::Range;
 use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::surface::Footprint;
 
 /// Frames compared at once: bounds the memory.
@@ -40,20 +40,16 @@ impl Overlaps {
         states: &FrameStates,
         frame_range: &Range<usize>,
     ) -> Result<Self, ProblemError> {
-        let frames = states.estimates.par_iter().zip(&states.rejections);
-        let footprints = frames
-            .enumerate()
-            .map(|(k, (estimate, rejection))| {
-                if frame_range.contains(&k) && rejection.is_none() {
-                    let camera = camera.with_sweep(&states.sweep(context, k));
-                    footprint(context, &camera, k, &estimate.pose).map(Some)
-                } else {
-                    Ok(None)
-                }
-            })
-            .collect::<Result<_, _>>()?;
+        let footprints = (0..states.estimates.len()).par_map(|k| {
+            if frame_range.contains(&k) && states.rejections[k].is_none() {
+                let camera = camera.with_sweep(&states.sweep(context, k));
+                footprint(context, &camera, k, &states.estimates[k].pose).map(Some)
+            } else {
+                Ok(None)
+            }
+        });
         Ok(Self {
-            footprints,
+            footprints: footprints.into_iter().collect::<Result<_, _>>()?,
             frame_range: frame_range.clone(),
             perimeter_m: context.surface.perimeter_m(),
         })

@@ -30,11 +30,11 @@ use crate::thresholds::pairwise_lucas_kanade::LEVEL;
 use crate::validation::alignment::Alignment;
 use crate::validation::lucas_kanade_template::{PosedImage, Template};
 use crate::validation::overlaps::{Batch, Overlaps};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::Pyramid;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 
 /// Measures the displacements of those of some consecutive frames that are inliers and overlap;
 /// `finest`: the finest level of tracking.
@@ -53,31 +53,28 @@ pub fn align_pairs(
     let mut alignments = Vec::new();
     for Batch { partners, needed } in overlaps.batches(|_, _| true) {
         let pyramids: BTreeMap<usize, Arc<Pyramid>> = needed
-            .into_par_iter()
-            .map(|k| Ok((k, context.frames.get(k)?)))
+            .par_map(|&k| Ok((k, context.frames.get(k)?)))
+            .into_iter()
             .collect::<Result<_, ProblemError>>()?;
-        let of_batch: Vec<Vec<Alignment>> = partners
-            .par_iter()
-            .map(|(a, partners)| {
-                let image = |k: usize| PosedImage {
-                    context,
-                    level,
-                    camera: camera.with_sweep(&states.sweep(context, k)),
-                    pyramid: &pyramids[&k],
-                    pose: &states.estimates[k].pose,
-                };
-                let Some(footprint) = &overlaps.footprints[*a] else {
-                    return Vec::new();
-                };
-                let template = Template::new(&image(*a), footprint);
-                let align = |b: &usize| {
-                    let mut alignment = template.align(&image(*b))?;
-                    (alignment.a, alignment.b) = (*a, *b);
-                    Some(alignment)
-                };
-                partners.iter().filter_map(align).collect()
-            })
-            .collect();
+        let of_batch: Vec<Vec<Alignment>> = partners.par_map(|(a, partners)| {
+            let image = |k: usize| PosedImage {
+                context,
+                level,
+                camera: camera.with_sweep(&states.sweep(context, k)),
+                pyramid: &pyramids[&k],
+                pose: &states.estimates[k].pose,
+            };
+            let Some(footprint) = &overlaps.footprints[*a] else {
+                return Vec::new();
+            };
+            let template = Template::new(&image(*a), footprint);
+            let align = |b: &usize| {
+                let mut alignment = template.align(&image(*b))?;
+                (alignment.a, alignment.b) = (*a, *b);
+                Some(alignment)
+            };
+            partners.iter().filter_map(align).collect()
+        });
         alignments.extend(of_batch.into_iter().flatten());
     }
     Ok(alignments)

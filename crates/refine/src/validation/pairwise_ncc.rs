@@ -19,9 +19,9 @@ use crate::tracking::ncc_score::NccScore;
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use crate::validation::overlaps::{Batch, Overlaps};
 use nalgebra::Vector3;
-use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::surface::Footprint;
 
 /// The comparison of two frames where they overlap.
@@ -165,10 +165,12 @@ fn compare_pairs(
     for Batch { partners, needed } in overlaps.batches(is_wanted) {
         // Frames that the batch before has unwrapped are kept.
         unwrapped_frames.retain(|k, _| needed.binary_search(k).is_ok());
-        let added: Vec<(usize, UnwrappedFrame)> = needed
-            .into_par_iter()
+        let missing: Vec<usize> = needed
+            .into_iter()
             .filter(|k| !unwrapped_frames.contains_key(k))
-            .map(|k| {
+            .collect();
+        let added: Vec<(usize, UnwrappedFrame)> = missing
+            .par_map(|&k| {
                 let sweep = states.sweep(context, k);
                 let unwrapped = UnwrappedFrame::with_window(
                     context,
@@ -180,6 +182,7 @@ fn compare_pairs(
                 )?;
                 Ok((k, unwrapped))
             })
+            .into_iter()
             .collect::<Result<_, ProblemError>>()?;
         unwrapped_frames.extend(added);
         let frames = PosedFrames {
@@ -188,10 +191,8 @@ fn compare_pairs(
             footprints: &overlaps.footprints,
             unwrapped_frames: &unwrapped_frames,
         };
-        let compared: Vec<Vec<Compared>> = partners
-            .par_iter()
-            .map(|(a, partners)| frames.compare_with_partners(*a, partners, stride_px))
-            .collect();
+        let compared: Vec<Vec<Compared>> =
+            partners.par_map(|(a, partners)| frames.compare_with_partners(*a, partners, stride_px));
         pairs.extend(compared.into_iter().flatten());
     }
     Ok(pairs)

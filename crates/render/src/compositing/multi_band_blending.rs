@@ -21,6 +21,7 @@ use crate::sampling::point_batch::{MAX_BATCH_POINTS, PointBatch};
 use crate::sampling::thumbnails::Thumbnails;
 use crate::warp::projection::LocalPoints;
 use rayon::prelude::*;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::surface::Surface;
 
 /// Bands of the pyramid; the coarsest grid's nodes are `2^(PYRAMID_BANDS − 1)` as far apart. The
@@ -77,10 +78,7 @@ pub fn corrections(
     // The composite.
     let mut composite = vec![0.0f32; labels.len() * channels];
     for chunk in windows.chunks(FRAMES_AT_ONCE) {
-        let layers: Vec<Layer> = chunk
-            .par_iter()
-            .map(|(frame, window)| sampled(*frame, window))
-            .collect();
+        let layers: Vec<Layer> = chunk.par_map(|(frame, window)| sampled(*frame, window));
         let columns = grid.columns as usize;
         let rows = composite.par_chunks_exact_mut(columns * channels);
         let labels = labels.par_chunks_exact(columns);
@@ -111,37 +109,33 @@ pub fn corrections(
         })
         .collect();
     for chunk in windows.chunks(FRAMES_AT_ONCE) {
-        let parts: Vec<Vec<Layer>> = chunk
-            .par_iter()
-            .map(|(frame, window)| {
-                let mut different = sampled(*frame, window);
-                let mut mask = Layer::zeros(window.columns, window.rows, 1);
-                // Outside the grid nothing differs.
-                let mut within = vec![false; mask.values.len()];
-                window.each(grid, |node, at| {
-                    within[at] = true;
-                    mask.values[at] = f32::from(labels[node] == *frame as u32);
-                    let given = labels[node] != NO_FRAME;
-                    for c in 0..channels {
-                        let value = &mut different.values[at * channels + c];
-                        let off = *value - composite[node * channels + c];
-                        // NaN where the frame sees nothing.
-                        *value =
-                            if given && off.abs() <= MAX_DIFFERENCE / 255.0 * f32::from(u16::MAX) {
-                                off
-                            } else {
-                                0.0
-                            };
-                    }
-                });
-                for (at, within) in within.iter().enumerate() {
-                    if !within {
-                        different.values[at * channels..][..channels].fill(0.0);
-                    }
+        let parts: Vec<Vec<Layer>> = chunk.par_map(|(frame, window)| {
+            let mut different = sampled(*frame, window);
+            let mut mask = Layer::zeros(window.columns, window.rows, 1);
+            // Outside the grid nothing differs.
+            let mut within = vec![false; mask.values.len()];
+            window.each(grid, |node, at| {
+                within[at] = true;
+                mask.values[at] = f32::from(labels[node] == *frame as u32);
+                let given = labels[node] != NO_FRAME;
+                for c in 0..channels {
+                    let value = &mut different.values[at * channels + c];
+                    let off = *value - composite[node * channels + c];
+                    // NaN where the frame sees nothing.
+                    *value = if given && off.abs() <= MAX_DIFFERENCE / 255.0 * f32::from(u16::MAX) {
+                        off
+                    } else {
+                        0.0
+                    };
                 }
-                weighted_bands(different, mask, window.columns == grid.columns as usize)
-            })
-            .collect();
+            });
+            for (at, within) in within.iter().enumerate() {
+                if !within {
+                    different.values[at * channels..][..channels].fill(0.0);
+                }
+            }
+            weighted_bands(different, mask, window.columns == grid.columns as usize)
+        });
         for (band, sum) in bands.iter_mut().enumerate() {
             let (columns, channels) = (sum.columns, sum.channels);
             let rows = sum.values.par_chunks_exact_mut(columns * channels);

@@ -22,8 +22,8 @@ use crate::sampling::exposure::Exposure;
 use crate::sampling::point_batch::{MAX_BATCH_POINTS, PointBatch};
 use crate::sampling::thumbnails::Thumbnails;
 use crate::warp::projection::LocalPoints;
-use rayon::prelude::*;
 use tunnelstitch_core::numerics::median::median;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::surface::{Surface, WallFrame};
 
 /// Edge of a tile of nodes: the parts of frames that show them stay in the second-level cache.
@@ -104,10 +104,8 @@ pub fn select_frames(
     let mut labels: Vec<u32> = Vec::with_capacity(grid.pixels());
     // Band by band, each with the one before fixed.
     for band in tiles(surface, grid, placements, TILE_EDGE) {
-        let parts: Vec<Vec<Candidates>> = band
-            .par_iter()
-            .map(|tile| node_candidates(&observer, grid, tile))
-            .collect();
+        let parts: Vec<Vec<Candidates>> =
+            band.par_map(|tile| node_candidates(&observer, grid, tile));
         let rows = band.first().map_or(0, |tile| tile.rows as usize);
         let mut candidates = Vec::with_capacity(rows * columns);
         for row in 0..rows {
@@ -307,10 +305,7 @@ impl NodeLabelling {
 
     /// Solves lines of nodes that are no neighbours of one another.
     fn solve(&mut self, lines: &[Vec<usize>], above: Option<&[u32]>) {
-        let solved: Vec<Vec<u8>> = lines
-            .par_iter()
-            .map(|line| self.viterbi(line, above))
-            .collect();
+        let solved: Vec<Vec<u8>> = lines.par_map(|line| self.viterbi(line, above));
         for (line, solved) in lines.iter().zip(solved) {
             for (node, chosen) in line.iter().zip(solved) {
                 self.chosen[*node] = chosen;

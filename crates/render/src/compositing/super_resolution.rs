@@ -9,9 +9,9 @@ use crate::sampling::exposure::{Exposure, Response};
 use crate::sampling::picture::Picture;
 use crate::sampling::picture_cache::PictureCache;
 use crate::sampling::sample::{Sample, Samples};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 use tunnelstitch_core::frames::{GreyImage, noise_sigma};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::super_resolve::{Footprints, MARGIN, PosedCamera, Reading, Region};
 use tunnelstitch_core::surface::Surface;
 
@@ -48,15 +48,12 @@ impl FrameReadings {
             .copied()
             .filter(|frame| !self.frames.contains_key(frame))
             .collect();
-        let read: Vec<Option<(usize, CorrectedFrame)>> = missing
-            .into_par_iter()
-            .map(|frame| {
-                Some((
-                    frame,
-                    CorrectedFrame::of(cache.picture(frame)?, exposure.of(frame)),
-                ))
-            })
-            .collect();
+        let read: Vec<Option<(usize, CorrectedFrame)>> = missing.par_map(|&frame| {
+            Some((
+                frame,
+                CorrectedFrame::of(cache.picture(frame)?, exposure.of(frame)),
+            ))
+        });
         self.frames.extend(read.into_iter().flatten());
     }
 
@@ -71,10 +68,8 @@ impl FrameReadings {
         tiles: &[Tile],
         band: &mut Band,
     ) {
-        let solved: Vec<Vec<Vec<f32>>> = tiles
-            .par_iter()
-            .map(|tile| self.tile(surface, cache, placements, canvas, tile, band))
-            .collect();
+        let solved: Vec<Vec<Vec<f32>>> =
+            tiles.par_map(|tile| self.tile(surface, cache, placements, canvas, tile, band));
         for (tile, channels) in tiles.iter().zip(solved) {
             for (c, values) in channels.iter().enumerate() {
                 band.write_channel(canvas, tile, c, values);

@@ -6,9 +6,9 @@ use crate::layout::placement::{NO_FRAME, Placement};
 use crate::layout::sightings::px_per_metre;
 use crate::layout::tiles::{EDGE, tiles};
 use nalgebra::{Matrix2, Matrix6};
-use rayon::prelude::*;
 use std::path::Path;
 use tunnelstitch_core::camera::Camera;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::raster::{
     CogWriter, Compression, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
 };
@@ -77,32 +77,29 @@ impl Map {
         let columns = grid.columns as usize;
         let mut values = vec![f32::NAN; grid.pixels()];
         for band in tiles(surface, grid, placements, EDGE) {
-            let parts: Vec<Vec<f32>> = band
-                .par_iter()
-                .map(|tile| {
-                    let node = |k: usize| {
-                        let (row, column) = (k / tile.columns as usize, k % tile.columns as usize);
-                        (tile.row as usize + row) * columns + tile.column as usize + column
+            let parts: Vec<Vec<f32>> = band.par_map(|tile| {
+                let node = |k: usize| {
+                    let (row, column) = (k / tile.columns as usize, k % tile.columns as usize);
+                    (tile.row as usize + row) * columns + tile.column as usize + column
+                };
+                let of_point = |(k, point)| {
+                    let wall = surface.frame(point);
+                    let fine = |frame: usize| {
+                        let placement = &placements[frame];
+                        px_per_metre(&placement.camera(camera), &placement.pose, &wall)
                     };
-                    let of_point = |(k, point)| {
-                        let wall = surface.frame(point);
-                        let fine = |frame: usize| {
-                            let placement = &placements[frame];
-                            px_per_metre(&placement.camera(camera), &placement.pose, &wall)
-                        };
-                        let label = labels.map(|labels| labels[node(k)]);
-                        let shown = match label {
-                            Some(NO_FRAME) => None,
-                            Some(frame) => Some(frame as usize),
-                            None => finest(&tile.frames, &fine),
-                        };
-                        shown
-                            .and_then(|frame| Some(value((frame, wall), fine(frame)?)))
-                            .unwrap_or(f32::NAN)
+                    let label = labels.map(|labels| labels[node(k)]);
+                    let shown = match label {
+                        Some(NO_FRAME) => None,
+                        Some(frame) => Some(frame as usize),
+                        None => finest(&tile.frames, &fine),
                     };
-                    tile.walls(grid).enumerate().map(of_point).collect()
-                })
-                .collect();
+                    shown
+                        .and_then(|frame| Some(value((frame, wall), fine(frame)?)))
+                        .unwrap_or(f32::NAN)
+                };
+                tile.walls(grid).enumerate().map(of_point).collect()
+            });
             for (tile, part) in band.iter().zip(parts) {
                 let rows = part.chunks_exact(tile.columns as usize);
                 for (row, part) in rows.enumerate() {

@@ -17,6 +17,7 @@ use crate::sampling::picture_cache::PictureCache;
 use crate::sampling::thumbnails::Thumbnails;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_core::surface::Surface;
 
@@ -183,10 +184,7 @@ impl<'a> Plan<'a> {
         progress: &dyn Progress,
     ) -> Result<(), RenderError> {
         let starts: Vec<u32> = (0..self.canvas.rows).step_by(BAND_ROWS as usize).collect();
-        let needs: Vec<Vec<usize>> = starts
-            .par_iter()
-            .map(|row| self.needed(frames, &self.tiles(*row)))
-            .collect();
+        let needs: Vec<Vec<usize>> = starts.par_map(|row| self.needed(frames, &self.tiles(*row)));
         progress.start("panorama", starts.len());
         progress.advance(first.min(starts.len()));
         let sources = targets.iter().any(|target| target.wants_sources());

@@ -6,10 +6,10 @@ use crate::layout::canvas::{Canvas, Layout};
 use crate::layout::tiles::BAND_ROWS;
 use crate::sampling::pixel_format::PixelFormat;
 use crate::sampling::sample::Samples;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::persist::atomic::WriteError;
 use tunnelstitch_core::raster::{
     CogState, CogWriter, Compression, DziFormat, DziState, DziWriter, Georeference, Nodata,
@@ -210,10 +210,7 @@ impl Target for RasterTarget {
     fn put(&mut self, canvas: &Canvas, band: &Band) -> Result<(), RenderError> {
         let pixels = self.bytes(band);
         let places = (canvas.columns as usize).div_ceil(TILE_EDGE_PX);
-        let tiles = (0..places)
-            .into_par_iter()
-            .map(|place| self.tile(canvas, band, &pixels, place))
-            .collect();
+        let tiles = (0..places).par_map(|place| self.tile(canvas, band, &pixels, place));
         match &mut self.writer {
             Writer::Cog(writer) => writer.add(tiles)?,
             Writer::Dzi(writer) => writer.add(tiles)?,

@@ -6,7 +6,7 @@ use crate::layout::canvas::Canvas;
 use crate::layout::placement::Placement;
 use crate::layout::tiles::{EDGE, Tile, tiles};
 use crate::warp::projection::LocalPoints;
-use rayon::prelude::*;
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::surface::Surface;
 use tunnelstitch_photometry::Observation;
 
@@ -19,11 +19,8 @@ pub fn observe_points(
     grid: &Canvas,
 ) -> Vec<Vec<Observation>> {
     let bands = tiles(surface, grid, placements, EDGE);
-    let found: Vec<Vec<Vec<Observation>>> = bands
-        .par_iter()
-        .flatten()
-        .map(|tile| observe_tile(surface, thumbnails, placements, grid, tile))
-        .collect();
+    let tiles: Vec<Tile> = bands.into_iter().flatten().collect();
+    let found = tiles.par_map(|tile| observe_tile(surface, thumbnails, placements, grid, tile));
     found.into_iter().flatten().collect()
 }
 

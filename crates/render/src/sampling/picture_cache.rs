@@ -3,9 +3,9 @@
 use super::picture::Picture;
 use super::pixel_format::PixelFormat;
 use crate::error::RenderError;
-use rayon::prelude::*;
 use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::{FrameFile, FrameSet, PyramidMask, colour_type, load_colour};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::progress::Progress;
 
 /// Cache of a survey's frames, all in one format, with the camera that took them.
@@ -47,10 +47,8 @@ impl PictureCache {
     /// # Errors
     /// A frame that is missing or is no picture; the first in the order of the files.
     pub fn open(files: &FrameSet, camera: &Camera, level: usize) -> Result<Self, RenderError> {
-        let formats: Vec<Result<PixelFormat, RenderError>> = files
-            .par_iter()
-            .map(|file| Ok(PixelFormat::of(colour_type(file)?)))
-            .collect();
+        let formats: Vec<Result<PixelFormat, RenderError>> =
+            files.par_map(|file| Ok(PixelFormat::of(colour_type(file)?)));
         let mut format = PixelFormat {
             channels: 1,
             deep: false,
@@ -129,10 +127,8 @@ impl PictureCache {
             .filter(|frame| self.pictures[*frame].is_none())
             .collect();
         self.evict(frames, later, room, missing.len());
-        let decoded: Vec<Result<Picture, RenderError>> = missing
-            .par_iter()
-            .map(|frame| self.decode(*frame))
-            .collect();
+        let decoded: Vec<Result<Picture, RenderError>> =
+            missing.par_map(|frame| self.decode(*frame));
         for (frame, picture) in missing.iter().zip(decoded) {
             self.pictures[*frame] = Some(picture?);
         }

@@ -8,9 +8,9 @@ use crate::error::RenderError;
 use crate::layout::canvas::Canvas;
 use crate::layout::placement::{Placement, native_px_per_metre};
 use crate::warp::projection::{LocalPoints, LocalProjection};
-use rayon::prelude::*;
 use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::numerics::kernel::{Interpolation, Kernel};
+use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_core::surface::Surface;
 
@@ -38,17 +38,14 @@ impl Thumbnails {
         progress: &dyn Progress,
     ) -> Result<Self, RenderError> {
         progress.start("thumbnails", frames.len());
-        let pictures: Vec<Result<Picture, RenderError>> = (0..frames.len())
-            .into_par_iter()
-            .map(|frame| {
-                let small = match frames.picture(frame) {
-                    Some(picture) => picture.thumbnail(level),
-                    None => frames.decode(frame)?.thumbnail(level),
-                };
-                progress.advance(1);
-                Ok(small)
-            })
-            .collect();
+        let pictures: Vec<Result<Picture, RenderError>> = (0..frames.len()).par_map(|frame| {
+            let small = match frames.picture(frame) {
+                Some(picture) => picture.thumbnail(level),
+                None => frames.decode(frame)?.thumbnail(level),
+            };
+            progress.advance(1);
+            Ok(small)
+        });
         progress.finish();
         let camera = frames.camera();
         Ok(Self {
