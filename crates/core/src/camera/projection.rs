@@ -59,6 +59,7 @@ impl Camera {
     }
 
     /// This camera with a rolling-shutter motion.
+    #[inline]
     pub fn with_sweep(&self, sweep: &Sweep) -> Self {
         Self {
             sweep: *sweep,
@@ -67,6 +68,7 @@ impl Camera {
     }
 
     /// The share τ of the readout time at which row `v` is read ([`Sweep`]).
+    #[inline]
     pub fn share(&self, v: f64) -> f64 {
         let height = f64::from(self.height);
         ((v - 0.5 * (height - 1.0)) / height).clamp(-MAX_SHARE, MAX_SHARE)
@@ -87,6 +89,7 @@ impl Camera {
     }
 
     /// The origin of the rays of row `v`, in camera coordinates, metres: 0 without a sweep.
+    #[inline]
     pub fn origin(&self, v: f64) -> Vector3<f64> {
         if self.sweep.is_none() {
             Vector3::zeros()
@@ -205,6 +208,7 @@ impl Camera {
     }
 
     /// True if the pixel lies at least `margin` pixels inside the outermost pixel centres.
+    #[inline]
     pub fn is_in_image(&self, pixel: &Vector2<f64>, margin: f64) -> bool {
         pixel.x >= margin
             && pixel.y >= margin

@@ -31,11 +31,13 @@ pub(super) const MAX_SHARE: f64 = 1.0;
 
 impl Sweep {
     /// True for a global shutter or a camera at rest.
+    #[inline]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }
 
     /// The motion during `factor` times the readout time.
+    #[inline]
     pub fn scaled(&self, factor: f64) -> Self {
         Self {
             omega_rad: self.omega_rad * factor,

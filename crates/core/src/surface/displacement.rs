@@ -16,6 +16,7 @@ use nalgebra::{Matrix2x5, Matrix2x6, Vector3};
 ///
 /// The equations hold for any surface with tangents. Rows: s, h (metres); columns: ω (radians), ρ
 /// (metres). The result is not finite where the ray grazes the wall.
+#[inline]
 pub fn wall_jacobian(pose: &Pose, wall: &WallFrame) -> Matrix2x6<f64> {
     let d = wall.x_w - pose.t_wc;
     let x_c: Vector3<f64> = pose.r_wc.inverse_transform_vector(&d);

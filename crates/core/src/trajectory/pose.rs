@@ -30,11 +30,13 @@ impl Pose {
     }
 
     /// Transforms a point from camera to world: `R_wc x_c + t_wc`.
+    #[inline]
     pub fn to_world(&self, x_c: &Vector3<f64>) -> Vector3<f64> {
         self.r_wc * x_c + self.t_wc
     }
 
     /// Transforms a point from world to camera: `R_wcᵀ (x_w − t_wc)`.
+    #[inline]
     pub fn to_camera(&self, x_w: &Vector3<f64>) -> Vector3<f64> {
         self.r_wc.inverse_transform_vector(&(x_w - self.t_wc))
     }
