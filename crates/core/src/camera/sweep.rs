@@ -33,7 +33,8 @@ impl Sweep {
     /// True for a global shutter or a camera at rest.
     #[inline]
     pub fn is_none(&self) -> bool {
-        *self == Self::default()
+        let is_zero = |v: &Vector3<f64>| v.x == 0.0 && v.y == 0.0 && v.z == 0.0;
+        is_zero(&self.omega_rad) && is_zero(&self.nu_m)
     }
 
     /// The motion during `factor` times the readout time.

@@ -35,8 +35,8 @@
 
 use super::atomic::{self, WriteError};
 use super::provenance::Input;
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use serde::de::{DeserializeOwned, Error};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::fs::{File, TryLockError};
 use std::io::{self, BufWriter, ErrorKind, IntoInnerError, Write};
 use std::path::{Path, PathBuf};
@@ -131,6 +131,19 @@ impl Origin {
         let mut pairs = self.inputs.iter().zip(&other.inputs);
         let pair = pairs.find(|(own, other)| own.blake3 != other.blake3);
         pair.map(|(own, _)| format!("{} has changed since", own.path.display()))
+    }
+}
+
+/// A state that is read through `dyn Deserializer`, so that the reader of CBOR is compiled once and
+/// not for every type.
+struct Erased<S>(S);
+
+impl<'de, S: Deserialize<'de>> Deserialize<'de> for Erased<S> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut erased = <dyn erased_serde::Deserializer>::erase(deserializer);
+        erased_serde::deserialize(&mut erased)
+            .map(Self)
+            .map_err(Error::custom)
     }
 }
 
@@ -276,11 +289,12 @@ impl Checkpoint {
             Some((content, hash)) if blake3::hash(content) == blake3::Hash::from(*hash) => content,
             _ => return Err(damaged("its hash does not match".to_owned())),
         };
-        let state = ciborium::from_reader(content);
-        state.map(Some).map_err(|error| damaged(error.to_string()))
+        let state = ciborium::from_reader::<Erased<S>, _>(content);
+        let state = state.map_err(|error| damaged(error.to_string()))?;
+        Ok(Some(state.0))
     }
 
-    fn write<S: Serialize>(&self, file: &str, state: &S) -> Result<(), WriteError> {
+    fn write(&self, file: &str, state: &dyn erased_serde::Serialize) -> Result<(), WriteError> {
         atomic::write(&self.folder.join(file), |writer| {
             let hashing = Hashing {
                 writer,
@@ -288,7 +302,7 @@ impl Checkpoint {
             };
             // Buffered, because hashing number by number is slow.
             let mut hashing = BufWriter::with_capacity(HASH_BUFFER_BYTES, hashing);
-            ciborium::into_writer(state, &mut hashing).map_err(io::Error::other)?;
+            ciborium::into_writer(&state, &mut hashing).map_err(io::Error::other)?;
             let Hashing { writer, hasher } =
                 hashing.into_inner().map_err(IntoInnerError::into_error)?;
             writer.write_all(hasher.finalize().as_bytes())
