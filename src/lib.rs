@@ -141,10 +141,9 @@ pub mod cli;
 pub mod inspect;
 pub mod report;
 
-pub use tunnelstitch_core::{
-    camera, frames, persist, progress, raster, super_resolve, surface, survey, trajectory,
-};
+pub use tunnelstitch_core::{frames, persist, progress, raster, super_resolve, survey};
 pub use tunnelstitch_evaluate as evaluate;
+pub use tunnelstitch_geometry::{camera, surface, trajectory};
 pub use tunnelstitch_refine as refine;
 pub use tunnelstitch_render as render;
 pub use tunnelstitch_simulate as simulate;

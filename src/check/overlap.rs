@@ -6,7 +6,7 @@ use crate::survey::Survey;
 use crate::trajectory::Pose;
 use nalgebra::{Vector2, Vector3};
 use serde::Serialize;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Largest number of frames whose overlap with other turns is measured.
 const MAX_MEASURED_FRAMES: usize = 200;

@@ -5,7 +5,7 @@ use crate::frames::{FrameFile, GreyImage, StoredFrame, noise_sigma};
 use crate::survey::Survey;
 use rayon::prelude::*;
 use serde::Serialize;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Largest number of frames that are decoded.
 const MAX_DECODED_FRAMES: usize = 12;

@@ -1,6 +1,6 @@
 //! Median of values that may be absent.
 
-use tunnelstitch_core::numerics::median::upper_median;
+use tunnelstitch_geometry::numerics::median::upper_median;
 
 /// The median; 0 of no values.
 pub(super) fn median_or_zero(values: impl Iterator<Item = f64>) -> f64 {

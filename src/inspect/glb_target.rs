@@ -9,7 +9,7 @@ use crate::render::{Band, Canvas, PixelFormat, RenderError, Target};
 use crate::surface::Surface;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Tiles along the side of a texture, whose side is at most 4096 pixels with its border.
 const TILES_PER_SIDE: usize = (4096 - TILE_EDGE_PX) / TILE_EDGE_PX;

@@ -13,7 +13,7 @@ use crate::surface::Surface;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Render target that writes `tileset.json` and `LEVEL/COLUMN_ROW.glb` into a folder.
 ///

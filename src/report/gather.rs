@@ -15,7 +15,7 @@ use serde::Serialize;
 use serde_json::{Map, Value};
 use std::path::Path;
 use tunnelstitch_core::PROGRAM;
-use tunnelstitch_core::numerics::median::upper_median;
+use tunnelstitch_geometry::numerics::median::upper_median;
 
 /// Sources of a report.
 #[derive(Debug)]

@@ -1,5 +1,4 @@
-//! What a survey is made of: cameras, trajectories, tunnel surfaces, frames and the files that
-//! describe them; and what the other crates of `tunnelstitch` share with it.
+//! Frames, surveys and large rasters, and how files are written and runs are resumed.
 //!
 //! The crate `tunnelstitch` re-exports what users of the library need, and its documentation has
 //! the flow of data, the order of the folders and the symbols.
@@ -12,15 +11,11 @@
 pub const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
 
 pub mod bitmap_text;
-pub mod camera;
 pub mod frames;
-pub mod numerics;
 pub mod persist;
 pub mod progress;
 pub mod raster;
 pub mod super_resolve;
-pub mod surface;
 pub mod survey;
 #[doc(hidden)]
 pub mod test_wall;
-pub mod trajectory;

@@ -1,11 +1,11 @@
 //! A wall with a known texture and frames of it, for tests.
 
-use crate::camera::Camera;
 use crate::frames::GreyImage;
-use crate::surface::{Circle, Surface, WallPoint};
-use crate::trajectory::{Pose, so3, spiral};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Circle, Surface, WallPoint};
+use tunnelstitch_geometry::trajectory::{Pose, so3, spiral};
 
 /// Grey value of a wall point; the second argument is the perimeter, metres.
 pub type Texture = fn(WallPoint, f64) -> f64;

@@ -8,11 +8,11 @@ use crate::trajectory_error::{TrajectoryError, trajectory_error};
 use crate::unaligned_error::{UnalignedError, unaligned_error};
 use crate::wall_error::{WallError, wall_error};
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::FrameSet;
 use tunnelstitch_core::progress::Progress;
-use tunnelstitch_core::surface::Surface;
-use tunnelstitch_core::trajectory::{Pose, Shutter};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::Surface;
+use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 use tunnelstitch_render::{
     Canvas, Panorama, PictureCache, Placement, RenderOptions, check_memory, level_for,
     native_px_per_metre, place, render,
@@ -97,7 +97,7 @@ pub struct ComparedPanoramas {
 
 /// Compares initial with refined poses, and both with the true poses if they are known.
 ///
-/// With truth, both are first aligned to it along the tunnel's [gauge](tunnelstitch_core::surface::Gauge), so
+/// With truth, both are first aligned to it along the tunnel's [gauge](tunnelstitch_geometry::surface::Gauge), so
 /// that the panoramas coincide. All panoramas share one canvas, which holds all footprints.
 ///
 /// # Errors

@@ -1,6 +1,6 @@
 //! Errors of an evaluation.
 
-use tunnelstitch_core::surface::SurfaceError;
+use tunnelstitch_geometry::surface::SurfaceError;
 use tunnelstitch_render::RenderError;
 
 /// Reason why an evaluation is impossible.

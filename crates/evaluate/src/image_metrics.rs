@@ -62,7 +62,7 @@ mod tests {
     use super::*;
     use tunnelstitch_core::progress::Silent;
     use tunnelstitch_core::test_wall::{TestWall, waves};
-    use tunnelstitch_core::trajectory::Shutter;
+    use tunnelstitch_geometry::trajectory::Shutter;
     use tunnelstitch_render::{Canvas, Mode, Picture, PictureCache, RenderOptions, place, render};
 
     fn panorama(wall: &TestWall, mut stack: PictureCache, ppm: f64) -> Panorama {

@@ -19,7 +19,7 @@
 //! use std::path::Path;
 //! use tunnelstitch_evaluate::wall_error;
 //! use tunnelstitch_core::survey::Survey;
-//! use tunnelstitch_core::trajectory::poses_of;
+//! use tunnelstitch_geometry::trajectory::poses_of;
 //!
 //! let survey = Survey::open(Path::new("../../fixtures/blender_free48"))?;
 //! let truth = poses_of(survey.truth.as_deref().ok_or("no true poses")?);

@@ -1,7 +1,7 @@
 //! Sharpness of an image from a slanted edge: modulation transfer function.
 
-use tunnelstitch_core::numerics::signal::{hann, sinc};
-use tunnelstitch_core::numerics::spectrum::half_spectrum;
+use tunnelstitch_geometry::numerics::signal::{hann, sinc};
+use tunnelstitch_geometry::numerics::spectrum::half_spectrum;
 
 /// Bins of the edge's profile per pixel of the image.
 const OVERSAMPLING: f64 = 4.0;

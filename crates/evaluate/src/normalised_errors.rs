@@ -3,8 +3,8 @@
 use crate::error::EvaluateError;
 use crate::error::check_pairs;
 use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
-use tunnelstitch_core::surface::Surface;
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::surface::Surface;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Computes pose errors with the gauge fixed at the first pose.
 ///
@@ -76,8 +76,8 @@ pub fn normalised_errors_squared(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_core::surface::{Circle, GaugeMotion};
-    use tunnelstitch_core::trajectory::spiral;
+    use tunnelstitch_geometry::surface::{Circle, GaugeMotion};
+    use tunnelstitch_geometry::trajectory::spiral;
 
     #[test]
     fn the_gauge_is_no_error_and_the_rest_is() {

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_render::{
     Canvas, EDGE, Interpolation, Kernel, PictureCache, Placement, Tile, tiles,
 };
@@ -244,14 +244,14 @@ mod tests {
     use super::super::test_pictures::pictures;
     use super::*;
     use tunnelstitch_core::test_wall::{TestWall, waves};
-    use tunnelstitch_core::trajectory::Shutter;
+    use tunnelstitch_geometry::trajectory::Shutter;
     use tunnelstitch_render::{Picture, place};
 
     #[test]
     fn true_poses_leave_rounding_noise_and_wrong_ones_much_more() {
         let wall = TestWall::ring(waves);
         let stack = pictures(&wall);
-        let residual = |poses: &[tunnelstitch_core::trajectory::Pose]| {
+        let residual = |poses: &[tunnelstitch_geometry::trajectory::Pose]| {
             let placements = place(&wall.circle, &wall.camera, poses, &Shutter::default()).unwrap();
             let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
             seam_residual(&wall.circle, &stack, &placements, &canvas).unwrap()

@@ -2,7 +2,7 @@
 
 use image::{ImageBuffer, Luma};
 use imageproc::filter::separable_filter_equal;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Half the side of the 11 × 11 window, pixels.
 const RADIUS: usize = 5;

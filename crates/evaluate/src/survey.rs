@@ -4,7 +4,7 @@ use super::compare::{CompareInput, ComparedPanoramas, Comparison, compare};
 use super::error::EvaluateError;
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_core::survey::Survey;
-use tunnelstitch_core::trajectory::{Pose, poses_of};
+use tunnelstitch_geometry::trajectory::{Pose, poses_of};
 use tunnelstitch_render::{Interpolation, Mode, RenderOptions};
 
 /// Compares a survey's initial poses with refined ones, and both with the true ones if they are

@@ -4,8 +4,8 @@ use crate::error::EvaluateError;
 use crate::error::check_pairs;
 use crate::error_statistics::ErrorStatistics;
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::surface::{Gauge, GaugeMotion};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::surface::{Gauge, GaugeMotion};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Pose errors after removing only the tunnel's gauge.
 ///
@@ -56,8 +56,8 @@ pub fn trajectory_error(
 mod tests {
     use super::*;
     use nalgebra::Vector3;
-    use tunnelstitch_core::surface::{Circle, Surface};
-    use tunnelstitch_core::trajectory::{so3, spiral};
+    use tunnelstitch_geometry::surface::{Circle, Surface};
+    use tunnelstitch_geometry::trajectory::{so3, spiral};
 
     #[test]
     fn known_errors_are_measured_and_the_gauge_is_not() {

@@ -4,7 +4,7 @@ use crate::error::EvaluateError;
 use crate::error::check_pairs;
 use crate::error_statistics::ErrorStatistics;
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Absolute and relative pose errors without alignment, not even along the gauge.
 ///
@@ -68,8 +68,8 @@ fn motion_statistics(motions: impl Iterator<Item = Pose>) -> (ErrorStatistics, E
 mod tests {
     use super::*;
     use nalgebra::Vector3;
-    use tunnelstitch_core::surface::GaugeMotion;
-    use tunnelstitch_core::trajectory::{so3, spiral};
+    use tunnelstitch_geometry::surface::GaugeMotion;
+    use tunnelstitch_geometry::trajectory::{so3, spiral};
 
     #[test]
     fn known_errors_are_measured() {

@@ -6,9 +6,9 @@ use crate::error_statistics::{ErrorStatistics, root_mean_square};
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::surface::{Surface, WallPoint, gauge_component, shortest_arc};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Surface, WallPoint, gauge_component, shortest_arc};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Maximum iterations of the mean of arcs.
 const MAX_MEAN_ITERATIONS: usize = 20;
@@ -17,7 +17,7 @@ const MAX_MEAN_ITERATIONS: usize = 20;
 ///
 /// They are computed for 9 × 7 pixels per frame ([`Camera::grid_rays`]). The mean `Δs` and the
 /// mean `Δh` over all pixels of all frames are removed as far as the tunnel's
-/// [gauge](tunnelstitch_core::surface::Gauge) leaves them free: they are unobservable.
+/// [gauge](tunnelstitch_geometry::surface::Gauge) leaves them free: they are unobservable.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct WallError {
@@ -177,8 +177,8 @@ pub(super) fn mean_arc(arcs_m: &[f64], perimeter_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_core::surface::{Circle, GaugeMotion};
-    use tunnelstitch_core::trajectory::spiral;
+    use tunnelstitch_geometry::surface::{Circle, GaugeMotion};
+    use tunnelstitch_geometry::trajectory::spiral;
 
     fn scene() -> (Circle, Camera, Vec<Pose>) {
         let circle = Circle::new(3.0).unwrap();

@@ -1,11 +1,11 @@
 //! The input of a refinement: frames, camera, tunnel, poses and their noise model.
 
 use std::f64::consts::TAU;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::FrameSet;
-use tunnelstitch_core::surface::{Surface, WallRegions};
 use tunnelstitch_core::survey::{CalibrateSection, Survey};
-use tunnelstitch_core::trajectory::{Jitter, Shutter, StampedPose};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Surface, WallRegions};
+use tunnelstitch_geometry::trajectory::{Jitter, Shutter, StampedPose};
 
 /// No part of the wall.
 static NOTHING: WallRegions = WallRegions::NONE;

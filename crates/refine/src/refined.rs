@@ -2,7 +2,7 @@
 
 use crate::report::RefineReport;
 use crate::uncertainty::covariance::Covariances;
-use tunnelstitch_core::trajectory::Trajectory;
+use tunnelstitch_geometry::trajectory::Trajectory;
 
 /// The result of a refinement.
 #[derive(Clone, Debug)]

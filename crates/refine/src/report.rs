@@ -5,7 +5,7 @@ use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::frame_sigma::FrameSigma;
 use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// The basis of a frame's refined pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -8,11 +8,11 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use crate::samples::visibility::PosedFrame;
 use crate::tiles::grid::WallGrid;
 use std::sync::LazyLock;
-use tunnelstitch_core::camera::{Camera, Sweep};
 use tunnelstitch_core::frames::FrameCache;
-use tunnelstitch_core::surface::{Circle, Footprint, WallRegions};
 use tunnelstitch_core::test_wall::TestWall;
-use tunnelstitch_core::trajectory::{Jitter, JitterModel, Pose, Shutter, spiral};
+use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::surface::{Circle, Footprint, WallRegions};
+use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose, Shutter, spiral};
 
 /// Prior of independent poses with 1-σ of 0.05 rad and 5 cm, one frame per second.
 pub fn independent_prior(initial: &[Pose]) -> Prior {

@@ -3,7 +3,7 @@
 use tunnelstitch_core::frames::FrameError;
 use tunnelstitch_core::persist::checkpoint::CheckpointError;
 use tunnelstitch_core::raster::RasterError;
-use tunnelstitch_core::surface::SurfaceError;
+use tunnelstitch_geometry::surface::SurfaceError;
 
 /// Error of drawing a panorama.
 #[derive(Debug, thiserror::Error)]

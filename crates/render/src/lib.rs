@@ -80,4 +80,4 @@ pub use sampling::picture::Picture;
 pub use sampling::picture_cache::{PictureCache, level_for};
 pub use sampling::pixel_format::PixelFormat;
 pub use sampling::sample::{Sample, Samples};
-pub use tunnelstitch_core::numerics::kernel::{Interpolation, Kernel};
+pub use tunnelstitch_geometry::numerics::kernel::{Interpolation, Kernel};

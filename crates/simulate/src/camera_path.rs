@@ -1,6 +1,6 @@
 //! Continuous camera motion through the true poses, for rolling-shutter frames.
 
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Smooth path of the camera through the true poses of the frames, equally spaced in time.
 ///
@@ -96,7 +96,7 @@ fn lerp_pose(from: &Pose, to: &Pose, s: f64) -> Pose {
 mod tests {
     use super::*;
     use nalgebra::Vector3;
-    use tunnelstitch_core::trajectory::spiral;
+    use tunnelstitch_geometry::trajectory::spiral;
 
     fn distance(a: &Pose, b: &Pose) -> f64 {
         a.r_wc.angle_to(&b.r_wc) + (a.t_wc - b.t_wc).norm()

@@ -1,7 +1,7 @@
-//! Cross-sections of the simulated tunnel, by equations independent of [`tunnelstitch_core::surface`].
+//! Cross-sections of the simulated tunnel, by equations independent of [`tunnelstitch_geometry::surface`].
 //!
 //! Each cross-section is the set `G = 1` of a convex function that grows in proportion to the
-//! distance from the axis. Nothing is shared with [`tunnelstitch_core::surface`], so that a simulated survey
+//! distance from the axis. Nothing is shared with [`tunnelstitch_geometry::surface`], so that a simulated survey
 //! can judge it.
 
 use std::f64::consts::{FRAC_PI_2, TAU};

@@ -5,9 +5,9 @@ use crate::error::SimulateError;
 use crate::sensor::BitDepth;
 use serde::Serialize;
 use std::path::PathBuf;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::survey::{PriorSection, TunnelSection};
-use tunnelstitch_core::trajectory::JitterModel;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::trajectory::JitterModel;
 
 /// Appearance of the wall under even light.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -5,10 +5,10 @@ use crate::wall_raster::{BATCH_POINTS, WallRaster};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use std::ops::Range;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::GreyImage;
-use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Number of cells of a pixel along each axis, at whose corners rays are cast.
 const CELLS: usize = 2;
@@ -231,8 +231,8 @@ mod tests {
     use super::*;
     use crate::options::Illumination;
     use crate::texture::wall_texture::WallTexture;
-    use tunnelstitch_core::camera::Lens;
-    use tunnelstitch_core::trajectory::so3;
+    use tunnelstitch_geometry::camera::Lens;
+    use tunnelstitch_geometry::trajectory::so3;
 
     /// A smooth texture.
     struct Waves;

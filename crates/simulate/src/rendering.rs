@@ -13,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use tunnelstitch_core::frames::GreyImage;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Number of rows of [`Scene::wall`] that are rendered at a time.
 const STRIP_ROWS: usize = 128;
@@ -187,7 +187,7 @@ mod tests {
     use super::*;
     use crate::exposure::GainBias;
     use crate::options::{Illumination, SimulateOptions, Wall};
-    use tunnelstitch_core::camera::Camera;
+    use tunnelstitch_geometry::camera::Camera;
 
     fn small() -> SimulateOptions {
         SimulateOptions {

@@ -15,8 +15,8 @@ use crate::wet_patches::WetPatches;
 use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::trajectory::{Jitter, Pose, spiral};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::trajectory::{Jitter, Pose, spiral};
 
 /// A tunnel and the camera's path through it.
 pub struct Scene {

@@ -7,14 +7,14 @@ use image::{GrayImage, Luma};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
-use tunnelstitch_core::camera::format_calibration;
 use tunnelstitch_core::frames::{PictureFormat, write_picture};
 use tunnelstitch_core::persist::atomic::{self, StagedFolder, WriteError};
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_core::survey::{
     CameraSection, FramesSection, PosesSection, SURVEY_FILE, SurveyFile, TunnelSection,
 };
-use tunnelstitch_core::trajectory::{Pose, StampedPose, tum};
+use tunnelstitch_geometry::camera::format_calibration;
+use tunnelstitch_geometry::trajectory::{Pose, StampedPose, tum};
 
 /// Content of `simulation.json`, from which the survey can be simulated again.
 #[derive(Clone, Debug, Serialize)]

@@ -2,16 +2,16 @@
 //!
 //! A round straight tunnel has a closed form. In all others the ray is marched until it leaves the
 //! inside, and the crossing is found by false position. The centreline of a curved tunnel comes
-//! from [`tunnelstitch_core::surface`], since it is an input; everything else is independent of it.
+//! from [`tunnelstitch_geometry::surface`], since it is an input; everything else is independent of it.
 
 use crate::cross_section::CrossSection;
 use crate::error::SimulateError;
 use crate::options::SimulateOptions;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
-use tunnelstitch_core::surface::Centreline;
 use tunnelstitch_core::survey::read_centreline;
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::surface::Centreline;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Shape of the simulated tunnel.
 pub(super) enum Tunnel {

@@ -4,8 +4,8 @@ use crate::camera_path::CameraPath;
 use crate::error::SimulateError;
 use crate::tunnel::{Tunnel, WallHit};
 use std::f64::consts::TAU;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Maximum distance of simulated wall from a camera along the tunnel, radii.
 const MAX_DISTANCE_RADII: f64 = 20.0;

@@ -7,9 +7,9 @@ use super::mask::PyramidMask;
 use super::pyramid::Pyramid;
 use super::shading::Shading;
 use super::stored_frame::StoredFrame;
-use crate::camera::Camera;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use tunnelstitch_geometry::camera::Camera;
 
 /// Fraction of the memory used for pyramids if not all of them fit; the rest holds stored frames.
 const PYRAMID_MEMORY_FRACTION: f64 = 0.25;

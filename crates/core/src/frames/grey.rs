@@ -58,7 +58,7 @@ impl GreyImage {
     /// corner shared by four pixels.
     ///
     /// The filter is even, so the new centre lies exactly between the old ones
-    /// (see [`crate::camera::Camera::at_level`]); borders repeat the outermost pixel.
+    /// (see [`tunnelstitch_geometry::camera::Camera::at_level`]); borders repeat the outermost pixel.
     ///
     /// Pixels without a value have no weight; where they make up more than half of the kernel, the
     /// result has no value.

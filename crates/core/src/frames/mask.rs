@@ -4,10 +4,10 @@
 use super::error::FrameError;
 use super::grey::GreyImage;
 use super::picture_decoder::open_picture;
-use crate::camera::Camera;
 use image::{DynamicImage, ImageDecoder, ImageError};
 use std::path::Path;
 use std::sync::Arc;
+use tunnelstitch_geometry::camera::Camera;
 
 /// Smallest grey level (of 255) of a mask pixel that shows the wall.
 const MIN_WALL_GREY: u8 = 128;

@@ -85,7 +85,11 @@ impl Shading {
     /// `V` at a pixel of a pyramid level, whose `camera` is given.
     ///
     /// Full size: `u = 2^l u_l + (2^l − 1)/2`, the same point of the picture.
-    pub fn at_level(&self, pixel: &Vector2<f64>, camera: &crate::camera::Camera) -> f64 {
+    pub fn at_level(
+        &self,
+        pixel: &Vector2<f64>,
+        camera: &tunnelstitch_geometry::camera::Camera,
+    ) -> f64 {
         let scale = (self.size.0 as f64 / f64::from(camera.width))
             .log2()
             .round()

@@ -1,8 +1,8 @@
 //! Provenance of results: hashes of the input files.
 
-use crate::numerics::parallel::ParallelMap;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// A file that cannot be hashed.
 #[derive(Debug, thiserror::Error)]

@@ -8,12 +8,12 @@ use super::overviews::{LevelTile, OverviewBuilder, Waiting};
 use super::spec::{Georeference, Nodata, RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
 use super::spool::{Spool, Stored};
 use super::{deflate, jpeg};
-use crate::numerics::parallel::ParallelMap;
 use crate::persist::atomic::{self, WriteError};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// A writer of Cloud-Optimised GeoTIFF (BigTIFF, tiles of [`TILE_EDGE_PX`] pixels, overviews down
 /// to one tile).

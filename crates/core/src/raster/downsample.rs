@@ -1,7 +1,7 @@
 //! Downsampling for overviews: 2 × 2 pixels become one.
 
 use super::spec::{RasterSpec, Reduce, SampleType, TILE_EDGE_PX};
-use crate::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// Columns and rows of a reduced tile.
 pub(super) const HALF_EDGE_PX: usize = TILE_EDGE_PX / 2;

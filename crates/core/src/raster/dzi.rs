@@ -4,7 +4,6 @@ use super::error::RasterError;
 use super::jpeg;
 use super::overviews::{LevelTile, OverviewBuilder, Waiting};
 use super::spec::{RasterSpec, RasterTile, SampleType, TILE_EDGE_PX};
-use crate::numerics::parallel::ParallelMap;
 use crate::persist::atomic::{self, StagedFolder, WriteError};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -13,6 +12,7 @@ use std::borrow::Cow;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// The format of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,9 +2,9 @@
 
 use super::error::RasterError;
 use super::spec::{RasterSpec, SampleType, TILE_EDGE_PX};
-use crate::numerics::simd_dispatch::dispatch_simd;
 use jpeg_encoder::{Encoder, ImageBuffer, JpegColorType, SamplingFactor, rgb_to_ycbcr};
 use std::io;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// Subsampling factor of the chroma.
 pub(super) const SUBSAMPLING: u16 = 2;

@@ -4,9 +4,9 @@
 use super::downsample::{HALF_EDGE_PX, reduce};
 use super::error::RasterError;
 use super::spec::{RasterSpec, RasterTile, TILE_EDGE_PX};
-use crate::numerics::parallel::ParallelMap;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// A complete tile of a level.
 #[derive(Debug)]

@@ -1,11 +1,11 @@
 //! Footprints of the frames' pixels on a region of the wall, as stencils of fine pixels.
 
-use crate::camera::Camera;
 use crate::super_resolve::reading::Reading;
 use crate::super_resolve::region::{FineGrid, Region};
 use crate::super_resolve::stencils::{MAX_STENCIL_WIDTH, PixelFootprint, Stencils};
-use crate::surface::Surface;
-use crate::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::Surface;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Number of points along each side of a region that are projected into a frame.
 const OUTLINE_POINTS: usize = 9;

@@ -1,8 +1,8 @@
 //! Observations of a region: pixel readings with robust weights.
 
-use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::super_resolve::footprints::Footprints;
 use crate::super_resolve::reading::Reading;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// Readings of all views with their footprints and weights.
 pub(super) struct Observations<'a> {

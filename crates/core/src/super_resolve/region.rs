@@ -1,6 +1,6 @@
 //! Grid of fine pixels on the unrolled wall, and its regions.
 
-use crate::surface::{WallPoint, shortest_arc};
+use tunnelstitch_geometry::surface::{WallPoint, shortest_arc};
 
 /// Grid of fine pixels on the unrolled wall.
 ///

@@ -1,8 +1,8 @@
 //! Roughness prior of the wall: weighted differences of fine pixels.
 
-use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::super_resolve::huber;
 use std::f64::consts::PI;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// Number of fine pixels over which an edge is expected to continue along an axis.
 const EDGE_LENGTH: usize = 6;

@@ -1,7 +1,7 @@
 //! Stencils: sparse rows of the observation matrix from fine pixels to pixels.
 
-use crate::numerics::simd_dispatch::dispatch_simd;
 use crate::super_resolve::region::Region;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// Maximum fine pixels along a side of a stencil.
 ///

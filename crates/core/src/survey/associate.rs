@@ -2,10 +2,10 @@
 
 use super::error::SurveyError;
 use crate::frames::FrameFile;
-use crate::trajectory::{PoseEntry, PoseFile, StampedPose, Trajectory, se3};
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::path::Path;
+use tunnelstitch_geometry::trajectory::{PoseEntry, PoseFile, StampedPose, Trajectory, se3};
 
 /// The criterion by which poses are associated with frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -215,7 +215,7 @@ pub(super) fn by_time(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::{PoseFormat, spiral};
+    use tunnelstitch_geometry::trajectory::{PoseFormat, spiral};
 
     fn frames(paths: &[&str]) -> Vec<FrameFile> {
         let frame = |(index, path): (usize, &&str)| FrameFile::picture(index, path.into());

@@ -1,12 +1,12 @@
 //! Search of a folder for the parts of a survey.
 
 use super::file::SURVEY_FILE;
-use crate::camera::{Camera, read_calibration};
 use crate::frames::{FrameError, Video, open_picture};
-use crate::trajectory::{PoseFile, read_poses};
 use image::ImageDecoder;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::camera::{Camera, read_calibration};
+use tunnelstitch_geometry::trajectory::{PoseFile, read_poses};
 
 /// Levels of folders below the searched one.
 const MAX_DEPTH: usize = 3;

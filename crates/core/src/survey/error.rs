@@ -1,10 +1,10 @@
 //! Errors of surveys.
 
-use crate::camera::CalibrationError;
 use crate::frames::FrameError;
-use crate::surface::SurfaceError;
-use crate::trajectory::PoseError;
 use std::path::PathBuf;
+use tunnelstitch_geometry::camera::CalibrationError;
+use tunnelstitch_geometry::surface::SurfaceError;
+use tunnelstitch_geometry::trajectory::PoseError;
 
 /// An error of a survey.
 #[derive(Debug, thiserror::Error)]

@@ -4,10 +4,10 @@ use super::calibrate::CalibrateSection;
 use super::error::SurveyError;
 use super::poses_section::PosesSection;
 use super::tunnel::TunnelSection;
-use crate::trajectory::{Jitter, JitterModel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::trajectory::{Jitter, JitterModel};
 
 /// Name of the file that describes a survey.
 pub const SURVEY_FILE: &str = "survey.toml";
@@ -166,7 +166,7 @@ mod tests {
     use crate::survey::ignore::IgnoreSection;
     use crate::survey::open::Survey;
     use crate::survey::tunnel::Shape;
-    use crate::trajectory::{CameraAxes, Direction, PoseFormat};
+    use tunnelstitch_geometry::trajectory::{CameraAxes, Direction, PoseFormat};
 
     #[test]
     fn the_file_round_trips() {

@@ -2,9 +2,9 @@
 
 use super::error::SurveyError;
 use crate::frames::FrameFile;
-use crate::trajectory::{PoseError, text, times};
 use std::collections::HashMap;
 use std::path::Path;
+use tunnelstitch_geometry::trajectory::{PoseError, text, times};
 
 /// Reads the frames' times, seconds, one per frame.
 ///

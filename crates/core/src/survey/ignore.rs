@@ -1,7 +1,7 @@
 //! `[tunnel] ignore`: regions of the wall that are excluded from the comparison of frames.
 
-use crate::surface::{Surface, WallRegions};
 use serde::{Deserialize, Serialize};
+use tunnelstitch_geometry::surface::{Surface, WallRegions};
 
 /// A region of the wall; a missing bound does not limit it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -71,7 +71,7 @@ pub(super) fn wall_regions(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surface::Circle;
+    use tunnelstitch_geometry::surface::Circle;
 
     #[test]
     fn impossible_parts_are_named() {

@@ -3,8 +3,8 @@
 use super::associate::Associate;
 use super::error::SurveyError;
 use super::open::Survey;
-use crate::trajectory::{Pose, poses_of};
 use std::path::Path;
+use tunnelstitch_geometry::trajectory::{Pose, poses_of};
 
 impl Survey {
     /// Keeps frames whose view is rotated by `step_deg` against the previous kept frame, by the
@@ -64,7 +64,7 @@ fn keyframe_indices(poses: &[Pose], step_rad: f64) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::spiral;
+    use tunnelstitch_geometry::trajectory::spiral;
 
     #[test]
     fn views_are_as_far_apart_as_asked() {

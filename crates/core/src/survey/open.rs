@@ -8,11 +8,13 @@ use super::frame_list::FrameList;
 use super::pose_reader::{InterpretedPoses, PoseReader};
 use super::poses_section::PosesSection;
 use super::{ignore, pose_validation};
-use crate::camera::{Camera, read_calibration};
 use crate::frames::{FrameSet, Mask};
-use crate::surface::{Surface, WallRegions};
-use crate::trajectory::{Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of};
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::camera::{Camera, read_calibration};
+use tunnelstitch_geometry::surface::{Surface, WallRegions};
+use tunnelstitch_geometry::trajectory::{
+    Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of,
+};
 
 /// A survey, read and validated, except the pixels.
 #[derive(Debug)]

@@ -5,11 +5,11 @@ use super::error::SurveyError;
 use super::frame_times;
 use super::poses_section::PosesSection;
 use crate::frames::FrameFile;
-use crate::trajectory::{
+use std::path::Path;
+use tunnelstitch_geometry::trajectory::{
     Convention, Pose, PoseFormat, StampedPose, Trajectory, read_camera_in_body, read_poses,
     read_tunnel_frame,
 };
-use std::path::Path;
 
 /// A reader of pose files with the options of a [`PosesSection`].
 pub(super) struct PoseReader<'a> {

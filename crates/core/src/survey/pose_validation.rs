@@ -8,11 +8,11 @@
 
 use super::error::SurveyError;
 use super::pose_reader::InterpretedPoses;
-use crate::camera::Camera;
-use crate::surface::Surface;
-use crate::trajectory::{Convention, Pose, TunnelAxis, so3};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use std::path::Path;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::Surface;
+use tunnelstitch_geometry::trajectory::{Convention, Pose, TunnelAxis, so3};
 
 /// Smallest number of frames from which a convention is judged.
 const MIN_FRAMES: usize = 4;
@@ -23,7 +23,7 @@ const MAX_WRONG_FRACTION: f64 = 0.34;
 /// noisy.
 const MAX_AXIAL_FRACTION: f64 = 0.05;
 /// Angle from the axis at which motion and rotation are along another direction: twice the 30° of a
-/// carrier that sways by 6° per frame and steers back ([`Jitter`](crate::trajectory::Jitter)).
+/// carrier that sways by 6° per frame and steers back ([`Jitter`](tunnelstitch_geometry::trajectory::Jitter)).
 /// Other axes of the world are 90° off.
 const MIN_ASKEW_ANGLE_RAD: f64 = std::f64::consts::FRAC_PI_3;
 /// Angle from the axis within which motion and rotation are along it.

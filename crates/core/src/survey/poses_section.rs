@@ -1,9 +1,9 @@
 //! `[poses]`: the pose files and their convention.
 
 use super::associate::Associate;
-use crate::trajectory::{CameraAxes, Direction, PoseFormat};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
+use tunnelstitch_geometry::trajectory::{CameraAxes, Direction, PoseFormat};
 
 /// `[poses]`. Defaults are detected from the files' content or given by the conventions of their
 /// formats.
@@ -25,11 +25,11 @@ pub struct PosesSection {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera_axes: Option<CameraAxes>,
     /// The motion from the body whose poses the files hold to the camera; see
-    /// [`read_camera_in_body`](crate::trajectory::read_camera_in_body).
+    /// [`read_camera_in_body`](tunnelstitch_geometry::trajectory::read_camera_in_body).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_to_camera: Option<PathBuf>,
     /// The tunnel's frame in the poses' world; see
-    /// [`read_tunnel_frame`](crate::trajectory::read_tunnel_frame).
+    /// [`read_tunnel_frame`](tunnelstitch_geometry::trajectory::read_tunnel_frame).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tunnel_frame: Option<PathBuf>,
     /// The criterion that associates poses with frames; by default their names, if the file has

@@ -1,9 +1,9 @@
 //! A commented `survey.toml` for the files of a folder.
 
 use super::discover::Discovery;
-use crate::trajectory::PoseFormat;
 use std::fmt::Write;
 use std::path::Path;
+use tunnelstitch_geometry::trajectory::PoseFormat;
 
 /// Keys of `[poses]` that are only mentioned, and the table `[prior]`.
 const CONVENTIONS_AND_PRIOR: &str = "\

@@ -2,12 +2,12 @@
 
 use super::error::SurveyError;
 use super::ignore::IgnoreSection;
-use crate::surface::section::{CircleOutline, Ellipse, PiecewiseOutline, Section};
-use crate::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
-use crate::trajectory::{PoseError, text};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use tunnelstitch_geometry::surface::section::{CircleOutline, Ellipse, PiecewiseOutline, Section};
+use tunnelstitch_geometry::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
+use tunnelstitch_geometry::trajectory::{PoseError, text};
 
 /// The section of the tunnel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -118,7 +118,7 @@ impl TunnelSection {
             self.width_m.unwrap_or_default(),
             self.height_m.unwrap_or_default(),
         );
-        let fail = |error: crate::surface::SurfaceError| error.to_string();
+        let fail = |error: tunnelstitch_geometry::surface::SurfaceError| error.to_string();
         Ok(match self.shape {
             Shape::Circle => {
                 let radius_m = self.radius_m.unwrap_or_default();

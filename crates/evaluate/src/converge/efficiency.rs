@@ -12,12 +12,12 @@ use std::f64::consts::TAU;
 use std::fmt;
 use std::path::Path;
 use std::sync::Arc;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::persist::atomic::{self, ScratchFolder};
 use tunnelstitch_core::progress::{Progress, Silent};
-use tunnelstitch_core::surface::{Surface, wall_jacobian};
 use tunnelstitch_core::survey::Survey;
-use tunnelstitch_core::trajectory::{Pose, poses_of};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Surface, wall_jacobian};
+use tunnelstitch_geometry::trajectory::{Pose, poses_of};
 use tunnelstitch_refine::{
     Covariances, FINER, PoseBounds, RefineOptions, UnknownTexture, pose_bounds, refine,
 };

@@ -64,7 +64,7 @@ pub(super) fn draw_survey(
 mod tests {
     use super::*;
     use crate::converge::sweep_cell::SweepWall;
-    use tunnelstitch_core::trajectory::JitterModel;
+    use tunnelstitch_geometry::trajectory::JitterModel;
 
     fn drawn(rotation_deg: f64, translation_scale: f64, frames: usize) -> SurveyDraw {
         let options = ConvergeOptions {

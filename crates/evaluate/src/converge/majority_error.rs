@@ -3,9 +3,9 @@
 use crate::error::EvaluateError;
 use crate::error::check_pairs;
 use crate::wall_error::{FrameOffsets, frame_offsets, mean_arc};
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::surface::{Surface, shortest_arc};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Surface, shortest_arc};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Root mean square wall error below which a frame is good, pixels.
 pub const GOOD_PX: f64 = 0.5;
@@ -164,8 +164,8 @@ impl AllOffsets<'_> {
 mod tests {
     use super::*;
     use crate::wall_error::wall_error;
-    use tunnelstitch_core::surface::{Circle, GaugeMotion};
-    use tunnelstitch_core::trajectory::spiral;
+    use tunnelstitch_geometry::surface::{Circle, GaugeMotion};
+    use tunnelstitch_geometry::trajectory::spiral;
 
     fn scene() -> (Circle, Camera, Vec<Pose>) {
         let circle = Circle::new(3.0).unwrap();

@@ -6,8 +6,8 @@ use crate::converge::sweep_cell::unit_sigmas;
 use crate::converge::sweep_cell::{SweepCell, SweepWall};
 use serde::Serialize;
 use std::collections::HashSet;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::trajectory::JitterModel;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::trajectory::JitterModel;
 use tunnelstitch_simulate::SimulateOptions;
 
 /// Vertical field of view of the paper's camera: 60°.

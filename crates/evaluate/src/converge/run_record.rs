@@ -86,7 +86,7 @@ pub(super) mod tests {
     use super::*;
     use crate::converge::options::ConvergeOptions;
     use crate::converge::sweep_cell::SweepWall;
-    use tunnelstitch_core::trajectory::JitterModel;
+    use tunnelstitch_geometry::trajectory::JitterModel;
 
     /// A successful run of the default sweep.
     pub fn record(rotation_deg: f64, seed: u64) -> RunRecord {

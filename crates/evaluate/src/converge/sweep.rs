@@ -16,7 +16,7 @@ use tunnelstitch_core::frames::{PictureFormat, write_picture};
 use tunnelstitch_core::persist::atomic::{self, ScratchFolder};
 use tunnelstitch_core::progress::{Progress, Silent};
 use tunnelstitch_core::survey::Survey;
-use tunnelstitch_core::trajectory::poses_of;
+use tunnelstitch_geometry::trajectory::poses_of;
 use tunnelstitch_refine::{FrameFlag, RefineOptions, Refined, refine};
 use tunnelstitch_simulate::SimulateOptions;
 

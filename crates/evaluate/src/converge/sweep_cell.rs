@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use tunnelstitch_core::survey::PriorSection;
-use tunnelstitch_core::trajectory::JitterModel;
+use tunnelstitch_geometry::trajectory::JitterModel;
 use tunnelstitch_simulate::{SimulateOptions, Wall};
 
 /// Wall of a sweep; each is one that needs no image file.

@@ -5,7 +5,7 @@ use crate::samples::visibility::Visibility;
 use crate::tiles::grid::{TILE, TileId, WallGrid};
 use std::ops::Range;
 use tunnelstitch_core::super_resolve::Region;
-use tunnelstitch_core::surface::WallRegions;
+use tunnelstitch_geometry::surface::WallRegions;
 
 /// Observations of the tiles of a region.
 pub struct ObservationMask {

@@ -163,7 +163,7 @@ mod tests {
     use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
     use crate::linear::sparse_cholesky::SymbolicFactorisation;
     use nalgebra::{DMatrix, DVector};
-    use tunnelstitch_core::camera::Camera;
+    use tunnelstitch_geometry::camera::Camera;
 
     /// Deterministic numbers in −1..1.
     fn number(k: usize, salt: f64) -> f64 {

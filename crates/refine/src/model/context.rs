@@ -5,10 +5,10 @@ use crate::parameters::calibration::{Calibration, Kappa};
 use crate::parameters::frame_estimate::FrameEstimate;
 use std::borrow::Cow;
 use std::ops::Range;
-use tunnelstitch_core::camera::{Camera, Sweep};
 use tunnelstitch_core::frames::FrameCache;
-use tunnelstitch_core::surface::{Surface, WallRegions};
-use tunnelstitch_core::trajectory::{Pose, Shutter};
+use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::surface::{Surface, WallRegions};
+use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
 /// All inputs of the estimator.
 #[derive(Clone, Copy)]

@@ -7,7 +7,7 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::ops::Range;
-use tunnelstitch_core::camera::Sweep;
+use tunnelstitch_geometry::camera::Sweep;
 
 /// The states of all frames, and the shared parameters.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -9,9 +9,9 @@ use crate::parameters::calibration::{DATUM_PARAMETERS, Datum, INTRINSIC_PARAMETE
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use nalgebra::{Matrix6, Vector3, Vector6};
 use std::ops::Range;
-use tunnelstitch_core::numerics::median::upper_median;
-use tunnelstitch_core::surface::{Gauge, GaugeMotion};
-use tunnelstitch_core::trajectory::{Jitter, JitterModel, Pose};
+use tunnelstitch_geometry::numerics::median::upper_median;
+use tunnelstitch_geometry::surface::{Gauge, GaugeMotion};
+use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose};
 
 /// Gaussian prior on poses and exposures.
 ///

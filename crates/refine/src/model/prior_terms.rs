@@ -6,7 +6,7 @@
 
 use crate::parameters::calibration::{DATUM_PARAMETERS, Datum};
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
-use tunnelstitch_core::trajectory::{Pose, so3};
+use tunnelstitch_geometry::trajectory::{Pose, so3};
 
 /// Derivative of an error by the datum parameters `(ln r, τ_x, τ_z, o_x, o_z)`.
 pub type DatumJacobian = SMatrix<f64, 6, DATUM_PARAMETERS>;
@@ -99,7 +99,7 @@ pub fn relative_error_by_datum(
 pub mod tests {
     use super::*;
     use crate::parameters::calibration::{Calibration, INTRINSIC_PARAMETERS, Kappa};
-    use tunnelstitch_core::camera::Camera;
+    use tunnelstitch_geometry::camera::Camera;
 
     pub fn pose(seed: f64) -> Pose {
         Pose::new(

@@ -3,7 +3,7 @@
 use crate::linear::sparse_cholesky::FactorError;
 use tunnelstitch_core::frames::FrameError;
 use tunnelstitch_core::persist::checkpoint::CheckpointError;
-use tunnelstitch_core::surface::SurfaceError;
+use tunnelstitch_geometry::surface::SurfaceError;
 
 /// Failures of setting up or solving a photometric problem.
 #[derive(Debug, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// A reason to reject a frame's pixels and to leave it at its prior.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

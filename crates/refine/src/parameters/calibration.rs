@@ -14,7 +14,7 @@
 //! | `o_x, o_z` | offset of the tunnel's axis there, m | prior of the poses |
 //! | `ρ` | readout time of a frame, s | pixels |
 //!
-//! The first five are the intrinsics ([`tunnelstitch_core::camera::Camera::intrinsics_jacobian`]). The readout
+//! The first five are the intrinsics ([`tunnelstitch_geometry::camera::Camera::intrinsics_jacobian`]). The readout
 //! time is free in the rolling-shutter test alone
 //! ([`crate::uncertainty::rolling_shutter_test`]).
 //!
@@ -29,9 +29,9 @@
 //! its prior is unobservable ([`crate::uncertainty::observability`]).
 
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::survey::{CalibrateSection, CalibrationGroup};
-use tunnelstitch_core::trajectory::{Jitter, JitterModel, Pose, so3};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose, so3};
 
 /// Number of shared parameters.
 pub const SHARED_PARAMETERS: usize = 11;

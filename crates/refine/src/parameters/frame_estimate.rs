@@ -2,7 +2,7 @@
 
 use nalgebra::{SVector, Vector6};
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Number of parameters of a frame: rotation (3), translation (3), log-gain, bias.
 pub const FRAME_PARAMETERS: usize = 8;

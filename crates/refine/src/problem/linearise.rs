@@ -9,8 +9,8 @@ use crate::problem::block_sums::BlockSums;
 use crate::problem::linearisation::{FrameContribution, Linearisation};
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::thresholds::photometric_problem::GAUGE_STIFFNESS_RATIO;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Blocks of tiles that are processed before their sums are added: bounds the memory, whatever the
 /// tunnel's length.
@@ -210,7 +210,7 @@ mod tests {
     use crate::problem::test_ring::{Ring, number};
     use crate::samples::sampling::Sampling;
     use crate::tiles::interpolation::Interpolation;
-    use tunnelstitch_core::surface::Surface;
+    use tunnelstitch_geometry::surface::Surface;
 
     /// Central differences of the cost against the gradient, parameter by parameter.
     ///

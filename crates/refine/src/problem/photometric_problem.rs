@@ -18,8 +18,8 @@ use crate::tiles::grid::WallGrid;
 use crate::tiles::residual_weighting::NoiseModel;
 use std::ops::Range;
 use std::sync::Arc;
-use tunnelstitch_core::camera::{Camera, Sweep};
 use tunnelstitch_core::frames::Pyramid;
+use tunnelstitch_geometry::camera::{Camera, Sweep};
 
 /// The objective ([`crate::tiles::tile`]) for a window of frames on a fixed set of wall
 /// samples.

@@ -9,9 +9,9 @@ use crate::thresholds::photometric_problem::{
     MAX_VIEWING_DISTANCE_RADII, MIN_SAMPLES_PER_IMAGE_HEIGHT,
 };
 use std::ops::Range;
-use tunnelstitch_core::camera::{Camera, Sweep};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::surface::{Surface, viewing_distance};
+use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::{Surface, viewing_distance};
 
 /// The participants at their poses with their footprints; None for those that are not compared.
 /// `rates`: motion of each participant's camera during a readout of one second.

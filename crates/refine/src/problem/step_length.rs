@@ -5,7 +5,7 @@ use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::thresholds::photometric_problem::MAX_LOG_GAIN_SIGMAS;
 use nalgebra::Vector5;
-use tunnelstitch_core::surface::{lens_jacobian, wall_jacobian};
+use tunnelstitch_geometry::surface::{lens_jacobian, wall_jacobian};
 
 impl PhotometricProblem<'_> {
     /// True if the camera is inside the tunnel and the log-gain within [`MAX_LOG_GAIN_SIGMAS`].
@@ -68,7 +68,7 @@ impl PhotometricProblem<'_> {
 mod tests {
     use super::*;
     use crate::problem::test_ring::Ring;
-    use tunnelstitch_core::surface::Surface;
+    use tunnelstitch_geometry::surface::Surface;
 
     #[test]
     fn cameras_outside_and_vanishing_gains_are_infeasible() {

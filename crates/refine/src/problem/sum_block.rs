@@ -12,8 +12,8 @@ use crate::tiles::tile_moments::TileMoments;
 use crate::tiles::workspace::TileWorkspace;
 use nalgebra::Matrix2x6;
 use std::ops::Range;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// A block of the wall with the frames of its stretch.
 struct BlockContext<'b> {

@@ -37,9 +37,9 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 use tunnelstitch_core::frames::GreyImage;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::numerics::signal::{hann, sinc};
-use tunnelstitch_core::numerics::spectrum::Transform;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::signal::{hann, sinc};
+use tunnelstitch_geometry::numerics::spectrum::Transform;
 
 /// Side of the patches whose periodograms are averaged, pixels of a frame.
 const PATCH_PX: usize = 64;

@@ -4,10 +4,10 @@ use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::thresholds::footprints::MAX_REACH_RADII;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::surface::{Footprint, Surface};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::{Footprint, Surface};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Largest distance along the tunnel at which a frame is compared, metres.
 pub fn reach_m(surface: &dyn Surface) -> f64 {

@@ -25,9 +25,9 @@ use crate::tiles::grid::{BLOCK, TileId, TilePoints, WallGrid};
 use crate::tiles::residual_weighting::{NoiseModel, median_and_sigma};
 use crate::tiles::workspace::{Misfit, TileWorkspace};
 use std::collections::HashMap;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Number of classes of the mean variance, with equally many tiles each.
 const CLASSES: usize = 8;
@@ -206,10 +206,10 @@ mod tests {
     use crate::samples::visibility::{Exclusions, PosedFrame};
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
-    use tunnelstitch_core::camera::Sweep;
     use tunnelstitch_core::frames::GreyImage;
-    use tunnelstitch_core::surface::Footprint;
     use tunnelstitch_core::test_wall::{TestWall, waves};
+    use tunnelstitch_geometry::camera::Sweep;
+    use tunnelstitch_geometry::surface::Footprint;
 
     /// A glint in the centre of one frame, 40 grey levels bright and 6 pixels wide: its tiles are
     /// excluded there and nowhere else, with its flanks, where it is no brighter than the noise;

@@ -1,9 +1,9 @@
 //! Projection and bilinear sampling of single wall points in a frame.
 
 use nalgebra::{Matrix3, Vector3};
-use tunnelstitch_core::camera::{Camera, LensF32, ProjectF32};
 use tunnelstitch_core::frames::GreyImage;
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::{Camera, LensF32, ProjectF32};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// A camera at a pose, prepared to project wall points relative to an origin near them.
 pub struct PointSampler {
@@ -87,8 +87,8 @@ impl ImagePoint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_core::camera::{Lens, Sweep};
-    use tunnelstitch_core::trajectory::so3;
+    use tunnelstitch_geometry::camera::{Lens, Sweep};
+    use tunnelstitch_geometry::trajectory::so3;
 
     /// Images of the pixel coordinates, sampled where the camera itself projects a point, lens
     /// included.

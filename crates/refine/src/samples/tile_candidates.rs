@@ -4,7 +4,7 @@ use crate::tiles::grid::{BLOCK, TileId, WallGrid};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::ops::Range;
-use tunnelstitch_core::surface::{Footprint, Surface, WallRegions};
+use tunnelstitch_geometry::surface::{Footprint, Surface, WallRegions};
 
 /// Rows of tiles that a footprint covers.
 pub fn covered_rows(grid: &WallGrid, footprint: &Footprint) -> Range<i64> {

@@ -16,10 +16,10 @@ use crate::tiles::grid::{BLOCK, WallGrid};
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::{FrameCache, FrameError, Pyramid};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::Surface;
 
 /// A stretch of the wall that is processed at once.
 #[derive(Clone, Debug)]

@@ -4,9 +4,9 @@ use crate::samples::observer::Observer;
 use crate::thresholds::visibility::{MIN_BORDER_DISTANCE_PX, MIN_RELATIVE_SAMPLE_AREA};
 use crate::tiles::grid::{SIDE, WallGrid};
 use nalgebra::{Vector2, Vector3};
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::{PyramidMask, Shading};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Area of a tile between its outermost samples, in samples.
 const SAMPLES_BETWEEN_CORNERS: f64 = ((SIDE - 1) * (SIDE - 1)) as f64;

@@ -21,9 +21,9 @@ use crate::tiles::frame_samples::SampledFrame;
 use crate::tiles::grid::{TilePoints, WallGrid};
 use crate::tiles::tile_statistics::squared_slopes;
 use std::ops::Range;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Selects the most informative tiles of each block until they hold the share `information` of its
 /// information.

@@ -7,11 +7,11 @@ use crate::samples::tile_projection::project_tile;
 use crate::tiles::grid::{TileId, WallGrid};
 use std::collections::HashSet;
 use std::ops::Range;
-use tunnelstitch_core::camera::{Camera, Sweep};
 use tunnelstitch_core::frames::{PyramidMask, Shading};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::surface::{Footprint, Surface, WallRegions};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::{Footprint, Surface, WallRegions};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// A tile and its observers.
 #[derive(Clone, Debug)]

@@ -22,10 +22,10 @@ use crate::uncertainty::rolling_shutter_test::estimate_readout;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::validation::inconsistent_frames::{find_disagreement, find_inconsistent_frames};
 use crate::validation::pairwise_lucas_kanade::align_pairs;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::FrameSet;
-use tunnelstitch_core::surface::GaugeMotion;
-use tunnelstitch_core::trajectory::{StampedPose, Trajectory};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::GaugeMotion;
+use tunnelstitch_geometry::trajectory::{StampedPose, Trajectory};
 
 /// Runs the stage on the last full-size solve.
 ///

@@ -10,7 +10,7 @@ use crate::parameters::calibration::{Calibration, Kappa};
 use crate::stages::state::PipelineState;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_core::survey::CalibrationGroup;
-use tunnelstitch_core::trajectory::{Pose, poses_of};
+use tunnelstitch_geometry::trajectory::{Pose, poses_of};
 
 /// The input and the options of a refinement, with what follows from both.
 pub struct Setup<'a> {

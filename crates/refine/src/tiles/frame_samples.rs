@@ -4,11 +4,11 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use crate::tiles::grid::{Plane, TilePoints, ZERO};
 use crate::tiles::interpolation::{Interpolation, cubic_weights};
 use nalgebra::{Matrix2x6, Matrix3, Vector3};
-use tunnelstitch_core::camera::{Camera, LensF32, ProjectF32, Sweep};
 use tunnelstitch_core::frames::GreyImage;
 use tunnelstitch_core::super_resolve::{self, Reading};
-use tunnelstitch_core::surface::{lens_jacobian, wall_jacobian};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::{Camera, LensF32, ProjectF32, Sweep};
+use tunnelstitch_geometry::surface::{lens_jacobian, wall_jacobian};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// 2²³: added to a non-negative float, it rounds it to an integer in the last bits of the sum.
 /// Unlike a cast, which saturates, this vectorises.
@@ -233,9 +233,9 @@ mod tests {
     use super::*;
     use crate::parameters::calibration::{Calibration, INTRINSIC_PARAMETERS, Kappa};
     use crate::tiles::grid::{AREA, SIDE, TileId, WallGrid};
-    use tunnelstitch_core::camera::{KannalaBrandt, Lens};
-    use tunnelstitch_core::surface::{Circle, Surface, WallPoint};
-    use tunnelstitch_core::trajectory::so3;
+    use tunnelstitch_geometry::camera::{KannalaBrandt, Lens};
+    use tunnelstitch_geometry::surface::{Circle, Surface, WallPoint};
+    use tunnelstitch_geometry::trajectory::so3;
 
     /// Central differences over the camera's parameters and the readout time.
     #[test]

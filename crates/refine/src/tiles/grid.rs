@@ -1,7 +1,7 @@
 //! Lattice of wall samples in square tiles.
 
 use nalgebra::Vector3;
-use tunnelstitch_core::surface::{Footprint, Surface, WallFrame, WallPoint};
+use tunnelstitch_geometry::surface::{Footprint, Surface, WallFrame, WallPoint};
 
 /// Samples along the side of a tile.
 pub const TILE: usize = 8;
@@ -182,7 +182,7 @@ impl TilePoints {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_core::surface::{Circle, shortest_arc};
+    use tunnelstitch_geometry::surface::{Circle, shortest_arc};
 
     #[test]
     fn a_whole_number_of_tiles_goes_around() {

@@ -7,7 +7,7 @@
 //! Transactions on Acoustics, Speech, and Signal Processing 29(6), 1981.
 
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::numerics::kernel;
+use tunnelstitch_geometry::numerics::kernel;
 
 /// Interpolation kernel K.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -53,7 +53,7 @@
 //! # Linearisation
 //!
 //! If frame i moves by ξ, the pixel that observes x shows the wall at `x − A_i ξ`, with
-//! `A_i = ∂(s, h)/∂ξ` ([`tunnelstitch_core::surface::wall_jacobian`]). Hence `∂e_i/∂ξ = −a_i ∇Sᵀ A_i`,
+//! `A_i = ∂(s, h)/∂ξ` ([`tunnelstitch_geometry::surface::wall_jacobian`]). Hence `∂e_i/∂ξ = −a_i ∇Sᵀ A_i`,
 //! `∂e_i/∂α_i = −a_i S` and `∂e_i/∂b_i = −1`. With the features `φ(x) = (∂S/∂s, ∂S/∂h, S, 1)`,
 //! common to all frames,
 //!
@@ -236,10 +236,10 @@ mod tests {
     use nalgebra::Vector3;
     use rand::SeedableRng;
     use rand_distr::{Distribution, Normal};
-    use tunnelstitch_core::camera::Camera;
     use tunnelstitch_core::frames::GreyImage;
-    use tunnelstitch_core::surface::Circle;
-    use tunnelstitch_core::trajectory::{Pose, so3};
+    use tunnelstitch_geometry::camera::Camera;
+    use tunnelstitch_geometry::surface::Circle;
+    use tunnelstitch_geometry::trajectory::{Pose, so3};
 
     /// Frames of pure noise, whose slopes are noise alone.
     #[test]

@@ -27,8 +27,8 @@ use crate::thresholds::shading_correction::MAX_SHADING_FRAMES;
 use crate::tracking::shading_correction::correct_until_settled;
 use crate::tracking::track::Tracking;
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::progress::Progress;
+use tunnelstitch_geometry::camera::Camera;
 
 /// Points on each edge of the picture at which cameras are compared.
 const STEPS_PER_EDGE: usize = 4;

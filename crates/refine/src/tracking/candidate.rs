@@ -9,8 +9,8 @@ use crate::tracking::correlation_search::min_samples;
 use crate::tracking::ncc_score::NccScore;
 use crate::tracking::pose_separation::separation_m;
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::Surface;
 
 /// A hypothesis after its refinement.
 #[derive(Clone, Copy, Debug)]

@@ -23,8 +23,8 @@ use crate::tracking::reference_mosaic::ReferenceMosaic;
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use rayon::prelude::*;
-use tunnelstitch_core::surface::{WallPoint, shortest_arc, wall_jacobian};
-use tunnelstitch_core::trajectory::{Pose, so3};
+use tunnelstitch_geometry::surface::{WallPoint, shortest_arc, wall_jacobian};
+use tunnelstitch_geometry::trajectory::{Pose, so3};
 
 /// A hypothesis of a frame's pose.
 #[derive(Clone, Copy, Debug)]

@@ -13,8 +13,8 @@
 use crate::tracking::reference_mosaic::ReferenceMosaic;
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use nalgebra::Vector2;
-use tunnelstitch_core::numerics::spectrum::{Spectrum, Transform};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::numerics::spectrum::{Spectrum, Transform};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// A local maximum of the correlation over shifts.
 pub struct CorrelationMaximum {

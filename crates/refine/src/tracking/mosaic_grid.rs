@@ -3,9 +3,9 @@
 use crate::model::context::EstimationContext;
 use crate::thresholds::reference_mosaic::MAX_VIEWING_DISTANCE_RADII;
 use nalgebra::Vector3;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::surface::{Footprint, WallPoint, viewing_distance};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Footprint, WallPoint, viewing_distance};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Largest number of grid points, which bounds the memory: a frame that looks far along the tunnel
 /// sees more wall, but not in detail.

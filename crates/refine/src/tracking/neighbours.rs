@@ -6,9 +6,9 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use crate::samples::footprints::footprint;
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use std::ops::Range;
-use tunnelstitch_core::camera::Sweep;
-use tunnelstitch_core::surface::Footprint;
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Sweep;
+use tunnelstitch_geometry::surface::Footprint;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// The frames around one that is registered; the slices are parallel to `frame_range`.
 pub struct Neighbours<'s> {

@@ -4,7 +4,7 @@ use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::prior::predict;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
-use tunnelstitch_core::trajectory::{JitterModel, Pose};
+use tunnelstitch_geometry::trajectory::{JitterModel, Pose};
 
 /// The prior's prediction of a frame's pose.
 #[derive(Clone, Copy, Debug)]

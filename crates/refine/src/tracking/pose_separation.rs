@@ -1,8 +1,8 @@
 //! Distance between two poses of a frame, measured on the wall.
 
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::surface::{Surface, shortest_arc};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Surface, shortest_arc};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Distance on the wall between two poses of a frame, metres: the mean over those of the picture's
 /// middle and corners through which both poses see the wall.
@@ -31,7 +31,7 @@ pub fn separation_m(surface: &dyn Surface, camera: &Camera, a: &Pose, b: &Pose) 
 mod tests {
     use super::*;
     use nalgebra::{UnitQuaternion, Vector3};
-    use tunnelstitch_core::surface::Circle;
+    use tunnelstitch_geometry::surface::Circle;
 
     /// A camera that looks along the tunnel: its corners see the wall, its middle does not.
     #[test]

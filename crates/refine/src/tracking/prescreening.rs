@@ -9,9 +9,9 @@ use crate::thresholds::prescreening::{
     MIN_SHADING_FRAMES,
 };
 use tunnelstitch_core::frames::{GreyImage, Shading, noise_sigma};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::progress::Progress;
-use tunnelstitch_core::surface::viewing_distance;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::viewing_distance;
 
 /// Frames decoded at once: bounds the memory.
 const BATCH: usize = 64;

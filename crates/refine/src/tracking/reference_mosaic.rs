@@ -12,9 +12,9 @@ use crate::tracking::ncc_score::NccScore;
 use crate::tracking::unwrapped_frame::{UnwrappedFrame, UnwrappedSampler};
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::surface::{Footprint, WallPoint};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Footprint, WallPoint};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// The wall around a frame, fused from the registered frames.
 pub struct ReferenceMosaic {

@@ -27,8 +27,8 @@ use crate::tracking::pose_prediction::PosePrediction;
 use crate::tracking::reference_mosaic::ReferenceMosaic;
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use std::borrow::Cow;
-use tunnelstitch_core::surface::viewing_distance;
-use tunnelstitch_core::trajectory::{Jitter, Pose};
+use tunnelstitch_geometry::surface::viewing_distance;
+use tunnelstitch_geometry::trajectory::{Jitter, Pose};
 
 /// Stopping rule of the solve of a single frame; the global solve does the rest.
 const STOPPING: Stopping = Stopping {

@@ -117,7 +117,7 @@ mod tests {
     use nalgebra::Vector2;
     use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
     use tunnelstitch_core::test_wall::{TestWall, waves};
-    use tunnelstitch_core::trajectory::spiral;
+    use tunnelstitch_geometry::trajectory::spiral;
 
     /// Two and a half turns past a wall in a light that depends on the pixel, and exposures that
     /// depend on the frame.

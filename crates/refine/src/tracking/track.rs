@@ -23,7 +23,7 @@ use crate::tracking::pose_prediction::{PosePrediction, predict_pose};
 use crate::tracking::registration::{Registered, register_frame};
 use crate::tracking::windows::{solve_long_window, solve_sliding_window};
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::surface::Footprint;
+use tunnelstitch_geometry::surface::Footprint;
 
 /// Frames that are tracked one after another.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -5,11 +5,11 @@ use crate::model::problem_error::ProblemError;
 use crate::samples::point_sampler::{ImagePoint, PointSampler};
 use nalgebra::Vector3;
 use std::sync::Arc;
-use tunnelstitch_core::camera::{Camera, Sweep};
 use tunnelstitch_core::frames::{
     GreyImage, LocalContrast, Pyramid, local_contrast, mask_outliers, noise_at_level,
 };
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// A frame at a pyramid level, with its local contrast, ready to be projected onto the wall.
 pub struct UnwrappedFrame {

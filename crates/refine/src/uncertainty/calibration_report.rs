@@ -5,7 +5,7 @@ use crate::parameters::calibration::{Calibration, Kappa, RADIUS_INDEX, SHARED_PA
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::shared_parameter_names::{PARAMETERS, ParameterKind};
 use serde::Serialize;
-use tunnelstitch_core::camera::Camera;
+use tunnelstitch_geometry::camera::Camera;
 
 /// One shared parameter of the report.
 #[derive(Clone, Debug, Serialize)]

@@ -47,14 +47,14 @@ use crate::linear::sparse_cholesky::FactorError;
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::uncertainty::frame_sigma::FrameSigma;
 use nalgebra::{Matrix6, Vector6};
-use tunnelstitch_core::surface::GaugeMotion;
+use tunnelstitch_geometry::surface::GaugeMotion;
 
 /// Unknowns of a frame's pose.
 const POSE: usize = 6;
 /// Unknowns of a frame's exposure.
 const EXPOSURE: usize = FRAME_PARAMETERS - POSE;
 
-/// Covariances of the poses' steps `ξ = (ω, ρ)` ([`tunnelstitch_core::trajectory::Pose::retract`]): rad²,
+/// Covariances of the poses' steps `ξ = (ω, ρ)` ([`tunnelstitch_geometry::trajectory::Pose::retract`]): rad²,
 /// rad·m, m².
 #[derive(Clone, Debug)]
 pub struct Covariances {

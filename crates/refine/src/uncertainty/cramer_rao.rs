@@ -48,10 +48,10 @@ use crate::tiles::interpolation::Interpolation;
 use crate::uncertainty::covariance::Covariances;
 use nalgebra::Matrix6;
 use std::borrow::Cow;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
 use tunnelstitch_core::survey::Survey;
-use tunnelstitch_core::trajectory::{Shutter, poses_of};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::trajectory::{Shutter, poses_of};
 
 /// Factor by which the frames of the bound have more pixels along each axis.
 pub const FINER: u32 = 4;

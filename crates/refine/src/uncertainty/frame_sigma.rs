@@ -5,8 +5,8 @@ use crate::parameters::calibration::INTRINSIC_PARAMETERS;
 use crate::parameters::frame_estimate::FrameEstimate;
 use nalgebra::Matrix6;
 use serde::{Deserialize, Deserializer};
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
 ///
@@ -82,13 +82,13 @@ pub fn compute_frame_sigma(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_core::trajectory::{Pose, so3};
+    use tunnelstitch_geometry::trajectory::{Pose, so3};
 
     /// A camera with an error of a millimetre along the tunnel displaces all of the wall by a
     /// millimetre; in pixels it is measured at the middle, even where the corners are far away.
     #[test]
     fn wall_sigma_in_pixels_is_measured_at_the_middle() {
-        let circle = tunnelstitch_core::surface::Circle::new(3.0).unwrap();
+        let circle = tunnelstitch_geometry::surface::Circle::new(3.0).unwrap();
         let camera = Camera::from_vertical_fov(160, 120, 40f64.to_radians());
         let mut covariance = Matrix6::zeros();
         covariance[(4, 4)] = 1e-6;

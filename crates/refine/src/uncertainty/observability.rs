@@ -145,7 +145,7 @@ fn explain(unknown: usize, covariance: &SharedBlock, free: &[bool; SHARED_PARAME
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_core::camera::Camera;
+    use tunnelstitch_geometry::camera::Camera;
 
     fn calibration() -> Calibration {
         Calibration {

@@ -26,7 +26,7 @@ use crate::tiles::grid::BLOCK;
 use crate::tiles::tile_arrays::SAMPLES;
 use crate::uncertainty::frame_sigma::compute_frame_sigma;
 use nalgebra::Matrix6;
-use tunnelstitch_core::numerics::median::upper_median;
+use tunnelstitch_geometry::numerics::median::upper_median;
 
 /// Wall samples of a patch: of the blocks over which the scatter is estimated.
 const PATCH: i64 = BLOCK * BLOCK * SAMPLES as i64;

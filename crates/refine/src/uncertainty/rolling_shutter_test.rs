@@ -25,8 +25,8 @@ use crate::thresholds::rolling_shutter_test::{
 use crate::uncertainty::observability::Posterior;
 use nalgebra::Vector3;
 use serde::Serialize;
-use tunnelstitch_core::surface::viewing_distance;
 use tunnelstitch_core::survey::{CalibrateSection, CalibrationGroup};
+use tunnelstitch_geometry::surface::viewing_distance;
 
 /// Stopping rule of the solve; where the given time is right, the first step is the last.
 const STOPPING: Stopping = Stopping {

@@ -168,7 +168,7 @@ fn mark_all_unobservable(calibration: &Calibration, reason: &str) -> Vec<Unobser
 mod tests {
     use super::*;
     use crate::parameters::calibration::Kappa;
-    use tunnelstitch_core::camera::Camera;
+    use tunnelstitch_geometry::camera::Camera;
 
     #[test]
     fn all_free_parameters_are_marked() {

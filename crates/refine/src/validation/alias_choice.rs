@@ -10,8 +10,8 @@
 
 use crate::model::prior::Prior;
 use crate::thresholds::aliasing::{MAX_PERIOD_DIFFERENCE, MAX_SWEEPS};
-use tunnelstitch_core::surface::{Gauge, GaugeMotion};
-use tunnelstitch_core::trajectory::{JitterModel, Pose};
+use tunnelstitch_geometry::surface::{Gauge, GaugeMotion};
+use tunnelstitch_geometry::trajectory::{JitterModel, Pose};
 
 /// The prior's choice between aliases, frame by frame.
 #[derive(Debug, PartialEq)]
@@ -205,7 +205,7 @@ impl Evidence<'_> {
 mod tests {
     use super::*;
     use crate::thresholds::aliasing::MIN_CLEAR_ODDS_NATS;
-    use tunnelstitch_core::trajectory::{Jitter, spiral};
+    use tunnelstitch_geometry::trajectory::{Jitter, spiral};
 
     /// A period of the wall along the tunnel.
     fn period() -> GaugeMotion {

@@ -14,8 +14,8 @@ use crate::tracking::neighbours::Neighbours;
 use crate::tracking::reference_mosaic::ReferenceMosaic;
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use nalgebra::Vector2;
-use tunnelstitch_core::surface::{Footprint, GaugeMotion, gauge_component};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::surface::{Footprint, GaugeMotion, gauge_component};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Finds the gauge motions (rotations about the axis, translations along it) within the prior's
 /// reach after which frame `frame` matches what the others show as well as it does now.

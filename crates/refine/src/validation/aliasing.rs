@@ -17,9 +17,9 @@ use crate::thresholds::aliasing::{MAX_ITERATIONS, MIN_CLEAR_ODDS_NATS};
 use crate::validation::alias_choice::{Evidence, find_periods};
 use crate::validation::alias_search::find_alias_motions;
 use std::collections::BTreeMap;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::surface::GaugeMotion;
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::GaugeMotion;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// A frame and the gauge motion to its alias.
 pub type AliasHypothesis = (usize, GaugeMotion);

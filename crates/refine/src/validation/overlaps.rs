@@ -6,9 +6,9 @@ use crate::model::problem_error::ProblemError;
 use crate::samples::footprints::footprint;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
 use std::ops::Range;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::surface::Footprint;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::Footprint;
 
 /// Frames compared at once: bounds the memory.
 const BATCH: usize = 32;

@@ -34,7 +34,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::Pyramid;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Measures the displacements of those of some consecutive frames that are inliers and overlap;
 /// `finest`: the finest level of tracking.
@@ -86,7 +86,7 @@ mod tests {
     use crate::test_scene::{frame_states, independent_prior, test_context};
     use tunnelstitch_core::frames::FrameCache;
     use tunnelstitch_core::test_wall::{TestWall, waves};
-    use tunnelstitch_core::trajectory::Pose;
+    use tunnelstitch_geometry::trajectory::Pose;
 
     /// Alignments of a ring of frames at the given poses.
     fn align_ring(wall: &TestWall, poses: &[Pose]) -> Vec<Alignment> {

@@ -21,8 +21,8 @@ use crate::validation::overlaps::{Batch, Overlaps};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::surface::Footprint;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::Footprint;
 
 /// The comparison of two frames where they overlap.
 #[derive(Clone, Copy, Debug)]
@@ -295,9 +295,9 @@ mod tests {
     use super::*;
     use crate::test_scene::{frame_states, independent_prior, test_context};
     use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
-    use tunnelstitch_core::surface::{GaugeMotion, WallPoint};
     use tunnelstitch_core::test_wall::{TestWall, waves};
-    use tunnelstitch_core::trajectory::Pose;
+    use tunnelstitch_geometry::surface::{GaugeMotion, WallPoint};
+    use tunnelstitch_geometry::trajectory::Pose;
 
     /// Bricks around.
     const BRICKS: f64 = 60.0;

@@ -5,7 +5,7 @@ use crate::layout::tiles::TILE_COLUMNS;
 use crate::sampling::point_batch::PointBatch;
 use crate::sampling::sample::Sample;
 use std::ops::Range;
-use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// Accumulator of weighted values, column by column.
 pub struct RowAccumulator {

@@ -21,7 +21,7 @@ use crate::warp::patches::{LANES, PATCH_EDGE, split_at_multiples, split_at_patch
 use crate::warp::projection::LocalPoints;
 use arrayvec::ArrayVec;
 use std::ops::Range;
-use tunnelstitch_core::numerics::simd_dispatch::prefetch_rows;
+use tunnelstitch_geometry::numerics::simd_dispatch::prefetch_rows;
 
 /// Buffers that are used again for the next tile.
 #[derive(Default)]

@@ -21,8 +21,8 @@ use crate::sampling::point_batch::{MAX_BATCH_POINTS, PointBatch};
 use crate::sampling::thumbnails::Thumbnails;
 use crate::warp::projection::LocalPoints;
 use rayon::prelude::*;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Bands of the pyramid; the coarsest grid's nodes are `2^(PYRAMID_BANDS − 1)` as far apart. The
 /// grid has a multiple of that many columns. More bands blend light over longer distances.

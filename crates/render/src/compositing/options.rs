@@ -1,7 +1,7 @@
 //! Options of drawing: interpolation, choice of frames, blending, super-resolution.
 
 use serde::Serialize;
-use tunnelstitch_core::numerics::kernel::Interpolation;
+use tunnelstitch_geometry::numerics::kernel::Interpolation;
 
 /// Choice of the frames that a pixel of the panorama shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]

@@ -22,9 +22,9 @@ use crate::sampling::exposure::Exposure;
 use crate::sampling::point_batch::{MAX_BATCH_POINTS, PointBatch};
 use crate::sampling::thumbnails::Thumbnails;
 use crate::warp::projection::LocalPoints;
-use tunnelstitch_core::numerics::median::median;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::surface::{Surface, WallFrame};
+use tunnelstitch_geometry::numerics::median::median;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::{Surface, WallFrame};
 
 /// Edge of a tile of nodes: the parts of frames that show them stay in the second-level cache.
 const TILE_EDGE: u32 = 32;

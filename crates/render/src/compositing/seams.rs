@@ -17,7 +17,7 @@ use crate::sampling::exposure::Exposure;
 use crate::sampling::thumbnails::Thumbnails;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Frame and correction of each node of the grid.
 #[derive(Clone, Debug, Serialize, Deserialize)]

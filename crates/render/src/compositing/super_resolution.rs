@@ -11,9 +11,9 @@ use crate::sampling::picture_cache::PictureCache;
 use crate::sampling::sample::{Sample, Samples};
 use std::collections::BTreeMap;
 use tunnelstitch_core::frames::{GreyImage, noise_sigma};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::super_resolve::{Footprints, MARGIN, PosedCamera, Reading, Region};
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Variance of rounding to whole grey levels.
 const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;

@@ -17,8 +17,8 @@ use crate::warp::control_points::ControlPoints;
 use crate::warp::local_polynomial::ProjectedControlPoints;
 use crate::warp::projection::LocalPoints;
 use nalgebra::Vector3;
-use tunnelstitch_core::numerics::median::median;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::numerics::median::median;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Renderer of tiles from the frames in memory.
 pub struct TileRenderer<'a> {

@@ -5,7 +5,7 @@ use crate::error::RenderError;
 use image::DynamicImage;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_core::super_resolve::FineGrid;
-use tunnelstitch_core::surface::{Footprint, Surface, WallPoint};
+use tunnelstitch_geometry::surface::{Footprint, Surface, WallPoint};
 
 /// Orientation of the panorama in its picture file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -229,7 +229,7 @@ impl Canvas {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_core::surface::Circle;
+    use tunnelstitch_geometry::surface::Circle;
 
     fn footprint(h_min_m: f64, h_max_m: f64) -> Footprint {
         Footprint {

@@ -1,9 +1,9 @@
 //! Places of the frames on the unrolled wall.
 
 use crate::error::RenderError;
-use tunnelstitch_core::camera::{Camera, Sweep};
-use tunnelstitch_core::surface::{Footprint, Surface, viewing_distance};
-use tunnelstitch_core::trajectory::{Pose, Shutter};
+use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::surface::{Footprint, Surface, viewing_distance};
+use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
 /// Index that stands in a map of frames where no frame sees the wall.
 pub const NO_FRAME: u32 = u32::MAX;
@@ -83,8 +83,8 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
     use std::f64::consts::TAU;
-    use tunnelstitch_core::surface::Circle;
-    use tunnelstitch_core::trajectory::so3;
+    use tunnelstitch_geometry::surface::Circle;
+    use tunnelstitch_geometry::trajectory::so3;
 
     fn camera() -> Camera {
         Camera::from_vertical_fov(640, 480, 60f64.to_radians())

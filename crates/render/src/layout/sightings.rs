@@ -3,10 +3,10 @@
 use super::placement::Placement;
 use nalgebra::{Matrix2, Vector2};
 use serde::Serialize;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::Mask;
-use tunnelstitch_core::surface::{Surface, WallFrame, WallPoint};
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Surface, WallFrame, WallPoint};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// A frame that shows a point of the wall.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
     use crate::layout::placement::place;
     use tunnelstitch_core::test_wall::{TestWall, waves};
-    use tunnelstitch_core::trajectory::{Shutter, indexed};
+    use tunnelstitch_geometry::trajectory::{Shutter, indexed};
 
     /// Each pixel's ray meets the point again, and its stretch is what its neighbours say.
     #[test]

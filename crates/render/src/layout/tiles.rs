@@ -3,7 +3,7 @@
 use super::canvas::Canvas;
 use super::placement::Placement;
 use nalgebra::Vector3;
-use tunnelstitch_core::surface::{Footprint, Surface, WallPoint};
+use tunnelstitch_geometry::surface::{Footprint, Surface, WallPoint};
 
 /// Edge of a tile, pixels: its wall points stay in the second-level cache, and all that is known of
 /// one of its rows in the first-level cache.
@@ -127,9 +127,9 @@ pub fn tiles_at(
 mod tests {
     use super::*;
     use crate::layout::placement::place;
-    use tunnelstitch_core::camera::Camera;
-    use tunnelstitch_core::surface::Circle;
-    use tunnelstitch_core::trajectory::{Shutter, spiral};
+    use tunnelstitch_geometry::camera::Camera;
+    use tunnelstitch_geometry::surface::Circle;
+    use tunnelstitch_geometry::trajectory::{Shutter, spiral};
 
     #[test]
     fn tiles_cover_the_canvas_once_and_know_their_frames() {

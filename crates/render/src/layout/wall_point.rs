@@ -2,9 +2,9 @@
 
 use crate::layout::placement::Placement;
 use nalgebra::Vector2;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::Mask;
-use tunnelstitch_core::surface::{Surface, SurfaceError, WallPoint};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Surface, SurfaceError, WallPoint};
 
 /// Error of a frame's pixel that shows no point of the wall.
 #[derive(Debug, thiserror::Error)]

@@ -12,7 +12,7 @@ use crate::layout::tiles::BAND_ROWS;
 use crate::sampling::picture_cache::PictureCache;
 use crate::sampling::thumbnails::Thumbnails;
 use serde::Serialize;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::surface::Surface;
 
 /// The memory of a panorama, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

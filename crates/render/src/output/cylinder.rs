@@ -4,8 +4,8 @@ use crate::sampling::picture::Picture;
 use crate::sampling::sample::{Sample, Samples};
 use image::DynamicImage;
 use rayon::prelude::*;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::numerics::kernel::{Interpolation, Kernel};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::kernel::{Interpolation, Kernel};
 
 /// A photo on the unit cylinder around its camera, unrolled.
 #[derive(Clone, Debug)]

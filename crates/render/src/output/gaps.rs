@@ -4,7 +4,7 @@ use crate::compositing::band::{Band, Target};
 use crate::error::RenderError;
 use crate::layout::canvas::Canvas;
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Edge of a cell, canvas pixels, unless there would be too many cells.
 const CELL_EDGE_PX: u32 = 8;
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
     use crate::sampling::pixel_format::PixelFormat;
     use crate::sampling::sample::Samples;
-    use tunnelstitch_core::surface::Circle;
+    use tunnelstitch_geometry::surface::Circle;
 
     const CANVAS: Canvas = Canvas {
         columns: 80,

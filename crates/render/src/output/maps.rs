@@ -7,12 +7,12 @@ use crate::layout::sightings::px_per_metre;
 use crate::layout::tiles::{EDGE, tiles};
 use nalgebra::{Matrix2, Matrix6};
 use std::path::Path;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::raster::{
     CogWriter, Compression, RasterError, RasterSpec, RasterTile, Reduce, SampleType,
 };
-use tunnelstitch_core::surface::{Surface, wall_jacobian};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::{Surface, wall_jacobian};
 
 /// Map of one number for each node of a grid; NaN where there is none.
 #[derive(Clone, Debug)]
@@ -72,7 +72,7 @@ impl Map {
         placements: &[Placement],
         grid: &Canvas,
         labels: Option<&[u32]>,
-        value: impl Fn((usize, tunnelstitch_core::surface::WallFrame), f64) -> f32 + Sync,
+        value: impl Fn((usize, tunnelstitch_geometry::surface::WallFrame), f64) -> f32 + Sync,
     ) -> Self {
         let columns = grid.columns as usize;
         let mut values = vec![f32::NAN; grid.pixels()];

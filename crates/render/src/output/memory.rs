@@ -44,7 +44,7 @@ fn parse_meminfo(meminfo: &str) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_core::camera::Camera;
+    use tunnelstitch_geometry::camera::Camera;
 
     #[test]
     fn the_available_line_is_read() {

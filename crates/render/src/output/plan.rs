@@ -17,9 +17,9 @@ use crate::sampling::picture_cache::PictureCache;
 use crate::sampling::thumbnails::Thumbnails;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::progress::Progress;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Exposures and seams, found before the first tile is drawn.
 #[derive(Clone, Debug, Serialize, Deserialize)]

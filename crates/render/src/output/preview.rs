@@ -8,7 +8,7 @@ use image::{Rgb, RgbImage};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use tunnelstitch_core::bitmap_text::{self, LETTER};
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Largest side of the preview, pixels.
 const MAX_SIDE_PX: u32 = 4096;
@@ -210,7 +210,7 @@ impl Preview {
 mod tests {
     use super::*;
     use crate::sampling::pixel_format::PixelFormat;
-    use tunnelstitch_core::surface::Circle;
+    use tunnelstitch_geometry::surface::Circle;
 
     #[test]
     fn a_long_panorama_becomes_short_and_keeps_its_places() {

@@ -9,12 +9,12 @@ use crate::sampling::sample::Samples;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::persist::atomic::WriteError;
 use tunnelstitch_core::raster::{
     CogState, CogWriter, Compression, DziFormat, DziState, DziWriter, Georeference, Nodata,
     RasterError, RasterSpec, RasterTile, Reduce, SampleType, TILE_EDGE_PX, TileOrder,
 };
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Layer of a band that is written to a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

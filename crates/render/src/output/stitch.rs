@@ -10,11 +10,11 @@ use crate::error::RenderError;
 use crate::layout::canvas::Canvas;
 use crate::layout::placement::{Placement, native_px_per_metre, place};
 use crate::sampling::picture_cache::{PictureCache, level_for};
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::FrameSet;
 use tunnelstitch_core::progress::Progress;
-use tunnelstitch_core::surface::Surface;
-use tunnelstitch_core::trajectory::{Pose, Shutter};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::Surface;
+use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
 /// Options of stitching frames on disk.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -20,8 +20,8 @@ use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use tunnelstitch_core::frames::Shading;
-use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_photometry::{PhotometricCalibration, Priors};
 
 /// Wall points a frame.

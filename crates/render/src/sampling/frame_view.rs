@@ -12,8 +12,8 @@ use crate::warp::local_polynomial::{LocalPolynomialWarp, ProjectedControlPoints}
 use crate::warp::patches::{PATCH_EDGE, split_at_patches, within_patch};
 use crate::warp::projection::{LocalPoints, LocalProjection};
 use std::ops::Range;
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::numerics::kernel::{Interpolation, Kernel};
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::kernel::{Interpolation, Kernel};
 
 /// Step between the stretches for which kernels are tabulated, from 1 upwards. A smaller value
 /// suppresses aliasing more evenly and takes more memory.

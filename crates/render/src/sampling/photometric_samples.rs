@@ -6,8 +6,8 @@ use crate::layout::canvas::Canvas;
 use crate::layout::placement::Placement;
 use crate::layout::tiles::{EDGE, Tile, tiles};
 use crate::warp::projection::LocalPoints;
-use tunnelstitch_core::numerics::parallel::ParallelMap;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_photometry::Observation;
 
 /// Observes the points of `grid` that at least two frames show in the thumbnails, with nothing

@@ -5,8 +5,8 @@ use super::sample::{PADDING, Sample, Samples};
 use image::DynamicImage;
 use nalgebra::Vector2;
 use tunnelstitch_core::frames::PyramidMask;
-use tunnelstitch_core::numerics::kernel::Kernel;
-use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// A picture of 8- or 16-bit samples, row-major, channels interleaved: 1 (grey) or 3 (red, green,
 /// blue).
@@ -132,7 +132,7 @@ impl Picture {
     }
 
     /// Halves the size by the mean of 2 × 2 pixels; an odd last row or column is dropped (see
-    /// [`tunnelstitch_core::camera::Camera::at_level`]).
+    /// [`tunnelstitch_geometry::camera::Camera::at_level`]).
     pub fn halved(&self) -> Self {
         let size = (self.width / 2, self.height / 2);
         let samples = match &self.samples {
@@ -252,7 +252,7 @@ fn pad<T: Sample>(samples: &mut Vec<T>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_core::numerics::kernel::Interpolation;
+    use tunnelstitch_geometry::numerics::kernel::Interpolation;
 
     fn parabola() -> Picture {
         let data: Vec<u8> = (0..10 * 9)

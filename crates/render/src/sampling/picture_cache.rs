@@ -3,10 +3,10 @@
 use super::picture::Picture;
 use super::pixel_format::PixelFormat;
 use crate::error::RenderError;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::{FrameFile, FrameSet, PyramidMask, colour_type, load_colour};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::progress::Progress;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Cache of a survey's frames, all in one format, with the camera that took them.
 ///

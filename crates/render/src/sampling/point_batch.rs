@@ -9,9 +9,9 @@ use crate::warp::local_polynomial::LocalPolynomialWarp;
 use crate::warp::patches::{LANES, PATCH_EDGE};
 use crate::warp::projection::{LocalPoints, LocalProjection};
 use std::ops::Range;
-use tunnelstitch_core::numerics::kernel::Kernel;
-use tunnelstitch_core::numerics::rounding::floor_and_fraction;
-use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::rounding::floor_and_fraction;
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// Most points of a batch: all its arrays stay in the first-level cache.
 pub const MAX_BATCH_POINTS: usize = TILE_COLUMNS;

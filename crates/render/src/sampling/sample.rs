@@ -2,7 +2,7 @@
 
 use image::{DynamicImage, ImageBuffer};
 use serde::{Deserialize, Serialize};
-use tunnelstitch_core::numerics::rounding::ROUNDING_OFFSET;
+use tunnelstitch_geometry::numerics::rounding::ROUNDING_OFFSET;
 
 /// A sample of a picture: 8 or 16 bits.
 pub trait Sample: Copy + Default + Send + Sync + std::fmt::Debug + PartialEq + 'static {

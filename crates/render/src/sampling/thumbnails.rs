@@ -8,11 +8,11 @@ use crate::error::RenderError;
 use crate::layout::canvas::Canvas;
 use crate::layout::placement::{Placement, native_px_per_metre};
 use crate::warp::projection::{LocalPoints, LocalProjection};
-use tunnelstitch_core::camera::Camera;
-use tunnelstitch_core::numerics::kernel::{Interpolation, Kernel};
-use tunnelstitch_core::numerics::parallel::ParallelMap;
 use tunnelstitch_core::progress::Progress;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::numerics::kernel::{Interpolation, Kernel};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Small 16-bit pictures of all frames.
 #[derive(Clone, Debug)]

@@ -12,10 +12,10 @@ use crate::sampling::picture_cache::PictureCache;
 use crate::sampling::pixel_format::PixelFormat;
 use crate::sampling::sample::Samples;
 use crate::tests::pictures::{changed_pictures, pictures};
-use tunnelstitch_core::numerics::kernel::{Interpolation, Kernel};
 use tunnelstitch_core::progress::Silent;
 use tunnelstitch_core::test_wall::{self, TestWall};
-use tunnelstitch_core::trajectory::Shutter;
+use tunnelstitch_geometry::numerics::kernel::{Interpolation, Kernel};
+use tunnelstitch_geometry::trajectory::Shutter;
 
 /// Frames as they are, all of them averaged: what shows geometry alone.
 const PLAIN: RenderOptions = RenderOptions {
@@ -209,7 +209,7 @@ fn raw_pixels_are_those_of_the_frames() {
                 }
                 let frame = *source as usize;
                 let wall = canvas.wall(column, row);
-                let x_w = tunnelstitch_core::surface::Surface::frame(&self.0.circle, wall).x_w;
+                let x_w = tunnelstitch_geometry::surface::Surface::frame(&self.0.circle, wall).x_w;
                 let x_c = self.0.poses[frame].to_camera(&x_w);
                 let pixel = self.0.camera.project(&x_c).unwrap();
                 // Single precision may take the other one in the middle between two.
@@ -258,7 +258,7 @@ fn raw_pixels_are_those_of_the_frames() {
 fn a_mark_on_the_wall_is_not_mirrored_and_chainage_right_is_a_turn() {
     // Bright towards larger θ and larger h from the point that the first camera looks at.
     let wall = TestWall::one(|point, perimeter_m| {
-        let s = tunnelstitch_core::surface::shortest_arc(point.s_m, perimeter_m);
+        let s = tunnelstitch_geometry::surface::shortest_arc(point.s_m, perimeter_m);
         if s > 0.0 && point.h_m > 0.0 {
             250.0
         } else if s > 0.0 {

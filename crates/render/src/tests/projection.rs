@@ -8,9 +8,9 @@ use crate::warp::control_points::ControlPoints;
 use crate::warp::local_polynomial::{LocalPolynomialWarp, ProjectedControlPoints};
 use crate::warp::patches::PATCH_EDGE;
 use crate::warp::projection::{LocalPoints, LocalProjection};
-use tunnelstitch_core::camera::{Camera, KannalaBrandt, Lens, Sweep};
-use tunnelstitch_core::surface::Circle;
-use tunnelstitch_core::trajectory::{Shutter, spiral};
+use tunnelstitch_geometry::camera::{Camera, KannalaBrandt, Lens, Sweep};
+use tunnelstitch_geometry::surface::Circle;
+use tunnelstitch_geometry::trajectory::{Shutter, spiral};
 
 fn cameras() -> Vec<Camera> {
     let plain = Camera::from_vertical_fov(960, 720, 60f64.to_radians());

@@ -6,7 +6,7 @@ use crate::layout::canvas::Canvas;
 use crate::layout::tiles::Tile;
 use nalgebra::Vector3;
 use std::f64::consts::SQRT_2;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Coordinates of a patch's control points along each axis; the last are the next patch's first.
 /// The polynomial is checked at 0 and fitted at the others.

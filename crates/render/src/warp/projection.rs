@@ -1,9 +1,9 @@
 //! Projection of wall points into a frame, in single precision.
 
 use nalgebra::{Matrix3, Vector3};
-use tunnelstitch_core::camera::{Camera, LensF32, ProjectF32};
-use tunnelstitch_core::numerics::simd_dispatch::dispatch_simd;
-use tunnelstitch_core::trajectory::Pose;
+use tunnelstitch_geometry::camera::{Camera, LensF32, ProjectF32};
+use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Pixel coordinates u and v of points, and which of the points the lens shows.
 pub type ProjectedPixels<'a> = (&'a mut [f32], &'a mut [f32], &'a mut [bool]);

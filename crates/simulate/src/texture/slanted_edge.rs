@@ -1,7 +1,7 @@
 //! Slanted-edge texture: a test target for sharpness.
 
 use crate::texture::wall_texture::WallTexture;
-use tunnelstitch_core::surface::{WallPoint, shortest_arc};
+use tunnelstitch_geometry::surface::{WallPoint, shortest_arc};
 
 /// Nominal distance between squares, metres; adjusted to the perimeter along s.
 const PITCH_M: f64 = 0.6;

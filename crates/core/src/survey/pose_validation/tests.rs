@@ -1,11 +1,11 @@
 //! Correct surveys cause no warnings, and wrong conventions are named.
 
 use super::*;
-use crate::surface::Circle;
-use crate::trajectory::{
+use rand::SeedableRng;
+use tunnelstitch_geometry::surface::Circle;
+use tunnelstitch_geometry::trajectory::{
     CameraAxes, Direction, Jitter, JitterModel, PoseFormat, indexed, poses_of, spiral,
 };
-use rand::SeedableRng;
 
 const RADIUS_M: f64 = 3.0;
 

@@ -12,12 +12,12 @@ use crate::output::raster_target::RasterTarget;
 use nalgebra::Matrix6;
 use std::borrow::Cow;
 use std::path::PathBuf;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::{PictureFormat, write_picture};
 use tunnelstitch_core::persist::atomic::WriteError;
 use tunnelstitch_core::persist::checkpoint::Checkpoint;
 use tunnelstitch_core::raster::RasterError;
-use tunnelstitch_core::surface::Surface;
+use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::Surface;
 
 /// Files of one panorama that is being drawn.
 pub struct PanoramaFiles {

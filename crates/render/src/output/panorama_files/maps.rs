@@ -13,10 +13,10 @@ use image::DynamicImage;
 use nalgebra::Matrix6;
 use std::borrow::Cow;
 use std::path::PathBuf;
-use tunnelstitch_core::camera::Camera;
 use tunnelstitch_core::frames::{PictureFormat, write_picture};
 use tunnelstitch_core::persist::atomic::{self, WriteError};
 use tunnelstitch_core::raster::RasterError;
+use tunnelstitch_geometry::camera::Camera;
 
 pub(super) const COVERAGE: &str = "coverage.tif";
 pub(super) const FRAMES: &str = "frames.tif";

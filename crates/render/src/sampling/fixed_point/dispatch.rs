@@ -10,9 +10,9 @@ use super::inputs::{
 };
 use super::scalar;
 use std::ops::Range;
-use tunnelstitch_core::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
 #[cfg(target_arch = "x86_64")]
-use tunnelstitch_core::numerics::simd_dispatch;
+use tunnelstitch_geometry::numerics::simd_dispatch;
 
 /// Runs the code compiled for the kernel's taps; 0 stands for any other number of them.
 #[cfg(target_arch = "x86_64")]

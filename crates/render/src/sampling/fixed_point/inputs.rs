@@ -4,7 +4,7 @@ use super::super::patch_light::PatchLight;
 use crate::warp::local_polynomial::PatchCoefficients;
 use crate::warp::patches::{LANES, PATCH_EDGE};
 use std::ops::Range;
-use tunnelstitch_core::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
 
 /// Samples of a picture.
 #[derive(Clone, Copy)]

@@ -1,7 +1,7 @@
 //! Sums and pixels one at a time: the reference for the vectors.
 
 use super::inputs::{KernelPositions, PictureSamples};
-use tunnelstitch_core::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
 
 pub fn sum_samples<const C: usize>(
     source: PictureSamples,

@@ -12,7 +12,7 @@ use crate::sampling::picture::Picture;
 use crate::sampling::sample::{Sample, Samples};
 use crate::warp::local_polynomial::LocalPolynomialWarp;
 use crate::warp::patches::{PATCH_EDGE, PATCH_SCALE};
-use tunnelstitch_core::numerics::kernel::{Interpolation, Kernel};
+use tunnelstitch_geometry::numerics::kernel::{Interpolation, Kernel};
 
 const KERNELS: [(Interpolation, f64); 7] = [
     (Interpolation::Bilinear, 1.0),

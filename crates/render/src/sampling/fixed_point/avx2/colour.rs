@@ -8,7 +8,7 @@ use super::weights::{four, taps, weights};
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::{__m128i, __m256i};
-use tunnelstitch_core::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
 
 /// Sums of eight pixels in colour: of the k-th and the k + 4th in the halves of the k-th vector.
 #[inline(always)]

@@ -8,7 +8,7 @@ use super::weights::{four_of, taps, weights};
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::{__m128i, __m256i};
-use tunnelstitch_core::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
 
 /// Sums of eight grey pixels.
 #[inline(always)]

@@ -9,7 +9,7 @@ use super::lanes::{Eight, truncated_pair};
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::{__m128i, __m256i};
-use tunnelstitch_core::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
 
 /// Samples that are read of a row.
 const ROW_SAMPLES: usize = 16;

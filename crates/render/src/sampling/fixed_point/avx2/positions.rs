@@ -10,8 +10,8 @@ use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::{__m256, __m256i};
 use std::ops::Range;
-use tunnelstitch_core::numerics::kernel::Kernel;
-use tunnelstitch_core::numerics::simd_dispatch;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::simd_dispatch;
 
 /// Groups of eight columns of a patch.
 pub const PATCH_GROUPS: usize = PATCH_EDGE / LANES;

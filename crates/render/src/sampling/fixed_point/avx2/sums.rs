@@ -6,7 +6,7 @@ use super::colour::colour_sums;
 use super::grey::grey_sums;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
-use tunnelstitch_core::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
 
 /// Sums the samples under each kernel, eight at a time, the rest by plain loops.
 #[inline(always)]

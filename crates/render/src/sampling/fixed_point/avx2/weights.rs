@@ -4,7 +4,7 @@ use super::lanes::Eight;
 use pulp::bytemuck::cast;
 use pulp::x86::V3;
 use std::arch::x86_64::__m256i;
-use tunnelstitch_core::numerics::kernel::Kernel;
+use tunnelstitch_geometry::numerics::kernel::Kernel;
 
 /// Taps of the kernel, known at compile time or not (0).
 #[inline(always)]

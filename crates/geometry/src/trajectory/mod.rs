@@ -16,7 +16,7 @@
 //!
 //! ```
 //! use std::path::Path;
-//! use tunnelstitch_core::trajectory::{PoseFormat, kitti, read_poses};
+//! use tunnelstitch_geometry::trajectory::{PoseFormat, kitti, read_poses};
 //!
 //! let file = read_poses(Path::new("../../fixtures/blender_free48/baseline.tum"), None)?;
 //! assert_eq!((file.format, file.entries.len()), (PoseFormat::Tum, 48));

@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use std::path::Path;
-//! use tunnelstitch_core::camera::read_calibration;
+//! use tunnelstitch_geometry::camera::read_calibration;
 //!
 //! let camera = read_calibration(Path::new("../../fixtures/blender_free48/camera.json"), None)?;
 //! let ray = camera.ray(12.5, 40.0).ok_or("the lens shows nothing there")?;

@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use nalgebra::Vector3;
-//! use tunnelstitch_core::surface::{Circle, Surface};
+//! use tunnelstitch_geometry::surface::{Circle, Surface};
 //!
 //! let tunnel = Circle::new(3.0)?;
 //! let hit = tunnel.hit(&Vector3::new(0.5, 1.0, 0.0), &Vector3::new(0.0, 0.2, 1.0))?;
