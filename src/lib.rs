@@ -61,6 +61,7 @@
 //!
 //! # The order of the folders
 //!
+//! The workspace has a crate for each layer, so that a change rebuilds no more than its own.
 //! Imports point from a folder to those before it in its row; folders between two `<` do not know
 //! each other. `tests/architecture` reads this table and holds the sources to it.
 //!
@@ -68,9 +69,12 @@
 //!
 //! | in | lowest first |
 //! | --- | --- |
-//! | `src` | `bitmap_text`, `numerics`, `persist`, `progress` < `raster` < `camera` < `trajectory` < `surface` < `frames` < `survey` < `photometry`, `super_resolve` < `refine`, `render`, `simulate` < `evaluate`, `check` < `report`, `inspect` < `cli` |
-//! | `src/refine` | `thresholds`, `options` < `parameters` < `linear` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `tracking` < `validation` < `uncertainty` < `report` < `refined` < `stages` < `pipeline` < `pose_convention_search` |
-//! | `src/render` | `error` < `layout` < `warp` < `sampling` < `compositing` < `output` |
+//! | `crates` | `geometry` < `core` < `photometry` < `refine`, `render`, `simulate` < `evaluate` < `src` |
+//! | `crates/geometry` | `numerics` < `camera` < `trajectory` < `surface` |
+//! | `crates/core` | `bitmap_text`, `persist`, `progress` < `raster`, `frames` < `survey`, `test_wall` < `super_resolve` |
+//! | `crates/refine` | `thresholds`, `options` < `parameters` < `linear` < `model` < `error`, `input`, `tiles` < `samples` < `joint` < `problem` < `solver` < `tracking` < `validation` < `uncertainty` < `report` < `refined` < `stages` < `pipeline` < `pose_convention_search` |
+//! | `crates/render` | `error` < `layout` < `warp` < `sampling` < `compositing` < `output` |
+//! | `src` | `check` < `report`, `inspect` < `cli` |
 //!
 //! <!-- end of the order -->
 //!

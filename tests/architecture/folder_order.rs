@@ -14,8 +14,9 @@ const ORDER_END: &str = "<!-- end of the order -->";
 pub struct FolderOrder(BTreeMap<String, Vec<Vec<String>>>);
 
 impl FolderOrder {
-    /// Reads the table in the documentation of the crate: a row names a folder (the crate itself is
-    /// `src`) and its modules in backticks, steps separated by `<`.
+    /// Reads the table in the documentation of the library: a row names a folder and its modules in
+    /// backticks, steps separated by `<`. The row of `crates` has the crates, of which `src` is
+    /// one.
     pub fn parse(lib: &str) -> FolderOrder {
         let table = lib
             .split_once(ORDER_START)
@@ -111,10 +112,13 @@ impl FolderOrder {
     }
 }
 
-/// `src`, `src/refine`, …
+/// `crates`, `crates/refine`, `crates/refine/tracking`, `src`, `src/cli`, …
 fn folder_name(folder: &[String]) -> String {
-    let names = std::iter::once("src").chain(folder.iter().map(String::as_str));
-    names.collect::<Vec<_>>().join("/")
+    match folder.first().map(String::as_str) {
+        Some("src") => folder.join("/"),
+        Some(_) => format!("crates/{}", folder.join("/")),
+        None => "crates".to_owned(),
+    }
 }
 
 fn in_backticks(text: &str) -> Vec<String> {

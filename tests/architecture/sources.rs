@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 pub fn in_all_files(rule: impl Fn(&Path, &str) -> Vec<Offence>) -> Vec<Offence> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut paths = vec![PathBuf::from("build.rs")];
-    for folder in ["src", "tests", "benches", "examples"] {
+    for folder in ["src", "crates", "tests", "benches", "examples"] {
         collect_rust_files(root, Path::new(folder), &mut paths);
     }
     paths.sort();

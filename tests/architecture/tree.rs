@@ -1,4 +1,4 @@
-//! The files of a crate, and which of them import which.
+//! The files of all crates of the workspace, and which of them import which.
 
 use crate::Offence;
 use crate::scan::Scan;
@@ -6,9 +6,8 @@ use crate::sources::collect_rust_files;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// The files of a crate and the names in each.
+/// The files and the names in each.
 pub struct Tree {
-    /// The first is the root.
     pub files: Vec<File>,
     /// Modules, those written inline included.
     modules: BTreeMap<Vec<String>, Module>,
@@ -17,6 +16,7 @@ pub struct Tree {
 pub struct File {
     pub path: PathBuf,
     text: String,
+    /// The crate (`src`, or its folder in `crates`) and the modules around and of the file.
     pub module: Vec<String>,
     /// Declared for tests only.
     pub test: bool,
@@ -48,7 +48,9 @@ impl Tree {
     pub fn of_sources() -> Tree {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let mut paths = Vec::new();
-        collect_rust_files(root, Path::new("src"), &mut paths);
+        for folder in ["src", "crates"] {
+            collect_rust_files(root, Path::new(folder), &mut paths);
+        }
         let read = |path: PathBuf| {
             let text = std::fs::read_to_string(root.join(&path)).expect("a source file");
             (path, text)
@@ -56,18 +58,22 @@ impl Tree {
         Tree::new(paths.into_iter().map(read))
     }
 
-    /// Files named from the folder above `src`; `main.rs` is another crate and left out.
+    /// Files named from the project's folder; `main.rs` is another crate and left out.
     pub fn new(sources: impl IntoIterator<Item = (PathBuf, String)>) -> Tree {
         let mut files: Vec<File> = Vec::new();
         for (path, text) in sources {
             let mut module: Vec<String> = path
                 .with_extension("")
                 .iter()
-                .skip(1)
                 .map(|name| name.to_string_lossy().into_owned())
                 .collect();
+            // `crates/name/src/…`: the crate goes by its folder's name.
+            if module[0] == "crates" {
+                module.remove(2);
+                module.remove(0);
+            }
             match module.last().map(String::as_str) {
-                Some("main") if module.len() == 1 => continue,
+                Some("main") if module.len() == 2 => continue,
                 Some("lib" | "mod") => drop(module.pop()),
                 _ => {}
             }
@@ -111,7 +117,8 @@ impl Tree {
 
     /// The text of `src/lib.rs`.
     pub fn root(&self) -> &str {
-        &self.files[0].text
+        let root = self.files.iter().find(|file| file.module == ["src"]);
+        root.map_or("", |file| &file.text)
     }
 
     /// Every import of one file from another.
@@ -162,11 +169,18 @@ impl Tree {
         let mut names = path.iter().peekable();
         match names.peek()?.as_str() {
             "crate" => {
-                at.clear();
+                at.truncate(1);
                 names.next();
             }
             "self" => drop(names.next()),
-            _ => {}
+            name => {
+                if let Some(member) = member(name)
+                    && self.modules.contains_key(&[member.to_owned()][..])
+                {
+                    at = vec![member.to_owned()];
+                    names.next();
+                }
+            }
         }
         while names.peek().is_some_and(|name| *name == "super") {
             at.pop()?;
@@ -206,6 +220,14 @@ impl Tree {
             return (!foreign).then_some(here.file);
         }
         self.modules.get(&at).map(|module| module.file)
+    }
+}
+
+/// The crate of the workspace that code calls `name`.
+fn member(name: &str) -> Option<&str> {
+    match name {
+        "tunnelstitch" => Some("src"),
+        _ => name.strip_prefix("tunnelstitch_"),
     }
 }
 

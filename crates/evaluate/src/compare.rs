@@ -97,8 +97,9 @@ pub struct ComparedPanoramas {
 
 /// Compares initial with refined poses, and both with the true poses if they are known.
 ///
-/// With truth, both are first aligned to it along the tunnel's [gauge](tunnelstitch_geometry::surface::Gauge), so
-/// that the panoramas coincide. All panoramas share one canvas, which holds all footprints.
+/// With truth, both are first aligned to it along the tunnel's
+/// [gauge](tunnelstitch_geometry::surface::Gauge), so that the panoramas coincide. All panoramas
+/// share one canvas, which holds all footprints.
 ///
 /// # Errors
 /// [`EvaluateError::Count`]; [`EvaluateError::Frame`] and [`EvaluateError::Render`] for poses whose

@@ -15,8 +15,8 @@ use std::sync::Arc;
 use tunnelstitch_core::persist::checkpoint::Checkpoint;
 use tunnelstitch_core::progress::Progress;
 
-/// Refines the poses of frames: a [`RefineInput`], or a [`Survey`](tunnelstitch_core::survey::Survey) that
-/// converts into one.
+/// Refines the poses of frames: a [`RefineInput`], or a
+/// [`Survey`](tunnelstitch_core::survey::Survey) that converts into one.
 ///
 /// Equal input gives equal bytes, whatever the number of threads.
 ///

@@ -1,8 +1,9 @@
-//! Cross-sections of the simulated tunnel, by equations independent of [`tunnelstitch_geometry::surface`].
+//! Cross-sections of the simulated tunnel, by equations independent of
+//! [`tunnelstitch_geometry::surface`].
 //!
 //! Each cross-section is the set `G = 1` of a convex function that grows in proportion to the
-//! distance from the axis. Nothing is shared with [`tunnelstitch_geometry::surface`], so that a simulated survey
-//! can judge it.
+//! distance from the axis. Nothing is shared with [`tunnelstitch_geometry::surface`], so that a
+//! simulated survey can judge it.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 use tunnelstitch_core::survey::Shape;

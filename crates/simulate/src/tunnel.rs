@@ -2,7 +2,8 @@
 //!
 //! A round straight tunnel has a closed form. In all others the ray is marched until it leaves the
 //! inside, and the crossing is found by false position. The centreline of a curved tunnel comes
-//! from [`tunnelstitch_geometry::surface`], since it is an input; everything else is independent of it.
+//! from [`tunnelstitch_geometry::surface`], since it is an input; everything else is independent of
+//! it.
 
 use crate::cross_section::CrossSection;
 use crate::error::SimulateError;

@@ -57,8 +57,8 @@ impl GreyImage {
     /// Halves the image: each pixel is the `[1 3 3 1]/8 ⊗ [1 3 3 1]/8` weighted mean around the
     /// corner shared by four pixels.
     ///
-    /// The filter is even, so the new centre lies exactly between the old ones
-    /// (see [`tunnelstitch_geometry::camera::Camera::at_level`]); borders repeat the outermost pixel.
+    /// The filter is even, so the new centre lies exactly between the old ones (see
+    /// [`tunnelstitch_geometry::camera::Camera::at_level`]); borders repeat the outermost pixel.
     ///
     /// Pixels without a value have no weight; where they make up more than half of the kernel, the
     /// result has no value.

@@ -22,7 +22,7 @@ pub(super) fn decoder(input: Input) -> ImageResult<impl ImageDecoder> {
         .into_decoder()
 }
 
-/// What a decoder reads. It is one type, so that every decoder is compiled once.
+/// Input of a decoder. It is one type, so that every decoder is compiled once.
 pub(super) enum Input {
     /// A file, as far as it is asked for.
     File(BufReader<File>),

@@ -66,7 +66,7 @@ pub fn compress(
     picture.encode(quality)
 }
 
-/// What is encoded: one type for grey and colour, with and without alpha, so that the encoder is
+/// Pixels to encode: one type for grey and colour, with and without alpha, so that the encoder is
 /// compiled once.
 struct Picture<'a> {
     pixels: &'a [u8],

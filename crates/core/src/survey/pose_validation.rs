@@ -23,8 +23,8 @@ const MAX_WRONG_FRACTION: f64 = 0.34;
 /// noisy.
 const MAX_AXIAL_FRACTION: f64 = 0.05;
 /// Angle from the axis at which motion and rotation are along another direction: twice the 30° of a
-/// carrier that sways by 6° per frame and steers back ([`Jitter`](tunnelstitch_geometry::trajectory::Jitter)).
-/// Other axes of the world are 90° off.
+/// carrier that sways by 6° per frame and steers back
+/// ([`Jitter`](tunnelstitch_geometry::trajectory::Jitter)). Other axes of the world are 90° off.
 const MIN_ASKEW_ANGLE_RAD: f64 = std::f64::consts::FRAC_PI_3;
 /// Angle from the axis within which motion and rotation are along it.
 const MAX_ALIGNED_ANGLE_RAD: f64 = std::f64::consts::FRAC_PI_6;

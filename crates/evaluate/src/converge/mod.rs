@@ -15,10 +15,11 @@
 //! # The gauge
 //!
 //! A frame's error is its position relative to the rest of the trajectory, with nothing removed but
-//! the tunnel's [gauge](tunnelstitch_geometry::surface::Gauge). [`wall_error()`](super::wall_error()) fixes the
-//! gauge by least squares over all frames, so that one lost frame spoils the others' figures. Here
-//! the majority fixes it: [`majority_error()`] takes the shift under which the most frames are
-//! good, so that lost frames are counted one by one. If all frames are good, the two agree.
+//! the tunnel's [gauge](tunnelstitch_geometry::surface::Gauge).
+//! [`wall_error()`](super::wall_error()) fixes the gauge by least squares over all frames, so that
+//! one lost frame spoils the others' figures. Here the majority fixes it: [`majority_error()`]
+//! takes the shift under which the most frames are good, so that lost frames are counted one by
+//! one. If all frames are good, the two agree.
 
 mod efficiency;
 mod error;

@@ -39,8 +39,8 @@
 //!
 //! **Smooth walls** have no detail finer than pixels. There the mean of all frames does better, as
 //! it assumes nothing about the wall. The share of such detail in the pixels follows from the
-//! roughness ([`tunnelstitch_core::super_resolve::aliased_variance`]); where it is small against the noise, the
-//! wall is not solved for.
+//! roughness ([`tunnelstitch_core::super_resolve::aliased_variance`]); where it is small against
+//! the noise, the wall is not solved for.
 //!
 //! The wall is solved block by block, with a margin, and x is discarded: memory does not grow with
 //! the tunnel's length.

@@ -14,9 +14,9 @@
 //! | `o_x, o_z` | offset of the tunnel's axis there, m | prior of the poses |
 //! | `ρ` | readout time of a frame, s | pixels |
 //!
-//! The first five are the intrinsics ([`tunnelstitch_geometry::camera::Camera::intrinsics_jacobian`]). The readout
-//! time is free in the rolling-shutter test alone
-//! ([`crate::uncertainty::rolling_shutter_test`]).
+//! The first five are the intrinsics
+//! ([`tunnelstitch_geometry::camera::Camera::intrinsics_jacobian`]). The readout time is free in
+//! the rolling-shutter test alone ([`crate::uncertainty::rolling_shutter_test`]).
 //!
 //! The images do not change if the radius and all positions are scaled together. Poses are
 //! therefore estimated in the tunnel of the given radius, and only the prior, which is in metres,

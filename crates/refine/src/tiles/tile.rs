@@ -53,9 +53,9 @@
 //! # Linearisation
 //!
 //! If frame i moves by ξ, the pixel that observes x shows the wall at `x − A_i ξ`, with
-//! `A_i = ∂(s, h)/∂ξ` ([`tunnelstitch_geometry::surface::wall_jacobian`]). Hence `∂e_i/∂ξ = −a_i ∇Sᵀ A_i`,
-//! `∂e_i/∂α_i = −a_i S` and `∂e_i/∂b_i = −1`. With the features `φ(x) = (∂S/∂s, ∂S/∂h, S, 1)`,
-//! common to all frames,
+//! `A_i = ∂(s, h)/∂ξ` ([`tunnelstitch_geometry::surface::wall_jacobian`]). Hence
+//! `∂e_i/∂ξ = −a_i ∇Sᵀ A_i`, `∂e_i/∂α_i = −a_i S` and `∂e_i/∂b_i = −1`. With the features
+//! `φ(x) = (∂S/∂s, ∂S/∂h, S, 1)`, common to all frames,
 //!
 //! `∂e_i = −a_i φ(x)ᵀ B_i`,   `B_i = diag(A_i, 1, 1/a_i)`  (4 × 8).
 //!

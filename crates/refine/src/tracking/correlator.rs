@@ -1,8 +1,8 @@
 //! Masked normalised cross-correlation of an unwrapped frame with the reference mosaic, over all
 //! shifts at once.
 //!
-//! Both are compared by their local contrast ([`tunnelstitch_core::frames::local_contrast`]), normalised over
-//! the samples that both show: with masks m,
+//! Both are compared by their local contrast ([`tunnelstitch_core::frames::local_contrast`]),
+//! normalised over the samples that both show: with masks m,
 //!
 //! `c(d) = Σ A(x) W(x+d) / √(Σ A²(x) m_W(x+d) · Σ m_A(x) W²(x+d))`.
 //!

@@ -5,8 +5,8 @@
 //! of the wall's texture in it: enough to register frames. On a faint wall a shading that is wrong
 //! by a grey level is still steeper than the texture, and it is fixed to the camera: frames get
 //! displaced by it. Where frames overlap, the wall itself determines the shading
-//! ([`tunnelstitch_photometry`]): an observation is the mean value z of a tile in a frame by the present
-//! bias and the present factor `f = a_i V`.
+//! ([`tunnelstitch_photometry`]): an observation is the mean value z of a tile in a frame by the
+//! present bias and the present factor `f = a_i V`.
 //!
 //! Only the shading is taken over; the solves that follow estimate gains and biases themselves.
 

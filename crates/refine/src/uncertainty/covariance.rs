@@ -54,8 +54,8 @@ const POSE: usize = 6;
 /// Unknowns of a frame's exposure.
 const EXPOSURE: usize = FRAME_PARAMETERS - POSE;
 
-/// Covariances of the poses' steps `ξ = (ω, ρ)` ([`tunnelstitch_geometry::trajectory::Pose::retract`]): rad²,
-/// rad·m, m².
+/// Covariances of the poses' steps `ξ = (ω, ρ)`
+/// ([`tunnelstitch_geometry::trajectory::Pose::retract`]): rad², rad·m, m².
 #[derive(Clone, Debug)]
 pub struct Covariances {
     /// Covariance of every frame, all others marginalised.

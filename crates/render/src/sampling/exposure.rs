@@ -2,8 +2,8 @@
 //!
 //! A frame i shows `I = a_i V(u, v) S + b_i` of the evenly lit wall S: gain a and bias b are the
 //! frame's own, V is the shading of lamp and lens, the same in all frames ([`Shading`]). They are
-//! calibrated by wall points all over the panorama ([`tunnelstitch_photometry`]), with nothing known
-//! beforehand: `a = e^α`, `b = β`, `ln V = Σ c_k B_k`.
+//! calibrated by wall points all over the panorama ([`tunnelstitch_photometry`]), with nothing
+//! known beforehand: `a = e^α`, `b = β`, `ln V = Σ c_k B_k`.
 //!
 //! A common factor of gains and wall cannot be observed. It is fixed twice over: V is 1 where it is
 //! brightest, and the gains are 1 in the (geometric) mean.
