@@ -135,10 +135,6 @@
 //! Source: R. S. Pahwa, W. K. Leong, S. Foong, K. Leman, M. N. Do, "Feature-less Stitching of
 //! Cylindrical Tunnel", arXiv 1806.10278.
 
-// The equations stand beside the code that does them, much of it private: `cargo doc
-// --document-private-items` shows all of it.
-#![allow(rustdoc::private_intra_doc_links)]
-
 pub mod check;
 #[doc(hidden)]
 pub mod cli;

@@ -3,10 +3,6 @@
 //! The crate `tunnelstitch` re-exports what users of the library need, and its documentation has
 //! the flow of data, the order of the folders and the symbols.
 
-// The equations stand beside the code that does them, much of it private: `cargo doc
-// --document-private-items` shows all of it.
-#![allow(rustdoc::private_intra_doc_links)]
-
 /// Name and version, as results carry them.
 pub const PROGRAM: &str = concat!("tunnelstitch ", env!("CARGO_PKG_VERSION"));
 

@@ -2,10 +2,6 @@
 //! Jacobians, and the files that hold cameras and poses. With them the numerical tools that all
 //! crates of `tunnelstitch` share.
 
-// The equations stand beside the code that does them, much of it private: `cargo doc
-// --document-private-items` shows all of it.
-#![allow(rustdoc::private_intra_doc_links)]
-
 pub mod camera;
 pub mod numerics;
 pub mod surface;

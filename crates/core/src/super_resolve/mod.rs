@@ -22,8 +22,8 @@
 //! it, so the margin is cut off. Two native pixels and the extent of most differences, [`MARGIN`]
 //! fine pixels, are enough.
 //!
-//! Panoramas are rendered this way ([`crate::render::RenderOptions::super_resolve`]), and poses are
-//! estimated jointly with the wall ([`crate::refine::RefineOptions`]).
+//! Panoramas are rendered this way (`RenderOptions::super_resolve`), and poses are
+//! estimated jointly with the wall (`RefineOptions`).
 //!
 //! Sources: R. C. Hardie, K. J. Barnard, E. E. Armstrong, "Joint MAP registration and
 //! high-resolution image estimation using a sequence of undersampled images", IEEE Transactions on

@@ -23,7 +23,7 @@ pub struct FrameSigma {
     /// Position on the wall, root mean square over the picture ([`Camera::grid_rays`]), metres.
     #[serde(deserialize_with = "nan_if_null")]
     pub wall_m: f64,
-    /// Position on the wall in pixels at the middle of the frame, as [`crate::evaluate::WallError`]
+    /// Position on the wall in pixels at the middle of the frame, as `evaluate::WallError`
     /// counts them.
     #[serde(deserialize_with = "nan_if_null")]
     pub wall_px: f64,
