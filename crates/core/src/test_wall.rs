@@ -65,6 +65,21 @@ impl TestWall {
         self.poses.iter().map(|pose| self.frame(pose)).collect()
     }
 
+    /// Draws the frames as samples of 8 bits, each changed by `change(frame, u, v, value)`.
+    pub fn samples(&self, change: impl Fn(usize, usize, usize, f32) -> f32) -> Vec<Vec<u8>> {
+        let width = self.camera.width as usize;
+        let of_frame = |(k, frame): (usize, GreyImage)| {
+            let values = frame.data().iter().enumerate();
+            let changed = values.map(|(at, value)| change(k, at % width, at / width, *value));
+            changed.map(|value| value.round() as u8).collect()
+        };
+        self.frames()
+            .into_iter()
+            .enumerate()
+            .map(of_frame)
+            .collect()
+    }
+
     fn frame(&self, pose: &Pose) -> GreyImage {
         let (width, height) = (self.camera.width, self.camera.height);
         let mut data = Vec::new();

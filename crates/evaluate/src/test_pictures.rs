@@ -5,13 +5,8 @@ use tunnelstitch_render::{Picture, PictureCache};
 
 /// The frames of a wall as 8-bit pictures.
 pub fn pictures(wall: &TestWall) -> PictureCache {
-    let frames = wall.frames().into_iter().map(|frame| {
-        let samples: Vec<u8> = frame
-            .data()
-            .iter()
-            .map(|value| value.round() as u8)
-            .collect();
-        Picture::new(frame.width(), frame.height(), 1, samples)
-    });
-    PictureCache::from_pictures(wall.camera, frames.collect())
+    let (width, height) = (wall.camera.width as usize, wall.camera.height as usize);
+    let samples = wall.samples(|_, _, _, value| value).into_iter();
+    let pictures = samples.map(|samples| Picture::new(width, height, 1, samples));
+    PictureCache::from_pictures(wall.camera, pictures.collect())
 }

@@ -162,6 +162,7 @@ mod tests {
     use super::*;
     use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
     use crate::linear::sparse_cholesky::SymbolicFactorisation;
+    use crate::linear::test_dense::set_block;
     use nalgebra::{DMatrix, DVector};
     use tunnelstitch_geometry::camera::Camera;
 
@@ -186,14 +187,7 @@ mod tests {
                     block = block * block.transpose() + Block::identity() * 30.0;
                 }
                 normal.add_block(&pattern, row, column, &block);
-                for r in 0..FRAME_PARAMETERS {
-                    for c in 0..FRAME_PARAMETERS {
-                        dense[(row * FRAME_PARAMETERS + r, column * FRAME_PARAMETERS + c)] =
-                            block[(r, c)];
-                        dense[(column * FRAME_PARAMETERS + c, row * FRAME_PARAMETERS + r)] =
-                            block[(r, c)];
-                    }
-                }
+                set_block(&mut dense, row, column, &block);
             }
             normal.gradient[column] = FrameStep::from_fn(|r, _| number(r, column as f64));
             border.frames[column] =

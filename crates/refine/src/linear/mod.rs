@@ -18,3 +18,5 @@ pub mod bordered_system;
 pub mod normal_equations;
 pub mod selected_inverse;
 pub mod sparse_cholesky;
+#[cfg(test)]
+mod test_dense;

@@ -149,6 +149,7 @@ fn factor_rows(pattern: &Pattern) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linear::test_dense::set_block;
     use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 
     #[test]
@@ -171,14 +172,7 @@ mod tests {
                     block = block * block.transpose() + Block::identity() * 12.0;
                 }
                 normal.add_block(&pattern, row, column, &block);
-                for r in 0..FRAME_PARAMETERS {
-                    for c in 0..FRAME_PARAMETERS {
-                        dense[(row * FRAME_PARAMETERS + r, column * FRAME_PARAMETERS + c)] =
-                            block[(r, c)];
-                        dense[(column * FRAME_PARAMETERS + c, row * FRAME_PARAMETERS + r)] =
-                            block[(r, c)];
-                    }
-                }
+                set_block(&mut dense, row, column, &block);
             }
         }
         let inverse = SelectedInverse::new(&pattern, &normal).unwrap();

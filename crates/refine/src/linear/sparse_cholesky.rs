@@ -177,6 +177,7 @@ impl Factor<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linear::test_dense::set_block;
 
     /// A random symmetric positive definite block matrix on a spiral-like pattern.
     fn example() -> (Pattern, NormalEquations, nalgebra::DMatrix<f64>) {
@@ -198,14 +199,7 @@ mod tests {
                     block = block * block.transpose() + Block::identity() * 20.0;
                 }
                 normal.add_block(&pattern, row, column, &block);
-                for r in 0..FRAME_PARAMETERS {
-                    for c in 0..FRAME_PARAMETERS {
-                        dense[(row * FRAME_PARAMETERS + r, column * FRAME_PARAMETERS + c)] =
-                            block[(r, c)];
-                        dense[(column * FRAME_PARAMETERS + c, row * FRAME_PARAMETERS + r)] =
-                            block[(r, c)];
-                    }
-                }
+                set_block(&mut dense, row, column, &block);
             }
             normal.gradient[column] = FrameStep::from_fn(|_, _| random());
         }

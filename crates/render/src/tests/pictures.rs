@@ -2,7 +2,6 @@
 
 use crate::sampling::picture::Picture;
 use crate::sampling::picture_cache::PictureCache;
-use tunnelstitch_core::frames::GreyImage;
 use tunnelstitch_core::test_wall::TestWall;
 
 /// The frames of a wall as 8-bit pictures.
@@ -15,12 +14,8 @@ pub fn changed_pictures(
     wall: &TestWall,
     change: impl Fn(usize, usize, usize, f32) -> f32,
 ) -> PictureCache {
-    let picture = |(k, frame): (usize, GreyImage)| {
-        let width = frame.width();
-        let value = |(at, v): (usize, &f32)| change(k, at % width, at / width, *v).round() as u8;
-        let data: Vec<u8> = frame.data().iter().enumerate().map(value).collect();
-        Picture::new(width, frame.height(), 1, data)
-    };
-    let pictures = wall.frames().into_iter().enumerate().map(picture);
+    let (width, height) = (wall.camera.width as usize, wall.camera.height as usize);
+    let samples = wall.samples(change).into_iter();
+    let pictures = samples.map(|samples| Picture::new(width, height, 1, samples));
     PictureCache::from_pictures(wall.camera, pictures.collect())
 }
