@@ -11,19 +11,20 @@ use std::time::{Duration, Instant};
 const KILLS: usize = 4;
 
 /// A simulated survey.
-fn survey(folder: &Path, frames: usize) -> PathBuf {
+fn survey(folder: &Path, frames: usize, size: &str) -> PathBuf {
     let survey = folder.join("survey");
     let frames = frames.to_string();
-    let size = ["--size", "320x240"];
     let simulate = [
         "simulate",
         "free",
         "--frames",
         &frames,
+        "--size",
+        size,
         "--out",
         text(&survey),
     ];
-    succeed(&[&simulate[..], &size].concat());
+    succeed(&simulate);
     survey
 }
 
@@ -130,14 +131,14 @@ fn refine_with_kills(survey: &Path, folder: &Path, options: &[&str]) {
 #[test]
 fn refine_ends_with_the_same_bytes_however_often_it_is_killed() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = survey(dir.path(), 18);
+    let survey = survey(dir.path(), 18, "320x240");
     refine_with_kills(&survey, dir.path(), &["--calibrate", "focal"]);
 }
 
 #[test]
 fn joint_refine_ends_with_the_same_bytes_however_often_it_is_killed() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = survey(dir.path(), 5);
+    let survey = survey(dir.path(), 5, "160x120");
     refine_with_kills(&survey, dir.path(), &["--joint"]);
     let report = std::fs::read_to_string(dir.path().join("broken/refine.json")).unwrap();
     assert!(report.contains("\"joint\": true"), "{report}");
@@ -146,7 +147,7 @@ fn joint_refine_ends_with_the_same_bytes_however_often_it_is_killed() {
 #[test]
 fn stitch_ends_with_the_same_bytes_however_often_it_is_killed() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = survey(dir.path(), 18);
+    let survey = survey(dir.path(), 18, "320x240");
     // Every kind of file at once: the panorama in memory or on disk, Deep Zoom, maps.
     for (picture, scale, seed) in [("wall.tif", "450", 2), ("wall.png", "250", 3)] {
         let run = |name: &str, kill: Option<Duration>| -> (PathBuf, Duration) {
@@ -197,7 +198,7 @@ fn wait_for_a_state(child: &mut Child, folder: &Path) {
 #[test]
 fn an_interrupted_run_continues_and_another_is_refused() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = survey(dir.path(), 12);
+    let survey = survey(dir.path(), 12, "320x240");
     let out = dir.path().join("refined");
     let kept = out.join("refine.unfinished");
     let arguments = ["refine", text(&survey), "--out", text(&out)];

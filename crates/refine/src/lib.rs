@@ -18,7 +18,7 @@
 //! | [`validate_pairs`](stages::validate_pairs) | rejects frames that contradict the others | [`validation::pairwise_ncc`] |
 //! | [`repair`](stages::repair) | rejects inconsistent frames, registers them again, resolves aliases | [`validation`] |
 //! | [`solve`](stages::solve), last | full size, dense samples; then jointly with the wall, if asked for | [`joint`] |
-//! | [`assess`](stages::assess) | uncertainty and verdict of every frame | [`uncertainty`] |
+//! | [`assess`](stages::assess) | uncertainty and verdict of every frame and of the survey | [`uncertainty`], [`verdict`] |
 //!
 //! # A solve
 //!
@@ -34,7 +34,7 @@
 //! | accept: damping, step test, stopping | [`solver::gauss_newton`] |
 //!
 //! Dependencies point downwards only, in the order parameters, linear, model, tiles, samples,
-//! joint, problem, solver, tracking, validation, uncertainty, stages, pipeline. Every tuned number
+//! joint, problem, solver, tracking, validation, uncertainty, verdict, stages, pipeline. Every tuned number
 //! is in [`thresholds`].
 //!
 //! # Speed
@@ -74,6 +74,7 @@ mod tiles;
 mod tracking;
 mod uncertainty;
 mod validation;
+mod verdict;
 
 pub use error::RefineError;
 pub use input::RefineInput;
@@ -91,4 +92,7 @@ pub use uncertainty::covariance::Covariances;
 pub use uncertainty::covariance_file::{CovarianceError, read_covariances};
 pub use uncertainty::cramer_rao::{FINER, PoseBounds, pose_bounds};
 pub use uncertainty::frame_sigma::FrameSigma;
+pub use uncertainty::model_error::ModelErrorReport;
 pub use uncertainty::rolling_shutter_test::ReadoutEstimate;
+pub use verdict::prior_test::{PriorTest, ScaleTest, SigmaTest};
+pub use verdict::survey_verdict::SurveyVerdict;

@@ -38,6 +38,11 @@ pub struct RefineOptions {
     /// smaller, in ten to twenty times the time. The solve is skipped where the wall is too smooth
     /// to gain from it.
     pub joint: bool,
+    /// Largest 1-σ of a photometric frame against those that show the same wall, pixels.
+    pub max_sigma_px: f64,
+    /// Rate of false alarms of a survey: of right frames that tests reject, and of right priors
+    /// that they contradict.
+    pub false_alarm_rate: f64,
     /// Memory for decoded frames, bytes. Frames that do not fit are decoded again when needed.
     pub cache_bytes: usize,
     /// Largest number of steps of a global solve.
@@ -64,6 +69,8 @@ impl Default for RefineOptions {
             search: true,
             windows: true,
             joint: false,
+            max_sigma_px: 0.25,
+            false_alarm_rate: 1e-3,
             cache_bytes: 2 << 30,
             max_iterations: 20,
             step_tolerance_px: 0.0005,

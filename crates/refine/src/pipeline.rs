@@ -3,9 +3,11 @@
 use crate::error::RefineError;
 use crate::input::RefineInput;
 use crate::model::frame_states::FrameStates;
+use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::parameters::calibration::Kappa;
 use crate::refined::Refined;
+use crate::stages::assess::without_solution;
 use crate::stages::plan::plan_stages;
 use crate::stages::run::run_stage;
 use crate::stages::session::Session;
@@ -57,7 +59,14 @@ pub fn refine_with_checkpoint<'a>(
         if estimation.solution.is_none() {
             session.keep_if_due(&setup, || estimation.state.clone())?;
         }
-        estimation = run_stage(stage, &setup, estimation, &mut session)?;
+        estimation = match run_stage(stage, &setup, estimation, &mut session) {
+            Ok(estimation) => estimation,
+            // Poses that nothing determines are those given.
+            Err(RefineError::Problem(ProblemError::Factor { .. })) => {
+                return Ok(without_solution(&setup, &mut session));
+            }
+            Err(error) => return Err(error),
+        };
         estimation.state.stages.pop_front();
     }
     estimation.refined.ok_or(RefineError::NoOverlap)
@@ -73,6 +82,7 @@ fn begin(setup: &Setup) -> PipelineState {
     PipelineState {
         stages: plan_stages(setup.options, setup.handover_level()),
         noise: 0.0,
+        dispersion: 1.0,
         solved: frames.clone(),
         frames,
         kappa: Kappa::zeros(),

@@ -4,6 +4,9 @@ use crate::solver::solve_record::SolveRecord;
 use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::frame_sigma::FrameSigma;
 use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
+use crate::uncertainty::model_error::ModelErrorReport;
+use crate::verdict::prior_test::PriorTest;
+use crate::verdict::survey_verdict::SurveyVerdict;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::trajectory::Pose;
 
@@ -115,6 +118,13 @@ pub struct RefineReport {
     /// [`crate::uncertainty::covariance`]: above 1 where residuals err together, below
     /// where they cancel.
     pub variance_factor: f64,
+    /// What the residuals show beyond noise, if they do.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub model_error: Option<ModelErrorReport>,
+    /// The refined poses against the prior.
+    pub prior_test: PriorTest,
+    /// Whether the result may be used, and for what.
+    pub verdict: SurveyVerdict,
     /// The rolling-shutter test: the readout time that fits the frames best, where they determine
     /// it.
     #[serde(skip_serializing_if = "Option::is_none")]

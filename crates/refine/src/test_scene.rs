@@ -50,6 +50,7 @@ pub fn test_context<'a>(
         kappa: Kappa::zeros(),
         frames,
         prior,
+        dispersion: 1.0,
         noise: 0.0,
     }
 }

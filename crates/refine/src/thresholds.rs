@@ -1019,32 +1019,22 @@ pub mod observability {
     pub const MAX_MEDIAN_SIGMA_PX: f64 = 0.2;
 }
 
-/// Thresholds of `uncertainty/overdispersion.rs`.
-pub mod overdispersion {
-    /// Overdispersion that is accepted of a single frame, pixels; it must exceed
-    /// [`MAX_OVERDISPERSION_RATIO`], too, to be rejected.
+/// Thresholds of `verdict/prior_test.rs`.
+pub mod prior_test {
+    /// 1-σ of the factor by which lengths of odometers and plans are usually wrong.
     ///
-    /// Higher: fewer frames are rejected.
+    /// Higher: larger errors of the radius or of units go unnoticed.
     ///
-    /// Chosen by: unknown.
-    pub const MAX_OVERDISPERSION_PX: f64 = 0.25;
+    /// Chosen by: wheels and cable counters in sewers slip by some per cent.
+    pub const SCALE_SIGMA: f64 = 0.05;
 
-    /// Overdispersion that is accepted of a single frame, over the displacement by noise.
+    /// Ratio of a σ of the prior to the one that fits, beyond which it is reported.
     ///
-    /// Higher: fewer frames are rejected.
+    /// Higher: σ that are farther off go unnoticed.
     ///
-    /// Chosen by: a glint on a faint wall makes it five to ten in one patch of a right frame (and a
-    /// pixel).
-    pub const MAX_OVERDISPERSION_RATIO: f64 = 12.0;
-
-    /// Overdispersion of the median frame that is accepted, pixels; beyond it all frames are
-    /// overdispersed.
-    ///
-    /// Higher: larger errors of the model go unnoticed.
-    ///
-    /// Chosen by: right surveys have none, whatever wall, light and noise; a focal length 0.3 % off
-    /// makes it 0.05, one 1 % off 0.13.
-    pub const MAX_MEDIAN_OVERDISPERSION_PX: f64 = 0.04;
+    /// Chosen by: results hardly change for smaller ones; with 24 frames, three times too much or
+    /// too little is found.
+    pub const MAX_SIGMA_RATIO: f64 = 1.5;
 }
 
 /// Thresholds of `uncertainty/rolling_shutter_test.rs`.
@@ -1122,15 +1112,6 @@ pub mod assessment {
     /// Share of a frame's pixels that must overlap other frames for its pose to count as
     /// photometric, 0 to 1. Higher: fewer frames are photometric. Chosen by: unknown.
     pub const MIN_PIXEL_SHARE: f64 = 0.02;
-    /// Largest step left of a photometric pose, pixels on the wall. Higher: more frames are
-    /// photometric. Chosen by: as [`MAX_SIGMA_PX`].
-    pub const MAX_STEP_PX: f64 = 0.25;
-    /// Largest step left of a photometric pose, multiples of σ, if that is more. Higher: more
-    /// frames are photometric. Chosen by: 2 σ.
-    pub const MAX_STEP_SIGMA: f64 = 2.0;
-    /// Largest 1-σ on the wall of a photometric pose, pixels. Higher: more frames are photometric.
-    /// Chosen by: twice that is half a pixel.
-    pub const MAX_SIGMA_PX: f64 = 0.25;
     /// Pairwise comparisons of all frames, with rejected frames registered again between two, at
     /// the most. Higher: more attempts, in more time. Chosen by: unknown.
     pub const MAX_PAIR_ITERATIONS: usize = 3;

@@ -31,6 +31,10 @@ pub struct EstimationContext<'a> {
     pub prior: &'a Prior,
     /// The sensor's noise, 1-σ in grey levels, estimated from single images.
     pub noise: f64,
+    /// Factor by which residuals are less informative than noise of their size, 1 or more: the
+    /// dispersion of [`crate::uncertainty::model_error`], once it is known. The information of
+    /// pixels is divided by it.
+    pub dispersion: f64,
 }
 
 impl EstimationContext<'_> {

@@ -146,20 +146,25 @@ impl Prior {
     }
 
     /// Motion along the gauge that minimises the cost of the prior: that of the first frame for a
-    /// random walk, of all frames for independent errors.
+    /// random walk, led there from the first of the frames `photometric` by the initial steps; of
+    /// all of these frames for independent errors.
     pub fn align_gauge(
         &self,
         gauge: &Gauge,
         estimates: &[FrameEstimate],
         datum: &Datum,
+        photometric: &[bool],
     ) -> GaugeMotion {
-        let count = match self.jitter.model {
-            JitterModel::RandomWalk => 1,
-            JitterModel::Independent => estimates.len(),
+        let initial = |k: usize| datum.to_nominal_tunnel(&self.initial[k]);
+        let chosen = (0..estimates.len()).filter(|k| photometric[*k]);
+        let pairs = chosen.map(|k| (k, estimates[k].pose));
+        let (poses, initial): (Vec<Pose>, Vec<Pose>) = match self.jitter.model {
+            JitterModel::RandomWalk => pairs
+                .take(1)
+                .map(|(k, pose)| (predict(&pose, &initial(k), &initial(0)), initial(0)))
+                .unzip(),
+            JitterModel::Independent => pairs.map(|(k, pose)| (pose, initial(k))).unzip(),
         };
-        let poses: Vec<Pose> = estimates[..count].iter().map(|e| e.pose).collect();
-        let initial = self.initial[..count].iter();
-        let initial: Vec<Pose> = initial.map(|pose| datum.to_nominal_tunnel(pose)).collect();
         gauge.align(&poses, &initial)
     }
 

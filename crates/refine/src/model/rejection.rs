@@ -60,11 +60,13 @@ pub enum RejectionReason {
         /// Share of its pixels that others show, 0 to 1.
         share: f64,
     },
-    /// Residuals of its patches contradict each other beyond noise.
-    Overdispersed {
-        /// Displacement of patches beyond noise, pixels.
-        overdispersion_px: f64,
+    /// Refined steps are a multiple of the initial ones: lengths cannot be believed.
+    ContradictsScale {
+        /// The factor.
+        factor: f64,
     },
+    /// The equations of the survey have no solution.
+    Unsolved,
     /// Too little texture to determine the pose.
     Uncertain {
         /// 1-σ on the wall, pixels.
@@ -152,12 +154,11 @@ impl fmt::Display for RejectionReason {
                 "only {:.1} % of its pixels overlap other frames",
                 100.0 * share
             ),
-            Self::Overdispersed { overdispersion_px } => write!(
+            Self::ContradictsScale { factor } => write!(
                 f,
-                "its residuals are overdispersed (patches of it are off by \
-                 {overdispersion_px:.2} px, or those of most frames are): a wrong camera, radius \
-                 or shape, or a repetitive wall that is closed one period off"
+                "refined steps are {factor:.2} times the initial ones, so lengths cannot be believed"
             ),
+            Self::Unsolved => write!(f, "the equations of the survey have no solution"),
             Self::Uncertain { wall_px } => write!(
                 f,
                 "its position on the wall is uncertain by {wall_px:.1} px: too little texture, \

@@ -72,6 +72,15 @@ impl IntrinsicsSums {
         }
     }
 
+    /// `g_κ`, with zeros for the parameters that pixels do not depend on.
+    pub fn shared_gradient(&self) -> Kappa {
+        let mut shared = Kappa::zeros();
+        for (column, index) in KAPPA_INDICES.into_iter().enumerate() {
+            shared[index] = self.gradient[column];
+        }
+        shared
+    }
+
     /// Adds the block to the border, and the outer product of its gradient, with that of its frames
     /// `slots`, to the scatter of the border.
     pub fn add_to(
@@ -87,9 +96,8 @@ impl IntrinsicsSums {
                 target += block.column(column);
             }
         }
-        let mut shared = Kappa::zeros();
+        let shared = self.shared_gradient();
         for (column, index) in KAPPA_INDICES.into_iter().enumerate() {
-            shared[index] = self.gradient[column];
             for (row, other) in KAPPA_INDICES.into_iter().enumerate() {
                 border.own[(other, index)] += self.own[(row, column)];
             }

@@ -14,7 +14,7 @@ use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Blocks of tiles that are processed before their sums are added: bounds the memory, whatever the
 /// tunnel's length.
-const BATCH: usize = 64;
+pub(super) const BATCH: usize = 64;
 
 impl PhotometricProblem<'_> {
     /// Cost and normal equations at the given estimates of the active frames and the initial shared
@@ -118,9 +118,9 @@ impl PhotometricProblem<'_> {
         Ok(())
     }
 
-    /// Divides the pixels' part by the noise variance `σ²` of a pixel.
+    /// Multiplies the pixels' part by [`Self::information`].
     fn scale_by_noise(&self, sums: &mut Linearisation) {
-        let information = self.sigma.powi(-2);
+        let information = self.information();
         sums.cost *= information;
         let NormalEquations { blocks, gradient } = &mut sums.normal;
         blocks.iter_mut().for_each(|b| *b *= information);
@@ -164,7 +164,7 @@ impl PhotometricProblem<'_> {
 
     /// Adds the prior of poses and exposures at the `estimates` of all participants and returns its
     /// cost.
-    fn add_prior(
+    pub(super) fn add_prior(
         &self,
         estimates: &[FrameEstimate],
         kappa: &Kappa,

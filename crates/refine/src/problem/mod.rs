@@ -22,6 +22,7 @@ pub mod linearisation;
 pub mod linearise;
 pub mod noise_estimation;
 pub mod observer_column;
+pub mod patch_scores;
 pub mod photometric_problem;
 pub mod set_up;
 pub mod step_length;

@@ -14,7 +14,7 @@ use crate::samples::tile_coverage::{FrameImages, TileCoverage};
 use crate::samples::visibility::Exclusions;
 use crate::tiles::denoising::Denoiser;
 use crate::tiles::frame_samples::SampledFrame;
-use crate::tiles::grid::WallGrid;
+use crate::tiles::grid::{BLOCK, WallGrid};
 use crate::tiles::residual_weighting::NoiseModel;
 use std::ops::Range;
 use std::sync::Arc;
@@ -235,9 +235,19 @@ impl<'a> PhotometricProblem<'a> {
         self.coverage.tiles as f64 / self.coverage.all_tiles.max(1) as f64
     }
 
+    /// Height of a block of the wall ([`crate::tiles::grid::BLOCK`]), metres.
+    pub fn block_size_m(&self) -> f64 {
+        BLOCK as f64 * self.grid.tile_size_m().1
+    }
+
     /// Estimated noise of a pixel, 1-σ in grey levels.
     pub fn sigma(&self) -> f64 {
         self.sigma
+    }
+
+    /// Information of a pixel's grey value, `1/(σ² dispersion)`.
+    pub(super) fn information(&self) -> f64 {
+        1.0 / (self.sigma * self.sigma * self.context.dispersion)
     }
 
     /// Turns a factorisation failure into an error that names the frames.

@@ -5,27 +5,25 @@ use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
-use crate::parameters::calibration::{Calibration, Datum, Kappa};
+use crate::parameters::calibration::{Calibration, Kappa};
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::problem::linearisation::FrameContribution;
 use crate::refined::Refined;
-use crate::report::{FrameFlag, FrameReport, PoseReport, RefineReport};
+use crate::report::FrameReport;
 use crate::solver::gauss_newton::Solution;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
-use crate::stages::state::{Estimation, PipelineState};
-use crate::thresholds::assessment::{MAX_SIGMA_PX, MAX_STEP_PX, MAX_STEP_SIGMA, MIN_PIXEL_SHARE};
+use crate::stages::placement::{Placement, ReportParts};
+use crate::stages::state::{Estimation, LastSolve, PipelineState};
 use crate::tracking::pose_separation::separation_m;
 use crate::uncertainty::calibration_report::CalibrationReport;
+use crate::uncertainty::covariance::Covariances;
 use crate::uncertainty::frame_sigma::FrameSigma;
 use crate::uncertainty::rolling_shutter_test::estimate_readout;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
-use crate::validation::inconsistent_frames::{find_disagreement, find_inconsistent_frames};
+use crate::validation::inconsistent_frames::find_inconsistent_frames;
 use crate::validation::pairwise_lucas_kanade::align_pairs;
-use tunnelstitch_core::frames::FrameSet;
-use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::GaugeMotion;
-use tunnelstitch_geometry::trajectory::{StampedPose, Trajectory};
+use crate::verdict::frame_verdict::FrameEvidence;
 
 /// Runs the stage on the last full-size solve.
 ///
@@ -36,47 +34,75 @@ pub fn run<'a>(
     mut estimation: Estimation<'a>,
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
-    let (solution, stopping) = estimation.solution.take().ok_or(RefineError::NoOverlap)?;
+    let last = estimation.solution.take().ok_or(RefineError::NoOverlap)?;
     session.progress.start("covariance", 1);
     let state = &mut estimation.state;
     let context = setup.context(state);
     reject_finally(setup, &context, state)?;
     let readout = estimate_readout(&context, setup.options, &state.frames)?;
+    let LastSolve {
+        solution,
+        uncertainty,
+        stopping,
+    } = last;
+    let sigmas = frame_sigmas(&context, &state.frames, &uncertainty);
+    let steps_px = steps_left(&solution).unwrap_or_else(|_| vec![0.0; setup.count()]);
+    let mut rejections = state.frames.rejections.clone();
+    judge(setup, &solution, &sigmas, &steps_px, &mut rejections);
     let calibration = setup.calibration_at(state);
-    let uncertainty = SolutionUncertainty::at(&context, &solution, &calibration)?;
-    let metric = calibration.datum(&context.kappa);
-    let estimates = &state.frames.estimates;
-    let motion = setup
-        .prior
-        .align_gauge(&context.surface.gauge(), estimates, &metric);
-    for rejection in state.frames.rejections.iter_mut().flatten() {
-        if let RejectionReason::Ambiguous { other, .. } = rejection {
-            *other = metric.to_metres(&motion.apply(other));
-        }
-    }
-    let frames = report_frames(setup, &context, &state.frames, &solution, &uncertainty);
+    let datum = calibration.datum(&context.kappa);
+    let placement = Placement::new(
+        setup,
+        &datum,
+        &state.frames.estimates,
+        &uncertainty.covariances,
+        rejections,
+    );
     session.progress.finish();
     session.record_time("covariance");
-    let on_prior = frames
-        .iter()
-        .filter(|frame| frame.flag != FrameFlag::Photometric);
+    let frames = (0..setup.count()).map(|k| FrameReport {
+        points: solution.linearisation.frames[k].samples,
+        residual: residual(&solution.linearisation.frames[k]),
+        inlier_share: inlier_share(&solution.linearisation.frames[k]),
+        gain: solution.estimates[k].log_gain.exp(),
+        bias: solution.estimates[k].bias,
+        overdispersion_px: uncertainty.overdispersions[k].px,
+        ..placement.report_frame(setup, k, sigmas[k])
+    });
     let record = &solution.record;
-    let report = RefineReport {
+    let parts = ReportParts {
+        frames: frames.collect(),
         stopped_because: record.stop.explain(&stopping, record.last_step_px),
-        frames_on_prior: on_prior.count(),
-        frames,
         levels: std::mem::take(&mut state.levels),
         rolling_shutter: readout,
-        variance_factor: uncertainty.covariances.variance_factor,
+        model_error: uncertainty.model_error,
         calibration: report_calibration(setup, &calibration, &context.kappa, &uncertainty, state),
         timings: std::mem::take(&mut session.timings),
     };
-    estimation.refined = Some(Refined {
-        trajectory: trajectory(setup.input.initial, &state.frames, &metric, &motion),
-        report,
-        covariances: uncertainty.covariances.moved(&motion).scaled(metric.scale),
-    });
+    estimation.refined = Some(placement.refined(setup, parts));
     Ok(estimation)
+}
+
+/// The result where equations have no solution: the initial poses.
+pub fn without_solution(setup: &Setup, session: &mut Session) -> Refined {
+    let count = setup.count();
+    let unknown = Covariances::unknown(count);
+    let estimates: Vec<FrameEstimate> =
+        setup.prior.initial.iter().map(|pose| FrameEstimate::at(*pose)).collect();
+    let datum = setup.calibration.datum(&Kappa::zeros());
+    let rejections = vec![Some(RejectionReason::Unsolved); count];
+    let placement = Placement::new(setup, &datum, &estimates, &unknown, rejections);
+    let frames = (0..count).map(|k| placement.report_frame(setup, k, FrameSigma::unknown()));
+    let parts = ReportParts {
+        frames: frames.collect(),
+        stopped_because: RejectionReason::Unsolved.to_string(),
+        levels: Vec::new(),
+        rolling_shutter: None,
+        model_error: None,
+        calibration: None,
+        timings: std::mem::take(&mut session.timings),
+    };
+    placement.refined(setup, parts)
 }
 
 /// Rejects frames with an alias that the prior does not exclude, and frames that the others do not
@@ -107,35 +133,42 @@ fn reject_finally(
     Ok(())
 }
 
-/// The report of every frame.
-fn report_frames(
-    setup: &Setup,
+/// 1-σ of every frame.
+fn frame_sigmas(
     context: &EstimationContext,
     frames: &FrameStates,
-    solution: &Solution,
     uncertainty: &SolutionUncertainty,
-) -> Vec<FrameReport> {
-    let count = setup.count();
-    // Without a covariance there is no step either; its lack is reported already.
-    let steps_px = steps_left(solution).unwrap_or_else(|_| vec![0.0; count]);
-    let rejections = uncertainty.reject_overdispersed(frames.rejections.clone());
-    let reports = rejections.into_iter().enumerate().map(|(k, rejection)| {
-        let sigma = uncertainty.frame_sigma(context, k, &frames.estimates[k]);
-        let rejection = rejection
-            .or_else(|| final_rejection(&setup.input.camera, k, solution, steps_px[k], &sigma));
-        let overdispersion_px = uncertainty.overdispersions[k].px;
-        report_frame(
-            setup.input.frames,
-            k,
-            solution,
-            rejection,
-            sigma,
-            overdispersion_px,
-        )
-    });
-    let mut reports: Vec<FrameReport> = reports.collect();
-    demote_single_frame(&mut reports);
-    reports
+) -> Vec<FrameSigma> {
+    let estimates = frames.estimates.iter().enumerate();
+    estimates.map(|(k, estimate)| uncertainty.frame_sigma(context, k, estimate)).collect()
+}
+
+/// Decides about every frame that no earlier test has rejected. A single photometric frame agrees
+/// with no other.
+fn judge(
+    setup: &Setup,
+    solution: &Solution,
+    sigmas: &[FrameSigma],
+    steps_px: &[f64],
+    rejections: &mut [Option<RejectionReason>],
+) {
+    let camera = &setup.input.camera;
+    let all_pixels =
+        f64::from(camera.width) * f64::from(camera.height) * solution.problem.compared_share();
+    for (k, rejection) in rejections.iter_mut().enumerate() {
+        let evidence = FrameEvidence {
+            rejection: rejection.take(),
+            contribution: &solution.linearisation.frames[k],
+            all_pixels,
+            sigma: sigmas[k],
+            step_px: steps_px[k],
+        };
+        *rejection = evidence.judge(setup.options);
+    }
+    let mut left = rejections.iter_mut().filter(|rejection| rejection.is_none());
+    if let (Some(alone), None) = (left.next(), left.next()) {
+        *alone = Some(RejectionReason::Disconnected { frames: 1 });
+    }
 }
 
 /// The report of the self-calibration, if there was one.
@@ -158,21 +191,6 @@ fn report_calibration(
     })
 }
 
-/// The refined poses in metres, with the times of the initial ones.
-fn trajectory(
-    initial: &[StampedPose],
-    frames: &FrameStates,
-    metric: &Datum,
-    motion: &GaugeMotion,
-) -> Trajectory {
-    let poses = initial.iter().zip(&frames.estimates);
-    let poses = poses.map(|(initial, estimate)| StampedPose {
-        time_s: initial.time_s,
-        pose: metric.to_metres(&motion.apply(&estimate.pose)),
-    });
-    poses.collect()
-}
-
 /// Movement of each frame, pixels on the wall, in the undamped step that is left where the solve
 /// ended for want of iterations or of descent.
 ///
@@ -189,74 +207,12 @@ fn steps_left(solution: &Solution) -> Result<Vec<f64>, ProblemError> {
     Ok(problem.wall_step_px(&solution.estimates, &step, &Kappa::zeros()))
 }
 
-/// The rejection reason of a frame that no other test has rejected, if the solution gives one.
-fn final_rejection(
-    camera: &Camera,
-    k: usize,
-    solution: &Solution,
-    step_px: f64,
-    sigma: &FrameSigma,
-) -> Option<RejectionReason> {
-    let share: &FrameContribution = &solution.linearisation.frames[k];
-    let all =
-        f64::from(camera.width) * f64::from(camera.height) * solution.problem.compared_share();
-    if share.pixels < MIN_PIXEL_SHARE * all {
-        Some(RejectionReason::NoOverlap {
-            share: share.pixels / all,
-        })
-    } else if let Some(rejection) = find_disagreement(share) {
-        Some(rejection)
-    } else if sigma.wall_px.is_nan() || sigma.wall_px > MAX_SIGMA_PX {
-        Some(RejectionReason::Uncertain {
-            wall_px: sigma.wall_px,
-        })
-    } else if step_px > MAX_STEP_PX.max(MAX_STEP_SIGMA * sigma.wall_px) {
-        Some(RejectionReason::NotConverged { step_px })
-    } else {
-        None
-    }
+/// Root mean square residual of a frame, grey levels.
+fn residual(contribution: &FrameContribution) -> f64 {
+    (contribution.square / contribution.inliers.max(1e-9)).sqrt()
 }
 
-/// The report of one frame.
-fn report_frame(
-    frames: &FrameSet,
-    k: usize,
-    solution: &Solution,
-    rejection: Option<RejectionReason>,
-    sigma: FrameSigma,
-    overdispersion_px: f64,
-) -> FrameReport {
-    let share: &FrameContribution = &solution.linearisation.frames[k];
-    let estimate: &FrameEstimate = &solution.estimates[k];
-    FrameReport {
-        index: k,
-        file: frames[k].name(),
-        flag: match &rejection {
-            None => FrameFlag::Photometric,
-            Some(RejectionReason::Ambiguous { .. }) => FrameFlag::Ambiguous,
-            Some(_) => FrameFlag::Prior,
-        },
-        other_pose: match &rejection {
-            Some(RejectionReason::Ambiguous { other, .. }) => Some(PoseReport::from(other)),
-            _ => None,
-        },
-        reason: rejection.map(|rejection| rejection.to_string()),
-        points: share.samples,
-        residual: (share.square / share.inliers.max(1e-9)).sqrt(),
-        inlier_share: share.inliers / share.pixels.max(1e-9),
-        gain: estimate.log_gain.exp(),
-        bias: estimate.bias,
-        sigma,
-        overdispersion_px,
-    }
-}
-
-/// Sets the flag of a single photometric frame to the prior: it agrees with no other.
-fn demote_single_frame(reports: &mut [FrameReport]) {
-    let photometric = |report: &&mut FrameReport| report.flag == FrameFlag::Photometric;
-    let mut left = reports.iter_mut().filter(photometric);
-    if let (Some(alone), None) = (left.next(), left.next()) {
-        alone.flag = FrameFlag::Prior;
-        alone.reason = Some(RejectionReason::Disconnected { frames: 1 }.to_string());
-    }
+/// Share of a frame's pixels' weight that the robust loss left.
+fn inlier_share(contribution: &FrameContribution) -> f64 {
+    contribution.inliers / contribution.pixels.max(1e-9)
 }

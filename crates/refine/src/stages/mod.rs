@@ -9,10 +9,12 @@
 //! | what is fixed | [`setup`] |
 //! | what changes, and what a checkpoint keeps of it | [`state`] |
 //! | checkpoints, progress, times | [`session`] |
+//! | final poses | [`placement`] |
 //! | dispatch | [`run`](mod@run) |
 
 pub mod assess;
 pub mod correct_shading;
+pub mod placement;
 pub mod plan;
 pub mod prescreen;
 pub mod repair;

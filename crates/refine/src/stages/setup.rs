@@ -111,6 +111,7 @@ impl<'a> Setup<'a> {
             frames: &self.frames,
             prior: &self.prior,
             noise,
+            dispersion: 1.0,
         }
     }
 
@@ -118,6 +119,7 @@ impl<'a> Setup<'a> {
     pub fn context(&self, state: &PipelineState) -> EstimationContext<'_> {
         EstimationContext {
             calibration: self.calibration_at(state),
+            dispersion: state.dispersion,
             ..self.initial_context(state.noise)
         }
         .at(state.kappa)

@@ -11,7 +11,7 @@ use crate::solver::gauss_newton::{Solution, SolveState};
 use crate::stages::plan::{SolvePlan, Stage};
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
-use crate::stages::state::{Estimation, PipelineState};
+use crate::stages::state::{Estimation, LastSolve, PipelineState};
 use crate::thresholds::joint;
 use crate::tracking::shading_correction::correct;
 use crate::uncertainty::observability::UnobservableParameter;
@@ -20,7 +20,9 @@ use crate::validation::inconsistent_frames::reject_disagreeing_frames;
 
 /// Runs the stage; a snapshot may be kept between two steps.
 ///
-/// A parameter that the last solve finds unobservable is fixed, and the solve planned again.
+/// A parameter that the last solve finds unobservable is fixed, and the solve planned again; as it
+/// is if residuals show model errors, with pixels that tell accordingly less
+/// ([`crate::uncertainty::model_error`]).
 ///
 /// # Errors
 /// A frame that cannot be read, equations without a solution.
@@ -69,7 +71,21 @@ pub fn run<'a>(
         correct(&context, setup.options, &state.frames)?;
     }
     // The assessment uses the last one only.
-    estimation.solution = (!has_solve_ahead(state)).then_some((solution, plan.stopping));
+    if !has_solve_ahead(state) {
+        let calibration = setup.calibration_at(state);
+        let uncertainty = SolutionUncertainty::at(&context, &solution, &calibration)?;
+        let dispersion = uncertainty.model_error.map_or(1.0, |found| found.dispersion);
+        if state.dispersion == 1.0 && dispersion > 1.0 {
+            state.dispersion = dispersion;
+            plan_again(&plan, setup.options, state);
+        } else {
+            estimation.solution = Some(LastSolve {
+                solution,
+                uncertainty,
+                stopping: plan.stopping,
+            });
+        }
+    }
     session.record_time(&format!("global {}", plan.name()));
     Ok(estimation)
 }

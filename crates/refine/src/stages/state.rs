@@ -9,6 +9,7 @@ use crate::solver::stopping::Stopping;
 use crate::stages::plan::Stage;
 use crate::tracking::alternating_calibration::AlternatingCalibration;
 use crate::uncertainty::observability::UnobservableParameter;
+use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::validation::aliasing::AliasHypothesis;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -21,6 +22,8 @@ pub struct PipelineState {
     pub stages: VecDeque<Stage>,
     /// 1-σ of the sensor's noise, grey levels.
     pub noise: f64,
+    /// Dispersion of the residuals ([`crate::uncertainty::model_error`]), once it is known.
+    pub dispersion: f64,
     /// The frames: estimates (none before they are tracked) and rejection reasons.
     pub frames: FrameStates,
     /// The frames as the last solve left them; repair looks at what has changed since.
@@ -54,13 +57,23 @@ pub struct Snapshot {
     pub elapsed_s: f64,
 }
 
+/// The last full-size solve.
+pub struct LastSolve<'a> {
+    /// The solution.
+    pub solution: Solution<'a>,
+    /// Its uncertainty.
+    pub uncertainty: SolutionUncertainty,
+    /// The stopping rule.
+    pub stopping: Stopping,
+}
+
 /// A refinement between two stages.
 pub struct Estimation<'a> {
     /// The state.
     pub state: PipelineState,
-    /// The last full-size solve, with its stopping rule. It is held in memory only; no checkpoint
-    /// is kept between it and the assessment that uses it.
-    pub solution: Option<(Solution<'a>, Stopping)>,
+    /// The last full-size solve. It is held in memory only; no checkpoint is kept between it and
+    /// the assessment that uses it.
+    pub solution: Option<LastSolve<'a>>,
     /// The result, once assessed.
     pub refined: Option<Refined>,
 }

@@ -78,18 +78,6 @@ impl Covariances {
         }
     }
 
-    /// Adds the uncertainty of the shared parameters: `Z + W Σ_κ Wᵀ`.
-    pub fn with_shared(mut self, w: &[BorderBlock], covariance: &SharedBlock) -> Self {
-        let pose = |k: usize| w[k].fixed_rows::<6>(0).into_owned();
-        for (k, frame) in self.frames.iter_mut().enumerate() {
-            *frame += pose(k) * covariance * pose(k).transpose();
-        }
-        for (k, next) in self.next.iter_mut().enumerate() {
-            *next += pose(k) * covariance * pose(k + 1).transpose();
-        }
-        self
-    }
-
     /// Scales all positions by `scale`.
     pub fn scaled(mut self, scale: f64) -> Self {
         let d = Matrix6::from_diagonal(&Vector6::new(1.0, 1.0, 1.0, scale, scale, scale));
@@ -148,6 +136,68 @@ impl Covariances {
     }
 }
 
+/// Covariances of the steps of all pairs of frames that share wall, on the pattern of the normal
+/// matrix.
+#[derive(Clone, Debug)]
+pub struct PairCovariances {
+    /// `Σ_jk`, in the pattern's order; NaN where it is unknown.
+    blocks: Vec<Matrix6<f64>>,
+    /// Variance factor c.
+    pub variance_factor: f64,
+    /// Part of c that the scatter V contributes, without the prior.
+    pub pixel_dispersion: f64,
+}
+
+impl PairCovariances {
+    /// `Σ_jk` of two frames; None if they share no wall.
+    pub fn of_pair(&self, pattern: &Pattern, j: usize, k: usize) -> Option<Matrix6<f64>> {
+        let block = &self.blocks[pattern.block_index(j.min(k), j.max(k))?];
+        Some(if j <= k { *block } else { block.transpose() })
+    }
+
+    /// The same pairs with other covariances.
+    pub fn replaced(mut self, pattern: &Pattern, pair: impl Fn(usize, usize) -> Matrix6<f64>) -> Self {
+        for column in 0..pattern.frames() {
+            for &row in pattern.rows(column) {
+                if let Some(index) = pattern.block_index(row, column) {
+                    self.blocks[index] = pair(row, column);
+                }
+            }
+        }
+        self
+    }
+
+    /// Adds the uncertainty of the shared parameters: `+ W Σ_κ Wᵀ`.
+    pub fn with_shared(
+        mut self,
+        pattern: &Pattern,
+        w: &[BorderBlock],
+        covariance: &SharedBlock,
+    ) -> Self {
+        let pose = |k: usize| w[k].fixed_rows::<6>(0).into_owned();
+        for column in 0..pattern.frames() {
+            for &row in pattern.rows(column) {
+                if let Some(index) = pattern.block_index(row, column) {
+                    self.blocks[index] += pose(row) * covariance * pose(column).transpose();
+                }
+            }
+        }
+        self
+    }
+
+    /// The covariances of every frame, and of every frame with the next.
+    pub fn covariances(&self, pattern: &Pattern) -> Covariances {
+        let unknown = Matrix6::from_element(f64::NAN);
+        let pair = |j: usize, k: usize| self.of_pair(pattern, j, k).unwrap_or(unknown);
+        let count = pattern.frames();
+        Covariances {
+            frames: (0..count).map(|k| pair(k, k)).collect(),
+            next: (1..count).map(|k| pair(k - 1, k)).collect(),
+            variance_factor: self.variance_factor,
+        }
+    }
+}
+
 /// Computes the covariances at a solution.
 ///
 /// `normal`: H, with `tied` freedoms of the gauge tied; `scatter`: V of the pixels; `prior`: P; all
@@ -162,27 +212,26 @@ pub fn compute_covariances(
     scatter: &[Block],
     prior: &[Block],
     curvature: f64,
-) -> Result<Covariances, FactorError> {
+) -> Result<PairCovariances, FactorError> {
     let inverse = SelectedInverse::new(pattern, normal)?;
     let of_exposures = SelectedInverse::new(pattern, &exposures_alone(pattern, normal))?;
-    let count = pattern.frames();
-    let q = scatter.iter().zip(prior);
-    let q: Vec<Block> = q.map(|(v, p)| v / curvature.powi(2) + p).collect();
-    let q_ee: Vec<Block> = q.iter().map(exposures_part).collect();
-    let trace =
-        trace_of_product(pattern, &inverse, &q) - trace_of_product(pattern, &of_exposures, &q_ee);
-    let freedoms = count * POSE - tied;
-    let variance_factor = trace / freedoms as f64;
+    let trace = |of: &[Block]| {
+        let exposures: Vec<Block> = of.iter().map(exposures_part).collect();
+        trace_of_product(pattern, &inverse, of) - trace_of_product(pattern, &of_exposures, &exposures)
+    };
+    let freedoms = (pattern.frames() * POSE - tied) as f64;
+    let pixel_dispersion = trace(scatter) / curvature.powi(2) / freedoms;
+    let variance_factor = pixel_dispersion + trace(prior) / freedoms;
     let pose = |block: Block| variance_factor * block.fixed_view::<POSE, POSE>(0, 0).into_owned();
     let unknown = Matrix6::from_element(f64::NAN);
-    Ok(Covariances {
-        frames: (0..count)
-            .map(|k| inverse.block(k, k).map_or(unknown, pose))
-            .collect(),
-        next: (1..count)
-            .map(|k| inverse.block(k - 1, k).map_or(unknown, pose))
-            .collect(),
+    let columns = (0..pattern.frames()).flat_map(|column| {
+        let rows = pattern.rows(column).iter();
+        rows.map(|row| inverse.block(*row, column).map_or(unknown, pose)).collect::<Vec<_>>()
+    });
+    Ok(PairCovariances {
+        blocks: columns.collect(),
         variance_factor,
+        pixel_dispersion,
     })
 }
 
@@ -211,7 +260,7 @@ fn exposures_part(block: &Block) -> Block {
 }
 
 /// The normal matrix for known poses: `diag(I, H_ee)`.
-fn exposures_alone(pattern: &Pattern, normal: &NormalEquations) -> NormalEquations {
+pub fn exposures_alone(pattern: &Pattern, normal: &NormalEquations) -> NormalEquations {
     let mut alone = NormalEquations::zeros(pattern);
     for (alone, block) in alone.blocks.iter_mut().zip(&normal.blocks) {
         *alone = exposures_part(block);
@@ -258,7 +307,11 @@ mod tests {
         }
         let none = vec![Block::zeros(); pattern.blocks()];
         let at = |scatter: &[Block], prior: &[Block], curvature: f64| {
-            compute_covariances(&pattern, &normal, 0, scatter, prior, curvature).unwrap()
+            {
+                let pairs =
+                    compute_covariances(&pattern, &normal, 0, scatter, prior, curvature).unwrap();
+                pairs.covariances(&pattern)
+            }
         };
         let one = at(&normal.blocks, &none, 1.0);
         assert!((one.variance_factor - 1.0).abs() < 1e-12);

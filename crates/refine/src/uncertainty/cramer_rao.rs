@@ -119,6 +119,7 @@ pub fn pose_bounds(
         kappa: Kappa::zeros(),
         frames: &frames,
         prior: &prior,
+        dispersion: 1.0,
         noise: 0.0,
     };
     let estimates: Vec<FrameEstimate> =

@@ -27,6 +27,28 @@ pub struct FrameSigma {
     /// counts them.
     #[serde(deserialize_with = "nan_if_null")]
     pub wall_px: f64,
+    /// Displacement against the frames that show the same wall, root mean square over what they
+    /// share, pixels ([`crate::uncertainty::registration_sigma`]); NaN where there are none.
+    #[serde(default = "unknown", deserialize_with = "nan_if_null")]
+    pub registration_px: f64,
+}
+
+impl FrameSigma {
+    /// Unknown 1-σ: NaN.
+    pub(crate) fn unknown() -> Self {
+        Self {
+            rotation_deg: f64::NAN,
+            translation_m: f64::NAN,
+            wall_m: f64::NAN,
+            wall_px: f64::NAN,
+            registration_px: f64::NAN,
+        }
+    }
+}
+
+/// A number that a file of an earlier version does not have.
+fn unknown() -> f64 {
+    f64::NAN
 }
 
 /// Reads a number that may be NaN, which JSON writes as null.
@@ -76,6 +98,7 @@ pub fn compute_frame_sigma(
         translation_m: (trace(3) / 3.0).sqrt(),
         wall_m,
         wall_px: wall_m * camera.focal_px() / distance_m,
+        registration_px: f64::NAN,
     }
 }
 

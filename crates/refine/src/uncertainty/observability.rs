@@ -8,10 +8,11 @@
 use crate::linear::bordered_system::{BorderBlock, SchurComplement, SharedBlock, reduce_to_shared};
 use crate::linear::sparse_cholesky::FactorError;
 use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
+use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::{MAX_SIGMA_SHARE, MIN_REPORTED_CORRELATION};
 use crate::uncertainty::shared_parameter_names::{PARAMETERS, ParameterKind};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, SMatrix};
 use serde::{Deserialize, Serialize};
 
 /// A shared parameter that was to be estimated and cannot be observed.
@@ -71,6 +72,23 @@ impl Posterior {
             }
         }
         Some(covariance)
+    }
+
+    /// Steps `S⁻¹ (z_κ − Wᵀ z_p)` of the shared parameters for right sides of the frames and of
+    /// these parameters, a column each; zero if S is singular.
+    pub fn steps_of_shared<const C: usize>(
+        &self,
+        z: &[SMatrix<f64, FRAME_PARAMETERS, C>],
+        z_shared: &SMatrix<f64, SHARED_PARAMETERS, C>,
+    ) -> SMatrix<f64, SHARED_PARAMETERS, C> {
+        let mut reduced = *z_shared;
+        for (w, z) in self.w.iter().zip(z) {
+            reduced -= w.transpose() * z;
+        }
+        match self.schur.cholesky() {
+            Some(schur) => schur.solve(&reduced),
+            None => SMatrix::zeros(),
+        }
     }
 
     /// Finds the parameters that the data do not observe, one by one, the worst first. If S is

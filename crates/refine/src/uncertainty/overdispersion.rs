@@ -16,17 +16,12 @@
 
 use crate::linear::normal_equations::Block;
 use crate::model::context::EstimationContext;
-use crate::model::rejection::RejectionReason;
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::solver::gauss_newton::Solution;
-use crate::thresholds::overdispersion::{
-    MAX_MEDIAN_OVERDISPERSION_PX, MAX_OVERDISPERSION_PX, MAX_OVERDISPERSION_RATIO,
-};
 use crate::tiles::grid::BLOCK;
 use crate::tiles::tile_arrays::SAMPLES;
 use crate::uncertainty::frame_sigma::compute_frame_sigma;
 use nalgebra::Matrix6;
-use tunnelstitch_geometry::numerics::median::upper_median;
 
 /// Wall samples of a patch: of the blocks over which the scatter is estimated.
 const PATCH: i64 = BLOCK * BLOCK * SAMPLES as i64;
@@ -105,22 +100,6 @@ pub fn compute_overdispersions(
         .collect()
 }
 
-/// Marks the inliers with more overdispersion than is accepted; all of them if their median has.
-pub fn find_overdispersed(
-    overdispersions: &[Overdispersion],
-    rejections: &[Option<RejectionReason>],
-) -> Vec<bool> {
-    let inliers = (0..rejections.len()).filter(|k| rejections[*k].is_none());
-    let median_px = upper_median(inliers.map(|k| overdispersions[k].px).collect());
-    let all = median_px.is_some_and(|px| px > MAX_MEDIAN_OVERDISPERSION_PX);
-    let exceeds = |overdispersion: &Overdispersion| {
-        overdispersion.px > MAX_OVERDISPERSION_PX && overdispersion.ratio > MAX_OVERDISPERSION_RATIO
-    };
-    (0..rejections.len())
-        .map(|k| rejections[k].is_none() && (all || exceeds(&overdispersions[k])))
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,27 +130,5 @@ mod tests {
         let along = Block::from_fn(|r, c| information[(r, 7)] * information[(7, c)]);
         let (q, _) = compute_dispersion(&information, &(scatter + along * 100.0)).unwrap();
         assert!((q - 1.0).abs() < 1e-12, "{q}");
-    }
-
-    #[test]
-    fn overdispersion_of_the_median_frame_counts_for_all() {
-        let mut rejections = vec![None; 4];
-        rejections[0] = Some(RejectionReason::Featureless);
-        let overdispersion = |ratio, px| Overdispersion { ratio, px };
-        let of = |overdispersions: [Overdispersion; 4]| {
-            find_overdispersed(&overdispersions, &rejections)
-        };
-        let (none, moderate, large) = (
-            overdispersion(1.5, 0.01),
-            overdispersion(10.0, 0.1),
-            overdispersion(20.0, 0.5),
-        );
-        let (faint, clean) = (overdispersion(8.0, 1.0), overdispersion(20.0, 0.02));
-        assert_eq!(of([large, none, none, none]), [false; 4]);
-        assert_eq!(of([none, none, large, moderate]), [false, true, true, true]);
-        assert_eq!(of([none, none, large, none]), [false, false, true, false]);
-        assert_eq!(of([moderate, none, moderate, none]), [false; 4]);
-        assert_eq!(of([none, clean, faint, clean]), [false; 4]);
-        assert_eq!(find_overdispersed(&[], &[]), [false; 0]);
     }
 }

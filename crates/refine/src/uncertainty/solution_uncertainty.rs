@@ -10,15 +10,19 @@ use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::{MAX_MEDIAN_SIGMA_PX, MAX_MISFIT_SHARE};
 use crate::uncertainty::covariance::{Covariances, compute_covariances};
 use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma};
+use crate::uncertainty::model_error::{ModelError, ModelErrorReport};
 use crate::uncertainty::observability::{Posterior, UnobservableParameter};
-use crate::uncertainty::overdispersion::{
-    Overdispersion, compute_overdispersions, find_overdispersed,
-};
+use crate::uncertainty::registration_sigma::registration_sigmas;
+use crate::uncertainty::overdispersion::{Overdispersion, compute_overdispersions};
 
 /// The uncertainty of a solution.
 pub struct SolutionUncertainty {
     /// Covariances of the poses.
     pub covariances: Covariances,
+    /// 1-σ of every frame against those that show the same wall, pixels.
+    pub registration_px: Vec<f64>,
+    /// What the residuals show beyond noise, if they do.
+    pub model_error: Option<ModelErrorReport>,
     /// Covariance `Σ_κ` of the shared parameters, where they were estimated.
     pub shared: Option<SharedBlock>,
     /// Overdispersion of every frame; 0 for those that show nothing.
@@ -41,10 +45,11 @@ impl SolutionUncertainty {
         let problem = &solution.problem;
         let posterior = Posterior::at(solution).map_err(|source| problem.factor_error(source))?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
-        let shared = posterior.as_ref().and_then(of_free);
+        let mut shared = posterior.as_ref().and_then(of_free);
         let (prior, _) = problem.prior_information(&solution.estimates, &solution.kappa);
-        let found = compute_covariances(
-            problem.pattern(),
+        let pattern = problem.pattern();
+        let of_noise = compute_covariances(
+            pattern,
             &solution.linearisation.normal,
             problem.constrained_gauge_freedoms(),
             &solution.linearisation.scatter,
@@ -52,13 +57,35 @@ impl SolutionUncertainty {
             solution.record.curvature(),
         );
         // Poses without a covariance still count; they are reported as uncertain.
-        let mut covariances =
-            found.unwrap_or_else(|_| Covariances::unknown(solution.estimates.len()));
-        if let (Some(posterior), Some(shared)) = (&posterior, &shared) {
-            covariances = covariances.with_shared(&posterior.w, shared);
+        let (mut pairs, mut model_error) = (None, None);
+        if let Ok(of_noise) = of_noise {
+            model_error = ModelError::find(solution, posterior.as_ref(), of_noise.pixel_dispersion)?;
+            pairs = Some(match (&model_error, &posterior, &shared) {
+                // Its draws include the shared parameters.
+                (Some(model_error), ..) => {
+                    of_noise.replaced(pattern, |j, k| model_error.of_pair(j, k))
+                }
+                (None, Some(posterior), Some(shared)) => {
+                    of_noise.with_shared(pattern, &posterior.w, shared)
+                }
+                _ => of_noise,
+            });
         }
+        if let (Some(shared), Some(model_error)) = (&mut shared, &model_error) {
+            *shared += model_error.of_shared();
+        }
+        let covariances = match &pairs {
+            Some(pairs) => pairs.covariances(pattern),
+            None => Covariances::unknown(solution.estimates.len()),
+        };
+        let registration_px = match &pairs {
+            Some(pairs) => registration_sigmas(context, pattern, pairs, &solution.estimates),
+            None => vec![f64::NAN; solution.estimates.len()],
+        };
         Ok(Self {
             covariances,
+            registration_px,
+            model_error: model_error.map(|found| ModelErrorReport::new(&found, problem)),
             shared,
             overdispersions: compute_overdispersions(context, solution),
             posterior,
@@ -73,37 +100,20 @@ impl SolutionUncertainty {
         estimate: &FrameEstimate,
     ) -> FrameSigma {
         let w = self.posterior.as_ref().map(|posterior| &posterior.w[k]);
-        compute_frame_sigma(
-            context.surface,
-            &context.camera,
-            estimate,
-            &self.covariances.frames[k],
-            w.zip(self.shared.as_ref()),
-        )
-    }
-
-    /// Rejects frames whose residuals are not noise, besides those rejected already.
-    pub fn reject_overdispersed(
-        &self,
-        mut rejections: Vec<Option<RejectionReason>>,
-    ) -> Vec<Option<RejectionReason>> {
-        let overdispersed = find_overdispersed(&self.overdispersions, &rejections);
-        for ((rejection, is_overdispersed), overdispersion) in rejections
-            .iter_mut()
-            .zip(overdispersed)
-            .zip(&self.overdispersions)
-        {
-            if is_overdispersed {
-                *rejection = Some(RejectionReason::Overdispersed {
-                    overdispersion_px: overdispersion.px,
-                });
-            }
+        FrameSigma {
+            registration_px: self.registration_px[k],
+            ..compute_frame_sigma(
+                context.surface,
+                &context.camera,
+                estimate,
+                &self.covariances.frames[k],
+                w.zip(self.shared.as_ref()),
+            )
         }
-        rejections
     }
 
     /// Finds the shared parameters that the data do not observe. All are unobservable if too many
-    /// frames do not fit the others, if all are overdispersed, or if they are tied too loosely.
+    /// frames do not fit the others, or if they are tied too loosely.
     /// `context`: with the solution's own κ.
     pub fn find_unobservable(
         &self,
@@ -127,16 +137,8 @@ impl SolutionUncertainty {
             );
             return mark_all_unobservable(calibration, &reason);
         }
-        let overdispersed = find_overdispersed(&self.overdispersions, rejections);
-        let inliers = (0..count).filter(|k| rejections[*k].is_none() && !overdispersed[*k]);
-        let inliers: Vec<usize> = inliers.collect();
-        if inliers.is_empty() && overdispersed.contains(&true) {
-            let reason = "the frames fit each other only under overdispersion: a wall that repeats \
-                          and is closed a period off, a wrong shape, or what is not estimated";
-            return mark_all_unobservable(calibration, reason);
-        }
-        let sigmas = inliers
-            .into_iter()
+        let sigmas = (0..count)
+            .filter(|k| rejections[*k].is_none())
             .map(|k| self.frame_sigma(context, k, &estimates[k]).wall_px);
         let mut sigmas: Vec<f64> = sigmas.collect();
         sigmas.sort_unstable_by(f64::total_cmp);

@@ -1,0 +1,134 @@
+//! Scores of patches of the wall: the gradients that the pixels of each patch contribute.
+
+use crate::model::problem_error::ProblemError;
+use crate::parameters::calibration::Kappa;
+use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
+use crate::problem::block_sums::BlockSums;
+use crate::problem::linearise::BATCH;
+use crate::problem::photometric_problem::PhotometricProblem;
+use std::collections::BTreeMap;
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+
+/// The scores of square patches of blocks, by row and column of the patch.
+#[derive(Clone, Debug, Default)]
+pub struct PatchScores(BTreeMap<(i64, i64), PatchScore>);
+
+/// The score of one patch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PatchScore {
+    /// Gradients of the frames that observe it, by their indices among the active ones.
+    pub frames: BTreeMap<usize, FrameStep>,
+    /// Gradient of the shared parameters.
+    pub shared: Kappa,
+}
+
+impl PatchScores {
+    /// The scores, in a fixed order.
+    pub fn iter(&self) -> impl Iterator<Item = &PatchScore> {
+        self.0.values()
+    }
+
+    /// The scores of patches twice as wide and high.
+    pub fn doubled(&self) -> Self {
+        let mut doubled = Self::default();
+        for ((row, column), score) in &self.0 {
+            let frames = score.frames.iter().map(|(slot, gradient)| (*slot, gradient));
+            doubled.add((row.div_euclid(2), column.div_euclid(2)), frames, &score.shared);
+        }
+        doubled
+    }
+
+    /// Adds gradients to those of a patch.
+    fn add<'g>(
+        &mut self,
+        patch: (i64, i64),
+        frames: impl Iterator<Item = (usize, &'g FrameStep)>,
+        shared: &Kappa,
+    ) {
+        let score = self.0.entry(patch).or_insert_with(|| PatchScore {
+            frames: BTreeMap::new(),
+            shared: Kappa::zeros(),
+        });
+        for (slot, gradient) in frames {
+            *score.frames.entry(slot).or_insert_with(FrameStep::zeros) += gradient;
+        }
+        score.shared += shared;
+    }
+}
+
+impl PhotometricProblem<'_> {
+    /// The scores of patches of 2 × 2 blocks at the given estimates of the active frames and shared
+    /// parameters, scaled as the gradient of the cost is.
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
+    pub fn patch_scores(
+        &self,
+        active: &[FrameEstimate],
+        kappa: &Kappa,
+    ) -> Result<PatchScores, ProblemError> {
+        let estimates = self.with_active(active);
+        let calibration = self.context.calibration;
+        let mut scores = PatchScores::default();
+        let Some(camera) = calibration.camera(kappa) else {
+            return Ok(scores);
+        };
+        let readout_s = calibration.readout_s(kappa);
+        let information = self.information();
+        let free = Kappa::from_fn(|k, _| if calibration.free[k] { information } else { 0.0 });
+        for stretch in 0..self.coverage.len() {
+            let visibility = self.coverage.visibility(stretch)?;
+            let pyramids = self.images.load(self.coverage.frames(stretch))?;
+            let at_level = camera.at_level(self.sampling.level);
+            let sampled_frames =
+                self.sampled_frames(stretch, &pyramids, &estimates, at_level, readout_s);
+            for batch in visibility.blocks.chunks(BATCH) {
+                let blocks: Vec<BlockSums> = batch.par_map(|block| {
+                    self.sum_block(stretch, &visibility, block, &sampled_frames, &camera)
+                });
+                for (tiles, block) in batch.iter().zip(blocks) {
+                    let (row, column) = visibility.tiles[tiles.start].id.block();
+                    let patch = (row.div_euclid(2), column.div_euclid(2));
+                    let gradient: Vec<FrameStep> =
+                        block.gradient.iter().map(|g| g * information).collect();
+                    let shared = block.intrinsics.as_ref().map(|sums| sums.shared_gradient());
+                    let shared = shared.unwrap_or_else(Kappa::zeros).component_mul(&free);
+                    let frames = block.slots.iter().copied().zip(&gradient);
+                    scores.add(patch, frames, &shared);
+                }
+            }
+        }
+        Ok(scores)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::test_ring::Ring;
+
+    /// Scores of all patches add up to the gradient without the prior, whatever their size.
+    #[test]
+    fn scores_add_up_to_the_gradient() {
+        let ring = Ring::new(1e-4);
+        let problem = ring.problem();
+        let kappa = problem.kappa();
+        let mut scores = problem.patch_scores(&ring.estimates, &kappa).unwrap();
+        let at = problem.linearise(&ring.estimates).unwrap();
+        let mut prior = crate::linear::normal_equations::NormalEquations::zeros(problem.pattern());
+        problem.add_prior(&ring.estimates, &kappa, &mut prior, None);
+        for _ in 0..3 {
+            let mut sums = vec![FrameStep::zeros(); ring.estimates.len()];
+            for score in scores.iter() {
+                for (slot, gradient) in &score.frames {
+                    sums[*slot] += gradient;
+                }
+            }
+            for (k, sum) in sums.iter().enumerate() {
+                let expected = at.normal.gradient[k] - prior.gradient[k];
+                assert!((sum - expected).norm() < 1e-9 * expected.norm().max(1.0), "{k}");
+            }
+            scores = scores.doubled();
+        }
+    }
+}

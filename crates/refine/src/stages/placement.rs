@@ -1,0 +1,196 @@
+//! Final poses: those of photometric frames as solved, all others by the prior.
+
+use crate::model::rejection::RejectionReason;
+use crate::parameters::calibration::Datum;
+use crate::parameters::frame_estimate::FrameEstimate;
+use crate::refined::Refined;
+use crate::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
+use crate::stages::setup::Setup;
+use crate::uncertainty::calibration_report::CalibrationReport;
+use crate::uncertainty::covariance::Covariances;
+use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma};
+use crate::uncertainty::model_error::ModelErrorReport;
+use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
+use crate::verdict::bridging::Bridging;
+use crate::verdict::prior_test::PriorTest;
+use crate::verdict::survey_verdict::SurveyVerdict;
+use nalgebra::Matrix6;
+use tunnelstitch_geometry::surface::GaugeMotion;
+use tunnelstitch_geometry::trajectory::{Pose, StampedPose};
+
+/// The final poses of all frames, and the verdict that they follow from.
+pub struct Placement {
+    /// Poses in the tunnel of the given radius, aligned with the initial ones.
+    estimates: Vec<FrameEstimate>,
+    /// Final poses, metres.
+    poses: Vec<Pose>,
+    covariances: Covariances,
+    rejections: Vec<Option<RejectionReason>>,
+    prior_test: PriorTest,
+}
+
+/// Parts of the report that the poses do not determine.
+pub struct ReportParts {
+    /// Frames in order.
+    pub frames: Vec<FrameReport>,
+    /// The reason for which the last solve stopped, in words.
+    pub stopped_because: String,
+    /// Global solves.
+    pub levels: Vec<LevelReport>,
+    /// The rolling-shutter test.
+    pub rolling_shutter: Option<ReadoutEstimate>,
+    /// What the residuals show beyond noise.
+    pub model_error: Option<ModelErrorReport>,
+    /// Self-calibration.
+    pub calibration: Option<CalibrationReport>,
+    /// Time by stage.
+    pub timings: Vec<StageTime>,
+}
+
+impl Placement {
+    /// Aligns the estimates with the initial poses along the gauge, tests the prior, and gives all
+    /// frames that are not photometric their poses by it. If the prior contradicts the lengths, no
+    /// frame is photometric.
+    pub fn new(
+        setup: &Setup,
+        datum: &Datum,
+        estimates: &[FrameEstimate],
+        covariances: &Covariances,
+        mut rejections: Vec<Option<RejectionReason>>,
+    ) -> Self {
+        let prior = &setup.prior;
+        let mut photometric: Vec<bool> = rejections.iter().map(Option::is_none).collect();
+        let gauge = setup.input.surface.gauge();
+        let motion = prior.align_gauge(&gauge, estimates, datum, &photometric);
+        let mut estimates = aligned(estimates, &motion);
+        let mut covariances = covariances.clone().moved(&motion).scaled(datum.scale);
+        let poses: Vec<Pose> = estimates.iter().map(|estimate| estimate.pose).collect();
+        let alpha = setup.options.false_alarm_rate;
+        let prior_test = PriorTest::new(prior, datum, &poses, &covariances, &photometric, alpha);
+        if let Some(scale) = prior_test.scale.filter(|scale| scale.contradicts) {
+            let factor = scale.factor;
+            for rejection in &mut rejections {
+                rejection.get_or_insert(RejectionReason::ContradictsScale { factor });
+            }
+            photometric.fill(false);
+        }
+        for rejection in rejections.iter_mut().flatten() {
+            if let RejectionReason::Ambiguous { other, .. } = rejection {
+                *other = datum.to_metres(&motion.apply(other));
+            }
+        }
+        let mut frame_covariances = std::mem::take(&mut covariances.frames);
+        let bridging = Bridging {
+            prior,
+            datum,
+            photometric: &photometric,
+        };
+        if bridging.apply(&mut estimates, &mut frame_covariances).is_err() {
+            for k in (0..estimates.len()).filter(|k| !photometric[*k]) {
+                frame_covariances[k] = Matrix6::from_element(f64::NAN);
+            }
+        }
+        covariances.frames = frame_covariances;
+        for k in 1..estimates.len() {
+            if !(photometric[k - 1] && photometric[k]) {
+                covariances.next[k - 1] = Matrix6::from_element(f64::NAN);
+            }
+        }
+        let is_kept = !photometric.contains(&true);
+        let poses = estimates.iter().zip(&prior.initial).map(|(estimate, initial)| {
+            if is_kept {
+                *initial
+            } else {
+                datum.to_metres(&estimate.pose)
+            }
+        });
+        Self {
+            poses: poses.collect(),
+            estimates,
+            covariances,
+            rejections,
+            prior_test,
+        }
+    }
+
+    /// The report of frame `k`, without what the last solve says of it; `sigma`: by that solve.
+    pub fn report_frame(&self, setup: &Setup, k: usize, sigma: FrameSigma) -> FrameReport {
+        let rejection = self.rejections[k].as_ref();
+        let (surface, camera) = (setup.input.surface, &setup.input.camera);
+        FrameReport {
+            index: k,
+            file: setup.input.frames[k].name(),
+            flag: match rejection {
+                None => FrameFlag::Photometric,
+                Some(RejectionReason::Ambiguous { .. }) => FrameFlag::Ambiguous,
+                Some(_) => FrameFlag::Prior,
+            },
+            other_pose: match rejection {
+                Some(RejectionReason::Ambiguous { other, .. }) => Some(PoseReport::from(other)),
+                _ => None,
+            },
+            reason: rejection.map(ToString::to_string),
+            points: 0,
+            residual: 0.0,
+            inlier_share: 0.0,
+            gain: 1.0,
+            bias: 0.0,
+            sigma: match rejection {
+                None => sigma,
+                Some(_) => {
+                    let covariance = &self.covariances.frames[k];
+                    compute_frame_sigma(surface, camera, &self.estimates[k], covariance, None)
+                }
+            },
+            overdispersion_px: 0.0,
+        }
+    }
+
+    /// The result.
+    pub fn refined(self, setup: &Setup, parts: ReportParts) -> Refined {
+        let photometric: Vec<FrameSigma> = (parts.frames.iter())
+            .filter(|frame| frame.flag == FrameFlag::Photometric)
+            .map(|frame| frame.sigma)
+            .collect();
+        let radius_m = setup.input.nominal_radius_m;
+        let scale = self.prior_test.scale.filter(|scale| scale.contradicts);
+        let contradiction = scale.map(|scale| scale.explain(Some(radius_m)));
+        let verdict = SurveyVerdict::new(
+            &photometric,
+            parts.frames.len(),
+            parts.model_error.as_ref(),
+            contradiction.as_deref(),
+        );
+        let poses = setup.input.initial.iter().zip(self.poses);
+        let poses = poses.map(|(initial, pose)| StampedPose {
+            time_s: initial.time_s,
+            pose,
+        });
+        Refined {
+            trajectory: poses.collect(),
+            report: RefineReport {
+                frames_on_prior: parts.frames.len() - photometric.len(),
+                frames: parts.frames,
+                stopped_because: parts.stopped_because,
+                levels: parts.levels,
+                rolling_shutter: parts.rolling_shutter,
+                variance_factor: self.covariances.variance_factor,
+                model_error: parts.model_error,
+                prior_test: self.prior_test,
+                verdict,
+                calibration: parts.calibration,
+                timings: parts.timings,
+            },
+            covariances: self.covariances,
+        }
+    }
+}
+
+/// Moves estimates along the gauge.
+fn aligned(estimates: &[FrameEstimate], motion: &GaugeMotion) -> Vec<FrameEstimate> {
+    let aligned = estimates.iter().map(|estimate| FrameEstimate {
+        pose: motion.apply(&estimate.pose),
+        ..*estimate
+    });
+    aligned.collect()
+}

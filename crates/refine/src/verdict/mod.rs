@@ -1,0 +1,17 @@
+//! The verdict: which frames are right, whether the prior agrees, and whether the result may be
+//! used.
+//!
+//! ```text
+//! frame_verdict ──→ prior_test ──→ bridging ──→ survey_verdict
+//! ```
+//!
+//! [`frame_verdict`] turns the evidence about a frame into one decision with its reason, and
+//! [`prior_test`] compares the refined steps with the initial ones. Frames that are not photometric
+//! get their poses by the prior ([`bridging`]); a survey without any keeps its initial poses.
+//! [`survey_verdict`] says in one sentence what may be done with the result.
+
+pub mod bridging;
+pub mod frame_verdict;
+pub mod prior_test;
+pub mod significance;
+pub mod survey_verdict;
