@@ -77,6 +77,11 @@ impl PhotometricProblem<'_> {
         }
         // The variance of a sample is that of a pixel times `β(0)²`.
         self.sigma = f64::from(self.noise.floor).sqrt() / axis;
+        self.unit_variance = if self.sampling.variance_weighting || self.sampling.joint {
+            self.sigma.powi(2)
+        } else {
+            histogram.unit_variance(&self.noise) / (axis * axis)
+        };
         Ok(())
     }
 

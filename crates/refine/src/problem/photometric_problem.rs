@@ -63,6 +63,9 @@ pub struct PhotometricProblem<'a> {
     pub(super) symbolic: SymbolicFactorisation,
     /// Noise of a pixel, 1-σ in grey levels.
     pub(super) sigma: f64,
+    /// Variance of unit weight, grey levels²: `σ²` where samples are weighted by their variances
+    /// ([`crate::tiles::residual_weighting::NoiseHistogram::unit_variance`]).
+    pub(super) unit_variance: f64,
     /// Noise model of the residuals.
     pub(super) noise: NoiseModel,
     /// Filter of the fused texture for its slopes.
@@ -151,6 +154,7 @@ impl<'a> PhotometricProblem<'a> {
             participants,
             active,
             sigma: 1.0,
+            unit_variance: 1.0,
             noise: NoiseModel {
                 floor: 1.0,
                 steepness: 0.0,
@@ -172,6 +176,7 @@ impl<'a> PhotometricProblem<'a> {
     pub fn with_known_noise(self, sigma: f64) -> Self {
         Self {
             sigma,
+            unit_variance: sigma * sigma,
             noise: NoiseModel {
                 floor: f32::MAX,
                 steepness: 0.0,
@@ -245,9 +250,10 @@ impl<'a> PhotometricProblem<'a> {
         self.sigma
     }
 
-    /// Information of a pixel's grey value, `1/(σ² dispersion)`.
+    /// Information of a pixel's grey value: the inverse of the variance of unit weight times the
+    /// dispersion.
     pub(super) fn information(&self) -> f64 {
-        1.0 / (self.sigma * self.sigma * self.context.dispersion)
+        1.0 / (self.unit_variance * self.context.dispersion)
     }
 
     /// Turns a factorisation failure into an error that names the frames.

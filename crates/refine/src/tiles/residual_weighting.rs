@@ -147,11 +147,7 @@ impl NoiseHistogram {
             if total < MIN_RESIDUALS_PER_BIN {
                 continue;
             }
-            let x = if row == 0 {
-                0.3
-            } else {
-                1.5 * 2f64.powi(row as i32 - 1)
-            };
+            let x = gradient_square(row);
             let y = (MAD_TO_SIGMA * median(counts, total))
                 .max(MIN_SIGMA_GREY)
                 .powi(2);
@@ -178,16 +174,52 @@ impl NoiseHistogram {
     }
 }
 
+impl NoiseHistogram {
+    /// Variance of unit weight: the mean of `ω e²` over all residuals, weighted by the information
+    /// `ω g²` that each has about a displacement; at least the floor of `model`.
+    ///
+    /// Where all samples are weighted alike, as if their variance were σ², this is the variance
+    /// with which the normal matrix states the information of the pixels as it is. (Steep samples
+    /// have larger errors, and the information is theirs.)
+    pub fn unit_variance(&self, model: &NoiseModel) -> f64 {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (row, counts) in self.counts.chunks_exact(RESIDUAL_BINS).enumerate() {
+            let g2 = gradient_square(row);
+            let precision = model.precision(g2 as f32);
+            for (column, count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+                let square = residual(column as f64 + 0.5).powi(2);
+                let omega = f64::from(Loss::weight(square as f32, precision));
+                sum += *count as f64 * omega * g2 * square;
+                total += *count as f64 * omega * g2;
+            }
+        }
+        let floor = f64::from(model.floor);
+        if total > 0.0 { (sum / total).max(floor) } else { floor }
+    }
+}
+
+/// Square of the gradient of a bin, grey levels² per sample².
+fn gradient_square(row: usize) -> f64 {
+    match row {
+        0 => 0.3,
+        _ => 1.5 * 2f64.powi(row as i32 - 1),
+    }
+}
+
+/// Residual at a position among the bins of the residual, grey levels.
+fn residual(position: f64) -> f64 {
+    let octave = (position / 16.0).floor();
+    let part = position / 16.0 - octave;
+    f64::from(FIRST_RESIDUAL_GREY) * octave.exp2() * (1.0 + part)
+}
+
 /// Median of the residual magnitudes of one gradient bin.
 fn median(counts: &[u64], total: u64) -> f64 {
     let mut below = 0;
     for (column, count) in counts.iter().enumerate() {
         if below + count > total / 2 {
             let part = (total / 2 - below) as f64 / *count as f64;
-            let octave = 2f64.powi(column as i32 / 16);
-            return f64::from(FIRST_RESIDUAL_GREY)
-                * octave
-                * (1.0 + ((column % 16) as f64 + part) / 16.0);
+            return residual(column as f64 + part);
         }
         below += count;
     }
@@ -227,6 +259,11 @@ mod tests {
         let model = histogram.fit();
         assert!((model.floor.sqrt() / 2.0 - 1.0).abs() < 0.1, "{model:?}");
         assert!((model.steepness / 0.01 - 1.0).abs() < 0.2, "{model:?}");
+        // Weighted by g², the mean of 4 + 0.01 g² over half octaves of g² up to 2¹⁰.
+        let ln2 = std::f64::consts::LN_2;
+        let mean = 4.0 + 0.01 * (1024.0f64.powi(2) / 2.0) / 1024.0 * (1.0 + 0.0 * ln2);
+        let unit = histogram.unit_variance(&model);
+        assert!((unit / mean - 1.0).abs() < 0.15, "{unit} {mean}");
     }
 
     /// Gaussian pairs with correlation 0.8, a tenth of them replaced by outliers.
