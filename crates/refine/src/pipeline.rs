@@ -89,7 +89,6 @@ fn begin(setup: &Setup) -> PipelineState {
         free: setup.calibration.free,
         tracking: None,
         solve: None,
-        aliases: Vec::new(),
         levels: Vec::new(),
         unobservable: Vec::new(),
     }

@@ -55,6 +55,13 @@ pub mod tracking {
     /// Chosen by: unknown.
     pub const LONG_WINDOW_FRAMES: usize = 160;
 
+    /// Number of frames that fit nowhere, from the beginning, after which no others are tried.
+    ///
+    /// Higher: surveys that cannot be refined take longer.
+    ///
+    /// Chosen by: three turns of 120°: a wrong frame spoils its neighbours within a turn.
+    pub const MAX_FAILURES: usize = 12;
+
     /// Number of frames tracked between the solves of two long windows.
     ///
     /// Higher: fewer long windows are solved.
@@ -875,28 +882,6 @@ pub mod pairwise_lucas_kanade {
 
 /// Thresholds of `validation/inconsistent_frames.rs`.
 pub mod inconsistent_frames {
-    /// Displacement of a pair that is accepted, pixels of full size.
-    ///
-    /// Higher: fewer frames are rejected as misaligned.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_ERROR_PX: f64 = 0.5;
-
-    /// Displacement of a pair that is accepted, multiples of the median of the survey: where all
-    /// pairs are misaligned, the calibration is at fault.
-    ///
-    /// Higher: fewer frames are rejected as misaligned where all are displaced.
-    ///
-    /// Chosen by: the test `no_frame_is_rejected_where_all_pairs_are_misaligned`.
-    pub const MAX_ERROR_RATIO: f64 = 4.0;
-
-    /// Deviation z beyond the accepted displacement from which on a pair is misaligned, σ.
-    ///
-    /// Higher: fewer frames are rejected as misaligned.
-    ///
-    /// Chosen by: derivation. A pair at the limit is called misaligned about once in a million.
-    pub const MISALIGNMENT_SIGMA: f64 = 5.0;
-
     /// Correlation below which two frames with enough texture to be measured show different things.
     ///
     /// Higher: more pairs are misaligned.
@@ -924,13 +909,6 @@ pub mod inconsistent_frames {
 /// Thresholds of `validation/aliasing.rs`, `validation/alias_choice.rs` and
 /// `validation/alias_search.rs`.
 pub mod aliasing {
-    /// Difference of log-posteriors from which on the prior decides between two aliases, nats.
-    ///
-    /// Higher: more frames are ambiguous.
-    ///
-    /// Chosen by: derivation. `ln 1000`: odds of 1000 to 1.
-    pub const MIN_CLEAR_ODDS_NATS: f64 = 6.9;
-
     /// Length of a gauge motion on the wall from which on it leads to an alias, samples of the
     /// search level.
     ///

@@ -26,7 +26,7 @@ mod tunnel;
 
 pub use frame_times::{FrameTimesArguments, clock_times};
 pub use motion::{MotionArguments, MountingArguments};
-pub use numbers::{memory_size, numbers, picture_size, positive};
+pub use numbers::{memory_size, numbers, picture_size, positive, rate, share};
 pub use panorama_files::OutputArguments;
 pub use poses::{PoseReadingArguments, PosesArguments};
 pub use rendering::{BlendArguments, CanvasArguments, InterpolationArgument, PictureArguments};

@@ -11,6 +11,32 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses a share: `90%` or `0.9`.
+///
+/// # Errors
+/// Anything else.
+pub fn share(text: &str) -> Result<f64, String> {
+    let (number, unit) = match text.strip_suffix('%') {
+        Some(number) => (number, 0.01),
+        None => (text, 1.0),
+    };
+    match number.trim().parse::<f64>().map(|number| number * unit) {
+        Ok(share) if (0.0..=1.0).contains(&share) => Ok(share),
+        _ => Err("must be a share from 0% to 100%, as 90%".to_owned()),
+    }
+}
+
+/// Parses a rate of false alarms.
+///
+/// # Errors
+/// Anything else.
+pub fn rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if rate > 0.0 && rate < 0.5 => Ok(rate),
+        _ => Err("must be above 0 and below 0.5, as 0.001".to_owned()),
+    }
+}
+
 /// Parses N finite numbers separated by commas.
 ///
 /// # Errors

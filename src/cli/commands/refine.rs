@@ -1,7 +1,9 @@
 //! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
 
 use crate::camera::format_calibration;
-use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, resume};
+use crate::cli::arguments::{
+    PoseReadingArguments, ResumeArguments, positive, rate, resume, share,
+};
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::persist::atomic;
 use crate::persist::checkpoint::Checkpoint;
@@ -56,6 +58,29 @@ pub struct RefineArguments {
         value_parser = clap::value_parser!(u64).range(1..)
     )]
     max_iterations: u64,
+    /// Largest 1-σ of a photometric frame against those that show the same wall, pixels. Frames
+    /// that are less certain keep their poses by the prior.
+    #[arg(
+        long,
+        value_name = "X",
+        default_value_t = RefineOptions::default().max_sigma_px,
+        value_parser = positive
+    )]
+    max_sigma_px: f64,
+    /// Rate of false alarms of the whole survey: the tests of frames, of aliases and of the prior
+    /// share it.
+    #[arg(
+        long,
+        value_name = "RATE",
+        default_value_t = RefineOptions::default().false_alarm_rate,
+        value_parser = rate
+    )]
+    false_alarm_rate: f64,
+    /// Smallest share of photometric frames, as 90%: with fewer, exit code 4, after everything is
+    /// written. (Without a single one, and where refined steps contradict the initial ones, the
+    /// exit code is 4 in any case.)
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    min_photometric: Option<f64>,
     /// Print refine.json on standard output instead of the summary.
     #[arg(long)]
     json: bool,
@@ -153,6 +178,32 @@ pub fn run(
         print_summary(&refined, terminal);
         print_outputs(arguments, &refined.report, terminal);
     }
+    conclude(arguments, &refined.report, terminal)
+}
+
+/// Says in one sentence whether the result may be used; fails if it may not, or if fewer frames are
+/// photometric than asked for.
+fn conclude(
+    arguments: &RefineArguments,
+    report: &RefineReport,
+    terminal: &Terminal,
+) -> Result<(), Failure> {
+    let verdict = &report.verdict;
+    let share = verdict.photometric as f64 / verdict.frames as f64;
+    if verdict.photometric == 0 {
+        return Err(Failure::quality(verdict.sentence.clone()));
+    }
+    if let Some(min) = arguments.min_photometric.filter(|min| share < *min) {
+        return Err(Failure::quality(format!(
+            "{:.1} % of the frames are photometric, fewer than --min-photometric {}%; {}",
+            100.0 * share,
+            100.0 * min,
+            verdict.sentence
+        )));
+    }
+    if !arguments.json {
+        terminal.say(&verdict.sentence);
+    }
     Ok(())
 }
 
@@ -161,6 +212,8 @@ impl RefineArguments {
     fn options(&self) -> RefineOptions {
         RefineOptions {
             max_iterations: self.max_iterations,
+            max_sigma_px: self.max_sigma_px,
+            false_alarm_rate: self.false_alarm_rate,
             calibrate: self
                 .calibrate
                 .as_ref()
@@ -393,14 +446,19 @@ pub fn print_summary(refined: &Refined, terminal: &Terminal) {
         .map(|t| format!("{} {:.2} s", t.stage, t.seconds))
         .collect();
     terminal.say(format!("  {seconds:.2} s: {}", stages.join(", ")));
-    if report.frames_on_prior == 0 {
-        let count = report.frames.len();
+    for finding in &report.prior_test.findings {
+        terminal.warn(format!("  {finding}"));
+    }
+    if let Some(found) = &report.model_error {
         terminal.say(format!(
-            "  all {count} frames are photometric: their poses are refined"
+            "  residuals go together over {:.2} m of the wall, more than by noise: σ includes \
+             errors of lens, shape or light as far as they show",
+            found.patch_m
         ));
-    } else {
+    }
+    if report.frames_on_prior > 0 {
         terminal.warn(format!(
-            "{} of {} frames are rejected, so their poses rest on the prior or are ambiguous:",
+            "{} of {} frames are rejected, so their poses rest on the prior:",
             report.frames_on_prior,
             report.frames.len()
         ));

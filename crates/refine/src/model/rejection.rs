@@ -67,6 +67,11 @@ pub enum RejectionReason {
     },
     /// The equations of the survey have no solution.
     Unsolved,
+    /// It was not tried, as none of those before it fitted.
+    NotTried {
+        /// Number of frames that were tried.
+        failures: usize,
+    },
     /// Too little texture to determine the pose.
     Uncertain {
         /// 1-σ on the wall, pixels.
@@ -157,6 +162,11 @@ impl fmt::Display for RejectionReason {
             Self::ContradictsScale { factor } => write!(
                 f,
                 "refined steps are {factor:.2} times the initial ones, so lengths cannot be believed"
+            ),
+            Self::NotTried { failures } => write!(
+                f,
+                "it was not tried: {failures} frames from the beginning were searched for over \
+                 3.5 σ of the prior in all directions, and none fitted the others"
             ),
             Self::Unsolved => write!(f, "the equations of the survey have no solution"),
             Self::Uncertain { wall_px } => write!(

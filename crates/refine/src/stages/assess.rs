@@ -15,7 +15,6 @@ use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::placement::{Placement, ReportParts};
 use crate::stages::state::{Estimation, LastSolve, PipelineState};
-use crate::tracking::pose_separation::separation_m;
 use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::covariance::Covariances;
 use crate::uncertainty::frame_sigma::FrameSigma;
@@ -38,7 +37,7 @@ pub fn run<'a>(
     session.progress.start("covariance", 1);
     let state = &mut estimation.state;
     let context = setup.context(state);
-    reject_finally(setup, &context, state)?;
+    reject_inconsistent(setup, &context, state)?;
     let readout = estimate_readout(&context, setup.options, &state.frames)?;
     let LastSolve {
         solution,
@@ -105,29 +104,15 @@ pub fn without_solution(setup: &Setup, session: &mut Session) -> Refined {
     placement.refined(setup, parts)
 }
 
-/// Rejects frames with an alias that the prior does not exclude, and frames that the others do not
-/// support at full size.
-fn reject_finally(
+/// Rejects frames that the others do not support at full size.
+fn reject_inconsistent(
     setup: &Setup,
     context: &EstimationContext,
     state: &mut PipelineState,
 ) -> Result<(), ProblemError> {
     let (count, finest) = (setup.count(), setup.handover_level());
     let pairs = align_pairs(context, finest, &state.frames, &(0..count))?;
-    let inconsistent = find_inconsistent_frames(&pairs, count);
-    let aliases = std::mem::take(&mut state.aliases).into_iter();
-    let ambiguous = aliases.map(|(frame, motion)| {
-        let pose = &state.frames.estimates[frame].pose;
-        let other = motion.apply(pose);
-        let separation_m = separation_m(context.surface, &context.camera, pose, &other);
-        let ambiguous = RejectionReason::Ambiguous {
-            other,
-            separation_m,
-        };
-        (frame, ambiguous)
-    });
-    let found: Vec<(usize, RejectionReason)> = ambiguous.chain(inconsistent).collect();
-    for (frame, rejection) in found {
+    for (frame, rejection) in find_inconsistent_frames(&pairs, count, setup.options) {
         state.frames.rejections[frame].get_or_insert(rejection);
     }
     Ok(())

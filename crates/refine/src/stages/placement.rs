@@ -66,7 +66,15 @@ impl Placement {
         let mut covariances = covariances.clone().moved(&motion).scaled(datum.scale);
         let poses: Vec<Pose> = estimates.iter().map(|estimate| estimate.pose).collect();
         let alpha = setup.options.false_alarm_rate;
-        let prior_test = PriorTest::new(prior, datum, &poses, &covariances, &photometric, alpha);
+        let radius_m = setup.input.nominal_radius_m;
+        let prior_test = PriorTest::new(
+            prior,
+            (datum, radius_m),
+            &poses,
+            &covariances,
+            &photometric,
+            alpha,
+        );
         if let Some(scale) = prior_test.scale.filter(|scale| scale.contradicts) {
             let factor = scale.factor;
             for rejection in &mut rejections {
@@ -154,7 +162,7 @@ impl Placement {
             .collect();
         let radius_m = setup.input.nominal_radius_m;
         let scale = self.prior_test.scale.filter(|scale| scale.contradicts);
-        let contradiction = scale.map(|scale| scale.explain(Some(radius_m)));
+        let contradiction = scale.map(|scale| scale.explain(radius_m));
         let verdict = SurveyVerdict::new(
             &photometric,
             parts.frames.len(),

@@ -1,9 +1,12 @@
-//! Stage: repairs the trajectory where frames do not support each other.
+//! Stage: repairs the trajectory where frames do not support each other, and rejects those with an
+//! alias that the prior does not exclude: the last solve must not rest on them.
 
 use crate::error::RefineError;
+use crate::model::rejection::RejectionReason;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::Estimation;
+use crate::tracking::pose_separation::separation_m;
 use crate::validation::repair;
 
 /// Runs the stage on frames that have been solved at full size; without such a solve it does
@@ -21,13 +24,23 @@ pub fn run<'a>(
         return Ok(estimation);
     }
     let context = setup.context(state);
-    state.aliases = repair::repair(
+    let aliases = repair::repair(
         &context,
         setup.options,
         &mut state.frames,
         state.solved.clone(),
         session.progress.as_ref(),
     )?;
+    for (frame, motion) in aliases {
+        let pose = &state.frames.estimates[frame].pose;
+        let other = motion.apply(pose);
+        let separation_m = separation_m(context.surface, &context.camera, pose, &other);
+        let ambiguous = RejectionReason::Ambiguous {
+            other,
+            separation_m,
+        };
+        state.frames.rejections[frame].get_or_insert(ambiguous);
+    }
     session.record_time("repair");
     Ok(estimation)
 }

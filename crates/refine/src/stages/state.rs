@@ -10,7 +10,6 @@ use crate::stages::plan::Stage;
 use crate::tracking::alternating_calibration::AlternatingCalibration;
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
-use crate::validation::aliasing::AliasHypothesis;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use tunnelstitch_core::frames::Shading;
@@ -36,8 +35,6 @@ pub struct PipelineState {
     pub tracking: Option<AlternatingCalibration>,
     /// The global solve that is under way.
     pub solve: Option<SolveState>,
-    /// Second poses that the wall's repetition leaves possible.
-    pub aliases: Vec<AliasHypothesis>,
     /// Global solves that are over.
     pub levels: Vec<LevelReport>,
     /// Shared parameters that the data do not observe.

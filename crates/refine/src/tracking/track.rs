@@ -17,7 +17,7 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use crate::samples::footprints::footprint;
 use crate::samples::footprints::footprints;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
-use crate::thresholds::tracking::LONG_WINDOW_STRIDE;
+use crate::thresholds::tracking::{LONG_WINDOW_STRIDE, MAX_FAILURES};
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::{PosePrediction, predict_pose};
 use crate::tracking::registration::{Registered, register_frame};
@@ -36,6 +36,10 @@ pub struct Tracking {
     earliest_overlap: usize,
     /// The last shared parameters κ that made a valid camera.
     kappa: Kappa,
+    /// Frames that were registered on others, or were tried to.
+    attempts: usize,
+    /// Those of them that fitted.
+    successes: usize,
 }
 
 impl Tracking {
@@ -50,12 +54,19 @@ impl Tracking {
             footprints: Vec::new(),
             earliest_overlap: 0,
             kappa,
+            attempts: 0,
+            successes: 0,
         }
     }
 
     /// The number of frames tracked so far, rejected ones included.
     pub fn tracked_frames(&self) -> usize {
         self.states.estimates.len()
+    }
+
+    /// True if so many frames fitted nowhere, and none fitted, that no others will.
+    fn is_hopeless(&self) -> bool {
+        self.successes == 0 && self.attempts >= MAX_FAILURES
     }
 
     /// True if all frames are tracked.
@@ -89,6 +100,12 @@ impl Tracking {
         let context = &context.at(self.kappa).at(self.states.kappa);
         self.kappa = context.kappa;
         let predicted = predict_pose(context, k, &self.states);
+        if self.is_hopeless() {
+            let reason = RejectionReason::NotTried {
+                failures: self.attempts,
+            };
+            self.states.rejections[k].get_or_insert(reason);
+        }
         let estimate = FrameEstimate::at(predicted.pose);
         self.states.estimates.push(estimate);
         self.footprints
@@ -139,11 +156,13 @@ impl Tracking {
             footprints: &self.footprints[frame_range.clone()],
             frame_range,
         };
+        self.attempts += 1;
         match register_frame(context, options, k, predicted, &neighbours)? {
             Ok(Registered {
                 estimate,
                 is_reliable,
             }) => {
+                self.successes += 1;
                 states.estimates[k] = estimate;
                 Ok(is_reliable)
             }

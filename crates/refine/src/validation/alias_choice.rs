@@ -204,8 +204,10 @@ impl Evidence<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::thresholds::aliasing::MIN_CLEAR_ODDS_NATS;
     use tunnelstitch_geometry::trajectory::{Jitter, spiral};
+
+    /// Odds of 1000 to 1, nats.
+    const MIN_ODDS: f64 = 6.9;
 
     /// A period of the wall along the tunnel.
     fn period() -> GaugeMotion {
@@ -246,7 +248,7 @@ mod tests {
             alias_motions,
             periods: &find_periods(alias_motions, 3.0),
         };
-        evidence.choose(MIN_CLEAR_ODDS_NATS)
+        evidence.choose(MIN_ODDS)
     }
 
     #[test]

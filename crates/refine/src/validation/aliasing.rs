@@ -13,7 +13,7 @@ use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::samples::footprints::footprints;
-use crate::thresholds::aliasing::{MAX_ITERATIONS, MIN_CLEAR_ODDS_NATS};
+use crate::thresholds::aliasing::MAX_ITERATIONS;
 use crate::validation::alias_choice::{Evidence, find_periods};
 use crate::validation::alias_search::find_alias_motions;
 use std::collections::BTreeMap;
@@ -95,7 +95,9 @@ pub fn resolve_aliases(
         alias_motions: &alias_motions,
         periods: &find_periods(&alias_motions, radius_m),
     };
-    let mut choice = evidence.choose(MIN_CLEAR_ODDS_NATS);
+    // A choice with posterior odds of 1/α is wrong with the probability α.
+    let min_odds = -options.false_alarm_rate.ln();
+    let mut choice = evidence.choose(min_odds);
     let undecided = choice.aliases.iter().flatten().count();
     if 2 * undecided > frames.len() {
         let first = std::mem::replace(&mut choice, evidence.choose(f64::INFINITY));

@@ -7,9 +7,10 @@
 
 use crate::model::rejection::RejectionReason;
 use crate::problem::linearisation::FrameContribution;
+use crate::model::significance::normal_quantile;
+use crate::options::RefineOptions;
 use crate::thresholds::inconsistent_frames::{
-    MAX_ERROR_PX, MAX_ERROR_RATIO, MAX_REJECTED_SHARE, MAX_TYING_SIGMA_PX, MIN_CORRELATION,
-    MISALIGNMENT_SIGMA,
+    MAX_REJECTED_SHARE, MAX_TYING_SIGMA_PX, MIN_CORRELATION,
 };
 use crate::validation::alignment::Alignment;
 
@@ -41,8 +42,9 @@ pub fn find_disagreement(share: &FrameContribution) -> Option<RejectionReason> {
 pub fn find_inconsistent_frames(
     alignments: &[Alignment],
     frames: usize,
+    options: &RefineOptions,
 ) -> Vec<(usize, RejectionReason)> {
-    let max_error_px = max_error_px(alignments);
+    let limits = Limits::new(alignments, options);
     let mut rejected = vec![false; frames];
     let mut rejections = Vec::new();
     loop {
@@ -54,7 +56,7 @@ pub fn find_inconsistent_frames(
         {
             for frame in [pair.a, pair.b] {
                 all[frame] += pair.samples;
-                if is_misaligned(pair, max_error_px) {
+                if limits.is_misaligned(pair) {
                     misaligned[frame] += pair.samples;
                     worst_px[frame] = worst_px[frame].max(pair.error_px);
                 }
@@ -100,21 +102,41 @@ pub fn find_inconsistent_frames(
     rejections
 }
 
-/// True if two frames show different things, or are displaced by more than their uncertainty
-/// explains.
-fn is_misaligned(pair: &Alignment, max_error_px: f64) -> bool {
-    let is_different = pair.sigma_px <= MAX_TYING_SIGMA_PX && pair.correlation < MIN_CORRELATION;
-    is_different || pair.error_px > max_error_px + MISALIGNMENT_SIGMA * pair.sigma_px
+/// Limits of the displacement of a pair.
+struct Limits {
+    /// Displacement that is accepted, pixels.
+    max_error_px: f64,
+    /// z: σ beyond it from which on a pair is misaligned.
+    sigmas: f64,
 }
 
-/// The largest alignment error that is accepted, pixels: relative to the median of the survey, for
-/// where all pairs are misaligned, the calibration is at fault and no frame.
-fn max_error_px(alignments: &[Alignment]) -> f64 {
-    let measured = alignments.iter().filter(|p| p.sigma_px.is_finite());
-    let mut errors: Vec<f64> = measured.map(|p| p.error_px).collect();
-    errors.sort_unstable_by(f64::total_cmp);
-    let median = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
-    MAX_ERROR_PX.max(MAX_ERROR_RATIO * median)
+impl Limits {
+    /// The limits for a survey with these pairs, which share its rate of false alarms.
+    ///
+    /// Two frames within a σ of [`RefineOptions::max_sigma_px`] are displaced by twice that at the
+    /// most (2 σ). Where all pairs are displaced, camera or shape are at fault and no frame: if the
+    /// two components of displacements are normal, their length exceeds its median `√(2 ln 2)` σ by
+    /// the factor `√(ln(n/α)/ln 2)` once in n pairs with the probability α.
+    fn new(alignments: &[Alignment], options: &RefineOptions) -> Self {
+        let measured = alignments.iter().filter(|p| p.sigma_px.is_finite());
+        let mut errors: Vec<f64> = measured.map(|p| p.error_px).collect();
+        errors.sort_unstable_by(f64::total_cmp);
+        let median = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
+        let pairs = alignments.len().max(1);
+        let ratio = (pairs as f64 / options.false_alarm_rate).ln() / std::f64::consts::LN_2;
+        Self {
+            max_error_px: (2.0 * options.max_sigma_px).max(ratio.sqrt() * median),
+            sigmas: normal_quantile(options.false_alarm_rate, pairs),
+        }
+    }
+
+    /// True if two frames show different things, or are displaced by more than their uncertainty
+    /// explains.
+    fn is_misaligned(&self, pair: &Alignment) -> bool {
+        let is_different =
+            pair.sigma_px <= MAX_TYING_SIGMA_PX && pair.correlation < MIN_CORRELATION;
+        is_different || pair.error_px > self.max_error_px + self.sigmas * pair.sigma_px
+    }
 }
 
 /// Connected components of the graph of pairs: for each frame the first frame of its component.
@@ -136,6 +158,10 @@ fn connected_components(pairs: impl Iterator<Item = (usize, usize)>, frames: usi
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn find(pairs: &[Alignment], frames: usize) -> Vec<(usize, RejectionReason)> {
+        find_inconsistent_frames(pairs, frames, &RefineOptions::default())
+    }
 
     fn pair(a: usize, b: usize, error_px: f64) -> Alignment {
         Alignment {
@@ -159,7 +185,7 @@ mod tests {
 
     #[test]
     fn aligned_frames_are_all_inliers() {
-        assert!(find_inconsistent_frames(&chain(0..9), 9).is_empty());
+        assert!(find(&chain(0..9), 9).is_empty());
     }
 
     #[test]
@@ -168,7 +194,7 @@ mod tests {
         for pair in pairs.iter_mut().filter(|p| p.a == 4 || p.b == 4) {
             pair.error_px = 2.0;
         }
-        let rejections = find_inconsistent_frames(&pairs, 9);
+        let rejections = find(&pairs, 9);
         assert_eq!(
             rejections,
             vec![(4, RejectionReason::Misaligned { error_px: 2.0 })]
@@ -179,14 +205,14 @@ mod tests {
     fn error_within_its_uncertainty_is_accepted() {
         let mut pairs = chain(0..9);
         (pairs[3].error_px, pairs[3].sigma_px) = (1.5, 0.4);
-        assert!(find_inconsistent_frames(&pairs, 9).is_empty());
+        assert!(find(&pairs, 9).is_empty());
     }
 
     #[test]
     fn larger_of_two_disconnected_groups_is_inlier() {
         let mut pairs = chain(0..4);
         pairs.extend(chain(4..9));
-        let rejections = find_inconsistent_frames(&pairs, 9);
+        let rejections = find(&pairs, 9);
         let frames: Vec<usize> = rejections.iter().map(|(k, _)| *k).collect();
         assert_eq!(frames, [0, 1, 2, 3]);
         assert!(
@@ -198,9 +224,9 @@ mod tests {
         let mut weak = pair(3, 4, 3.0);
         weak.sigma_px = 2.0;
         pairs.push(weak);
-        assert_eq!(find_inconsistent_frames(&pairs, 9).len(), 4);
+        assert_eq!(find(&pairs, 9).len(), 4);
         pairs.push(pair(2, 4, 0.1));
-        assert!(find_inconsistent_frames(&pairs, 9).is_empty());
+        assert!(find(&pairs, 9).is_empty());
     }
 
     /// A robust fit of two different things may end anywhere, also near zero displacement.
@@ -211,7 +237,7 @@ mod tests {
         let mut chance = pair(3, 4, 0.1);
         chance.correlation = 0.1;
         pairs.push(chance);
-        let rejections = find_inconsistent_frames(&pairs, 11);
+        let rejections = find(&pairs, 11);
         assert!((0..4).all(|k| rejections.iter().any(|(frame, _)| *frame == k)));
     }
 
@@ -221,6 +247,6 @@ mod tests {
         for pair in &mut pairs {
             pair.error_px = 1.2;
         }
-        assert!(find_inconsistent_frames(&pairs, 9).is_empty());
+        assert!(find(&pairs, 9).is_empty());
     }
 }

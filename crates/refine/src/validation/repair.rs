@@ -50,7 +50,7 @@ pub fn repair(
                 .iter()
                 .all(|k| states.rejections[*k].is_none())
         });
-        states.reject(find_inconsistent_frames(&alignments, count));
+        states.reject(find_inconsistent_frames(&alignments, count, options));
         let has_changed = !changes(&solved, states).is_empty();
         let is_better = |best: &FrameStates| count_inliers(best) < count_inliers(states);
         if !has_changed && best.as_ref().is_none_or(is_better) {

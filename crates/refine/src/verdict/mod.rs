@@ -13,5 +13,4 @@
 pub mod bridging;
 pub mod frame_verdict;
 pub mod prior_test;
-pub mod significance;
 pub mod survey_verdict;

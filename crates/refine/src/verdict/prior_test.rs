@@ -24,7 +24,7 @@ use crate::model::prior_terms::{absolute_error, relative_error};
 use crate::parameters::calibration::Datum;
 use crate::thresholds::prior_test::{MAX_SIGMA_RATIO, SCALE_SIGMA};
 use crate::uncertainty::covariance::Covariances;
-use crate::verdict::significance::{chi_squared_bounds, normal_quantile};
+use crate::model::significance::{chi_squared_bounds, normal_quantile};
 use nalgebra::{Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::trajectory::{JitterModel, Pose};
@@ -51,6 +51,8 @@ pub struct PriorTest {
     pub sigmas: Vec<SigmaTest>,
     /// True if signs of errors alternate or persist, as by the other model of the prior.
     pub other_model: bool,
+    /// What the tests found, in sentences.
+    pub findings: Vec<String>,
 }
 
 /// Refined steps over initial ones.
@@ -89,10 +91,10 @@ struct PriorError {
 
 impl PriorTest {
     /// Tests the prior on the photometric frames. `estimates` and `covariances` are aligned with
-    /// the initial poses along the gauge; `alpha`: rate of false alarms.
+    /// the initial poses along the gauge; `radius_m`: as given; `alpha`: rate of false alarms.
     pub fn new(
         prior: &Prior,
-        datum: &Datum,
+        (datum, radius_m): (&Datum, f64),
         poses: &[Pose],
         covariances: &Covariances,
         photometric: &[bool],
@@ -101,20 +103,18 @@ impl PriorTest {
         let errors = errors(prior, datum, poses, covariances, photometric);
         let sigmas = (0..NAMES.len()).filter_map(|k| test_sigma(prior, &errors, k, alpha));
         let expects_walk = prior.jitter.model == JitterModel::RandomWalk;
-        Self {
+        let mut test = Self {
             scale: test_scale(&errors, alpha),
             sigmas: sigmas.collect(),
             other_model: (0..NAMES.len()).any(|k| runs_contradict(&errors, k, expects_walk, alpha)),
-        }
+            findings: Vec::new(),
+        };
+        test.findings = test.explain(radius_m, prior.jitter.model);
+        test
     }
 
-    /// True if lengths of the result cannot be believed.
-    pub fn contradicts_scale(&self) -> bool {
-        self.scale.is_some_and(|scale| scale.contradicts)
-    }
-
-    /// What the tests found, in sentences; `radius_m`: as given.
-    pub fn findings(&self, radius_m: Option<f64>, model: JitterModel) -> Vec<String> {
+    /// What the tests found, in sentences.
+    fn explain(&self, radius_m: f64, model: JitterModel) -> Vec<String> {
         let mut findings = Vec::new();
         if let Some(scale) = self.scale.filter(|scale| scale.contradicts) {
             findings.push(scale.explain(radius_m));
@@ -148,7 +148,7 @@ impl PriorTest {
 
 impl ScaleTest {
     /// The contradiction and its likely cause.
-    pub fn explain(&self, radius_m: Option<f64>) -> String {
+    pub fn explain(&self, radius_m: f64) -> String {
         let Self { factor, sigma, .. } = self;
         let is_near = |value: f64| (factor / value).ln().abs() < 3.0 * sigma / factor + 0.05;
         let cause = if is_near(2.0) {
@@ -160,11 +160,10 @@ impl ScaleTest {
         } else {
             "check radius_m, and unit and times of the poses"
         };
-        let radius = radius_m.map_or_else(String::new, |radius| {
-            format!(": if the poses are right, radius_m is about {:.2}", radius / factor)
-        });
         format!(
-            "refined steps are {factor:.2} ± {sigma:.2} times the initial ones{radius} ({cause})"
+            "refined steps are {factor:.2} ± {sigma:.2} times the initial ones: if the poses are \
+             right, radius_m is about {:.2} ({cause})",
+            radius_m / factor
         )
     }
 }
@@ -361,7 +360,7 @@ mod tests {
         };
         let calibration = Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0));
         let datum = calibration.datum(&Kappa::zeros());
-        PriorTest::new(prior, &datum, poses, &covariances, &[true; COUNT], 1e-3)
+        PriorTest::new(prior, (&datum, 6.0), poses, &covariances, &[true; COUNT], 1e-3)
     }
 
     #[test]
@@ -370,7 +369,7 @@ mod tests {
             for model in [JitterModel::RandomWalk, JitterModel::Independent] {
                 let poses = poses(model == JitterModel::RandomWalk, 1.0, seed);
                 let found = test(&prior(model, 0.03), &poses);
-                assert!(found.findings(None, model).is_empty(), "{seed}: {found:?}");
+                assert!(found.findings.is_empty(), "{seed}: {found:?}");
             }
         }
     }
@@ -379,8 +378,8 @@ mod tests {
     fn a_diameter_for_the_radius_is_named() {
         let model = JitterModel::RandomWalk;
         let found = test(&prior(model, 0.03), &poses(true, 2.0, 5));
-        assert!(found.contradicts_scale(), "{found:?}");
-        let text = found.findings(Some(6.0), model).join("\n");
+        assert!(found.scale.unwrap().contradicts, "{found:?}");
+        let text = found.findings.join("\n");
         assert!(text.contains("radius_m is about") && text.contains("diameter"), "{text}");
     }
 
