@@ -51,6 +51,13 @@ impl FrameStates {
             .collect()
     }
 
+    /// True if most frames are inliers. If not, the inliers may be those that are wrong, and to
+    /// register the others on them is in vain.
+    pub fn has_majority(&self) -> bool {
+        let inliers = self.rejections.iter().filter(|rejection| rejection.is_none());
+        2 * inliers.count() > self.rejections.len()
+    }
+
     /// Rejects frames, each with its reason.
     pub fn reject(&mut self, rejected: Vec<(usize, RejectionReason)>) {
         for (frame, reason) in rejected {

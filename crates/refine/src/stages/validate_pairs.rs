@@ -32,6 +32,7 @@ pub fn run<'a>(
         frames.reject(find_contradictions(&pairs, count));
         frames.reject(find_blurred_frames(&pairs, count));
         if iteration + 1 == MAX_PAIR_ITERATIONS
+            || !frames.has_majority()
             || register_rejected(&context, options, frames)? == 0
         {
             break;

@@ -56,6 +56,9 @@ pub fn repair(
         if !has_changed && best.as_ref().is_none_or(is_better) {
             best = Some(states.clone());
         }
+        if !states.has_majority() {
+            break;
+        }
         let registered = if iteration < MAX_REGISTRATION_ITERATIONS {
             register_rejected(context, options, states)?
         } else {
@@ -80,6 +83,7 @@ pub fn repair(
     }
     match undecided {
         Some(undecided) => Ok(undecided),
+        None if !states.has_majority() => Ok(Vec::new()),
         None => resolve_all_aliases(context, options, states),
     }
 }
