@@ -3,8 +3,8 @@
 use crate::solver::solve_record::SolveRecord;
 use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::frame_sigma::FrameSigma;
-use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::uncertainty::model_error::ModelErrorReport;
+use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::verdict::prior_test::PriorTest;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use serde::{Deserialize, Serialize};

@@ -139,6 +139,14 @@ pub mod registration {
     /// Chosen by: unknown.
     pub const MAX_HYPOTHESES: usize = 10;
 
+    /// Mean number of hypotheses that are refined for a frame, at the most.
+    ///
+    /// Higher: fewer right poses are missed on repetitive walls, and surveys that cannot be refined
+    /// take longer.
+    ///
+    /// Chosen by: unknown.
+    pub const MEAN_HYPOTHESES: usize = 6;
+
     /// Largest deficit of a hypothesis to the best one with which it is refined, nats:
     /// log-posterior odds.
     ///

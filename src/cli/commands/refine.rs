@@ -1,9 +1,7 @@
 //! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
 
 use crate::camera::format_calibration;
-use crate::cli::arguments::{
-    PoseReadingArguments, ResumeArguments, positive, rate, resume, share,
-};
+use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::persist::atomic;
 use crate::persist::checkpoint::Checkpoint;

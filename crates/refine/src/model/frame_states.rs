@@ -54,7 +54,10 @@ impl FrameStates {
     /// True if most frames are inliers. If not, the inliers may be those that are wrong, and to
     /// register the others on them is in vain.
     pub fn has_majority(&self) -> bool {
-        let inliers = self.rejections.iter().filter(|rejection| rejection.is_none());
+        let inliers = self
+            .rejections
+            .iter()
+            .filter(|rejection| rejection.is_none());
         2 * inliers.count() > self.rejections.len()
     }
 

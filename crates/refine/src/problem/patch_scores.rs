@@ -32,8 +32,15 @@ impl PatchScores {
     pub fn doubled(&self) -> Self {
         let mut doubled = Self::default();
         for ((row, column), score) in &self.0 {
-            let frames = score.frames.iter().map(|(slot, gradient)| (*slot, gradient));
-            doubled.add((row.div_euclid(2), column.div_euclid(2)), frames, &score.shared);
+            let frames = score
+                .frames
+                .iter()
+                .map(|(slot, gradient)| (*slot, gradient));
+            doubled.add(
+                (row.div_euclid(2), column.div_euclid(2)),
+                frames,
+                &score.shared,
+            );
         }
         doubled
     }
@@ -75,7 +82,13 @@ impl PhotometricProblem<'_> {
         };
         let readout_s = calibration.readout_s(kappa);
         let information = self.information();
-        let free = Kappa::from_fn(|k, _| if calibration.free[k] { information } else { 0.0 });
+        let free = Kappa::from_fn(|k, _| {
+            if calibration.free[k] {
+                information
+            } else {
+                0.0
+            }
+        });
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch)?;
             let pyramids = self.images.load(self.coverage.frames(stretch))?;
@@ -126,7 +139,10 @@ mod tests {
             }
             for (k, sum) in sums.iter().enumerate() {
                 let expected = at.normal.gradient[k] - prior.gradient[k];
-                assert!((sum - expected).norm() < 1e-9 * expected.norm().max(1.0), "{k}");
+                assert!(
+                    (sum - expected).norm() < 1e-9 * expected.norm().max(1.0),
+                    "{k}"
+                );
             }
             scores = scores.doubled();
         }

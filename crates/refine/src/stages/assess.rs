@@ -11,9 +11,9 @@ use crate::problem::linearisation::FrameContribution;
 use crate::refined::Refined;
 use crate::report::FrameReport;
 use crate::solver::gauss_newton::Solution;
+use crate::stages::placement::{Placement, ReportParts};
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
-use crate::stages::placement::{Placement, ReportParts};
 use crate::stages::state::{Estimation, LastSolve, PipelineState};
 use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::covariance::Covariances;
@@ -86,8 +86,12 @@ pub fn run<'a>(
 pub fn without_solution(setup: &Setup, session: &mut Session) -> Refined {
     let count = setup.count();
     let unknown = Covariances::unknown(count);
-    let estimates: Vec<FrameEstimate> =
-        setup.prior.initial.iter().map(|pose| FrameEstimate::at(*pose)).collect();
+    let estimates: Vec<FrameEstimate> = setup
+        .prior
+        .initial
+        .iter()
+        .map(|pose| FrameEstimate::at(*pose))
+        .collect();
     let datum = setup.calibration.datum(&Kappa::zeros());
     let rejections = vec![Some(RejectionReason::Unsolved); count];
     let placement = Placement::new(setup, &datum, &estimates, &unknown, rejections);
@@ -125,7 +129,9 @@ fn frame_sigmas(
     uncertainty: &SolutionUncertainty,
 ) -> Vec<FrameSigma> {
     let estimates = frames.estimates.iter().enumerate();
-    estimates.map(|(k, estimate)| uncertainty.frame_sigma(context, k, estimate)).collect()
+    estimates
+        .map(|(k, estimate)| uncertainty.frame_sigma(context, k, estimate))
+        .collect()
 }
 
 /// Decides about every frame that no earlier test has rejected. A single photometric frame agrees
@@ -150,7 +156,9 @@ fn judge(
         };
         *rejection = evidence.judge(setup.options);
     }
-    let mut left = rejections.iter_mut().filter(|rejection| rejection.is_none());
+    let mut left = rejections
+        .iter_mut()
+        .filter(|rejection| rejection.is_none());
     if let (Some(alone), None) = (left.next(), left.next()) {
         *alone = Some(RejectionReason::Disconnected { frames: 1 });
     }

@@ -93,7 +93,10 @@ impl Placement {
             datum,
             photometric: &photometric,
         };
-        if bridging.apply(&mut estimates, &mut frame_covariances).is_err() {
+        if bridging
+            .apply(&mut estimates, &mut frame_covariances)
+            .is_err()
+        {
             for k in (0..estimates.len()).filter(|k| !photometric[*k]) {
                 frame_covariances[k] = Matrix6::from_element(f64::NAN);
             }
@@ -105,13 +108,16 @@ impl Placement {
             }
         }
         let is_kept = !photometric.contains(&true);
-        let poses = estimates.iter().zip(&prior.initial).map(|(estimate, initial)| {
-            if is_kept {
-                *initial
-            } else {
-                datum.to_metres(&estimate.pose)
-            }
-        });
+        let poses = estimates
+            .iter()
+            .zip(&prior.initial)
+            .map(|(estimate, initial)| {
+                if is_kept {
+                    *initial
+                } else {
+                    datum.to_metres(&estimate.pose)
+                }
+            });
         Self {
             poses: poses.collect(),
             estimates,

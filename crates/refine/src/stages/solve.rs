@@ -74,7 +74,9 @@ pub fn run<'a>(
     if !has_solve_ahead(state) {
         let calibration = setup.calibration_at(state);
         let uncertainty = SolutionUncertainty::at(&context, &solution, &calibration)?;
-        let dispersion = uncertainty.model_error.map_or(1.0, |found| found.dispersion);
+        let dispersion = uncertainty
+            .model_error
+            .map_or(1.0, |found| found.dispersion);
         if state.dispersion == 1.0 && dispersion > 1.0 {
             state.dispersion = dispersion;
             plan_again(&plan, setup.options, state);

@@ -194,7 +194,11 @@ impl NoiseHistogram {
             }
         }
         let floor = f64::from(model.floor);
-        if total > 0.0 { (sum / total).max(floor) } else { floor }
+        if total > 0.0 {
+            (sum / total).max(floor)
+        } else {
+            floor
+        }
     }
 }
 

@@ -17,7 +17,8 @@ use crate::thresholds::correlation_search::MAX_DEVIATION_SIGMA;
 use crate::thresholds::registration::{
     CLOSER_SEARCH_SIGMA_RAD, MAX_CLOSER_HYPOTHESES, MAX_CLOSER_SEARCH_ITERATIONS,
     MAX_DEVIATION_COST, MAX_HYPOTHESES, MAX_SCORE_DEFICIT_NATS, MAX_SOLVE_ITERATIONS,
-    MIN_RELIABLE_CORRELATION, MIN_SCORE_GAIN_NATS, MIN_UNEXPLAINED, SOLVE_STEP_TOLERANCE_PX,
+    MEAN_HYPOTHESES, MIN_RELIABLE_CORRELATION, MIN_SCORE_GAIN_NATS, MIN_UNEXPLAINED,
+    SOLVE_STEP_TOLERANCE_PX,
 };
 use crate::tracking::candidate::{Candidate, choose_candidate, sort_candidates, unexplained_share};
 use crate::tracking::correlation_search::{Hypothesis, log_likelihood, search_poses};
@@ -26,6 +27,7 @@ use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::PosePrediction;
 use crate::tracking::reference_mosaic::ReferenceMosaic;
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
+use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use tunnelstitch_geometry::surface::viewing_distance;
 use tunnelstitch_geometry::trajectory::{Jitter, Pose};
@@ -47,6 +49,28 @@ pub struct Registered {
     pub is_reliable: bool,
 }
 
+/// The effort that registering frames may take: hypotheses that are refined.
+///
+/// A frame that fits at once leaves its share to later ones that do not.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Effort {
+    left: usize,
+}
+
+impl Effort {
+    /// Adds the share of one frame.
+    pub fn grant(&mut self) {
+        self.left += MEAN_HYPOTHESES;
+    }
+
+    /// Takes one hypothesis; false if none is left.
+    fn take(&mut self) -> bool {
+        let has_any = self.left > 0;
+        self.left = self.left.saturating_sub(1);
+        has_any
+    }
+}
+
 /// Registers frame `frame` on the wall that the registered frames around it show; returns the
 /// reason if it must be rejected.
 ///
@@ -58,16 +82,18 @@ pub fn register_frame(
     frame: usize,
     predicted: &PosePrediction,
     neighbours: &Neighbours,
+    effort: &mut Effort,
 ) -> Result<Result<Registered, RejectionReason>, ProblemError> {
     let Ok(distance_m) = viewing_distance(context.surface, &predicted.pose) else {
         return Ok(Err(RejectionReason::NoMatch { correlation: 0.0 }));
     };
     let registration =
         Registration::new(context, options, frame, predicted, neighbours, distance_m)?;
+    effort.grant();
     let hypotheses = registration.find_hypotheses(options);
-    let mut candidates = registration.refine_hypotheses(&hypotheses)?;
+    let mut candidates = registration.refine_hypotheses(&hypotheses, effort)?;
     if options.search {
-        registration.search_closer(&mut candidates)?;
+        registration.search_closer(&mut candidates, effort)?;
     }
     sort_candidates(&mut candidates);
     let camera = context.camera.at_level(registration.search_level);
@@ -169,7 +195,11 @@ impl<'r> Registration<'r> {
     }
 
     /// Refines the hypotheses that may turn out to be right.
-    fn refine_hypotheses(&self, hypotheses: &[Hypothesis]) -> Result<Vec<Candidate>, ProblemError> {
+    fn refine_hypotheses(
+        &self,
+        hypotheses: &[Hypothesis],
+        effort: &mut Effort,
+    ) -> Result<Vec<Candidate>, ProblemError> {
         let best_score = hypotheses
             .first()
             .map_or(0.0, |hypothesis| hypothesis.score);
@@ -177,7 +207,7 @@ impl<'r> Registration<'r> {
             .iter()
             .filter(|one| is_worth_refining(one, best_score));
         let mut candidates = Vec::new();
-        for hypothesis in promising {
+        for hypothesis in promising.take_while(|_| effort.take()) {
             candidates.extend(self.refine_pose(&hypothesis.pose)?);
         }
         Ok(candidates)
@@ -187,7 +217,11 @@ impl<'r> Registration<'r> {
     ///
     /// A pose that is half right has stretched and sheared the picture that it unwraps; from there
     /// the search correlates better.
-    fn search_closer(&self, candidates: &mut Vec<Candidate>) -> Result<(), ProblemError> {
+    fn search_closer(
+        &self,
+        candidates: &mut Vec<Candidate>,
+        effort: &mut Effort,
+    ) -> Result<(), ProblemError> {
         let sigma_rad = self
             .sigma_rad
             .map(|sigma| sigma.min(CLOSER_SEARCH_SIGMA_RAD));
@@ -198,7 +232,11 @@ impl<'r> Registration<'r> {
                 break;
             };
             let (pose, before) = (first.estimate.pose, first.log_posterior());
-            for hypothesis in self.search(&pose, sigma_rad, MAX_CLOSER_HYPOTHESES) {
+            if effort.left == 0 {
+                break;
+            }
+            let closer = self.search(&pose, sigma_rad, MAX_CLOSER_HYPOTHESES);
+            for hypothesis in closer.into_iter().take_while(|_| effort.take()) {
                 candidates.extend(self.refine_pose(&hypothesis.pose)?);
             }
             if !candidates

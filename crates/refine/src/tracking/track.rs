@@ -20,7 +20,7 @@ use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
 use crate::thresholds::tracking::{LONG_WINDOW_STRIDE, MAX_FAILURES};
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::{PosePrediction, predict_pose};
-use crate::tracking::registration::{Registered, register_frame};
+use crate::tracking::registration::{Effort, Registered, register_frame};
 use crate::tracking::windows::{solve_long_window, solve_sliding_window};
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::surface::Footprint;
@@ -40,6 +40,8 @@ pub struct Tracking {
     attempts: usize,
     /// Those of them that fitted.
     successes: usize,
+    /// The effort that is left for registrations.
+    effort: Effort,
 }
 
 impl Tracking {
@@ -56,6 +58,7 @@ impl Tracking {
             kappa,
             attempts: 0,
             successes: 0,
+            effort: Effort::default(),
         }
     }
 
@@ -157,7 +160,14 @@ impl Tracking {
             frame_range,
         };
         self.attempts += 1;
-        match register_frame(context, options, k, predicted, &neighbours)? {
+        match register_frame(
+            context,
+            options,
+            k,
+            predicted,
+            &neighbours,
+            &mut self.effort,
+        )? {
             Ok(Registered {
                 estimate,
                 is_reliable,
@@ -195,6 +205,7 @@ pub fn register_rejected(
 ) -> Result<usize, ProblemError> {
     let count = states.estimates.len();
     let mut registered_frames = 0;
+    let mut effort = Effort::default();
     let mut footprints = footprints(context, states)?;
     for k in 0..count {
         if !states.rejections[k]
@@ -213,7 +224,7 @@ pub fn register_rejected(
             footprints: &footprints[frame_range.clone()],
             frame_range,
         };
-        let result = register_frame(context, options, k, &predicted, &neighbours)?;
+        let result = register_frame(context, options, k, &predicted, &neighbours, &mut effort)?;
         states.estimates[k] = match result {
             Ok(registered) => {
                 states.rejections[k] = None;

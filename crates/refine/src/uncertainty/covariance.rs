@@ -13,12 +13,16 @@
 //! **Q** is estimated from the scatter of the gradients of parts of the cost, `V = Σ_b g_b g_bᵀ`
 //! over blocks b of the wall (32 × 32 pixels: errors of neighbouring samples are correlated, those
 //! of blocks hardly), whatever the residuals are like, over κ², plus the prior's own information P.
-//! If the residuals were independent Gaussian noise of the assumed σ, c would be 0.97. They are not
-//! quite: where the wall is steep, aliasing and interpolation add errors that depend on the
-//! position between pixels, with correlations of their own. With one factor for all poses, and J
-//! the normal matrix of the poses with the exposures eliminated,
+//! If the residuals were independent Gaussian noise of the assumed σ, V/κ² would be `H − P`. They
+//! are not quite: where the wall is steep, aliasing and interpolation add errors that depend on the
+//! position between pixels, with correlations of their own. One factor for all poses, the dispersion
+//! `c_1`, makes up for that, `V/κ² ≈ c_1 (H − P)`, and
 //!
-//! `Σ = c J⁻¹`, `c = tr(J⁻¹ E Q Eᵀ) / freedoms`, `Q = V/κ² + P`, `J = H_pp − H_pe H_ee⁻¹ H_ep`,
+//! `Σ = H⁻¹ Q H⁻¹ = c_1 H⁻¹ + (1 − c_1) H⁻¹ P H⁻¹`.
+//!
+//! With J the normal matrix of the poses with the exposures eliminated,
+//!
+//! `c_1 = tr(J⁻¹ E V Eᵀ)/(κ² (freedoms − tr(J⁻¹ E P Eᵀ)))`, `J = H_pp − H_pe H_ee⁻¹ H_ep`,
 //! `E = (I, −H_pe H_ee⁻¹)`,
 //!
 //! the freedoms being six of each frame less those of the gauge. The exposures are left out because
@@ -29,9 +33,10 @@
 //! `tr(J⁻¹ E Q Eᵀ) = tr(H⁻¹ Q) − tr(H_ee⁻¹ Q_ee)`,
 //!
 //! for which only those blocks of `H⁻¹` and `H_ee⁻¹` are needed where H itself has blocks
-//! ([`crate::linear::selected_inverse`]). `J⁻¹` is the poses' part of `H⁻¹`. c is about
-//! 0.35 on sharp bricks, where aliasing, which the weight of every sample takes for independent,
-//! cancels over a block, and 0.7 on noisy walls of low contrast.
+//! ([`crate::linear::selected_inverse`]). `c_1` is about 0.35 on sharp bricks, where aliasing, which
+//! the weight of every sample takes for independent, cancels over a block, and 0.7 on noisy walls of
+//! low contrast. `H⁻¹ P H⁻¹`, which matters only where the prior decides, comes from draws
+//! ([`crate::uncertainty::model_error`]).
 //!
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard
 //! conditions", 1967 (`D⁻¹ Q D⁻¹`); F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw, W. A. Stahel,
@@ -76,6 +81,18 @@ impl Covariances {
             next: vec![unknown; frames.saturating_sub(1)],
             variance_factor: f64::NAN,
         }
+    }
+
+    /// Adds the uncertainty of the shared parameters: `+ W Σ_κ Wᵀ`.
+    pub fn with_shared(mut self, w: &[BorderBlock], covariance: &SharedBlock) -> Self {
+        let pose = |k: usize| w[k].fixed_rows::<6>(0).into_owned();
+        for (k, frame) in self.frames.iter_mut().enumerate() {
+            *frame += pose(k) * covariance * pose(k).transpose();
+        }
+        for (k, next) in self.next.iter_mut().enumerate() {
+            *next += pose(k) * covariance * pose(k + 1).transpose();
+        }
+        self
     }
 
     /// Scales all positions by `scale`.
@@ -136,69 +153,49 @@ impl Covariances {
     }
 }
 
-/// Covariances of the steps of all pairs of frames that share wall, on the pattern of the normal
-/// matrix.
+/// The inverse of the normal matrix, as far as covariances are made of it, and the dispersion of
+/// the pixels' scores.
 #[derive(Clone, Debug)]
-pub struct PairCovariances {
-    /// `Σ_jk`, in the pattern's order; NaN where it is unknown.
-    blocks: Vec<Matrix6<f64>>,
-    /// Variance factor c.
+pub struct NoiseCovariance {
+    /// `J⁻¹` of every frame.
+    frames: Vec<Matrix6<f64>>,
+    /// `J⁻¹` of every frame with the next; NaN where the two have nothing in common.
+    next: Vec<Matrix6<f64>>,
+    /// Variance factor c: the covariance over `J⁻¹`.
     pub variance_factor: f64,
-    /// Part of c that the scatter V contributes, without the prior.
+    /// Dispersion `c_1` of the pixels' scores.
     pub pixel_dispersion: f64,
+    /// Number of freedoms of the poses that the pixels determine.
+    pub determined: f64,
 }
 
-impl PairCovariances {
-    /// `Σ_jk` of two frames; None if they share no wall.
-    pub fn of_pair(&self, pattern: &Pattern, j: usize, k: usize) -> Option<Matrix6<f64>> {
-        let block = &self.blocks[pattern.block_index(j.min(k), j.max(k))?];
-        Some(if j <= k { *block } else { block.transpose() })
-    }
-
-    /// The same pairs with other covariances.
-    pub fn replaced(mut self, pattern: &Pattern, pair: impl Fn(usize, usize) -> Matrix6<f64>) -> Self {
-        for column in 0..pattern.frames() {
-            for &row in pattern.rows(column) {
-                if let Some(index) = pattern.block_index(row, column) {
-                    self.blocks[index] = pair(row, column);
-                }
-            }
-        }
-        self
-    }
-
-    /// Adds the uncertainty of the shared parameters: `+ W Σ_κ Wᵀ`.
-    pub fn with_shared(
-        mut self,
-        pattern: &Pattern,
-        w: &[BorderBlock],
-        covariance: &SharedBlock,
-    ) -> Self {
-        let pose = |k: usize| w[k].fixed_rows::<6>(0).into_owned();
-        for column in 0..pattern.frames() {
-            for &row in pattern.rows(column) {
-                if let Some(index) = pattern.block_index(row, column) {
-                    self.blocks[index] += pose(row) * covariance * pose(column).transpose();
-                }
-            }
-        }
-        self
-    }
-
-    /// The covariances of every frame, and of every frame with the next.
-    pub fn covariances(&self, pattern: &Pattern) -> Covariances {
-        let unknown = Matrix6::from_element(f64::NAN);
-        let pair = |j: usize, k: usize| self.of_pair(pattern, j, k).unwrap_or(unknown);
-        let count = pattern.frames();
+impl NoiseCovariance {
+    /// Covariances that `pair` makes of two frames and their block of `J⁻¹`.
+    pub fn map(&self, pair: impl Fn(usize, usize, &Matrix6<f64>) -> Matrix6<f64>) -> Covariances {
+        let frames = self.frames.iter().enumerate();
+        let next = self.next.iter().enumerate();
         Covariances {
-            frames: (0..count).map(|k| pair(k, k)).collect(),
-            next: (1..count).map(|k| pair(k - 1, k)).collect(),
+            frames: frames.map(|(k, block)| pair(k, k, block)).collect(),
+            next: next
+                .map(|(k, block)| {
+                    // What has nothing in common has no covariance, whatever draws say.
+                    if block[(0, 0)].is_nan() {
+                        *block
+                    } else {
+                        pair(k, k + 1, block)
+                    }
+                })
+                .collect(),
             variance_factor: self.variance_factor,
         }
     }
 }
 
-/// Computes the covariances at a solution.
+/// Share of the freedoms below which nothing is known of the pixels' dispersion: less than rounding
+/// leaves of it.
+const MIN_DETERMINED: f64 = 1e-6;
+
+/// Computes the inverse of the normal matrix and the dispersion at a solution.
 ///
 /// `normal`: H, with `tied` freedoms of the gauge tied; `scatter`: V of the pixels; `prior`: P; all
 /// on `pattern`. `curvature`: κ.
@@ -212,26 +209,32 @@ pub fn compute_covariances(
     scatter: &[Block],
     prior: &[Block],
     curvature: f64,
-) -> Result<PairCovariances, FactorError> {
+) -> Result<NoiseCovariance, FactorError> {
     let inverse = SelectedInverse::new(pattern, normal)?;
     let of_exposures = SelectedInverse::new(pattern, &exposures_alone(pattern, normal))?;
     let trace = |of: &[Block]| {
         let exposures: Vec<Block> = of.iter().map(exposures_part).collect();
-        trace_of_product(pattern, &inverse, of) - trace_of_product(pattern, &of_exposures, &exposures)
+        trace_of_product(pattern, &inverse, of)
+            - trace_of_product(pattern, &of_exposures, &exposures)
     };
     let freedoms = (pattern.frames() * POSE - tied) as f64;
-    let pixel_dispersion = trace(scatter) / curvature.powi(2) / freedoms;
-    let variance_factor = pixel_dispersion + trace(prior) / freedoms;
-    let pose = |block: Block| variance_factor * block.fixed_view::<POSE, POSE>(0, 0).into_owned();
+    let (of_pixels, of_prior) = (trace(scatter) / curvature.powi(2), trace(prior));
+    // The freedoms that pixels determine, by their share of the information.
+    let determined = freedoms - of_prior;
+    let pose = |block: Block| block.fixed_view::<POSE, POSE>(0, 0).into_owned();
     let unknown = Matrix6::from_element(f64::NAN);
-    let columns = (0..pattern.frames()).flat_map(|column| {
-        let rows = pattern.rows(column).iter();
-        rows.map(|row| inverse.block(*row, column).map_or(unknown, pose)).collect::<Vec<_>>()
-    });
-    Ok(PairCovariances {
-        blocks: columns.collect(),
-        variance_factor,
-        pixel_dispersion,
+    let block = |j: usize, k: usize| inverse.block(j, k).map_or(unknown, pose);
+    let count = pattern.frames();
+    Ok(NoiseCovariance {
+        frames: (0..count).map(|k| block(k, k)).collect(),
+        next: (1..count).map(|k| block(k - 1, k)).collect(),
+        variance_factor: (of_pixels + of_prior) / freedoms,
+        pixel_dispersion: if determined > MIN_DETERMINED * freedoms {
+            of_pixels / determined
+        } else {
+            1.0
+        },
+        determined,
     })
 }
 
@@ -307,11 +310,10 @@ mod tests {
         }
         let none = vec![Block::zeros(); pattern.blocks()];
         let at = |scatter: &[Block], prior: &[Block], curvature: f64| {
-            {
-                let pairs =
-                    compute_covariances(&pattern, &normal, 0, scatter, prior, curvature).unwrap();
-                pairs.covariances(&pattern)
-            }
+            let pairs =
+                compute_covariances(&pattern, &normal, 0, scatter, prior, curvature).unwrap();
+            let factor = pairs.variance_factor;
+            pairs.map(|_, _, block| block * factor)
         };
         let one = at(&normal.blocks, &none, 1.0);
         assert!((one.variance_factor - 1.0).abs() < 1e-12);

@@ -27,8 +27,8 @@ pub struct FrameSigma {
     /// counts them.
     #[serde(deserialize_with = "nan_if_null")]
     pub wall_px: f64,
-    /// Displacement against the frames that show the same wall, root mean square over what they
-    /// share, pixels ([`crate::uncertainty::registration_sigma`]); NaN where there are none.
+    /// Position on the wall as the other frames show it, root mean square over the picture, pixels
+    /// ([`crate::uncertainty::registration_sigma`]).
     #[serde(default = "unknown", deserialize_with = "nan_if_null")]
     pub registration_px: f64,
 }

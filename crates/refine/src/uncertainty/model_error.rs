@@ -2,20 +2,19 @@
 //!
 //! Where lens, shape or light are not quite as modelled, the scores of neighbouring blocks of the
 //! wall err together, over distances that nobody knows beforehand. So the scatter of the scores is
-//! computed over square patches of P × P blocks, `V_P = Σ_p g_p g_pᵀ`, for P = 1, 2, 4, 8. Its
-//! dispersion
+//! computed over square patches of P × P blocks, `V_P = Σ_p g_p g_pᵀ`, for P = 1, 2, 4, 8. With H
+//! the normal matrix, P its part by the prior and κ the curvature
+//! ([`crate::uncertainty::covariance`]), its dispersion
 //!
-//! `c_P = (tr(H⁻¹ V_P) − tr(H_ee⁻¹ V_P,ee)) / (κ² · freedoms)`
+//! `c_P = (tr(H⁻¹ V_P) − tr(H_ee⁻¹ V_P,ee)) / (κ² · freedoms determined by pixels)`
 //!
 //! does not grow with P if errors of blocks are independent; it falls, as the six unknowns of every
-//! frame are fitted to its patches. If it is largest at P = 1, all is noise, and
-//! [`crate::uncertainty::covariance`] states the covariance. If not, the P with the largest
-//! dispersion is the size over which errors go together, and the covariance is
+//! frame are fitted to its patches. If it is largest at P = 1, all is noise. If not, the P with the
+//! largest dispersion is the size over which errors go together, and the covariance is
 //!
 //! `Σ = (H⁻¹ (V_P/κ² + P) H⁻¹)_pp`,
 //!
-//! P the information of the prior: in every direction what errors of this size, and those of the
-//! initial poses, do to the estimate.
+//! in every direction what errors of this size, and those of the initial poses, do to the estimate.
 //!
 //! It is not sparse. But for independent random signs ε, `z = Σ_p ε_p g_p/κ` has the covariance
 //! `V_P/κ²`, a normal vector times the Cholesky factor of P has the covariance P, and `δ = H⁻¹ z` of
@@ -44,7 +43,7 @@ use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::problem::patch_scores::PatchScores;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::gauss_newton::Solution;
-use crate::uncertainty::covariance::exposures_alone;
+use crate::uncertainty::covariance::{NoiseCovariance, exposures_alone};
 use crate::uncertainty::observability::Posterior;
 use nalgebra::{Matrix6, SMatrix, Vector6};
 use rand::{Rng, SeedableRng};
@@ -63,28 +62,44 @@ const BATCH: usize = 16;
 /// mean of `eᵀ Σ⁻¹ e` is 128/(128 − 7) = 1.06 of what it should be.
 const BATCHES: u64 = 8;
 
-/// What model errors do to the estimate: draws of its error.
-pub struct ModelError {
-    /// Side of the patches over which errors go together, blocks.
-    pub patch_blocks: u32,
+/// Errors of the estimate.
+pub struct EstimateErrors {
+    /// Draws of them: of those that patches and prior make, or the prior alone.
+    pub draws: ErrorDraws,
+    /// The patches over which errors go together; None if all is noise.
+    pub patches: Option<Patches>,
+}
+
+/// Patches over which errors go together.
+#[derive(Clone, Copy, Debug)]
+pub struct Patches {
+    /// Side, blocks.
+    pub blocks: u32,
     /// Dispersion `c_P` of their scores.
     pub dispersion: f64,
+}
+
+/// Draws of the errors of an estimate.
+pub struct ErrorDraws {
+    /// Mean of `zᵀ H⁻¹ z − z_eᵀ H_ee⁻¹ z_e` of the patches' scores.
+    quadratic: f64,
     /// Draws of the step δ of every frame.
     frames: Vec<Vec<Vector6<f64>>>,
     /// Draws of the step of the shared parameters.
     shared: Vec<Kappa>,
 }
 
-impl ModelError {
-    /// Finds the size of patches over which errors go together, and draws the errors that they make
-    /// in the poses; None if `noise_dispersion`, that of single blocks, is the largest.
+impl EstimateErrors {
+    /// Finds the size of patches over which errors go together, and draws the errors that they and
+    /// the prior make in the poses; those of the prior alone if the dispersion of single blocks is
+    /// the largest. None if the prior leaves a pose free.
     ///
     /// # Errors
     /// [`ProblemError`]: a frame that cannot be read, a singular normal matrix.
     pub fn find(
         solution: &Solution,
         posterior: Option<&Posterior>,
-        noise_dispersion: f64,
+        of_noise: &NoiseCovariance,
     ) -> Result<Option<Self>, ProblemError> {
         let problem = &solution.problem;
         let pattern = problem.pattern();
@@ -96,40 +111,48 @@ impl ModelError {
         let factor = factor_of(normal)?;
         let exposures_alone = exposures_alone(pattern, normal);
         let exposures = factor_of(&exposures_alone)?;
-        let freedoms =
-            (6 * pattern.frames()).saturating_sub(problem.constrained_gauge_freedoms()) as f64;
-        let curvature = solution.record.curvature();
         let (prior, _) = problem.prior_information(&solution.estimates, &solution.kappa);
         let Some(prior) = PriorRoot::of(pattern, &prior) else {
             return Ok(None);
         };
-        let mut scores = problem.patch_scores(&solution.estimates, &solution.kappa)?;
-        let mut largest: Option<Self> = None;
-        for patch_blocks in PATCH_BLOCKS {
+        let draw = |scores: &PatchScores, posterior| {
             let system = System {
                 factor: &factor,
                 exposures: &exposures,
                 posterior,
-                scores: &scores,
+                scores,
                 prior: &prior,
-                curvature,
+                curvature: solution.record.curvature(),
             };
-            let draws = system.draw(pattern.frames());
-            let dispersion = draws.dispersion / freedoms;
-            let largest_yet = largest.as_ref().map_or(noise_dispersion, |l| l.dispersion);
-            if dispersion > largest_yet {
-                largest = Some(Self {
-                    patch_blocks,
-                    dispersion,
-                    frames: draws.frames,
-                    shared: draws.shared,
-                });
+            system.draw(pattern.frames())
+        };
+        let mut scores = problem.patch_scores(&solution.estimates, &solution.kappa)?;
+        let mut largest: Option<(ErrorDraws, Patches)> = None;
+        for blocks in PATCH_BLOCKS {
+            let draws = draw(&scores, posterior);
+            let dispersion = draws.quadratic / of_noise.determined;
+            let before = largest
+                .as_ref()
+                .map_or(of_noise.pixel_dispersion, |l| l.1.dispersion);
+            if dispersion > before {
+                largest = Some((draws, Patches { blocks, dispersion }));
             }
             scores = scores.doubled();
         }
-        Ok(largest)
+        Ok(Some(match largest {
+            Some((draws, patches)) => Self {
+                draws,
+                patches: Some(patches),
+            },
+            None => Self {
+                draws: draw(&PatchScores::default(), None),
+                patches: None,
+            },
+        }))
     }
+}
 
+impl ErrorDraws {
     /// Covariance of the errors of two frames.
     pub fn of_pair(&self, j: usize, k: usize) -> Matrix6<f64> {
         let products = self.frames[j].iter().zip(&self.frames[k]);
@@ -156,9 +179,9 @@ pub struct ModelErrorReport {
 
 impl ModelErrorReport {
     /// The report of what was found at the end of a solve.
-    pub fn new(found: &ModelError, problem: &PhotometricProblem) -> Self {
+    pub fn new(found: &Patches, problem: &PhotometricProblem) -> Self {
         Self {
-            patch_m: f64::from(found.patch_blocks) * problem.block_size_m(),
+            patch_m: f64::from(found.blocks) * problem.block_size_m(),
             dispersion: found.dispersion,
         }
     }
@@ -176,14 +199,6 @@ struct System<'s> {
     curvature: f64,
 }
 
-/// Draws of steps.
-struct Draws {
-    /// Mean of `zᵀ H⁻¹ z − z_eᵀ H_ee⁻¹ z_e`.
-    dispersion: f64,
-    frames: Vec<Vec<Vector6<f64>>>,
-    shared: Vec<Kappa>,
-}
-
 /// Right sides or steps of a batch of draws: a column each.
 type BatchBlock = SMatrix<f64, FRAME_PARAMETERS, BATCH>;
 /// The same of the shared parameters.
@@ -191,19 +206,21 @@ type SharedBatch = SMatrix<f64, SHARED_PARAMETERS, BATCH>;
 
 impl System<'_> {
     /// Draws of the steps that scores with random signs make.
-    fn draw(&self, count: usize) -> Draws {
+    fn draw(&self, count: usize) -> ErrorDraws {
         let batches = (0..BATCHES as usize).par_map(|batch| self.draw_batch(batch as u64, count));
-        let mut draws = Draws {
-            dispersion: 0.0,
+        let mut draws = ErrorDraws {
+            quadratic: 0.0,
             frames: vec![Vec::new(); count],
             shared: Vec::new(),
         };
         for (quadratic, steps, shared) in batches {
-            draws.dispersion += quadratic / (BATCHES as usize * BATCH) as f64;
+            draws.quadratic += quadratic / (BATCHES as usize * BATCH) as f64;
             for (frame, step) in draws.frames.iter_mut().zip(&steps) {
                 frame.extend((0..BATCH).map(|d| step.fixed_view::<6, 1>(0, d).into_owned()));
             }
-            draws.shared.extend((0..BATCH).map(|d| shared.column(d).into_owned()));
+            draws
+                .shared
+                .extend((0..BATCH).map(|d| shared.column(d).into_owned()));
         }
         draws
     }
@@ -214,9 +231,9 @@ impl System<'_> {
         let mut z = vec![BatchBlock::zeros(); count];
         let mut z_shared = SharedBatch::zeros();
         for score in self.scores.iter() {
-            let signs = SMatrix::<f64, 1, BATCH>::from_fn(|_, _| {
-                if rng.random() { 1.0 } else { -1.0 }
-            }) / self.curvature;
+            let signs =
+                SMatrix::<f64, 1, BATCH>::from_fn(|_, _| if rng.random() { 1.0 } else { -1.0 })
+                    / self.curvature;
             for (slot, gradient) in &score.frames {
                 z[*slot] += gradient * signs;
             }
@@ -256,7 +273,9 @@ impl PriorRoot {
     /// Factorises P, with the upper `blocks` on `pattern`; None if it is singular.
     fn of(pattern: &Pattern, blocks: &[Block]) -> Option<Self> {
         let block = |row: usize, column: usize| {
-            pattern.block_index(row, column).map_or_else(Block::zeros, |index| blocks[index])
+            pattern
+                .block_index(row, column)
+                .map_or_else(Block::zeros, |index| blocks[index])
         };
         let mut root = Self {
             own: Vec::new(),
@@ -265,7 +284,9 @@ impl PriorRoot {
         for k in 0..pattern.frames() {
             let before = match k.checked_sub(1) {
                 // L_k,k−1 L_k−1ᵀ = P_k,k−1.
-                Some(last) => root.own[last].solve_lower_triangular(&block(last, k))?.transpose(),
+                Some(last) => root.own[last]
+                    .solve_lower_triangular(&block(last, k))?
+                    .transpose(),
                 None => Block::zeros(),
             };
             let left = block(k, k) - before * before.transpose();

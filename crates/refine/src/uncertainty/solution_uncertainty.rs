@@ -8,18 +8,18 @@ use crate::parameters::calibration::{Calibration, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::{MAX_MEDIAN_SIGMA_PX, MAX_MISFIT_SHARE};
-use crate::uncertainty::covariance::{Covariances, compute_covariances};
+use crate::uncertainty::covariance::{Covariances, NoiseCovariance, compute_covariances};
 use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma};
-use crate::uncertainty::model_error::{ModelError, ModelErrorReport};
+use crate::uncertainty::model_error::{EstimateErrors, ModelErrorReport};
 use crate::uncertainty::observability::{Posterior, UnobservableParameter};
-use crate::uncertainty::registration_sigma::registration_sigmas;
 use crate::uncertainty::overdispersion::{Overdispersion, compute_overdispersions};
+use crate::uncertainty::registration_sigma::registration_sigmas;
 
 /// The uncertainty of a solution.
 pub struct SolutionUncertainty {
     /// Covariances of the poses.
     pub covariances: Covariances,
-    /// 1-σ of every frame against those that show the same wall, pixels.
+    /// 1-σ of every frame against the wall that the others show, pixels.
     pub registration_px: Vec<f64>,
     /// What the residuals show beyond noise, if they do.
     pub model_error: Option<ModelErrorReport>,
@@ -47,9 +47,8 @@ impl SolutionUncertainty {
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
         let (prior, _) = problem.prior_information(&solution.estimates, &solution.kappa);
-        let pattern = problem.pattern();
         let of_noise = compute_covariances(
-            pattern,
+            problem.pattern(),
             &solution.linearisation.normal,
             problem.constrained_gauge_freedoms(),
             &solution.linearisation.scatter,
@@ -57,35 +56,25 @@ impl SolutionUncertainty {
             solution.record.curvature(),
         );
         // Poses without a covariance still count; they are reported as uncertain.
-        let (mut pairs, mut model_error) = (None, None);
-        if let Ok(of_noise) = of_noise {
-            model_error = ModelError::find(solution, posterior.as_ref(), of_noise.pixel_dispersion)?;
-            pairs = Some(match (&model_error, &posterior, &shared) {
-                // Its draws include the shared parameters.
-                (Some(model_error), ..) => {
-                    of_noise.replaced(pattern, |j, k| model_error.of_pair(j, k))
+        let mut patches = None;
+        let (covariances, dispersion) = match of_noise {
+            Ok(of_noise) => {
+                let errors = EstimateErrors::find(solution, posterior.as_ref(), &of_noise)?;
+                let of_shared = posterior.as_ref().zip(shared.as_ref());
+                let covariances = total(&of_noise, errors.as_ref(), of_shared);
+                if let (Some(shared), Some(errors)) = (&mut shared, &errors) {
+                    *shared += errors.draws.of_shared();
                 }
-                (None, Some(posterior), Some(shared)) => {
-                    of_noise.with_shared(pattern, &posterior.w, shared)
-                }
-                _ => of_noise,
-            });
-        }
-        if let (Some(shared), Some(model_error)) = (&mut shared, &model_error) {
-            *shared += model_error.of_shared();
-        }
-        let covariances = match &pairs {
-            Some(pairs) => pairs.covariances(pattern),
-            None => Covariances::unknown(solution.estimates.len()),
-        };
-        let registration_px = match &pairs {
-            Some(pairs) => registration_sigmas(context, pattern, pairs, &solution.estimates),
-            None => vec![f64::NAN; solution.estimates.len()],
+                patches = errors.and_then(|errors| errors.patches);
+                let of_patches = patches.map(|patches| patches.dispersion);
+                (covariances, of_patches.unwrap_or(of_noise.pixel_dispersion))
+            }
+            Err(_) => (Covariances::unknown(solution.estimates.len()), f64::NAN),
         };
         Ok(Self {
             covariances,
-            registration_px,
-            model_error: model_error.map(|found| ModelErrorReport::new(&found, problem)),
+            registration_px: registration_sigmas(context, solution, dispersion),
+            model_error: patches.map(|found| ModelErrorReport::new(&found, problem)),
             shared,
             overdispersions: compute_overdispersions(context, solution),
             posterior,
@@ -152,6 +141,30 @@ impl SolutionUncertainty {
             return mark_all_unobservable(calibration, &reason);
         }
         posterior.find_unobservable(calibration)
+    }
+}
+
+/// The covariance of all errors ([`crate::uncertainty::covariance`],
+/// [`crate::uncertainty::model_error`]).
+fn total(
+    of_noise: &NoiseCovariance,
+    errors: Option<&EstimateErrors>,
+    shared: Option<(&Posterior, &SharedBlock)>,
+) -> Covariances {
+    let c = of_noise.pixel_dispersion;
+    let poses = match errors {
+        // Draws of patches include those of the shared parameters.
+        Some(errors) if errors.patches.is_some() => {
+            return of_noise.map(|j, k, _| errors.draws.of_pair(j, k));
+        }
+        Some(errors) => {
+            of_noise.map(|j, k, inverse| inverse * c + errors.draws.of_pair(j, k) * (1.0 - c))
+        }
+        None => of_noise.map(|_, _, inverse| inverse * c),
+    };
+    match shared {
+        Some((posterior, covariance)) => poses.with_shared(&posterior.w, covariance),
+        None => poses,
     }
 }
 

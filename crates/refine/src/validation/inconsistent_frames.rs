@@ -6,9 +6,9 @@
 //! without texture, or the prior.
 
 use crate::model::rejection::RejectionReason;
-use crate::problem::linearisation::FrameContribution;
 use crate::model::significance::normal_quantile;
 use crate::options::RefineOptions;
+use crate::problem::linearisation::FrameContribution;
 use crate::thresholds::inconsistent_frames::{
     MAX_REJECTED_SHARE, MAX_TYING_SIGMA_PX, MIN_CORRELATION,
 };

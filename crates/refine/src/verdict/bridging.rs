@@ -45,7 +45,9 @@ impl Bridging<'_> {
             self.predict(&gap, estimates);
             let inverse = self.solve(&gap, estimates)?;
             for k in gap.clone() {
-                let own = inverse.block(k - gap.start, k - gap.start).unwrap_or_default();
+                let own = inverse
+                    .block(k - gap.start, k - gap.start)
+                    .unwrap_or_default();
                 let from_start = k - gap.start;
                 let start = gap.start.checked_sub(1);
                 let end = Some(gap.end).filter(|end| *end < estimates.len());

@@ -89,7 +89,10 @@ mod tests {
         use RejectionReason::{Disagrees, NotConverged, Uncertain};
         assert_eq!(judge(0.02, 95.0, 0.01), None);
         assert!(matches!(judge(0.3, 95.0, 0.01), Some(Uncertain { .. })));
-        assert!(matches!(judge(f64::NAN, 95.0, 0.01), Some(Uncertain { .. })));
+        assert!(matches!(
+            judge(f64::NAN, 95.0, 0.01),
+            Some(Uncertain { .. })
+        ));
         assert!(matches!(judge(0.3, 20.0, 0.01), Some(Disagrees { .. })));
         assert!(matches!(judge(0.02, 95.0, 1.0), Some(NotConverged { .. })));
     }

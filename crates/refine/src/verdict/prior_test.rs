@@ -21,10 +21,10 @@
 
 use crate::model::prior::Prior;
 use crate::model::prior_terms::{absolute_error, relative_error};
+use crate::model::significance::{chi_squared_bounds, normal_quantile};
 use crate::parameters::calibration::Datum;
 use crate::thresholds::prior_test::{MAX_SIGMA_RATIO, SCALE_SIGMA};
 use crate::uncertainty::covariance::Covariances;
-use crate::model::significance::{chi_squared_bounds, normal_quantile};
 use nalgebra::{Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::trajectory::{JitterModel, Pose};
@@ -124,7 +124,11 @@ impl PriorTest {
                 "[prior] {} = {:.3} is too {}: the refined poses fit {:.3}",
                 sigma.name,
                 sigma.given,
-                if sigma.fits > sigma.given { "small" } else { "large" },
+                if sigma.fits > sigma.given {
+                    "small"
+                } else {
+                    "large"
+                },
                 sigma.fits
             ));
         }
@@ -179,7 +183,11 @@ fn errors(
     let r = prior.jitter.rotation_sigma_rad;
     let [x, y, z] = prior.jitter.translation_sigma_m;
     let sigma = Vector6::new(r, r, r, x, y, z);
-    let initial: Vec<Pose> = prior.initial.iter().map(|pose| datum.to_tunnel(pose)).collect();
+    let initial: Vec<Pose> = prior
+        .initial
+        .iter()
+        .map(|pose| datum.to_tunnel(pose))
+        .collect();
     let chosen: Vec<usize> = (0..poses.len()).filter(|k| photometric[*k]).collect();
     match prior.jitter.model {
         JitterModel::RandomWalk => {
@@ -199,8 +207,8 @@ fn errors(
                 };
                 let crossed = carry(&covariances.next[k - 1]);
                 let earlier = carry(&carry(&covariances.frames[k - 1]).transpose());
-                let variance = (covariances.frames[k] + earlier - crossed - crossed.transpose())
-                    .diagonal();
+                let variance =
+                    (covariances.frames[k] + earlier - crossed - crossed.transpose()).diagonal();
                 let step = initial[1].t_wc - initial[0].t_wc;
                 PriorError::new(&e, &variance, &step, &sigma)
             };
@@ -229,10 +237,18 @@ impl PriorError {
         d: &Vector3<f64>,
         sigma: &Vector6<f64>,
     ) -> Self {
-        let shown = |share: f64| if share.is_finite() { (1.0 - share).max(0.0) } else { 0.0 };
+        let shown = |share: f64| {
+            if share.is_finite() {
+                (1.0 - share).max(0.0)
+            } else {
+                0.0
+            }
+        };
         Self {
             e: e.component_div(sigma),
-            shown: variance.component_div(&sigma.component_mul(sigma)).map(shown),
+            shown: variance
+                .component_div(&sigma.component_mul(sigma))
+                .map(shown),
             d: d.component_div(&sigma.fixed_rows::<3>(3)),
         }
     }
@@ -341,7 +357,9 @@ mod tests {
                 xi[n] = draw(sigma);
             }
             let mut expected = match poses.last() {
-                Some(last) if is_walk => crate::model::prior::predict(last, &initial[k - 1], &initial[k]),
+                Some(last) if is_walk => {
+                    crate::model::prior::predict(last, &initial[k - 1], &initial[k])
+                }
                 _ => initial[k],
             };
             if is_walk && k > 0 {
@@ -360,7 +378,14 @@ mod tests {
         };
         let calibration = Calibration::none(&Camera::from_vertical_fov(160, 120, 1.0));
         let datum = calibration.datum(&Kappa::zeros());
-        PriorTest::new(prior, (&datum, 6.0), poses, &covariances, &[true; COUNT], 1e-3)
+        PriorTest::new(
+            prior,
+            (&datum, 6.0),
+            poses,
+            &covariances,
+            &[true; COUNT],
+            1e-3,
+        )
     }
 
     #[test]
@@ -380,7 +405,10 @@ mod tests {
         let found = test(&prior(model, 0.03), &poses(true, 2.0, 5));
         assert!(found.scale.unwrap().contradicts, "{found:?}");
         let text = found.findings.join("\n");
-        assert!(text.contains("radius_m is about") && text.contains("diameter"), "{text}");
+        assert!(
+            text.contains("radius_m is about") && text.contains("diameter"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -392,7 +420,10 @@ mod tests {
                 panic!("{found:?}");
             };
             assert_eq!(sigma.name, "rotation_sigma_deg");
-            assert!((sigma.fits / 0.03f64.to_degrees() - 1.0).abs() < 0.2, "{sigma:?}");
+            assert!(
+                (sigma.fits / 0.03f64.to_degrees() - 1.0).abs() < 0.2,
+                "{sigma:?}"
+            );
         }
     }
 

@@ -49,7 +49,9 @@ impl SurveyVerdict {
                           poses are kept"
                 .to_owned(),
             (None, all) if all == frames => {
-                format!("the result may be used: all {frames} frames are right to {accuracy}{shape}")
+                format!(
+                    "the result may be used: all {frames} frames are right to {accuracy}{shape}"
+                )
             }
             (None, some) => format!(
                 "the result may be used for {some} of {frames} frames, which are right to \
