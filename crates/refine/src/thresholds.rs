@@ -15,13 +15,6 @@ pub mod prescreening {
     /// Chosen by: unknown.
     pub const MIN_CONTRAST_GREY: f64 = 0.75;
 
-    /// Share of a frame's pixels at the coarsest level that must have a value.
-    ///
-    /// Higher: more frames are rejected.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_KNOWN_SHARE: f64 = 0.1;
-
     /// Root mean square difference at the coarsest level below which two frames are the same
     /// picture, grey levels.
     ///
@@ -29,92 +22,56 @@ pub mod prescreening {
     ///
     /// Chosen by: unknown.
     pub const MAX_REPEAT_DIFFERENCE_GREY: f64 = 0.1;
-
-    /// Motion between two initial poses from which on two equal pictures cannot both be right,
-    /// pixels of full size.
-    ///
-    /// Higher: fewer frames are rejected as repeated.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_MOTION_PX: f64 = 20.0;
-
-    /// Number of frames whose mean tells shading from texture.
-    ///
-    /// Higher: shading is corrected in longer surveys only.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_SHADING_FRAMES: usize = 10;
 }
 
-/// Thresholds of `tracking/windows.rs` and `tracking/track.rs`.
+/// Thresholds of `tracking/*.rs`, and of `solver/neighbourhood.rs`.
 pub mod tracking {
-    /// Number of frames in a long window.
+    /// Number of frames in a long window, and of those around a changed frame that are solved
+    /// again.
     ///
     /// Higher: less bend is left over several turns, in more time.
     ///
     /// Chosen by: unknown.
     pub const LONG_WINDOW_FRAMES: usize = 160;
 
-    /// Number of frames tracked between the solves of two long windows.
-    ///
-    /// Higher: fewer long windows are solved.
-    ///
-    /// Chosen by: unknown.
-    pub const LONG_WINDOW_STRIDE: usize = 30;
-
-    /// The oldest of so many equal parts of a long window is held.
-    ///
-    /// Higher: fewer frames are held.
-    ///
-    /// Chosen by: unknown.
-    pub const LONG_WINDOW_HELD_DIVISOR: usize = 8;
-
-    /// The oldest of so many equal parts of a sliding window is held.
+    /// The oldest of so many equal parts of a window is held.
     ///
     /// Higher: fewer frames are held, and the window is tied more loosely to the frames before it.
     ///
     /// Chosen by: a prototype whose windows held the oldest third and stayed bounded.
     pub const WINDOW_HELD_DIVISOR: usize = 3;
 
-    /// Number of Gauss–Newton iterations in a window.
+    /// Number of times that a part of tracking is repeated until it settles: all frames with a new
+    /// camera, the first frames with a new shading, the correction of the shading, the closer
+    /// search of a frame.
     ///
-    /// Higher: windows converge further, in more time.
+    /// Higher: a camera that is farther off can be estimated, frames that are tilted farther are
+    /// found, in more time.
     ///
     /// Chosen by: unknown.
-    pub const MAX_WINDOW_ITERATIONS: u64 = 6;
+    pub const MAX_ALTERNATIONS: usize = 5;
 
-    /// Step length below which a window has converged, pixels of the level.
+    /// Number of Gauss–Newton iterations in which a single frame or a window is solved for at one
+    /// level.
     ///
-    /// Higher: windows stop earlier; the global solve has more to do.
+    /// Higher: they converge further, in more time. Poses in the basin of an alias then get all the
+    /// way into it.
     ///
-    /// Chosen by: unknown.
-    pub const WINDOW_STEP_TOLERANCE_PX: f64 = 0.2;
+    /// Chosen by: a sweep of `converge` over tiled bricks with 6° of rotation. With 6 or 8 and
+    /// [`STEP_TOLERANCE_PX`] 0.2, and with 20 and a tenth of it, frames more are misregistered.
+    pub const MAX_SOLVE_ITERATIONS: u64 = 12;
+
+    /// Step length below which a single frame or a window has converged, pixels of full size; the
+    /// global solve does the rest.
+    ///
+    /// Higher: they stop earlier, and the global solve has more to do.
+    ///
+    /// Chosen by: as [`MAX_SOLVE_ITERATIONS`].
+    pub const STEP_TOLERANCE_PX: f64 = 0.1;
 }
 
 /// Thresholds of `tracking/alternating_calibration.rs`.
 pub mod alternating_calibration {
-    /// Number of times that all frames are tracked.
-    ///
-    /// Higher: a camera that is farther off can be estimated, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_TRACKING_ITERATIONS: usize = 5;
-
-    /// Displacement of the picture's border by the change of the camera, pixels of full size, below
-    /// which frames need not be tracked again.
-    ///
-    /// Higher: frames are tracked fewer times.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_CAMERA_CHANGE_PX: f64 = 2.0;
-
-    /// Number of times that the first frames are tracked for the shading.
-    ///
-    /// Higher: the shading converges further, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_SHADING_ITERATIONS: usize = 3;
-
     /// Relative change of the shading below which frames need not be tracked again.
     ///
     /// Higher: the first frames are tracked fewer times.
@@ -132,35 +89,6 @@ pub mod registration {
     /// Chosen by: unknown.
     pub const MAX_HYPOTHESES: usize = 10;
 
-    /// Largest deficit of a hypothesis to the best one with which it is refined, nats:
-    /// log-posterior odds.
-    ///
-    /// The probability that a hypothesis is right whose log-posterior is Δ lower is no more than
-    /// `exp(−Δ)`. The search underestimates log-posteriors by its steps, in proportion to the
-    /// number of samples. So the deficit is between the upper bound for the hypothesis after
-    /// refinement ([`super::correlation_search::MIN_SQUARED_CORRELATION_LEFT`]) and the lower bound
-    /// for the best one, its score before refinement.
-    ///
-    /// Higher: more hypotheses are refined, and fewer right ones are dismissed.
-    ///
-    /// Chosen by: derivation. `ln(10/0.001)`: of ten hypotheses, a right one is dismissed at most
-    /// once in a thousand frames.
-    pub const MAX_SCORE_DEFICIT_NATS: f64 = 9.2;
-
-    /// Number of Gauss–Newton iterations for a single frame at one level.
-    ///
-    /// Higher: candidates converge further, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_SOLVE_ITERATIONS: u64 = 12;
-
-    /// Step length below which a single frame has converged, pixels of the level.
-    ///
-    /// Higher: candidates stop earlier; the windows have more to do.
-    ///
-    /// Chosen by: unknown.
-    pub const SOLVE_STEP_TOLERANCE_PX: f64 = 0.1;
-
     /// Correlation with the reference mosaic, corrected for noise, that a registered frame must
     /// reach.
     ///
@@ -168,44 +96,6 @@ pub mod registration {
     ///
     /// Chosen by: unknown.
     pub const MIN_CORRELATION: f64 = 0.5;
-
-    /// Correlation with the reference mosaic, corrected for noise, from which on a pose is reliable
-    /// and no closer search is made.
-    ///
-    /// Higher: more closer searches, and more windows solved from the coarsest level.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_RELIABLE_CORRELATION: f64 = 0.9;
-
-    /// Number of closer searches around the best candidate.
-    ///
-    /// Higher: frames that are tilted farther are found, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_CLOSER_SEARCH_ITERATIONS: usize = 4;
-
-    /// Number of hypotheses that are refined after a closer search.
-    ///
-    /// Higher: fewer right poses are missed, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_CLOSER_HYPOTHESES: usize = 2;
-
-    /// Largest σ of pitch, yaw and roll in a closer search, radians.
-    ///
-    /// Higher: closer searches reach farther.
-    ///
-    /// Chosen by: unknown.
-    pub const CLOSER_SEARCH_SIGMA_RAD: f64 = 0.05;
-
-    /// Least gain in log-posterior, nats, for which another closer search is worth its time.
-    ///
-    /// Higher: fewer closer searches.
-    ///
-    /// Chosen by: derivation. Twice the gain that fitting the six unknowns of a pose to other noise
-    /// brings follows χ² with six degrees of freedom (Wilks), whose mean is 6: a smaller gain is
-    /// noise.
-    pub const MIN_SCORE_GAIN_NATS: f64 = 3.0;
 
     /// Share `1 − c²` of the texture's variance that even the right pose leaves unexplained: blur,
     /// interpolation.
@@ -223,13 +113,6 @@ pub mod registration {
     /// Chosen by: unknown.
     pub const MAX_UNEXPLAINED_RATIO: f64 = 2.0;
 
-    /// Difference of the prior's log-densities from which on the prior tells two poses apart.
-    ///
-    /// Higher: more frames are ambiguous.
-    ///
-    /// Chosen by: derivation. `½ 3²`: three σ.
-    pub const MIN_PRIOR_MARGIN_NATS: f64 = 4.5;
-
     /// Deviation `½ eᵀΣ⁻¹e` of a pose from the prior's prediction up to which the prior allows it.
     ///
     /// Higher: poses farther from the prior are accepted.
@@ -239,14 +122,6 @@ pub mod registration {
         * 6.0
         * super::correlation_search::MAX_DEVIATION_SIGMA
         * super::correlation_search::MAX_DEVIATION_SIGMA;
-
-    /// Distance on the wall from which on two candidates are different poses, samples of the search
-    /// level.
-    ///
-    /// Higher: fewer frames are ambiguous.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_SEPARATION_SAMPLES: f64 = 2.0;
 }
 
 /// Thresholds of `tracking/correlation_search.rs`.
@@ -255,7 +130,8 @@ pub mod correlation_search {
     ///
     /// Higher: poses farther from the prior are found, in more time.
     ///
-    /// Chosen by: unknown.
+    /// Chosen by: derivation. One of three normal deviates exceeds it about once in a thousand
+    /// frames.
     pub const MAX_DEVIATION_SIGMA: f64 = 3.5;
 
     /// Number ν of samples that share one independent piece of texture.
@@ -265,7 +141,7 @@ pub mod correlation_search {
     /// Chosen by: unknown.
     pub const SAMPLES_PER_INDEPENDENT_PIECE: f64 = 4.0;
 
-    /// Share of the frame's pixels that must lie on known wall.
+    /// Share of the frame's pixels that must have a value and lie on known wall.
     ///
     /// Higher: more frames with little overlap are rejected.
     ///
@@ -283,13 +159,6 @@ pub mod correlation_search {
     /// `exp(−d²/L²)` = 0.52 of it.
     pub const MIN_SQUARED_CORRELATION_LEFT: f64 = 0.5;
 
-    /// Step between roll hypotheses: motion of the picture's corners, samples.
-    ///
-    /// Higher: a coarser search, which misses more poses, in less time.
-    ///
-    /// Chosen by: unknown.
-    pub const ROLL_STEP_SAMPLES: f64 = 2.0;
-
     /// Step between pitch hypotheses, radians; shifts along the tunnel make up for what lies
     /// between.
     ///
@@ -297,105 +166,10 @@ pub mod correlation_search {
     ///
     /// Chosen by: unknown.
     pub const PITCH_STEP_RAD: f64 = 0.12;
-
-    /// Share of the pitch step to which it shrinks as the frame looks more steeply along the
-    /// tunnel.
-    ///
-    /// Higher: a coarser search for steep views, in less time.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_PITCH_STEP_SHARE: f64 = 0.4;
-
-    /// Share of a pitch step for which shifts along the tunnel make up.
-    ///
-    /// Higher: neighbouring pitches overlap more, in more time.
-    ///
-    /// Chosen by: derivation. Half a step to either side, and some overlap.
-    pub const PITCH_STEP_SHARE_BY_SHIFT: f64 = 0.6;
-
-    /// Number of maxima kept for each pitch and roll.
-    ///
-    /// Higher: fewer right poses are missed on repetitive walls.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_MAXIMA_PER_TURN: usize = 4;
-
-    /// Distance on the wall from which on two maxima are different hypotheses, samples.
-    ///
-    /// Higher: fewer hypotheses close to each other.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_SEPARATION_SAMPLES: f64 = 2.5;
-
-    /// Difference of roll from which on two maxima are different hypotheses, steps of roll.
-    ///
-    /// Higher: fewer hypotheses close to each other.
-    ///
-    /// Chosen by: derivation. Neighbouring steps show the same pose, the next but one does not.
-    pub const MIN_SEPARATION_ROLL_STEPS: f64 = 1.5;
-
-    /// Number of Newton iterations that rotate a pose to look at a given wall point.
-    ///
-    /// Higher: more exact hypotheses.
-    ///
-    /// Chosen by: unknown.
-    pub const VIEW_ITERATIONS: usize = 8;
-
-    /// Length of a single one of these iterations, radians.
-    ///
-    /// Higher: faster convergence, but steep views may diverge.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_VIEW_STEP_RAD: f64 = 0.3;
 }
 
-/// Thresholds of `tracking/reference_mosaic.rs`, `tracking/mosaic_grid.rs` and
-/// `tracking/ncc_score.rs`.
+/// Thresholds of `tracking/ncc_score.rs`.
 pub mod reference_mosaic {
-    /// Share of the pixels that a piece of wall has when seen squarely from the axis, below which
-    /// it is left out.
-    ///
-    /// Higher: the mosaic covers less of obliquely seen wall.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_PIXEL_DENSITY: f32 = 0.1;
-
-    /// Distance along the tunnel that the mosaic covers, radii.
-    ///
-    /// Higher: the mosaic covers more wall, in more time.
-    ///
-    /// Chosen by: derivation. At an angle φ to the section `cos³ φ` of the pixels are left: at this
-    /// distance less than [`MIN_PIXEL_DENSITY`], with some room.
-    pub const MAX_REACH_RADII: f64 = 2.5;
-
-    /// The wall is sampled as if it were no farther away than this, radii.
-    ///
-    /// Higher: a coarser mosaic for frames that look along the tunnel.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_SPACING_RADII: f64 = 1.25;
-
-    /// Viewing distance to which the size of a pixel on the wall is bounded, radii.
-    ///
-    /// Higher: coarser grids for frames that look along the tunnel.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_VIEWING_DISTANCE_RADII: f64 = 3.0;
-
-    /// Smallest gain of a frame against the mosaic.
-    ///
-    /// Higher: frames that are darker are fitted worse.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_GAIN: f64 = 0.4;
-
-    /// Largest gain of a frame against the mosaic.
-    ///
-    /// Higher: frames that are brighter are fitted better.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_GAIN: f64 = 2.5;
-
     /// Share of the contrast's variance that must be texture for a correlation to be corrected for
     /// noise.
     ///
@@ -403,25 +177,6 @@ pub mod reference_mosaic {
     ///
     /// Chosen by: unknown.
     pub const MIN_TEXTURE_SHARE: f64 = 0.2;
-}
-
-/// Thresholds of `tracking/shading_correction.rs`.
-pub mod shading_correction {
-    /// Frames that the shading is estimated from, at the most. Higher: more time; the shading is
-    /// the same in all frames. Chosen by: unknown.
-    pub const MAX_SHADING_FRAMES: usize = 60;
-    /// Tiles that the shading is estimated from, spread over all of these frames. Higher: less
-    /// noise, more time. Chosen by: unknown.
-    pub const MAX_SHADING_TILES: usize = 1000;
-    /// Corrections of the shading with solves between, at the most. Higher: more time. Chosen by:
-    /// unknown.
-    pub const MAX_CORRECTION_ITERATIONS: usize = 2;
-    /// Size of a new shading over its 1-σ from noise above which it is taken over. Higher: weak
-    /// shadings are ignored. Chosen by: 3 σ.
-    pub const MIN_SIGNIFICANCE_SIGMA: f64 = 3.0;
-    /// Size of a change of an existing shading over its 1-σ from noise above which it is taken
-    /// over. Higher: fewer corrections. Chosen by: unknown.
-    pub const MIN_CHANGE_SIGNIFICANCE_SIGMA: f64 = 1.5;
 }
 
 /// Thresholds of `samples/footprints.rs`.
@@ -517,15 +272,6 @@ pub mod gauss_newton {
     /// Chosen by: on sharp bricks the cost varies by up to 0.9 % while the whole survey moves along
     /// its gauge, which changes nothing.
     pub const MAX_COST_RISE: f64 = 0.01;
-    /// First damping λ after a rejected step. Higher: the first damped step is shorter. Chosen by:
-    /// unknown.
-    pub const MIN_DAMPING: f64 = 1e-4;
-    /// Factor from one damping to the next. Higher: fewer, coarser dampings are tried. Chosen by:
-    /// Marquardt's original choice.
-    pub const DAMPING_FACTOR: f64 = 10.0;
-    /// Dampings tried before a step is given up. Higher: longer search for a step. Chosen by:
-    /// unknown.
-    pub const MAX_DAMPING_ITERATIONS: usize = 8;
     /// Plausible curvatures of a solve; others belong to solves that were still far from their end.
     /// Wider: curvatures of such solves count, too. Chosen by: unknown.
     pub const PLAUSIBLE_CURVATURES: RangeInclusive<f64> = 0.6..=1.2;
@@ -539,13 +285,6 @@ pub mod stopping {
     /// Step at which a solve that another one follows ends, multiples of the uncertainty. Higher:
     /// fewer steps. Chosen by: unknown.
     pub const INTERMEDIATE_STEP_SIGMA: f64 = 2.0;
-}
-
-/// Thresholds of `solver/neighbourhood.rs`.
-pub mod neighbourhood {
-    /// Frames on either side of a changed one that are solved again. Higher: more of the trajectory
-    /// adapts, in more time. Chosen by: a wrong frame bends its neighbours over a few turns.
-    pub const MAX_CHANGED_DISTANCE: usize = 64;
 }
 
 /// Thresholds of `validation/pairwise_ncc.rs`, `validation/contradictions.rs` and
