@@ -1,9 +1,10 @@
 //! Every tuned number of the estimator, grouped by stage.
 //!
 //! Each constant says what it bounds and in which unit, what a higher value does, and what it was
-//! chosen by: a row of the ablation, a test, a derivation, or "unknown". Sizes that follow from the
-//! data layout (tile size, batch sizes) are no thresholds and stay with their code; numbers that a
-//! user may want to change are options ([`crate::RefineOptions`]).
+//! chosen by: a row of the ablation, a test, or "unknown". Numbers that follow from others, with
+//! their derivation, and sizes that follow from the data layout, the memory or the number of random
+//! samples (tile size, batch sizes) are no thresholds and stay with their code; numbers that a user
+//! may want to change are options ([`crate::RefineOptions`]).
 
 /// Thresholds of `tracking/prescreening.rs`.
 pub mod prescreening {
@@ -49,7 +50,7 @@ pub mod tracking {
     /// found, in more time.
     ///
     /// Chosen by: unknown.
-    pub const MAX_ALTERNATIONS: usize = 5;
+    pub const MAX_TRACKING_ITERATIONS: usize = 5;
 
     /// Number of Gauss–Newton iterations in which a single frame or a window is solved for at one
     /// level.

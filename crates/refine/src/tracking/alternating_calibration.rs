@@ -21,7 +21,7 @@ use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
 use crate::thresholds::alternating_calibration::MAX_SHADING_CHANGE;
-use crate::thresholds::tracking::MAX_ALTERNATIONS;
+use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::shading_correction::{MAX_SHADING_FRAMES, correct_until_settled};
 use crate::tracking::track::Tracking;
 use serde::{Deserialize, Serialize};
@@ -63,7 +63,7 @@ impl AlternatingCalibration {
         progress: &dyn Progress,
     ) -> Result<(), ProblemError> {
         let frames = self.rejections.len().min(MAX_SHADING_FRAMES);
-        for _ in 0..MAX_ALTERNATIONS {
+        for _ in 0..MAX_TRACKING_ITERATIONS {
             let Some(before) = context.frames.shading() else {
                 break;
             };
@@ -131,7 +131,7 @@ impl AlternatingCalibration {
             self.round += 1;
             let change_px = border_displacement_px(&before, &context.camera);
             // Half a pixel of the level where tracking ends changes no registration.
-            if change_px < 0.5 * 2f64.powi(level as i32) || self.round == MAX_ALTERNATIONS {
+            if change_px < 0.5 * 2f64.powi(level as i32) || self.round == MAX_TRACKING_ITERATIONS {
                 return Ok(states);
             }
             self.kappa = context.kappa;

@@ -15,7 +15,7 @@ use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
 use crate::thresholds::correlation_search::{MAX_DEVIATION_SIGMA, PITCH_STEP_RAD};
 use crate::thresholds::registration::{MAX_DEVIATION_COST, MAX_HYPOTHESES, MIN_UNEXPLAINED};
-use crate::thresholds::tracking::MAX_ALTERNATIONS;
+use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::candidate::{Candidate, choose_candidate, sort_candidates, unexplained_share};
 use crate::tracking::correlation_search::{Hypothesis, log_likelihood, search_poses};
 use crate::tracking::mosaic_grid::pixel_size_m;
@@ -206,7 +206,7 @@ impl<'r> Registration<'r> {
         let sigma_rad = self
             .sigma_rad
             .map(|sigma| sigma.min(CLOSER_SEARCH_SIGMA_RAD));
-        for _ in 0..MAX_ALTERNATIONS {
+        for _ in 0..MAX_TRACKING_ITERATIONS {
             sort_candidates(candidates);
             let first = candidates.first();
             let Some(first) = first.filter(|c| !c.is_reliable()) else {

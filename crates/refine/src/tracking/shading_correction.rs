@@ -17,7 +17,7 @@ use crate::options::RefineOptions;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::solver::neighbourhood::Neighbourhood;
-use crate::thresholds::tracking::MAX_ALTERNATIONS;
+use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use std::ops::Range;
 use tunnelstitch_core::frames::Shading;
 use tunnelstitch_photometry::{Observation, PhotometricCalibration, Priors};
@@ -44,7 +44,7 @@ pub fn correct_until_settled(
 ) -> Result<(), ProblemError> {
     let side = context.camera.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
-    for _ in 0..MAX_ALTERNATIONS {
+    for _ in 0..MAX_TRACKING_ITERATIONS {
         if !correct(context, options, frames)? {
             break;
         }
