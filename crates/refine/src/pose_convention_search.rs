@@ -7,10 +7,17 @@
 
 use crate::options::RefineOptions;
 use crate::pipeline::refine;
-use crate::thresholds::pose_convention_search::{MAX_FRAMES, MIN_FRAMES, MIN_TURN_RAD};
 use std::sync::Arc;
 use tunnelstitch_core::progress::{Progress, Silent};
 use tunnelstitch_core::survey::{Survey, SurveyError};
+
+/// Angle by which the camera turns within the frames that are refined, radians: once around, and
+/// about a field of view more, so that the last frames overlap the first.
+const MIN_TURN_RAD: f64 = 1.15 * std::f64::consts::TAU;
+/// Smallest number of frames that are refined in each convention.
+const MIN_FRAMES: usize = 8;
+/// Largest number of frames that are refined in each convention: bounds the time.
+const MAX_FRAMES: usize = 40;
 
 /// Counts the frames to refine in each convention.
 fn count_frames(survey: &Survey) -> usize {

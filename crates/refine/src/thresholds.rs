@@ -1,9 +1,10 @@
 //! Every tuned number of the estimator, grouped by stage.
 //!
 //! Each constant says what it bounds and in which unit, what a higher value does, and what it was
-//! chosen by: a row of the ablation, a test, a derivation, or "unknown". Sizes that follow from the
-//! data layout (tile size, batch sizes) are no thresholds and stay with their code; numbers that a
-//! user may want to change are options ([`crate::RefineOptions`]).
+//! chosen by: a row of the ablation, a test, or "unknown". Numbers that follow from others, with
+//! their derivation, and sizes that follow from the data layout, the memory or the number of random
+//! samples (tile size, batch sizes) are no thresholds and stay with their code; numbers that a user
+//! may want to change are options ([`crate::RefineOptions`]).
 
 /// Thresholds of `tracking/prescreening.rs`.
 pub mod prescreening {
@@ -15,13 +16,6 @@ pub mod prescreening {
     /// Chosen by: unknown.
     pub const MIN_CONTRAST_GREY: f64 = 0.75;
 
-    /// Share of a frame's pixels at the coarsest level that must have a value.
-    ///
-    /// Higher: more frames are rejected.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_KNOWN_SHARE: f64 = 0.1;
-
     /// Root mean square difference at the coarsest level below which two frames are the same
     /// picture, grey levels.
     ///
@@ -29,26 +23,12 @@ pub mod prescreening {
     ///
     /// Chosen by: unknown.
     pub const MAX_REPEAT_DIFFERENCE_GREY: f64 = 0.1;
-
-    /// Motion between two initial poses from which on two equal pictures cannot both be right,
-    /// pixels of full size.
-    ///
-    /// Higher: fewer frames are rejected as repeated.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_MOTION_PX: f64 = 20.0;
-
-    /// Number of frames whose mean tells shading from texture.
-    ///
-    /// Higher: shading is corrected in longer surveys only.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_SHADING_FRAMES: usize = 10;
 }
 
-/// Thresholds of `tracking/windows.rs` and `tracking/track.rs`.
+/// Thresholds of `tracking/*.rs`, and of `solver/neighbourhood.rs`.
 pub mod tracking {
-    /// Number of frames in a long window.
+    /// Number of frames in a long window, and of those around a changed frame that are solved
+    /// again.
     ///
     /// Higher: less bend is left over several turns, in more time.
     ///
@@ -62,66 +42,44 @@ pub mod tracking {
     /// Chosen by: three turns of 120°: a wrong frame spoils its neighbours within a turn.
     pub const MAX_FAILURES: usize = 12;
 
-    /// Number of frames tracked between the solves of two long windows.
-    ///
-    /// Higher: fewer long windows are solved.
-    ///
-    /// Chosen by: unknown.
-    pub const LONG_WINDOW_STRIDE: usize = 30;
-
-    /// The oldest of so many equal parts of a long window is held.
-    ///
-    /// Higher: fewer frames are held.
-    ///
-    /// Chosen by: unknown.
-    pub const LONG_WINDOW_HELD_DIVISOR: usize = 8;
-
-    /// The oldest of so many equal parts of a sliding window is held.
+    /// The oldest of so many equal parts of a window is held.
     ///
     /// Higher: fewer frames are held, and the window is tied more loosely to the frames before it.
     ///
     /// Chosen by: a prototype whose windows held the oldest third and stayed bounded.
     pub const WINDOW_HELD_DIVISOR: usize = 3;
 
-    /// Number of Gauss–Newton iterations in a window.
+    /// Number of times that a part of tracking is repeated until it settles: all frames with a new
+    /// camera, the first frames with a new shading, the correction of the shading, the closer
+    /// search of a frame.
     ///
-    /// Higher: windows converge further, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_WINDOW_ITERATIONS: u64 = 6;
-
-    /// Step length below which a window has converged, pixels of the level.
-    ///
-    /// Higher: windows stop earlier; the global solve has more to do.
-    ///
-    /// Chosen by: unknown.
-    pub const WINDOW_STEP_TOLERANCE_PX: f64 = 0.2;
-}
-
-/// Thresholds of `tracking/alternating_calibration.rs`.
-pub mod alternating_calibration {
-    /// Number of times that all frames are tracked.
-    ///
-    /// Higher: a camera that is farther off can be estimated, in more time.
+    /// Higher: a camera that is farther off can be estimated, frames that are tilted farther are
+    /// found, in more time.
     ///
     /// Chosen by: unknown.
     pub const MAX_TRACKING_ITERATIONS: usize = 5;
 
-    /// Displacement of the picture's border by the change of the camera, pixels of full size, below
-    /// which frames need not be tracked again.
+    /// Number of Gauss–Newton iterations in which a single frame or a window is solved for at one
+    /// level.
     ///
-    /// Higher: frames are tracked fewer times.
+    /// Higher: they converge further, in more time. Poses in the basin of an alias then get all the
+    /// way into it.
     ///
-    /// Chosen by: unknown.
-    pub const MAX_CAMERA_CHANGE_PX: f64 = 2.0;
+    /// Chosen by: a sweep of `converge` over tiled bricks with 6° of rotation. With 6 or 8 and
+    /// [`STEP_TOLERANCE_PX`] 0.2, and with 20 and a tenth of it, frames more are misregistered.
+    pub const MAX_SOLVE_ITERATIONS: u64 = 12;
 
-    /// Number of times that the first frames are tracked for the shading.
+    /// Step length below which a single frame or a window has converged, pixels of full size; the
+    /// global solve does the rest.
     ///
-    /// Higher: the shading converges further, in more time.
+    /// Higher: they stop earlier, and the global solve has more to do.
     ///
-    /// Chosen by: unknown.
-    pub const MAX_SHADING_ITERATIONS: usize = 3;
+    /// Chosen by: as [`MAX_SOLVE_ITERATIONS`].
+    pub const STEP_TOLERANCE_PX: f64 = 0.1;
+}
 
+/// Thresholds of `tracking/alternating_calibration.rs`.
+pub mod alternating_calibration {
     /// Relative change of the shading below which frames need not be tracked again.
     ///
     /// Higher: the first frames are tracked fewer times.
@@ -144,37 +102,8 @@ pub mod registration {
     /// Higher: fewer right poses are missed on repetitive walls, and surveys that cannot be refined
     /// take longer.
     ///
-    /// Chosen by: unknown.
+    /// Chosen by: 48 frames of brick need 1.2 each, of concrete 3.4.
     pub const MEAN_HYPOTHESES: usize = 6;
-
-    /// Largest deficit of a hypothesis to the best one with which it is refined, nats:
-    /// log-posterior odds.
-    ///
-    /// The probability that a hypothesis is right whose log-posterior is Δ lower is no more than
-    /// `exp(−Δ)`. The search underestimates log-posteriors by its steps, in proportion to the
-    /// number of samples. So the deficit is between the upper bound for the hypothesis after
-    /// refinement ([`super::correlation_search::MIN_SQUARED_CORRELATION_LEFT`]) and the lower bound
-    /// for the best one, its score before refinement.
-    ///
-    /// Higher: more hypotheses are refined, and fewer right ones are dismissed.
-    ///
-    /// Chosen by: derivation. `ln(10/0.001)`: of ten hypotheses, a right one is dismissed at most
-    /// once in a thousand frames.
-    pub const MAX_SCORE_DEFICIT_NATS: f64 = 9.2;
-
-    /// Number of Gauss–Newton iterations for a single frame at one level.
-    ///
-    /// Higher: candidates converge further, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_SOLVE_ITERATIONS: u64 = 12;
-
-    /// Step length below which a single frame has converged, pixels of the level.
-    ///
-    /// Higher: candidates stop earlier; the windows have more to do.
-    ///
-    /// Chosen by: unknown.
-    pub const SOLVE_STEP_TOLERANCE_PX: f64 = 0.1;
 
     /// Correlation with the reference mosaic, corrected for noise, that a registered frame must
     /// reach.
@@ -183,44 +112,6 @@ pub mod registration {
     ///
     /// Chosen by: unknown.
     pub const MIN_CORRELATION: f64 = 0.5;
-
-    /// Correlation with the reference mosaic, corrected for noise, from which on a pose is reliable
-    /// and no closer search is made.
-    ///
-    /// Higher: more closer searches, and more windows solved from the coarsest level.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_RELIABLE_CORRELATION: f64 = 0.9;
-
-    /// Number of closer searches around the best candidate.
-    ///
-    /// Higher: frames that are tilted farther are found, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_CLOSER_SEARCH_ITERATIONS: usize = 4;
-
-    /// Number of hypotheses that are refined after a closer search.
-    ///
-    /// Higher: fewer right poses are missed, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_CLOSER_HYPOTHESES: usize = 2;
-
-    /// Largest σ of pitch, yaw and roll in a closer search, radians.
-    ///
-    /// Higher: closer searches reach farther.
-    ///
-    /// Chosen by: unknown.
-    pub const CLOSER_SEARCH_SIGMA_RAD: f64 = 0.05;
-
-    /// Least gain in log-posterior, nats, for which another closer search is worth its time.
-    ///
-    /// Higher: fewer closer searches.
-    ///
-    /// Chosen by: derivation. Twice the gain that fitting the six unknowns of a pose to other noise
-    /// brings follows χ² with six degrees of freedom (Wilks), whose mean is 6: a smaller gain is
-    /// noise.
-    pub const MIN_SCORE_GAIN_NATS: f64 = 3.0;
 
     /// Share `1 − c²` of the texture's variance that even the right pose leaves unexplained: blur,
     /// interpolation.
@@ -238,13 +129,6 @@ pub mod registration {
     /// Chosen by: unknown.
     pub const MAX_UNEXPLAINED_RATIO: f64 = 2.0;
 
-    /// Difference of the prior's log-densities from which on the prior tells two poses apart.
-    ///
-    /// Higher: more frames are ambiguous.
-    ///
-    /// Chosen by: derivation. `½ 3²`: three σ.
-    pub const MIN_PRIOR_MARGIN_NATS: f64 = 4.5;
-
     /// Deviation `½ eᵀΣ⁻¹e` of a pose from the prior's prediction up to which the prior allows it.
     ///
     /// Higher: poses farther from the prior are accepted.
@@ -254,14 +138,6 @@ pub mod registration {
         * 6.0
         * super::correlation_search::MAX_DEVIATION_SIGMA
         * super::correlation_search::MAX_DEVIATION_SIGMA;
-
-    /// Distance on the wall from which on two candidates are different poses, samples of the search
-    /// level.
-    ///
-    /// Higher: fewer frames are ambiguous.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_SEPARATION_SAMPLES: f64 = 2.0;
 }
 
 /// Thresholds of `tracking/correlation_search.rs`.
@@ -270,7 +146,8 @@ pub mod correlation_search {
     ///
     /// Higher: poses farther from the prior are found, in more time.
     ///
-    /// Chosen by: unknown.
+    /// Chosen by: derivation. One of three normal deviates exceeds it about once in a thousand
+    /// frames.
     pub const MAX_DEVIATION_SIGMA: f64 = 3.5;
 
     /// Number ν of samples that share one independent piece of texture.
@@ -280,7 +157,7 @@ pub mod correlation_search {
     /// Chosen by: unknown.
     pub const SAMPLES_PER_INDEPENDENT_PIECE: f64 = 4.0;
 
-    /// Share of the frame's pixels that must lie on known wall.
+    /// Share of the frame's pixels that must have a value and lie on known wall.
     ///
     /// Higher: more frames with little overlap are rejected.
     ///
@@ -298,13 +175,6 @@ pub mod correlation_search {
     /// `exp(−d²/L²)` = 0.52 of it.
     pub const MIN_SQUARED_CORRELATION_LEFT: f64 = 0.5;
 
-    /// Step between roll hypotheses: motion of the picture's corners, samples.
-    ///
-    /// Higher: a coarser search, which misses more poses, in less time.
-    ///
-    /// Chosen by: unknown.
-    pub const ROLL_STEP_SAMPLES: f64 = 2.0;
-
     /// Step between pitch hypotheses, radians; shifts along the tunnel make up for what lies
     /// between.
     ///
@@ -312,105 +182,10 @@ pub mod correlation_search {
     ///
     /// Chosen by: unknown.
     pub const PITCH_STEP_RAD: f64 = 0.12;
-
-    /// Share of the pitch step to which it shrinks as the frame looks more steeply along the
-    /// tunnel.
-    ///
-    /// Higher: a coarser search for steep views, in less time.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_PITCH_STEP_SHARE: f64 = 0.4;
-
-    /// Share of a pitch step for which shifts along the tunnel make up.
-    ///
-    /// Higher: neighbouring pitches overlap more, in more time.
-    ///
-    /// Chosen by: derivation. Half a step to either side, and some overlap.
-    pub const PITCH_STEP_SHARE_BY_SHIFT: f64 = 0.6;
-
-    /// Number of maxima kept for each pitch and roll.
-    ///
-    /// Higher: fewer right poses are missed on repetitive walls.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_MAXIMA_PER_TURN: usize = 4;
-
-    /// Distance on the wall from which on two maxima are different hypotheses, samples.
-    ///
-    /// Higher: fewer hypotheses close to each other.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_SEPARATION_SAMPLES: f64 = 2.5;
-
-    /// Difference of roll from which on two maxima are different hypotheses, steps of roll.
-    ///
-    /// Higher: fewer hypotheses close to each other.
-    ///
-    /// Chosen by: derivation. Neighbouring steps show the same pose, the next but one does not.
-    pub const MIN_SEPARATION_ROLL_STEPS: f64 = 1.5;
-
-    /// Number of Newton iterations that rotate a pose to look at a given wall point.
-    ///
-    /// Higher: more exact hypotheses.
-    ///
-    /// Chosen by: unknown.
-    pub const VIEW_ITERATIONS: usize = 8;
-
-    /// Length of a single one of these iterations, radians.
-    ///
-    /// Higher: faster convergence, but steep views may diverge.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_VIEW_STEP_RAD: f64 = 0.3;
 }
 
-/// Thresholds of `tracking/reference_mosaic.rs`, `tracking/mosaic_grid.rs` and
-/// `tracking/ncc_score.rs`.
+/// Thresholds of `tracking/ncc_score.rs`.
 pub mod reference_mosaic {
-    /// Share of the pixels that a piece of wall has when seen squarely from the axis, below which
-    /// it is left out.
-    ///
-    /// Higher: the mosaic covers less of obliquely seen wall.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_PIXEL_DENSITY: f32 = 0.1;
-
-    /// Distance along the tunnel that the mosaic covers, radii.
-    ///
-    /// Higher: the mosaic covers more wall, in more time.
-    ///
-    /// Chosen by: derivation. At an angle φ to the section `cos³ φ` of the pixels are left: at this
-    /// distance less than [`MIN_PIXEL_DENSITY`], with some room.
-    pub const MAX_REACH_RADII: f64 = 2.5;
-
-    /// The wall is sampled as if it were no farther away than this, radii.
-    ///
-    /// Higher: a coarser mosaic for frames that look along the tunnel.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_SPACING_RADII: f64 = 1.25;
-
-    /// Viewing distance to which the size of a pixel on the wall is bounded, radii.
-    ///
-    /// Higher: coarser grids for frames that look along the tunnel.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_VIEWING_DISTANCE_RADII: f64 = 3.0;
-
-    /// Smallest gain of a frame against the mosaic.
-    ///
-    /// Higher: frames that are darker are fitted worse.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_GAIN: f64 = 0.4;
-
-    /// Largest gain of a frame against the mosaic.
-    ///
-    /// Higher: frames that are brighter are fitted better.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_GAIN: f64 = 2.5;
-
     /// Share of the contrast's variance that must be texture for a correlation to be corrected for
     /// noise.
     ///
@@ -420,25 +195,6 @@ pub mod reference_mosaic {
     pub const MIN_TEXTURE_SHARE: f64 = 0.2;
 }
 
-/// Thresholds of `tracking/shading_correction.rs`.
-pub mod shading_correction {
-    /// Frames that the shading is estimated from, at the most. Higher: more time; the shading is
-    /// the same in all frames. Chosen by: unknown.
-    pub const MAX_SHADING_FRAMES: usize = 60;
-    /// Tiles that the shading is estimated from, spread over all of these frames. Higher: less
-    /// noise, more time. Chosen by: unknown.
-    pub const MAX_SHADING_TILES: usize = 1000;
-    /// Corrections of the shading with solves between, at the most. Higher: more time. Chosen by:
-    /// unknown.
-    pub const MAX_CORRECTION_ITERATIONS: usize = 2;
-    /// Size of a new shading over its 1-σ from noise above which it is taken over. Higher: weak
-    /// shadings are ignored. Chosen by: 3 σ.
-    pub const MIN_SIGNIFICANCE_SIGMA: f64 = 3.0;
-    /// Size of a change of an existing shading over its 1-σ from noise above which it is taken
-    /// over. Higher: fewer corrections. Chosen by: unknown.
-    pub const MIN_CHANGE_SIGNIFICANCE_SIGMA: f64 = 1.5;
-}
-
 /// Thresholds of `samples/footprints.rs`.
 pub mod footprints {
     /// Largest distance in the sequence at which two frames are tested for overlap, frames.
@@ -446,64 +202,19 @@ pub mod footprints {
     /// Higher: overlaps after more turns of a spiral are found, at more time and memory. Chosen by:
     /// unknown.
     pub const MAX_OVERLAP_DISTANCE_FRAMES: usize = 256;
-
-    /// Largest distance along the tunnel at which a frame is compared, radii of a circle with the
-    /// section's perimeter.
-    ///
-    /// Higher: frames that look along the tunnel keep more of their oblique wall. Chosen by:
-    /// unknown.
-    pub const MAX_REACH_RADII: f64 = 6.0;
 }
 
-/// Thresholds of `samples/visibility.rs`.
+/// Thresholds of `samples/tile_projection.rs` and `tracking/reference_mosaic.rs`.
 pub mod visibility {
-    /// Least distance of a tile from the image's border and from masked pixels, pixels: room for
-    /// the steps to come.
+    /// Least area of a sample in a frame over that at the distance the lattice was laid out for: of
+    /// the tiles that are compared, and of the points of the reference mosaic.
     ///
-    /// Higher: larger steps stay inside the image, but less of its border is used. Chosen by:
-    /// unknown.
-    pub const MIN_BORDER_DISTANCE_PX: f64 = 1.0;
-
-    /// Least area of a sample in a frame over that at the distance the lattice was laid out for.
-    ///
-    /// Higher: more oblique or distant tiles are excluded. Chosen by: unknown.
+    /// Higher: more oblique or distant wall is excluded. Chosen by: unknown.
     pub const MIN_RELATIVE_SAMPLE_AREA: f64 = 0.05;
-}
-
-/// Thresholds of `samples/tile_coverage.rs`.
-pub mod tile_coverage {
-    /// Observations per stretch of the wall.
-    ///
-    /// Higher: more work for parallel threads at once, and more memory. Chosen by: unknown (work
-    /// for all threads within little memory).
-    pub const MAX_STRETCH_OBSERVATIONS: f64 = 1e6;
-
-    /// Frames per stretch of the wall, apart from those that reach over from its neighbours.
-    ///
-    /// Higher: fewer stretches at coarse levels, and more memory. Chosen by: unknown.
-    pub const MAX_STRETCH_FRAMES: f64 = 256.0;
-
-    /// Observations whose visibility is kept from one linearisation to the next; further ones are
-    /// computed anew each time.
-    ///
-    /// Higher: less time and more memory on long surveys. Chosen by: unknown.
-    pub const MAX_KEPT_OBSERVATIONS: usize = 16_000_000;
 }
 
 /// Thresholds of `samples/outlier_mask.rs`.
 pub mod outlier_mask {
-    /// Excess of a misfit over the typical one, in spreads, from which a frame does not show the
-    /// wall.
-    ///
-    /// Higher: fewer tiles are excluded. Chosen by: the test
-    /// `a_glint_and_its_flanks_are_excluded_and_the_wall_is_not` bounds it; otherwise unknown.
-    pub const MIN_OUTLIER_EXCESS: f32 = 5.0;
-
-    /// Largest excess of a tile, in spreads, that counts in the test of its neighbourhood.
-    ///
-    /// Higher: a single bad tile excludes more of its neighbours. Chosen by: unknown.
-    pub const MAX_NEIGHBOUR_EXCESS: f32 = 15.0;
-
     /// Least spread of the misfits R: frames differ in sharpness from tile to tile.
     ///
     /// Higher: fewer tiles are excluded on walls where the frames agree well. Chosen by: unknown.
@@ -517,17 +228,6 @@ pub mod residual_weighting {
     /// Higher: less of the information in Gaussian noise is lost (2 % at 6), but outliers exert
     /// more force. Chosen by: unknown.
     pub const TUKEY_CUTOFF_SIGMAS: f32 = 6.0;
-
-    /// Least σ of the noise model, grey levels.
-    ///
-    /// Higher: fewer residuals are rejected on images without noise. Chosen by: derivation:
-    /// rounding to 8 bits gives 0.29, which the averaging of interpolation lowers.
-    pub const MIN_SIGMA_GREY: f64 = 0.2;
-
-    /// Least number of residuals in a gradient bin for it to enter the fit of the noise model.
-    ///
-    /// Higher: the fit is less noisy, but uses fewer of the steep bins. Chosen by: unknown.
-    pub const MIN_RESIDUALS_PER_BIN: u64 = 100;
 }
 
 /// Thresholds of `tiles/tile.rs`.
@@ -537,50 +237,10 @@ pub mod tile {
     /// Higher: the texture is nearer to the minimiser under outliers, at more time per tile. Chosen
     /// by: unknown (the tests of the gradient against the cost pass with it).
     pub const REWEIGHTING_ITERATIONS: usize = 2;
-
-    /// Number of frames from which on the second smallest gradient sets the variance of a sample
-    /// instead of the smallest.
-    ///
-    /// Higher: the variance is lower where few frames observe the wall. Chosen by: unknown.
-    pub const MIN_FRAMES_FOR_SECOND_SMALLEST_GRADIENT: usize = 4;
 }
 
 /// Thresholds of `problem/*.rs`.
 pub mod photometric_problem {
-    /// Least number of wall samples over the height of an image.
-    ///
-    /// Higher: coarse pyramid levels are sampled more densely, so that whole tiles use more of the
-    /// images' borders, at more time. Chosen by: unknown.
-    pub const MIN_SAMPLES_PER_IMAGE_HEIGHT: u32 = 90;
-
-    /// Largest viewing distance for which the lattice is laid out, radii of the section.
-    ///
-    /// Higher: frames that look along the tunnel make the lattice coarser. Chosen by: unknown.
-    pub const MAX_VIEWING_DISTANCE_RADII: f64 = 3.0;
-
-    /// Largest log-gain of a feasible estimate, standard deviations of its prior.
-    ///
-    /// Higher: a frame that fits nowhere may lower its cost by a gain near 0, which amplifies
-    /// rounding. Chosen by: unknown.
-    pub const MAX_LOG_GAIN_SIGMAS: f64 = 10.0;
-
-    /// Stiffness of the gauge constraint at the first compared frame over that of its pixels.
-    ///
-    /// Higher: rounding moves the frames less along the gauge, but the matrix is worse conditioned.
-    /// Chosen by: unknown.
-    pub const GAUGE_STIFFNESS_RATIO: f64 = 1e6;
-
-    /// Number of tiles from which the noise and the typical misfit are estimated.
-    ///
-    /// Higher: better estimates at more time. Chosen by: unknown.
-    pub const NOISE_ESTIMATION_TILES: usize = 600;
-
-    /// Number of blocks of tiles that are solved for to estimate roughness and stiffness of the
-    /// wall.
-    ///
-    /// Higher: better estimates at more time. Chosen by: unknown.
-    pub const WALL_MODEL_BLOCKS: usize = 48;
-
     /// Least variance that detail finer than pixels adds to a pixel, over the variance of its
     /// noise, for the wall to be solved for jointly.
     ///
@@ -595,21 +255,6 @@ pub mod photometric_problem {
     /// Higher: the noise of single images replaces that of the residuals more often. Chosen by:
     /// unknown.
     pub const MAX_NOISE_UNDERESTIMATE: f64 = 1.25;
-
-    /// Random frequencies by which the information of an unknown texture is averaged.
-    ///
-    /// Higher: less Monte Carlo noise at more time. Chosen by: unknown.
-    pub const RANDOM_FREQUENCIES: usize = 800;
-
-    /// Random sets of sub-pixel positions for each of these frequencies.
-    ///
-    /// Higher: less Monte Carlo noise at more time. Chosen by: unknown.
-    pub const RANDOM_POSITION_SETS: usize = 4;
-
-    /// Largest number of frames that the information of an unknown texture is computed for.
-    ///
-    /// Higher: more time. Chosen by: beyond it the information hardly changes.
-    pub const MAX_TEXTURE_FRAMES: usize = 24;
 }
 
 /// Thresholds of `joint/*.rs`.
@@ -621,7 +266,8 @@ pub mod joint {
 
     /// Samples per pixel of the lattice on which outliers are detected before the joint solve.
     ///
-    /// Higher: smaller outliers are found at more time. Chosen by: unknown.
+    /// Higher: smaller outliers are found at more time. Chosen by: derivation. Two samples a pixel
+    /// resolve all that a pixel shows (Nyquist).
     pub const OUTLIER_MASK_SAMPLES_PER_PIXEL: f64 = 2.0;
 
     /// Largest step that ends the joint solve, standard deviations of the estimates.
@@ -629,38 +275,6 @@ pub mod joint {
     /// Higher: fewer of its expensive steps. Chosen by: the step after one of this length is a
     /// tenth of it.
     pub const MAX_FINAL_STEP_SIGMA: f64 = 0.3;
-
-    /// Conjugate-gradient iterations on the wall between two rounds of reweighting.
-    ///
-    /// Higher: the wall is nearer to the minimiser, at more time. Chosen by: unknown.
-    pub const MAX_WALL_ITERATIONS: usize = 10;
-
-    /// Rounds of reweighting of edges and pixels.
-    ///
-    /// Higher: sharper edges at more time. Chosen by: on bricks with noise of 2 grey levels, two
-    /// rounds make the poses' squared error 14 % larger, and seven 4 % smaller.
-    pub const REWEIGHTING_ROUNDS: usize = 4;
-
-    /// Width of Huber's loss in the first round of reweighting, standard deviations.
-    ///
-    /// Higher: outliers distort the first wall more. Chosen by: unknown.
-    pub const HUBER_WIDTH_SIGMAS: f32 = 2.0;
-
-    /// Conjugate-gradient iterations for the response of the wall to the motion of a frame.
-    ///
-    /// Higher: a more exact stiffness at more time. Chosen by: unknown.
-    pub const MAX_RESPONSE_ITERATIONS: usize = 20;
-
-    /// Largest number of frames that is distinguished in the stiffness of the wall.
-    ///
-    /// Higher: finer classes, each from fewer tiles. Chosen by: on bricks the stiffness is constant
-    /// from five frames on.
-    pub const MAX_STIFFNESS_FRAMES: usize = 12;
-
-    /// Least stiffness ratio.
-    ///
-    /// Higher: a wall of which hardly anything is known constrains frames more. Chosen by: unknown.
-    pub const MIN_STIFFNESS_RATIO: f64 = 0.05;
 }
 
 /// Thresholds of `solver/gauss_newton.rs, solve_record.rs`.
@@ -674,15 +288,6 @@ pub mod gauss_newton {
     /// Chosen by: on sharp bricks the cost varies by up to 0.9 % while the whole survey moves along
     /// its gauge, which changes nothing.
     pub const MAX_COST_RISE: f64 = 0.01;
-    /// First damping λ after a rejected step. Higher: the first damped step is shorter. Chosen by:
-    /// unknown.
-    pub const MIN_DAMPING: f64 = 1e-4;
-    /// Factor from one damping to the next. Higher: fewer, coarser dampings are tried. Chosen by:
-    /// Marquardt's original choice.
-    pub const DAMPING_FACTOR: f64 = 10.0;
-    /// Dampings tried before a step is given up. Higher: longer search for a step. Chosen by:
-    /// unknown.
-    pub const MAX_DAMPING_ITERATIONS: usize = 8;
     /// Plausible curvatures of a solve; others belong to solves that were still far from their end.
     /// Wider: curvatures of such solves count, too. Chosen by: unknown.
     pub const PLAUSIBLE_CURVATURES: RangeInclusive<f64> = 0.6..=1.2;
@@ -696,13 +301,6 @@ pub mod stopping {
     /// Step at which a solve that another one follows ends, multiples of the uncertainty. Higher:
     /// fewer steps. Chosen by: unknown.
     pub const INTERMEDIATE_STEP_SIGMA: f64 = 2.0;
-}
-
-/// Thresholds of `solver/neighbourhood.rs`.
-pub mod neighbourhood {
-    /// Frames on either side of a changed one that are solved again. Higher: more of the trajectory
-    /// adapts, in more time. Chosen by: a wrong frame bends its neighbours over a few turns.
-    pub const MAX_CHANGED_DISTANCE: usize = 64;
 }
 
 /// Thresholds of `validation/pairwise_ncc.rs`, `validation/contradictions.rs` and
@@ -1066,31 +664,6 @@ pub mod rolling_shutter_test {
     ///
     /// Chosen by: unknown.
     pub const MIN_SHIFT_PX: f64 = 0.5;
-}
-
-/// Thresholds of `pose_convention_search.rs`.
-pub mod pose_convention_search {
-    /// Angle by which the camera turns within the frames that are refined, radians: once around and
-    /// some.
-    ///
-    /// Higher: a more certain answer, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_TURN_RAD: f64 = 1.15 * std::f64::consts::TAU;
-
-    /// Smallest number of frames that are refined in each convention.
-    ///
-    /// Higher: a more certain answer, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_FRAMES: usize = 8;
-
-    /// Largest number of frames that are refined in each convention.
-    ///
-    /// Higher: a more certain answer, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_FRAMES: usize = 40;
 }
 
 /// Thresholds of `stages/assess.rs, validate_pairs.rs`.

@@ -46,5 +46,8 @@ pub use huber::weight as huber_weight;
 pub use reading::Reading;
 pub use region::{FineGrid, Region};
 pub use roughness::{KINDS, aliased_variance};
-pub use roughness_estimation::{RoughnessEvidence, SolvedRegion};
+pub use roughness_estimation::{
+    HUBER_LIMIT_SIGMAS, MAX_CG_ITERATIONS, MAX_REWEIGHTING_ITERATIONS, RoughnessEvidence,
+    SolvedRegion,
+};
 pub use wall_solve::{MARGIN, WallSolve};

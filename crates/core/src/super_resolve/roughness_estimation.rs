@@ -7,11 +7,11 @@ use crate::super_resolve::roughness::{KINDS, Roughness};
 use crate::super_resolve::wall_solve::WallSolve;
 
 /// Iterations of solving, reweighting and roughness estimation.
-const MAX_REWEIGHTING_ITERATIONS: usize = 4;
+pub const MAX_REWEIGHTING_ITERATIONS: usize = 4;
 /// Iterations of conjugate gradients per solve.
-const MAX_CG_ITERATIONS: usize = 10;
+pub const MAX_CG_ITERATIONS: usize = 10;
 /// Residual of a pixel, in σ, beyond which Huber's loss is linear.
-const HUBER_LIMIT_SIGMAS: f32 = 2.0;
+pub const HUBER_LIMIT_SIGMAS: f32 = 2.0;
 /// Minimum share of the residuals' degrees of freedom that is not fitted.
 const MIN_FREE_SHARE: f64 = 0.05;
 /// Minimum degrees of freedom of each kind of difference, as a share of the fine pixels.

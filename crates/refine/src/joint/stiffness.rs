@@ -19,9 +19,16 @@
 //! Without the ratio the steps of Gauss–Newton would be too short by it, and the estimated
 //! variances of the poses too small.
 
-use crate::thresholds::joint::{MAX_STIFFNESS_FRAMES, MIN_STIFFNESS_RATIO};
 use crate::tiles::tile_moments::TileMoments;
 use nalgebra::Matrix4;
+
+/// Largest number of frames that is distinguished: a common table entry for more, as the ratio is
+/// constant from five on.
+const MAX_STIFFNESS_FRAMES: usize = 12;
+
+/// Least ratio, which keeps the normal matrix positive definite if the sums are mostly noise. Those
+/// of walls that are solved for are ten times as large.
+const MIN_STIFFNESS_RATIO: f64 = 0.05;
 
 /// Sums of stiffnesses, by the number of frames that are compared in a tile.
 #[derive(Clone, Copy, Debug, Default)]

@@ -8,13 +8,17 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use crate::problem::block_sums::BlockSums;
 use crate::problem::linearisation::{FrameContribution, Linearisation};
 use crate::problem::photometric_problem::PhotometricProblem;
-use crate::thresholds::photometric_problem::GAUGE_STIFFNESS_RATIO;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Blocks of tiles that are processed before their sums are added: bounds the memory, whatever the
 /// tunnel's length.
 pub(super) const BATCH: usize = 64;
+
+/// Stiffness of the gauge constraint at the first compared frame over that of its pixels. At about
+/// the root of the inverse rounding error, neither rounding moves the frames along the gauge, nor
+/// does the condition of the matrix suffer.
+const GAUGE_STIFFNESS_RATIO: f64 = 1e6;
 
 impl PhotometricProblem<'_> {
     /// Cost and normal equations at the given estimates of the active frames and the initial shared

@@ -9,9 +9,7 @@ use crate::samples::observer::Observer;
 use crate::samples::outlier_mask::OutlierMask;
 use crate::samples::sampling::Sampling;
 use crate::samples::visibility::{Tile, Visibility};
-use crate::thresholds::photometric_problem::{
-    MAX_NOISE_UNDERESTIMATE, MIN_ALIASED_VARIANCE_RATIO, NOISE_ESTIMATION_TILES, WALL_MODEL_BLOCKS,
-};
+use crate::thresholds::photometric_problem::{MAX_NOISE_UNDERESTIMATE, MIN_ALIASED_VARIANCE_RATIO};
 use crate::tiles::denoising::TextureSpectrum;
 use crate::tiles::frame_samples::SampledFrame;
 use crate::tiles::grid::{BLOCK, TilePoints};
@@ -28,6 +26,12 @@ use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 
 /// Tiles of one piece of parallel work.
 const TILES_PER_TASK: usize = 32;
+/// Number of tiles from which the noise and the typical misfit are estimated: tens of thousands of
+/// residuals.
+const NOISE_ESTIMATION_TILES: usize = 600;
+/// Number of blocks of tiles that are solved for to estimate roughness and stiffness of the wall:
+/// some thousand tiles.
+const WALL_MODEL_BLOCKS: usize = 48;
 
 impl PhotometricProblem<'_> {
     /// Estimates the noise model and the spectrum of the texture from the residuals around the

@@ -3,15 +3,17 @@
 use crate::linear::normal_equations::Pattern;
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
-use crate::samples::footprints::footprint;
+use crate::samples::footprints::{MAX_VIEWING_DISTANCE_RADII, footprint};
 use crate::samples::visibility::PosedFrame;
-use crate::thresholds::photometric_problem::{
-    MAX_VIEWING_DISTANCE_RADII, MIN_SAMPLES_PER_IMAGE_HEIGHT,
-};
+use crate::tiles::grid::SIDE;
 use std::ops::Range;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{Surface, viewing_distance};
+
+/// Least number of wall samples over the height of an image. Of whole tiles, a strip of half a tile
+/// with its ring is lost at either border, together a ninth of this height.
+const MIN_SAMPLES_PER_IMAGE_HEIGHT: usize = 9 * SIDE;
 
 /// The participants at their poses with their footprints; None for those that are not compared.
 /// `rates`: motion of each participant's camera during a readout of one second.
@@ -62,7 +64,7 @@ pub fn normal_pattern(
 /// Least number of wall samples per pixel along each axis: one, but more at coarse levels, where
 /// whole tiles of pixels would leave much of the image's border unused.
 pub fn min_density(rows: u32) -> f64 {
-    (f64::from(MIN_SAMPLES_PER_IMAGE_HEIGHT) / f64::from(rows))
+    (MIN_SAMPLES_PER_IMAGE_HEIGHT as f64 / f64::from(rows))
         .ceil()
         .max(1.0)
 }

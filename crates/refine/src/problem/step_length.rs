@@ -3,9 +3,12 @@
 use crate::parameters::calibration::{INTRINSIC_PARAMETERS, Kappa};
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use crate::problem::photometric_problem::PhotometricProblem;
-use crate::thresholds::photometric_problem::MAX_LOG_GAIN_SIGMAS;
 use nalgebra::Vector5;
 use tunnelstitch_geometry::surface::{lens_jacobian, wall_jacobian};
+
+/// Largest log-gain of a feasible estimate, standard deviations of its prior. No frame has such a
+/// gain; one that fits nowhere could lower its cost by a gain near 0.
+const MAX_LOG_GAIN_SIGMAS: f64 = 10.0;
 
 impl PhotometricProblem<'_> {
     /// True if the camera is inside the tunnel and the log-gain within [`MAX_LOG_GAIN_SIGMAS`].

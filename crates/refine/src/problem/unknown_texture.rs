@@ -29,9 +29,6 @@
 //! Transactions on Acoustics, Speech, and Signal Processing 38(10), 1990 (the bound with a known
 //! texture is not attained with any amount of data, this one is).
 
-use crate::thresholds::photometric_problem::{
-    MAX_TEXTURE_FRAMES, RANDOM_FREQUENCIES, RANDOM_POSITION_SETS,
-};
 use nalgebra::{Complex, DMatrix, DVector, Matrix4};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -43,6 +40,12 @@ use tunnelstitch_geometry::numerics::spectrum::Transform;
 
 /// Side of the patches whose periodograms are averaged, pixels of a frame.
 const PATCH_PX: usize = 64;
+/// Random frequencies by which the information is averaged.
+const RANDOM_FREQUENCIES: usize = 800;
+/// Random sets of sub-pixel positions for each of these frequencies.
+const RANDOM_POSITION_SETS: usize = 4;
+/// Largest number of frames that the information is computed for; beyond it hardly changes.
+const MAX_TEXTURE_FRAMES: usize = 24;
 
 /// Shares of the information of displacements, by the number of frames that observe a point of the
 /// wall.

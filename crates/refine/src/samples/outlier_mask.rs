@@ -17,9 +17,7 @@
 
 use crate::samples::observer_marks::ObserverMarks;
 use crate::samples::visibility::{Tile, Visibility};
-use crate::thresholds::outlier_mask::{
-    MAX_NEIGHBOUR_EXCESS, MIN_MISFIT_SPREAD, MIN_OUTLIER_EXCESS,
-};
+use crate::thresholds::outlier_mask::MIN_MISFIT_SPREAD;
 use crate::tiles::frame_samples::SampledFrame;
 use crate::tiles::grid::{BLOCK, TileId, TilePoints, WallGrid};
 use crate::tiles::residual_weighting::{NoiseModel, median_and_sigma};
@@ -28,6 +26,14 @@ use std::collections::HashMap;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_geometry::surface::Surface;
+
+/// Excess of a misfit over the typical one, in spreads, from which a frame does not show the wall.
+/// Normal deviates exceed it three times in ten million; a survey has about as many observations.
+const MIN_OUTLIER_EXCESS: f32 = 5.0;
+
+/// Largest excess of a tile, in spreads, that counts in the test of its neighbourhood: `√9` of
+/// [`MIN_OUTLIER_EXCESS`], so that a single bad tile of nine does not exclude its neighbours.
+const MAX_NEIGHBOUR_EXCESS: f32 = 3.0 * MIN_OUTLIER_EXCESS;
 
 /// Number of classes of the mean variance, with equally many tiles each.
 const CLASSES: usize = 8;

@@ -8,9 +8,6 @@ use crate::samples::observer_marks::ObserverMarks;
 use crate::samples::tile_candidates::covered_rows;
 use crate::samples::tile_selection::select_most_informative;
 use crate::samples::visibility::{Exclusions, PosedFrame, Visibility};
-use crate::thresholds::tile_coverage::{
-    MAX_KEPT_OBSERVATIONS, MAX_STRETCH_FRAMES, MAX_STRETCH_OBSERVATIONS,
-};
 use crate::tiles::frame_samples::SampledFrame;
 use crate::tiles::grid::{BLOCK, WallGrid};
 use std::borrow::Cow;
@@ -20,6 +17,15 @@ use tunnelstitch_core::frames::{FrameCache, FrameError, Pyramid};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::Surface;
+
+/// Observations per stretch of the wall: work for all threads at once, within little memory.
+const MAX_STRETCH_OBSERVATIONS: f64 = 1e6;
+/// Frames per stretch of the wall, apart from those that reach over from its neighbours: bounds the
+/// memory at coarse levels.
+const MAX_STRETCH_FRAMES: f64 = 256.0;
+/// Observations whose visibility is kept from one linearisation to the next; further ones are
+/// computed anew each time. Bounds the memory on long surveys.
+const MAX_KEPT_OBSERVATIONS: usize = 16_000_000;
 
 /// A stretch of the wall that is processed at once.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! Projection of a tile into a frame.
 
 use crate::samples::observer::Observer;
-use crate::thresholds::visibility::{MIN_BORDER_DISTANCE_PX, MIN_RELATIVE_SAMPLE_AREA};
+use crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA;
 use crate::tiles::grid::{SIDE, WallGrid};
 use nalgebra::{Vector2, Vector3};
 use tunnelstitch_core::frames::{PyramidMask, Shading};
@@ -10,6 +10,10 @@ use tunnelstitch_geometry::trajectory::Pose;
 
 /// Area of a tile between its outermost samples, in samples.
 const SAMPLES_BETWEEN_CORNERS: f64 = ((SIDE - 1) * (SIDE - 1)) as f64;
+
+/// Least distance of a tile from the image's border and from masked pixels, pixels: the cubic
+/// kernel of interpolation reads one pixel beyond the two that a position lies between.
+const MIN_BORDER_DISTANCE_PX: f64 = 1.0;
 
 /// A tile in the image of a frame.
 pub struct TileProjection {

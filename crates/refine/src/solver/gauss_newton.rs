@@ -11,10 +11,20 @@ use crate::problem::linearisation::Linearisation;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::solve_record::{SolveRecord, StepRecord};
 use crate::solver::stopping::{StopReason, Stopping};
-use crate::thresholds::gauss_newton::{
-    DAMPING_FACTOR, MAX_COST_RISE, MAX_DAMPING_ITERATIONS, MIN_DAMPING, MIN_SLOPE_REDUCTION,
-};
+use crate::thresholds::gauss_newton::{MAX_COST_RISE, MIN_SLOPE_REDUCTION};
 use serde::{Deserialize, Serialize};
+
+/// Factor from one damping to the next.
+///
+/// Source: D. W. Marquardt, "An algorithm for least-squares estimation of nonlinear parameters",
+/// Journal of the Society for Industrial and Applied Mathematics 11(2), 1963.
+const DAMPING_FACTOR: f64 = 10.0;
+/// First damping λ after a rejected step. A chain of N frames has modes down to `½ (π/N)²` of its
+/// diagonal, 1e-4 for 220 frames: weaker dampings hardly shorten even these.
+const MIN_DAMPING: f64 = 1e-4;
+/// Dampings tried before a step is given up: none, and the powers of ten from [`MIN_DAMPING`] to
+/// 100, where a step is a hundredth of that along the gradient.
+const MAX_DAMPING_ITERATIONS: usize = 8;
 
 /// The unknowns of a solve: estimates of the active frames, and the shared parameters κ.
 pub type Unknowns = (Vec<FrameEstimate>, Kappa);

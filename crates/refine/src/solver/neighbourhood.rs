@@ -15,8 +15,12 @@ use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
-use crate::thresholds::neighbourhood::MAX_CHANGED_DISTANCE;
+use crate::thresholds::tracking::LONG_WINDOW_FRAMES;
 use std::ops::{Range, RangeInclusive};
+
+/// Frames on either side of a changed one that are solved again: together as many as those of a
+/// long window, in which a bend straightens.
+const MAX_CHANGED_DISTANCE: usize = LONG_WINDOW_FRAMES / 2;
 
 /// A range of frames that are solved again.
 #[derive(Clone, Debug, PartialEq, Eq)]

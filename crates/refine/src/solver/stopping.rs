@@ -2,6 +2,7 @@
 
 use crate::options::RefineOptions;
 use crate::thresholds::stopping::{INTERMEDIATE_STEP_PX, INTERMEDIATE_STEP_SIGMA};
+use crate::thresholds::tracking::{MAX_SOLVE_ITERATIONS, STEP_TOLERANCE_PX};
 use serde::{Deserialize, Serialize};
 
 /// Stopping rule of a solve.
@@ -17,6 +18,14 @@ pub struct Stopping {
 }
 
 impl Stopping {
+    /// The rule of the solves of single frames and windows in tracking; the global solve does the
+    /// rest.
+    pub const TRACKING: Self = Self {
+        max_iterations: MAX_SOLVE_ITERATIONS,
+        step_px: STEP_TOLERANCE_PX,
+        step_sigma: 0.0,
+    };
+
     /// The rule of a solve at a pyramid level that only brings the estimate close for the next one.
     pub fn intermediate(options: &RefineOptions, level: usize) -> Self {
         Self {

@@ -1,8 +1,6 @@
 //! Noise model of the residuals, robust loss, and robust statistics.
 
-use crate::thresholds::residual_weighting::{
-    MIN_RESIDUALS_PER_BIN, MIN_SIGMA_GREY, TUKEY_CUTOFF_SIGMAS,
-};
+use crate::thresholds::residual_weighting::TUKEY_CUTOFF_SIGMAS;
 use tunnelstitch_core::frames::MAD_TO_SIGMA;
 
 /// Variance of the residuals at a wall sample with the texture gradient g (grey levels per sample):
@@ -102,6 +100,13 @@ const GRADIENT_BINS: usize = 14;
 const RESIDUAL_BINS: usize = 256;
 /// Upper limit of the first bin of the residual, grey levels.
 const FIRST_RESIDUAL_GREY: f32 = 0.01;
+
+/// Least number of residuals in a gradient bin for it to enter the fit of the noise model: their
+/// variance is then known to a fifth.
+const MIN_RESIDUALS_PER_BIN: u64 = 100;
+/// Least σ of the noise model, grey levels: rounding to 8 bits, `1/√12` = 0.29, of which bilinear
+/// interpolation leaves two thirds.
+const MIN_SIGMA_GREY: f64 = 0.2;
 
 /// Counts of residual magnitudes by gradient of the texture, to which the noise model is fitted.
 #[derive(Clone, Debug)]

@@ -1,10 +1,13 @@
 //! The texture of a tile: mean, median and robust mean of its observers.
 
-use crate::thresholds::tile::MIN_FRAMES_FOR_SECOND_SMALLEST_GRADIENT;
 use crate::tiles::grid::{Plane, SIDE, TILE, ZERO};
 use crate::tiles::residual_weighting::{Loss, NoiseModel};
 use crate::tiles::tile_arrays::{INTERIOR, Rows, ZERO_ROWS, squared_gradients, with_ring};
 use crate::tiles::workspace::TileWorkspace;
+
+/// Number of frames from which on the second smallest gradient sets the variance of a sample
+/// instead of the smallest: only of four or more is it below the median one.
+const MIN_FRAMES_FOR_SECOND_SMALLEST_GRADIENT: usize = 4;
 
 // Everything here is inlined into its caller, which is compiled for the processor's widest vectors.
 impl TileWorkspace {

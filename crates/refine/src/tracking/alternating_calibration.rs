@@ -20,11 +20,9 @@ use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
-use crate::thresholds::alternating_calibration::{
-    MAX_CAMERA_CHANGE_PX, MAX_SHADING_CHANGE, MAX_SHADING_ITERATIONS, MAX_TRACKING_ITERATIONS,
-};
-use crate::thresholds::shading_correction::MAX_SHADING_FRAMES;
-use crate::tracking::shading_correction::correct_until_settled;
+use crate::thresholds::alternating_calibration::MAX_SHADING_CHANGE;
+use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
+use crate::tracking::shading_correction::{MAX_SHADING_FRAMES, correct_until_settled};
 use crate::tracking::track::Tracking;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_core::progress::Progress;
@@ -65,7 +63,7 @@ impl AlternatingCalibration {
         progress: &dyn Progress,
     ) -> Result<(), ProblemError> {
         let frames = self.rejections.len().min(MAX_SHADING_FRAMES);
-        for _ in 0..MAX_SHADING_ITERATIONS {
+        for _ in 0..MAX_TRACKING_ITERATIONS {
             let Some(before) = context.frames.shading() else {
                 break;
             };
@@ -132,7 +130,8 @@ impl AlternatingCalibration {
             context = context.at(states.kappa);
             self.round += 1;
             let change_px = border_displacement_px(&before, &context.camera);
-            if change_px < MAX_CAMERA_CHANGE_PX || self.round == MAX_TRACKING_ITERATIONS {
+            // Half a pixel of the level where tracking ends changes no registration.
+            if change_px < 0.5 * 2f64.powi(level as i32) || self.round == MAX_TRACKING_ITERATIONS {
                 return Ok(states);
             }
             self.kappa = context.kappa;

@@ -2,15 +2,17 @@
 
 use crate::model::rejection::RejectionReason;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::thresholds::registration::{
-    MAX_UNEXPLAINED_RATIO, MIN_CORRELATION, MIN_PRIOR_MARGIN_NATS, MIN_SEPARATION_SAMPLES,
-};
-use crate::tracking::correlation_search::min_samples;
+use crate::thresholds::registration::{MAX_UNEXPLAINED_RATIO, MIN_CORRELATION, MIN_UNEXPLAINED};
+use crate::tracking::correlation_search::{MIN_SEPARATION_SAMPLES, min_samples};
 use crate::tracking::ncc_score::NccScore;
 use crate::tracking::pose_separation::separation_m;
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::Surface;
+
+/// Difference of the prior's log-densities from which on the prior tells two poses apart: `½ 3²`,
+/// three σ.
+const MIN_PRIOR_MARGIN_NATS: f64 = 4.5;
 
 /// A hypothesis after its refinement.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +31,12 @@ pub struct Candidate {
 }
 
 impl Candidate {
+    /// True if the frame matches the mosaic as well as two right poses may differ, once for the
+    /// frame's own pose and once for those that the mosaic is fused from.
+    pub fn is_reliable(&self) -> bool {
+        self.unexplained <= MAX_UNEXPLAINED_RATIO * MAX_UNEXPLAINED_RATIO * MIN_UNEXPLAINED
+    }
+
     /// The log-posterior, up to a constant.
     pub fn log_posterior(&self) -> f64 {
         self.log_likelihood - self.deviation

@@ -12,11 +12,10 @@
 //! independent piece of texture.
 
 use crate::model::context::EstimationContext;
+use crate::samples::footprints::MAX_VIEWING_DISTANCE_RADII;
 use crate::thresholds::correlation_search::{
-    MAX_DEVIATION_SIGMA, MAX_MAXIMA_PER_TURN, MAX_VIEW_STEP_RAD, MIN_OVERLAP_SHARE,
-    MIN_PITCH_STEP_SHARE, MIN_SEPARATION_ROLL_STEPS, MIN_SEPARATION_SAMPLES,
-    MIN_SQUARED_CORRELATION_LEFT, PITCH_STEP_RAD, PITCH_STEP_SHARE_BY_SHIFT, ROLL_STEP_SAMPLES,
-    SAMPLES_PER_INDEPENDENT_PIECE, VIEW_ITERATIONS,
+    MAX_DEVIATION_SIGMA, MIN_OVERLAP_SHARE, MIN_SQUARED_CORRELATION_LEFT, PITCH_STEP_RAD,
+    SAMPLES_PER_INDEPENDENT_PIECE,
 };
 use crate::tracking::correlator::{CorrelationMaximum, Correlator};
 use crate::tracking::reference_mosaic::ReferenceMosaic;
@@ -25,6 +24,33 @@ use nalgebra::{Matrix2, Matrix2x3, Vector2, Vector3};
 use rayon::prelude::*;
 use tunnelstitch_geometry::surface::{WallPoint, shortest_arc, wall_jacobian};
 use tunnelstitch_geometry::trajectory::{Pose, so3};
+
+/// Distance on the wall from which on two poses are different, samples: two correlation lengths.
+///
+/// With the autocorrelation `exp(−d²/2L²)` of the texture, an independent piece has
+/// [`SAMPLES_PER_INDEPENDENT_PIECE`] `= π L²` samples, so `2L = 2 √(4/π)`; e⁻² of the correlation
+/// is left there.
+pub const MIN_SEPARATION_SAMPLES: f64 = 2.26;
+
+/// Step between roll hypotheses: motion of the picture's corners, samples. The right roll is within
+/// a sample, all over the picture.
+const ROLL_STEP_SAMPLES: f64 = 2.0;
+
+/// Difference of roll from which on two maxima are different hypotheses, steps of roll:
+/// neighbouring steps show the same pose, the next but one does not.
+const MIN_SEPARATION_ROLL_STEPS: f64 = 1.5;
+
+/// Share of the pitch step to which it shrinks as the frame looks more steeply along the tunnel:
+/// the cosine of the angle to the section at which the farthest resolved wall is seen.
+const MIN_PITCH_STEP_SHARE: f64 = 1.0 / MAX_VIEWING_DISTANCE_RADII;
+
+/// Length of a step of the Newton iterations that rotate a pose to look at a wall point, radians:
+/// along it the tangent of a view at 45° changes by less than a factor of two.
+const MAX_VIEW_STEP_RAD: f64 = 0.3;
+
+/// Number of these iterations: five of full length turn the view by a right angle, three more
+/// square the error three times, from a tenth of a radian to 1e-8.
+const VIEW_ITERATIONS: usize = 8;
 
 /// A hypothesis of a frame's pose.
 #[derive(Clone, Copy, Debug)]
@@ -68,10 +94,10 @@ pub fn search_poses(
     sigma_rad: [f64; 3],
     count: usize,
 ) -> Vec<Hypothesis> {
-    let Some(grid) = SearchGrid::new(context, unwrapped, predicted, sigma_rad) else {
+    let spacing_m = mosaic.grid.spacing_m;
+    let Some(grid) = SearchGrid::new(context, unwrapped, predicted, sigma_rad, spacing_m) else {
         return Vec::new();
     };
-    let spacing_m = mosaic.grid.spacing_m;
     let cells = |length_m: f64| (length_m / spacing_m).ceil() as usize;
     let correlator = Correlator::new(mosaic, (cells(grid.reach_m[0]), cells(grid.reach_m[1])));
     let min_samples = min_samples(unwrapped);
@@ -84,15 +110,10 @@ pub fn search_poses(
         .par_iter()
         .flat_map_iter(|&(pitch, roll)| {
             let pose = grid.turned_pose(pitch, roll);
-            let mut of_turn: Vec<ScoredMaximum> = correlator
-                .find_maxima(mosaic, unwrapped, &pose)
-                .into_iter()
-                .filter(|found| found.samples >= min_samples)
-                .map(|found| grid.score(pitch, roll, spacing_m, &found))
-                .collect();
-            of_turn.sort_by(|a, b| b.score.total_cmp(&a.score));
-            of_turn.truncate(MAX_MAXIMA_PER_TURN);
-            of_turn
+            let maxima = correlator.find_maxima(mosaic, unwrapped, &pose).into_iter();
+            let compared = maxima.filter(|found| found.samples >= min_samples);
+            let scored = compared.map(|found| grid.score(pitch, roll, spacing_m, &found));
+            scored.collect::<Vec<ScoredMaximum>>()
         })
         .collect();
     maxima.sort_by(|a, b| b.score.total_cmp(&a.score));
@@ -143,12 +164,14 @@ struct SearchGrid<'p> {
 }
 
 impl<'p> SearchGrid<'p> {
-    /// The grid around a pose; None if that does not look at the wall, or looks along the tunnel.
+    /// The grid around a pose, for samples `spacing_m` apart; None if that does not look at the
+    /// wall, or looks along the tunnel.
     fn new(
         context: &EstimationContext,
         unwrapped: &UnwrappedFrame,
         predicted: &'p Pose,
         sigma_rad: [f64; 3],
+        spacing_m: f64,
     ) -> Option<Self> {
         let ray = predicted.r_wc * Vector3::z();
         let hit = context.surface.hit(&predicted.t_wc, &ray).ok()?;
@@ -166,11 +189,12 @@ impl<'p> SearchGrid<'p> {
         let pitches = symmetric_steps(pitch_reach, PITCH_STEP_RAD * steepness);
         let roll_reach = MAX_DEVIATION_SIGMA * sigma_rad[2];
         let rolls = symmetric_steps(roll_reach, ROLL_STEP_SAMPLES / half_diagonal);
-        // Shifts along h make up for half a step of pitch; those along s for all of the yaw.
-        let pitch_by_shift = if pitches.len() > 1 {
-            PITCH_STEP_SHARE_BY_SHIFT * (pitches[1] - pitches[0])
+        // Shifts along h make up for half a step of pitch, and a sample more, as a maximum may lie
+        // between those of two pitches; shifts along s make up for all of the yaw.
+        let along_reach_m = if pitches.len() > 1 {
+            0.5 * (pitches[1] - pitches[0]) * along_m + spacing_m
         } else {
-            pitch_reach
+            pitch_reach * along_m
         };
         let widest_m = 0.5 * context.surface.perimeter_m();
         Some(Self {
@@ -185,7 +209,7 @@ impl<'p> SearchGrid<'p> {
             rolls,
             reach_m: [
                 (MAX_DEVIATION_SIGMA * sigma_rad[1] * across_m).min(widest_m),
-                (pitch_by_shift * along_m).min(widest_m),
+                along_reach_m.min(widest_m),
             ],
         })
     }

@@ -1,7 +1,7 @@
 //! A regular grid on the unrolled wall, on which frames are compared.
 
 use crate::model::context::EstimationContext;
-use crate::thresholds::reference_mosaic::MAX_VIEWING_DISTANCE_RADII;
+use crate::samples::footprints::MAX_VIEWING_DISTANCE_RADII;
 use nalgebra::Vector3;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::{Footprint, WallPoint, viewing_distance};

@@ -4,10 +4,8 @@
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
-use crate::thresholds::prescreening::{
-    MAX_REPEAT_DIFFERENCE_GREY, MIN_CONTRAST_GREY, MIN_KNOWN_SHARE, MIN_MOTION_PX,
-    MIN_SHADING_FRAMES,
-};
+use crate::thresholds::correlation_search::MIN_OVERLAP_SHARE;
+use crate::thresholds::prescreening::{MAX_REPEAT_DIFFERENCE_GREY, MIN_CONTRAST_GREY};
 use tunnelstitch_core::frames::{GreyImage, Shading, noise_sigma};
 use tunnelstitch_core::progress::Progress;
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -15,6 +13,8 @@ use tunnelstitch_geometry::surface::viewing_distance;
 
 /// Frames decoded at once: bounds the memory.
 const BATCH: usize = 64;
+/// Number of frames whose mean shows the shading: of the wall's texture it keeps less than a third.
+const MIN_SHADING_FRAMES: usize = 10;
 
 /// The result of prescreening.
 pub struct Prescreened {
@@ -57,9 +57,10 @@ pub fn prescreen(
             let (mean, spread, known) = compute_moments(&picture);
             let repeated = last.as_ref().filter(|(earlier, other)| {
                 rms_difference(other, &picture) < MAX_REPEAT_DIFFERENCE_GREY
-                    && has_moved(context, *earlier, k)
+                    && has_moved(context, *earlier, k, coarsest)
             });
-            rejections.push(if known < MIN_KNOWN_SHARE || spread < MIN_CONTRAST_GREY {
+            // With fewer known pixels no pose has the overlap that registration asks for.
+            rejections.push(if known < MIN_OVERLAP_SHARE || spread < MIN_CONTRAST_GREY {
                 Some(RejectionReason::Featureless)
             } else {
                 repeated.map(|(earlier, _)| RejectionReason::Repeated(*earlier))
@@ -121,13 +122,14 @@ fn rms_difference(a: &GreyImage, b: &GreyImage) -> f64 {
     (sum / n.max(1.0)).sqrt()
 }
 
-/// True if two frames cannot show the same picture by their initial poses.
-fn has_moved(context: &EstimationContext, a: usize, b: usize) -> bool {
+/// True if two frames cannot show the same picture by their initial poses: if these move the
+/// picture by more than a pixel of the coarsest level, where pictures are compared.
+fn has_moved(context: &EstimationContext, a: usize, b: usize, coarsest: usize) -> bool {
     let (from, to) = (&context.prior.initial[a], &context.prior.initial[b]);
     let Ok(distance_m) = viewing_distance(context.surface, from) else {
         return true;
     };
     let rotation = from.r_wc.angle_to(&to.r_wc);
     let translation = (to.t_wc - from.t_wc).norm() / distance_m;
-    (rotation + translation) * context.camera.fy > MIN_MOTION_PX
+    (rotation + translation) * context.camera.fy > 2f64.powi(coarsest as i32)
 }

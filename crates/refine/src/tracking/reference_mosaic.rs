@@ -3,10 +3,8 @@
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::samples::footprints::reach_m;
-use crate::thresholds::reference_mosaic::{
-    MAX_GAIN, MAX_REACH_RADII, MAX_SPACING_RADII, MIN_GAIN, MIN_PIXEL_DENSITY,
-};
+use crate::samples::footprints::RESOLVED_REACH_RADII;
+use crate::thresholds::visibility::MIN_RELATIVE_SAMPLE_AREA;
 use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
 use crate::tracking::ncc_score::NccScore;
 use crate::tracking::unwrapped_frame::{UnwrappedFrame, UnwrappedSampler};
@@ -43,8 +41,8 @@ struct Viewpoint {
 }
 
 impl Viewpoint {
-    /// True if a wall point with this normal is seen with at least [`MIN_PIXEL_DENSITY`] of the
-    /// pixels that it has when seen squarely from the axis.
+    /// True if a wall point with this normal is seen with at least the share
+    /// [`MIN_RELATIVE_SAMPLE_AREA`] of the pixels that it has when seen squarely from the axis.
     ///
     /// At distance d and angle β to the normal the share is `cos β (r/d)²`.
     #[inline]
@@ -52,7 +50,7 @@ impl Viewpoint {
         let ray = Vector3::from(*point) - self.centre;
         let square = ray.norm_squared();
         ray.dot(normal).abs() * self.radius_m * self.radius_m
-            > MIN_PIXEL_DENSITY * square * square.sqrt()
+            > MIN_RELATIVE_SAMPLE_AREA as f32 * square * square.sqrt()
     }
 }
 
@@ -78,13 +76,13 @@ impl ReferenceMosaic {
         margin_m: f64,
     ) -> Result<Self, ProblemError> {
         let radius_m = context.surface.perimeter_m() / std::f64::consts::TAU;
-        let reach_m = reach_m(context.surface).min(MAX_REACH_RADII * radius_m);
+        let reach_m = RESOLVED_REACH_RADII * radius_m;
         let footprint = Footprint::within(context.surface, camera, pose, reach_m)
             .map_err(|source| ProblemError::Placement { frame, source })?
             .widened(margin_m);
-        // A frame that looks along the tunnel has its detail where the wall is near.
-        let spacing_m =
-            pixel_size_m(context, camera, pose).min(MAX_SPACING_RADII * radius_m / camera.fy);
+        // A frame that looks along the tunnel has its detail where the wall is near, for a camera
+        // on the axis a radius away.
+        let spacing_m = pixel_size_m(context, camera, pose).min(radius_m / camera.fy);
         let grid = MosaicGrid::over(&footprint, spacing_m);
         let middle = WallPoint {
             s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
@@ -158,8 +156,14 @@ impl ReferenceMosaic {
     }
 
     /// The frame's estimate at `pose`, with the gain and bias that fit its grey values to those of
-    /// the mosaic: a regression line.
-    pub fn fit_exposure(&self, unwrapped: &UnwrappedFrame, pose: &Pose) -> FrameEstimate {
+    /// the mosaic: a regression line. The gain is within three σ of its prior, whose logarithm has
+    /// the 1-σ `log_gain_sigma`.
+    pub fn fit_exposure(
+        &self,
+        unwrapped: &UnwrappedFrame,
+        pose: &Pose,
+        log_gain_sigma: f64,
+    ) -> FrameEstimate {
         let grey = unwrapped.grey_at(pose, &self.origin);
         let (mut n, mut x, mut y, mut xx, mut xy) = (0.0f64, 0.0f64, 0.0f64, 0.0f64, 0.0f64);
         for (point, wall) in self.points.iter().zip(&self.grey) {
@@ -179,8 +183,9 @@ impl ReferenceMosaic {
             return FrameEstimate::at(*pose);
         }
         let gain = (xy - x * y / n) / (xx - x * x / n);
+        let max_gain = (3.0 * log_gain_sigma).exp();
         let gain = if gain.is_finite() {
-            gain.clamp(MIN_GAIN, MAX_GAIN)
+            gain.clamp(1.0 / max_gain, max_gain)
         } else {
             1.0
         };

@@ -13,13 +13,11 @@ use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
-use crate::thresholds::correlation_search::MAX_DEVIATION_SIGMA;
+use crate::thresholds::correlation_search::{MAX_DEVIATION_SIGMA, PITCH_STEP_RAD};
 use crate::thresholds::registration::{
-    CLOSER_SEARCH_SIGMA_RAD, MAX_CLOSER_HYPOTHESES, MAX_CLOSER_SEARCH_ITERATIONS,
-    MAX_DEVIATION_COST, MAX_HYPOTHESES, MAX_SCORE_DEFICIT_NATS, MAX_SOLVE_ITERATIONS,
-    MEAN_HYPOTHESES, MIN_RELIABLE_CORRELATION, MIN_SCORE_GAIN_NATS, MIN_UNEXPLAINED,
-    SOLVE_STEP_TOLERANCE_PX,
+    MAX_DEVIATION_COST, MAX_HYPOTHESES, MEAN_HYPOTHESES, MIN_UNEXPLAINED,
 };
+use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::candidate::{Candidate, choose_candidate, sort_candidates, unexplained_share};
 use crate::tracking::correlation_search::{Hypothesis, log_likelihood, search_poses};
 use crate::tracking::mosaic_grid::pixel_size_m;
@@ -32,12 +30,30 @@ use std::borrow::Cow;
 use tunnelstitch_geometry::surface::viewing_distance;
 use tunnelstitch_geometry::trajectory::{Jitter, Pose};
 
-/// Stopping rule of the solve of a single frame; the global solve does the rest.
-const STOPPING: Stopping = Stopping {
-    max_iterations: MAX_SOLVE_ITERATIONS,
-    step_px: SOLVE_STEP_TOLERANCE_PX,
-    step_sigma: 0.0,
-};
+/// Largest deficit of a hypothesis to the best one with which it is refined, nats: log-posterior
+/// odds of `ln(MAX_HYPOTHESES/0.001)`. Of ten hypotheses, a right one is dismissed at most once in
+/// a thousand frames.
+///
+/// The probability that a hypothesis is right whose log-posterior is Δ lower is no more than
+/// `exp(−Δ)`. The search underestimates log-posteriors by its steps, in proportion to the number of
+/// samples. So the deficit is between the upper bound for the hypothesis after refinement
+/// ([`crate::tracking::correlation_search::attainable_log_likelihood`]) and the lower bound for the
+/// best one, its score before refinement.
+const MAX_SCORE_DEFICIT_NATS: f64 = 9.2;
+
+/// Least gain in log-posterior, nats, for which another closer search is worth its time.
+///
+/// Twice the gain that fitting the six unknowns of a pose to other noise brings follows χ² with six
+/// degrees of freedom (Wilks), whose mean is 6: a smaller gain is noise.
+const MIN_SCORE_GAIN_NATS: f64 = 3.0;
+
+/// Number of hypotheses of a closer search that are refined: the best one and its nearest rival,
+/// which the ambiguity test compares.
+const MAX_CLOSER_HYPOTHESES: usize = 2;
+
+/// Largest σ of pitch, yaw and roll in a closer search, radians. The search then covers the pitch
+/// next to that of the best candidate, and the half step around it that shifts make up for.
+const CLOSER_SEARCH_SIGMA_RAD: f64 = 1.5 * PITCH_STEP_RAD / MAX_DEVIATION_SIGMA;
 
 /// The estimate of a registered frame.
 #[derive(Clone, Copy, Debug)]
@@ -225,10 +241,10 @@ impl<'r> Registration<'r> {
         let sigma_rad = self
             .sigma_rad
             .map(|sigma| sigma.min(CLOSER_SEARCH_SIGMA_RAD));
-        for _ in 0..MAX_CLOSER_SEARCH_ITERATIONS {
+        for _ in 0..MAX_TRACKING_ITERATIONS {
             sort_candidates(candidates);
             let first = candidates.first();
-            let Some(first) = first.filter(|c| c.correlation < MIN_RELIABLE_CORRELATION) else {
+            let Some(first) = first.filter(|c| !c.is_reliable()) else {
                 break;
             };
             let (pose, before) = (first.estimate.pose, first.log_posterior());
@@ -252,7 +268,10 @@ impl<'r> Registration<'r> {
     /// Refines a pose by Gauss–Newton down to the level of the search; None if that leads out of
     /// the tunnel, off the wall, or beyond what the prior allows.
     fn refine_pose(&self, pose: &Pose) -> Result<Option<Candidate>, ProblemError> {
-        let mut estimate = self.mosaic.fit_exposure(&self.unwrapped, pose);
+        let log_gain_sigma = self.context.prior.log_gain_sigma;
+        let mut estimate = self
+            .mosaic
+            .fit_exposure(&self.unwrapped, pose, log_gain_sigma);
         for level in (self.search_level..=self.coarsest_level).rev() {
             estimate = match self.solve_at(level, estimate) {
                 Ok(refined) => refined,
@@ -291,7 +310,7 @@ impl<'r> Registration<'r> {
         }
         Ok(Registered {
             estimate,
-            is_reliable: candidate.correlation >= MIN_RELIABLE_CORRELATION,
+            is_reliable: candidate.is_reliable(),
         })
     }
 
@@ -317,7 +336,7 @@ impl<'r> Registration<'r> {
         if problem.tiles() == 0 {
             return Ok(estimate);
         }
-        Ok(solve(problem, STOPPING)?.estimates[0])
+        Ok(solve(problem, Stopping::TRACKING)?.estimates[0])
     }
 }
 

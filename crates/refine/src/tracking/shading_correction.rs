@@ -17,13 +17,21 @@ use crate::options::RefineOptions;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::solver::neighbourhood::Neighbourhood;
-use crate::thresholds::shading_correction::{
-    MAX_CORRECTION_ITERATIONS, MAX_SHADING_FRAMES, MAX_SHADING_TILES,
-    MIN_CHANGE_SIGNIFICANCE_SIGMA, MIN_SIGNIFICANCE_SIGMA,
-};
+use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use std::ops::Range;
 use tunnelstitch_core::frames::Shading;
 use tunnelstitch_photometry::{Observation, PhotometricCalibration, Priors};
+
+/// Frames that the shading is estimated from, at the most: it is the same in all.
+pub const MAX_SHADING_FRAMES: usize = 60;
+/// Tiles that the shading is estimated from, spread over all of these frames.
+const MAX_SHADING_TILES: usize = 1000;
+/// Size of a new shading over its 1-σ from noise above which it is taken over: three σ.
+const MIN_SIGNIFICANCE_SIGMA: f64 = 3.0;
+/// Size of a change of an existing shading over its 1-σ from noise above which it is taken over. It
+/// has 27 coefficients, so that the square has the distribution `χ²/27`, whose 99.9 % quantile is
+/// 55.5/27.
+const MIN_CHANGE_SIGNIFICANCE_SIGMA: f64 = 1.43;
 
 /// Corrects the shading until frames agree where they overlap, solving for their poses in between.
 ///
@@ -36,7 +44,7 @@ pub fn correct_until_settled(
 ) -> Result<(), ProblemError> {
     let side = context.camera.shorter_side();
     let (coarsest, finest) = (options.coarsest_level(side), options.handover_level(side));
-    for _ in 0..MAX_CORRECTION_ITERATIONS {
+    for _ in 0..MAX_TRACKING_ITERATIONS {
         if !correct(context, options, frames)? {
             break;
         }

@@ -17,11 +17,11 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use crate::samples::footprints::footprint;
 use crate::samples::footprints::footprints;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
-use crate::thresholds::tracking::{LONG_WINDOW_STRIDE, MAX_FAILURES};
+use crate::thresholds::tracking::MAX_FAILURES;
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::pose_prediction::{PosePrediction, predict_pose};
 use crate::tracking::registration::{Effort, Registered, register_frame};
-use crate::tracking::windows::{solve_long_window, solve_sliding_window};
+use crate::tracking::windows::{LONG_WINDOW_STRIDE, solve_long_window, solve_sliding_window};
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::surface::Footprint;
 

@@ -15,18 +15,15 @@ use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
-use crate::thresholds::tracking::{
-    LONG_WINDOW_FRAMES, LONG_WINDOW_HELD_DIVISOR, MAX_WINDOW_ITERATIONS, WINDOW_HELD_DIVISOR,
-    WINDOW_STEP_TOLERANCE_PX,
-};
+use crate::thresholds::tracking::{LONG_WINDOW_FRAMES, WINDOW_HELD_DIVISOR};
 use std::ops::Range;
 
-/// Stopping rule of the solve of a window; the global solve does the rest.
-const STOPPING: Stopping = Stopping {
-    max_iterations: MAX_WINDOW_ITERATIONS,
-    step_px: WINDOW_STEP_TOLERANCE_PX,
-    step_sigma: 0.0,
-};
+/// Number of frames of a long window that are held.
+const LONG_WINDOW_HELD: usize = LONG_WINDOW_FRAMES / WINDOW_HELD_DIVISOR;
+
+/// Number of frames tracked between the solves of two long windows: as many as are held, so that
+/// those held in one have been solved for in the window before.
+pub const LONG_WINDOW_STRIDE: usize = LONG_WINDOW_HELD;
 
 /// Solves the window that reaches from frame `first` to the last tracked one, the oldest third of
 /// it held; `drifted`: the last frame may be many pixels off.
@@ -80,11 +77,7 @@ pub fn solve_long_window(
     let finest = options.handover_level(context.camera.shorter_side());
     let end = states.estimates.len();
     let start = end.saturating_sub(LONG_WINDOW_FRAMES);
-    let held = if start == 0 {
-        0
-    } else {
-        LONG_WINDOW_FRAMES / LONG_WINDOW_HELD_DIVISOR
-    };
+    let held = if start == 0 { 0 } else { LONG_WINDOW_HELD };
     let context = context.at(states.kappa);
     solve_window(&context, finest, start..end, held, states)?;
     Ok(())
@@ -128,7 +121,7 @@ fn solve_window(
     if problem.tiles() == 0 {
         return Ok(f64::INFINITY);
     }
-    let solution = solve(problem, STOPPING)?;
+    let solution = solve(problem, Stopping::TRACKING)?;
     states.kappa = solution.kappa;
     states.estimates[active].copy_from_slice(&solution.estimates);
     let record = solution.record;
