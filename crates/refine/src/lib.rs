@@ -34,8 +34,8 @@
 //! | accept: damping, step test, stopping | [`solver::gauss_newton`] |
 //!
 //! Dependencies point downwards only, in the order parameters, linear, model, tiles, samples,
-//! joint, problem, solver, tracking, validation, uncertainty, verdict, stages, pipeline. Every tuned number
-//! is in [`thresholds`].
+//! joint, problem, solver, tracking, validation, uncertainty, verdict, stages, pipeline. Every
+//! tuned number is in [`thresholds`].
 //!
 //! # Speed
 //!

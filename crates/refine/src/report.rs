@@ -118,12 +118,12 @@ pub struct RefineReport {
     /// [`crate::uncertainty::covariance`]: above 1 where residuals err together, below
     /// where they cancel.
     pub variance_factor: f64,
-    /// What the residuals show beyond noise, if they do.
+    /// Errors beyond noise, if the residuals show any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub model_error: Option<ModelErrorReport>,
     /// The refined poses against the prior.
     pub prior_test: PriorTest,
-    /// Whether the result may be used, and for what.
+    /// The verdict: whether the result may be used, and for what.
     pub verdict: SurveyVerdict,
     /// The rolling-shutter test: the readout time that fits the frames best, where they determine
     /// it.

@@ -128,16 +128,6 @@ pub mod registration {
     ///
     /// Chosen by: unknown.
     pub const MAX_UNEXPLAINED_RATIO: f64 = 2.0;
-
-    /// Deviation `½ eᵀΣ⁻¹e` of a pose from the prior's prediction up to which the prior allows it.
-    ///
-    /// Higher: poses farther from the prior are accepted.
-    ///
-    /// Chosen by: derivation. All six unknowns of the pose as far off as the search reaches.
-    pub const MAX_DEVIATION_COST: f64 = 0.5
-        * 6.0
-        * super::correlation_search::MAX_DEVIATION_SIGMA
-        * super::correlation_search::MAX_DEVIATION_SIGMA;
 }
 
 /// Thresholds of `tracking/correlation_search.rs`.
@@ -163,17 +153,6 @@ pub mod correlation_search {
     ///
     /// Chosen by: unknown.
     pub const MIN_OVERLAP_SHARE: f64 = 0.08;
-
-    /// Smallest share of its squared correlation that a right hypothesis keeps at half a step of
-    /// the search from the right pose.
-    ///
-    /// Higher: fewer hypotheses and fewer aliases are refined.
-    ///
-    /// Chosen by: derivation. With the autocorrelation `exp(−d²/2L²)` of the texture, `π L²` = 4
-    /// samples (an independent piece), half a sample off along both axes (d² = 1/2) and half a step
-    /// of roll off (one sample at the corners, d² = 1/3 in the mean) leave
-    /// `exp(−d²/L²)` = 0.52 of it.
-    pub const MIN_SQUARED_CORRELATION_LEFT: f64 = 0.5;
 
     /// Step between pitch hypotheses, radians; shifts along the tunnel make up for what lies
     /// between.
@@ -264,12 +243,6 @@ pub mod joint {
     /// Higher: sharper edges, more time and memory. Chosen by: unknown.
     pub const SAMPLES_PER_PIXEL: f64 = 3.0;
 
-    /// Samples per pixel of the lattice on which outliers are detected before the joint solve.
-    ///
-    /// Higher: smaller outliers are found at more time. Chosen by: derivation. Two samples a pixel
-    /// resolve all that a pixel shows (Nyquist).
-    pub const OUTLIER_MASK_SAMPLES_PER_PIXEL: f64 = 2.0;
-
     /// Largest step that ends the joint solve, standard deviations of the estimates.
     ///
     /// Higher: fewer of its expensive steps. Chosen by: the step after one of this length is a
@@ -306,33 +279,12 @@ pub mod stopping {
 /// Thresholds of `validation/pairwise_ncc.rs`, `validation/contradictions.rs` and
 /// `validation/blurred_frames.rs`.
 pub mod pairwise_ncc {
-    /// Distance between samples of the coarse comparison, pixels of the level.
-    ///
-    /// Higher: fewer samples, in less time.
-    ///
-    /// Chosen by: unknown.
-    pub const COARSE_STRIDE_PX: usize = 4;
-
     /// Half width of the window of local contrast in the coarse comparison, pixels of the level.
     ///
     /// Higher: larger structures are compared.
     ///
     /// Chosen by: a window that holds a brick or two.
     pub const COARSE_WINDOW_PX: usize = 6;
-
-    /// Pyramid level of the fine comparison.
-    ///
-    /// Higher: noise weighs less, but so does detail.
-    ///
-    /// Chosen by: unknown.
-    pub const FINE_LEVEL: usize = 1;
-
-    /// Distance between samples of the fine comparison, pixels of the level.
-    ///
-    /// Higher: fewer samples, in less time.
-    ///
-    /// Chosen by: unknown.
-    pub const FINE_STRIDE_PX: usize = 5;
 
     /// Half width of the window of local contrast in the fine comparison, pixels of the level.
     ///
@@ -341,13 +293,6 @@ pub mod pairwise_ncc {
     /// Chosen by: unknown.
     pub const FINE_WINDOW_PX: usize = 3;
 
-    /// Share of the earlier frame's samples that two frames must have in common to be compared.
-    ///
-    /// Higher: fewer pairs are compared.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_OVERLAP_SHARE: f64 = 0.03;
-
     /// Correlation, corrected for noise, below which two frames contradict each other.
     ///
     /// Higher: more pairs contradict, and more frames are rejected.
@@ -355,14 +300,6 @@ pub mod pairwise_ncc {
     /// Chosen by: the tests `frames_at_true_poses_correlate` (above 0.8) and
     /// `frame_displaced_by_a_brick_contradicts_the_others`.
     pub const MIN_CORRELATION: f64 = 0.6;
-
-    /// Correlation of all samples, corrected for noise, from which on that of most samples is not
-    /// computed.
-    ///
-    /// Higher: more robust correlations, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_CERTAIN_CORRELATION: f64 = 0.85;
 
     /// Share of the samples that must be left without what stands out of the wall, for the rest to
     /// vouch for the pair.
@@ -405,27 +342,6 @@ pub mod pairwise_lucas_kanade {
     /// Chosen by: unknown.
     pub const STRIDE_PX: f64 = 4.0;
 
-    /// Number of Gauss–Newton iterations.
-    ///
-    /// Higher: larger displacements are measured, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_ITERATIONS: usize = 8;
-
-    /// Number of samples that two frames must share to be aligned.
-    ///
-    /// Higher: fewer pairs are measured.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_SAMPLES: f64 = 40.0;
-
-    /// Share of the earlier frame's samples that two frames must share to be aligned.
-    ///
-    /// Higher: fewer pairs are measured.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_OVERLAP_SHARE: f64 = 0.02;
-
     /// Root mean square displacement beyond which the iterations have diverged, pixels of the
     /// level.
     ///
@@ -434,14 +350,6 @@ pub mod pairwise_lucas_kanade {
     /// Chosen by: Gauss–Newton finds no larger displacement.
     pub const MAX_DISPLACEMENT_PX: f64 = 8.0;
 
-    /// Share of the squared slopes that must be texture and not noise; with less, the normal matrix
-    /// is chance.
-    ///
-    /// Higher: more pairs are too faint to measure.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_TEXTURE_SHARE: f64 = 0.3;
-
     /// Ratio of a sample's squared slope to the median one beyond which its influence no longer
     /// grows.
     ///
@@ -449,41 +357,6 @@ pub mod pairwise_lucas_kanade {
     ///
     /// Chosen by: unknown.
     pub const MAX_SQUARED_SLOPE_RATIO: f32 = 10.0;
-
-    /// Step length below which the iterations have converged, pixels of the level.
-    ///
-    /// Higher: fewer iterations, less exact displacements.
-    ///
-    /// Chosen by: unknown.
-    pub const CONVERGED_STEP_PX: f64 = 0.03;
-
-    /// Step length at which the result counts nevertheless, multiples of [`CONVERGED_STEP_PX`].
-    ///
-    /// Higher: fewer results of the first iteration are returned.
-    ///
-    /// Chosen by: unknown.
-    pub const ENDED_STEP_FACTOR: f64 = 3.0;
-
-    /// Noise of the residuals that is assumed at least, grey levels.
-    ///
-    /// Higher: larger σ of noise-free frames.
-    ///
-    /// Chosen by: derivation. Rounding to whole grey levels has σ = 1/√12 = 0.29.
-    pub const MIN_RESIDUAL_SIGMA_GREY: f32 = 0.3;
-
-    /// Smallest gain of one frame against the other.
-    ///
-    /// Higher: pairs of very different exposure are fitted worse.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_GAIN: f64 = 0.4;
-
-    /// Largest gain of one frame against the other.
-    ///
-    /// Higher: pairs of very different exposure are fitted better.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_GAIN: f64 = 2.5;
 }
 
 /// Thresholds of `validation/inconsistent_frames.rs`.
@@ -515,52 +388,16 @@ pub mod inconsistent_frames {
 /// Thresholds of `validation/aliasing.rs`, `validation/alias_choice.rs` and
 /// `validation/alias_search.rs`.
 pub mod aliasing {
-    /// Length of a gauge motion on the wall from which on it leads to an alias, samples of the
-    /// search level.
-    ///
-    /// Higher: aliases of short periods are missed.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_MOTION_SAMPLES: f64 = 3.0;
-
-    /// Number of times that the step of the search for the best fraction of a sample is halved.
-    ///
-    /// Higher: more exact aliases, in more time.
-    ///
-    /// Chosen by: derivation. The last step is a sixteenth of a sample.
-    pub const SHIFT_REFINEMENTS: usize = 4;
-
-    /// Number of sweeps over all frames until no choice changes.
-    ///
-    /// Higher: choices settle in longer surveys.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_SWEEPS: usize = 20;
-
     /// Difference of two periods, as a share of one of them, below which they are the same.
     ///
     /// Higher: fewer periods are told apart.
     ///
     /// Chosen by: unknown.
     pub const MAX_PERIOD_DIFFERENCE: f64 = 0.1;
-
-    /// Number of times that all frames are compared with the wall elsewhere.
-    ///
-    /// Higher: fewer frames remain undecided, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_ITERATIONS: usize = 8;
 }
 
 /// Thresholds of `validation/repair.rs`.
 pub mod repair {
-    /// Number of iterations in which rejected frames are registered again.
-    ///
-    /// Higher: more frames are recovered, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_REGISTRATION_ITERATIONS: usize = 3;
-
     /// Number of iterations in which frames are rejected and their neighbourhoods solved.
     ///
     /// Higher: longer repairs, fewer wrong frames left.
@@ -578,13 +415,6 @@ pub mod observability {
     /// Chosen by: unknown.
     pub const MAX_SIGMA_SHARE: f64 = 0.5;
 
-    /// Correlation with another parameter from which on it is reported.
-    ///
-    /// Higher: fewer correlations are reported.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_REPORTED_CORRELATION: f64 = 0.9;
-
     /// Share of frames that fit nowhere up to which shared parameters are estimated: beyond it the
     /// others may fit each other in wrong places.
     ///
@@ -592,15 +422,6 @@ pub mod observability {
     ///
     /// Chosen by: unknown.
     pub const MAX_MISFIT_SHARE: f64 = 0.1;
-
-    /// 1-σ of the median frame on the wall up to which shared parameters are estimated, pixels.
-    /// Frames that are tied more loosely can tilt and shift together, the camera with them, at less
-    /// cost than aliasing causes; the covariance does not know that.
-    ///
-    /// Higher: self-calibration of weaker surveys.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_MEDIAN_SIGMA_PX: f64 = 0.2;
 }
 
 /// Thresholds of `verdict/prior_test.rs`.
@@ -623,47 +444,12 @@ pub mod prior_test {
 
 /// Thresholds of `uncertainty/rolling_shutter_test.rs`.
 pub mod rolling_shutter_test {
-    /// Number of frames that are used, from the middle of the survey.
-    ///
-    /// Higher: a more certain readout time, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_FRAMES: usize = 120;
-
-    /// Number of Gauss–Newton iterations.
-    ///
-    /// Higher: a more exact readout time, in more time.
-    ///
-    /// Chosen by: unknown.
-    pub const MAX_SOLVE_ITERATIONS: u64 = 4;
-
-    /// Step length below which the solve has converged, pixels of the level.
-    ///
-    /// Higher: a less exact readout time.
-    ///
-    /// Chosen by: unknown.
-    pub const STEP_TOLERANCE_PX: f64 = 0.02;
-
-    /// Step length below which the solve has converged, σ.
-    ///
-    /// Higher: a less exact readout time.
-    ///
-    /// Chosen by: unknown.
-    pub const STEP_TOLERANCE_SIGMA: f64 = 1.0;
-
     /// Difference from the readout time given that is systematic, σ.
     ///
     /// Higher: fewer wrong times are reported.
     ///
     /// Chosen by: unknown.
     pub const MIN_DIFFERENCE_SIGMA: f64 = 6.0;
-
-    /// Displacement of the first row against the last by the difference that is systematic, pixels.
-    ///
-    /// Higher: fewer wrong times are reported.
-    ///
-    /// Chosen by: unknown.
-    pub const MIN_SHIFT_PX: f64 = 0.5;
 }
 
 /// Thresholds of `stages/assess.rs, validate_pairs.rs`.

@@ -161,7 +161,8 @@ impl fmt::Display for RejectionReason {
             ),
             Self::ContradictsScale { factor } => write!(
                 f,
-                "refined steps are {factor:.2} times the initial ones, so lengths cannot be believed"
+                "refined steps are {factor:.2} times the initial ones, so lengths cannot be \
+                 believed"
             ),
             Self::NotTried { failures } => write!(
                 f,

@@ -39,7 +39,7 @@ pub struct ReportParts {
     pub levels: Vec<LevelReport>,
     /// The rolling-shutter test.
     pub rolling_shutter: Option<ReadoutEstimate>,
-    /// What the residuals show beyond noise.
+    /// Errors beyond noise that the residuals show.
     pub model_error: Option<ModelErrorReport>,
     /// Self-calibration.
     pub calibration: Option<CalibrationReport>,

@@ -12,7 +12,6 @@ use crate::stages::plan::{SolvePlan, Stage};
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::{Estimation, LastSolve, PipelineState};
-use crate::thresholds::joint;
 use crate::tracking::shading_correction::correct;
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
@@ -110,7 +109,7 @@ fn problem_of<'a>(
         return Ok(Some(problem));
     }
     let density = if sampling.joint {
-        Some(joint::OUTLIER_MASK_SAMPLES_PER_PIXEL)
+        Some(RefineOptions::default().final_density)
     } else {
         let chosen = setup.options.outlier_mask_density;
         chosen.filter(|_| sampling.variance_weighting)
@@ -166,6 +165,7 @@ fn find_unobservable(
         &calibration,
         &solution.estimates,
         &state.frames.rejections,
+        setup.options.max_sigma_px,
     ))
 }
 

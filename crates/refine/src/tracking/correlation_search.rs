@@ -14,8 +14,7 @@
 use crate::model::context::EstimationContext;
 use crate::samples::footprints::MAX_VIEWING_DISTANCE_RADII;
 use crate::thresholds::correlation_search::{
-    MAX_DEVIATION_SIGMA, MIN_OVERLAP_SHARE, MIN_SQUARED_CORRELATION_LEFT, PITCH_STEP_RAD,
-    SAMPLES_PER_INDEPENDENT_PIECE,
+    MAX_DEVIATION_SIGMA, MIN_OVERLAP_SHARE, PITCH_STEP_RAD, SAMPLES_PER_INDEPENDENT_PIECE,
 };
 use crate::tracking::correlator::{CorrelationMaximum, Correlator};
 use crate::tracking::reference_mosaic::ReferenceMosaic;
@@ -51,6 +50,14 @@ const MAX_VIEW_STEP_RAD: f64 = 0.3;
 /// Number of these iterations: five of full length turn the view by a right angle, three more
 /// square the error three times, from a tenth of a radian to 1e-8.
 const VIEW_ITERATIONS: usize = 8;
+
+/// Smallest share of its squared correlation that a right hypothesis keeps at half a step of the
+/// search from the right pose.
+///
+/// With the autocorrelation `exp(−d²/2L²)` of the texture, `π L²` = 4 samples (an independent
+/// piece), half a sample off along both axes (d² = 1/2) and half a step of roll off (one sample at
+/// the corners, d² = 1/3 in the mean) leave `exp(−d²/L²)` = 0.52 of it.
+pub const MIN_SQUARED_CORRELATION_LEFT: f64 = 0.5;
 
 /// A hypothesis of a frame's pose.
 #[derive(Clone, Copy, Debug)]

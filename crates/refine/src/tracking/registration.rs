@@ -14,9 +14,7 @@ use crate::samples::sampling::Sampling;
 use crate::solver::argmin_glue::solve;
 use crate::solver::stopping::Stopping;
 use crate::thresholds::correlation_search::{MAX_DEVIATION_SIGMA, PITCH_STEP_RAD};
-use crate::thresholds::registration::{
-    MAX_DEVIATION_COST, MAX_HYPOTHESES, MEAN_HYPOTHESES, MIN_UNEXPLAINED,
-};
+use crate::thresholds::registration::{MAX_HYPOTHESES, MEAN_HYPOTHESES, MIN_UNEXPLAINED};
 use crate::thresholds::tracking::MAX_TRACKING_ITERATIONS;
 use crate::tracking::candidate::{Candidate, choose_candidate, sort_candidates, unexplained_share};
 use crate::tracking::correlation_search::{Hypothesis, log_likelihood, search_poses};
@@ -54,6 +52,10 @@ const MAX_CLOSER_HYPOTHESES: usize = 2;
 /// Largest σ of pitch, yaw and roll in a closer search, radians. The search then covers the pitch
 /// next to that of the best candidate, and the half step around it that shifts make up for.
 const CLOSER_SEARCH_SIGMA_RAD: f64 = 1.5 * PITCH_STEP_RAD / MAX_DEVIATION_SIGMA;
+
+/// Deviation `½ eᵀΣ⁻¹e` of a pose from the prior's prediction up to which the prior allows it: all
+/// six unknowns of the pose as far off as the search reaches.
+pub const MAX_DEVIATION_COST: f64 = 0.5 * 6.0 * MAX_DEVIATION_SIGMA * MAX_DEVIATION_SIGMA;
 
 /// The estimate of a registered frame.
 #[derive(Clone, Copy, Debug)]

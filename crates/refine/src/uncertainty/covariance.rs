@@ -15,8 +15,8 @@
 //! of blocks hardly), whatever the residuals are like, over κ², plus the prior's own information P.
 //! If the residuals were independent Gaussian noise of the assumed σ, V/κ² would be `H − P`. They
 //! are not quite: where the wall is steep, aliasing and interpolation add errors that depend on the
-//! position between pixels, with correlations of their own. One factor for all poses, the dispersion
-//! `c_1`, makes up for that, `V/κ² ≈ c_1 (H − P)`, and
+//! position between pixels, with correlations of their own. One factor for all poses, the
+//! dispersion `c_1`, makes up for that, `V/κ² ≈ c_1 (H − P)`, and
 //!
 //! `Σ = H⁻¹ Q H⁻¹ = c_1 H⁻¹ + (1 − c_1) H⁻¹ P H⁻¹`.
 //!
@@ -33,9 +33,9 @@
 //! `tr(J⁻¹ E Q Eᵀ) = tr(H⁻¹ Q) − tr(H_ee⁻¹ Q_ee)`,
 //!
 //! for which only those blocks of `H⁻¹` and `H_ee⁻¹` are needed where H itself has blocks
-//! ([`crate::linear::selected_inverse`]). `c_1` is about 0.35 on sharp bricks, where aliasing, which
-//! the weight of every sample takes for independent, cancels over a block, and 0.7 on noisy walls of
-//! low contrast. `H⁻¹ P H⁻¹`, which matters only where the prior decides, comes from draws
+//! ([`crate::linear::selected_inverse`]). `c_1` is about 0.35 on sharp bricks, where aliasing,
+//! which the weight of every sample takes for independent, cancels over a block, and 0.7 on noisy
+//! walls of low contrast. `H⁻¹ P H⁻¹`, which matters only where the prior decides, comes from draws
 //! ([`crate::uncertainty::model_error`]).
 //!
 //! Source: P. J. Huber, "The behavior of maximum likelihood estimates under nonstandard

@@ -17,8 +17,8 @@
 //! in every direction what errors of this size, and those of the initial poses, do to the estimate.
 //!
 //! It is not sparse. But for independent random signs ε, `z = Σ_p ε_p g_p/κ` has the covariance
-//! `V_P/κ²`, a normal vector times the Cholesky factor of P has the covariance P, and `δ = H⁻¹ z` of
-//! their sum that of the estimate. So means over some draws give all blocks of Σ, and
+//! `V_P/κ²`, a normal vector times the Cholesky factor of P has the covariance P, and `δ = H⁻¹ z`
+//! of their sum that of the estimate. So means over some draws give all blocks of Σ, and
 //! `tr(H⁻¹ V_P)` as the mean of `zᵀ H⁻¹ z`.
 //!
 //! A residual that errs with its neighbours tells less than one that errs by itself: by the factor
@@ -26,8 +26,8 @@
 //! solve is repeated with the information of pixels divided by c_P
 //! ([`crate::model::context::EstimationContext::dispersion`]).
 //!
-//! What moves all scores of a frame alike (an error that its six unknowns absorb) leaves no trace in
-//! residuals: an oval tunnel, a wrong radius, a long undulation. Of these Σ knows nothing.
+//! What moves all scores of a frame alike (an error that its six unknowns absorb) leaves no trace
+//! in residuals: an oval tunnel, a wrong radius, a long undulation. Of these Σ knows nothing.
 //!
 //! Source: A. C. Cameron, J. B. Gelbach, D. L. Miller, "Bootstrap-based improvements for inference
 //! with clustered errors", Review of Economics and Statistics 90(3), 2008 (random signs of
@@ -201,7 +201,7 @@ struct System<'s> {
 
 /// Right sides or steps of a batch of draws: a column each.
 type BatchBlock = SMatrix<f64, FRAME_PARAMETERS, BATCH>;
-/// The same of the shared parameters.
+/// Right sides or steps of the shared parameters.
 type SharedBatch = SMatrix<f64, SHARED_PARAMETERS, BATCH>;
 
 impl System<'_> {

@@ -10,10 +10,14 @@ use crate::linear::sparse_cholesky::FactorError;
 use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::solver::gauss_newton::Solution;
-use crate::thresholds::observability::{MAX_SIGMA_SHARE, MIN_REPORTED_CORRELATION};
+use crate::thresholds::observability::MAX_SIGMA_SHARE;
 use crate::uncertainty::shared_parameter_names::{PARAMETERS, ParameterKind};
 use nalgebra::{DMatrix, SMatrix};
 use serde::{Deserialize, Serialize};
+
+/// Correlation with another parameter from which on it is reported: without the other, 1-σ is less
+/// than half, `√(1 − r²)` of it.
+const MIN_REPORTED_CORRELATION: f64 = 0.87;
 
 /// A shared parameter that was to be estimated and cannot be observed.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -3,8 +3,8 @@
 //! The covariance of a pose is relative to the first frame and grows along the tunnel. What a
 //! panorama, a crack or a change needs is that frames agree about the wall that they share: the
 //! uncertainty of a frame with all others held, `c (H_kk⁻¹)_pp`, c the dispersion of the pixels'
-//! scores, model errors included. It counts over the whole picture: a frame that shares only a strip
-//! with others is registered there, and uncertain elsewhere.
+//! scores, model errors included. It counts over the whole picture: a frame that shares only a
+//! strip with others is registered there, and uncertain elsewhere.
 
 use crate::model::context::EstimationContext;
 use crate::parameters::frame_estimate::FrameEstimate;

@@ -7,7 +7,7 @@ use crate::model::rejection::RejectionReason;
 use crate::parameters::calibration::{Calibration, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::solver::gauss_newton::Solution;
-use crate::thresholds::observability::{MAX_MEDIAN_SIGMA_PX, MAX_MISFIT_SHARE};
+use crate::thresholds::observability::MAX_MISFIT_SHARE;
 use crate::uncertainty::covariance::{Covariances, NoiseCovariance, compute_covariances};
 use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma};
 use crate::uncertainty::model_error::{EstimateErrors, ModelErrorReport};
@@ -21,7 +21,7 @@ pub struct SolutionUncertainty {
     pub covariances: Covariances,
     /// 1-σ of every frame against the wall that the others show, pixels.
     pub registration_px: Vec<f64>,
-    /// What the residuals show beyond noise, if they do.
+    /// Errors beyond noise, if the residuals show any.
     pub model_error: Option<ModelErrorReport>,
     /// Covariance `Σ_κ` of the shared parameters, where they were estimated.
     pub shared: Option<SharedBlock>,
@@ -110,6 +110,7 @@ impl SolutionUncertainty {
         calibration: &Calibration,
         estimates: &[FrameEstimate],
         rejections: &[Option<RejectionReason>],
+        max_sigma_px: f64,
     ) -> Vec<UnobservableParameter> {
         let Some(posterior) = &self.posterior else {
             return Vec::new();
@@ -132,10 +133,10 @@ impl SolutionUncertainty {
         let mut sigmas: Vec<f64> = sigmas.collect();
         sigmas.sort_unstable_by(f64::total_cmp);
         let median = sigmas.get(sigmas.len() / 2).copied().unwrap_or(f64::NAN);
-        if median.is_nan() || median > MAX_MEDIAN_SIGMA_PX {
+        if median.is_nan() || median > max_sigma_px {
             let reason = format!(
                 "the frames tie each other to {median:.2} px of the wall only (1-σ), and more than \
-                 {MAX_MEDIAN_SIGMA_PX} px leave the camera to chance; use more frames, best a \
+                 {max_sigma_px} px leave the camera to chance; use more frames, best a \
                  whole turn or two, or more of a wall with texture"
             );
             return mark_all_unobservable(calibration, &reason);

@@ -9,7 +9,8 @@
 //! clearly have it a period away, as other frames have shown it, it is ambiguous, too.
 
 use crate::model::prior::Prior;
-use crate::thresholds::aliasing::{MAX_PERIOD_DIFFERENCE, MAX_SWEEPS};
+use crate::thresholds::aliasing::MAX_PERIOD_DIFFERENCE;
+use crate::thresholds::repair::MAX_ITERATIONS;
 use tunnelstitch_geometry::surface::{Gauge, GaugeMotion};
 use tunnelstitch_geometry::trajectory::{JitterModel, Pose};
 
@@ -167,7 +168,7 @@ impl Evidence<'_> {
             motions: vec![GaugeMotion::default(); self.frames.len()],
             aliases: vec![None; self.frames.len()],
         };
-        for _ in 0..MAX_SWEEPS {
+        for _ in 0..MAX_ITERATIONS {
             let moved: Vec<Pose> = choice
                 .motions
                 .iter()

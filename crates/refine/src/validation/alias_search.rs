@@ -4,18 +4,23 @@ use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
-use crate::thresholds::aliasing::{MIN_MOTION_SAMPLES, SHIFT_REFINEMENTS};
-use crate::thresholds::correlation_search::MIN_SQUARED_CORRELATION_LEFT;
 use crate::thresholds::footprints::MAX_OVERLAP_DISTANCE_FRAMES;
-use crate::thresholds::registration::{MAX_DEVIATION_COST, MAX_UNEXPLAINED_RATIO, MIN_UNEXPLAINED};
+use crate::thresholds::registration::{MAX_UNEXPLAINED_RATIO, MIN_UNEXPLAINED};
 use crate::tracking::candidate::unexplained_share;
-use crate::tracking::correlation_search::find_matching_shifts;
+use crate::tracking::correlation_search::{
+    MIN_SEPARATION_SAMPLES, MIN_SQUARED_CORRELATION_LEFT, find_matching_shifts,
+};
 use crate::tracking::neighbours::Neighbours;
 use crate::tracking::reference_mosaic::ReferenceMosaic;
+use crate::tracking::registration::MAX_DEVIATION_COST;
 use crate::tracking::unwrapped_frame::UnwrappedFrame;
 use nalgebra::Vector2;
 use tunnelstitch_geometry::surface::{Footprint, GaugeMotion, gauge_component};
 use tunnelstitch_geometry::trajectory::Pose;
+
+/// Number of times that the step of the search for the best fraction of a sample is halved: the
+/// last one is a sixteenth of a sample.
+const SHIFT_REFINEMENTS: usize = 4;
 
 /// Finds the gauge motions (rotations about the axis, translations along it) within the prior's
 /// reach after which frame `frame` matches what the others show as well as it does now.
@@ -78,15 +83,15 @@ pub fn find_alias_motions(
         // Where the shape of the tunnel forbids a motion, no alias is reached by it.
         let (made_m, _) = comparison.motion(shift_m);
         let missed_m = (made_m - Vector2::from(shift_m)).norm();
-        if shift_m[0].hypot(shift_m[1]) < MIN_MOTION_SAMPLES * spacing_m
-            || missed_m > MIN_MOTION_SAMPLES * spacing_m
+        if shift_m[0].hypot(shift_m[1]) < MIN_SEPARATION_SAMPLES * spacing_m
+            || missed_m > MIN_SEPARATION_SAMPLES * spacing_m
         {
             continue;
         }
         let (unexplained, shift_m) = comparison.refine_shift(shift_m, spacing_m);
         let (made_m, motion) = comparison.motion(shift_m);
         if unexplained.is_some_and(|there| there < max_unexplained)
-            && made_m.norm() >= MIN_MOTION_SAMPLES * spacing_m
+            && made_m.norm() >= MIN_SEPARATION_SAMPLES * spacing_m
         {
             motions.push(motion);
         }

@@ -1,6 +1,6 @@
 //! Normal equations of one Lucas–Kanade step: affine displacement field, gain and bias.
 
-use crate::thresholds::pairwise_lucas_kanade::MIN_TEXTURE_SHARE;
+use crate::thresholds::reference_mosaic::MIN_TEXTURE_SHARE;
 use crate::tiles::residual_weighting::Loss;
 use crate::validation::alignment::Alignment;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};

@@ -2,11 +2,11 @@
 
 use crate::model::context::EstimationContext;
 use crate::samples::point_sampler::PointSampler;
+use crate::thresholds::assessment::MIN_PIXEL_SHARE;
 use crate::thresholds::pairwise_lucas_kanade::{
-    CONVERGED_STEP_PX, ENDED_STEP_FACTOR, MAX_DISPLACEMENT_PX, MAX_GAIN, MAX_ITERATIONS,
-    MAX_SQUARED_SLOPE_RATIO, MIN_GAIN, MIN_OVERLAP_SHARE, MIN_RESIDUAL_SIGMA_GREY, MIN_SAMPLES,
-    STRIDE_PX,
+    MAX_DISPLACEMENT_PX, MAX_SQUARED_SLOPE_RATIO, STRIDE_PX,
 };
+use crate::thresholds::tracking::{MAX_SOLVE_ITERATIONS, STEP_TOLERANCE_PX};
 use crate::tiles::residual_weighting::robust_correlation;
 use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
 use crate::validation::alignment::Alignment;
@@ -19,6 +19,13 @@ use tunnelstitch_geometry::trajectory::Pose;
 
 /// Samples along the side of a patch: larger than most glints.
 const PATCH: usize = 4;
+
+/// Number of samples that two frames must share: five for each of the eight unknowns.
+const MIN_SAMPLES: f64 = 40.0;
+
+/// Variance of the residuals that is assumed at least, grey levels²: that of rounding to whole grey
+/// levels.
+const MIN_RESIDUAL_VARIANCE: f32 = 1.0 / 12.0;
 
 /// A frame's image at its pose.
 pub struct PosedImage<'a> {
@@ -57,6 +64,8 @@ pub struct Template {
     slope_noise: f64,
     /// Variance of the noise of a grey value.
     noise: f32,
+    /// Largest gain of one frame against the other, and the inverse of the smallest.
+    max_gain: f64,
 }
 
 impl Template {
@@ -126,6 +135,8 @@ impl Template {
             scale: f64::from(1u32 << image.level),
             slope_noise: 0.5 * noise,
             noise: noise as f32,
+            // Three σ of the difference of two frames' log-gains.
+            max_gain: (3.0 * std::f64::consts::SQRT_2 * context.prior.log_gain_sigma).exp(),
         }
     }
 
@@ -140,13 +151,13 @@ impl Template {
         let mut correlation = None;
         let mut first = None;
         let mut result = None;
-        for _ in 0..MAX_ITERATIONS {
+        for _ in 0..MAX_SOLVE_ITERATIONS {
             let shared = self.sample_displaced(&p, &grey);
-            let min_samples = (MIN_OVERLAP_SHARE * self.samples.len() as f64).max(MIN_SAMPLES);
+            let min_samples = (MIN_PIXEL_SHARE * self.samples.len() as f64).max(MIN_SAMPLES);
             if (shared.len() as f64) < min_samples {
                 return None;
             }
-            let exposure_before = *exposure.get_or_insert_with(|| fit_exposure(&shared));
+            let exposure_before = *exposure.get_or_insert_with(|| self.fit_exposure(&shared));
             let correlation = *correlation.get_or_insert_with(|| compute_correlation(&shared));
             let variance = self.residual_variance(&shared, exposure_before);
             let fit = AffineFit::new(
@@ -167,13 +178,28 @@ impl Template {
             let alignment = fit.alignment(&p, self.scale, f64::from(variance));
             let first = *first.get_or_insert(alignment);
             let has_diverged = fit.rms(&p) > MAX_DISPLACEMENT_PX;
-            let has_ended = !has_diverged && moved_px < ENDED_STEP_FACTOR * CONVERGED_STEP_PX;
-            result = Some(if has_ended { alignment } else { first });
-            if has_diverged || moved_px < CONVERGED_STEP_PX {
+            let has_converged = !has_diverged && moved_px < STEP_TOLERANCE_PX;
+            result = Some(if has_converged { alignment } else { first });
+            if has_diverged || has_converged {
                 break;
             }
         }
         result
+    }
+
+    /// Fits the exposure `value = a grey + b` by least squares.
+    fn fit_exposure(&self, shared: &[(&TemplateSample, f32)]) -> (f64, f64) {
+        let mut m = [0.0f64; 5];
+        for (sample, value) in shared {
+            let (x, y) = (f64::from(sample.grey), f64::from(*value));
+            for (sum, term) in m.iter_mut().zip([1.0, x, y, x * x, x * y]) {
+                *sum += term;
+            }
+        }
+        let [n, x, y, xx, xy] = m;
+        let gain = (xy - x * y / n) / (xx - x * x / n).max(1e-9);
+        let gain = gain.clamp(1.0 / self.max_gain, self.max_gain);
+        (gain, (y - gain * x) / n)
     }
 
     /// The samples with another frame's grey value at the points displaced by the field `p`, where
@@ -212,7 +238,7 @@ impl Template {
         (MAD_TO_SIGMA as f32 * *median)
             .powi(2)
             .max(2.0 * self.noise)
-            .max(MIN_RESIDUAL_SIGMA_GREY * MIN_RESIDUAL_SIGMA_GREY)
+            .max(MIN_RESIDUAL_VARIANCE)
     }
 }
 
@@ -236,21 +262,6 @@ fn bound_influence(samples: &mut [TemplateSample]) {
 #[inline]
 fn displaced(point: &[f32; 3], e_s: &[f32; 3], e_h: &[f32; 3], ds: f32, dh: f32) -> [f32; 3] {
     std::array::from_fn(|k| point[k] + ds * e_s[k] + dh * e_h[k])
-}
-
-/// Fits the exposure `value = a grey + b` by least squares.
-fn fit_exposure(shared: &[(&TemplateSample, f32)]) -> (f64, f64) {
-    let mut m = [0.0f64; 5];
-    for (sample, value) in shared {
-        let (x, y) = (f64::from(sample.grey), f64::from(*value));
-        for (sum, term) in m.iter_mut().zip([1.0, x, y, x * x, x * y]) {
-            *sum += term;
-        }
-    }
-    let [n, x, y, xx, xy] = m;
-    let gain = (xy - x * y / n) / (xx - x * x / n).max(1e-9);
-    let gain = gain.clamp(MIN_GAIN, MAX_GAIN);
-    (gain, (y - gain * x) / n)
 }
 
 /// Correlation of grey values, −1 to 1: of all samples or of most, whichever is greater.

@@ -9,9 +9,10 @@
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
+use crate::thresholds::assessment::MIN_PIXEL_SHARE;
+use crate::thresholds::pairwise_lucas_kanade::{LEVEL, STRIDE_PX};
 use crate::thresholds::pairwise_ncc::{
-    COARSE_STRIDE_PX, COARSE_WINDOW_PX, FINE_LEVEL, FINE_STRIDE_PX, FINE_WINDOW_PX,
-    MIN_CERTAIN_CORRELATION, MIN_CORRELATION, MIN_OVERLAP_SHARE, MIN_SHARE_WITHOUT_OUTLIERS,
+    COARSE_WINDOW_PX, FINE_WINDOW_PX, MIN_CORRELATION, MIN_SHARE_WITHOUT_OUTLIERS,
 };
 use crate::tiles::residual_weighting::robust_correlation;
 use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
@@ -65,13 +66,11 @@ pub fn compute_pairwise_ncc(
     let any = |_, _| true;
     let coarse = Comparison {
         level,
-        stride_px: COARSE_STRIDE_PX,
         window_px: COARSE_WINDOW_PX,
         with_outliers: true,
     };
     let fine = Comparison {
-        level: FINE_LEVEL.min(level),
-        stride_px: FINE_STRIDE_PX,
+        level: LEVEL.min(level),
         window_px: FINE_WINDOW_PX,
         with_outliers: true,
     };
@@ -127,8 +126,6 @@ fn by_pair(compared: Vec<Compared>) -> BTreeMap<(usize, usize), Compared> {
 struct Comparison {
     /// Pyramid level.
     level: usize,
-    /// Distance between wall samples along each axis, pixels.
-    stride_px: usize,
     /// Half width of the window of local contrast, pixels.
     window_px: usize,
     /// True to compare all that the frames show; false to leave out what stands out of the wall.
@@ -154,7 +151,6 @@ fn compare_pairs(
 ) -> Result<Vec<Compared>, ProblemError> {
     let Comparison {
         level,
-        stride_px,
         window_px,
         with_outliers,
     } = comparison;
@@ -192,7 +188,7 @@ fn compare_pairs(
             unwrapped_frames: &unwrapped_frames,
         };
         let compared: Vec<Vec<Compared>> =
-            partners.par_map(|(a, partners)| frames.compare_with_partners(*a, partners, stride_px));
+            partners.par_map(|(a, partners)| frames.compare_with_partners(*a, partners));
         pairs.extend(compared.into_iter().flatten());
     }
     Ok(pairs)
@@ -208,12 +204,7 @@ struct PosedFrames<'a> {
 
 impl PosedFrames<'_> {
     /// Compares frame `a` with its partners.
-    fn compare_with_partners(
-        &self,
-        a: usize,
-        partners: &[usize],
-        stride_px: usize,
-    ) -> Vec<Compared> {
+    fn compare_with_partners(&self, a: usize, partners: &[usize]) -> Vec<Compared> {
         let context = self.context;
         let (Some(own), Some(footprint)) = (self.unwrapped_frames.get(&a), &self.footprints[a])
         else {
@@ -221,7 +212,7 @@ impl PosedFrames<'_> {
         };
         let pose = &self.states.estimates[a].pose;
         let pixel_size_m = pixel_size_m(context, own.camera(), pose);
-        let grid = MosaicGrid::over(footprint, stride_px as f64 * pixel_size_m);
+        let grid = MosaicGrid::over(footprint, STRIDE_PX * pixel_size_m);
         let points = grid.world_points(context);
         let origin = points[points.len() / 2];
         let sampler = own.sampler_at(context, pose, &origin);
@@ -263,7 +254,7 @@ impl PosedFrames<'_> {
         }
         let gain = |k: usize| self.states.estimates[k].log_gain.exp();
         let gain_ratio = gain(b) / gain(a);
-        let min_samples = MIN_OVERLAP_SHARE * samples.len() as f64;
+        let min_samples = MIN_PIXEL_SHARE * samples.len() as f64;
         (ncc_score.samples >= min_samples).then(|| Compared {
             a,
             b,
@@ -283,9 +274,6 @@ type Sample = ([f32; 3], (f32, f32, f32));
 /// glints outweigh a faint wall.
 fn robust_corrected_correlation(ncc_score: &NccScore, shared: &[(f32, f32)]) -> Option<f64> {
     let of_all = ncc_score.corrected_correlation()?;
-    if of_all > MIN_CERTAIN_CORRELATION {
-        return Some(of_all);
-    }
     let of_most = robust_correlation(shared) / ncc_score.texture_share();
     Some(of_all.max(of_most.min(1.0)))
 }

@@ -11,7 +11,8 @@ use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
 use crate::solver::neighbourhood::{Neighbourhood, changes};
-use crate::thresholds::repair::{MAX_ITERATIONS, MAX_REGISTRATION_ITERATIONS};
+use crate::thresholds::assessment::MAX_PAIR_ITERATIONS;
+use crate::thresholds::repair::MAX_ITERATIONS;
 use crate::tracking::track::register_rejected;
 use crate::validation::aliasing::{AliasHypothesis, resolve_aliases, resolve_all_aliases};
 use crate::validation::alignment::Alignment;
@@ -59,7 +60,7 @@ pub fn repair(
         if !states.has_majority() {
             break;
         }
-        let registered = if iteration < MAX_REGISTRATION_ITERATIONS {
+        let registered = if iteration < MAX_PAIR_ITERATIONS {
             register_rejected(context, options, states)?
         } else {
             0

@@ -1,7 +1,7 @@
 //! Poses of frames that are not photometric: by the prior, between those that are.
 //!
-//! A run of such frames between two photometric ones is where the prior puts it with both ends held:
-//! a random walk bridges the gap, with the error of the initial steps spread over it; with
+//! A run of such frames between two photometric ones is where the prior puts it with both ends
+//! held: a random walk bridges the gap, with the error of the initial steps spread over it; with
 //! independent errors each frame stays at its initial pose. Without photometric frames all keep
 //! their initial poses. No frame that does not know its place moves another, or is moved.
 

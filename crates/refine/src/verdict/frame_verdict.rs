@@ -17,7 +17,7 @@ use crate::validation::inconsistent_frames::find_disagreement;
 pub struct FrameEvidence<'e> {
     /// The rejection reason that an earlier test has found.
     pub rejection: Option<RejectionReason>,
-    /// What the frame contributed to the solve.
+    /// The frame's contribution to the solve.
     pub contribution: &'e FrameContribution,
     /// Number of its pixels that could be compared, if all of them showed common wall.
     pub all_pixels: f64,

@@ -6,18 +6,20 @@
 //!
 //! - **Scale.** Pictures show lengths in units of the radius only, so a radius that is wrong makes
 //!   all refined steps d wrong by one factor. With the initial steps `d̂` its estimate is
-//!   `f = Σ d̂ᵀΣ⁻¹d / Σ d̂ᵀΣ⁻¹d̂`, with the variance `1/Σ d̂ᵀΣ⁻¹d̂ + s²`, s what odometers and plans are
-//!   usually wrong by ([`SCALE_SIGMA`]).
-//! - **σ.** `q = Σ e²/σ²` is χ² with as many degrees of freedom as there are errors; `σ √(q/n)` would
-//!   fit. Rotations count together, as the prior has one σ for them, translations axis by axis.
-//! - **Runs.** Errors with alternating or persistent signs follow the other model: steps of
-//!   independent errors alternate, independent errors that are a random walk persist. The number of
-//!   sign changes of n errors has the mean (n − 1)/2 and the variance (n − 1)/4.
+//!   `f = Σ d̂ᵀΣ⁻¹d / Σ d̂ᵀΣ⁻¹d̂`, with the variance `1/Σ d̂ᵀΣ⁻¹d̂ + s²`, s what odometers and
+//!   plans are usually wrong by ([`SCALE_SIGMA`]).
+//! - **σ.** `q = Σ e²/σ²` is χ² with as many degrees of freedom as there are errors; `σ √(q/n)`
+//!   would fit. Rotations count together, as the prior has one σ for them, translations axis by
+//!   axis.
+//! - **Runs.** Errors that alternate or persist follow the other model: steps between independent
+//!   errors have the serial correlation `r = Σ e_k e_k+1/Σ e²` of −½, and independent errors that
+//!   are a random walk one near 1. Of n independent errors, r has the variance 1/n.
 //!
 //! Each test has its share of the survey's false-alarm rate.
 //!
-//! Source: F. S. Swed, C. Eisenhart, "Tables for testing randomness of grouping in a sequence of
-//! alternatives", Annals of Mathematical Statistics 14(1), 1943 (runs).
+//! Source: M. S. Bartlett, "On the theoretical specification and sampling properties of
+//! autocorrelated time-series", Supplement to the Journal of the Royal Statistical Society 8(1),
+//! 1946 (serial correlation).
 
 use crate::model::prior::Prior;
 use crate::model::prior_terms::{absolute_error, relative_error};
@@ -29,8 +31,8 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::trajectory::{JitterModel, Pose};
 
-/// Tests of the prior: scale, four σ, runs of four kinds of errors.
-const TESTS: usize = 9;
+/// Tests of the prior: scale, four σ, runs.
+const TESTS: usize = 6;
 
 /// Names of the σ of the prior, as survey.toml has them.
 const NAMES: [&str; 4] = [
@@ -51,7 +53,7 @@ pub struct PriorTest {
     pub sigmas: Vec<SigmaTest>,
     /// True if signs of errors alternate or persist, as by the other model of the prior.
     pub other_model: bool,
-    /// What the tests found, in sentences.
+    /// Contradictions between the prior and the refined poses, in sentences.
     pub findings: Vec<String>,
 }
 
@@ -106,14 +108,14 @@ impl PriorTest {
         let mut test = Self {
             scale: test_scale(&errors, alpha),
             sigmas: sigmas.collect(),
-            other_model: (0..NAMES.len()).any(|k| runs_contradict(&errors, k, expects_walk, alpha)),
+            other_model: runs_contradict(&errors, expects_walk, alpha),
             findings: Vec::new(),
         };
         test.findings = test.explain(radius_m, prior.jitter.model);
         test
     }
 
-    /// What the tests found, in sentences.
+    /// The contradictions in sentences.
     fn explain(&self, radius_m: f64, model: JitterModel) -> Vec<String> {
         let mut findings = Vec::new();
         if let Some(scale) = self.scale.filter(|scale| scale.contradicts) {
@@ -140,8 +142,8 @@ impl PriorTest {
                         .to_owned()
                 }
                 JitterModel::Independent => {
-                    "errors of neighbouring poses go together: [prior] model = \"random-walk\" fits \
-                     better than \"independent\""
+                    "errors of neighbouring poses go together: [prior] model = \"random-walk\" \
+                     fits better than \"independent\""
                         .to_owned()
                 }
             });
@@ -299,18 +301,14 @@ fn test_sigma(prior: &Prior, errors: &[PriorError], k: usize, alpha: f64) -> Opt
     })
 }
 
-/// True if the signs of errors alternate (under a random walk) or persist (under independent
-/// errors).
-fn runs_contradict(errors: &[PriorError], k: usize, expects_walk: bool, alpha: f64) -> bool {
-    let (mut changes, mut pairs) = (0.0, 0.0);
-    for component in PriorError::of_sigma(k) {
-        for pair in errors.windows(2) {
-            changes += f64::from(pair[0].e[component] * pair[1].e[component] < 0.0);
-            pairs += 1.0;
-        }
-    }
-    let z = (changes - 0.5 * pairs) / f64::sqrt(0.25 * f64::max(pairs, 1.0));
-    let towards_other = if expects_walk { z } else { -z };
+/// True if errors alternate (under a random walk) or persist (under independent errors).
+fn runs_contradict(errors: &[PriorError], expects_walk: bool, alpha: f64) -> bool {
+    let products = errors.windows(2).map(|pair| pair[0].e.dot(&pair[1].e));
+    let square: f64 = errors.iter().map(|error| error.e.norm_squared()).sum();
+    let correlation = products.sum::<f64>() / square;
+    let shown: f64 = errors.iter().map(|error| error.shown.sum()).sum();
+    let z = correlation * shown.sqrt();
+    let towards_other = if expects_walk { -z } else { z };
     towards_other > normal_quantile(alpha, TESTS)
 }
 

@@ -13,7 +13,7 @@ pub struct SurveyVerdict {
     pub photometric: usize,
     /// Number of frames.
     pub frames: usize,
-    /// Whether the result may be used, and for what.
+    /// The sentence: whether the result may be used, and for what.
     pub sentence: String,
 }
 
