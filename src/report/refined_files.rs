@@ -1,7 +1,9 @@
 //! Files that `refine` has written.
 
 use super::error::ReportError;
-use crate::refine::{FrameReport, LevelReport, StageTime, read_covariances};
+use crate::refine::{
+    FrameReport, LevelReport, PriorTest, StageTime, SurveyVerdict, read_covariances,
+};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, poses_of};
 use nalgebra::Matrix6;
@@ -28,6 +30,12 @@ pub struct Refinement {
     pub frames_on_prior: usize,
     /// Ratio of the covariance to that of independent noise; null if there is none.
     pub variance_factor: Option<f64>,
+    /// The verdict about the survey; none in files of version 0.1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub verdict: Option<SurveyVerdict>,
+    /// The test of the prior.
+    #[serde(default)]
+    pub prior_test: PriorTest,
     /// Self-calibration, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub calibration: Option<Calibration>,

@@ -25,5 +25,6 @@ mod shapes;
 mod simulate;
 mod super_resolve;
 mod support;
+mod verdict;
 mod video;
 mod view;

@@ -63,8 +63,11 @@ fn refine_simulated(options: &[&str]) -> (serde_json::Value, String) {
     simulate(&survey, options);
     let output = tunnelstitch(&["refine", text(&survey), "--out", text(&out)]);
     let warned = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(output.status.success(), "{options:?}: {warned}");
-    (json(&out.join("refine.json")), warned)
+    let code = output.status.code();
+    let report = json(&out.join("refine.json"));
+    let expected = if report["verdict"]["photometric"] == 0 { 4 } else { 0 };
+    assert_eq!(code, Some(expected), "{options:?}: {warned}");
+    (report, warned)
 }
 
 /// A wall without texture determines no pose, so no frame is photometric.

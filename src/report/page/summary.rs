@@ -57,11 +57,26 @@ pub fn section(data: &PageData) -> Markup {
                 @if let Some(tile) = error_tile(report) { (tile) }
                 @if let Some(tile) = seam_tile(report) { (tile) }
             }
+            @if let Some(refinement) = &report.refinement {
+                @if let Some(verdict) = &refinement.verdict {
+                    p.note { (sentence(&verdict.sentence)) }
+                }
+                @for finding in &refinement.prior_test.findings {
+                    p.note { (sentence(finding)) }
+                }
+            }
             @for note in &report.notes {
                 p.note { (note) }
             }
         }
     }
+}
+
+/// Words as a sentence: with a capital and a full stop.
+fn sentence(words: &str) -> String {
+    let mut letters = words.chars();
+    let first = letters.next().map(|first| first.to_uppercase().to_string());
+    format!("{}{}.", first.unwrap_or_default(), letters.as_str())
 }
 
 fn frames_tile(frames: usize, flagged: usize) -> Markup {

@@ -43,7 +43,8 @@ pub fn run<'a>(
     }
     let solution = solve(&plan, problem, setup, state, session)?;
     state.frames.estimates.clone_from(&solution.estimates);
-    let unobservable = find_unobservable(&plan, setup, &context, state, &solution)?;
+    let uncertainty = uncertainty_of(&plan, setup, &context, state, &solution)?;
+    let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
     state.kappa = solution.kappa;
     for parameter in &unobservable {
         state.kappa[parameter.unknown] = 0.0;
@@ -70,9 +71,7 @@ pub fn run<'a>(
         correct(&context, setup.options, &state.frames)?;
     }
     // The assessment uses the last one only.
-    if !has_solve_ahead(state) {
-        let calibration = setup.calibration_at(state);
-        let uncertainty = SolutionUncertainty::at(&context, &solution, &calibration)?;
+    if let Some(uncertainty) = uncertainty.filter(|_| !has_solve_ahead(state)) {
         let dispersion = uncertainty
             .model_error
             .map_or(1.0, |found| found.dispersion);
@@ -146,27 +145,43 @@ fn solve<'a>(
     Ok(solution)
 }
 
-/// The shared parameters that a full-size solution does not observe.
-fn find_unobservable(
+/// The uncertainty of a full-size solution that is the last one, or has shared parameters that it may
+/// not observe.
+fn uncertainty_of(
     plan: &SolvePlan,
     setup: &Setup,
     context: &EstimationContext,
     state: &PipelineState,
     solution: &Solution,
-) -> Result<Vec<UnobservableParameter>, ProblemError> {
+) -> Result<Option<SolutionUncertainty>, ProblemError> {
     let calibration = setup.calibration_at(state);
-    if plan.sampling.level > 0 || !calibration.has_free_parameters() {
-        return Ok(Vec::new());
+    let is_last = !has_solve_ahead(state);
+    if plan.sampling.level > 0 || !(is_last || calibration.has_free_parameters()) {
+        return Ok(None);
     }
     let solved = context.at(solution.kappa);
-    let uncertainty = SolutionUncertainty::at(&solved, solution, &calibration)?;
-    Ok(uncertainty.find_unobservable(
-        &solved,
-        &calibration,
-        &solution.estimates,
-        &state.frames.rejections,
-        setup.options.max_sigma_px,
-    ))
+    SolutionUncertainty::at(&solved, solution, &calibration).map(Some)
+}
+
+/// The shared parameters that a full-size solution does not observe.
+fn find_unobservable(
+    setup: &Setup,
+    context: &EstimationContext,
+    state: &PipelineState,
+    solution: &Solution,
+    uncertainty: Option<&SolutionUncertainty>,
+) -> Vec<UnobservableParameter> {
+    let calibration = setup.calibration_at(state);
+    match uncertainty.filter(|_| calibration.has_free_parameters()) {
+        Some(uncertainty) => uncertainty.find_unobservable(
+            &context.at(solution.kappa),
+            &calibration,
+            &solution.estimates,
+            &state.frames.rejections,
+            setup.options.max_sigma_px,
+        ),
+        None => Vec::new(),
+    }
 }
 
 /// True if another solve is certain to follow; a joint one may turn out to be needless.
