@@ -401,7 +401,7 @@ fn what_only_pictures_can_tell_is_named_by_refine() {
     let refine = |more: &[&str]| {
         let arguments = ["refine", text(dir), "--fast", "--out", text(&out)];
         let output = support::tunnelstitch(&[&arguments, more].concat());
-        assert!(output.status.success());
+        assert!(matches!(output.status.code(), Some(0 | 4)));
         String::from_utf8(output.stderr).unwrap()
     };
     let said = refine(&[]);

@@ -22,8 +22,15 @@ fn poses(path: &Path) -> Vec<tunnelstitch::trajectory::StampedPose> {
 fn a_diameter_given_for_the_radius_is_named() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    simulate(&survey, &["--frames", "24", "--size", "320x240", "--seed", "3"]);
-    edit(&survey.join("survey.toml"), "radius_m = 3.0", "radius_m = 6.0");
+    simulate(
+        &survey,
+        &["--frames", "24", "--size", "320x240", "--seed", "3"],
+    );
+    edit(
+        &survey.join("survey.toml"),
+        "radius_m = 3.0",
+        "radius_m = 6.0",
+    );
     let message = fail(&["refine", text(&survey), "--out", text(&out)], 4);
     assert!(message.contains("times the initial ones"), "{message}");
     assert!(message.contains("diameter"), "{message}");
@@ -41,7 +48,10 @@ fn a_lens_that_is_not_exact_enlarges_sigma() {
     let dir = tempfile::tempdir().unwrap();
     let path = |name: &str| dir.path().join(name);
     let survey = path("survey");
-    simulate(&survey, &["--frames", "36", "--size", "320x240", "--seed", "2"]);
+    simulate(
+        &survey,
+        &["--frames", "36", "--size", "320x240", "--seed", "2"],
+    );
     let camera = survey.join("camera.json");
     let mut calibration = json(&camera);
     for (name, off) in [("cx", 1.5), ("cy", -1.0)] {
@@ -58,7 +68,10 @@ fn a_lens_that_is_not_exact_enlarges_sigma() {
     let squares = sigmas.map(|frame| frame["sigma"]["wall_px"].as_f64().unwrap().powi(2));
     let stated = (squares.sum::<f64>() / 36.0).sqrt();
     let error = wall_px(&survey, &out.join("poses.tum"), &path("compared"));
-    assert!((0.5..3.0).contains(&(stated / error)), "{stated} stated, {error}");
+    assert!(
+        (0.5..3.0).contains(&(stated / error)),
+        "{stated} stated, {error}"
+    );
 }
 
 /// The last line says whether the result may be used; a gate that is not met has its exit code.
@@ -66,12 +79,22 @@ fn a_lens_that_is_not_exact_enlarges_sigma() {
 fn the_last_line_says_what_may_be_done_with_the_result() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    let bad = ["--bad-frames", "5:black", "--frames", "12", "--size", "320x240"];
+    let bad = [
+        "--bad-frames",
+        "5:black",
+        "--frames",
+        "12",
+        "--size",
+        "320x240",
+    ];
     simulate(&survey, &bad);
     let refine = ["refine", text(&survey), "--out", text(&out)];
     let said = succeed(&refine);
     let last = said.lines().last().unwrap();
-    assert!(last.starts_with("the result may be used for 11 of 12 frames"), "{said}");
+    assert!(
+        last.starts_with("the result may be used for 11 of 12 frames"),
+        "{said}"
+    );
     succeed(&[&refine[..], &["--min-photometric", "90%"]].concat());
     let message = fail(&[&refine[..], &["--min-photometric", "100%"]].concat(), 4);
     assert!(message.contains("--min-photometric"), "{message}");
@@ -83,7 +106,14 @@ fn the_last_line_says_what_may_be_done_with_the_result() {
 fn a_frame_that_shows_nothing_rests_on_the_prior_between_its_neighbours() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    let bad = ["--bad-frames", "5:black", "--frames", "12", "--size", "320x240"];
+    let bad = [
+        "--bad-frames",
+        "5:black",
+        "--frames",
+        "12",
+        "--size",
+        "320x240",
+    ];
     simulate(&survey, &bad);
     succeed(&["refine", text(&survey), "--out", text(&out), "--quiet"]);
     let refined = poses(&out.join("poses.tum"));

@@ -10,7 +10,8 @@
 //! translation sigma. A *run* is one survey of a cell, by its seed. A survey is *feasible* if all
 //! true poses are inside the tunnel and look at its wall. A run *succeeds* if the wall error of
 //! every frame is below [`GOOD_PX`]. A *false success* is a frame that the refinement reports as
-//! photometric although its error is larger: an undetected failure.
+//! photometric although its error is larger, and larger than 3.5 of its stated σ: an undetected
+//! failure.
 //!
 //! # The gauge
 //!

@@ -75,7 +75,8 @@ pub struct RunRecord {
     pub good_frames: usize,
     /// Number of frames that the refinement flags as anything but photometric.
     pub flagged_frames: usize,
-    /// Number of frames that the refinement flags as photometric although they are not good.
+    /// Number of frames that the refinement flags as photometric although they are neither good nor
+    /// within 3.5 of their stated σ.
     pub false_successes: usize,
     /// Duration of the refinement, seconds.
     pub seconds: f64,

@@ -158,6 +158,9 @@ fn simulate_and_refine(
     }
 }
 
+/// Deviation of a photometric frame beyond which its stated σ is wrong, σ.
+const MAX_DEVIATION_SIGMA: f64 = 3.5;
+
 /// Records the accuracy of the refined poses and the reliability of their flags.
 ///
 /// # Errors
@@ -182,11 +185,12 @@ fn record_accuracy(
         .iter()
         .filter(|frame| !is_photometric(frame.flag))
         .count();
+    // NaN does not count as good.
+    let is_good = |px: f64, sigma_px: f64| px < GOOD_PX.max(MAX_DEVIATION_SIGMA * sigma_px);
     record.false_successes = frames
         .iter()
         .zip(&error.frame_rms_px)
-        // NaN does not count as good.
-        .filter(|(frame, px)| is_photometric(frame.flag) && (px.is_nan() || **px >= GOOD_PX))
+        .filter(|(frame, px)| is_photometric(frame.flag) && !is_good(**px, frame.sigma.wall_px))
         .count();
     Ok(())
 }
