@@ -41,7 +41,9 @@ fn the_fixture_is_repaired_and_any_number_of_threads_gives_the_same_bytes() {
     assert_eq!(report["frames_on_prior"], 0);
     for level in report["levels"].as_array().unwrap() {
         let cost = |name: &str| level[name].as_f64().unwrap();
-        assert!(level["iterations"] == 0 || cost("cost_end") < cost("cost_start"));
+        // The last step is not judged.
+        let judged = level["iterations"].as_u64().unwrap() > 1;
+        assert!(!judged || cost("cost_end") < cost("cost_start"));
         assert!(level["observations"].as_u64().unwrap() > 0);
     }
     for frame in report["frames"].as_array().unwrap() {

@@ -12,8 +12,9 @@ use std::path::PathBuf;
 /// simulates a survey (the `free` experiment with this noise), refines it with default options, and
 /// measures the error of every frame on the wall against the true poses, relative to the majority
 /// of the frames. A run succeeds if the error of every frame is below 0.5 px. A frame that `refine`
-/// flags as photometric although its error is larger, and larger than 3.5 of its stated σ, counts as
-/// a false success. A survey whose true poses leave the tunnel or look along it is simulated again with the next seed (seed + 1000, …).
+/// flags as photometric although its error is larger, and larger than 3.5 of its stated σ, counts
+/// as a false success. A survey whose true poses leave the tunnel or look along it is simulated
+/// again with the next seed (seed + 1000, …).
 ///
 /// Writes runs.jsonl (a line for each finished run), converge.json and converge.txt (statistics of
 /// each cell of the grid) and converge.png (map of the success rates). After Ctrl-C the same
