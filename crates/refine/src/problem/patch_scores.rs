@@ -23,6 +23,11 @@ pub struct PatchScore {
 }
 
 impl PatchScores {
+    /// Number of patches.
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
     /// The scores, in a fixed order.
     pub fn iter(&self) -> impl Iterator<Item = &PatchScore> {
         self.0.values()

@@ -160,7 +160,8 @@ fn uncertainty_of(
         return Ok(None);
     }
     let solved = context.at(solution.kappa);
-    SolutionUncertainty::at(&solved, solution, &calibration).map(Some)
+    let alpha = setup.options.false_alarm_rate;
+    SolutionUncertainty::at(&solved, solution, &calibration, alpha).map(Some)
 }
 
 /// The shared parameters that a full-size solution does not observe.

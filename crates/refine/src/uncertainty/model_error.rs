@@ -8,9 +8,10 @@
 //!
 //! `c_P = (tr(H⁻¹ V_P) − tr(H_ee⁻¹ V_P,ee)) / (κ² · freedoms determined by pixels)`
 //!
-//! does not grow with P if errors of blocks are independent; it falls, as the six unknowns of every
-//! frame are fitted to its patches. If it is largest at P = 1, all is noise. If not, the P with the
-//! largest dispersion is the size over which errors go together, and the covariance is
+//! does not grow with P, but by chance, if errors of blocks are independent; it falls, as the six
+//! unknowns of every frame are fitted to its patches. If it is largest at P = 1, all is noise. If
+//! not, the P with the largest dispersion is the size over which errors go together, and the
+//! covariance is
 //!
 //! `Σ = (H⁻¹ (V_P/κ² + P) H⁻¹)_pp`,
 //!
@@ -38,6 +39,7 @@ use crate::linear::bordered_system::SharedBlock;
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
+use crate::model::significance::normal_quantile;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::problem::patch_scores::PatchScores;
@@ -100,6 +102,7 @@ impl EstimateErrors {
         solution: &Solution,
         posterior: Option<&Posterior>,
         of_noise: &NoiseCovariance,
+        alpha: f64,
     ) -> Result<Option<Self>, ProblemError> {
         let problem = &solution.problem;
         let pattern = problem.pattern();
@@ -131,10 +134,9 @@ impl EstimateErrors {
         for blocks in PATCH_BLOCKS {
             let draws = draw(&scores, posterior);
             let dispersion = draws.quadratic / of_noise.determined;
-            let before = largest
-                .as_ref()
-                .map_or(of_noise.pixel_dispersion, |l| l.1.dispersion);
-            if dispersion > before {
+            let before = largest.as_ref().map_or(0.0, |l| l.1.dispersion);
+            let by_chance = of_noise.pixel_dispersion * chance_factor(scores.len(), alpha);
+            if dispersion > before.max(by_chance) {
                 largest = Some((draws, Patches { blocks, dispersion }));
             }
             scores = scores.doubled();
@@ -150,6 +152,14 @@ impl EstimateErrors {
             },
         }))
     }
+}
+
+/// Factor by which the dispersion of some patches exceeds that of blocks by chance, with the
+/// probability `alpha` for all sizes of patches: a mean of n squares of normal errors has the
+/// relative variance 2/n, and the score of a patch counts as six errors, those of one frame.
+fn chance_factor(patches: usize, alpha: f64) -> f64 {
+    let z = normal_quantile(alpha, PATCH_BLOCKS.len());
+    1.0 + z * (2.0 / (6.0 * patches as f64)).sqrt()
 }
 
 impl ErrorDraws {

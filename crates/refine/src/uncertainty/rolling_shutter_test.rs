@@ -74,7 +74,11 @@ pub fn estimate_readout(
     if problem.tiles() == 0 {
         return Ok(None);
     }
-    let solution = match solve(problem, Stopping::intermediate(options, level)) {
+    let stopping = Stopping {
+        step_sigma: options.step_tolerance_sigma,
+        ..Stopping::intermediate(options, level)
+    };
+    let solution = match solve(problem, stopping) {
         Ok(solution) => solution,
         Err(ProblemError::Factor { .. }) => return Ok(None),
         Err(error) => return Err(error),

@@ -32,7 +32,7 @@ pub struct SolutionUncertainty {
 
 impl SolutionUncertainty {
     /// Computes the uncertainty of a solution, with the free parameters of `calibration`;
-    /// `context`: with the solution's own κ.
+    /// `context`: with the solution's own κ; `alpha`: rate of false alarms.
     ///
     /// # Errors
     /// [`ProblemError::Factor`] if shared parameters were estimated and the poses' normal matrix is
@@ -41,6 +41,7 @@ impl SolutionUncertainty {
         context: &EstimationContext,
         solution: &Solution,
         calibration: &Calibration,
+        alpha: f64,
     ) -> Result<Self, ProblemError> {
         let problem = &solution.problem;
         let posterior = Posterior::at(solution).map_err(|source| problem.factor_error(source))?;
@@ -59,7 +60,7 @@ impl SolutionUncertainty {
         let mut patches = None;
         let (covariances, dispersion) = match of_noise {
             Ok(of_noise) => {
-                let errors = EstimateErrors::find(solution, posterior.as_ref(), &of_noise)?;
+                let errors = EstimateErrors::find(solution, posterior.as_ref(), &of_noise, alpha)?;
                 let of_shared = posterior.as_ref().zip(shared.as_ref());
                 let covariances = total(&of_noise, errors.as_ref(), of_shared);
                 if let (Some(shared), Some(errors)) = (&mut shared, &errors) {
