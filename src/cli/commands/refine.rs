@@ -460,7 +460,9 @@ pub fn print_summary(refined: &Refined, terminal: &Terminal) {
             report.frames_on_prior,
             report.frames.len()
         ));
-        if report.frames_on_prior == report.frames.len() {
+        let scale = report.prior_test.scale;
+        let contradicts = scale.is_some_and(|scale| scale.contradicts);
+        if report.frames_on_prior == report.frames.len() && !contradicts {
             terminal.warn(
                 "  no frame is photometric; possible causes: too few overlapping frames, a wall \
                  without texture, poses in another convention (--pose-convention, --camera-axes, \

@@ -250,6 +250,11 @@ impl<'a> PhotometricProblem<'a> {
         self.sigma
     }
 
+    /// Dispersion by which the information of the pixels is divided, 1 or more.
+    pub fn dispersion(&self) -> f64 {
+        self.context.dispersion
+    }
+
     /// Information of a pixel's grey value: the inverse of the variance of unit weight times the
     /// dispersion.
     pub(super) fn information(&self) -> f64 {

@@ -5,7 +5,7 @@
 //! The parameters are the poses `T_i`, log-gains `α_i` and biases `b_i` of the frames, the texture
 //! S of the wall, and the shared parameters κ if they are estimated. The estimator minimises
 //!
-//! `E = 1/σ² Σ_x Σ_i q_i τ(x) ρ(e_i(x); v(x))`   (pixels)
+//! `E = 1/(σ_u² c) Σ_x Σ_i q_i τ(x) ρ(e_i(x); v(x))`   (pixels)
 //! `  + ½ Σ_k ε_kᵀ Σ_k⁻¹ ε_k`   (poses)
 //! `  + ½ Σ_i (α_i²/σ_α² + b_i²/σ_b²)`   (exposures)
 //! `  + ½ Σ_j κ_j²/σ_j² − (3N − 1) ln r`   (shared parameters)
@@ -26,6 +26,10 @@
 //!   ([`crate::tiles::interpolation::Interpolation::autocorrelation`]).
 //! - **Variance weighting** `τ(x) = σ_s²/v(x)` in the last solves, else 1. Aliasing makes the
 //!   residuals at edges large; without τ the sharpest edges would dominate.
+//! - **Unit variance** `σ_u²`: σ² with variance weighting, else the variance of unit weight
+//!   ([`crate::tiles::residual_weighting::NoiseHistogram::unit_variance`]); and the **dispersion**
+//!   c of the residuals, 1 unless they show errors of the model
+//!   ([`crate::model::context::EstimationContext::dispersion`]).
 //! - **Pixels per sample** `q_i`: the area of a sample in frame i, so that every pixel counts once
 //!   ([`crate::samples::observer::Observer`]).
 //! - **Gaps**: a sample without a value (clipped pixels) has `ω = 0` and costs `ρ = v/2`, as much

@@ -183,7 +183,8 @@ impl ErrorDraws {
 pub struct ModelErrorReport {
     /// Side of the patches of the wall over which residuals err together, metres.
     pub patch_m: f64,
-    /// Dispersion of their scores, `c_P`; noise alone has about 1.
+    /// Dispersion of their scores, `c_P`, with all information of the pixels; noise alone has 1 or
+    /// less.
     pub dispersion: f64,
 }
 
@@ -192,7 +193,7 @@ impl ModelErrorReport {
     pub fn new(found: &Patches, problem: &PhotometricProblem) -> Self {
         Self {
             patch_m: f64::from(found.blocks) * problem.block_size_m(),
-            dispersion: found.dispersion,
+            dispersion: found.dispersion * problem.dispersion(),
         }
     }
 }

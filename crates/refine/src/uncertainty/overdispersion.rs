@@ -88,9 +88,13 @@ pub fn compute_overdispersions(
     let at = &solution.linearisation;
     let pattern = solution.problem.pattern();
     let patch = PATCH as f64 * solution.problem.compared_share();
+    let dispersion = solution.problem.dispersion();
     let of_frame = |(k, estimate): (usize, &FrameEstimate)| {
         let place = pattern.block_index(k, k)?;
-        let blocks = (&at.normal.blocks[place], &at.scatter[place]);
+        // With all information of the pixels.
+        let information = at.normal.blocks[place] * dispersion;
+        let scatter = at.scatter[place] * dispersion.powi(2);
+        let blocks = (&information, &scatter);
         let patches = at.frames[k].samples as f64 / patch;
         Overdispersion::of_frame(context, estimate, blocks, patches)
     };

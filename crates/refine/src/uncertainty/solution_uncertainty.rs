@@ -136,7 +136,7 @@ impl SolutionUncertainty {
         let median = sigmas.get(sigmas.len() / 2).copied().unwrap_or(f64::NAN);
         if median.is_nan() || median > max_sigma_px {
             let reason = format!(
-                "the frames tie each other to {median:.2} px of the wall only (1-σ), and more than \
+                "the frames are certain to {median:.2} px of the wall only (1-σ), and more than \
                  {max_sigma_px} px leave the camera to chance; use more frames, best a \
                  whole turn or two, or more of a wall with texture"
             );

@@ -41,7 +41,8 @@ impl FrameEvidence<'_> {
         let no_overlap = (!has_overlap).then(|| RejectionReason::NoOverlap {
             share: contribution.pixels / all_pixels,
         });
-        let is_uncertain = !(sigma.registration_px <= options.max_sigma_px);
+        let registration_px = sigma.registration_px;
+        let is_uncertain = registration_px.is_nan() || registration_px > options.max_sigma_px;
         let uncertain = is_uncertain.then_some(RejectionReason::Uncertain {
             wall_px: sigma.registration_px,
         });

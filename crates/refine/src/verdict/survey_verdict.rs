@@ -30,7 +30,7 @@ impl SurveyVerdict {
             upper_median(photometric.iter().map(of).collect()).unwrap_or(f64::NAN)
         };
         let accuracy = format!(
-            "{:.2} px against each other, {:.2} px against the first frame (1-σ)",
+            "{:.3} px against each other, {:.2} px against the first frame (1-σ)",
             median(|sigma| sigma.registration_px),
             median(|sigma| sigma.wall_px),
         );
