@@ -145,8 +145,8 @@ fn solve<'a>(
     Ok(solution)
 }
 
-/// The uncertainty of a full-size solution that is the last one, or has shared parameters that it may
-/// not observe.
+/// The uncertainty of a full-size solution that is the last one, or has shared parameters that it
+/// may not observe.
 fn uncertainty_of(
     plan: &SolvePlan,
     setup: &Setup,
