@@ -456,7 +456,7 @@ pub mod rolling_shutter_test {
 pub mod assessment {
     /// Share of a frame's pixels that must overlap other frames for its pose to count as
     /// photometric, 0 to 1. Higher: fewer frames are photometric. Chosen by: unknown.
-    pub const MIN_PIXEL_SHARE: f64 = 0.02;
+    pub const MIN_PIXEL_SHARE: f64 = 0.03;
     /// Pairwise comparisons of all frames, with rejected frames registered again between two, at
     /// the most. Higher: more attempts, in more time. Chosen by: unknown.
     pub const MAX_PAIR_ITERATIONS: usize = 3;

@@ -65,6 +65,13 @@ pub enum RejectionReason {
         /// The factor.
         factor: f64,
     },
+    /// It is one of few frames that fit, where most do not: they may fit by chance.
+    Minority {
+        /// Number of frames that fit.
+        frames: usize,
+        /// Number of frames that show something.
+        shown: usize,
+    },
     /// The equations of the survey have no solution.
     Unsolved,
     /// It was not tried, as none of those before it fitted.
@@ -80,6 +87,11 @@ pub enum RejectionReason {
 }
 
 impl RejectionReason {
+    /// True if the image shows nothing that could fit others.
+    pub fn shows_nothing(&self) -> bool {
+        matches!(self, Self::Featureless | Self::Repeated(_))
+    }
+
     /// True if the image shows a wall that does not fit the other frames.
     pub fn is_misfit(&self) -> bool {
         matches!(
@@ -168,6 +180,12 @@ impl fmt::Display for RejectionReason {
                 f,
                 "it was not tried: {failures} frames from the beginning were searched for over \
                  3.5 σ of the prior in all directions, and none fitted the others"
+            ),
+            Self::Minority { frames: 1, .. } => write!(f, "it fits no other frame"),
+            Self::Minority { frames, shown } => write!(
+                f,
+                "only {frames} of {shown} frames fit each other, which may be chance where most \
+                 do not"
             ),
             Self::Unsolved => write!(f, "the equations of the survey have no solution"),
             Self::Uncertain { wall_px } => write!(

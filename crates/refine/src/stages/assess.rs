@@ -156,11 +156,15 @@ fn judge(
         };
         *rejection = evidence.judge(setup.options);
     }
-    let mut left = rejections
-        .iter_mut()
-        .filter(|rejection| rejection.is_none());
-    if let (Some(alone), None) = (left.next(), left.next()) {
-        *alone = Some(RejectionReason::Disconnected { frames: 1 });
+    let is_shown = |rejection: &&Option<RejectionReason>| {
+        !(rejection.as_ref()).is_some_and(RejectionReason::shows_nothing)
+    };
+    let shown = rejections.iter().filter(is_shown).count();
+    let frames = rejections.iter().filter(|one| one.is_none()).count();
+    if frames == 1 || 2 * frames < shown {
+        for rejection in rejections {
+            rejection.get_or_insert(RejectionReason::Minority { frames, shown });
+        }
     }
 }
 
