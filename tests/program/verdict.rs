@@ -16,6 +16,12 @@ fn poses(path: &Path) -> Vec<tunnelstitch::trajectory::StampedPose> {
     tunnelstitch::trajectory::tum::read(path).unwrap().to_vec()
 }
 
+/// Simulates twelve frames, of which the sixth is black.
+fn simulate_with_a_black_frame(survey: &Path) {
+    let options = "--bad-frames 5:black --frames 12 --size 320x240";
+    simulate(survey, &options.split(' ').collect::<Vec<_>>());
+}
+
 /// A diameter for the radius makes all steps twice as long, which the initial ones contradict: the
 /// factor is named, no frame is believed, and the initial poses are kept.
 #[test]
@@ -79,15 +85,7 @@ fn a_lens_that_is_not_exact_enlarges_sigma() {
 fn the_last_line_says_what_may_be_done_with_the_result() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    let bad = [
-        "--bad-frames",
-        "5:black",
-        "--frames",
-        "12",
-        "--size",
-        "320x240",
-    ];
-    simulate(&survey, &bad);
+    simulate_with_a_black_frame(&survey);
     let refine = ["refine", text(&survey), "--out", text(&out)];
     let said = succeed(&refine);
     let last = said.lines().last().unwrap();
@@ -106,15 +104,7 @@ fn the_last_line_says_what_may_be_done_with_the_result() {
 fn a_frame_that_shows_nothing_rests_on_the_prior_between_its_neighbours() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    let bad = [
-        "--bad-frames",
-        "5:black",
-        "--frames",
-        "12",
-        "--size",
-        "320x240",
-    ];
-    simulate(&survey, &bad);
+    simulate_with_a_black_frame(&survey);
     succeed(&["refine", text(&survey), "--out", text(&out), "--quiet"]);
     let refined = poses(&out.join("poses.tum"));
     let initial = poses(&survey.join("baseline.tum"));

@@ -460,8 +460,7 @@ pub fn print_summary(refined: &Refined, terminal: &Terminal) {
             report.frames_on_prior,
             report.frames.len()
         ));
-        let scale = report.prior_test.scale;
-        let contradicts = scale.is_some_and(|scale| scale.contradicts);
+        let contradicts = report.prior_test.contradicting_scale().is_some();
         if report.frames_on_prior == report.frames.len() && !contradicts {
             terminal.warn(
                 "  no frame is photometric; possible causes: too few overlapping frames, a wall \

@@ -13,7 +13,7 @@ use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// Blocks of tiles that are processed before their sums are added: bounds the memory, whatever the
 /// tunnel's length.
-pub(super) const BATCH: usize = 64;
+const BATCH: usize = 64;
 
 /// Stiffness of the gauge constraint at the first compared frame over that of its pixels. At about
 /// the root of the inverse rounding error, neither rounding moves the frames along the gauge, nor
@@ -89,6 +89,34 @@ impl PhotometricProblem<'_> {
         camera: &Camera,
         sums: &mut Linearisation,
     ) -> Result<(), ProblemError> {
+        self.visit_blocks(estimates, kappa, camera, &mut |_, block| {
+            sums.cost += block.cost;
+            block.add_to(
+                &self.pattern,
+                &mut sums.normal,
+                &mut sums.scatter,
+                &mut sums.frames,
+            );
+            if let Some(((intrinsics, border), scatter)) = block
+                .intrinsics
+                .as_ref()
+                .zip(sums.border.as_mut())
+                .zip(sums.border_scatter.as_mut())
+            {
+                intrinsics.add_to(&block.slots, &block.gradient, border, scatter);
+            }
+        })
+    }
+
+    /// Sums over every block of the wall, and visits them in a fixed order with row and column of
+    /// the block.
+    pub(super) fn visit_blocks(
+        &self,
+        estimates: &[FrameEstimate],
+        kappa: &Kappa,
+        camera: &Camera,
+        visit: &mut dyn FnMut((i64, i64), &BlockSums),
+    ) -> Result<(), ProblemError> {
         let readout_s = self.context.calibration.readout_s(kappa);
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch)?;
@@ -100,22 +128,8 @@ impl PhotometricProblem<'_> {
                 let blocks: Vec<BlockSums> = batch.par_map(|block| {
                     self.sum_block(stretch, &visibility, block, &sampled_frames, camera)
                 });
-                for block in blocks {
-                    sums.cost += block.cost;
-                    block.add_to(
-                        &self.pattern,
-                        &mut sums.normal,
-                        &mut sums.scatter,
-                        &mut sums.frames,
-                    );
-                    if let Some(((intrinsics, border), scatter)) = block
-                        .intrinsics
-                        .as_ref()
-                        .zip(sums.border.as_mut())
-                        .zip(sums.border_scatter.as_mut())
-                    {
-                        intrinsics.add_to(&block.slots, &block.gradient, border, scatter);
-                    }
+                for (tiles, block) in batch.iter().zip(&blocks) {
+                    visit(visibility.tiles[tiles.start].id.block(), block);
                 }
             }
         }

@@ -3,11 +3,8 @@
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
-use crate::problem::block_sums::BlockSums;
-use crate::problem::linearise::BATCH;
 use crate::problem::photometric_problem::PhotometricProblem;
 use std::collections::BTreeMap;
-use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 
 /// The scores of square patches of blocks, by row and column of the patch.
 #[derive(Clone, Debug, Default)]
@@ -85,7 +82,6 @@ impl PhotometricProblem<'_> {
         let Some(camera) = calibration.camera(kappa) else {
             return Ok(scores);
         };
-        let readout_s = calibration.readout_s(kappa);
         let information = self.information();
         let free = Kappa::from_fn(|k, _| {
             if calibration.free[k] {
@@ -94,28 +90,13 @@ impl PhotometricProblem<'_> {
                 0.0
             }
         });
-        for stretch in 0..self.coverage.len() {
-            let visibility = self.coverage.visibility(stretch)?;
-            let pyramids = self.images.load(self.coverage.frames(stretch))?;
-            let at_level = camera.at_level(self.sampling.level);
-            let sampled_frames =
-                self.sampled_frames(stretch, &pyramids, &estimates, at_level, readout_s);
-            for batch in visibility.blocks.chunks(BATCH) {
-                let blocks: Vec<BlockSums> = batch.par_map(|block| {
-                    self.sum_block(stretch, &visibility, block, &sampled_frames, &camera)
-                });
-                for (tiles, block) in batch.iter().zip(blocks) {
-                    let (row, column) = visibility.tiles[tiles.start].id.block();
-                    let patch = (row.div_euclid(2), column.div_euclid(2));
-                    let gradient: Vec<FrameStep> =
-                        block.gradient.iter().map(|g| g * information).collect();
-                    let shared = block.intrinsics.as_ref().map(|sums| sums.shared_gradient());
-                    let shared = shared.unwrap_or_else(Kappa::zeros).component_mul(&free);
-                    let frames = block.slots.iter().copied().zip(&gradient);
-                    scores.add(patch, frames, &shared);
-                }
-            }
-        }
+        self.visit_blocks(&estimates, kappa, &camera, &mut |(row, column), block| {
+            let gradient: Vec<FrameStep> = block.gradient.iter().map(|g| g * information).collect();
+            let shared = block.intrinsics.as_ref().map(|sums| sums.shared_gradient());
+            let shared = shared.unwrap_or_else(Kappa::zeros).component_mul(&free);
+            let patch = (row.div_euclid(2), column.div_euclid(2));
+            scores.add(patch, block.slots.iter().copied().zip(&gradient), &shared);
+        })?;
         Ok(scores)
     }
 }

@@ -134,8 +134,9 @@ fn frame_sigmas(
         .collect()
 }
 
-/// Decides about every frame that no earlier test has rejected. A single photometric frame agrees
-/// with no other.
+/// Decides about every frame that no earlier test has rejected. If most frames that show something
+/// do not fit, the others may fit each other by chance, and none is photometric; nor is a single
+/// one, which agrees with no other.
 fn judge(
     setup: &Setup,
     solution: &Solution,

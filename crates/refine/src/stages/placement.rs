@@ -75,7 +75,7 @@ impl Placement {
             &photometric,
             alpha,
         );
-        if let Some(scale) = prior_test.scale.filter(|scale| scale.contradicts) {
+        if let Some(scale) = prior_test.contradicting_scale() {
             let factor = scale.factor;
             for rejection in &mut rejections {
                 rejection.get_or_insert(RejectionReason::ContradictsScale { factor });
@@ -87,21 +87,19 @@ impl Placement {
                 *other = datum.to_metres(&motion.apply(other));
             }
         }
-        let mut frame_covariances = std::mem::take(&mut covariances.frames);
         let bridging = Bridging {
             prior,
             datum,
             photometric: &photometric,
         };
         if bridging
-            .apply(&mut estimates, &mut frame_covariances)
+            .apply(&mut estimates, &mut covariances.frames)
             .is_err()
         {
             for k in (0..estimates.len()).filter(|k| !photometric[*k]) {
-                frame_covariances[k] = Matrix6::from_element(f64::NAN);
+                covariances.frames[k] = Matrix6::from_element(f64::NAN);
             }
         }
-        covariances.frames = frame_covariances;
         for k in 1..estimates.len() {
             if !(photometric[k - 1] && photometric[k]) {
                 covariances.next[k - 1] = Matrix6::from_element(f64::NAN);
@@ -167,7 +165,7 @@ impl Placement {
             .map(|frame| frame.sigma)
             .collect();
         let radius_m = setup.input.nominal_radius_m;
-        let scale = self.prior_test.scale.filter(|scale| scale.contradicts);
+        let scale = self.prior_test.contradicting_scale();
         let contradiction = scale.map(|scale| scale.explain(radius_m));
         let verdict = SurveyVerdict::new(
             &photometric,

@@ -23,6 +23,7 @@ use crate::uncertainty::observability::Posterior;
 use nalgebra::Vector3;
 use serde::Serialize;
 use tunnelstitch_core::survey::{CalibrateSection, CalibrationGroup};
+use tunnelstitch_geometry::numerics::median::upper_median;
 use tunnelstitch_geometry::surface::viewing_distance;
 
 /// Number of frames that are used, from the middle of the survey: ten turns of them determine the
@@ -132,7 +133,5 @@ fn shift_px_per_s(context: &EstimationContext, states: &FrameStates) -> f64 {
         let moved = rate.omega_rad.cross(&x_c) + rate.nu_m;
         Some((context.camera.project_jacobian(&x_c) * moved).norm() * row_share)
     };
-    let mut shifts: Vec<f64> = all.clone().filter_map(shift).collect();
-    shifts.sort_unstable_by(f64::total_cmp);
-    shifts.get(shifts.len() / 2).copied().unwrap_or_default()
+    upper_median(all.clone().filter_map(shift).collect()).unwrap_or_default()
 }

@@ -13,6 +13,7 @@ use crate::thresholds::inconsistent_frames::{
     MAX_REJECTED_SHARE, MAX_TYING_SIGMA_PX, MIN_CORRELATION,
 };
 use crate::validation::alignment::Alignment;
+use tunnelstitch_geometry::numerics::median::upper_median;
 
 /// Rejects the frames of which the robust loss has rejected too many pixels at full size, so that
 /// the last solve leaves them out.
@@ -119,9 +120,7 @@ impl Limits {
     /// the factor `√(ln(n/α)/ln 2)` once in n pairs with the probability α.
     fn new(alignments: &[Alignment], options: &RefineOptions) -> Self {
         let measured = alignments.iter().filter(|p| p.sigma_px.is_finite());
-        let mut errors: Vec<f64> = measured.map(|p| p.error_px).collect();
-        errors.sort_unstable_by(f64::total_cmp);
-        let median = errors.get(errors.len() / 2).copied().unwrap_or(0.0);
+        let median = upper_median(measured.map(|p| p.error_px).collect()).unwrap_or(0.0);
         let pairs = alignments.len().max(1);
         let ratio = (pairs as f64 / options.false_alarm_rate).ln() / std::f64::consts::LN_2;
         Self {

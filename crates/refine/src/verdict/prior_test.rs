@@ -115,10 +115,15 @@ impl PriorTest {
         test
     }
 
+    /// The scale, if it contradicts the prior: lengths of the result cannot be believed.
+    pub fn contradicting_scale(&self) -> Option<ScaleTest> {
+        self.scale.filter(|scale| scale.contradicts)
+    }
+
     /// The contradictions in sentences.
     fn explain(&self, radius_m: f64, model: JitterModel) -> Vec<String> {
         let mut findings = Vec::new();
-        if let Some(scale) = self.scale.filter(|scale| scale.contradicts) {
+        if let Some(scale) = self.contradicting_scale() {
             findings.push(scale.explain(radius_m));
         }
         for sigma in &self.sigmas {
