@@ -40,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         })
         .collect();
 
-    let input = RefineInput::new(camera, &pipe, &frames, &initial, prior);
+    let input = RefineInput::new(camera, Arc::new(pipe), &frames, &initial, prior);
     let silent: Arc<dyn Progress> = Arc::new(Silent);
     let refined = refine(input, &RefineOptions::default(), &silent)?;
 

@@ -25,7 +25,7 @@
 //!
 //! let input = RefineInput::new(
 //!     survey.camera,
-//!     survey.surface.as_ref(),
+//!     Arc::clone(&survey.surface),
 //!     &frames,
 //!     &survey.initial[..14],
 //!     survey.prior,

@@ -1,6 +1,7 @@
 //! The input of a refinement: frames, camera, tunnel, poses and their noise model.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 use tunnelstitch_core::frames::FrameSet;
 use tunnelstitch_core::survey::{CalibrateSection, Survey};
 use tunnelstitch_geometry::camera::Camera;
@@ -18,7 +19,7 @@ pub struct RefineInput<'a> {
     /// The camera, at rest.
     pub camera: Camera,
     /// The tunnel.
-    pub surface: &'a dyn Surface,
+    pub surface: Arc<dyn Surface>,
     /// The frames, in the order of their poses.
     pub frames: &'a FrameSet,
     /// The initial poses, camera to world, one per frame.
@@ -42,13 +43,14 @@ impl<'a> RefineInput<'a> {
     /// `frames` and `initial` correspond one to one.
     pub fn new(
         camera: Camera,
-        surface: &'a dyn Surface,
+        surface: Arc<dyn Surface>,
         frames: &'a FrameSet,
         initial: &'a [StampedPose],
         prior: Jitter,
     ) -> Self {
         Self {
             camera,
+            nominal_radius_m: surface.perimeter_m() / TAU,
             surface,
             frames,
             initial,
@@ -56,7 +58,6 @@ impl<'a> RefineInput<'a> {
             shutter: Shutter::default(),
             ignored: &NOTHING,
             calibrate: CalibrateSection::default(),
-            nominal_radius_m: surface.perimeter_m() / TAU,
         }
     }
 }
@@ -65,7 +66,7 @@ impl<'a> From<&'a Survey> for RefineInput<'a> {
     fn from(survey: &'a Survey) -> Self {
         Self {
             camera: survey.camera,
-            surface: survey.surface.as_ref(),
+            surface: Arc::clone(&survey.surface),
             frames: &survey.frames,
             initial: &survey.initial,
             prior: survey.prior,

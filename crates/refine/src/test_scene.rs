@@ -42,7 +42,7 @@ pub fn test_context<'a>(
     prior: &'a Prior,
 ) -> EstimationContext<'a> {
     EstimationContext {
-        surface: &wall.circle,
+        surface: std::sync::Arc::new(wall.circle),
         ignored: &NO_PATCHES,
         camera: wall.camera,
         shutter: &GLOBAL_SHUTTER,

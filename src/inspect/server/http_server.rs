@@ -29,7 +29,7 @@ const MAX_DRAINED_BYTES: u64 = 8 << 20;
 /// Source frames of the layers.
 pub struct SourceFrames {
     /// The tunnel.
-    pub surface: Box<dyn Surface>,
+    pub surface: std::sync::Arc<dyn Surface>,
     /// The camera.
     pub camera: Camera,
     /// The frames.

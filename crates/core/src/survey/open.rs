@@ -10,6 +10,7 @@ use super::poses_section::PosesSection;
 use super::{ignore, pose_validation};
 use crate::frames::{FrameSet, Mask};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
 use tunnelstitch_geometry::surface::{Surface, WallRegions};
 use tunnelstitch_geometry::trajectory::{
@@ -26,7 +27,7 @@ pub struct Survey {
     /// The camera.
     pub camera: Camera,
     /// The tunnel.
-    pub surface: Box<dyn Surface>,
+    pub surface: Arc<dyn Surface>,
     /// Regions of the wall that are excluded from the comparison of frames.
     pub ignored: WallRegions,
     /// The frames, sorted by name, with their common mask.

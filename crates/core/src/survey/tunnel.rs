@@ -5,6 +5,7 @@ use super::ignore::IgnoreSection;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use tunnelstitch_geometry::surface::section::{CircleOutline, Ellipse, PiecewiseOutline, Section};
 use tunnelstitch_geometry::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
 use tunnelstitch_geometry::trajectory::{PoseError, text};
@@ -78,7 +79,7 @@ impl TunnelSection {
     /// # Errors
     /// A size that is missing, impossible or of another shape; a centreline that cannot be read or
     /// that no tunnel can follow.
-    pub fn surface(&self, toml: &Path, folder: &Path) -> Result<Box<dyn Surface>, SurveyError> {
+    pub fn surface(&self, toml: &Path, folder: &Path) -> Result<Arc<dyn Surface>, SurveyError> {
         let value = |what: String| SurveyError::Value {
             path: toml.to_owned(),
             what: format!("tunnel: {what}"),
@@ -88,16 +89,16 @@ impl TunnelSection {
             return Ok(match (self.shape, self.radius_m) {
                 // The fastest shape.
                 (Shape::Circle, Some(radius_m)) => {
-                    Box::new(Circle::new(radius_m).map_err(|error| value(error.to_string()))?)
+                    Arc::new(Circle::new(radius_m).map_err(|error| value(error.to_string()))?)
                 }
-                _ => Box::new(Prism::new(section)),
+                _ => Arc::new(Prism::new(section)),
             });
         };
         let path = folder.join(centreline);
         let points = read_centreline(&path)?;
         let line = Centreline::through(&points, self.nominal_m(), section.farthest_m());
         let line = line.map_err(|error| PoseError::file(&path, error.to_string()))?;
-        Ok(Box::new(Swept::new(section, line)))
+        Ok(Arc::new(Swept::new(section, line)))
     }
 
     /// Creates the section, or returns the problem of its sizes.

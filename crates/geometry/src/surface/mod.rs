@@ -19,27 +19,33 @@
 
 mod centreline;
 mod circle;
+mod displaced;
 mod displacement;
 mod error;
 mod footprint;
 mod gauge;
 mod gauge_component;
 mod prism;
+mod radial_field;
 pub mod section;
 mod shape;
+mod spline_lattice;
 mod swept;
 mod wall;
 mod wall_regions;
 
 pub use centreline::{CentrePoint, Centreline, CentrelineFrame};
 pub use circle::Circle;
+pub use displaced::Displaced;
 pub use displacement::{lens_jacobian, wall_jacobian};
 pub use error::SurfaceError;
 pub use footprint::{Footprint, shortest_arc};
 pub use gauge::{Axis, Gauge, GaugeMotion};
 pub use gauge_component::gauge_component;
 pub use prism::Prism;
+pub use radial_field::{FieldValue, RadialField};
 pub use shape::{Surface, viewing_distance};
+pub use spline_lattice::{SplineLattice, Support};
 pub use swept::Swept;
 pub use wall::{Hit, WallFrame, WallPoint};
 pub use wall_regions::WallRegions;

@@ -1,9 +1,10 @@
 //! Points of the wall, in the world and unrolled.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// A point of the unrolled wall, metres.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WallPoint {
     /// Arc length around the section, in `[0, perimeter)`.
     pub s_m: f64,
@@ -31,4 +32,11 @@ pub struct WallFrame {
     pub e_s: Vector3<f64>,
     /// `∂x_w/∂h`.
     pub e_h: Vector3<f64>,
+}
+
+impl WallFrame {
+    /// The unit normal `e_s × e_h/|e_s × e_h|`, which points outwards.
+    pub fn normal(&self) -> Vector3<f64> {
+        self.e_s.cross(&self.e_h).normalize()
+    }
 }

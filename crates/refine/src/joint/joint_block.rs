@@ -132,7 +132,7 @@ impl<'a> JointBlock<'a> {
         let mask = ObservationMask::new(context.ignored, grid, visibility, block, &frames, &region)
             .shifted(shift);
         let views: Vec<_> = frames.iter().map(|k| sampled_frames[*k].view()).collect();
-        let footprints = Footprints::new(context.surface, &lattice, region, &views);
+        let footprints = Footprints::new(context.surface.as_ref(), &lattice, region, &views);
         let sigma = sigma as f32;
         let readings = frames.iter().enumerate().map(|(n, frame)| {
             let pixels = footprints.pixels(n).iter().zip(footprints.positions(n));

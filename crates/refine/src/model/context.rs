@@ -5,16 +5,17 @@ use crate::parameters::calibration::{Calibration, Kappa};
 use crate::parameters::frame_estimate::FrameEstimate;
 use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::surface::{Surface, WallRegions};
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
 /// All inputs of the estimator.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub struct EstimationContext<'a> {
     /// The tunnel.
-    pub surface: &'a dyn Surface,
+    pub surface: Arc<dyn Surface>,
     /// Parts of the wall where frames are not compared.
     pub ignored: &'a WallRegions,
     /// The camera at full size at the current κ, without motion during the readout.
@@ -39,14 +40,14 @@ pub struct EstimationContext<'a> {
 
 impl EstimationContext<'_> {
     /// Replaces the shared parameters and the camera; no change if `kappa` gives no valid camera.
-    pub fn at(self, kappa: Kappa) -> Self {
+    pub fn at(&self, kappa: Kappa) -> Self {
         match self.calibration.camera(&kappa) {
             Some(camera) => Self {
                 camera,
                 kappa,
-                ..self
+                ..self.clone()
             },
-            None => self,
+            None => self.clone(),
         }
     }
 

@@ -222,7 +222,7 @@ impl PhotometricProblem<'_> {
         let pyramids = self.images.load(participants)?;
         let sampled_frames = self.initial_sampled_frames(stretch, &pyramids);
         mask.detect(
-            self.context.surface,
+            self.context.surface.as_ref(),
             visibility,
             participants,
             &sampled_frames,
@@ -255,8 +255,12 @@ impl PhotometricProblem<'_> {
                 let mut workspace = TileWorkspace::default();
                 let mut scratch = Vec::new();
                 for tile in tiles {
-                    let points =
-                        TilePoints::new(&self.grid, self.context.surface, tile.id, &mut scratch);
+                    let points = TilePoints::new(
+                        &self.grid,
+                        self.context.surface.as_ref(),
+                        tile.id,
+                        &mut scratch,
+                    );
                     let mut observed_tile = ObservedTile {
                         workspace: &mut workspace,
                         points: &points,

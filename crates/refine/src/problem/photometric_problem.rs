@@ -109,9 +109,10 @@ impl<'a> PhotometricProblem<'a> {
         let gauge_slot = active
             .clone()
             .position(|frame| compared[frame - participants.start]);
-        let pixel_size_m = pixel_size_on_wall(context.surface, &camera, posed.iter().flatten());
+        let pixel_size_m =
+            pixel_size_on_wall(context.surface.as_ref(), &camera, posed.iter().flatten());
         let density = density.max(min_density(camera.height));
-        let grid = WallGrid::new(context.surface, pixel_size_m, density);
+        let grid = WallGrid::new(context.surface.as_ref(), pixel_size_m, density);
         let images = FrameImages {
             frames: context.frames,
             first: participants.start,
@@ -122,7 +123,7 @@ impl<'a> PhotometricProblem<'a> {
             mask: context.frames.mask(&camera),
         };
         let coverage = TileCoverage::new(
-            context.surface,
+            Arc::clone(&context.surface),
             grid,
             camera,
             images,
@@ -139,7 +140,7 @@ impl<'a> PhotometricProblem<'a> {
                 source,
             })?;
         let mut problem = Self {
-            context: *context,
+            context: context.clone(),
             sampling,
             images,
             camera,

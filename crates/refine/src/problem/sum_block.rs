@@ -75,8 +75,14 @@ impl PhotometricProblem<'_> {
         let visibility = context.visibility;
         let tiles = &visibility.tiles[block.clone()];
         let mut scratch = Vec::new();
-        let mut points_of =
-            |tile: &Tile| TilePoints::new(&self.grid, self.context.surface, tile.id, &mut scratch);
+        let mut points_of = |tile: &Tile| {
+            TilePoints::new(
+                &self.grid,
+                self.context.surface.as_ref(),
+                tile.id,
+                &mut scratch,
+            )
+        };
         if let Some(wall_model) = &self.wall_model {
             let joint = self.joint_block(visibility, block, context.sampled_frames);
             let moments = joint.moments(wall_model);

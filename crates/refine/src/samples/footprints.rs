@@ -41,8 +41,13 @@ pub fn footprint(
     frame: usize,
     pose: &Pose,
 ) -> Result<Footprint, ProblemError> {
-    Footprint::within(context.surface, camera, pose, reach_m(context.surface))
-        .map_err(|source| ProblemError::Placement { frame, source })
+    Footprint::within(
+        context.surface.as_ref(),
+        camera,
+        pose,
+        reach_m(context.surface.as_ref()),
+    )
+    .map_err(|source| ProblemError::Placement { frame, source })
 }
 
 /// Footprint of each frame at its current pose.

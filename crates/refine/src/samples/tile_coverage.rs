@@ -58,7 +58,7 @@ impl FrameImages<'_> {
 /// The observations of a window of frames, stretch by stretch.
 #[derive(Debug)]
 pub struct TileCoverage<'a> {
-    surface: &'a dyn Surface,
+    surface: Arc<dyn Surface>,
     grid: WallGrid,
     /// The camera at the pyramid level.
     camera: Camera,
@@ -90,7 +90,7 @@ impl<'a> TileCoverage<'a> {
     /// # Errors
     /// [`FrameError`] if an image that the selection needs cannot be read.
     pub fn new(
-        surface: &'a dyn Surface,
+        surface: Arc<dyn Surface>,
         grid: WallGrid,
         camera: Camera,
         images: FrameImages<'a>,
@@ -177,7 +177,7 @@ impl<'a> TileCoverage<'a> {
         let Stretch { rows, frames } = &self.stretches[stretch];
         let posed: Vec<PosedFrame> = frames.iter().filter_map(|k| self.posed[*k]).collect();
         let all = Visibility::find(
-            self.surface,
+            self.surface.as_ref(),
             &self.grid,
             &self.camera,
             self.images.frames.shading().as_deref(),
@@ -203,7 +203,7 @@ impl<'a> TileCoverage<'a> {
             &all,
             self.information,
             &self.grid,
-            self.surface,
+            self.surface.as_ref(),
             &sampled_frames,
         );
         Ok((selected, all.tiles.len()))

@@ -128,7 +128,7 @@ impl Placement {
     /// The report of frame `k`, without what the last solve says of it; `sigma`: by that solve.
     pub fn report_frame(&self, setup: &Setup, k: usize, sigma: FrameSigma) -> FrameReport {
         let rejection = self.rejections[k].as_ref();
-        let (surface, camera) = (setup.input.surface, &setup.input.camera);
+        let (surface, camera) = (setup.input.surface.as_ref(), &setup.input.camera);
         FrameReport {
             index: k,
             file: setup.input.frames[k].name(),

@@ -102,7 +102,7 @@ impl<'a> Setup<'a> {
     /// grey levels.
     pub fn initial_context(&self, noise: f64) -> EstimationContext<'_> {
         EstimationContext {
-            surface: self.input.surface,
+            surface: std::sync::Arc::clone(&self.input.surface),
             ignored: self.input.ignored,
             camera: self.input.camera,
             shutter: &self.input.shutter,

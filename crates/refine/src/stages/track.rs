@@ -22,7 +22,7 @@ pub fn run<'a>(
     let initial = setup.initial_context(state.noise);
     let context = EstimationContext {
         prior: &setup.tracking_prior,
-        ..initial
+        ..initial.clone()
     };
     let tracking = state.tracking.take();
     let tracking =

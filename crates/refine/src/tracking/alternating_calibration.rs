@@ -99,7 +99,7 @@ impl AlternatingCalibration {
     ) -> Result<FrameStates, ProblemError> {
         let mut context = EstimationContext {
             calibration: context.calibration.intrinsics_only(),
-            ..*context
+            ..context.clone()
         }
         .at(self.kappa);
         if self.round == 0 && self.tracking.tracked_frames() == 0 {

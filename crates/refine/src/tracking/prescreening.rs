@@ -126,7 +126,7 @@ fn rms_difference(a: &GreyImage, b: &GreyImage) -> f64 {
 /// picture by more than a pixel of the coarsest level, where pictures are compared.
 fn has_moved(context: &EstimationContext, a: usize, b: usize, coarsest: usize) -> bool {
     let (from, to) = (&context.prior.initial[a], &context.prior.initial[b]);
-    let Ok(distance_m) = viewing_distance(context.surface, from) else {
+    let Ok(distance_m) = viewing_distance(context.surface.as_ref(), from) else {
         return true;
     };
     let rotation = from.r_wc.angle_to(&to.r_wc);

@@ -77,7 +77,7 @@ impl ReferenceMosaic {
     ) -> Result<Self, ProblemError> {
         let radius_m = context.surface.perimeter_m() / std::f64::consts::TAU;
         let reach_m = RESOLVED_REACH_RADII * radius_m;
-        let footprint = Footprint::within(context.surface, camera, pose, reach_m)
+        let footprint = Footprint::within(context.surface.as_ref(), camera, pose, reach_m)
             .map_err(|source| ProblemError::Placement { frame, source })?
             .widened(margin_m);
         // A frame that looks along the tunnel has its detail where the wall is near, for a camera

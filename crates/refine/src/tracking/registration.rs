@@ -102,7 +102,7 @@ pub fn register_frame(
     neighbours: &Neighbours,
     effort: &mut Effort,
 ) -> Result<Result<Registered, RejectionReason>, ProblemError> {
-    let Ok(distance_m) = viewing_distance(context.surface, &predicted.pose) else {
+    let Ok(distance_m) = viewing_distance(context.surface.as_ref(), &predicted.pose) else {
         return Ok(Err(RejectionReason::NoMatch { correlation: 0.0 }));
     };
     let registration =
@@ -117,7 +117,12 @@ pub fn register_frame(
     let camera = context.camera.at_level(registration.search_level);
     let pixel_size =
         |candidate: &Candidate| pixel_size_m(context, &camera, &candidate.estimate.pose);
-    let chosen = choose_candidate(&candidates, context.surface, &context.camera, pixel_size);
+    let chosen = choose_candidate(
+        &candidates,
+        context.surface.as_ref(),
+        &context.camera,
+        pixel_size,
+    );
     match chosen {
         Ok(candidate) => registration.finish(candidate).map(Ok),
         Err(reason) => Ok(Err(reason)),

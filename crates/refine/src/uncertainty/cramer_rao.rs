@@ -111,7 +111,7 @@ pub fn pose_bounds(
     // The motion during readout hardly changes the information.
     let shutter = Shutter::default();
     let context = EstimationContext {
-        surface: survey.surface.as_ref(),
+        surface: std::sync::Arc::clone(&survey.surface),
         ignored: &survey.ignored,
         camera,
         shutter: &shutter,

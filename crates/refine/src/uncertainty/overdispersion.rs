@@ -55,7 +55,7 @@ impl Overdispersion {
     ) -> Option<Self> {
         let (q, covariance) = compute_dispersion(information, scatter)?;
         let sigma = compute_frame_sigma(
-            context.surface,
+            context.surface.as_ref(),
             &context.camera,
             estimate,
             &covariance,

@@ -23,7 +23,7 @@ pub fn registration_sigmas(
         let block = &solution.linearisation.normal.blocks[pattern.block_index(k, k)?];
         let inverse = block.cholesky()?.inverse();
         let covariance = dispersion * inverse.fixed_view::<6, 6>(0, 0);
-        let (surface, camera) = (context.surface, &context.camera);
+        let (surface, camera) = (context.surface.as_ref(), &context.camera);
         Some(compute_frame_sigma(surface, camera, estimate, &covariance, None).wall_px)
     };
     let frames = solution.estimates.iter().enumerate();

@@ -63,7 +63,7 @@ pub fn estimate_readout(
     let calibration = free_readout(context);
     let context = &EstimationContext {
         calibration,
-        ..*context
+        ..context.clone()
     };
     let level = options.handover_level(context.camera.shorter_side());
     let sampling = Sampling {
@@ -128,7 +128,7 @@ fn shift_px_per_s(context: &EstimationContext, states: &FrameStates) -> f64 {
     let row_share = 1.0 - 1.0 / f64::from(context.camera.height);
     let shift = |k: usize| {
         let pose = &states.estimates[k].pose;
-        let x_c = Vector3::z() * viewing_distance(context.surface, pose).ok()?;
+        let x_c = Vector3::z() * viewing_distance(context.surface.as_ref(), pose).ok()?;
         let rate = context.sweep_rate(k, &all, &states.estimates);
         let moved = rate.omega_rad.cross(&x_c) + rate.nu_m;
         Some((context.camera.project_jacobian(&x_c) * moved).norm() * row_share)

@@ -93,7 +93,7 @@ impl SolutionUncertainty {
         FrameSigma {
             registration_px: self.registration_px[k],
             ..compute_frame_sigma(
-                context.surface,
+                context.surface.as_ref(),
                 &context.camera,
                 estimate,
                 &self.covariances.frames[k],

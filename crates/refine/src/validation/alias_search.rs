@@ -121,7 +121,7 @@ struct Comparison<'a> {
 impl Comparison<'_> {
     /// The gauge motion closest to a shift on the wall, with the shift that it makes.
     fn motion(&self, shift_m: [f64; 2]) -> (Vector2<f64>, GaugeMotion) {
-        gauge_component(self.context.surface, self.pose, &shift_m.into())
+        gauge_component(self.context.surface.as_ref(), self.pose, &shift_m.into())
     }
 
     /// Unexplained share of the texture's variance at a shift on the wall.
