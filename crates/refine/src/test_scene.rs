@@ -42,6 +42,8 @@ pub fn test_context<'a>(
     prior: &'a Prior,
 ) -> EstimationContext<'a> {
     EstimationContext {
+        nominal: std::sync::Arc::new(wall.circle),
+        shape: None,
         surface: std::sync::Arc::new(wall.circle),
         ignored: &NO_PATCHES,
         camera: wall.camera,

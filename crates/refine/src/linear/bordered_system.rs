@@ -131,7 +131,7 @@ pub fn reduce_to_shared(
     w: &[BorderBlock],
 ) -> SharedBlock {
     let mut reduced = border.own;
-    for column in 0..pattern.frames() {
+    for column in 0..pattern.columns() {
         let cross = w[column].transpose() * border.frames[column];
         reduced -= cross + cross.transpose();
         for &row in pattern.rows(column) {

@@ -15,6 +15,7 @@
 //! ([`crate::parameters`]).
 
 pub mod bordered_system;
+pub mod elimination_order;
 pub mod normal_equations;
 pub mod selected_inverse;
 pub mod sparse_cholesky;

@@ -1,9 +1,12 @@
 //! The normal equations: a symmetric block-sparse matrix and a gradient.
+//!
+//! Every slot stands for eight parameters: those of a frame, or, behind all frames, a block of
+//! coefficients of the wall's shape ([`crate::parameters::shape`]).
 
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use nalgebra::SMatrix;
 
-/// One block of the normal matrix: the parameters of one frame by those of another.
+/// One block of the normal matrix: the parameters of one slot by those of another.
 pub type Block = SMatrix<f64, FRAME_PARAMETERS, FRAME_PARAMETERS>;
 
 /// Sparsity pattern of the upper triangle: for every block column the ascending rows up to the
@@ -15,14 +18,14 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of `frames` frames of which the `pairs` (any order, repeated or not) share
-    /// residuals; the diagonal always exists.
-    pub fn new(frames: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Self {
-        let mut rows: Vec<Vec<usize>> = (0..frames).map(|k| vec![k]).collect();
+    /// The pattern of `slots` blocks of parameters of which the `pairs` (any order, repeated or not)
+    /// share residuals; the diagonal always exists.
+    pub fn new(slots: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Self {
+        let mut rows: Vec<Vec<usize>> = (0..slots).map(|k| vec![k]).collect();
         for (a, b) in pairs {
             rows[a.max(b)].push(a.min(b));
         }
-        let mut starts = Vec::with_capacity(frames);
+        let mut starts = Vec::with_capacity(slots);
         let mut total = 0;
         for column in &mut rows {
             column.sort_unstable();
@@ -34,7 +37,7 @@ impl Pattern {
     }
 
     /// Number of block columns.
-    pub fn frames(&self) -> usize {
+    pub fn columns(&self) -> usize {
         self.rows.len()
     }
 
@@ -60,7 +63,7 @@ impl Pattern {
 pub struct NormalEquations {
     /// Blocks in the order of the pattern.
     pub blocks: Vec<Block>,
-    /// Gradient of the cost, one vector per frame.
+    /// Gradient of the cost, one vector per slot.
     pub gradient: Vec<FrameStep>,
 }
 
@@ -69,7 +72,7 @@ impl NormalEquations {
     pub fn zeros(pattern: &Pattern) -> Self {
         Self {
             blocks: vec![Block::zeros(); pattern.blocks()],
-            gradient: vec![FrameStep::zeros(); pattern.frames()],
+            gradient: vec![FrameStep::zeros(); pattern.columns()],
         }
     }
 

@@ -1,22 +1,25 @@
 //! Selected inversion: the blocks of `H⁻¹` on the sparsity pattern of the factor of H.
 //!
-//! Let `H = L D Lᵀ` with L unit lower triangular in 8 × 8 blocks, in the order of the frames, in
-//! which the matrix is banded. `Z = H⁻¹` obeys `Z = D⁻¹ L⁻¹ + (I − Lᵀ) Z` (Takahashi's equations).
+//! Let `H = L D Lᵀ` with L unit lower triangular in 8 × 8 blocks, in an order of elimination that
+//! leaves it sparse ([`elimination_order`]). `Z = H⁻¹` obeys `Z = D⁻¹ L⁻¹ + (I − Lᵀ) Z` (Takahashi's equations).
 //! From the last column to the first, with R_j the rows of L's column j below the diagonal,
 //!
 //! `Z_ij = −Σ_{k∈R_j} Z_ik L_kj`  (i ∈ R_j),   `Z_jj = D_j⁻¹ − Σ_{k∈R_j} L_kjᵀ Z_kj`,
 //!
 //! where every `Z_ik` with i, k ∈ R_j lies on the pattern of the factor. Time and memory grow
-//! linearly with the number of frames.
+//! linearly with the length of the tunnel.
 //!
 //! Source: K. Takahashi, J. Fagan, M. Chin, "Formation of a sparse bus impedance matrix and its
 //! application to short circuit study", 1973.
 
+use crate::linear::elimination_order::elimination_order;
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::sparse_cholesky::FactorError;
 
 /// Blocks of `H⁻¹` on the pattern of the factor.
 pub struct SelectedInverse {
+    /// Position of every slot in the order of elimination; all else is in this order.
+    position: Vec<usize>,
     /// Rows of every column of L below the diagonal, ascending.
     rows: Vec<Vec<usize>>,
     /// `Z_ij` of these rows, in their order.
@@ -31,24 +34,26 @@ impl SelectedInverse {
     /// # Errors
     /// [`FactorError::NotPositiveDefinite`].
     pub fn new(pattern: &Pattern, normal: &NormalEquations) -> Result<Self, FactorError> {
-        let count = pattern.frames();
-        let rows = factor_rows(pattern);
+        let count = pattern.columns();
+        let place_of = elimination_order(pattern)?;
+        let rows = factor_rows(pattern, &place_of);
         let position =
             |rows: &[Vec<usize>], column: usize, row: usize| rows[column].binary_search(&row).ok();
         // The lower triangle: the transposes of the pattern's upper blocks.
         let mut factor: Vec<Vec<Block>> =
             rows.iter().map(|r| vec![Block::zeros(); r.len()]).collect();
         let mut diagonal = vec![Block::zeros(); count];
-        for (column, pivot) in diagonal.iter_mut().enumerate() {
+        for column in 0..count {
             for &row in pattern.rows(column) {
                 let Some(at) = pattern.block_index(row, column) else {
                     continue;
                 };
                 let block = &normal.blocks[at];
+                let (i, j) = (place_of[row], place_of[column]);
                 if row == column {
-                    *pivot = block.symmetric_upper();
-                } else if let Some(at) = position(&rows, row, column) {
-                    factor[row][at] = block.transpose();
+                    diagonal[j] = block.symmetric_upper();
+                } else if let Some(at) = position(&rows, i.min(j), i.max(j)) {
+                    factor[i.min(j)][at] = if i < j { block.transpose() } else { *block };
                 }
             }
         }
@@ -74,6 +79,7 @@ impl SelectedInverse {
             inverse_pivots.push(pivot);
         }
         let mut inverse = Self {
+            position: place_of,
             below: rows.iter().map(|_| Vec::new()).collect(),
             diagonal: inverse_pivots,
             rows,
@@ -83,7 +89,7 @@ impl SelectedInverse {
                 .iter()
                 .map(|&i| {
                     let sum = inverse.rows[j].iter().zip(&factor[j]);
-                    sum.map(|(&k, l)| inverse.block(i, k).unwrap_or_default() * l)
+                    sum.map(|(&k, l)| inverse.block_at(i, k).unwrap_or_default() * l)
                         .fold(Block::zeros(), |sum, term| sum - term)
                 })
                 .collect();
@@ -97,6 +103,11 @@ impl SelectedInverse {
 
     /// Block (row, column) of `H⁻¹`, if it lies on the pattern of the factor.
     pub fn block(&self, row: usize, column: usize) -> Option<Block> {
+        self.block_at(self.position[row], self.position[column])
+    }
+
+    /// The block at positions in the order of elimination.
+    fn block_at(&self, row: usize, column: usize) -> Option<Block> {
         if row == column {
             return Some(self.diagonal[row]);
         }
@@ -123,15 +134,17 @@ impl SymmetricUpper for Block {
     }
 }
 
-/// Symbolic factorisation: the rows of the factor's columns below the diagonal. A
-/// column has the rows of the matrix and those of its children in the elimination tree.
-fn factor_rows(pattern: &Pattern) -> Vec<Vec<usize>> {
-    let count = pattern.frames();
+/// Symbolic factorisation: the rows of the factor's columns below the diagonal, in the order of
+/// elimination. A column has the rows of the matrix and those of its children in the elimination
+/// tree.
+fn factor_rows(pattern: &Pattern, place_of: &[usize]) -> Vec<Vec<usize>> {
+    let count = pattern.columns();
     let mut rows: Vec<Vec<usize>> = vec![Vec::new(); count];
     for column in 0..count {
         for &row in pattern.rows(column) {
             if row < column {
-                rows[row].push(column);
+                let (i, j) = (place_of[row], place_of[column]);
+                rows[i.min(j)].push(i.max(j));
             }
         }
     }
@@ -189,6 +202,5 @@ mod tests {
                 }
             }
         }
-        assert!(inverse.block(0, 10).is_none());
     }
 }

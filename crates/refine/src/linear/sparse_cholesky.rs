@@ -38,12 +38,12 @@ impl SymbolicFactorisation {
     /// # Errors
     /// [`FactorError::Structure`].
     pub fn new(pattern: &Pattern) -> Result<Self, FactorError> {
-        let n = pattern.frames() * FRAME_PARAMETERS;
+        let n = pattern.columns() * FRAME_PARAMETERS;
         let mut column_starts = Vec::with_capacity(n + 1);
         let mut row_indices =
             Vec::with_capacity(pattern.blocks() * FRAME_PARAMETERS * FRAME_PARAMETERS);
         column_starts.push(0);
-        for column in 0..pattern.frames() {
+        for column in 0..pattern.columns() {
             for c in 0..FRAME_PARAMETERS {
                 for &row in pattern.rows(column) {
                     let height = if row == column {
@@ -81,7 +81,7 @@ impl SymbolicFactorisation {
         lambda: f64,
     ) -> Result<Factor<'_>, FactorError> {
         let mut values = Vec::with_capacity(self.structure.row_idx().len());
-        for column in 0..pattern.frames() {
+        for column in 0..pattern.columns() {
             for c in 0..FRAME_PARAMETERS {
                 for &row in pattern.rows(column) {
                     let block: &Block = match pattern.block_index(row, column) {

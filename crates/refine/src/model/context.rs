@@ -3,18 +3,23 @@
 use crate::model::prior::{Prior, predict};
 use crate::parameters::calibration::{Calibration, Kappa};
 use crate::parameters::frame_estimate::FrameEstimate;
+use crate::parameters::shape::Shape;
 use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
-use tunnelstitch_geometry::surface::{Surface, WallRegions};
+use tunnelstitch_geometry::surface::{Displaced, Gauge, Surface, WallRegions};
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
 /// All inputs of the estimator.
 #[derive(Clone)]
 pub struct EstimationContext<'a> {
-    /// The tunnel.
+    /// The wall as planned.
+    pub nominal: Arc<dyn Surface>,
+    /// Its shape as built, if it is to be estimated.
+    pub shape: Option<Arc<Shape>>,
+    /// The wall: with its shape, at the start of a solve.
     pub surface: Arc<dyn Surface>,
     /// Parts of the wall where frames are not compared.
     pub ignored: &'a WallRegions,
@@ -48,6 +53,23 @@ impl EstimationContext<'_> {
                 ..self.clone()
             },
             None => self.clone(),
+        }
+    }
+
+    /// The wall with a shape.
+    pub fn surface_with(&self, shape: &Shape) -> Arc<dyn Surface> {
+        match shape.field() {
+            Some(field) => Arc::new(Displaced::new(Arc::clone(&self.nominal), field)),
+            None => Arc::clone(&self.nominal),
+        }
+    }
+
+    /// The rigid motions that change no image. Where the shape is estimated they move it with the
+    /// poses.
+    pub fn gauge(&self) -> Gauge {
+        match self.shape {
+            Some(_) => self.nominal.gauge(),
+            None => self.surface.gauge(),
         }
     }
 

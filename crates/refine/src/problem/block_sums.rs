@@ -5,6 +5,7 @@ use crate::parameters::frame_estimate::FrameStep;
 use crate::problem::intrinsics_terms::IntrinsicsSums;
 use crate::problem::linearisation::FrameContribution;
 use crate::problem::observer_column::ObserverColumn;
+use crate::problem::shape_terms::TileShape;
 use crate::tiles::tile_arrays::SAMPLES;
 use nalgebra::Matrix4;
 
@@ -16,15 +17,18 @@ pub struct TileSums {
     pub features: Matrix4<f64>,
     /// Sum of the mean weights `w̄` of all observers, held ones too.
     pub total_weight: f64,
+    /// The shape's functions, if they are estimated.
+    pub shape: Option<TileShape>,
 }
 
-/// Sums over the tiles of one block, for the few active frames that observe it.
+/// Sums over the tiles of one block, for the few active frames that observe it and the functions of
+/// the wall's shape there.
 pub struct BlockSums {
-    /// The frames, as indices among the active ones.
+    /// Slots of the frames and, behind them, of the blocks of the shape, ascending.
     pub slots: Vec<usize>,
     /// Robust cost.
     pub cost: f64,
-    /// Gradient, frame by frame.
+    /// Gradient, slot by slot.
     pub gradient: Vec<FrameStep>,
     /// Contribution of each frame.
     contributions: Vec<FrameContribution>,
@@ -35,14 +39,15 @@ pub struct BlockSums {
 }
 
 impl BlockSums {
-    /// Zero sums of the frames `slots`, with the border if the shared parameters are estimated.
-    pub fn new(slots: Vec<usize>, estimates_shared: bool) -> Self {
+    /// Zero sums of the ascending `slots`, of which the first `frames` are frames, with the border
+    /// if the shared parameters are estimated.
+    pub fn new(slots: Vec<usize>, frames: usize, estimates_shared: bool) -> Self {
         let n = slots.len();
         Self {
             slots,
             cost: 0.0,
             gradient: vec![FrameStep::zeros(); n],
-            contributions: vec![FrameContribution::default(); n],
+            contributions: vec![FrameContribution::default(); frames],
             blocks: vec![Block::zeros(); n * (n + 1) / 2],
             intrinsics: estimates_shared.then(|| IntrinsicsSums::new(n)),
         }
@@ -58,6 +63,13 @@ impl BlockSums {
     fn block_index(&self, row: usize, column: usize) -> usize {
         let n = self.slots.len();
         row * n - row * (row + 1) / 2 + column
+    }
+
+    /// Block (row, column) of the upper triangle.
+    #[inline(always)]
+    pub fn block_mut(&mut self, row: usize, column: usize) -> &mut Block {
+        let index = self.block_index(row, column);
+        &mut self.blocks[index]
     }
 
     /// Adds a tile: `g = −B_iᵀ g_i`, `H_ij = (w̄_i δ_ij − w̄_i w̄_j / Σw̄) B_iᵀ M B_j`.
@@ -108,11 +120,13 @@ impl BlockSums {
     ) {
         for (column, slot) in self.slots.iter().enumerate() {
             normal.gradient[*slot] += self.gradient[column];
-            let (frame, sum) = (&mut frames[*slot], &self.contributions[column]);
-            frame.samples += sum.samples;
-            frame.pixels += sum.pixels;
-            frame.inliers += sum.inliers;
-            frame.square += sum.square;
+            if let Some(sum) = self.contributions.get(column) {
+                let frame = &mut frames[*slot];
+                frame.samples += sum.samples;
+                frame.pixels += sum.pixels;
+                frame.inliers += sum.inliers;
+                frame.square += sum.square;
+            }
             for row in 0..=column {
                 let block = &self.blocks[self.block_index(row, column)];
                 normal.add_block(pattern, self.slots[row], *slot, block);

@@ -15,10 +15,10 @@ use crate::linear::bordered_system::SharedBorder;
 use crate::parameters::calibration::{INTRINSIC_PARAMETERS, Kappa, READOUT_INDEX};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::problem::observer_column::ObserverColumn;
-use nalgebra::{Matrix2x6, Matrix4, Matrix4x2, Matrix6, SMatrix, Vector6};
+use nalgebra::{Matrix2x6, Matrix4, Matrix4x2, Matrix6, RowSVector, SMatrix, Vector6};
 
 /// Number of shared parameters that pixels depend on: the intrinsics and the readout time.
-const PIXEL_PARAMETERS: usize = INTRINSIC_PARAMETERS + 1;
+pub const PIXEL_PARAMETERS: usize = INTRINSIC_PARAMETERS + 1;
 /// Their indices in κ.
 const KAPPA_INDICES: [usize; PIXEL_PARAMETERS] = [0, 1, 2, 3, 4, READOUT_INDEX];
 
@@ -26,7 +26,7 @@ const KAPPA_INDICES: [usize; PIXEL_PARAMETERS] = [0, 1, 2, 3, 4, READOUT_INDEX];
 /// frames that observe it.
 #[derive(Clone, Debug)]
 pub struct IntrinsicsSums {
-    /// `H_pκ`, one block per frame.
+    /// `H_pκ` and `H_cκ`, one block per slot.
     frames: Vec<SMatrix<f64, FRAME_PARAMETERS, PIXEL_PARAMETERS>>,
     /// `H_κκ`.
     own: Matrix6<f64>,
@@ -36,9 +36,9 @@ pub struct IntrinsicsSums {
 
 impl IntrinsicsSums {
     /// All zero.
-    pub fn new(frames: usize) -> Self {
+    pub fn new(slots: usize) -> Self {
         Self {
-            frames: vec![SMatrix::zeros(); frames],
+            frames: vec![SMatrix::zeros(); slots],
             own: Matrix6::zeros(),
             gradient: Vector6::zeros(),
         }
@@ -70,6 +70,18 @@ impl IntrinsicsSums {
             self.own += deviation.transpose() * f.fixed_rows::<2>(0);
             self.gradient -= i.c.transpose() * i.moments.gradient.fixed_rows::<2>(0);
         }
+    }
+
+    /// Adds to the row of a coefficient of the wall's shape: component of the block with the given
+    /// index ([`crate::problem::shape_terms`]).
+    pub fn add_shape(
+        &mut self,
+        index: usize,
+        component: usize,
+        row: &RowSVector<f64, PIXEL_PARAMETERS>,
+    ) {
+        let mut target = self.frames[index].row_mut(component);
+        target += row;
     }
 
     /// `g_κ`, with zeros for the parameters that pixels do not depend on.

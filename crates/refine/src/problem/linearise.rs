@@ -3,8 +3,10 @@
 use crate::linear::bordered_system::SharedBorder;
 use crate::linear::normal_equations::{Block, NormalEquations};
 use crate::model::problem_error::ProblemError;
-use crate::parameters::calibration::{Kappa, RADIUS_INDEX};
+use crate::parameters::calibration::RADIUS_INDEX;
 use crate::parameters::frame_estimate::FrameEstimate;
+use crate::parameters::shape::ShapeStep;
+use crate::parameters::unknowns::Unknowns;
 use crate::problem::block_sums::BlockSums;
 use crate::problem::linearisation::{FrameContribution, Linearisation};
 use crate::problem::photometric_problem::PhotometricProblem;
@@ -21,16 +23,16 @@ const BATCH: usize = 64;
 const GAUGE_STIFFNESS_RATIO: f64 = 1e6;
 
 impl PhotometricProblem<'_> {
-    /// Cost and normal equations at the given estimates of the active frames and the initial shared
-    /// parameters.
+    /// Cost and normal equations at the given estimates of the active frames and the initial values
+    /// of all other unknowns.
     ///
     /// # Errors
     /// Those of [`PhotometricProblem::linearise_at`].
     pub fn linearise(&self, active: &[FrameEstimate]) -> Result<Linearisation, ProblemError> {
-        self.linearise_at(active, &self.context.kappa)
+        self.linearise_at(&self.unknowns_of(active))
     }
 
-    /// Cost and normal equations at the given estimates of the active frames and shared parameters.
+    /// Cost and normal equations at the given unknowns.
     ///
     /// The cost is infinite if κ gives no valid camera
     /// ([`crate::parameters::calibration::Calibration::camera`]). All sums run in the same
@@ -38,21 +40,17 @@ impl PhotometricProblem<'_> {
     ///
     /// # Errors
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
-    pub fn linearise_at(
-        &self,
-        active: &[FrameEstimate],
-        kappa: &Kappa,
-    ) -> Result<Linearisation, ProblemError> {
-        let estimates = self.with_active(active);
+    pub fn linearise_at(&self, unknowns: &Unknowns) -> Result<Linearisation, ProblemError> {
+        let kappa = &unknowns.kappa;
         let mut sums = self.zero_linearisation();
         let calibration = self.context.calibration;
         let Some(camera) = calibration.camera(kappa) else {
             sums.cost = f64::INFINITY;
             return Ok(sums);
         };
-        self.add_pixels(&estimates, kappa, &camera, &mut sums)?;
+        self.add_pixels(unknowns, &camera, &mut sums)?;
         self.scale_by_noise(&mut sums);
-        sums.cost += self.add_prior(&estimates, kappa, &mut sums.normal, sums.border.as_mut());
+        sums.cost += self.add_prior(unknowns, &mut sums.normal, sums.border.as_mut());
         if let Some(border) = &mut sums.border {
             sums.cost +=
                 calibration.prior_cost(kappa) - self.log_volume_slope() * kappa[RADIUS_INDEX];
@@ -61,7 +59,7 @@ impl PhotometricProblem<'_> {
         }
         if self.held_frame_count() == 0 {
             let slot = self.gauge_slot.unwrap_or(0);
-            self.constrain_gauge(slot, &active[slot], &mut sums.normal);
+            self.constrain_gauge(slot, &unknowns.frames[slot], &mut sums.normal);
         }
         Ok(sums)
     }
@@ -70,7 +68,7 @@ impl PhotometricProblem<'_> {
     fn zero_linearisation(&self) -> Linearisation {
         let border = self
             .estimates_shared
-            .then(|| SharedBorder::zeros(self.active.len()));
+            .then(|| SharedBorder::zeros(self.pattern.columns()));
         Linearisation {
             cost: 0.0,
             normal: NormalEquations::zeros(&self.pattern),
@@ -84,12 +82,11 @@ impl PhotometricProblem<'_> {
     /// Adds the pixels' part, in units of grey levels², block by block of the wall.
     fn add_pixels(
         &self,
-        estimates: &[FrameEstimate],
-        kappa: &Kappa,
+        unknowns: &Unknowns,
         camera: &Camera,
         sums: &mut Linearisation,
     ) -> Result<(), ProblemError> {
-        self.visit_blocks(estimates, kappa, camera, &mut |_, block| {
+        self.visit_blocks(unknowns, camera, &mut |_, block| {
             sums.cost += block.cost;
             block.add_to(
                 &self.pattern,
@@ -112,12 +109,13 @@ impl PhotometricProblem<'_> {
     /// the block.
     pub(super) fn visit_blocks(
         &self,
-        estimates: &[FrameEstimate],
-        kappa: &Kappa,
+        unknowns: &Unknowns,
         camera: &Camera,
         visit: &mut dyn FnMut((i64, i64), &BlockSums),
     ) -> Result<(), ProblemError> {
-        let readout_s = self.context.calibration.readout_s(kappa);
+        let estimates = &self.with_active(&unknowns.frames);
+        let readout_s = self.context.calibration.readout_s(&unknowns.kappa);
+        let surface = self.surface_at(unknowns);
         for stretch in 0..self.coverage.len() {
             let visibility = self.coverage.visibility(stretch)?;
             let pyramids = self.images.load(self.coverage.frames(stretch))?;
@@ -126,7 +124,8 @@ impl PhotometricProblem<'_> {
                 self.sampled_frames(stretch, &pyramids, estimates, at_level, readout_s);
             for batch in visibility.blocks.chunks(BATCH) {
                 let blocks: Vec<BlockSums> = batch.par_map(|block| {
-                    self.sum_block(stretch, &visibility, block, &sampled_frames, camera)
+                    let wall = (surface.as_ref(), camera);
+                    self.sum_block(stretch, &visibility, block, &sampled_frames, wall)
                 });
                 for (tiles, block) in batch.iter().zip(&blocks) {
                     visit(visibility.tiles[tiles.start].id.block(), block);
@@ -166,38 +165,49 @@ impl PhotometricProblem<'_> {
         }
     }
 
-    /// Normal matrix and border of the prior alone, at the given estimates of the active frames.
-    pub fn prior_information(
-        &self,
-        active: &[FrameEstimate],
-        kappa: &Kappa,
-    ) -> (Vec<Block>, SharedBorder) {
+    /// Normal matrix and border of the prior alone, at the given unknowns.
+    pub fn prior_information(&self, unknowns: &Unknowns) -> (Vec<Block>, SharedBorder) {
         let mut normal = NormalEquations::zeros(&self.pattern);
-        let mut border = SharedBorder::zeros(self.active.len());
-        let estimates = self.with_active(active);
-        self.add_prior(&estimates, kappa, &mut normal, Some(&mut border));
-        border.apply_prior(&self.context.calibration, kappa);
+        let mut border = SharedBorder::zeros(self.pattern.columns());
+        self.add_prior(unknowns, &mut normal, Some(&mut border));
+        border.apply_prior(&self.context.calibration, &unknowns.kappa);
         (normal.blocks, border)
     }
 
-    /// Adds the prior of poses and exposures at the `estimates` of all participants and returns its
-    /// cost.
+    /// Adds the prior of poses, exposures and shape and returns its cost.
     pub(super) fn add_prior(
         &self,
-        estimates: &[FrameEstimate],
-        kappa: &Kappa,
+        unknowns: &Unknowns,
         normal: &mut NormalEquations,
         border: Option<&mut SharedBorder>,
     ) -> f64 {
-        self.context.prior.add_to(
+        let of_frames = self.context.prior.add_to(
             &self.participants,
-            estimates,
+            &self.with_active(&unknowns.frames),
             &self.active,
-            &self.context.calibration.datum(kappa),
+            &self.context.calibration.datum(&unknowns.kappa),
             &self.pattern,
             normal,
             border,
-        )
+        );
+        of_frames + self.add_shape_prior(&unknowns.shape, normal)
+    }
+
+    /// Adds the prior of the shape, `½ Σ (c/σ)²`, and returns its cost.
+    fn add_shape_prior(&self, blocks: &[ShapeStep], normal: &mut NormalEquations) -> f64 {
+        let Some(shape) = &self.shape else {
+            return 0.0;
+        };
+        let mut cost = 0.0;
+        let sigmas_m = shape.model.block_sigmas_m();
+        for (k, (block, sigma_m)) in blocks.iter().zip(sigmas_m).enumerate() {
+            let (slot, information) = (self.active.len() + k, sigma_m.powi(-2));
+            let diagonal = Block::identity() * information;
+            normal.add_block(&self.pattern, slot, slot, &diagonal);
+            normal.gradient[slot] += block * information;
+            cost += 0.5 * information * block.norm_squared();
+        }
+        cost
     }
 
     /// Stiffens the first compared frame along the gauge, where pixels give no information and
@@ -210,7 +220,7 @@ impl PhotometricProblem<'_> {
             return;
         };
         let pose_block = normal.blocks[index].fixed_view::<6, 6>(0, 0).into_owned();
-        for direction in self.context.surface.gauge().directions(&first.pose) {
+        for direction in self.context.gauge().directions(&first.pose) {
             let stiffness = (direction.transpose() * pose_block * direction)[0]
                 / direction.norm_squared().powi(2);
             let constraint =
@@ -224,7 +234,9 @@ impl PhotometricProblem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::parameters::calibration::Kappa;
     use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
+    use crate::parameters::shape::{Shape, ShapeModel};
     use crate::problem::test_ring::{Ring, number};
     use crate::samples::sampling::Sampling;
     use crate::tiles::interpolation::Interpolation;
@@ -329,7 +341,13 @@ mod tests {
         kappa
             .fixed_rows_mut::<5>(0)
             .copy_from_slice(&[2e-4, 0.02, -0.02, 3e-4, -3e-4]);
-        let at = |kappa: &Kappa| problem.linearise_at(&ring.estimates, kappa).unwrap();
+        let at = |kappa: &Kappa| {
+            let unknowns = Unknowns {
+                kappa: *kappa,
+                ..problem.unknowns_of(&ring.estimates)
+            };
+            problem.linearise_at(&unknowns).unwrap()
+        };
         let gradient = at(&kappa).border.unwrap().gradient;
         let steps = [2e-4, 0.02, 0.02, 5e-4, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3];
         for (k, h) in steps.into_iter().enumerate() {
@@ -346,6 +364,36 @@ mod tests {
                 gradient[k]
             );
         }
+    }
+
+    /// Central differences of the cost against the gradient of the wall's shape.
+    #[test]
+    fn shape_gradient_is_the_derivative_of_the_cost() {
+        let ring = Ring::new(1e-4);
+        let model = ShapeModel::new(ring.wall.circle.perimeter_m(), [-0.5, 2.0], 16, 0.01);
+        let problem = ring.problem_with_shape(Shape::nominal(model));
+        let mut unknowns = problem.unknowns_of(&ring.estimates);
+        for (k, block) in unknowns.shape.iter_mut().enumerate() {
+            *block = ShapeStep::from_fn(|n, _| 2e-4 * number(8 * k + n, 0.4));
+        }
+        let gradient = problem.linearise_at(&unknowns).unwrap().normal.gradient;
+        let of_shape = &gradient[ring.estimates.len()..];
+        let (mut error, mut size) = (0.0f64, 0.0f64);
+        let stride = of_shape.len() / 9;
+        for block in (0..of_shape.len()).step_by(stride) {
+            for component in [0, 3, 6] {
+                let cost = |amount: f64| {
+                    let mut moved = unknowns.clone();
+                    moved.shape[block][component] += amount;
+                    problem.linearise_at(&moved).unwrap().cost
+                };
+                let numeric = (cost(2e-4) - cost(-2e-4)) / 4e-4;
+                error += (numeric - of_shape[block][component]).powi(2);
+                size += numeric.powi(2);
+            }
+        }
+        let relative = (error / size).sqrt();
+        assert!(relative < 0.05, "{relative}");
     }
 
     /// Undamped steps from 2 mrad and 2 mm off to the truth, up to the gauge.

@@ -25,6 +25,7 @@ pub mod observer_column;
 pub mod patch_scores;
 pub mod photometric_problem;
 pub mod set_up;
+pub mod shape_terms;
 pub mod step_length;
 pub mod sum_block;
 #[cfg(test)]

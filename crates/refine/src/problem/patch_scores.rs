@@ -2,7 +2,8 @@
 
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
-use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
+use crate::parameters::frame_estimate::FrameStep;
+use crate::parameters::unknowns::Unknowns;
 use crate::problem::photometric_problem::PhotometricProblem;
 use std::collections::BTreeMap;
 
@@ -13,8 +14,8 @@ pub struct PatchScores(BTreeMap<(i64, i64), PatchScore>);
 /// The score of one patch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PatchScore {
-    /// Gradients of the frames that observe it, by their indices among the active ones.
-    pub frames: BTreeMap<usize, FrameStep>,
+    /// Gradients of the slots that it concerns.
+    pub slots: BTreeMap<usize, FrameStep>,
     /// Gradient of the shared parameters.
     pub shared: Kappa,
 }
@@ -34,13 +35,10 @@ impl PatchScores {
     pub fn doubled(&self) -> Self {
         let mut doubled = Self::default();
         for ((row, column), score) in &self.0 {
-            let frames = score
-                .frames
-                .iter()
-                .map(|(slot, gradient)| (*slot, gradient));
+            let slots = score.slots.iter().map(|(slot, gradient)| (*slot, gradient));
             doubled.add(
                 (row.div_euclid(2), column.div_euclid(2)),
-                frames,
+                slots,
                 &score.shared,
             );
         }
@@ -51,35 +49,30 @@ impl PatchScores {
     fn add<'g>(
         &mut self,
         patch: (i64, i64),
-        frames: impl Iterator<Item = (usize, &'g FrameStep)>,
+        slots: impl Iterator<Item = (usize, &'g FrameStep)>,
         shared: &Kappa,
     ) {
         let score = self.0.entry(patch).or_insert_with(|| PatchScore {
-            frames: BTreeMap::new(),
+            slots: BTreeMap::new(),
             shared: Kappa::zeros(),
         });
-        for (slot, gradient) in frames {
-            *score.frames.entry(slot).or_insert_with(FrameStep::zeros) += gradient;
+        for (slot, gradient) in slots {
+            *score.slots.entry(slot).or_insert_with(FrameStep::zeros) += gradient;
         }
         score.shared += shared;
     }
 }
 
 impl PhotometricProblem<'_> {
-    /// The scores of patches of 2 × 2 blocks at the given estimates of the active frames and shared
-    /// parameters, scaled as the gradient of the cost is.
+    /// The scores of patches of 2 × 2 blocks at the given unknowns, scaled as the gradient of the cost
+    /// is.
     ///
     /// # Errors
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.
-    pub fn patch_scores(
-        &self,
-        active: &[FrameEstimate],
-        kappa: &Kappa,
-    ) -> Result<PatchScores, ProblemError> {
-        let estimates = self.with_active(active);
+    pub fn patch_scores(&self, unknowns: &Unknowns) -> Result<PatchScores, ProblemError> {
         let calibration = self.context.calibration;
         let mut scores = PatchScores::default();
-        let Some(camera) = calibration.camera(kappa) else {
+        let Some(camera) = calibration.camera(&unknowns.kappa) else {
             return Ok(scores);
         };
         let information = self.information();
@@ -90,7 +83,7 @@ impl PhotometricProblem<'_> {
                 0.0
             }
         });
-        self.visit_blocks(&estimates, kappa, &camera, &mut |(row, column), block| {
+        self.visit_blocks(unknowns, &camera, &mut |(row, column), block| {
             let gradient: Vec<FrameStep> = block.gradient.iter().map(|g| g * information).collect();
             let shared = block.intrinsics.as_ref().map(|sums| sums.shared_gradient());
             let shared = shared.unwrap_or_else(Kappa::zeros).component_mul(&free);
@@ -111,15 +104,16 @@ mod tests {
     fn scores_add_up_to_the_gradient() {
         let ring = Ring::new(1e-4);
         let problem = ring.problem();
-        let kappa = problem.kappa();
-        let mut scores = problem.patch_scores(&ring.estimates, &kappa).unwrap();
+        let mut scores = problem
+            .patch_scores(&problem.unknowns_of(&ring.estimates))
+            .unwrap();
         let at = problem.linearise(&ring.estimates).unwrap();
         let mut prior = crate::linear::normal_equations::NormalEquations::zeros(problem.pattern());
-        problem.add_prior(&ring.estimates, &kappa, &mut prior, None);
+        problem.add_prior(&problem.unknowns_of(&ring.estimates), &mut prior, None);
         for _ in 0..3 {
             let mut sums = vec![FrameStep::zeros(); ring.estimates.len()];
             for score in scores.iter() {
-                for (slot, gradient) in &score.frames {
+                for (slot, gradient) in &score.slots {
                     sums[*slot] += gradient;
                 }
             }

@@ -5,9 +5,12 @@ use crate::linear::normal_equations::Pattern;
 use crate::linear::sparse_cholesky::{FactorError, SymbolicFactorisation};
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
-use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::problem::set_up::{min_density, normal_pattern, pixel_size_on_wall, pose_frames};
+use crate::parameters::shape::Shape;
+use crate::parameters::unknowns::Unknowns;
+use crate::problem::set_up::{
+    active_pairs, min_density, pixel_size_on_wall, pose_frames, shape_pairs,
+};
 use crate::problem::unknown_texture::UnknownTexture;
 use crate::samples::sampling::Sampling;
 use crate::samples::tile_coverage::{FrameImages, TileCoverage};
@@ -20,6 +23,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::Pyramid;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
+use tunnelstitch_geometry::surface::Surface;
 
 /// The objective ([`crate::tiles::tile`]) for a window of frames on a fixed set of wall
 /// samples.
@@ -76,6 +80,8 @@ pub struct PhotometricProblem<'a> {
     pub(super) unknown_texture: Option<UnknownTexture>,
     /// True if the shared parameters are estimated.
     pub(super) estimates_shared: bool,
+    /// The wall's shape, if it is estimated.
+    pub(super) shape: Option<Arc<Shape>>,
 }
 
 impl<'a> PhotometricProblem<'a> {
@@ -131,8 +137,21 @@ impl<'a> PhotometricProblem<'a> {
             information,
             posed,
         )?;
-        let prior_pairs = context.prior.pairs(&active);
-        let pattern = normal_pattern(&coverage.pairs, prior_pairs, participants.start, &active);
+        let shape = context.shape.clone().filter(|_| sampling.shape);
+        let mut pairs = active_pairs(&coverage.pairs, participants.start, &active);
+        pairs.extend(context.prior.pairs(&active));
+        if let Some(shape) = &shape {
+            let slot = |k: usize| k.checked_sub(active.start - participants.start);
+            pairs.extend(shape_pairs(
+                &coverage,
+                &grid,
+                &shape.model,
+                active.len(),
+                slot,
+            )?);
+        }
+        let blocks = shape.as_ref().map_or(0, |shape| shape.model.blocks());
+        let pattern = Pattern::new(active.len() + blocks, pairs);
         let symbolic =
             SymbolicFactorisation::new(&pattern).map_err(|source| ProblemError::Factor {
                 first: active.start,
@@ -164,6 +183,7 @@ impl<'a> PhotometricProblem<'a> {
             wall_model: None,
             unknown_texture: None,
             estimates_shared: false,
+            shape,
         };
         problem.estimate_noise()?;
         if sampling.joint {
@@ -204,15 +224,36 @@ impl<'a> PhotometricProblem<'a> {
         }
     }
 
-    /// Initial values of the shared parameters.
-    pub fn kappa(&self) -> Kappa {
-        self.context.kappa
+    /// Initial values of the unknowns.
+    pub fn initial_unknowns(&self) -> Unknowns {
+        let first = self.active.start - self.participants.start;
+        self.unknowns_of(&self.estimates[first..first + self.active.len()])
     }
 
-    /// Initial estimates of the active frames.
-    pub fn initial_estimates(&self) -> Vec<FrameEstimate> {
-        let first = self.active.start - self.participants.start;
-        self.estimates[first..first + self.active.len()].to_vec()
+    /// Estimates of the active frames with the initial values of all other unknowns.
+    pub fn unknowns_of(&self, active: &[FrameEstimate]) -> Unknowns {
+        let shape = self.shape.as_ref();
+        Unknowns {
+            frames: active.to_vec(),
+            kappa: self.context.kappa,
+            shape: shape.map_or_else(Vec::new, |shape| shape.coefficients.clone()),
+        }
+    }
+
+    /// The wall with the shape of some unknowns.
+    pub(super) fn surface_at(&self, unknowns: &Unknowns) -> Arc<dyn Surface> {
+        match &self.shape {
+            Some(shape) => self.context.surface_with(&Shape {
+                model: shape.model.clone(),
+                coefficients: unknowns.shape.clone(),
+            }),
+            None => Arc::clone(&self.context.surface),
+        }
+    }
+
+    /// The shape that is estimated, at its initial values.
+    pub fn shape(&self) -> Option<&Shape> {
+        self.shape.as_deref()
     }
 
     /// The block pattern of the normal matrix.
@@ -336,7 +377,7 @@ impl<'a> PhotometricProblem<'a> {
     /// Number of degrees of freedom of the poses that the gauge constraint removes.
     pub fn constrained_gauge_freedoms(&self) -> usize {
         match self.held_frame_count() {
-            0 => self.context.surface.gauge().degrees_of_freedom(),
+            0 => self.context.gauge().degrees_of_freedom(),
             _ => 0,
         }
     }

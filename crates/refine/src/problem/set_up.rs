@@ -1,12 +1,15 @@
 //! Steps of the set-up of a problem: posed frames, density of the samples, sparsity pattern.
 
-use crate::linear::normal_equations::Pattern;
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
+use crate::parameters::shape::ShapeModel;
 use crate::samples::footprints::{MAX_VIEWING_DISTANCE_RADII, footprint};
+use crate::samples::tile_coverage::TileCoverage;
 use crate::samples::visibility::PosedFrame;
-use crate::tiles::grid::SIDE;
+use crate::tiles::grid::{SIDE, TileId, WallGrid};
+use std::collections::HashSet;
 use std::ops::Range;
+use tunnelstitch_core::frames::FrameError;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
 use tunnelstitch_geometry::surface::{Surface, viewing_distance};
@@ -44,21 +47,66 @@ pub fn pose_frames(
     posed.into_iter().collect()
 }
 
-/// Sparsity pattern of the `active` frames: pairs of participants (counted from frame `first`) that
-/// observe common tiles, and pairs of active frames with a common prior.
-pub fn normal_pattern(
+/// Pairs of `active` frames among pairs of participants (counted from frame `first`) that observe
+/// common tiles.
+pub fn active_pairs(
     covisible: &[(usize, usize)],
-    prior_pairs: Vec<(usize, usize)>,
     first: usize,
     active: &Range<usize>,
-) -> Pattern {
+) -> Vec<(usize, usize)> {
     let slot = |k: &usize| {
         let frame = first + k;
         active.contains(&frame).then(|| frame - active.start)
     };
     let covisible = covisible.iter();
-    let covisible = covisible.filter_map(|(a, b)| slot(a).zip(slot(b)));
-    Pattern::new(active.len(), covisible.chain(prior_pairs))
+    covisible
+        .filter_map(|(a, b)| slot(a).zip(slot(b)))
+        .collect()
+}
+
+/// Pairs of slots of which one is a block of the shape: blocks with functions in a common block of
+/// the wall, and those with the frames that observe it. `frames`: number of active frames; `slot`:
+/// slot of a participant.
+///
+/// # Errors
+/// [`FrameError`] if an image that the selection of tiles needs cannot be read.
+pub fn shape_pairs(
+    coverage: &TileCoverage,
+    grid: &WallGrid,
+    model: &ShapeModel,
+    frames: usize,
+    slot: impl Fn(usize) -> Option<usize>,
+) -> Result<HashSet<(usize, usize)>, FrameError> {
+    let mut pairs = HashSet::new();
+    for stretch in 0..coverage.len() {
+        let visibility = coverage.visibility(stretch)?;
+        for tiles in &visibility.blocks {
+            let ids = visibility.tiles[tiles.clone()].iter().map(|tile| tile.id);
+            let shape = shape_slots(ids, grid, model, frames);
+            let observers = visibility.frames(tiles).into_iter();
+            let observers = observers.filter_map(|k| slot(coverage.frames(stretch)[k]));
+            let slots: Vec<usize> = observers.chain(shape.iter().copied()).collect();
+            for a in &shape {
+                pairs.extend(slots.iter().map(|b| (*b.min(a), *b.max(a))));
+            }
+        }
+    }
+    Ok(pairs)
+}
+
+/// Slots of the blocks of the shape that have functions at the centres of some tiles, ascending;
+/// they follow the slots of the `frames` active frames.
+pub fn shape_slots(
+    tiles: impl Iterator<Item = TileId>,
+    grid: &WallGrid,
+    model: &ShapeModel,
+    frames: usize,
+) -> Vec<usize> {
+    let functions = tiles.flat_map(|tile| model.functions_at(grid.centre(tile)));
+    let mut slots: Vec<usize> = functions.map(|f| frames + f.block).collect();
+    slots.sort_unstable();
+    slots.dedup();
+    slots
 }
 
 /// Least number of wall samples per pixel along each axis: one, but more at coarse levels, where

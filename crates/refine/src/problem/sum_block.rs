@@ -3,6 +3,8 @@
 use crate::problem::block_sums::{BlockSums, TileSums};
 use crate::problem::observer_column::ObserverColumn;
 use crate::problem::photometric_problem::PhotometricProblem;
+use crate::problem::set_up::shape_slots;
+use crate::problem::shape_terms::{TileFunction, TileShape};
 use crate::samples::observer::Observer;
 use crate::samples::visibility::{Tile, Visibility};
 use crate::tiles::frame_samples::SampledFrame;
@@ -14,6 +16,7 @@ use nalgebra::Matrix2x6;
 use std::ops::Range;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
+use tunnelstitch_geometry::surface::Surface;
 
 /// A block of the wall with the frames of its stretch.
 struct BlockContext<'b> {
@@ -25,6 +28,8 @@ struct BlockContext<'b> {
     participants: &'b [usize],
     /// Their indices among the active frames.
     slots: Vec<Option<usize>>,
+    /// The wall.
+    surface: &'b dyn Surface,
     /// The camera at full size.
     camera: &'b Camera,
 }
@@ -37,7 +42,7 @@ impl PhotometricProblem<'_> {
         visibility: &Visibility,
         block: &Range<usize>,
         sampled_frames: &[SampledFrame],
-        camera: &Camera,
+        (surface, camera): (&dyn Surface, &Camera),
     ) -> BlockSums {
         let participants = self.coverage.frames(stretch);
         let context = BlockContext {
@@ -45,11 +50,22 @@ impl PhotometricProblem<'_> {
             sampled_frames,
             participants,
             slots: participants.iter().map(|k| self.slot(*k)).collect(),
+            surface,
             camera,
         };
         let frames = visibility.frames(block).into_iter();
-        let slots = frames.filter_map(|k| context.slots[k]).collect();
-        let mut sums = BlockSums::new(slots, self.estimates_shared);
+        let mut slots: Vec<usize> = frames.filter_map(|k| context.slots[k]).collect();
+        let frames = slots.len();
+        if let Some(shape) = &self.shape {
+            let ids = visibility.tiles[block.clone()].iter().map(|tile| tile.id);
+            slots.extend(shape_slots(
+                ids,
+                &self.grid,
+                &shape.model,
+                self.active.len(),
+            ));
+        }
+        let mut sums = BlockSums::new(slots, frames, self.estimates_shared);
         let tiles = self.sum_tiles(&context, block, &mut sums);
         dispatch_simd(
             #[inline(always)]
@@ -58,6 +74,9 @@ impl PhotometricProblem<'_> {
                     sums.add_tile(&tile.columns, &tile.features, tile.total_weight);
                     if let Some(intrinsics) = &mut sums.intrinsics {
                         intrinsics.add_tile(&tile.columns, &tile.features, tile.total_weight);
+                    }
+                    if let Some(shape) = &tile.shape {
+                        sums.add_shape(&tile.columns, &tile.features, tile.total_weight, shape);
                     }
                 }
             },
@@ -75,14 +94,8 @@ impl PhotometricProblem<'_> {
         let visibility = context.visibility;
         let tiles = &visibility.tiles[block.clone()];
         let mut scratch = Vec::new();
-        let mut points_of = |tile: &Tile| {
-            TilePoints::new(
-                &self.grid,
-                self.context.surface.as_ref(),
-                tile.id,
-                &mut scratch,
-            )
-        };
+        let mut points_of =
+            |tile: &Tile| TilePoints::new(&self.grid, context.surface, tile.id, &mut scratch);
         if let Some(wall_model) = &self.wall_model {
             let joint = self.joint_block(visibility, block, context.sampled_frames);
             let moments = joint.moments(wall_model);
@@ -153,7 +166,25 @@ impl PhotometricProblem<'_> {
                 .iter()
                 .map(|observer| observer.weight)
                 .sum(),
+            shape: self.tile_shape(tile, sums),
         }
+    }
+
+    /// The shape's functions at a tile; None if the shape is not estimated.
+    fn tile_shape(&self, tile: &Tile, sums: &BlockSums) -> Option<TileShape> {
+        let shape = self.shape.as_ref()?;
+        let centre = self.grid.centre(tile.id);
+        let functions = shape.model.functions_at(centre).into_iter();
+        Some(TileShape {
+            normal: self.context.nominal.frame(centre).normal(),
+            functions: functions
+                .map(|function| TileFunction {
+                    index: sums.index_of(self.active.len() + function.block),
+                    component: function.component,
+                    value: function.value,
+                })
+                .collect(),
+        })
     }
 
     /// `C` of an observer; zero if the shared parameters are not estimated.

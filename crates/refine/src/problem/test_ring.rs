@@ -4,12 +4,14 @@ use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::prior::Prior;
 use crate::parameters::calibration::{Calibration, Kappa, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FrameEstimate;
+use crate::parameters::shape::Shape;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::samples::sampling::Sampling;
 use crate::test_scene::{independent_prior, test_context};
 use crate::tiles::interpolation::Interpolation;
 use nalgebra::Vector6;
 use std::borrow::Cow;
+use std::sync::Arc;
 use tunnelstitch_core::frames::{FrameCache, GreyImage, Pyramid};
 use tunnelstitch_core::test_wall::{TestWall, waves};
 
@@ -96,7 +98,25 @@ impl Ring {
 
     /// The problem with this sampling.
     pub fn problem_of(&self, sampling: Sampling) -> PhotometricProblem<'_> {
+        self.problem_from(sampling, None)
+    }
+
+    /// The problem of all frames and of the wall's shape at full size.
+    pub fn problem_with_shape(&self, shape: Shape) -> PhotometricProblem<'_> {
+        let sampling = Sampling {
+            shape: true,
+            ..self.sampling()
+        };
+        self.problem_from(sampling, Some(Arc::new(shape)))
+    }
+
+    fn problem_from(
+        &self,
+        sampling: Sampling,
+        shape: Option<Arc<Shape>>,
+    ) -> PhotometricProblem<'_> {
         let context = EstimationContext {
+            shape,
             calibration: self.calibration,
             ..test_context(&self.wall, &self.frames, &self.prior)
         };

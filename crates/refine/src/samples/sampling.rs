@@ -24,6 +24,9 @@ pub struct Sampling {
     /// True if the wall is solved for at the density of the samples, jointly with the poses
     /// ([`crate::joint::joint_block`]); at full size only.
     pub joint: bool,
+    /// True if the wall's shape is estimated with the poses, if it has any
+    /// ([`crate::parameters::shape`]).
+    pub shape: bool,
 }
 
 impl Sampling {
@@ -36,6 +39,7 @@ impl Sampling {
             interpolation: Interpolation::Bilinear,
             variance_weighting: false,
             joint: false,
+            shape: false,
         }
     }
 }

@@ -2,8 +2,9 @@
 //! stops; [`DampedGaussNewton`] does the work.
 
 use crate::model::problem_error::ProblemError;
+use crate::parameters::unknowns::Unknowns;
 use crate::problem::photometric_problem::PhotometricProblem;
-use crate::solver::gauss_newton::{DampedGaussNewton, Solution, SolveState, Unknowns};
+use crate::solver::gauss_newton::{DampedGaussNewton, Solution, SolveState};
 use crate::solver::stopping::Stopping;
 use argmin::core::observers::{Observe, ObserverMode};
 use argmin::core::{
@@ -52,7 +53,7 @@ pub fn resume<'a>(
 ) -> Result<Solution<'a>, ProblemError> {
     let (gauss_newton, start, done) = match begun {
         None => {
-            let start = (problem.initial_estimates(), problem.kappa());
+            let start = problem.initial_unknowns();
             (DampedGaussNewton::new(stopping), start, 0)
         }
         Some(state) => {

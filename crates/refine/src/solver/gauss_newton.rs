@@ -7,6 +7,7 @@ use crate::linear::sparse_cholesky::FactorError;
 use crate::model::problem_error::ProblemError;
 use crate::parameters::calibration::Kappa;
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameEstimate, FrameStep};
+use crate::parameters::unknowns::Unknowns;
 use crate::problem::linearisation::Linearisation;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::solve_record::{SolveRecord, StepRecord};
@@ -26,17 +27,12 @@ const MIN_DAMPING: f64 = 1e-4;
 /// 100, where a step is a hundredth of that along the gradient.
 const MAX_DAMPING_ITERATIONS: usize = 8;
 
-/// The unknowns of a solve: estimates of the active frames, and the shared parameters κ.
-pub type Unknowns = (Vec<FrameEstimate>, Kappa);
-
 /// The end of a solve.
 pub struct Solution<'a> {
     /// The problem that was solved.
     pub problem: PhotometricProblem<'a>,
-    /// Estimates of the active frames.
-    pub estimates: Vec<FrameEstimate>,
-    /// The shared parameters.
-    pub kappa: Kappa,
+    /// The unknowns.
+    pub unknowns: Unknowns,
     /// Cost and normal equations there, or within the tolerance of there.
     pub linearisation: Linearisation,
     /// Its course.
@@ -135,7 +131,7 @@ impl DampedGaussNewton {
     ) -> Result<(Unknowns, f64), ProblemError> {
         let current = match self.current.take() {
             Some(current) => current,
-            None => problem.linearise_at(&unknowns.0, &unknowns.1)?,
+            None => problem.linearise_at(unknowns)?,
         };
         self.cost_start.get_or_insert(current.cost);
         let (unknowns, next) = self.step(problem, unknowns, current)?;
@@ -161,11 +157,9 @@ impl DampedGaussNewton {
             sigma: problem.sigma(),
             stop: self.stop.unwrap_or(StopReason::MaxIterations),
         };
-        let (estimates, kappa) = unknowns;
         Some(Solution {
             problem,
-            estimates,
-            kappa,
+            unknowns,
             linearisation,
             record,
         })
@@ -179,15 +173,15 @@ impl DampedGaussNewton {
         unknowns: &Unknowns,
         current: Linearisation,
     ) -> Result<(Unknowns, Linearisation), ProblemError> {
-        let (estimates, kappa) = unknowns;
+        let frames = &unknowns.frames;
         let mut undamped_failed = false;
         for _ in 0..MAX_DAMPING_ITERATIONS {
             let Some((mut step, shared)) = self.damped_step(problem, &current)? else {
                 self.raise_damping();
                 continue;
             };
-            let all_feasible = hold_infeasible_frames(problem, estimates, &mut step);
-            let moved = problem.wall_step_px(estimates, &step, &shared);
+            let all_feasible = hold_infeasible_frames(problem, frames, &mut step);
+            let moved = problem.wall_step_px(frames, &step, &shared);
             let step_px = moved.into_iter().fold(0.0, f64::max);
             let decrement = -slope(&step, &shared, &current);
             let stop = self.reason_to_stop(step_px, decrement, FRAME_PARAMETERS * step.len());
@@ -199,9 +193,7 @@ impl DampedGaussNewton {
                 self.lambda = 0.0;
                 continue;
             }
-            let moved = estimates.iter().zip(&step);
-            let moved = moved.map(|(estimate, step)| estimate.retract(step));
-            let candidate = (moved.collect(), kappa + shared);
+            let candidate = unknowns.stepped(&step, &shared);
             let mut record = StepRecord {
                 cost: None,
                 step_px,
@@ -213,7 +205,7 @@ impl DampedGaussNewton {
                 self.stop = stop;
                 return Ok((candidate, current));
             }
-            let next = problem.linearise_at(&candidate.0, &candidate.1)?;
+            let next = problem.linearise_at(&candidate)?;
             let left = slope(&step, &shared, &next).abs();
             let settles = step_px < problem.pixel_px()
                 && left < (1.0 - MIN_SLOPE_REDUCTION) * decrement
@@ -221,7 +213,7 @@ impl DampedGaussNewton {
             if next.cost < current.cost || settles {
                 record.cost = Some(next.cost);
                 // A whole undamped step is δ = −H⁻¹ g.
-                let of_poses = |at| frames_slope(&step, at, 6);
+                let of_poses = |at| slots_slope(&step[..frames.len()], at, 6);
                 record.curvature = (self.lambda == 0.0 && all_feasible)
                     .then(|| 1.0 - of_poses(&next) / of_poses(&current));
                 self.steps.push(record);
@@ -235,7 +227,7 @@ impl DampedGaussNewton {
         Ok((unknowns.clone(), current))
     }
 
-    /// The step `δ = −(H + λ diag H)⁻¹ g` of the frames and of the shared parameters; None if a
+    /// The step `δ = −(H + λ diag H)⁻¹ g` of the slots and of the shared parameters; None if a
     /// stronger damping is needed.
     fn damped_step(
         &self,
@@ -303,11 +295,11 @@ fn hold_infeasible_frames(
     all_feasible
 }
 
-/// The derivative of the cost along the first `unknowns` of each frame's step: `δᵀ g`.
-fn frames_slope(step: &[FrameStep], at: &Linearisation, unknowns: usize) -> f64 {
-    let frames = step.iter().zip(&at.normal.gradient);
+/// The derivative of the cost along the first `unknowns` of the step of each slot: `δᵀ g`.
+fn slots_slope(step: &[FrameStep], at: &Linearisation, unknowns: usize) -> f64 {
+    let slots = step.iter().zip(&at.normal.gradient);
     let slopes =
-        frames.map(|(step, gradient)| step.rows(0, unknowns).dot(&gradient.rows(0, unknowns)));
+        slots.map(|(step, gradient)| step.rows(0, unknowns).dot(&gradient.rows(0, unknowns)));
     slopes.sum()
 }
 
@@ -315,5 +307,5 @@ fn frames_slope(step: &[FrameStep], at: &Linearisation, unknowns: usize) -> f64 
 fn slope(step: &[FrameStep], shared: &Kappa, at: &Linearisation) -> f64 {
     let border = at.border.as_ref();
     let of_shared = border.map_or(0.0, |border| shared.dot(&border.gradient));
-    frames_slope(step, at, FRAME_PARAMETERS) + of_shared
+    slots_slope(step, at, FRAME_PARAMETERS) + of_shared
 }

@@ -96,7 +96,7 @@ impl Neighbourhood {
             let window = frames.window_of(self.participants.clone(), self.active.clone());
             let problem = PhotometricProblem::new(context, Sampling::of(level), window)?;
             let solution = solve(problem, Stopping::intermediate(options, level))?;
-            frames.estimates[self.active.clone()].copy_from_slice(&solution.estimates);
+            frames.estimates[self.active.clone()].copy_from_slice(&solution.unknowns.frames);
             shares = solution.linearisation.frames;
         }
         Ok(shares)

@@ -63,8 +63,8 @@ pub fn run<'a>(
         points: solution.linearisation.frames[k].samples,
         residual: residual(&solution.linearisation.frames[k]),
         inlier_share: inlier_share(&solution.linearisation.frames[k]),
-        gain: solution.estimates[k].log_gain.exp(),
-        bias: solution.estimates[k].bias,
+        gain: solution.unknowns.frames[k].log_gain.exp(),
+        bias: solution.unknowns.frames[k].bias,
         overdispersion_px: uncertainty.overdispersions[k].px,
         ..placement.report_frame(setup, k, sigmas[k])
     });
@@ -202,7 +202,7 @@ fn steps_left(solution: &Solution) -> Result<Vec<f64>, ProblemError> {
         .factorise(problem.pattern(), &linearisation.normal, 0.0)
         .map_err(|source| problem.factor_error(source))?;
     let step = factor.step(&linearisation.normal.gradient);
-    Ok(problem.wall_step_px(&solution.estimates, &step, &Kappa::zeros()))
+    Ok(problem.wall_step_px(&solution.unknowns.frames, &step, &Kappa::zeros()))
 }
 
 /// Root mean square residual of a frame, grey levels.

@@ -151,7 +151,7 @@ impl Placement {
                 None => sigma,
                 Some(_) => {
                     let covariance = &self.covariances.frames[k];
-                    compute_frame_sigma(surface, camera, &self.estimates[k], covariance, None)
+                    compute_frame_sigma(surface, camera, &self.estimates[k], covariance)
                 }
             },
             overdispersion_px: 0.0,

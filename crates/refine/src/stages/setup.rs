@@ -8,6 +8,7 @@ use crate::model::prior::{Prior, median_step_s};
 use crate::options::RefineOptions;
 use crate::parameters::calibration::{Calibration, Kappa};
 use crate::stages::state::PipelineState;
+use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_core::survey::CalibrationGroup;
 use tunnelstitch_geometry::trajectory::{Pose, poses_of};
@@ -102,7 +103,9 @@ impl<'a> Setup<'a> {
     /// grey levels.
     pub fn initial_context(&self, noise: f64) -> EstimationContext<'_> {
         EstimationContext {
-            surface: std::sync::Arc::clone(&self.input.surface),
+            nominal: Arc::clone(&self.input.surface),
+            shape: None,
+            surface: Arc::clone(&self.input.surface),
             ignored: self.input.ignored,
             camera: self.input.camera,
             shutter: &self.input.shutter,

@@ -42,10 +42,10 @@ pub fn run<'a>(
         return Ok(estimation);
     }
     let solution = solve(&plan, problem, setup, state, session)?;
-    state.frames.estimates.clone_from(&solution.estimates);
+    state.frames.estimates.clone_from(&solution.unknowns.frames);
     let uncertainty = uncertainty_of(&plan, setup, &context, state, &solution)?;
     let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
-    state.kappa = solution.kappa;
+    state.kappa = solution.unknowns.kappa;
     for parameter in &unobservable {
         state.kappa[parameter.unknown] = 0.0;
         state.free[parameter.unknown] = false;
@@ -159,7 +159,7 @@ fn uncertainty_of(
     if plan.sampling.level > 0 || !(is_last || calibration.has_free_parameters()) {
         return Ok(None);
     }
-    let solved = context.at(solution.kappa);
+    let solved = context.at(solution.unknowns.kappa);
     let alpha = setup.options.false_alarm_rate;
     SolutionUncertainty::at(&solved, solution, &calibration, alpha).map(Some)
 }
@@ -175,9 +175,9 @@ fn find_unobservable(
     let calibration = setup.calibration_at(state);
     match uncertainty.filter(|_| calibration.has_free_parameters()) {
         Some(uncertainty) => uncertainty.find_unobservable(
-            &context.at(solution.kappa),
+            &context.at(solution.unknowns.kappa),
             &calibration,
-            &solution.estimates,
+            &solution.unknowns.frames,
             &state.frames.rejections,
             setup.options.max_sigma_px,
         ),

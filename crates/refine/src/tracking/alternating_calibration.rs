@@ -124,8 +124,8 @@ impl AlternatingCalibration {
             let problem = PhotometricProblem::new(&context, Sampling::of(level), states.window())?;
             if problem.tiles() > 0 {
                 let solution = solve(problem.with_shared_parameters(), stopping)?;
-                states.estimates = solution.estimates;
-                states.kappa = solution.kappa;
+                states.estimates = solution.unknowns.frames;
+                states.kappa = solution.unknowns.kappa;
             }
             context = context.at(states.kappa);
             self.round += 1;

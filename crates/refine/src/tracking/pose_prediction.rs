@@ -68,7 +68,7 @@ fn predict_pose_unchecked(
             let (from, to): (Vec<Pose>, Vec<Pose>) = inliers
                 .map(|i| (initial(i), states.estimates[i].pose))
                 .unzip();
-            let motion = context.surface.gauge().align(&from, &to);
+            let motion = context.gauge().align(&from, &to);
             PosePrediction {
                 pose: motion.apply(&initial(frame)),
                 sigma_scale: 1.0,

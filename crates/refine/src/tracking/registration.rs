@@ -343,7 +343,7 @@ impl<'r> Registration<'r> {
         if problem.tiles() == 0 {
             return Ok(estimate);
         }
-        Ok(solve(problem, Stopping::TRACKING)?.estimates[0])
+        Ok(solve(problem, Stopping::TRACKING)?.unknowns.frames[0])
     }
 }
 

@@ -122,8 +122,8 @@ fn solve_window(
         return Ok(f64::INFINITY);
     }
     let solution = solve(problem, Stopping::TRACKING)?;
-    states.kappa = solution.kappa;
-    states.estimates[active].copy_from_slice(&solution.estimates);
+    states.kappa = solution.unknowns.kappa;
+    states.estimates[active].copy_from_slice(&solution.unknowns.frames);
     let record = solution.record;
     // Each problem estimates σ at its start; costs in units of it could not be compared.
     Ok(record.cost_end * record.sigma.powi(2) / record.observations as f64)

@@ -45,7 +45,6 @@
 //!
 //! [`SolveRecord::curvature`]: crate::SolveRecord::curvature
 
-use crate::linear::bordered_system::{BorderBlock, SharedBlock};
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::linear::selected_inverse::SelectedInverse;
 use crate::linear::sparse_cholesky::FactorError;
@@ -81,18 +80,6 @@ impl Covariances {
             next: vec![unknown; frames.saturating_sub(1)],
             variance_factor: f64::NAN,
         }
-    }
-
-    /// Adds the uncertainty of the shared parameters: `+ W Σ_κ Wᵀ`.
-    pub fn with_shared(mut self, w: &[BorderBlock], covariance: &SharedBlock) -> Self {
-        let pose = |k: usize| w[k].fixed_rows::<6>(0).into_owned();
-        for (k, frame) in self.frames.iter_mut().enumerate() {
-            *frame += pose(k) * covariance * pose(k).transpose();
-        }
-        for (k, next) in self.next.iter_mut().enumerate() {
-            *next += pose(k) * covariance * pose(k + 1).transpose();
-        }
-        self
     }
 
     /// Scales all positions by `scale`.
@@ -155,40 +142,15 @@ impl Covariances {
 
 /// The inverse of the normal matrix, as far as covariances are made of it, and the dispersion of
 /// the pixels' scores.
-#[derive(Clone, Debug)]
 pub struct NoiseCovariance {
-    /// `J⁻¹` of every frame.
-    frames: Vec<Matrix6<f64>>,
-    /// `J⁻¹` of every frame with the next; NaN where the two have nothing in common.
-    next: Vec<Matrix6<f64>>,
+    /// `H⁻¹`; its blocks of poses are those of `J⁻¹`.
+    pub inverse: SelectedInverse,
     /// Variance factor c: the covariance over `J⁻¹`.
     pub variance_factor: f64,
     /// Dispersion `c_1` of the pixels' scores.
     pub pixel_dispersion: f64,
-    /// Number of freedoms of the poses that the pixels determine.
+    /// Number of freedoms of poses and shape that the pixels determine.
     pub determined: f64,
-}
-
-impl NoiseCovariance {
-    /// Covariances that `pair` makes of two frames and their block of `J⁻¹`.
-    pub fn map(&self, pair: impl Fn(usize, usize, &Matrix6<f64>) -> Matrix6<f64>) -> Covariances {
-        let frames = self.frames.iter().enumerate();
-        let next = self.next.iter().enumerate();
-        Covariances {
-            frames: frames.map(|(k, block)| pair(k, k, block)).collect(),
-            next: next
-                .map(|(k, block)| {
-                    // What has nothing in common has no covariance, whatever draws say.
-                    if block[(0, 0)].is_nan() {
-                        *block
-                    } else {
-                        pair(k, k + 1, block)
-                    }
-                })
-                .collect(),
-            variance_factor: self.variance_factor,
-        }
-    }
 }
 
 /// Share of the freedoms below which nothing is known of the pixels' dispersion: less than rounding
@@ -198,12 +160,14 @@ const MIN_DETERMINED: f64 = 1e-6;
 /// Computes the inverse of the normal matrix and the dispersion at a solution.
 ///
 /// `normal`: H, with `tied` freedoms of the gauge tied; `scatter`: V of the pixels; `prior`: P; all
-/// on `pattern`. `curvature`: κ.
+/// on `pattern`, whose first `frames` slots are frames and the others the wall's shape.
+/// `curvature`: κ.
 ///
 /// # Errors
 /// [`FactorError`] if the normal matrix is singular.
 pub fn compute_covariances(
     pattern: &Pattern,
+    frames: usize,
     normal: &NormalEquations,
     tied: usize,
     scatter: &[Block],
@@ -211,23 +175,19 @@ pub fn compute_covariances(
     curvature: f64,
 ) -> Result<NoiseCovariance, FactorError> {
     let inverse = SelectedInverse::new(pattern, normal)?;
-    let of_exposures = SelectedInverse::new(pattern, &exposures_alone(pattern, normal))?;
+    let of_exposures = SelectedInverse::new(pattern, &exposures_alone(pattern, frames, normal))?;
     let trace = |of: &[Block]| {
-        let exposures: Vec<Block> = of.iter().map(exposures_part).collect();
+        let exposures = exposures_parts(pattern, frames, of);
         trace_of_product(pattern, &inverse, of)
             - trace_of_product(pattern, &of_exposures, &exposures)
     };
-    let freedoms = (pattern.frames() * POSE - tied) as f64;
+    let of_shape = (pattern.columns() - frames) * FRAME_PARAMETERS;
+    let freedoms = (frames * POSE + of_shape - tied) as f64;
     let (of_pixels, of_prior) = (trace(scatter) / curvature.powi(2), trace(prior));
     // The freedoms that pixels determine, by their share of the information.
     let determined = freedoms - of_prior;
-    let pose = |block: Block| block.fixed_view::<POSE, POSE>(0, 0).into_owned();
-    let unknown = Matrix6::from_element(f64::NAN);
-    let block = |j: usize, k: usize| inverse.block(j, k).map_or(unknown, pose);
-    let count = pattern.frames();
     Ok(NoiseCovariance {
-        frames: (0..count).map(|k| block(k, k)).collect(),
-        next: (1..count).map(|k| block(k - 1, k)).collect(),
+        inverse,
         variance_factor: (of_pixels + of_prior) / freedoms,
         pixel_dispersion: if determined > MIN_DETERMINED * freedoms {
             of_pixels / determined
@@ -241,7 +201,7 @@ pub fn compute_covariances(
 /// `tr(H⁻¹ Q)` of a symmetric matrix Q with the upper `blocks` on `pattern`.
 fn trace_of_product(pattern: &Pattern, inverse: &SelectedInverse, blocks: &[Block]) -> f64 {
     let mut trace = 0.0;
-    for column in 0..pattern.frames() {
+    for column in 0..pattern.columns() {
         for &row in pattern.rows(column) {
             let z = inverse.block(row, column);
             if let Some((place, z)) = pattern.block_index(row, column).zip(z) {
@@ -254,23 +214,36 @@ fn trace_of_product(pattern: &Pattern, inverse: &SelectedInverse, blocks: &[Bloc
     trace
 }
 
-/// The part of a block that belongs to the exposures.
-fn exposures_part(block: &Block) -> Block {
-    let mut part = Block::zeros();
-    part.fixed_view_mut::<EXPOSURE, EXPOSURE>(POSE, POSE)
-        .copy_from(&block.fixed_view::<EXPOSURE, EXPOSURE>(POSE, POSE));
-    part
+/// The parts of the blocks that belong to the exposures of the first `frames` slots.
+fn exposures_parts(pattern: &Pattern, frames: usize, blocks: &[Block]) -> Vec<Block> {
+    let mut parts = vec![Block::zeros(); blocks.len()];
+    for column in 0..frames {
+        for &row in pattern.rows(column) {
+            if let Some(index) = pattern.block_index(row, column) {
+                parts[index]
+                    .fixed_view_mut::<EXPOSURE, EXPOSURE>(POSE, POSE)
+                    .copy_from(&blocks[index].fixed_view::<EXPOSURE, EXPOSURE>(POSE, POSE));
+            }
+        }
+    }
+    parts
 }
 
-/// The normal matrix for known poses: `diag(I, H_ee)`.
-pub fn exposures_alone(pattern: &Pattern, normal: &NormalEquations) -> NormalEquations {
-    let mut alone = NormalEquations::zeros(pattern);
-    for (alone, block) in alone.blocks.iter_mut().zip(&normal.blocks) {
-        *alone = exposures_part(block);
-    }
+/// The normal matrix for known poses and shape: `diag(I, H_ee)`, with exposures in the first
+/// `frames` slots.
+pub fn exposures_alone(
+    pattern: &Pattern,
+    frames: usize,
+    normal: &NormalEquations,
+) -> NormalEquations {
+    let mut alone = NormalEquations {
+        blocks: exposures_parts(pattern, frames, &normal.blocks),
+        ..NormalEquations::zeros(pattern)
+    };
     let poses = Block::from_diagonal(&FrameStep::from_fn(|k, _| if k < POSE { 1.0 } else { 0.0 }));
-    for k in 0..pattern.frames() {
-        alone.add_block(pattern, k, k, &poses);
+    for k in 0..pattern.columns() {
+        let known = if k < frames { poses } else { Block::identity() };
+        alone.add_block(pattern, k, k, &known);
     }
     alone
 }
@@ -310,27 +283,30 @@ mod tests {
         }
         let none = vec![Block::zeros(); pattern.blocks()];
         let at = |scatter: &[Block], prior: &[Block], curvature: f64| {
-            let pairs =
-                compute_covariances(&pattern, &normal, 0, scatter, prior, curvature).unwrap();
-            let factor = pairs.variance_factor;
-            pairs.map(|_, _, block| block * factor)
+            let found =
+                compute_covariances(&pattern, 3, &normal, 0, scatter, prior, curvature).unwrap();
+            let factor = found.variance_factor;
+            let block = |j, k| found.inverse.block(j, k).unwrap() * factor;
+            (factor, [block(0, 0), block(1, 1), block(0, 1)])
         };
         let one = at(&normal.blocks, &none, 1.0);
-        assert!((one.variance_factor - 1.0).abs() < 1e-12);
+        assert!((one.0 - 1.0).abs() < 1e-12);
         let two = at(&normal.blocks, &normal.blocks, 1.0);
-        assert!((two.frames[1] - one.frames[1] * 2.0).norm() < 1e-12);
+        assert!((two.1[1] - one.1[1] * 2.0).norm() < 1e-12);
         let bent = at(&normal.blocks, &normal.blocks, 0.5);
-        assert!((bent.frames[1] - one.frames[1] * 5.0).norm() < 1e-12);
-        assert!((one.frames[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
-        assert!((one.next[0][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
+        assert!((bent.1[1] - one.1[1] * 5.0).norm() < 1e-12);
+        assert!((one.1[0][(0, 0)] - 15.0 / 56.0).abs() < 1e-12);
+        assert!((one.1[2][(0, 0)] - 4.0 / 56.0).abs() < 1e-12);
         let mut exposed = normal.blocks.clone();
-        exposed
-            .iter_mut()
-            .for_each(|block| *block += exposures_part(block) * 9.0);
+        let exposures = exposures_parts(&pattern, 3, &normal.blocks);
+        for (block, exposures) in exposed.iter_mut().zip(exposures) {
+            *block += exposures * 9.0;
+        }
         let same = at(&exposed, &none, 1.0);
-        assert!((same.variance_factor - 1.0).abs() < 1e-12);
+        assert!((same.0 - 1.0).abs() < 1e-12);
         // With the gauge tied, two of 18 freedoms are no freedoms.
-        let tied = compute_covariances(&pattern, &normal, 2, &normal.blocks, &none, 1.0).unwrap();
+        let tied =
+            compute_covariances(&pattern, 3, &normal, 2, &normal.blocks, &none, 1.0).unwrap();
         assert!((tied.variance_factor - 18.0 / 16.0).abs() < 1e-12);
     }
 
@@ -358,7 +334,7 @@ mod tests {
         let mut normal = NormalEquations::zeros(&pattern);
         normal.blocks = blocks(&h);
         let none = vec![Block::zeros(); pattern.blocks()];
-        let found = compute_covariances(&pattern, &normal, 0, &blocks(&q), &none, 1.0).unwrap();
+        let found = compute_covariances(&pattern, 2, &normal, 0, &blocks(&q), &none, 1.0).unwrap();
         let poses: Vec<usize> = (0..2 * FRAME_PARAMETERS)
             .filter(|k| k % FRAME_PARAMETERS < POSE)
             .collect();

@@ -111,6 +111,8 @@ pub fn pose_bounds(
     // The motion during readout hardly changes the information.
     let shutter = Shutter::default();
     let context = EstimationContext {
+        nominal: std::sync::Arc::clone(&survey.surface),
+        shape: None,
         surface: std::sync::Arc::clone(&survey.surface),
         ignored: &survey.ignored,
         camera,
@@ -138,7 +140,7 @@ pub fn pose_bounds(
     // One pixel is FINER² fine pixels.
     let noise_grey = f64::from(FINER) * noise_grey;
     let problem = PhotometricProblem::new(&context, sampling, window)?.with_known_noise(noise_grey);
-    let (prior, _) = problem.prior_information(&estimates, &Kappa::zeros());
+    let (prior, _) = problem.prior_information(&problem.unknowns_of(&estimates));
     let with_prior = problem.linearise(&estimates)?.normal;
     let bayesian = invert(&problem, &with_prior)?;
     let known = invert(&problem, &subtract_pose_prior(&prior, with_prior))?;

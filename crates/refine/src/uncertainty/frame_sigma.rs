@@ -1,12 +1,10 @@
 //! Uncertainty of one frame, stated as σ of rotation, translation and wall position.
 
-use crate::linear::bordered_system::{BorderBlock, SharedBlock};
-use crate::parameters::calibration::INTRINSIC_PARAMETERS;
 use crate::parameters::frame_estimate::FrameEstimate;
-use nalgebra::Matrix6;
+use nalgebra::{Matrix2x6, Matrix6, Vector3};
 use serde::{Deserialize, Deserializer};
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Surface, lens_jacobian, viewing_distance, wall_jacobian};
+use tunnelstitch_geometry::surface::{Surface, WallPoint, viewing_distance, wall_jacobian};
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
 ///
@@ -56,17 +54,28 @@ fn nan_if_null<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(from)?.unwrap_or(f64::NAN))
 }
 
-/// Computes σ of rotation, translation and wall position from the covariance of a pose.
-///
-/// `shared`: W of the frame and `Σ_κ`, where the shared parameters were estimated. As ξ moves by
-/// `−W κ` with κ, their covariance is `−W Σ_κ`; the wall point of a pixel, `A ξ + C κ`, is more
-/// certain than by the pose alone.
+/// Computes σ of rotation, translation and wall position from the covariance of a pose alone.
 pub fn compute_frame_sigma(
     surface: &dyn Surface,
     camera: &Camera,
     estimate: &FrameEstimate,
     covariance: &Matrix6<f64>,
-    shared: Option<(&BorderBlock, &SharedBlock)>,
+) -> FrameSigma {
+    let variance = |_: WallPoint, a: &Matrix2x6<f64>, _: &Vector3<f64>| {
+        (a * covariance * a.transpose()).trace()
+    };
+    compute_frame_sigma_by(surface, camera, estimate, covariance, variance)
+}
+
+/// Computes σ of rotation and translation from the covariance of a pose, and that of the wall
+/// position from the `variance` of wall points (m², along s and h together), which is given the
+/// point, the Jacobian A of the pose there, and the point in the camera's coordinates.
+pub fn compute_frame_sigma_by(
+    surface: &dyn Surface,
+    camera: &Camera,
+    estimate: &FrameEstimate,
+    covariance: &Matrix6<f64>,
+    variance: impl Fn(WallPoint, &Matrix2x6<f64>, &Vector3<f64>) -> f64,
 ) -> FrameSigma {
     let pose = &estimate.pose;
     let trace = |first: usize| {
@@ -79,15 +88,7 @@ pub fn compute_frame_sigma(
         let ray = pose.r_wc * ray_c;
         if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
             let a = wall_jacobian(pose, &surface.frame(hit.wall));
-            let mut variance = (a * covariance * a.transpose()).trace();
-            if let Some((w, covariance)) = shared {
-                let c = lens_jacobian(pose, &a, camera, &(ray_c * hit.range));
-                let lens = covariance.fixed_rows::<INTRINSIC_PARAMETERS>(0);
-                let own = c * lens.fixed_columns::<INTRINSIC_PARAMETERS>(0) * c.transpose();
-                let crossed = c * lens * w.fixed_rows::<6>(0).transpose() * a.transpose();
-                variance += own.trace() - 2.0 * crossed.trace();
-            }
-            variance_sum += variance;
+            variance_sum += variance(hit.wall, &a, &(ray_c * hit.range));
             points += 1.0;
         }
     }
@@ -119,7 +120,7 @@ mod tests {
             let tilt = nalgebra::Vector3::x() * tilt_deg.to_radians();
             let pose = Pose::new(so3::exp(&tilt), nalgebra::Vector3::zeros());
             let estimate = FrameEstimate::at(pose);
-            let sigma = compute_frame_sigma(&circle, &camera, &estimate, &covariance, None);
+            let sigma = compute_frame_sigma(&circle, &camera, &estimate, &covariance);
             assert!((sigma.wall_m - 1e-3).abs() < 1e-9, "{sigma:?}");
             let expected = 1e-3 * camera.fy / distance_m;
             assert!((sigma.wall_px - expected).abs() < 1e-6, "{sigma:?}");

@@ -23,3 +23,4 @@ pub mod registration_sigma;
 pub mod rolling_shutter_test;
 pub mod shared_parameter_names;
 pub mod solution_uncertainty;
+pub mod total_covariance;

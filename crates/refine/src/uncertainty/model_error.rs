@@ -41,13 +41,13 @@ use crate::linear::sparse_cholesky::Factor;
 use crate::model::problem_error::ProblemError;
 use crate::model::significance::normal_quantile;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
-use crate::parameters::frame_estimate::FRAME_PARAMETERS;
+use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::problem::patch_scores::PatchScores;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::gauss_newton::Solution;
 use crate::uncertainty::covariance::{NoiseCovariance, exposures_alone};
 use crate::uncertainty::observability::Posterior;
-use nalgebra::{Matrix6, SMatrix, Vector6};
+use nalgebra::SMatrix;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -85,8 +85,8 @@ pub struct Patches {
 pub struct ErrorDraws {
     /// Mean of `zᵀ H⁻¹ z − z_eᵀ H_ee⁻¹ z_e` of the patches' scores.
     quadratic: f64,
-    /// Draws of the step δ of every frame.
-    frames: Vec<Vec<Vector6<f64>>>,
+    /// Draws of the step δ of every slot.
+    slots: Vec<Vec<FrameStep>>,
     /// Draws of the step of the shared parameters.
     shared: Vec<Kappa>,
 }
@@ -107,14 +107,15 @@ impl EstimateErrors {
         let problem = &solution.problem;
         let pattern = problem.pattern();
         let normal = &solution.linearisation.normal;
+        let frames = solution.unknowns.frames.len();
         let factor_of = |normal: &NormalEquations| {
             let factor = problem.symbolic().factorise(pattern, normal, 0.0);
             factor.map_err(|source| problem.factor_error(source))
         };
         let factor = factor_of(normal)?;
-        let exposures_alone = exposures_alone(pattern, normal);
+        let exposures_alone = exposures_alone(pattern, frames, normal);
         let exposures = factor_of(&exposures_alone)?;
-        let (prior, _) = problem.prior_information(&solution.estimates, &solution.kappa);
+        let (prior, _) = problem.prior_information(&solution.unknowns);
         let Some(prior) = PriorRoot::of(pattern, &prior) else {
             return Ok(None);
         };
@@ -127,9 +128,9 @@ impl EstimateErrors {
                 prior: &prior,
                 curvature: solution.record.curvature(),
             };
-            system.draw(pattern.frames())
+            system.draw(pattern.columns(), frames)
         };
-        let mut scores = problem.patch_scores(&solution.estimates, &solution.kappa)?;
+        let mut scores = problem.patch_scores(&solution.unknowns)?;
         let mut largest: Option<(ErrorDraws, Patches)> = None;
         for blocks in PATCH_BLOCKS {
             let draws = draw(&scores, posterior);
@@ -163,10 +164,10 @@ fn chance_factor(patches: usize, alpha: f64) -> f64 {
 }
 
 impl ErrorDraws {
-    /// Covariance of the errors of two frames.
-    pub fn of_pair(&self, j: usize, k: usize) -> Matrix6<f64> {
-        let products = self.frames[j].iter().zip(&self.frames[k]);
-        let sum: Matrix6<f64> = products.map(|(j, k)| j * k.transpose()).sum();
+    /// Covariance of the errors of two slots.
+    pub fn of_pair(&self, j: usize, k: usize) -> Block {
+        let products = self.slots[j].iter().zip(&self.slots[k]);
+        let sum: Block = products.map(|(j, k)| j * k.transpose()).sum();
         sum / self.shared.len() as f64
     }
 
@@ -216,18 +217,20 @@ type BatchBlock = SMatrix<f64, FRAME_PARAMETERS, BATCH>;
 type SharedBatch = SMatrix<f64, SHARED_PARAMETERS, BATCH>;
 
 impl System<'_> {
-    /// Draws of the steps that scores with random signs make.
-    fn draw(&self, count: usize) -> ErrorDraws {
-        let batches = (0..BATCHES as usize).par_map(|batch| self.draw_batch(batch as u64, count));
+    /// Draws of the steps of `count` slots, of which the first `frames` are frames, that scores with
+    /// random signs make.
+    fn draw(&self, count: usize, frames: usize) -> ErrorDraws {
+        let batches =
+            (0..BATCHES as usize).par_map(|batch| self.draw_batch(batch as u64, count, frames));
         let mut draws = ErrorDraws {
             quadratic: 0.0,
-            frames: vec![Vec::new(); count],
+            slots: vec![Vec::new(); count],
             shared: Vec::new(),
         };
         for (quadratic, steps, shared) in batches {
             draws.quadratic += quadratic / (BATCHES as usize * BATCH) as f64;
-            for (frame, step) in draws.frames.iter_mut().zip(&steps) {
-                frame.extend((0..BATCH).map(|d| step.fixed_view::<6, 1>(0, d).into_owned()));
+            for (slot, step) in draws.slots.iter_mut().zip(&steps) {
+                slot.extend((0..BATCH).map(|d| step.column(d).into_owned()));
             }
             draws
                 .shared
@@ -237,7 +240,12 @@ impl System<'_> {
     }
 
     /// A batch of draws: the sum of `zᵀ H⁻¹ z − z_eᵀ H_ee⁻¹ z_e`, and the steps.
-    fn draw_batch(&self, batch: u64, count: usize) -> (f64, Vec<BatchBlock>, SharedBatch) {
+    fn draw_batch(
+        &self,
+        batch: u64,
+        count: usize,
+        frames: usize,
+    ) -> (f64, Vec<BatchBlock>, SharedBatch) {
         let mut rng = ChaCha8Rng::seed_from_u64(batch);
         let mut z = vec![BatchBlock::zeros(); count];
         let mut z_shared = SharedBatch::zeros();
@@ -245,13 +253,16 @@ impl System<'_> {
             let signs =
                 SMatrix::<f64, 1, BATCH>::from_fn(|_, _| if rng.random() { 1.0 } else { -1.0 })
                     / self.curvature;
-            for (slot, gradient) in &score.frames {
+            for (slot, gradient) in &score.slots {
                 z[*slot] += gradient * signs;
             }
             z_shared += score.shared * signs;
         }
         let of_pixels = self.factor.solve(&z);
-        let exposures_alone: Vec<BatchBlock> = z.iter().map(exposure_rows).collect();
+        let mut exposures_alone = vec![BatchBlock::zeros(); count];
+        for (exposures, z) in exposures_alone.iter_mut().zip(&z[..frames]) {
+            *exposures = exposure_rows(z);
+        }
         let of_exposures = self.exposures.solve(&exposures_alone);
         let product = |a: &[BatchBlock], b: &[BatchBlock]| -> f64 {
             a.iter().zip(b).map(|(a, b)| a.component_mul(b).sum()).sum()
@@ -292,7 +303,7 @@ impl PriorRoot {
             own: Vec::new(),
             before: Vec::new(),
         };
-        for k in 0..pattern.frames() {
+        for k in 0..pattern.columns() {
             let before = match k.checked_sub(1) {
                 // L_k,k−1 L_k−1ᵀ = P_k,k−1.
                 Some(last) => root.own[last]

@@ -59,7 +59,6 @@ impl Overdispersion {
             &context.camera,
             estimate,
             &covariance,
-            None,
         );
         (q.is_finite() && sigma.wall_px.is_finite()).then(|| Self::new(q, patches, sigma.wall_px))
     }
@@ -98,7 +97,7 @@ pub fn compute_overdispersions(
         let patches = at.frames[k].samples as f64 / patch;
         Overdispersion::of_frame(context, estimate, blocks, patches)
     };
-    let frames = solution.estimates.iter().enumerate();
+    let frames = solution.unknowns.frames.iter().enumerate();
     frames
         .map(|frame| of_frame(frame).unwrap_or_default())
         .collect()

@@ -24,9 +24,9 @@ pub fn registration_sigmas(
         let inverse = block.cholesky()?.inverse();
         let covariance = dispersion * inverse.fixed_view::<6, 6>(0, 0);
         let (surface, camera) = (context.surface.as_ref(), &context.camera);
-        Some(compute_frame_sigma(surface, camera, estimate, &covariance, None).wall_px)
+        Some(compute_frame_sigma(surface, camera, estimate, &covariance).wall_px)
     };
-    let frames = solution.estimates.iter().enumerate();
+    let frames = solution.unknowns.frames.iter().enumerate();
     frames
         .map(|frame| of_frame(frame).unwrap_or(f64::NAN))
         .collect()

@@ -91,7 +91,10 @@ pub fn estimate_readout(
         return Ok(None);
     };
     let readout_ms = |kappa: &Kappa| 1e3 * calibration.readout_s(kappa);
-    let (given_ms, estimate_ms) = (readout_ms(&context.kappa), readout_ms(&solution.kappa));
+    let (given_ms, estimate_ms) = (
+        readout_ms(&context.kappa),
+        readout_ms(&solution.unknowns.kappa),
+    );
     let sigma_ms = 1e3 * covariance[(READOUT_INDEX, READOUT_INDEX)].sqrt();
     let difference_ms = estimate_ms - given_ms;
     let shift_px = 1e-3 * difference_ms.abs() * shift_px_per_s(context, states);

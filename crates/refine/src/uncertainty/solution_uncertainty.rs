@@ -8,12 +8,15 @@ use crate::parameters::calibration::{Calibration, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::MAX_MISFIT_SHARE;
-use crate::uncertainty::covariance::{Covariances, NoiseCovariance, compute_covariances};
-use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma};
+use crate::uncertainty::covariance::{Covariances, compute_covariances};
+use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma_by};
 use crate::uncertainty::model_error::{EstimateErrors, ModelErrorReport};
 use crate::uncertainty::observability::{Posterior, UnobservableParameter};
 use crate::uncertainty::overdispersion::{Overdispersion, compute_overdispersions};
 use crate::uncertainty::registration_sigma::registration_sigmas;
+use crate::uncertainty::total_covariance::{PixelJacobians, TotalCovariance};
+use nalgebra::{Matrix2x6, Vector3};
+use tunnelstitch_geometry::surface::{WallPoint, lens_jacobian};
 
 /// The uncertainty of a solution.
 pub struct SolutionUncertainty {
@@ -27,12 +30,14 @@ pub struct SolutionUncertainty {
     pub shared: Option<SharedBlock>,
     /// Overdispersion of every frame; 0 for those that show nothing.
     pub overdispersions: Vec<Overdispersion>,
+    /// Covariance of all unknowns; None where the equations are singular.
+    total: Option<TotalCovariance>,
     posterior: Option<Posterior>,
 }
 
 impl SolutionUncertainty {
     /// Computes the uncertainty of a solution, with the free parameters of `calibration`;
-    /// `context`: with the solution's own κ; `alpha`: rate of false alarms.
+    /// `context`: with the solution's own κ and shape; `alpha`: rate of false alarms.
     ///
     /// # Errors
     /// [`ProblemError::Factor`] if shared parameters were estimated and the poses' normal matrix is
@@ -44,12 +49,14 @@ impl SolutionUncertainty {
         alpha: f64,
     ) -> Result<Self, ProblemError> {
         let problem = &solution.problem;
+        let frames = solution.unknowns.frames.len();
         let posterior = Posterior::at(solution).map_err(|source| problem.factor_error(source))?;
         let of_free = |posterior: &Posterior| posterior.covariance(&calibration.free);
         let mut shared = posterior.as_ref().and_then(of_free);
-        let (prior, _) = problem.prior_information(&solution.estimates, &solution.kappa);
+        let (prior, _) = problem.prior_information(&solution.unknowns);
         let of_noise = compute_covariances(
             problem.pattern(),
+            frames,
             &solution.linearisation.normal,
             problem.constrained_gauge_freedoms(),
             &solution.linearisation.scatter,
@@ -57,27 +64,38 @@ impl SolutionUncertainty {
             solution.record.curvature(),
         );
         // Poses without a covariance still count; they are reported as uncertain.
-        let mut patches = None;
-        let (covariances, dispersion) = match of_noise {
+        let total = match of_noise {
             Ok(of_noise) => {
                 let errors = EstimateErrors::find(solution, posterior.as_ref(), &of_noise, alpha)?;
-                let of_shared = posterior.as_ref().zip(shared.as_ref());
-                let covariances = total(&of_noise, errors.as_ref(), of_shared);
                 if let (Some(shared), Some(errors)) = (&mut shared, &errors) {
                     *shared += errors.draws.of_shared();
                 }
-                patches = errors.and_then(|errors| errors.patches);
-                let of_patches = patches.map(|patches| patches.dispersion);
-                (covariances, of_patches.unwrap_or(of_noise.pixel_dispersion))
+                let of_shared = posterior.as_ref().zip(shared);
+                Some(TotalCovariance {
+                    of_noise,
+                    errors,
+                    shared: of_shared.map(|(posterior, shared)| (posterior.w.clone(), shared)),
+                })
             }
-            Err(_) => (Covariances::unknown(solution.estimates.len()), f64::NAN),
+            Err(_) => None,
+        };
+        let errors = total.as_ref().and_then(|total| total.errors.as_ref());
+        let patches = errors.and_then(|errors| errors.patches);
+        let dispersion = match (&patches, &total) {
+            (Some(patches), _) => patches.dispersion,
+            (None, Some(total)) => total.of_noise.pixel_dispersion,
+            (None, None) => f64::NAN,
         };
         Ok(Self {
-            covariances,
+            covariances: match &total {
+                Some(total) => total.of_frames(frames),
+                None => Covariances::unknown(frames),
+            },
             registration_px: registration_sigmas(context, solution, dispersion),
             model_error: patches.map(|found| ModelErrorReport::new(&found, problem)),
             shared,
             overdispersions: compute_overdispersions(context, solution),
+            total,
             posterior,
         })
     }
@@ -89,15 +107,31 @@ impl SolutionUncertainty {
         k: usize,
         estimate: &FrameEstimate,
     ) -> FrameSigma {
-        let w = self.posterior.as_ref().map(|posterior| &posterior.w[k]);
+        let frames = self.covariances.frames.len();
+        let wall_variance = |wall: WallPoint, a: &Matrix2x6<f64>, x_c: &Vector3<f64>| {
+            let Some(total) = &self.total else {
+                return f64::NAN;
+            };
+            let normal = context.nominal.frame(wall).normal();
+            let functions = context.shape.as_ref().map(|s| s.model.functions_at(wall));
+            let tau = -(a.fixed_columns::<3>(3) * normal);
+            let pixel = PixelJacobians {
+                pose: *a,
+                lens: lens_jacobian(&estimate.pose, a, &context.camera, x_c),
+                shape: functions
+                    .as_deref()
+                    .map(|functions| (tau, functions, frames)),
+            };
+            total.wall_variance(k, &pixel)
+        };
         FrameSigma {
             registration_px: self.registration_px[k],
-            ..compute_frame_sigma(
+            ..compute_frame_sigma_by(
                 context.surface.as_ref(),
                 &context.camera,
                 estimate,
                 &self.covariances.frames[k],
-                w.zip(self.shared.as_ref()),
+                wall_variance,
             )
         }
     }
@@ -143,30 +177,6 @@ impl SolutionUncertainty {
             return mark_all_unobservable(calibration, &reason);
         }
         posterior.find_unobservable(calibration)
-    }
-}
-
-/// The covariance of all errors ([`crate::uncertainty::covariance`],
-/// [`crate::uncertainty::model_error`]).
-fn total(
-    of_noise: &NoiseCovariance,
-    errors: Option<&EstimateErrors>,
-    shared: Option<(&Posterior, &SharedBlock)>,
-) -> Covariances {
-    let c = of_noise.pixel_dispersion;
-    let poses = match errors {
-        // Draws of patches include those of the shared parameters.
-        Some(errors) if errors.patches.is_some() => {
-            return of_noise.map(|j, k, _| errors.draws.of_pair(j, k));
-        }
-        Some(errors) => {
-            of_noise.map(|j, k, inverse| inverse * c + errors.draws.of_pair(j, k) * (1.0 - c))
-        }
-        None => of_noise.map(|_, _, inverse| inverse * c),
-    };
-    match shared {
-        Some((posterior, covariance)) => poses.with_shared(&posterior.w, covariance),
-        None => poses,
     }
 }
 

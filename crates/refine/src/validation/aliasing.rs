@@ -89,7 +89,7 @@ pub fn resolve_aliases(
     let radius_m = context.surface.perimeter_m() / std::f64::consts::TAU;
     let evidence = Evidence {
         prior: context.prior,
-        gauge: context.surface.gauge(),
+        gauge: context.gauge(),
         frames: &frames,
         poses: &poses,
         alias_motions: &alias_motions,

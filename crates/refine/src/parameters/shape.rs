@@ -1,0 +1,383 @@
+//! Shape of the wall: its displacement from the nominal surface, a sum of functions of several
+//! scales.
+//!
+//! The displacement ([`tunnelstitch_geometry::surface::RadialField`]) is
+//!
+//! `δ(s, h) = Σ_k Σ_j c_kj φ_kj(s, h)`,  `c_kj ~ N(0, σ_k²)`,
+//!
+//! with one strength σ_k for all coefficients of a scale k ([`Scale`]):
+//!
+//! | scale | functions φ |
+//! | --- | --- |
+//! | harmonics | cos mθ and sin mθ, m = 2 … 5, constant along the tunnel: ovality |
+//! | lattices of 8, 16, 32, … columns | cubic B-splines: undulations of a quarter of the perimeter and shorter |
+//!
+//! Each lattice has half the spacing of the one before, so that the sum is a B-spline on the
+//! finest. Strengths are learned from the frames ([`crate::stages::shape_strengths`]): a wall that
+//! is as planned has none. A scale of strength 0 has no coefficients.
+//!
+//! Coefficients come in blocks of eight, as many as a frame has parameters, so that the normal
+//! equations have blocks of one size ([`crate::linear::normal_equations`]): neighbours in a row of
+//! a lattice, or the eight harmonics.
+//!
+//! Source: C. K. Chui, "An Introduction to Wavelets", 1992 (splines of halved spacing); D. J. C.
+//! MacKay, "Bayesian interpolation", Neural Computation 4(3), 1992 (strengths by evidence).
+
+use crate::parameters::frame_estimate::FRAME_PARAMETERS;
+use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
+use std::ops::Range;
+use tunnelstitch_geometry::surface::{RadialField, SplineLattice, WallPoint};
+
+/// Coefficients in a block.
+const BLOCK_FUNCTIONS: usize = FRAME_PARAMETERS;
+/// Columns of the coarsest lattice.
+const MIN_COLUMNS: usize = BLOCK_FUNCTIONS;
+/// Order m of the first harmonic. Those of order 0 and 1 are the radius and the position of the
+/// axis.
+const FIRST_HARMONIC: usize = 2;
+
+/// A block of coefficients, metres, or a step of them.
+pub type ShapeStep = SVector<f64, BLOCK_FUNCTIONS>;
+
+/// Functions whose coefficients have one strength.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Functions {
+    /// cos mθ and sin mθ, m = 2 … 5, constant along the tunnel.
+    Harmonics,
+    /// Cubic B-splines on a lattice.
+    Lattice {
+        /// Columns around the section, a multiple of eight.
+        columns: usize,
+        /// First row.
+        first_row: i64,
+        /// Number of rows.
+        rows: usize,
+    },
+}
+
+impl Functions {
+    /// Number of blocks of coefficients.
+    pub fn blocks(&self) -> usize {
+        match *self {
+            Self::Harmonics => 1,
+            Self::Lattice { columns, rows, .. } => rows * columns / BLOCK_FUNCTIONS,
+        }
+    }
+}
+
+/// One scale of the shape.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scale {
+    /// Its functions.
+    pub functions: Functions,
+    /// Strength σ: 1-σ of each coefficient, metres.
+    pub sigma_m: f64,
+}
+
+/// The functions of a wall's shape, and the prior of their coefficients.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ShapeModel {
+    /// Perimeter of the nominal section, metres.
+    perimeter_m: f64,
+    /// Chainage between which the wall has a shape, metres.
+    extent_h_m: [f64; 2],
+    /// The scales.
+    pub scales: Vec<Scale>,
+}
+
+/// A wall's shape: coefficients of a model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shape {
+    /// The model.
+    pub model: ShapeModel,
+    /// Its coefficients, metres, scale by scale, block by block.
+    pub coefficients: Vec<ShapeStep>,
+}
+
+/// A function that is not zero at a point of the wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FunctionValue {
+    /// Block of its coefficient.
+    pub block: usize,
+    /// Its coefficient in the block.
+    pub component: usize,
+    /// φ.
+    pub value: f64,
+}
+
+impl ShapeModel {
+    /// Harmonics and lattices of 8, 16, … up to `finest` columns, all of the strength `sigma_m`,
+    /// for the wall between two chainages, metres.
+    pub fn new(perimeter_m: f64, extent_h_m: [f64; 2], finest: usize, sigma_m: f64) -> Self {
+        let mut model = Self {
+            perimeter_m,
+            extent_h_m,
+            scales: vec![Scale {
+                functions: Functions::Harmonics,
+                sigma_m,
+            }],
+        };
+        let mut columns = MIN_COLUMNS;
+        while columns <= finest {
+            model.scales.push(model.lattice_scale(columns, sigma_m));
+            columns *= 2;
+        }
+        model
+    }
+
+    /// The lattice of `columns` columns.
+    fn lattice(&self, columns: usize) -> SplineLattice {
+        SplineLattice {
+            perimeter_m: self.perimeter_m,
+            columns,
+            origin: WallPoint::default(),
+        }
+    }
+
+    /// The scale of a lattice.
+    fn lattice_scale(&self, columns: usize, sigma_m: f64) -> Scale {
+        let [from, to] = self.extent_h_m;
+        let rows = self.lattice(columns).rows_between(from, to);
+        Scale {
+            functions: Functions::Lattice {
+                columns,
+                first_row: rows.start,
+                rows: (rows.end - rows.start) as usize,
+            },
+            sigma_m,
+        }
+    }
+
+    /// Number of blocks of coefficients.
+    pub fn blocks(&self) -> usize {
+        self.scales.iter().map(|s| s.functions.blocks()).sum()
+    }
+
+    /// The blocks of each scale.
+    pub fn ranges(&self) -> Vec<Range<usize>> {
+        let mut next = 0;
+        let range = |scale: &Scale| {
+            let start = next;
+            next += scale.functions.blocks();
+            start..next
+        };
+        self.scales.iter().map(range).collect()
+    }
+
+    /// Strength of every block, metres.
+    pub fn block_sigmas_m(&self) -> Vec<f64> {
+        let scales = self.scales.iter();
+        scales
+            .flat_map(|scale| vec![scale.sigma_m; scale.functions.blocks()])
+            .collect()
+    }
+
+    /// The functions that are not zero at a point of the wall, by ascending block.
+    pub fn functions_at(&self, wall: WallPoint) -> Vec<FunctionValue> {
+        let mut values = Vec::with_capacity(16 * self.scales.len());
+        let mut first = 0;
+        for scale in &self.scales {
+            match scale.functions {
+                Functions::Harmonics => {
+                    let theta = TAU * wall.s_m / self.perimeter_m;
+                    values.extend((0..BLOCK_FUNCTIONS).map(|component| FunctionValue {
+                        block: first,
+                        component,
+                        value: harmonic(component, theta),
+                    }));
+                }
+                Functions::Lattice {
+                    columns,
+                    first_row,
+                    rows,
+                } => {
+                    let support = self.lattice(columns).support(wall);
+                    for (j, along_h) in support.along_h.into_iter().enumerate() {
+                        let row = support.first_row + j as i64 - first_row;
+                        if !(0..rows as i64).contains(&row) {
+                            continue;
+                        }
+                        for (column, along_s) in support.columns.into_iter().zip(support.along_s) {
+                            let index = row as usize * columns + column;
+                            values.push(FunctionValue {
+                                block: first + index / BLOCK_FUNCTIONS,
+                                component: index % BLOCK_FUNCTIONS,
+                                value: along_h * along_s,
+                            });
+                        }
+                    }
+                }
+            }
+            first += scale.functions.blocks();
+        }
+        values.sort_unstable_by_key(|value| (value.block, value.component));
+        values
+    }
+
+    /// The finest lattice of the model, or one that is fine enough for the harmonics.
+    fn finest_columns(&self) -> usize {
+        let columns = self
+            .scales
+            .iter()
+            .filter_map(|scale| match scale.functions {
+                Functions::Harmonics => None,
+                Functions::Lattice { columns, .. } => Some(columns),
+            });
+        columns.fold(4 * MIN_COLUMNS, usize::max)
+    }
+
+    /// The model with a lattice of half the spacing added, of the strength `sigma_m`.
+    pub fn refined(&self, sigma_m: f64) -> Self {
+        let mut model = self.clone();
+        let finer = model.lattice_scale(2 * self.finest_columns(), sigma_m);
+        model.scales.push(finer);
+        model
+    }
+}
+
+/// The harmonic of a block's component: cos mθ for even ones, sin mθ for odd ones.
+fn harmonic(component: usize, theta: f64) -> f64 {
+    let angle = (FIRST_HARMONIC + component / 2) as f64 * theta;
+    if component.is_multiple_of(2) {
+        angle.cos()
+    } else {
+        angle.sin()
+    }
+}
+
+impl Shape {
+    /// The nominal wall, in the terms of a model.
+    pub fn nominal(model: ShapeModel) -> Self {
+        Self {
+            coefficients: vec![ShapeStep::zeros(); model.blocks()],
+            model,
+        }
+    }
+
+    /// The displacement of the wall; None if there are no functions.
+    pub fn field(&self) -> Option<RadialField> {
+        let model = &self.model;
+        if model.scales.is_empty() {
+            return None;
+        }
+        let finest = model.finest_columns();
+        let mut field: Option<RadialField> = None;
+        let mut columns = MIN_COLUMNS;
+        while columns <= finest {
+            field = field.map(|field| field.halved());
+            for (scale, range) in model.scales.iter().zip(model.ranges()) {
+                let Functions::Lattice {
+                    columns: own,
+                    first_row,
+                    ..
+                } = scale.functions
+                else {
+                    continue;
+                };
+                if own == columns {
+                    let blocks = self.coefficients[range].iter();
+                    let coefficients = blocks.flat_map(|block| block.iter().copied()).collect();
+                    let own = RadialField::new(model.lattice(columns), first_row, coefficients);
+                    field = Some(match field {
+                        Some(coarser) => coarser.plus(&own),
+                        None => own,
+                    });
+                }
+            }
+            columns *= 2;
+        }
+        let harmonics = self.harmonics(finest);
+        match (field, harmonics) {
+            (Some(field), Some(harmonics)) => Some(field.plus(&harmonics)),
+            (field, harmonics) => field.or(harmonics),
+        }
+    }
+
+    /// The harmonics, as a B-spline on a lattice; None if the model has none.
+    ///
+    /// The spline with the coefficients `cos mθ_i / β` at the nodes, `β = (2 + cos(2π m/n))/3`,
+    /// interpolates cos mθ there.
+    fn harmonics(&self, columns: usize) -> Option<RadialField> {
+        let mut scales = self.model.scales.iter().zip(self.model.ranges());
+        let (_, range) = scales.find(|(s, _)| s.functions == Functions::Harmonics)?;
+        let block = &self.coefficients[range.start];
+        let value = |column: usize| -> f64 {
+            let step = TAU / columns as f64;
+            let terms = block.iter().enumerate().map(|(component, amplitude)| {
+                let order = (FIRST_HARMONIC + component / 2) as f64;
+                let beta = (2.0 + (order * step).cos()) / 3.0;
+                amplitude * harmonic(component, column as f64 * step) / beta
+            });
+            terms.sum()
+        };
+        let row: Vec<f64> = (0..columns).map(value).collect();
+        let lattice = self.model.lattice(columns);
+        let [from, to] = self.model.extent_h_m;
+        let rows = lattice.rows_between(from, to);
+        let coefficients = rows.clone().flat_map(|_| row.clone()).collect();
+        Some(RadialField::new(lattice, rows.start, coefficients))
+    }
+
+    /// The shape after a step.
+    pub fn stepped(&self, step: &[ShapeStep]) -> Vec<ShapeStep> {
+        let coefficients = self.coefficients.iter().zip(step);
+        coefficients.map(|(c, step)| c + step).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shape() -> Shape {
+        let model = ShapeModel::new(3.0 * TAU, [-0.5, 6.0], 32, 0.005);
+        let coefficients = (0..model.blocks())
+            .map(|k| ShapeStep::from_fn(|n, _| (12.9898 * (k * 8 + n) as f64).sin()))
+            .collect();
+        Shape {
+            model,
+            coefficients,
+        }
+    }
+
+    /// Sum of the functions times their coefficients.
+    fn sum(shape: &Shape, wall: WallPoint) -> f64 {
+        let functions = shape.model.functions_at(wall).into_iter();
+        functions
+            .map(|f| f.value * shape.coefficients[f.block][f.component])
+            .sum()
+    }
+
+    #[test]
+    fn the_field_is_the_sum_of_the_functions() {
+        let shape = shape();
+        let field = shape.field().unwrap();
+        for (s_m, h_m) in [(0.1, 0.0), (18.0, 3.3), (7.0, 5.9), (11.0, -0.4)] {
+            let wall = WallPoint { s_m, h_m };
+            let difference = field.at(wall).delta_m - sum(&shape, wall);
+            // Harmonics are splines to a thousandth.
+            assert!(difference.abs() < 3e-3, "{difference}");
+        }
+    }
+
+    #[test]
+    fn a_refined_model_has_one_more_lattice() {
+        let model = shape().model;
+        let refined = model.refined(0.001);
+        assert_eq!(refined.scales.len(), model.scales.len() + 1);
+        assert!(matches!(
+            refined.scales.last().unwrap().functions,
+            Functions::Lattice { columns: 64, .. }
+        ));
+        assert_eq!(refined.ranges().last().unwrap().end, refined.blocks());
+    }
+
+    #[test]
+    fn a_shape_without_functions_is_nominal() {
+        let mut model = shape().model;
+        model.scales.clear();
+        assert!(Shape::nominal(model).field().is_none());
+    }
+}

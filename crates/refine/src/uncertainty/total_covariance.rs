@@ -1,0 +1,112 @@
+//! The covariance of all errors of an estimate: noise, prior, model errors, shared parameters.
+
+use crate::linear::bordered_system::{BorderBlock, SharedBlock};
+use crate::linear::normal_equations::Block;
+use crate::parameters::calibration::INTRINSIC_PARAMETERS;
+use crate::parameters::shape::{FunctionValue, ShapeStep};
+use crate::uncertainty::covariance::{Covariances, NoiseCovariance};
+use crate::uncertainty::model_error::EstimateErrors;
+use nalgebra::{Matrix2x5, Matrix2x6, Matrix6, SVector, Vector2};
+use std::collections::BTreeMap;
+
+/// The covariance of the errors of all slots and of the shared parameters.
+pub struct TotalCovariance {
+    /// By noise.
+    pub of_noise: NoiseCovariance,
+    /// By model errors and prior; None if the prior leaves a pose free.
+    pub errors: Option<EstimateErrors>,
+    /// W of all slots and `Σ_κ`, where the shared parameters were estimated.
+    pub shared: Option<(Vec<BorderBlock>, SharedBlock)>,
+}
+
+/// Jacobians of the wall point of a fixed pixel.
+pub struct PixelJacobians<'j> {
+    /// `A = ∂(s, h)/∂ξ`.
+    pub pose: Matrix2x6<f64>,
+    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2)`.
+    pub lens: Matrix2x5<f64>,
+    /// `τ = ∂(s, h)/∂δ`, with the shape's functions there and the slot of their first block.
+    pub shape: Option<(Vector2<f64>, &'j [FunctionValue], usize)>,
+}
+
+impl TotalCovariance {
+    /// Covariance of two slots ([`crate::uncertainty::covariance`],
+    /// [`crate::uncertainty::model_error`]); None where they have nothing in common.
+    pub fn block(&self, j: usize, k: usize) -> Option<Block> {
+        // What has nothing in common has no covariance, whatever draws say.
+        let inverse = self.of_noise.inverse.block(j, k)?;
+        let c = self.of_noise.pixel_dispersion;
+        let total = match &self.errors {
+            // Draws of patches include those of the shared parameters.
+            Some(errors) if errors.patches.is_some() => return Some(errors.draws.of_pair(j, k)),
+            Some(errors) => inverse * c + errors.draws.of_pair(j, k) * (1.0 - c),
+            None => inverse * c,
+        };
+        Some(match &self.shared {
+            Some((w, covariance)) => total + w[j] * covariance * w[k].transpose(),
+            None => total,
+        })
+    }
+
+    /// Covariances of the first `frames` slots, which are the frames.
+    pub fn of_frames(&self, frames: usize) -> Covariances {
+        let unknown = Matrix6::from_element(f64::NAN);
+        let pose = |j: usize, k: usize| {
+            let block = self.block(j, k);
+            block.map_or(unknown, |block| block.fixed_view::<6, 6>(0, 0).into_owned())
+        };
+        Covariances {
+            frames: (0..frames).map(|k| pose(k, k)).collect(),
+            next: (1..frames).map(|k| pose(k - 1, k)).collect(),
+            variance_factor: self.of_noise.variance_factor,
+        }
+    }
+
+    /// Variance of the wall point of a fixed pixel of frame `k`, the sum along s and h, m²: of
+    /// `A ξ + C κ + τ δ`.
+    ///
+    /// As slots move by `−W κ` with κ, their covariance with it is `−W Σ_κ`.
+    pub fn wall_variance(&self, k: usize, pixel: &PixelJacobians) -> f64 {
+        let Some(pose) = self.block(k, k) else {
+            return f64::NAN;
+        };
+        let a = &pixel.pose;
+        let mut variance = (a * pose.fixed_view::<6, 6>(0, 0) * a.transpose()).trace();
+        // By the slots: A ξ, and τ φᵀ c for a block of the shape.
+        let mut crossed_w = SVector::<f64, 2>::zeros();
+        let lens = self.shared.as_ref().map(|(w, covariance)| {
+            let of_lens = covariance
+                .fixed_rows::<INTRINSIC_PARAMETERS>(0)
+                .into_owned();
+            (w, pixel.lens * of_lens)
+        });
+        if let Some((w, lens)) = &lens {
+            let own = lens.fixed_columns::<INTRINSIC_PARAMETERS>(0) * pixel.lens.transpose();
+            let crossed = lens * w[k].fixed_rows::<6>(0).transpose() * a.transpose();
+            variance += own.trace() - 2.0 * crossed.trace();
+        }
+        let Some((tau, functions, first)) = pixel.shape else {
+            return variance;
+        };
+        let mut blocks: BTreeMap<usize, ShapeStep> = BTreeMap::new();
+        for function in functions {
+            let block = blocks.entry(first + function.block).or_default();
+            block[function.component] = function.value;
+        }
+        for (slot, phi) in &blocks {
+            if let Some(covariance) = self.block(k, *slot) {
+                let with_pose = a * covariance.fixed_rows::<6>(0) * phi;
+                variance += 2.0 * with_pose.dot(&tau);
+            }
+            for (other, phi_other) in &blocks {
+                if let Some(covariance) = self.block(*slot, *other) {
+                    variance += tau.norm_squared() * (phi.transpose() * covariance * phi_other)[0];
+                }
+            }
+            if let Some((w, lens)) = &lens {
+                crossed_w += lens * (w[*slot].transpose() * phi);
+            }
+        }
+        variance - 2.0 * crossed_w.dot(&tau)
+    }
+}
