@@ -8,6 +8,10 @@ use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::{Surface, WallRegions};
 use tunnelstitch_geometry::trajectory::{Jitter, Shutter, StampedPose};
 
+/// 1-σ of a real lining's deviation from its nominal shape, radii: a centimetre at a radius of three
+/// metres.
+const DEFAULT_SHAPE_SIGMA_RADII: f64 = 1.0 / 300.0;
+
 /// No part of the wall.
 static NOTHING: WallRegions = WallRegions::NONE;
 
@@ -32,6 +36,8 @@ pub struct RefineInput<'a> {
     pub ignored: &'a WallRegions,
     /// Shared parameters to estimate besides the poses, and their priors.
     pub calibrate: CalibrateSection,
+    /// 1-σ of the wall's deviation from its nominal shape, metres; 0 if it is exact.
+    pub shape_sigma_m: f64,
     /// Radius of the tunnel, or half its width, as given; metres.
     pub nominal_radius_m: f64,
 }
@@ -50,6 +56,7 @@ impl<'a> RefineInput<'a> {
     ) -> Self {
         Self {
             camera,
+            shape_sigma_m: DEFAULT_SHAPE_SIGMA_RADII * surface.perimeter_m() / TAU,
             nominal_radius_m: surface.perimeter_m() / TAU,
             surface,
             frames,
@@ -66,6 +73,7 @@ impl<'a> From<&'a Survey> for RefineInput<'a> {
     fn from(survey: &'a Survey) -> Self {
         Self {
             camera: survey.camera,
+            shape_sigma_m: DEFAULT_SHAPE_SIGMA_RADII * survey.surface.perimeter_m() / TAU,
             surface: Arc::clone(&survey.surface),
             frames: &survey.frames,
             initial: &survey.initial,

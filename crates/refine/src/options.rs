@@ -2,6 +2,18 @@
 
 use tunnelstitch_core::survey::CalibrationGroup;
 
+/// Treatment of the wall's shape.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ShapeMode {
+    /// The deviation from the nominal shape is estimated with the poses, and the lens with both, as
+    /// far as the frames show any.
+    #[default]
+    Estimated,
+    /// The wall is as given.
+    Fixed,
+}
+
 /// Options of a refinement. The defaults suit most surveys; the noise model of the poses comes with
 /// the input.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -9,6 +21,8 @@ pub struct RefineOptions {
     /// Shared parameters to estimate besides the poses; if None, those that the input asks for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibrate: Option<Vec<CalibrationGroup>>,
+    /// Treatment of the wall's shape.
+    pub shape: ShapeMode,
     /// 1-σ of the logarithm of a frame's gain around 0 (0.3 is about ±30 %).
     pub log_gain_sigma: f64,
     /// 1-σ of a frame's bias around 0, grey levels.
@@ -58,6 +72,7 @@ impl Default for RefineOptions {
     fn default() -> Self {
         Self {
             calibrate: None,
+            shape: ShapeMode::Estimated,
             log_gain_sigma: 0.3,
             bias_sigma: 10.0,
             coarsest_side: 30,

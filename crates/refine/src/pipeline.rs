@@ -87,6 +87,7 @@ fn begin(setup: &Setup) -> PipelineState {
         frames,
         kappa: Kappa::zeros(),
         free: setup.calibration.free,
+        shape: None,
         tracking: None,
         solve: None,
         levels: Vec::new(),

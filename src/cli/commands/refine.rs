@@ -310,11 +310,17 @@ pub fn refine_into(
         &out.join("covariance.csv"),
         &refined.covariances.csv(&sigmas),
     )?;
+    if let Some(shape) = &refined.shape {
+        atomic::write_text(&out.join(SHAPE_FILE), &json::text(shape)?)?;
+    }
     if let Some(calibration) = &refined.report.calibration {
         write_calibration(survey, calibration, out)?;
     }
     Ok((refined, json))
 }
+
+/// Name of the wall's shape.
+const SHAPE_FILE: &str = "shape.json";
 
 /// Name of the refined calibration.
 const CAMERA_FILE: &str = "camera.json";

@@ -118,6 +118,15 @@ impl RadialField {
         Self::new(self.lattice, first_row, coefficients_m)
     }
 
+    /// The field of a wall that is scaled as a whole.
+    pub fn scaled(mut self, scale: f64) -> Self {
+        self.lattice.perimeter_m *= scale;
+        self.lattice.origin.s_m *= scale;
+        self.lattice.origin.h_m *= scale;
+        self.coefficients_m.iter_mut().for_each(|c| *c *= scale);
+        self
+    }
+
     /// The field moved by `by` on the unrolled wall.
     pub fn moved(mut self, by: WallPoint) -> Self {
         let origin = &mut self.lattice.origin;

@@ -3,8 +3,9 @@
 use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
-    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat};
 use faer::{Conj, MatMut, Par, Side};
@@ -162,6 +163,26 @@ impl Factor<'_> {
         (0..blocks.len())
             .map(|frame| SMatrix::from_fn(|row, column| value(frame, row, column)))
             .collect()
+    }
+
+    /// `log det H`.
+    pub fn log_determinant(&self) -> f64 {
+        let logarithms = |diagonal: &mut dyn Iterator<Item = f64>| -> f64 {
+            diagonal.map(|pivot| 2.0 * pivot.ln()).sum()
+        };
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(symbolic) => {
+                let pivots = &symbolic.col_ptr()[..symbolic.ncols()];
+                logarithms(&mut pivots.iter().map(|at| self.numeric[*at]))
+            }
+            SymbolicCholeskyRaw::Supernodal(symbolic) => {
+                let factor = SupernodalLltRef::new(symbolic, &self.numeric);
+                let supernodes = (0..symbolic.n_supernodes()).map(|k| factor.supernode(k).val());
+                supernodes
+                    .map(|values| logarithms(&mut (0..values.ncols()).map(|k| values[(k, k)])))
+                    .sum()
+            }
+        }
     }
 
     /// Solves `H δ = −g` for the step δ.

@@ -13,7 +13,7 @@
 //! | lattices of 8, 16, 32, … columns | cubic B-splines: undulations of a quarter of the perimeter and shorter |
 //!
 //! Each lattice has half the spacing of the one before, so that the sum is a B-spline on the
-//! finest. Strengths are learned from the frames ([`crate::stages::shape_strengths`]): a wall that
+//! finest. Strengths are learned from the frames ([`crate::solver::shape_evidence`]): a wall that
 //! is as planned has none. A scale of strength 0 has no coefficients.
 //!
 //! Coefficients come in blocks of eight, as many as a frame has parameters, so that the normal
@@ -218,14 +218,20 @@ impl ShapeModel {
 
     /// The finest lattice of the model, or one that is fine enough for the harmonics.
     fn finest_columns(&self) -> usize {
-        let columns = self
+        let finest = self.finest_lattice().map_or(0, |(columns, _)| columns);
+        finest.max(4 * MIN_COLUMNS)
+    }
+
+    /// Columns and strength (metres) of the finest lattice; None if there is none.
+    pub fn finest_lattice(&self) -> Option<(usize, f64)> {
+        let lattices = self
             .scales
             .iter()
             .filter_map(|scale| match scale.functions {
                 Functions::Harmonics => None,
-                Functions::Lattice { columns, .. } => Some(columns),
+                Functions::Lattice { columns, .. } => Some((columns, scale.sigma_m)),
             });
-        columns.fold(4 * MIN_COLUMNS, usize::max)
+        lattices.max_by_key(|(columns, _)| *columns)
     }
 
     /// The model with a lattice of half the spacing added, of the strength `sigma_m`.

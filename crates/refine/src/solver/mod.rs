@@ -3,5 +3,6 @@
 pub mod argmin_glue;
 pub mod gauss_newton;
 pub mod neighbourhood;
+pub mod shape_evidence;
 pub mod solve_record;
 pub mod stopping;

@@ -53,7 +53,7 @@ pub fn run<'a>(
     let placement = Placement::new(
         setup,
         &datum,
-        &state.frames.estimates,
+        (&state.frames.estimates, state.shape.as_ref()),
         &uncertainty.covariances,
         rejections,
     );
@@ -94,7 +94,7 @@ pub fn without_solution(setup: &Setup, session: &mut Session) -> Refined {
         .collect();
     let datum = setup.calibration.datum(&Kappa::zeros());
     let rejections = vec![Some(RejectionReason::Unsolved); count];
-    let placement = Placement::new(setup, &datum, &estimates, &unknown, rejections);
+    let placement = Placement::new(setup, &datum, (&estimates, None), &unknown, rejections);
     let frames = (0..count).map(|k| placement.report_frame(setup, k, FrameSigma::unknown()));
     let parts = ReportParts {
         frames: frames.collect(),

@@ -21,6 +21,7 @@ pub mod repair;
 pub mod run;
 pub mod session;
 pub mod setup;
+pub mod shape;
 pub mod solve;
 pub mod state;
 pub mod track;

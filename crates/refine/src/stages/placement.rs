@@ -3,6 +3,7 @@
 use crate::model::rejection::RejectionReason;
 use crate::parameters::calibration::Datum;
 use crate::parameters::frame_estimate::FrameEstimate;
+use crate::parameters::shape::Shape;
 use crate::refined::Refined;
 use crate::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 use crate::stages::setup::Setup;
@@ -14,8 +15,8 @@ use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
 use crate::verdict::bridging::Bridging;
 use crate::verdict::prior_test::PriorTest;
 use crate::verdict::survey_verdict::SurveyVerdict;
-use nalgebra::Matrix6;
-use tunnelstitch_geometry::surface::GaugeMotion;
+use nalgebra::{Matrix6, Vector3};
+use tunnelstitch_geometry::surface::{GaugeMotion, RadialField, Surface, WallPoint};
 use tunnelstitch_geometry::trajectory::{Pose, StampedPose};
 
 /// The final poses of all frames, and the verdict that they follow from.
@@ -27,6 +28,8 @@ pub struct Placement {
     covariances: Covariances,
     rejections: Vec<Option<RejectionReason>>,
     prior_test: PriorTest,
+    /// Displacement of the wall, metres; None if it is as planned.
+    field: Option<RadialField>,
 }
 
 /// Parts of the report that the poses do not determine.
@@ -54,7 +57,7 @@ impl Placement {
     pub fn new(
         setup: &Setup,
         datum: &Datum,
-        estimates: &[FrameEstimate],
+        (estimates, shape): (&[FrameEstimate], Option<&Shape>),
         covariances: &Covariances,
         mut rejections: Vec<Option<RejectionReason>>,
     ) -> Self {
@@ -62,6 +65,9 @@ impl Placement {
         let mut photometric: Vec<bool> = rejections.iter().map(Option::is_none).collect();
         let gauge = setup.input.surface.gauge();
         let motion = prior.align_gauge(&gauge, estimates, datum, &photometric);
+        let field = shape.and_then(Shape::field);
+        let by = displacement_by(&motion, setup.input.surface.as_ref(), &estimates[0].pose);
+        let field = field.map(|field| field.moved(by).scaled(datum.scale));
         let mut estimates = aligned(estimates, &motion);
         let mut covariances = covariances.clone().moved(&motion).scaled(datum.scale);
         let poses: Vec<Pose> = estimates.iter().map(|estimate| estimate.pose).collect();
@@ -122,6 +128,7 @@ impl Placement {
             covariances,
             rejections,
             prior_test,
+            field: field.filter(|_| !is_kept),
         }
     }
 
@@ -194,7 +201,22 @@ impl Placement {
                 timings: parts.timings,
             },
             covariances: self.covariances,
+            shape: self.field,
         }
+    }
+}
+
+/// Displacement of the wall's points, on the unrolled wall, by a motion along the gauge: that of the
+/// point that `pose` looks at.
+fn displacement_by(motion: &GaugeMotion, nominal: &dyn Surface, pose: &Pose) -> WallPoint {
+    let seen = |pose: &Pose| {
+        let hit = nominal.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()));
+        hit.map(|hit| hit.wall).unwrap_or_default()
+    };
+    let (before, after) = (seen(pose), seen(&motion.apply(pose)));
+    WallPoint {
+        s_m: after.s_m - before.s_m,
+        h_m: after.h_m - before.h_m,
     }
 }
 

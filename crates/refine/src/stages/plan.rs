@@ -72,6 +72,7 @@ impl SolvePlan {
         Self {
             sampling: Sampling {
                 information,
+                shape: true,
                 ..Sampling::of(level)
             },
             stopping: Stopping::intermediate(options, level),
@@ -90,6 +91,7 @@ impl SolvePlan {
                 density: options.final_density,
                 interpolation: Interpolation::Bicubic,
                 variance_weighting: true,
+                shape: true,
                 ..Sampling::of(0)
             },
             stopping: Stopping {

@@ -5,7 +5,7 @@ use crate::error::RefineError;
 use crate::input::RefineInput;
 use crate::model::context::EstimationContext;
 use crate::model::prior::{Prior, median_step_s};
-use crate::options::RefineOptions;
+use crate::options::{RefineOptions, ShapeMode};
 use crate::parameters::calibration::{Calibration, Kappa};
 use crate::stages::state::PipelineState;
 use std::sync::Arc;
@@ -26,8 +26,10 @@ pub struct Setup<'a> {
     /// The prior widened by the uncertainty of the shared parameters, for registering frames before
     /// these are estimated.
     pub tracking_prior: Prior,
-    /// The shared parameters that are estimated, and their priors.
+    /// The shared parameters that are asked for, and the priors of all.
     pub calibration: Calibration,
+    /// 1-σ of the wall's deviation from its nominal shape, metres; 0 if it is exact.
+    pub shape_sigma_m: f64,
 }
 
 impl<'a> Setup<'a> {
@@ -64,9 +66,14 @@ impl<'a> Setup<'a> {
             jitter: calibration.widen_jitter(&prior.jitter, prior.lever_arm_m()),
             ..prior.clone()
         };
+        let shape_sigma_m = match options.shape {
+            ShapeMode::Estimated => input.shape_sigma_m,
+            ShapeMode::Fixed => 0.0,
+        };
         Ok(Self {
             input,
             options,
+            shape_sigma_m,
             frames,
             prior,
             tracking_prior,
@@ -118,12 +125,19 @@ impl<'a> Setup<'a> {
         }
     }
 
-    /// The estimation context with the shared parameters as `state` has them.
+    /// The estimation context with shared parameters and shape as `state` has them.
     pub fn context(&self, state: &PipelineState) -> EstimationContext<'_> {
+        let initial = self.initial_context(state.noise);
+        let surface = match &state.shape {
+            Some(shape) => initial.surface_with(shape),
+            None => Arc::clone(&initial.surface),
+        };
         EstimationContext {
+            shape: state.shape.clone().map(Arc::new),
+            surface,
             calibration: self.calibration_at(state),
             dispersion: state.dispersion,
-            ..self.initial_context(state.noise)
+            ..initial
         }
         .at(state.kappa)
     }
@@ -140,11 +154,7 @@ fn calibration_of(
 ) -> Result<Calibration, RefineError> {
     let section = &input.calibrate;
     let groups = options.calibrate.as_ref().unwrap_or(&section.unknowns);
-    let calibration = if groups.is_empty() {
-        Calibration::none(&input.camera)
-    } else {
-        Calibration::new(groups, section, &input.camera, initial)
-    };
+    let calibration = Calibration::new(groups, section, &input.camera, initial);
     let is_straight_and_round = input.surface.gauge().degrees_of_freedom() == 2;
     for (group, unknown) in [
         (CalibrationGroup::Radius, "the radius"),

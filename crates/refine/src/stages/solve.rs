@@ -11,11 +11,15 @@ use crate::solver::gauss_newton::{Solution, SolveState};
 use crate::stages::plan::{SolvePlan, Stage};
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
+use crate::stages::shape;
 use crate::stages::state::{Estimation, LastSolve, PipelineState};
 use crate::tracking::shading_correction::correct;
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::validation::inconsistent_frames::reject_disagreeing_frames;
+
+/// Solves at full size after which the strengths of the shape are not learned again.
+const MAX_LEARNING_SOLVES: usize = 4;
 
 /// Runs the stage; a snapshot may be kept between two steps.
 ///
@@ -32,6 +36,7 @@ pub fn run<'a>(
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
     let state = &mut estimation.state;
+    shape::begin(setup, state)?;
     let context = setup.context(state);
     let Some(problem) = problem_of(&plan, setup, &context, state)? else {
         session.record_time("joint model of the wall");
@@ -43,9 +48,16 @@ pub fn run<'a>(
     }
     let solution = solve(&plan, problem, setup, state, session)?;
     state.frames.estimates.clone_from(&solution.unknowns.frames);
+    if let Some(shape) = &mut state.shape {
+        shape.coefficients.clone_from(&solution.unknowns.shape);
+    }
     let uncertainty = uncertainty_of(&plan, setup, &context, state, &solution)?;
     let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
     state.kappa = solution.unknowns.kappa;
+    let needs_solve = match state.shape {
+        Some(_) if may_learn_shape(&plan, state) => shape::learn(setup, state, &solution),
+        _ => false,
+    };
     for parameter in &unobservable {
         state.kappa[parameter.unknown] = 0.0;
         state.free[parameter.unknown] = false;
@@ -75,7 +87,9 @@ pub fn run<'a>(
         let dispersion = uncertainty
             .model_error
             .map_or(1.0, |found| found.dispersion);
-        if state.dispersion == 1.0 && dispersion > 1.0 {
+        if needs_solve {
+            plan_again(&plan, setup.options, state);
+        } else if state.dispersion == 1.0 && dispersion > 1.0 {
             state.dispersion = dispersion;
             plan_again(&plan, setup.options, state);
         } else {
@@ -156,7 +170,7 @@ fn uncertainty_of(
 ) -> Result<Option<SolutionUncertainty>, ProblemError> {
     let calibration = setup.calibration_at(state);
     let is_last = !has_solve_ahead(state);
-    if plan.sampling.level > 0 || !(is_last || calibration.has_free_parameters()) {
+    if plan.sampling.level > 0 || !(is_last || setup.calibration.has_free_parameters()) {
         return Ok(None);
     }
     let solved = context.at(solution.unknowns.kappa);
@@ -173,7 +187,7 @@ fn find_unobservable(
     uncertainty: Option<&SolutionUncertainty>,
 ) -> Vec<UnobservableParameter> {
     let calibration = setup.calibration_at(state);
-    match uncertainty.filter(|_| calibration.has_free_parameters()) {
+    match uncertainty.filter(|_| setup.calibration.has_free_parameters()) {
         Some(uncertainty) => uncertainty.find_unobservable(
             &context.at(solution.unknowns.kappa),
             &calibration,
@@ -183,6 +197,12 @@ fn find_unobservable(
         ),
         None => Vec::new(),
     }
+}
+
+/// True if the strengths of the shape are learned after this solve: at full size, a few times.
+fn may_learn_shape(plan: &SolvePlan, state: &PipelineState) -> bool {
+    let before = state.levels.iter().filter(|solve| solve.level == 0).count();
+    plan.sampling.level == 0 && before < MAX_LEARNING_SOLVES
 }
 
 /// True if another solve is certain to follow; a joint one may turn out to be needless.

@@ -2,6 +2,7 @@
 
 use crate::model::frame_states::FrameStates;
 use crate::parameters::calibration::{Kappa, SHARED_PARAMETERS};
+use crate::parameters::shape::Shape;
 use crate::refined::Refined;
 use crate::report::{LevelReport, StageTime};
 use crate::solver::gauss_newton::{Solution, SolveState};
@@ -31,6 +32,8 @@ pub struct PipelineState {
     pub kappa: Kappa,
     /// ... and which of them are still estimated.
     pub free: [bool; SHARED_PARAMETERS],
+    /// The wall's shape, if it is estimated, from the first global solve on.
+    pub shape: Option<Shape>,
     /// Tracking, if it is under way.
     pub tracking: Option<AlternatingCalibration>,
     /// The global solve that is under way.

@@ -1,0 +1,115 @@
+//! The wall's shape between solves: begun before the first, its strengths learned at full size.
+
+use crate::model::problem_error::ProblemError;
+use crate::model::significance::chi_squared_bounds;
+use crate::options::RefineOptions;
+use crate::parameters::calibration::INTRINSIC_PARAMETERS;
+use crate::parameters::shape::{Shape, ShapeModel, ShapeStep};
+use crate::samples::footprints::footprints;
+use crate::solver::gauss_newton::Solution;
+use crate::solver::shape_evidence::{LearnedShape, learn_shape};
+use crate::stages::setup::Setup;
+use crate::stages::state::PipelineState;
+
+/// Columns of the finest lattice before anything is known: nodes a fifth of the radius apart.
+const FIRST_FINEST_COLUMNS: usize = 32;
+/// Columns of the finest lattice at the most: nodes a tenth of the radius apart. Twice as many would
+/// cost eight times the time.
+const MAX_COLUMNS: usize = 64;
+/// Strength of a finer lattice over that of the one before, before it is learned.
+const FINER_STRENGTH: f64 = 0.5;
+/// Factor by which a strength may change without a new solve; the estimate hardly depends on it.
+const MAX_STRENGTH_CHANGE: f64 = 1.3;
+
+/// Begins to estimate the shape, and the lens with it, if the options ask for it.
+///
+/// # Errors
+/// [`ProblemError::Placement`].
+pub fn begin(setup: &Setup, state: &mut PipelineState) -> Result<(), ProblemError> {
+    if state.shape.is_some() || setup.shape_sigma_m == 0.0 {
+        return Ok(());
+    }
+    let context = setup.context(state);
+    let footprints = footprints(&context, &state.frames)?.into_iter();
+    let extent = footprints.fold([f64::INFINITY, f64::NEG_INFINITY], |[from, to], one| {
+        [from.min(one.h_min_m), to.max(one.h_max_m)]
+    });
+    let perimeter_m = context.nominal.perimeter_m();
+    let model = ShapeModel::new(
+        perimeter_m,
+        extent,
+        FIRST_FINEST_COLUMNS,
+        setup.shape_sigma_m,
+    );
+    state.shape = Some(Shape::nominal(model));
+    state.free[..INTRINSIC_PARAMETERS].fill(true);
+    Ok(())
+}
+
+/// Learns the strengths of the shape at a full-size solution, and whether the lens differs from the
+/// given one. Returns true if that changes anything; the state is then ready for a new solve.
+pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution) -> bool {
+    let Some(learned) = learn_shape(solution, setup.options.false_alarm_rate) else {
+        return false;
+    };
+    let mut free = state.free;
+    if !is_lens_changed(&learned, setup.options) {
+        let asked_for = &setup.calibration.free[..INTRINSIC_PARAMETERS];
+        free[..INTRINSIC_PARAMETERS].copy_from_slice(asked_for);
+    }
+    let shape = with_finer_lattice(learned.shape);
+    let before = solution.problem.shape().map(|before| &before.model);
+    if free == state.free && before.is_some_and(|before| !is_changed(before, &shape.model)) {
+        return false;
+    }
+    for k in (0..INTRINSIC_PARAMETERS).filter(|k| !free[*k]) {
+        state.kappa[k] = 0.0;
+    }
+    state.free = free;
+    state.shape = Some(shape);
+    true
+}
+
+/// True if the lens differs from the given one by more than chance: `κᵀ S κ`, S the information of
+/// the lens parameters, is a χ² variable if it does not.
+fn is_lens_changed(learned: &LearnedShape, options: &RefineOptions) -> bool {
+    let Some((kappa, information)) = &learned.shared else {
+        return false;
+    };
+    let lens = kappa.fixed_rows::<INTRINSIC_PARAMETERS>(0);
+    let information = information.fixed_view::<INTRINSIC_PARAMETERS, INTRINSIC_PARAMETERS>(0, 0);
+    let square = (lens.transpose() * information * lens)[0];
+    let bounds = chi_squared_bounds(2.0 * options.false_alarm_rate, INTRINSIC_PARAMETERS as f64);
+    bounds.is_some_and(|(_, most)| square > most)
+}
+
+/// The shape with a lattice of half the spacing added, if its finest lattice is still of use.
+fn with_finer_lattice(shape: Shape) -> Shape {
+    let finest = shape.model.finest_lattice();
+    match finest.filter(|(columns, _)| 2 * columns <= MAX_COLUMNS) {
+        Some((columns, sigma_m)) if columns >= FIRST_FINEST_COLUMNS => {
+            let model = shape.model.refined(FINER_STRENGTH * sigma_m);
+            let mut coefficients = shape.coefficients;
+            coefficients.resize(model.blocks(), ShapeStep::zeros());
+            Shape {
+                model,
+                coefficients,
+            }
+        }
+        _ => shape,
+    }
+}
+
+/// True if scales come or go, or change their strength.
+fn is_changed(before: &ShapeModel, after: &ShapeModel) -> bool {
+    before.scales.len() != after.scales.len()
+        || before
+            .scales
+            .iter()
+            .zip(&after.scales)
+            .any(|(before, after)| {
+                let ratio = after.sigma_m / before.sigma_m;
+                before.functions != after.functions
+                    || !(1.0 / MAX_STRENGTH_CHANGE..MAX_STRENGTH_CHANGE).contains(&ratio)
+            })
+}
