@@ -3,14 +3,10 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameSet;
-use tunnelstitch_core::survey::{CalibrateSection, Survey};
+use tunnelstitch_core::survey::{CalibrateSection, DEFAULT_SHAPE_SIGMA_RADII, Survey};
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Surface, WallRegions};
+use tunnelstitch_geometry::surface::{RadialField, Surface, WallRegions};
 use tunnelstitch_geometry::trajectory::{Jitter, Shutter, StampedPose};
-
-/// 1-σ of a real lining's deviation from its nominal shape, radii: a centimetre at a radius of three
-/// metres.
-const DEFAULT_SHAPE_SIGMA_RADII: f64 = 1.0 / 300.0;
 
 /// No part of the wall.
 static NOTHING: WallRegions = WallRegions::NONE;
@@ -22,7 +18,7 @@ static NOTHING: WallRegions = WallRegions::NONE;
 pub struct RefineInput<'a> {
     /// The camera, at rest.
     pub camera: Camera,
-    /// The tunnel.
+    /// The tunnel, in its nominal shape.
     pub surface: Arc<dyn Surface>,
     /// The frames, in the order of their poses.
     pub frames: &'a FrameSet,
@@ -36,7 +32,9 @@ pub struct RefineInput<'a> {
     pub ignored: &'a WallRegions,
     /// Shared parameters to estimate besides the poses, and their priors.
     pub calibrate: CalibrateSection,
-    /// 1-σ of the wall's deviation from its nominal shape, metres; 0 if it is exact.
+    /// Known displacement of the wall from `surface`, from which its estimation starts.
+    pub displacement: Option<&'a RadialField>,
+    /// 1-σ of the wall's deviation from its shape, metres; 0 if it is exact.
     pub shape_sigma_m: f64,
     /// Radius of the tunnel, or half its width, as given; metres.
     pub nominal_radius_m: f64,
@@ -56,6 +54,7 @@ impl<'a> RefineInput<'a> {
     ) -> Self {
         Self {
             camera,
+            displacement: None,
             shape_sigma_m: DEFAULT_SHAPE_SIGMA_RADII * surface.perimeter_m() / TAU,
             nominal_radius_m: surface.perimeter_m() / TAU,
             surface,
@@ -73,8 +72,9 @@ impl<'a> From<&'a Survey> for RefineInput<'a> {
     fn from(survey: &'a Survey) -> Self {
         Self {
             camera: survey.camera,
-            shape_sigma_m: DEFAULT_SHAPE_SIGMA_RADII * survey.surface.perimeter_m() / TAU,
-            surface: Arc::clone(&survey.surface),
+            surface: Arc::clone(&survey.nominal),
+            displacement: survey.displacement.as_ref(),
+            shape_sigma_m: survey.shape_sigma_m,
             frames: &survey.frames,
             initial: &survey.initial,
             prior: survey.prior,

@@ -2,7 +2,7 @@
 
 use crate::report::RefineReport;
 use crate::uncertainty::covariance::Covariances;
-use tunnelstitch_geometry::surface::RadialField;
+use crate::uncertainty::shape_report::EstimatedShape;
 use tunnelstitch_geometry::trajectory::Trajectory;
 
 /// The result of a refinement.
@@ -15,6 +15,6 @@ pub struct Refined {
     pub report: RefineReport,
     /// Covariances of the poses.
     pub covariances: Covariances,
-    /// Displacement of the wall from its nominal shape; None if it is as planned.
-    pub shape: Option<RadialField>,
+    /// Shape of the wall; None if it is as planned.
+    pub shape: Option<EstimatedShape>,
 }

@@ -5,6 +5,7 @@ use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::frame_sigma::FrameSigma;
 use crate::uncertainty::model_error::ModelErrorReport;
 use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
+use crate::uncertainty::shape_report::ShapeReport;
 use crate::verdict::prior_test::PriorTest;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use serde::{Deserialize, Serialize};
@@ -129,6 +130,9 @@ pub struct RefineReport {
     /// it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rolling_shutter: Option<ReadoutEstimate>,
+    /// The wall's shape, if it was estimated.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shape: Option<ShapeReport>,
     /// Self-calibration, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,

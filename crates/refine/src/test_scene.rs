@@ -43,6 +43,7 @@ pub fn test_context<'a>(
 ) -> EstimationContext<'a> {
     EstimationContext {
         nominal: std::sync::Arc::new(wall.circle),
+        displacement: None,
         shape: None,
         surface: std::sync::Arc::new(wall.circle),
         ignored: &NO_PATCHES,

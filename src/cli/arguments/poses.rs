@@ -1,7 +1,8 @@
 //! Arguments that select poses and say how they are read.
 
+use crate::cli::output::REPORT_FILE;
 use crate::cli::output::{Failure, Terminal};
-use crate::survey::{Associate, PosesSection, Survey, SurveyFile};
+use crate::survey::{Associate, PosesSection, SURVEY_FILE, Survey, SurveyError, SurveyFile};
 use crate::trajectory::{CameraAxes, Direction, PoseFormat, Trajectory};
 use clap::ValueEnum;
 use std::path::{Path, PathBuf};
@@ -155,6 +156,30 @@ impl PoseReadingArguments {
         Ok(Survey::open_with(survey, |file| self.apply_to(file))?)
     }
 
+    /// Opens a survey as [`PoseReadingArguments::open`] does, with the camera and the wall that
+    /// `refine` has written beside the poses `refined`, if it has.
+    ///
+    /// # Errors
+    /// Everything that can be wrong with the survey.
+    pub fn open_beside(
+        &self,
+        survey: &Path,
+        refined: &Path,
+        terminal: &Terminal,
+    ) -> Result<Survey, Failure> {
+        let mut taken = Ok(());
+        let opened = Survey::open_with(survey, |file| {
+            taken = take_over_found(file, refined);
+            self.apply_to(file);
+        });
+        taken?;
+        let survey = opened?;
+        for warning in &survey.warnings {
+            terminal.warn(warning);
+        }
+        Ok(survey)
+    }
+
     /// Writes the flags into a survey's file. Their paths are relative to the working folder, not
     /// to the survey's.
     fn apply_to(&self, file: &mut SurveyFile) {
@@ -196,7 +221,8 @@ fn absolute(path: &Path) -> PathBuf {
 pub struct PosesArguments {
     /// Poses to use: `initial` and `truth` are those of survey.toml; anything else is a file in any
     /// supported format, in the tunnel's frame as `refine` and `convert` write it, unless the flags
-    /// below say otherwise.
+    /// below say otherwise. With poses of `refine` come the camera and the shape of the wall that it
+    /// has found and written beside them.
     #[arg(
         id = "poses",
         long = "poses",
@@ -204,8 +230,33 @@ pub struct PosesArguments {
         value_name = "initial|truth|FILE"
     )]
     name: String,
+    /// Shape of the wall, as `refine` writes it [default: that beside the poses, or that of
+    /// survey.toml].
+    #[arg(long, value_name = "FILE")]
+    shape: Option<PathBuf>,
     #[command(flatten)]
     reading: PoseReadingArguments,
+}
+
+/// Takes camera and wall from the survey.toml that `refine` has written beside `poses`, if it has.
+///
+/// # Errors
+/// A malformed file.
+fn take_over_found(file: &mut SurveyFile, poses: &Path) -> Result<(), SurveyError> {
+    let Some(folder) = poses.parent() else {
+        return Ok(());
+    };
+    let beside = folder.join(SURVEY_FILE);
+    if !(folder.join(REPORT_FILE).is_file() && beside.is_file()) {
+        return Ok(());
+    }
+    let mut found = Survey::read_file(&beside)?;
+    for path in found.paths_mut() {
+        *path = absolute(&folder.join(&*path));
+    }
+    file.camera = found.camera;
+    file.tunnel = found.tunnel;
+    Ok(())
 }
 
 impl PosesArguments {
@@ -213,8 +264,33 @@ impl PosesArguments {
     pub fn from_file(file: &Path) -> Self {
         Self {
             name: file.to_string_lossy().into_owned(),
+            shape: None,
             reading: PoseReadingArguments::default(),
         }
+    }
+
+    /// Opens a survey with the camera and the wall that belong to these poses.
+    ///
+    /// # Errors
+    /// Everything that can be wrong with the survey.
+    pub fn open_survey(
+        &self,
+        survey: &Path,
+        change: impl FnOnce(&mut SurveyFile),
+    ) -> Result<Survey, Failure> {
+        let mut taken = Ok(());
+        let opened = Survey::open_with(survey, |file| {
+            if let Some(poses) = self.file() {
+                taken = take_over_found(file, poses);
+            }
+            replace(
+                &mut file.tunnel.shape_file,
+                self.shape.as_deref().map(absolute),
+            );
+            change(file);
+        });
+        taken?;
+        Ok(opened?)
     }
 
     /// The file, unless the poses are those of survey.toml.
@@ -239,7 +315,7 @@ impl PosesArguments {
         terminal: &Terminal,
     ) -> Result<(Survey, Trajectory), Failure> {
         if let Some(path) = self.file() {
-            let survey = Survey::open_with(survey, |file| {
+            let survey = self.open_survey(survey, |file| {
                 file.poses = PosesSection::of(absolute(path));
                 self.reading.apply_to(file);
             })?;
@@ -249,7 +325,10 @@ impl PosesArguments {
             let poses = survey.initial.clone();
             return Ok((survey, poses));
         }
-        let survey = self.reading.open(survey, terminal)?;
+        let survey = self.open_survey(survey, |file| self.reading.apply_to(file))?;
+        for warning in &survey.warnings {
+            terminal.warn(warning);
+        }
         let poses = match (self.name.as_str(), &survey.truth) {
             ("truth", Some(truth)) => truth.clone(),
             ("truth", None) => {

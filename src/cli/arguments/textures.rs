@@ -112,7 +112,7 @@ impl LayerArguments {
         let mut all = Vec::new();
         if poses.file().is_some() {
             all.push(layer(LayerName::Refined, &given, &survey));
-            survey = Survey::open(path)?;
+            survey = poses.open_survey(path, |_| ())?;
         }
         let of_survey = [
             (LayerName::Baseline, Some(&survey.initial)),

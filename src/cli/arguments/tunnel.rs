@@ -58,6 +58,8 @@ impl TunnelArguments {
             width_m: self.width_m,
             height_m: self.height_m,
             centreline: self.centreline.clone(),
+            shape_file: None,
+            shape_sigma_mm: None,
             ignore: Vec::new(),
         }
     }

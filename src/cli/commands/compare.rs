@@ -26,7 +26,8 @@ pub struct CompareArguments {
     survey: PathBuf,
     /// The refined poses in any format, in the tunnel's frame as `refine` and `convert` write them.
     /// The flags for reading poses apply to those of the survey only; convert poses of another
-    /// convention first.
+    /// convention first. Camera and wall are those that `refine` has found and written beside them,
+    /// for all poses.
     #[arg(long, value_name = "FILE")]
     refined: PathBuf,
     /// Folder for the results; created if missing.
@@ -66,7 +67,9 @@ pub fn run(
     record: &RunRecord,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    let survey = arguments.reading.open(&arguments.survey, terminal)?;
+    let survey = arguments
+        .reading
+        .open_beside(&arguments.survey, &arguments.refined, terminal)?;
     if arguments.max_wall_px.is_some() && survey.truth.is_none() {
         return Err(Failure::usage(
             "--max-wall-px needs true poses, and the survey has no poses.truth",

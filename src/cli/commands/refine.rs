@@ -2,15 +2,15 @@
 
 use crate::camera::format_calibration;
 use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
-use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
+use crate::cli::output::{Failure, REPORT_FILE, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::persist::atomic;
 use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::{
     CalibrationReport, FrameFlag, FrameReport, ReadoutEstimate, RefineOptions, RefineReport,
-    Refined, refine_with_checkpoint, search_pose_conventions,
+    Refined, ShapeMode, refine_with_checkpoint, search_pose_conventions,
 };
-use crate::survey::{CalibrationGroup, SURVEY_FILE, Survey, SurveyFile};
+use crate::survey::{CalibrationGroup, FoundFiles, SURVEY_FILE, ShapeFile, Survey, SurveyFile};
 use crate::trajectory::tum;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -48,6 +48,10 @@ pub struct RefineArguments {
     /// DIR, for the other commands.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
     calibrate: Option<Vec<CalibrateArgument>>,
+    /// Shape of the wall: auto estimates how the wall deviates from the drawing, and the lens with
+    /// it, as far as the frames show it, and writes shape.json; fixed takes both as given.
+    #[arg(long, value_name = "MODE", value_enum, default_value_t = ShapeArgument::Auto)]
+    shape: ShapeArgument,
     /// Largest number of Gauss–Newton iterations of each global solve.
     #[arg(
         long,
@@ -86,6 +90,24 @@ pub struct RefineArguments {
     reading: PoseReadingArguments,
     #[command(flatten)]
     resume: ResumeArguments,
+}
+
+/// Names of modes for `--shape`.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum ShapeArgument {
+    /// Estimated with the poses.
+    Auto,
+    /// As given.
+    Fixed,
+}
+
+impl From<ShapeArgument> for ShapeMode {
+    fn from(mode: ShapeArgument) -> Self {
+        match mode {
+            ShapeArgument::Auto => Self::Estimated,
+            ShapeArgument::Fixed => Self::Fixed,
+        }
+    }
 }
 
 /// Names of parameters for `--calibrate`.
@@ -217,6 +239,7 @@ impl RefineArguments {
                 .as_ref()
                 .map(|list| list.iter().flat_map(|group| group.groups()).collect()),
             joint: self.joint,
+            shape: self.shape.into(),
             ..if self.fast {
                 RefineOptions::fast()
             } else {
@@ -255,7 +278,7 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
     terminal.say(format!(
         "wrote {} and {}",
         poses.display(),
-        arguments.out.join("refine.json").display()
+        arguments.out.join(REPORT_FILE).display()
     ));
     if report.calibration.is_some() {
         terminal.say(format!(
@@ -280,14 +303,7 @@ pub fn refine_into(
     terminal: &Arc<Terminal>,
 ) -> Result<(Refined, String), Failure> {
     atomic::create_folder(out)?;
-    let survey_section = survey.file.calibrate.as_ref();
-    let calibrated = options
-        .calibrate
-        .as_ref()
-        .or(survey_section.map(|section| &section.unknowns));
-    if calibrated.is_some_and(|groups| !groups.is_empty()) {
-        refuse_survey_folder(&survey.folder, out)?;
-    }
+    refuse_survey_folder(&survey.folder, out)?;
     let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
     let refined = refine_with_checkpoint(survey, options, checkpoint, &progress)?;
     let json = json::text(&RefineFile {
@@ -299,7 +315,7 @@ pub fn refine_into(
         report: &refined.report,
     })?;
     atomic::write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
-    atomic::write_text(&out.join("refine.json"), &json)?;
+    atomic::write_text(&out.join(REPORT_FILE), &json)?;
     let sigmas: Vec<_> = refined
         .report
         .frames
@@ -310,12 +326,7 @@ pub fn refine_into(
         &out.join("covariance.csv"),
         &refined.covariances.csv(&sigmas),
     )?;
-    if let Some(shape) = &refined.shape {
-        atomic::write_text(&out.join(SHAPE_FILE), &json::text(shape)?)?;
-    }
-    if let Some(calibration) = &refined.report.calibration {
-        write_calibration(survey, calibration, out)?;
-    }
+    write_survey(survey, &refined, out)?;
     Ok((refined, json))
 }
 
@@ -325,30 +336,36 @@ const SHAPE_FILE: &str = "shape.json";
 /// Name of the refined calibration.
 const CAMERA_FILE: &str = "camera.json";
 
-/// Refuses to write the refined calibration over the survey's own.
+/// Refuses to write what is found over the survey's own files.
 fn refuse_survey_folder(survey: &Path, out: &Path) -> Result<(), Failure> {
     match (survey.canonicalize(), out.canonicalize()) {
         (Ok(survey), Ok(folder)) if survey == folder => Err(Failure::input(format!(
-            "{}: with --calibrate, --out must not be the survey's own folder, whose {SURVEY_FILE} \
-             would be replaced",
+            "{}: --out must not be the survey's own folder, whose {SURVEY_FILE} would be replaced",
             out.display()
         ))),
         _ => Ok(()),
     }
 }
 
-/// Writes the refined calibration, and a `survey.toml` that uses it with the survey's frames and
-/// initial poses.
-fn write_calibration(
-    survey: &Survey,
-    calibration: &CalibrationReport,
-    out: &Path,
-) -> Result<(), Failure> {
-    let file = survey.with_calibration(calibration.radius_m, CAMERA_FILE);
+/// Writes the calibration and the shape that were found, and a `survey.toml` that uses them with the
+/// survey's frames and initial poses; removes those of an earlier run.
+fn write_survey(survey: &Survey, refined: &Refined, out: &Path) -> Result<(), Failure> {
+    let calibration = refined.report.calibration.as_ref();
+    let text_of = |file: &str, text: Option<String>| match text {
+        Some(text) => Ok(atomic::write_text(&out.join(file), &text)?),
+        None => Ok::<(), Failure>(atomic::remove_file(&out.join(file))?),
+    };
+    let camera = calibration.map(|calibration| format_calibration(&calibration.camera));
+    text_of(CAMERA_FILE, camera)?;
+    let shape = refined.shape.as_ref();
+    let shape = shape.map(|shape| json::text(&ShapeFile::new(&shape.field, shape.sigma_m.clone())));
+    text_of(SHAPE_FILE, shape.transpose()?)?;
+    let file = survey.as_found(&FoundFiles {
+        calibration: calibration.map(|calibration| (CAMERA_FILE, calibration.radius_m)),
+        shape_file: refined.shape.as_ref().map(|_| SHAPE_FILE),
+    });
     let text = toml::to_string(&file).map_err(|error| Failure::bug(error.to_string()))?;
-    let text = format!("# The survey with the calibration that refine has found.\n{text}");
-    let camera = format_calibration(&calibration.camera);
-    atomic::write_text(&out.join(CAMERA_FILE), &camera)?;
+    let text = format!("# The survey with the camera and the wall that refine has found.\n{text}");
     Ok(atomic::write_text(&out.join(SURVEY_FILE), &text)?)
 }
 

@@ -48,7 +48,9 @@ pub fn run(
     record: &RunRecord,
     terminal: &Terminal,
 ) -> Result<(), Failure> {
-    let survey = arguments.reading.open(&arguments.survey, terminal)?;
+    let survey = arguments
+        .reading
+        .open_beside(&arguments.survey, &arguments.refined, terminal)?;
     let refined = RefinedFiles::read(&survey, &arguments.refined)?;
     let px_per_metre = match arguments.px_per_metre {
         Some(px_per_metre) => Some(px_per_metre),

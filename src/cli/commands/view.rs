@@ -1,7 +1,7 @@
 //! `tunnelstitch view`: shows the tunnel in the browser.
 
 use crate::cli::arguments::{LayerArguments, PosesArguments, TextureArguments};
-use crate::cli::output::{Failure, Terminal};
+use crate::cli::output::{Failure, REPORT_FILE, Terminal};
 use crate::inspect::{
     MANIFEST, Marks, Server, ServerContent, Viewer, draw_layers, pose_source_frames,
 };
@@ -90,7 +90,7 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
 /// # Errors
 /// A survey that no longer exists.
 fn refined_folder(folder: &Path) -> Result<Option<(PathBuf, PosesArguments)>, Failure> {
-    let report = folder.join("refine.json");
+    let report = folder.join(REPORT_FILE);
     let Ok(text) = std::fs::read_to_string(&report) else {
         return Ok(None);
     };

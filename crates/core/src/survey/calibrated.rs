@@ -1,26 +1,37 @@
-//! A survey's file with a refined calibration.
+//! A survey's file with the calibration and the shape that refine has found.
 
 use super::file::SurveyFile;
 use super::open::Survey;
 use std::path::Path;
 
+/// Files that refine has written beside a survey.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct FoundFiles<'f> {
+    /// The refined calibration, and the radius that goes with it, metres.
+    pub calibration: Option<(&'f str, f64)>,
+    /// The shape of the wall.
+    pub shape_file: Option<&'f str>,
+}
+
 impl Survey {
-    /// `survey.toml` for another folder, with the refined `radius_m` and the refined calibration in
-    /// `camera_file`.
+    /// `survey.toml` for another folder, with what refine has found: radius, calibration and shape.
     ///
     /// Frames and poses are those of this survey, their paths absolute. The radius replaces only
     /// that of a straight round tunnel. The tables `[calibrate]` and `[options]` are left out.
-    pub fn with_calibration(&self, radius_m: f64, camera_file: &str) -> SurveyFile {
+    pub fn as_found(&self, found: &FoundFiles) -> SurveyFile {
         let folder = std::path::absolute(&self.folder).unwrap_or_else(|_| self.folder.clone());
         let mut file = self.file.clone();
         for path in file.paths_mut() {
             *path = folder.join(&*path);
         }
-        if file.tunnel.is_straight_and_round() {
-            file.tunnel.radius_m = Some(radius_m);
+        if let Some((camera_file, radius_m)) = found.calibration {
+            if file.tunnel.is_straight_and_round() {
+                file.tunnel.radius_m = Some(radius_m);
+            }
+            file.camera.file = camera_file.into();
+            file.camera.name = None;
         }
-        file.camera.file = camera_file.into();
-        file.camera.name = None;
+        file.tunnel.shape_file = found.shape_file.map(Into::into);
         if let Some(images) = &mut file.frames.images {
             let escaped = glob::Pattern::escape(&folder.to_string_lossy());
             let pattern = Path::new(&escaped).join(&*images);

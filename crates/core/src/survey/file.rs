@@ -42,6 +42,7 @@ impl SurveyFile {
         let poses = &mut self.poses;
         [
             self.tunnel.centreline.as_mut(),
+            self.tunnel.shape_file.as_mut(),
             Some(&mut self.camera.file),
             self.frames.times.as_mut(),
             self.frames.mask.as_mut(),
@@ -177,6 +178,8 @@ mod tests {
                 width_m: Some(4.0),
                 height_m: Some(3.0),
                 centreline: Some("curve.txt".into()),
+                shape_file: None,
+                shape_sigma_mm: None,
                 ignore: vec![IgnoreSection {
                     theta_deg: Some([150.0, 210.0]),
                     chainage_m: None,

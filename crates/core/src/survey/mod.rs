@@ -6,7 +6,9 @@
 //!                             # width_m and height_m
 //! radius_m = 3.0
 //! centreline = "curve.txt"    # optional, for curved tunnels: lines `x y z [radius]`
-//! ignore = [                  # optional: regions of the wall that refine excludes
+//! shape_file = "shape.json"   # optional: the wall as built, as `refine` writes it
+//! shape_sigma_mm = 10.0       # optional: deviation from the shape, 1-σ; 0 if it is exact
+//! ignore = [                 # optional: regions of the wall that refine excludes
 //!     { theta_deg = [150, 210], chainage_m = [2.0, 5.5] }, # either is optional
 //! ]
 //!
@@ -80,12 +82,14 @@ mod open;
 mod pose_reader;
 mod pose_validation;
 mod poses_section;
+mod shape_file;
 mod template;
 mod tunnel;
 mod unposed_frames;
 
 pub use associate::{Associate, TIME_TOLERANCE_S};
 pub use calibrate::{CalibrateSection, CalibrationGroup};
+pub use calibrated::FoundFiles;
 pub use capture_times::FrameTimes;
 pub use discover::{Discovery, PictureGroup, VideoChoice};
 pub use error::SurveyError;
@@ -95,5 +99,6 @@ pub use ignore::IgnoreSection;
 pub use open::Survey;
 pub use open::toml_path;
 pub use poses_section::PosesSection;
-pub use tunnel::{Shape, TunnelSection, read_centreline};
+pub use shape_file::ShapeFile;
+pub use tunnel::{DEFAULT_SHAPE_SIGMA_RADII, Shape, TunnelSection, read_centreline};
 pub use unposed_frames::UnposedFrames;

@@ -12,7 +12,7 @@ use crate::frames::{FrameSet, Mask};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
-use tunnelstitch_geometry::surface::{Surface, WallRegions};
+use tunnelstitch_geometry::surface::{Displaced, RadialField, Surface, WallRegions};
 use tunnelstitch_geometry::trajectory::{
     Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of,
 };
@@ -28,6 +28,12 @@ pub struct Survey {
     pub camera: Camera,
     /// The tunnel.
     pub surface: Arc<dyn Surface>,
+    /// The tunnel without the displacement of `shape_file`.
+    pub nominal: Arc<dyn Surface>,
+    /// The displacement of the wall that `shape_file` has.
+    pub displacement: Option<RadialField>,
+    /// 1-σ of the wall's deviation from the given shape, metres.
+    pub shape_sigma_m: f64,
     /// Regions of the wall that are excluded from the comparison of frames.
     pub ignored: WallRegions,
     /// The frames, sorted by name, with their common mask.
@@ -82,7 +88,13 @@ impl Survey {
             path: toml_path.clone(),
             what,
         };
-        let surface = file.tunnel.surface(&toml_path, &folder)?;
+        let nominal = file.tunnel.surface(&toml_path, &folder)?;
+        let shape_sigma_m = file.tunnel.shape_sigma_m().map_err(value)?;
+        let displacement = file.tunnel.displacement(nominal.as_ref(), &folder)?;
+        let surface: Arc<dyn Surface> = match &displacement {
+            Some(field) => Arc::new(Displaced::new(Arc::clone(&nominal), field.clone())),
+            None => Arc::clone(&nominal),
+        };
         let prior = &file.prior;
         if !(1e-6..=180.0).contains(&prior.rotation_sigma_deg) {
             return Err(value(format!(
@@ -138,6 +150,9 @@ impl Survey {
         let mut survey = Self {
             camera,
             surface,
+            nominal,
+            displacement,
+            shape_sigma_m,
             ignored,
             frames: FrameSet::new(frames, mask),
             initial: Vec::new(),
@@ -221,14 +236,14 @@ impl Survey {
                 time_s: stamped.time_s,
                 pose: convention.to_tunnel(&stamped.pose),
             });
-            let survey = Self {
+            let candidate = Self {
                 folder: self.folder.clone(),
                 file: self.file.clone(),
                 camera: self.camera,
-                surface: self
-                    .file
-                    .tunnel
-                    .surface(Path::new(SURVEY_FILE), &self.folder)?,
+                surface: Arc::clone(&self.surface),
+                nominal: Arc::clone(&self.nominal),
+                displacement: self.displacement.clone(),
+                shape_sigma_m: self.shape_sigma_m,
                 ignored: self.ignored.clone(),
                 frames: self.frames.first(most_frames),
                 initial: stamped.take(most_frames).collect(),
@@ -238,9 +253,9 @@ impl Survey {
                 times_s: None,
                 own_files: self.own_files.clone(),
             };
-            Ok((flags, survey))
+            (flags, candidate)
         };
-        std::iter::once(given).chain(possible).map(survey).collect()
+        Ok(std::iter::once(given).chain(possible).map(survey).collect())
     }
 
     /// The files of the survey except the frames, even if others were read in their place.

@@ -2,13 +2,22 @@
 
 use super::error::SurveyError;
 use super::ignore::IgnoreSection;
+use super::shape_file::ShapeFile;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::surface::section::{CircleOutline, Ellipse, PiecewiseOutline, Section};
-use tunnelstitch_geometry::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
+use tunnelstitch_geometry::surface::{
+    CentrePoint, Centreline, Circle, Prism, RadialField, Surface, Swept,
+};
 use tunnelstitch_geometry::trajectory::{PoseError, text};
+
+/// 1-σ of a real lining's deviation from its nominal shape, radii: a centimetre at a radius of three
+/// metres.
+pub const DEFAULT_SHAPE_SIGMA_RADII: f64 = 1.0 / 300.0;
+/// Largest 1-σ of it, radii.
+const MAX_SHAPE_SIGMA_RADII: f64 = 0.1;
 
 /// The section of the tunnel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -43,6 +52,13 @@ pub struct TunnelSection {
     /// A file of the centreline, if it is not the world's y axis; see [`read_centreline`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centreline: Option<PathBuf>,
+    /// A file of the wall's displacement from this shape ([`crate::survey::ShapeFile`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape_file: Option<PathBuf>,
+    /// 1-σ of the wall's deviation from the given shape, millimetres; 0 if it is exact. By default
+    /// that of a real lining, a 300th of the radius.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shape_sigma_mm: Option<f64>,
     /// Regions of the wall that are excluded from the comparison of frames: water, plants, moving
     /// objects.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -58,6 +74,8 @@ impl TunnelSection {
             width_m: None,
             height_m: None,
             centreline: None,
+            shape_file: None,
+            shape_sigma_mm: None,
             ignore: Vec::new(),
         }
     }
@@ -74,7 +92,40 @@ impl TunnelSection {
         self.shape == Shape::Circle && self.centreline.is_none()
     }
 
-    /// Creates the tunnel; paths are relative to `folder`, and errors name the file `toml`.
+    /// 1-σ of the wall's deviation from the given shape, metres.
+    ///
+    /// # Errors
+    /// A value that is negative or more than a tenth of the radius, as text.
+    pub fn shape_sigma_m(&self) -> Result<f64, String> {
+        let most_mm = 1e3 * MAX_SHAPE_SIGMA_RADII * self.nominal_m();
+        match self.shape_sigma_mm {
+            None => Ok(DEFAULT_SHAPE_SIGMA_RADII * self.nominal_m()),
+            Some(mm) if (0.0..=most_mm).contains(&mm) => Ok(1e-3 * mm),
+            Some(mm) => Err(format!(
+                "tunnel.shape_sigma_mm is {mm}; it must lie between 0 (exact) and {most_mm:.0}, a \
+                 tenth of the radius"
+            )),
+        }
+    }
+
+    /// The displacement of the wall that `shape_file` names; paths are relative to `folder`.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is of another tunnel.
+    pub fn displacement(
+        &self,
+        nominal: &dyn Surface,
+        folder: &Path,
+    ) -> Result<Option<RadialField>, SurveyError> {
+        let file = self.shape_file.as_ref();
+        file.map(|file| {
+            let file = ShapeFile::read(&folder.join(file), nominal.perimeter_m())?;
+            Ok(file.field())
+        })
+        .transpose()
+    }
+
+    /// Creates the tunnel of the given shape, without `shape_file`; paths are relative to `folder`, and errors name the file `toml`.
     ///
     /// # Errors
     /// A size that is missing, impossible or of another shape; a centreline that cannot be read or
@@ -206,6 +257,8 @@ mod tests {
             width_m: sizes[1],
             height_m: sizes[2],
             centreline: None,
+            shape_file: None,
+            shape_sigma_mm: None,
             ignore: Vec::new(),
         };
         let surface = |tunnel: TunnelSection| {

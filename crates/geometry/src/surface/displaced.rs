@@ -103,9 +103,10 @@ where
         self.nominal.perimeter_m()
     }
 
-    /// None: no motion maps a displaced wall onto itself.
+    /// The gauge of the nominal surface. Its motions move the displacement as well: trajectories that
+    /// are estimated with the wall's shape are compared up to them.
     fn gauge(&self) -> Gauge {
-        Gauge::default()
+        self.nominal.gauge()
     }
 
     fn chainage_m(&self, t: &Vector3<f64>) -> f64 {

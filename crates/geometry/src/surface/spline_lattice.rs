@@ -48,6 +48,14 @@ impl SplineLattice {
         self.perimeter_m / self.columns as f64
     }
 
+    /// A node.
+    pub fn node(&self, row: i64, column: usize) -> WallPoint {
+        WallPoint {
+            s_m: self.origin.s_m + column as f64 * self.spacing_m(),
+            h_m: self.origin.h_m + row as f64 * self.spacing_m(),
+        }
+    }
+
     /// The basis functions at a point of the wall.
     pub fn support(&self, wall: WallPoint) -> Support {
         let spacing_m = self.spacing_m();

@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
-use tunnelstitch_geometry::surface::{Displaced, Gauge, Surface, WallRegions};
+use tunnelstitch_geometry::surface::{Displaced, Gauge, RadialField, Surface, WallRegions};
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
 /// All inputs of the estimator.
@@ -17,7 +17,9 @@ use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 pub struct EstimationContext<'a> {
     /// The wall as planned.
     pub nominal: Arc<dyn Surface>,
-    /// Its shape as built, if it is to be estimated.
+    /// Its known displacement.
+    pub displacement: Option<&'a RadialField>,
+    /// Its further displacement, if it is to be estimated.
     pub shape: Option<Arc<Shape>>,
     /// The wall: with its shape, at the start of a solve.
     pub surface: Arc<dyn Surface>,
@@ -58,18 +60,23 @@ impl EstimationContext<'_> {
 
     /// The wall with a shape.
     pub fn surface_with(&self, shape: &Shape) -> Arc<dyn Surface> {
-        match shape.field() {
+        self.displaced(shape.field())
+    }
+
+    /// The wall with a displacement beyond the known one.
+    pub fn displaced(&self, further: Option<RadialField>) -> Arc<dyn Surface> {
+        match total_displacement(self.displacement, further) {
             Some(field) => Arc::new(Displaced::new(Arc::clone(&self.nominal), field)),
             None => Arc::clone(&self.nominal),
         }
     }
 
-    /// The rigid motions that change no image. Where the shape is estimated they move it with the
-    /// poses.
+    /// The rigid motions that change no image. They move the shape that is estimated with the poses,
+    /// but not one that is known.
     pub fn gauge(&self) -> Gauge {
-        match self.shape {
-            Some(_) => self.nominal.gauge(),
-            None => self.surface.gauge(),
+        match self.displacement {
+            Some(_) => Gauge::default(),
+            None => self.nominal.gauge(),
         }
     }
 
@@ -108,6 +115,25 @@ impl EstimationContext<'_> {
             }
         })
     }
+}
+
+/// The sum of a known displacement and a further one on a lattice of the same origin.
+pub fn total_displacement(
+    known: Option<&RadialField>,
+    further: Option<RadialField>,
+) -> Option<RadialField> {
+    let (known, further) = match (known, further) {
+        (Some(known), Some(further)) => (known.clone(), further),
+        (known, further) => return further.or(known.cloned()),
+    };
+    let columns = known.lattice().columns.max(further.lattice().columns);
+    let refined = |mut field: RadialField| {
+        while field.lattice().columns < columns {
+            field = field.halved();
+        }
+        field
+    };
+    Some(refined(known).plus(&refined(further)))
 }
 
 /// The frames of a problem.

@@ -81,6 +81,8 @@ pub struct Scale {
 pub struct ShapeModel {
     /// Perimeter of the nominal section, metres.
     perimeter_m: f64,
+    /// Origin of the lattices.
+    origin: WallPoint,
     /// Chainage between which the wall has a shape, metres.
     extent_h_m: [f64; 2],
     /// The scales.
@@ -109,10 +111,17 @@ pub struct FunctionValue {
 
 impl ShapeModel {
     /// Harmonics and lattices of 8, 16, … up to `finest` columns, all of the strength `sigma_m`,
-    /// for the wall between two chainages, metres.
-    pub fn new(perimeter_m: f64, extent_h_m: [f64; 2], finest: usize, sigma_m: f64) -> Self {
+    /// for the wall between two chainages, metres; `origin`: node of the lattices.
+    pub fn new(
+        perimeter_m: f64,
+        origin: WallPoint,
+        extent_h_m: [f64; 2],
+        finest: usize,
+        sigma_m: f64,
+    ) -> Self {
         let mut model = Self {
             perimeter_m,
+            origin,
             extent_h_m,
             scales: vec![Scale {
                 functions: Functions::Harmonics,
@@ -132,7 +141,7 @@ impl ShapeModel {
         SplineLattice {
             perimeter_m: self.perimeter_m,
             columns,
-            origin: WallPoint::default(),
+            origin: self.origin,
         }
     }
 
@@ -148,6 +157,11 @@ impl ShapeModel {
             },
             sigma_m,
         }
+    }
+
+    /// Distance of the nodes of a lattice, metres.
+    pub fn spacing_m(&self, columns: usize) -> f64 {
+        self.lattice(columns).spacing_m()
     }
 
     /// Number of blocks of coefficients.
@@ -181,7 +195,7 @@ impl ShapeModel {
         for scale in &self.scales {
             match scale.functions {
                 Functions::Harmonics => {
-                    let theta = TAU * wall.s_m / self.perimeter_m;
+                    let theta = TAU * (wall.s_m - self.origin.s_m) / self.perimeter_m;
                     values.extend((0..BLOCK_FUNCTIONS).map(|component| FunctionValue {
                         block: first,
                         component,
@@ -338,7 +352,13 @@ mod tests {
     use super::*;
 
     fn shape() -> Shape {
-        let model = ShapeModel::new(3.0 * TAU, [-0.5, 6.0], 32, 0.005);
+        let model = ShapeModel::new(
+            3.0 * TAU,
+            WallPoint { s_m: 1.0, h_m: 0.3 },
+            [-0.5, 6.0],
+            32,
+            0.005,
+        );
         let coefficients = (0..model.blocks())
             .map(|k| ShapeStep::from_fn(|n, _| (12.9898 * (k * 8 + n) as f64).sin()))
             .collect();

@@ -240,7 +240,7 @@ mod tests {
     use crate::problem::test_ring::{Ring, number};
     use crate::samples::sampling::Sampling;
     use crate::tiles::interpolation::Interpolation;
-    use tunnelstitch_geometry::surface::Surface;
+    use tunnelstitch_geometry::surface::{Surface, WallPoint};
 
     /// Central differences of the cost against the gradient, parameter by parameter.
     ///
@@ -370,7 +370,13 @@ mod tests {
     #[test]
     fn shape_gradient_is_the_derivative_of_the_cost() {
         let ring = Ring::new(1e-4);
-        let model = ShapeModel::new(ring.wall.circle.perimeter_m(), [-0.5, 2.0], 16, 0.01);
+        let model = ShapeModel::new(
+            ring.wall.circle.perimeter_m(),
+            WallPoint::default(),
+            [-0.5, 2.0],
+            16,
+            0.01,
+        );
         let problem = ring.problem_with_shape(Shape::nominal(model));
         let mut unknowns = problem.unknowns_of(&ring.estimates);
         for (k, block) in unknowns.shape.iter_mut().enumerate() {

@@ -53,8 +53,6 @@ const MAX_STEP_FACTOR: f64 = 30.0;
 pub struct LearnedShape {
     /// Its strengths and coefficients; scales of no use are dropped.
     pub shape: Shape,
-    /// By how much each scale raises L.
-    pub gains: Vec<f64>,
     /// The shared parameters with these strengths, and their information; None if they were not
     /// estimated.
     pub shared: Option<(Kappa, SharedBlock)>,
@@ -100,7 +98,6 @@ pub fn learn_shape(solution: &Solution, alpha: f64) -> Option<LearnedShape> {
                 let schur = minimum.schur.as_ref();
                 return Some(LearnedShape {
                     shape: equations.learned(&sigmas_m, &dropped, &minimum.step),
-                    gains,
                     shared: schur.map(|schur| (kappa, schur.schur)),
                 });
             }

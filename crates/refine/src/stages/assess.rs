@@ -19,6 +19,7 @@ use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::covariance::Covariances;
 use crate::uncertainty::frame_sigma::FrameSigma;
 use crate::uncertainty::rolling_shutter_test::estimate_readout;
+use crate::uncertainty::shape_report::{EstimatedShape, ShapeReport};
 use crate::uncertainty::solution_uncertainty::SolutionUncertainty;
 use crate::validation::inconsistent_frames::find_inconsistent_frames;
 use crate::validation::pairwise_lucas_kanade::align_pairs;
@@ -50,10 +51,18 @@ pub fn run<'a>(
     judge(setup, &solution, &sigmas, &steps_px, &mut rejections);
     let calibration = setup.calibration_at(state);
     let datum = calibration.datum(&context.kappa);
+    let shape = EstimatedShape::new(
+        &context,
+        state.shape.as_ref(),
+        uncertainty.total.as_ref(),
+        setup.count(),
+    );
+    let model = state.shape.as_ref().map(|shape| &shape.model);
+    let shape_report = model.map(|model| ShapeReport::new(model, shape.as_ref()));
     let placement = Placement::new(
         setup,
         &datum,
-        (&state.frames.estimates, state.shape.as_ref()),
+        (&state.frames.estimates, shape),
         &uncertainty.covariances,
         rejections,
     );
@@ -75,6 +84,7 @@ pub fn run<'a>(
         levels: std::mem::take(&mut state.levels),
         rolling_shutter: readout,
         model_error: uncertainty.model_error,
+        shape: shape_report,
         calibration: report_calibration(setup, &calibration, &context.kappa, &uncertainty, state),
         timings: std::mem::take(&mut session.timings),
     };
@@ -102,6 +112,7 @@ pub fn without_solution(setup: &Setup, session: &mut Session) -> Refined {
         levels: Vec::new(),
         rolling_shutter: None,
         model_error: None,
+        shape: None,
         calibration: None,
         timings: std::mem::take(&mut session.timings),
     };

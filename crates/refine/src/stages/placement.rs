@@ -3,7 +3,6 @@
 use crate::model::rejection::RejectionReason;
 use crate::parameters::calibration::Datum;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::parameters::shape::Shape;
 use crate::refined::Refined;
 use crate::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 use crate::stages::setup::Setup;
@@ -12,11 +11,12 @@ use crate::uncertainty::covariance::Covariances;
 use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma};
 use crate::uncertainty::model_error::ModelErrorReport;
 use crate::uncertainty::rolling_shutter_test::ReadoutEstimate;
+use crate::uncertainty::shape_report::{EstimatedShape, ShapeReport};
 use crate::verdict::bridging::Bridging;
 use crate::verdict::prior_test::PriorTest;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use nalgebra::{Matrix6, Vector3};
-use tunnelstitch_geometry::surface::{GaugeMotion, RadialField, Surface, WallPoint};
+use tunnelstitch_geometry::surface::{GaugeMotion, Surface, WallPoint};
 use tunnelstitch_geometry::trajectory::{Pose, StampedPose};
 
 /// The final poses of all frames, and the verdict that they follow from.
@@ -28,8 +28,8 @@ pub struct Placement {
     covariances: Covariances,
     rejections: Vec<Option<RejectionReason>>,
     prior_test: PriorTest,
-    /// Displacement of the wall, metres; None if it is as planned.
-    field: Option<RadialField>,
+    /// Shape of the wall; None if it is as planned.
+    shape: Option<EstimatedShape>,
 }
 
 /// Parts of the report that the poses do not determine.
@@ -44,6 +44,8 @@ pub struct ReportParts {
     pub rolling_shutter: Option<ReadoutEstimate>,
     /// Errors beyond noise that the residuals show.
     pub model_error: Option<ModelErrorReport>,
+    /// The wall's shape, if it was estimated.
+    pub shape: Option<ShapeReport>,
     /// Self-calibration.
     pub calibration: Option<CalibrationReport>,
     /// Time by stage.
@@ -57,17 +59,16 @@ impl Placement {
     pub fn new(
         setup: &Setup,
         datum: &Datum,
-        (estimates, shape): (&[FrameEstimate], Option<&Shape>),
+        (estimates, shape): (&[FrameEstimate], Option<EstimatedShape>),
         covariances: &Covariances,
         mut rejections: Vec<Option<RejectionReason>>,
     ) -> Self {
         let prior = &setup.prior;
         let mut photometric: Vec<bool> = rejections.iter().map(Option::is_none).collect();
-        let gauge = setup.input.surface.gauge();
+        let gauge = setup.initial_context(0.0).gauge();
         let motion = prior.align_gauge(&gauge, estimates, datum, &photometric);
-        let field = shape.and_then(Shape::field);
         let by = displacement_by(&motion, setup.input.surface.as_ref(), &estimates[0].pose);
-        let field = field.map(|field| field.moved(by).scaled(datum.scale));
+        let shape = shape.map(|shape| shape.moved(by, datum.scale));
         let mut estimates = aligned(estimates, &motion);
         let mut covariances = covariances.clone().moved(&motion).scaled(datum.scale);
         let poses: Vec<Pose> = estimates.iter().map(|estimate| estimate.pose).collect();
@@ -128,7 +129,7 @@ impl Placement {
             covariances,
             rejections,
             prior_test,
-            field: field.filter(|_| !is_kept),
+            shape: shape.filter(|_| !is_kept),
         }
     }
 
@@ -197,11 +198,12 @@ impl Placement {
                 model_error: parts.model_error,
                 prior_test: self.prior_test,
                 verdict,
+                shape: parts.shape,
                 calibration: parts.calibration,
                 timings: parts.timings,
             },
             covariances: self.covariances,
-            shape: self.field,
+            shape: self.shape,
         }
     }
 }

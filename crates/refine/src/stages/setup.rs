@@ -11,6 +11,7 @@ use crate::stages::state::PipelineState;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_core::survey::CalibrationGroup;
+use tunnelstitch_geometry::surface::{Displaced, Surface};
 use tunnelstitch_geometry::trajectory::{Pose, poses_of};
 
 /// The input and the options of a refinement, with what follows from both.
@@ -109,10 +110,16 @@ impl<'a> Setup<'a> {
     /// The estimation context before anything is estimated, with the sensor's noise of 1-σ `noise`
     /// grey levels.
     pub fn initial_context(&self, noise: f64) -> EstimationContext<'_> {
+        let nominal = Arc::clone(&self.input.surface);
+        let surface: Arc<dyn Surface> = match self.input.displacement {
+            Some(field) => Arc::new(Displaced::new(Arc::clone(&nominal), field.clone())),
+            None => Arc::clone(&nominal),
+        };
         EstimationContext {
-            nominal: Arc::clone(&self.input.surface),
+            nominal,
+            displacement: self.input.displacement,
             shape: None,
-            surface: Arc::clone(&self.input.surface),
+            surface,
             ignored: self.input.ignored,
             camera: self.input.camera,
             shutter: &self.input.shutter,

@@ -35,8 +35,10 @@ pub fn begin(setup: &Setup, state: &mut PipelineState) -> Result<(), ProblemErro
         [from.min(one.h_min_m), to.max(one.h_max_m)]
     });
     let perimeter_m = context.nominal.perimeter_m();
+    let known = context.displacement.map(|field| field.lattice().origin);
     let model = ShapeModel::new(
         perimeter_m,
+        known.unwrap_or_default(),
         extent,
         FIRST_FINEST_COLUMNS,
         setup.shape_sigma_m,

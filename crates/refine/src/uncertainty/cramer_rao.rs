@@ -111,7 +111,8 @@ pub fn pose_bounds(
     // The motion during readout hardly changes the information.
     let shutter = Shutter::default();
     let context = EstimationContext {
-        nominal: std::sync::Arc::clone(&survey.surface),
+        nominal: std::sync::Arc::clone(&survey.nominal),
+        displacement: survey.displacement.as_ref(),
         shape: None,
         surface: std::sync::Arc::clone(&survey.surface),
         ignored: &survey.ignored,

@@ -21,6 +21,7 @@ pub mod observability;
 pub mod overdispersion;
 pub mod registration_sigma;
 pub mod rolling_shutter_test;
+pub mod shape_report;
 pub mod shared_parameter_names;
 pub mod solution_uncertainty;
 pub mod total_covariance;

@@ -31,7 +31,7 @@ pub struct SolutionUncertainty {
     /// Overdispersion of every frame; 0 for those that show nothing.
     pub overdispersions: Vec<Overdispersion>,
     /// Covariance of all unknowns; None where the equations are singular.
-    total: Option<TotalCovariance>,
+    pub total: Option<TotalCovariance>,
     posterior: Option<Posterior>,
 }
 

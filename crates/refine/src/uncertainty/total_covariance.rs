@@ -88,20 +88,11 @@ impl TotalCovariance {
         let Some((tau, functions, first)) = pixel.shape else {
             return variance;
         };
-        let mut blocks: BTreeMap<usize, ShapeStep> = BTreeMap::new();
-        for function in functions {
-            let block = blocks.entry(first + function.block).or_default();
-            block[function.component] = function.value;
-        }
-        for (slot, phi) in &blocks {
+        variance += tau.norm_squared() * self.shape_variance(functions, first);
+        for (slot, phi) in &by_slot(functions, first) {
             if let Some(covariance) = self.block(k, *slot) {
                 let with_pose = a * covariance.fixed_rows::<6>(0) * phi;
                 variance += 2.0 * with_pose.dot(&tau);
-            }
-            for (other, phi_other) in &blocks {
-                if let Some(covariance) = self.block(*slot, *other) {
-                    variance += tau.norm_squared() * (phi.transpose() * covariance * phi_other)[0];
-                }
             }
             if let Some((w, lens)) = &lens {
                 crossed_w += lens * (w[*slot].transpose() * phi);
@@ -109,4 +100,30 @@ impl TotalCovariance {
         }
         variance - 2.0 * crossed_w.dot(&tau)
     }
+
+    /// Variance of the wall's displacement where the shape has the given `functions`, m²; `first`:
+    /// slot of its first block.
+    pub fn shape_variance(&self, functions: &[FunctionValue], first: usize) -> f64 {
+        let blocks = by_slot(functions, first);
+        let mut variance = 0.0;
+        for (n, (slot, phi)) in blocks.iter().enumerate() {
+            for (m, (other, phi_other)) in blocks.iter().enumerate().skip(n) {
+                if let Some(covariance) = self.block(*slot, *other) {
+                    let twice = if m == n { 1.0 } else { 2.0 };
+                    variance += twice * (phi.transpose() * covariance * phi_other)[0];
+                }
+            }
+        }
+        variance
+    }
+}
+
+/// Functions of a shape by the slot of their block, ascending.
+fn by_slot(functions: &[FunctionValue], first: usize) -> BTreeMap<usize, ShapeStep> {
+    let mut blocks: BTreeMap<usize, ShapeStep> = BTreeMap::new();
+    for function in functions {
+        let block = blocks.entry(first + function.block).or_default();
+        block[function.component] = function.value;
+    }
+    blocks
 }

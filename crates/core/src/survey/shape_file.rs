@@ -1,0 +1,187 @@
+//! `shape.json`: a wall's displacement from its nominal shape.
+//!
+//! ```json
+//! {
+//!   "format": "wall-shape-1",
+//!   "perimeter_m": 18.85, "columns": 64,
+//!   "origin": { "s_m": 0.0, "h_m": 0.0 }, "first_row": -3,
+//!   "coefficients_m": [0.0012, 0.0009],
+//!   "sigma_m": [0.0001, 0.0001]
+//! }
+//! ```
+//!
+//! The displacement along the normal of the nominal wall, positive outwards, is the cubic B-spline
+//! `δ(s, h) = Σ_ji c_ji B((s − s_0)/Δ − i) B((h − h_0)/Δ − j)`, with the spacing
+//! `Δ = perimeter/columns`, the columns i periodic, and rows j from `first_row` on, row by row in
+//! `coefficients_m` ([`tunnelstitch_geometry::surface::RadialField`]). `sigma_m` has 1-σ of δ at each
+//! node; it is optional.
+
+use super::error::SurveyError;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use tunnelstitch_geometry::surface::{RadialField, SplineLattice, WallPoint};
+
+/// Name and version of the format.
+const FORMAT: &str = "wall-shape-1";
+/// Columns at the most: nodes a thousandth of the perimeter apart.
+const MAX_COLUMNS: usize = 1024;
+/// Largest displacement, share of the perimeter.
+const MAX_DISPLACEMENT_SHARE: f64 = 0.05;
+/// Largest difference between the perimeter of the file and that of the tunnel, relative.
+const MAX_PERIMETER_ERROR: f64 = 1e-6;
+
+/// The content of `shape.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ShapeFile {
+    format: String,
+    perimeter_m: f64,
+    columns: usize,
+    origin: WallPoint,
+    first_row: i64,
+    coefficients_m: Vec<f64>,
+    /// 1-σ of δ at each node, metres; empty if unknown.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sigma_m: Vec<f64>,
+}
+
+impl ShapeFile {
+    /// The file of a field, with 1-σ at each of its nodes, metres, if all are known.
+    pub fn new(field: &RadialField, mut sigma_m: Vec<f64>) -> Self {
+        if !sigma_m.iter().all(|sigma_m| sigma_m.is_finite()) {
+            sigma_m.clear();
+        }
+        let lattice = field.lattice();
+        Self {
+            format: FORMAT.to_owned(),
+            perimeter_m: lattice.perimeter_m,
+            columns: lattice.columns,
+            origin: lattice.origin,
+            first_row: field.rows().start,
+            coefficients_m: field.coefficients_m().to_vec(),
+            sigma_m,
+        }
+    }
+
+    /// Reads a file for a tunnel of the given perimeter, metres.
+    ///
+    /// # Errors
+    /// [`SurveyError::Value`] that names the file and what is wrong.
+    pub fn read(path: &Path, perimeter_m: f64) -> Result<Self, SurveyError> {
+        let value = |what: String| SurveyError::Value {
+            path: path.to_owned(),
+            what,
+        };
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| value(format!("cannot read the wall's shape: {error}")))?;
+        let file: Self = serde_json::from_str(&text).map_err(|error| value(error.to_string()))?;
+        file.check(perimeter_m).map_err(value)?;
+        Ok(file)
+    }
+
+    /// The field.
+    pub fn field(&self) -> RadialField {
+        let lattice = SplineLattice {
+            perimeter_m: self.perimeter_m,
+            columns: self.columns,
+            origin: self.origin,
+        };
+        RadialField::new(lattice, self.first_row, self.coefficients_m.clone())
+    }
+
+    /// Checks all values; returns what is wrong.
+    fn check(&self, perimeter_m: f64) -> Result<(), String> {
+        if self.format != FORMAT {
+            return Err(format!(
+                "format is {:?}; it must be {FORMAT:?}",
+                self.format
+            ));
+        }
+        if !((self.perimeter_m / perimeter_m - 1.0).abs() < MAX_PERIMETER_ERROR) {
+            return Err(format!(
+                "perimeter_m is {}, that of the tunnel {perimeter_m}; the shape is of another tunnel",
+                self.perimeter_m
+            ));
+        }
+        if !(8..=MAX_COLUMNS).contains(&self.columns) || !self.columns.is_power_of_two() {
+            return Err(format!(
+                "columns is {}; it must be a power of two from 8 to {MAX_COLUMNS}",
+                self.columns
+            ));
+        }
+        if !(self.origin.s_m.is_finite() && self.origin.h_m.is_finite()) {
+            return Err("origin is not finite".to_owned());
+        }
+        let most_m = MAX_DISPLACEMENT_SHARE * perimeter_m;
+        if let Some(c) = (self.coefficients_m.iter()).find(|c| !(c.abs() <= most_m)) {
+            return Err(format!(
+                "a coefficient is {c} m; displacements must be no more than {most_m:.3} m"
+            ));
+        }
+        if !self.coefficients_m.len().is_multiple_of(self.columns) {
+            return Err(format!(
+                "coefficients_m has {} values, which are no whole rows of {} columns",
+                self.coefficients_m.len(),
+                self.columns
+            ));
+        }
+        if !self.sigma_m.is_empty() && self.sigma_m.len() != self.coefficients_m.len() {
+            return Err(format!(
+                "sigma_m has {} values for {} coefficients",
+                self.sigma_m.len(),
+                self.coefficients_m.len()
+            ));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file() -> ShapeFile {
+        let lattice = SplineLattice {
+            perimeter_m: 18.0,
+            columns: 8,
+            origin: WallPoint { s_m: 0.1, h_m: 2.0 },
+        };
+        let field = RadialField::new(
+            lattice,
+            -2,
+            (0..24).map(|k| 1e-3 / f64::from(k + 1)).collect(),
+        );
+        ShapeFile::new(&field, vec![1e-4; 24])
+    }
+
+    #[test]
+    fn a_written_shape_is_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("shape.json");
+        std::fs::write(&path, serde_json::to_string(&file()).unwrap()).unwrap();
+        let read = ShapeFile::read(&path, 18.0).unwrap();
+        assert_eq!(read, file());
+        assert_eq!(read.field(), file().field());
+    }
+
+    #[test]
+    fn impossible_values_are_named() {
+        type Change = fn(&mut ShapeFile);
+        let changes: [(Change, &str); 7] = [
+            (|f| f.format = "x".to_owned(), "format"),
+            (|f| f.perimeter_m = 17.0, "perimeter_m"),
+            (|f| f.columns = 12, "columns"),
+            (|f| f.origin.h_m = f64::NAN, "origin"),
+            (|f| f.coefficients_m[3] = 5.0, "coefficient"),
+            (|f| f.coefficients_m.truncate(23), "coefficients_m"),
+            (|f| f.sigma_m.truncate(2), "sigma_m"),
+        ];
+        for (change, named) in changes {
+            let mut file = file();
+            change(&mut file);
+            let error = file.check(18.0).unwrap_err();
+            assert!(error.contains(named), "{error}");
+        }
+        assert_eq!(file().check(18.0), Ok(()));
+    }
+}

@@ -1,0 +1,112 @@
+//! The wall's shape of the result, with its uncertainty.
+
+use crate::model::context::{EstimationContext, total_displacement};
+use crate::parameters::shape::{Functions, Shape, ShapeModel};
+use crate::uncertainty::total_covariance::TotalCovariance;
+use serde::{Deserialize, Serialize};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::{RadialField, WallPoint};
+
+/// An estimated shape of the wall.
+#[derive(Clone, Debug)]
+pub struct EstimatedShape {
+    /// The displacement from the nominal wall.
+    pub field: RadialField,
+    /// 1-σ of the displacement at each node of the field, in the order of its coefficients, metres;
+    /// NaN where it is unknown.
+    pub sigma_m: Vec<f64>,
+}
+
+/// The shape in the report.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ShapeReport {
+    /// Scales at which the wall deviates from the nominal one; empty if it is not seen to.
+    pub scales: Vec<ScaleReport>,
+    /// Displacement over the wall, root mean square, millimetres.
+    pub rms_mm: f64,
+    /// 1-σ of the displacement, root mean square over the wall, millimetres.
+    pub sigma_mm: f64,
+}
+
+/// One scale of the shape.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ScaleReport {
+    /// Distance of the nodes of its lattice, metres; none for the harmonics (ovality), which are
+    /// constant along the tunnel.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spacing_m: Option<f64>,
+    /// Its strength: 1-σ of its coefficients, as learned from the frames, millimetres.
+    pub sigma_mm: f64,
+}
+
+impl EstimatedShape {
+    /// The known displacement of a context plus the estimated one, with its uncertainty; None if
+    /// there is neither. `first_slot`: slot of the shape's first block in `covariance`.
+    pub fn new(
+        context: &EstimationContext,
+        shape: Option<&Shape>,
+        covariance: Option<&TotalCovariance>,
+        first_slot: usize,
+    ) -> Option<Self> {
+        let field = total_displacement(context.displacement, shape.and_then(Shape::field))?;
+        let model = shape.map(|shape| &shape.model);
+        let (rows, lattice) = (field.rows(), *field.lattice());
+        let sigma_m = (0..field.coefficients_m().len()).par_map(|k| {
+            let node = lattice.node(
+                rows.start + (k / lattice.columns) as i64,
+                k % lattice.columns,
+            );
+            model
+                .zip(covariance)
+                .map_or(f64::NAN, |(model, covariance)| {
+                    sigma_at(model, covariance, first_slot, node)
+                })
+        });
+        Some(Self { field, sigma_m })
+    }
+
+    /// The shape moved on the unrolled wall and scaled with all of it.
+    pub fn moved(self, by: WallPoint, scale: f64) -> Self {
+        Self {
+            field: self.field.moved(by).scaled(scale),
+            sigma_m: self.sigma_m.iter().map(|sigma_m| sigma_m * scale).collect(),
+        }
+    }
+}
+
+/// 1-σ of the displacement at a point of the wall, metres.
+fn sigma_at(
+    model: &ShapeModel,
+    covariance: &TotalCovariance,
+    first_slot: usize,
+    wall: WallPoint,
+) -> f64 {
+    covariance
+        .shape_variance(&model.functions_at(wall), first_slot)
+        .sqrt()
+}
+
+impl ShapeReport {
+    /// Reports the scales of a model and the shape estimated with them.
+    pub fn new(model: &ShapeModel, estimated: Option<&EstimatedShape>) -> Self {
+        let scale = |scale: &crate::parameters::shape::Scale| ScaleReport {
+            spacing_m: match scale.functions {
+                Functions::Harmonics => None,
+                Functions::Lattice { columns, .. } => Some(model.spacing_m(columns)),
+            },
+            sigma_mm: 1e3 * scale.sigma_m,
+        };
+        let rms_mm = |values: &[f64]| {
+            let known = values.iter().filter(|value| value.is_finite());
+            let (sum, count) = known.fold((0.0, 0.0), |(sum, n), v| (sum + v * v, n + 1.0));
+            1e3 * f64::sqrt(sum / f64::max(count, 1.0))
+        };
+        Self {
+            scales: model.scales.iter().map(scale).collect(),
+            rms_mm: estimated.map_or(0.0, |shape| rms_mm(shape.field.coefficients_m())),
+            sigma_mm: estimated.map_or(0.0, |shape| rms_mm(&shape.sigma_m)),
+        }
+    }
+}
