@@ -6,7 +6,7 @@ use super::server::SourceFrames;
 use super::tiles_target::{TilesTarget, tiles_px_per_metre};
 use crate::persist::atomic;
 use crate::progress::Progress;
-use crate::render::{RenderError, RenderOptions, Stitch, StitchOptions, place};
+use crate::render::{RenderError, RenderOptions, Stitch, StitchOptions, place_frames};
 use crate::survey::Survey;
 use crate::trajectory::{Pose, Shutter};
 use serde::Serialize;
@@ -121,7 +121,7 @@ pub fn pose_source_frames(
     let surface = survey.surface.as_ref();
     let mut placements = Vec::new();
     for layer in layers {
-        let placed = place(surface, &survey.camera, &layer.poses, &layer.shutter)?;
+        let placed = place_frames(surface, &survey.camera, &layer.poses, &layer.shutter)?;
         placements.push((layer.name.to_owned(), placed));
     }
     Ok(SourceFrames {

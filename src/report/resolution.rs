@@ -1,7 +1,7 @@
 //! Resolution at which the panoramas of a report are compared.
 
 use super::error::ReportError;
-use crate::render::{Canvas, PictureCache, level_for, native_px_per_metre, place};
+use crate::render::{Canvas, PictureCache, level_for, native_px_per_metre, place_frames};
 use crate::survey::Survey;
 use crate::trajectory::Pose;
 
@@ -19,7 +19,7 @@ const RESOLUTION_STEP: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// [`ReportError::Render`]: poses that lie nowhere on the wall, frames that cannot be read.
 pub fn choose_resolution(survey: &Survey, poses: &[Pose]) -> Result<Option<f64>, ReportError> {
     let (surface, camera) = (survey.surface.as_ref(), &survey.camera);
-    let placements = place(surface, camera, poses, &survey.shutter())?;
+    let placements = place_frames(surface, camera, poses, &survey.shutter())?;
     let native = native_px_per_metre(surface, camera, poses)?;
     let mut px_per_metre = native;
     loop {

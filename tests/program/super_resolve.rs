@@ -5,7 +5,9 @@ use std::time::Instant;
 use tunnelstitch::camera::Camera;
 use tunnelstitch::evaluate::mtf50;
 use tunnelstitch::frames::GreyImage;
-use tunnelstitch::render::{Canvas, Interpolation, Kernel, Picture, native_px_per_metre, place};
+use tunnelstitch::render::{
+    Canvas, Interpolation, Kernel, Picture, native_px_per_metre, place_frames,
+};
 use tunnelstitch::simulate::{Illumination, Scene, SimulateOptions, SlantedEdge, Wall};
 use tunnelstitch::super_resolve::{Footprints, MARGIN, PosedCamera, Reading, Region};
 use tunnelstitch::surface::{Circle, Surface, WallPoint};
@@ -41,7 +43,7 @@ impl Simulated {
         let scene = Scene::new(options).unwrap();
         let circle = Circle::new(options.tunnel.nominal_m()).unwrap();
         let placements =
-            place(&circle, scene.camera(), scene.truth(), &Shutter::default()).unwrap();
+            place_frames(&circle, scene.camera(), scene.truth(), &Shutter::default()).unwrap();
         let native = native_px_per_metre(&circle, scene.camera(), scene.truth()).unwrap();
         let canvas = Canvas::of_placements(&circle, &placements, 2.0 * native).unwrap();
         let frames: Vec<_> = (0..options.frames)

@@ -15,7 +15,7 @@ use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 use tunnelstitch_render::{
     Canvas, Panorama, PictureCache, Placement, RenderOptions, check_memory, level_for,
-    native_px_per_metre, place, render,
+    native_px_per_metre, place_frames, render,
 };
 
 /// Input of a comparison.
@@ -195,7 +195,7 @@ impl<'a> PlacedPoses<'a> {
             }
             None => given.to_vec(),
         };
-        let placements = place(input.surface, input.camera, &aligned, input.shutter)
+        let placements = place_frames(input.surface, input.camera, &aligned, input.shutter)
             .map_err(|source| EvaluateError::Render { which, source })?;
         Ok(Self {
             which,

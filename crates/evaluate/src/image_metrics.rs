@@ -63,11 +63,13 @@ mod tests {
     use tunnelstitch_core::progress::Silent;
     use tunnelstitch_core::test_wall::{TestWall, waves};
     use tunnelstitch_geometry::trajectory::Shutter;
-    use tunnelstitch_render::{Canvas, Mode, Picture, PictureCache, RenderOptions, place, render};
+    use tunnelstitch_render::{
+        Canvas, Mode, Picture, PictureCache, RenderOptions, place_frames, render,
+    };
 
     fn panorama(wall: &TestWall, mut stack: PictureCache, ppm: f64) -> Panorama {
         let placements =
-            place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
+            place_frames(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, ppm).unwrap();
         render(
             &wall.circle,

@@ -245,14 +245,15 @@ mod tests {
     use super::*;
     use tunnelstitch_core::test_wall::{TestWall, waves};
     use tunnelstitch_geometry::trajectory::Shutter;
-    use tunnelstitch_render::{Picture, place};
+    use tunnelstitch_render::{Picture, place_frames};
 
     #[test]
     fn true_poses_leave_rounding_noise_and_wrong_ones_much_more() {
         let wall = TestWall::ring(waves);
         let stack = pictures(&wall);
         let residual = |poses: &[tunnelstitch_geometry::trajectory::Pose]| {
-            let placements = place(&wall.circle, &wall.camera, poses, &Shutter::default()).unwrap();
+            let placements =
+                place_frames(&wall.circle, &wall.camera, poses, &Shutter::default()).unwrap();
             let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
             seam_residual(&wall.circle, &stack, &placements, &canvas).unwrap()
         };
@@ -270,7 +271,8 @@ mod tests {
         let (w, h) = (wall.camera.width as usize, wall.camera.height as usize);
         let flat = |value| Picture::new(w, h, 1, vec![value; w * h]);
         let poses = vec![wall.poses[0]; 3];
-        let placements = place(&wall.circle, &wall.camera, &poses, &Shutter::default()).unwrap();
+        let placements =
+            place_frames(&wall.circle, &wall.camera, &poses, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
         let of = |values: &[u8]| {
             let pictures: Vec<Picture> = values.iter().map(|value| flat(*value)).collect();
@@ -291,7 +293,8 @@ mod tests {
         let wall = TestWall::ring(waves);
         let mut wrong = wall.poses.clone();
         wrong[4].t_wc.y += 0.05;
-        let placements = place(&wall.circle, &wall.camera, &wrong, &Shutter::default()).unwrap();
+        let placements =
+            place_frames(&wall.circle, &wall.camera, &wrong, &Shutter::default()).unwrap();
         let canvas = Canvas::of_placements(&wall.circle, &placements, 60.0).unwrap();
         let map = SeamMap::new(&wall.circle, &pictures(&wall), &placements, &canvas);
         let [around, along] = map.size();

@@ -1,10 +1,11 @@
-//! `tunnelstitch locate`: converts a point between panorama, wall and frames.
+//! `tunnelstitch locate`: converts a point between panorama, wall and frames; many points at once by
+//! [`locate_points`].
 
 use crate::cli::arguments::{CanvasArguments, PosesArguments};
+use crate::cli::commands::locate_points::{find_frame, locate_points};
 use crate::cli::output::{Failure, Terminal, json};
 use crate::render::{
-    Canvas, FramePixelError, LaidOut, Layout, Placement, Sighting, lay_out, sightings,
-    wall_point_of_pixel,
+    Canvas, FramePixelError, LaidOut, Layout, Placement, Sighting, hit_of_pixel, lay_out, sightings,
 };
 use crate::surface::WallPoint;
 use crate::survey::Survey;
@@ -29,7 +30,9 @@ use std::path::PathBuf;
     tunnelstitch locate survey --poses refined/poses.tum --clock 12.30,4:30\n      \
     which frames show the wall at chainage 12.30 m, half past four?\n  \
     tunnelstitch locate survey --poses refined/poses.tum --frame 000017.png,320,240 --json\n      \
-    where on the wall is the centre of this frame?"
+    where on the wall is the centre of this frame?\n  \
+    tunnelstitch locate survey --poses refined/poses.tum --points pixels.csv --out wall.csv\n      \
+    where on the wall are all these pixels?"
 )]
 pub struct LocateArguments {
     /// Folder of the survey, or its survey.toml.
@@ -71,6 +74,14 @@ pub struct LocateArguments {
         allow_hyphen_values = true
     )]
     frame: Option<FramePixel>,
+    /// Many pixels: a CSV file with the columns frame (name of its file, or its index from 0), u and
+    /// v. They are copied to --out with the columns theta_rad, h_m and range_m (distance from the
+    /// camera) added, empty where the frame shows no wall.
+    #[arg(long, group = "point", value_name = "IN.csv", requires = "out")]
+    points: Option<PathBuf>,
+    /// The file to write for --points.
+    #[arg(long, short, value_name = "OUT.csv", requires = "points")]
+    out: Option<PathBuf>,
     #[command(flatten)]
     poses: PosesArguments,
     #[command(flatten)]
@@ -175,6 +186,9 @@ struct FrameSighting {
 /// [`Failure`] for everything wrong with the survey, the poses or the point.
 pub fn run(arguments: &LocateArguments, terminal: &Terminal) -> Result<(), Failure> {
     let (survey, trajectory) = arguments.poses.open(&arguments.survey, terminal)?;
+    if let (Some(points), Some(out)) = (&arguments.points, &arguments.out) {
+        return locate_points(&survey, &poses_of(&trajectory), points, out, terminal);
+    }
     let surface = survey.surface.as_ref();
     let LaidOut {
         placements, canvas, ..
@@ -248,44 +262,21 @@ fn wall_point(
     let Some(FramePixel { frame, pixel }) = &arguments.frame else {
         return Err(Failure::bug("no point is given"));
     };
-    let k = find_frame(survey, frame)?;
-    wall_point_of_pixel(
+    let k = find_frame(survey, frame)
+        .map_err(|what| Failure::usage(format!("--frame {frame}: {what}")))?;
+    hit_of_pixel(
         survey.surface.as_ref(),
         &survey.camera,
         survey.frames.mask().map(AsRef::as_ref),
         &placements[k],
         *pixel,
     )
+    .map(|hit| hit.wall)
     .map_err(|error| match error {
         FramePixelError::Outside { .. } => Failure::usage(format!("--frame {frame}: {error}")),
         FramePixelError::Surface(error) => Failure::input(format!("frame {k}: {error}")),
         _ => Failure::input(format!("--frame {frame}: {error}")),
     })
-}
-
-/// Finds the frame by the name of its file, the end of its path, or its index.
-fn find_frame(survey: &Survey, name: &str) -> Result<usize, Failure> {
-    let count = survey.frames.len();
-    let has_name = |k: &usize| survey.frames[*k].path.ends_with(name);
-    let mut found = (0..count).filter(has_name);
-    match (found.next(), found.next()) {
-        (Some(only), None) => Ok(only),
-        (Some(first), Some(second)) => Err(Failure::usage(format!(
-            "--frame {name}: {} and {} both have this name; give the folder, too, or an index \
-             from 0 to {}",
-            survey.frames[first].path.display(),
-            survey.frames[second].path.display(),
-            count - 1
-        ))),
-        _ => name.parse().ok().filter(|k| *k < count).ok_or_else(|| {
-            Failure::usage(format!(
-                "--frame {name}: no such frame; give the name of a file, as {}, or an index from \
-                 0 to {}",
-                survey.frames[0].name(),
-                count - 1
-            ))
-        }),
-    }
 }
 
 /// Formats an angle as hours and minutes: 12:00 at 0°, two minutes per degree.

@@ -10,6 +10,7 @@ pub mod export;
 pub mod gyro;
 pub mod init;
 pub mod locate;
+pub mod locate_points;
 pub mod plan;
 pub mod project;
 pub mod refine;

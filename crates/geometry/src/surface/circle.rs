@@ -95,6 +95,18 @@ impl Surface for Circle {
         }
     }
 
+    /// Computes one normal per column.
+    fn normals(&self, s_m: &[f64], h_m: &[f64], normals: &mut Vec<Vector3<f64>>) {
+        normals.clear();
+        for &h_m in h_m.iter().take(1) {
+            let frames = s_m.iter().map(|&s_m| self.frame(WallPoint { s_m, h_m }));
+            normals.extend(frames.map(|frame| frame.normal()));
+        }
+        for _ in 1..h_m.len() {
+            normals.extend_from_within(..s_m.len());
+        }
+    }
+
     fn perimeter_m(&self) -> f64 {
         TAU * self.radius_m
     }

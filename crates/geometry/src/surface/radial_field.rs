@@ -1,6 +1,6 @@
 //! The wall's displacement from its nominal shape, a field over the unrolled wall.
 
-use super::spline_lattice::{SUPPORT, SplineLattice, halve_spacing};
+use super::spline_lattice::{SUPPORT, SplineLattice, Support, halve_spacing};
 use super::wall::WallPoint;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -83,6 +83,38 @@ impl RadialField {
             value.slope_s += slope * support.along_h[j];
         }
         value
+    }
+
+    /// δ (metres) on the grid `s_m × h_m` of wall points, row by row (s runs fastest).
+    pub fn grid(&self, s_m: &[f64], h_m: &[f64]) -> Vec<f64> {
+        let support = |s_m: f64, h_m: f64| self.lattice.support(WallPoint { s_m, h_m });
+        let columns: Vec<Support> = s_m.iter().map(|s_m| support(*s_m, 0.0)).collect();
+        let mut grid = Vec::with_capacity(s_m.len() * h_m.len());
+        for h_m in h_m {
+            let across = support(0.0, *h_m);
+            let rows: [&[f64]; SUPPORT] =
+                std::array::from_fn(|j| self.row(across.first_row + j as i64));
+            grid.extend(columns.iter().map(|column| {
+                let mut delta_m = 0.0;
+                for (row, weight) in rows.iter().zip(across.along_h) {
+                    if let Some(values) = column.values_of(row) {
+                        delta_m += weight * values;
+                    }
+                }
+                delta_m
+            }));
+        }
+        grid
+    }
+
+    /// Coefficients of a row, metres; empty beyond the rows.
+    fn row(&self, row: i64) -> &[f64] {
+        if self.rows().contains(&row) {
+            let start = (row - self.first_row) as usize * self.lattice.columns;
+            &self.coefficients_m[start..start + self.lattice.columns]
+        } else {
+            &[]
+        }
     }
 
     /// The same field on a lattice of half the spacing.
@@ -168,6 +200,16 @@ pub(super) mod tests {
             let by_h = (at(s_m, h_m + step) - at(s_m, h_m - step)) / (2.0 * step);
             assert!((by_s - value.slope_s).abs() < 1e-9);
             assert!((by_h - value.slope_h).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn the_grid_is_the_field_point_by_point() {
+        let field = irregular(0.01);
+        let (s, h) = ([0.1, 7.0, 18.8], [-50.0, -2.2, 3.3, 5.9]);
+        for (k, delta_m) in field.grid(&s, &h).into_iter().enumerate() {
+            let (s_m, h_m) = (s[k % 3], h[k / 3]);
+            assert!((field.at(WallPoint { s_m, h_m }).delta_m - delta_m).abs() < 1e-16);
         }
     }
 

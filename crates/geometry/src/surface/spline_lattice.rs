@@ -42,6 +42,19 @@ pub struct Support {
     pub slope_s: [f64; SUPPORT],
 }
 
+impl Support {
+    /// Sum along s of a row of coefficients; None for an empty row.
+    #[inline]
+    pub(super) fn values_of(&self, row: &[f64]) -> Option<f64> {
+        let terms = self.columns.iter().zip(self.along_s);
+        let mut sum = 0.0;
+        for (column, weight) in terms {
+            sum += weight * row.get(*column)?;
+        }
+        Some(sum)
+    }
+}
+
 impl SplineLattice {
     /// Distance Δ between neighbouring nodes along either axis, metres.
     pub fn spacing_m(&self) -> f64 {

@@ -30,7 +30,7 @@ impl Placement {
 ///
 /// # Errors
 /// [`RenderError::Frame`], for the first frame that has no place.
-pub fn place(
+pub fn place_frames(
     surface: &dyn Surface,
     camera: &Camera,
     poses: &[Pose],
@@ -109,7 +109,7 @@ mod tests {
             facing(Vector3::zeros()),
             facing(Vector3::x() * (-TAU / 4.0)),
         ];
-        let message = place(&circle, &camera(), &poses, &Shutter::default())
+        let message = place_frames(&circle, &camera(), &poses, &Shutter::default())
             .unwrap_err()
             .to_string();
         for part in ["frame 1", "vanishing point", "check its pose"] {

@@ -87,7 +87,7 @@ pub fn sightings(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::placement::place;
+    use crate::layout::placement::place_frames;
     use tunnelstitch_core::test_wall::{TestWall, waves};
     use tunnelstitch_geometry::trajectory::{Shutter, indexed};
 
@@ -103,7 +103,7 @@ mod tests {
     }
 
     fn look_at_points(wall: &TestWall, shutter: &Shutter) {
-        let placements = place(&wall.circle, &wall.camera, &wall.poses, shutter).unwrap();
+        let placements = place_frames(&wall.circle, &wall.camera, &wall.poses, shutter).unwrap();
         let mut seen = 0;
         for k in 0..40 {
             let point = WallPoint {

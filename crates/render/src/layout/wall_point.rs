@@ -4,7 +4,7 @@ use crate::layout::placement::Placement;
 use nalgebra::Vector2;
 use tunnelstitch_core::frames::Mask;
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Surface, SurfaceError, WallPoint};
+use tunnelstitch_geometry::surface::{Hit, Surface, SurfaceError};
 
 /// Error of a frame's pixel that shows no point of the wall.
 #[derive(Debug, thiserror::Error)]
@@ -43,18 +43,18 @@ pub enum FramePixelError {
     Surface(#[from] SurfaceError),
 }
 
-/// Finds the wall point that pixel `(u, v)` of a placed frame shows: where its ray
+/// Finds the point of the wall that pixel `(u, v)` of a placed frame shows: where its ray
 /// `x_w(t) = t_wc + R_wc (o(v) + t d(u, v))` hits the wall.
 ///
 /// # Errors
 /// [`FramePixelError`].
-pub fn wall_point_of_pixel(
+pub fn hit_of_pixel(
     surface: &dyn Surface,
     camera: &Camera,
     mask: Option<&Mask>,
     placement: &Placement,
     [u, v]: [f64; 2],
-) -> Result<WallPoint, FramePixelError> {
+) -> Result<Hit, FramePixelError> {
     let pose = &placement.pose;
     let camera = placement.camera(camera);
     if !camera.is_in_image(&Vector2::new(u, v), 0.0) {
@@ -70,5 +70,5 @@ pub fn wall_point_of_pixel(
     }
     let ray = camera.ray(u, v).ok_or(FramePixelError::NoRay { u, v })?;
     let start = pose.to_world(&camera.origin(v));
-    Ok(surface.hit(&start, &(pose.r_wc * ray))?.wall)
+    Ok(surface.hit(&start, &(pose.r_wc * ray))?)
 }

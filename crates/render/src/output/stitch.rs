@@ -8,7 +8,7 @@ use crate::compositing::band::Target;
 use crate::compositing::options::RenderOptions;
 use crate::error::RenderError;
 use crate::layout::canvas::Canvas;
-use crate::layout::placement::{Placement, native_px_per_metre, place};
+use crate::layout::placement::{Placement, native_px_per_metre, place_frames};
 use crate::sampling::picture_cache::{PictureCache, level_for};
 use tunnelstitch_core::frames::FrameSet;
 use tunnelstitch_core::progress::Progress;
@@ -83,7 +83,7 @@ pub fn lay_out(
     px_per_metre: Option<f64>,
     finer: f64,
 ) -> Result<LaidOut, RenderError> {
-    let placements = place(surface, camera, poses, shutter)?;
+    let placements = place_frames(surface, camera, poses, shutter)?;
     let native = native_px_per_metre(surface, camera, poses)?;
     let px_per_metre = px_per_metre.unwrap_or(finer * native);
     let canvas = Canvas::of_placements(surface, &placements, px_per_metre)?;

@@ -4,7 +4,7 @@ use crate::compositing::band::{Band, Target};
 use crate::compositing::options::{Mode, RenderOptions};
 use crate::error::RenderError;
 use crate::layout::canvas::{Canvas, Layout};
-use crate::layout::placement::{NO_FRAME, place};
+use crate::layout::placement::{NO_FRAME, place_frames};
 use crate::output::panorama::Panorama;
 use crate::output::plan::Plan;
 use crate::output::stitch::{on_the_axis, render};
@@ -32,7 +32,8 @@ const BEST: RenderOptions = RenderOptions {
 };
 
 fn draw(wall: &TestWall, mut cache: PictureCache, ppm: f64, options: &RenderOptions) -> Panorama {
-    let placements = place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
+    let placements =
+        place_frames(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, ppm).unwrap();
     let progress = &Silent;
     render(
@@ -232,7 +233,8 @@ fn raw_pixels_are_those_of_the_frames() {
         0.8 * value + (2 * k) as f32 + ((7 * u + 13 * v + 5 * k) % 11) as f32
     });
     let frames = cache.clone();
-    let placements = place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
+    let placements =
+        place_frames(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, 70.0).unwrap();
     let options = RenderOptions {
         interpolation: Interpolation::Nearest,
@@ -393,7 +395,8 @@ fn little_memory_changes_nothing_but_the_time() {
         })
         .collect();
     let files = FrameSet::from(files);
-    let placements = place(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
+    let placements =
+        place_frames(&wall.circle, &wall.camera, &wall.poses, &Shutter::default()).unwrap();
     let canvas = Canvas::of_placements(&wall.circle, &placements, 700.0).unwrap();
     let draw = |room| {
         let mut frames = PictureCache::open(&files, &wall.camera, 0).unwrap();

@@ -1,7 +1,7 @@
 //! Local polynomials against the projection of the camera itself.
 
 use crate::layout::canvas::Canvas;
-use crate::layout::placement::{Placement, place};
+use crate::layout::placement::{Placement, place_frames};
 use crate::layout::tiles::tiles;
 use crate::sampling::point_batch::PointBatch;
 use crate::warp::control_points::ControlPoints;
@@ -40,7 +40,7 @@ fn charts_project_as_cameras_do() {
             ..camera
         };
         let poses = spiral(4, 0.3, 80f64.to_radians());
-        let placements = place(&circle, &still, &poses, &Shutter::default()).unwrap();
+        let placements = place_frames(&circle, &still, &poses, &Shutter::default()).unwrap();
         let placement = Placement {
             sweep: camera.sweep,
             ..placements[1]
