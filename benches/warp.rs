@@ -17,7 +17,7 @@ use tunnelstitch::camera::Camera;
 use tunnelstitch::progress::Silent;
 use tunnelstitch::render::{
     Band, Canvas, Interpolation, Mode, Picture, PictureCache, Placement, Plan, RenderError,
-    RenderOptions, Target, place,
+    RenderOptions, Target, place_frames,
 };
 use tunnelstitch::surface::Circle;
 use tunnelstitch::trajectory::{Shutter, spiral};
@@ -134,7 +134,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let camera = Camera::from_vertical_fov(1920, 1080, FOV_DEG.to_radians());
     let circle = Circle::new(RADIUS_M)?;
     let advance_m = 2.0 * RADIUS_M * (0.5 * FOV_DEG.to_radians()).tan() / FRAMES_AROUND as f64;
-    let placements = place(
+    let placements = place_frames(
         &circle,
         &camera,
         &spiral(FRAMES, advance_m, TAU / FRAMES_AROUND as f64),

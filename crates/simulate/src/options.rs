@@ -43,6 +43,27 @@ pub enum Illumination {
     Even,
 }
 
+/// Deviation of a straight round lining from its radius.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct AsBuilt {
+    /// Amplitude of the ovality, a second harmonic along all of the tunnel, millimetres.
+    pub ovality_mm: f64,
+    /// Undulation, root mean square, millimetres.
+    pub undulation_mm: f64,
+    /// Length ℓ of the undulation's correlation `exp(−x²/2ℓ²)`, metres.
+    pub undulation_length_m: f64,
+}
+
+impl Default for AsBuilt {
+    fn default() -> Self {
+        Self {
+            ovality_mm: 0.0,
+            undulation_mm: 0.0,
+            undulation_length_m: 0.5,
+        }
+    }
+}
+
 /// Options of a simulated survey.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SimulateOptions {
@@ -69,6 +90,9 @@ pub struct SimulateOptions {
     pub offset_m: [f64; 3],
     /// Noise of the true poses about the plan, if any; the initial poses do not contain it.
     pub jitter: Option<PriorSection>,
+    /// Deviation of the lining from the tunnel, which the survey does not know.
+    #[serde(skip_serializing_if = "is_default")]
+    pub as_built: AsBuilt,
     /// Appearance of the wall.
     pub wall: Wall,
     /// Illumination of the wall.
@@ -137,6 +161,7 @@ impl SimulateOptions {
             wall: Wall::Brick,
             light: Illumination::Downward,
             noise_grey: 2.0,
+            as_built: AsBuilt::default(),
             gain_percent: 0.0,
             bias_grey: 0.0,
             lamp_corner: None,
@@ -261,6 +286,17 @@ impl SimulateOptions {
                 "the width of the texture must be a positive number of metres",
             )?;
         }
+        let built = &self.as_built;
+        let most_mm = 50.0 * self.tunnel.nominal_m();
+        let deviates = |mm: f64| (0.0..=most_mm).contains(&mm);
+        check(
+            deviates(built.ovality_mm) && deviates(built.undulation_mm),
+            "the lining may deviate by no more than a twentieth of the radius",
+        )?;
+        check(
+            built.undulation_length_m >= 0.02 * self.tunnel.nominal_m(),
+            "the undulation must be at least a fiftieth of the radius long",
+        )?;
         check(
             not_negative(self.noise_grey),
             "the noise must not be negative",

@@ -41,6 +41,8 @@ pub(super) enum RandomStream {
     MovingObjects,
     /// Blur and occlusion of bad frames.
     BadFrames,
+    /// Deviation of the lining.
+    Lining,
 }
 
 impl RandomStream {

@@ -1,13 +1,15 @@
 //! Shape of the simulated tunnel and its intersection with rays.
 //!
-//! A round straight tunnel has a closed form. In all others the ray is marched until it leaves the
+//! A round straight tunnel has a closed form. In all others, as in one whose lining deviates from it, the ray is marched until it leaves the
 //! inside, and the crossing is found by false position. The centreline of a curved tunnel comes
 //! from [`tunnelstitch_geometry::surface`], since it is an input; everything else is independent of
 //! it.
 
 use crate::cross_section::CrossSection;
 use crate::error::SimulateError;
-use crate::options::SimulateOptions;
+use crate::lining::Lining;
+use crate::options::{AsBuilt, SimulateOptions};
+use crate::procedural_noise::RandomStream;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use tunnelstitch_core::survey::read_centreline;
@@ -18,6 +20,8 @@ use tunnelstitch_geometry::trajectory::Pose;
 pub(super) enum Tunnel {
     /// Straight and round, with its radius in metres.
     Round(f64),
+    /// Straight and round, but for the deviations of its lining.
+    AsBuilt(Lining),
     /// Any other cross-section or centreline.
     Shaped {
         /// The cross-section.
@@ -61,7 +65,20 @@ impl Tunnel {
         let fail = |what: String| SimulateError::Option { what };
         section.section().map_err(fail)?;
         if let (true, Some(radius_m)) = (section.is_straight_and_round(), section.radius_m) {
-            return Ok(Self::Round(radius_m));
+            if options.as_built == AsBuilt::default() {
+                return Ok(Self::Round(radius_m));
+            }
+            let seed = RandomStream::Lining.seed(options.seed);
+            return Ok(Self::AsBuilt(Lining::new(
+                radius_m,
+                &options.as_built,
+                seed,
+            )));
+        }
+        if options.as_built != AsBuilt::default() {
+            return Err(fail(
+                "a lining as built needs a straight round tunnel".to_owned(),
+            ));
         }
         let nominal_m = section.nominal_m();
         let width_m = 2.0 * nominal_m;
@@ -85,6 +102,7 @@ impl Tunnel {
     pub fn perimeter_m(&self) -> f64 {
         match self {
             Self::Round(radius_m) => TAU * radius_m,
+            Self::AsBuilt(lining) => TAU * lining.radius_m,
             Self::Shaped { section, .. } => section.perimeter_m(),
         }
     }
@@ -93,6 +111,7 @@ impl Tunnel {
     pub fn nearest_m(&self) -> f64 {
         match self {
             Self::Round(radius_m) => *radius_m,
+            Self::AsBuilt(lining) => lining.radius_m,
             Self::Shaped { section, .. } => section.nearest_m(),
         }
     }
@@ -133,6 +152,7 @@ impl Tunnel {
                 let distance_m = point.x.hypot(point.z);
                 (distance_m / radius_m, distance_m)
             }
+            Self::AsBuilt(lining) => (1.0 + lining.beyond(point), point.x.hypot(point.z)),
             Self::Shaped { section, line } => {
                 let line = line.as_ref();
                 let h_m = line.map_or(0.0, |line| line.chainage_m(point));
@@ -189,7 +209,8 @@ impl RayCaster<'_> {
     pub fn intersect(&self, d: &Vector3<f64>) -> WallHit {
         match self.tunnel {
             Tunnel::Round(radius_m) => self.intersect_round(*radius_m, d),
-            Tunnel::Shaped { section, line } => self.march(section, line.as_ref(), d),
+            Tunnel::AsBuilt(lining) => self.march_to_lining(lining, d),
+            Tunnel::Shaped { section, line } => self.march_to_section(section, line.as_ref(), d),
         }
     }
 
@@ -211,8 +232,28 @@ impl RayCaster<'_> {
         }
     }
 
-    /// Marches a ray until it leaves the inside, and finds the crossing.
-    fn march(
+    /// Marches a ray to a lining as built.
+    fn march_to_lining(&self, lining: &Lining, d: &Vector3<f64>) -> WallHit {
+        let d = d.normalize();
+        let point_at = |distance_m: f64, _: f64| {
+            let point = self.t + d * distance_m;
+            RayPoint {
+                distance_m,
+                point,
+                beyond: lining.beyond(&point),
+            }
+        };
+        match self.march(&d, lining.radius_m / 3.0, point_at) {
+            Some(wall) => WallHit {
+                theta: wall.x.atan2(wall.z).rem_euclid(TAU),
+                h_m: wall.y,
+            },
+            None => WallHit::NONE,
+        }
+    }
+
+    /// Marches a ray to the wall of a section swept along a line.
+    fn march_to_section(
         &self,
         section: &CrossSection,
         line: Option<&Centreline>,
@@ -228,23 +269,35 @@ impl RayCaster<'_> {
                 beyond,
             }
         };
-        let step_m = section.nearest_m() / 3.0;
+        match self.march(&d, section.nearest_m() / 3.0, point_at) {
+            Some(wall) => WallHit {
+                theta: section.angle_of(wall.x, wall.z),
+                h_m: wall.y,
+            },
+            None => WallHit::NONE,
+        }
+    }
+
+    /// Marches a ray of unit direction `d` in steps of `step_m` until it leaves the inside, and finds
+    /// the crossing, in the coordinates of `point_at`; None if there is none.
+    fn march(
+        &self,
+        d: &Vector3<f64>,
+        step_m: f64,
+        point_at: impl Fn(f64, f64) -> RayPoint,
+    ) -> Option<Vector3<f64>> {
         let mut inside = point_at(0.0, self.h_m);
         // Chainage grows from step to step about as it did before.
-        let mut growth_m = step_m * self.along.dot(&d);
+        let mut growth_m = step_m * self.along.dot(d);
         for _ in 0..MAX_RAY_STEPS {
             let next = point_at(inside.distance_m + step_m, inside.point.y + growth_m);
             if next.beyond >= 0.0 {
-                let wall = find_crossing(inside, next, point_at);
-                return WallHit {
-                    theta: section.angle_of(wall.x, wall.z),
-                    h_m: wall.y,
-                };
+                return Some(find_crossing(inside, next, point_at));
             }
             growth_m = next.point.y - inside.point.y;
             inside = next;
         }
-        WallHit::NONE
+        None
     }
 }
 

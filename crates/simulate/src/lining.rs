@@ -1,0 +1,127 @@
+//! A round lining as built: oval and undulating.
+//!
+//! The radius at the angle θ and the chainage h is `r + a cos 2(θ − θ_0) + u(θ, h)`, with the
+//! undulation u a sum of [`WAVES`] cosines of random phase. Their wave numbers are drawn from the
+//! spectrum of a Gaussian correlation `exp(−x²/2ℓ²)`, of which u is a sample.
+//!
+//! Source: M. Shinozuka, C.-M. Jan, "Digital simulation of random processes and its applications",
+//! Journal of Sound and Vibration 25(1), 1972.
+
+use crate::options::AsBuilt;
+use nalgebra::Vector3;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::TAU;
+
+/// Number of cosines.
+const WAVES: usize = 240;
+
+/// A round lining that deviates from its radius.
+#[derive(Clone, Debug)]
+pub(super) struct Lining {
+    /// r, metres.
+    pub radius_m: f64,
+    ovality_m: f64,
+    ovality_at_rad: f64,
+    /// Amplitude of each cosine, metres.
+    amplitude_m: f64,
+    waves: Vec<Wave>,
+}
+
+/// One cosine.
+#[derive(Clone, Copy, Debug)]
+struct Wave {
+    /// Waves around the section, a whole number.
+    around: f64,
+    /// Wave number along the axis, 1/m.
+    along: f64,
+    phase: f64,
+}
+
+impl Lining {
+    /// The lining of a tunnel of the given radius.
+    pub fn new(radius_m: f64, as_built: &AsBuilt, seed: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let length_m = as_built.undulation_length_m;
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        let mut waves: Vec<Wave> = (0..WAVES)
+            .map(|_| Wave {
+                around: (normal() * radius_m / length_m).round(),
+                along: normal() / length_m,
+                phase: 0.0,
+            })
+            .collect();
+        for wave in &mut waves {
+            wave.phase = rng.random_range(0.0..TAU);
+        }
+        Self {
+            radius_m,
+            ovality_m: 1e-3 * as_built.ovality_mm,
+            ovality_at_rad: rng.random_range(0.0..TAU),
+            amplitude_m: 1e-3 * as_built.undulation_mm * (2.0 / WAVES as f64).sqrt(),
+            waves: if as_built.undulation_mm > 0.0 {
+                waves
+            } else {
+                Vec::new()
+            },
+        }
+    }
+
+    /// Deviation from the radius, metres.
+    pub fn deviation_m(&self, theta: f64, h_m: f64) -> f64 {
+        let cosine = |wave: &Wave| (wave.around * theta + wave.along * h_m + wave.phase).cos();
+        let oval = self.ovality_m * (2.0 * (theta - self.ovality_at_rad)).cos();
+        oval + self.amplitude_m * self.waves.iter().map(cosine).sum::<f64>()
+    }
+
+    /// Relative distance of a point beyond the wall; negative inside.
+    pub fn beyond(&self, point: &Vector3<f64>) -> f64 {
+        let theta = point.x.atan2(point.z);
+        point.x.hypot(point.z) / (self.radius_m + self.deviation_m(theta, point.y)) - 1.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_undulation_has_its_size_and_length() {
+        let as_built = AsBuilt {
+            undulation_mm: 3.0,
+            undulation_length_m: 0.5,
+            ..AsBuilt::default()
+        };
+        let (mut square, mut product, mut count) = (0.0, 0.0, 0.0);
+        for seed in 0..6 {
+            let lining = Lining::new(3.0, &as_built, seed);
+            for k in 0..4000 {
+                let (theta, h_m) = (0.37 * f64::from(k), 0.011 * f64::from(k));
+                let here = lining.deviation_m(theta, h_m);
+                square += here * here;
+                product += here * lining.deviation_m(theta, h_m + 0.5);
+                count += 1.0;
+            }
+        }
+        let rms_m = f64::sqrt(square / count);
+        assert!((rms_m / 0.003 - 1.0).abs() < 0.1, "{rms_m}");
+        assert!((product / square - (-0.5f64).exp()).abs() < 0.1);
+    }
+
+    #[test]
+    fn the_ovality_is_a_second_harmonic_without_seam() {
+        let as_built = AsBuilt {
+            ovality_mm: 10.0,
+            ..AsBuilt::default()
+        };
+        let lining = Lining::new(3.0, &as_built, 1);
+        let at = |theta: f64| lining.deviation_m(theta, 1.0);
+        assert!((at(0.4) + at(0.4 + 0.25 * TAU)).abs() < 1e-12);
+        assert!((at(0.4) - at(0.4 + TAU)).abs() < 1e-12);
+        let largest = (0..360)
+            .map(|k| at(f64::from(k).to_radians()))
+            .fold(0.0, f64::max);
+        assert!((largest - 0.01).abs() < 1e-5);
+    }
+}
