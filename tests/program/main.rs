@@ -1,5 +1,6 @@
 //! Tests that run the program on files and check its output.
 
+mod as_built;
 mod bad_input;
 mod broken_inputs;
 mod calibrate;

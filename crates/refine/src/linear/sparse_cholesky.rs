@@ -248,6 +248,16 @@ mod tests {
     }
 
     #[test]
+    fn log_determinant_is_that_of_the_dense_matrix() {
+        let (pattern, normal, dense) = example();
+        let symbolic = SymbolicFactorisation::new(&pattern).unwrap();
+        let factor = symbolic.factorise(&pattern, &normal, 0.0).unwrap();
+        let l = dense.cholesky().unwrap().l();
+        let expected: f64 = l.diagonal().iter().map(|pivot| 2.0 * pivot.ln()).sum();
+        assert!((factor.log_determinant() - expected).abs() < 1e-9);
+    }
+
+    #[test]
     fn indefinite_matrix_is_an_error() {
         let pattern = Pattern::new(1, []);
         let mut normal = NormalEquations::zeros(&pattern);

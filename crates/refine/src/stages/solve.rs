@@ -4,6 +4,7 @@ use crate::error::RefineError;
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
+use crate::parameters::unknowns::Unknowns;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::report::LevelReport;
 use crate::solver::argmin_glue::{self, Observation};
@@ -24,8 +25,8 @@ const MAX_LEARNING_SOLVES: usize = 4;
 /// Runs the stage; a snapshot may be kept between two steps.
 ///
 /// A parameter that the last solve finds unobservable is fixed, and the solve planned again; as it
-/// is if residuals show model errors, with pixels that tell accordingly less
-/// ([`crate::uncertainty::model_error`]).
+/// is if the shape turns out to have other strengths ([`crate::stages::shape`]), or if residuals show
+/// model errors, with pixels that tell accordingly less ([`crate::uncertainty::model_error`]).
 ///
 /// # Errors
 /// A frame that cannot be read, equations without a solution.
@@ -47,17 +48,15 @@ pub fn run<'a>(
         return Ok(estimation);
     }
     let solution = solve(&plan, problem, setup, state, session)?;
-    state.frames.estimates.clone_from(&solution.unknowns.frames);
-    if let Some(shape) = &mut state.shape {
-        shape.coefficients.clone_from(&solution.unknowns.shape);
+    take_over(&solution.unknowns, state);
+    if may_learn_shape(&plan, state)
+        && shape::learn(setup, state, &solution)
+        && !has_solve_ahead(state)
+    {
+        plan_again(&plan, setup.options, state);
     }
     let uncertainty = uncertainty_of(&plan, setup, &context, state, &solution)?;
     let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
-    state.kappa = solution.unknowns.kappa;
-    let needs_solve = match state.shape {
-        Some(_) if may_learn_shape(&plan, state) => shape::learn(setup, state, &solution),
-        _ => false,
-    };
     for parameter in &unobservable {
         state.kappa[parameter.unknown] = 0.0;
         state.free[parameter.unknown] = false;
@@ -87,9 +86,7 @@ pub fn run<'a>(
         let dispersion = uncertainty
             .model_error
             .map_or(1.0, |found| found.dispersion);
-        if needs_solve {
-            plan_again(&plan, setup.options, state);
-        } else if state.dispersion == 1.0 && dispersion > 1.0 {
+        if state.dispersion == 1.0 && dispersion > 1.0 {
             state.dispersion = dispersion;
             plan_again(&plan, setup.options, state);
         } else {
@@ -203,6 +200,15 @@ fn find_unobservable(
 fn may_learn_shape(plan: &SolvePlan, state: &PipelineState) -> bool {
     let before = state.levels.iter().filter(|solve| solve.level == 0).count();
     plan.sampling.level == 0 && before < MAX_LEARNING_SOLVES
+}
+
+/// Takes over the unknowns of a solution.
+fn take_over(unknowns: &Unknowns, state: &mut PipelineState) {
+    state.frames.estimates.clone_from(&unknowns.frames);
+    state.kappa = unknowns.kappa;
+    if let Some(shape) = &mut state.shape {
+        shape.coefficients.clone_from(&unknowns.shape);
+    }
 }
 
 /// True if another solve is certain to follow; a joint one may turn out to be needless.
