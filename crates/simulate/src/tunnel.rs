@@ -1,9 +1,9 @@
 //! Shape of the simulated tunnel and its intersection with rays.
 //!
-//! A round straight tunnel has a closed form. In all others, as in one whose lining deviates from it, the ray is marched until it leaves the
-//! inside, and the crossing is found by false position. The centreline of a curved tunnel comes
-//! from [`tunnelstitch_geometry::surface`], since it is an input; everything else is independent of
-//! it.
+//! A round straight tunnel has a closed form. In all others, as in one whose lining deviates from
+//! it, the ray is marched until it leaves the inside, and the crossing is found by false position.
+//! The centreline of a curved tunnel comes from [`tunnelstitch_geometry::surface`], since it is an
+//! input; everything else is independent of it.
 
 use crate::cross_section::CrossSection;
 use crate::error::SimulateError;
@@ -278,8 +278,8 @@ impl RayCaster<'_> {
         }
     }
 
-    /// Marches a ray of unit direction `d` in steps of `step_m` until it leaves the inside, and finds
-    /// the crossing, in the coordinates of `point_at`; None if there is none.
+    /// Marches a ray of unit direction `d` in steps of `step_m` until it leaves the inside, and
+    /// finds the crossing, in the coordinates of `point_at`; None if there is none.
     fn march(
         &self,
         d: &Vector3<f64>,

@@ -221,8 +221,8 @@ fn absolute(path: &Path) -> PathBuf {
 pub struct PosesArguments {
     /// Poses to use: `initial` and `truth` are those of survey.toml; anything else is a file in any
     /// supported format, in the tunnel's frame as `refine` and `convert` write it, unless the flags
-    /// below say otherwise. With poses of `refine` come the camera and the shape of the wall that it
-    /// has found and written beside them.
+    /// below say otherwise. With poses of `refine` come the camera and the shape of the wall that
+    /// it has found and written beside them.
     #[arg(
         id = "poses",
         long = "poses",

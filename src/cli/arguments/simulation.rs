@@ -20,8 +20,8 @@ pub struct DegradationArguments {
     /// [above 0, up to 1: no shading]. Combine with --light even to have no other light.
     #[arg(long, value_name = "SHARE")]
     lamp_corner: Option<f64>,
-    /// Oval lining: the radius varies by ± this around the section, twice once around, along all of the
-    /// tunnel, which the survey does not know. Straight round tunnels only.
+    /// Oval lining: the radius varies by ± this around the section, twice once around, along all of
+    /// the tunnel, which the survey does not know. Straight round tunnels only.
     #[arg(long, value_name = "MM", default_value_t = 0.0)]
     ovality_mm: f64,
     /// Undulating lining: the radius varies at random by this, root mean square.

@@ -1,5 +1,5 @@
-//! `tunnelstitch locate`: converts a point between panorama, wall and frames; many points at once by
-//! [`locate_points`].
+//! `tunnelstitch locate`: converts a point between panorama, wall and frames; many points at once
+//! by [`locate_points`].
 
 use crate::cli::arguments::{CanvasArguments, PosesArguments};
 use crate::cli::commands::locate_points::{find_frame, locate_points};
@@ -74,9 +74,9 @@ pub struct LocateArguments {
         allow_hyphen_values = true
     )]
     frame: Option<FramePixel>,
-    /// Many pixels: a CSV file with the columns frame (name of its file, or its index from 0), u and
-    /// v. They are copied to --out with the columns theta_rad, h_m and range_m (distance from the
-    /// camera) added, empty where the frame shows no wall.
+    /// Many pixels: a CSV file with the columns frame (name of its file, or its index from 0), u
+    /// and v. They are copied to --out with the columns theta_rad, h_m and range_m (distance from
+    /// the camera) added, empty where the frame shows no wall.
     #[arg(long, group = "point", value_name = "IN.csv", requires = "out")]
     points: Option<PathBuf>,
     /// The file to write for --points.

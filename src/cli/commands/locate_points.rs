@@ -19,7 +19,8 @@ const ADDED_COLUMNS: [&str; 3] = ["theta_rad", "h_m", "range_m"];
 /// shows no wall.
 ///
 /// # Errors
-/// A file without the columns, a line that names no frame or pixel, an output that cannot be written.
+/// A file without the columns, a line that names no frame or pixel, an output that cannot be
+/// written.
 pub fn locate_points(
     survey: &Survey,
     poses: &[Pose],
@@ -84,8 +85,8 @@ fn find_columns(headers: &StringRecord) -> Result<[usize; 3], String> {
         let found = headers.iter().position(|header| header == name);
         *place = found.ok_or_else(|| {
             format!(
-                "there is no column {name}; the first line must name the columns frame, u and v, and \
-                 has {}",
+                "there is no column {name}; the first line must name the columns frame, u and v, \
+                 and has {}",
                 headers.iter().collect::<Vec<_>>().join(", ")
             )
         })?;

@@ -347,8 +347,8 @@ fn refuse_survey_folder(survey: &Path, out: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Writes the calibration and the shape that were found, and a `survey.toml` that uses them with the
-/// survey's frames and initial poses; removes those of an earlier run.
+/// Writes the calibration and the shape that were found, and a `survey.toml` that uses them with
+/// the survey's frames and initial poses; removes those of an earlier run.
 fn write_survey(survey: &Survey, refined: &Refined, out: &Path) -> Result<(), Failure> {
     let calibration = refined.report.calibration.as_ref();
     let text_of = |file: &str, text: Option<String>| match text {

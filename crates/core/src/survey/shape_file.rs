@@ -13,8 +13,8 @@
 //! The displacement along the normal of the nominal wall, positive outwards, is the cubic B-spline
 //! `δ(s, h) = Σ_ji c_ji B((s − s_0)/Δ − i) B((h − h_0)/Δ − j)`, with the spacing
 //! `Δ = perimeter/columns`, the columns i periodic, and rows j from `first_row` on, row by row in
-//! `coefficients_m` ([`tunnelstitch_geometry::surface::RadialField`]). `sigma_m` has 1-σ of δ at each
-//! node; it is optional.
+//! `coefficients_m` ([`tunnelstitch_geometry::surface::RadialField`]). `sigma_m` has 1-σ of δ at
+//! each node; it is optional.
 
 use super::error::SurveyError;
 use serde::{Deserialize, Serialize};
@@ -97,9 +97,11 @@ impl ShapeFile {
                 self.format
             ));
         }
-        if !((self.perimeter_m / perimeter_m - 1.0).abs() < MAX_PERIMETER_ERROR) {
+        let ratios = 1.0 - MAX_PERIMETER_ERROR..1.0 + MAX_PERIMETER_ERROR;
+        if !ratios.contains(&(self.perimeter_m / perimeter_m)) {
             return Err(format!(
-                "perimeter_m is {}, that of the tunnel {perimeter_m}; the shape is of another tunnel",
+                "perimeter_m is {}, that of the tunnel {perimeter_m}; the shape is of another \
+                 tunnel",
                 self.perimeter_m
             ));
         }
@@ -113,7 +115,8 @@ impl ShapeFile {
             return Err("origin is not finite".to_owned());
         }
         let most_m = MAX_DISPLACEMENT_SHARE * perimeter_m;
-        if let Some(c) = (self.coefficients_m.iter()).find(|c| !(c.abs() <= most_m)) {
+        let possible = -most_m..=most_m;
+        if let Some(c) = (self.coefficients_m.iter()).find(|c| !possible.contains(*c)) {
             return Err(format!(
                 "a coefficient is {c} m; displacements must be no more than {most_m:.3} m"
             ));

@@ -13,8 +13,8 @@ use tunnelstitch_geometry::surface::{
 };
 use tunnelstitch_geometry::trajectory::{PoseError, text};
 
-/// 1-σ of a real lining's deviation from its nominal shape, radii: a centimetre at a radius of three
-/// metres.
+/// 1-σ of a real lining's deviation from its nominal shape, radii: a centimetre at a radius of
+/// three metres.
 pub const DEFAULT_SHAPE_SIGMA_RADII: f64 = 1.0 / 300.0;
 /// Largest 1-σ of it, radii.
 const MAX_SHAPE_SIGMA_RADII: f64 = 0.1;
@@ -125,7 +125,8 @@ impl TunnelSection {
         .transpose()
     }
 
-    /// Creates the tunnel of the given shape, without `shape_file`; paths are relative to `folder`, and errors name the file `toml`.
+    /// Creates the tunnel of the given shape, without `shape_file`; paths are relative to `folder`,
+    /// and errors name the file `toml`.
     ///
     /// # Errors
     /// A size that is missing, impossible or of another shape; a centreline that cannot be read or

@@ -106,8 +106,8 @@ where
         self.nominal.perimeter_m()
     }
 
-    /// The gauge of the nominal surface. Its motions move the displacement as well: trajectories that
-    /// are estimated with the wall's shape are compared up to them.
+    /// The gauge of the nominal surface. Its motions move the displacement as well: trajectories
+    /// that are estimated with the wall's shape are compared up to them.
     fn gauge(&self) -> Gauge {
         self.nominal.gauge()
     }

@@ -117,7 +117,7 @@ impl RadialField {
         }
     }
 
-    /// The same field on a lattice of half the spacing.
+    /// This field on a lattice of half the spacing.
     pub fn halved(&self) -> Self {
         let lattice = self.lattice.halved();
         let rows = self.rows();

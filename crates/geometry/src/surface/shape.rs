@@ -34,8 +34,8 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
         }
     }
 
-    /// Unit normals `e_s × e_h/|e_s × e_h|` (outwards) on the grid `s_m × h_m` of wall points, written
-    /// to `normals` row by row; shapes override it as [`Surface::lattice`].
+    /// Unit normals `e_s × e_h/|e_s × e_h|` (outwards) on the grid `s_m × h_m` of wall points,
+    /// written to `normals` row by row; shapes override it as [`Surface::lattice`].
     fn normals(&self, s_m: &[f64], h_m: &[f64], normals: &mut Vec<Vector3<f64>>) {
         normals.clear();
         for &h_m in h_m {

@@ -18,8 +18,8 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of `slots` blocks of parameters of which the `pairs` (any order, repeated or not)
-    /// share residuals; the diagonal always exists.
+    /// The pattern of `slots` blocks of parameters of which the `pairs` (any order, repeated or
+    /// not) share residuals; the diagonal always exists.
     pub fn new(slots: usize, pairs: impl IntoIterator<Item = (usize, usize)>) -> Self {
         let mut rows: Vec<Vec<usize>> = (0..slots).map(|k| vec![k]).collect();
         for (a, b) in pairs {

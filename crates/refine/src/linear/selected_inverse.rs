@@ -1,8 +1,9 @@
 //! Selected inversion: the blocks of `H⁻¹` on the sparsity pattern of the factor of H.
 //!
 //! Let `H = L D Lᵀ` with L unit lower triangular in 8 × 8 blocks, in an order of elimination that
-//! leaves it sparse ([`elimination_order`]). `Z = H⁻¹` obeys `Z = D⁻¹ L⁻¹ + (I − Lᵀ) Z` (Takahashi's equations).
-//! From the last column to the first, with R_j the rows of L's column j below the diagonal,
+//! leaves it sparse ([`elimination_order`]). `Z = H⁻¹` obeys `Z = D⁻¹ L⁻¹ + (I − Lᵀ) Z`
+//! (Takahashi's equations). From the last column to the first, with R_j the rows of L's column j
+//! below the diagonal,
 //!
 //! `Z_ij = −Σ_{k∈R_j} Z_ik L_kj`  (i ∈ R_j),   `Z_jj = D_j⁻¹ − Σ_{k∈R_j} L_kjᵀ Z_kj`,
 //!

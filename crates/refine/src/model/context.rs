@@ -71,8 +71,8 @@ impl EstimationContext<'_> {
         }
     }
 
-    /// The rigid motions that change no image. They move the shape that is estimated with the poses,
-    /// but not one that is known.
+    /// The rigid motions that change no image. They move the shape that is estimated with the
+    /// poses, but not one that is known.
     pub fn gauge(&self) -> Gauge {
         match self.displacement {
             Some(_) => Gauge::default(),

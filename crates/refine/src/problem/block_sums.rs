@@ -5,7 +5,7 @@ use crate::parameters::frame_estimate::FrameStep;
 use crate::problem::intrinsics_terms::IntrinsicsSums;
 use crate::problem::linearisation::FrameContribution;
 use crate::problem::observer_column::ObserverColumn;
-use crate::problem::shape_terms::TileShape;
+use crate::problem::tile_shape::TileShape;
 use crate::tiles::tile_arrays::SAMPLES;
 use nalgebra::Matrix4;
 

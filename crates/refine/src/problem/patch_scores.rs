@@ -64,8 +64,8 @@ impl PatchScores {
 }
 
 impl PhotometricProblem<'_> {
-    /// The scores of patches of 2 × 2 blocks at the given unknowns, scaled as the gradient of the cost
-    /// is.
+    /// The scores of patches of 2 × 2 blocks at the given unknowns, scaled as the gradient of the
+    /// cost is.
     ///
     /// # Errors
     /// [`ProblemError::Frame`] if a frame has to be read again and cannot be.

@@ -19,27 +19,8 @@ use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::problem::block_sums::BlockSums;
 use crate::problem::intrinsics_terms::PIXEL_PARAMETERS;
 use crate::problem::observer_column::ObserverColumn;
+use crate::problem::tile_shape::TileShape;
 use nalgebra::{Matrix4, RowSVector, SMatrix, Vector2, Vector3, Vector4};
-
-/// A function of the shape at a tile.
-#[derive(Clone, Copy, Debug)]
-pub struct TileFunction {
-    /// Its block, among the slots of the block of the wall.
-    pub index: usize,
-    /// Its coefficient in the block.
-    pub component: usize,
-    /// Its value at the tile's centre.
-    pub value: f64,
-}
-
-/// The shape's functions at a tile.
-#[derive(Clone, Debug)]
-pub struct TileShape {
-    /// Unit normal of the nominal wall at the tile's centre.
-    pub normal: Vector3<f64>,
-    /// The functions that are not zero there, by ascending block.
-    pub functions: Vec<TileFunction>,
-}
 
 /// Sums over the observers of a tile.
 struct ObserverSums {

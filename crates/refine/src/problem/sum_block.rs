@@ -4,7 +4,7 @@ use crate::problem::block_sums::{BlockSums, TileSums};
 use crate::problem::observer_column::ObserverColumn;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::problem::set_up::shape_slots;
-use crate::problem::shape_terms::{TileFunction, TileShape};
+use crate::problem::tile_shape::{TileFunction, TileShape};
 use crate::samples::observer::Observer;
 use crate::samples::visibility::{Tile, Visibility};
 use crate::tiles::frame_samples::SampledFrame;

@@ -1,10 +1,10 @@
 //! Strengths of the wall's shape, learned from the frames by evidence.
 //!
 //! At the end of a solve the cost is, nearly, a quadratic function of all unknowns x: the frames,
-//! the shared parameters, and the coefficients c of the shape, which have the prior
-//! `N(0, σ_k²)` with one strength for each scale k ([`crate::parameters::shape`]). With A the normal
-//! matrix for the strengths σ and x̂ the minimiser of the cost E, the logarithm of the probability
-//! of the pixels given the strengths is, but for a constant,
+//! the shared parameters, and the coefficients c of the shape, which have the prior `N(0, σ_k²)`
+//! with one strength for each scale k ([`crate::parameters::shape`]). With A the normal matrix for
+//! the strengths σ and x̂ the minimiser of the cost E, the logarithm of the probability of the
+//! pixels given the strengths is, but for a constant,
 //!
 //! `L(σ) = −E(x̂) − ½ log det A − Σ_k n_k log σ_k`,
 //!
@@ -268,7 +268,8 @@ mod tests {
     use rand_distr::{Distribution, StandardNormal};
     use tunnelstitch_geometry::surface::WallPoint;
 
-    /// Every coefficient is observed with an error of 1 mm; those of one lattice are 5 mm, all others
+    /// Every coefficient is observed with an error of 1 mm; those of one lattice are 5 mm, all
+    /// others
     /// 0. Strengths begin at 10 mm.
     #[test]
     fn strengths_are_those_of_the_wall_and_useless_scales_are_dropped() {

@@ -208,8 +208,8 @@ impl Placement {
     }
 }
 
-/// Displacement of the wall's points, on the unrolled wall, by a motion along the gauge: that of the
-/// point that `pose` looks at.
+/// Displacement of the wall's points, on the unrolled wall, by a motion along the gauge: that of
+/// the point that `pose` looks at.
 fn displacement_by(motion: &GaugeMotion, nominal: &dyn Surface, pose: &Pose) -> WallPoint {
     let seen = |pose: &Pose| {
         let hit = nominal.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()));

@@ -13,8 +13,8 @@ use crate::stages::state::PipelineState;
 
 /// Columns of the finest lattice before anything is known: nodes a fifth of the radius apart.
 const FIRST_FINEST_COLUMNS: usize = 32;
-/// Columns of the finest lattice at the most: nodes a tenth of the radius apart. Twice as many would
-/// cost eight times the time.
+/// Columns of the finest lattice at the most: nodes a tenth of the radius apart. Twice as many
+/// would cost eight times the time.
 const MAX_COLUMNS: usize = 64;
 /// Strength of a finer lattice over that of the one before, before it is learned.
 const FINER_STRENGTH: f64 = 0.5;

@@ -25,8 +25,8 @@ const MAX_LEARNING_SOLVES: usize = 4;
 /// Runs the stage; a snapshot may be kept between two steps.
 ///
 /// A parameter that the last solve finds unobservable is fixed, and the solve planned again; as it
-/// is if the shape turns out to have other strengths ([`crate::stages::shape`]), or if residuals show
-/// model errors, with pixels that tell accordingly less ([`crate::uncertainty::model_error`]).
+/// is if the shape turns out to have other strengths ([`crate::stages::shape`]), or if residuals
+/// show model errors, with pixels that tell accordingly less ([`crate::uncertainty::model_error`]).
 ///
 /// # Errors
 /// A frame that cannot be read, equations without a solution.

@@ -217,8 +217,8 @@ type BatchBlock = SMatrix<f64, FRAME_PARAMETERS, BATCH>;
 type SharedBatch = SMatrix<f64, SHARED_PARAMETERS, BATCH>;
 
 impl System<'_> {
-    /// Draws of the steps of `count` slots, of which the first `frames` are frames, that scores with
-    /// random signs make.
+    /// Draws of the steps of `count` slots, of which the first `frames` are frames, that scores
+    /// with random signs make.
     fn draw(&self, count: usize, frames: usize) -> ErrorDraws {
         let batches =
             (0..BATCHES as usize).par_map(|batch| self.draw_batch(batch as u64, count, frames));

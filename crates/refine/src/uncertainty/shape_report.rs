@@ -1,7 +1,7 @@
 //! The wall's shape of the result, with its uncertainty.
 
 use crate::model::context::{EstimationContext, total_displacement};
-use crate::parameters::shape::{Functions, Shape, ShapeModel};
+use crate::parameters::shape::{Functions, Scale, Shape, ShapeModel};
 use crate::uncertainty::total_covariance::TotalCovariance;
 use serde::{Deserialize, Serialize};
 use tunnelstitch_geometry::numerics::parallel::ParallelMap;
@@ -91,7 +91,7 @@ fn sigma_at(
 impl ShapeReport {
     /// Reports the scales of a model and the shape estimated with them.
     pub fn new(model: &ShapeModel, estimated: Option<&EstimatedShape>) -> Self {
-        let scale = |scale: &crate::parameters::shape::Scale| ScaleReport {
+        let scale = |scale: &Scale| ScaleReport {
             spacing_m: match scale.functions {
                 Functions::Harmonics => None,
                 Functions::Lattice { columns, .. } => Some(model.spacing_m(columns)),
