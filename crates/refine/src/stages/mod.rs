@@ -24,4 +24,3 @@ pub mod setup;
 pub mod solve;
 pub mod state;
 pub mod track;
-pub mod validate_pairs;
