@@ -311,8 +311,8 @@ fn displaced(point: &[f32; 3], e_s: &[f32; 3], e_h: &[f32; 3], ds: f32, dh: f32)
     std::array::from_fn(|k| point[k] + ds * e_s[k] + dh * e_h[k])
 }
 
-/// Slopes along s and h at a point with the tangents `e_s` and `e_h`, grey levels per pixel: central
-/// differences over one pixel of the width `step` (metres) to either side.
+/// Slopes along s and h at a point with the tangents `e_s` and `e_h`, grey levels per pixel:
+/// central differences over one pixel of the width `step` (metres) to either side.
 fn slope_at(
     grey: impl Fn(&[f32; 3]) -> Option<f32>,
     [point, e_s, e_h]: [&[f32; 3]; 3],

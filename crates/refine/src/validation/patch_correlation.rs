@@ -2,8 +2,8 @@
 //!
 //! Two frames that are aligned with each other need not show the same wall: joints coincide
 //! wherever the pattern of the bricks does, whatever is between them. So their grey values are
-//! compared, less the medians of patches that hold a brick or two: smooth light cancels, and a glint
-//! displaces nothing.
+//! compared, less the medians of patches that hold a brick or two: smooth light cancels, and a
+//! glint displaces nothing.
 //!
 //! With t the share of the contrast's variance that is texture and not noise, frames of one wall
 //! correlate with `r = c t`, c the correlation without noise, 1 but for what changes between
