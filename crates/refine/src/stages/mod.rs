@@ -25,4 +25,3 @@ pub mod shape;
 pub mod solve;
 pub mod state;
 pub mod track;
-pub mod validate_pairs;
