@@ -52,6 +52,9 @@ where
     N: Deref<Target: Surface> + Send + Sync + std::fmt::Debug,
 {
     /// Intersects by Newton's method on `t + λ d − X(s, h) = 0` from the nominal intersection.
+    ///
+    /// A ray that grazes the wall, for which this does not settle, gets the nominal intersection: it
+    /// meets the wall somewhere near.
     fn hit(&self, t: &Vector3<f64>, d: &Vector3<f64>) -> Result<Hit, SurfaceError> {
         let nominal = self.nominal.hit(t, d)?;
         let (mut range, mut wall) = (nominal.range, nominal.wall);
@@ -59,12 +62,17 @@ where
         for _ in 0..MAX_NEWTON_STEPS {
             let frame = self.frame(wall);
             let jacobian = Matrix3::from_columns(&[*d, -frame.e_s, -frame.e_h]);
-            let inverse = jacobian.try_inverse().ok_or(SurfaceError::Grazing)?;
+            let Some(inverse) = jacobian.try_inverse() else {
+                break;
+            };
             let step = inverse * (frame.x_w - t - d * range);
-            range += step.x;
-            wall.s_m += step.y;
-            wall.h_m += step.z;
-            if step.y.hypot(step.z) < converged_m {
+            let length_m = step.y.hypot(step.z);
+            // Within a node's reach the wall is nearly plane.
+            let share = (self.field.lattice().spacing_m() / length_m).min(1.0);
+            range += step.x * share;
+            wall.s_m += step.y * share;
+            wall.h_m += step.z * share;
+            if length_m < converged_m {
                 wall.s_m = wall.s_m.rem_euclid(self.perimeter_m());
                 return Ok(Hit {
                     range,
@@ -73,7 +81,7 @@ where
                 });
             }
         }
-        Err(SurfaceError::Grazing)
+        Ok(nominal)
     }
 
     /// Computes the tangents by central differences, which hold those of the normal as well.

@@ -18,9 +18,6 @@ pub enum SurfaceError {
     /// The ray runs along the axis and never meets the wall.
     #[error("the ray runs along the tunnel's axis and meets no wall")]
     Parallel,
-    /// The ray grazes a wall that is not smooth, so that its intersection is not certain.
-    #[error("the ray grazes the wall, and where it meets it is not certain")]
-    Grazing,
     /// The vanishing point of the axis lies within the image.
     #[error(
         "the image contains the vanishing point of the tunnel's axis, so that its view has no \

@@ -16,6 +16,9 @@ const FIRST_FINEST_COLUMNS: usize = 32;
 /// Columns of the finest lattice at the most: nodes a tenth of the radius apart. Twice as many
 /// would cost eight times the time.
 const MAX_COLUMNS: usize = 64;
+/// Coefficient beyond which a shape is not believed, 1-σ of the prior: a thirtieth of the radius, if the
+/// survey does not say how exact the wall is.
+const MAX_PRIOR_SIGMAS: f64 = 10.0;
 /// Strength of a finer lattice over that of the one before, before it is learned.
 const FINER_STRENGTH: f64 = 0.5;
 /// Factor by which a strength may change without a new solve; the estimate hardly depends on it.
@@ -48,26 +51,47 @@ pub fn begin(setup: &Setup, state: &mut PipelineState) -> Result<(), ProblemErro
     Ok(())
 }
 
+/// Takes over the shape of a solution. A shape far beyond its prior means that something else is
+/// wrong: then the wall and the lens are those given.
+pub fn take_over(setup: &Setup, state: &mut PipelineState, solution: &Solution) {
+    let Some(shape) = &mut state.shape else {
+        return;
+    };
+    shape.coefficients.clone_from(&solution.unknowns.shape);
+    let most_m = MAX_PRIOR_SIGMAS * setup.shape_sigma_m;
+    let is_plausible = |block: &ShapeStep| (0.0..=most_m).contains(&block.amax());
+    if !shape.coefficients.iter().all(is_plausible) {
+        shape.model.scales.clear();
+        shape.coefficients.clear();
+        fix_lens(setup, state);
+    }
+}
+
+/// Fixes the lens parameters that were not asked for at their given values.
+fn fix_lens(setup: &Setup, state: &mut PipelineState) {
+    for k in 0..INTRINSIC_PARAMETERS {
+        state.free[k] = setup.calibration.free[k];
+        if !state.free[k] {
+            state.kappa[k] = 0.0;
+        }
+    }
+}
+
 /// Learns the strengths of the shape at a full-size solution, and whether the lens differs from the
 /// given one. Returns true if that changes anything; the state is then ready for a new solve.
 pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution) -> bool {
     let Some(learned) = learn_shape(solution, setup.options.false_alarm_rate) else {
         return false;
     };
-    let mut free = state.free;
+    let free = state.free;
     if !is_lens_changed(&learned, setup.options) {
-        let asked_for = &setup.calibration.free[..INTRINSIC_PARAMETERS];
-        free[..INTRINSIC_PARAMETERS].copy_from_slice(asked_for);
+        fix_lens(setup, state);
     }
     let shape = with_finer_lattice(learned.shape);
     let before = solution.problem.shape().map(|before| &before.model);
     if free == state.free && before.is_some_and(|before| !is_changed(before, &shape.model)) {
         return false;
     }
-    for k in (0..INTRINSIC_PARAMETERS).filter(|k| !free[*k]) {
-        state.kappa[k] = 0.0;
-    }
-    state.free = free;
     state.shape = Some(shape);
     true
 }

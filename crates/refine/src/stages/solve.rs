@@ -4,7 +4,6 @@ use crate::error::RefineError;
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::options::RefineOptions;
-use crate::parameters::unknowns::Unknowns;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::report::LevelReport;
 use crate::solver::argmin_glue::{self, Observation};
@@ -48,7 +47,9 @@ pub fn run<'a>(
         return Ok(estimation);
     }
     let solution = solve(&plan, problem, setup, state, session)?;
-    take_over(&solution.unknowns, state);
+    state.frames.estimates.clone_from(&solution.unknowns.frames);
+    state.kappa = solution.unknowns.kappa;
+    shape::take_over(setup, state, &solution);
     if may_learn_shape(&plan, state)
         && shape::learn(setup, state, &solution)
         && !has_solve_ahead(state)
@@ -156,8 +157,7 @@ fn solve<'a>(
     Ok(solution)
 }
 
-/// The uncertainty of a full-size solution that is the last one, or has shared parameters that it
-/// may not observe.
+/// The uncertainty of the last solution; before, unknowns may be free that it turns out not to have.
 fn uncertainty_of(
     plan: &SolvePlan,
     setup: &Setup,
@@ -166,8 +166,7 @@ fn uncertainty_of(
     solution: &Solution,
 ) -> Result<Option<SolutionUncertainty>, ProblemError> {
     let calibration = setup.calibration_at(state);
-    let is_last = !has_solve_ahead(state);
-    if plan.sampling.level > 0 || !(is_last || setup.calibration.has_free_parameters()) {
+    if plan.sampling.level > 0 || has_solve_ahead(state) {
         return Ok(None);
     }
     let solved = context.at(solution.unknowns.kappa);
@@ -200,15 +199,6 @@ fn find_unobservable(
 fn may_learn_shape(plan: &SolvePlan, state: &PipelineState) -> bool {
     let before = state.levels.iter().filter(|solve| solve.level == 0).count();
     plan.sampling.level == 0 && before < MAX_LEARNING_SOLVES
-}
-
-/// Takes over the unknowns of a solution.
-fn take_over(unknowns: &Unknowns, state: &mut PipelineState) {
-    state.frames.estimates.clone_from(&unknowns.frames);
-    state.kappa = unknowns.kappa;
-    if let Some(shape) = &mut state.shape {
-        shape.coefficients.clone_from(&unknowns.shape);
-    }
 }
 
 /// True if another solve is certain to follow; a joint one may turn out to be needless.
