@@ -10,7 +10,7 @@ static OVAL: LazyLock<TempDir> = LazyLock::new(|| {
     let dir = tempfile::tempdir().unwrap();
     let survey = dir.path().join("survey");
     let lining = "--ovality-mm 10 --undulation-mm 2 --undulation-length-m 1.5";
-    let options = format!("--frames 36 --size 160x120 --seed 5 --noise 1 {lining}");
+    let options = format!("--frames 40 --size 200x150 --seed 5 --noise 1 {lining}");
     simulate(&survey, &options.split(' ').collect::<Vec<_>>());
     for (mode, out) in [("auto", "auto"), ("fixed", "fixed")] {
         let out = dir.path().join(out);

@@ -1,6 +1,7 @@
 //! Stage: states the uncertainty and the verdict of every frame, and writes the report.
 
 use crate::error::RefineError;
+use crate::linear::sparse_cholesky::FactorError;
 use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
@@ -212,8 +213,14 @@ fn steps_left(solution: &Solution) -> Result<Vec<f64>, ProblemError> {
         .symbolic()
         .factorise(problem.pattern(), &linearisation.normal, 0.0)
         .map_err(|source| problem.factor_error(source))?;
-    let step = factor.step(&linearisation.normal.gradient);
-    Ok(problem.wall_step_px(&solution.unknowns.frames, &step, &Kappa::zeros()))
+    let gradient = &linearisation.normal.gradient;
+    let (step, shared) = match &linearisation.border {
+        None => (factor.step(gradient), Kappa::zeros()),
+        Some(border) => border
+            .step(&factor, gradient, 0.0)
+            .ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))?,
+    };
+    Ok(problem.wall_step_px(&solution.unknowns.frames, &step, &shared))
 }
 
 /// Root mean square residual of a frame, grey levels.

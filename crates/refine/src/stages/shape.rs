@@ -1,4 +1,5 @@
-//! The wall's shape between solves: begun before the first, its strengths learned at full size.
+//! The wall's shape between solves: begun before the first at full size, its strengths learned after
+//! it.
 
 use crate::model::problem_error::ProblemError;
 use crate::model::significance::chi_squared_bounds;

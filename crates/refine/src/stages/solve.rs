@@ -36,7 +36,9 @@ pub fn run<'a>(
     session: &mut Session,
 ) -> Result<Estimation<'a>, RefineError> {
     let state = &mut estimation.state;
-    shape::begin(setup, state)?;
+    if plan.sampling.level == 0 {
+        shape::begin(setup, state)?;
+    }
     let context = setup.context(state);
     let Some(problem) = problem_of(&plan, setup, &context, state)? else {
         session.record_time("joint model of the wall");

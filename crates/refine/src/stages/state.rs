@@ -32,7 +32,7 @@ pub struct PipelineState {
     pub kappa: Kappa,
     /// ... and which of them are still estimated.
     pub free: [bool; SHARED_PARAMETERS],
-    /// The wall's shape, if it is estimated, from the first global solve on.
+    /// The wall's shape, if it is estimated, from the first solve at full size on.
     pub shape: Option<Shape>,
     /// Tracking, if it is under way.
     pub tracking: Option<AlternatingCalibration>,
