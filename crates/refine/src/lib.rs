@@ -15,6 +15,7 @@
 //! | [`track`](stages::track) | registers one frame after another on the wall that its predecessors show; sliding windows | [`tracking`] |
 //! | [`correct_shading`](stages::correct_shading) | light that moves with the camera, from the overlaps | [`tunnelstitch_photometry`] |
 //! | [`solve`](stages::solve) | all frames together, coarse to fine | [`problem`], [`solver`] |
+//! | [`validate_pairs`](stages::validate_pairs) | rejects frames that contradict the others | [`validation::pairwise_ncc`] |
 //! | [`repair`](stages::repair) | rejects inconsistent frames, registers them again, resolves aliases | [`validation`] |
 //! | [`solve`](stages::solve), last | full size, dense samples; then jointly with the wall, if asked for | [`joint`] |
 //! | [`assess`](stages::assess) | uncertainty and verdict of every frame and of the survey | [`uncertainty`], [`verdict`] |
@@ -79,16 +80,13 @@ pub use error::RefineError;
 pub use input::RefineInput;
 pub use model::problem_error::ProblemError;
 pub use options::{RefineOptions, ShapeMode};
-pub use pipeline::{refine, refine_in_stages, refine_with_checkpoint};
+pub use pipeline::{refine, refine_with_checkpoint};
 pub use pose_convention_search::search_pose_conventions;
 pub use problem::unknown_texture::UnknownTexture;
 pub use refined::Refined;
 pub use report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
-pub use samples::sampling::Sampling;
 pub use solver::solve_record::{SolveRecord, StepRecord};
-pub use solver::stopping::{StopReason, Stopping};
-pub use stages::plan::{SolvePlan, Stage};
-pub use tiles::interpolation::Interpolation;
+pub use solver::stopping::StopReason;
 pub use uncertainty::calibration_report::{CalibrationReport, UnknownReport};
 pub use uncertainty::covariance::Covariances;
 pub use uncertainty::covariance_file::{CovarianceError, read_covariances};

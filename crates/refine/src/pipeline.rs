@@ -8,12 +8,11 @@ use crate::options::RefineOptions;
 use crate::parameters::calibration::Kappa;
 use crate::refined::Refined;
 use crate::stages::assess::without_solution;
-use crate::stages::plan::{Stage, plan_stages};
+use crate::stages::plan::plan_stages;
 use crate::stages::run::run_stage;
 use crate::stages::session::Session;
 use crate::stages::setup::Setup;
 use crate::stages::state::{Estimation, PipelineState};
-use std::collections::VecDeque;
 use std::sync::Arc;
 use tunnelstitch_core::persist::checkpoint::Checkpoint;
 use tunnelstitch_core::progress::Progress;
@@ -50,52 +49,21 @@ pub fn refine_with_checkpoint<'a>(
     let setup = Setup::new(input.into(), options)?;
     let mut session = Session::new(checkpoint, progress);
     let state = session.restore(&setup)?;
-    let stages = plan_stages(options, setup.handover_level());
-    run_stages(
-        &setup,
-        state.unwrap_or_else(|| begin(&setup, stages)),
-        &mut session,
-    )
-}
-
-/// Refines the poses of frames in other stages: `change` is given those that the options ask for.
-///
-/// # Errors
-/// [`RefineError`].
-pub fn refine_in_stages<'a>(
-    input: impl Into<RefineInput<'a>>,
-    options: &RefineOptions,
-    change: impl FnOnce(&mut VecDeque<Stage>),
-    progress: &Arc<dyn Progress>,
-) -> Result<Refined, RefineError> {
-    let setup = Setup::new(input.into(), options)?;
-    let mut stages = plan_stages(options, setup.handover_level());
-    change(&mut stages);
-    let mut session = Session::new(None, progress);
-    run_stages(&setup, begin(&setup, stages), &mut session)
-}
-
-/// Runs the stages that are left.
-fn run_stages(
-    setup: &Setup,
-    state: PipelineState,
-    session: &mut Session,
-) -> Result<Refined, RefineError> {
     let mut estimation = Estimation {
-        state,
+        state: state.unwrap_or_else(|| begin(&setup)),
         solution: None,
         refined: None,
     };
     while let Some(stage) = estimation.state.stages.front().copied() {
         // The solution that the assessment uses is no part of a snapshot.
         if estimation.solution.is_none() {
-            session.keep_if_due(setup, || estimation.state.clone())?;
+            session.keep_if_due(&setup, || estimation.state.clone())?;
         }
-        estimation = match run_stage(stage, setup, estimation, session) {
+        estimation = match run_stage(stage, &setup, estimation, &mut session) {
             Ok(estimation) => estimation,
             // Poses that nothing determines are those given.
             Err(RefineError::Problem(ProblemError::Factor { .. })) => {
-                return Ok(without_solution(setup, session));
+                return Ok(without_solution(&setup, &mut session));
             }
             Err(error) => return Err(error),
         };
@@ -105,14 +73,14 @@ fn run_stages(
 }
 
 /// The state before the first stage.
-fn begin(setup: &Setup, stages: VecDeque<Stage>) -> PipelineState {
+fn begin(setup: &Setup) -> PipelineState {
     let frames = FrameStates {
         estimates: Vec::new(),
         rejections: vec![None; setup.count()],
         kappa: Kappa::zeros(),
     };
     PipelineState {
-        stages,
+        stages: plan_stages(setup.options, setup.handover_level()),
         noise: 0.0,
         dispersion: 1.0,
         solved: frames.clone(),

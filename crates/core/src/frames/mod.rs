@@ -24,7 +24,7 @@ pub use frame_file::{FrameFile, list_frames};
 pub use frame_set::FrameSet;
 pub use grey::GreyImage;
 pub use hash::hash_frames;
-pub use local_contrast::{LocalContrast, local_contrast};
+pub use local_contrast::{LocalContrast, local_contrast, mask_outliers};
 pub use mask::{Mask, PyramidMask};
 pub use noise::MAD_TO_SIGMA;
 pub use noise::{noise_at_level, noise_sigma};

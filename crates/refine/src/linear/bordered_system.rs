@@ -160,9 +160,9 @@ pub struct SchurComplement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear::normal_equations::Block;
+    use crate::linear::normal_equations::{Block, NormalEquations, Pattern};
     use crate::linear::sparse_cholesky::SymbolicFactorisation;
-    use crate::linear::test_dense::random_system;
+    use crate::linear::test_dense::set_block;
     use nalgebra::{DMatrix, DVector};
     use tunnelstitch_geometry::camera::Camera;
 
@@ -174,12 +174,22 @@ mod tests {
     #[test]
     fn step_solves_the_bordered_equations() {
         let frames = 6;
-        let (pattern, normal, of_frames) = random_system(frames);
+        let pattern = Pattern::new(frames, (1..frames).map(|k| (k - 1, k)));
+        let mut normal = NormalEquations::zeros(&pattern);
         let mut border = SharedBorder::zeros(frames);
         let n = frames * FRAME_PARAMETERS;
-        let mut dense = of_frames.resize(n + SHARED_PARAMETERS, n + SHARED_PARAMETERS, 0.0);
+        let mut dense = DMatrix::zeros(n + SHARED_PARAMETERS, n + SHARED_PARAMETERS);
         let mut gradient = DVector::zeros(n + SHARED_PARAMETERS);
         for column in 0..frames {
+            for &row in pattern.rows(column) {
+                let mut block = Block::from_fn(|r, c| number(r + 8 * c, (row + 9 * column) as f64));
+                if row == column {
+                    block = block * block.transpose() + Block::identity() * 30.0;
+                }
+                normal.add_block(&pattern, row, column, &block);
+                set_block(&mut dense, row, column, &block);
+            }
+            normal.gradient[column] = FrameStep::from_fn(|r, _| number(r, column as f64));
             border.frames[column] =
                 BorderBlock::from_fn(|r, c| number(r + 8 * c, 0.3 * column as f64));
             for r in 0..FRAME_PARAMETERS {

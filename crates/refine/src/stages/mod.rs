@@ -25,3 +25,4 @@ pub mod shape;
 pub mod solve;
 pub mod state;
 pub mod track;
+pub mod validate_pairs;

@@ -21,6 +21,9 @@ pub enum Stage {
     CorrectShading,
     /// Solves all frames together at one pyramid level ([`crate::stages::solve`]).
     Solve(SolvePlan),
+    /// Rejects frames that contradict the others pair by pair
+    /// ([`crate::stages::validate_pairs`]).
+    ValidatePairs,
     /// Rejects inconsistent frames, registers them again, resolves aliases
     /// ([`crate::stages::repair`]).
     Repair,
@@ -29,12 +32,15 @@ pub enum Stage {
 }
 
 /// The stages of a refinement whose tracking ends at pyramid level `handover`: track coarsely,
-/// solve coarse to fine with a repair before the last solve, assess.
+/// solve coarse to fine with a check after the first solve and a repair before the last, assess.
 pub fn plan_stages(options: &RefineOptions, handover: usize) -> VecDeque<Stage> {
     let mut stages = VecDeque::from([Stage::Prescreen, Stage::Track, Stage::CorrectShading]);
     for level in (0..=handover).rev() {
         let plan = SolvePlan::intermediate(options, level, handover);
         stages.push_back(Stage::Solve(plan));
+        if level == handover {
+            stages.push_back(Stage::ValidatePairs);
+        }
     }
     stages.push_back(Stage::Repair);
     stages.push_back(Stage::Solve(SolvePlan::last(options)));
@@ -149,7 +155,8 @@ mod tests {
         let expected = [(2, false), (1, false), (0, false), (0, false), (0, true)];
         assert_eq!(solves.collect::<Vec<_>>(), expected);
         assert_eq!(stages.back(), Some(&Stage::Assess));
-        // The first solve uses all of the information.
+        // The first solve is checked at once, with all of the information.
+        assert_eq!(stages[4], Stage::ValidatePairs);
         let Stage::Solve(first) = stages[3] else {
             panic!("{:?}", stages[3]);
         };

@@ -5,7 +5,9 @@ use crate::model::problem_error::ProblemError;
 use crate::samples::point_sampler::{ImagePoint, PointSampler};
 use nalgebra::Vector3;
 use std::sync::Arc;
-use tunnelstitch_core::frames::{GreyImage, LocalContrast, Pyramid, noise_at_level};
+use tunnelstitch_core::frames::{
+    GreyImage, LocalContrast, Pyramid, local_contrast, mask_outliers, noise_at_level,
+};
 use tunnelstitch_geometry::camera::{Camera, Sweep};
 use tunnelstitch_geometry::trajectory::Pose;
 
@@ -33,6 +35,37 @@ impl UnwrappedFrame {
         Ok(Self {
             camera: context.camera.at_level(level).with_sweep(sweep),
             local: pyramid.contrast(level),
+            level,
+            pyramid,
+        })
+    }
+
+    /// Frame `frame`, read while its camera moves by `sweep`; its local contrast is taken over no
+    /// more than `window_px` pixels to each side, so that only fine detail is left.
+    ///
+    /// `with_outliers`: of all that the frame shows, or without what stands out of the wall
+    /// ([`mask_outliers`]).
+    ///
+    /// # Errors
+    /// [`ProblemError::Frame`].
+    pub fn with_window(
+        context: &EstimationContext,
+        level: usize,
+        frame: usize,
+        sweep: &Sweep,
+        window_px: usize,
+        with_outliers: bool,
+    ) -> Result<Self, ProblemError> {
+        let pyramid = context.frames.get(frame)?;
+        let image = pyramid.level(level);
+        let local = if with_outliers {
+            local_contrast(image, window_px)
+        } else {
+            local_contrast(&mask_outliers(image), window_px)
+        };
+        Ok(Self {
+            camera: context.camera.at_level(level).with_sweep(sweep),
+            local: Arc::new(local),
             level,
             pyramid,
         })
@@ -98,6 +131,16 @@ impl UnwrappedSampler<'_> {
         let spot = self.sampler.project(point)?;
         let contrast = spot.sample_valid(&self.unwrapped.local.contrast)?;
         Some((contrast, self.noise_at(&spot)))
+    }
+
+    /// Local contrast, the variance of its noise, and the fine detail in grey levels; None where
+    /// the frame has no value.
+    #[inline]
+    pub fn contrast_and_detail(&self, point: &[f32; 3]) -> Option<(f32, f32, f32)> {
+        let spot = self.sampler.project(point)?;
+        let contrast = spot.sample_valid(&self.unwrapped.local.contrast)?;
+        let detail = spot.sample(&self.unwrapped.local.detail);
+        Some((contrast, self.noise_at(&spot), detail))
     }
 
     /// Local contrast, the variance of its noise, and the grey value; None where the frame has no

@@ -1,18 +1,18 @@
 //! Rejection of frames that the others do not support, once all are solved at full size.
 //!
-//! A frame is an inlier if it is as sharp as the others, if it is aligned with every inlier that it
-//! shares wall with and shows the same, and if such pairs tie it to the others. Agreement of
-//! neighbours is not enough: a group of frames can be right in itself and stand in the wrong place,
-//! if all that it shares with the others is a strip without texture, or the prior.
+//! A frame is an inlier if it is aligned with every inlier that it shares wall with, and if such
+//! pairs tie it to the others. Agreement of neighbours is not enough: a group of frames can be
+//! right in itself and stand in the wrong place, if all that it shares with the others is a strip
+//! without texture, or the prior.
 
 use crate::model::rejection::RejectionReason;
 use crate::model::significance::normal_quantile;
 use crate::options::RefineOptions;
 use crate::problem::linearisation::FrameContribution;
 use crate::thresholds::inconsistent_frames::{
-    MAX_REJECTED_SHARE, MAX_TYING_SIGMA_PX, MIN_CORRELATION, MIN_SHARPNESS_RATIO,
+    MAX_REJECTED_SHARE, MAX_TYING_SIGMA_PX, MIN_CORRELATION,
 };
-use crate::validation::alignment::{Alignment, Displacement};
+use crate::validation::alignment::Alignment;
 use tunnelstitch_geometry::numerics::median::upper_median;
 
 /// Rejects the frames of which the robust loss has rejected too many pixels at full size, so that
@@ -37,51 +37,50 @@ pub fn find_disagreement(share: &FrameContribution) -> Option<RejectionReason> {
 
 /// Finds the frames that the others do not support, with the reason.
 ///
-/// Blurred frames are rejected first. Of two frames that are misaligned or show different things
-/// one is wrong: the one with the largest share of its samples in such pairs is rejected first,
-/// until none is left. The inliers are the largest group of the rest that pairs tie together.
+/// Of two misaligned frames one is wrong: the one with the largest share of its samples in
+/// misaligned pairs is rejected first, until no such pair is left. The inliers are the largest
+/// group of the rest that pairs tie together.
 pub fn find_inconsistent_frames(
     alignments: &[Alignment],
     frames: usize,
     options: &RefineOptions,
 ) -> Vec<(usize, RejectionReason)> {
     let limits = Limits::new(alignments, options);
-    let mut rejections = find_blurred_frames(alignments, frames);
     let mut rejected = vec![false; frames];
-    for (frame, _) in &rejections {
-        rejected[*frame] = true;
-    }
+    let mut rejections = Vec::new();
     loop {
-        let (mut all, mut refuted) = (vec![0.0; frames], vec![0.0; frames]);
-        let present = || {
-            let both_left = |pair: &&Alignment| !rejected[pair.a] && !rejected[pair.b];
-            alignments.iter().filter(both_left)
-        };
-        for pair in present() {
+        let (mut all, mut misaligned) = (vec![0.0; frames], vec![0.0; frames]);
+        let mut worst_px = vec![0.0f64; frames];
+        for pair in alignments
+            .iter()
+            .filter(|p| !rejected[p.a] && !rejected[p.b])
+        {
             for frame in [pair.a, pair.b] {
                 all[frame] += pair.samples;
-                if limits.is_misaligned(pair) || limits.is_different(pair) {
-                    refuted[frame] += pair.samples;
+                if limits.is_misaligned(pair) {
+                    misaligned[frame] += pair.samples;
+                    worst_px[frame] = worst_px[frame].max(pair.error_px);
                 }
             }
         }
-        let share = |k: usize| refuted[k] / all[k];
+        let share = |k: usize| misaligned[k] / all[k];
         let worst = (0..frames)
-            .filter(|k| refuted[*k] > 0.0)
+            .filter(|k| misaligned[*k] > 0.0)
             .max_by(|a, b| share(*a).total_cmp(&share(*b)));
         let Some(worst) = worst else { break };
-        let own = present().filter(|pair| pair.a == worst || pair.b == worst);
-        rejections.push((worst, limits.reason_against(worst, own)));
         rejected[worst] = true;
+        rejections.push((
+            worst,
+            RejectionReason::Misaligned {
+                error_px: worst_px[worst],
+            },
+        ));
     }
     let aligned = alignments
         .iter()
         // Pairs with too little texture to measure are left to the covariance.
         .filter(|p| !rejected[p.a] && !rejected[p.b])
-        .filter(|p| {
-            let sigma_px = p.displacement.sigma_px;
-            sigma_px <= MAX_TYING_SIGMA_PX || sigma_px == f64::INFINITY
-        });
+        .filter(|p| p.sigma_px <= MAX_TYING_SIGMA_PX || p.sigma_px == f64::INFINITY);
     let group = connected_components(aligned.map(|pair| (pair.a, pair.b)), frames);
     let mut sizes = vec![0usize; frames];
     // Frames without any measured pair are not judged here.
@@ -120,9 +119,8 @@ impl Limits {
     /// two components of displacements are normal, their length exceeds its median `√(2 ln 2)` σ by
     /// the factor `√(ln(n/α)/ln 2)` once in n pairs with the probability α.
     fn new(alignments: &[Alignment], options: &RefineOptions) -> Self {
-        let displacements = alignments.iter().map(|pair| pair.displacement);
-        let measured = displacements.filter(|d| d.sigma_px.is_finite());
-        let median = upper_median(measured.map(|d| d.error_px).collect()).unwrap_or(0.0);
+        let measured = alignments.iter().filter(|p| p.sigma_px.is_finite());
+        let median = upper_median(measured.map(|p| p.error_px).collect()).unwrap_or(0.0);
         let pairs = alignments.len().max(1);
         let ratio = (pairs as f64 / options.false_alarm_rate).ln() / std::f64::consts::LN_2;
         Self {
@@ -131,56 +129,13 @@ impl Limits {
         }
     }
 
-    /// True if two frames are displaced by more than their uncertainty explains.
+    /// True if two frames show different things, or are displaced by more than their uncertainty
+    /// explains.
     fn is_misaligned(&self, pair: &Alignment) -> bool {
-        let Displacement { error_px, sigma_px } = pair.displacement;
-        error_px > self.max_error_px + self.sigmas * sigma_px
+        let is_different =
+            pair.sigma_px <= MAX_TYING_SIGMA_PX && pair.correlation < MIN_CORRELATION;
+        is_different || pair.error_px > self.max_error_px + self.sigmas * pair.sigma_px
     }
-
-    /// True if two frames correlate so little that they show different things.
-    fn is_different(&self, pair: &Alignment) -> bool {
-        pair.contrast.is_below(MIN_CORRELATION, self.sigmas)
-    }
-
-    /// The reason to reject a frame with these pairs: its largest displacement, or without any, the
-    /// frame that it correlates with the least.
-    fn reason_against<'p>(
-        &self,
-        frame: usize,
-        pairs: impl Iterator<Item = &'p Alignment> + Clone,
-    ) -> RejectionReason {
-        let misaligned = pairs.clone().filter(|pair| self.is_misaligned(pair));
-        let worst_px = misaligned.map(|pair| pair.displacement.error_px);
-        if let Some(error_px) = worst_px.max_by(f64::total_cmp) {
-            return RejectionReason::Misaligned { error_px };
-        }
-        let different = pairs.filter(|pair| self.is_different(pair));
-        let correlations = different.map(|pair| {
-            let other = if pair.a == frame { pair.b } else { pair.a };
-            (other, pair.contrast.corrected())
-        });
-        let least = correlations.min_by(|a, b| a.1.total_cmp(&b.1));
-        let (frame, correlation) = least.unwrap_or((frame, 1.0));
-        RejectionReason::Contradicts { frame, correlation }
-    }
-}
-
-/// Finds the frames that show less fine detail than the frames that they overlap.
-fn find_blurred_frames(alignments: &[Alignment], frames: usize) -> Vec<(usize, RejectionReason)> {
-    let mut ratios: Vec<Vec<f64>> = vec![Vec::new(); frames];
-    for (pair, ratio) in alignments
-        .iter()
-        .filter_map(|pair| Some((pair, pair.sharpness_ratio?)))
-    {
-        ratios[pair.a].push(ratio);
-        ratios[pair.b].push(1.0 / ratio);
-    }
-    let shares = ratios.into_iter().map(upper_median).enumerate();
-    shares
-        .filter_map(|(frame, share)| Some((frame, share?)))
-        .filter(|(_, share)| *share < MIN_SHARPNESS_RATIO)
-        .map(|(frame, share)| (frame, RejectionReason::Blurred { share }))
-        .collect()
 }
 
 /// Connected components of the graph of pairs: for each frame the first frame of its component.
@@ -202,7 +157,6 @@ fn connected_components(pairs: impl Iterator<Item = (usize, usize)>, frames: usi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validation::patch_correlation::PatchCorrelation;
 
     fn find(pairs: &[Alignment], frames: usize) -> Vec<(usize, RejectionReason)> {
         find_inconsistent_frames(pairs, frames, &RefineOptions::default())
@@ -212,21 +166,10 @@ mod tests {
         Alignment {
             a,
             b,
-            samples: 1000.0,
-            displacement: Displacement {
-                error_px,
-                sigma_px: 0.03,
-            },
-            contrast: contrast(0.9),
-            sharpness_ratio: Some(1.0),
-        }
-    }
-
-    fn contrast(correlation: f64) -> PatchCorrelation {
-        PatchCorrelation {
-            correlation,
-            texture_share: 1.0,
-            independent: 200.0,
+            samples: 100.0,
+            error_px,
+            sigma_px: 0.03,
+            correlation: 0.9,
         }
     }
 
@@ -248,7 +191,7 @@ mod tests {
     fn only_the_misaligned_frame_is_rejected() {
         let mut pairs = chain(0..9);
         for pair in pairs.iter_mut().filter(|p| p.a == 4 || p.b == 4) {
-            pair.displacement.error_px = 2.0;
+            pair.error_px = 2.0;
         }
         let rejections = find(&pairs, 9);
         assert_eq!(
@@ -260,10 +203,7 @@ mod tests {
     #[test]
     fn error_within_its_uncertainty_is_accepted() {
         let mut pairs = chain(0..9);
-        pairs[3].displacement = Displacement {
-            error_px: 1.5,
-            sigma_px: 0.4,
-        };
+        (pairs[3].error_px, pairs[3].sigma_px) = (1.5, 0.4);
         assert!(find(&pairs, 9).is_empty());
     }
 
@@ -281,7 +221,7 @@ mod tests {
         );
         // An uncertain pair ties nothing.
         let mut weak = pair(3, 4, 3.0);
-        weak.displacement.sigma_px = 2.0;
+        weak.sigma_px = 2.0;
         pairs.push(weak);
         assert_eq!(find(&pairs, 9).len(), 4);
         pairs.push(pair(2, 4, 0.1));
@@ -294,42 +234,17 @@ mod tests {
         let mut pairs = chain(0..4);
         pairs.extend(chain(4..11));
         let mut chance = pair(3, 4, 0.1);
-        chance.contrast = contrast(0.1);
+        chance.correlation = 0.1;
         pairs.push(chance);
         let rejections = find(&pairs, 11);
         assert!((0..4).all(|k| rejections.iter().any(|(frame, _)| *frame == k)));
     }
 
     #[test]
-    fn only_the_frame_that_shows_something_else_is_rejected() {
-        let mut pairs = chain(0..9);
-        for (k, pair) in pairs.iter_mut().enumerate() {
-            if pair.a == 5 || pair.b == 5 {
-                pair.contrast = contrast(0.4 - 0.01 * k as f64);
-            }
-        }
-        let rejections = find(&pairs, 9);
-        let [(5, RejectionReason::Contradicts { frame: 7, .. })] = rejections[..] else {
-            panic!("{rejections:?}");
-        };
-    }
-
-    #[test]
-    fn frame_without_fine_detail_is_blurred() {
-        let mut pairs = [pair(0, 1, 0.05), pair(1, 2, 0.05), pair(0, 2, 0.05)];
-        (pairs[0].sharpness_ratio, pairs[1].sharpness_ratio) = (Some(5.0), Some(0.2));
-        let rejections = find(&pairs, 3);
-        assert_eq!(
-            rejections,
-            vec![(1, RejectionReason::Blurred { share: 0.2 })]
-        );
-    }
-
-    #[test]
     fn no_frame_is_rejected_where_all_pairs_are_misaligned() {
         let mut pairs = chain(0..9);
         for pair in &mut pairs {
-            pair.displacement.error_px = 1.2;
+            pair.error_px = 1.2;
         }
         assert!(find(&pairs, 9).is_empty());
     }

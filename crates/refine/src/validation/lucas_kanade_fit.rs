@@ -2,7 +2,7 @@
 
 use crate::thresholds::reference_mosaic::MIN_TEXTURE_SHARE;
 use crate::tiles::residual_weighting::Loss;
-use crate::validation::alignment::Displacement;
+use crate::validation::alignment::Alignment;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3, Vector6};
 
 /// A sample of the template.
@@ -35,19 +35,24 @@ pub struct AffineFit {
     scatter: SMatrix<f64, 8, 8>,
     /// Mean `W = Σ x xᵀ / Σ 1` over the regressors.
     w: Matrix3<f64>,
+    samples: f64,
+    /// Correlation at the present poses.
+    correlation: f64,
     /// False if the slopes are mostly noise.
     has_texture: bool,
 }
 
 impl AffineFit {
     /// Linearises the samples shared with another frame, in a number of `patches`; `slope_noise`
-    /// and `variance`: of the noise of a slope, and of the residuals.
+    /// and
+    /// `variance`: of the noise of a slope, and of the residuals.
     pub fn new(
         shared: &[(&TemplateSample, f32)],
         patches: usize,
         slope_noise: f64,
         (gain, bias): (f64, f64),
         variance: f32,
+        correlation: f64,
     ) -> Self {
         let mut scores = vec![SVector::<f64, 8>::zeros(); patches];
         let mut n = SMatrix::<f64, 8, 8>::zeros();
@@ -102,6 +107,8 @@ impl AffineFit {
             right,
             scatter,
             w: w / shared.len() as f64,
+            samples: shared.len() as f64,
+            correlation,
             has_texture,
         }
     }
@@ -115,6 +122,15 @@ impl AffineFit {
         }
     }
 
+    /// The alignment where there is too little texture: unknown.
+    pub fn without_texture(&self, scale: f64) -> Alignment {
+        Alignment {
+            error_px: 0.0,
+            sigma_px: f64::INFINITY,
+            ..self.alignment(&Vector6::zeros(), scale, 1.0)
+        }
+    }
+
     /// Root mean square displacement `√(pᵀWp)`, pixels of the level.
     pub fn rms(&self, p: &Vector6<f64>) -> f64 {
         let (s, h) = (p.fixed_rows::<3>(0), p.fixed_rows::<3>(3));
@@ -123,8 +139,8 @@ impl AffineFit {
             .sqrt()
     }
 
-    /// The displacement by the field `p`; `scale`: pixels of full size per pixel of the level.
-    pub fn displacement(&self, p: &Vector6<f64>, scale: f64, variance: f64) -> Displacement {
+    /// The alignment at the field `p`; `scale`: pixels of full size per pixel of the level.
+    pub fn alignment(&self, p: &Vector6<f64>, scale: f64, variance: f64) -> Alignment {
         let square = |covariance: &SMatrix<f64, 8, 8>| {
             let of = |k| covariance.fixed_view::<3, 3>(k, k).component_mul(&self.w);
             of(0).sum() + of(3).sum()
@@ -134,9 +150,13 @@ impl AffineFit {
             let sandwich = inverse * self.scatter * inverse;
             square(&(variance * inverse)).max(square(&sandwich))
         });
-        Displacement {
+        Alignment {
+            a: 0,
+            b: 0,
+            samples: self.samples,
             error_px: scale * self.rms(p),
             sigma_px: scale * square.sqrt(),
+            correlation: self.correlation,
         }
     }
 }

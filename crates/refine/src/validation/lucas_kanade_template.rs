@@ -1,22 +1,21 @@
 //! Template of a frame on the wall, which is aligned with other frames by Gauss–Newton.
 
 use crate::model::context::EstimationContext;
-use crate::parameters::frame_estimate::FrameEstimate;
 use crate::samples::point_sampler::PointSampler;
 use crate::thresholds::assessment::MIN_PIXEL_SHARE;
 use crate::thresholds::pairwise_lucas_kanade::{
     MAX_DISPLACEMENT_PX, MAX_SQUARED_SLOPE_RATIO, STRIDE_PX,
 };
-use crate::thresholds::reference_mosaic::MIN_TEXTURE_SHARE;
 use crate::thresholds::tracking::{MAX_SOLVE_ITERATIONS, STEP_TOLERANCE_PX};
+use crate::tiles::residual_weighting::robust_correlation;
 use crate::tracking::mosaic_grid::{MosaicGrid, pixel_size_m};
-use crate::validation::alignment::{Alignment, Displacement};
+use crate::validation::alignment::Alignment;
 use crate::validation::lucas_kanade_fit::{AffineFit, TemplateSample};
-use crate::validation::patch_correlation::PatchCorrelation;
 use nalgebra::{Vector3, Vector6};
 use tunnelstitch_core::frames::{MAD_TO_SIGMA, Pyramid, noise_at_level};
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::surface::{Footprint, WallPoint};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// Samples along the side of a patch: larger than most glints.
 const PATCH: usize = 4;
@@ -30,8 +29,6 @@ const MIN_RESIDUAL_VARIANCE: f32 = 1.0 / 12.0;
 
 /// A frame's image at its pose.
 pub struct PosedImage<'a> {
-    /// The frame's number.
-    pub frame: usize,
     /// The estimation context.
     pub context: &'a EstimationContext<'a>,
     /// Pyramid level.
@@ -40,14 +37,14 @@ pub struct PosedImage<'a> {
     pub camera: Camera,
     /// The frame's image pyramid.
     pub pyramid: &'a Pyramid,
-    /// The frame's pose and exposure.
-    pub estimate: &'a FrameEstimate,
+    /// The pose.
+    pub pose: &'a Pose,
 }
 
 impl PosedImage<'_> {
     /// A function from wall points relative to `origin` to the frame's grey value there.
     fn grey_at(&self, origin: &Vector3<f64>) -> impl Fn(&[f32; 3]) -> Option<f32> + use<'_> {
-        let sampler = PointSampler::new(&self.camera, &self.estimate.pose, origin);
+        let sampler = PointSampler::new(&self.camera, self.pose, origin);
         let image = self.pyramid.level(self.level);
         move |point| sampler.project(point)?.sample_valid(image)
     }
@@ -55,8 +52,6 @@ impl PosedImage<'_> {
 
 /// A frame on the wall, to be aligned with others.
 pub struct Template {
-    frame: usize,
-    gain: f64,
     origin: Vector3<f64>,
     samples: Vec<TemplateSample>,
     /// Number of patches of neighbouring samples.
@@ -77,7 +72,7 @@ impl Template {
     /// The template of a frame over its footprint.
     pub fn new(image: &PosedImage, footprint: &Footprint) -> Self {
         let context = image.context;
-        let pixel_size_m = pixel_size_m(context, &image.camera, &image.estimate.pose);
+        let pixel_size_m = pixel_size_m(context, &image.camera, image.pose);
         let grid = MosaicGrid::over(footprint, STRIDE_PX * pixel_size_m);
         let middle = WallPoint {
             s_m: 0.5 * (footprint.s_min_m + footprint.s_max_m),
@@ -103,9 +98,14 @@ impl Template {
                 let (e_s, e_h): ([f32; 3], [f32; 3]) =
                     (frame.e_s.cast().into(), frame.e_h.cast().into());
                 let step = pixel_size_m as f32;
-                let value = grey(&point);
-                let slope = slope_at(&grey, [&point, &e_s, &e_h], step);
-                let (Some(value), Some(slope)) = (value, slope) else {
+                let at = |ds: f32, dh: f32| grey(&displaced(&point, &e_s, &e_h, ds, dh));
+                let (Some(value), Some(left), Some(right), Some(up), Some(down)) = (
+                    grey(&point),
+                    at(-step, 0.0),
+                    at(step, 0.0),
+                    at(0.0, -step),
+                    at(0.0, step),
+                ) else {
                     continue;
                 };
                 let x = [
@@ -119,7 +119,7 @@ impl Template {
                     e_h,
                     x,
                     grey: value,
-                    slope,
+                    slope: [0.5 * (right - left), 0.5 * (down - up)],
                     influence_weight: 1.0,
                     patch: row / PATCH * patch_columns + column / PATCH,
                 });
@@ -128,8 +128,6 @@ impl Template {
         bound_influence(&mut samples);
         let noise = context.noise * context.noise * noise_at_level(image.level);
         Self {
-            frame: image.frame,
-            gain: image.estimate.log_gain.exp(),
             origin,
             samples,
             patches: grid.rows.div_ceil(PATCH) * patch_columns,
@@ -150,23 +148,17 @@ impl Template {
         let grey = other.grey_at(&self.origin);
         let mut p = Vector6::<f64>::zeros();
         let mut exposure: Option<(f64, f64)> = None;
-        let mut result: Option<Alignment> = None;
+        let mut correlation = None;
+        let mut first = None;
+        let mut result = None;
         for _ in 0..MAX_SOLVE_ITERATIONS {
             let shared = self.sample_displaced(&p, &grey);
             let min_samples = (MIN_PIXEL_SHARE * self.samples.len() as f64).max(MIN_SAMPLES);
             if (shared.len() as f64) < min_samples {
                 return None;
             }
-            let is_first = result.is_none();
-            let result = result.get_or_insert_with(|| Alignment {
-                a: self.frame,
-                b: other.frame,
-                samples: shared.len() as f64,
-                displacement: Displacement::unknown(),
-                contrast: self.correlate(&shared),
-                sharpness_ratio: self.sharpness_ratio(&shared, other),
-            });
             let exposure_before = *exposure.get_or_insert_with(|| self.fit_exposure(&shared));
+            let correlation = *correlation.get_or_insert_with(|| compute_correlation(&shared));
             let variance = self.residual_variance(&shared, exposure_before);
             let fit = AffineFit::new(
                 &shared,
@@ -174,64 +166,25 @@ impl Template {
                 self.slope_noise,
                 exposure_before,
                 variance,
+                correlation,
             );
             let Some(step) = fit.step() else {
-                result.displacement = Displacement::unknown();
-                break;
+                return Some(fit.without_texture(self.scale));
             };
             let (gain, bias) = exposure_before;
             p += step.fixed_rows::<6>(0);
             exposure = Some((gain + step[6], bias + step[7]));
             let moved_px = fit.rms(&Vector6::from(step.fixed_rows::<6>(0)));
-            let displacement = fit.displacement(&p, self.scale, f64::from(variance));
+            let alignment = fit.alignment(&p, self.scale, f64::from(variance));
+            let first = *first.get_or_insert(alignment);
             let has_diverged = fit.rms(&p) > MAX_DISPLACEMENT_PX;
             let has_converged = !has_diverged && moved_px < STEP_TOLERANCE_PX;
-            if is_first || has_converged {
-                result.displacement = displacement;
-            }
-            if has_converged {
-                result.samples = shared.len() as f64;
-                result.contrast = self.correlate(&shared);
-            }
+            result = Some(if has_converged { alignment } else { first });
             if has_diverged || has_converged {
                 break;
             }
         }
         result
-    }
-
-    /// Correlation of the contrast with another frame's.
-    fn correlate(&self, shared: &[(&TemplateSample, f32)]) -> PatchCorrelation {
-        let samples = shared.iter();
-        let samples = samples.map(|(sample, value)| (sample.patch, (sample.grey, *value)));
-        PatchCorrelation::new(samples, self.patches, self.noise)
-    }
-
-    /// Variance of the template's slopes over that of another frame's at the present poses, gains
-    /// and noise removed; None where noise drowns both.
-    fn sharpness_ratio(
-        &self,
-        shared: &[(&TemplateSample, f32)],
-        other: &PosedImage,
-    ) -> Option<f64> {
-        let grey = other.grey_at(&self.origin);
-        let step = self.pixel_size_m as f32;
-        let mut squares = [0.0f64; 2];
-        let mut noise = 0.0;
-        for (sample, _) in shared {
-            let axes = [&sample.point, &sample.e_s, &sample.e_h];
-            if let Some(slope) = slope_at(&grey, axes, step) {
-                noise += 2.0 * self.slope_noise;
-                for (sum, slope) in squares.iter_mut().zip([sample.slope, slope]) {
-                    *sum += f64::from(slope[0].powi(2) + slope[1].powi(2));
-                }
-            }
-        }
-        let has_texture = squares.map(|all| all - noise > MIN_TEXTURE_SHARE * all);
-        let [own, others] = squares.map(|all| (all - noise).max(0.0));
-        let gain_ratio = other.estimate.log_gain.exp() / self.gain;
-        (has_texture != [false; 2])
-            .then(|| gain_ratio.powi(2) * own / others.max(f64::MIN_POSITIVE))
     }
 
     /// Fits the exposure `value = a grey + b` by least squares.
@@ -311,15 +264,21 @@ fn displaced(point: &[f32; 3], e_s: &[f32; 3], e_h: &[f32; 3], ds: f32, dh: f32)
     std::array::from_fn(|k| point[k] + ds * e_s[k] + dh * e_h[k])
 }
 
-/// Slopes along s and h at a point with the tangents `e_s` and `e_h`, grey levels per pixel:
-/// central differences over one pixel of the width `step` (metres) to either side.
-fn slope_at(
-    grey: impl Fn(&[f32; 3]) -> Option<f32>,
-    [point, e_s, e_h]: [&[f32; 3]; 3],
-    step: f32,
-) -> Option<[f32; 2]> {
-    let at = |ds: f32, dh: f32| grey(&displaced(point, e_s, e_h, ds, dh));
-    let (left, right) = (at(-step, 0.0)?, at(step, 0.0)?);
-    let (up, down) = (at(0.0, -step)?, at(0.0, step)?);
-    Some([0.5 * (right - left), 0.5 * (down - up)])
+/// Correlation of grey values, −1 to 1: of all samples or of most, whichever is greater.
+///
+/// Glints outweigh a faint wall in the former; where most of the wall is flat, the latter is that
+/// of noise.
+fn compute_correlation(shared: &[(&TemplateSample, f32)]) -> f64 {
+    let pairs: Vec<(f32, f32)> = shared.iter().map(|(s, value)| (s.grey, *value)).collect();
+    let mut m = [0.0f64; 6];
+    for (x, y) in &pairs {
+        let (x, y) = (f64::from(*x), f64::from(*y));
+        for (sum, term) in m.iter_mut().zip([1.0, x, y, x * x, y * y, x * y]) {
+            *sum += term;
+        }
+    }
+    let [n, x, y, xx, yy, xy] = m;
+    let spread = (xx - x * x / n) * (yy - y * y / n);
+    let of_all = (xy - x * y / n) / spread.sqrt().max(f64::MIN_POSITIVE);
+    of_all.max(robust_correlation(&pairs))
 }
