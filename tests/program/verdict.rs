@@ -48,8 +48,8 @@ fn a_diameter_given_for_the_radius_is_named() {
     }
 }
 
-/// A principal point 1.5 px off that is not estimated: the poses are a little wrong, and σ says by how
-/// much.
+/// A principal point 1.5 px off that is not estimated: the poses are a little wrong, and σ says by
+/// how much.
 #[test]
 fn a_lens_that_is_not_exact_enlarges_sigma() {
     let dir = tempfile::tempdir().unwrap();

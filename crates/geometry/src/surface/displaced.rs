@@ -53,8 +53,8 @@ where
 {
     /// Intersects by Newton's method on `t + λ d − X(s, h) = 0` from the nominal intersection.
     ///
-    /// A ray that grazes the wall, for which this does not settle, gets the nominal intersection: it
-    /// meets the wall somewhere near.
+    /// A ray that grazes the wall, for which this does not settle, gets the nominal intersection:
+    /// it meets the wall somewhere near.
     fn hit(&self, t: &Vector3<f64>, d: &Vector3<f64>) -> Result<Hit, SurfaceError> {
         let nominal = self.nominal.hit(t, d)?;
         let (mut range, mut wall) = (nominal.range, nominal.wall);

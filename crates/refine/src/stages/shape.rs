@@ -1,5 +1,5 @@
-//! The wall's shape between solves: begun before the first at full size, its strengths learned after
-//! it.
+//! The wall's shape between solves: begun before the first at full size, its strengths learned
+//! after it.
 
 use crate::model::problem_error::ProblemError;
 use crate::model::significance::chi_squared_bounds;
@@ -17,8 +17,8 @@ const FIRST_FINEST_COLUMNS: usize = 32;
 /// Columns of the finest lattice at the most: nodes a tenth of the radius apart. Twice as many
 /// would cost eight times the time.
 const MAX_COLUMNS: usize = 64;
-/// Coefficient beyond which a shape is not believed, 1-σ of the prior: a thirtieth of the radius, if the
-/// survey does not say how exact the wall is.
+/// Coefficient beyond which a shape is not believed, 1-σ of the prior: a thirtieth of the radius,
+/// if the survey does not say how exact the wall is.
 const MAX_PRIOR_SIGMAS: f64 = 10.0;
 /// Strength of a finer lattice over that of the one before, before it is learned.
 const FINER_STRENGTH: f64 = 0.5;

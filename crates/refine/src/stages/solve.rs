@@ -159,7 +159,8 @@ fn solve<'a>(
     Ok(solution)
 }
 
-/// The uncertainty of the last solution; before, unknowns may be free that it turns out not to have.
+/// The uncertainty of the last solution; before, unknowns may be free that it turns out not to
+/// have.
 fn uncertainty_of(
     plan: &SolvePlan,
     setup: &Setup,

@@ -74,7 +74,7 @@ pub struct LaidOut {
 /// times the frames' own resolution: the canvas that [`stitch()`] draws.
 ///
 /// # Errors
-/// As [`place`], [`native_px_per_metre`] and [`Canvas::covering`].
+/// As [`place_frames`], [`native_px_per_metre`] and [`Canvas::covering`].
 pub fn lay_out(
     surface: &dyn Surface,
     camera: &Camera,
