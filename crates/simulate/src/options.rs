@@ -294,7 +294,8 @@ impl SimulateOptions {
             "the lining may deviate by no more than a twentieth of the radius",
         )?;
         check(
-            built.undulation_length_m >= 0.02 * self.tunnel.nominal_m(),
+            built.undulation_mm == 0.0
+                || built.undulation_length_m >= 0.02 * self.tunnel.nominal_m(),
             "the undulation must be at least a fiftieth of the radius long",
         )?;
         check(
