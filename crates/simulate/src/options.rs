@@ -135,6 +135,17 @@ pub struct SimulateOptions {
     pub seed: u64,
 }
 
+/// Passes a good value; the error says `what` is wrong with another.
+fn check(good: bool, what: &str) -> Result<(), SimulateError> {
+    if good {
+        Ok(())
+    } else {
+        Err(SimulateError::Option {
+            what: what.to_owned(),
+        })
+    }
+}
+
 /// True for the default interval, which the record leaves out.
 fn is_one_second(value: &f64) -> bool {
     *value == 1.0
@@ -225,15 +236,6 @@ impl SimulateOptions {
     pub(super) fn validate(&self) -> Result<(), SimulateError> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let not_negative = |v: f64| v.is_finite() && v >= 0.0;
-        let check = |good: bool, what: &str| {
-            if good {
-                Ok(())
-            } else {
-                Err(SimulateError::Option {
-                    what: what.to_owned(),
-                })
-            }
-        };
         check(
             (1..=1_000_000).contains(&self.frames),
             "the number of frames must lie between 1 and 1000000",
@@ -286,6 +288,11 @@ impl SimulateOptions {
                 "the width of the texture must be a positive number of metres",
             )?;
         }
+        self.validate_degradations()
+    }
+
+    /// Checks what makes the survey differ from an ideal one.
+    fn validate_degradations(&self) -> Result<(), SimulateError> {
         let built = &self.as_built;
         let most_mm = 50.0 * self.tunnel.nominal_m();
         let deviates = |mm: f64| (0.0..=most_mm).contains(&mm);
@@ -299,7 +306,7 @@ impl SimulateOptions {
             "the undulation must be at least a fiftieth of the radius long",
         )?;
         check(
-            not_negative(self.noise_grey),
+            self.noise_grey.is_finite() && self.noise_grey >= 0.0,
             "the noise must not be negative",
         )?;
         check(

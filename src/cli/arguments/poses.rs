@@ -141,11 +141,7 @@ impl PoseReadingArguments {
     /// # Errors
     /// Everything that can be wrong with the survey.
     pub fn open(&self, survey: &Path, terminal: &Terminal) -> Result<Survey, Failure> {
-        let survey = self.open_quietly(survey)?;
-        for warning in &survey.warnings {
-            terminal.warn(warning);
-        }
-        Ok(survey)
+        Ok(warned(self.open_quietly(survey)?, terminal))
     }
 
     /// Opens a survey, its poses read according to the flags, and prints nothing.
@@ -167,17 +163,8 @@ impl PoseReadingArguments {
         refined: &Path,
         terminal: &Terminal,
     ) -> Result<Survey, Failure> {
-        let mut taken = Ok(());
-        let opened = Survey::open_with(survey, |file| {
-            taken = take_over_found(file, refined);
-            self.apply_to(file);
-        });
-        taken?;
-        let survey = opened?;
-        for warning in &survey.warnings {
-            terminal.warn(warning);
-        }
-        Ok(survey)
+        let opened = open_as_found(survey, Some(refined), |file| self.apply_to(file))?;
+        Ok(warned(opened, terminal))
     }
 
     /// Writes the flags into a survey's file. Their paths are relative to the working folder, not
@@ -238,6 +225,35 @@ pub struct PosesArguments {
     reading: PoseReadingArguments,
 }
 
+/// Prints the warnings of a survey.
+fn warned(survey: Survey, terminal: &Terminal) -> Survey {
+    for warning in &survey.warnings {
+        terminal.warn(warning);
+    }
+    survey
+}
+
+/// Opens a survey with the camera and the wall that `refine` has written beside some poses, if it
+/// has, and then changed by `change`.
+///
+/// # Errors
+/// Everything that can be wrong with the survey.
+fn open_as_found(
+    survey: &Path,
+    poses: Option<&Path>,
+    change: impl FnOnce(&mut SurveyFile),
+) -> Result<Survey, Failure> {
+    let mut taken = Ok(());
+    let opened = Survey::open_with(survey, |file| {
+        if let Some(poses) = poses {
+            taken = take_over_found(file, poses);
+        }
+        change(file);
+    });
+    taken?;
+    Ok(opened?)
+}
+
 /// Takes camera and wall from the survey.toml that `refine` has written beside `poses`, if it has.
 ///
 /// # Errors
@@ -278,19 +294,13 @@ impl PosesArguments {
         survey: &Path,
         change: impl FnOnce(&mut SurveyFile),
     ) -> Result<Survey, Failure> {
-        let mut taken = Ok(());
-        let opened = Survey::open_with(survey, |file| {
-            if let Some(poses) = self.file() {
-                taken = take_over_found(file, poses);
-            }
+        open_as_found(survey, self.file(), |file| {
             replace(
                 &mut file.tunnel.shape_file,
                 self.shape.as_deref().map(absolute),
             );
             change(file);
-        });
-        taken?;
-        Ok(opened?)
+        })
     }
 
     /// The file, unless the poses are those of survey.toml.
@@ -314,21 +324,13 @@ impl PosesArguments {
         survey: &Path,
         terminal: &Terminal,
     ) -> Result<(Survey, Trajectory), Failure> {
-        if let Some(path) = self.file() {
-            let survey = self.open_survey(survey, |file| {
+        let opened = self.open_survey(survey, |file| {
+            if let Some(path) = self.file() {
                 file.poses = PosesSection::of(absolute(path));
-                self.reading.apply_to(file);
-            })?;
-            for warning in &survey.warnings {
-                terminal.warn(warning);
             }
-            let poses = survey.initial.clone();
-            return Ok((survey, poses));
-        }
-        let survey = self.open_survey(survey, |file| self.reading.apply_to(file))?;
-        for warning in &survey.warnings {
-            terminal.warn(warning);
-        }
+            self.reading.apply_to(file);
+        })?;
+        let survey = warned(opened, terminal);
         let poses = match (self.name.as_str(), &survey.truth) {
             ("truth", Some(truth)) => truth.clone(),
             ("truth", None) => {

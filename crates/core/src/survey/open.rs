@@ -12,7 +12,7 @@ use crate::frames::{FrameSet, Mask};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
-use tunnelstitch_geometry::surface::{Displaced, RadialField, Surface, WallRegions};
+use tunnelstitch_geometry::surface::{RadialField, Surface, WallRegions, displaced};
 use tunnelstitch_geometry::trajectory::{
     Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of,
 };
@@ -91,37 +91,8 @@ impl Survey {
         let nominal = file.tunnel.surface(&toml_path, &folder)?;
         let shape_sigma_m = file.tunnel.shape_sigma_m().map_err(value)?;
         let displacement = file.tunnel.displacement(nominal.as_ref(), &folder)?;
-        let surface: Arc<dyn Surface> = match &displacement {
-            Some(field) => Arc::new(Displaced::new(Arc::clone(&nominal), field.clone())),
-            None => Arc::clone(&nominal),
-        };
-        let prior = &file.prior;
-        if !(1e-6..=180.0).contains(&prior.rotation_sigma_deg) {
-            return Err(value(format!(
-                "prior.rotation_sigma_deg is {}; it must lie between 1e-6 and 180",
-                prior.rotation_sigma_deg
-            )));
-        }
-        if !prior
-            .translation_sigma_m
-            .iter()
-            .all(|s| (1e-9..=10.0 * file.tunnel.nominal_m()).contains(s))
-        {
-            return Err(value(format!(
-                "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times \
-                 the radius (half the width)",
-                prior.translation_sigma_m
-            )));
-        }
-        if let Some(calibrate) = &file.calibrate {
-            calibrate.validate().map_err(value)?;
-        }
-        let tolerance_s = file.poses.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S);
-        if !(0.0..=1e6).contains(&tolerance_s) {
-            return Err(value(format!(
-                "poses.time_tolerance_s is {tolerance_s}; it must be seconds, 0 or more"
-            )));
-        }
+        let surface = displaced(&nominal, displacement.clone());
+        check_values(&file).map_err(value)?;
         let camera =
             read_calibration(&folder.join(&file.camera.file), file.camera.name.as_deref())?;
         let FrameList {
@@ -313,4 +284,36 @@ pub fn toml_path(path: &Path) -> PathBuf {
     } else {
         path.to_owned()
     }
+}
+
+/// Checks the numbers of a survey's file that stand for themselves; returns what is wrong.
+fn check_values(file: &SurveyFile) -> Result<(), String> {
+    let prior = &file.prior;
+    if !(1e-6..=180.0).contains(&prior.rotation_sigma_deg) {
+        return Err(format!(
+            "prior.rotation_sigma_deg is {}; it must lie between 1e-6 and 180",
+            prior.rotation_sigma_deg
+        ));
+    }
+    if !prior
+        .translation_sigma_m
+        .iter()
+        .all(|s| (1e-9..=10.0 * file.tunnel.nominal_m()).contains(s))
+    {
+        return Err(format!(
+            "prior.translation_sigma_m is {:?}; all three must lie between 1e-9 and ten times \
+             the radius (half the width)",
+            prior.translation_sigma_m
+        ));
+    }
+    if let Some(calibrate) = &file.calibrate {
+        calibrate.validate()?;
+    }
+    let tolerance_s = file.poses.time_tolerance_s.unwrap_or(TIME_TOLERANCE_S);
+    if !(0.0..=1e6).contains(&tolerance_s) {
+        return Err(format!(
+            "poses.time_tolerance_s is {tolerance_s}; it must be seconds, 0 or more"
+        ));
+    }
+    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use super::error::{SurfaceError, check_size};
 use super::gauge::Gauge;
-use super::shape::Surface;
+use super::shape::{Surface, normals_of_straight};
 use super::wall::{Hit, WallFrame, WallPoint};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
@@ -95,16 +95,8 @@ impl Surface for Circle {
         }
     }
 
-    /// Computes one normal per column.
     fn normals(&self, s_m: &[f64], h_m: &[f64], normals: &mut Vec<Vector3<f64>>) {
-        normals.clear();
-        for &h_m in h_m.iter().take(1) {
-            let frames = s_m.iter().map(|&s_m| self.frame(WallPoint { s_m, h_m }));
-            normals.extend(frames.map(|frame| frame.normal()));
-        }
-        for _ in 1..h_m.len() {
-            normals.extend_from_within(..s_m.len());
-        }
+        normals_of_straight(self, s_m, h_m, normals);
     }
 
     fn perimeter_m(&self) -> f64 {

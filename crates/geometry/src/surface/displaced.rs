@@ -8,6 +8,7 @@ use super::wall::{Hit, WallFrame, WallPoint};
 use crate::trajectory::Pose;
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Deref;
+use std::sync::Arc;
 
 /// Steps of Newton's method to intersect a ray; three or four suffice for rays that do not graze
 /// the wall.
@@ -27,6 +28,14 @@ const DIFFERENCE: f64 = 1e-6;
 pub struct Displaced<N> {
     nominal: N,
     field: RadialField,
+}
+
+/// The nominal wall displaced by a field, or itself if there is none.
+pub fn displaced(nominal: &Arc<dyn Surface>, field: Option<RadialField>) -> Arc<dyn Surface> {
+    match field {
+        Some(field) => Arc::new(Displaced::new(Arc::clone(nominal), field)),
+        None => Arc::clone(nominal),
+    }
 }
 
 impl<N: Deref<Target: Surface>> Displaced<N> {
@@ -162,7 +171,7 @@ mod tests {
     use crate::surface::section::Ellipse;
     use proptest::prelude::*;
 
-    fn displaced() -> Displaced<Box<dyn Surface>> {
+    fn irregular_wall() -> Displaced<Box<dyn Surface>> {
         Displaced::new(Box::new(Circle::new(3.0).unwrap()), irregular(0.03))
     }
 
@@ -172,7 +181,7 @@ mod tests {
             s_m in 0.0f64..18.8, h_m in -2.0f64..8.0, x in -1.0f64..1.0, y in -2.0f64..8.0,
             z in -1.0f64..1.0,
         ) {
-            let wall = displaced();
+            let wall = irregular_wall();
             let t = Vector3::new(x, y, z);
             let target = wall.frame(WallPoint { s_m, h_m }).x_w;
             let d = (target - t) * 0.4;
@@ -188,7 +197,7 @@ mod tests {
 
     #[test]
     fn a_displacement_is_outwards() {
-        let wall = displaced();
+        let wall = irregular_wall();
         for s_m in [0.0, 4.0, 11.0, 18.0] {
             let at = WallPoint { s_m, h_m: 1.0 };
             let delta_m = wall.field().at(at).delta_m;
@@ -221,7 +230,7 @@ mod tests {
 
     #[test]
     fn the_lattice_is_the_frame_point_by_point() {
-        let wall = displaced();
+        let wall = irregular_wall();
         let (s, h) = ([0.1, 0.2, 18.8], [-1.0, 4.0]);
         let mut points = Vec::new();
         wall.lattice(&s, &h, &mut points);

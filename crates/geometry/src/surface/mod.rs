@@ -36,7 +36,7 @@ mod wall_regions;
 
 pub use centreline::{CentrePoint, Centreline, CentrelineFrame};
 pub use circle::Circle;
-pub use displaced::Displaced;
+pub use displaced::{Displaced, displaced};
 pub use displacement::{lens_jacobian, wall_jacobian};
 pub use error::SurfaceError;
 pub use footprint::{Footprint, shortest_arc};

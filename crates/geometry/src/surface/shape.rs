@@ -81,6 +81,23 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
     fn check_inside(&self, t: &Vector3<f64>) -> Result<(), SurfaceError>;
 }
 
+/// Writes the normals of a straight wall, the same in every row, as [`Surface::normals`] does.
+pub(super) fn normals_of_straight(
+    surface: &impl Surface,
+    s_m: &[f64],
+    h_m: &[f64],
+    normals: &mut Vec<Vector3<f64>>,
+) {
+    normals.clear();
+    for &h_m in h_m.iter().take(1) {
+        let frames = s_m.iter().map(|&s_m| surface.frame(WallPoint { s_m, h_m }));
+        normals.extend(frames.map(|frame| frame.normal()));
+    }
+    for _ in 1..h_m.len() {
+        normals.extend_from_within(..s_m.len());
+    }
+}
+
 /// Distance of the wall along a camera's optical axis, metres.
 ///
 /// # Errors

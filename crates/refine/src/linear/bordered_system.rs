@@ -108,17 +108,8 @@ impl SharedBorder {
         gradient: &[FrameStep],
         lambda: f64,
     ) -> Option<(Vec<FrameStep>, Kappa)> {
-        let SchurComplement { w, schur } = self.eliminate(factor, lambda);
-        let mut reduced = self.gradient;
-        for (w, gradient) in w.iter().zip(gradient) {
-            reduced -= w.transpose() * gradient;
-        }
-        let shared = schur.cholesky()?.solve(&-reduced);
-        let mut step = factor.step(gradient);
-        for (step, w) in step.iter_mut().zip(&w) {
-            *step -= w * shared;
-        }
-        Some((step, shared))
+        self.eliminate(factor, lambda)
+            .step(factor, gradient, &self.gradient)
     }
 }
 
@@ -155,6 +146,28 @@ pub struct SchurComplement {
     pub w: Vec<BorderBlock>,
     /// S.
     pub schur: SharedBlock,
+}
+
+impl SchurComplement {
+    /// The step `(δp, δκ)` for the gradients of the slots and of the shared parameters; None if S is
+    /// not positive definite.
+    pub fn step(
+        &self,
+        factor: &Factor,
+        gradient: &[FrameStep],
+        shared_gradient: &Kappa,
+    ) -> Option<(Vec<FrameStep>, Kappa)> {
+        let mut reduced = *shared_gradient;
+        for (w, gradient) in self.w.iter().zip(gradient) {
+            reduced -= w.transpose() * gradient;
+        }
+        let shared = self.schur.cholesky()?.solve(&-reduced);
+        let mut step = factor.step(gradient);
+        for (step, w) in step.iter_mut().zip(&self.w) {
+            *step -= w * shared;
+        }
+        Some((step, shared))
+    }
 }
 
 #[cfg(test)]

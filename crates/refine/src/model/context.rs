@@ -9,7 +9,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
-use tunnelstitch_geometry::surface::{Displaced, Gauge, RadialField, Surface, WallRegions};
+use tunnelstitch_geometry::surface::{Gauge, RadialField, Surface, WallRegions, displaced};
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
 /// All inputs of the estimator.
@@ -58,17 +58,10 @@ impl EstimationContext<'_> {
         }
     }
 
-    /// The wall with a shape.
+    /// The wall with a shape beyond its known displacement.
     pub fn surface_with(&self, shape: &Shape) -> Arc<dyn Surface> {
-        self.displaced(shape.field())
-    }
-
-    /// The wall with a displacement beyond the known one.
-    pub fn displaced(&self, further: Option<RadialField>) -> Arc<dyn Surface> {
-        match total_displacement(self.displacement, further) {
-            Some(field) => Arc::new(Displaced::new(Arc::clone(&self.nominal), field)),
-            None => Arc::clone(&self.nominal),
-        }
+        let field = total_displacement(self.displacement, shape.field());
+        displaced(&self.nominal, field)
     }
 
     /// The rigid motions that change no image. They move the shape that is estimated with the

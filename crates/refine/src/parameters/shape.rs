@@ -184,7 +184,7 @@ impl ShapeModel {
     pub fn block_sigmas_m(&self) -> Vec<f64> {
         let scales = self.scales.iter();
         scales
-            .flat_map(|scale| vec![scale.sigma_m; scale.functions.blocks()])
+            .flat_map(|scale| std::iter::repeat_n(scale.sigma_m, scale.functions.blocks()))
             .collect()
     }
 

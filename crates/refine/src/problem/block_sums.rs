@@ -5,7 +5,6 @@ use crate::parameters::frame_estimate::FrameStep;
 use crate::problem::intrinsics_terms::IntrinsicsSums;
 use crate::problem::linearisation::FrameContribution;
 use crate::problem::observer_column::ObserverColumn;
-use crate::problem::tile_shape::TileShape;
 use crate::tiles::tile_arrays::SAMPLES;
 use nalgebra::Matrix4;
 
@@ -17,8 +16,6 @@ pub struct TileSums {
     pub features: Matrix4<f64>,
     /// Sum of the mean weights `w̄` of all observers, held ones too.
     pub total_weight: f64,
-    /// The shape's functions, if they are estimated.
-    pub shape: Option<TileShape>,
 }
 
 /// Sums over the tiles of one block, for the few active frames that observe it and the functions of

@@ -2,6 +2,9 @@
 
 use crate::linear::bordered_system::SharedBorder;
 use crate::linear::normal_equations::{Block, NormalEquations};
+use crate::linear::sparse_cholesky::Factor;
+use crate::parameters::calibration::Kappa;
+use crate::parameters::frame_estimate::FrameStep;
 
 /// Cost and normal equations at one estimate ([`crate::tiles::tile`]).
 #[derive(Clone, Debug)]
@@ -21,6 +24,18 @@ pub struct Linearisation {
     pub border: Option<SharedBorder>,
     /// Border of the scatter.
     pub border_scatter: Option<SharedBorder>,
+}
+
+impl Linearisation {
+    /// The step of all slots and of the shared parameters by a factor of the normal matrix that is
+    /// damped by λ; None if the border is not positive definite.
+    pub fn step(&self, factor: &Factor, lambda: f64) -> Option<(Vec<FrameStep>, Kappa)> {
+        let gradient = &self.normal.gradient;
+        match &self.border {
+            Some(border) => border.step(factor, gradient, lambda),
+            None => Some((factor.step(gradient), Kappa::zeros())),
+        }
+    }
 }
 
 /// Contribution of a frame to a linearisation.

@@ -30,5 +30,4 @@ pub mod step_length;
 pub mod sum_block;
 #[cfg(test)]
 mod test_ring;
-pub mod tile_shape;
 pub mod unknown_texture;

@@ -8,9 +8,7 @@ use crate::model::problem_error::ProblemError;
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::parameters::shape::Shape;
 use crate::parameters::unknowns::Unknowns;
-use crate::problem::set_up::{
-    active_pairs, min_density, pixel_size_on_wall, pose_frames, shape_pairs,
-};
+use crate::problem::set_up::{min_density, normal_pattern, pixel_size_on_wall, pose_frames};
 use crate::problem::unknown_texture::UnknownTexture;
 use crate::samples::sampling::Sampling;
 use crate::samples::tile_coverage::{FrameImages, TileCoverage};
@@ -138,20 +136,8 @@ impl<'a> PhotometricProblem<'a> {
             posed,
         )?;
         let shape = context.shape.clone().filter(|_| sampling.shape);
-        let mut pairs = active_pairs(&coverage.pairs, participants.start, &active);
-        pairs.extend(context.prior.pairs(&active));
-        if let Some(shape) = &shape {
-            let slot = |k: usize| k.checked_sub(active.start - participants.start);
-            pairs.extend(shape_pairs(
-                &coverage,
-                &grid,
-                &shape.model,
-                active.len(),
-                slot,
-            )?);
-        }
-        let blocks = shape.as_ref().map_or(0, |shape| shape.model.blocks());
-        let pattern = Pattern::new(active.len() + blocks, pairs);
+        let frames = (participants.start, &active);
+        let pattern = normal_pattern(context, &coverage, &grid, frames, shape.as_deref())?;
         let symbolic =
             SymbolicFactorisation::new(&pattern).map_err(|source| ProblemError::Factor {
                 first: active.start,

@@ -1,12 +1,13 @@
 //! Steps of the set-up of a problem: posed frames, density of the samples, sparsity pattern.
 
+use crate::linear::normal_equations::Pattern;
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
-use crate::parameters::shape::ShapeModel;
+use crate::parameters::shape::{FunctionValue, Shape};
 use crate::samples::footprints::{MAX_VIEWING_DISTANCE_RADII, footprint};
 use crate::samples::tile_coverage::TileCoverage;
 use crate::samples::visibility::PosedFrame;
-use crate::tiles::grid::{SIDE, TileId, WallGrid};
+use crate::tiles::grid::{SIDE, WallGrid};
 use std::collections::HashSet;
 use std::ops::Range;
 use tunnelstitch_core::frames::FrameError;
@@ -47,62 +48,52 @@ pub fn pose_frames(
     posed.into_iter().collect()
 }
 
-/// Pairs of `active` frames among pairs of participants (counted from frame `first`) that observe
-/// common tiles.
-pub fn active_pairs(
-    covisible: &[(usize, usize)],
-    first: usize,
-    active: &Range<usize>,
-) -> Vec<(usize, usize)> {
-    let slot = |k: &usize| {
-        let frame = first + k;
-        active.contains(&frame).then(|| frame - active.start)
-    };
-    let covisible = covisible.iter();
-    covisible
-        .filter_map(|(a, b)| slot(a).zip(slot(b)))
-        .collect()
-}
-
-/// Pairs of slots of which one is a block of the shape: blocks with functions in a common block of
-/// the wall, and those with the frames that observe it. `frames`: number of active frames; `slot`:
-/// slot of a participant.
+/// Sparsity pattern of the `active` frames among participants that are counted from frame `first`,
+/// and of the blocks of the shape behind them: frames that observe common tiles or have a common
+/// prior, blocks with functions in a common block of the wall, and those with the frames that observe
+/// it.
 ///
 /// # Errors
 /// [`FrameError`] if an image that the selection of tiles needs cannot be read.
-pub fn shape_pairs(
+pub fn normal_pattern(
+    context: &EstimationContext,
     coverage: &TileCoverage,
     grid: &WallGrid,
-    model: &ShapeModel,
-    frames: usize,
-    slot: impl Fn(usize) -> Option<usize>,
-) -> Result<HashSet<(usize, usize)>, FrameError> {
-    let mut pairs = HashSet::new();
+    (first, active): (usize, &Range<usize>),
+    shape: Option<&Shape>,
+) -> Result<Pattern, FrameError> {
+    let slot = |k: usize| {
+        let frame = first + k;
+        active.contains(&frame).then(|| frame - active.start)
+    };
+    let covisible = coverage.pairs.iter();
+    let covisible = covisible.filter_map(|(a, b)| slot(*a).zip(slot(*b)));
+    let mut pairs: HashSet<(usize, usize)> = covisible.collect();
+    pairs.extend(context.prior.pairs(active));
+    let Some(Shape { model, .. }) = shape else {
+        return Ok(Pattern::new(active.len(), pairs));
+    };
     for stretch in 0..coverage.len() {
         let visibility = coverage.visibility(stretch)?;
         for tiles in &visibility.blocks {
-            let ids = visibility.tiles[tiles.clone()].iter().map(|tile| tile.id);
-            let shape = shape_slots(ids, grid, model, frames);
+            let tiles_of_block = visibility.tiles[tiles.clone()].iter();
+            let functions =
+                tiles_of_block.flat_map(|tile| model.functions_at(grid.centre(tile.id)));
+            let of_shape = shape_slots(functions, active.len());
             let observers = visibility.frames(tiles).into_iter();
             let observers = observers.filter_map(|k| slot(coverage.frames(stretch)[k]));
-            let slots: Vec<usize> = observers.chain(shape.iter().copied()).collect();
-            for a in &shape {
+            let slots: Vec<usize> = observers.chain(of_shape.iter().copied()).collect();
+            for a in &of_shape {
                 pairs.extend(slots.iter().map(|b| (*b.min(a), *b.max(a))));
             }
         }
     }
-    Ok(pairs)
+    Ok(Pattern::new(active.len() + model.blocks(), pairs))
 }
 
-/// Slots of the blocks of the shape that have functions at the centres of some tiles, ascending;
-/// they follow the slots of the `frames` active frames.
-pub fn shape_slots(
-    tiles: impl Iterator<Item = TileId>,
-    grid: &WallGrid,
-    model: &ShapeModel,
-    frames: usize,
-) -> Vec<usize> {
-    let functions = tiles.flat_map(|tile| model.functions_at(grid.centre(tile)));
+/// Slots of the blocks that some functions of the shape belong to, ascending; they follow the slots
+/// of the `frames` active frames.
+pub fn shape_slots(functions: impl Iterator<Item = FunctionValue>, frames: usize) -> Vec<usize> {
     let mut slots: Vec<usize> = functions.map(|f| frames + f.block).collect();
     slots.sort_unstable();
     slots.dedup();

@@ -16,11 +16,20 @@
 //! the shape.
 
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
-use crate::problem::block_sums::BlockSums;
+use crate::parameters::shape::FunctionValue;
+use crate::problem::block_sums::{BlockSums, TileSums};
 use crate::problem::intrinsics_terms::PIXEL_PARAMETERS;
 use crate::problem::observer_column::ObserverColumn;
-use crate::problem::tile_shape::TileShape;
-use nalgebra::{Matrix4, RowSVector, SMatrix, Vector2, Vector3, Vector4};
+use nalgebra::{RowSVector, SMatrix, Vector2, Vector3, Vector4};
+
+/// The shape's functions at a tile.
+#[derive(Clone, Debug)]
+pub struct TileShape {
+    /// Unit normal of the nominal wall at the tile's centre.
+    pub normal: Vector3<f64>,
+    /// The functions that are not zero there, by ascending block.
+    pub functions: Vec<FunctionValue>,
+}
 
 /// Sums over the observers of a tile.
 struct ObserverSums {
@@ -35,12 +44,12 @@ struct ObserverSums {
 }
 
 /// Sums over the observers of a tile.
-fn sum_observers(
-    columns: &[ObserverColumn],
-    features: &Matrix4<f64>,
-    total_weight: f64,
-    normal: &Vector3<f64>,
-) -> ObserverSums {
+fn sum_observers(tile: &TileSums, normal: &Vector3<f64>) -> ObserverSums {
+    let TileSums {
+        columns,
+        features,
+        total_weight,
+    } = tile;
     let tau =
         |column: &ObserverColumn| -> Vector2<f64> { -(column.a.fixed_columns::<3>(3) * normal) };
     let weighted = columns.iter().map(|i| tau(i) * i.moments.weight);
@@ -69,34 +78,30 @@ fn sum_observers(
 }
 
 impl BlockSums {
-    /// Adds a tile's part of the shape. `columns`: all its observers; `features`: M;
-    /// `total_weight`: `Σw̄`.
-    pub fn add_shape(
-        &mut self,
-        columns: &[ObserverColumn],
-        features: &Matrix4<f64>,
-        total_weight: f64,
-        shape: &TileShape,
-    ) {
-        let sums = sum_observers(columns, features, total_weight, &shape.normal);
-        for (n, b) in shape.functions.iter().enumerate() {
-            self.gradient[b.index][b.component] += sums.gradient * b.value;
-            for a in &shape.functions[..=n] {
+    /// Adds a tile's part of the shape, whose first block has the slot `first_slot`.
+    pub fn add_shape(&mut self, tile: &TileSums, shape: &TileShape, first_slot: usize) {
+        let sums = sum_observers(tile, &shape.normal);
+        let functions: Vec<(usize, &FunctionValue)> = (shape.functions.iter())
+            .map(|function| (self.index_of(first_slot + function.block), function))
+            .collect();
+        for (n, (column, b)) in functions.iter().enumerate() {
+            self.gradient[*column][b.component] += sums.gradient * b.value;
+            for (row, a) in &functions[..=n] {
                 let product = sums.own * a.value * b.value;
-                let block = self.block_mut(a.index, b.index);
+                let block = self.block_mut(*row, *column);
                 block[(a.component, b.component)] += product;
                 // The lower triangle of a block on the diagonal.
-                if a.index == b.index && a.component != b.component {
+                if row == column && a.component != b.component {
                     block[(b.component, a.component)] += product;
                 }
             }
-            for (column, of_frame) in columns.iter().zip(&sums.frames) {
-                let block = self.block_mut(column.frame, b.index);
+            for (observer, of_frame) in tile.columns.iter().zip(&sums.frames) {
+                let block = self.block_mut(observer.frame, *column);
                 let mut target = block.column_mut(b.component);
                 target += of_frame * b.value;
             }
             if let Some(intrinsics) = &mut self.intrinsics {
-                intrinsics.add_shape(b.index, b.component, &(sums.shared * b.value));
+                intrinsics.add_shape(*column, b.component, &(sums.shared * b.value));
             }
         }
     }

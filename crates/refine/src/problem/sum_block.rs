@@ -1,10 +1,11 @@
 //! Sums over the tiles of one block of the wall.
 
+use crate::parameters::shape::Shape;
 use crate::problem::block_sums::{BlockSums, TileSums};
 use crate::problem::observer_column::ObserverColumn;
 use crate::problem::photometric_problem::PhotometricProblem;
 use crate::problem::set_up::shape_slots;
-use crate::problem::tile_shape::{TileFunction, TileShape};
+use crate::problem::shape_terms::TileShape;
 use crate::samples::observer::Observer;
 use crate::samples::visibility::{Tile, Visibility};
 use crate::tiles::frame_samples::SampledFrame;
@@ -14,6 +15,7 @@ use crate::tiles::tile_moments::TileMoments;
 use crate::tiles::workspace::TileWorkspace;
 use nalgebra::Matrix2x6;
 use std::ops::Range;
+use std::sync::Arc;
 use tunnelstitch_geometry::camera::Camera;
 use tunnelstitch_geometry::numerics::simd_dispatch::dispatch_simd;
 use tunnelstitch_geometry::surface::Surface;
@@ -56,15 +58,11 @@ impl PhotometricProblem<'_> {
         let frames = visibility.frames(block).into_iter();
         let mut slots: Vec<usize> = frames.filter_map(|k| context.slots[k]).collect();
         let frames = slots.len();
-        if let Some(shape) = &self.shape {
-            let ids = visibility.tiles[block.clone()].iter().map(|tile| tile.id);
-            slots.extend(shape_slots(
-                ids,
-                &self.grid,
-                &shape.model,
-                self.active.len(),
-            ));
-        }
+        let functions = self.tile_functions(&visibility.tiles[block.clone()]);
+        let of_shape = functions
+            .iter()
+            .flat_map(|tile| tile.functions.iter().copied());
+        slots.extend(shape_slots(of_shape, self.active.len()));
         let mut sums = BlockSums::new(slots, frames, self.estimates_shared);
         let tiles = self.sum_tiles(&context, block, &mut sums);
         dispatch_simd(
@@ -75,13 +73,29 @@ impl PhotometricProblem<'_> {
                     if let Some(intrinsics) = &mut sums.intrinsics {
                         intrinsics.add_tile(&tile.columns, &tile.features, tile.total_weight);
                     }
-                    if let Some(shape) = &tile.shape {
-                        sums.add_shape(&tile.columns, &tile.features, tile.total_weight, shape);
-                    }
                 }
             },
         );
+        for (tile, shape) in tiles.iter().zip(&functions) {
+            sums.add_shape(tile, shape, self.active.len());
+        }
         sums
+    }
+
+    /// The shape's functions at some tiles; none if the shape is not estimated or has no functions.
+    fn tile_functions(&self, tiles: &[Tile]) -> Vec<TileShape> {
+        let shape = self.shape.iter().filter(|shape| shape.model.blocks() > 0);
+        let of_tile = |(shape, tile): (&Arc<Shape>, &Tile)| {
+            let centre = self.grid.centre(tile.id);
+            TileShape {
+                normal: self.context.nominal.frame(centre).normal(),
+                functions: shape.model.functions_at(centre),
+            }
+        };
+        shape
+            .flat_map(|shape| tiles.iter().map(move |tile| (shape, tile)))
+            .map(of_tile)
+            .collect()
     }
 
     /// Computes the contribution of each tile of a block, and adds its cost to `sums`.
@@ -166,25 +180,7 @@ impl PhotometricProblem<'_> {
                 .iter()
                 .map(|observer| observer.weight)
                 .sum(),
-            shape: self.tile_shape(tile, sums),
         }
-    }
-
-    /// The shape's functions at a tile; None if the shape is not estimated.
-    fn tile_shape(&self, tile: &Tile, sums: &BlockSums) -> Option<TileShape> {
-        let shape = self.shape.as_ref()?;
-        let centre = self.grid.centre(tile.id);
-        let functions = shape.model.functions_at(centre).into_iter();
-        Some(TileShape {
-            normal: self.context.nominal.frame(centre).normal(),
-            functions: functions
-                .map(|function| TileFunction {
-                    index: sums.index_of(self.active.len() + function.block),
-                    component: function.component,
-                    value: function.value,
-                })
-                .collect(),
-        })
     }
 
     /// `C` of an observer; zero if the shared parameters are not estimated.

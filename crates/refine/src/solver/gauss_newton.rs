@@ -244,10 +244,7 @@ impl DampedGaussNewton {
             Err(source) if is_last_resort => return Err(problem.factor_error(source)),
             Err(_) => return Ok(None),
         };
-        let Some(border) = &current.border else {
-            return Ok(Some((factor.step(&normal.gradient), Kappa::zeros())));
-        };
-        match border.step(&factor, &normal.gradient, self.lambda) {
+        match current.step(&factor, self.lambda) {
             None if is_last_resort => Err(problem.factor_error(FactorError::NotPositiveDefinite)),
             step => Ok(step),
         }

@@ -166,22 +166,24 @@ impl<'s> ShapeEquations<'s> {
             }
         }
         let factor = self.symbolic.factorise(self.pattern, &normal, 0.0).ok()?;
-        let schur = self.border.map(|border| border.eliminate(&factor, 0.0));
+        let eliminated = self
+            .border
+            .map(|border| (border, border.eliminate(&factor, 0.0)));
         let mut log_determinant = factor.log_determinant();
-        let (step, shared) = match self.border {
-            Some(border) => border.step(&factor, &normal.gradient, 0.0)?,
+        let (step, shared) = match &eliminated {
+            Some((border, schur)) => schur.step(&factor, &normal.gradient, &border.gradient)?,
             None => (factor.step(&normal.gradient), Kappa::zeros()),
         };
         let slopes = step.iter().zip(&normal.gradient);
         let mut slope: f64 = slopes.map(|(step, gradient)| step.dot(gradient)).sum();
-        if let (Some(border), Some(schur)) = (self.border, &schur) {
+        if let Some((border, schur)) = &eliminated {
             slope += shared.dot(&border.gradient);
             let l = schur.schur.cholesky()?.l();
             log_determinant += 2.0 * l.diagonal().iter().map(|d| d.ln()).sum::<f64>();
         }
         Some(Minimum {
             factor,
-            schur,
+            schur: eliminated.map(|(_, schur)| schur),
             step,
             shared,
             log_evidence: -(prior_cost + 0.5 * slope) - 0.5 * log_determinant - log_volume,

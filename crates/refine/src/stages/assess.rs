@@ -213,13 +213,9 @@ fn steps_left(solution: &Solution) -> Result<Vec<f64>, ProblemError> {
         .symbolic()
         .factorise(problem.pattern(), &linearisation.normal, 0.0)
         .map_err(|source| problem.factor_error(source))?;
-    let gradient = &linearisation.normal.gradient;
-    let (step, shared) = match &linearisation.border {
-        None => (factor.step(gradient), Kappa::zeros()),
-        Some(border) => border
-            .step(&factor, gradient, 0.0)
-            .ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))?,
-    };
+    let (step, shared) = linearisation
+        .step(&factor, 0.0)
+        .ok_or_else(|| problem.factor_error(FactorError::NotPositiveDefinite))?;
     Ok(problem.wall_step_px(&solution.unknowns.frames, &step, &shared))
 }
 

@@ -11,7 +11,7 @@ use crate::stages::state::PipelineState;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_core::survey::CalibrationGroup;
-use tunnelstitch_geometry::surface::{Displaced, Surface};
+use tunnelstitch_geometry::surface::displaced;
 use tunnelstitch_geometry::trajectory::{Pose, poses_of};
 
 /// The input and the options of a refinement, with what follows from both.
@@ -111,10 +111,7 @@ impl<'a> Setup<'a> {
     /// grey levels.
     pub fn initial_context(&self, noise: f64) -> EstimationContext<'_> {
         let nominal = Arc::clone(&self.input.surface);
-        let surface: Arc<dyn Surface> = match self.input.displacement {
-            Some(field) => Arc::new(Displaced::new(Arc::clone(&nominal), field.clone())),
-            None => Arc::clone(&nominal),
-        };
+        let surface = displaced(&nominal, self.input.displacement.cloned());
         EstimationContext {
             nominal,
             displacement: self.input.displacement,

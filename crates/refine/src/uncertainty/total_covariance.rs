@@ -88,8 +88,9 @@ impl TotalCovariance {
         let Some((tau, functions, first)) = pixel.shape else {
             return variance;
         };
-        variance += tau.norm_squared() * self.shape_variance(functions, first);
-        for (slot, phi) in &by_slot(functions, first) {
+        let blocks = by_slot(functions, first);
+        variance += tau.norm_squared() * self.variance_of(&blocks);
+        for (slot, phi) in &blocks {
             if let Some(covariance) = self.block(k, *slot) {
                 let with_pose = a * covariance.fixed_rows::<6>(0) * phi;
                 variance += 2.0 * with_pose.dot(&tau);
@@ -104,7 +105,11 @@ impl TotalCovariance {
     /// Variance of the wall's displacement where the shape has the given `functions`, m²; `first`:
     /// slot of its first block.
     pub fn shape_variance(&self, functions: &[FunctionValue], first: usize) -> f64 {
-        let blocks = by_slot(functions, first);
+        self.variance_of(&by_slot(functions, first))
+    }
+
+    /// Variance of `Σ φᵀ c` over blocks of the shape, by their slots.
+    fn variance_of(&self, blocks: &BTreeMap<usize, ShapeStep>) -> f64 {
         let mut variance = 0.0;
         for (n, (slot, phi)) in blocks.iter().enumerate() {
             for (m, (other, phi_other)) in blocks.iter().enumerate().skip(n) {
