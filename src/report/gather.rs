@@ -5,7 +5,7 @@ use super::model::{
     Abscissa, FrameRow, Report, ResultSummary, SCHEMA_VERSION, SurveyFacts, WallMaps,
 };
 use super::pictures::{Pictures, panoramas, thumbnails};
-use super::refined_files::{RefinedFiles, Refinement};
+use super::refined_files::{REFINEMENT_FILE, RefinedFiles, Refinement};
 use crate::evaluate::{ComparedPanoramas, Comparison, SeamMap, WallError};
 use crate::refine::FrameFlag;
 use crate::survey::Survey;
@@ -235,7 +235,7 @@ fn notes(survey: &Survey, refined: &RefinedFiles, comparison: &Comparison) -> Ve
     match &refined.refinement {
         None => notes.push(format!(
             "No {}, so flags, residuals, costs and options are not known.",
-            is_beside("refine.json")
+            is_beside(REFINEMENT_FILE)
         )),
         Some(refinement) => {
             if refinement.has_old_keys {

@@ -42,5 +42,7 @@ pub use model::{
 };
 pub use page::page;
 pub use pictures::{PICTURES, Pictures};
-pub use refined_files::{CalibratedUnknown, Calibration, RefinedFiles, Refinement};
+pub use refined_files::{
+    CalibratedUnknown, Calibration, REFINEMENT_FILE, RefinedFiles, Refinement,
+};
 pub use resolution::choose_resolution;

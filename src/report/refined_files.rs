@@ -82,7 +82,7 @@ pub struct CalibratedUnknown {
 }
 
 /// Name of refine's report beside the poses.
-const REFINEMENT: &str = "refine.json";
+pub const REFINEMENT_FILE: &str = "refine.json";
 /// Name of the covariances beside the poses.
 const COVARIANCES: &str = "covariance.csv";
 
@@ -125,7 +125,7 @@ impl RefinedFiles {
             (own && path.is_file()).then_some(path)
         };
         let count = survey.frames.len();
-        let refinement = beside(REFINEMENT).map(|path| read_refinement(&path, count));
+        let refinement = beside(REFINEMENT_FILE).map(|path| read_refinement(&path, count));
         let covariances = beside(COVARIANCES).map(|path| read_covariances(&path, count));
         Ok(Self {
             refinement: refinement.transpose()?,
@@ -139,7 +139,7 @@ impl RefinedFiles {
     pub fn files(&self) -> Vec<PathBuf> {
         let beside = |name: &str, read: bool| read.then(|| self.path.with_file_name(name));
         let others = [
-            beside(REFINEMENT, self.refinement.is_some()),
+            beside(REFINEMENT_FILE, self.refinement.is_some()),
             beside(COVARIANCES, self.covariances.is_some()),
         ];
         let poses = std::iter::once(self.path.clone());

@@ -1,7 +1,7 @@
 //! Arguments that select poses and say how they are read.
 
-use crate::cli::output::REPORT_FILE;
 use crate::cli::output::{Failure, Terminal};
+use crate::report::REFINEMENT_FILE;
 use crate::survey::{Associate, PosesSection, SURVEY_FILE, Survey, SurveyError, SurveyFile};
 use crate::trajectory::{CameraAxes, Direction, PoseFormat, Trajectory};
 use clap::ValueEnum;
@@ -263,7 +263,7 @@ fn take_over_found(file: &mut SurveyFile, poses: &Path) -> Result<(), SurveyErro
         return Ok(());
     };
     let beside = folder.join(SURVEY_FILE);
-    if !(folder.join(REPORT_FILE).is_file() && beside.is_file()) {
+    if !(folder.join(REFINEMENT_FILE).is_file() && beside.is_file()) {
         return Ok(());
     }
     let mut found = Survey::read_file(&beside)?;

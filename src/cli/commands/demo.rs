@@ -1,7 +1,8 @@
 //! `tunnelstitch demo`: runs all steps on a simulated survey.
 
 use super::compare::write_comparison;
-use super::refine::{print_summary, refine_into};
+use super::refine::print_summary;
+use super::refine_files::refine_into;
 use super::report::report_into;
 use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json};
 use crate::evaluate::{Comparison, compare_survey};

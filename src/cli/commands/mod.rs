@@ -14,6 +14,7 @@ pub mod locate_points;
 pub mod plan;
 pub mod project;
 pub mod refine;
+pub mod refine_files;
 pub mod report;
 pub mod shell;
 pub mod simulate;

@@ -1,21 +1,18 @@
 //! `tunnelstitch refine`: refines the poses of a survey by photometric bundle adjustment.
 
-use crate::camera::format_calibration;
 use crate::cli::arguments::{PoseReadingArguments, ResumeArguments, positive, rate, resume, share};
-use crate::cli::output::{Failure, REPORT_FILE, RUN_FILE, RunRecord, Terminal, json, record};
+use crate::cli::commands::refine_files::refine_into;
+use crate::cli::output::{Failure, RUN_FILE, RunRecord, Terminal, json, record};
 use crate::persist::atomic;
-use crate::persist::checkpoint::Checkpoint;
 use crate::progress::Progress;
 use crate::refine::{
     CalibrationReport, FrameFlag, FrameReport, ReadoutEstimate, RefineOptions, RefineReport,
-    Refined, ShapeMode, refine_with_checkpoint, search_pose_conventions,
+    Refined, ShapeMode, search_pose_conventions,
 };
-use crate::survey::{CalibrationGroup, FoundFiles, SURVEY_FILE, ShapeFile, Survey, SurveyFile};
-use crate::trajectory::tum;
-use serde::Serialize;
-use std::path::{Path, PathBuf};
+use crate::report::REFINEMENT_FILE;
+use crate::survey::{CalibrationGroup, Survey};
+use std::path::PathBuf;
 use std::sync::Arc;
-use tunnelstitch_core::PROGRAM;
 
 /// Refines the poses of a survey by photometric bundle adjustment.
 ///
@@ -141,22 +138,6 @@ impl CalibrateArgument {
     }
 }
 
-/// `refine.json`.
-#[derive(Serialize)]
-struct RefineFile<'a> {
-    /// Name and version of the program.
-    program: &'static str,
-    /// The command line.
-    command: &'a [String],
-    /// Path of the survey as given, and the content of its survey.toml.
-    survey: &'a Path,
-    survey_file: &'a SurveyFile,
-    /// The effective options.
-    options: &'a RefineOptions,
-    #[serde(flatten)]
-    report: &'a RefineReport,
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -278,7 +259,7 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
     terminal.say(format!(
         "wrote {} and {}",
         poses.display(),
-        arguments.out.join(REPORT_FILE).display()
+        arguments.out.join(REFINEMENT_FILE).display()
     ));
     if report.calibration.is_some() {
         terminal.say(format!(
@@ -287,86 +268,6 @@ fn print_outputs(arguments: &RefineArguments, report: &RefineReport, terminal: &
             poses.display()
         ));
     }
-}
-
-/// Refines a survey, continuing from a checkpoint if there is one, and writes poses.tum,
-/// refine.json and covariance.csv into `out`. Also returns the text of refine.json.
-///
-/// # Errors
-/// Bad input, or an output that cannot be written.
-pub fn refine_into(
-    survey: &Survey,
-    options: &RefineOptions,
-    out: &Path,
-    record: &RunRecord,
-    checkpoint: Option<&mut Checkpoint>,
-    terminal: &Arc<Terminal>,
-) -> Result<(Refined, String), Failure> {
-    atomic::create_folder(out)?;
-    refuse_survey_folder(&survey.folder, out)?;
-    let progress: Arc<dyn Progress> = Arc::clone(terminal) as Arc<dyn Progress>;
-    let refined = refine_with_checkpoint(survey, options, checkpoint, &progress)?;
-    let json = json::text(&RefineFile {
-        program: PROGRAM,
-        command: &record.arguments,
-        survey: &survey.folder,
-        survey_file: &survey.file,
-        options,
-        report: &refined.report,
-    })?;
-    atomic::write_text(&out.join("poses.tum"), &tum::format(&refined.trajectory))?;
-    atomic::write_text(&out.join(REPORT_FILE), &json)?;
-    let sigmas: Vec<_> = refined
-        .report
-        .frames
-        .iter()
-        .map(|frame| frame.sigma)
-        .collect();
-    atomic::write_text(
-        &out.join("covariance.csv"),
-        &refined.covariances.csv(&sigmas),
-    )?;
-    write_survey(survey, &refined, out)?;
-    Ok((refined, json))
-}
-
-/// Name of the wall's shape.
-const SHAPE_FILE: &str = "shape.json";
-
-/// Name of the refined calibration.
-const CAMERA_FILE: &str = "camera.json";
-
-/// Refuses to write what is found over the survey's own files.
-fn refuse_survey_folder(survey: &Path, out: &Path) -> Result<(), Failure> {
-    match (survey.canonicalize(), out.canonicalize()) {
-        (Ok(survey), Ok(folder)) if survey == folder => Err(Failure::input(format!(
-            "{}: --out must not be the survey's own folder, whose {SURVEY_FILE} would be replaced",
-            out.display()
-        ))),
-        _ => Ok(()),
-    }
-}
-
-/// Writes the calibration and the shape that were found, and a `survey.toml` that uses them with
-/// the survey's frames and initial poses; removes those of an earlier run.
-fn write_survey(survey: &Survey, refined: &Refined, out: &Path) -> Result<(), Failure> {
-    let calibration = refined.report.calibration.as_ref();
-    let text_of = |file: &str, text: Option<String>| match text {
-        Some(text) => Ok(atomic::write_text(&out.join(file), &text)?),
-        None => Ok::<(), Failure>(atomic::remove_file(&out.join(file))?),
-    };
-    let camera = calibration.map(|calibration| format_calibration(&calibration.camera));
-    text_of(CAMERA_FILE, camera)?;
-    let shape = refined.shape.as_ref();
-    let shape = shape.map(|shape| json::text(&ShapeFile::new(&shape.field, shape.sigma_m.clone())));
-    text_of(SHAPE_FILE, shape.transpose()?)?;
-    let file = survey.as_found(&FoundFiles {
-        calibration: calibration.map(|calibration| (CAMERA_FILE, calibration.radius_m)),
-        shape_file: refined.shape.as_ref().map(|_| SHAPE_FILE),
-    });
-    let text = toml::to_string(&file).map_err(|error| Failure::bug(error.to_string()))?;
-    let text = format!("# The survey with the camera and the wall that refine has found.\n{text}");
-    Ok(atomic::write_text(&out.join(SURVEY_FILE), &text)?)
 }
 
 /// Prints the estimated parameters of the self-calibration.

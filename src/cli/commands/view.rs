@@ -1,11 +1,12 @@
 //! `tunnelstitch view`: shows the tunnel in the browser.
 
 use crate::cli::arguments::{LayerArguments, PosesArguments, TextureArguments};
-use crate::cli::output::{Failure, REPORT_FILE, Terminal};
+use crate::cli::output::{Failure, Terminal};
 use crate::inspect::{
     MANIFEST, Marks, Server, ServerContent, Viewer, draw_layers, pose_source_frames,
 };
 use crate::persist::atomic::ScratchFolder;
+use crate::report::REFINEMENT_FILE;
 use crate::survey::SURVEY_FILE;
 use std::path::{Path, PathBuf};
 
@@ -90,7 +91,7 @@ pub fn run(arguments: &ViewArguments, terminal: &Terminal) -> Result<(), Failure
 /// # Errors
 /// A survey that no longer exists.
 fn refined_folder(folder: &Path) -> Result<Option<(PathBuf, PosesArguments)>, Failure> {
-    let report = folder.join(REPORT_FILE);
+    let report = folder.join(REFINEMENT_FILE);
     let Ok(text) = std::fs::read_to_string(&report) else {
         return Ok(None);
     };

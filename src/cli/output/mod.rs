@@ -10,6 +10,6 @@ mod terminal;
 
 pub use failure::Failure;
 pub use paths::{create_parent_folder, picture_format, refuse_overwriting, survey_files};
-pub use record::{REPORT_FILE, RUN_FILE, RunRecord};
+pub use record::{RUN_FILE, RunRecord};
 pub use suggestion::{Suggestion, SuggestionArguments};
 pub use terminal::Terminal;

@@ -32,9 +32,6 @@ struct RunFile<'a> {
 
 const SCHEMA_VERSION: u32 = 1;
 
-/// Name of refine's report in a folder of results.
-pub const REPORT_FILE: &str = "refine.json";
-
 /// Name of the record in a folder of results.
 pub const RUN_FILE: &str = "run.toml";
 

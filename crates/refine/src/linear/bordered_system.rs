@@ -149,8 +149,8 @@ pub struct SchurComplement {
 }
 
 impl SchurComplement {
-    /// The step `(δp, δκ)` for the gradients of the slots and of the shared parameters; None if S is
-    /// not positive definite.
+    /// The step `(δp, δκ)` for the gradients of the slots and of the shared parameters; None if S
+    /// is not positive definite.
     pub fn step(
         &self,
         factor: &Factor,

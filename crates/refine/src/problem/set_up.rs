@@ -50,8 +50,8 @@ pub fn pose_frames(
 
 /// Sparsity pattern of the `active` frames among participants that are counted from frame `first`,
 /// and of the blocks of the shape behind them: frames that observe common tiles or have a common
-/// prior, blocks with functions in a common block of the wall, and those with the frames that observe
-/// it.
+/// prior, blocks with functions in a common block of the wall, and those with the frames that
+/// observe it.
 ///
 /// # Errors
 /// [`FrameError`] if an image that the selection of tiles needs cannot be read.
