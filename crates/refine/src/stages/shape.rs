@@ -52,13 +52,20 @@ pub fn begin(setup: &Setup, state: &mut PipelineState) -> Result<(), ProblemErro
     Ok(())
 }
 
-/// Takes over the shape of a solution. A shape far beyond its prior means that something else is
-/// wrong: then the wall and the lens are those given.
+/// Takes over the shape of a solution.
 pub fn take_over(setup: &Setup, state: &mut PipelineState, solution: &Solution) {
-    let Some(shape) = &mut state.shape else {
-        return;
-    };
-    shape.coefficients.clone_from(&solution.unknowns.shape);
+    if let Some(shape) = state.shape.take() {
+        let solved = Shape {
+            coefficients: solution.unknowns.shape.clone(),
+            ..shape
+        };
+        adopt(setup, state, solved);
+    }
+}
+
+/// Adopts a shape. One far beyond its prior means that something else is wrong: then the wall and
+/// the lens are those given.
+fn adopt(setup: &Setup, state: &mut PipelineState, mut shape: Shape) {
     let most_m = MAX_PRIOR_SIGMAS * setup.shape_sigma_m;
     let is_plausible = |block: &ShapeStep| (0.0..=most_m).contains(&block.amax());
     if !shape.coefficients.iter().all(is_plausible) {
@@ -66,6 +73,7 @@ pub fn take_over(setup: &Setup, state: &mut PipelineState, solution: &Solution) 
         shape.coefficients.clear();
         fix_lens(setup, state);
     }
+    state.shape = Some(shape);
 }
 
 /// Fixes the lens parameters that were not asked for at their given values.
@@ -93,7 +101,7 @@ pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution) -> b
     if free == state.free && before.is_some_and(|before| !is_changed(before, &shape.model)) {
         return false;
     }
-    state.shape = Some(shape);
+    adopt(setup, state, shape);
     true
 }
 
