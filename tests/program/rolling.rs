@@ -16,14 +16,7 @@ fn simulate(out: &Path, more: &[&str]) {
 
 /// Refines a survey; returns the result of the rolling-shutter test and the warnings.
 fn refine(survey: &Path, out: &Path) -> (Value, String) {
-    let output = tunnelstitch(&[
-        "refine",
-        "--shape",
-        "fixed",
-        text(survey),
-        "--out",
-        text(out),
-    ]);
+    let output = tunnelstitch(&["refine", text(survey), "--out", text(out)]);
     let warned = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{warned}");
     let report = json(&out.join("refine.json"));
