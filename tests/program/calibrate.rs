@@ -1,6 +1,8 @@
 //! Self-calibration through the program: wrong calibrations are found, or refused with the reason.
 
-use crate::support::{blender_survey, edit, fail, first_frames, json, simulate, succeed, text};
+use crate::support::{
+    blender_survey, edit, fail, first_frames, json, simulate, succeed, text, tunnelstitch,
+};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::path::Path;
 use tunnelstitch::trajectory::{Pose, tum};
@@ -26,6 +28,11 @@ fn scale_focal(survey: &Path, factor: f64) {
 fn calibrate(survey: &Path, out: &Path, unknowns: &str) -> impl Fn(&str) -> serde_json::Value {
     let arguments = ["refine", text(survey), "--out", text(out), "--quiet"];
     succeed(&[&arguments[..], &["--fast", "--calibrate", unknowns]].concat());
+    reported_unknowns(out)
+}
+
+/// The unknowns of a report by name.
+fn reported_unknowns(out: &Path) -> impl Fn(&str) -> serde_json::Value {
     let report = json(&out.join("refine.json"));
     move |name| {
         let unknowns = report["calibration"]["unknowns"].as_array().unwrap();
@@ -64,7 +71,7 @@ fn a_wrong_focal_length_is_found_and_the_result_is_a_survey() {
     let (poses, compared) = (out.join("poses.tum"), dir.path().join("compared"));
     let arguments = ["compare", text(&out), "--refined", text(&poses), "--quiet"];
     let more = ["--out", text(&compared), "--max-wall-px", "0.1"];
-    succeed(&[&arguments[..], &more].concat());
+    succeed(&[&arguments[..], &more, &["--px-per-metre", "40"]].concat());
 }
 
 /// Everything wrong at once: observable parameters are right, the others have a reason.
@@ -166,7 +173,11 @@ fn two_frames_are_honest() {
     simulate(&survey, &["--frames", "2", "--size", "320x240"]);
     let truth = tunnelstitch::camera::read_calibration(&survey.join("camera.json"), None).unwrap();
     scale_focal(&survey, 1.02);
-    let unknown = calibrate(&survey, &out, "focal,centre,distortion");
+    let unknowns = ["--fast", "--calibrate", "focal,centre,distortion"];
+    let arguments = ["refine", text(&survey), "--out", text(&out), "--quiet"];
+    // So little may also end in the initial poses and an exit code that says so.
+    tunnelstitch(&[&arguments[..], &unknowns].concat());
+    let unknown = reported_unknowns(&out);
     assert_honest(&unknown("focal"), truth.fx);
     assert_honest(&unknown("cx"), truth.cx);
     assert_honest(&unknown("cy"), truth.cy);

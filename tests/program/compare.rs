@@ -1,6 +1,8 @@
 //! Refine and compare on frames that a renderer independent of this program made.
 
-use crate::support::{self, blender_survey, fail, first_frames, json, succeed, text};
+use crate::support::{
+    self, blender_survey, fail, first_frames, json, refined_blender_survey, succeed, text,
+};
 
 fn number(value: &serde_json::Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
@@ -10,9 +12,8 @@ fn number(value: &serde_json::Value) -> f64 {
 fn the_fixture_is_repaired_to_the_accuracy_promised() {
     let dir = tempfile::tempdir().unwrap();
     let survey = blender_survey();
-    let (refined, compared) = (dir.path().join("refined"), dir.path().join("compared"));
-    succeed(&["refine", text(&survey), "--out", text(&refined)]);
-    let poses = refined.join("poses.tum");
+    let compared = dir.path().join("compared");
+    let poses = refined_blender_survey().join("poses.tum");
     let table = succeed(&[
         "compare",
         text(&survey),

@@ -1,30 +1,16 @@
 //! Refinement of the Blender-rendered fixture through the program, judged against the true poses.
 
 use crate::support::{
-    self, blender_survey, first_frames, json, simulate, succeed, text, tunnelstitch,
+    self, first_frames, json, refine_blender_survey, refined_blender_survey, simulate, succeed,
+    text, tunnelstitch,
 };
 use std::path::Path;
-
-/// Refines the fixture into `out`.
-fn refine(out: &Path, threads: &str) {
-    let survey = blender_survey();
-    succeed(&[
-        "refine",
-        text(&survey),
-        "--out",
-        text(out),
-        "--threads",
-        threads,
-        "--quiet",
-    ]);
-}
 
 #[test]
 fn the_fixture_is_repaired_and_any_number_of_threads_gives_the_same_bytes() {
     let dir = tempfile::tempdir().unwrap();
-    let (one, two) = (dir.path().join("1"), dir.path().join("2"));
-    refine(&one, "1");
-    refine(&two, "2");
+    let (one, two) = (dir.path().join("1"), refined_blender_survey());
+    refine_blender_survey(&one, 1);
     let poses = std::fs::read(one.join("poses.tum")).unwrap();
     assert_eq!(poses, std::fs::read(two.join("poses.tum")).unwrap());
 
@@ -172,7 +158,7 @@ fn simulate_and_refine(options: &[&str]) -> tempfile::TempDir {
 /// moving objects, 16 bits.
 #[test]
 fn uneven_light_highlights_and_moving_objects_do_no_harm() {
-    let light = "--frames 30 --size 480x360 --gain-percent 30 --bias-grey 5 --lamp-corner 0.4 \
+    let light = "--frames 30 --size 320x240 --gain-percent 30 --bias-grey 5 --lamp-corner 0.4 \
                  --specular-percent 3 --moving 2 --bits 16 --seed 4";
     let dir = simulate_and_refine(&light.split_whitespace().collect::<Vec<_>>());
     let px = photometric_wall_px(&dir.path().join("survey"), &dir.path().join("out"));
@@ -228,7 +214,7 @@ fn faulty_frames_are_flagged_and_the_others_stay_accurate() {
 fn a_wrong_prior_costs_one_frame() {
     let dir = tempfile::tempdir().unwrap();
     let (survey, out) = (dir.path().join("survey"), dir.path().join("out"));
-    let options = ["--frames", "24", "--size", "480x360", "--seed", "8"];
+    let options = ["--frames", "24", "--size", "320x240", "--seed", "8"];
     simulate(&survey, &options);
     let path = survey.join("baseline.tum");
     let mut baseline = tunnelstitch::trajectory::tum::read(&path).unwrap();
@@ -292,7 +278,7 @@ fn joint_estimation_of_the_wall_improves_bricks() {
     let survey = dir.path().join("survey");
     simulate(
         &survey,
-        &["--frames", "16", "--size", "320x240", "--noise", "2"],
+        &["--frames", "16", "--size", "160x120", "--noise", "2"],
     );
     let refined = |name: &str, options: &[&str]| {
         let out = dir.path().join(name);

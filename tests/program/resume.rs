@@ -131,7 +131,7 @@ fn refine_with_kills(survey: &Path, folder: &Path, options: &[&str]) {
 #[test]
 fn refine_ends_with_the_same_bytes_however_often_it_is_killed() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = survey(dir.path(), 18, "320x240");
+    let survey = survey(dir.path(), 18, "160x120");
     refine_with_kills(&survey, dir.path(), &["--calibrate", "focal"]);
 }
 
@@ -147,9 +147,10 @@ fn joint_refine_ends_with_the_same_bytes_however_often_it_is_killed() {
 #[test]
 fn stitch_ends_with_the_same_bytes_however_often_it_is_killed() {
     let dir = tempfile::tempdir().unwrap();
-    let survey = survey(dir.path(), 18, "320x240");
-    // Every kind of file at once: the panorama in memory or on disk, Deep Zoom, maps.
-    for (picture, scale, seed) in [("wall.tif", "450", 2), ("wall.png", "250", 3)] {
+    let survey = survey(dir.path(), 18, "160x120");
+    // Every kind of file at once, several bands high: the panorama in memory or on disk, Deep Zoom,
+    // maps.
+    for (picture, scale, seed) in [("wall.tif", "300", 2), ("wall.png", "200", 3)] {
         let run = |name: &str, kill: Option<Duration>| -> (PathBuf, Duration) {
             let folder = dir.path().join(format!("{name}-{picture}"));
             let (out, dzi, maps) = (

@@ -9,7 +9,7 @@ use std::path::Path;
 fn refined(folder: &Path, arguments: &[&str]) -> [f64; 2] {
     let path = |name: &str| folder.join(name);
     let (survey, refined, out) = (path("survey"), path("refined"), path("compared"));
-    simulate(&survey, &[&["--size", "320x240"], arguments].concat());
+    simulate(&survey, arguments);
     succeed(&["refine", text(&survey), "--out", text(&refined)]);
     let poses = refined.join("poses.tum");
     succeed(&[
@@ -19,6 +19,8 @@ fn refined(folder: &Path, arguments: &[&str]) -> [f64; 2] {
         text(&poses),
         "--out",
         text(&out),
+        "--px-per-metre",
+        "20",
     ]);
     let json = json(&out.join("compare.json"));
     ["refined", "baseline"].map(|which| json[which]["wall"]["px"]["rms"].as_f64().unwrap())
@@ -32,7 +34,8 @@ fn boxes_horseshoes_and_ellipses_are_refined_as_circles_are() {
         ["--shape", "ellipse", "--width-m", "5", "--height-m", "3.5"],
     ] {
         let dir = tempfile::tempdir().unwrap();
-        let arguments = [&shape[..], &["--frames", "24"]].concat();
+        let size = "--frames 24 --size 320x240 --supersample 4".split(' ');
+        let arguments: Vec<&str> = shape.iter().copied().chain(size).collect();
         let [refined, initial] = refined(dir.path(), &arguments);
         assert!(initial > 10.0, "{shape:?}: {initial} px before");
         assert!(refined <= 0.1, "{shape:?}: {refined} px");
@@ -62,7 +65,7 @@ fn circling(pitch_m: f64) -> String {
 /// one: the errors match the stated uncertainty.
 #[test]
 fn a_tight_bend_is_refined_as_exactly_as_is_said() {
-    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&bend(), "24");
+    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&bend(), "320x240");
 }
 
 /// A winding line in a tunnel of varying width has no gauge freedom.
@@ -74,11 +77,11 @@ fn a_winding_tunnel_of_changing_radius_is_refined_as_exactly_as_is_said() {
         format!("{x} {y} 0 {}\n", 0.6 + 0.06 * (3.1 * y).sin())
     };
     let winding: String = (-6..50).map(point).collect();
-    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&winding, "24");
+    a_narrow_tunnel_is_refined_as_exactly_as_is_said(&winding, "240x180");
 }
 
 /// A tunnel of 0.6 m radius along a line.
-fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str, frames: &str) {
+fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str, size: &str) {
     let dir = tempfile::tempdir().unwrap();
     let line = dir.path().join("line.txt");
     std::fs::write(&line, points).unwrap();
@@ -90,7 +93,9 @@ fn a_narrow_tunnel_is_refined_as_exactly_as_is_said(points: &str, frames: &str) 
             "--centreline",
             text(&line),
             "--frames",
-            frames,
+            "24",
+            "--size",
+            size,
             "--advance-m",
             "0.05",
             "--translation-sigma-m",

@@ -7,10 +7,29 @@ pub mod npm;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::OnceLock;
 
 /// The survey rendered by Blender.
 pub fn blender_survey() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/blender_free48")
+}
+
+/// The folder of [`blender_survey`] refined by two threads, once for all tests.
+pub fn refined_blender_survey() -> &'static Path {
+    static REFINED: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let refined = REFINED.get_or_init(|| {
+        let dir = tempfile::tempdir().expect("a temporary folder");
+        refine_blender_survey(dir.path(), 2);
+        dir
+    });
+    refined.path()
+}
+
+/// Refines [`blender_survey`] into a folder.
+pub fn refine_blender_survey(out: &Path, threads: usize) {
+    let (survey, threads) = (blender_survey(), threads.to_string());
+    let refine = ["refine", text(&survey), "--out", text(out), "--quiet"];
+    succeed(&[&refine[..], &["--threads", &threads]].concat());
 }
 
 /// A writable survey of the fixture's first `count` frames.
