@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tunnelstitch_core::frames::FrameSet;
 use tunnelstitch_core::survey::{CalibrateSection, DEFAULT_SHAPE_SIGMA_RADII, Survey};
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{RadialField, Surface, WallRegions};
+use tunnelstitch_geometry::surface::{Bend, RadialField, Surface, WallRegions};
 use tunnelstitch_geometry::trajectory::{Jitter, Shutter, StampedPose};
 
 /// No part of the wall.
@@ -20,6 +20,8 @@ pub struct RefineInput<'a> {
     pub camera: Camera,
     /// The tunnel, in its nominal shape.
     pub surface: Arc<dyn Surface>,
+    /// The bend that is known of it, and that `surface` has.
+    pub bend: Option<Bend>,
     /// The frames, in the order of their poses.
     pub frames: &'a FrameSet,
     /// The initial poses, camera to world, one per frame.
@@ -54,6 +56,7 @@ impl<'a> RefineInput<'a> {
     ) -> Self {
         Self {
             camera,
+            bend: None,
             displacement: None,
             shape_sigma_m: DEFAULT_SHAPE_SIGMA_RADII * surface.perimeter_m() / TAU,
             nominal_radius_m: surface.perimeter_m() / TAU,
@@ -73,6 +76,7 @@ impl<'a> From<&'a Survey> for RefineInput<'a> {
         Self {
             camera: survey.camera,
             surface: Arc::clone(&survey.nominal),
+            bend: survey.bend,
             displacement: survey.displacement.as_ref(),
             shape_sigma_m: survey.shape_sigma_m,
             frames: &survey.frames,

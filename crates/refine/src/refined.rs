@@ -3,6 +3,7 @@
 use crate::report::RefineReport;
 use crate::uncertainty::covariance::Covariances;
 use crate::uncertainty::shape_report::EstimatedShape;
+use tunnelstitch_geometry::surface::Bend;
 use tunnelstitch_geometry::trajectory::Trajectory;
 
 /// The result of a refinement.
@@ -17,4 +18,6 @@ pub struct Refined {
     pub covariances: Covariances,
     /// Shape of the wall; None if it is as planned.
     pub shape: Option<EstimatedShape>,
+    /// Bend of a tunnel that was planned straight; None if it has none.
+    pub bend: Option<Bend>,
 }

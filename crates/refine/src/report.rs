@@ -1,6 +1,7 @@
 //! `refine.json`: the report of a refinement.
 
 use crate::solver::solve_record::SolveRecord;
+use crate::uncertainty::bend_report::BendReport;
 use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::frame_sigma::FrameSigma;
 use crate::uncertainty::model_error::ModelErrorReport;
@@ -133,6 +134,9 @@ pub struct RefineReport {
     /// The wall's shape, if it was estimated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shape: Option<ShapeReport>,
+    /// The bend of a tunnel that was planned straight, if it was found to have one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bend: Option<BendReport>,
     /// Self-calibration, if it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<CalibrationReport>,

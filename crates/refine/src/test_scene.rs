@@ -42,6 +42,8 @@ pub fn test_context<'a>(
     prior: &'a Prior,
 ) -> EstimationContext<'a> {
     EstimationContext {
+        planned: std::sync::Arc::new(wall.circle),
+        is_deviation_known: false,
         nominal: std::sync::Arc::new(wall.circle),
         displacement: None,
         shape: None,

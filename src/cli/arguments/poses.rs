@@ -326,7 +326,10 @@ impl PosesArguments {
     ) -> Result<(Survey, Trajectory), Failure> {
         let opened = self.open_survey(survey, |file| {
             if let Some(path) = self.file() {
-                file.poses = PosesSection::of(absolute(path));
+                file.poses = PosesSection {
+                    as_built: Some(true),
+                    ..PosesSection::of(absolute(path))
+                };
             }
             self.reading.apply_to(file);
         })?;

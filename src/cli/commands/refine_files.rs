@@ -97,14 +97,23 @@ fn write_survey(survey: &Survey, refined: &Refined, out: &Path) -> Result<(), Fa
     };
     let camera = calibration.map(|calibration| format_calibration(&calibration.camera));
     text_of(CAMERA_FILE, camera)?;
-    let shape = refined.shape.as_ref();
-    let shape = shape.map(|shape| json::text(&ShapeFile::new(&shape.field, shape.sigma_m.clone())));
-    text_of(SHAPE_FILE, shape.transpose()?)?;
+    let shape = shape_file(refined, survey.nominal.perimeter_m());
+    text_of(SHAPE_FILE, shape.as_ref().map(json::text).transpose()?)?;
     let file = survey.as_found(&FoundFiles {
         calibration: calibration.map(|calibration| (CAMERA_FILE, calibration.radius_m)),
-        shape_file: refined.shape.as_ref().map(|_| SHAPE_FILE),
+        shape_file: shape.map(|_| SHAPE_FILE),
     });
     let text = toml::to_string(&file).map_err(|error| Failure::bug(error.to_string()))?;
     let text = format!("# The survey with the camera and the wall that refine has found.\n{text}");
     Ok(atomic::write_text(&out.join(SURVEY_FILE), &text)?)
+}
+
+/// The wall's shape with the tunnel's bend, if there is either; `perimeter_m` of the tunnel.
+fn shape_file(refined: &Refined, perimeter_m: f64) -> Option<ShapeFile> {
+    let shape = refined.shape.as_ref();
+    let shape = shape.map(|shape| ShapeFile::new(&shape.field, shape.sigma_m.clone()));
+    match (shape, refined.bend) {
+        (Some(shape), bend) => Some(shape.with_bend(bend)),
+        (None, bend) => bend.map(|bend| ShapeFile::of_bend(bend, perimeter_m)),
+    }
 }

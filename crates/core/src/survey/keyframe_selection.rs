@@ -4,11 +4,12 @@ use super::associate::Associate;
 use super::error::SurveyError;
 use super::open::Survey;
 use std::path::Path;
+use tunnelstitch_geometry::surface::Surface;
 use tunnelstitch_geometry::trajectory::{Pose, poses_of};
 
 impl Survey {
     /// Keeps frames whose view is rotated by `step_deg` against the previous kept frame, by the
-    /// initial poses.
+    /// initial poses, which are those of the tunnel as planned.
     ///
     /// # Errors
     /// An impossible step; poses that are not associated by time, as the selection requires.
@@ -16,6 +17,7 @@ impl Survey {
         &mut self,
         step_deg: f64,
         toml_path: &Path,
+        planned: &dyn Surface,
     ) -> Result<(), SurveyError> {
         let fail = |what: String| {
             Err(SurveyError::Value {
@@ -36,7 +38,8 @@ impl Survey {
                     .to_owned(),
             );
         }
-        let (all, _) = self.read_as(section, &self.folder.join(&section.initial))?;
+        let path = self.folder.join(&section.initial);
+        let (all, _) = self.read_as(section, &path, planned)?;
         let kept = keyframe_indices(&poses_of(&all), step_deg.to_radians());
         self.frames = self.frames.only(&kept);
         if let Some(times_s) = &mut self.times_s {

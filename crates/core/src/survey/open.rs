@@ -12,7 +12,7 @@ use crate::frames::{FrameSet, Mask};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::camera::{Camera, read_calibration};
-use tunnelstitch_geometry::surface::{RadialField, Surface, WallRegions, displaced};
+use tunnelstitch_geometry::surface::{Bend, RadialField, Surface, WallRegions, bent, displaced};
 use tunnelstitch_geometry::trajectory::{
     Convention, Jitter, Pose, Shutter, StampedPose, Trajectory, poses_of,
 };
@@ -28,8 +28,10 @@ pub struct Survey {
     pub camera: Camera,
     /// The tunnel.
     pub surface: Arc<dyn Surface>,
-    /// The tunnel without the displacement of `shape_file`.
+    /// The tunnel without the displacement of `shape_file`, but with its bend.
     pub nominal: Arc<dyn Surface>,
+    /// The bend of the tunnel that `shape_file` has.
+    pub bend: Option<Bend>,
     /// The displacement of the wall that `shape_file` has.
     pub displacement: Option<RadialField>,
     /// 1-σ of the wall's deviation from the given shape, metres.
@@ -88,9 +90,12 @@ impl Survey {
             path: toml_path.clone(),
             what,
         };
-        let nominal = file.tunnel.surface(&toml_path, &folder)?;
+        let planned = file.tunnel.surface(&toml_path, &folder)?;
         let shape_sigma_m = file.tunnel.shape_sigma_m().map_err(value)?;
-        let displacement = file.tunnel.displacement(nominal.as_ref(), &folder)?;
+        let found = file.tunnel.found_shape(planned.as_ref(), &folder)?;
+        let bend = found.as_ref().and_then(|found| found.bend);
+        let nominal = bent(&planned, bend);
+        let displacement = found.and_then(|found| found.displacement());
         let surface = displaced(&nominal, displacement.clone());
         check_values(&file).map_err(value)?;
         let camera =
@@ -122,6 +127,7 @@ impl Survey {
             camera,
             surface,
             nominal,
+            bend,
             displacement,
             shape_sigma_m,
             ignored,
@@ -136,14 +142,25 @@ impl Survey {
             file,
         };
         if let Some(step_deg) = survey.file.frames.angle_step_deg {
-            survey.select_keyframes(step_deg, &toml_path)?;
+            survey.select_keyframes(step_deg, &toml_path, planned.as_ref())?;
         }
         let section = &survey.file.poses;
-        let (initial, mut warnings) =
-            survey.read_as(section, &survey.folder.join(&section.initial))?;
+        let (initial, mut warnings) = survey.read_as(
+            section,
+            &survey.folder.join(&section.initial),
+            match section.as_built {
+                Some(true) => survey.surface.as_ref(),
+                _ => planned.as_ref(),
+            },
+        )?;
+        let initial = match section.as_built {
+            Some(true) => initial,
+            _ => survey.carried(initial),
+        };
         let truth = match &section.truth {
             Some(truth) => {
-                let (truth, more) = survey.read_as(section, &survey.folder.join(truth))?;
+                let (truth, more) =
+                    survey.read_as(section, &survey.folder.join(truth), survey.surface.as_ref())?;
                 warnings.extend(more);
                 Some(truth)
             }
@@ -166,21 +183,36 @@ impl Survey {
     /// A malformed file, poses that cannot be associated with the frames, a camera outside the
     /// tunnel.
     pub fn read_poses(&self, path: &Path) -> Result<Trajectory, SurveyError> {
-        Ok(self.read_as(&PosesSection::of(path), path)?.0)
+        let surface = self.surface.as_ref();
+        Ok(self.read_as(&PosesSection::of(path), path, surface)?.0)
     }
 
-    /// Reads a file of poses with the options of a section; also returns warnings.
+    /// Initial poses carried along with the bend of the tunnel: they are those of the tunnel as
+    /// planned.
+    fn carried(&self, initial: Trajectory) -> Trajectory {
+        let carry = |stamped: StampedPose| match &self.bend {
+            Some(bend) => StampedPose {
+                pose: bend.bent(&stamped.pose),
+                ..stamped
+            },
+            None => stamped,
+        };
+        initial.into_iter().map(carry).collect()
+    }
+
+    /// Reads a file of poses in the tunnel `surface` with the options of a section; also returns
+    /// warnings.
     pub(super) fn read_as(
         &self,
         section: &PosesSection,
         path: &Path,
+        surface: &dyn Surface,
     ) -> Result<(Trajectory, Vec<String>), SurveyError> {
         let times_s = self.times_s.as_deref();
         let reading: InterpretedPoses =
             PoseReader::new(section, &self.folder, &self.frames, times_s)?.read(path)?;
         let trajectory = reading.trajectory();
         let poses = poses_of(&trajectory);
-        let surface = self.surface.as_ref();
         let warning =
             pose_validation::validate_poses(surface, &self.camera, &reading, &poses, path)?;
         Ok((trajectory, warning))
@@ -213,11 +245,12 @@ impl Survey {
                 camera: self.camera,
                 surface: Arc::clone(&self.surface),
                 nominal: Arc::clone(&self.nominal),
+                bend: self.bend,
                 displacement: self.displacement.clone(),
                 shape_sigma_m: self.shape_sigma_m,
                 ignored: self.ignored.clone(),
                 frames: self.frames.first(most_frames),
-                initial: stamped.take(most_frames).collect(),
+                initial: self.carried(stamped.take(most_frames).collect()),
                 truth: None,
                 prior: self.prior,
                 warnings: Vec::new(),

@@ -42,6 +42,10 @@ pub struct PosesSection {
     /// True to interpolate between the two neighbouring poses, rather than take the nearer one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub interpolate: Option<bool>,
+    /// True if the initial poses are those in the tunnel as it was built, false (the default) if
+    /// they are those in the tunnel as planned, along whose bend (`shape_file`) they are carried.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub as_built: Option<bool>,
 }
 
 impl PosesSection {

@@ -1,4 +1,4 @@
-//! `shape.json`: a wall's displacement from its nominal shape.
+//! `shape.json`: a wall's displacement from its nominal shape, and the bend of its tunnel.
 //!
 //! ```json
 //! {
@@ -6,7 +6,8 @@
 //!   "perimeter_m": 18.85, "columns": 64,
 //!   "origin": { "s_m": 0.0, "h_m": 0.0 }, "first_row": -3,
 //!   "coefficients_m": [0.0012, 0.0009],
-//!   "sigma_m": [0.0001, 0.0001]
+//!   "sigma_m": [0.0001, 0.0001],
+//!   "bend": { "curvature_per_m": [0.0033, 0.0], "at_h_m": 2.35 }
 //! }
 //! ```
 //!
@@ -15,18 +16,25 @@
 //! `Δ = perimeter/columns`, the columns i periodic, and rows j from `first_row` on, row by row in
 //! `coefficients_m` ([`tunnelstitch_geometry::surface::RadialField`]). `sigma_m` has 1-σ of δ at
 //! each node; it is optional.
+//!
+//! `bend`, optional as well, is a constant curvature of a tunnel that was planned straight
+//! ([`tunnelstitch_geometry::surface::Bend`]); its wall is displaced from there.
 
 use super::error::SurveyError;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use tunnelstitch_geometry::surface::{RadialField, SplineLattice, WallPoint};
+use tunnelstitch_geometry::surface::{Bend, RadialField, SplineLattice, Surface, WallPoint};
 
 /// Name and version of the format.
 const FORMAT: &str = "wall-shape-1";
+/// Columns at the least.
+const MIN_COLUMNS: usize = 8;
 /// Columns at the most: nodes a thousandth of the perimeter apart.
 const MAX_COLUMNS: usize = 1024;
 /// Largest displacement, share of the perimeter.
 const MAX_DISPLACEMENT_SHARE: f64 = 0.05;
+/// Smallest radius of a bend, perimeters; a tighter one is no deviation from a plan.
+const MIN_BEND_RADIUS_PERIMETERS: f64 = 1.0;
 /// Largest difference between the perimeter of the file and that of the tunnel, relative.
 const MAX_PERIMETER_ERROR: f64 = 1e-6;
 
@@ -43,6 +51,9 @@ pub struct ShapeFile {
     /// 1-σ of δ at each node, metres; empty if unknown.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sigma_m: Vec<f64>,
+    /// A curvature of the tunnel that is not planned.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bend: Option<Bend>,
 }
 
 impl ShapeFile {
@@ -60,14 +71,34 @@ impl ShapeFile {
             first_row: field.rows().start,
             coefficients_m: field.coefficients_m().to_vec(),
             sigma_m,
+            bend: None,
         }
     }
 
-    /// Reads a file for a tunnel of the given perimeter, metres.
+    /// The file with another bend.
+    pub fn with_bend(self, bend: Option<Bend>) -> Self {
+        Self { bend, ..self }
+    }
+
+    /// The file of a bend without displacement, in a tunnel of the given perimeter, metres.
+    pub fn of_bend(bend: Bend, perimeter_m: f64) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            perimeter_m,
+            columns: MIN_COLUMNS,
+            origin: WallPoint::default(),
+            first_row: 0,
+            coefficients_m: Vec::new(),
+            sigma_m: Vec::new(),
+            bend: Some(bend),
+        }
+    }
+
+    /// Reads a file for a tunnel as planned.
     ///
     /// # Errors
     /// [`SurveyError::Value`] that names the file and what is wrong.
-    pub fn read(path: &Path, perimeter_m: f64) -> Result<Self, SurveyError> {
+    pub fn read(path: &Path, planned: &dyn Surface) -> Result<Self, SurveyError> {
         let value = |what: String| SurveyError::Value {
             path: path.to_owned(),
             what,
@@ -75,7 +106,11 @@ impl ShapeFile {
         let text = std::fs::read_to_string(path)
             .map_err(|error| value(format!("cannot read the wall's shape: {error}")))?;
         let file: Self = serde_json::from_str(&text).map_err(|error| value(error.to_string()))?;
-        file.check(perimeter_m).map_err(value)?;
+        file.check(planned.perimeter_m()).map_err(value)?;
+        if file.bend.is_some() && !planned.gauge().shift {
+            let what = "has a bend, which only a straight tunnel can have; remove it";
+            return Err(value(what.to_owned()));
+        }
         Ok(file)
     }
 
@@ -87,6 +122,11 @@ impl ShapeFile {
             origin: self.origin,
         };
         RadialField::new(lattice, self.first_row, self.coefficients_m.clone())
+    }
+
+    /// The field; None if it is empty.
+    pub fn displacement(&self) -> Option<RadialField> {
+        (!self.coefficients_m.is_empty()).then(|| self.field())
     }
 
     /// Checks all values; returns what is wrong.
@@ -105,14 +145,26 @@ impl ShapeFile {
                 self.perimeter_m
             ));
         }
-        if !(8..=MAX_COLUMNS).contains(&self.columns) || !self.columns.is_power_of_two() {
+        if !(MIN_COLUMNS..=MAX_COLUMNS).contains(&self.columns) || !self.columns.is_power_of_two() {
             return Err(format!(
-                "columns is {}; it must be a power of two from 8 to {MAX_COLUMNS}",
+                "columns is {}; it must be a power of two from {MIN_COLUMNS} to \
+                 {MAX_COLUMNS}",
                 self.columns
             ));
         }
         if !(self.origin.s_m.is_finite() && self.origin.h_m.is_finite()) {
             return Err("origin is not finite".to_owned());
+        }
+        if let Some(bend) = &self.bend {
+            let least_m = MIN_BEND_RADIUS_PERIMETERS * perimeter_m;
+            let is_possible = bend.at_h_m.is_finite() && bend.radius_m() > least_m;
+            if !is_possible {
+                return Err(format!(
+                    "bend has a radius of {} m; it must be more than {least_m:.0} m, at a finite \
+                     chainage",
+                    bend.radius_m()
+                ));
+            }
         }
         let most_m = MAX_DISPLACEMENT_SHARE * perimeter_m;
         let possible = -most_m..=most_m;
@@ -142,10 +194,16 @@ impl ShapeFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tunnelstitch_geometry::surface::Circle;
+
+    const BEND: Bend = Bend {
+        curvature_per_m: [0.003, -0.001],
+        at_h_m: 5.0,
+    };
 
     fn file() -> ShapeFile {
         let lattice = SplineLattice {
-            perimeter_m: 18.0,
+            perimeter_m: circle().perimeter_m(),
             columns: 8,
             origin: WallPoint { s_m: 0.1, h_m: 2.0 },
         };
@@ -154,7 +212,14 @@ mod tests {
             -2,
             (0..24).map(|k| 1e-3 / f64::from(k + 1)).collect(),
         );
-        ShapeFile::new(&field, vec![1e-4; 24])
+        ShapeFile {
+            bend: Some(BEND),
+            ..ShapeFile::new(&field, vec![1e-4; 24])
+        }
+    }
+
+    fn circle() -> Circle {
+        Circle::new(3.0).unwrap()
     }
 
     #[test]
@@ -162,15 +227,19 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("shape.json");
         std::fs::write(&path, serde_json::to_string(&file()).unwrap()).unwrap();
-        let read = ShapeFile::read(&path, 18.0).unwrap();
+        let read = ShapeFile::read(&path, &circle()).unwrap();
         assert_eq!(read, file());
-        assert_eq!(read.field(), file().field());
+        assert_eq!(read.displacement(), Some(file().field()));
+        let only = ShapeFile::of_bend(BEND, circle().perimeter_m());
+        std::fs::write(&path, serde_json::to_string(&only).unwrap()).unwrap();
+        let read = ShapeFile::read(&path, &circle()).unwrap();
+        assert_eq!((read.bend, read.displacement()), (Some(BEND), None));
     }
 
     #[test]
     fn impossible_values_are_named() {
         type Change = fn(&mut ShapeFile);
-        let changes: [(Change, &str); 7] = [
+        let changes: [(Change, &str); 8] = [
             (|f| f.format = "x".to_owned(), "format"),
             (|f| f.perimeter_m = 17.0, "perimeter_m"),
             (|f| f.columns = 12, "columns"),
@@ -178,13 +247,17 @@ mod tests {
             (|f| f.coefficients_m[3] = 5.0, "coefficient"),
             (|f| f.coefficients_m.truncate(23), "coefficients_m"),
             (|f| f.sigma_m.truncate(2), "sigma_m"),
+            (
+                |f| f.bend.as_mut().unwrap().curvature_per_m[0] = 0.1,
+                "bend",
+            ),
         ];
         for (change, named) in changes {
             let mut file = file();
             change(&mut file);
-            let error = file.check(18.0).unwrap_err();
+            let error = file.check(circle().perimeter_m()).unwrap_err();
             assert!(error.contains(named), "{error}");
         }
-        assert_eq!(file().check(18.0), Ok(()));
+        assert_eq!(file().check(circle().perimeter_m()), Ok(()));
     }
 }

@@ -8,9 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tunnelstitch_geometry::surface::section::{CircleOutline, Ellipse, PiecewiseOutline, Section};
-use tunnelstitch_geometry::surface::{
-    CentrePoint, Centreline, Circle, Prism, RadialField, Surface, Swept,
-};
+use tunnelstitch_geometry::surface::{CentrePoint, Centreline, Circle, Prism, Surface, Swept};
 use tunnelstitch_geometry::trajectory::{PoseError, text};
 
 /// 1-σ of a real lining's deviation from its nominal shape, radii: a centimetre at a radius of
@@ -108,21 +106,18 @@ impl TunnelSection {
         }
     }
 
-    /// The displacement of the wall that `shape_file` names; paths are relative to `folder`.
+    /// The content of `shape_file`; paths are relative to `folder`.
     ///
     /// # Errors
     /// A file that cannot be read or is of another tunnel.
-    pub fn displacement(
+    pub fn found_shape(
         &self,
-        nominal: &dyn Surface,
+        planned: &dyn Surface,
         folder: &Path,
-    ) -> Result<Option<RadialField>, SurveyError> {
+    ) -> Result<Option<ShapeFile>, SurveyError> {
         let file = self.shape_file.as_ref();
-        file.map(|file| {
-            let file = ShapeFile::read(&folder.join(file), nominal.perimeter_m())?;
-            Ok(file.field())
-        })
-        .transpose()
+        file.map(|file| ShapeFile::read(&folder.join(file), planned))
+            .transpose()
     }
 
     /// Creates the tunnel of the given shape, without `shape_file`; paths are relative to `folder`,

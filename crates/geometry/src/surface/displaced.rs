@@ -2,19 +2,15 @@
 
 use super::error::SurfaceError;
 use super::gauge::Gauge;
+use super::newton::settle_hit;
 use super::radial_field::RadialField;
 use super::shape::Surface;
 use super::wall::{Hit, WallFrame, WallPoint};
 use crate::trajectory::Pose;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// Steps of Newton's method to intersect a ray; three or four suffice for rays that do not graze
-/// the wall.
-const MAX_NEWTON_STEPS: usize = 30;
-/// Step below which the intersection has converged, share of the perimeter.
-const CONVERGED: f64 = 1e-13;
 /// Step of the central differences for the tangents, share of the perimeter: errors of 1e-10 by
 /// curvature, and of 1e-11 by rounding.
 const DIFFERENCE: f64 = 1e-6;
@@ -60,37 +56,12 @@ impl<N> Surface for Displaced<N>
 where
     N: Deref<Target: Surface> + Send + Sync + std::fmt::Debug,
 {
-    /// Intersects by Newton's method on `t + λ d − X(s, h) = 0` from the nominal intersection.
-    ///
-    /// A ray that grazes the wall, for which this does not settle, gets the nominal intersection:
-    /// it meets the wall somewhere near.
+    /// Intersects by Newton's method from the nominal intersection.
     fn hit(&self, t: &Vector3<f64>, d: &Vector3<f64>) -> Result<Hit, SurfaceError> {
         let nominal = self.nominal.hit(t, d)?;
-        let (mut range, mut wall) = (nominal.range, nominal.wall);
-        let converged_m = CONVERGED * self.perimeter_m();
-        for _ in 0..MAX_NEWTON_STEPS {
-            let frame = self.frame(wall);
-            let jacobian = Matrix3::from_columns(&[*d, -frame.e_s, -frame.e_h]);
-            let Some(inverse) = jacobian.try_inverse() else {
-                break;
-            };
-            let step = inverse * (frame.x_w - t - d * range);
-            let length_m = step.y.hypot(step.z);
-            // Within a node's reach the wall is nearly plane.
-            let share = (self.field.lattice().spacing_m() / length_m).min(1.0);
-            range += step.x * share;
-            wall.s_m += step.y * share;
-            wall.h_m += step.z * share;
-            if length_m < converged_m {
-                wall.s_m = wall.s_m.rem_euclid(self.perimeter_m());
-                return Ok(Hit {
-                    range,
-                    x_w: t + d * range,
-                    wall,
-                });
-            }
-        }
-        Ok(nominal)
+        // Within a node's reach the wall is nearly plane.
+        let longest_m = self.field.lattice().spacing_m();
+        Ok(settle_hit(self, nominal, [t, d], longest_m))
     }
 
     /// Computes the tangents by central differences, which hold those of the normal as well.

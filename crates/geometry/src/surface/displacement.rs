@@ -3,7 +3,7 @@
 use super::wall::WallFrame;
 use crate::camera::Camera;
 use crate::trajectory::{Pose, so3};
-use nalgebra::{Matrix2x5, Matrix2x6, Vector3};
+use nalgebra::{Matrix2, Matrix2x5, Matrix2x6, Matrix3x2, Vector3};
 
 /// `∂(s, h)/∂ξ` of the wall point seen through a fixed pixel, for `ξ = (ω, ρ)` of
 /// [`Pose::retract`].
@@ -57,9 +57,33 @@ pub fn lens_jacobian(
     a.fixed_columns::<3>(3) * (r_wc.matrix() * moved)
 }
 
+/// `∂(s, h)/∂(c_x, c_z)` of the wall point `x_c` (camera coordinates) seen through a fixed pixel,
+/// for a curvature c of the tunnel ([`super::Bend`]) along which the camera is carried.
+///
+/// Seen from the camera's section, a wall point at the distance y along the tunnel and (x, z)
+/// across moves by `∂X = (½ y², −x y, 0) ∂c_x + (0, −z y, ½ y²) ∂c_z`, but for terms of the order
+/// of `c y³`; for the pixel it is as if the camera moved by `−∂X`: `−A_ρ Q ∂X`, with the section's
+/// frame Q. `straightened`: the pose in the straight tunnel. Rows: s, h; metres per 1/m.
+pub fn bend_jacobian(
+    pose: &Pose,
+    straightened: &Pose,
+    a: &Matrix2x6<f64>,
+    x_c: &Vector3<f64>,
+) -> Matrix2<f64> {
+    let mut p = straightened.r_wc * x_c;
+    p.x += straightened.t_wc.x;
+    p.z += straightened.t_wc.z;
+    let half = 0.5 * p.y * p.y;
+    let moved = Matrix3x2::new(half, 0.0, -p.x * p.y, -p.z * p.y, 0.0, half);
+    let section = pose.r_wc * straightened.r_wc.inverse();
+    a.fixed_columns::<3>(3) * (section.to_rotation_matrix().matrix() * -moved)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::surface::bend::Bend;
+    use crate::surface::bent::bent;
     use crate::surface::circle::Circle;
     use crate::surface::shape::Surface;
     use nalgebra::Vector6;
@@ -87,6 +111,44 @@ mod tests {
                     let numeric_h = (plus.h_m - minus.h_m) / (2.0 * step);
                     assert!((numeric_s - analytic[(0, k)]).abs() < 1e-7, "s, column {k}");
                     assert!((numeric_h - analytic[(1, k)]).abs() < 1e-7, "h, column {k}");
+                }
+            }
+        }
+    }
+
+    /// Against the wall point of a pixel of a carried camera, from a straight and from a bent start.
+    #[test]
+    fn jacobian_of_the_bend_matches_central_differences() {
+        let straight: std::sync::Arc<dyn Surface> = std::sync::Arc::new(Circle::new(3.0).unwrap());
+        let camera = Camera::from_vertical_fov(640, 480, 60f64.to_radians());
+        let pose = Pose::new(
+            so3::exp(&Vector3::new(0.1, 0.7, -0.2)),
+            Vector3::new(0.5, 9.0, -0.4),
+        );
+        for start in [[0.0; 2], [2e-3, -3e-3]] {
+            let bend = |dx: f64, dz: f64| Bend {
+                curvature_per_m: [start[0] + dx, start[1] + dz],
+                at_h_m: 2.0,
+            };
+            let ray = camera.ray(100.0, 50.0).unwrap();
+            let hit_of = |bend: Bend| {
+                let (wall, pose) = (bent(&straight, Some(bend)), bend.bent(&pose));
+                let hit = wall.hit(&pose.t_wc, &(pose.r_wc * ray)).unwrap();
+                (hit, wall.frame(hit.wall), pose)
+            };
+            let (hit, frame, here) = hit_of(bend(0.0, 0.0));
+            let a = wall_jacobian(&here, &frame);
+            let x_c = here.to_camera(&hit.x_w);
+            let analytic = bend_jacobian(&here, &pose, &a, &x_c);
+            let step = 1e-6;
+            for (k, d) in [[step, 0.0], [0.0, step]].into_iter().enumerate() {
+                let plus = hit_of(bend(d[0], d[1])).0.wall;
+                let minus = hit_of(bend(-d[0], -d[1])).0.wall;
+                let numeric = [plus.s_m - minus.s_m, plus.h_m - minus.h_m];
+                for row in 0..2 {
+                    let difference = numeric[row] / (2.0 * step) - analytic[(row, k)];
+                    let most = 1e-6 + 10.0 * start[0].abs();
+                    assert!(difference.abs() < most, "{row} {k} {difference} {analytic}");
                 }
             }
         }

@@ -17,6 +17,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bend;
+mod bent;
 mod centreline;
 mod circle;
 mod displaced;
@@ -25,6 +27,7 @@ mod error;
 mod footprint;
 mod gauge;
 mod gauge_component;
+mod newton;
 mod prism;
 mod radial_field;
 pub mod section;
@@ -34,10 +37,12 @@ mod swept;
 mod wall;
 mod wall_regions;
 
+pub use bend::Bend;
+pub use bent::{Bent, bent};
 pub use centreline::{CentrePoint, Centreline, CentrelineFrame};
 pub use circle::Circle;
 pub use displaced::{Displaced, displaced};
-pub use displacement::{lens_jacobian, wall_jacobian};
+pub use displacement::{bend_jacobian, lens_jacobian, wall_jacobian};
 pub use error::SurfaceError;
 pub use footprint::{Footprint, shortest_arc};
 pub use gauge::{Axis, Gauge, GaugeMotion};

@@ -9,14 +9,18 @@ use std::ops::Range;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_geometry::camera::{Camera, Sweep};
-use tunnelstitch_geometry::surface::{Gauge, RadialField, Surface, WallRegions, displaced};
+use tunnelstitch_geometry::surface::{Gauge, RadialField, Surface, WallRegions, bent, displaced};
 use tunnelstitch_geometry::trajectory::{Pose, Shutter};
 
 /// All inputs of the estimator.
 #[derive(Clone)]
 pub struct EstimationContext<'a> {
     /// The wall as planned.
+    pub planned: Arc<dyn Surface>,
+    /// The wall as planned, but for the curvature of the current κ.
     pub nominal: Arc<dyn Surface>,
+    /// True if it is known to bend or to be displaced.
+    pub is_deviation_known: bool,
     /// Its known displacement.
     pub displacement: Option<&'a RadialField>,
     /// Its further displacement, if it is to be estimated.
@@ -46,30 +50,38 @@ pub struct EstimationContext<'a> {
 }
 
 impl EstimationContext<'_> {
-    /// Replaces the shared parameters and the camera; no change if `kappa` gives no valid camera.
+    /// Replaces the shared parameters, the camera and the wall; no change if `kappa` gives no valid
+    /// camera.
     pub fn at(&self, kappa: Kappa) -> Self {
         match self.calibration.camera(&kappa) {
             Some(camera) => Self {
                 camera,
                 kappa,
+                nominal: self.nominal_at(&kappa),
+                surface: self.surface_at(&kappa, self.shape.as_deref()),
                 ..self.clone()
             },
             None => self.clone(),
         }
     }
 
-    /// The wall with a shape beyond its known displacement.
-    pub fn surface_with(&self, shape: &Shape) -> Arc<dyn Surface> {
-        let field = total_displacement(self.displacement, shape.field());
-        displaced(&self.nominal, field)
+    /// The wall as planned, but for the curvature of κ.
+    fn nominal_at(&self, kappa: &Kappa) -> Arc<dyn Surface> {
+        bent(&self.planned, self.calibration.bend(kappa))
     }
 
-    /// The rigid motions that change no image. They move the shape that is estimated with the
-    /// poses, but not one that is known.
+    /// The wall with the curvature of κ, and a shape beyond its known displacement.
+    pub fn surface_at(&self, kappa: &Kappa, shape: Option<&Shape>) -> Arc<dyn Surface> {
+        let field = total_displacement(self.displacement, shape.and_then(Shape::field));
+        displaced(&self.nominal_at(kappa), field)
+    }
+
+    /// The rigid motions that change no image. They move what is estimated with the poses, but not
+    /// a bend or a displacement that is known.
     pub fn gauge(&self) -> Gauge {
-        match self.displacement {
-            Some(_) => Gauge::default(),
-            None => self.nominal.gauge(),
+        match self.is_deviation_known {
+            true => Gauge::default(),
+            false => self.planned.gauge(),
         }
     }
 

@@ -2,7 +2,7 @@
 //!
 //! They are deviations from the given values,
 //!
-//! `κ = (ln f, cx, cy, k1, k2, ln r, τ_x, τ_z, o_x, o_z, ρ)`.
+//! `κ = (ln f, cx, cy, k1, k2, ln r, τ_x, τ_z, o_x, o_z, ρ, c_x, c_z)`.
 //!
 //! | parameters | meaning, unit | constrained by |
 //! | --- | --- | --- |
@@ -13,10 +13,13 @@
 //! | `τ_x, τ_z` | tilt of the tunnel's axis in the initial poses' frame, rad | prior of the poses |
 //! | `o_x, o_z` | offset of the tunnel's axis there, m | prior of the poses |
 //! | `ρ` | readout time of a frame, s | pixels |
+//! | `c_x, c_z` | curvature of the tunnel, 1/m ([`Bend`]) | pixels |
 //!
 //! The first five are the intrinsics
 //! ([`tunnelstitch_geometry::camera::Camera::intrinsics_jacobian`]). The readout time is free in
-//! the rolling-shutter test alone ([`crate::uncertainty::rolling_shutter_test`]).
+//! the rolling-shutter test alone ([`crate::uncertainty::rolling_shutter_test`]), the curvature
+//! where a straight tunnel's shape is estimated ([`crate::stages::shape`]). With a curvature all
+//! poses are those in the bent tunnel, and a step of it carries them along ([`Calibration::carry`]).
 //!
 //! The images do not change if the radius and all positions are scaled together. Poses are
 //! therefore estimated in the tunnel of the given radius, and only the prior, which is in metres,
@@ -31,10 +34,11 @@
 use nalgebra::{Matrix3, SVector, UnitQuaternion, Vector3};
 use tunnelstitch_core::survey::{CalibrateSection, CalibrationGroup};
 use tunnelstitch_geometry::camera::Camera;
+use tunnelstitch_geometry::surface::{Bend, GaugeMotion};
 use tunnelstitch_geometry::trajectory::{Jitter, JitterModel, Pose, so3};
 
 /// Number of shared parameters.
-pub const SHARED_PARAMETERS: usize = 11;
+pub const SHARED_PARAMETERS: usize = 13;
 /// Number of intrinsic parameters of the camera; they come first in κ.
 pub const INTRINSIC_PARAMETERS: usize = 5;
 /// Number of datum parameters ([`Datum`]); they follow the intrinsics in κ.
@@ -43,6 +47,16 @@ pub const DATUM_PARAMETERS: usize = 5;
 pub const RADIUS_INDEX: usize = 5;
 /// Index of the readout time ρ in κ, seconds.
 pub const READOUT_INDEX: usize = INTRINSIC_PARAMETERS + DATUM_PARAMETERS;
+/// Index of `c_x` in κ; `c_z` follows, 1/m.
+pub const BEND_INDEX: usize = READOUT_INDEX + 1;
+/// Number of components of the curvature.
+pub const BEND_PARAMETERS: usize = 2;
+/// Number of shared parameters that pixels depend on: the intrinsics, the readout time, and the
+/// curvature.
+pub const PIXEL_PARAMETERS: usize = INTRINSIC_PARAMETERS + 1 + BEND_PARAMETERS;
+/// Their indices in κ.
+pub const PIXEL_INDICES: [usize; PIXEL_PARAMETERS] =
+    [0, 1, 2, 3, 4, READOUT_INDEX, BEND_INDEX, BEND_INDEX + 1];
 
 /// The shared parameters κ, or a step of them.
 pub type Kappa = SVector<f64, SHARED_PARAMETERS>;
@@ -166,6 +180,32 @@ impl Calibration {
         self.readout_s + kappa[READOUT_INDEX]
     }
 
+    /// The bend at κ; None without curvature.
+    pub fn bend(&self, kappa: &Kappa) -> Option<Bend> {
+        let bend = Bend {
+            curvature_per_m: [kappa[BEND_INDEX], kappa[BEND_INDEX + 1]],
+            at_h_m: self.middle_h_m,
+        };
+        (bend.curvature_per_m != [0.0; 2]).then_some(bend)
+    }
+
+    /// Carries a pose in the tunnel with the curvature of κ `from` along to that of `to`: in the
+    /// section it is in, it stays where it is.
+    pub fn carry(&self, pose: &Pose, from: &Kappa, to: &Kappa) -> Pose {
+        let is_same = |k: usize| from[k] == to[k];
+        if (BEND_INDEX..BEND_INDEX + BEND_PARAMETERS).all(is_same) {
+            return *pose;
+        }
+        let straight = match self.bend(from) {
+            Some(bend) => bend.straightened(pose),
+            None => *pose,
+        };
+        match self.bend(to) {
+            Some(bend) => bend.bent(&straight),
+            None => straight,
+        }
+    }
+
     /// The datum at κ.
     pub fn datum(&self, kappa: &Kappa) -> Datum {
         let tilt = Vector3::new(kappa[6], 0.0, kappa[7]);
@@ -176,6 +216,7 @@ impl Calibration {
             tilt,
             pivot,
             offset: Vector3::new(kappa[8], 0.0, kappa[9]),
+            bend: self.bend(kappa),
         }
     }
 
@@ -190,7 +231,8 @@ impl Calibration {
 ///
 /// A position `t̂` of the initial poses is `R_G (t̂ − p) + p + o` in the tunnel, metres, with the
 /// tilt `R_G = exp(τ)` about the pivot p. An estimated position t, in the tunnel of the given
-/// radius, is `scale · t` metres.
+/// radius, is `scale · t` metres. In a tunnel that turns out to bend, initial poses are where they
+/// were in the straight one ([`Bend::bent`]); a bend is estimated with the others fixed at 0.
 #[derive(Clone, Copy, Debug)]
 pub struct Datum {
     /// The true radius over the given one.
@@ -203,17 +245,28 @@ pub struct Datum {
     pivot: Vector3<f64>,
     /// o, metres.
     offset: Vector3<f64>,
+    /// The bend, if there is one.
+    pub bend: Option<Bend>,
 }
 
 impl Datum {
+    /// The datum after a motion of the tunnel along its gauge.
+    pub fn moved(self, motion: &GaugeMotion) -> Self {
+        Self {
+            bend: self.bend.map(|bend| bend.moved(motion)),
+            ..self
+        }
+    }
+
     /// Transforms an initial pose to the tunnel, in metres: `R_G R̂`, `R_G (t̂ − p) + p + o`.
     pub fn to_tunnel(self, initial: &Pose) -> Pose {
         // In this order the pose stays the same to the last bit without tilt and offset.
         let pivot = self.pivot - self.rotation * self.pivot + self.offset;
-        Pose::new(
+        let straight = Pose::new(
             self.rotation * initial.r_wc,
             self.rotation * initial.t_wc + pivot,
-        )
+        );
+        self.bend.map_or(straight, |bend| bend.bent(&straight))
     }
 
     /// Transforms an initial pose to the tunnel of the given radius, in which poses are estimated.

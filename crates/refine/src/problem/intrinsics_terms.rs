@@ -12,15 +12,14 @@
 //! [`crate::linear::bordered_system`] solves the bordered equations.
 
 use crate::linear::bordered_system::SharedBorder;
-use crate::parameters::calibration::{INTRINSIC_PARAMETERS, Kappa, READOUT_INDEX};
+use crate::parameters::calibration::{Kappa, PIXEL_INDICES, PIXEL_PARAMETERS};
 use crate::parameters::frame_estimate::{FRAME_PARAMETERS, FrameStep};
 use crate::problem::observer_column::ObserverColumn;
-use nalgebra::{Matrix2x6, Matrix4, Matrix4x2, Matrix6, RowSVector, SMatrix, Vector6};
+use crate::tiles::frame_samples::SharedJacobian;
+use nalgebra::{Matrix4, Matrix4x2, RowSVector, SMatrix, SVector};
 
-/// Number of shared parameters that pixels depend on: the intrinsics and the readout time.
-pub const PIXEL_PARAMETERS: usize = INTRINSIC_PARAMETERS + 1;
-/// Their indices in κ.
-const KAPPA_INDICES: [usize; PIXEL_PARAMETERS] = [0, 1, 2, 3, 4, READOUT_INDEX];
+/// A matrix over the shared parameters that pixels depend on.
+type SharedSquare = SMatrix<f64, PIXEL_PARAMETERS, PIXEL_PARAMETERS>;
 
 /// Sums over the tiles of one block for the shared parameters that pixels depend on, for the few
 /// frames that observe it.
@@ -29,9 +28,9 @@ pub struct IntrinsicsSums {
     /// `H_pκ` and `H_cκ`, one block per slot.
     frames: Vec<SMatrix<f64, FRAME_PARAMETERS, PIXEL_PARAMETERS>>,
     /// `H_κκ`.
-    own: Matrix6<f64>,
+    own: SharedSquare,
     /// `g_κ`.
-    gradient: Vector6<f64>,
+    gradient: SVector<f64, PIXEL_PARAMETERS>,
 }
 
 impl IntrinsicsSums {
@@ -39,8 +38,8 @@ impl IntrinsicsSums {
     pub fn new(slots: usize) -> Self {
         Self {
             frames: vec![SMatrix::zeros(); slots],
-            own: Matrix6::zeros(),
-            gradient: Vector6::zeros(),
+            own: SharedSquare::zeros(),
+            gradient: SVector::zeros(),
         }
     }
 
@@ -52,7 +51,7 @@ impl IntrinsicsSums {
         total_weight: f64,
     ) {
         let weighted = columns.iter().map(|i| i.c * i.moments.weight);
-        let mean = weighted.sum::<Matrix2x6<f64>>() / total_weight.max(1e-12);
+        let mean = weighted.sum::<SharedJacobian>() / total_weight.max(1e-12);
         // C affects the slopes along s and h only.
         let slopes: Matrix4x2<f64> = features.fixed_columns::<2>(0).into_owned();
         for i in columns {
@@ -87,7 +86,7 @@ impl IntrinsicsSums {
     /// `g_κ`, with zeros for the parameters that pixels do not depend on.
     pub fn shared_gradient(&self) -> Kappa {
         let mut shared = Kappa::zeros();
-        for (column, index) in KAPPA_INDICES.into_iter().enumerate() {
+        for (column, index) in PIXEL_INDICES.into_iter().enumerate() {
             shared[index] = self.gradient[column];
         }
         shared
@@ -103,14 +102,14 @@ impl IntrinsicsSums {
         scatter: &mut SharedBorder,
     ) {
         for (slot, block) in slots.iter().zip(&self.frames) {
-            for (column, index) in KAPPA_INDICES.into_iter().enumerate() {
+            for (column, index) in PIXEL_INDICES.into_iter().enumerate() {
                 let mut target = border.frames[*slot].column_mut(index);
                 target += block.column(column);
             }
         }
         let shared = self.shared_gradient();
-        for (column, index) in KAPPA_INDICES.into_iter().enumerate() {
-            for (row, other) in KAPPA_INDICES.into_iter().enumerate() {
+        for (column, index) in PIXEL_INDICES.into_iter().enumerate() {
+            for (row, other) in PIXEL_INDICES.into_iter().enumerate() {
                 border.own[(other, index)] += self.own[(row, column)];
             }
         }

@@ -120,8 +120,13 @@ impl PhotometricProblem<'_> {
             let visibility = self.coverage.visibility(stretch)?;
             let pyramids = self.images.load(self.coverage.frames(stretch))?;
             let at_level = camera.at_level(self.sampling.level);
-            let sampled_frames =
-                self.sampled_frames(stretch, &pyramids, estimates, at_level, readout_s);
+            let sampled_frames = self.sampled_frames(
+                stretch,
+                &pyramids,
+                estimates,
+                at_level,
+                (surface.as_ref(), readout_s),
+            );
             for batch in visibility.blocks.chunks(BATCH) {
                 let blocks: Vec<BlockSums> = batch.par_map(|block| {
                     let wall = (surface.as_ref(), camera);

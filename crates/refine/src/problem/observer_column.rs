@@ -2,6 +2,7 @@
 
 use crate::linear::normal_equations::Block;
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
+use crate::tiles::frame_samples::SharedJacobian;
 use crate::tiles::tile_moments::ObserverMoments;
 use nalgebra::{Matrix2x6, Matrix4, SMatrix};
 
@@ -14,7 +15,7 @@ pub struct ObserverColumn {
     /// `A = ∂(s, h)/∂ξ`.
     pub a: Matrix2x6<f64>,
     /// `C = ∂(s, h)/∂κ`; zero unless shared parameters are estimated.
-    pub c: Matrix2x6<f64>,
+    pub c: SharedJacobian,
     /// `1/a`, shading included.
     pub inverse_gain: f64,
 }

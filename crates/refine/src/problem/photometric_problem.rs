@@ -5,7 +5,8 @@ use crate::linear::normal_equations::Pattern;
 use crate::linear::sparse_cholesky::{FactorError, SymbolicFactorisation};
 use crate::model::context::{EstimationContext, FrameWindow};
 use crate::model::problem_error::ProblemError;
-use crate::parameters::frame_estimate::FrameEstimate;
+use crate::parameters::calibration::{BEND_INDEX, Kappa};
+use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use crate::parameters::shape::Shape;
 use crate::parameters::unknowns::Unknowns;
 use crate::problem::set_up::{min_density, normal_pattern, pixel_size_on_wall, pose_frames};
@@ -228,13 +229,31 @@ impl<'a> PhotometricProblem<'a> {
 
     /// The wall with the shape of some unknowns.
     pub(super) fn surface_at(&self, unknowns: &Unknowns) -> Arc<dyn Surface> {
-        match &self.shape {
-            Some(shape) => self.context.surface_with(&Shape {
-                model: shape.model.clone(),
-                coefficients: unknowns.shape.clone(),
-            }),
-            None => Arc::clone(&self.context.surface),
+        let shape = self.shape.as_ref().map(|shape| Shape {
+            model: shape.model.clone(),
+            coefficients: unknowns.shape.clone(),
+        });
+        match &shape {
+            None if unknowns.kappa == self.context.kappa => Arc::clone(&self.context.surface),
+            None => (self.context).surface_at(&unknowns.kappa, self.context.shape.as_deref()),
+            shape => self.context.surface_at(&unknowns.kappa, shape.as_ref()),
         }
+    }
+
+    /// The unknowns after a step of every slot and of the shared parameters; frames are carried
+    /// along with the tunnel's curvature.
+    pub(crate) fn stepped(
+        &self,
+        unknowns: &Unknowns,
+        step: &[FrameStep],
+        shared: &Kappa,
+    ) -> Unknowns {
+        let (from, to) = (&unknowns.kappa, unknowns.kappa + shared);
+        let mut stepped = unknowns.stepped(step, shared);
+        for frame in &mut stepped.frames {
+            frame.pose = self.context.calibration.carry(&frame.pose, from, &to);
+        }
+        stepped
     }
 
     /// The shape that is estimated, at its initial values.
@@ -306,25 +325,30 @@ impl<'a> PhotometricProblem<'a> {
     }
 
     /// The frames of a stretch at the given estimates of all participants, taken by `camera` (of
-    /// the level) with a readout of `readout_s` seconds.
+    /// the level) with a readout of `readout_s` seconds, along the wall `surface`.
     pub(super) fn sampled_frames<'s>(
         &self,
         stretch: usize,
         pyramids: &'s [Arc<Pyramid>],
         estimates: &[FrameEstimate],
         camera: Camera,
-        readout_s: f64,
+        (surface, readout_s): (&dyn Surface, f64),
     ) -> Vec<SampledFrame<'s>> {
         let frames = self.coverage.frames(stretch).iter();
+        let may_bend = self.context.calibration.free[BEND_INDEX];
         frames
             .zip(pyramids)
             .map(|(k, pyramid)| {
-                SampledFrame::new(
+                let frame = SampledFrame::new(
                     pyramid.level(self.sampling.level),
                     camera.with_sweep(&self.rates[*k].scaled(readout_s)),
                     &estimates[*k],
                 )
-                .with_interpolation(self.sampling.interpolation)
+                .with_interpolation(self.sampling.interpolation);
+                match may_bend {
+                    true => frame.with_straightened(surface),
+                    false => frame,
+                }
             })
             .collect()
     }
@@ -336,7 +360,8 @@ impl<'a> PhotometricProblem<'a> {
         pyramids: &'s [Arc<Pyramid>],
     ) -> Vec<SampledFrame<'s>> {
         let readout_s = self.context.calibration.readout_s(&self.context.kappa);
-        self.sampled_frames(stretch, pyramids, &self.estimates, self.camera, readout_s)
+        let wall = (self.context.surface.as_ref(), readout_s);
+        self.sampled_frames(stretch, pyramids, &self.estimates, self.camera, wall)
     }
 
     /// Estimates of all participants, with those of the active frames replaced.

@@ -15,10 +15,10 @@
 //! Frames that see the wall along parallel rays (those of one turn) have equal τ and say nothing of
 //! the shape.
 
+use crate::parameters::calibration::PIXEL_PARAMETERS;
 use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::parameters::shape::FunctionValue;
 use crate::problem::block_sums::{BlockSums, TileSums};
-use crate::problem::intrinsics_terms::PIXEL_PARAMETERS;
 use crate::problem::observer_column::ObserverColumn;
 use nalgebra::{RowSVector, SMatrix, Vector2, Vector3, Vector4};
 

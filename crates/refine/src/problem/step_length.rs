@@ -1,10 +1,9 @@
 //! Length of a step on the wall, and feasibility of an estimate.
 
-use crate::parameters::calibration::{INTRINSIC_PARAMETERS, Kappa};
+use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa};
 use crate::parameters::frame_estimate::{FrameEstimate, FrameStep};
 use crate::problem::photometric_problem::PhotometricProblem;
-use nalgebra::Vector5;
-use tunnelstitch_geometry::surface::{lens_jacobian, wall_jacobian};
+use tunnelstitch_geometry::surface::{bend_jacobian, lens_jacobian, wall_jacobian};
 
 /// Largest log-gain of a feasible estimate, standard deviations of its prior. No frame has such a
 /// gain; one that fits nowhere could lower its cost by a gain near 0.
@@ -31,25 +30,20 @@ impl PhotometricProblem<'_> {
         step: &[FrameStep],
         shared: &Kappa,
     ) -> Vec<f64> {
-        let intrinsics = shared.fixed_rows::<INTRINSIC_PARAMETERS>(0).into_owned();
         active
             .iter()
             .zip(step)
-            .map(|(estimate, step)| {
-                self.frame_step_px(estimate, step, &intrinsics) * self.pixel_px()
-            })
+            .map(|(estimate, step)| self.frame_step_px(estimate, step, shared) * self.pixel_px())
             .collect()
     }
 
     /// Motion of the wall in one frame's image, in pixels of the level.
-    fn frame_step_px(
-        &self,
-        estimate: &FrameEstimate,
-        step: &FrameStep,
-        intrinsics: &Vector5<f64>,
-    ) -> f64 {
+    fn frame_step_px(&self, estimate: &FrameEstimate, step: &FrameStep, shared: &Kappa) -> f64 {
         let xi: nalgebra::Vector6<f64> = step.fixed_rows::<6>(0).into();
         let pose = &estimate.pose;
+        let straightened = self.context.surface.straightened(pose);
+        let intrinsics = shared.fixed_rows::<INTRINSIC_PARAMETERS>(0);
+        let curvature = shared.fixed_rows::<BEND_PARAMETERS>(BEND_INDEX);
         (self.camera.corner_and_centre_rays().into_iter())
             .filter_map(|ray_c| {
                 let ray = pose.r_wc * ray_c;
@@ -59,7 +53,8 @@ impl PhotometricProblem<'_> {
                 let mut motion = a * xi;
                 if self.estimates_shared {
                     let x_c = ray_c * hit.range;
-                    motion += lens_jacobian(pose, &a, &self.context.camera, &x_c) * intrinsics;
+                    motion += lens_jacobian(pose, &a, &self.context.camera, &x_c) * intrinsics
+                        + bend_jacobian(pose, &straightened, &a, &x_c) * curvature;
                 }
                 Some(motion.norm() * self.camera.fy / hit.range)
             })

@@ -8,7 +8,7 @@ use crate::problem::set_up::shape_slots;
 use crate::problem::shape_terms::TileShape;
 use crate::samples::observer::Observer;
 use crate::samples::visibility::{Tile, Visibility};
-use crate::tiles::frame_samples::SampledFrame;
+use crate::tiles::frame_samples::{SampledFrame, SharedJacobian};
 use crate::tiles::grid::TilePoints;
 use crate::tiles::tile::ResidualWeighting;
 use crate::tiles::tile_moments::TileMoments;
@@ -190,13 +190,13 @@ impl PhotometricProblem<'_> {
         observer: &Observer,
         points: &TilePoints,
         a: &Matrix2x6<f64>,
-    ) -> Matrix2x6<f64> {
+    ) -> SharedJacobian {
         if self.estimates_shared {
             let frame = &context.sampled_frames[observer.frame as usize];
             let participant = context.participants[observer.frame as usize];
             frame.shared_jacobian(points, a, context.camera, &self.rates[participant])
         } else {
-            Matrix2x6::zeros()
+            SharedJacobian::zeros()
         }
     }
 }

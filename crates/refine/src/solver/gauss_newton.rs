@@ -33,8 +33,10 @@ pub struct Solution<'a> {
     pub problem: PhotometricProblem<'a>,
     /// The unknowns.
     pub unknowns: Unknowns,
-    /// Cost and normal equations there, or within the tolerance of there.
+    /// Cost and normal equations at the unknowns, or a step within the tolerance before.
     pub linearisation: Linearisation,
+    /// The unknowns at which these are.
+    pub linearised_at: Unknowns,
     /// Its course.
     pub record: SolveRecord,
 }
@@ -75,6 +77,8 @@ pub struct DampedGaussNewton {
     lambda: f64,
     /// Cost and equations at the present unknowns; None before the first linearisation.
     current: Option<Linearisation>,
+    /// The unknowns at which `current` is.
+    linearised_at: Unknowns,
     cost_start: Option<f64>,
     steps: Vec<StepRecord>,
     stop: Option<StopReason>,
@@ -87,6 +91,7 @@ impl DampedGaussNewton {
             stopping,
             lambda: 0.0,
             current: None,
+            linearised_at: Unknowns::default(),
             cost_start: None,
             steps: Vec::new(),
             stop: None,
@@ -134,10 +139,17 @@ impl DampedGaussNewton {
             None => problem.linearise_at(unknowns)?,
         };
         self.cost_start.get_or_insert(current.cost);
-        let (unknowns, next) = self.step(problem, unknowns, current)?;
+        let (stepped, next) = self.step(problem, unknowns, current)?;
+        // The last step is not judged.
+        let linearised_at = if self.stop.is_some() {
+            unknowns
+        } else {
+            &stepped
+        };
+        self.linearised_at.clone_from(linearised_at);
         let cost = next.cost;
         self.current = Some(next);
-        Ok((unknowns, cost))
+        Ok((stepped, cost))
     }
 
     /// The solution at `unknowns`, where the last iteration ended; None before the first.
@@ -161,6 +173,7 @@ impl DampedGaussNewton {
             problem,
             unknowns,
             linearisation,
+            linearised_at: self.linearised_at,
             record,
         })
     }
@@ -184,7 +197,7 @@ impl DampedGaussNewton {
             let moved = problem.wall_step_px(frames, &step, &shared);
             let step_px = moved.into_iter().fold(0.0, f64::max);
             let decrement = -slope(&step, &shared, &current);
-            let stop = self.reason_to_stop(step_px, decrement, FRAME_PARAMETERS * step.len());
+            let stop = self.reason_to_stop(step_px, decrement, FRAME_PARAMETERS * frames.len());
             if stop.is_some() && self.lambda > 0.0 {
                 // It is the damping that makes the step short.
                 if undamped_failed {
@@ -193,7 +206,7 @@ impl DampedGaussNewton {
                 self.lambda = 0.0;
                 continue;
             }
-            let candidate = unknowns.stepped(&step, &shared);
+            let candidate = problem.stepped(unknowns, &step, &shared);
             let mut record = StepRecord {
                 cost: None,
                 step_px,
@@ -251,7 +264,8 @@ impl DampedGaussNewton {
     }
 
     /// The reason for which a step that moves the wall by `step_px` and lowers the quadratic model
-    /// by `½ decrement` is the last one, if it is.
+    /// by `½ decrement` is the last one, if it is. `unknowns` are those of the frames: the wall's
+    /// shape has many more, most of which the prior determines.
     fn reason_to_stop(&self, step_px: f64, decrement: f64, unknowns: usize) -> Option<StopReason> {
         if step_px < self.stopping.step_px {
             Some(StopReason::StepBelowTolerance)

@@ -50,18 +50,17 @@ const NEGLIGIBLE: f64 = 1e-6;
 /// Largest factor of a strength in one step.
 const MAX_STEP_FACTOR: f64 = 30.0;
 
-/// A shape with learned strengths.
-pub struct LearnedShape {
-    /// Its strengths and coefficients; scales of no use are dropped.
-    pub shape: Shape,
-    /// The shared parameters with these strengths, and their information; None if they were not
-    /// estimated.
-    pub shared: Option<(Kappa, SharedBlock)>,
+/// A shape with learned strengths, and the minimum of the quadratic cost with these.
+pub struct LearnedShape<'s> {
+    equations: ShapeEquations<'s>,
+    minimum: Minimum<'s>,
+    sigmas_m: Vec<f64>,
+    dropped: Vec<bool>,
 }
 
 /// Learns the strengths of the shape at a solution; None if no shape was estimated, or if the
 /// equations are singular. `alpha`: probability of finding a shape where there is none.
-pub fn learn_shape(solution: &Solution, alpha: f64) -> Option<LearnedShape> {
+pub fn learn_shape<'s>(solution: &'s Solution, alpha: f64) -> Option<LearnedShape<'s>> {
     let problem = &solution.problem;
     let equations = ShapeEquations {
         pattern: problem.pattern(),
@@ -70,11 +69,11 @@ pub fn learn_shape(solution: &Solution, alpha: f64) -> Option<LearnedShape> {
         border: solution.linearisation.border.as_ref(),
         shape: Shape {
             model: problem.shape()?.model.clone(),
-            coefficients: solution.unknowns.shape.clone(),
+            coefficients: solution.linearised_at.shape.clone(),
         },
         first_slot: solution.unknowns.frames.len(),
     };
-    equations.learn(&solution.unknowns.kappa, alpha)
+    equations.learn(alpha)
 }
 
 /// The equations of all unknowns at a solution.
@@ -115,8 +114,8 @@ impl<'s> ShapeEquations<'s> {
         ranges.map(|range| range.start + self.first_slot..range.end + self.first_slot)
     }
 
-    /// Learns the strengths, and drops scales of no use; `kappa`: the shared parameters.
-    fn learn(&self, kappa: &Kappa, alpha: f64) -> Option<LearnedShape> {
+    /// Learns the strengths, and drops scales of no use.
+    fn learn(self, alpha: f64) -> Option<LearnedShape<'s>> {
         let scales = &self.shape.model.scales;
         let mut sigmas_m = self.sigmas_m();
         let mut dropped = vec![false; scales.len()];
@@ -139,10 +138,11 @@ impl<'s> ShapeEquations<'s> {
                     sigmas_m[k] = NEGLIGIBLE * scales[k].sigma_m;
                 }
                 None => {
-                    let schur = minimum.schur.as_ref();
                     return Some(LearnedShape {
-                        shape: self.learned(&sigmas_m, &dropped, &minimum.step),
-                        shared: schur.map(|schur| (kappa + minimum.shared, schur.schur)),
+                        equations: self,
+                        minimum,
+                        sigmas_m,
+                        dropped,
                     });
                 }
             }
@@ -241,20 +241,62 @@ impl<'s> ShapeEquations<'s> {
         }
         Some(trace / PROBES as f64)
     }
+}
 
-    /// The shape after the step, without the dropped scales.
-    fn learned(&self, sigmas_m: &[f64], dropped: &[bool], step: &[FrameStep]) -> Shape {
-        let of_shape = &step[self.first_slot..];
-        let moved = self.shape.stepped(of_shape);
-        let mut model: ShapeModel = self.shape.model.clone();
+impl LearnedShape<'_> {
+    /// Step of the shared parameters to the minimum, and their information; None if they were not
+    /// estimated.
+    pub fn shared(&self) -> Option<(Kappa, SharedBlock)> {
+        let schur = self.minimum.schur.as_ref()?;
+        Some((self.minimum.shared, schur.schur))
+    }
+
+    /// Step of all slots and of the shared parameters to the minimum where the latter make the
+    /// step `held`, as far as it has values; None if the equations are singular.
+    ///
+    /// With S and W of [`SchurComplement`], F the held parameters and R the others, the minimum
+    /// moves by `δκ_R = −S_RR⁻¹ S_RF δκ_F`, and the slots by `−W δκ`.
+    pub fn step_holding(
+        &self,
+        held: &[Option<f64>; SHARED_PARAMETERS],
+    ) -> Option<(Vec<FrameStep>, Kappa)> {
+        let Minimum { step, shared, .. } = &self.minimum;
+        let Some(SchurComplement { w, schur }) = &self.minimum.schur else {
+            return Some((step.clone(), *shared));
+        };
+        let mut reduced = *schur;
+        let mut change = Kappa::zeros();
+        for k in 0..SHARED_PARAMETERS {
+            if let Some(to) = held[k] {
+                change[k] = to - shared[k];
+            }
+        }
+        let mut pull = -(schur * change);
+        for k in (0..SHARED_PARAMETERS).filter(|k| held[*k].is_some()) {
+            reduced.row_mut(k).fill(0.0);
+            reduced.column_mut(k).fill(0.0);
+            reduced[(k, k)] = 1.0;
+            pull[k] = change[k];
+        }
+        let change = reduced.cholesky()?.solve(&pull);
+        let slots = step.iter().zip(w);
+        let slots = slots.map(|(step, w)| step - w * change);
+        Some((slots.collect(), shared + change))
+    }
+
+    /// The shape after a step of all slots, without the dropped scales.
+    pub fn shape_after(&self, step: &[FrameStep]) -> Shape {
+        let before = &self.equations.shape;
+        let moved = before.stepped(&step[self.equations.first_slot..]);
+        let mut model: ShapeModel = before.model.clone();
         let mut coefficients = Vec::new();
-        for (k, range) in self.shape.model.ranges().into_iter().enumerate() {
-            model.scales[k].sigma_m = sigmas_m[k];
-            if !dropped[k] {
+        for (k, range) in before.model.ranges().into_iter().enumerate() {
+            model.scales[k].sigma_m = self.sigmas_m[k];
+            if !self.dropped[k] {
                 coefficients.extend_from_slice(&moved[range]);
             }
         }
-        let mut kept = dropped.iter().map(|dropped| !dropped);
+        let mut kept = self.dropped.iter().map(|dropped| !dropped);
         model.scales.retain(|_| kept.next().unwrap_or_default());
         Shape {
             model,
@@ -302,7 +344,8 @@ mod tests {
             shape: Shape::nominal(model),
             first_slot: 1,
         };
-        let learned = equations.learn(&Kappa::zeros(), 1e-3).unwrap().shape;
+        let learned = equations.learn(1e-3).unwrap();
+        let learned = learned.shape_after(&learned.minimum.step);
         let scales = &learned.model.scales;
         assert_eq!(scales.len(), 1, "{scales:?}");
         assert!((scales[0].sigma_m / 0.005 - 1.0).abs() < 0.15, "{scales:?}");

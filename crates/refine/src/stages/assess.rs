@@ -6,7 +6,7 @@ use crate::model::context::EstimationContext;
 use crate::model::frame_states::FrameStates;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
-use crate::parameters::calibration::{Calibration, Kappa};
+use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS, Calibration, Kappa};
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::problem::linearisation::FrameContribution;
 use crate::refined::Refined;
@@ -86,6 +86,7 @@ pub fn run<'a>(
         rolling_shutter: readout,
         model_error: uncertainty.model_error,
         shape: shape_report,
+        bend_sigma_per_m: bend_sigma_per_m(state, &uncertainty),
         calibration: report_calibration(setup, &calibration, &context.kappa, &uncertainty, state),
         timings: std::mem::take(&mut session.timings),
     };
@@ -114,6 +115,7 @@ pub fn without_solution(setup: &Setup, session: &mut Session) -> Refined {
         rolling_shutter: None,
         model_error: None,
         shape: None,
+        bend_sigma_per_m: None,
         calibration: None,
         timings: std::mem::take(&mut session.timings),
     };
@@ -179,6 +181,17 @@ fn judge(
             rejection.get_or_insert(RejectionReason::Minority { frames, shown });
         }
     }
+}
+
+/// 1-σ of the curvature, 1/m, if it was estimated.
+fn bend_sigma_per_m(
+    state: &PipelineState,
+    uncertainty: &SolutionUncertainty,
+) -> Option<[f64; BEND_PARAMETERS]> {
+    let covariance = uncertainty.shared.filter(|_| state.free[BEND_INDEX])?;
+    Some(std::array::from_fn(|k| {
+        covariance[(BEND_INDEX + k, BEND_INDEX + k)].sqrt()
+    }))
 }
 
 /// The report of the self-calibration, if there was one.

@@ -6,6 +6,7 @@ use crate::parameters::frame_estimate::FrameEstimate;
 use crate::refined::Refined;
 use crate::report::{FrameFlag, FrameReport, LevelReport, PoseReport, RefineReport, StageTime};
 use crate::stages::setup::Setup;
+use crate::uncertainty::bend_report::BendReport;
 use crate::uncertainty::calibration_report::CalibrationReport;
 use crate::uncertainty::covariance::Covariances;
 use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma};
@@ -16,7 +17,8 @@ use crate::verdict::bridging::Bridging;
 use crate::verdict::prior_test::PriorTest;
 use crate::verdict::survey_verdict::SurveyVerdict;
 use nalgebra::{Matrix6, Vector3};
-use tunnelstitch_geometry::surface::{GaugeMotion, Surface, WallPoint};
+use std::sync::Arc;
+use tunnelstitch_geometry::surface::{Bend, GaugeMotion, Surface, WallPoint, bent};
 use tunnelstitch_geometry::trajectory::{Pose, StampedPose};
 
 /// The final poses of all frames, and the verdict that they follow from.
@@ -30,6 +32,10 @@ pub struct Placement {
     prior_test: PriorTest,
     /// Shape of the wall; None if it is as planned.
     shape: Option<EstimatedShape>,
+    /// Bend of the tunnel; None if it is as planned.
+    bend: Option<Bend>,
+    /// The tunnel along it.
+    nominal: Arc<dyn Surface>,
 }
 
 /// Parts of the report that the poses do not determine.
@@ -46,6 +52,8 @@ pub struct ReportParts {
     pub model_error: Option<ModelErrorReport>,
     /// The wall's shape, if it was estimated.
     pub shape: Option<ShapeReport>,
+    /// 1-σ of the tunnel's curvature, 1/m, where it was found to bend.
+    pub bend_sigma_per_m: Option<[f64; 2]>,
     /// Self-calibration.
     pub calibration: Option<CalibrationReport>,
     /// Time by stage.
@@ -67,7 +75,12 @@ impl Placement {
         let mut photometric: Vec<bool> = rejections.iter().map(Option::is_none).collect();
         let gauge = setup.initial_context(0.0).gauge();
         let motion = prior.align_gauge(&gauge, estimates, datum, &photometric);
-        let by = displacement_by(&motion, setup.input.surface.as_ref(), &estimates[0].pose);
+        let planned = &setup.input.surface;
+        let before = bent(planned, datum.bend);
+        let datum = &datum.moved(&motion);
+        let nominal = bent(planned, datum.bend);
+        let walls = [before.as_ref(), nominal.as_ref()];
+        let by = displacement_by(&motion, walls, &estimates[0].pose);
         let shape = shape.map(|shape| shape.moved(by, datum.scale));
         let mut estimates = aligned(estimates, &motion);
         let mut covariances = covariances.clone().moved(&motion).scaled(datum.scale);
@@ -130,13 +143,15 @@ impl Placement {
             rejections,
             prior_test,
             shape: shape.filter(|_| !is_kept),
+            bend: datum.bend.filter(|_| !is_kept).or(setup.input.bend),
+            nominal,
         }
     }
 
     /// The report of frame `k`, without what the last solve says of it; `sigma`: by that solve.
     pub fn report_frame(&self, setup: &Setup, k: usize, sigma: FrameSigma) -> FrameReport {
         let rejection = self.rejections[k].as_ref();
-        let (surface, camera) = (setup.input.surface.as_ref(), &setup.input.camera);
+        let (surface, camera) = (self.nominal.as_ref(), &setup.input.camera);
         FrameReport {
             index: k,
             file: setup.input.frames[k].name(),
@@ -199,23 +214,26 @@ impl Placement {
                 prior_test: self.prior_test,
                 verdict,
                 shape: parts.shape,
+                bend: (self.bend.zip(parts.bend_sigma_per_m))
+                    .map(|(bend, sigma_per_m)| BendReport::new(bend, sigma_per_m)),
                 calibration: parts.calibration,
                 timings: parts.timings,
             },
             covariances: self.covariances,
             shape: self.shape,
+            bend: self.bend,
         }
     }
 }
 
 /// Displacement of the wall's points, on the unrolled wall, by a motion along the gauge: that of
-/// the point that `pose` looks at.
-fn displacement_by(motion: &GaugeMotion, nominal: &dyn Surface, pose: &Pose) -> WallPoint {
-    let seen = |pose: &Pose| {
-        let hit = nominal.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()));
-        hit.map(|hit| hit.wall).unwrap_or_default()
-    };
-    let (before, after) = (seen(pose), seen(&motion.apply(pose)));
+/// the point that `pose` looks at. `walls`: without and with the motion.
+fn displacement_by(motion: &GaugeMotion, walls: [&dyn Surface; 2], pose: &Pose) -> WallPoint {
+    let [before, after] =
+        [(walls[0], *pose), (walls[1], motion.apply(pose))].map(|(wall, pose)| {
+            let hit = wall.hit(&pose.t_wc, &(pose.r_wc * Vector3::z()));
+            hit.map(|hit| hit.wall).unwrap_or_default()
+        });
     WallPoint {
         s_m: after.s_m - before.s_m,
         h_m: after.h_m - before.h_m,

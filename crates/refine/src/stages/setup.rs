@@ -6,13 +6,19 @@ use crate::input::RefineInput;
 use crate::model::context::EstimationContext;
 use crate::model::prior::{Prior, median_step_s};
 use crate::options::{RefineOptions, ShapeMode};
-use crate::parameters::calibration::{Calibration, Kappa};
+use crate::parameters::calibration::{
+    BEND_INDEX, BEND_PARAMETERS, Calibration, DATUM_PARAMETERS, INTRINSIC_PARAMETERS, Kappa,
+};
 use crate::stages::state::PipelineState;
 use std::sync::Arc;
 use tunnelstitch_core::frames::FrameCache;
 use tunnelstitch_core::survey::CalibrationGroup;
 use tunnelstitch_geometry::surface::displaced;
 use tunnelstitch_geometry::trajectory::{Pose, poses_of};
+
+/// Radius of the bend that a tunnel may have which is planned straight, 1-σ of the curvature, in
+/// multiples of its own radius: 90 m for one of 3 m.
+const BEND_RADIUS_RADII: f64 = 30.0;
 
 /// The input and the options of a refinement, with what follows from both.
 pub struct Setup<'a> {
@@ -110,10 +116,12 @@ impl<'a> Setup<'a> {
     /// The estimation context before anything is estimated, with the sensor's noise of 1-σ `noise`
     /// grey levels.
     pub fn initial_context(&self, noise: f64) -> EstimationContext<'_> {
-        let nominal = Arc::clone(&self.input.surface);
-        let surface = displaced(&nominal, self.input.displacement.cloned());
+        let planned = Arc::clone(&self.input.surface);
+        let surface = displaced(&planned, self.input.displacement.cloned());
         EstimationContext {
-            nominal,
+            nominal: Arc::clone(&planned),
+            planned,
+            is_deviation_known: self.input.bend.is_some() || self.input.displacement.is_some(),
             displacement: self.input.displacement,
             shape: None,
             surface,
@@ -131,19 +139,29 @@ impl<'a> Setup<'a> {
 
     /// The estimation context with shared parameters and shape as `state` has them.
     pub fn context(&self, state: &PipelineState) -> EstimationContext<'_> {
-        let initial = self.initial_context(state.noise);
-        let surface = match &state.shape {
-            Some(shape) => initial.surface_with(shape),
-            None => Arc::clone(&initial.surface),
-        };
         EstimationContext {
             shape: state.shape.clone().map(Arc::new),
-            surface,
             calibration: self.calibration_at(state),
             dispersion: state.dispersion,
-            ..initial
+            ..self.initial_context(state.noise)
         }
         .at(state.kappa)
+    }
+
+    /// True if a curvature can be estimated: if the tunnel is planned straight, and nothing else
+    /// is asked for that says where its axis is.
+    pub fn may_bend(&self) -> bool {
+        let datum = INTRINSIC_PARAMETERS..INTRINSIC_PARAMETERS + DATUM_PARAMETERS;
+        let is_straight = self.input.surface.gauge().shift && self.input.bend.is_none();
+        is_straight && !self.calibration.free[datum].contains(&true)
+    }
+
+    /// Replaces the shared parameters of a state, and carries its frames along with the curvature.
+    pub fn replace_kappa(&self, state: &mut PipelineState, kappa: Kappa) {
+        for estimate in &mut state.frames.estimates {
+            estimate.pose = self.calibration.carry(&estimate.pose, &state.kappa, &kappa);
+        }
+        state.kappa = kappa;
     }
 }
 
@@ -168,7 +186,13 @@ fn calibration_of(
             return Err(RefineError::OnlyRound { unknown });
         }
     }
+    let mut sigma = calibration.sigma;
+    let bend_sigma = 1.0 / (BEND_RADIUS_RADII * input.nominal_radius_m);
+    sigma
+        .fixed_rows_mut::<BEND_PARAMETERS>(BEND_INDEX)
+        .fill(bend_sigma);
     Ok(Calibration {
+        sigma,
         readout_s: input.shutter.readout_s(),
         ..calibration
     })

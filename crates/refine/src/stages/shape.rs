@@ -1,17 +1,22 @@
-//! The wall's shape between solves: begun before the first at full size, its strengths learned
-//! after it.
+//! The wall's shape between solves: begun before the first at full size, with the lens and, in a
+//! straight tunnel, a curvature; its strengths learned after it.
 
 use crate::model::problem_error::ProblemError;
 use crate::model::significance::chi_squared_bounds;
 use crate::options::RefineOptions;
-use crate::parameters::calibration::INTRINSIC_PARAMETERS;
+use crate::parameters::calibration::{BEND_INDEX, BEND_PARAMETERS, INTRINSIC_PARAMETERS, Kappa};
 use crate::parameters::shape::{Shape, ShapeModel, ShapeStep};
 use crate::samples::footprints::footprints;
 use crate::solver::gauss_newton::Solution;
 use crate::solver::shape_evidence::{LearnedShape, learn_shape};
 use crate::stages::setup::Setup;
 use crate::stages::state::PipelineState;
+use std::ops::Range;
 
+/// The lens in κ.
+const LENS: Range<usize> = 0..INTRINSIC_PARAMETERS;
+/// The curvature in κ.
+const BEND: Range<usize> = BEND_INDEX..BEND_INDEX + BEND_PARAMETERS;
 /// Columns of the finest lattice before anything is known: nodes a fifth of the radius apart.
 const FIRST_FINEST_COLUMNS: usize = 32;
 /// Columns of the finest lattice at the most: nodes a tenth of the radius apart. Twice as many
@@ -49,6 +54,7 @@ pub fn begin(setup: &Setup, state: &mut PipelineState) -> Result<(), ProblemErro
     );
     state.shape = Some(Shape::nominal(model));
     state.free[..INTRINSIC_PARAMETERS].fill(true);
+    state.free[BEND].fill(setup.may_bend());
     Ok(())
 }
 
@@ -71,50 +77,83 @@ fn adopt(setup: &Setup, state: &mut PipelineState, mut shape: Shape) {
     if !shape.coefficients.iter().all(is_plausible) {
         shape.model.scales.clear();
         shape.coefficients.clear();
-        fix_lens(setup, state);
+        fix(LENS, setup, state);
+        fix(BEND, setup, state);
     }
     state.shape = Some(shape);
 }
 
-/// Fixes the lens parameters that were not asked for at their given values.
-fn fix_lens(setup: &Setup, state: &mut PipelineState) {
-    for k in 0..INTRINSIC_PARAMETERS {
+/// Fixes the shared parameters `which`, but for those that were asked for, at their given values.
+fn fix(which: Range<usize>, setup: &Setup, state: &mut PipelineState) {
+    let mut kappa = state.kappa;
+    for k in which {
         state.free[k] = setup.calibration.free[k];
         if !state.free[k] {
-            state.kappa[k] = 0.0;
+            kappa[k] = 0.0;
         }
     }
+    setup.replace_kappa(state, kappa);
 }
 
 /// Learns the strengths of the shape at a full-size solution, and whether the lens differs from the
-/// given one. Returns true if that changes anything; the state is then ready for a new solve.
+/// given one, and the tunnel from a straight one. Returns true if that changes anything; the state is then ready for a new solve.
 pub fn learn(setup: &Setup, state: &mut PipelineState, solution: &Solution) -> bool {
     let Some(learned) = learn_shape(solution, setup.options.false_alarm_rate) else {
         return false;
     };
-    let free = state.free;
-    if !is_lens_changed(&learned, setup.options) {
-        fix_lens(setup, state);
-    }
-    let shape = with_finer_lattice(learned.shape);
-    let before = solution.problem.shape().map(|before| &before.model);
-    if free == state.free && before.is_some_and(|before| !is_changed(before, &shape.model)) {
+    let (kappa, mut free) = (solution.linearised_at.kappa, state.free);
+    let mut hold = |which: Range<usize>, is_changed: bool| {
+        for k in which.filter(|_| !is_changed) {
+            free[k] = setup.calibration.free[k];
+        }
+    };
+    hold(
+        LENS,
+        is_changed::<INTRINSIC_PARAMETERS>(&learned, &kappa, LENS, setup.options),
+    );
+    hold(
+        BEND,
+        is_changed::<BEND_PARAMETERS>(&learned, &kappa, BEND, setup.options),
+    );
+    let held = std::array::from_fn(|k| (state.free[k] && !free[k]).then(|| -kappa[k]));
+    let Some((step, shared)) = learned.step_holding(&held) else {
         return false;
+    };
+    let shape = with_finer_lattice(learned.shape_after(&step));
+    let before = solution.problem.shape().map(|before| &before.model);
+    if free == state.free && before.is_some_and(|before| !is_rescaled(before, &shape.model)) {
+        return false;
+    }
+    let stepped = solution
+        .problem
+        .stepped(&solution.linearised_at, &step, &shared);
+    state.free = free;
+    setup.replace_kappa(state, stepped.kappa);
+    for (estimate, stepped) in state.frames.estimates.iter_mut().zip(stepped.frames) {
+        if solution.problem.is_feasible(&stepped) {
+            *estimate = stepped;
+        }
     }
     adopt(setup, state, shape);
     true
 }
 
-/// True if the lens differs from the given one by more than chance: `κᵀ S κ`, S the information of
-/// the lens parameters, is a χ² variable if it does not.
-fn is_lens_changed(learned: &LearnedShape, options: &RefineOptions) -> bool {
-    let Some((kappa, information)) = &learned.shared else {
+/// True if the N shared parameters `which` differ from the given ones by more than chance:
+/// `κᵀ S κ`, S their information, is a χ² variable if they do not. `kappa`: those where the
+/// equations are.
+fn is_changed<const N: usize>(
+    learned: &LearnedShape,
+    kappa: &Kappa,
+    which: Range<usize>,
+    options: &RefineOptions,
+) -> bool {
+    let Some((step, information)) = learned.shared() else {
         return false;
     };
-    let lens = kappa.fixed_rows::<INTRINSIC_PARAMETERS>(0);
-    let information = information.fixed_view::<INTRINSIC_PARAMETERS, INTRINSIC_PARAMETERS>(0, 0);
-    let square = (lens.transpose() * information * lens)[0];
-    let bounds = chi_squared_bounds(2.0 * options.false_alarm_rate, INTRINSIC_PARAMETERS as f64);
+    let change = (kappa + step).fixed_rows::<N>(which.start).into_owned();
+    let information = information.fixed_view::<N, N>(which.start, which.start);
+    let square = (change.transpose() * information * change)[0];
+    let bounds = chi_squared_bounds(2.0 * options.false_alarm_rate, N as f64);
     bounds.is_some_and(|(_, most)| square > most)
 }
 
@@ -136,7 +175,7 @@ fn with_finer_lattice(shape: Shape) -> Shape {
 }
 
 /// True if scales come or go, or change their strength.
-fn is_changed(before: &ShapeModel, after: &ShapeModel) -> bool {
+fn is_rescaled(before: &ShapeModel, after: &ShapeModel) -> bool {
     before.scales.len() != after.scales.len()
         || before
             .scales

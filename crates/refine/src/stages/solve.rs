@@ -60,10 +60,12 @@ pub fn run<'a>(
     }
     let uncertainty = uncertainty_of(&plan, setup, &context, state, &solution)?;
     let unobservable = find_unobservable(setup, &context, state, &solution, uncertainty.as_ref());
+    let mut kappa = state.kappa;
     for parameter in &unobservable {
-        state.kappa[parameter.unknown] = 0.0;
+        kappa[parameter.unknown] = 0.0;
         state.free[parameter.unknown] = false;
     }
+    setup.replace_kappa(state, kappa);
     let context = setup.context(state);
     state.kappa = context.kappa;
     if !unobservable.is_empty() && !has_solve_ahead(state) {

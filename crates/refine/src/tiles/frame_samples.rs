@@ -1,18 +1,23 @@
 //! Values of a frame at the wall samples of a tile, and its Jacobians there.
 
+use crate::parameters::calibration::{BEND_PARAMETERS, INTRINSIC_PARAMETERS, PIXEL_PARAMETERS};
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::tiles::grid::{Plane, TilePoints, ZERO};
 use crate::tiles::interpolation::{Interpolation, cubic_weights};
-use nalgebra::{Matrix2x6, Matrix3, Vector3};
+use nalgebra::{Matrix2x6, Matrix3, SMatrix, Vector3};
 use tunnelstitch_core::frames::GreyImage;
 use tunnelstitch_core::super_resolve::{self, Reading};
 use tunnelstitch_geometry::camera::{Camera, LensF32, ProjectF32, Sweep};
-use tunnelstitch_geometry::surface::{lens_jacobian, wall_jacobian};
+use tunnelstitch_geometry::surface::{Surface, bend_jacobian, lens_jacobian, wall_jacobian};
 use tunnelstitch_geometry::trajectory::Pose;
 
 /// 2²³: added to a non-negative float, it rounds it to an integer in the last bits of the sum.
 /// Unlike a cast, which saturates, this vectorises.
 const ROUNDING: f32 = 8_388_608.0;
+
+/// `C = ∂(s, h)/∂κ` for the shared parameters that pixels depend on
+/// ([`crate::parameters::calibration::PIXEL_INDICES`]).
+pub type SharedJacobian = SMatrix<f64, 2, PIXEL_PARAMETERS>;
 
 /// For every sample of a tile, the index of the pixel to its upper left in an image.
 type Indices = [u32; ZERO.len()];
@@ -25,6 +30,8 @@ pub struct SampledFrame<'a> {
     intrinsics: [f32; 4],
     lens: LensF32,
     pose: Pose,
+    /// The pose in the straight tunnel, if the curvature is estimated.
+    straightened: Option<Pose>,
     r_cw: Matrix3<f32>,
     gain: f32,
     bias: f32,
@@ -41,6 +48,7 @@ impl<'a> SampledFrame<'a> {
             intrinsics: [camera.fx, camera.fy, camera.cx, camera.cy].map(|v| v as f32),
             lens: LensF32::new(&camera),
             pose: estimate.pose,
+            straightened: None,
             r_cw: r_wc.matrix().transpose().cast(),
             gain: estimate.log_gain.exp() as f32,
             bias: estimate.bias as f32,
@@ -52,6 +60,14 @@ impl<'a> SampledFrame<'a> {
     pub fn with_interpolation(self, interpolation: Interpolation) -> Self {
         Self {
             interpolation,
+            ..self
+        }
+    }
+
+    /// Adds the pose in the straight tunnel, for the derivative by the tunnel's curvature.
+    pub fn with_straightened(self, surface: &dyn Surface) -> Self {
+        Self {
+            straightened: Some(surface.straightened(&self.pose)),
             ..self
         }
     }
@@ -92,28 +108,34 @@ impl<'a> SampledFrame<'a> {
         wall_jacobian(&self.pose, &points.centre)
     }
 
-    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2, ρ)` at the centre of a tile, for the `camera` at full
+    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2, ρ, c_x, c_z)` at the centre of a tile, for the `camera` at full
     /// size; `a`: the pose's Jacobian there, `rate`: the motion of the frame's camera during a
     /// readout of one second.
     ///
     /// A row that is read at the share u of the readout sees the wall as from the pose moved by
     /// `(ω u, R ν u)`, with ω and ν proportional to the readout time ρ:
-    /// `∂(s, h)/∂ρ = A (ω, R ν) u`.
+    /// `∂(s, h)/∂ρ = A (ω, R ν) u`. The columns of the curvature are zero unless it is estimated.
     pub fn shared_jacobian(
         &self,
         points: &TilePoints,
         a: &Matrix2x6<f64>,
         camera: &Camera,
         rate: &Sweep,
-    ) -> Matrix2x6<f64> {
+    ) -> SharedJacobian {
         let x_c = self.pose.to_camera(&points.centre.x_w);
         let lens = lens_jacobian(&self.pose, a, camera, &x_c);
         let share = (camera.project(&x_c)).map_or(0.0, |pixel| camera.share(pixel.y));
         let shift = self.pose.r_wc * rate.nu_m;
         let by_readout = a.fixed_columns::<3>(0) * rate.omega_rad + a.fixed_columns::<3>(3) * shift;
-        let mut c = Matrix2x6::zeros();
-        c.fixed_columns_mut::<5>(0).copy_from(&lens);
-        c.set_column(5, &(by_readout * share));
+        let mut c = SharedJacobian::zeros();
+        c.fixed_columns_mut::<INTRINSIC_PARAMETERS>(0)
+            .copy_from(&lens);
+        c.set_column(INTRINSIC_PARAMETERS, &(by_readout * share));
+        if let Some(straightened) = &self.straightened {
+            let by_bend = bend_jacobian(&self.pose, straightened, a, &x_c);
+            c.fixed_columns_mut::<BEND_PARAMETERS>(INTRINSIC_PARAMETERS + 1)
+                .copy_from(&by_bend);
+        }
         c
     }
 

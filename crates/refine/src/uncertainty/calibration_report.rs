@@ -1,7 +1,9 @@
 //! Report of the self-calibration, in the units of the files.
 
 use crate::linear::bordered_system::SharedBlock;
-use crate::parameters::calibration::{Calibration, Kappa, RADIUS_INDEX, SHARED_PARAMETERS};
+use crate::parameters::calibration::{
+    BEND_INDEX, Calibration, Kappa, RADIUS_INDEX, SHARED_PARAMETERS,
+};
 use crate::uncertainty::observability::UnobservableParameter;
 use crate::uncertainty::shared_parameter_names::{PARAMETERS, ParameterKind};
 use serde::Serialize;
@@ -12,9 +14,10 @@ use tunnelstitch_geometry::camera::Camera;
 #[non_exhaustive]
 pub struct UnknownReport {
     /// `focal` (fx), `cx`, `cy`, `k1`, `k2`, `radius`, or of the tunnel's axis in the frame of the
-    /// initial poses: how far it tilts about x and z, and how far it lies off along x and z.
+    /// initial poses: how far it tilts about x and z, and how far it lies off along x and z; its
+    /// curvature along x and z.
     pub name: &'static str,
-    /// Its unit: `px`, `m`, `deg`, or `1`.
+    /// Its unit: `px`, `m`, `deg`, `1/m`, or `1`.
     pub unit: &'static str,
     /// The value given.
     pub initial: f64,
@@ -74,6 +77,8 @@ impl CalibrationReport {
             point.x,
             point.z,
             1e3 * calibration.readout_s(kappa),
+            kappa[BEND_INDEX],
+            kappa[BEND_INDEX + 1],
         ];
         let initial = [
             given.fx,
@@ -87,6 +92,8 @@ impl CalibrationReport {
             0.0,
             0.0,
             1e3 * calibration.readout_s,
+            0.0,
+            0.0,
         ];
         let is_asked_for =
             |k: &usize| calibration.free[*k] || unobservable.iter().any(|r| r.unknown == *k);
@@ -102,6 +109,7 @@ impl CalibrationReport {
                 ParameterKind::Tilt => ("deg", 1f64.to_degrees()),
                 ParameterKind::Offset => ("m", 1.0),
                 ParameterKind::Time => ("ms", 1e3),
+                ParameterKind::Curvature => ("1/m", 1.0),
             };
             let sigma = unobserved.map_or(covariance[(k, k)].sqrt(), |one| one.sigma);
             UnknownReport {

@@ -111,6 +111,8 @@ pub fn pose_bounds(
     // The motion during readout hardly changes the information.
     let shutter = Shutter::default();
     let context = EstimationContext {
+        planned: std::sync::Arc::clone(&survey.nominal),
+        is_deviation_known: survey.bend.is_some() || survey.displacement.is_some(),
         nominal: std::sync::Arc::clone(&survey.nominal),
         displacement: survey.displacement.as_ref(),
         shape: None,

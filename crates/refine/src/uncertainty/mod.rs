@@ -11,6 +11,7 @@
 //! hardly narrow down are unobservable. The rolling-shutter test estimates the readout time, and
 //! the Cramér–Rao bound states what any estimator could reach.
 
+pub mod bend_report;
 pub mod calibration_report;
 pub mod covariance;
 pub mod covariance_file;

@@ -140,7 +140,8 @@ fn explain(unknown: usize, covariance: &SharedBlock, free: &[bool; SHARED_PARAME
         ParameterKind::Focal
         | ParameterKind::Pixel
         | ParameterKind::Plain
-        | ParameterKind::Time => {
+        | ParameterKind::Time
+        | ParameterKind::Curvature => {
             "the frames leave it nearly as uncertain as it was: too little overlap, texture, or \
              width of view"
         }

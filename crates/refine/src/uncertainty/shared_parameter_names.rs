@@ -19,6 +19,8 @@ pub enum ParameterKind {
     Tilt,
     /// An offset of the tunnel's axis.
     Offset,
+    /// A curvature of the tunnel.
+    Curvature,
 }
 
 /// The names of the shared parameters in the report and their kinds, in the order of κ.
@@ -34,4 +36,6 @@ pub const PARAMETERS: [(&str, ParameterKind); SHARED_PARAMETERS] = [
     ("axis_offset_x", ParameterKind::Offset),
     ("axis_offset_z", ParameterKind::Offset),
     ("readout", ParameterKind::Time),
+    ("curvature_x", ParameterKind::Curvature),
+    ("curvature_z", ParameterKind::Curvature),
 ];

@@ -4,7 +4,9 @@ use crate::linear::bordered_system::SharedBlock;
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
-use crate::parameters::calibration::{Calibration, SHARED_PARAMETERS};
+use crate::parameters::calibration::{
+    BEND_INDEX, BEND_PARAMETERS, Calibration, INTRINSIC_PARAMETERS, SHARED_PARAMETERS,
+};
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::MAX_MISFIT_SHARE;
@@ -15,8 +17,9 @@ use crate::uncertainty::observability::{Posterior, UnobservableParameter};
 use crate::uncertainty::overdispersion::{Overdispersion, compute_overdispersions};
 use crate::uncertainty::registration_sigma::registration_sigmas;
 use crate::uncertainty::total_covariance::{PixelJacobians, TotalCovariance};
-use nalgebra::{Matrix2x6, Vector3};
-use tunnelstitch_geometry::surface::{WallPoint, lens_jacobian};
+use nalgebra::{Matrix2x6, SMatrix, Vector3};
+use tunnelstitch_geometry::surface::{WallPoint, bend_jacobian, lens_jacobian};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// The uncertainty of a solution.
 pub struct SolutionUncertainty {
@@ -117,7 +120,7 @@ impl SolutionUncertainty {
             let tau = -(a.fixed_columns::<3>(3) * normal);
             let pixel = PixelJacobians {
                 pose: *a,
-                lens: lens_jacobian(&estimate.pose, a, &context.camera, x_c),
+                shared: shared_jacobian(context, &estimate.pose, a, x_c),
                 shape: functions
                     .as_deref()
                     .map(|functions| (tau, functions, frames)),
@@ -178,6 +181,22 @@ impl SolutionUncertainty {
         }
         posterior.find_unobservable(calibration)
     }
+}
+
+/// `C = ∂(s, h)/∂κ` of the wall point `x_c` (camera coordinates) seen through a fixed pixel.
+fn shared_jacobian(
+    context: &EstimationContext,
+    pose: &Pose,
+    a: &Matrix2x6<f64>,
+    x_c: &Vector3<f64>,
+) -> SMatrix<f64, 2, SHARED_PARAMETERS> {
+    let mut c = SMatrix::<f64, 2, SHARED_PARAMETERS>::zeros();
+    c.fixed_columns_mut::<INTRINSIC_PARAMETERS>(0)
+        .copy_from(&lens_jacobian(pose, a, &context.camera, x_c));
+    let straightened = context.surface.straightened(pose);
+    c.fixed_columns_mut::<BEND_PARAMETERS>(BEND_INDEX)
+        .copy_from(&bend_jacobian(pose, &straightened, a, x_c));
+    c
 }
 
 /// Marks every free parameter as unobservable.

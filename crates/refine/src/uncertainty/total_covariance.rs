@@ -2,11 +2,11 @@
 
 use crate::linear::bordered_system::{BorderBlock, SharedBlock};
 use crate::linear::normal_equations::Block;
-use crate::parameters::calibration::INTRINSIC_PARAMETERS;
+use crate::parameters::calibration::SHARED_PARAMETERS;
 use crate::parameters::shape::{FunctionValue, ShapeStep};
 use crate::uncertainty::covariance::{Covariances, NoiseCovariance};
 use crate::uncertainty::model_error::EstimateErrors;
-use nalgebra::{Matrix2x5, Matrix2x6, Matrix6, SVector, Vector2};
+use nalgebra::{Matrix2x6, Matrix6, SMatrix, SVector, Vector2};
 use std::collections::BTreeMap;
 
 /// The covariance of the errors of all slots and of the shared parameters.
@@ -23,8 +23,8 @@ pub struct TotalCovariance {
 pub struct PixelJacobians<'j> {
     /// `A = ∂(s, h)/∂ξ`.
     pub pose: Matrix2x6<f64>,
-    /// `C = ∂(s, h)/∂(ln f, cx, cy, k1, k2)`.
-    pub lens: Matrix2x5<f64>,
+    /// `C = ∂(s, h)/∂κ`.
+    pub shared: SMatrix<f64, 2, SHARED_PARAMETERS>,
     /// `τ = ∂(s, h)/∂δ`, with the shape's functions there and the slot of their first block.
     pub shape: Option<(Vector2<f64>, &'j [FunctionValue], usize)>,
 }
@@ -74,15 +74,11 @@ impl TotalCovariance {
         let mut variance = (a * pose.fixed_view::<6, 6>(0, 0) * a.transpose()).trace();
         // By the slots: A ξ, and τ φᵀ c for a block of the shape.
         let mut crossed_w = SVector::<f64, 2>::zeros();
-        let lens = self.shared.as_ref().map(|(w, covariance)| {
-            let of_lens = covariance
-                .fixed_rows::<INTRINSIC_PARAMETERS>(0)
-                .into_owned();
-            (w, pixel.lens * of_lens)
-        });
-        if let Some((w, lens)) = &lens {
-            let own = lens.fixed_columns::<INTRINSIC_PARAMETERS>(0) * pixel.lens.transpose();
-            let crossed = lens * w[k].fixed_rows::<6>(0).transpose() * a.transpose();
+        let shared = self.shared.as_ref();
+        let shared = shared.map(|(w, covariance)| (w, pixel.shared * covariance));
+        if let Some((w, shared)) = &shared {
+            let own = shared * pixel.shared.transpose();
+            let crossed = shared * w[k].fixed_rows::<6>(0).transpose() * a.transpose();
             variance += own.trace() - 2.0 * crossed.trace();
         }
         let Some((tau, functions, first)) = pixel.shape else {
@@ -95,8 +91,8 @@ impl TotalCovariance {
                 let with_pose = a * covariance.fixed_rows::<6>(0) * phi;
                 variance += 2.0 * with_pose.dot(&tau);
             }
-            if let Some((w, lens)) = &lens {
-                crossed_w += lens * (w[*slot].transpose() * phi);
+            if let Some((w, shared)) = &shared {
+                crossed_w += shared * (w[*slot].transpose() * phi);
             }
         }
         variance - 2.0 * crossed_w.dot(&tau)
