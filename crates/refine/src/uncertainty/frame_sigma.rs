@@ -1,10 +1,11 @@
 //! Uncertainty of one frame, stated as σ of rotation, translation and wall position.
 
 use crate::parameters::frame_estimate::FrameEstimate;
-use nalgebra::{Matrix2x6, Matrix6, Vector3};
+use nalgebra::Matrix6;
 use serde::{Deserialize, Deserializer};
 use tunnelstitch_geometry::camera::Camera;
-use tunnelstitch_geometry::surface::{Surface, WallPoint, viewing_distance, wall_jacobian};
+use tunnelstitch_geometry::surface::{Hit, Surface, WallFrame, viewing_distance, wall_jacobian};
+use tunnelstitch_geometry::trajectory::Pose;
 
 /// 1-σ of one frame, with the two gauge freedoms fixed at the first frame.
 ///
@@ -61,52 +62,77 @@ pub fn compute_frame_sigma(
     estimate: &FrameEstimate,
     covariance: &Matrix6<f64>,
 ) -> FrameSigma {
-    let variance = |_: WallPoint, a: &Matrix2x6<f64>, _: &Vector3<f64>| {
-        (a * covariance * a.transpose()).trace()
+    let pose = &estimate.pose;
+    let variance = |_: &Hit, frame: &WallFrame| {
+        let a = wall_jacobian(pose, frame);
+        Some((a * covariance * a.transpose()).trace())
     };
     compute_frame_sigma_by(surface, camera, estimate, covariance, variance)
 }
 
 /// Computes σ of rotation and translation from the covariance of a pose, and that of the wall
-/// position from the `variance` of wall points (m², along s and h together), which is given the
-/// point, the Jacobian A of the pose there, and the point in the camera's coordinates.
+/// position from the `variance` of wall points, as [`wall_sigma_m`].
 pub fn compute_frame_sigma_by(
     surface: &dyn Surface,
     camera: &Camera,
     estimate: &FrameEstimate,
     covariance: &Matrix6<f64>,
-    variance: impl Fn(WallPoint, &Matrix2x6<f64>, &Vector3<f64>) -> f64,
+    variance: impl Fn(&Hit, &WallFrame) -> Option<f64>,
 ) -> FrameSigma {
-    let pose = &estimate.pose;
     let trace = |first: usize| {
         (0..3)
             .map(|k| covariance[(first + k, first + k)])
             .sum::<f64>()
     };
-    let (mut variance_sum, mut points) = (0.0, 0.0);
-    for ray_c in camera.grid_rays() {
-        let ray = pose.r_wc * ray_c;
-        if let Ok(hit) = surface.hit(&pose.t_wc, &ray) {
-            let a = wall_jacobian(pose, &surface.frame(hit.wall));
-            variance_sum += variance(hit.wall, &a, &(ray_c * hit.range));
-            points += 1.0;
-        }
-    }
-    let wall_m = f64::sqrt(variance_sum / points);
-    let distance_m = viewing_distance(surface, pose).unwrap_or(f64::NAN);
+    let wall_m = wall_sigma_m(surface, camera, &estimate.pose, variance);
     FrameSigma {
         rotation_deg: (trace(0) / 3.0).sqrt().to_degrees(),
         translation_m: (trace(3) / 3.0).sqrt(),
         wall_m,
-        wall_px: wall_m * camera.focal_px() / distance_m,
+        wall_px: wall_m * px_per_metre(surface, camera, &estimate.pose),
         registration_px: f64::NAN,
     }
+}
+
+/// Computes 1-σ of the wall points that a frame shows, root mean square over the picture, metres,
+/// from their `variance` (m², along s and h together); points without one do not count.
+fn wall_sigma_m(
+    surface: &dyn Surface,
+    camera: &Camera,
+    pose: &Pose,
+    variance: impl Fn(&Hit, &WallFrame) -> Option<f64>,
+) -> f64 {
+    let (mut sum, mut points) = (0.0, 0.0);
+    for ray_c in camera.grid_rays() {
+        if let Ok(hit) = surface.hit(&pose.t_wc, &(pose.r_wc * ray_c)) {
+            if let Some(variance) = variance(&hit, &surface.frame(hit.wall)) {
+                sum += variance;
+                points += 1.0;
+            }
+        }
+    }
+    f64::sqrt(sum / points)
+}
+
+/// Computes 1-σ as [`wall_sigma_m`] does, in pixels at the middle of the frame.
+pub fn wall_sigma_px(
+    surface: &dyn Surface,
+    camera: &Camera,
+    pose: &Pose,
+    variance: impl Fn(&Hit, &WallFrame) -> Option<f64>,
+) -> f64 {
+    wall_sigma_m(surface, camera, pose, variance) * px_per_metre(surface, camera, pose)
+}
+
+/// Pixels per metre of wall at the middle of a frame.
+fn px_per_metre(surface: &dyn Surface, camera: &Camera, pose: &Pose) -> f64 {
+    camera.focal_px() / viewing_distance(surface, pose).unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tunnelstitch_geometry::trajectory::{Pose, so3};
+    use tunnelstitch_geometry::trajectory::so3;
 
     /// A camera with an error of a millimetre along the tunnel displaces all of the wall by a
     /// millimetre; in pixels it is measured at the middle, even where the corners are far away.

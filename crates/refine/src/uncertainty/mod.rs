@@ -20,6 +20,7 @@ pub mod frame_sigma;
 pub mod model_error;
 pub mod observability;
 pub mod overdispersion;
+pub mod pixel_jacobians;
 pub mod registration_sigma;
 pub mod rolling_shutter_test;
 pub mod shape_report;

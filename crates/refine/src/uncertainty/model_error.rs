@@ -47,7 +47,8 @@ use crate::problem::photometric_problem::PhotometricProblem;
 use crate::solver::gauss_newton::Solution;
 use crate::uncertainty::covariance::{NoiseCovariance, exposures_alone};
 use crate::uncertainty::observability::Posterior;
-use nalgebra::SMatrix;
+use crate::uncertainty::total_covariance::PointJacobians;
+use nalgebra::{SMatrix, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -169,6 +170,18 @@ impl ErrorDraws {
         let products = self.slots[j].iter().zip(&self.slots[k]);
         let sum: Block = products.map(|(j, k)| j * k.transpose()).sum();
         sum / self.shared.len() as f64
+    }
+
+    /// Mean square of the errors of a point of the wall, m².
+    pub fn mean_square(&self, point: &PointJacobians) -> f64 {
+        let square = |draw: usize| {
+            let of_slots = (point.slots.iter())
+                .map(|(slot, jacobian)| jacobian * self.slots[*slot][draw])
+                .sum::<Vector2<f64>>();
+            (of_slots + point.shared * self.shared[draw]).norm_squared()
+        };
+        let draws = self.shared.len();
+        (0..draws).map(square).sum::<f64>() / draws as f64
     }
 
     /// Covariance of the errors of the shared parameters.

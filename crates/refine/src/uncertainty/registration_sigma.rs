@@ -1,33 +1,83 @@
-//! Uncertainty of the registration: of a frame against the wall that the others show.
+//! Uncertainty of the registration: of a frame against the wall that all frames show.
 //!
 //! The covariance of a pose is relative to the first frame and grows along the tunnel. What a
-//! panorama, a crack or a change needs is that frames agree about the wall that they share: the
-//! uncertainty of a frame with all others held, `c (H_kk⁻¹)_pp`, c the dispersion of the pixels'
-//! scores, model errors included. It counts over the whole picture: a frame that shares only a
-//! strip with others is registered there, and uncertain elsewhere.
+//! panorama, a crack or a change needs is that frames agree about the wall that they share. A point
+//! of the wall is where the n frames that see it put it in the mean, and frame i is off by
+//!
+//! `r_i = (e_i − Σ_j e_j/n)`,  `e_j = A_j ξ_j + C_j κ + τ_j δ`,
+//!
+//! with the errors of poses, shared parameters and shape
+//! ([`crate::uncertainty::total_covariance`]). What all of them do alike cancels. Where no other
+//! frame sees the wall, there is nothing to be registered against.
 
 use crate::model::context::EstimationContext;
 use crate::parameters::frame_estimate::FrameEstimate;
-use crate::solver::gauss_newton::Solution;
-use crate::uncertainty::frame_sigma::compute_frame_sigma;
+use crate::uncertainty::frame_sigma::wall_sigma_px;
+use crate::uncertainty::pixel_jacobians::pixel_jacobians;
+use crate::uncertainty::total_covariance::{PointJacobians, TotalCovariance};
+use nalgebra::{Vector2, Vector3};
+use tunnelstitch_geometry::numerics::parallel::ParallelMap;
+use tunnelstitch_geometry::surface::{Hit, WallFrame};
 
-/// Computes 1-σ of every frame with all others held, pixels in the middle of the frame; NaN where
-/// they do not determine its pose. `dispersion`: c.
+/// Computes 1-σ of every frame against the wall that all show, pixels in the middle of the frame,
+/// root mean square over the part of it that others show; NaN where it is unknown. `neighbours`: of every frame, the
+/// frames that see part of the same wall.
 pub fn registration_sigmas(
     context: &EstimationContext,
-    solution: &Solution,
-    dispersion: f64,
+    estimates: &[FrameEstimate],
+    neighbours: &[Vec<usize>],
+    total: &TotalCovariance,
 ) -> Vec<f64> {
-    let pattern = solution.problem.pattern();
-    let of_frame = |(k, estimate): (usize, &FrameEstimate)| {
-        let block = &solution.linearisation.normal.blocks[pattern.block_index(k, k)?];
-        let inverse = block.cholesky()?.inverse();
-        let covariance = dispersion * inverse.fixed_view::<6, 6>(0, 0);
-        let (surface, camera) = (context.surface.as_ref(), &context.camera);
-        Some(compute_frame_sigma(surface, camera, estimate, &covariance).wall_px)
+    (0..estimates.len()).par_map(|k| {
+        let variance = |hit: &Hit, frame: &WallFrame| {
+            let frames = (k, &neighbours[k][..]);
+            let point = registration_jacobians(context, estimates, frames, hit, frame)?;
+            Some(total.variance(&point))
+        };
+        wall_sigma_px(
+            context.surface.as_ref(),
+            &context.camera,
+            &estimates[k].pose,
+            variance,
+        )
+    })
+}
+
+/// Derivatives of `r_k` at the wall point `hit` of a pixel of frame k; None if no other frame sees
+/// it.
+fn registration_jacobians(
+    context: &EstimationContext,
+    estimates: &[FrameEstimate],
+    (k, neighbours): (usize, &[usize]),
+    hit: &Hit,
+    frame: &WallFrame,
+) -> Option<PointJacobians> {
+    let sees = |j: &usize| is_seen(context, &estimates[*j], &hit.x_w);
+    let others: Vec<usize> = neighbours.iter().copied().filter(sees).collect();
+    if others.is_empty() {
+        return None;
+    }
+    let share = 1.0 / (1 + others.len()) as f64;
+    let mut point = PointJacobians::default();
+    let mut tau = Vector2::zeros();
+    let mut add = |j: usize, share: f64| {
+        let pixel = pixel_jacobians(context, &estimates[j].pose, hit.wall, frame);
+        point.add_pixel(j, &pixel, share);
+        tau += pixel.tau * share;
     };
-    let frames = solution.unknowns.frames.iter().enumerate();
-    frames
-        .map(|frame| of_frame(frame).unwrap_or(f64::NAN))
-        .collect()
+    add(k, 1.0 - share);
+    for j in others {
+        add(j, -share);
+    }
+    if let Some(shape) = &context.shape {
+        let functions = shape.model.functions_at(hit.wall);
+        point.add_shape(&tau, &functions, estimates.len());
+    }
+    Some(point)
+}
+
+/// True if a frame shows a point of the wall.
+fn is_seen(context: &EstimationContext, estimate: &FrameEstimate, x_w: &Vector3<f64>) -> bool {
+    let pixel = context.camera.project(&estimate.pose.to_camera(x_w));
+    pixel.is_some_and(|pixel| context.camera.is_in_image(&pixel, 0.0))
 }

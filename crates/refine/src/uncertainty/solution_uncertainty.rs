@@ -1,12 +1,11 @@
 //! Uncertainty of a solution: of its poses, and of the shared parameters that it does not observe.
 
 use crate::linear::bordered_system::SharedBlock;
+use crate::linear::normal_equations::Pattern;
 use crate::model::context::EstimationContext;
 use crate::model::problem_error::ProblemError;
 use crate::model::rejection::RejectionReason;
-use crate::parameters::calibration::{
-    BEND_INDEX, BEND_PARAMETERS, Calibration, INTRINSIC_PARAMETERS, SHARED_PARAMETERS,
-};
+use crate::parameters::calibration::{Calibration, SHARED_PARAMETERS};
 use crate::parameters::frame_estimate::FrameEstimate;
 use crate::solver::gauss_newton::Solution;
 use crate::thresholds::observability::MAX_MISFIT_SHARE;
@@ -15,11 +14,10 @@ use crate::uncertainty::frame_sigma::{FrameSigma, compute_frame_sigma_by};
 use crate::uncertainty::model_error::{EstimateErrors, ModelErrorReport};
 use crate::uncertainty::observability::{Posterior, UnobservableParameter};
 use crate::uncertainty::overdispersion::{Overdispersion, compute_overdispersions};
+use crate::uncertainty::pixel_jacobians::pixel_jacobians;
 use crate::uncertainty::registration_sigma::registration_sigmas;
-use crate::uncertainty::total_covariance::{PixelJacobians, TotalCovariance};
-use nalgebra::{Matrix2x6, SMatrix, Vector3};
-use tunnelstitch_geometry::surface::{WallPoint, bend_jacobian, lens_jacobian};
-use tunnelstitch_geometry::trajectory::Pose;
+use crate::uncertainty::total_covariance::{PointJacobians, TotalCovariance};
+use tunnelstitch_geometry::surface::{Hit, WallFrame};
 
 /// The uncertainty of a solution.
 pub struct SolutionUncertainty {
@@ -84,17 +82,19 @@ impl SolutionUncertainty {
         };
         let errors = total.as_ref().and_then(|total| total.errors.as_ref());
         let patches = errors.and_then(|errors| errors.patches);
-        let dispersion = match (&patches, &total) {
-            (Some(patches), _) => patches.dispersion,
-            (None, Some(total)) => total.of_noise.pixel_dispersion,
-            (None, None) => f64::NAN,
-        };
         Ok(Self {
             covariances: match &total {
                 Some(total) => total.of_frames(frames),
                 None => Covariances::unknown(frames),
             },
-            registration_px: registration_sigmas(context, solution, dispersion),
+            registration_px: match &total {
+                Some(total) => {
+                    let estimates = &solution.unknowns.frames;
+                    let neighbours = neighbours(problem.pattern(), frames);
+                    registration_sigmas(context, estimates, &neighbours, total)
+                }
+                None => vec![f64::NAN; frames],
+            },
             model_error: patches.map(|found| ModelErrorReport::new(&found, problem)),
             shared,
             overdispersions: compute_overdispersions(context, solution),
@@ -111,21 +111,15 @@ impl SolutionUncertainty {
         estimate: &FrameEstimate,
     ) -> FrameSigma {
         let frames = self.covariances.frames.len();
-        let wall_variance = |wall: WallPoint, a: &Matrix2x6<f64>, x_c: &Vector3<f64>| {
-            let Some(total) = &self.total else {
-                return f64::NAN;
-            };
-            let normal = context.nominal.frame(wall).normal();
-            let functions = context.shape.as_ref().map(|s| s.model.functions_at(wall));
-            let tau = -(a.fixed_columns::<3>(3) * normal);
-            let pixel = PixelJacobians {
-                pose: *a,
-                shared: shared_jacobian(context, &estimate.pose, a, x_c),
-                shape: functions
-                    .as_deref()
-                    .map(|functions| (tau, functions, frames)),
-            };
-            total.wall_variance(k, &pixel)
+        let wall_variance = |hit: &Hit, frame: &WallFrame| {
+            let total = self.total.as_ref()?;
+            let pixel = pixel_jacobians(context, &estimate.pose, hit.wall, frame);
+            let mut point = PointJacobians::default();
+            point.add_pixel(k, &pixel, 1.0);
+            if let Some(shape) = &context.shape {
+                point.add_shape(&pixel.tau, &shape.model.functions_at(hit.wall), frames);
+            }
+            Some(total.variance(&point))
         };
         FrameSigma {
             registration_px: self.registration_px[k],
@@ -183,20 +177,16 @@ impl SolutionUncertainty {
     }
 }
 
-/// `C = ∂(s, h)/∂κ` of the wall point `x_c` (camera coordinates) seen through a fixed pixel.
-fn shared_jacobian(
-    context: &EstimationContext,
-    pose: &Pose,
-    a: &Matrix2x6<f64>,
-    x_c: &Vector3<f64>,
-) -> SMatrix<f64, 2, SHARED_PARAMETERS> {
-    let mut c = SMatrix::<f64, 2, SHARED_PARAMETERS>::zeros();
-    c.fixed_columns_mut::<INTRINSIC_PARAMETERS>(0)
-        .copy_from(&lens_jacobian(pose, a, &context.camera, x_c));
-    let straightened = context.surface.straightened(pose);
-    c.fixed_columns_mut::<BEND_PARAMETERS>(BEND_INDEX)
-        .copy_from(&bend_jacobian(pose, &straightened, a, x_c));
-    c
+/// Of every frame, those that see part of the same wall.
+fn neighbours(pattern: &Pattern, frames: usize) -> Vec<Vec<usize>> {
+    let mut neighbours = vec![Vec::new(); frames];
+    for column in 0..frames {
+        for &row in pattern.rows(column).iter().filter(|row| **row != column) {
+            neighbours[row].push(column);
+            neighbours[column].push(row);
+        }
+    }
+    neighbours
 }
 
 /// Marks every free parameter as unobservable.

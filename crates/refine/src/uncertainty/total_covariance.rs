@@ -3,10 +3,11 @@
 use crate::linear::bordered_system::{BorderBlock, SharedBlock};
 use crate::linear::normal_equations::Block;
 use crate::parameters::calibration::SHARED_PARAMETERS;
+use crate::parameters::frame_estimate::FRAME_PARAMETERS;
 use crate::parameters::shape::{FunctionValue, ShapeStep};
 use crate::uncertainty::covariance::{Covariances, NoiseCovariance};
 use crate::uncertainty::model_error::EstimateErrors;
-use nalgebra::{Matrix2x6, Matrix6, SMatrix, SVector, Vector2};
+use nalgebra::{Matrix2x6, Matrix6, SMatrix, Vector2};
 use std::collections::BTreeMap;
 
 /// The covariance of the errors of all slots and of the shared parameters.
@@ -19,14 +20,48 @@ pub struct TotalCovariance {
     pub shared: Option<(Vec<BorderBlock>, SharedBlock)>,
 }
 
-/// Jacobians of the wall point of a fixed pixel.
-pub struct PixelJacobians<'j> {
+/// Derivative of a point of the wall, `(s, h)`, by the unknowns of one slot.
+pub type SlotJacobian = SMatrix<f64, 2, FRAME_PARAMETERS>;
+/// Derivative of a point of the wall, `(s, h)`, by the shared parameters.
+pub type KappaJacobian = SMatrix<f64, 2, SHARED_PARAMETERS>;
+
+/// Derivatives of a point of the wall by all unknowns on which it depends.
+#[derive(Clone, Debug, Default)]
+pub struct PointJacobians {
+    /// By slots.
+    pub slots: BTreeMap<usize, SlotJacobian>,
+    /// By the shared parameters.
+    pub shared: KappaJacobian,
+}
+
+impl PointJacobians {
+    /// Adds `share` times the derivatives of the wall point of a fixed pixel: by its frame, the
+    /// slot `k`, and the shared parameters.
+    pub fn add_pixel(&mut self, k: usize, pixel: &PixelJacobians, share: f64) {
+        let pose = self.slots.entry(k).or_default();
+        let mut target = pose.fixed_columns_mut::<6>(0);
+        target += pixel.pose * share;
+        self.shared += pixel.shared * share;
+    }
+
+    /// Adds the derivatives by the shape: `τ φᵀ`; `first`: slot of the shape's first block.
+    pub fn add_shape(&mut self, tau: &Vector2<f64>, functions: &[FunctionValue], first: usize) {
+        for function in functions {
+            let slot = self.slots.entry(first + function.block).or_default();
+            let mut target = slot.column_mut(function.component);
+            target += tau * function.value;
+        }
+    }
+}
+
+/// Derivatives of the wall point of a fixed pixel.
+pub struct PixelJacobians {
     /// `A = ∂(s, h)/∂ξ`.
     pub pose: Matrix2x6<f64>,
     /// `C = ∂(s, h)/∂κ`.
-    pub shared: SMatrix<f64, 2, SHARED_PARAMETERS>,
-    /// `τ = ∂(s, h)/∂δ`, with the shape's functions there and the slot of their first block.
-    pub shape: Option<(Vector2<f64>, &'j [FunctionValue], usize)>,
+    pub shared: KappaJacobian,
+    /// `τ = ∂(s, h)/∂δ`.
+    pub tau: Vector2<f64>,
 }
 
 impl TotalCovariance {
@@ -62,40 +97,33 @@ impl TotalCovariance {
         }
     }
 
-    /// Variance of the wall point of a fixed pixel of frame `k`, the sum along s and h, m²: of
-    /// `A ξ + C κ + τ δ`.
+    /// Variance of a point of the wall, the sum along s and h, m²: of `Σ_j J_j x_j + C κ`.
     ///
-    /// As slots move by `−W κ` with κ, their covariance with it is `−W Σ_κ`.
-    pub fn wall_variance(&self, k: usize, pixel: &PixelJacobians) -> f64 {
-        let Some(pose) = self.block(k, k) else {
-            return f64::NAN;
+    /// As slots move by `−W κ` with κ, what κ alone does is `K Σ_κ Kᵀ`, `K = C − Σ_j J_j W_j`.
+    pub fn variance(&self, point: &PointJacobians) -> f64 {
+        let PointJacobians { slots, shared } = point;
+        let c = self.of_noise.pixel_dispersion;
+        let of_prior = match &self.errors {
+            // Draws of patches include those of the shared parameters.
+            Some(errors) if errors.patches.is_some() => return errors.draws.mean_square(point),
+            Some(errors) => (1.0 - c) * errors.draws.mean_square(point),
+            None => 0.0,
         };
-        let a = &pixel.pose;
-        let mut variance = (a * pose.fixed_view::<6, 6>(0, 0) * a.transpose()).trace();
-        // By the slots: A ξ, and τ φᵀ c for a block of the shape.
-        let mut crossed_w = SVector::<f64, 2>::zeros();
-        let shared = self.shared.as_ref();
-        let shared = shared.map(|(w, covariance)| (w, pixel.shared * covariance));
-        if let Some((w, shared)) = &shared {
-            let own = shared * pixel.shared.transpose();
-            let crossed = shared * w[k].fixed_rows::<6>(0).transpose() * a.transpose();
-            variance += own.trace() - 2.0 * crossed.trace();
-        }
-        let Some((tau, functions, first)) = pixel.shape else {
-            return variance;
-        };
-        let blocks = by_slot(functions, first);
-        variance += tau.norm_squared() * self.variance_of(&blocks);
-        for (slot, phi) in &blocks {
-            if let Some(covariance) = self.block(k, *slot) {
-                let with_pose = a * covariance.fixed_rows::<6>(0) * phi;
-                variance += 2.0 * with_pose.dot(&tau);
-            }
-            if let Some((w, shared)) = &shared {
-                crossed_w += shared * (w[*slot].transpose() * phi);
+        let mut of_pixels = 0.0;
+        for (n, (j, of_j)) in slots.iter().enumerate() {
+            for (m, (k, of_k)) in slots.iter().enumerate().skip(n) {
+                if let Some(covariance) = self.of_noise.inverse.block(*j, *k) {
+                    let twice = if m == n { 1.0 } else { 2.0 };
+                    of_pixels += twice * (of_j * covariance).dot(of_k);
+                }
             }
         }
-        variance - 2.0 * crossed_w.dot(&tau)
+        let of_shared = self.shared.as_ref().map_or(0.0, |(w, covariance)| {
+            let moved: KappaJacobian = slots.iter().map(|(slot, of_slot)| of_slot * w[*slot]).sum();
+            let left = shared - moved;
+            (left * covariance).dot(&left)
+        });
+        c * of_pixels + of_prior + of_shared
     }
 
     /// Variance of the wall's displacement where the shape has the given `functions`, m²; `first`:
